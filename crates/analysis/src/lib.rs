@@ -1,0 +1,1 @@
+//! Allan family, fits, checks and diagnosis of inertial sensor records.

@@ -1,0 +1,1 @@
+//! The ATmega16 in simavr, corrected where simavr is wrong.

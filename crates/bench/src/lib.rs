@@ -1,0 +1,1 @@
+//! The physical stand as a witness: parts, motor, supply, thermal and mechanical world.

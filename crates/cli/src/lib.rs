@@ -1,0 +1,1 @@
+//! Capture, analysis and diagnosis of an inertial test stand.

@@ -1,0 +1,2 @@
+//! The program `imu-stand`.
+fn main() {}

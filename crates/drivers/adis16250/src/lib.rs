@@ -1,0 +1,2 @@
+//! Driver for the ADIS16250/ADIS16255 yaw rate gyroscope.
+#![no_std]

@@ -1,0 +1,2 @@
+//! Driver for the MMA7260QT three-axis analog accelerometer.
+#![no_std]

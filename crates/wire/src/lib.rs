@@ -1,0 +1,2 @@
+//! Frames, CRC and versions of the IMU stand's serial link.
+#![no_std]

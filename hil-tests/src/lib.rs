@@ -1,0 +1,1 @@
+//! The real image on a simulated ATmega16, or on a real board.

@@ -1,0 +1,2 @@
+//! Toolchain, image, tests, flashing.
+fn main() {}
