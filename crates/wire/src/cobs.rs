@@ -1,0 +1,230 @@
+//! Consistent overhead byte stuffing in one pass, with the CRC computed on the way.
+
+use crate::crc;
+
+/// Writes a payload into a buffer, stuffed as it comes; [`Writer::finish`] adds CRC and delimiter.
+///
+/// The caller has checked that the buffer takes the whole frame; should it not, bytes are lost, never memory.
+pub(crate) struct Writer<'a> {
+    out: &'a mut [u8],
+    /// Where the next byte goes.
+    at: u8,
+    /// Where the code of the block being written goes.
+    code_at: u8,
+    register: u32,
+}
+
+impl<'a> Writer<'a> {
+    pub(crate) fn new(out: &'a mut [u8], kind: u8) -> Self {
+        let mut writer = Writer {
+            out,
+            at: 1,
+            code_at: 0,
+            register: crc::INIT,
+        };
+        writer.u8(crate::VERSION);
+        writer.u8(kind);
+        writer
+    }
+
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub(crate) fn u8(&mut self, byte: u8) {
+        self.register = crc::update(self.register, byte);
+        self.stuff(byte);
+    }
+
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub(crate) fn u16(&mut self, value: u16) {
+        for byte in value.to_le_bytes() {
+            self.u8(byte);
+        }
+    }
+
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub(crate) fn u32(&mut self, value: u32) {
+        for byte in value.to_le_bytes() {
+            self.u8(byte);
+        }
+    }
+
+    pub(crate) fn i16(&mut self, value: i16) {
+        self.u16(value.cast_unsigned());
+    }
+
+    pub(crate) fn i32(&mut self, value: i32) {
+        self.u32(value.cast_unsigned());
+    }
+
+    /// The frame's length on the line.
+    pub(crate) fn finish(mut self) -> usize {
+        for byte in crc::finish(self.register).to_le_bytes() {
+            self.stuff(byte);
+        }
+        self.put(self.code_at, self.at.wrapping_sub(self.code_at));
+        self.put(self.at, crate::DELIMITER);
+        usize::from(self.at.wrapping_add(1))
+    }
+
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    fn stuff(&mut self, byte: u8) {
+        if byte == crate::DELIMITER {
+            self.put(self.code_at, self.at.wrapping_sub(self.code_at));
+            self.code_at = self.at;
+        } else {
+            self.put(self.at, byte);
+        }
+        self.at = self.at.wrapping_add(1);
+    }
+
+    #[inline(always)]
+    fn put(&mut self, at: u8, byte: u8) {
+        if let Some(place) = self.out.get_mut(usize::from(at)) {
+            *place = byte;
+        }
+    }
+}
+
+/// Why a run of bytes between two delimiters is no payload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Broken {
+    /// A code byte points past the end of the frame, or is 0xFF, which no frame is long enough to need.
+    Cobs,
+    /// The CRC does not fit.
+    Crc,
+    /// Fewer bytes than version, kind and CRC have, or more than the longest payload.
+    Length,
+}
+
+/// Takes a line apart into payloads whose CRC fits. `N` is the room for the longest payload with its CRC.
+///
+/// Whatever was received, a delimiter brings it back to the start of a frame.
+#[derive(Clone, Debug)]
+pub(crate) struct Deframer<const N: usize> {
+    body: [u8; N],
+    len: u8,
+    /// Bytes until the next code byte; 0 before the first byte of a frame and when a code byte is due.
+    run: u8,
+    state: State,
+    register: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Empty,
+    Filling,
+    Overlong,
+    BadCobs,
+}
+
+impl<const N: usize> Deframer<N> {
+    pub(crate) const fn new() -> Self {
+        Deframer {
+            body: [0; N],
+            len: 0,
+            run: 0,
+            state: State::Empty,
+            register: crc::INIT,
+        }
+    }
+
+    /// At a delimiter that ends something: the payload without its CRC, or why there is none.
+    pub(crate) fn push(&mut self, byte: u8) -> Option<Result<&[u8], Broken>> {
+        if byte == crate::DELIMITER {
+            return self.end();
+        }
+        match self.state {
+            State::Overlong | State::BadCobs => {}
+            State::Empty => {
+                self.state = State::Filling;
+                self.code(byte);
+            }
+            State::Filling if self.run == 0 => {
+                self.append(0);
+                self.code(byte);
+            }
+            State::Filling => {
+                self.append(byte);
+                self.run = self.run.wrapping_sub(1);
+            }
+        }
+        None
+    }
+
+    fn code(&mut self, code: u8) {
+        if code == 0xFF {
+            self.state = State::BadCobs;
+        }
+        self.run = code.wrapping_sub(1);
+    }
+
+    fn append(&mut self, byte: u8) {
+        match self.body.get_mut(usize::from(self.len)) {
+            Some(place) => {
+                *place = byte;
+                self.len = self.len.wrapping_add(1);
+                self.register = crc::update(self.register, byte);
+            }
+            None => self.state = State::Overlong,
+        }
+    }
+
+    fn end(&mut self) -> Option<Result<&[u8], Broken>> {
+        let (state, len, run, register) = (self.state, self.len, self.run, self.register);
+        self.state = State::Empty;
+        self.len = 0;
+        self.run = 0;
+        self.register = crc::INIT;
+        match state {
+            State::Empty => None,
+            State::Overlong => Some(Err(Broken::Length)),
+            State::BadCobs => Some(Err(Broken::Cobs)),
+            State::Filling if run != 0 => Some(Err(Broken::Cobs)),
+            // Version, kind and CRC are there in every payload.
+            State::Filling if len < 6 => Some(Err(Broken::Length)),
+            State::Filling if register != crc::RESIDUE => Some(Err(Broken::Crc)),
+            State::Filling => Some(
+                self.body
+                    .get(..usize::from(len.wrapping_sub(4)))
+                    .ok_or(Broken::Length),
+            ),
+        }
+    }
+}
+
+/// Takes the fields of a payload one after the other; `None` past the end.
+pub(crate) struct Reader<'a>(pub(crate) &'a [u8]);
+
+impl Reader<'_> {
+    pub(crate) fn u8(&mut self) -> Option<u8> {
+        let (&byte, rest) = self.0.split_first()?;
+        self.0 = rest;
+        Some(byte)
+    }
+
+    pub(crate) fn u16(&mut self) -> Option<u16> {
+        let (bytes, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(u16::from_le_bytes(*bytes))
+    }
+
+    pub(crate) fn u32(&mut self) -> Option<u32> {
+        let (bytes, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(u32::from_le_bytes(*bytes))
+    }
+
+    pub(crate) fn i16(&mut self) -> Option<i16> {
+        Some(self.u16()?.cast_signed())
+    }
+
+    pub(crate) fn i32(&mut self) -> Option<i32> {
+        Some(self.u32()?.cast_signed())
+    }
+
+    pub(crate) fn three<T>(
+        &mut self,
+        mut one: impl FnMut(&mut Self) -> Option<T>,
+    ) -> Option<[T; 3]> {
+        Some([one(self)?, one(self)?, one(self)?])
+    }
+}

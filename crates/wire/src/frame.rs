@@ -1,0 +1,393 @@
+//! What the board says: hello, sample, health, reply.
+
+use crate::cobs::{Reader, Writer};
+use crate::{Health, OVERHEAD, Status, kind};
+
+/// The bits of [`Sample::flags`].
+pub mod flags {
+    /// Gyro x delivered a sample it had not delivered before (its ND bit).
+    pub const NEW_X: u16 = 1 << 0;
+    /// Gyro y delivered a new sample.
+    pub const NEW_Y: u16 = 1 << 1;
+    /// Gyro z delivered a new sample.
+    pub const NEW_Z: u16 = 1 << 2;
+    /// Gyro x raises its error/alarm bit (EA).
+    pub const ERROR_X: u16 = 1 << 3;
+    /// Gyro y raises its error/alarm bit.
+    pub const ERROR_Y: u16 = 1 << 4;
+    /// Gyro z raises its error/alarm bit.
+    pub const ERROR_Z: u16 = 1 << 5;
+    /// At least one gyro does not answer; its NEW bit is clear, its counts are 0 and mean nothing.
+    pub const GYRO_NOT_ANSWERING: u16 = 1 << 6;
+    /// At least one accelerometer output reads 0 or 1023.
+    pub const ACC_AT_RAIL: u16 = 1 << 7;
+    /// At least one tick between the last sample and this one had no sample: the work took too long.
+    pub const TICK_OVERRUN: u16 = 1 << 8;
+    /// A bias measurement is running; the rates still have the old bias subtracted.
+    pub const BIAS_NULL: u16 = 1 << 9;
+    /// Reserved, 0: whether the motor turns is in [`Sample::pwm`](crate::Sample::pwm).
+    pub const RESERVED_10: u16 = 1 << 10;
+    /// A gyro measured its supply outside 4.75 V to 5.25 V.
+    pub const SUPPLY_OUT_OF_RANGE: u16 = 1 << 11;
+    /// At least one accelerometer channel could not be converted; its counts are 0 and mean nothing.
+    pub const ACC_NOT_CONVERTED: u16 = 1 << 12;
+    /// At least one gyro is set up differently from what the hello frame says, or its set-up is being repaired.
+    pub const GYRO_MISCONFIGURED: u16 = 1 << 13;
+
+    /// What a sample in order reads: three new readings and nothing else.
+    pub const IN_ORDER: u16 = NEW_X | NEW_Y | NEW_Z;
+
+    /// [`NEW_X`] and its kin for axis 0, 1, 2.
+    #[must_use]
+    pub const fn new_data(axis: u8) -> u16 {
+        NEW_X.wrapping_shl(axis as u32)
+    }
+
+    /// [`ERROR_X`] and its kin for axis 0, 1, 2.
+    #[must_use]
+    pub const fn error(axis: u8) -> u16 {
+        ERROR_X.wrapping_shl(axis as u32)
+    }
+}
+
+/// The bits of [`Hello::reset_cause`], as the ATmega16 has them in MCUCSR.
+pub mod reset_cause {
+    /// Power came on.
+    pub const POWER_ON: u8 = 1 << 0;
+    /// The reset pin was pulled low.
+    pub const EXTERNAL: u8 = 1 << 1;
+    /// The supply sagged below the brown-out threshold.
+    pub const BROWN_OUT: u8 = 1 << 2;
+    /// The watchdog ran out. The reboot command ends this way too.
+    pub const WATCHDOG: u8 = 1 << 3;
+    /// JTAG.
+    pub const JTAG: u8 = 1 << 4;
+}
+
+/// Hello frame: who the board is and how it is set. Sent at start, on request and whenever the set-up has changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Hello {
+    /// Firmware version: major, minor, patch.
+    pub firmware: [u8; 3],
+    /// Number of the board, from its EEPROM; 0 where none was given.
+    pub board_id: u16,
+    /// What caused the last reset: bits of [`reset_cause`].
+    pub reset_cause: u8,
+    /// Resets since power came on, kept over resets; saturates.
+    pub restarts: u16,
+    /// Sequence number that the next tick's sample will have: 0 in the hello frame of a start.
+    pub next_seq: u16,
+    /// Length of a timer tick, the unit of [`Sample::t_ticks`], ns.
+    pub tick_ns: u32,
+    /// Time from sample to sample, timer ticks.
+    pub period_ticks: u16,
+    /// The USART's UBRR: the line runs at 16 MHz / 16 / (divisor + 1) baud.
+    pub baud_divisor: u16,
+    /// Gyro range, bits 10:8 of SENS/AVG: 4 for 320 deg/s, 2 for 160 deg/s, 1 for 80 deg/s.
+    pub gyro_range: u8,
+    /// Gyro filter, bits 2:0 of SENS/AVG: 2^m taps in each of two stages.
+    pub gyro_filter: u8,
+    /// Gyro sample period, SMPL_PRD.
+    pub gyro_sample_period: u8,
+    /// Accelerometer range, g-select2 and g-select1 as bits 1 and 0: 0 for 1.5 g, 1 for 2 g, 2 for 4 g, 3 for 6 g.
+    pub acc_range: u8,
+    /// Where the set-up came from: 0 built in, 1 and 2 the EEPROM's two copies, 3 changed by command since.
+    pub config_source: u8,
+    /// Bias subtracted from each rate, Q16.16 deg/s.
+    pub bias: [i32; 3],
+    /// Scale factor of each gyro, Q8.24 deg/s for each count.
+    pub scale: [i32; 3],
+}
+
+impl Hello {
+    /// Bytes of the payload, version and kind included.
+    pub const LEN: usize = 49;
+    /// Bytes on the line.
+    pub const FRAME_LEN: usize = Self::LEN + OVERHEAD;
+
+    fn write(&self, writer: &mut Writer<'_>) {
+        for byte in self.firmware {
+            writer.u8(byte);
+        }
+        writer.u16(self.board_id);
+        writer.u8(self.reset_cause);
+        writer.u16(self.restarts);
+        writer.u16(self.next_seq);
+        writer.u32(self.tick_ns);
+        writer.u16(self.period_ticks);
+        writer.u16(self.baud_divisor);
+        writer.u8(self.gyro_range);
+        writer.u8(self.gyro_filter);
+        writer.u8(self.gyro_sample_period);
+        writer.u8(self.acc_range);
+        writer.u8(self.config_source);
+        for value in self.bias {
+            writer.i32(value);
+        }
+        for value in self.scale {
+            writer.i32(value);
+        }
+    }
+
+    fn read(reader: &mut Reader<'_>) -> Option<Self> {
+        Some(Hello {
+            firmware: reader.three(Reader::u8)?,
+            board_id: reader.u16()?,
+            reset_cause: reader.u8()?,
+            restarts: reader.u16()?,
+            next_seq: reader.u16()?,
+            tick_ns: reader.u32()?,
+            period_ticks: reader.u16()?,
+            baud_divisor: reader.u16()?,
+            gyro_range: reader.u8()?,
+            gyro_filter: reader.u8()?,
+            gyro_sample_period: reader.u8()?,
+            acc_range: reader.u8()?,
+            config_source: reader.u8()?,
+            bias: reader.three(Reader::i32)?,
+            scale: reader.three(Reader::i32)?,
+        })
+    }
+}
+
+/// Sample frame: everything that was measured at one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sample {
+    /// Sequence number: one for every tick since the start, sampled or not; wraps.
+    pub seq: u16,
+    /// Time of the tick, timer ticks of [`Hello::tick_ns`] since the start; wraps.
+    pub t_ticks: u32,
+    /// GYRO_OUT of x, y, z, counts.
+    pub gyro: [i16; 3],
+    /// TEMP_OUT of x, y, z, counts; 0 is 25 degC.
+    pub temp: [i16; 3],
+    /// SUPPLY_OUT, counts.
+    pub supply: u16,
+    /// ADC readings of the accelerometer's x, y, z, counts.
+    pub acc: [u16; 3],
+    /// Motor command at the tick, -255 ..= 255; 0 is off.
+    pub pwm: i16,
+    /// Bits of [`flags`].
+    pub flags: u16,
+    /// Rates of x, y, z, scaled and less bias, Q16.16 deg/s.
+    pub rate: [i32; 3],
+}
+
+impl Sample {
+    /// Bytes of the payload, version and kind included.
+    pub const LEN: usize = 44;
+    /// Bytes on the line.
+    pub const FRAME_LEN: usize = Self::LEN + OVERHEAD;
+
+    fn write(&self, writer: &mut Writer<'_>) {
+        writer.u16(self.seq);
+        writer.u32(self.t_ticks);
+        for count in self.gyro {
+            writer.i16(count);
+        }
+        for count in self.temp {
+            writer.i16(count);
+        }
+        writer.u16(self.supply);
+        for count in self.acc {
+            writer.u16(count);
+        }
+        writer.i16(self.pwm);
+        writer.u16(self.flags);
+        for value in self.rate {
+            writer.i32(value);
+        }
+    }
+
+    fn read(reader: &mut Reader<'_>) -> Option<Self> {
+        Some(Sample {
+            seq: reader.u16()?,
+            t_ticks: reader.u32()?,
+            gyro: reader.three(Reader::i16)?,
+            temp: reader.three(Reader::i16)?,
+            supply: reader.u16()?,
+            acc: reader.three(Reader::u16)?,
+            pwm: reader.i16()?,
+            flags: reader.u16()?,
+            rate: reader.three(Reader::i32)?,
+        })
+    }
+}
+
+/// Reply frame: the one answer to a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reply {
+    /// Number of the request.
+    pub number: u16,
+    /// Code of the command, as the request had it.
+    pub command: u8,
+    /// What became of it.
+    pub status: Status,
+    /// What the command returns; 0 where it returns nothing or failed. docs/wire-format.md says which command
+    /// returns what.
+    pub value: i32,
+    /// What the command returns for each axis; 0 where it returns nothing.
+    pub detail: [i32; 3],
+}
+
+impl Reply {
+    /// Bytes of the payload, version and kind included.
+    pub const LEN: usize = 22;
+    /// Bytes on the line.
+    pub const FRAME_LEN: usize = Self::LEN + OVERHEAD;
+
+    fn write(&self, writer: &mut Writer<'_>) {
+        writer.u16(self.number);
+        writer.u8(self.command);
+        writer.u8(self.status as u8);
+        writer.i32(self.value);
+        for value in self.detail {
+            writer.i32(value);
+        }
+    }
+
+    /// `None` for a status code that is not in the table too.
+    fn read(reader: &mut Reader<'_>) -> Option<Self> {
+        Some(Reply {
+            number: reader.u16()?,
+            command: reader.u8()?,
+            status: Status::from_code(reader.u8()?)?,
+            value: reader.i32()?,
+            detail: reader.three(Reader::i32)?,
+        })
+    }
+}
+
+/// A frame from the board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Frame {
+    /// Who the board is and how it is set.
+    Hello(Hello),
+    /// What was measured at a tick.
+    Sample(Sample),
+    /// What went wrong so far.
+    Health(Health),
+    /// The answer to a request.
+    Reply(Reply),
+}
+
+impl Frame {
+    /// Bytes of a payload of this kind; `None` where no frame from the board has it.
+    pub(crate) const fn payload_len(kind_byte: u8) -> Option<usize> {
+        match kind_byte {
+            kind::HELLO => Some(Hello::LEN),
+            kind::SAMPLE => Some(Sample::LEN),
+            kind::HEALTH => Some(Health::LEN),
+            kind::REPLY => Some(Reply::LEN),
+            _ => None,
+        }
+    }
+
+    /// The fields after version and kind.
+    pub(crate) fn read(kind_byte: u8, fields: &[u8]) -> Option<Self> {
+        let mut reader = Reader(fields);
+        match kind_byte {
+            kind::HELLO => Hello::read(&mut reader).map(Frame::Hello),
+            kind::SAMPLE => Sample::read(&mut reader).map(Frame::Sample),
+            kind::HEALTH => Health::read(&mut reader).map(Frame::Health),
+            kind::REPLY => Reply::read(&mut reader).map(Frame::Reply),
+            _ => None,
+        }
+    }
+}
+
+/// Why a frame was not written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EncodeError {
+    /// The buffer takes fewer bytes than the frame has; nothing was written.
+    BufferTooSmall {
+        /// Bytes the frame has on the line.
+        need: usize,
+        /// Bytes the buffer takes.
+        have: usize,
+    },
+}
+
+impl core::fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            EncodeError::BufferTooSmall { need, have } => {
+                write!(f, "the frame has {need} bytes, the buffer takes {have}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for EncodeError {}
+
+/// Checks the room, then writes.
+#[inline(always)]
+pub(crate) fn write_frame(
+    out: &mut [u8],
+    kind_byte: u8,
+    frame_len: usize,
+    fields: impl FnOnce(&mut Writer<'_>),
+) -> Result<usize, EncodeError> {
+    if out.len() < frame_len {
+        return Err(EncodeError::BufferTooSmall {
+            need: frame_len,
+            have: out.len(),
+        });
+    }
+    let mut writer = Writer::new(out, kind_byte);
+    fields(&mut writer);
+    Ok(writer.finish())
+}
+
+/// Writes a frame as it goes on the line, delimiter included; returns its length.
+///
+/// # Errors
+/// [`EncodeError::BufferTooSmall`]; [`MAX_FRAME`](crate::MAX_FRAME) bytes are always enough.
+pub fn encode(frame: &Frame, out: &mut [u8]) -> Result<usize, EncodeError> {
+    match frame {
+        Frame::Hello(hello) => encode_hello(hello, out),
+        Frame::Sample(sample) => encode_sample(sample, out),
+        Frame::Health(health) => encode_health(health, out),
+        Frame::Reply(reply) => encode_reply(reply, out),
+    }
+}
+
+/// Writes a hello frame, without the detour over [`Frame`].
+///
+/// # Errors
+/// [`EncodeError::BufferTooSmall`] below [`Hello::FRAME_LEN`].
+pub fn encode_hello(hello: &Hello, out: &mut [u8]) -> Result<usize, EncodeError> {
+    write_frame(out, kind::HELLO, Hello::FRAME_LEN, |writer| {
+        hello.write(writer)
+    })
+}
+
+/// Writes a sample frame, without the detour over [`Frame`].
+///
+/// # Errors
+/// [`EncodeError::BufferTooSmall`] below [`Sample::FRAME_LEN`].
+pub fn encode_sample(sample: &Sample, out: &mut [u8]) -> Result<usize, EncodeError> {
+    write_frame(out, kind::SAMPLE, Sample::FRAME_LEN, |writer| {
+        sample.write(writer)
+    })
+}
+
+/// Writes a health frame, without the detour over [`Frame`].
+///
+/// # Errors
+/// [`EncodeError::BufferTooSmall`] below [`Health::FRAME_LEN`].
+pub fn encode_health(health: &Health, out: &mut [u8]) -> Result<usize, EncodeError> {
+    write_frame(out, kind::HEALTH, Health::FRAME_LEN, |writer| {
+        health.write(writer)
+    })
+}
+
+/// Writes a reply frame, without the detour over [`Frame`].
+///
+/// # Errors
+/// [`EncodeError::BufferTooSmall`] below [`Reply::FRAME_LEN`].
+pub fn encode_reply(reply: &Reply, out: &mut [u8]) -> Result<usize, EncodeError> {
+    write_frame(out, kind::REPLY, Reply::FRAME_LEN, |writer| {
+        reply.write(writer)
+    })
+}
