@@ -1,25 +1,64 @@
 //! The model file: what the diagnosis writes, the simulation reads and a person edits.
+//!
+//! ```toml
+//! format = "imu-stand-model/1"
+//! stand = "the paper's"
+//! rate_hz = 20.0
+//!
+//! [fitted_on]
+//! file = "run.csv"
+//! seconds = 600.0
+//!
+//! [excitation]
+//! heater_degc = 6.0
+//!
+//! [[channel]]
+//! name = "gyro_z"
+//! unit = "deg/s"
+//! lsb = 0.07326
+//! angle_random_walk = { value = 5.27, std_error = 0.03, unit = "deg/sqrt(h)" }
+//!
+//! [[effect]]
+//! cause = "temperature"
+//! channels = ["gyro_z"]
+//! slope = { value = 0.08, std_error = 0.01, unit = "deg/s/degC" }
+//! ```
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::effect::{Parameters, unit_on};
+use crate::effects::effect;
+use crate::excitation::SETTINGS;
 use crate::parameter::Parameter;
 
 /// Format line of a model file.
 pub const FORMAT: &str = "imu-stand-model/1";
 
+/// Baseline parameters of a channel with their units on a gyro in deg/s.
+pub const BASELINE: [(&str, &str); 4] = [
+    ("bias", "deg/s"),
+    ("angle_random_walk", "deg/sqrt(h)"),
+    ("rate_random_walk", "deg/s/sqrt(s)"),
+    ("quantization_noise", "deg"),
+];
+
 /// An effect with its parameters, by the names of docs/effects.md.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct EffectModel {
     /// Cause id: `temperature`, `line`, ...
     pub cause: String,
-    /// Channels it acts on.
+    /// Channels it acts on; empty means all.
     pub channels: Vec<String>,
     /// Its parameters by name.
-    pub parameters: BTreeMap<String, Parameter>,
+    pub parameters: Parameters,
 }
 
 /// The baseline of one channel: bias + white noise + random walk, quantised.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelModel {
     /// Name of the column: `gyro_x`, ...
     pub name: String,
@@ -28,7 +67,7 @@ pub struct ChannelModel {
     /// Unit per count, where it is quantised.
     pub lsb: Option<f64>,
     /// `bias`, `angle_random_walk`, `rate_random_walk`.
-    pub baseline: BTreeMap<String, Parameter>,
+    pub baseline: Parameters,
 }
 
 /// The record a model was fitted on.
@@ -51,10 +90,443 @@ pub struct ModelFile {
     pub rate_hz: f64,
     /// The record it was fitted on.
     pub fitted_on: Option<FittedOn>,
-    /// What acts on the stand in a simulation.
+    /// What acts on the stand in a simulation ([`crate::excitation::SETTINGS`]).
     pub excitation: BTreeMap<String, f64>,
     /// Channels with their baselines.
     pub channels: Vec<ChannelModel>,
     /// Effects.
     pub effects: Vec<EffectModel>,
+}
+
+/// What is wrong with a model file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {what}")]
+pub struct ModelFileError {
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// What was found and what was expected.
+    pub what: String,
+}
+
+impl ModelFile {
+    /// The stand of the paper: three gyros at 20 Hz with its figures, nothing else.
+    #[must_use]
+    pub fn paper() -> Self {
+        let channel = |name: &str| ChannelModel {
+            name: name.to_owned(),
+            unit: "deg/s".to_owned(),
+            lsb: Some(0.07326),
+            baseline: [
+                ("bias".to_owned(), Parameter::exact(0.0, "deg/s")),
+                (
+                    "angle_random_walk".to_owned(),
+                    Parameter::exact(5.27, "deg/sqrt(h)"),
+                ),
+                (
+                    "rate_random_walk".to_owned(),
+                    Parameter::exact(0.0015, "deg/s/sqrt(s)"),
+                ),
+            ]
+            .into(),
+        };
+        Self {
+            stand: "Istomin and Belyaev, 2009".to_owned(),
+            rate_hz: 20.0,
+            channels: ["gyro_x", "gyro_y", "gyro_z"].map(channel).into(),
+            ..Self::default()
+        }
+    }
+
+    /// Read a model file.
+    ///
+    /// # Errors
+    /// [`ModelFileError`] with the line, for anything that is no TOML, unknown, missing, or in another unit.
+    pub fn parse(text: &str) -> Result<Self, ModelFileError> {
+        Parser { text }.file()
+    }
+
+    /// The file as text.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let mut out = String::new();
+        let quoted = |s: &str| toml::Value::String(s.to_owned()).to_string();
+        let _ = writeln!(
+            out,
+            "format = {}\nstand = {}\nrate_hz = {:?}",
+            quoted(FORMAT),
+            quoted(&self.stand),
+            self.rate_hz
+        );
+        if let Some(on) = &self.fitted_on {
+            let _ = writeln!(out, "\n[fitted_on]\nfile = {}", quoted(&on.file));
+            if let Some(hash) = &on.hash {
+                let _ = writeln!(out, "hash = {}", quoted(hash));
+            }
+            let _ = writeln!(out, "seconds = {:?}", on.seconds);
+        }
+        if !self.excitation.is_empty() {
+            out.push_str("\n[excitation]\n");
+            for (key, value) in &self.excitation {
+                let _ = writeln!(out, "{key} = {value:?}");
+            }
+        }
+        let parameters = |out: &mut String, all: &Parameters| {
+            for (name, p) in all.iter().filter(|(_, p)| p.value.is_finite()) {
+                let error = p
+                    .std_error
+                    .filter(|e| e.is_finite())
+                    .map_or(String::new(), |e| format!(", std_error = {e:?}"));
+                let _ = writeln!(
+                    out,
+                    "{name} = {{ value = {:?}{error}, unit = {} }}",
+                    p.value,
+                    quoted(&p.unit)
+                );
+            }
+        };
+        for channel in &self.channels {
+            let _ = writeln!(
+                out,
+                "\n[[channel]]\nname = {}\nunit = {}",
+                quoted(&channel.name),
+                quoted(&channel.unit)
+            );
+            if let Some(lsb) = channel.lsb {
+                let _ = writeln!(out, "lsb = {lsb:?}");
+            }
+            parameters(&mut out, &channel.baseline);
+        }
+        for e in &self.effects {
+            let channels: Vec<_> = e.channels.iter().map(|c| quoted(c)).collect();
+            let _ = writeln!(
+                out,
+                "\n[[effect]]\ncause = {}\nchannels = [{}]",
+                quoted(&e.cause),
+                channels.join(", ")
+            );
+            parameters(&mut out, &e.parameters);
+        }
+        out
+    }
+}
+
+struct Parser<'a> {
+    text: &'a str,
+}
+
+type Parsed<T> = Result<T, ModelFileError>;
+
+impl<'a> Parser<'a> {
+    fn error<T>(&self, at: usize, what: String) -> Parsed<T> {
+        let line = 1 + self
+            .text
+            .get(..at)
+            .unwrap_or(self.text)
+            .matches('\n')
+            .count();
+        Err(ModelFileError { line, what })
+    }
+
+    fn table<'t>(&self, value: &'t Spanned<DeValue<'a>>, name: &str) -> Parsed<&'t DeTable<'a>> {
+        match value.get_ref() {
+            DeValue::Table(table) => Ok(table),
+            _ => self.error(value.span().start, format!("{name} has to be a table")),
+        }
+    }
+
+    fn array<'t>(
+        &self,
+        value: &'t Spanned<DeValue<'a>>,
+        name: &str,
+    ) -> Parsed<Vec<&'t Spanned<DeValue<'a>>>> {
+        match value.get_ref() {
+            DeValue::Array(array) => Ok(array.iter().collect()),
+            _ => self.error(value.span().start, format!("{name} has to be an array")),
+        }
+    }
+
+    fn string(&self, value: &Spanned<DeValue<'a>>, name: &str) -> Parsed<String> {
+        match value.get_ref() {
+            DeValue::String(s) => Ok(s.to_string()),
+            _ => self.error(
+                value.span().start,
+                format!("{name} has to be a text in quotes"),
+            ),
+        }
+    }
+
+    fn number(&self, value: &Spanned<DeValue<'a>>, name: &str) -> Parsed<f64> {
+        let number = match value.get_ref() {
+            DeValue::Float(f) => f.as_str().replace('_', "").parse().ok(),
+            DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix())
+                .ok()
+                .map(|i| i as f64),
+            _ => None,
+        };
+        match number {
+            Some(n) if f64::is_finite(n) => Ok(n),
+            _ => self.error(
+                value.span().start,
+                format!("{name} has to be a finite number"),
+            ),
+        }
+    }
+
+    fn file(&self) -> Parsed<ModelFile> {
+        let document = DeTable::parse(self.text).map_err(|e| ModelFileError {
+            line: 1 + self
+                .text
+                .get(..e.span().map_or(0, |s| s.start))
+                .unwrap_or("")
+                .matches('\n')
+                .count(),
+            what: e.message().to_owned(),
+        })?;
+        let mut file = ModelFile::default();
+        let mut format = None;
+        for (key, value) in document.get_ref() {
+            match &**key.get_ref() {
+                "format" => format = Some((self.string(value, "format")?, value.span().start)),
+                "stand" => file.stand = self.string(value, "stand")?,
+                "rate_hz" => file.rate_hz = self.number(value, "rate_hz")?,
+                "fitted_on" => file.fitted_on = Some(self.fitted_on(value)?),
+                "excitation" => file.excitation = self.excitation(value)?,
+                "channel" => {
+                    for v in self.array(value, "channel")? {
+                        file.channels.push(self.channel(v)?);
+                    }
+                }
+                "effect" => {}
+                other => {
+                    return self.error(key.span().start, format!(
+                        "unknown key {other}; known are format, stand, rate_hz, fitted_on, excitation, channel, effect"
+                    ));
+                }
+            }
+        }
+        match format {
+            Some((f, _)) if f == FORMAT => {}
+            Some((f, at)) => {
+                return self.error(
+                    at,
+                    format!("format is {f:?}, this program reads {FORMAT:?}"),
+                );
+            }
+            None => {
+                return self.error(
+                    0,
+                    format!("no format line; the first one has to be format = {FORMAT:?}"),
+                );
+            }
+        }
+        if file.rate_hz <= 0.0 {
+            return self.error(0, "rate_hz is missing or not positive".to_owned());
+        }
+        if let Some(value) = document.get_ref().get("effect") {
+            for v in self.array(value, "effect")? {
+                file.effects.push(self.effect(v, &file.channels)?);
+            }
+        }
+        Ok(file)
+    }
+
+    fn fitted_on(&self, value: &Spanned<DeValue<'a>>) -> Parsed<FittedOn> {
+        let mut on = FittedOn::default();
+        for (key, v) in self.table(value, "fitted_on")? {
+            match &**key.get_ref() {
+                "file" => on.file = self.string(v, "file")?,
+                "hash" => on.hash = Some(self.string(v, "hash")?),
+                "seconds" => on.seconds = self.number(v, "seconds")?,
+                other => {
+                    return self.error(
+                        key.span().start,
+                        format!("unknown key {other} in fitted_on; known are file, hash, seconds"),
+                    );
+                }
+            }
+        }
+        Ok(on)
+    }
+
+    fn excitation(&self, value: &Spanned<DeValue<'a>>) -> Parsed<BTreeMap<String, f64>> {
+        let mut all = BTreeMap::new();
+        for (key, v) in self.table(value, "excitation")? {
+            let name: &str = key.get_ref();
+            if !SETTINGS.iter().any(|s| s.key == name) {
+                let known: Vec<_> = SETTINGS.iter().map(|s| s.key).collect();
+                return self.error(
+                    key.span().start,
+                    format!("unknown excitation {name}; known are {}", known.join(", ")),
+                );
+            }
+            all.insert(name.to_owned(), self.number(v, name)?);
+        }
+        Ok(all)
+    }
+
+    fn parameter(
+        &self,
+        name: &str,
+        value: &Spanned<DeValue<'a>>,
+        units: &[String],
+    ) -> Parsed<Parameter> {
+        let (mut number, mut error, mut unit) = (None, None, None);
+        for (key, v) in self.table(value, name)? {
+            match &**key.get_ref() {
+                "value" => number = Some(self.number(v, "value")?),
+                "std_error" => error = Some(self.number(v, "std_error")?),
+                "unit" => unit = Some((self.string(v, "unit")?, v.span().start)),
+                other => {
+                    return self.error(
+                        key.span().start,
+                        format!("unknown key {other} in {name}; known are value, std_error, unit"),
+                    );
+                }
+            }
+        }
+        let at = value.span().start;
+        let Some(number) = number else {
+            return self.error(at, format!("{name} has no value"));
+        };
+        match unit {
+            Some((u, _)) if units.contains(&u) => Ok(Parameter {
+                value: number,
+                std_error: error,
+                unit: u,
+            }),
+            Some((u, at)) => self.error(
+                at,
+                format!("{name} is in {u:?}; its unit is {:?}", units[0]),
+            ),
+            None => self.error(at, format!("{name} has no unit; it is {:?}", units[0])),
+        }
+    }
+
+    fn channel(&self, value: &Spanned<DeValue<'a>>) -> Parsed<ChannelModel> {
+        let table = self.table(value, "channel")?;
+        let mut channel = ChannelModel::default();
+        for (key, v) in table {
+            match &**key.get_ref() {
+                "name" => channel.name = self.string(v, "name")?,
+                "unit" => channel.unit = self.string(v, "unit")?,
+                "lsb" => channel.lsb = Some(self.number(v, "lsb")?),
+                _ => {}
+            }
+        }
+        let at = value.span().start;
+        if channel.name.is_empty() || channel.unit.is_empty() {
+            return self.error(at, "a channel needs a name and a unit".to_owned());
+        }
+        for (key, v) in table {
+            let name: &str = key.get_ref();
+            if matches!(name, "name" | "unit" | "lsb") {
+                continue;
+            }
+            let Some((_, spec)) = BASELINE.iter().find(|(n, _)| *n == name) else {
+                return self.error(
+                    key.span().start,
+                    format!(
+                        "unknown key {name} in a channel; known are name, unit, lsb, {}",
+                        BASELINE.map(|b| b.0).join(", ")
+                    ),
+                );
+            };
+            let units = [baseline_unit(spec, &channel.unit)];
+            channel
+                .baseline
+                .insert(name.to_owned(), self.parameter(name, v, &units)?);
+        }
+        Ok(channel)
+    }
+
+    fn effect(
+        &self,
+        value: &Spanned<DeValue<'a>>,
+        channels: &[ChannelModel],
+    ) -> Parsed<EffectModel> {
+        let table = self.table(value, "effect")?;
+        let at = value.span().start;
+        let Some(cause) = table.get("cause") else {
+            return self.error(at, "an effect needs a cause".to_owned());
+        };
+        let id = self.string(cause, "cause")?;
+        let Some(known) = effect(&id) else {
+            let ids: Vec<_> = crate::effects::EFFECTS.iter().map(|e| e.id()).collect();
+            return self.error(
+                cause.span().start,
+                format!("unknown effect {id}; known are {}", ids.join(", ")),
+            );
+        };
+        let mut found = EffectModel {
+            cause: id.clone(),
+            ..EffectModel::default()
+        };
+        if let Some(v) = table.get("channels") {
+            for name in self.array(v, "channels")? {
+                let text = self.string(name, "channels")?;
+                if !channels.iter().any(|c| c.name == text) {
+                    return self.error(
+                        name.span().start,
+                        format!("effect {id} names channel {text}, which the file does not have"),
+                    );
+                }
+                found.channels.push(text);
+            }
+        }
+        let unit = found
+            .channels
+            .first()
+            .and_then(|n| channels.iter().find(|c| c.name == *n))
+            .or(channels.first())
+            .map_or("deg/s", |c| c.unit.as_str());
+        for (key, v) in table {
+            let name: &str = key.get_ref();
+            if matches!(name, "cause" | "channels") {
+                continue;
+            }
+            let Some(spec) = known.parameters().iter().find(|p| p.name == name) else {
+                let names: Vec<_> = known.parameters().iter().map(|p| p.name).collect();
+                return self.error(
+                    key.span().start,
+                    format!(
+                        "unknown parameter {name} of {id}; it has {}",
+                        names.join(", ")
+                    ),
+                );
+            };
+            let units = [if unit == "deg/s" {
+                spec.unit.to_owned()
+            } else {
+                unit_on(spec.unit, unit)
+            }];
+            found
+                .parameters
+                .insert(name.to_owned(), self.parameter(name, v, &units)?);
+        }
+        if let Some(missing) = known
+            .parameters()
+            .iter()
+            .find(|p| p.required && !found.parameters.contains_key(p.name))
+        {
+            return self.error(
+                at,
+                format!(
+                    "effect {id} needs {} = {{ value = ..., unit = {:?} }}",
+                    missing.name, missing.unit
+                ),
+            );
+        }
+        Ok(found)
+    }
+}
+
+/// Unit of a baseline parameter on a channel of that unit.
+#[must_use]
+pub fn baseline_unit(spec: &str, channel_unit: &str) -> String {
+    match (channel_unit, spec) {
+        ("deg/s", _) => spec.to_owned(),
+        (_, "deg/sqrt(h)") => format!("{channel_unit}*sqrt(s)"),
+        (_, "deg") => format!("{channel_unit}*s"),
+        _ => unit_on(spec, channel_unit),
+    }
 }

@@ -2,8 +2,14 @@
 //!
 //! Data in, values out: nothing here opens a file, reads a clock or prints.
 
+pub mod effect;
+pub mod effects;
+pub mod excitation;
 pub mod file;
 pub mod parameter;
 pub mod record;
+pub mod simulate;
 
+pub use file::ModelFile;
 pub use parameter::Parameter;
+pub use simulate::{simulate, simulate_in_the_world_of};

@@ -1,0 +1,57 @@
+//! Low bits are missing.
+
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, value};
+use crate::simulate::Simulation;
+
+/// The effect.
+pub struct CoarseLsb;
+
+/// The one instance that the library lists.
+pub static EFFECT: CoarseLsb = CoarseLsb;
+
+impl Effect for CoarseLsb {
+    fn id(&self) -> &'static str {
+        "coarse_lsb"
+    }
+
+    fn parameters(&self) -> &'static [ParameterSpec] {
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter("missing_bits", "1", "low bits that are always 0"),
+        ];
+        PARAMETERS
+    }
+
+    fn docs(&self) -> Docs {
+        Docs {
+            title: "Coarse quantisation",
+            physics: "The lowest bits are always zero: a wrong shift, a format with fewer bits.",
+            excitation: "Nothing.",
+            test: "Audit: share of ones in the low bits against the share that the noise makes.",
+            figure: "Share of ones by bit.",
+        }
+    }
+
+    fn rivals(&self) -> &'static [Rival] {
+        const RIVALS: &[Rival] = &[
+            Rival { cause: "stuck_bit", experiment: "look at the counts: one bit or all below it" }
+        ];
+        RIVALS
+    }
+
+    fn hypotheses(&self, _view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
+        Ok(vec![Hypothesis::Audit])
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Counts
+    }
+
+    fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
+        let bits = value(parameters, "missing_bits").round().clamp(0.0, 13.0) as u32;
+        for &axis in channels {
+            for c in &mut simulation.counts[axis] {
+                *c = (*c >> bits) << bits;
+            }
+        }
+    }
+}

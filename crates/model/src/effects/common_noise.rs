@@ -1,0 +1,75 @@
+//! The gyros share a part of their noise.
+
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::parameter::Parameter;
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Found, parameter, value};
+use crate::record::Quantity;
+use crate::simulate::Simulation;
+
+/// The effect.
+pub struct CommonNoise;
+
+/// The one instance that the library lists.
+pub static EFFECT: CommonNoise = CommonNoise;
+
+impl Effect for CommonNoise {
+    fn id(&self) -> &'static str {
+        "common_noise"
+    }
+
+    fn parameters(&self) -> &'static [ParameterSpec] {
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter("sigma", "deg/s", "standard deviation of the shared part"),
+        ];
+        PARAMETERS
+    }
+
+    fn docs(&self) -> Docs {
+        Docs {
+            title: "Common noise",
+            physics: "e_i(t) = own noise + c(t): a shared supply or reference, broadband shaking of the base.",
+            excitation: "At least two gyros.",
+            test: "Correlation of the whitened residuals of each pair of axes.",
+            figure: "Whitened residual of one axis against another.",
+        }
+    }
+
+    fn rivals(&self) -> &'static [Rival] {
+        const RIVALS: &[Rival] = &[
+            Rival { cause: "base_motion", experiment: "decouple the base from the bench" },
+            Rival { cause: "supply_sensitivity", experiment: "a battery in place of the supply" }
+        ];
+        RIVALS
+    }
+
+    fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
+        if view.all(Quantity::Gyro).count() < 2 {
+            return Err("a single gyro: nothing to compare with".into());
+        }
+        Ok(vec![Hypothesis::Common])
+    }
+
+    fn describe(&self, found: &Found) -> Parameters {
+        let sigma = found.coefficients.first().map_or((0.0, 0.0), |c| *c);
+        [("sigma".to_owned(), Parameter::estimated(sigma.0, sigma.1, &found.unit))].into()
+    }
+
+    fn same_event(&self, _a: &Parameters, _b: &Parameters) -> bool {
+        true
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Rate
+    }
+
+    fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
+        let sigma = value(parameters, "sigma");
+        for i in 0..simulation.samples {
+            let c: f64 = StandardNormal.sample(&mut simulation.rng);
+            for &axis in channels {
+                simulation.rate[axis][i] += sigma * c;
+            }
+        }
+    }
+}

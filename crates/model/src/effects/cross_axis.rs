@@ -1,0 +1,84 @@
+//! The gyro feels the rotation about another axis.
+
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Regression, optional, value};
+use crate::record::Quantity;
+use crate::simulate::Simulation;
+
+/// The effect.
+pub struct CrossAxis;
+
+/// The one instance that the library lists.
+pub static EFFECT: CrossAxis = CrossAxis;
+
+impl Effect for CrossAxis {
+    fn id(&self) -> &'static str {
+        "cross_axis"
+    }
+
+    fn parameters(&self) -> &'static [ParameterSpec] {
+        const PARAMETERS: &[ParameterSpec] = &[
+            optional("from_gyro_x", "1", "share of the rate about x"),
+            optional("from_gyro_y", "1", "share of the rate about y"),
+            optional("from_gyro_z", "1", "share of the rate about z"),
+        ];
+        PARAMETERS
+    }
+
+    fn docs(&self) -> Docs {
+        Docs {
+            title: "Cross-axis sensitivity",
+            physics: "b(t) = sum of shares x rates about the other axes: misaligned mounting, coupled modes of the element.",
+            excitation: "Rotation about another axis, while this one is at rest.",
+            test: "Least squares on the other gyros that turn, random walk refitted.",
+            figure: "Rate in blocks of the other rate against that rate.",
+        }
+    }
+
+    fn rivals(&self) -> &'static [Rival] {
+        const RIVALS: &[Rival] = &[
+            Rival { cause: "base_motion", experiment: "a rate table with a stiff axis" },
+            Rival { cause: "g_sensitivity", experiment: "a six-position test at rest" }
+        ];
+        RIVALS
+    }
+
+    fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
+        let sources: Vec<_> = view
+            .all(Quantity::Gyro)
+            .filter(|s| s.moving && s.axis != view.axis && s.axis.is_some())
+            .collect();
+        if sources.is_empty() {
+            return Err("no other axis turns: do a rate-table run".into());
+        }
+        Ok(sources
+            .iter()
+            .map(|s| {
+                let mean = s.values.iter().sum::<f64>() / s.values.len() as f64;
+                let source = s.axis.map_or(0, |a| a.index());
+                Hypothesis::Regression(Regression {
+                    columns: vec![Column {
+                        parameter: ["from_gyro_x", "from_gyro_y", "from_gyro_z"][source],
+                        values: s.values.iter().map(|v| v - mean).collect(),
+                    }],
+                    fixed: vec![],
+                    follows: Some(s.name.clone()),
+                })
+            })
+            .collect())
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Rate
+    }
+
+    fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
+        for (source, name) in ["from_gyro_x", "from_gyro_y", "from_gyro_z"].iter().enumerate() {
+            let share = value(parameters, name);
+            for &axis in channels {
+                for (rate, w) in simulation.rate[axis].iter_mut().zip(&simulation.motion[source]) {
+                    *rate += share * w;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! A bias that wanders and comes back.
+
+use std::sync::Arc;
+
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::parameter::Parameter;
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Covariance, Found, parameter, value};
+use crate::simulate::Simulation;
+
+/// The effect.
+pub struct GaussMarkov;
+
+/// The one instance that the library lists.
+pub static EFFECT: GaussMarkov = GaussMarkov;
+
+impl Effect for GaussMarkov {
+    fn id(&self) -> &'static str {
+        "gauss_markov"
+    }
+
+    fn parameters(&self) -> &'static [ParameterSpec] {
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter("sigma", "deg/s", "standard deviation"),
+            parameter("correlation_time", "s", "time in which the correlation falls to 1/e"),
+        ];
+        PARAMETERS
+    }
+
+    fn docs(&self) -> Docs {
+        Docs {
+            title: "Gauss-Markov bias",
+            physics: "First-order Gauss-Markov process: autocorrelation sigma^2 exp(-|t| / correlation_time); loops in the electronics, air currents, slow modes.",
+            excitation: "Nothing; several correlation times.",
+            test: "White variance, random walk, sigma and correlation time refitted by maximum likelihood.",
+            figure: "Spectrum of the rate with the model before and after: a shoulder.",
+        }
+    }
+
+    fn rivals(&self) -> &'static [Rival] {
+        const RIVALS: &[Rival] = &[
+            Rival { cause: "flicker", experiment: "a longer record: flicker goes on rising to lower frequencies" },
+            Rival { cause: "low_pass", experiment: "change the filter taps" },
+            Rival { cause: "telegraph", experiment: "a longer record: look at the histogram for two levels" },
+            Rival { cause: "bias_step", experiment: "a longer record" }
+        ];
+        RIVALS
+    }
+
+    fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
+        if view.samples < 256 {
+            return Err("fewer than 256 samples".into());
+        }
+        Ok(vec![Hypothesis::Covariance(Arc::new(Process))])
+    }
+
+    fn describe(&self, found: &Found) -> Parameters {
+        let [(a, a_error), (t, t_error), ..] = found.coefficients[..] else { return Parameters::new() };
+        let sigma = found.white_sigma * (a / 2.0).exp();
+        let tau = t.exp() / found.rate_hz;
+        [
+            ("sigma".to_owned(), Parameter::estimated(sigma, sigma * a_error / 2.0, &found.unit)),
+            ("correlation_time".to_owned(), Parameter::estimated(tau, tau * t_error, "s")),
+        ]
+        .into()
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Rate
+    }
+
+    fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
+        let (sigma, tau) = (value(parameters, "sigma"), value(parameters, "correlation_time"));
+        let p = if tau > 0.0 { (-1.0 / (tau * simulation.rate_hz)).exp() } else { 0.0 };
+        for &axis in channels {
+            let normal = |s: &mut Simulation| -> f64 { StandardNormal.sample(&mut s.rng) };
+            let mut x = sigma * normal(simulation);
+            for i in 0..simulation.samples {
+                simulation.rate[axis][i] += x;
+                x = p * x + sigma * (1.0 - p * p).sqrt() * normal(simulation);
+            }
+        }
+    }
+}
+
+/// Coordinates: ln(sigma^2 / white variance), ln(correlation time in samples).
+struct Process;
+
+impl Covariance for Process {
+    fn dimensions(&self) -> usize {
+        2
+    }
+
+    fn density(&self, theta: &[f64], omega: f64) -> f64 {
+        let p = (-(-theta[1]).exp()).exp();
+        theta[0].exp() * (1.0 - p * p) / (1.0 + p * p - 2.0 * p * omega.cos())
+    }
+
+    fn bounds(&self, samples: usize) -> Vec<(f64, f64)> {
+        vec![(-16.0, 6.0), (0.0, (samples as f64 / 10.0).ln())]
+    }
+
+    fn starts(&self, samples: usize) -> Vec<Vec<f64>> {
+        let longest = samples as f64 / 60.0;
+        [1.5, 6.0, 25.0, 100.0]
+            .iter()
+            .filter(|t| **t < longest.max(2.0))
+            .map(|t: &f64| vec![-3.0 - 0.5 * t.ln(), t.ln()])
+            .collect()
+    }
+}

@@ -1,0 +1,64 @@
+//! Single samples far off.
+
+use rand_distr::{Distribution, Uniform};
+
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, optional, value};
+use crate::simulate::Simulation;
+
+/// The effect.
+pub struct Outliers;
+
+/// The one instance that the library lists.
+pub static EFFECT: Outliers = Outliers;
+
+impl Effect for Outliers {
+    fn id(&self) -> &'static str {
+        "outliers"
+    }
+
+    fn parameters(&self) -> &'static [ParameterSpec] {
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter("count", "1", "samples far off"),
+            optional("size", "deg/s", "distance from the truth in a simulation; 10 white sigma where it is left out"),
+        ];
+        PARAMETERS
+    }
+
+    fn docs(&self) -> Docs {
+        Docs {
+            title: "Outliers",
+            physics: "Single samples that the noise cannot have made: a disturbed SPI word, a discharge, a knock.",
+            excitation: "Nothing.",
+            test: "Audit: distance of the whitened sample against the normal tail of the record length.",
+            figure: "The rate around each of them.",
+        }
+    }
+
+    fn rivals(&self) -> &'static [Rival] {
+        const RIVALS: &[Rival] = &[
+            Rival { cause: "telegraph", experiment: "a longer record" },
+            Rival { cause: "stuck_bit", experiment: "look at the counts: a stuck bit is off by one power of two" }
+        ];
+        RIVALS
+    }
+
+    fn hypotheses(&self, _view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
+        Ok(vec![Hypothesis::Audit])
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Output
+    }
+
+    fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
+        let count = value(parameters, "count").round().max(0.0) as usize;
+        let Ok(at) = Uniform::new(0, simulation.samples.max(1)) else { return };
+        for &axis in channels {
+            let size = parameters.get("size").map_or(10.0 * simulation.white_sigma[axis], |p| p.value);
+            for k in 0..count {
+                let i = at.sample(&mut simulation.rng);
+                simulation.white[axis][i] += if k % 2 == 0 { size } else { -size };
+            }
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! The last sample comes again.
+
+use rand_distr::{Distribution, Uniform};
+
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, optional, value};
+use crate::simulate::Simulation;
+
+/// The effect.
+pub struct StaleSamples;
+
+/// The one instance that the library lists.
+pub static EFFECT: StaleSamples = StaleSamples;
+
+impl Effect for StaleSamples {
+    fn id(&self) -> &'static str {
+        "stale_samples"
+    }
+
+    fn parameters(&self) -> &'static [ParameterSpec] {
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter("count", "1", "frames that repeat the one before"),
+            optional("silent", "1", "1 where the new-data flags do not tell"),
+        ];
+        PARAMETERS
+    }
+
+    fn docs(&self) -> Docs {
+        Docs {
+            title: "Stale samples",
+            physics: "A frame repeats the readings of the frame before: the sensor was read before it had a new sample, or a buffer was sent twice.",
+            excitation: "Nothing.",
+            test: "Audit: new-data flags, and frames with all gyros equal to the frame before against their chance.",
+            figure: "The rate around each of them.",
+        }
+    }
+
+    fn rivals(&self) -> &'static [Rival] {
+        const RIVALS: &[Rival] = &[
+            Rival { cause: "dropped_samples", experiment: "the sequence numbers" }
+        ];
+        RIVALS
+    }
+
+    fn hypotheses(&self, _view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
+        Ok(vec![Hypothesis::Audit])
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Frames
+    }
+
+    fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
+        let count = value(parameters, "count").round().max(0.0) as usize;
+        let silent = value(parameters, "silent") != 0.0;
+        let Ok(at) = Uniform::new(1, simulation.samples.max(2)) else { return };
+        for _ in 0..count {
+            let i = at.sample(&mut simulation.rng).min(simulation.samples - 1);
+            for &axis in channels {
+                simulation.counts[axis][i] = simulation.counts[axis][i - 1];
+                if !silent {
+                    simulation.flags[i] &= !(1 << axis);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! The bias switches between two levels.
+
+use rand_distr::{Distribution, Exp1};
+
+use crate::parameter::Parameter;
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Found, parameter, value};
+use crate::simulate::Simulation;
+
+/// The effect.
+pub struct Telegraph;
+
+/// The one instance that the library lists.
+pub static EFFECT: Telegraph = Telegraph;
+
+impl Effect for Telegraph {
+    fn id(&self) -> &'static str {
+        "telegraph"
+    }
+
+    fn parameters(&self) -> &'static [ParameterSpec] {
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter("half_height", "deg/s", "half the distance of the levels"),
+            parameter("dwell_time", "s", "mean time on a level"),
+        ];
+        PARAMETERS
+    }
+
+    fn docs(&self) -> Docs {
+        Docs {
+            title: "Telegraph noise",
+            physics: "b(t) = +-half_height, switching at random with the mean dwell time on either level: a single charge trap, a loose contact, popcorn noise.",
+            excitation: "Nothing; many switches within the record.",
+            test: "Likelihood of a two-level hidden Markov chain against Gauss-Markov and steps.",
+            figure: "Rate in time blocks with the most probable level.",
+        }
+    }
+
+    fn rivals(&self) -> &'static [Rival] {
+        const RIVALS: &[Rival] = &[
+            Rival { cause: "gauss_markov", experiment: "a longer record: look at the histogram for two levels" },
+            Rival { cause: "flicker", experiment: "a longer record: look at the histogram for two levels" },
+            Rival { cause: "bias_step", experiment: "a longer record: telegraph noise comes back" }
+        ];
+        RIVALS
+    }
+
+    fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
+        if view.seconds() < 60.0 {
+            return Err("the record is shorter than a minute".into());
+        }
+        Ok(vec![Hypothesis::TwoLevel])
+    }
+
+    /// Coefficients: half the distance of the levels, and the dwell time in s.
+    fn describe(&self, found: &Found) -> Parameters {
+        let [half, dwell, ..] = found.coefficients[..] else { return Parameters::new() };
+        [
+            ("half_height".to_owned(), Parameter::estimated(half.0, half.1, &found.unit)),
+            ("dwell_time".to_owned(), Parameter::estimated(dwell.0, dwell.1, "s")),
+        ]
+        .into()
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Rate
+    }
+
+    fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
+        let (half, dwell) = (value(parameters, "half_height"), value(parameters, "dwell_time"));
+        if dwell <= 0.0 {
+            return;
+        }
+        for &axis in channels {
+            let mut level = half;
+            let mut left = dwell * Distribution::<f64>::sample(&Exp1, &mut simulation.rng);
+            for i in 0..simulation.samples {
+                while left < 0.0 {
+                    level = -level;
+                    left += dwell * Distribution::<f64>::sample(&Exp1, &mut simulation.rng);
+                }
+                simulation.rate[axis][i] += level;
+                left -= 1.0 / simulation.rate_hz;
+            }
+        }
+    }
+}

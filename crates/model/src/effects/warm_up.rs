@@ -1,0 +1,97 @@
+//! The bias settles after power-up.
+
+use std::sync::Arc;
+
+use crate::parameter::Parameter;
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Found, Shape, parameter, value};
+use crate::simulate::Simulation;
+
+/// The effect.
+pub struct WarmUp;
+
+/// The one instance that the library lists.
+pub static EFFECT: WarmUp = WarmUp;
+
+impl Effect for WarmUp {
+    fn id(&self) -> &'static str {
+        "warm_up"
+    }
+
+    fn parameters(&self) -> &'static [ParameterSpec] {
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter("amplitude", "deg/s", "bias at the start of the record, minus the final one"),
+            parameter("time_constant", "s", "time in which it falls to 1/e"),
+        ];
+        PARAMETERS
+    }
+
+    fn docs(&self) -> Docs {
+        Docs {
+            title: "Warm-up",
+            physics: "b(t) = amplitude exp(-t / time_constant): self-heating of a part whose thermometer lags or sits elsewhere, or settling of its electronics.",
+            excitation: "A record that starts at power-up and lasts several time constants.",
+            test: "Least squares on exponentials over a grid of time constants, refined; random walk refitted.",
+            figure: "Rate in time blocks with the exponential.",
+        }
+    }
+
+    fn rivals(&self) -> &'static [Rival] {
+        const RIVALS: &[Rival] = &[
+            Rival { cause: "temperature", experiment: "a heater cycle of two periods, or a restart while warm: a temperature term repeats, a warm-up does not" },
+            Rival { cause: "temperature_quadratic", experiment: "two cold starts at different ambient temperatures" },
+            Rival { cause: "rate_ramp", experiment: "a record ten times longer: a ramp goes on, a warm-up ends" },
+            Rival { cause: "bias_step", experiment: "a second cold start: a warm-up comes back, a step does not" }
+        ];
+        RIVALS
+    }
+
+    fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
+        Ok(vec![Hypothesis::Shaped(Arc::new(Exponentials { samples: view.samples, rate_hz: view.rate_hz }))])
+    }
+
+    fn describe(&self, found: &Found) -> Parameters {
+        let mut all = crate::effect::columns_as_parameters(self.parameters(), found);
+        if let Some((tau, error)) = found.location.first() {
+            all.insert("time_constant".into(), Parameter::estimated(*tau, *error, "s"));
+        }
+        all
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Rate
+    }
+
+    fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
+        let (amplitude, tau) = (value(parameters, "amplitude"), value(parameters, "time_constant"));
+        if tau <= 0.0 {
+            return;
+        }
+        for &axis in channels {
+            for (i, rate) in simulation.rate[axis].iter_mut().enumerate() {
+                *rate += amplitude * (-(i as f64) / simulation.rate_hz / tau).exp();
+            }
+        }
+    }
+}
+
+/// exp(-t / tau), tau from a fiftieth to a third of the record.
+struct Exponentials {
+    samples: usize,
+    rate_hz: f64,
+}
+
+impl Shape for Exponentials {
+    fn coordinate(&self) -> (&'static str, &'static str) {
+        ("time_constant", "s")
+    }
+
+    fn grid(&self) -> Vec<f64> {
+        let seconds = self.samples as f64 / self.rate_hz;
+        [50.0, 24.0, 12.0, 6.0, 3.0].iter().map(|part| seconds / part).collect()
+    }
+
+    fn columns(&self, at: f64) -> Vec<Column> {
+        let values = (0..self.samples).map(|i| (-(i as f64) / self.rate_hz / at).exp()).collect();
+        vec![Column { parameter: "amplitude", values }]
+    }
+}

@@ -1,0 +1,196 @@
+//! What acts on a simulated stand: temperature, supply, motor, vibration. Stated in the model file, or taken from a record.
+
+use std::collections::BTreeMap;
+
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// A setting of the `[excitation]` section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// Key; its last word is the unit.
+    pub key: &'static str,
+    /// Value where the file does not give it.
+    pub default: f64,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+const fn setting(key: &'static str, default: f64, meaning: &'static str) -> Setting {
+    Setting {
+        key,
+        default,
+        meaning,
+    }
+}
+
+/// All settings. What is zero does not act.
+pub const SETTINGS: &[Setting] = &[
+    setting("ambient_degc", 25.0, "temperature at the start"),
+    setting(
+        "self_heating_degc",
+        0.0,
+        "rise of the temperature by self-heating",
+    ),
+    setting("self_heating_time_constant_s", 120.0, "its time constant"),
+    setting(
+        "drift_degc",
+        0.0,
+        "rise of the temperature over the whole run, linear",
+    ),
+    setting(
+        "heater_degc",
+        0.0,
+        "swing of the temperature by a heater, peak to peak",
+    ),
+    setting("heater_period_s", 240.0, "its period, half of it on"),
+    setting(
+        "heater_time_constant_s",
+        40.0,
+        "thermal time constant of the heater",
+    ),
+    setting("supply_v", 5.0, "supply voltage"),
+    setting("supply_load_v", 0.0, "sag of the supply by a switched load"),
+    setting(
+        "supply_load_period_s",
+        55.0,
+        "period of the load, half of it on",
+    ),
+    setting(
+        "supply_motor_v",
+        0.0,
+        "sag of the supply at full duty of the motor",
+    ),
+    setting("motor_duty", 0.0, "largest duty of the motor, 0..1"),
+    setting(
+        "motor_period_s",
+        80.0,
+        "period of its profile: forward, off, back, off",
+    ),
+    setting(
+        "vibration_g",
+        0.0,
+        "rms of a broadband vibration on each accelerometer axis",
+    ),
+    setting(
+        "sway_deg",
+        0.0,
+        "amplitude of a sway of the base about x and y",
+    ),
+    setting("sway_period_s", 10.0, "period of the sway"),
+    setting(
+        "turn_dps",
+        0.0,
+        "amplitude of a slow turning of the table about z",
+    ),
+    setting("turn_period_s", 40.0, "period of the turning"),
+];
+
+/// The value of a setting.
+#[must_use]
+pub fn setting_value(given: &BTreeMap<String, f64>, key: &str) -> f64 {
+    given.get(key).copied().unwrap_or_else(|| {
+        SETTINGS
+            .iter()
+            .find(|s| s.key == key)
+            .map_or(0.0, |s| s.default)
+    })
+}
+
+/// The world of a run, one value per sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct World {
+    /// Die temperature by axis, degC.
+    pub temperature: [Vec<f64>; 3],
+    /// Supply, V.
+    pub supply: Vec<f64>,
+    /// Motor duty, -1..1.
+    pub duty: Vec<f64>,
+    /// Specific force, g.
+    pub acc: [Vec<f64>; 3],
+    /// True rate, deg/s.
+    pub motion: [Vec<f64>; 3],
+}
+
+impl World {
+    /// The world that the settings describe.
+    #[must_use]
+    pub fn stated(
+        given: &BTreeMap<String, f64>,
+        samples: usize,
+        rate_hz: f64,
+        rng: &mut Xoshiro256PlusPlus,
+    ) -> Self {
+        let get = |key| setting_value(given, key);
+        let seconds = samples as f64 / rate_hz;
+        let time = |i: usize| i as f64 / rate_hz;
+        let on = |t: f64, period: f64| (t / period).rem_euclid(1.0) < 0.5;
+        let mut heater = 0.0;
+        let mut temperature = Vec::with_capacity(samples);
+        let mut duty = Vec::with_capacity(samples);
+        let mut supply = Vec::with_capacity(samples);
+        for i in 0..samples {
+            let t = time(i);
+            let target = if on(t, get("heater_period_s")) {
+                get("heater_degc")
+            } else {
+                0.0
+            };
+            heater += (target - heater) / (get("heater_time_constant_s") * rate_hz).max(1.0);
+            temperature.push(
+                get("ambient_degc")
+                    + get("self_heating_degc")
+                        * (1.0 - (-t / get("self_heating_time_constant_s")).exp())
+                    + get("drift_degc") * t / seconds
+                    + heater,
+            );
+            let d = match (t / get("motor_period_s")).rem_euclid(1.0) * 4.0 {
+                phase if phase < 1.0 => 0.0,
+                phase if phase < 2.0 => get("motor_duty"),
+                phase if phase < 3.0 => 0.0,
+                _ => -get("motor_duty"),
+            };
+            duty.push((d * 255.0).round() / 255.0);
+            let load = if on(t, get("supply_load_period_s")) {
+                0.0
+            } else {
+                get("supply_load_v")
+            };
+            supply.push(get("supply_v") - load - get("supply_motor_v") * d.abs());
+        }
+        let sway = |i: usize, shift: f64| {
+            let w = std::f64::consts::TAU / get("sway_period_s");
+            let amplitude = get("sway_deg");
+            (
+                amplitude * (w * time(i) + shift).sin(),
+                amplitude * w * (w * time(i) + shift).cos(),
+            )
+        };
+        let rms = get("vibration_g");
+        let mut shake = |_| {
+            let e: f64 = StandardNormal.sample(rng);
+            rms * e
+        };
+        let mut acc: [Vec<f64>; 3] =
+            std::array::from_fn(|_| (0..samples).map(&mut shake).collect());
+        let mut motion: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; samples]);
+        for i in 0..samples {
+            let (roll, roll_rate) = sway(i, 0.0);
+            let (pitch, pitch_rate) = sway(i, 1.0);
+            acc[0][i] -= pitch.to_radians().sin();
+            acc[1][i] += roll.to_radians().sin();
+            acc[2][i] += pitch.to_radians().cos() * roll.to_radians().cos();
+            motion[0][i] = roll_rate;
+            motion[1][i] = pitch_rate;
+            let w = std::f64::consts::TAU / get("turn_period_s");
+            motion[2][i] = get("turn_dps") * (w * time(i)).sin();
+        }
+        Self {
+            temperature: std::array::from_fn(|_| temperature.clone()),
+            supply,
+            duty,
+            acc,
+            motion,
+        }
+    }
+}
