@@ -2,9 +2,20 @@
 //!
 //! Data in, values out: nothing here opens a file, reads a clock or prints.
 
+pub mod checks;
 pub mod diagnosis;
 pub mod error;
+pub mod estimate;
+mod evidence;
+pub mod gain;
+pub mod grid;
+pub mod kalman;
+pub mod likelihood;
+pub mod optimise;
 pub mod result;
+pub mod scan;
+pub mod search;
+pub mod threshold;
 
 pub use diagnosis::{DiagnoseOptions, diagnose};
 pub use error::AnalysisError;

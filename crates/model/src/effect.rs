@@ -224,12 +224,33 @@ pub trait Shape: Send + Sync {
     fn columns(&self, at: f64) -> Vec<Column>;
 }
 
+/// Frequencies at which a density is wanted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frequencies {
+    /// Angular frequency, rad per sample.
+    pub omega: Vec<f64>,
+    /// Its cosine.
+    pub cosine: Vec<f64>,
+}
+
+impl Frequencies {
+    /// Density of an AR(1) process of variance `variance` and pole `p`.
+    #[must_use]
+    pub fn one_pole(&self, variance: f64, p: f64) -> Vec<f64> {
+        let (top, bottom) = (variance * (1.0 - p * p), 1.0 + p * p);
+        self.cosine
+            .iter()
+            .map(|c| top / (bottom - 2.0 * p * c))
+            .collect()
+    }
+}
+
 /// A stationary process added to the noise, or a filter on it.
 pub trait Covariance: Send + Sync {
     /// Names of the shape's coordinates; they are optimised unconstrained within [`Covariance::bounds`].
     fn dimensions(&self) -> usize;
-    /// Contribution at angular frequency `omega` (rad per sample), in units of the white variance.
-    fn density(&self, theta: &[f64], omega: f64) -> f64;
+    /// Contribution at each frequency, in units of the white variance.
+    fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64>;
     /// Whether the density replaces the white noise (a filter) instead of adding to it.
     fn filters_white(&self) -> bool {
         false

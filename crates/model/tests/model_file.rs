@@ -14,7 +14,11 @@ fn full() -> ModelFile {
             .iter()
             .map(|p| (p.name.to_owned(), Parameter::estimated(0.5, 0.125, p.unit)))
             .collect();
-        model.effects.push(EffectModel { cause: e.id().into(), channels: vec!["gyro_y".into()], parameters });
+        model.effects.push(EffectModel {
+            cause: e.id().into(),
+            channels: vec!["gyro_y".into()],
+            parameters,
+        });
     }
     model
 }
@@ -30,13 +34,19 @@ fn unknown_keys_units_and_effects_are_named_with_their_line() {
     let text = ModelFile::paper().to_toml();
     for (from, to, line, what) in [
         ("rate_hz", "rate_hertz", 3, "unknown key rate_hertz"),
-        ("unit = \"deg/sqrt(h)\"", "unit = \"deg/h\"", 8, "its unit is \"deg/sqrt(h)\""),
+        (
+            "unit = \"deg/sqrt(h)\"",
+            "unit = \"deg/h\"",
+            8,
+            "its unit is \"deg/sqrt(h)\"",
+        ),
         ("lsb =", "lsbs =", 8, "unknown key lsbs"),
     ] {
         let error = ModelFile::parse(&text.replacen(from, to, 1)).expect_err(from);
         assert!(error.what.contains(what) && error.line >= line, "{error}");
     }
-    let error = ModelFile::parse(&format!("{text}\n[[effect]]\ncause = \"gremlins\"\n")).expect_err("gremlins");
+    let error = ModelFile::parse(&format!("{text}\n[[effect]]\ncause = \"gremlins\"\n"))
+        .expect_err("gremlins");
     assert_eq!(error.line, text.lines().count() + 3, "{error}");
 }
 
@@ -44,8 +54,18 @@ fn unknown_keys_units_and_effects_are_named_with_their_line() {
 fn every_effect_has_an_id_of_its_own_a_page_and_rivals_that_exist() {
     for (i, e) in EFFECTS.iter().enumerate() {
         assert!(EFFECTS.iter().skip(i + 1).all(|o| o.id() != e.id()));
-        assert!(!e.parameters().is_empty() && e.docs().physics.len() > 40, "{}", e.id());
-        assert!(e.rivals().iter().all(|r| model::effects::effect(r.cause).is_some()), "{}", e.id());
+        assert!(
+            !e.parameters().is_empty() && e.docs().physics.len() > 40,
+            "{}",
+            e.id()
+        );
+        assert!(
+            e.rivals()
+                .iter()
+                .all(|r| model::effects::effect(r.cause).is_some()),
+            "{}",
+            e.id()
+        );
     }
 }
 
@@ -55,9 +75,14 @@ fn a_run_is_the_same_from_the_same_seed_and_has_the_stated_noise() {
     let one = model::simulate(&model, 600.0, 20.0, 7).expect("a run");
     assert_eq!(one, model::simulate(&model, 600.0, 20.0, 7).expect("a run"));
     let x = &one.channels[0].values;
-    let half_mean_square = x.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / (2.0 * (x.len() - 1) as f64);
+    let half_mean_square =
+        x.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / (2.0 * (x.len() - 1) as f64);
     // 5.27 deg/sqrt(h) at 20 Hz is 0.393 deg/s; the quantisation adds lsb^2 / 12.
     let sigma = (5.27f64 / 60.0 * 20f64.sqrt()).hypot(0.07326 / 12f64.sqrt());
     assert!((half_mean_square.sqrt() / sigma - 1.0).abs() < 0.04);
-    assert!(one.flags.as_ref().is_some_and(|f| f.iter().all(|f| *f == 7)));
+    assert!(
+        one.flags
+            .as_ref()
+            .is_some_and(|f| f.iter().all(|f| *f == 7))
+    );
 }

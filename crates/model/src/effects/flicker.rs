@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Covariance, Found, parameter, value};
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -95,8 +95,8 @@ impl Covariance for Pink {
         1
     }
 
-    fn density(&self, theta: &[f64], omega: f64) -> f64 {
-        theta[0].exp() / omega
+    fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
+        at.omega.iter().map(|w| theta[0].exp() / w).collect()
     }
 
     fn bounds(&self, _samples: usize) -> Vec<(f64, f64)> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Covariance, Found, parameter, value};
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -91,9 +91,8 @@ impl Covariance for Process {
         2
     }
 
-    fn density(&self, theta: &[f64], omega: f64) -> f64 {
-        let p = (-(-theta[1]).exp()).exp();
-        theta[0].exp() * (1.0 - p * p) / (1.0 + p * p - 2.0 * p * omega.cos())
+    fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
+        at.one_pole(theta[0].exp(), (-(-theta[1]).exp()).exp())
     }
 
     fn bounds(&self, samples: usize) -> Vec<(f64, f64)> {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Covariance, Found, parameter, value};
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -101,9 +101,8 @@ impl Covariance for Pole {
         true
     }
 
-    fn density(&self, theta: &[f64], omega: f64) -> f64 {
-        let r = logistic(theta[0]);
-        (1.0 - r * r) / (1.0 + r * r - 2.0 * r * omega.cos())
+    fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
+        at.one_pole(1.0, logistic(theta[0]))
     }
 
     fn bounds(&self, _samples: usize) -> Vec<(f64, f64)> {
@@ -148,16 +147,17 @@ impl Covariance for Triangle {
         true
     }
 
-    fn density(&self, theta: &[f64], omega: f64) -> f64 {
+    fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
         let unit = inverse_spline(logistic(theta[0]));
-        let mut density = 1.0;
-        let mut lag = 1.0;
-        while lag * unit < 2.0 {
-            density += 2.0 * spline(lag * unit) * (lag * omega).cos();
-            lag += 1.0;
-        }
-        // Quantization and the electronics behind the filter keep the density off zero.
-        density.max(0.0) + 2e-3
+        let taps: Vec<f64> = (1..).map(|l| spline(f64::from(l) * unit)).take_while(|r| *r > 0.0).collect();
+        at.omega
+            .iter()
+            .map(|w| {
+                let tail: f64 = taps.iter().zip(1..).map(|(r, l)| 2.0 * r * (f64::from(l) * w).cos()).sum();
+                // Quantization and the electronics behind the filter keep the density off zero.
+                (1.0 + tail).max(0.0) + 2e-3
+            })
+            .collect()
     }
 
     fn bounds(&self, _samples: usize) -> Vec<(f64, f64)> {

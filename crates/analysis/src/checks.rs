@@ -1,0 +1,181 @@
+//! Omnibus checks of whitened residuals: they show that something is left, the search says what.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+use crate::likelihood::Panel;
+use crate::scan::residual;
+use crate::search::State;
+
+/// Chance below which a check fails.
+pub const LEAST_CHANCE: f64 = 1e-5;
+/// Lags of the Ljung-Box statistic.
+const LAGS: usize = 20;
+/// Bands.
+const BANDS: usize = 19;
+
+/// One statistic with its chance, and what was seen where.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// Name of the check.
+    pub id: &'static str,
+    /// Statistic.
+    pub statistic: f64,
+    /// Chance of a larger one under the model.
+    pub p_value: f64,
+    /// What it sees.
+    pub what: String,
+}
+
+/// Whitened coefficients, and the same in time: independent N(0, 1) under the model.
+#[must_use]
+pub fn whitened(panel: &Panel, state: &State) -> (Vec<f64>, Vec<f64>) {
+    let n = panel.bins.n;
+    let r = residual(panel, &state.columns(), &state.solution);
+    let g = state.noise.everywhere(n);
+    let u: Vec<f64> = r
+        .iter()
+        .zip(&g)
+        .map(|(r, g)| r / (state.solution.white * g).sqrt())
+        .collect();
+    let e = panel.dct.inverse(&u);
+    (u, e)
+}
+
+fn chi_tail(x: f64, degrees: f64) -> f64 {
+    ChiSquared::new(degrees).map_or(f64::NAN, |c| c.sf(x))
+}
+
+/// Two-sided tail of the standard normal.
+#[must_use]
+pub fn normal_tail(z: f64) -> f64 {
+    2.0 * Normal::standard().sf(z.abs())
+}
+
+/// All checks of one channel.
+#[must_use]
+pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
+    vec![
+        ljung_box(e),
+        bands(u, rate_hz),
+        variance_cusum(e, rate_hz),
+        kurtosis(e, rate_hz),
+    ]
+}
+
+fn ljung_box(e: &[f64]) -> Outcome {
+    let n = e.len() as f64;
+    let total: f64 = e.iter().map(|v| v * v).sum();
+    let mut worst = (0, 0.0f64);
+    let statistic = (1..=LAGS)
+        .map(|lag| {
+            let r = e.iter().zip(&e[lag..]).map(|(a, b)| a * b).sum::<f64>() / total;
+            if r.abs() > worst.1.abs() {
+                worst = (lag, r);
+            }
+            n * (n + 2.0) * r * r / (n - lag as f64)
+        })
+        .sum();
+    Outcome {
+        id: "ljung_box",
+        statistic,
+        p_value: chi_tail(statistic, LAGS as f64),
+        what: format!(
+            "correlation of the whitened residual over {LAGS} samples; largest {:.3} at lag {}",
+            worst.1, worst.0
+        ),
+    }
+}
+
+fn bands(u: &[f64], rate_hz: f64) -> Outcome {
+    let n = u.len();
+    let edge = |b: usize| (20f64 * (n as f64 / 20.0).powf(b as f64 / BANDS as f64)) as usize;
+    let mut worst = (1.0, 0.0, 0.0, 0.0);
+    for b in 0..BANDS {
+        let (low, high) = (if b == 0 { 1 } else { edge(b) }, edge(b + 1).min(n));
+        if high <= low {
+            continue;
+        }
+        let degrees = (high - low) as f64;
+        let energy: f64 = u[low..high].iter().map(|v| v * v).sum();
+        let upper = chi_tail(energy, degrees);
+        let p = (2.0 * upper.min(1.0 - upper) * BANDS as f64).min(1.0);
+        if p < worst.0 {
+            let hz = |k: usize| k as f64 / n as f64 * rate_hz / 2.0;
+            worst = (p, energy / degrees, hz(low), hz(high));
+        }
+    }
+    Outcome {
+        id: "band_energy",
+        statistic: worst.1,
+        p_value: worst.0,
+        what: format!(
+            "energy of the whitened residual over the model's in {BANDS} bands; {:.3} from {:.4} to {:.4} Hz stands out most",
+            worst.1, worst.2, worst.3
+        ),
+    }
+}
+
+fn variance_cusum(e: &[f64], rate_hz: f64) -> Outcome {
+    let n = e.len() as f64;
+    let mean = e.iter().map(|v| v * v).sum::<f64>() / n;
+    let spread = e.iter().map(|v| (v * v - mean).powi(2)).sum::<f64>() / n;
+    let (mut sum, mut low, mut high) = (0.0, (0.0, 0usize), (0.0, 0usize));
+    for (i, v) in e.iter().enumerate() {
+        sum += v * v - mean;
+        if sum < low.0 {
+            low = (sum, i);
+        }
+        if sum > high.0 {
+            high = (sum, i);
+        }
+    }
+    let v = (high.0 - low.0) / (n * spread).sqrt();
+    let p: f64 = (1..=40)
+        .map(|j| {
+            let x = 2.0 * (f64::from(j) * v).powi(2);
+            2.0 * (2.0 * x - 1.0) * (-x).exp()
+        })
+        .sum();
+    let (from, to) = (
+        low.1.min(high.1) as f64 / rate_hz,
+        low.1.max(high.1) as f64 / rate_hz,
+    );
+    let size = if low.1 < high.1 { "larger" } else { "smaller" };
+    Outcome {
+        id: "variance_in_time",
+        statistic: v,
+        p_value: if v < 0.9 { 1.0 } else { p.clamp(0.0, 1.0) },
+        what: format!(
+            "range of the cumulated squares of the whitened residual; it is {size} from {from:.1} to {to:.1} s"
+        ),
+    }
+}
+
+fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
+    let n = e.len() as f64;
+    let m2 = e.iter().map(|v| v * v).sum::<f64>() / n;
+    let excess = e.iter().map(|v| v.powi(4)).sum::<f64>() / n / (m2 * m2) - 3.0;
+    let far = (0..e.len())
+        .max_by(|a, b| e[*a].abs().total_cmp(&e[*b].abs()))
+        .unwrap_or(0);
+    // Anscombe and Glynn (1983): the cube root makes the skewed statistic normal.
+    let b2 = excess + 3.0;
+    let mean = 3.0 * (n - 1.0) / (n + 1.0);
+    let variance = 24.0 * n * (n - 2.0) * (n - 3.0) / ((n + 1.0).powi(2) * (n + 3.0) * (n + 5.0));
+    let x = (b2 - mean) / variance.sqrt();
+    let skew = 6.0 * (n * n - 5.0 * n + 2.0) / ((n + 7.0) * (n + 9.0))
+        * (6.0 * (n + 3.0) * (n + 5.0) / (n * (n - 2.0) * (n - 3.0))).sqrt();
+    let a = 6.0 + 8.0 / skew * (2.0 / skew + (1.0 + 4.0 / (skew * skew)).sqrt());
+    let inner = (1.0 - 2.0 / a) / (1.0 + x * (2.0 / (a - 4.0)).sqrt());
+    let z = ((1.0 - 2.0 / (9.0 * a)) - inner.cbrt()) / (2.0 / (9.0 * a)).sqrt();
+    Outcome {
+        id: "kurtosis",
+        statistic: excess,
+        p_value: normal_tail(z),
+        what: format!(
+            "excess kurtosis of the whitened residual; farthest sample {:.1} sigma at {:.2} s",
+            e[far].abs(),
+            far as f64 / rate_hz
+        ),
+    }
+}

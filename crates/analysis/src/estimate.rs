@@ -1,0 +1,217 @@
+//! Estimates with honest errors: coefficients averaged over the random walk, noise parameters from the curvature.
+
+use model::effect::Found;
+
+use crate::likelihood::{Noise, Panel, invert, least_walk};
+use crate::search::{Form, State};
+
+/// Points of the random walk that coefficients are averaged over.
+const WALKS: u32 = 28;
+
+/// Random walks with their posterior weights (flat in the random walk's size, restricted likelihood).
+#[must_use]
+pub fn mixture(
+    panel: &Panel,
+    noise: &Noise,
+    columns: &[usize],
+) -> Vec<(f64, crate::likelihood::Solution)> {
+    let n = (panel.bins.n - 1) as f64;
+    let high = (noise.log_walk + 4.0).max(least_walk(panel.bins.n) + 14.0);
+    let low = least_walk(panel.bins.n);
+    let step = (high - low) / f64::from(WALKS);
+    let points: Vec<_> = (0..=WALKS)
+        .map(|i| {
+            let log_walk = low + step * f64::from(i);
+            let trial = Noise {
+                log_walk,
+                terms: noise.terms.clone(),
+            };
+            let s = panel.solve(&trial.over(&panel.bins), columns);
+            let free = n - columns.len() as f64;
+            let restricted =
+                -0.5 * (free * s.rss.ln() + s.log_det_noise + s.log_det_normal) + 0.5 * log_walk;
+            (restricted, s)
+        })
+        .collect();
+    let top = points.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
+    let sum: f64 = points.iter().map(|p| (p.0 - top).exp()).sum();
+    points
+        .into_iter()
+        .map(|(r, s)| ((r - top).exp() / sum, s))
+        .collect()
+}
+
+/// Coefficients of all columns with standard errors, averaged over the random walk.
+#[must_use]
+pub fn coefficients(panel: &Panel, state: &State) -> Vec<(f64, f64)> {
+    let columns = state.columns();
+    let mixed = mixture(panel, &state.noise, &columns);
+    (0..columns.len())
+        .map(|i| {
+            let mean: f64 = mixed.iter().map(|(w, s)| w * s.beta[i]).sum();
+            let variance: f64 = mixed
+                .iter()
+                .map(|(w, s)| w * (s.white * s.inverse[i][i] + (s.beta[i] - mean).powi(2)))
+                .sum();
+            (mean, variance.sqrt())
+        })
+        .collect()
+}
+
+/// Coordinates of the noise shape (random walk first) with standard errors from the curvature of the likelihood.
+#[must_use]
+pub fn noise_errors(panel: &Panel, state: &State) -> Vec<f64> {
+    let columns = state.columns();
+    let mut x = vec![state.noise.log_walk];
+    x.extend(state.noise.terms.iter().flat_map(|t| t.1.iter().copied()));
+    let at = |x: &[f64]| {
+        let mut rest = &x[1..];
+        let terms = state
+            .noise
+            .terms
+            .iter()
+            .map(|(c, theta)| {
+                let (own, tail) = rest.split_at(theta.len());
+                rest = tail;
+                (c.clone(), own.to_vec())
+            })
+            .collect();
+        let noise = Noise {
+            log_walk: x[0],
+            terms,
+        };
+        panel
+            .solve(&noise.over(&panel.bins), &columns)
+            .log_likelihood
+    };
+    let h = 0.1;
+    let m = x.len();
+    let shifted = |i: usize, a: f64, j: usize, b: f64| {
+        let mut y = x.clone();
+        y[i] += a * h;
+        y[j] += b * h;
+        at(&y)
+    };
+    let mut information = vec![vec![0.0; m]; m];
+    for i in 0..m {
+        for j in i..m {
+            let mixed =
+                (shifted(i, 1.0, j, 1.0) - shifted(i, 1.0, j, -1.0) - shifted(i, -1.0, j, 1.0)
+                    + shifted(i, -1.0, j, -1.0))
+                    / (4.0 * h * h);
+            information[i][j] = -mixed;
+            information[j][i] = -mixed;
+        }
+    }
+    let (inverse, _) = invert(&information);
+    (0..m)
+        .map(|i| {
+            if inverse[i][i] > 0.0 {
+                inverse[i][i].sqrt()
+            } else {
+                f64::NAN
+            }
+        })
+        .collect()
+}
+
+/// What was found for each term of a state.
+#[must_use]
+pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Found> {
+    let beta = coefficients(panel, state);
+    let errors = noise_errors(panel, state);
+    let n = panel.bins.n as f64;
+    let (mut column, mut coordinate) = (0, 1);
+    let g = |omega: f64| {
+        let k = ((omega / std::f64::consts::PI * n).round() as usize).clamp(1, panel.bins.n - 1);
+        state.noise.everywhere(panel.bins.n)[k]
+    };
+    state
+        .terms
+        .iter()
+        .map(|t| {
+            let own = &beta[column..column + t.columns.len()];
+            column += t.columns.len();
+            let mut found = Found {
+                unit: unit.to_owned(),
+                rate_hz,
+                white_sigma: state.solution.white.sqrt(),
+                names: t.names.clone(),
+                coefficients: own.to_vec(),
+                fixed: t.fixed.clone(),
+                location: vec![],
+            };
+            // Cramer-Rao bound of a frequency, rad per sample: 24 s^2 / (A^2 n^3).
+            let frequency = |omega: f64, amplitude: f64| {
+                let error = (24.0 * state.solution.white * g(omega) / n.powi(3)).sqrt() / amplitude;
+                let hz = rate_hz / std::f64::consts::TAU;
+                (omega * hz, error * hz)
+            };
+            match &t.form {
+                Form::Columns => {}
+                Form::Step(at, error) => found.location.push((at / rate_hz, error / rate_hz)),
+                Form::Line(omega) => found
+                    .location
+                    .push(frequency(*omega, own[0].0.hypot(own[1].0))),
+                Form::SideBands(carrier, distance) => {
+                    found
+                        .location
+                        .push(frequency(*carrier, own[0].0.hypot(own[1].0)));
+                    let bands = own[2].0.hypot(own[3].0).hypot(own[4].0.hypot(own[5].0));
+                    let (_, error) = frequency(*carrier, bands);
+                    found
+                        .location
+                        .push((distance * rate_hz / std::f64::consts::TAU, error));
+                }
+                Form::Shaped(shape, at) => found
+                    .location
+                    .push((*at, shape_error(panel, state, t, shape.as_ref(), *at))),
+                Form::Covariance(_, theta) => {
+                    let own = theta
+                        .iter()
+                        .zip(&errors[coordinate..])
+                        .map(|(v, e)| (*v, *e));
+                    found.coefficients = own.collect();
+                    coordinate += theta.len();
+                }
+            }
+            found
+        })
+        .collect()
+}
+
+/// Standard error of a shape's coordinate: the curvature of the likelihood in its logarithm.
+fn shape_error(
+    panel: &Panel,
+    state: &State,
+    term: &crate::search::Term,
+    shape: &dyn model::effect::Shape,
+    at: f64,
+) -> f64 {
+    let g = state.noise.over(&panel.bins);
+    let others: Vec<usize> = state
+        .columns()
+        .into_iter()
+        .filter(|c| !term.columns.contains(c))
+        .collect();
+    let width = panel.width();
+    let l = |x: f64| {
+        let added: Vec<usize> = shape
+            .columns(x)
+            .iter()
+            .map(|c| panel.add(&c.values))
+            .collect();
+        let l = panel
+            .solve(&g, &[others.clone(), added].concat())
+            .log_likelihood;
+        panel.truncate(width);
+        l
+    };
+    let h: f64 = 0.15;
+    let curvature = (l(at * h.exp()) - 2.0 * l(at) + l(at * (-h).exp())) / (h * h);
+    if curvature < 0.0 {
+        at / (-curvature).sqrt()
+    } else {
+        f64::NAN
+    }
+}

@@ -1,0 +1,232 @@
+//! The figures that convict, and the Allan curve held against replicates.
+
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::diagnosis::Searched;
+use crate::grid::Grid;
+use crate::likelihood::Panel;
+use crate::result::{Evidence, Series, SeriesStyle};
+use crate::search::{Form, State, Term};
+
+/// Replicates of the Allan misfit.
+const REPLICATES: usize = 32;
+/// Points of a figure of blocks.
+const BLOCKS: usize = 60;
+
+/// Overlapping Allan variance by octaves up to a tenth of the record, from the cumulated sum.
+fn allan(y: &[f64]) -> Vec<f64> {
+    let mut sum = vec![0.0];
+    for v in y {
+        sum.push(sum[sum.len() - 1] + v);
+    }
+    let mut all = vec![];
+    let mut m = 1;
+    while m <= y.len() / 10 {
+        let count = sum.len() - 2 * m;
+        let total: f64 = (0..count)
+            .map(|i| (sum[i + 2 * m] - 2.0 * sum[i + m] + sum[i]).powi(2))
+            .sum();
+        all.push(0.5 * (total / count as f64 / (2.0 * (m * m) as f64)).ln());
+        m *= 2;
+    }
+    all
+}
+
+/// sup |z| of ln ADEV against replicates of the model, before and after.
+pub(crate) fn allan_misfit(s: &Searched<'_>, _rate_hz: f64, seed: u64) -> [f64; 2] {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x616c_6c61_6e21);
+    let y = &s.target.y;
+    let panel = &s.search.panel;
+    let n = y.len();
+    let mut against = |state: &State| {
+        let g = state.noise.everywhere(n);
+        let white = state.solution.white;
+        let fitted = modelled(panel, state, &state.terms.iter().collect::<Vec<_>>());
+        let measured: Vec<f64> = y.iter().zip(&fitted).map(|(y, f)| y - f).collect();
+        let target = allan(&measured);
+        let (mut sum, mut square) = (vec![0.0; target.len()], vec![0.0; target.len()]);
+        for _ in 0..REPLICATES {
+            let c: Vec<f64> = g
+                .iter()
+                .enumerate()
+                .map(|(k, g)| {
+                    let e: f64 = StandardNormal.sample(&mut rng);
+                    if k == 0 { 0.0 } else { (white * g).sqrt() * e }
+                })
+                .collect();
+            for (i, v) in allan(&panel.dct.inverse(&c)).into_iter().enumerate() {
+                sum[i] += v;
+                square[i] += v * v;
+            }
+        }
+        let count = REPLICATES as f64;
+        (0..target.len())
+            .map(|i| {
+                let mean = sum[i] / count;
+                let spread = ((square[i] - count * mean * mean) / (count - 1.0)).sqrt();
+                ((target[i] - mean) / spread).abs()
+            })
+            .fold(0.0, f64::max)
+    };
+    [against(&s.baseline), against(&s.state)]
+}
+
+/// What the columns of some terms contribute, in time.
+fn modelled(panel: &Panel, state: &State, terms: &[&Term]) -> Vec<f64> {
+    let n = panel.bins.n;
+    let mut sum = vec![0.0; n];
+    let mut at = 0;
+    for t in &state.terms {
+        let own = &state.solution.beta[at..at + t.columns.len()];
+        at += t.columns.len();
+        if terms.iter().all(|o| o.columns != t.columns) {
+            continue;
+        }
+        for (c, b) in t.columns.iter().zip(own) {
+            sum.iter_mut()
+                .zip(panel.column(*c).iter())
+                .for_each(|(s, x)| *s += b * x);
+        }
+    }
+    panel.dct.inverse(&sum)
+}
+
+fn blocks(values: &[f64], count: usize) -> Vec<f64> {
+    let n = values.len();
+    (0..count)
+        .map(|b| {
+            let part = &values[b * n / count..(b + 1) * n / count];
+            part.iter().sum::<f64>() / part.len().max(1) as f64
+        })
+        .collect()
+}
+
+/// One figure for each term of a channel.
+pub(crate) fn of_channel(s: &Searched<'_>, grid: &Grid) -> Vec<Evidence> {
+    s.state.terms.iter().map(|t| of_term(s, grid, t)).collect()
+}
+
+fn series(label: &str, style: SeriesStyle, x: Vec<f64>, y: Vec<f64>) -> Series {
+    Series {
+        label: label.into(),
+        style,
+        x,
+        y,
+    }
+}
+
+fn of_term(s: &Searched<'_>, grid: &Grid, term: &Term) -> Evidence {
+    let panel = &s.search.panel;
+    let others: Vec<&Term> = s
+        .state
+        .terms
+        .iter()
+        .filter(|t| t.columns != term.columns)
+        .collect();
+    let unit = &s.target.unit;
+    let mut evidence = Evidence {
+        cause: term.effect.id().into(),
+        title: format!("{}: {}", s.target.name, term.effect.docs().title),
+        channel: s.target.name.clone(),
+        x_label: "time, s".into(),
+        y_label: format!("rate, {unit}"),
+        log_x: false,
+        log_y: false,
+        series: vec![],
+        caption: term.effect.docs().figure.into(),
+    };
+    match &term.form {
+        Form::Covariance(..) | Form::Line(_) | Form::SideBands(..) => {
+            spectrum(s, grid, &mut evidence)
+        }
+        _ => {
+            let rest = modelled(panel, &s.state, &others);
+            let mean = s.target.y.iter().sum::<f64>() / s.target.y.len() as f64;
+            let seen: Vec<f64> = s
+                .target
+                .y
+                .iter()
+                .zip(&rest)
+                .map(|(y, r)| y - r - mean)
+                .collect();
+            let fitted = modelled(panel, &s.state, &[term]);
+            let count = BLOCKS.min(seen.len() / 4);
+            let followed = term
+                .follows
+                .as_ref()
+                .and_then(|f| grid.signals.iter().find(|g| g.name == *f));
+            let (x, order) = match followed {
+                Some(signal) => {
+                    evidence.x_label = signal.name.clone();
+                    let x = blocks(&signal.smooth, count);
+                    let mut order: Vec<usize> = (0..count).collect();
+                    order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));
+                    (x, order)
+                }
+                None => {
+                    let time: Vec<f64> = (0..seen.len()).map(|i| i as f64 / grid.rate_hz).collect();
+                    (blocks(&time, count), (0..count).collect())
+                }
+            };
+            let (seen, fitted) = (blocks(&seen, count), blocks(&fitted, count));
+            let pick = |v: &[f64]| -> Vec<f64> { order.iter().map(|i| v[*i]).collect() };
+            evidence.series = vec![
+                series(
+                    "measured, other terms taken out",
+                    SeriesStyle::Points,
+                    pick(&x),
+                    pick(&seen),
+                ),
+                series("model", SeriesStyle::Line, pick(&x), pick(&fitted)),
+            ];
+        }
+    }
+    evidence
+}
+
+/// Amplitude density of the rate with the models before and after.
+fn spectrum(s: &Searched<'_>, grid: &Grid, evidence: &mut Evidence) {
+    let panel = &s.search.panel;
+    let n = panel.bins.n;
+    let c = panel.column(0);
+    let hz: Vec<f64> = panel
+        .bins
+        .at
+        .omega
+        .iter()
+        .map(|w| w / std::f64::consts::TAU * grid.rate_hz)
+        .collect();
+    // One-sided density: 2 var / rate.
+    let ones: Vec<f64> = vec![1.0; n];
+    let counts = panel.bins.products(&ones, &ones);
+    let density: Vec<f64> = panel
+        .bins
+        .products(&c, &c)
+        .iter()
+        .zip(&counts)
+        .map(|(e, m)| (2.0 * e / m / grid.rate_hz).sqrt())
+        .collect();
+    let model = |state: &State| -> Vec<f64> {
+        state
+            .noise
+            .over(&panel.bins)
+            .iter()
+            .map(|g| (2.0 * state.solution.white * g / grid.rate_hz).sqrt())
+            .collect()
+    };
+    (evidence.log_x, evidence.log_y) = (true, true);
+    evidence.x_label = "frequency, Hz".into();
+    evidence.y_label = format!("density, {}/sqrt(Hz)", s.target.unit);
+    evidence.series = vec![
+        series("measured", SeriesStyle::Points, hz.clone(), density),
+        series(
+            "noise model before",
+            SeriesStyle::Line,
+            hz.clone(),
+            model(&s.baseline),
+        ),
+        series("noise model after", SeriesStyle::Line, hz, model(&s.state)),
+    ];
+}

@@ -1,0 +1,213 @@
+//! What a term gains on data that its fit has not seen.
+//!
+//! Prequential Bayes score: the marginal likelihood m of the first n_j samples (mean and coefficients flat, white
+//! variance by Jeffreys, in closed form; random walk and sizes of stationary terms mixed over a grid), and for each of
+//! twelve blocks ln m(1..n_j) - ln m(1..n_{j-1}) of the extended model minus the same of the model without the term.
+
+use std::rc::Rc;
+
+use statrs::function::gamma::ln_gamma;
+
+use crate::likelihood::{Bins, Dct, Noise, Panel, least_walk};
+use crate::search::{Form, State};
+
+/// Blocks, and the part of the record before the first.
+const BLOCKS: usize = 12;
+const BEFORE: f64 = 0.4;
+/// Random walks of the mixture.
+const WALKS: u32 = 12;
+
+/// Score of a term.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Score {
+    /// Extended minus reduced, nats, on all blocks.
+    pub nats: f64,
+    /// Its standard error from the spread of the blocks.
+    pub std_error: f64,
+    /// rms angle error, deg, (reduced, extended), over 10 s and 100 s, where the held-out part has three such windows.
+    pub angle: Vec<(&'static str, [f64; 2])>,
+}
+
+fn log_sum(values: &[f64]) -> f64 {
+    let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln()
+}
+
+/// A prefix of the record under one model: ln m, the coefficients and the random walk that fit it best.
+struct Prefix {
+    log_m: f64,
+    beta: Vec<f64>,
+    log_walk: f64,
+}
+
+fn marginal(
+    panel: &Panel,
+    state: &State,
+    columns: &[usize],
+    skip: Option<usize>,
+    walk: f64,
+) -> Prefix {
+    // Sizes of stationary terms are averaged over a factor of e^2 either way of the fitted one.
+    let sizes: &[f64] = if state
+        .terms
+        .iter()
+        .enumerate()
+        .any(|(i, t)| Some(i) != skip && matches!(t.form, Form::Covariance(..)))
+    {
+        &[-2.0, -1.0, 0.0, 1.0, 2.0]
+    } else {
+        &[0.0]
+    };
+    let n = panel.bins.n as f64;
+    let low = least_walk(panel.bins.n).min(walk - 4.0);
+    let step = (walk + 3.0 - low) / f64::from(WALKS);
+    let mut all = vec![];
+    let mut best = (f64::NEG_INFINITY, vec![], walk);
+    for size in sizes {
+        let terms: Vec<_> = state
+            .terms
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| Some(*i) != skip)
+            .filter_map(|(_, t)| match &t.form {
+                Form::Covariance(c, theta) => {
+                    let mut theta = theta.clone();
+                    let bound = c.bounds(panel.bins.n)[0];
+                    theta[0] = (theta[0] + size).clamp(bound.0, bound.1);
+                    Some((c.clone(), theta))
+                }
+                _ => None,
+            })
+            .collect();
+        for i in 0..=WALKS {
+            let noise = Noise {
+                log_walk: low + step * f64::from(i),
+                terms: terms.clone(),
+            };
+            let s = panel.solve(&noise.over(&panel.bins), columns);
+            let free = (n - 1.0 - columns.len() as f64) / 2.0;
+            let log_m =
+                ln_gamma(free) - free * s.rss.ln() - 0.5 * (s.log_det_noise + s.log_det_normal);
+            if log_m > best.0 {
+                best = (log_m, s.beta, noise.log_walk);
+            }
+            all.push(log_m);
+        }
+    }
+    Prefix {
+        log_m: log_sum(&all) - (all.len() as f64).ln(),
+        beta: best.1,
+        log_walk: best.2,
+    }
+}
+
+/// Score each term of a state on a channel; `columns_of(term)` gives its columns in samples.
+#[must_use]
+pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) -> Vec<Score> {
+    let n = y.len();
+    let ends: Vec<usize> = (0..=BLOCKS)
+        .map(|j| ((BEFORE + (1.0 - BEFORE) * j as f64 / BLOCKS as f64) * n as f64).round() as usize)
+        .collect();
+    let models: Vec<Option<usize>> = (0..state.terms.len()).map(Some).chain([None]).collect();
+    let mut log_m = vec![vec![]; models.len()];
+    let windows: Vec<(&'static str, usize)> = [("10s", 10.0), ("100s", 100.0)]
+        .iter()
+        .map(|(name, s)| (*name, (s * rate_hz).round() as usize))
+        .filter(|(_, w)| *w >= 2 && 3 * w <= n - ends[0])
+        .collect();
+    let mut squares = vec![vec![(0.0, 0usize); windows.len()]; models.len()];
+    for (j, end) in ends.iter().enumerate() {
+        let (dct, bins) = (Dct::new(*end), Rc::new(Bins::new(*end)));
+        let panel = Panel::new(&dct, &bins, &y[..*end]);
+        let columns: Vec<Vec<usize>> = values
+            .iter()
+            .map(|term| term.iter().map(|c| panel.add(&c[..*end])).collect())
+            .collect();
+        for (m, skip) in models.iter().enumerate() {
+            let used: Vec<usize> = columns
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| Some(*i) != *skip)
+                .flat_map(|(_, c)| c.clone())
+                .collect();
+            let prefix = marginal(&panel, state, &used, *skip, state.noise.log_walk);
+            log_m[m].push(prefix.log_m);
+            let Some(next) = ends.get(j + 1) else {
+                continue;
+            };
+            let shapes: Vec<&Vec<f64>> = values
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| Some(*i) != *skip)
+                .flat_map(|(_, c)| c)
+                .collect();
+            let rest: Vec<f64> = (0..n)
+                .map(|i| {
+                    y[i] - shapes
+                        .iter()
+                        .zip(&prefix.beta)
+                        .map(|(x, b)| x[i] * b)
+                        .sum::<f64>()
+                })
+                .collect();
+            for (w, (_, length)) in windows.iter().enumerate() {
+                add_angles(
+                    &rest,
+                    prefix.log_walk,
+                    (*end, *next),
+                    *length,
+                    rate_hz,
+                    &mut squares[m][w],
+                );
+            }
+        }
+    }
+    let full = log_m.len() - 1;
+    (0..state.terms.len())
+        .map(|i| {
+            let gains: Vec<f64> = (1..=BLOCKS)
+                .map(|j| (log_m[full][j] - log_m[full][j - 1]) - (log_m[i][j] - log_m[i][j - 1]))
+                .collect();
+            let nats: f64 = gains.iter().sum();
+            let mean = nats / BLOCKS as f64;
+            let spread =
+                gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (BLOCKS - 1) as f64;
+            let rms = |m: usize, w: usize| (squares[m][w].0 / squares[m][w].1.max(1) as f64).sqrt();
+            let angle = windows
+                .iter()
+                .enumerate()
+                .map(|(w, (name, _))| (*name, [rms(i, w), rms(full, w)]))
+                .collect();
+            Score {
+                nats,
+                std_error: (spread * BLOCKS as f64).sqrt(),
+                angle,
+            }
+        })
+        .collect()
+}
+
+/// Angle errors of windows that start in (from, to), the filter's level held from their start.
+fn add_angles(
+    rest: &[f64],
+    log_walk: f64,
+    span: (usize, usize),
+    length: usize,
+    rate_hz: f64,
+    sum: &mut (f64, usize),
+) {
+    let lambda = log_walk.exp();
+    let (mut level, mut p) = (rest[0], 1.0);
+    for (i, v) in rest.iter().enumerate().take(span.1) {
+        // Windows start at multiples of their length from the start of the held-out part.
+        if i >= span.0 && i % length == 0 && i + length <= rest.len() {
+            let angle: f64 = rest[i..i + length].iter().map(|v| v - level).sum::<f64>() / rate_hz;
+            sum.0 += angle * angle;
+            sum.1 += 1;
+        }
+        p += lambda;
+        let gain = p / (p + 1.0);
+        level += gain * (v - level);
+        p *= 1.0 - gain;
+    }
+}

@@ -1,0 +1,323 @@
+//! From a record to an even grid: gaps found by the sequence numbers, lost samples filled so that the likelihood cannot
+//! tell, slow channels smoothed, motion of the base noticed.
+
+use std::rc::Rc;
+
+use model::effect::Signal;
+use model::record::{Axis, Base, Channel, Quantity, Record};
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::error::AnalysisError;
+use crate::likelihood::{Bins, Dct, Noise, Panel};
+
+/// Least number of samples of a gyro.
+pub const LEAST_SAMPLES: usize = 600;
+/// Least length, s.
+pub const LEAST_SECONDS: f64 = 30.0;
+/// Rate between [`MOTION_BAND_HZ`] beyond what a bias can wander, deg/s rms.
+const MOTION_RMS: f64 = 0.3;
+const MOTION_BAND_HZ: (f64, f64) = (0.02, 0.6);
+
+/// A gyro on the grid.
+pub struct Target {
+    /// Channel name.
+    pub name: String,
+    /// Axis.
+    pub axis: Option<Axis>,
+    /// Unit of `y`.
+    pub unit: String,
+    /// Unit per count.
+    pub lsb: Option<f64>,
+    /// Readings, lost ones filled.
+    pub y: Vec<f64>,
+    /// Grid places without a reading.
+    pub lost: Vec<usize>,
+    /// Excess rms in the band of base motion, deg/s.
+    pub motion_rms: f64,
+    /// Whether that is more than a bias can wander.
+    pub moving: bool,
+    /// Baseline noise as first fitted, and its white variance.
+    pub noise: Noise,
+    /// White variance.
+    pub white: f64,
+}
+
+/// A record on its grid.
+pub struct Grid {
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Places.
+    pub n: usize,
+    /// Transform of that length.
+    pub dct: Dct,
+    /// Its bins.
+    pub bins: Rc<Bins>,
+    /// What the base did.
+    pub base: Option<Base>,
+    /// The gyros.
+    pub targets: Vec<Target>,
+    /// All channels, gyros included.
+    pub signals: Vec<Signal>,
+}
+
+/// Sample rate of a record: the header's, else from device or host times.
+#[must_use]
+pub fn rate_of(record: &Record) -> Option<f64> {
+    let from_times = || {
+        let t = record.host_time_s.as_ref()?;
+        let (first, last) = (t.first()?, t.last()?);
+        Some((t.len() - 1) as f64 / (last - first))
+    };
+    record
+        .header
+        .rate_hz
+        .or_else(from_times)
+        .filter(|r| r.is_finite() && *r > 0.0)
+}
+
+/// Place of every row on the grid, and the number of places.
+fn places(record: &Record) -> (Vec<usize>, usize) {
+    let rows = record.len();
+    let even = || ((0..rows).collect(), rows);
+    let Some(seq) = record.seq.as_ref().filter(|s| s.len() == rows && rows > 0) else {
+        return even();
+    };
+    let ascending = seq.windows(2).all(|w| w[1] > w[0]);
+    let span = seq[rows - 1].saturating_sub(seq[0]) as usize + 1;
+    // A sequence that leaps by more than the record is no count of samples.
+    if !ascending || span > 4 * rows {
+        return even();
+    }
+    (seq.iter().map(|s| (s - seq[0]) as usize).collect(), span)
+}
+
+fn spread(values: &[f64], places: &[usize], n: usize, masked: &[usize]) -> Vec<f64> {
+    let mut grid = vec![f64::NAN; n];
+    for (v, p) in values.iter().zip(places) {
+        grid[*p] = *v;
+    }
+    for row in masked {
+        if let Some(p) = places.get(*row) {
+            grid[*p] = f64::NAN;
+        }
+    }
+    grid
+}
+
+fn interpolated(values: &[f64]) -> Vec<f64> {
+    let known: Vec<usize> = (0..values.len())
+        .filter(|i| values[*i].is_finite())
+        .collect();
+    let mut out = values.to_vec();
+    let (Some(first), Some(last)) = (known.first(), known.last()) else {
+        return vec![0.0; values.len()];
+    };
+    out[..*first].fill(values[*first]);
+    out[*last..].fill(values[*last]);
+    for pair in known.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        for i in a + 1..b {
+            out[i] = values[a] + (values[b] - values[a]) * (i - a) as f64 / (b - a) as f64;
+        }
+    }
+    out
+}
+
+/// White variance from first differences, robust against steps and spikes.
+fn white_by_differences(y: &[f64]) -> f64 {
+    let mut d: Vec<f64> = y
+        .windows(2)
+        .map(|w| (w[1] - w[0]).abs())
+        .filter(|d| d.is_finite())
+        .collect();
+    if d.is_empty() {
+        return 0.0;
+    }
+    let middle = d.len() / 2;
+    let (_, median, _) = d.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median / 0.6745).powi(2) / 2.0
+}
+
+/// Put a record on its grid. `masked(name)` gives the rows of a channel that are not to be believed.
+///
+/// # Errors
+/// As [`crate::diagnose`].
+pub fn lay_out(
+    record: &Record,
+    masked: &dyn Fn(&str) -> Vec<usize>,
+    seed: u64,
+) -> Result<Grid, AnalysisError> {
+    let rate_hz = rate_of(record).ok_or(AnalysisError::NoRate)?;
+    let gyros: Vec<&Channel> = record.all(Quantity::Gyro).collect();
+    if gyros.is_empty() {
+        let present = record.channels.iter().map(|c| c.name.clone()).collect();
+        return Err(AnalysisError::NoChannel {
+            name: "gyro_x, gyro_y or gyro_z".into(),
+            present,
+        });
+    }
+    let (places, n) = places(record);
+    let seconds = n as f64 / rate_hz;
+    let short = |have: f64, need: f64, unit| AnalysisError::Inconclusive {
+        what: "a diagnosis".into(),
+        have,
+        need,
+        unit,
+    };
+    if n < LEAST_SAMPLES {
+        return Err(short(n as f64, LEAST_SAMPLES as f64, "samples"));
+    }
+    if seconds < LEAST_SECONDS {
+        return Err(short(seconds, LEAST_SECONDS, "s"));
+    }
+    let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
+    let mut targets = vec![];
+    for channel in gyros {
+        let (scale, unit) = match channel.unit.as_str() {
+            "rad/s" => (180.0 / std::f64::consts::PI, "deg/s".to_owned()),
+            other => (1.0, other.to_owned()),
+        };
+        let mut y = spread(&channel.values, &places, n, &masked(&channel.name));
+        y.iter_mut().for_each(|v| *v *= scale);
+        let lost: Vec<usize> = (0..n).filter(|i| !y[*i].is_finite()).collect();
+        if n - lost.len() < LEAST_SAMPLES {
+            return Err(short(
+                (n - lost.len()) as f64,
+                LEAST_SAMPLES as f64,
+                "samples",
+            ));
+        }
+        let guess =
+            white_by_differences(&y).max(channel.lsb.map_or(0.0, |l| (l * scale).powi(2) / 12.0));
+        let constant = y
+            .iter()
+            .filter(|v| v.is_finite())
+            .all(|v| Some(v) == y.iter().find(|v| v.is_finite()));
+        if constant || guess <= 0.0 && white_of(&y) <= 0.0 {
+            let value = channel
+                .values
+                .iter()
+                .copied()
+                .find(|v| v.is_finite())
+                .unwrap_or(f64::NAN);
+            return Err(AnalysisError::Constant {
+                name: channel.name.clone(),
+                value,
+            });
+        }
+        let given = y.clone();
+        let mut fit = (Noise::new(0.0), guess.max(1e-300));
+        crate::kalman::fill(&mut y, fit.1, fit.1 * 1e-4, &mut rng);
+        for pass in 0..2 {
+            let panel = Panel::new(&dct, &bins, &y);
+            let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
+            fit = (noise, solution.white);
+            if lost.is_empty() || pass == 1 {
+                break;
+            }
+            y = given.clone();
+            crate::kalman::fill(&mut y, fit.1, fit.1 * fit.0.log_walk.exp(), &mut rng);
+        }
+        let motion_rms = if unit == "deg/s" {
+            motion(&dct.forward(&y), n, rate_hz)
+        } else {
+            0.0
+        };
+        targets.push(Target {
+            name: channel.name.clone(),
+            axis: channel.axis,
+            unit,
+            lsb: channel.lsb.map(|l| l * scale),
+            y,
+            lost,
+            motion_rms,
+            moving: motion_rms > MOTION_RMS,
+            noise: fit.0,
+            white: fit.1,
+        });
+    }
+    let signals = record
+        .channels
+        .iter()
+        .map(|c| signal(c, &places, n, &dct, &bins, &targets))
+        .collect();
+    Ok(Grid {
+        rate_hz,
+        n,
+        dct,
+        bins,
+        base: record.header.base,
+        targets,
+        signals,
+    })
+}
+
+fn white_of(y: &[f64]) -> f64 {
+    let d: Vec<f64> = y
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .filter(|d| d.is_finite())
+        .collect();
+    d.iter().map(|d| d * d).sum::<f64>() / (2.0 * d.len().max(1) as f64)
+}
+
+/// Excess rms in the band of base motion, white noise taken off.
+fn motion(c: &[f64], n: usize, rate_hz: f64) -> f64 {
+    let k_of = |f: f64| ((2.0 * f / rate_hz * n as f64) as usize).clamp(1, n - 1);
+    let (low, high) = (k_of(MOTION_BAND_HZ.0), k_of(MOTION_BAND_HZ.1));
+    let mut above: Vec<f64> = c[high..].iter().map(|v| v * v).collect();
+    let middle = above.len() / 2;
+    // Median of chi-square(1) is 0.4549.
+    let white = if above.is_empty() {
+        0.0
+    } else {
+        *above.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.4549
+    };
+    let band: f64 = c[low..high].iter().map(|v| v * v - white).sum();
+    (band.max(0.0) / n as f64).sqrt()
+}
+
+fn signal(
+    c: &Channel,
+    places: &[usize],
+    n: usize,
+    dct: &Dct,
+    bins: &Rc<Bins>,
+    targets: &[Target],
+) -> Signal {
+    let target = targets.iter().find(|t| t.name == c.name);
+    let values = target.map_or_else(
+        || interpolated(&spread(&c.values, places, n, &[])),
+        |t| t.y.clone(),
+    );
+    let smooth = match c.quantity {
+        Quantity::Temp | Quantity::Supply => smoothed(&values, dct, bins),
+        _ => values.clone(),
+    };
+    Signal {
+        name: c.name.clone(),
+        quantity: c.quantity,
+        axis: c.axis,
+        values,
+        smooth,
+        lsb: c.lsb,
+        moving: target.is_some_and(|t| t.moving),
+    }
+}
+
+/// The level of a local-level model fitted to `values`: every coefficient shrunk by the random walk's share.
+fn smoothed(values: &[f64], dct: &Dct, bins: &Rc<Bins>) -> Vec<f64> {
+    let panel = Panel::new(dct, bins, values);
+    let mut c = panel.column(0).to_vec();
+    if c[1..].iter().all(|v| v.abs() < 1e-9) {
+        return values.to_vec();
+    }
+    let (noise, _) = panel.fit(&Noise::new(-12.0), &[]);
+    let g = noise.everywhere(values.len());
+    for (v, g) in c.iter_mut().zip(g).skip(1) {
+        *v *= 1.0 - 1.0 / g;
+    }
+    dct.inverse(&c)
+}

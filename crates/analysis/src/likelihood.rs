@@ -1,0 +1,510 @@
+//! The likelihood of white noise + random walk + regressors + stationary terms, in the DCT-II domain.
+//!
+//! The DCT-II diagonalises a flat-start random walk plus white noise exactly (the path graph's Laplacian has it as
+//! eigenvectors): the coefficients c_k, k = 1..N-1, are independent with var c_k = s² g_k,
+//! g_k = h(w_k) + lambda / (2 - 2 cos w_k) + further densities, w_k = pi k / N. What a fit needs of the data are sums
+//! of products of coefficients over bins in which g hardly changes: singly at low frequency, then 1 % wide.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use model::effect::{Covariance, Frequencies};
+use rustdct::{DctPlanner, TransformType2And3};
+
+/// Bins of single coefficients at the low end.
+const SINGLE: usize = 256;
+/// Width of the other bins over their frequency.
+const WIDTH: f64 = 0.01;
+
+/// The orthonormal DCT-II of one length.
+#[derive(Clone)]
+pub struct Dct {
+    plan: Arc<dyn TransformType2And3<f64>>,
+    n: usize,
+}
+
+impl Dct {
+    /// Plan for `n` samples.
+    #[must_use]
+    pub fn new(n: usize) -> Self {
+        Self {
+            plan: DctPlanner::new().plan_dct2(n),
+            n,
+        }
+    }
+
+    /// Coefficients of `x`.
+    #[must_use]
+    pub fn forward(&self, x: &[f64]) -> Vec<f64> {
+        let mut c = x.to_vec();
+        self.plan.process_dct2(&mut c);
+        let scale = (2.0 / self.n as f64).sqrt();
+        c.iter_mut().for_each(|v| *v *= scale);
+        if let Some(first) = c.first_mut() {
+            *first /= 2f64.sqrt();
+        }
+        c
+    }
+
+    /// Samples from coefficients.
+    #[must_use]
+    pub fn inverse(&self, c: &[f64]) -> Vec<f64> {
+        let scale = (2.0 / self.n as f64).sqrt();
+        let mut x: Vec<f64> = c.iter().map(|v| v * scale).collect();
+        if let Some(first) = x.first_mut() {
+            *first *= 2f64.sqrt();
+        }
+        self.plan.process_dct3(&mut x);
+        x
+    }
+}
+
+/// The bins of a length.
+#[derive(Clone, Debug)]
+pub struct Bins {
+    /// Samples.
+    pub n: usize,
+    /// First coefficient of each bin, and the end.
+    start: Vec<usize>,
+    /// Middle of each bin.
+    pub at: Frequencies,
+    /// Random-walk shape 1 / (2 - 2 cos w).
+    walk: Vec<f64>,
+}
+
+fn walk_shape(omega: f64) -> f64 {
+    1.0 / (4.0 * (omega / 2.0).sin().powi(2))
+}
+
+impl Bins {
+    /// Bins for `n` samples.
+    #[must_use]
+    pub fn new(n: usize) -> Self {
+        let mut start = vec![];
+        let mut k = 1;
+        while k < n {
+            start.push(k);
+            k += if k < SINGLE {
+                1
+            } else {
+                ((k as f64 * WIDTH) as usize).max(1)
+            };
+        }
+        start.push(n);
+        let omega: Vec<f64> = start
+            .windows(2)
+            .map(|w| std::f64::consts::PI * (w[0] + w[1] - 1) as f64 / 2.0 / n as f64)
+            .collect();
+        let cosine = omega.iter().map(|w| w.cos()).collect();
+        let walk = omega.iter().map(|w| walk_shape(*w)).collect();
+        Self {
+            n,
+            start,
+            at: Frequencies { omega, cosine },
+            walk,
+        }
+    }
+
+    /// Sums of a[k] b[k] over each bin.
+    #[must_use]
+    pub fn products(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
+        self.start
+            .windows(2)
+            .map(|w| {
+                a[w[0]..w[1]]
+                    .iter()
+                    .zip(&b[w[0]..w[1]])
+                    .map(|(x, y)| x * y)
+                    .sum()
+            })
+            .collect()
+    }
+}
+
+/// The shape of the noise: everything but its white variance.
+#[derive(Clone)]
+pub struct Noise {
+    /// ln of the random walk's step variance over the white variance.
+    pub log_walk: f64,
+    /// Stationary terms with their coordinates.
+    pub terms: Vec<(Arc<dyn Covariance>, Vec<f64>)>,
+}
+
+impl Noise {
+    /// White noise and a random walk.
+    #[must_use]
+    pub fn new(log_walk: f64) -> Self {
+        Self {
+            log_walk,
+            terms: vec![],
+        }
+    }
+
+    fn shape(&self, at: &Frequencies, walk: &[f64]) -> Vec<f64> {
+        let lambda = self.log_walk.exp();
+        let mut g: Vec<f64> = walk.iter().map(|w| lambda * w).collect();
+        let mut white = None;
+        for (term, theta) in &self.terms {
+            let density = term.density(theta, at);
+            if term.filters_white() {
+                white = Some(density);
+            } else {
+                g.iter_mut().zip(density).for_each(|(g, d)| *g += d);
+            }
+        }
+        match white {
+            Some(w) => g.iter_mut().zip(w).for_each(|(g, w)| *g += w),
+            None => g.iter_mut().for_each(|g| *g += 1.0),
+        }
+        g
+    }
+
+    /// g over the bins.
+    #[must_use]
+    pub fn over(&self, bins: &Bins) -> Vec<f64> {
+        self.shape(&bins.at, &bins.walk)
+    }
+
+    /// g at every coefficient k = 0..n; that of k = 0, which no likelihood uses, is infinite.
+    #[must_use]
+    pub fn everywhere(&self, n: usize) -> Vec<f64> {
+        let omega: Vec<f64> = (0..n)
+            .map(|k| std::f64::consts::PI * k.max(1) as f64 / n as f64)
+            .collect();
+        let cosine = omega.iter().map(|w| w.cos()).collect();
+        let walk: Vec<f64> = omega.iter().map(|w| walk_shape(*w)).collect();
+        let mut g = self.shape(&Frequencies { omega, cosine }, &walk);
+        if let Some(first) = g.first_mut() {
+            *first = f64::INFINITY;
+        }
+        g
+    }
+}
+
+/// Lower bound of `log_walk`: a random walk that changes no coefficient by a thousandth.
+#[must_use]
+pub fn least_walk(n: usize) -> f64 {
+    (1e-3 * (std::f64::consts::PI / n as f64).powi(2)).ln()
+}
+
+/// The data of one channel and all columns that may explain it, as coefficients.
+pub struct Panel {
+    /// Transform.
+    pub dct: Dct,
+    /// Bins.
+    pub bins: Rc<Bins>,
+    columns: RefCell<Vec<Rc<Vec<f64>>>>,
+    pairs: RefCell<HashMap<(usize, usize), Rc<Vec<f64>>>>,
+}
+
+/// Weighted least squares under one noise shape.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Profile log likelihood, nats, up to a constant of the length.
+    pub log_likelihood: f64,
+    /// White variance, maximum likelihood.
+    pub white: f64,
+    /// Residual sum of squares over g.
+    pub rss: f64,
+    /// Coefficients of the columns.
+    pub beta: Vec<f64>,
+    /// Inverse of the normal matrix (covariance of beta over the white variance).
+    pub inverse: Vec<Vec<f64>>,
+    /// ln det of the normal matrix.
+    pub log_det_normal: f64,
+    /// Sum of ln g.
+    pub log_det_noise: f64,
+}
+
+impl Panel {
+    /// A panel on the data `y`, which becomes column 0.
+    #[must_use]
+    pub fn new(dct: &Dct, bins: &Rc<Bins>, y: &[f64]) -> Self {
+        Self {
+            dct: dct.clone(),
+            bins: Rc::clone(bins),
+            columns: RefCell::new(vec![Rc::new(dct.forward(y))]),
+            pairs: RefCell::default(),
+        }
+    }
+
+    /// Add a column of samples; returns its number.
+    pub fn add(&self, values: &[f64]) -> usize {
+        let c = self.dct.forward(values);
+        self.columns.borrow_mut().push(Rc::new(c));
+        self.columns.borrow().len() - 1
+    }
+
+    /// Coefficients of a column.
+    #[must_use]
+    pub fn column(&self, i: usize) -> Rc<Vec<f64>> {
+        Rc::clone(&self.columns.borrow()[i])
+    }
+
+    /// Forget the columns from `length` on.
+    pub fn truncate(&self, length: usize) {
+        self.columns.borrow_mut().truncate(length);
+        self.pairs.borrow_mut().retain(|k, _| k.1 < length);
+    }
+
+    /// Columns held, the data included.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.columns.borrow().len()
+    }
+
+    fn pair(&self, i: usize, j: usize) -> Rc<Vec<f64>> {
+        let key = (i.min(j), i.max(j));
+        if let Some(p) = self.pairs.borrow().get(&key) {
+            return Rc::clone(p);
+        }
+        let columns = self.columns.borrow();
+        let p = Rc::new(self.bins.products(&columns[key.0], &columns[key.1]));
+        self.pairs.borrow_mut().insert(key, Rc::clone(&p));
+        p
+    }
+
+    /// Least squares of the data on `columns` under the shape `g` over the bins.
+    #[must_use]
+    pub fn solve(&self, g: &[f64], columns: &[usize]) -> Solution {
+        let weight: Vec<f64> = g.iter().map(|g| 1.0 / g).collect();
+        let log_det_noise = self
+            .bins
+            .start
+            .windows(2)
+            .zip(g)
+            .map(|(w, g)| (w[1] - w[0]) as f64 * g.ln())
+            .sum();
+        self.solve_weighted(&weight, log_det_noise, columns)
+    }
+
+    /// As [`Panel::solve`], with 1/g and the sum of ln g at hand.
+    #[must_use]
+    pub fn solve_weighted(
+        &self,
+        weight: &[f64],
+        log_det_noise: f64,
+        columns: &[usize],
+    ) -> Solution {
+        let dot = |i, j| -> f64 { self.pair(i, j).iter().zip(weight).map(|(p, w)| p * w).sum() };
+        let m = columns.len();
+        let mut normal = vec![vec![0.0; m]; m];
+        for a in 0..m {
+            for b in a..m {
+                normal[a][b] = dot(columns[a], columns[b]);
+                normal[b][a] = normal[a][b];
+            }
+        }
+        let right: Vec<f64> = columns.iter().map(|c| dot(0, *c)).collect();
+        let (inverse, log_det_normal) = invert(&normal);
+        let beta: Vec<f64> = inverse
+            .iter()
+            .map(|row| row.iter().zip(&right).map(|(a, b)| a * b).sum())
+            .collect();
+        let total = dot(0, 0);
+        let explained: f64 = beta.iter().zip(&right).map(|(a, b)| a * b).sum();
+        let rss = (total - explained).max(total * 1e-12);
+        let n = (self.bins.n - 1) as f64;
+        let white = rss / n;
+        let log_likelihood = -0.5 * (n * white.ln() + log_det_noise);
+        Solution {
+            log_likelihood,
+            white,
+            rss,
+            beta,
+            inverse,
+            log_det_normal,
+            log_det_noise,
+        }
+    }
+
+    /// Maximise over the random walk and the coordinates of all terms, from where `noise` is.
+    #[must_use]
+    pub fn fit(&self, noise: &Noise, columns: &[usize]) -> (Noise, Solution) {
+        if noise.terms.is_empty() {
+            let walk = self.best_walk(noise, columns);
+            let solution = self.solve(&walk.over(&self.bins), columns);
+            return (walk, solution);
+        }
+        let n = self.bins.n;
+        let mut bounds = vec![(least_walk(n), 6.0)];
+        let mut start = vec![noise.log_walk.max(least_walk(n))];
+        let mut steps = vec![1.0];
+        for (term, theta) in &noise.terms {
+            bounds.extend(term.bounds(n));
+            start.extend(theta);
+            steps.extend(theta.iter().map(|_| 0.6));
+        }
+        let unpack = |x: &[f64]| {
+            let mut rest = &x[1..];
+            let terms = noise
+                .terms
+                .iter()
+                .map(|(term, theta)| {
+                    let (own, tail) = rest.split_at(theta.len());
+                    rest = tail;
+                    (Arc::clone(term), own.to_vec())
+                })
+                .collect();
+            Noise {
+                log_walk: x[0],
+                terms,
+            }
+        };
+        let objective = |x: &[f64]| {
+            let inside: Vec<f64> = x
+                .iter()
+                .zip(&bounds)
+                .map(|(v, b)| v.clamp(b.0, b.1))
+                .collect();
+            let outside: f64 = x.iter().zip(&inside).map(|(a, b)| (a - b).powi(2)).sum();
+            outside
+                - self
+                    .solve(&unpack(&inside).over(&self.bins), columns)
+                    .log_likelihood
+        };
+        let best = crate::optimise::nelder_mead(&objective, &start, &steps, 120 + 60 * start.len());
+        let inside: Vec<f64> = best
+            .iter()
+            .zip(&bounds)
+            .map(|(v, b)| v.clamp(b.0, b.1))
+            .collect();
+        let fitted = unpack(&inside);
+        let solution = self.solve(&fitted.over(&self.bins), columns);
+        (fitted, solution)
+    }
+
+    /// The best random walk with the terms held.
+    fn best_walk(&self, noise: &Noise, columns: &[usize]) -> Noise {
+        let (low, high) = (least_walk(self.bins.n), 6.0);
+        let at = |x: f64| {
+            let trial = Noise {
+                log_walk: x,
+                terms: noise.terms.clone(),
+            };
+            self.solve(&trial.over(&self.bins), columns).log_likelihood
+        };
+        let count = 24;
+        let step = (high - low) / f64::from(count);
+        let best = (0..=count)
+            .map(|i| low + step * f64::from(i))
+            .map(|x| (x, at(x)))
+            .fold(
+                (low, f64::NEG_INFINITY),
+                |a, b| if b.1 > a.1 { b } else { a },
+            );
+        let x = crate::optimise::golden(
+            &|x| -at(x),
+            (best.0 - step).max(low),
+            (best.0 + step).min(high),
+            14,
+        );
+        let log_walk = if at(x) > best.1 { x } else { best.0 };
+        Noise {
+            log_walk,
+            terms: noise.terms.clone(),
+        }
+    }
+
+    /// 1/g and sum ln g for random walks about the fitted one: what profiling a candidate needs.
+    #[must_use]
+    pub fn walks(&self, noise: &Noise) -> Vec<(Noise, Vec<f64>, f64)> {
+        let low = least_walk(self.bins.n);
+        let step = std::f64::consts::LN_10;
+        let mut at: Vec<f64> = [-3.0, -2.0, -1.5, -1.0, -0.7, -0.4, -0.2, 0.0, 0.2, 0.5, 1.0]
+            .iter()
+            .map(|d| (noise.log_walk + d * step).max(low))
+            .collect();
+        at.push(low);
+        at.sort_by(f64::total_cmp);
+        at.dedup();
+        at.into_iter()
+            .map(|log_walk| {
+                let trial = Noise {
+                    log_walk,
+                    terms: noise.terms.clone(),
+                };
+                let g = trial.over(&self.bins);
+                let log_det = self
+                    .bins
+                    .start
+                    .windows(2)
+                    .zip(&g)
+                    .map(|(w, g)| (w[1] - w[0]) as f64 * g.ln())
+                    .sum();
+                (trial, g.iter().map(|g| 1.0 / g).collect(), log_det)
+            })
+            .collect()
+    }
+
+    /// Highest log likelihood over the given random walks, with a parabola through the best three.
+    #[must_use]
+    pub fn profile(&self, walks: &[(Noise, Vec<f64>, f64)], columns: &[usize]) -> f64 {
+        let points: Vec<(f64, f64)> = walks
+            .iter()
+            .map(|(noise, weight, log_det)| {
+                (
+                    noise.log_walk,
+                    self.solve_weighted(weight, *log_det, columns)
+                        .log_likelihood,
+                )
+            })
+            .collect();
+        crate::optimise::peak(&points)
+    }
+}
+
+/// Inverse and ln det of a symmetric positive matrix; a direction without information gets no coefficient.
+#[must_use]
+pub fn invert(a: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
+    let m = a.len();
+    let scale: Vec<f64> = (0..m)
+        .map(|i| if a[i][i] > 0.0 { a[i][i].sqrt() } else { 1.0 })
+        .collect();
+    let mut work: Vec<Vec<f64>> = (0..m)
+        .map(|i| (0..m).map(|j| a[i][j] / (scale[i] * scale[j])).collect())
+        .collect();
+    let mut log_det = 0.0;
+    // Gauss-Jordan by sweeps: a pivot below 1e-9 is a column that the others already span.
+    let mut swept = vec![false; m];
+    for k in 0..m {
+        let pivot = work[k][k];
+        if pivot < 1e-9 {
+            continue;
+        }
+        swept[k] = true;
+        log_det += pivot.ln() + 2.0 * scale[k].ln();
+        let row: Vec<f64> = work[k].clone();
+        for i in 0..m {
+            if i == k {
+                continue;
+            }
+            let f = work[i][k] / pivot;
+            for j in 0..m {
+                if j != k {
+                    work[i][j] -= f * row[j];
+                }
+            }
+            work[i][k] = f;
+        }
+        for j in 0..m {
+            work[k][j] = if j == k { -1.0 / pivot } else { row[j] / pivot };
+        }
+    }
+    let inverse = (0..m)
+        .map(|i| {
+            (0..m)
+                .map(|j| {
+                    if swept[i] && swept[j] {
+                        -work[i][j] / (scale[i] * scale[j])
+                    } else {
+                        0.0
+                    }
+                })
+                .collect()
+        })
+        .collect();
+    (inverse, log_det)
+}

@@ -1,0 +1,181 @@
+//! Scans: a step at all times at once, a line at all frequencies at once, side bands, stretches of larger variance.
+
+use rustdct::DctPlanner;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+
+use crate::likelihood::{Noise, Panel, Solution};
+
+/// Longest grid of step times; beyond it the scan is as fine as this many places.
+const LONGEST_STEP_GRID: usize = 1 << 16;
+
+/// Residual coefficients of the data under a solution.
+#[must_use]
+pub fn residual(panel: &Panel, columns: &[usize], solution: &Solution) -> Vec<f64> {
+    let mut r = panel.column(0).to_vec();
+    for (c, b) in columns.iter().zip(&solution.beta) {
+        r.iter_mut()
+            .zip(panel.column(*c).iter())
+            .for_each(|(r, x)| *r -= b * x);
+    }
+    r[0] = 0.0;
+    r
+}
+
+/// Likelihood ratio of a step at each of the grid's times, the random walk profiled; times in samples.
+#[must_use]
+pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Vec<(f64, f64)> {
+    let n = panel.bins.n;
+    let m = n.min(LONGEST_STEP_GRID);
+    let mut planner = DctPlanner::new();
+    let dst = planner.plan_dst1(m - 1);
+    let fft = FftPlanner::<f64>::new().plan_fft_forward(m);
+    let half: Vec<f64> = (0..m)
+        .map(|k| 2.0 * (std::f64::consts::PI * k.max(1) as f64 / (2.0 * n as f64)).sin())
+        .collect();
+    let scale = -(2.0 / n as f64).sqrt();
+    let mut best = vec![f64::NEG_INFINITY; m];
+    for noise in walks {
+        let g = noise.everywhere(n);
+        let solution = panel.solve(&noise.over(&panel.bins), columns);
+        // <step at t, x> under this noise, for all t.
+        let against = |x: &[f64]| {
+            let mut b: Vec<f64> = (1..m).map(|k| scale * x[k] / (g[k] * half[k])).collect();
+            dst.process_dst1(&mut b);
+            b
+        };
+        let a = against(&residual(panel, columns, &solution));
+        let d: Vec<f64> = (0..m)
+            .map(|k| {
+                if k == 0 {
+                    0.0
+                } else {
+                    1.0 / (half[k] * half[k] * g[k])
+                }
+            })
+            .collect();
+        let mut spectrum: Vec<Complex<f64>> = d.iter().map(|v| Complex::new(*v, 0.0)).collect();
+        fft.process(&mut spectrum);
+        let total: f64 = d.iter().sum();
+        let crossed: Vec<Vec<f64>> = columns.iter().map(|c| against(&panel.column(*c))).collect();
+        let count = (n - 1) as f64;
+        for j in 1..m {
+            let mut b = (total - spectrum[j].re) / n as f64;
+            let whole = b;
+            for (p, x) in crossed.iter().enumerate() {
+                for (q, y) in crossed.iter().enumerate() {
+                    b -= x[j - 1] * solution.inverse[p][q] * y[j - 1];
+                }
+            }
+            if b < 1e-6 * whole {
+                continue;
+            }
+            let rss = (solution.rss - a[j - 1] * a[j - 1] / b).max(solution.rss * 1e-9);
+            let l = -0.5 * (count * (rss / count).ln() + solution.log_det_noise);
+            best[j] = best[j].max(2.0 * (l - null));
+        }
+    }
+    let places = n as f64 / m as f64;
+    // A step next to an end is a spike or an offset of a few samples: half a second is left out by the caller.
+    best.into_iter()
+        .enumerate()
+        .skip(1)
+        .map(|(j, lr)| (j as f64 * places, lr))
+        .collect()
+}
+
+/// Amplitudes of the whitened residual at twice the Fourier frequencies: likelihood ratio of a line at k pi / n.
+#[must_use]
+pub fn lines(panel: &Panel, noise: &Noise, columns: &[usize], solution: &Solution) -> Vec<f64> {
+    let n = panel.bins.n;
+    let g = noise.everywhere(n);
+    let r = residual(panel, columns, solution);
+    let weighted: Vec<f64> = r.iter().zip(&g).map(|(r, g)| r / g).collect();
+    let z = panel.dct.inverse(&weighted);
+    let mut spectrum: Vec<Complex<f64>> = z.iter().map(|v| Complex::new(*v, 0.0)).collect();
+    spectrum.resize(2 * n, Complex::new(0.0, 0.0));
+    FftPlanner::<f64>::new()
+        .plan_fft_forward(2 * n)
+        .process(&mut spectrum);
+    let count = (n - 1) as f64;
+    (0..n)
+        .map(|k| {
+            if k == 0 {
+                return 0.0;
+            }
+            let drop = spectrum[k].norm_sqr() * 2.0 * g[k] / n as f64;
+            -count * (1.0 - (drop / solution.rss).min(0.999)).ln()
+        })
+        .collect()
+}
+
+/// Cosine and sine of a frequency in rad per sample.
+#[must_use]
+pub fn sinusoid(n: usize, omega: f64) -> [Vec<f64>; 2] {
+    [
+        (0..n).map(|i| (omega * i as f64).cos()).collect(),
+        (0..n).map(|i| (omega * i as f64).sin()).collect(),
+    ]
+}
+
+/// A stretch of larger (or smaller) variance of unit-variance residuals: (LR, start, end, increase).
+#[must_use]
+pub fn segment(u: &[f64]) -> (f64, usize, usize, f64) {
+    let blocks = 240.min(u.len() / 8).max(2);
+    let edge = |b: usize| b * u.len() / blocks;
+    let mut sums = vec![0.0];
+    for b in 0..blocks {
+        let s: f64 = u[edge(b)..edge(b + 1)].iter().map(|v| v * v).sum();
+        sums.push(sums[b] + s);
+    }
+    let (n, total) = (u.len() as f64, sums[blocks]);
+    let mut best = (0.0, 0, 0, 0.0);
+    for i in 0..blocks {
+        for j in i + 1..=blocks {
+            let inside_n = (edge(j) - edge(i)) as f64;
+            let outside_n = n - inside_n;
+            if outside_n < n / 50.0 || inside_n < n / 100.0 {
+                continue;
+            }
+            let (inside, outside) = (sums[j] - sums[i], total - (sums[j] - sums[i]));
+            let lr = n * (total / n).ln()
+                - inside_n * (inside / inside_n).ln()
+                - outside_n * (outside / outside_n).ln();
+            if lr > best.0 {
+                best = (
+                    lr,
+                    edge(i),
+                    edge(j),
+                    inside / inside_n / (outside / outside_n) - 1.0,
+                );
+            }
+        }
+    }
+    best
+}
+
+/// Likelihood of variance 1 + gamma x shape, its scale profiled: (LR, gamma, standard error).
+#[must_use]
+pub fn variance_law(u: &[f64], shape: &[f64]) -> (f64, f64, f64) {
+    let top = shape.iter().copied().fold(1e-9, f64::max);
+    let n = u.len() as f64;
+    let minus_l = |x: f64| {
+        let gamma = (x.exp() - 1.0) / top;
+        let (mut scaled, mut logs) = (0.0, 0.0);
+        for (u, d) in u.iter().zip(shape) {
+            let v = 1.0 + gamma * d;
+            scaled += u * u / v;
+            logs += v.ln();
+        }
+        0.5 * (n * (scaled / n).ln() + logs)
+    };
+    let x = crate::optimise::golden(&minus_l, -2.0, 3.0, 24);
+    let h = 0.02;
+    let curvature = (minus_l(x + h) - 2.0 * minus_l(x) + minus_l(x - h)) / (h * h);
+    let gamma = (x.exp() - 1.0) / top;
+    (
+        2.0 * (minus_l(0.0) - minus_l(x)),
+        gamma,
+        x.exp() / top / curvature.max(1e-12).sqrt(),
+    )
+}

@@ -1,0 +1,62 @@
+//! What a likelihood ratio has to reach, by the kind of hypothesis: a false one once in 20 000 clean channels.
+//!
+//! The tails are those of chi-square widened for the random walk that is refitted under each hypothesis, and, for
+//! scans, for the number of independent places. `cargo run --release -p analysis --example calibrate` prints the
+//! highest ratios of clean simulated channels beside these limits.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Chance of a false alarm of one hypothesis on one clean channel.
+pub const FALSE_ALARM: f64 = 5e-5;
+/// Refitting the random walk widens the null distribution of slow regressors by this factor.
+const WIDENED: f64 = 1.05;
+
+fn quantile(degrees: usize, places: f64) -> f64 {
+    let p = (FALSE_ALARM / places).max(1e-300);
+    // inverse of the survival function: for small p the inverse cdf of 1 - p is accurate to 1e-4 here.
+    ChiSquared::new(degrees as f64).map_or(f64::INFINITY, |c| c.inverse_cdf(1.0 - p))
+}
+
+/// A regression on `columns` columns, one of `siblings` that the effect offers.
+#[must_use]
+pub fn regression(columns: usize, siblings: usize) -> f64 {
+    WIDENED * quantile(columns, siblings as f64)
+}
+
+/// A shape with one coordinate on a grid.
+#[must_use]
+pub fn shaped(columns: usize) -> f64 {
+    WIDENED * quantile(columns, 2.5)
+}
+
+/// A step anywhere in `n` samples: measured 27.7 at a chance of 1e-4 for 12 000 samples; doubling the length adds as
+/// many places near the ends as in the whole middle, which is why it grows with the double logarithm.
+#[must_use]
+pub fn step(n: usize) -> f64 {
+    let grown = (n as f64).ln().ln() / 12_000f64.ln().ln();
+    quantile(1, 220.0 * grown)
+}
+
+/// A line at any of `n` half-cycle frequencies.
+#[must_use]
+pub fn line(n: usize) -> f64 {
+    quantile(2, 3.0 * n as f64)
+}
+
+/// Side bands at any of `places` distances.
+#[must_use]
+pub fn side_bands(places: usize) -> f64 {
+    quantile(4, 2.0 * places.max(1) as f64)
+}
+
+/// A stationary term with `dimensions` coordinates, one of which is a size that cannot be negative.
+#[must_use]
+pub fn covariance(dimensions: usize) -> f64 {
+    quantile(dimensions, 1.0)
+}
+
+/// A stretch of other variance: any of about 28 000 pairs of ends, strongly overlapping.
+#[must_use]
+pub fn segment() -> f64 {
+    quantile(1, 2000.0)
+}
