@@ -92,17 +92,14 @@ pub fn noise_errors(panel: &Panel, state: &State) -> Vec<f64> {
         y[j] += b * h;
         at(&y)
     };
-    let mut information = vec![vec![0.0; m]; m];
-    for i in 0..m {
-        for j in i..m {
-            let mixed =
-                (shifted(i, 1.0, j, 1.0) - shifted(i, 1.0, j, -1.0) - shifted(i, -1.0, j, 1.0)
-                    + shifted(i, -1.0, j, -1.0))
-                    / (4.0 * h * h);
-            information[i][j] = -mixed;
-            information[j][i] = -mixed;
-        }
-    }
+    let second = |i: usize, j: usize| {
+        (shifted(i, 1.0, j, 1.0) - shifted(i, 1.0, j, -1.0) - shifted(i, -1.0, j, 1.0)
+            + shifted(i, -1.0, j, -1.0))
+            / (4.0 * h * h)
+    };
+    let information: Vec<Vec<f64>> = (0..m)
+        .map(|i| (0..m).map(|j| -second(i.min(j), i.max(j))).collect())
+        .collect();
     let (inverse, _) = invert(&information);
     (0..m)
         .map(|i| {
@@ -174,6 +171,9 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
                     found.coefficients = own.collect();
                     coordinate += theta.len();
                 }
+            }
+            if let Some(stated) = &t.stated {
+                found.coefficients.clone_from(stated);
             }
             found
         })

@@ -117,8 +117,8 @@ fn interpolated(values: &[f64]) -> Vec<f64> {
     out[*last..].fill(values[*last]);
     for pair in known.windows(2) {
         let (a, b) = (pair[0], pair[1]);
-        for i in a + 1..b {
-            out[i] = values[a] + (values[b] - values[a]) * (i - a) as f64 / (b - a) as f64;
+        for (step, v) in out[a + 1..b].iter_mut().enumerate() {
+            *v = values[a] + (values[b] - values[a]) * (step + 1) as f64 / (b - a) as f64;
         }
     }
     out

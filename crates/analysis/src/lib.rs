@@ -3,6 +3,7 @@
 //! Data in, values out: nothing here opens a file, reads a clock or prints.
 
 pub mod checks;
+pub mod contest;
 pub mod diagnosis;
 pub mod error;
 pub mod estimate;

@@ -189,6 +189,9 @@ pub fn least_walk(n: usize) -> f64 {
     (1e-3 * (std::f64::consts::PI / n as f64).powi(2)).ln()
 }
 
+/// Sums over bins by pair of columns.
+type Pairs = HashMap<(usize, usize), Rc<Vec<f64>>>;
+
 /// The data of one channel and all columns that may explain it, as coefficients.
 pub struct Panel {
     /// Transform.
@@ -196,7 +199,7 @@ pub struct Panel {
     /// Bins.
     pub bins: Rc<Bins>,
     columns: RefCell<Vec<Rc<Vec<f64>>>>,
-    pairs: RefCell<HashMap<(usize, usize), Rc<Vec<f64>>>>,
+    pairs: RefCell<Pairs>,
 }
 
 /// Weighted least squares under one noise shape.
@@ -477,17 +480,12 @@ pub fn invert(a: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
         swept[k] = true;
         log_det += pivot.ln() + 2.0 * scale[k].ln();
         let row: Vec<f64> = work[k].clone();
-        for i in 0..m {
-            if i == k {
-                continue;
+        for (_, other) in work.iter_mut().enumerate().filter(|(i, _)| *i != k) {
+            let f = other[k] / pivot;
+            for (j, v) in other.iter_mut().enumerate().filter(|(j, _)| *j != k) {
+                *v -= f * row[j];
             }
-            let f = work[i][k] / pivot;
-            for j in 0..m {
-                if j != k {
-                    work[i][j] -= f * row[j];
-                }
-            }
-            work[i][k] = f;
+            other[k] = f;
         }
         for j in 0..m {
             work[k][j] = if j == k { -1.0 / pivot } else { row[j] / pivot };

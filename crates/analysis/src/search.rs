@@ -61,6 +61,8 @@ pub struct Term {
     pub threshold: f64,
     /// Effects that leave the answer open, with their log odds.
     pub alternatives: Vec<(&'static dyn Effect, f64)>,
+    /// Coefficients found by other means than the fit.
+    pub stated: Option<Vec<(f64, f64)>>,
 }
 
 impl Term {
@@ -202,10 +204,10 @@ impl<'a> Search<'a> {
         };
         let mut fitted = state.noise.terms.iter();
         for t in &mut state.terms {
-            if let Form::Covariance(_, theta) = &mut t.form {
-                if let Some((_, best)) = fitted.next() {
-                    theta.clone_from(best);
-                }
+            if let Form::Covariance(_, theta) = &mut t.form
+                && let Some((_, best)) = fitted.next()
+            {
+                theta.clone_from(best);
             }
         }
         state
@@ -233,6 +235,7 @@ impl<'a> Search<'a> {
             lr,
             threshold,
             alternatives: vec![],
+            stated: None,
         };
         let n = self.panel.bins.n;
         match &candidate.hypothesis {
@@ -538,7 +541,7 @@ impl<'a> Search<'a> {
             state = self.without(&state, i);
         }
         self.find_rivals(&mut state);
-        (baseline, state)
+        (baseline, crate::contest::hold(self, state))
     }
 
     /// A covariance term that swallowed a regressor gives way to it.

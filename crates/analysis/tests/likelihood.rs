@@ -49,9 +49,9 @@ fn a_quarter_of_the_samples_lost_costs_no_bias_of_the_noise() {
     let mut ratios = vec![];
     for seed in 0..8 {
         let mut y = walk(n, 1.0, 2e-5, 100 + seed);
-        for i in 0..n {
+        for (i, v) in y.iter_mut().enumerate() {
             if (i / 40) % 4 == 1 {
-                y[i] = f64::NAN;
+                *v = f64::NAN;
             }
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -68,4 +68,16 @@ fn a_quarter_of_the_samples_lost_costs_no_bias_of_the_noise() {
         (white - 1.0).abs() < 4.0 * (2.0f64 / n as f64 / 8.0).sqrt(),
         "{white}"
     );
+}
+
+#[test]
+fn two_levels_without_height_are_the_gaussian_model() {
+    let n = 3000;
+    let y = walk(n, 1.0, 1e-4, 5);
+    let panel = Panel::new(&Dct::new(n), &Rc::new(Bins::new(n)), &y);
+    let s = panel.solve(&Noise::new(1e-4f64.ln()).over(&panel.bins), &[]);
+    let count = (n - 1) as f64;
+    let gaussian = s.log_likelihood - 0.5 * count * (1.0 + std::f64::consts::TAU.ln());
+    let both = analysis::contest::two_level(&y, &[s.white.ln(), 1e-4f64.ln(), -20.0, 3.0]);
+    assert!((both - gaussian).abs() < 0.05, "{both} {gaussian}");
 }

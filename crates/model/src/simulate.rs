@@ -287,8 +287,8 @@ fn run(
             .collect();
     }
     stage(Stage::Output, &mut s);
-    for axis in 0..3 {
-        let unit = lsb[axis].unwrap_or(0.07326);
+    for (axis, own) in lsb.iter().enumerate() {
+        let unit = own.unwrap_or(0.07326);
         s.counts[axis] = (0..samples)
             .map(|i| {
                 let w = s.scale[axis] * s.motion[axis][i] + s.rate[axis][i] + s.white[axis][i];
