@@ -2,9 +2,12 @@
 //!
 //! Data in, values out: nothing here opens a file, reads a clock or prints.
 
+pub mod allan;
+pub mod analyze;
 pub mod checks;
 pub mod contest;
 pub mod diagnosis;
+pub mod edf;
 pub mod error;
 pub mod estimate;
 mod evidence;
@@ -12,11 +15,17 @@ pub mod gain;
 pub mod grid;
 pub mod kalman;
 pub mod likelihood;
+pub mod noise_fit;
+pub mod noise_id;
 pub mod optimise;
+pub mod paper;
 pub mod result;
+pub mod sampling;
 pub mod scan;
 pub mod search;
 pub mod threshold;
+pub mod units;
 
+pub use analyze::{Analysis, AnalyzeOptions, analyze};
 pub use diagnosis::{DiagnoseOptions, diagnose};
 pub use error::AnalysisError;

@@ -1,0 +1,184 @@
+//! Integrated readings, in runs without gaps.
+
+use std::ops::{Add, Range, Sub};
+
+use super::{Deviation, Estimate, kernels, total};
+
+/// A point of integrated readings: `f64`, or `i64` where the readings are counts and every sum is exact.
+pub trait PhasePoint: Copy + Default + Add<Output = Self> + Sub<Output = Self> {
+    /// As a floating-point number.
+    fn to_f64(self) -> f64;
+}
+
+impl PhasePoint for f64 {
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        self
+    }
+}
+
+impl PhasePoint for i64 {
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        self as f64
+    }
+}
+
+#[derive(Clone, Debug)]
+enum Runs {
+    Counts(Vec<Vec<i64>>),
+    Values(Vec<Vec<f64>>),
+}
+
+/// Integrated readings: a run of `n` samples holds `n + 1` points, the first of them 0.
+#[derive(Clone, Debug)]
+pub struct Phase {
+    runs: Runs,
+    unit_per_count: f64,
+    samples: usize,
+    longest_run: usize,
+}
+
+impl Phase {
+    /// From readings in unit U; `runs` are the rows without a gap between them. The mean over all of them is taken out
+    /// first: no deviation sees it, and the sums stay small.
+    #[must_use]
+    pub fn from_values(values: &[f64], runs: &[Range<usize>]) -> Self {
+        let samples: usize = runs.iter().map(ExactSizeIterator::len).sum();
+        let mean =
+            runs.iter().flat_map(|r| &values[r.clone()]).sum::<f64>() / samples.max(1) as f64;
+        let points = runs
+            .iter()
+            .map(|run| {
+                let mut sum = 0.0;
+                let mut out = Vec::with_capacity(run.len() + 1);
+                out.push(0.0);
+                out.extend(values[run.clone()].iter().map(|v| {
+                    sum += v - mean;
+                    sum
+                }));
+                out
+            })
+            .collect();
+        Self::new(Runs::Values(points), 1.0, runs)
+    }
+
+    /// From counts of `unit_per_count` U each: sums are exact.
+    #[must_use]
+    pub fn from_counts(counts: &[i32], unit_per_count: f64, runs: &[Range<usize>]) -> Self {
+        let samples: usize = runs.iter().map(ExactSizeIterator::len).sum();
+        let total: i64 = runs
+            .iter()
+            .flat_map(|r| &counts[r.clone()])
+            .map(|c| i64::from(*c))
+            .sum();
+        let mean = total / samples.max(1) as i64;
+        let points = runs
+            .iter()
+            .map(|run| {
+                let mut sum = 0i64;
+                let mut out = Vec::with_capacity(run.len() + 1);
+                out.push(0);
+                out.extend(counts[run.clone()].iter().map(|c| {
+                    sum += i64::from(*c) - mean;
+                    sum
+                }));
+                out
+            })
+            .collect();
+        Self::new(Runs::Counts(points), unit_per_count, runs)
+    }
+
+    fn new(points: Runs, unit_per_count: f64, runs: &[Range<usize>]) -> Self {
+        Self {
+            runs: points,
+            unit_per_count,
+            samples: runs.iter().map(ExactSizeIterator::len).sum(),
+            longest_run: runs.iter().map(ExactSizeIterator::len).max().unwrap_or(0),
+        }
+    }
+
+    /// Samples in all runs.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Samples in the longest run.
+    #[must_use]
+    pub fn longest_run(&self) -> usize {
+        self.longest_run
+    }
+
+    /// Samples of each run.
+    #[must_use]
+    pub fn run_lengths(&self) -> Vec<usize> {
+        match &self.runs {
+            Runs::Counts(runs) => runs.iter().map(|r| r.len() - 1).collect(),
+            Runs::Values(runs) => runs.iter().map(|r| r.len() - 1).collect(),
+        }
+    }
+
+    /// Means over `m` samples, of all runs one after the other.
+    #[must_use]
+    pub fn cluster_means(&self, m: usize) -> Vec<f64> {
+        fn means<T: PhasePoint>(runs: &[Vec<T>], m: usize, unit: f64) -> Vec<f64> {
+            runs.iter()
+                .flat_map(|x| {
+                    x.iter()
+                        .step_by(m)
+                        .zip(x.iter().skip(m).step_by(m))
+                        .map(move |(a, b)| (*b - *a).to_f64() * unit / m as f64)
+                })
+                .collect()
+        }
+        match &self.runs {
+            Runs::Counts(runs) => means(runs, m, self.unit_per_count),
+            Runs::Values(runs) => means(runs, m, self.unit_per_count),
+        }
+    }
+
+    pub(super) fn deviation(&self, kind: Deviation, tau0: f64, m: usize) -> Option<Estimate> {
+        fn sum<T: PhasePoint>(runs: &[Vec<T>], kind: Deviation, m: usize) -> (f64, usize) {
+            let mut out = (0.0, 0);
+            for x in runs {
+                let (squares, n) = match kind {
+                    Deviation::Adev => kernels::second_differences(x, m, m),
+                    Deviation::Oadev => kernels::second_differences(x, m, 1),
+                    Deviation::Mdev | Deviation::Tdev => kernels::averaged_second_differences(x, m),
+                    Deviation::Hdev => kernels::third_differences(x, m, m),
+                    Deviation::Ohdev => kernels::third_differences(x, m, 1),
+                    Deviation::Totdev => total::total(x, m),
+                    Deviation::Mtotdev => total::modified_total(x, m),
+                };
+                out.0 += squares;
+                out.1 += n;
+            }
+            out
+        }
+        let (squares, n) = match &self.runs {
+            Runs::Counts(runs) => sum(runs, kind, m),
+            Runs::Values(runs) => sum(runs, kind, m),
+        };
+        if n == 0 {
+            return None;
+        }
+        let mf = m as f64;
+        // The points count samples, so τ₀ cancels: a second difference over m points is m·τ₀·(ȳ₂ − ȳ₁)/τ₀.
+        let factor = match kind {
+            Deviation::Adev | Deviation::Oadev | Deviation::Totdev => 1.0 / (2.0 * mf * mf),
+            Deviation::Mdev | Deviation::Tdev | Deviation::Mtotdev => 1.0 / (2.0 * mf.powi(4)),
+            Deviation::Hdev | Deviation::Ohdev => 1.0 / (6.0 * mf * mf),
+        };
+        let mut deviation = (squares * factor / n as f64).sqrt() * self.unit_per_count;
+        if kind == Deviation::Tdev {
+            deviation *= mf * tau0 / 3f64.sqrt();
+        }
+        Some(Estimate {
+            m,
+            tau_s: mf * tau0,
+            deviation,
+            n,
+        })
+    }
+}

@@ -1,0 +1,456 @@
+//! `imu-stand analyze`: deviations, noise parameters and the paper's figures of every channel.
+
+use std::collections::BTreeMap;
+
+use model::record::{Channel, Quantity, Record};
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
+
+use crate::allan::{Deviation, Phase, TauGrid, deviation};
+use crate::edf::{NoiseType, chi_square_interval, edf};
+use crate::error::AnalysisError;
+use crate::noise_fit::{Estimated, Misfit, NoiseFit, Spectrum, Term, fit, misfit};
+use crate::noise_id::identify;
+use crate::paper::{Figure, paper_figures};
+use crate::sampling::Sampling;
+use crate::units::{Scale, Units};
+
+/// The `format` of an analysis.
+pub const ANALYSIS_FORMAT: &str = "imu-stand-analysis/1";
+
+/// Samples in runs below which no noise parameter is estimated.
+const FIT_NEEDS: usize = 64;
+/// Replicates behind the check of the fit.
+const MISFIT_REPLICATES: usize = 300;
+/// Chance below which the fit is said not to describe the curve.
+const MISFIT_P: f64 = 0.005;
+
+/// Options of [`analyze`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct AnalyzeOptions {
+    /// Deviations to compute.
+    pub deviations: Vec<Deviation>,
+    /// Cluster times.
+    pub taus: TauGrid,
+    /// Channels by name; without it the gyros, the accelerometers and channels of unknown kind.
+    pub channels: Option<Vec<String>>,
+    /// Sample rate that overrides what the record says, Hz.
+    pub rate_hz: Option<f64>,
+    /// Seed of the replicates behind intervals and the check of the fit.
+    pub seed: u64,
+    /// Name of the file, for the report.
+    pub file: String,
+}
+
+impl Default for AnalyzeOptions {
+    fn default() -> Self {
+        Self {
+            deviations: vec![Deviation::Oadev],
+            taus: TauGrid::Octave,
+            channels: None,
+            rate_hz: None,
+            seed: 0,
+            file: String::new(),
+        }
+    }
+}
+
+/// What was analyzed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AnalysisInput {
+    /// File name as the user gave it.
+    pub file: String,
+    /// Time covered by samples, s.
+    pub seconds: f64,
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Rows.
+    pub samples: usize,
+    /// Channels present.
+    pub channels: Vec<String>,
+    /// Interruptions of the record.
+    pub gaps: usize,
+    /// Samples lost in them, as far as they can be counted.
+    pub lost_samples: u64,
+}
+
+/// A deviation at one cluster time, with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeviationPoint {
+    /// Cluster time, s.
+    pub tau_s: f64,
+    /// The deviation, in the unit of the channel (`tdev`: times s).
+    pub deviation: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Equivalent degrees of freedom.
+    pub edf: f64,
+    /// Differences in it.
+    pub n: usize,
+}
+
+/// A figure with its 95 % interval.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// `None` where the record does not establish it.
+    pub value: Option<f64>,
+    /// Standard error; `None` without a value.
+    pub std_error: Option<f64>,
+    /// Lower end.
+    pub low: Option<f64>,
+    /// Upper end; without a value the upper limit.
+    pub high: Option<f64>,
+    /// Unit of all four.
+    pub unit: String,
+}
+
+impl Interval {
+    fn unknown(scale: &Scale) -> Self {
+        Self {
+            value: None,
+            std_error: None,
+            low: None,
+            high: None,
+            unit: scale.unit.clone(),
+        }
+    }
+
+    fn estimated(e: Estimated, scale: &Scale) -> Self {
+        Self {
+            value: e.value.map(|v| v * scale.factor),
+            std_error: e.std_error.map(|v| v * scale.factor),
+            low: Some(e.low * scale.factor),
+            high: Some(e.high * scale.factor),
+            unit: scale.unit.clone(),
+        }
+    }
+
+    fn figure(f: Option<Figure>, scale: &Scale) -> Self {
+        f.map_or_else(
+            || Self::unknown(scale),
+            |f| {
+                Self::estimated(
+                    Estimated {
+                        value: Some(f.value),
+                        std_error: Some(f.std_error),
+                        low: f.low,
+                        high: f.high,
+                    },
+                    scale,
+                )
+            },
+        )
+    }
+}
+
+/// N, B, K, R, Q of IEEE Std 952.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NoiseParameters {
+    /// N.
+    pub angle_random_walk: Interval,
+    /// B.
+    pub bias_instability: Interval,
+    /// K.
+    pub rate_random_walk: Interval,
+    /// R.
+    pub rate_ramp: Interval,
+    /// Q.
+    pub quantization_noise: Interval,
+}
+
+/// The paper's figures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Paper {
+    /// From the line between 0.1 and 10 s.
+    pub angle_random_walk: Interval,
+    /// Level between 10 and 100 s.
+    pub in_run_bias_stability: Interval,
+    /// What a reader has to know.
+    pub notes: Vec<String>,
+}
+
+/// Everything about one channel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChannelAnalysis {
+    /// Unit of the deviations.
+    pub unit: String,
+    /// By name of the deviation.
+    pub deviations: BTreeMap<Deviation, Vec<DeviationPoint>>,
+    /// Noise parameters.
+    pub parameters: NoiseParameters,
+    /// The paper's figures.
+    pub paper: Paper,
+    /// What a reader has to know.
+    pub warnings: Vec<String>,
+    /// Overlapping Allan deviation of the fitted parameters at the cluster times of the octave grid: `[τ in s, σ]`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fitted: Vec<[f64; 2]>,
+}
+
+/// An analysis, exactly as `--json` writes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Analysis {
+    /// [`ANALYSIS_FORMAT`].
+    pub format: String,
+    /// What was analyzed.
+    pub input: AnalysisInput,
+    /// By channel.
+    pub channels: BTreeMap<String, ChannelAnalysis>,
+}
+
+/// Analyze a record.
+///
+/// # Errors
+/// [`AnalysisError::NoChannel`] when a channel asked for is absent or the record has none to analyze,
+/// [`AnalysisError::NoRate`] when its sample rate is unknown, [`AnalysisError::BadOption`] for a rate that is not
+/// positive, [`AnalysisError::Inconclusive`] below 3 samples, [`AnalysisError::Constant`] when nothing in it moves.
+pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, AnalysisError> {
+    let present = || {
+        record
+            .channels
+            .iter()
+            .map(|c| c.name.clone())
+            .collect::<Vec<_>>()
+    };
+    let chosen: Vec<&Channel> = match &options.channels {
+        Some(names) => names
+            .iter()
+            .map(|name| {
+                record
+                    .channel(name)
+                    .ok_or_else(|| AnalysisError::NoChannel {
+                        name: name.clone(),
+                        present: present(),
+                    })
+            })
+            .collect::<Result<_, _>>()?,
+        None => record
+            .channels
+            .iter()
+            .filter(|c| matches!(c.quantity, Quantity::Gyro | Quantity::Acc | Quantity::Other))
+            .collect(),
+    };
+    if chosen.is_empty() {
+        return Err(AnalysisError::NoChannel {
+            name: "gyro_* or acc_*".into(),
+            present: present(),
+        });
+    }
+    if record.len() < 3 {
+        return Err(AnalysisError::Inconclusive {
+            what: "a deviation".into(),
+            have: record.len() as f64,
+            need: 3.0,
+            unit: "samples",
+        });
+    }
+    let sampling = Sampling::of(record, options.rate_hz)?;
+    let mut channels = BTreeMap::new();
+    let mut constant = None;
+    for channel in &chosen {
+        let result = analyze_channel(channel, &sampling, options);
+        if result.deviations.is_empty() {
+            constant.get_or_insert((
+                channel.name.clone(),
+                channel.values.iter().copied().find(|v| v.is_finite()),
+            ));
+        }
+        channels.insert(channel.name.clone(), result);
+    }
+    if channels.values().all(|c| c.deviations.is_empty())
+        && let Some((name, value)) = constant
+    {
+        return Err(AnalysisError::Constant {
+            name,
+            value: value.unwrap_or(f64::NAN),
+        });
+    }
+    Ok(Analysis {
+        format: ANALYSIS_FORMAT.into(),
+        input: AnalysisInput {
+            file: options.file.clone(),
+            seconds: record.len() as f64 * sampling.tau0,
+            rate_hz: 1.0 / sampling.tau0,
+            samples: record.len(),
+            channels: present(),
+            gaps: sampling.runs.len().saturating_sub(1),
+            lost_samples: sampling.lost,
+        },
+        channels,
+    })
+}
+
+fn analyze_channel(
+    channel: &Channel,
+    sampling: &Sampling,
+    options: &AnalyzeOptions,
+) -> ChannelAnalysis {
+    let units = Units::of(channel.quantity, &channel.unit);
+    let tau0 = sampling.tau0;
+    let runs = sampling.runs_of(&channel.values);
+    let mut out = ChannelAnalysis {
+        unit: units.reading.unit.clone(),
+        deviations: BTreeMap::new(),
+        parameters: NoiseParameters {
+            angle_random_walk: Interval::unknown(&units.angle_random_walk),
+            bias_instability: Interval::unknown(&units.bias_instability),
+            rate_random_walk: Interval::unknown(&units.rate_random_walk),
+            rate_ramp: Interval::unknown(&units.rate_ramp),
+            quantization_noise: Interval::unknown(&units.quantization_noise),
+        },
+        paper: Paper {
+            angle_random_walk: Interval::unknown(&units.angle_random_walk),
+            in_run_bias_stability: Interval::unknown(&units.bias_instability),
+            notes: Vec::new(),
+        },
+        warnings: sampling.warnings.clone(),
+        fitted: Vec::new(),
+    };
+    let mut readings = runs.iter().flat_map(|r| &channel.values[r.clone()]);
+    let Some(first) = readings.next() else {
+        out.warnings
+            .push("the channel has no finite reading".into());
+        return out;
+    };
+    if readings.all(|v| v == first) {
+        out.warnings.push(format!(
+            "the channel reads {first} throughout: a sensor at rest has noise, so this is no measurement"
+        ));
+        return out;
+    }
+    let phase = match (&channel.counts, channel.lsb) {
+        (Some(counts), Some(lsb)) if counts.len() == channel.values.len() => {
+            Phase::from_counts(counts, lsb, &runs)
+        }
+        _ => Phase::from_values(&channel.values, &runs),
+    };
+    if runs.len() > 1 {
+        out.warnings.push(format!(
+            "{} interruptions: no difference spans one, so cluster times end at {:.6} s and intervals are wider",
+            runs.len() - 1,
+            (phase.longest_run() / 2) as f64 * tau0
+        ));
+    }
+    for kind in &options.deviations {
+        let scale = if *kind == Deviation::Tdev {
+            &units.time_deviation
+        } else {
+            &units.reading
+        };
+        out.deviations
+            .insert(*kind, curve(&phase, *kind, tau0, options.taus, scale));
+    }
+    if phase.samples() < FIT_NEEDS {
+        out.warnings.push(format!(
+            "inconclusive: noise parameters need {FIT_NEEDS} samples, the channel has {}",
+            phase.samples()
+        ));
+        return out;
+    }
+    let spectrum = Spectrum::of(&channel.values, &runs, tau0);
+    let fitted = fit(&spectrum);
+    out.parameters = NoiseParameters {
+        angle_random_walk: Interval::estimated(fitted.term(Term::White), &units.angle_random_walk),
+        bias_instability: Interval::estimated(fitted.term(Term::Flicker), &units.bias_instability),
+        rate_random_walk: Interval::estimated(
+            fitted.term(Term::RandomWalk),
+            &units.rate_random_walk,
+        ),
+        rate_ramp: Interval::estimated(fitted.rate_ramp, &units.rate_ramp),
+        quantization_noise: Interval::estimated(
+            fitted.term(Term::Quantization),
+            &units.quantization_noise,
+        ),
+    };
+    out.fitted = TauGrid::Octave
+        .factors(phase.longest_run() / 2)
+        .into_iter()
+        .map(|m| [m as f64 * tau0, fitted.deviation(m) * units.reading.factor])
+        .collect();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
+    let ms = TauGrid::Octave.factors(phase.longest_run() / 5);
+    if let Some(found) = misfit(&spectrum, &fitted, &ms, MISFIT_REPLICATES, &mut rng)
+        && found.p_value < MISFIT_P
+    {
+        out.warnings.push(misfit_warning(&found, &fitted, tau0));
+    }
+    if let Some(lsb) = channel.lsb
+        && let Some(n) = fitted.term(Term::White).value
+        && n / tau0.sqrt() < 0.5 * lsb
+    {
+        out.warnings.push(format!(
+            "the noise of a sample is {:.2} steps of the converter: below half a step the readings stick to codes, and \
+             every figure here is in doubt",
+            n / tau0.sqrt() / lsb
+        ));
+    }
+    let figures = paper_figures(&phase, &spectrum, &fitted, &mut rng);
+    out.paper = Paper {
+        angle_random_walk: Interval::figure(figures.angle_random_walk, &units.angle_random_walk),
+        in_run_bias_stability: Interval::figure(
+            figures.in_run_bias_stability,
+            &units.bias_instability,
+        ),
+        notes: figures.notes,
+    };
+    out
+}
+
+fn misfit_warning(found: &Misfit, fitted: &NoiseFit, tau0: f64) -> String {
+    let names: Vec<&str> = Term::ALL
+        .into_iter()
+        .filter(|t| fitted.model.terms[*t as usize])
+        .map(|t| match t {
+            Term::White => "N",
+            Term::Flicker => "B",
+            Term::RandomWalk => "K",
+            Term::Quantization => "Q",
+        })
+        .chain(fitted.model.ramp.then_some("R"))
+        .collect();
+    format!(
+        "the fitted terms ({}) do not describe the curve: sup |z| = {:.1} at {:.3} s, where the deviation is {:.1} % {} the \
+         fit (p = {:.3} over refitted replicates). Parameters and intervals presume the terms; `imu-stand diagnose` looks \
+         for the cause",
+        names.join(", "),
+        found.sup_z,
+        found.worst_m as f64 * tau0,
+        100.0 * (found.ratio - 1.0).abs(),
+        if found.ratio > 1.0 { "above" } else { "below" },
+        found.p_value
+    )
+}
+
+/// A curve with its intervals. Where too few clusters are left to identify the noise, the last type identified holds.
+fn curve(
+    phase: &Phase,
+    kind: Deviation,
+    tau0: f64,
+    grid: TauGrid,
+    scale: &Scale,
+) -> Vec<DeviationPoint> {
+    let runs = phase.run_lengths();
+    let mut noise = NoiseType::WhiteRate;
+    grid.factors(kind.longest(phase.longest_run()))
+        .into_iter()
+        .filter_map(|m| {
+            let e = deviation(phase, kind, tau0, m)?;
+            if let Some(found) = identify(phase, m) {
+                noise = found;
+            }
+            let edf = edf(kind, noise, m, &runs);
+            let (low, high) = chi_square_interval(e.deviation, edf, 0.95);
+            Some(DeviationPoint {
+                tau_s: e.tau_s,
+                deviation: e.deviation * scale.factor,
+                low: low * scale.factor,
+                high: high * scale.factor,
+                edf,
+                n: e.n,
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,247 @@
+//! N, B, K, Q and R of a record by exact likelihood, with intervals.
+//!
+//! White noise, random walk and a constant are always in the model. Flicker, quantization noise of the angle and a ramp
+//! enter when the likelihood asks for them: white noise alone gets no bias instability. Intervals are profile
+//! likelihood within the model chosen; those of the ramp are averaged over the random walk, because the two hide each
+//! other and a plug-in interval is too narrow.
+
+mod likelihood;
+mod replicate;
+mod spectrum;
+
+pub use likelihood::{Maximum, Model};
+pub use replicate::{Misfit, misfit, replicate};
+pub use spectrum::{Bin, Coefficients, Spectrum, Term, model_allan_variance};
+
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use likelihood::{maximize, profile_interval, ramp_given};
+
+/// Half of χ²(1) at 95 %: the fall of the log likelihood at the ends of an interval, nats.
+const DROP_95: f64 = 1.920_73;
+
+/// Likelihood ratio a further variance needs to enter: chance 1e-4 where there is none, the boundary counted (half the
+/// mass of the ratio is at 0).
+const ENTER_VARIANCE: f64 = 13.8;
+
+/// The same for the ramp, two-sided.
+const ENTER_RAMP: f64 = 15.1;
+
+/// An estimate with its 95 % interval, in IEEE Std 952 letters and the channel's unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimated {
+    /// `None` where the record does not establish the term.
+    pub value: Option<f64>,
+    /// Half the interval over 1.96; `None` without a value.
+    pub std_error: Option<f64>,
+    /// Lower end; 0 without a value.
+    pub low: f64,
+    /// Upper end; without a value the upper limit (of the magnitude, for the ramp).
+    pub high: f64,
+}
+
+/// A fit of the noise terms.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NoiseFit {
+    /// Which terms are in the model.
+    pub model: Model,
+    /// Its maximum.
+    pub maximum: Maximum,
+    /// N, B, K, Q in the order of [`Term::ALL`].
+    pub terms: [Estimated; 4],
+    /// R, U/s.
+    pub rate_ramp: Estimated,
+    /// Sample interval, s.
+    pub tau0: f64,
+}
+
+impl NoiseFit {
+    /// One of the variance terms.
+    #[must_use]
+    pub fn term(&self, term: Term) -> Estimated {
+        self.terms[term as usize]
+    }
+
+    /// Allan deviation of the fitted model at `m`, U.
+    #[must_use]
+    pub fn deviation(&self, m: usize) -> f64 {
+        model_allan_variance(&self.maximum.coefficients, self.maximum.ramp, self.tau0, m).sqrt()
+    }
+}
+
+/// Fit the terms to a spectrum.
+#[must_use]
+pub fn fit(spectrum: &Spectrum) -> NoiseFit {
+    let mut model = Model {
+        terms: [true, false, true, false],
+        ramp: false,
+    };
+    let mut maximum = maximize(spectrum, model, None, None);
+    loop {
+        let candidates = [
+            (
+                Model {
+                    terms: with(model.terms, Term::Flicker),
+                    ..model
+                },
+                ENTER_VARIANCE,
+            ),
+            (
+                Model {
+                    terms: with(model.terms, Term::Quantization),
+                    ..model
+                },
+                ENTER_VARIANCE,
+            ),
+            (
+                Model {
+                    ramp: true,
+                    ..model
+                },
+                ENTER_RAMP,
+            ),
+        ];
+        let best = candidates
+            .into_iter()
+            .filter(|(candidate, _)| *candidate != model)
+            .map(|(candidate, threshold)| {
+                let found = maximize(spectrum, candidate, None, None);
+                (
+                    2.0 * (found.log_likelihood - maximum.log_likelihood) - threshold,
+                    candidate,
+                    found,
+                )
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        match best {
+            Some((score, candidate, found)) if score > 0.0 => {
+                model = candidate;
+                maximum = found;
+            }
+            _ => break,
+        }
+    }
+    let tau0 = spectrum.tau0;
+    let terms = Term::ALL.map(|term| {
+        let t = term as usize;
+        let inside = model.terms[t];
+        // A term outside the model is let in for its own upper limit, the others refitted.
+        let wider = Model {
+            terms: with(model.terms, term),
+            ..model
+        };
+        let top = if inside {
+            maximum
+        } else {
+            maximize(spectrum, wider, None, None)
+        };
+        let (low, high) = profile_interval(spectrum, wider, t, &top, DROP_95);
+        let (low, high) = (term.letter(low, tau0), term.letter(high, tau0));
+        if inside && low > 0.0 {
+            Estimated {
+                value: Some(term.letter(maximum.coefficients[t], tau0)),
+                std_error: Some((high - low) / (2.0 * 1.959_964)),
+                low,
+                high,
+            }
+        } else {
+            Estimated {
+                value: None,
+                std_error: None,
+                low: 0.0,
+                high,
+            }
+        }
+    });
+    let rate_ramp = ramp_interval(
+        spectrum,
+        model,
+        &maximum,
+        terms[Term::RandomWalk as usize].high,
+    );
+    NoiseFit {
+        model,
+        maximum,
+        terms,
+        rate_ramp,
+        tau0,
+    }
+}
+
+fn with(mut terms: [bool; 4], term: Term) -> [bool; 4] {
+    terms[term as usize] = true;
+    terms
+}
+
+/// The ramp averaged over the random walk: normal for each K, K weighted by its restricted likelihood on an even grid.
+fn ramp_interval(spectrum: &Spectrum, model: Model, maximum: &Maximum, k_high: f64) -> Estimated {
+    const POINTS: usize = 24;
+    let walk = Term::RandomWalk as usize;
+    let with_ramp = Model {
+        ramp: true,
+        ..model
+    };
+    let mut start = maximum.coefficients;
+    let parts: Vec<(f64, f64, f64)> = (0..POINTS)
+        .map(|i| {
+            let k = 1.5 * k_high * i as f64 / (POINTS - 1) as f64;
+            let q = Term::RandomWalk.coefficient(k, spectrum.tau0);
+            start[walk] = q;
+            let found = maximize(spectrum, with_ramp, Some((walk, q)), Some(&start));
+            start = found.coefficients;
+            let (mean, precision) = ramp_given(spectrum, &found.coefficients);
+            (
+                found.log_likelihood - 0.5 * precision.ln(),
+                mean,
+                precision.sqrt().recip(),
+            )
+        })
+        .collect();
+    let top = parts.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = parts.iter().map(|p| (p.0 - top).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    let standard = Normal::standard();
+    let cdf = |x: f64| {
+        parts
+            .iter()
+            .zip(&weights)
+            .map(|(p, w)| w * standard.cdf((x - p.1) / p.2))
+            .sum::<f64>()
+            / total
+    };
+    let widest = parts
+        .iter()
+        .map(|p| p.1.abs() + 8.0 * p.2)
+        .fold(0.0, f64::max);
+    let quantile = |target: f64| {
+        let (mut a, mut b) = (-widest, widest);
+        for _ in 0..60 {
+            let middle = 0.5 * (a + b);
+            if cdf(middle) < target {
+                a = middle;
+            } else {
+                b = middle;
+            }
+        }
+        0.5 * (a + b)
+    };
+    let (low, high) = (quantile(0.025), quantile(0.975));
+    if model.ramp && low * high > 0.0 {
+        Estimated {
+            value: Some(quantile(0.5)),
+            std_error: Some((high - low) / (2.0 * 1.959_964)),
+            low,
+            high,
+        }
+    } else {
+        Estimated {
+            value: None,
+            std_error: None,
+            low: 0.0,
+            high: high.abs().max(low.abs()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,291 @@
+//! The sample interval of a record, and where it is interrupted.
+
+use std::ops::Range;
+
+use model::record::Record;
+
+use crate::error::AnalysisError;
+
+/// Share of intervals off the median by more than half of it, beyond which times are taken for arrival times that
+/// come in bursts and not for sampling times.
+const BURSTY_SHARE: f64 = 0.05;
+
+/// Evenly spaced stretches of a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sampling {
+    /// Sample interval τ₀, s.
+    pub tau0: f64,
+    /// Rows that follow each other without a gap, in order.
+    pub runs: Vec<Range<usize>>,
+    /// Samples lost in the gaps, as far as they can be counted.
+    pub lost: u64,
+    /// What a reader of the results has to know.
+    pub warnings: Vec<String>,
+}
+
+impl Sampling {
+    /// Of a record: the interval from `rate_hz` (an option of the user), the header, the device's clock or the times of
+    /// the rows, in this order; the gaps from sequence numbers and device ticks, else from the times.
+    ///
+    /// # Errors
+    /// [`AnalysisError::NoRate`] when nothing tells the rate, [`AnalysisError::BadOption`] when `rate_hz` is not
+    /// positive.
+    pub fn of(record: &Record, rate_hz: Option<f64>) -> Result<Self, AnalysisError> {
+        if let Some(rate) = rate_hz
+            && !(rate.is_finite() && rate > 0.0)
+        {
+            return Err(AnalysisError::BadOption {
+                option: "--rate",
+                found: rate.to_string(),
+                expected: "a positive number of samples per second".into(),
+            });
+        }
+        let mut warnings = Vec::new();
+        let device: Option<Vec<f64>> = match (&record.t_ticks, record.header.tick_s) {
+            (Some(ticks), Some(tick_s)) => Some(
+                ticks
+                    .iter()
+                    .map(|t| t.wrapping_sub(ticks[0]) as i64 as f64 * tick_s)
+                    .collect(),
+            ),
+            _ => None,
+        };
+        let device_interval = device.as_deref().and_then(Interval::of);
+        let host_interval = record.host_time_s.as_deref().and_then(Interval::of);
+        let stated = rate_hz
+            .or(record.header.rate_hz.filter(|r| r.is_finite() && *r > 0.0))
+            .map(|r| 1.0 / r);
+        let tau0 = stated
+            .or(device_interval.as_ref().map(|i| i.regular_s))
+            .or(host_interval.as_ref().map(Interval::best_s))
+            .ok_or(AnalysisError::NoRate)?;
+        if let (Some(stated), Some(measured)) = (stated, &device_interval)
+            && (measured.regular_s / stated - 1.0).abs() > 0.01
+        {
+            warnings.push(format!(
+                "the stated interval {stated:.6} s differs from the device's clock, which says {:.6} s: all times here \
+                 follow the stated one",
+                measured.regular_s
+            ));
+        }
+
+        let n = record.len();
+        let mut cut = vec![false; n];
+        let mut lost = 0u64;
+        if let Some(seq) = &record.seq {
+            let mut backwards = 0usize;
+            for i in 1..n.min(seq.len()) {
+                match seq[i].checked_sub(seq[i - 1]) {
+                    Some(1) => {}
+                    Some(step) if step > 1 => {
+                        cut[i] = true;
+                        lost += step - 1;
+                    }
+                    _ => {
+                        cut[i] = true;
+                        backwards += 1;
+                    }
+                }
+            }
+            if backwards > 0 {
+                warnings.push(format!(
+                    "the sequence number repeats or runs backwards at {backwards} rows: treated as interruptions"
+                ));
+            }
+        }
+        if let Some(times) = &device {
+            // A jump of the clock that the sequence number does not show is an interruption all the same.
+            for i in 1..n.min(times.len()) {
+                let step = times[i] - times[i - 1];
+                if !cut[i] && (step > 1.5 * tau0 || step < 0.5 * tau0) {
+                    cut[i] = true;
+                    lost += ((step / tau0).round() as i64 - 1).max(0) as u64;
+                }
+            }
+        } else if record.seq.is_none()
+            && let (Some(times), Some(interval)) = (&record.host_time_s, &host_interval)
+        {
+            if interval.bursty() {
+                warnings.push(format!(
+                    "the times come in bursts ({:.0} % of the steps are off the median by more than half of it), so they \
+                     tell arrival, not sampling: rows are taken as evenly spaced at {:.6} s, and gaps cannot be seen",
+                    100.0 * interval.irregular_share,
+                    tau0
+                ));
+            } else {
+                for i in 1..n.min(times.len()) {
+                    let step = times[i] - times[i - 1];
+                    if !(0.5 * tau0..=1.5 * tau0).contains(&step) {
+                        cut[i] = true;
+                        lost += ((step / tau0).round() as i64 - 1).max(0) as u64;
+                    }
+                }
+            }
+        }
+        let mut runs = Vec::new();
+        let mut start = 0;
+        for (i, &c) in cut.iter().enumerate() {
+            if c {
+                runs.push(start..i);
+                start = i;
+            }
+        }
+        if start < n {
+            runs.push(start..n);
+        }
+        Ok(Self {
+            tau0,
+            runs,
+            lost,
+            warnings,
+        })
+    }
+
+    /// The runs of one channel: those of the record, interrupted wherever the channel has no finite reading.
+    #[must_use]
+    pub fn runs_of(&self, values: &[f64]) -> Vec<Range<usize>> {
+        let mut out = Vec::new();
+        for run in &self.runs {
+            let mut start = run.start;
+            for i in run.clone() {
+                if !values[i].is_finite() {
+                    if i > start {
+                        out.push(start..i);
+                    }
+                    start = i + 1;
+                }
+            }
+            if run.end > start {
+                out.push(start..run.end);
+            }
+        }
+        out
+    }
+}
+
+/// What a column of times says about the interval.
+struct Interval {
+    /// Mean of the steps within half a median of the median, s.
+    regular_s: f64,
+    /// Length over number of steps, s.
+    mean_s: f64,
+    irregular_share: f64,
+}
+
+impl Interval {
+    fn of(times: &[f64]) -> Option<Self> {
+        let mut steps: Vec<f64> = times
+            .windows(2)
+            .map(|w| w[1] - w[0])
+            .filter(|d| d.is_finite())
+            .collect();
+        if steps.len() < 2 {
+            return None;
+        }
+        let mean_s = steps.iter().sum::<f64>() / steps.len() as f64;
+        let middle = steps.len() / 2;
+        let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+        let median = *median;
+        let regular: Vec<f64> = steps
+            .iter()
+            .copied()
+            .filter(|d| (d - median).abs() <= 0.5 * median)
+            .collect();
+        let irregular_share = 1.0 - regular.len() as f64 / steps.len() as f64;
+        let regular_s = regular.iter().sum::<f64>() / regular.len().max(1) as f64;
+        (mean_s > 0.0 && (regular_s > 0.0 || irregular_share > BURSTY_SHARE)).then_some(Self {
+            regular_s,
+            mean_s,
+            irregular_share,
+        })
+    }
+
+    fn bursty(&self) -> bool {
+        self.irregular_share > BURSTY_SHARE
+    }
+
+    fn best_s(&self) -> f64 {
+        if self.bursty() {
+            self.mean_s
+        } else {
+            self.regular_s
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model::record::{Channel, Header, Quantity};
+
+    fn record(n: usize) -> Record {
+        Record {
+            channels: vec![Channel {
+                name: "y".into(),
+                quantity: Quantity::Other,
+                axis: None,
+                unit: "1".into(),
+                values: vec![0.0; n],
+                counts: None,
+                lsb: None,
+            }],
+            ..Record::default()
+        }
+    }
+
+    #[test]
+    fn a_hole_in_the_sequence_numbers_is_a_gap_of_its_length() {
+        let mut r = record(5);
+        r.header.rate_hz = Some(20.0);
+        r.seq = Some(vec![7, 8, 12, 13, 14]);
+        let s = Sampling::of(&r, None).unwrap();
+        assert_eq!((s.runs, s.lost), (vec![0..2, 2..5], 3));
+    }
+
+    #[test]
+    fn rounded_times_give_the_mean_interval_and_a_jump_is_a_gap() {
+        let mut r = record(1000);
+        r.host_time_s = Some(
+            (0..1000)
+                .map(|i| ((if i < 400 { i } else { i + 3 }) as f64 * 0.0503424 * 1e4).round() / 1e4)
+                .collect(),
+        );
+        let s = Sampling::of(&r, None).unwrap();
+        assert!((s.tau0 / 0.0503424 - 1.0).abs() < 1e-4, "{}", s.tau0);
+        assert_eq!((s.runs, s.lost), (vec![0..400, 400..1000], 3));
+    }
+
+    #[test]
+    fn bursts_of_arrival_times_are_told_and_the_mean_rate_is_used() {
+        let mut r = record(1000);
+        // Ten samples at a time, every 0.1 s.
+        r.host_time_s = Some(
+            (0..1000)
+                .map(|i| (i / 10) as f64 * 0.1 + (i % 10) as f64 * 1e-4)
+                .collect(),
+        );
+        let s = Sampling::of(&r, None).unwrap();
+        assert!((s.tau0 / 0.01 - 1.0).abs() < 0.02, "{}", s.tau0);
+        assert_eq!(s.runs, vec![0..1000]);
+        assert!(s.warnings[0].contains("bursts"), "{:?}", s.warnings);
+    }
+
+    #[test]
+    fn without_rate_and_times_there_is_no_answer() {
+        assert_eq!(Sampling::of(&record(10), None), Err(AnalysisError::NoRate));
+        let header = Header {
+            rate_hz: Some(0.0),
+            ..Header::default()
+        };
+        assert_eq!(
+            Sampling::of(
+                &Record {
+                    header,
+                    ..record(10)
+                },
+                None
+            ),
+            Err(AnalysisError::NoRate)
+        );
+    }
+}

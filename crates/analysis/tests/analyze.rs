@@ -1,0 +1,269 @@
+//! `analyze` on whole records: the contract of its JSON, the measured records, and its answers to bad input.
+
+use analysis::allan::{Deviation, TauGrid};
+use analysis::{AnalysisError, AnalyzeOptions, analyze};
+use model::record::{Axis, Channel, Quantity, Record};
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+fn gyro(values: Vec<f64>) -> Record {
+    let mut record = Record {
+        channels: vec![Channel {
+            name: "gyro_z".into(),
+            quantity: Quantity::Gyro,
+            axis: Some(Axis::Z),
+            unit: "deg/s".into(),
+            values,
+            counts: None,
+            lsb: None,
+        }],
+        ..Record::default()
+    };
+    record.header.rate_hz = Some(20.0);
+    record
+}
+
+/// 600 s at 20 Hz of the paper's 5.27 deg/sqrt(h), white.
+fn white(seed: u64) -> Record {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let sigma = 5.27 / 60.0 / 0.05f64.sqrt();
+    gyro(
+        (0..12_000)
+            .map(|_| {
+                let e: f64 = StandardNormal.sample(&mut rng);
+                0.3 + sigma * e
+            })
+            .collect(),
+    )
+}
+
+#[test]
+fn the_json_is_the_contract_and_white_noise_reads_as_5_27_without_a_bias_instability() {
+    let options = AnalyzeOptions {
+        deviations: vec![Deviation::Oadev, Deviation::Mdev],
+        ..AnalyzeOptions::default()
+    };
+    let json = serde_json::to_value(analyze(&white(1), &options).unwrap()).unwrap();
+    assert_eq!(json["format"], "imu-stand-analysis/1");
+    let z = &json["channels"]["gyro_z"];
+    assert_eq!(z["unit"], "deg/s");
+    for kind in ["oadev", "mdev"] {
+        for key in ["tau_s", "deviation", "low", "high", "edf", "n"] {
+            assert!(z["deviations"][kind][0][key].is_number(), "{kind} {key}");
+        }
+    }
+    for (name, unit) in [
+        ("angle_random_walk", "deg/sqrt(h)"),
+        ("bias_instability", "deg/h"),
+        ("rate_random_walk", "deg/s/sqrt(s)"),
+        ("rate_ramp", "deg/s^2"),
+        ("quantization_noise", "deg"),
+    ] {
+        assert_eq!(z["parameters"][name]["unit"], unit);
+        assert!(z["parameters"][name]["high"].is_number(), "{name}");
+    }
+    let n = &z["parameters"]["angle_random_walk"];
+    // Standard error N/sqrt(2·12000) = 0.65 %: 4 of them.
+    assert!(
+        (n["value"].as_f64().unwrap() / 5.27 - 1.0).abs() < 0.026,
+        "{n}"
+    );
+    assert!(z["parameters"]["bias_instability"]["value"].is_null());
+    let paper = &z["paper"];
+    assert!(
+        (paper["angle_random_walk"]["value"].as_f64().unwrap() / 5.27 - 1.0).abs() < 0.15,
+        "{paper}"
+    );
+    assert_eq!(paper["in_run_bias_stability"]["unit"], "deg/h");
+    let notes = paper["notes"].to_string();
+    assert!(
+        notes.contains("supports cluster times up to 60 s"),
+        "{notes}"
+    );
+    assert!(
+        notes.contains("white noise alone explains the flat level"),
+        "{notes}"
+    );
+    assert_eq!(
+        z["warnings"].as_array().unwrap().len(),
+        0,
+        "{}",
+        z["warnings"]
+    );
+}
+
+#[test]
+fn the_same_seed_gives_the_same_answer() {
+    let options = AnalyzeOptions {
+        seed: 7,
+        ..AnalyzeOptions::default()
+    };
+    assert_eq!(
+        analyze(&white(2), &options).unwrap(),
+        analyze(&white(2), &options).unwrap()
+    );
+}
+
+#[test]
+fn missing_readings_are_gaps() {
+    let mut record = white(3);
+    for i in [4000, 4001, 9000] {
+        record.channels[0].values[i] = f64::NAN;
+    }
+    let analysis = analyze(&record, &AnalyzeOptions::default()).unwrap();
+    let z = &analysis.channels["gyro_z"];
+    // Runs of 4000, 4998 and 2999 samples; n − 2m + 1 each.
+    assert_eq!(z.deviations[&Deviation::Oadev][0].n, 3999 + 4997 + 2998);
+    assert!(
+        z.warnings[0].contains("2 interruptions"),
+        "{:?}",
+        z.warnings
+    );
+    assert!(z.parameters.angle_random_walk.value.is_some());
+}
+
+#[test]
+fn bad_input_says_what_to_do() {
+    let mut record = white(4);
+    record.header.rate_hz = None;
+    assert_eq!(
+        analyze(&record, &AnalyzeOptions::default()),
+        Err(AnalysisError::NoRate)
+    );
+    let rate = AnalyzeOptions {
+        rate_hz: Some(20.0),
+        ..AnalyzeOptions::default()
+    };
+    assert!(analyze(&record, &rate).is_ok());
+    let missing = AnalyzeOptions {
+        channels: Some(vec!["gyro_q".into()]),
+        ..rate.clone()
+    };
+    assert_eq!(
+        analyze(&record, &missing).unwrap_err().to_string(),
+        "no channel gyro_q; the record has: gyro_z"
+    );
+    let stuck = gyro(vec![0.25; 100]);
+    assert!(matches!(
+        analyze(&stuck, &rate),
+        Err(AnalysisError::Constant { .. })
+    ));
+    assert!(matches!(
+        analyze(&gyro(vec![0.1, 0.2]), &rate),
+        Err(AnalysisError::Inconclusive { .. })
+    ));
+    let short = analyze(&gyro(vec![0.1, 0.2, 0.15, 0.12]), &rate).unwrap();
+    assert!(short.channels["gyro_z"].warnings[0].contains("inconclusive"));
+}
+
+/// The folder of measured records: `IMU_STAND_DATA`, else `../shared/data` beside the checkout.
+fn data(name: &str) -> Option<std::path::PathBuf> {
+    let folder = std::env::var_os("IMU_STAND_DATA").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
+        Into::into,
+    );
+    let path = folder.join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    println!(
+        "NOT RUN: no {name} in {}; set IMU_STAND_DATA to the folder of measured records",
+        folder.display()
+    );
+    None
+}
+
+#[test]
+fn ref_stable32_ocxo_overlapping_allan() {
+    let (Some(record), Some(table)) = (
+        data("aux_ocxo_fractional_freq_1hz.csv.gz"),
+        data("aux_ocxo_stable32_oadev.txt"),
+    ) else {
+        return;
+    };
+    let text = std::io::read_to_string(flate2::read::GzDecoder::new(
+        std::fs::File::open(record).unwrap(),
+    ))
+    .unwrap();
+    let y: Vec<f64> = text
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .skip(1)
+        .map(|l| l.split(',').nth(1).unwrap().parse().unwrap())
+        .collect();
+    let phase = analysis::allan::Phase::from_values(&y, std::slice::from_ref(&(0..y.len())));
+    let mut compared = 0;
+    for line in std::fs::read_to_string(table)
+        .unwrap()
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+    {
+        let columns: Vec<f64> = line
+            .split_whitespace()
+            .map(|v| v.parse().unwrap())
+            .collect();
+        let [m, _, n, _, _, sigma, _] = columns[..] else {
+            continue;
+        };
+        let e = analysis::allan::deviation(&phase, Deviation::Oadev, 1.0, m as usize).unwrap();
+        assert_eq!(e.n as f64, n, "m = {m}");
+        assert!(
+            (e.deviation / sigma - 1.0).abs() < 1e-4,
+            "m = {m}: {} {sigma}",
+            e.deviation
+        );
+        compared += 1;
+    }
+    assert!(compared > 100, "{compared}");
+}
+
+#[test]
+fn the_measured_adis16405_has_the_noise_its_makers_state() {
+    let Some(path) = data("adis16405_run1_20hz_600s.csv.gz") else {
+        return;
+    };
+    let text = std::io::read_to_string(flate2::read::GzDecoder::new(
+        std::fs::File::open(path).unwrap(),
+    ))
+    .unwrap();
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .skip(1)
+        .map(|l| l.split(',').map(|v| v.parse().unwrap()).collect())
+        .collect();
+    let mut record = gyro(Vec::new());
+    record.header.rate_hz = None;
+    record.host_time_s = Some(rows.iter().map(|r| r[0]).collect());
+    record.channels = ["gyro_x", "gyro_y", "gyro_z"]
+        .into_iter()
+        .enumerate()
+        .map(|(i, name)| Channel {
+            name: name.into(),
+            values: rows.iter().map(|r| r[i + 1]).collect(),
+            ..record.channels[0].clone()
+        })
+        .collect();
+    let options = AnalyzeOptions {
+        taus: TauGrid::Decade,
+        ..AnalyzeOptions::default()
+    };
+    let analysis = analyze(&record, &options).unwrap();
+    assert!((analysis.input.rate_hz - 20.0).abs() < 1e-6);
+    for (name, channel) in &analysis.channels {
+        // data/README.md: overlapping Allan deviation at 1 s 0.041, 0.043, 0.039 deg/s over 10 000 s.
+        let at_1s = channel.deviations[&Deviation::Oadev]
+            .iter()
+            .find(|p| (p.tau_s - 1.0).abs() < 1e-6)
+            .unwrap();
+        assert!(
+            (0.033..0.050).contains(&at_1s.deviation),
+            "{name} {at_1s:?}"
+        );
+        println!("{name}: N {:?}", channel.parameters.angle_random_walk);
+        println!("{name}: B {:?}", channel.parameters.bias_instability);
+        println!("{name}: K {:?}", channel.parameters.rate_random_walk);
+        println!("{name}: {:?} {:?}", channel.paper, channel.warnings);
+    }
+}
