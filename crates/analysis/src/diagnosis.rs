@@ -9,14 +9,15 @@ use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
 use model::record::Record;
 
 use crate::checks::{self, LEAST_CHANCE};
+use crate::common::{Shared, common};
 use crate::error::AnalysisError;
 use crate::estimate;
-use crate::gain;
+use crate::findings::{joined, motion_finding, scale_finding, term_findings, variance_finding};
 use crate::grid::{Grid, Target, lay_out};
 use crate::likelihood::Panel;
 use crate::result::{
-    Alternative, Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, Gain,
-    Input, NotTested, Parameter, Unexplained, Verdict,
+    Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, Input, NotTested,
+    Parameter, Unexplained, Verdict,
 };
 use crate::search::{Search, State};
 use crate::{evidence, scan, threshold};
@@ -41,17 +42,19 @@ pub(crate) struct Searched<'a> {
     pub found: Vec<Found>,
     /// Whitened residual in time, before and after.
     pub e: [Vec<f64>; 2],
-    u: [Vec<f64>; 2],
-    variance: Option<VarianceFound>,
+    /// Whitened coefficients, before and after.
+    pub u: [Vec<f64>; 2],
+    /// The law of the variance, where one was found.
+    pub variance: Option<VarianceFound>,
 }
 
 /// A law of the variance that was found.
 pub(crate) struct VarianceFound {
-    effect: &'static dyn Effect,
-    parameters: Parameters,
-    lr: f64,
+    pub effect: &'static dyn Effect,
+    pub parameters: Parameters,
+    pub lr: f64,
     threshold: f64,
-    alternatives: Vec<(&'static dyn Effect, f64)>,
+    pub alternatives: Vec<(&'static dyn Effect, f64)>,
     /// Variance over its mean, by sample.
     pub law: Vec<f64>,
 }
@@ -65,18 +68,34 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     let grid = lay_out(record, &|_| vec![], options.seed)?;
     let searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();
     let mut findings = vec![];
+    let mut scale_not_tested = vec![];
     for s in &searched {
         findings.extend(motion_finding(s, &grid));
         findings.extend(term_findings(s, &grid, options.seed));
         findings.extend(variance_finding(s));
+        match scale_finding(s, &grid) {
+            Ok(found) => findings.extend(found),
+            Err((cause, why)) => scale_not_tested.push(NotTested {
+                cause: cause.into(),
+                why: format!("{}: {why}", s.target.name),
+            }),
+        }
     }
     let shared = common(&searched, &grid);
     let mut checks: Vec<Check> = searched.iter().flat_map(channel_checks).collect();
-    let unexplained = left_over(&checks, &shared);
+    let mut unexplained = left_over(&checks, &shared);
+    for s in &searched {
+        let note = |what: &String| Unexplained {
+            channel: s.target.name.clone(),
+            what: what.clone(),
+        };
+        unexplained.extend(s.state.notes.iter().map(note));
+    }
     checks.extend(shared.checks);
     findings.extend(shared.finding);
     let findings = joined(findings);
-    let not_tested = not_tested(&searched);
+    let mut not_tested = not_tested(&searched);
+    not_tested.extend(scale_not_tested);
     let verdict = match (unexplained.is_empty(), findings.is_empty()) {
         (false, _) => Verdict::Unexplained,
         (true, true) => Verdict::Adequate,
@@ -249,262 +268,6 @@ fn variance(s: &Searched<'_>) -> Option<VarianceFound> {
     Some(all.swap_remove(0))
 }
 
-fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {
-    let first = alternatives.first()?;
-    let stated = of
-        .rivals()
-        .iter()
-        .find(|r| r.cause == first.cause)
-        .map(|r| r.experiment);
-    let back = effect(&first.cause)
-        .and_then(|e| e.rivals().iter().find(|r| r.cause == of.id()))
-        .map(|r| r.experiment);
-    Some(
-        stated
-            .or(back)
-            .unwrap_or("a record ten times longer, each excitation switched on its own")
-            .to_owned(),
-    )
-}
-
-fn alternatives(all: &[(&'static dyn Effect, f64)]) -> Vec<Alternative> {
-    all.iter()
-        .map(|(e, odds)| Alternative {
-            cause: e.id().into(),
-            log_odds: *odds,
-        })
-        .collect()
-}
-
-fn sentence(title: &str, channel: &str, parameters: &Parameters) -> String {
-    let values: Vec<String> = parameters
-        .iter()
-        .map(|(name, p)| match p.std_error {
-            Some(e) => format!("{name} {:.4} +- {e:.4} {}", p.value, p.unit),
-            None => format!("{name} {:.4} {}", p.value, p.unit),
-        })
-        .collect();
-    format!("{title} on {channel}: {}", values.join(", "))
-}
-
-fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Finding> {
-    if s.state.terms.is_empty() {
-        return vec![];
-    }
-    let values: Vec<Vec<Vec<f64>>> = s
-        .state
-        .terms
-        .iter()
-        .map(|t| {
-            t.columns
-                .iter()
-                .map(|c| s.search.panel.dct.inverse(&s.search.panel.column(*c)))
-                .collect()
-        })
-        .collect();
-    let scores = gain::scores(&s.target.y, grid.rate_hz, &s.state, &values);
-    let misfit = evidence::allan_misfit(s, grid.rate_hz, seed);
-    let n = (grid.n as f64).ln();
-    s.state
-        .terms
-        .iter()
-        .zip(&s.found)
-        .zip(scores)
-        .map(|((term, found), score)| {
-            let parameters = term.effect.describe(found);
-            let alternatives = alternatives(&term.alternatives);
-            let size = (found.coefficients.len() + found.location.len()) as f64;
-            Finding {
-                cause: term.effect.id().into(),
-                channels: vec![s.target.name.clone()],
-                experiment: experiment(term.effect, &alternatives),
-                alternatives,
-                gain: Some(Gain {
-                    held_out_log_score_nats: Some(score.nats),
-                    std_error: Some(score.std_error),
-                    delta_bic: Some(term.lr - size * n),
-                    allan_misfit_before: Some(misfit[0]),
-                    allan_misfit_after: Some(misfit[1]),
-                    angle_rms_deg: score
-                        .angle
-                        .iter()
-                        .map(|(k, v)| ((*k).to_owned(), *v))
-                        .collect(),
-                    ablation_nats: Some(term.lr / 2.0),
-                }),
-                what: sentence(term.effect.docs().title, &s.target.name, &parameters),
-                parameters,
-                likelihood_ratio: Some(term.lr),
-                confirmed_on_held_out_data: Some(score.nats > 0.0),
-                ..Finding::default()
-            }
-        })
-        .collect()
-}
-
-fn variance_finding(s: &Searched<'_>) -> Option<Finding> {
-    let v = s.variance.as_ref()?;
-    let alternatives = alternatives(&v.alternatives);
-    Some(Finding {
-        cause: v.effect.id().into(),
-        channels: vec![s.target.name.clone()],
-        experiment: experiment(v.effect, &alternatives),
-        alternatives,
-        gain: Some(Gain {
-            delta_bic: Some(v.lr - (v.parameters.len() as f64) * (s.target.y.len() as f64).ln()),
-            ablation_nats: Some(v.lr / 2.0),
-            ..Gain::default()
-        }),
-        what: sentence(v.effect.docs().title, &s.target.name, &v.parameters),
-        parameters: v.parameters.clone(),
-        likelihood_ratio: Some(v.lr),
-        ..Finding::default()
-    })
-}
-
-fn motion_finding(s: &Searched<'_>, grid: &Grid) -> Option<Finding> {
-    if !s.target.moving || grid.base == Some(model::record::Base::Turntable) {
-        return None;
-    }
-    let of = s
-        .search
-        .candidates
-        .iter()
-        .find(|c| matches!(c.hypothesis, Hypothesis::Motion))?
-        .effect;
-    // The rate in blocks of 0.4 s: short enough for the band of base motion, long enough to average the noise.
-    let block = ((0.4 * grid.rate_hz).round() as usize).max(1);
-    let y = &s.target.y;
-    let mean = y.iter().sum::<f64>() / y.len() as f64;
-    let peak = y
-        .chunks_exact(block)
-        .map(|c| (c.iter().sum::<f64>() / block as f64 - mean).abs())
-        .fold(0.0, f64::max);
-    let error = (s.target.white / block as f64).sqrt();
-    let found = Found {
-        unit: s.target.unit.clone(),
-        coefficients: vec![(peak, error)],
-        ..Found::default()
-    };
-    let parameters = of.describe(&found);
-    Some(Finding {
-        cause: of.id().into(),
-        channels: vec![s.target.name.clone()],
-        what: format!(
-            "The base moves about {}: {:.2} deg/s rms between 0.02 and 0.6 Hz. No error of the sensor",
-            s.target.name, s.target.motion_rms
-        ),
-        parameters,
-        ..Finding::default()
-    })
-}
-
-/// What the axes share.
-struct Shared {
-    checks: Vec<Check>,
-    finding: Option<Finding>,
-    left: Vec<Unexplained>,
-}
-
-/// Correlation of the whitened residuals, axis by axis.
-fn common(searched: &[Searched<'_>], grid: &Grid) -> Shared {
-    let mut shared = Shared {
-        checks: vec![],
-        finding: None,
-        left: vec![],
-    };
-    let mut pairs = vec![];
-    let first = grid.n / 50;
-    for (i, a) in searched.iter().enumerate() {
-        for b in &searched[i + 1..] {
-            if a.target.moving || b.target.moving {
-                continue;
-            }
-            let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
-            for (x, y) in a.u[1][first..].iter().zip(&b.u[1][first..]) {
-                ab += x * y;
-                aa += x * x;
-                bb += y * y;
-            }
-            let r = ab / (aa * bb).sqrt();
-            let z = r.clamp(-0.999_999, 0.999_999).atanh() * ((grid.n - first) as f64 - 3.0).sqrt();
-            let p = checks::normal_tail(z);
-            pairs.push((a, b, r, p));
-        }
-    }
-    let fails: Vec<_> = pairs.iter().filter(|p| p.3 < LEAST_CHANCE).collect();
-    let of = searched
-        .iter()
-        .flat_map(|s| &s.search.candidates)
-        .find(|c| matches!(c.hypothesis, Hypothesis::Common))
-        .map(|c| c.effect);
-    // A shared source correlates positively; where more than one pair shows it, all of its pairs are counted.
-    let positive = !fails.is_empty() && fails.iter().all(|p| p.2 > 0.0);
-    if let (Some(of), true) = (of, positive) {
-        let names: Vec<String> = searched
-            .iter()
-            .map(|s| s.target.name.clone())
-            .filter(|n| {
-                fails
-                    .iter()
-                    .any(|p| p.0.target.name == *n || p.1.target.name == *n)
-            })
-            .collect();
-        let sigma = |s: &Searched<'_>| s.state.solution.white.sqrt();
-        let shares: Vec<f64> = fails
-            .iter()
-            .map(|p| p.2 * sigma(p.0) * sigma(p.1))
-            .collect();
-        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
-        let product =
-            fails.iter().map(|p| sigma(p.0) * sigma(p.1)).sum::<f64>() / shares.len() as f64;
-        let error = product / ((grid.n * shares.len()) as f64).sqrt();
-        let found = Found {
-            unit: searched[0].target.unit.clone(),
-            coefficients: vec![(mean.sqrt(), error / (2.0 * mean.sqrt()))],
-            ..Found::default()
-        };
-        let parameters = of.describe(&found);
-        shared.finding = Some(Finding {
-            cause: of.id().into(),
-            what: sentence(of.docs().title, &names.join(", "), &parameters),
-            channels: names,
-            parameters,
-            likelihood_ratio: Some(
-                fails
-                    .iter()
-                    .map(|p| -(grid.n as f64) * (1.0 - p.2 * p.2).ln())
-                    .sum(),
-            ),
-            ..Finding::default()
-        });
-    }
-    for (a, b, r, p) in &pairs {
-        let fails = *p < LEAST_CHANCE;
-        let explained = shared.finding.is_some();
-        shared.checks.push(Check {
-            id: "cross_correlation".into(),
-            channel: format!("{}, {}", a.target.name, b.target.name),
-            statistic: *r,
-            p_value: Some(*p),
-            threshold: LEAST_CHANCE,
-            fails_before: fails,
-            fails_after: fails && !explained,
-            what: "correlation of the whitened residuals of two axes".into(),
-        });
-        if fails && !explained {
-            shared.left.push(Unexplained {
-                channel: a.target.name.clone(),
-                what: format!(
-                    "correlates with {} ({r:.3}) sample by sample",
-                    b.target.name
-                ),
-            });
-        }
-    }
-    shared
-}
-
 fn channel_checks(s: &Searched<'_>) -> Vec<Check> {
     let rate_hz = s.search.view.rate_hz;
     let before = checks::all(&s.u[0], &s.e[0], rate_hz);
@@ -539,57 +302,6 @@ fn left_over(checks: &[Check], shared: &Shared) -> Vec<Unexplained> {
         })
         .chain(shared.left.iter().cloned())
         .collect()
-}
-
-/// One finding for one event on several channels, and for one cause on one channel by several terms.
-fn joined(findings: Vec<Finding>) -> Vec<Finding> {
-    let mut all: Vec<Finding> = vec![];
-    for f in findings {
-        let same_channel = all.iter_mut().find(|o| {
-            o.cause == f.cause
-                && o.channels == f.channels
-                && f.parameters.keys().all(|k| !o.parameters.contains_key(k))
-        });
-        if let Some(other) = same_channel {
-            other.parameters.extend(f.parameters);
-            other.likelihood_ratio =
-                Some(other.likelihood_ratio.unwrap_or(0.0) + f.likelihood_ratio.unwrap_or(0.0));
-            other.what = format!("{}; {}", other.what, f.what);
-            continue;
-        }
-        let event = effect(&f.cause).and_then(|e| {
-            all.iter_mut().find(|o| {
-                o.cause == f.cause
-                    && !o.channels.contains(&f.channels[0])
-                    && e.same_event(&o.parameters, &f.parameters)
-            })
-        });
-        if let Some(other) = event {
-            if other.per_channel.is_empty() {
-                other
-                    .per_channel
-                    .insert(other.channels[0].clone(), other.parameters.clone());
-            }
-            other
-                .per_channel
-                .insert(f.channels[0].clone(), f.parameters);
-            other.channels.extend(f.channels);
-            other.likelihood_ratio =
-                Some(other.likelihood_ratio.unwrap_or(0.0) + f.likelihood_ratio.unwrap_or(0.0));
-            if let (Some(a), Some(b)) = (&mut other.gain, f.gain) {
-                a.held_out_log_score_nats = a
-                    .held_out_log_score_nats
-                    .zip(b.held_out_log_score_nats)
-                    .map(|(x, y)| x + y);
-                a.std_error = a.std_error.zip(b.std_error).map(|(x, y)| x.hypot(y));
-                a.delta_bic = a.delta_bic.zip(b.delta_bic).map(|(x, y)| x + y);
-            }
-            other.what = format!("{}; {}", other.what, f.what);
-            continue;
-        }
-        all.push(f);
-    }
-    all
 }
 
 fn not_tested(searched: &[Searched<'_>]) -> Vec<NotTested> {

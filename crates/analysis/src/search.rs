@@ -13,6 +13,8 @@ use crate::threshold;
 
 /// Most terms on one channel.
 const MOST_TERMS: usize = 8;
+/// Most lines, and most steps, that are told as separate causes.
+const MOST_ALIKE: usize = 2;
 /// Scores closer than this (twice 3 nats) leave the answer open.
 pub const RIVAL_SPAN: f64 = 6.0;
 /// Fewest cycles of a line in the record.
@@ -105,6 +107,8 @@ pub struct State {
     pub noise: Noise,
     /// Its fit.
     pub solution: Solution,
+    /// Structure that was seen and that no single effect explains.
+    pub notes: Vec<String>,
 }
 
 impl State {
@@ -201,6 +205,7 @@ impl<'a> Search<'a> {
             terms,
             noise,
             solution,
+            notes: vec![],
         };
         let mut fitted = state.noise.terms.iter();
         for t in &mut state.terms {
@@ -243,7 +248,15 @@ impl<'a> Search<'a> {
                 let columns = [own, candidate.columns.clone()].concat();
                 let lr = 2.0 * (self.panel.profile(walks, &columns) - null);
                 let names = r.columns.iter().map(|c| c.parameter).collect();
-                let limit = threshold::regression(r.columns.len(), candidate.siblings);
+                // In the place of a narrower term, only the columns beyond it are new.
+                let held: usize = state
+                    .terms
+                    .iter()
+                    .filter(|t| candidate.effect.extends() == Some(t.effect.id()))
+                    .map(|t| t.columns.len())
+                    .sum();
+                let new = r.columns.len().saturating_sub(held).max(1);
+                let limit = threshold::regression(new, candidate.siblings);
                 let mut t = term(Form::Columns, candidate.columns.clone(), names, lr, limit);
                 t.fixed.clone_from(&r.fixed);
                 t.follows.clone_from(&r.follows);
@@ -471,8 +484,12 @@ impl<'a> Search<'a> {
 
     /// Add a term, in place of the one that it extends.
     fn accept(&self, state: &State, term: Term) -> State {
-        let term = self.refine(state, term);
+        let mut term = self.refine(state, term);
         let mut terms = state.terms.clone();
+        if term.effect.extends().is_some() && matches!(term.form, Form::Columns) {
+            // Later it is weighed as a whole.
+            term.threshold = threshold::regression(term.columns.len(), 1);
+        }
         if let Some(extended) = term.effect.extends() {
             let carrier = |t: &Term| match (&t.form, &term.form) {
                 (Form::Line(a), Form::SideBands(b, _)) => a == b,
@@ -511,14 +528,12 @@ impl<'a> Search<'a> {
             terms: vec![],
             noise,
             solution,
+            notes: vec![],
         };
         let mut state = baseline.clone();
         while state.terms.len() < MOST_TERMS {
             let offers = self.offers(&state, &|_| true);
-            let Some(best) = offers
-                .into_iter()
-                .max_by(|a, b| a.score().total_cmp(&b.score()))
-            else {
+            let Some(best) = Self::simplest_best(offers) else {
                 break;
             };
             if best.score() <= 0.0 {
@@ -540,8 +555,79 @@ impl<'a> Search<'a> {
             };
             state = self.without(&state, i);
         }
+        state = crate::contest::hold(self, state);
+        let notes = self.crowds(&mut state);
         self.find_rivals(&mut state);
-        (baseline, crate::contest::hold(self, state))
+        state.notes = notes;
+        (baseline, state)
+    }
+
+    /// More lines or more steps than separate causes make are one structure that the library does not have: the
+    /// strongest line stays, the steps go, and a note says what is seen.
+    fn crowds(&self, state: &mut State) -> Vec<String> {
+        let mut notes = vec![];
+        let hz = |w: f64| w * self.view.rate_hz / std::f64::consts::TAU;
+        let lines: Vec<(f64, f64)> = state
+            .terms
+            .iter()
+            .filter_map(|t| match t.form {
+                Form::Line(w) | Form::SideBands(w, _) => Some((hz(w), t.lr)),
+                _ => None,
+            })
+            .collect();
+        if lines.len() > MOST_ALIKE {
+            let (low, high) = lines
+                .iter()
+                .fold((f64::INFINITY, 0.0f64), |(l, h), (f, _)| {
+                    (l.min(*f), h.max(*f))
+                });
+            notes.push(format!(
+                "{} lines from {low:.3} to {high:.3} Hz: no steady line but a band, a chirp or harmonics",
+                lines.len()
+            ));
+            let strongest = lines.iter().map(|l| l.1).fold(0.0, f64::max);
+            state.terms.retain(|t| {
+                !matches!(t.form, Form::Line(_) | Form::SideBands(..)) || t.lr == strongest
+            });
+        }
+        let times: Vec<f64> = state
+            .terms
+            .iter()
+            .filter_map(|t| match t.form {
+                Form::Step(at, _) => Some(at / self.view.rate_hz),
+                _ => None,
+            })
+            .collect();
+        if times.len() > MOST_ALIKE {
+            let told: Vec<String> = times.iter().map(|t| format!("{t:.1}")).collect();
+            notes.push(format!(
+                "jumps at {} s: more than single events make",
+                told.join(", ")
+            ));
+            state.terms.retain(|t| !matches!(t.form, Form::Step(..)));
+        }
+        if !notes.is_empty() {
+            *state = self.refit(std::mem::take(&mut state.terms), state.noise.log_walk);
+            self.reweigh(state);
+        }
+        notes
+    }
+
+    /// The best offer; where it extends another that would pass too, that one: the extension has to earn its place.
+    fn simplest_best(offers: Vec<Term>) -> Option<Term> {
+        let best = offers
+            .iter()
+            .max_by(|a, b| a.score().total_cmp(&b.score()))?;
+        let narrower = offers
+            .iter()
+            .filter(|o| {
+                // Side bands come after their line; another line beside it is no narrower case of them.
+                matches!(best.form, Form::Columns)
+                    && best.effect.extends() == Some(o.effect.id())
+                    && o.score() > 0.0
+            })
+            .max_by(|a, b| a.score().total_cmp(&b.score()));
+        Some(narrower.unwrap_or(best).clone())
     }
 
     /// A covariance term that swallowed a regressor gives way to it.
@@ -560,10 +646,7 @@ impl<'a> Search<'a> {
                 let offers = self.offers(&rest, &|c| {
                     !matches!(c.hypothesis, Hypothesis::Covariance(_))
                 });
-                let Some(offer) = offers
-                    .into_iter()
-                    .max_by(|a, b| a.score().total_cmp(&b.score()))
-                else {
+                let Some(offer) = Self::simplest_best(offers) else {
                     break;
                 };
                 if offer.score() <= 0.0 {
@@ -582,11 +665,14 @@ impl<'a> Search<'a> {
     /// Put every other effect that would do as well in the place of a term beside it.
     fn find_rivals(&self, state: &mut State) {
         for i in 0..state.terms.len() {
+            if state.terms[i].stated.is_some() {
+                continue;
+            }
             let rest = self.without(state, i);
             let own = state.terms[i].effect.id();
             let extended = state.terms[i].effect.extends();
             let score = state.terms[i].score();
-            let mut alternatives: Vec<(&'static dyn Effect, f64)> = vec![];
+            let mut alternatives = std::mem::take(&mut state.terms[i].alternatives);
             for offer in self.offers(&rest, &|c| c.effect.id() != own) {
                 let close = offer.score() > 0.0 && offer.score() > score - RIVAL_SPAN;
                 // The narrower case of an extension that needed more than it is no rival.

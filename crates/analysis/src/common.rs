@@ -1,0 +1,115 @@
+//! What the axes share: correlation of their whitened residuals.
+
+use model::effect::{Found, Hypothesis};
+
+use crate::checks::{self, LEAST_CHANCE};
+use crate::diagnosis::Searched;
+use crate::findings::sentence;
+use crate::grid::Grid;
+use crate::result::{Check, Finding, Unexplained};
+
+/// What the axes share.
+pub(crate) struct Shared {
+    pub checks: Vec<Check>,
+    pub finding: Option<Finding>,
+    pub left: Vec<Unexplained>,
+}
+
+/// Correlation of the whitened residuals, axis by axis.
+pub(crate) fn common(searched: &[Searched<'_>], grid: &Grid) -> Shared {
+    let mut shared = Shared {
+        checks: vec![],
+        finding: None,
+        left: vec![],
+    };
+    let mut pairs = vec![];
+    let first = grid.n / 50;
+    for (i, a) in searched.iter().enumerate() {
+        for b in &searched[i + 1..] {
+            if a.target.moving || b.target.moving {
+                continue;
+            }
+            let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
+            for (x, y) in a.u[1][first..].iter().zip(&b.u[1][first..]) {
+                ab += x * y;
+                aa += x * x;
+                bb += y * y;
+            }
+            let r = ab / (aa * bb).sqrt();
+            let z = r.clamp(-0.999_999, 0.999_999).atanh() * ((grid.n - first) as f64 - 3.0).sqrt();
+            let p = checks::normal_tail(z);
+            pairs.push((a, b, r, p));
+        }
+    }
+    let fails: Vec<_> = pairs.iter().filter(|p| p.3 < LEAST_CHANCE).collect();
+    let of = searched
+        .iter()
+        .flat_map(|s| &s.search.candidates)
+        .find(|c| matches!(c.hypothesis, Hypothesis::Common))
+        .map(|c| c.effect);
+    // A shared source correlates positively; where more than one pair shows it, all of its pairs are counted.
+    let positive = !fails.is_empty() && fails.iter().all(|p| p.2 > 0.0);
+    if let (Some(of), true) = (of, positive) {
+        let names: Vec<String> = searched
+            .iter()
+            .map(|s| s.target.name.clone())
+            .filter(|n| {
+                fails
+                    .iter()
+                    .any(|p| p.0.target.name == *n || p.1.target.name == *n)
+            })
+            .collect();
+        let sigma = |s: &Searched<'_>| s.state.solution.white.sqrt();
+        let shares: Vec<f64> = fails
+            .iter()
+            .map(|p| p.2 * sigma(p.0) * sigma(p.1))
+            .collect();
+        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+        let product =
+            fails.iter().map(|p| sigma(p.0) * sigma(p.1)).sum::<f64>() / shares.len() as f64;
+        let error = product / ((grid.n * shares.len()) as f64).sqrt();
+        let found = Found {
+            unit: searched[0].target.unit.clone(),
+            coefficients: vec![(mean.sqrt(), error / (2.0 * mean.sqrt()))],
+            ..Found::default()
+        };
+        let parameters = of.describe(&found);
+        shared.finding = Some(Finding {
+            cause: of.id().into(),
+            what: sentence(of.docs().title, &names.join(", "), &parameters),
+            channels: names,
+            parameters,
+            likelihood_ratio: Some(
+                fails
+                    .iter()
+                    .map(|p| -(grid.n as f64) * (1.0 - p.2 * p.2).ln())
+                    .sum(),
+            ),
+            ..Finding::default()
+        });
+    }
+    for (a, b, r, p) in &pairs {
+        let fails = *p < LEAST_CHANCE;
+        let explained = shared.finding.is_some();
+        shared.checks.push(Check {
+            id: "cross_correlation".into(),
+            channel: format!("{}, {}", a.target.name, b.target.name),
+            statistic: *r,
+            p_value: Some(*p),
+            threshold: LEAST_CHANCE,
+            fails_before: fails,
+            fails_after: fails && !explained,
+            what: "correlation of the whitened residuals of two axes".into(),
+        });
+        if fails && !explained {
+            shared.left.push(Unexplained {
+                channel: a.target.name.clone(),
+                what: format!(
+                    "correlates with {} ({r:.3}) sample by sample",
+                    b.target.name
+                ),
+            });
+        }
+    }
+    shared
+}

@@ -1,0 +1,248 @@
+//! Findings out of what was estimated: one for each cause, with its rivals, its experiment and its gain.
+
+use model::effect::{Effect, Found, Hypothesis, Parameters};
+use model::effects::effect;
+use model::record::Base;
+
+use crate::diagnosis::Searched;
+use crate::grid::Grid;
+use crate::result::{Alternative, Finding, Gain};
+use crate::{evidence, gain, scale, threshold};
+
+pub(crate) fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {
+    let first = alternatives.first()?;
+    let stated = of
+        .rivals()
+        .iter()
+        .find(|r| r.cause == first.cause)
+        .map(|r| r.experiment);
+    let back = effect(&first.cause)
+        .and_then(|e| e.rivals().iter().find(|r| r.cause == of.id()))
+        .map(|r| r.experiment);
+    Some(
+        stated
+            .or(back)
+            .unwrap_or("a record ten times longer, each excitation switched on its own")
+            .to_owned(),
+    )
+}
+
+pub(crate) fn alternatives(all: &[(&'static dyn Effect, f64)]) -> Vec<Alternative> {
+    all.iter()
+        .map(|(e, odds)| Alternative {
+            cause: e.id().into(),
+            log_odds: *odds,
+        })
+        .collect()
+}
+
+pub(crate) fn sentence(title: &str, channel: &str, parameters: &Parameters) -> String {
+    let values: Vec<String> = parameters
+        .iter()
+        .map(|(name, p)| match p.std_error {
+            Some(e) => format!("{name} {:.4} +- {e:.4} {}", p.value, p.unit),
+            None => format!("{name} {:.4} {}", p.value, p.unit),
+        })
+        .collect();
+    format!("{title} on {channel}: {}", values.join(", "))
+}
+
+pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Finding> {
+    if s.state.terms.is_empty() {
+        return vec![];
+    }
+    let values: Vec<Vec<Vec<f64>>> = s
+        .state
+        .terms
+        .iter()
+        .map(|t| {
+            t.columns
+                .iter()
+                .map(|c| s.search.panel.dct.inverse(&s.search.panel.column(*c)))
+                .collect()
+        })
+        .collect();
+    let scores = gain::scores(&s.target.y, grid.rate_hz, &s.state, &values);
+    let misfit = evidence::allan_misfit(s, grid.rate_hz, seed);
+    let n = (grid.n as f64).ln();
+    s.state
+        .terms
+        .iter()
+        .zip(&s.found)
+        .zip(scores)
+        .map(|((term, found), score)| {
+            let parameters = term.effect.describe(found);
+            let alternatives = alternatives(&term.alternatives);
+            let size = (found.coefficients.len() + found.location.len()) as f64;
+            Finding {
+                cause: term.effect.id().into(),
+                channels: vec![s.target.name.clone()],
+                experiment: experiment(term.effect, &alternatives),
+                alternatives,
+                gain: Some(Gain {
+                    held_out_log_score_nats: Some(score.nats),
+                    std_error: Some(score.std_error),
+                    delta_bic: Some(term.lr - size * n),
+                    allan_misfit_before: Some(misfit[0]),
+                    allan_misfit_after: Some(misfit[1]),
+                    angle_rms_deg: score
+                        .angle
+                        .iter()
+                        .map(|(k, v)| ((*k).to_owned(), *v))
+                        .collect(),
+                    ablation_nats: Some(term.lr / 2.0),
+                }),
+                what: sentence(term.effect.docs().title, &s.target.name, &parameters),
+                parameters,
+                likelihood_ratio: Some(term.lr),
+                confirmed_on_held_out_data: Some(score.nats > 0.0),
+                ..Finding::default()
+            }
+        })
+        .collect()
+}
+
+pub(crate) fn variance_finding(s: &Searched<'_>) -> Option<Finding> {
+    let v = s.variance.as_ref()?;
+    let alternatives = alternatives(&v.alternatives);
+    Some(Finding {
+        cause: v.effect.id().into(),
+        channels: vec![s.target.name.clone()],
+        experiment: experiment(v.effect, &alternatives),
+        alternatives,
+        gain: Some(Gain {
+            delta_bic: Some(v.lr - (v.parameters.len() as f64) * (s.target.y.len() as f64).ln()),
+            ablation_nats: Some(v.lr / 2.0),
+            ..Gain::default()
+        }),
+        what: sentence(v.effect.docs().title, &s.target.name, &v.parameters),
+        parameters: v.parameters.clone(),
+        likelihood_ratio: Some(v.lr),
+        ..Finding::default()
+    })
+}
+
+pub(crate) fn motion_finding(s: &Searched<'_>, grid: &Grid) -> Option<Finding> {
+    if !s.target.moving || grid.base == Some(Base::Turntable) {
+        return None;
+    }
+    let of = s
+        .search
+        .candidates
+        .iter()
+        .find(|c| matches!(c.hypothesis, Hypothesis::Motion))?
+        .effect;
+    // The rate in blocks of 0.4 s: short enough for the band of base motion, long enough to average the noise.
+    let block = ((0.4 * grid.rate_hz).round() as usize).max(1);
+    let y = &s.target.y;
+    let mean = y.iter().sum::<f64>() / y.len() as f64;
+    let peak = y
+        .chunks_exact(block)
+        .map(|c| (c.iter().sum::<f64>() / block as f64 - mean).abs())
+        .fold(0.0, f64::max);
+    let error = (s.target.white / block as f64).sqrt();
+    let found = Found {
+        unit: s.target.unit.clone(),
+        coefficients: vec![(peak, error)],
+        ..Found::default()
+    };
+    let parameters = of.describe(&found);
+    Some(Finding {
+        cause: of.id().into(),
+        channels: vec![s.target.name.clone()],
+        what: format!(
+            "The base moves about {}: {:.2} deg/s rms between 0.02 and 0.6 Hz. No error of the sensor",
+            s.target.name, s.target.motion_rms
+        ),
+        parameters,
+        ..Finding::default()
+    })
+}
+
+/// One finding for one event on several channels, and for one cause on one channel by several terms.
+pub(crate) fn joined(findings: Vec<Finding>) -> Vec<Finding> {
+    let mut all: Vec<Finding> = vec![];
+    for f in findings {
+        let same_channel = all.iter_mut().find(|o| {
+            o.cause == f.cause
+                && o.channels == f.channels
+                && f.parameters.keys().all(|k| !o.parameters.contains_key(k))
+        });
+        if let Some(other) = same_channel {
+            other.parameters.extend(f.parameters);
+            other.likelihood_ratio =
+                Some(other.likelihood_ratio.unwrap_or(0.0) + f.likelihood_ratio.unwrap_or(0.0));
+            other.what = format!("{}; {}", other.what, f.what);
+            continue;
+        }
+        let event = effect(&f.cause).and_then(|e| {
+            all.iter_mut().find(|o| {
+                o.cause == f.cause
+                    && !o.channels.contains(&f.channels[0])
+                    && e.same_event(&o.parameters, &f.parameters)
+            })
+        });
+        if let Some(other) = event {
+            if other.per_channel.is_empty() {
+                other
+                    .per_channel
+                    .insert(other.channels[0].clone(), other.parameters.clone());
+            }
+            other
+                .per_channel
+                .insert(f.channels[0].clone(), f.parameters);
+            other.channels.extend(f.channels);
+            other.likelihood_ratio =
+                Some(other.likelihood_ratio.unwrap_or(0.0) + f.likelihood_ratio.unwrap_or(0.0));
+            if let (Some(a), Some(b)) = (&mut other.gain, f.gain) {
+                a.held_out_log_score_nats = a
+                    .held_out_log_score_nats
+                    .zip(b.held_out_log_score_nats)
+                    .map(|(x, y)| x + y);
+                a.std_error = a.std_error.zip(b.std_error).map(|(x, y)| x.hypot(y));
+                a.delta_bic = a.delta_bic.zip(b.delta_bic).map(|(x, y)| x + y);
+            }
+            other.what = format!("{}; {}", other.what, f.what);
+            continue;
+        }
+        all.push(f);
+    }
+    all
+}
+
+/// The scale factor, where the base sways and the accelerometers see it; or why not.
+pub(crate) fn scale_finding(
+    s: &Searched<'_>,
+    grid: &Grid,
+) -> Result<Option<Finding>, (&'static str, String)> {
+    let of = s
+        .search
+        .candidates
+        .iter()
+        .find(|c| matches!(c.hypothesis, Hypothesis::Scale))
+        .map(|c| c.effect);
+    let Some(of) = of else { return Ok(None) };
+    let found = scale::against_tilt(grid, s.target).map_err(|why| (of.id(), why))?;
+    let lr = (found.relative / found.std_error).powi(2);
+    if lr < threshold::regression(1, 1) {
+        return Ok(None);
+    }
+    let estimate = Found {
+        unit: s.target.unit.clone(),
+        names: vec!["relative"],
+        coefficients: vec![(found.relative, found.std_error)],
+        ..Found::default()
+    };
+    let parameters = of.describe(&estimate);
+    Ok(Some(Finding {
+        cause: of.id().into(),
+        channels: vec![s.target.name.clone()],
+        what: format!(
+            "{}. The scale of the accelerometers is taken as right",
+            sentence(of.docs().title, &s.target.name, &parameters)
+        ),
+        parameters,
+        likelihood_ratio: Some(lr),
+        ..Finding::default()
+    }))
+}

@@ -1,0 +1,91 @@
+//! The scale factor of a gyro held against the tilt that the accelerometers see while the base sways.
+
+use model::record::{Axis, Quantity};
+
+use crate::grid::{Grid, Target};
+use crate::likelihood::Dct;
+
+/// Band in which a sway is sought, Hz.
+const BAND_HZ: (f64, f64) = (0.02, 2.0);
+/// Least correlation of tilt rate and rate in the band of the sway.
+const LEAST_CORRELATION: f64 = 0.9;
+
+/// Scale over the stated one, minus 1, with its standard error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// True scale over the stated one, minus 1.
+    pub relative: f64,
+    /// Standard error.
+    pub std_error: f64,
+}
+
+/// Regress the tilt rate on the rate, in a band around the sway.
+///
+/// # Errors
+/// Why the record does not allow it.
+pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
+    // About x the component along y tilts, about y the one along x.
+    let along =
+        match target.axis {
+            Some(Axis::X) => Axis::Y,
+            Some(Axis::Y) => Axis::X,
+            _ => return Err(
+                "a turn about the vertical tilts no accelerometer: sway about a horizontal axis"
+                    .into(),
+            ),
+        };
+    let acc = |axis| {
+        grid.signals
+            .iter()
+            .find(|s| s.quantity == Quantity::Acc && s.axis == Some(axis))
+    };
+    let (Some(side), Some(up)) = (acc(along), acc(Axis::Z)) else {
+        return Err("acc_z and the accelerometer across the axis are needed".into());
+    };
+    let n = grid.n;
+    let tilt: Vec<f64> = side
+        .values
+        .iter()
+        .zip(&up.values)
+        .map(|(s, u)| s.atan2(*u).to_degrees())
+        .collect();
+    // Central difference of the tilt, and the rate averaged with the same weights (trapezoids).
+    let tilt_rate: Vec<f64> = (0..n)
+        .map(|i| (tilt[(i + 1).min(n - 1)] - tilt[i.saturating_sub(1)]) * grid.rate_hz / 2.0)
+        .collect();
+    let y = &target.y;
+    let rate: Vec<f64> = (0..n)
+        .map(|i| (y[i.saturating_sub(1)] + 2.0 * y[i] + y[(i + 1).min(n - 1)]) / 4.0)
+        .collect();
+    let dct = Dct::new(n);
+    let (t, w) = (dct.forward(&tilt_rate), dct.forward(&rate));
+    let k_of = |hz: f64| ((2.0 * hz / grid.rate_hz * n as f64) as usize).clamp(1, n - 1);
+    let (low, high) = (k_of(BAND_HZ.0), k_of(BAND_HZ.1));
+    let Some(peak) = (low..high).max_by(|a, b| w[*a].abs().total_cmp(&w[*b].abs())) else {
+        return Err("the record is too short for a sway".into());
+    };
+    let band = (peak / 2).max(low)..(2 * peak).min(high);
+    let (mut tw, mut ww, mut tt) = (0.0, 0.0, 0.0);
+    for k in band.clone() {
+        tw += t[k] * w[k];
+        ww += w[k] * w[k];
+        tt += t[k] * t[k];
+    }
+    let correlation = tw / (ww * tt).sqrt();
+    if !correlation.is_finite() || correlation.abs() < LEAST_CORRELATION {
+        return Err(format!(
+            "tilt and rate correlate by {:.2} only: sway the base slowly by some degrees about a horizontal axis",
+            correlation.abs()
+        ));
+    }
+    // The white noise of the rate, which the weights let through at these low frequencies, does not tilt.
+    let signal = ww - target.white * band.len() as f64;
+    let slope = tw / signal;
+    let rest = (tt - tw * tw / ww).max(0.0) / band.len().max(2) as f64;
+    let error = (rest / signal).sqrt();
+    // The rate carries the scale: tilt rate = rate / (1 + relative).
+    Ok(Scale {
+        relative: 1.0 / slope.abs() - 1.0,
+        std_error: error / (slope * slope),
+    })
+}
