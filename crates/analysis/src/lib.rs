@@ -4,6 +4,7 @@
 
 pub mod allan;
 pub mod analyze;
+pub mod attitude;
 pub mod checks;
 mod common;
 pub mod contest;
@@ -21,6 +22,8 @@ pub mod noise_fit;
 pub mod noise_id;
 pub mod optimise;
 pub mod paper;
+pub mod plan;
+pub mod representative;
 pub mod result;
 pub mod sampling;
 pub mod scale;
@@ -32,3 +35,4 @@ pub mod units;
 pub use analyze::{Analysis, AnalyzeOptions, analyze};
 pub use diagnosis::{DiagnoseOptions, diagnose};
 pub use error::AnalysisError;
+pub use representative::{Representative, representative};

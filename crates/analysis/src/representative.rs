@@ -1,0 +1,344 @@
+//! Which of many runs represents them, and which do not: the paper's step before the analysis proper.
+
+use model::record::{Quantity, Record};
+use rand_core::{Rng, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
+
+use crate::allan::{Deviation, Phase, deviation};
+use crate::edf::{NoiseType, edf};
+use crate::error::AnalysisError;
+use crate::noise_fit::{Spectrum, Term, fit};
+use crate::noise_id::identify;
+use crate::sampling::Sampling;
+use crate::units::Units;
+
+/// Runs below which nothing can be said about any one of them.
+const NEEDED: usize = 4;
+/// Chance of calling any run odd where none is, over all runs and figures.
+const FALSE_ALARM: f64 = 0.05;
+/// Draws behind the limit.
+const DRAWS: usize = 4000;
+
+/// One figure of one channel over all runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunFigure {
+    /// The channel.
+    pub channel: String,
+    /// `angle_random_walk`, `slow_deviation` (overlapping Allan deviation at a tenth of the shortest run) or `bias`.
+    pub figure: String,
+    /// Unit of `values`, `pooled` and `spread`.
+    pub unit: String,
+    /// By run.
+    pub values: Vec<f64>,
+    /// Standard error of each, 0 where it is not known apart from the spread.
+    pub std_errors: Vec<f64>,
+    /// Median over the runs.
+    pub pooled: f64,
+    /// Run-to-run standard deviation (robust), what the errors alone would make included.
+    pub spread: f64,
+    /// Distance of each run from the median, in its own scale.
+    pub z: Vec<f64>,
+}
+
+/// A run that does not represent the others.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Odd {
+    /// Index of the run.
+    pub run: usize,
+    /// The channel.
+    pub channel: String,
+    /// In what.
+    pub figure: String,
+    /// Its distance.
+    pub z: f64,
+}
+
+/// The answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Representative {
+    /// Index of the run nearest to the middle in all figures together, among those that are not odd.
+    pub run: usize,
+    /// Runs that stand out, after correction for the number of looks.
+    pub odd: Vec<Odd>,
+    /// |z| beyond which a run stands out.
+    pub limit: f64,
+    /// All figures.
+    pub figures: Vec<RunFigure>,
+}
+
+/// Compare runs of the same stand by the gyros (without any, by all channels) that all of them have.
+///
+/// Distances are from the median, over the robust run-to-run spread or the figure's own error, whichever is larger. The
+/// limit is simulated: equal Gaussian runs of the same number exceed it anywhere with a chance of at most 5 %, the
+/// number of figures counted (Bonferroni).
+///
+/// # Errors
+/// [`AnalysisError::Inconclusive`] below 4 runs or with runs too short to fit, [`AnalysisError::NoRate`] and
+/// [`AnalysisError::NoChannel`] as elsewhere.
+pub fn representative(records: &[Record], seed: u64) -> Result<Representative, AnalysisError> {
+    if records.len() < NEEDED {
+        return Err(AnalysisError::Inconclusive {
+            what: "a comparison of runs".into(),
+            have: records.len() as f64,
+            need: NEEDED as f64,
+            unit: "runs",
+        });
+    }
+    let common = |gyro: bool| -> Vec<String> {
+        records[0]
+            .channels
+            .iter()
+            .filter(|c| !gyro || c.quantity == Quantity::Gyro)
+            .map(|c| c.name.clone())
+            .filter(|name| records.iter().all(|r| r.channel(name).is_some()))
+            .collect()
+    };
+    let mut names = common(true);
+    if names.is_empty() {
+        names = common(false);
+    }
+    if names.is_empty() {
+        return Err(AnalysisError::NoChannel {
+            name: "common to all runs".into(),
+            present: Vec::new(),
+        });
+    }
+    let samplings = records
+        .iter()
+        .map(|r| Sampling::of(r, None))
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut figures = Vec::new();
+    for name in &names {
+        figures.extend(figures_of(records, &samplings, name)?);
+    }
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let limit = limit(records.len(), figures.len(), &mut rng);
+    let mut odd = Vec::new();
+    for figure in &figures {
+        for (run, z) in figure.z.iter().enumerate() {
+            if z.abs() > limit {
+                odd.push(Odd {
+                    run,
+                    channel: figure.channel.clone(),
+                    figure: figure.figure.clone(),
+                    z: *z,
+                });
+            }
+        }
+    }
+    let distance = |run: usize| figures.iter().map(|f| f.z[run].powi(2)).sum::<f64>();
+    let run = (0..records.len())
+        .min_by(|a, b| {
+            let out = |r: &usize| odd.iter().any(|o| o.run == *r);
+            out(a)
+                .cmp(&out(b))
+                .then(distance(*a).total_cmp(&distance(*b)))
+        })
+        .unwrap_or(0);
+    Ok(Representative {
+        run,
+        odd,
+        limit,
+        figures,
+    })
+}
+
+fn figures_of(
+    records: &[Record],
+    samplings: &[Sampling],
+    name: &str,
+) -> Result<Vec<RunFigure>, AnalysisError> {
+    let mut rows: Vec<[(f64, f64); 3]> = Vec::new();
+    let channels: Vec<_> = records.iter().filter_map(|r| r.channel(name)).collect();
+    let units = Units::of(channels[0].quantity, &channels[0].unit);
+    let phases: Vec<Phase> = channels
+        .iter()
+        .zip(samplings)
+        .map(|(c, s)| Phase::from_values(&c.values, &s.runs_of(&c.values)))
+        .collect();
+    let tau = phases
+        .iter()
+        .zip(samplings)
+        .map(|(p, s)| p.longest_run() as f64 * s.tau0)
+        .fold(f64::INFINITY, f64::min)
+        / 10.0;
+    for ((channel, sampling), phase) in channels.iter().zip(samplings).zip(&phases) {
+        let short = || AnalysisError::Inconclusive {
+            what: format!("a comparison of runs by {name}"),
+            have: phase.samples() as f64,
+            need: 64.0,
+            unit: "samples in a run",
+        };
+        if phase.samples() < 64 {
+            return Err(short());
+        }
+        let runs = sampling.runs_of(&channel.values);
+        let n = fit(&Spectrum::of(&channel.values, &runs, sampling.tau0)).term(Term::White);
+        let (Some(value), Some(error)) = (n.value, n.std_error) else {
+            return Err(short());
+        };
+        let m = (tau / sampling.tau0).round().max(1.0) as usize;
+        let slow = deviation(phase, Deviation::Oadev, sampling.tau0, m).ok_or_else(short)?;
+        let noise = identify(phase, (m / 4).max(1)).unwrap_or(NoiseType::WhiteRate);
+        let freedom = edf(Deviation::Oadev, noise, m, &phase.run_lengths());
+        let readings: Vec<f64> = runs
+            .iter()
+            .flat_map(|r| channel.values[r.clone()].iter().copied())
+            .collect();
+        let bias = readings.iter().sum::<f64>() / readings.len() as f64;
+        rows.push([
+            (
+                value * units.angle_random_walk.factor,
+                error * units.angle_random_walk.factor,
+            ),
+            (
+                slow.deviation * units.reading.factor,
+                slow.deviation * units.reading.factor / (2.0 * freedom).sqrt(),
+            ),
+            (bias * units.reading.factor, 0.0),
+        ]);
+    }
+    let titles = [
+        ("angle_random_walk", units.angle_random_walk.unit, true),
+        ("slow_deviation", units.reading.unit.clone(), true),
+        ("bias", units.reading.unit, false),
+    ];
+    Ok(titles
+        .into_iter()
+        .enumerate()
+        .map(|(i, (figure, unit, positive))| {
+            let values: Vec<f64> = rows.iter().map(|r| r[i].0).collect();
+            let std_errors: Vec<f64> = rows.iter().map(|r| r[i].1).collect();
+            // Sizes are compared as ratios.
+            let x: Vec<f64> = values
+                .iter()
+                .map(|v| if positive { v.ln() } else { *v })
+                .collect();
+            let errors: Vec<f64> = values
+                .iter()
+                .zip(&std_errors)
+                .map(|(v, e)| if positive { e / v } else { *e })
+                .collect();
+            let (centre, spread) = (median(&x), scatter(&x));
+            let z = x
+                .iter()
+                .zip(&errors)
+                .map(|(x, e)| (x - centre) / spread.max(*e).max(f64::MIN_POSITIVE))
+                .collect();
+            let pooled = if positive { centre.exp() } else { centre };
+            RunFigure {
+                channel: name.to_owned(),
+                figure: figure.to_owned(),
+                unit,
+                values,
+                std_errors,
+                pooled,
+                spread: if positive { spread * pooled } else { spread },
+                z,
+            }
+        })
+        .collect())
+}
+
+fn median(x: &[f64]) -> f64 {
+    let mut sorted = x.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    0.5 * (sorted[(n - 1) / 2] + sorted[n / 2])
+}
+
+/// 1.4826 times the median distance from the median: the standard deviation of Gaussian values.
+fn scatter(x: &[f64]) -> f64 {
+    let centre = median(x);
+    1.4826 * median(&x.iter().map(|v| (v - centre).abs()).collect::<Vec<_>>())
+}
+
+fn limit(runs: usize, figures: usize, rng: &mut impl Rng) -> f64 {
+    let mut largest: Vec<f64> = (0..DRAWS)
+        .map(|_| {
+            let x: Vec<f64> = (0..runs).map(|_| StandardNormal.sample(rng)).collect();
+            let (centre, spread) = (median(&x), scatter(&x));
+            x.iter()
+                .map(|v| ((v - centre) / spread).abs())
+                .fold(0.0, f64::max)
+        })
+        .collect();
+    largest.sort_by(f64::total_cmp);
+    let tail = FALSE_ALARM / figures as f64;
+    largest[(((1.0 - tail) * DRAWS as f64) as usize).min(DRAWS - 1)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model::record::{Axis, Channel};
+
+    fn run(sigma: f64, bias: f64, rng: &mut Xoshiro256PlusPlus) -> Record {
+        let values = (0..2000)
+            .map(|_| {
+                let e: f64 = StandardNormal.sample(rng);
+                bias + sigma * e
+            })
+            .collect();
+        let mut record = Record {
+            channels: vec![Channel {
+                name: "gyro_z".into(),
+                quantity: Quantity::Gyro,
+                axis: Some(Axis::Z),
+                unit: "deg/s".into(),
+                values,
+                counts: None,
+                lsb: None,
+            }],
+            ..Record::default()
+        };
+        record.header.rate_hz = Some(20.0);
+        record
+    }
+
+    fn bias(rng: &mut Xoshiro256PlusPlus) -> f64 {
+        let e: f64 = StandardNormal.sample(rng);
+        0.5 + 0.1 * e
+    }
+
+    #[test]
+    fn equal_runs_are_seldom_called_odd() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+        let alarms = (0..40)
+            .filter(|_| {
+                let runs: Vec<Record> = (0..12)
+                    .map(|_| {
+                        let b = bias(&mut rng);
+                        run(0.39, b, &mut rng)
+                    })
+                    .collect();
+                !representative(&runs, 1).unwrap().odd.is_empty()
+            })
+            .count();
+        // Binomial(40, 0.05): 9 or more has a chance of 1e-4.
+        assert!(alarms < 9, "{alarms}");
+    }
+
+    #[test]
+    fn a_run_with_twice_the_noise_is_odd_in_that_and_not_chosen() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(12);
+        let runs: Vec<Record> = (0..12)
+            .map(|i| {
+                let b = bias(&mut rng);
+                run(if i == 5 { 0.78 } else { 0.39 }, b, &mut rng)
+            })
+            .collect();
+        let answer = representative(&runs, 1).unwrap();
+        assert!(
+            answer
+                .odd
+                .iter()
+                .any(|o| o.run == 5 && o.figure == "angle_random_walk" && o.z > 0.0),
+            "{answer:?}"
+        );
+        assert_ne!(answer.run, 5);
+        assert!(representative(&runs[..3], 1).is_err());
+    }
+}
