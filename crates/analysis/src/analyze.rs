@@ -434,23 +434,30 @@ fn curve(
 ) -> Vec<DeviationPoint> {
     let runs = phase.run_lengths();
     let mut noise = NoiseType::WhiteRate;
-    grid.factors(kind.longest(phase.longest_run()))
+    let factors = grid.factors(kind.longest(phase.longest_run()));
+    let estimates = match kind {
+        Deviation::Oadev => phase.overlapping_allan(tau0, &factors),
+        _ => factors
+            .into_iter()
+            .filter_map(|m| deviation(phase, kind, tau0, m))
+            .collect(),
+    };
+    estimates
         .into_iter()
-        .filter_map(|m| {
-            let e = deviation(phase, kind, tau0, m)?;
-            if let Some(found) = identify(phase, m) {
+        .map(|e| {
+            if let Some(found) = identify(phase, e.m) {
                 noise = found;
             }
-            let edf = edf(kind, noise, m, &runs);
+            let edf = edf(kind, noise, e.m, &runs);
             let (low, high) = chi_square_interval(e.deviation, edf, 0.95);
-            Some(DeviationPoint {
+            DeviationPoint {
                 tau_s: e.tau_s,
                 deviation: e.deviation * scale.factor,
                 low: low * scale.factor,
                 high: high * scale.factor,
                 edf,
                 n: e.n,
-            })
+            }
         })
         .collect()
 }
