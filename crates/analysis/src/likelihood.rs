@@ -170,7 +170,13 @@ impl Noise {
     /// g at every coefficient k = 0..n; that of k = 0, which no likelihood uses, is infinite.
     #[must_use]
     pub fn everywhere(&self, n: usize) -> Vec<f64> {
-        let omega: Vec<f64> = (0..n)
+        self.first(n, n)
+    }
+
+    /// g at the first `count` of `n` coefficients; as [`Noise::everywhere`].
+    #[must_use]
+    pub fn first(&self, n: usize, count: usize) -> Vec<f64> {
+        let omega: Vec<f64> = (0..count)
             .map(|k| std::f64::consts::PI * k.max(1) as f64 / n as f64)
             .collect();
         let cosine = omega.iter().map(|w| w.cos()).collect();

@@ -12,7 +12,17 @@ const LONGEST_STEP_GRID: usize = 1 << 16;
 /// Residual coefficients of the data under a solution.
 #[must_use]
 pub fn residual(panel: &Panel, columns: &[usize], solution: &Solution) -> Vec<f64> {
-    let mut r = panel.column(0).to_vec();
+    first_of_residual(panel, columns, solution, panel.bins.n)
+}
+
+/// The first `count` residual coefficients.
+fn first_of_residual(
+    panel: &Panel,
+    columns: &[usize],
+    solution: &Solution,
+    count: usize,
+) -> Vec<f64> {
+    let mut r = panel.column(0)[..count].to_vec();
     for (c, b) in columns.iter().zip(&solution.beta) {
         r.iter_mut()
             .zip(panel.column(*c).iter())
@@ -36,7 +46,7 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
     let scale = -(2.0 / n as f64).sqrt();
     let mut best = vec![f64::NEG_INFINITY; m];
     for noise in walks {
-        let g = noise.everywhere(n);
+        let g = noise.first(n, m);
         let solution = panel.solve(&noise.over(&panel.bins), columns);
         // <step at t, x> under this noise, for all t.
         let against = |x: &[f64]| {
@@ -44,7 +54,7 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
             dst.process_dst1(&mut b);
             b
         };
-        let a = against(&residual(panel, columns, &solution));
+        let a = against(&first_of_residual(panel, columns, &solution, m));
         let d: Vec<f64> = (0..m)
             .map(|k| {
                 if k == 0 {

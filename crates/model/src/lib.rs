@@ -2,6 +2,7 @@
 //!
 //! Data in, values out: nothing here opens a file, reads a clock or prints.
 
+pub mod docs;
 pub mod effect;
 pub mod effects;
 pub mod excitation;
