@@ -1,0 +1,157 @@
+//! What the base does: tilt, sway, floor, vibration, knocks. Rates about and accelerations along the body axes.
+
+use std::f64::consts::TAU;
+
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::random::{Stream, standard_normal, uniform};
+use crate::scenario::{BasePart, Fault, STANDARD_GRAVITY};
+
+/// Corner of the floor's vibration, Hz.
+const FLOOR_CORNER_HZ: f64 = 10.0;
+/// A knock rings at this frequency, Hz, and dies out with this time constant, s.
+const KNOCK_HZ: f64 = 18.0;
+const KNOCK_TAU_S: f64 = 0.06;
+/// Peak rate and acceleration of a knock for each degree that the mount gives way, deg/s and g.
+const KNOCK_DPS_PER_DEG: f64 = 4.0;
+const KNOCK_G_PER_DEG: f64 = 0.2;
+
+/// One sine that both the gyros and the accelerometer see.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tone {
+    pub axis: usize,
+    pub frequency_hz: f64,
+    pub amplitude_dps: f64,
+    pub linear_g: f64,
+    /// Turns.
+    pub phase: f64,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Base {
+    part: BasePart,
+    tones: Vec<Tone>,
+    knocks: Vec<(usize, f64, f64)>,
+    shoves: Vec<(usize, f64, f64, f64)>,
+    rng: Xoshiro256PlusPlus,
+    floor_g: [f64; 3],
+}
+
+impl Base {
+    pub fn new(part: BasePart, faults: &[Fault], seed: u64) -> Self {
+        let mut rng = Stream::Base.of(seed);
+        let mut base = Base {
+            part,
+            tones: Vec::new(),
+            knocks: Vec::new(),
+            shoves: Vec::new(),
+            rng: rng.clone(),
+            floor_g: [0.0; 3],
+        };
+        for fault in faults {
+            match *fault {
+                Fault::Vibration {
+                    axis,
+                    frequency_hz,
+                    amplitude_dps,
+                    linear_g,
+                } => {
+                    let phase = uniform(&mut rng, 0.0, 1.0);
+                    base.tones.push(Tone {
+                        axis,
+                        frequency_hz,
+                        amplitude_dps,
+                        linear_g,
+                        phase,
+                    });
+                }
+                Fault::Knock {
+                    gyro,
+                    time_s,
+                    tilt_deg,
+                    ..
+                } => base.knocks.push((gyro, time_s, tilt_deg)),
+                Fault::Shove {
+                    axis,
+                    time_s,
+                    peak_dps,
+                    length_s,
+                } => {
+                    base.shoves.push((axis, time_s, peak_dps, length_s));
+                }
+                _ => {}
+            }
+        }
+        base
+    }
+
+    /// Moves the floor on by `dt` s.
+    pub fn step(&mut self, dt: f64) {
+        if self.part.floor_g_rms > 0.0 {
+            let keep = (-dt * TAU * FLOOR_CORNER_HZ).exp();
+            let fresh = self.part.floor_g_rms * (1.0 - keep * keep).sqrt();
+            for value in &mut self.floor_g {
+                *value = keep * *value + fresh * standard_normal(&mut self.rng);
+            }
+        }
+    }
+
+    /// True rate about each axis, deg/s, without the tones: those go through the sensor's pole in closed form.
+    pub fn rate_dps(&self, t: f64) -> [f64; 3] {
+        let mut rate = [0.0; 3];
+        if self.part.sway_deg != 0.0 {
+            let w = TAU / self.part.sway_period_s;
+            rate[0] += self.part.sway_deg * w * (w * t).cos();
+        }
+        for &(axis, time, tilt) in &self.knocks {
+            rate[axis] += KNOCK_DPS_PER_DEG * tilt * ring(t - time);
+        }
+        for &(axis, time, peak, length) in &self.shoves {
+            let turn = (t - time) / length;
+            if (0.0..1.0).contains(&turn) {
+                // There and back: the base ends where it was.
+                rate[axis] += peak * (TAU * turn).sin();
+            }
+        }
+        rate
+    }
+
+    pub fn tones(&self) -> &[Tone] {
+        &self.tones
+    }
+
+    /// Specific force along each axis, m/s^2.
+    pub fn acceleration(&self, t: f64) -> [f64; 3] {
+        let mut tilt = self.part.tilt_deg;
+        let mut g = self.floor_g;
+        if self.part.sway_deg != 0.0 {
+            tilt[0] += self.part.sway_deg * (TAU / self.part.sway_period_s * t).sin();
+        }
+        for &(_, time, angle) in &self.knocks {
+            if t >= time {
+                tilt[1] += angle;
+                g[2] += KNOCK_G_PER_DEG * angle * ring(t - time);
+            }
+        }
+        for tone in &self.tones {
+            let value = tone.linear_g * (TAU * (tone.frequency_hz * t + tone.phase)).sin();
+            for axis in &mut g {
+                *axis += value;
+            }
+        }
+        let (about_x, about_y) = (tilt[0].to_radians(), tilt[1].to_radians());
+        g[0] += -about_y.sin() * about_x.cos();
+        g[1] += about_x.sin();
+        g[2] += about_y.cos() * about_x.cos();
+        g.map(|value| value * STANDARD_GRAVITY)
+    }
+}
+
+/// A damped ring that starts at 0.
+fn ring(since: f64) -> f64 {
+    if since < 0.0 {
+        0.0
+    } else {
+        (-since / KNOCK_TAU_S).exp() * (TAU * KNOCK_HZ * since).sin()
+    }
+}

@@ -1,0 +1,99 @@
+//! The MMA7260QT at its pins: V = clamp(VDD/2 (1 + e0) + S (1 + es) a + n, 0.25, VDD - 0.25).
+
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::random::{Stream, standard_normal};
+use crate::scenario::{AccPart, STANDARD_GRAVITY};
+
+/// Levels of the g-select and sleep pins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AccSelect {
+    /// g-Select1.
+    pub select1: bool,
+    /// g-Select2.
+    pub select2: bool,
+    /// The sleep pin, which is active low: `true` when the part is awake.
+    pub awake: bool,
+}
+
+/// Output filter, X, Y and Z, Hz.
+const POLES_HZ: [f64; 3] = [350.0, 350.0, 150.0];
+/// Sleep to 90 % of the output, s.
+const ENABLE_S: f64 = 0.5e-3;
+
+/// The accelerometer.
+#[derive(Clone, Debug)]
+pub struct Mma7260Qt {
+    part: AccPart,
+    rng: Xoshiro256PlusPlus,
+    select: AccSelect,
+    awake_since_s: f64,
+    noise_g: [f64; 3],
+    filtered: [f64; 3],
+}
+
+impl Mma7260Qt {
+    /// Awake with open g-select pins: 1.5 g.
+    #[must_use]
+    pub fn new(part: AccPart, seed: u64) -> Self {
+        Mma7260Qt {
+            part,
+            rng: Stream::AccNoise.of(seed),
+            select: AccSelect {
+                select1: false,
+                select2: false,
+                awake: true,
+            },
+            awake_since_s: 0.0,
+            noise_g: [0.0; 3],
+            filtered: [0.0; 3],
+        }
+    }
+
+    /// Typical sensitivity at 3.3 V for g-Select2, g-Select1 as bits 1 and 0, V/g.
+    #[must_use]
+    pub fn sensitivity_v_g(range: u8) -> f64 {
+        match range & 3 {
+            0 => 0.8,
+            1 => 0.6,
+            2 => 0.3,
+            _ => 0.2,
+        }
+    }
+
+    /// The pins change at `t` s.
+    pub fn set_pins(&mut self, select: AccSelect, t: f64) {
+        if select.awake && !self.select.awake {
+            self.awake_since_s = t;
+        }
+        self.select = select;
+    }
+
+    /// Moves on by `dt` s under the specific force `acceleration`, m/s^2 along x, y, z.
+    pub fn step(&mut self, acceleration: [f64; 3], dt: f64) {
+        for axis in 0..3 {
+            // White noise behind a pole: variance = density^2 (pi/2) pole.
+            let pole = POLES_HZ[axis];
+            let keep = (-std::f64::consts::TAU * pole * dt).exp();
+            let sigma = self.part.noise_density_g * (std::f64::consts::FRAC_PI_2 * pole).sqrt();
+            self.noise_g[axis] = keep * self.noise_g[axis]
+                + sigma * (1.0 - keep * keep).sqrt() * standard_normal(&mut self.rng);
+            let g = acceleration[axis] / STANDARD_GRAVITY;
+            self.filtered[axis] = g + (self.filtered[axis] - g) * keep;
+        }
+    }
+
+    /// Output voltage of an axis at `t` s and the supply `vdd`, V. Asleep: 0.
+    #[must_use]
+    pub fn volts(&self, axis: usize, vdd: f64, t: f64) -> f64 {
+        if !self.select.awake || t < self.awake_since_s + ENABLE_S {
+            return 0.0;
+        }
+        let ratio = vdd / 3.3;
+        let range = u8::from(self.select.select2) << 1 | u8::from(self.select.select1);
+        let sensitivity = Self::sensitivity_v_g(range) * (1.0 + self.part.scale_error[axis]);
+        let g = self.filtered[axis] + self.noise_g[axis];
+        let volts = (1.65 + self.part.zero_g_error_v[axis] + sensitivity * g) * ratio;
+        volts.clamp(0.25, vdd - 0.25)
+    }
+}
