@@ -45,7 +45,9 @@ impl Sampling {
             (Some(ticks), Some(tick_s)) => Some(
                 ticks
                     .iter()
-                    .map(|t| t.wrapping_sub(ticks[0]) as i64 as f64 * tick_s)
+                    .map(|t| {
+                        t.wrapping_sub(ticks.first().copied().unwrap_or(0)) as i64 as f64 * tick_s
+                    })
                     .collect(),
             ),
             _ => None,
@@ -93,15 +95,9 @@ impl Sampling {
                 ));
             }
         }
-        if let Some(times) = &device {
+        if let (Some(times), Some(interval)) = (&device, &device_interval) {
             // A jump of the clock that the sequence number does not show is an interruption all the same.
-            for i in 1..n.min(times.len()) {
-                let step = times[i] - times[i - 1];
-                if !cut[i] && (step > 1.5 * tau0 || step < 0.5 * tau0) {
-                    cut[i] = true;
-                    lost += ((step / tau0).round() as i64 - 1).max(0) as u64;
-                }
-            }
+            lost += jumps(times, interval.regular_s, &mut cut);
         } else if record.seq.is_none()
             && let (Some(times), Some(interval)) = (&record.host_time_s, &host_interval)
         {
@@ -113,13 +109,7 @@ impl Sampling {
                     tau0
                 ));
             } else {
-                for i in 1..n.min(times.len()) {
-                    let step = times[i] - times[i - 1];
-                    if !(0.5 * tau0..=1.5 * tau0).contains(&step) {
-                        cut[i] = true;
-                        lost += ((step / tau0).round() as i64 - 1).max(0) as u64;
-                    }
-                }
+                lost += jumps(times, interval.regular_s, &mut cut);
             }
         }
         let mut runs = Vec::new();
@@ -161,6 +151,22 @@ impl Sampling {
         }
         out
     }
+}
+
+/// Mark the rows before which the times jump by something else than `interval`, and count the samples missing there.
+fn jumps(times: &[f64], interval: f64, cut: &mut [bool]) -> u64 {
+    let mut lost = 0;
+    for (i, pair) in times.windows(2).enumerate() {
+        let steps = (pair[1] - pair[0]) / interval;
+        if let Some(cut) = cut.get_mut(i + 1)
+            && !*cut
+            && !(0.5..=1.5).contains(&steps)
+        {
+            *cut = true;
+            lost += (steps.round() - 1.0).max(0.0) as u64;
+        }
+    }
+    lost
 }
 
 /// What a column of times says about the interval.
@@ -253,6 +259,20 @@ mod tests {
         let s = Sampling::of(&r, None).unwrap();
         assert!((s.tau0 / 0.0503424 - 1.0).abs() < 1e-4, "{}", s.tau0);
         assert_eq!((s.runs, s.lost), (vec![0..400, 400..1000], 3));
+    }
+
+    #[test]
+    fn a_wrong_rate_is_told_and_invents_no_gaps() {
+        let mut r = record(100);
+        r.header.tick_s = Some(4e-6);
+        r.t_ticks = Some(
+            (0..100u64)
+                .map(|i| i * 12_500 + if i > 60 { 25_000 } else { 0 })
+                .collect(),
+        );
+        let s = Sampling::of(&r, Some(100.0)).unwrap();
+        assert_eq!((s.tau0, s.lost, s.runs), (0.01, 2, vec![0..61, 61..100]));
+        assert!(s.warnings[0].contains("0.050000 s"), "{:?}", s.warnings);
     }
 
     #[test]
