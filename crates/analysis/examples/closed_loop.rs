@@ -191,7 +191,7 @@ fn main() {
         "clean: {alarms} of {clean} with an alarm {by_cause:?}, {:.0} ms each",
         begun.elapsed().as_millis() as f64 / clean.max(1) as f64
     );
-    for (cause, excitation, ranges) in PLANS {
+    for (plan, (cause, excitation, ranges)) in PLANS.iter().enumerate() {
         let begun = std::time::Instant::now();
         let (mut named, mut alone) = (0, 0);
         let mut others: BTreeMap<String, usize> = BTreeMap::new();
@@ -229,8 +229,13 @@ fn main() {
                 channels,
                 parameters: parameters.clone(),
             });
-            let record = model::simulate(&model, 600.0, 20.0, seed * 1_000_000 + 500_000 + run)
-                .expect("a run");
+            let record = model::simulate(
+                &model,
+                600.0,
+                20.0,
+                seed * 1_000_000 + 500_000 + plan as u64 * 10_000 + run,
+            )
+            .expect("a run");
             let d = diagnose(&record, &DiagnoseOptions::default())
                 .expect("a diagnosis")
                 .diagnosis;

@@ -20,7 +20,7 @@ use crate::result::{
     Parameter, Unexplained, Verdict,
 };
 use crate::search::{Search, State};
-use crate::{evidence, scan, threshold};
+use crate::{evidence, losses, scan, threshold};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,7 +67,7 @@ pub(crate) struct VarianceFound {
 pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed, AnalysisError> {
     let grid = lay_out(record, &|_| vec![], options.seed)?;
     let searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();
-    let mut findings = vec![];
+    let mut findings = losses::findings(record, &searched, &grid);
     let mut scale_not_tested = vec![];
     for s in &searched {
         findings.extend(motion_finding(s, &grid));

@@ -31,8 +31,10 @@ pub struct Target {
     pub lsb: Option<f64>,
     /// Readings, lost ones filled.
     pub y: Vec<f64>,
-    /// Grid places without a reading.
+    /// Grid places without a reading, spikes included.
     pub lost: Vec<usize>,
+    /// Places whose reading the noise cannot have made.
+    pub spikes: Vec<usize>,
     /// Excess rms in the band of base motion, deg/s.
     pub motion_rms: f64,
     /// Whether that is more than a bias can wander.
@@ -220,6 +222,13 @@ pub fn lay_out(
             y = given.clone();
             crate::kalman::fill(&mut y, fit.1, fit.1 * fit.0.log_walk.exp(), &mut rng);
         }
+        let moves = unit == "deg/s" && motion(&dct.forward(&y), n, rate_hz) > MOTION_RMS;
+        let spikes = if moves {
+            vec![]
+        } else {
+            spikes(&given, &mut y, &mut fit, &dct, &bins, &mut rng)
+        };
+        let lost = [lost, spikes.clone()].concat();
         let motion_rms = if unit == "deg/s" {
             motion(&dct.forward(&y), n, rate_hz)
         } else {
@@ -232,6 +241,7 @@ pub fn lay_out(
             lsb: channel.lsb.map(|l| l * scale),
             y,
             lost,
+            spikes,
             motion_rms,
             moving: motion_rms > MOTION_RMS,
             noise: fit.0,
@@ -252,6 +262,62 @@ pub fn lay_out(
         targets,
         signals,
     })
+}
+
+/// Take out single samples that the noise cannot have made, and fill their places; largest first, since each one
+/// widens the noise that the others are held against.
+fn spikes(
+    given: &[f64],
+    y: &mut Vec<f64>,
+    fit: &mut (Noise, f64),
+    dct: &Dct,
+    bins: &Rc<Bins>,
+    rng: &mut Xoshiro256PlusPlus,
+) -> Vec<usize> {
+    const PASSES: usize = 8;
+    let n = y.len();
+    let mut found: Vec<usize> = vec![];
+    for _ in 0..PASSES {
+        let g = fit.0.everywhere(n);
+        let c: Vec<f64> = dct
+            .forward(y)
+            .iter()
+            .zip(&g)
+            .map(|(c, g)| c / (fit.1 * g).sqrt())
+            .collect();
+        let e = dct.inverse(&c);
+        let beyond = |limit: f64| {
+            (0..n)
+                .filter(|i| e[*i].abs() > limit && given[*i].is_finite())
+                .collect::<Vec<_>>()
+        };
+        let fresh: Vec<usize> = beyond(spike_limit(n))
+            .into_iter()
+            .filter(|i| !found.contains(i))
+            .collect();
+        if fresh.is_empty() {
+            break;
+        }
+        found.extend(fresh);
+        let mut rest = given.to_vec();
+        for i in &found {
+            rest[*i] = f64::NAN;
+        }
+        crate::kalman::fill(&mut rest, fit.1, fit.1 * fit.0.log_walk.exp(), rng);
+        let panel = Panel::new(dct, bins, &rest);
+        let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
+        *fit = (noise, solution.white);
+        *y = rest;
+    }
+    found.sort_unstable();
+    found
+}
+
+/// Distance in sigma that one of `n` samples reaches once in 10^5 records.
+fn spike_limit(n: usize) -> f64 {
+    let tail =
+        |z: f64| (n as f64 * crate::checks::normal_tail(z)).ln() - crate::checks::LEAST_CHANCE.ln();
+    crate::optimise::golden(&|z| tail(z).abs(), 4.0, 12.0, 40)
 }
 
 fn white_of(y: &[f64]) -> f64 {

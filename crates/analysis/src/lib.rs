@@ -18,6 +18,7 @@ pub mod gain;
 pub mod grid;
 pub mod kalman;
 pub mod likelihood;
+mod losses;
 pub mod noise_fit;
 pub mod noise_id;
 pub mod optimise;

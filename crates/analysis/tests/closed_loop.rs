@@ -364,3 +364,30 @@ fn a_third_of_the_frames_lost_leaves_the_cause_in_sight() {
         .collect();
     assert_eq!(causes, ["bias_step"], "{:?}", d.findings);
 }
+
+#[test]
+fn faults_of_frames_and_samples_are_counted_and_leave_the_rest_clean() {
+    for (cause, count, channels) in [
+        ("dropped_samples", 9.0, vec![]),
+        ("stale_samples", 12.0, vec!["gyro_z".to_owned()]),
+        ("outliers", 5.0, vec!["gyro_x".to_owned()]),
+    ] {
+        let mut model = ModelFile::paper();
+        let parameters = [("count".to_owned(), Parameter::exact(count, "1"))].into();
+        model.effects.push(EffectModel {
+            cause: cause.into(),
+            channels,
+            parameters,
+        });
+        let d = told(&model, 31);
+        let causes: Vec<&str> = d.findings.iter().map(|f| f.cause.as_str()).collect();
+        assert_eq!(causes, [cause], "{:?}", d.findings);
+        // Two events may fall on one sample.
+        let told = d.findings[0].parameters["count"].value;
+        assert!(
+            told <= count && told >= count - 1.0,
+            "{cause}: {told} of {count}"
+        );
+        assert!(d.unexplained.is_empty(), "{cause}: {:?}", d.unexplained);
+    }
+}
