@@ -1,0 +1,201 @@
+//! Motor, EEPROM, watchdog, reset cause, stack.
+
+use avr_device::atmega16::{CPU, EEPROM, PORTC, PORTD, TC2, WDT};
+use avr_device::interrupt;
+use firmware::{Board, Job};
+
+use super::{serial, tick};
+
+/// PWM of the motor: OC2 = PD7; direction: PD6.
+const MOTOR_PWM: u8 = 1 << 7;
+const MOTOR_DIRECTION: u8 = 1 << 6;
+/// Fast PWM, clock / 8: 7.8 kHz, which common bridge drivers follow.
+const FAST_PWM: u8 = 1 << 6 | 1 << 3 | 2;
+/// Non-inverting output on OC2.
+const PWM_TO_PIN: u8 = 1 << 5;
+const RESET_FLAGS: u8 = 0x1f;
+const POWER_ON: u8 = 1;
+const EERE: u8 = 1;
+const EEWE: u8 = 1 << 1;
+const EEMWE: u8 = 1 << 2;
+/// What untouched stack looks like.
+const PAINT: u8 = 0xc5;
+/// End of SRAM + 1.
+const RAM_END: usize = 0x460;
+
+unsafe extern "C" {
+    /// End of .data and .bss, by the linker.
+    static mut _end: u8;
+}
+
+#[unsafe(link_section = ".noinit")]
+static mut RESTARTS: u16 = 0;
+
+/// Fills the free stack with [`PAINT`], so that its depth can be read off later.
+#[inline(always)]
+pub fn paint_stack() {
+    // SAFETY: from the end of the statics to well below the stack pointer nothing lives yet.
+    unsafe {
+        let low = core::ptr::read_volatile(0x5d as *const u8);
+        let high = core::ptr::read_volatile(0x5e as *const u8);
+        let top = (u16::from_le_bytes([low, high]) as usize).wrapping_sub(8) as *mut u8;
+        let mut at = core::ptr::addr_of_mut!(_end);
+        while at < top {
+            core::ptr::write_volatile(at, PAINT);
+            at = at.wrapping_add(1);
+        }
+    }
+}
+
+/// The board but for its sensors.
+pub struct AvrBoard {
+    reset_cause: u8,
+    restarts: u16,
+    baud: Option<u16>,
+}
+
+impl AvrBoard {
+    /// Reads why it started, and sets the motor's pins to off.
+    pub fn start() -> Self {
+        // SAFETY: at start nothing else runs.
+        let (cpu, port, restarts) = unsafe {
+            (
+                &*CPU::ptr(),
+                &*PORTD::ptr(),
+                &mut *core::ptr::addr_of_mut!(RESTARTS),
+            )
+        };
+        port.portd.write(|w| bits!(w, 0));
+        port.ddrd.write(|w| bits!(w, MOTOR_PWM | MOTOR_DIRECTION));
+        let reset_cause = cpu.mcucsr.read().bits() & RESET_FLAGS;
+        cpu.mcucsr.write(|w| bits!(w, 0));
+        *restarts = if reset_cause & POWER_ON != 0 {
+            0
+        } else {
+            restarts.saturating_add(1)
+        };
+        Self {
+            reset_cause,
+            restarts: *restarts,
+            baud: None,
+        }
+    }
+
+    /// What has to wait for the line to be idle.
+    pub fn work(&mut self) {
+        if let Some(divisor) = self.baud
+            && serial::is_idle()
+        {
+            serial::set_baud(divisor);
+            self.baud = None;
+        }
+    }
+}
+
+impl Board for AvrBoard {
+    fn send(&mut self, frame: &[u8]) -> bool {
+        serial::send(frame)
+    }
+
+    fn set_motor(&mut self, duty: i16) {
+        // SAFETY: timer 2 and port D's upper pins are the motor's.
+        let (timer, port) = unsafe { (&*TC2::ptr(), &*PORTD::ptr()) };
+        if duty == 0 {
+            // Disconnected, so that the pin is low: fast PWM would leave a spike at 0.
+            timer.tccr2.write(|w| bits!(w, 0));
+            return;
+        }
+        if duty < 0 {
+            port.portd
+                .modify(|r, w| bits!(w, r.bits() | MOTOR_DIRECTION));
+        } else {
+            port.portd
+                .modify(|r, w| bits!(w, r.bits() & !MOTOR_DIRECTION));
+        }
+        timer
+            .ocr2
+            .write(|w| bits!(w, duty.unsigned_abs().min(255) as u8));
+        timer.tccr2.write(|w| bits!(w, FAST_PWM | PWM_TO_PIN));
+    }
+
+    fn set_period(&mut self, ticks: u16) {
+        tick::set_period(ticks);
+    }
+
+    fn set_baud(&mut self, divisor: u16) {
+        if self.baud.is_none() && serial::is_unset() {
+            serial::set_baud(divisor);
+        } else {
+            self.baud = Some(divisor);
+        }
+    }
+
+    fn set_acc_range(&mut self, range: u8) {
+        // Open drain: an output that is low, or an input that the pull-up to 3.3 V holds high.
+        // SAFETY: port C is the accelerometer's.
+        unsafe { (*PORTC::ptr()).ddrc.write(|w| bits!(w, !range & 0b11)) };
+    }
+
+    fn post(&mut self, job: Job) -> bool {
+        tick::post(job)
+    }
+
+    fn eeprom_read(&mut self, address: u16) -> u8 {
+        // SAFETY: the EEPROM is used here alone.
+        let eeprom = unsafe { &*EEPROM::ptr() };
+        eeprom.eear.write(|w| bits!(w, address));
+        eeprom.eecr.modify(|r, w| bits!(w, r.bits() | EERE));
+        eeprom.eedr.read().bits()
+    }
+
+    fn eeprom_is_ready(&mut self) -> bool {
+        // SAFETY: as above.
+        unsafe { (*EEPROM::ptr()).eecr.read().bits() & EEWE == 0 }
+    }
+
+    fn eeprom_write(&mut self, address: u16, byte: u8) {
+        // SAFETY: as above.
+        let eeprom = unsafe { &*EEPROM::ptr() };
+        eeprom.eear.write(|w| bits!(w, address));
+        eeprom.eedr.write(|w| bits!(w, byte));
+        // EEWE has to follow EEMWE within four cycles.
+        interrupt::free(|_| {
+            eeprom.eecr.write(|w| bits!(w, EEMWE));
+            eeprom.eecr.write(|w| bits!(w, EEMWE | EEWE));
+        });
+    }
+
+    fn reboot(&mut self) {
+        interrupt::disable();
+        // SAFETY: nothing runs any more; 16 ms and the watchdog resets the board.
+        unsafe { (*WDT::ptr()).wdtcr.write(|w| bits!(w, 1 << 3)) };
+        loop {
+            avr_device::asm::nop();
+        }
+    }
+
+    fn reset_cause(&self) -> u8 {
+        self.reset_cause
+    }
+
+    fn restarts(&self) -> u16 {
+        self.restarts
+    }
+
+    fn stack_free(&self) -> u16 {
+        // SAFETY: reads SRAM above the statics.
+        unsafe {
+            let mut at = core::ptr::addr_of!(_end);
+            let mut free = 0u16;
+            while (at as usize) < RAM_END && core::ptr::read_volatile(at) == PAINT {
+                at = at.wrapping_add(1);
+                free = free.wrapping_add(1);
+            }
+            free
+        }
+    }
+
+    fn ticks_since(&self) -> u16 {
+        tick::ticks_since()
+    }
+}

@@ -1,0 +1,71 @@
+//! The board on its registers: start, main loop, and the interrupts that feed it.
+
+/// Writes all bits of a register. Some registers' `bits` is safe, most are not: which values are legal is the data
+/// sheet's word, and the constants beside each use say where theirs come from.
+macro_rules! bits {
+    ($w:ident, $value:expr) => {
+        // SAFETY: a whole value for the register, from the data sheet.
+        {
+            #[allow(unused_unsafe)]
+            let written = unsafe { $w.bits($value) };
+            written
+        }
+    };
+}
+
+mod board;
+mod console;
+mod sensors;
+mod serial;
+mod tick;
+
+use avr_device::{asm, interrupt};
+use firmware::{Stand, configure};
+use wire::Fault;
+
+/// Nothing that panics may be reachable: the symbol is defined nowhere, so an image that could get here does not link.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    unsafe extern "C" {
+        fn firmware_contains_a_reachable_panic() -> !;
+    }
+    // SAFETY: defined nowhere, see above.
+    unsafe { firmware_contains_a_reachable_panic() }
+}
+
+#[avr_device::entry]
+fn main() -> ! {
+    board::paint_stack();
+    let mut board = board::AvrBoard::start();
+    let (mut received, sensors) = (serial::start(), sensors::start());
+    let mut stand = Stand::boot(&mut board);
+    let misconfigured = configure(sensors, stand.sens_avg());
+    stand.started(&mut board, misconfigured);
+    // SAFETY: called once, before interrupts are on; from here on the sensors are the tick's.
+    unsafe { tick::start(sensors) };
+    // SAFETY: everything that the interrupts touch is set up.
+    unsafe { interrupt::enable() };
+
+    let mut console = console::Console::new();
+    loop {
+        if let Some(sample) = tick::take() {
+            if sample.missed > 0 {
+                stand.count(Fault::TickOverrun, sample.missed);
+            }
+            stand.on_sample(&mut board, &sample.raw, sample.t_ticks, sample.missed > 0);
+            // The watchdog is fed by samples alone: a tick that stalls is a reset, and a reset stops the motor.
+            asm::wdr();
+        }
+        while let Some(byte) = received.dequeue() {
+            if !console.takes(&mut board, byte) {
+                stand.on_byte(&mut board, byte);
+            }
+        }
+        serial::count_losses(&mut stand);
+        while tick::take_millisecond() {
+            stand.on_millisecond(&mut board);
+        }
+        board.work();
+        tick::sleep_unless_work();
+    }
+}

@@ -1,0 +1,215 @@
+//! SPI with three chip selects, and the ADC.
+
+use adis16250::Adis16250;
+use avr_device::atmega16::{ADC, PORTA, PORTB, PORTC, SPI};
+use embedded_hal::{
+    delay::DelayNs,
+    spi::{ErrorKind, ErrorType, Operation, SpiDevice},
+};
+use firmware::Sensors;
+
+/// Chip selects on port B: x PB2, y PB3, z PB4 (which is SS, so it has to be an output anyway).
+const SELECTS: [u8; 3] = [1 << 2, 1 << 3, 1 << 4];
+const MOSI: u8 = 1 << 5;
+const SCK: u8 = 1 << 7;
+/// SPE, MSTR, CPOL, CPHA (mode 3), SPR0; with SPI2X: clock / 8 = 2 MHz, below the part's 2.5 MHz.
+const SPCR: u8 = 1 << 6 | 1 << 4 | 1 << 3 | 1 << 2 | 1;
+const SPI2X: u8 = 1;
+const SPIF: u8 = 1 << 7;
+/// Polls for the end of a byte: it takes 64 cycles, a poll about 6.
+const SPI_BUDGET: u8 = 60;
+/// ADEN, clock / 128 = 125 kHz: the only setting at 16 MHz inside the 50..200 kHz that 10 bits need.
+const ADC_ON: u8 = 1 << 7 | 7;
+const ADSC: u8 = 1 << 6;
+/// Polls for the end of a conversion: it takes 1664 cycles, the first 3200; a poll about 6.
+const ADC_BUDGET: u16 = 1_000;
+
+/// The end of a byte did not come: SS was pulled low, or the clock has stopped.
+#[derive(Clone, Copy, Debug)]
+pub struct Stalled;
+
+impl embedded_hal::spi::Error for Stalled {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::ModeFault
+    }
+}
+
+/// One gyro's SPI.
+pub struct GyroSpi {
+    select: u8,
+}
+
+fn spi() -> &'static avr_device::atmega16::spi::RegisterBlock {
+    // SAFETY: SPI is used by the sensors alone, which exist once (`start`).
+    unsafe { &*SPI::ptr() }
+}
+
+fn port_b() -> &'static avr_device::atmega16::portb::RegisterBlock {
+    // SAFETY: port B is used by the sensors alone.
+    unsafe { &*PORTB::ptr() }
+}
+
+fn byte(out: u8) -> Result<u8, Stalled> {
+    let spi = spi();
+    spi.spdr.write(|w| bits!(w, out));
+    for _ in 0..SPI_BUDGET {
+        if spi.spsr.read().bits() & SPIF != 0 {
+            return Ok(spi.spdr.read().bits());
+        }
+    }
+    // A low level on SS drops the master bit, and the byte never ends: become master again.
+    spi.spcr.write(|w| bits!(w, SPCR));
+    Err(Stalled)
+}
+
+impl GyroSpi {
+    fn selected<T>(&mut self, work: impl FnOnce() -> T) -> T {
+        let port = port_b();
+        port.portb.modify(|r, w| bits!(w, r.bits() & !self.select));
+        let result = work();
+        port.portb.modify(|r, w| bits!(w, r.bits() | self.select));
+        result
+    }
+}
+
+impl ErrorType for GyroSpi {
+    type Error = Stalled;
+}
+
+impl SpiDevice for GyroSpi {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Stalled> {
+        self.selected(|| {
+            for operation in operations {
+                match operation {
+                    Operation::Read(into) => {
+                        for place in into.iter_mut() {
+                            *place = byte(0)?;
+                        }
+                    }
+                    Operation::Write(from) => {
+                        for &out in from.iter() {
+                            byte(out)?;
+                        }
+                    }
+                    Operation::Transfer(into, from) => {
+                        for (place, &out) in into.iter_mut().zip(from.iter()) {
+                            *place = byte(out)?;
+                        }
+                    }
+                    Operation::TransferInPlace(both) => {
+                        for place in both.iter_mut() {
+                            *place = byte(*place)?;
+                        }
+                    }
+                    Operation::DelayNs(ns) => Delay.delay_ns(*ns),
+                }
+            }
+            Ok(())
+        })
+    }
+
+    fn transfer_in_place(&mut self, both: &mut [u8]) -> Result<(), Stalled> {
+        self.selected(|| {
+            for place in both.iter_mut() {
+                *place = byte(*place)?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Waits by counting cycles of 62.5 ns.
+#[derive(Clone, Copy)]
+pub struct Delay;
+
+impl DelayNs for Delay {
+    fn delay_ns(&mut self, ns: u32) {
+        // 1024 ns for a microsecond, rounded up: never less than asked but by 2.4 %, and no division.
+        self.delay_us((ns >> 10).wrapping_add(1));
+    }
+
+    fn delay_us(&mut self, us: u32) {
+        // Four passes of four cycles to the microsecond.
+        for _ in 0..us {
+            avr_device::asm::delay_cycles(9);
+        }
+    }
+
+    fn delay_ms(&mut self, ms: u32) {
+        for _ in 0..ms {
+            avr_device::asm::delay_cycles(15_990);
+        }
+    }
+}
+
+/// The three gyros and the accelerometer.
+pub struct AvrSensors {
+    gyros: [Adis16250<GyroSpi>; 3],
+}
+
+static mut SENSORS: AvrSensors = AvrSensors {
+    gyros: [
+        Adis16250::new(GyroSpi { select: SELECTS[0] }),
+        Adis16250::new(GyroSpi { select: SELECTS[1] }),
+        Adis16250::new(GyroSpi { select: SELECTS[2] }),
+    ],
+};
+
+/// Sets up SPI and ADC and waits until the gyros have started. Called once, at start.
+pub fn start() -> &'static mut AvrSensors {
+    let all = SELECTS[0] | SELECTS[1] | SELECTS[2];
+    let port = port_b();
+    port.portb.write(|w| bits!(w, all | SCK));
+    port.ddrb.write(|w| bits!(w, all | MOSI | SCK));
+    spi().spsr.write(|w| bits!(w, SPI2X));
+    spi().spcr.write(|w| bits!(w, SPCR));
+    // SAFETY: port A and C are set up here, before anything else uses them.
+    unsafe {
+        (*PORTA::ptr()).ddra.write(|w| bits!(w, 0));
+        (*PORTA::ptr()).porta.write(|w| bits!(w, 0));
+        // Sleep pin and g-select: driven low or left to the pull-up to 3.3 V, never driven high: 5 V would harm the part.
+        (*PORTC::ptr()).portc.write(|w| bits!(w, 0));
+        (*PORTC::ptr()).ddrc.write(|w| bits!(w, 0b11));
+    }
+    adc().adcsra.write(|w| bits!(w, ADC_ON | ADSC));
+    Delay.delay_ms(u32::from(firmware::SENSOR_START_MS));
+    // SAFETY: called once; the one reference goes to the caller.
+    unsafe { &mut *core::ptr::addr_of_mut!(SENSORS) }
+}
+
+fn adc() -> &'static avr_device::atmega16::adc::RegisterBlock {
+    // SAFETY: the ADC is used by the sensors alone.
+    unsafe { &*ADC::ptr() }
+}
+
+impl Sensors for AvrSensors {
+    type Spi = GyroSpi;
+    type Delay = Delay;
+
+    fn gyros(&mut self) -> &mut [Adis16250<GyroSpi>; 3] {
+        &mut self.gyros
+    }
+
+    fn delay(&mut self) -> Delay {
+        Delay
+    }
+
+    fn sampled(&mut self) {
+        super::tick::unmask();
+    }
+
+    fn adc_start(&mut self, channel: u8) {
+        // REFS = 00: AREF is the sensor's own 3.3 V, so the reading is ratiometric.
+        adc().admux.write(|w| bits!(w, channel & 3));
+        adc().adcsra.write(|w| bits!(w, ADC_ON | ADSC));
+    }
+
+    fn adc_finish(&mut self) -> Option<u16> {
+        for _ in 0..ADC_BUDGET {
+            if adc().adcsra.read().bits() & ADSC == 0 {
+                return Some(adc().adc.read().bits());
+            }
+        }
+        None
+    }
+}

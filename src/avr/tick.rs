@@ -1,0 +1,250 @@
+//! The sample clock. Nothing may move the instant at which a sample is taken, whatever else goes on:
+//!
+//! timer 1 counts 4 us ticks to the period (compare A). 64 us before that, compare B interrupts whatever runs, masks
+//! the other interrupts and sleeps. The compare A that wakes it is then alone, and the wake-up from sleep takes the
+//! same number of cycles every time. Once the first round over the sensors is done, the masks fall and the rest of
+//! the acquisition shares the processor with the serial line again.
+
+use core::ptr::addr_of_mut;
+
+use avr_device::atmega16::{CPU, TC0, TC1};
+use avr_device::{asm, interrupt};
+use firmware::{Job, Raw, acquire};
+
+use super::sensors::AvrSensors;
+use super::serial;
+
+/// Compare B comes this many ticks of 4 us before compare A: 1024 cycles, more than the longest section with
+/// interrupts off and the longest interrupt together (hil-tests/tests/timing.rs measures the jitter).
+const GUARD_TICKS: u16 = 16;
+const OCIE1A: u8 = 1 << 4;
+const OCIE1B: u8 = 1 << 3;
+const OCIE0: u8 = 1 << 1;
+/// Sleep enable, mode idle (SM = 000).
+const SLEEP_IDLE: u8 = 1 << 6;
+const AWAKE: u8 = 0;
+
+/// A sample on its way to the main loop.
+pub struct Taken {
+    /// What the sensors said.
+    pub raw: Raw,
+    /// Time of the tick.
+    pub t_ticks: u32,
+    /// Ticks since the last one that was taken whose samples are lost.
+    pub missed: u16,
+}
+
+struct Shared {
+    sensors: Option<&'static mut AvrSensors>,
+    raw: Raw,
+    job: Option<Job>,
+    t_ticks: u32,
+    /// Period in force, and the one to change to at the next tick.
+    period: u16,
+    next_period: u16,
+    masked_ucsrb: u8,
+    missed: u16,
+    milliseconds: u8,
+    ready: bool,
+    ticked: bool,
+}
+
+static mut SHARED: Shared = Shared {
+    sensors: None,
+    raw: Raw::new(),
+    job: None,
+    t_ticks: 0,
+    period: 12_500,
+    next_period: 12_500,
+    masked_ucsrb: 0,
+    missed: 0,
+    milliseconds: 0,
+    ready: false,
+    ticked: false,
+};
+
+fn shared() -> *mut Shared {
+    addr_of_mut!(SHARED)
+}
+
+fn timer0() -> &'static avr_device::atmega16::tc0::RegisterBlock {
+    // SAFETY: timer 0 and TIMSK are this module's.
+    unsafe { &*TC0::ptr() }
+}
+
+fn timer1() -> &'static avr_device::atmega16::tc1::RegisterBlock {
+    // SAFETY: timer 1 is this module's.
+    unsafe { &*TC1::ptr() }
+}
+
+/// Starts both timers and the watchdog.
+///
+/// # Safety
+/// Once, before interrupts are on.
+pub unsafe fn start(sensors: &'static mut AvrSensors) {
+    // SAFETY: interrupts are off.
+    unsafe {
+        (*shared()).sensors = Some(sensors);
+        set_compare((*shared()).next_period);
+        (*shared()).period = (*shared()).next_period;
+        // Watchdog: 1 s, longer than the slowest tick.
+        let watchdog = &*avr_device::atmega16::WDT::ptr();
+        asm::wdr();
+        watchdog.wdtcr.write(|w| bits!(w, 1 << 3 | 6));
+    }
+    // Timer 0: CTC, clock / 64, 250 counts: 1 kHz.
+    timer0().ocr0.write(|w| bits!(w, 249));
+    timer0().tccr0.write(|w| bits!(w, 1 << 3 | 3));
+    // Timer 1: CTC with OCR1A (mode 4), clock / 64: 4 us.
+    timer1().tcnt1.write(|w| bits!(w, 0));
+    timer1().tccr1b.write(|w| bits!(w, 1 << 3 | 3));
+    timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
+}
+
+fn set_compare(period: u16) {
+    let last = period.wrapping_sub(1);
+    timer1().ocr1a.write(|w| bits!(w, last));
+    timer1()
+        .ocr1b
+        .write(|w| bits!(w, last.wrapping_sub(GUARD_TICKS)));
+}
+
+/// The time from tick to tick, from the next tick on.
+pub fn set_period(ticks: u16) {
+    // SAFETY: interrupts are off.
+    interrupt::free(|_| unsafe { (*shared()).next_period = ticks });
+}
+
+/// Posts a job for the slot after the next sample; false while one waits.
+pub fn post(job: Job) -> bool {
+    interrupt::free(|_| {
+        // SAFETY: interrupts are off.
+        let waiting = unsafe { &mut (*shared()).job };
+        let free = waiting.is_none();
+        if free {
+            *waiting = Some(job);
+        }
+        free
+    })
+}
+
+/// Timer ticks since the tick.
+pub fn ticks_since() -> u16 {
+    interrupt::free(|_| timer1().tcnt1.read().bits())
+}
+
+/// The sample that waits, if one does.
+pub fn take() -> Option<Taken> {
+    interrupt::free(|_| {
+        // SAFETY: interrupts are off.
+        let shared = unsafe { &mut *shared() };
+        if !shared.ready {
+            return None;
+        }
+        shared.ready = false;
+        let missed = core::mem::take(&mut shared.missed);
+        Some(Taken {
+            raw: shared.raw,
+            t_ticks: shared.t_ticks,
+            missed,
+        })
+    })
+}
+
+/// Whether a millisecond has passed that nobody has taken yet.
+pub fn take_millisecond() -> bool {
+    interrupt::free(|_| {
+        // SAFETY: interrupts are off.
+        let passed = unsafe { &mut (*shared()).milliseconds };
+        let any = *passed > 0;
+        *passed = passed.saturating_sub(1);
+        any
+    })
+}
+
+/// Sleeps until the next interrupt, unless something waits already.
+pub fn sleep_unless_work() {
+    interrupt::disable();
+    // SAFETY: interrupts are off.
+    let waits = unsafe { (*shared()).ready || (*shared()).milliseconds > 0 };
+    if waits || serial::has_received() {
+        // SAFETY: they were on.
+        unsafe { interrupt::enable() };
+    } else {
+        sleep_now();
+    }
+}
+
+/// Sleeps in idle mode; `sei` takes effect after the next instruction, so no interrupt slips in before the `sleep`.
+#[inline(always)]
+fn sleep_now() {
+    // SAFETY: the CPU's control register is touched here alone.
+    let cpu = unsafe { &*CPU::ptr() };
+    cpu.mcucr.write(|w| bits!(w, SLEEP_IDLE));
+    // SAFETY: called with interrupts off where they were on before.
+    unsafe { interrupt::enable() };
+    asm::sleep();
+    cpu.mcucr.write(|w| bits!(w, AWAKE));
+}
+
+/// The sampling instants have passed: the other interrupts come back.
+pub fn unmask() {
+    // SAFETY: the masks are the tick's own; a single byte is read.
+    serial::unmask(unsafe { (*shared()).masked_ucsrb });
+    timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE0));
+}
+
+#[avr_device::interrupt(atmega16)]
+fn TIMER0_COMP() {
+    // SAFETY: the main loop takes it with interrupts off.
+    let passed = unsafe { &mut (*shared()).milliseconds };
+    *passed = passed.saturating_add(1);
+}
+
+#[avr_device::interrupt(atmega16)]
+fn TIMER1_COMPA() {
+    // SAFETY: the guard waits for this, the main loop reads with interrupts off.
+    unsafe { (*shared()).ticked = true };
+}
+
+#[avr_device::interrupt(atmega16)]
+fn TIMER1_COMPB() {
+    timer1().timsk.write(|w| bits!(w, OCIE1A));
+    // SAFETY: this interrupt is off until it ends, so it never meets itself; the main loop looks with interrupts off.
+    let shared = unsafe { &mut *shared() };
+    shared.masked_ucsrb = serial::mask();
+    shared.ticked = false;
+    // Only compare A is left to wake it; the bound is for a wake-up that nobody explains.
+    for _ in 0..4 {
+        sleep_now();
+        // SAFETY: a byte that the compare A interrupt sets.
+        if unsafe { core::ptr::read_volatile(&raw const shared.ticked) } {
+            break;
+        }
+    }
+    let mut raw = Raw::new();
+    if let Some(sensors) = &mut shared.sensors {
+        raw = acquire(*sensors);
+        let job = interrupt::free(|_| shared.job.take());
+        if let Some(job) = job {
+            raw.job = Some(firmware::acquire::work(*sensors, job));
+        }
+    } else {
+        unmask();
+    }
+    interrupt::free(|_| {
+        shared.t_ticks = shared.t_ticks.wrapping_add(u32::from(shared.period));
+        if shared.ready {
+            shared.missed = shared.missed.saturating_add(1);
+            // The job's result must not be lost with the sample.
+            raw.job = raw.job.or(shared.raw.job);
+        }
+        shared.raw = raw;
+        shared.ready = true;
+        if shared.period != shared.next_period {
+            shared.period = shared.next_period;
+            set_compare(shared.period);
+        }
+        timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
+    });
+}
