@@ -1,1 +1,6 @@
-//! Capture, analysis and diagnosis of an inertial test stand.
+//! The program `imu-stand` as a library: captures in and out, and what the commands share.
+
+pub mod capture;
+pub mod text;
+
+pub use capture::{CaptureError, ColumnMapping, ReadOptions, RecordBuilder, read_capture, write_capture};

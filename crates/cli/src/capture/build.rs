@@ -1,0 +1,176 @@
+//! From frames to rows.
+
+use model::record::{Axis, Base, Channel, Header, Quantity, Record};
+use wire::{Sample, flags};
+
+use super::STANDARD_GRAVITY;
+
+/// What the board's counts mean; goes into the header.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Tick of the time stamps, s.
+    pub tick_s: f64,
+    /// Tolerance of the board's crystal, ppm.
+    pub tick_tolerance_ppm: f64,
+    /// deg/s for each count.
+    pub gyro_lsb_dps: f64,
+    /// ADC counts at 0 g.
+    pub acc_zero_counts: f64,
+    /// ADC counts for 1 g.
+    pub acc_counts_per_g: f64,
+    /// What the base does.
+    pub base: Base,
+}
+
+impl Default for Calibration {
+    /// The stand of the paper: 20 Hz, ADIS16250 at 320 deg/s, MMA7260QT at 1.5 g with AREF at its own 3.3 V
+    /// (1024 counts / 3.3 V * 0.8 V/g), a 100-ppm crystal.
+    fn default() -> Self {
+        Self {
+            rate_hz: 20.0,
+            tick_s: 4e-6,
+            tick_tolerance_ppm: 100.0,
+            gyro_lsb_dps: 0.073_26,
+            acc_zero_counts: 512.0,
+            acc_counts_per_g: 1024.0 / 3.3 * 0.8,
+            base: Base::Static,
+        }
+    }
+}
+
+/// TEMP_OUT: degC a count, and the temperature of count 0 (ADIS16250 data sheet).
+const TEMP: (f64, f64) = (0.1453, 25.0);
+/// SUPPLY_OUT: V a count (ADIS16250 data sheet).
+const SUPPLY_LSB_V: f64 = 1.8315e-3;
+
+/// Collects frames.
+#[derive(Clone, Debug)]
+pub struct RecordBuilder {
+    calibration: Calibration,
+    rows: Vec<(Sample, f64)>,
+}
+
+impl RecordBuilder {
+    /// Nothing yet.
+    #[must_use]
+    pub fn new(calibration: Calibration) -> Self {
+        Self { calibration, rows: Vec::new() }
+    }
+
+    /// A frame and when it arrived, s.
+    pub fn push(&mut self, sample: &Sample, host_time_s: f64) {
+        self.rows.push((*sample, host_time_s));
+    }
+
+    /// Rows so far.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// The record.
+    #[must_use]
+    pub fn build(&self) -> Record {
+        let c = &self.calibration;
+        let entry = |key: &str, value: f64| (key.to_owned(), format!("{value}"));
+        let header = Header {
+            rate_hz: Some(c.rate_hz),
+            tick_s: Some(c.tick_s),
+            tick_tolerance_ppm: Some(c.tick_tolerance_ppm),
+            base: Some(c.base),
+            entries: vec![
+                ("format".to_owned(), "imu-stand-capture/1".to_owned()),
+                entry("rate_hz", c.rate_hz),
+                entry("tick_s", c.tick_s),
+                entry("tick_tolerance_ppm", c.tick_tolerance_ppm),
+                entry("gyro_lsb_dps", c.gyro_lsb_dps),
+                entry("temp_lsb_c", TEMP.0),
+                entry("temp_zero_c", TEMP.1),
+                entry("supply_lsb_v", SUPPLY_LSB_V),
+                entry("acc_zero_counts", c.acc_zero_counts),
+                entry("acc_counts_per_g", c.acc_counts_per_g),
+            ],
+        };
+        let mut channels = Vec::new();
+        let acc = (c.acc_zero_counts, STANDARD_GRAVITY / c.acc_counts_per_g);
+        for axis in Axis::ALL {
+            let k = axis.index();
+            // A gyro that does not answer delivers neither a new sample nor an alarm: there is no value.
+            let lost = move |s: &Sample| {
+                s.flags & flags::GYRO_NOT_ANSWERING != 0
+                    && s.flags & (flags::new_data(k as u8) | flags::error(k as u8)) == 0
+            };
+            channels.push(self.channel("gyro", Quantity::Gyro, Some(axis), "deg/s", (0.0, c.gyro_lsb_dps), move |s| {
+                (!lost(s)).then_some(i32::from(s.gyro[k]))
+            }));
+        }
+        for axis in Axis::ALL {
+            let k = axis.index();
+            let temp = (-TEMP.1 / TEMP.0, TEMP.0);
+            channels.push(self.channel("temp", Quantity::Temp, Some(axis), "degC", temp, move |s| {
+                Some(i32::from(s.temp[k]))
+            }));
+        }
+        channels.push(self.channel("supply", Quantity::Supply, None, "V", (0.0, SUPPLY_LSB_V), |s| {
+            Some(i32::from(s.supply))
+        }));
+        for axis in Axis::ALL {
+            let k = axis.index();
+            channels.push(self.channel("acc", Quantity::Acc, Some(axis), "m/s^2", acc, move |s| {
+                (s.flags & flags::ACC_NOT_CONVERTED == 0).then_some(i32::from(s.acc[k]))
+            }));
+        }
+        channels.push(self.channel("pwm", Quantity::Pwm, None, "1", (0.0, 1.0), |s| Some(i32::from(s.pwm))));
+        Record {
+            header,
+            seq: Some(unwrap(self.rows.iter().map(|(s, _)| u64::from(s.seq)), 1 << 16)),
+            t_ticks: Some(unwrap(self.rows.iter().map(|(s, _)| u64::from(s.t_ticks)), 1 << 32)),
+            host_time_s: Some(self.rows.iter().map(|(_, time)| *time).collect()),
+            flags: Some(self.rows.iter().map(|(s, _)| s.flags).collect()),
+            channels,
+        }
+    }
+
+    fn channel(
+        &self,
+        stem: &str,
+        quantity: Quantity,
+        axis: Option<Axis>,
+        unit: &str,
+        (zero, lsb): (f64, f64),
+        count: impl Fn(&Sample) -> Option<i32>,
+    ) -> Channel {
+        let letter = axis.map(|axis| ["_x", "_y", "_z"][axis.index()]).unwrap_or_default();
+        let counts: Vec<Option<i32>> = self.rows.iter().map(|(sample, _)| count(sample)).collect();
+        Channel {
+            name: format!("{stem}{letter}"),
+            quantity,
+            axis,
+            unit: unit.to_owned(),
+            values: counts.iter().map(|c| c.map_or(f64::NAN, |c| (f64::from(c) - zero) * lsb)).collect(),
+            counts: Some(counts.iter().map(|c| c.unwrap_or(0)).collect()),
+            lsb: Some(lsb),
+        }
+    }
+}
+
+fn unwrap(values: impl Iterator<Item = u64>, modulus: u64) -> Vec<u64> {
+    let (mut turns, mut last) = (0, 0);
+    values
+        .map(|now| {
+            if last > now && last - now > modulus / 2 {
+                turns += modulus;
+            }
+            last = now;
+            now + turns
+        })
+        .collect()
+}

@@ -1,0 +1,88 @@
+//! What can be wrong with a capture, and what to do about it.
+
+use std::path::PathBuf;
+
+/// A capture that cannot be read or written.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+#[non_exhaustive]
+pub enum CaptureError {
+    /// The file system says no.
+    #[error("{}: {source}", path.display())]
+    #[diagnostic(code(capture::io), help("check that the path is right and that the file can be read or written"))]
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// What it said.
+        source: std::io::Error,
+    },
+    /// A format line that names another format.
+    #[error("line {line}: the format is `{found}`, this program reads `imu-stand-capture/1`")]
+    #[diagnostic(code(capture::format), help("a newer program wrote it: update imu-stand, or export the file again"))]
+    Format {
+        /// Where.
+        line: usize,
+        /// What it says.
+        found: String,
+    },
+    /// A key that is needed for a column is not there.
+    #[error("the header lacks the key `{key}`, which the column `{column}` needs")]
+    #[diagnostic(code(capture::missing_key), help("add a line `# {key}: VALUE` before the column names"))]
+    MissingKey {
+        /// The key.
+        key: String,
+        /// Who needs it.
+        column: String,
+    },
+    /// A key whose value makes no sense.
+    #[error("line {line}: `{key}` is `{found}`, expected {expected}")]
+    #[diagnostic(code(capture::bad_key), help("correct the line"))]
+    BadKey {
+        /// Where.
+        line: usize,
+        /// The key.
+        key: String,
+        /// What it says.
+        found: String,
+        /// What it may say.
+        expected: String,
+    },
+    /// No column names, or none that mean anything here.
+    #[error("{why}; the columns are: {}", columns.join(", "))]
+    #[diagnostic(code(capture::columns), help("map them, for example: --columns {example} --units gyro=deg/s,acc=m/s2"))]
+    Columns {
+        /// What is wrong.
+        why: String,
+        /// What there is.
+        columns: Vec<String>,
+        /// A mapping made of them.
+        example: String,
+    },
+    /// An option that cannot be understood.
+    #[error("{option}: {why}")]
+    #[diagnostic(code(capture::option), help("{help}"))]
+    Option {
+        /// `--columns`, `--units`.
+        option: &'static str,
+        /// What is wrong.
+        why: String,
+        /// What to write.
+        help: String,
+    },
+    /// A row that is no measurement.
+    #[error("line {line}, column `{column}`: `{found}` is {expected}")]
+    #[diagnostic(code(capture::bad_row), help("`--skip-bad` leaves such rows out and counts them; nothing is lost, the file stays as it is"))]
+    BadRow {
+        /// Where.
+        line: u64,
+        /// Which column.
+        column: String,
+        /// What stands there.
+        found: String,
+        /// What is wrong with it.
+        expected: String,
+    },
+    /// No rows at all.
+    #[error("there is no row of data")]
+    #[diagnostic(code(capture::empty), help("record again: the file ends after its column names"))]
+    Empty,
+}

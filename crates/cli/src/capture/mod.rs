@@ -1,0 +1,17 @@
+//! Captures: the CSV of the stand and foreign CSV by mapping, both become a [`Record`](model::record::Record).
+
+mod build;
+mod error;
+mod foreign;
+mod header;
+mod read;
+mod write;
+
+pub use build::{Calibration, RecordBuilder};
+pub use error::CaptureError;
+pub use foreign::ColumnMapping;
+pub use read::{Read, ReadOptions, read_capture, read_from};
+pub use write::{write_capture, write_to};
+
+/// Standard gravity, m/s^2 (CGPM 1901): the unit `g` of accelerometers.
+pub const STANDARD_GRAVITY: f64 = 9.806_65;
