@@ -77,7 +77,9 @@ impl Motor {
             self.cut();
             return true;
         }
-        let step = (self.target * 64 - self.output_q6).min(self.ramp_q6).max(self.ramp_q6.wrapping_neg());
+        let step = (self.target * 64 - self.output_q6)
+            .min(self.ramp_q6)
+            .max(self.ramp_q6.wrapping_neg());
         self.output_q6 = self.output_q6.wrapping_add(step);
         false
     }

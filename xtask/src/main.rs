@@ -1,2 +1,130 @@
-//! Toolchain, image, tests, flashing.
-fn main() {}
+//! Toolchain, image, tests: what a newcomer types.
+
+mod image;
+mod step;
+mod toolchain;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::time::Instant;
+
+use step::{Failure, run};
+
+const USAGE: &str = "usage: cargo xtask COMMAND
+
+  test     sets up what is missing and runs every check and test
+  demo     simulates the paper's stand with a hidden effect, analyzes and diagnoses it
+  image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}";
+
+fn main() -> ExitCode {
+    let command = std::env::args().nth(1);
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
+    let done = match command.as_deref() {
+        Some("test") => test(&root),
+        Some("demo") => demo(&root),
+        Some("image") => build_image(&root),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("{failure}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// A cargo of the toolchain that runs this.
+fn cargo(root: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root).args(arguments);
+    command
+}
+
+/// Packages that need neither the AVR toolchain nor simavr's libraries: the workspace's default members.
+const ALONE: &[&str] = &["wire", "adis16250", "mma7260qt"];
+
+fn test(root: &Path) -> Result<(), Failure> {
+    let start = Instant::now();
+    if !toolchain::has("cc") {
+        toolchain::install("a C compiler, which Rust links with", &["gcc", "libc6-dev"])?;
+    }
+    match std::env::var_os("IMU_STAND_DATA") {
+        Some(folder) => println!("measured records: {}", Path::new(&folder).display()),
+        None => println!(
+            "measured records: IMU_STAND_DATA is unset, tests on them will say so and not run"
+        ),
+    }
+    let mut steps: Vec<(String, Vec<&str>)> = vec![
+        ("format".into(), vec!["fmt", "--all", "--check"]),
+        (
+            "lints".into(),
+            vec!["clippy", "--all-targets", "--quiet", "--", "-D", "warnings"],
+        ),
+        ("tests".into(), vec!["test", "--quiet"]),
+    ];
+    for package in ALONE {
+        steps.push((
+            format!("{package} alone"),
+            vec!["test", "--quiet", "-p", package, "--no-default-features"],
+        ));
+    }
+    for (name, arguments) in &steps {
+        let from = Instant::now();
+        println!("== {name}: cargo {}", arguments.join(" "));
+        run(name, &mut cargo(root, arguments))?;
+        println!("== {name}: {:.0} s", from.elapsed().as_secs_f64());
+    }
+    build_image(root)?;
+    println!("all passed in {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+fn build_image(root: &Path) -> Result<(), Failure> {
+    let from = Instant::now();
+    let elf = image::build(root)?;
+    let sizes = image::sizes(&elf)?;
+    println!(
+        "image: {} B of 16384 B flash, {} B of 1024 B SRAM static, built in {:.0} s: {}",
+        sizes.flash,
+        sizes.sram,
+        from.elapsed().as_secs_f64(),
+        elf.display()
+    );
+    Ok(())
+}
+
+fn demo(root: &Path) -> Result<(), Failure> {
+    run(
+        "the build",
+        &mut cargo(
+            root,
+            &["build", "--release", "--quiet", "--bin", "imu-stand"],
+        ),
+    )?;
+    let program = root.join("target/release/imu-stand");
+    let folder = root.join("target/demo");
+    std::fs::create_dir_all(&folder).map_err(|error| {
+        Failure::new(
+            &format!("{}: {error}", folder.display()),
+            "make room or rights for it",
+        )
+    })?;
+    let file = |name: &str| folder.join(name).display().to_string();
+    let (capture, found) = (file("capture.csv"), file("diagnosis.json"));
+    run(
+        "simulate",
+        Command::new(&program).args(["simulate", "--seconds", "600", "--out", &capture]),
+    )?;
+    run(
+        "analyze",
+        Command::new(&program).args(["analyze", &capture, "--json", &file("analysis.json")]),
+    )?;
+    run(
+        "diagnose",
+        Command::new(&program).args(["diagnose", &capture, "--json", &found]),
+    )
+}

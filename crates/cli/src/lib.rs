@@ -3,4 +3,6 @@
 pub mod capture;
 pub mod text;
 
-pub use capture::{CaptureError, ColumnMapping, ReadOptions, RecordBuilder, read_capture, write_capture};
+pub use capture::{
+    CaptureError, ColumnMapping, ReadOptions, RecordBuilder, read_capture, write_capture,
+};

@@ -1,2 +1,35 @@
 //! The program `imu-stand`.
-fn main() {}
+
+mod commands;
+
+use clap::{Parser, Subcommand};
+
+/// Captures, analyzes and criticizes an inertial test stand: what your simulation of the sensor gets wrong, why, and
+/// what the gain is.
+#[derive(Parser)]
+#[command(name = "imu-stand", version, max_term_width = 100)]
+struct Program {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Allan deviations, N, B, K, R, Q and the paper's two figures, with intervals.
+    Analyze(commands::analyze::Arguments),
+    /// What the simulation gets wrong, the causes, the extended model, the measured gain.
+    Diagnose(commands::diagnose::Arguments),
+    /// A capture straight from a model file.
+    Simulate(commands::simulate::Arguments),
+    /// A capture from the board's serial port.
+    Capture(commands::capture::Arguments),
+}
+
+fn main() -> miette::Result<()> {
+    match Program::parse().command {
+        Command::Analyze(arguments) => commands::analyze::run(&arguments),
+        Command::Diagnose(arguments) => commands::diagnose::run(&arguments),
+        Command::Simulate(arguments) => commands::simulate::run(&arguments),
+        Command::Capture(arguments) => commands::capture::run(&arguments),
+    }
+}

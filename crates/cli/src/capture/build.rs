@@ -4,6 +4,7 @@ use model::record::{Axis, Base, Channel, Header, Quantity, Record};
 use wire::{Sample, flags};
 
 use super::STANDARD_GRAVITY;
+use super::read::unwrap;
 
 /// What the board's counts mean; goes into the header.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +33,7 @@ impl Default for Calibration {
             rate_hz: 20.0,
             tick_s: 4e-6,
             tick_tolerance_ppm: 100.0,
-            gyro_lsb_dps: 0.073_26,
+            gyro_lsb_dps: GYRO_LSB_DPS,
             acc_zero_counts: 512.0,
             acc_counts_per_g: 1024.0 / 3.3 * 0.8,
             base: Base::Static,
@@ -40,6 +41,8 @@ impl Default for Calibration {
     }
 }
 
+/// GYRO_OUT at the 320 deg/s range: deg/s a count (ADIS16250 data sheet).
+const GYRO_LSB_DPS: f64 = 0.073_26;
 /// TEMP_OUT: degC a count, and the temperature of count 0 (ADIS16250 data sheet).
 const TEMP: (f64, f64) = (0.1453, 25.0);
 /// SUPPLY_OUT: V a count (ADIS16250 data sheet).
@@ -56,12 +59,35 @@ impl RecordBuilder {
     /// Nothing yet.
     #[must_use]
     pub fn new(calibration: Calibration) -> Self {
-        Self { calibration, rows: Vec::new() }
+        Self {
+            calibration,
+            rows: Vec::new(),
+        }
     }
 
     /// A frame and when it arrived, s.
     pub fn push(&mut self, sample: &Sample, host_time_s: f64) {
         self.rows.push((*sample, host_time_s));
+    }
+
+    /// The board says how it is set: rate, tick and range are taken from it.
+    pub fn hello(&mut self, hello: &wire::Hello) {
+        let tick_s = f64::from(hello.tick_ns) * 1e-9;
+        if tick_s > 0.0 && hello.period_ticks > 0 {
+            self.calibration.tick_s = tick_s;
+            self.calibration.rate_hz = 1.0 / (tick_s * f64::from(hello.period_ticks));
+        }
+        // Ranges of 320, 160 and 80 deg/s (SENS/AVG bits 10:8) share their codes.
+        match hello.gyro_range {
+            4 => self.calibration.gyro_lsb_dps = GYRO_LSB_DPS,
+            2 => self.calibration.gyro_lsb_dps = GYRO_LSB_DPS / 2.0,
+            1 => self.calibration.gyro_lsb_dps = GYRO_LSB_DPS / 4.0,
+            _ => {}
+        }
+        // mV/g at 3.3 V for the four settings of g-select (MMA7260QT data sheet).
+        if let Some(millivolt) = [800.0, 600.0, 300.0, 200.0].get(usize::from(hello.acc_range)) {
+            self.calibration.acc_counts_per_g = 1024.0 / 3.3 * millivolt * 1e-3;
+        }
     }
 
     /// Rows so far.
@@ -108,31 +134,58 @@ impl RecordBuilder {
                 s.flags & flags::GYRO_NOT_ANSWERING != 0
                     && s.flags & (flags::new_data(k as u8) | flags::error(k as u8)) == 0
             };
-            channels.push(self.channel("gyro", Quantity::Gyro, Some(axis), "deg/s", (0.0, c.gyro_lsb_dps), move |s| {
-                (!lost(s)).then_some(i32::from(s.gyro[k]))
-            }));
+            channels.push(self.channel(
+                "gyro",
+                Quantity::Gyro,
+                Some(axis),
+                "deg/s",
+                (0.0, c.gyro_lsb_dps),
+                move |s| (!lost(s)).then_some(i32::from(s.gyro[k])),
+            ));
         }
         for axis in Axis::ALL {
             let k = axis.index();
             let temp = (-TEMP.1 / TEMP.0, TEMP.0);
-            channels.push(self.channel("temp", Quantity::Temp, Some(axis), "degC", temp, move |s| {
-                Some(i32::from(s.temp[k]))
-            }));
+            channels.push(self.channel(
+                "temp",
+                Quantity::Temp,
+                Some(axis),
+                "degC",
+                temp,
+                move |s| Some(i32::from(s.temp[k])),
+            ));
         }
-        channels.push(self.channel("supply", Quantity::Supply, None, "V", (0.0, SUPPLY_LSB_V), |s| {
-            Some(i32::from(s.supply))
-        }));
+        channels.push(self.channel(
+            "supply",
+            Quantity::Supply,
+            None,
+            "V",
+            (0.0, SUPPLY_LSB_V),
+            |s| Some(i32::from(s.supply)),
+        ));
         for axis in Axis::ALL {
             let k = axis.index();
-            channels.push(self.channel("acc", Quantity::Acc, Some(axis), "m/s^2", acc, move |s| {
-                (s.flags & flags::ACC_NOT_CONVERTED == 0).then_some(i32::from(s.acc[k]))
-            }));
+            channels.push(
+                self.channel("acc", Quantity::Acc, Some(axis), "m/s^2", acc, move |s| {
+                    (s.flags & flags::ACC_NOT_CONVERTED == 0).then_some(i32::from(s.acc[k]))
+                }),
+            );
         }
-        channels.push(self.channel("pwm", Quantity::Pwm, None, "1", (0.0, 1.0), |s| Some(i32::from(s.pwm))));
+        channels.push(
+            self.channel("pwm", Quantity::Pwm, None, "1", (0.0, 1.0), |s| {
+                Some(i32::from(s.pwm))
+            }),
+        );
         Record {
             header,
-            seq: Some(unwrap(self.rows.iter().map(|(s, _)| u64::from(s.seq)), 1 << 16)),
-            t_ticks: Some(unwrap(self.rows.iter().map(|(s, _)| u64::from(s.t_ticks)), 1 << 32)),
+            seq: Some(unwrap(
+                self.rows.iter().map(|(s, _)| u64::from(s.seq)),
+                1 << 16,
+            )),
+            t_ticks: Some(unwrap(
+                self.rows.iter().map(|(s, _)| u64::from(s.t_ticks)),
+                1 << 32,
+            )),
             host_time_s: Some(self.rows.iter().map(|(_, time)| *time).collect()),
             flags: Some(self.rows.iter().map(|(s, _)| s.flags).collect()),
             channels,
@@ -148,29 +201,21 @@ impl RecordBuilder {
         (zero, lsb): (f64, f64),
         count: impl Fn(&Sample) -> Option<i32>,
     ) -> Channel {
-        let letter = axis.map(|axis| ["_x", "_y", "_z"][axis.index()]).unwrap_or_default();
+        let letter = axis
+            .map(|axis| ["_x", "_y", "_z"][axis.index()])
+            .unwrap_or_default();
         let counts: Vec<Option<i32>> = self.rows.iter().map(|(sample, _)| count(sample)).collect();
         Channel {
             name: format!("{stem}{letter}"),
             quantity,
             axis,
             unit: unit.to_owned(),
-            values: counts.iter().map(|c| c.map_or(f64::NAN, |c| (f64::from(c) - zero) * lsb)).collect(),
+            values: counts
+                .iter()
+                .map(|c| c.map_or(f64::NAN, |c| (f64::from(c) - zero) * lsb))
+                .collect(),
             counts: Some(counts.iter().map(|c| c.unwrap_or(0)).collect()),
             lsb: Some(lsb),
         }
     }
-}
-
-fn unwrap(values: impl Iterator<Item = u64>, modulus: u64) -> Vec<u64> {
-    let (mut turns, mut last) = (0, 0);
-    values
-        .map(|now| {
-            if last > now && last - now > modulus / 2 {
-                turns += modulus;
-            }
-            last = now;
-            now + turns
-        })
-        .collect()
 }

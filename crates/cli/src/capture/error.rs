@@ -8,7 +8,10 @@ use std::path::PathBuf;
 pub enum CaptureError {
     /// The file system says no.
     #[error("{}: {source}", path.display())]
-    #[diagnostic(code(capture::io), help("check that the path is right and that the file can be read or written"))]
+    #[diagnostic(
+        code(capture::io),
+        help("check that the path is right and that the file can be read or written")
+    )]
     Io {
         /// Which file.
         path: PathBuf,
@@ -17,7 +20,10 @@ pub enum CaptureError {
     },
     /// A format line that names another format.
     #[error("line {line}: the format is `{found}`, this program reads `imu-stand-capture/1`")]
-    #[diagnostic(code(capture::format), help("a newer program wrote it: update imu-stand, or export the file again"))]
+    #[diagnostic(
+        code(capture::format),
+        help("a newer program wrote it: update imu-stand, or export the file again")
+    )]
     Format {
         /// Where.
         line: usize,
@@ -26,7 +32,10 @@ pub enum CaptureError {
     },
     /// A key that is needed for a column is not there.
     #[error("the header lacks the key `{key}`, which the column `{column}` needs")]
-    #[diagnostic(code(capture::missing_key), help("add a line `# {key}: VALUE` before the column names"))]
+    #[diagnostic(
+        code(capture::missing_key),
+        help("add a line `# {key}: VALUE` before the column names")
+    )]
     MissingKey {
         /// The key.
         key: String,
@@ -48,7 +57,10 @@ pub enum CaptureError {
     },
     /// No column names, or none that mean anything here.
     #[error("{why}; the columns are: {}", columns.join(", "))]
-    #[diagnostic(code(capture::columns), help("map them, for example: --columns {example} --units gyro=deg/s,acc=m/s2"))]
+    #[diagnostic(
+        code(capture::columns),
+        help("map them, for example: --columns {example} --units gyro=deg/s,acc=m/s2")
+    )]
     Columns {
         /// What is wrong.
         why: String,
@@ -70,7 +82,12 @@ pub enum CaptureError {
     },
     /// A row that is no measurement.
     #[error("line {line}, column `{column}`: `{found}` is {expected}")]
-    #[diagnostic(code(capture::bad_row), help("`--skip-bad` leaves such rows out and counts them; nothing is lost, the file stays as it is"))]
+    #[diagnostic(
+        code(capture::bad_row),
+        help(
+            "`--skip-bad` leaves such rows out and counts them; nothing is lost, the file stays as it is"
+        )
+    )]
     BadRow {
         /// Where.
         line: u64,
@@ -83,6 +100,9 @@ pub enum CaptureError {
     },
     /// No rows at all.
     #[error("there is no row of data")]
-    #[diagnostic(code(capture::empty), help("record again: the file ends after its column names"))]
+    #[diagnostic(
+        code(capture::empty),
+        help("record again: the file ends after its column names")
+    )]
     Empty,
 }

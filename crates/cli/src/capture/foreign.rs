@@ -19,8 +19,16 @@ impl ColumnMapping {
     /// # Errors
     /// [`CaptureError::Option`] where a text is no list of `a=b`.
     pub fn parse(columns: Option<&str>, units: Option<&str>) -> Result<Self, CaptureError> {
-        let columns = pairs("--columns", columns, "write `--columns time=time_s,gyro_x=gx_dps,acc_x=ax_mps2`")?;
-        let units = pairs("--units", units, "write `--units gyro=deg/s,acc=m/s2,temp=degC,supply=V`")?;
+        let columns = pairs(
+            "--columns",
+            columns,
+            "write `--columns time=time_s,gyro_x=gx_dps,acc_x=ax_mps2`",
+        )?;
+        let units = pairs(
+            "--units",
+            units,
+            "write `--units gyro=deg/s,acc=m/s2,temp=degC,supply=V`",
+        )?;
         Ok(Self { columns, units })
     }
 
@@ -34,14 +42,28 @@ impl ColumnMapping {
             Quantity::Pwm => "pwm",
             Quantity::Other => "other",
         };
-        let find = |key: &str| self.units.iter().find(|(k, _)| k == key).map(|(_, unit)| unit.as_str());
+        let find = |key: &str| {
+            self.units
+                .iter()
+                .find(|(k, _)| k == key)
+                .map(|(_, unit)| unit.as_str())
+        };
         find(name).or_else(|| find(of_quantity))
     }
 }
 
-fn pairs(option: &'static str, text: Option<&str>, help: &str) -> Result<Vec<(String, String)>, CaptureError> {
+fn pairs(
+    option: &'static str,
+    text: Option<&str>,
+    help: &str,
+) -> Result<Vec<(String, String)>, CaptureError> {
     let mut list = Vec::new();
-    for item in text.unwrap_or_default().split(',').map(str::trim).filter(|item| !item.is_empty()) {
+    for item in text
+        .unwrap_or_default()
+        .split(',')
+        .map(str::trim)
+        .filter(|item| !item.is_empty())
+    {
         match item.split_once('=') {
             Some((ours, theirs)) if !ours.trim().is_empty() && !theirs.trim().is_empty() => {
                 list.push((ours.trim().to_owned(), theirs.trim().to_owned()));
@@ -77,7 +99,10 @@ pub(crate) fn meaning(name: &str) -> (Quantity, Option<Axis>) {
 }
 
 /// Our unit for a unit given, and the factor into it.
-pub(crate) fn convert(quantity: Quantity, given: Option<&str>) -> Result<(String, f64), CaptureError> {
+pub(crate) fn convert(
+    quantity: Quantity,
+    given: Option<&str>,
+) -> Result<(String, f64), CaptureError> {
     let ours = match quantity {
         Quantity::Gyro => "deg/s",
         Quantity::Acc => "m/s^2",
@@ -85,7 +110,9 @@ pub(crate) fn convert(quantity: Quantity, given: Option<&str>) -> Result<(String
         Quantity::Supply => "V",
         Quantity::Pwm | Quantity::Other => "1",
     };
-    let Some(given) = given else { return Ok((ours.to_owned(), 1.0)) };
+    let Some(given) = given else {
+        return Ok((ours.to_owned(), 1.0));
+    };
     let factor = match (quantity, given) {
         (Quantity::Gyro, "deg/s" | "dps") => 1.0,
         (Quantity::Gyro, "rad/s") => 180.0 / std::f64::consts::PI,
@@ -121,14 +148,23 @@ pub(crate) fn example(columns: &[String]) -> String {
     };
     find("time", &|c| c.starts_with('t') && !c.starts_with("temp"));
     for (axis, letter) in [("x", 'x'), ("y", 'y'), ("z", 'z')] {
-        find(&format!("gyro_{axis}"), &|c| c.contains(letter) && (c.contains('g') || c.contains('w')) && !c.starts_with('a'));
+        find(&format!("gyro_{axis}"), &|c| {
+            c.contains(letter) && (c.contains('g') || c.contains('w')) && !c.starts_with('a')
+        });
     }
     for (axis, letter) in [("x", 'x'), ("y", 'y'), ("z", 'z')] {
-        find(&format!("acc_{axis}"), &|c| c.contains(letter) && c.starts_with('a'));
+        find(&format!("acc_{axis}"), &|c| {
+            c.contains(letter) && c.starts_with('a')
+        });
     }
     find("temp", &|c| c.starts_with("temp"));
     if out.is_empty() {
-        out = columns.iter().take(2).zip(["time", "gyro_z"]).map(|(c, ours)| format!("{ours}={c}")).collect();
+        out = columns
+            .iter()
+            .take(2)
+            .zip(["time", "gyro_z"])
+            .map(|(c, ours)| format!("{ours}={c}"))
+            .collect();
     }
     out.join(",")
 }

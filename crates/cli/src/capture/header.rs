@@ -16,20 +16,30 @@ impl Lines {
         let text = line.trim_start_matches('#').trim();
         if let Some((key, value)) = text.split_once(':') {
             let key = key.trim();
-            let is_key = !key.is_empty() && key.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
+            let is_key = !key.is_empty()
+                && key
+                    .bytes()
+                    .all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
             if is_key {
-                self.entries.push((number, key.to_owned(), value.trim().to_owned()));
+                self.entries
+                    .push((number, key.to_owned(), value.trim().to_owned()));
             }
         }
     }
 
     pub fn get(&self, key: &str) -> Option<(usize, &str)> {
-        self.entries.iter().rev().find(|(_, k, _)| k == key).map(|(line, _, value)| (*line, value.as_str()))
+        self.entries
+            .iter()
+            .rev()
+            .find(|(_, k, _)| k == key)
+            .map(|(line, _, value)| (*line, value.as_str()))
     }
 
     /// A number, if the key is there.
     pub fn number(&self, key: &str) -> Result<Option<f64>, CaptureError> {
-        let Some((line, text)) = self.get(key) else { return Ok(None) };
+        let Some((line, text)) = self.get(key) else {
+            return Ok(None);
+        };
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(Some(value)),
             _ => Err(bad(line, key, text, "a finite number")),
@@ -38,7 +48,10 @@ impl Lines {
 
     /// A number that has to be there for `column`.
     pub fn needed(&self, key: &str, column: &str) -> Result<f64, CaptureError> {
-        self.number(key)?.ok_or_else(|| CaptureError::MissingKey { key: key.to_owned(), column: column.to_owned() })
+        self.number(key)?.ok_or_else(|| CaptureError::MissingKey {
+            key: key.to_owned(),
+            column: column.to_owned(),
+        })
     }
 
     /// As [`needed`](Self::needed), and not 0.
@@ -56,7 +69,10 @@ impl Lines {
         if let Some((line, found)) = self.get("format")
             && found != "imu-stand-capture/1"
         {
-            return Err(CaptureError::Format { line, found: found.to_owned() });
+            return Err(CaptureError::Format {
+                line,
+                found: found.to_owned(),
+            });
         }
         let positive = |key: &str| match self.number(key)? {
             Some(value) if value <= 0.0 => {
@@ -70,18 +86,34 @@ impl Lines {
             Some((_, "static")) => Some(Base::Static),
             Some((_, "moving")) => Some(Base::Moving),
             Some((_, "turntable")) => Some(Base::Turntable),
-            Some((line, other)) => return Err(bad(line, "base", other, "`static`, `moving` or `turntable`")),
+            Some((line, other)) => {
+                return Err(bad(
+                    line,
+                    "base",
+                    other,
+                    "`static`, `moving` or `turntable`",
+                ));
+            }
         };
         Ok(Header {
             rate_hz: positive("rate_hz")?,
             tick_s: positive("tick_s")?,
             tick_tolerance_ppm: self.number("tick_tolerance_ppm")?,
             base,
-            entries: self.entries.iter().map(|(_, key, value)| (key.clone(), value.clone())).collect(),
+            entries: self
+                .entries
+                .iter()
+                .map(|(_, key, value)| (key.clone(), value.clone()))
+                .collect(),
         })
     }
 }
 
 fn bad(line: usize, key: &str, found: &str, expected: &str) -> CaptureError {
-    CaptureError::BadKey { line, key: key.to_owned(), found: found.to_owned(), expected: expected.to_owned() }
+    CaptureError::BadKey {
+        line,
+        key: key.to_owned(),
+        found: found.to_owned(),
+        expected: expected.to_owned(),
+    }
 }

@@ -35,10 +35,16 @@ pub struct Read {
 /// # Errors
 /// [`CaptureError`], which says what to do.
 pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureError> {
-    let io = |source| CaptureError::Io { path: path.to_owned(), source };
+    let io = |source| CaptureError::Io {
+        path: path.to_owned(),
+        source,
+    };
     let file = BufReader::new(File::open(path).map_err(io)?);
     let read = if path.extension().is_some_and(|e| e == "gz") {
-        read_from(BufReader::new(flate2::bufread::MultiGzDecoder::new(file)), options)
+        read_from(
+            BufReader::new(flate2::bufread::MultiGzDecoder::new(file)),
+            options,
+        )
     } else {
         read_from(file, options)
     };
@@ -62,7 +68,13 @@ enum Role {
     Time,
     Flags,
     /// value = (cell - zero) * scale; `lsb` where cells are counts.
-    Measured { quantity: Quantity, unit: String, zero: f64, scale: f64, counts: bool },
+    Measured {
+        quantity: Quantity,
+        unit: String,
+        zero: f64,
+        scale: f64,
+        counts: bool,
+    },
 }
 
 /// Reads a capture from a stream.
@@ -70,7 +82,10 @@ enum Role {
 /// # Errors
 /// [`CaptureError`].
 pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read, CaptureError> {
-    let io = |source| CaptureError::Io { path: "input".into(), source };
+    let io = |source| CaptureError::Io {
+        path: "input".into(),
+        source,
+    };
     let mut lines = Lines::default();
     let (mut number, mut names) = (0, Vec::new());
     let mut line = String::new();
@@ -84,7 +99,10 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         if text.starts_with('#') {
             lines.take(number, text);
         } else if !text.is_empty() {
-            names = text.split(',').map(|name| name.trim().trim_matches('"').to_owned()).collect();
+            names = text
+                .split(',')
+                .map(|name| name.trim().trim_matches('"').to_owned())
+                .collect();
         }
     }
     let mut header = lines.header()?;
@@ -123,7 +141,10 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
             },
         };
         match result {
-            Ok(()) => cells.iter_mut().zip(&values).for_each(|(column, &value)| column.push(value)),
+            Ok(()) => cells
+                .iter_mut()
+                .zip(&values)
+                .for_each(|(column, &value)| column.push(value)),
             Err(_) if options.skip_bad => skipped += 1,
             Err(error) => return Err(error),
         }
@@ -131,7 +152,10 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
     if cells.first().is_none_or(Vec::is_empty) {
         return Err(CaptureError::Empty);
     }
-    let mut record = Record { header, ..Record::default() };
+    let mut record = Record {
+        header,
+        ..Record::default()
+    };
     for (column, values) in columns.into_iter().zip(cells) {
         place(&mut record, column, values);
     }
@@ -139,11 +163,21 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
 }
 
 /// The columns of the stand's own format.
-fn own_columns(names: &[String], lines: &Lines, mapping: &ColumnMapping) -> Result<Vec<Column>, CaptureError> {
+fn own_columns(
+    names: &[String],
+    lines: &Lines,
+    mapping: &ColumnMapping,
+) -> Result<Vec<Column>, CaptureError> {
     let mut columns = Vec::new();
     for (at, name) in names.iter().enumerate() {
         let (quantity, _) = meaning(name);
-        let scaled = |zero, scale, unit: &str| Role::Measured { quantity, unit: unit.to_owned(), zero, scale, counts: true };
+        let scaled = |zero, scale, unit: &str| Role::Measured {
+            quantity,
+            unit: unit.to_owned(),
+            zero,
+            scale,
+            counts: true,
+        };
         let role = match (name.as_str(), quantity) {
             ("seq", _) => Role::Seq,
             ("t_ticks", _) => {
@@ -160,7 +194,11 @@ fn own_columns(names: &[String], lines: &Lines, mapping: &ColumnMapping) -> Resu
             (_, Quantity::Supply) => scaled(0.0, lines.scale("supply_lsb_v", name)?, "V"),
             (_, Quantity::Acc) => {
                 let per_g = lines.scale("acc_counts_per_g", name)?;
-                scaled(lines.needed("acc_zero_counts", name)?, STANDARD_GRAVITY / per_g, "m/s^2")
+                scaled(
+                    lines.needed("acc_zero_counts", name)?,
+                    STANDARD_GRAVITY / per_g,
+                    "m/s^2",
+                )
             }
             (_, Quantity::Pwm) => scaled(0.0, 1.0, "1"),
             (_, Quantity::Other) => {
@@ -169,12 +207,30 @@ fn own_columns(names: &[String], lines: &Lines, mapping: &ColumnMapping) -> Resu
                     continue;
                 }
                 let unit = mapping.unit(name, quantity).unwrap_or("1").to_owned();
-                Role::Measured { quantity, unit, zero: 0.0, scale: 1.0, counts: false }
+                Role::Measured {
+                    quantity,
+                    unit,
+                    zero: 0.0,
+                    scale: 1.0,
+                    counts: false,
+                }
             }
         };
-        columns.push(Column { at, name: name.clone(), role });
+        columns.push(Column {
+            at,
+            name: name.clone(),
+            role,
+        });
     }
-    if columns.iter().any(|c| matches!(c.role, Role::Measured { quantity: Quantity::Gyro | Quantity::Acc, .. })) {
+    if columns.iter().any(|c| {
+        matches!(
+            c.role,
+            Role::Measured {
+                quantity: Quantity::Gyro | Quantity::Acc,
+                ..
+            }
+        )
+    }) {
         return Ok(columns);
     }
     Err(CaptureError::Columns {
@@ -201,10 +257,20 @@ fn mapped_columns(names: &[String], mapping: &ColumnMapping) -> Result<Vec<Colum
             name => {
                 let (quantity, _) = meaning(name);
                 let (unit, scale) = convert(quantity, mapping.unit(name, quantity))?;
-                Role::Measured { quantity, unit, zero: 0.0, scale, counts: false }
+                Role::Measured {
+                    quantity,
+                    unit,
+                    zero: 0.0,
+                    scale,
+                    counts: false,
+                }
             }
         };
-        columns.push(Column { at, name: ours.clone(), role });
+        columns.push(Column {
+            at,
+            name: ours.clone(),
+            role,
+        });
     }
     Ok(columns)
 }
@@ -225,7 +291,11 @@ fn parse_row(
     if row.len() != width
         && let Some(column) = columns.first()
     {
-        return Err(bad(column, &format!("{} cells", row.len()), &format!("not a row of {width} cells")));
+        return Err(bad(
+            column,
+            &format!("{} cells", row.len()),
+            &format!("not a row of {width} cells"),
+        ));
     }
     for (column, value) in columns.iter().zip(values) {
         let cell = row.get(column.at).unwrap_or_default();
@@ -240,26 +310,47 @@ fn parse_row(
         let whole = match column.role {
             Role::Seq | Role::Ticks => *value >= 0.0 && value.fract() == 0.0,
             Role::Flags => *value >= 0.0 && *value <= 65_535.0 && value.fract() == 0.0,
-            Role::Measured { counts: true, .. } => value.is_nan() || (value.fract() == 0.0 && value.abs() < 1e9),
+            Role::Measured { counts: true, .. } => {
+                value.is_nan() || (value.fract() == 0.0 && value.abs() < 1e9)
+            }
             _ => true,
         };
         if !whole {
-            return Err(bad(column, cell, "not a whole number of the range that this column has"));
+            return Err(bad(
+                column,
+                cell,
+                "not a whole number of the range that this column has",
+            ));
         }
     }
     Ok(())
 }
 
+fn whole(values: &[f64]) -> impl Iterator<Item = u64> {
+    values.iter().map(|&value| value as u64)
+}
+
 fn place(record: &mut Record, column: Column, values: Vec<f64>) {
     match column.role {
-        Role::Seq => record.seq = Some(unwrap(&values, 65_536)),
-        Role::Ticks => record.t_ticks = Some(unwrap(&values, 1 << 32)),
+        Role::Seq => record.seq = Some(unwrap(whole(&values), 1 << 16)),
+        Role::Ticks => record.t_ticks = Some(unwrap(whole(&values), 1 << 32)),
         Role::Time => record.host_time_s = Some(values),
         Role::Flags => record.flags = Some(values.iter().map(|&value| value as u16).collect()),
-        Role::Measured { quantity, unit, zero, scale, counts } => {
+        Role::Measured {
+            quantity,
+            unit,
+            zero,
+            scale,
+            counts,
+        } => {
             let (_, axis) = meaning(&column.name);
             // Where a row has no value, its count means nothing.
-            let whole = counts.then(|| values.iter().map(|&v| if v.is_nan() { 0 } else { v as i32 }).collect());
+            let whole = counts.then(|| {
+                values
+                    .iter()
+                    .map(|&v| if v.is_nan() { 0 } else { v as i32 })
+                    .collect()
+            });
             record.channels.push(Channel {
                 name: column.name,
                 quantity,
@@ -273,18 +364,14 @@ fn place(record: &mut Record, column: Column, values: Vec<f64>) {
     }
 }
 
-/// Undoes the wrapping of a counter of `modulus` steps, if the file has it wrapped. What goes back by less than half
-/// a turn stays where it is: a repeated or reordered row.
-fn unwrap(values: &[f64], modulus: u64) -> Vec<u64> {
-    let half = modulus / 2;
-    let mut turns = 0u64;
-    let mut last = 0u64;
+/// Undoes the wrapping of a counter of `modulus` steps, if it is wrapped. What goes back by less than half a turn
+/// stays where it is: a repeated or reordered row.
+pub(super) fn unwrap(values: impl Iterator<Item = u64>, modulus: u64) -> Vec<u64> {
+    let (mut turns, mut last) = (0, 0);
     values
-        .iter()
-        .enumerate()
-        .map(|(k, &value)| {
-            let now = value as u64;
-            if k > 0 && now < modulus && last < modulus && last > now && last - now > half {
+        .map(|now| {
+            // A value of `modulus` or more was unwrapped by whoever wrote it.
+            if now < modulus && last < modulus && last > now && last - now > modulus / 2 {
                 turns += modulus;
             }
             last = now;
@@ -318,7 +405,10 @@ mod tests {
     fn a_missing_key_is_named() {
         let text = OURS.replace("# gyro_lsb_dps: 0.07326\n", "");
         let error = read(&text).unwrap_err().to_string();
-        assert!(error.contains("gyro_lsb_dps") && error.contains("gyro_z"), "{error}");
+        assert!(
+            error.contains("gyro_lsb_dps") && error.contains("gyro_z"),
+            "{error}"
+        );
     }
 
     #[test]
@@ -326,7 +416,10 @@ mod tests {
         let text = OURS.replace("65535,4294962500,-2,7", "65535,4294962500,-2x,7");
         let error = read(&text).unwrap_err().to_string();
         assert!(error.starts_with("line 8, column `gyro_z`"), "{error}");
-        let options = ReadOptions { skip_bad: true, ..ReadOptions::default() };
+        let options = ReadOptions {
+            skip_bad: true,
+            ..ReadOptions::default()
+        };
         let read = read_from(text.as_bytes(), &options).unwrap();
         assert_eq!((read.skipped, read.record.len()), (1, 2));
     }
@@ -336,9 +429,20 @@ mod tests {
         let text = "# a note: of theirs\ntime_s,gx_dps,gy_dps,gz_dps,ax_mps2\n0,1,2,3,4\n";
         let error = read(text).unwrap_err();
         let help = miette::Diagnostic::help(&error).unwrap().to_string();
-        assert!(help.contains("time=time_s,gyro_x=gx_dps,gyro_y=gy_dps,gyro_z=gz_dps,acc_x=ax_mps2"), "{help}");
-        let mapping = ColumnMapping::parse(Some("time=time_s,gyro_x=gx_dps"), Some("gyro=rad/s")).unwrap();
-        let read = read_from(text.as_bytes(), &ReadOptions { mapping, ..ReadOptions::default() }).unwrap();
+        assert!(
+            help.contains("time=time_s,gyro_x=gx_dps,gyro_y=gy_dps,gyro_z=gz_dps,acc_x=ax_mps2"),
+            "{help}"
+        );
+        let mapping =
+            ColumnMapping::parse(Some("time=time_s,gyro_x=gx_dps"), Some("gyro=rad/s")).unwrap();
+        let read = read_from(
+            text.as_bytes(),
+            &ReadOptions {
+                mapping,
+                ..ReadOptions::default()
+            },
+        )
+        .unwrap();
         assert!((read.record.channels[0].values[0] - 57.295_779_5).abs() < 1e-6);
     }
 }

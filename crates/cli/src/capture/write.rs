@@ -13,7 +13,10 @@ use super::CaptureError;
 /// # Errors
 /// [`CaptureError::Io`].
 pub fn write_capture(path: &Path, record: &Record) -> Result<(), CaptureError> {
-    let io = |source| CaptureError::Io { path: path.to_owned(), source };
+    let io = |source| CaptureError::Io {
+        path: path.to_owned(),
+        source,
+    };
     let file = BufWriter::new(File::create(path).map_err(io)?);
     if path.extension().is_some_and(|e| e == "gz") {
         let mut gz = flate2::write::GzEncoder::new(file, flate2::Compression::default());
@@ -21,7 +24,9 @@ pub fn write_capture(path: &Path, record: &Record) -> Result<(), CaptureError> {
         gz.finish().and_then(|mut file| file.flush()).map_err(io)
     } else {
         let mut file = file;
-        write_to(&mut file, record).and_then(|()| file.flush()).map_err(io)
+        write_to(&mut file, record)
+            .and_then(|()| file.flush())
+            .map_err(io)
     }
 }
 
@@ -53,8 +58,18 @@ pub fn write_to(out: &mut impl Write, record: &Record) -> std::io::Result<()> {
         writeln!(out, "# base: {base}")?;
     }
     let mut names = Vec::new();
-    let has = [record.seq.is_some(), record.t_ticks.is_some(), record.host_time_s.is_some()];
-    names.extend(["seq", "t_ticks", "host_time_s"].iter().zip(has).filter(|(_, has)| *has).map(|(name, _)| *name));
+    let has = [
+        record.seq.is_some(),
+        record.t_ticks.is_some(),
+        record.host_time_s.is_some(),
+    ];
+    names.extend(
+        ["seq", "t_ticks", "host_time_s"]
+            .iter()
+            .zip(has)
+            .filter(|(_, has)| *has)
+            .map(|(name, _)| *name),
+    );
     names.extend(record.channels.iter().map(|c| c.name.as_str()));
     if record.flags.is_some() {
         names.push("flags");
@@ -65,8 +80,14 @@ pub fn write_to(out: &mut impl Write, record: &Record) -> std::io::Result<()> {
         use std::fmt::Write as _;
         row.clear();
         let _ = record.seq.as_ref().map(|seq| write!(row, "{},", seq[k]));
-        let _ = record.t_ticks.as_ref().map(|ticks| write!(row, "{},", ticks[k]));
-        let _ = record.host_time_s.as_ref().map(|time| write!(row, "{:.6},", time[k]));
+        let _ = record
+            .t_ticks
+            .as_ref()
+            .map(|ticks| write!(row, "{},", ticks[k]));
+        let _ = record
+            .host_time_s
+            .as_ref()
+            .map(|time| write!(row, "{:.6},", time[k]));
         for channel in &record.channels {
             let _ = match &channel.counts {
                 _ if channel.values[k].is_nan() => write!(row, ","),
@@ -74,7 +95,10 @@ pub fn write_to(out: &mut impl Write, record: &Record) -> std::io::Result<()> {
                 None => write!(row, "{},", channel.values[k]),
             };
         }
-        let _ = record.flags.as_ref().map(|flags| write!(row, "{},", flags[k]));
+        let _ = record
+            .flags
+            .as_ref()
+            .map(|flags| write!(row, "{},", flags[k]));
         row.pop();
         writeln!(out, "{row}")?;
     }

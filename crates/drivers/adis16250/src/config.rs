@@ -201,7 +201,7 @@ impl SamplePeriod {
         } else {
             31 * 15_625
         };
-        ((self.0 & 0x7F) as u32 + 1) * base_eighths >> 3
+        (((self.0 & 0x7F) as u32 + 1) * base_eighths) >> 3
     }
 
     /// How fast the bus may run at this period.

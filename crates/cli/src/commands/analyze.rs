@@ -1,0 +1,116 @@
+//! `imu-stand analyze`.
+
+use std::path::PathBuf;
+
+use analysis::AnalyzeOptions;
+use analysis::analyze::{Analysis, ChannelAnalysis};
+use clap::Args;
+use imu_stand::text;
+use miette::Result;
+
+use super::Input;
+
+/// What `analyze` takes.
+#[derive(Args)]
+pub struct Arguments {
+    /// The capture, .csv or .csv.gz
+    capture: PathBuf,
+    #[command(flatten)]
+    input: Input,
+    /// Deviations to compute: oadev,mdev,...
+    #[arg(long, value_delimiter = ',', default_value = "oadev")]
+    deviations: Vec<String>,
+    /// Cluster times: octave, decade, all or log:N
+    #[arg(long, default_value = "octave")]
+    taus: String,
+    /// Only these channels: gyro_x,acc_z,...
+    #[arg(long, value_delimiter = ',')]
+    channels: Option<Vec<String>>,
+    /// Seed of the replicates behind intervals
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Write the result as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Runs it.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let read = arguments.input.read(&arguments.capture)?;
+    let deviations = arguments
+        .deviations
+        .iter()
+        .map(|name| name.parse().map_err(super::explain));
+    let options = AnalyzeOptions {
+        deviations: deviations.collect::<Result<_>>()?,
+        taus: arguments.taus.parse().map_err(super::explain)?,
+        channels: arguments.channels.clone(),
+        rate_hz: arguments.input.rate,
+        seed: arguments.seed,
+        file: super::name(&arguments.capture),
+    };
+    let analysis = analysis::analyze(&read.record, &options).map_err(super::explain)?;
+    super::write_json(arguments.json.as_ref(), &analysis)?;
+    if !arguments.input.quiet {
+        print(&analysis);
+    }
+    Ok(())
+}
+
+fn print(analysis: &Analysis) {
+    for (name, channel) in &analysis.channels {
+        println!("{name}");
+        parameters(channel);
+        for warning in &channel.warnings {
+            println!("{}", text::item("warning: ", warning));
+        }
+        println!("  paper's procedure");
+        interval("angle random walk", &channel.paper.angle_random_walk);
+        interval(
+            "in-run bias stability",
+            &channel.paper.in_run_bias_stability,
+        );
+        for note in &channel.paper.notes {
+            println!("{}", text::item("note: ", note));
+        }
+        for (deviation, points) in &channel.deviations {
+            let name = format!("{deviation:?}").to_lowercase();
+            println!(
+                "  {name}, {:<12}   tau s   deviation  95 % interval",
+                channel.unit
+            );
+            for point in points {
+                println!(
+                    "    {:>25.4} {:>11.5} {:>10.5} .. {:.5}",
+                    point.tau_s, point.deviation, point.low, point.high
+                );
+            }
+        }
+    }
+}
+
+fn parameters(channel: &ChannelAnalysis) {
+    let p = &channel.parameters;
+    interval("N angle random walk", &p.angle_random_walk);
+    interval("B bias instability", &p.bias_instability);
+    interval("K rate random walk", &p.rate_random_walk);
+    interval("R rate ramp", &p.rate_ramp);
+    interval("Q quantization noise", &p.quantization_noise);
+}
+
+fn interval(name: &str, interval: &analysis::analyze::Interval) {
+    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
+    match interval.value {
+        Some(value) => println!(
+            "  {name:<24} {value:>10.4} [{} .. {}] {}",
+            number(interval.low),
+            number(interval.high),
+            interval.unit
+        ),
+        None => println!(
+            "  {name:<24} not established; at most {} {}",
+            number(interval.high),
+            interval.unit
+        ),
+    }
+}

@@ -1,0 +1,75 @@
+//! `imu-stand diagnose`.
+
+use std::path::PathBuf;
+
+use analysis::DiagnoseOptions;
+use analysis::result::Diagnosis;
+use clap::Args;
+use imu_stand::text;
+use miette::Result;
+use serde::Serialize;
+
+use super::Input;
+
+/// What `diagnose` takes.
+#[derive(Args)]
+pub struct Arguments {
+    /// Captures, .csv or .csv.gz
+    #[arg(required = true)]
+    captures: Vec<PathBuf>,
+    #[command(flatten)]
+    input: Input,
+    /// Seed of whatever is random
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Write the result as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the extended model
+    #[arg(long, value_name = "FILE")]
+    model_out: Option<PathBuf>,
+}
+
+/// Several captures, each diagnosed by itself.
+#[derive(Serialize)]
+struct Several {
+    format: &'static str,
+    runs: Vec<Diagnosis>,
+}
+
+/// Runs it.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.captures.len() > 1 && arguments.model_out.is_some() {
+        miette::bail!(
+            help = "diagnose them one by one",
+            "--model-out takes the model of one capture"
+        );
+    }
+    let mut runs = Vec::new();
+    for path in &arguments.captures {
+        let read = arguments.input.read(path)?;
+        let options = DiagnoseOptions {
+            seed: arguments.seed,
+            file: super::name(path),
+            hash: Some(super::digest(path)?),
+        };
+        let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
+        if let Some(path) = &arguments.model_out {
+            super::write(path, &found.extended_model.to_toml())?;
+        }
+        if !arguments.input.quiet {
+            print!("{}", text::diagnosis(&found.diagnosis));
+        }
+        runs.push(found.diagnosis);
+    }
+    match runs.as_slice() {
+        [one] => super::write_json(arguments.json.as_ref(), one),
+        _ => super::write_json(
+            arguments.json.as_ref(),
+            &Several {
+                format: "imu-stand-diagnoses/1",
+                runs,
+            },
+        ),
+    }
+}

@@ -1,0 +1,113 @@
+//! The commands: arguments, files, and what is printed.
+
+pub mod analyze;
+pub mod capture;
+pub mod diagnose;
+pub mod simulate;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use imu_stand::capture::Read;
+use imu_stand::{ColumnMapping, ReadOptions, read_capture};
+use miette::{IntoDiagnostic, Result, WrapErr};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+/// How to read a file; the same for every command that takes captures.
+#[derive(Args)]
+pub struct Input {
+    /// Which column of a foreign file is what: `time=time_s,gyro_x=gx_dps,...`
+    #[arg(long, value_name = "OURS=THEIRS,...")]
+    columns: Option<String>,
+    /// Units of a foreign file: `gyro=deg/s,acc=m/s2`
+    #[arg(long, value_name = "OURS=UNIT,...")]
+    units: Option<String>,
+    /// Sample rate, Hz, where there is no time column
+    #[arg(long, value_name = "HZ")]
+    pub rate: Option<f64>,
+    /// Leave out rows that cannot be read, and count them
+    #[arg(long)]
+    skip_bad: bool,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+impl Input {
+    /// Reads a capture by these options; says how many rows were left out.
+    pub fn read(&self, path: &Path) -> Result<Read> {
+        if let Some(rate) = self.rate
+            && !(rate > 0.0 && rate.is_finite())
+        {
+            miette::bail!(
+                help = "write `--rate 20`",
+                "--rate: {rate} is no sample rate"
+            );
+        }
+        let mapping = ColumnMapping::parse(self.columns.as_deref(), self.units.as_deref())?;
+        let options = ReadOptions {
+            mapping,
+            rate_hz: self.rate,
+            skip_bad: self.skip_bad,
+        };
+        let read = read_capture(path, &options)
+            .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+        if read.skipped > 0 {
+            eprintln!(
+                "{}: {} rows cannot be read and are left out",
+                path.display(),
+                read.skipped
+            );
+        }
+        Ok(read)
+    }
+}
+
+/// The file's name for reports.
+pub fn name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned()
+}
+
+/// SHA-256 of a file, in hex.
+pub fn digest(path: &Path) -> Result<String> {
+    let mut file = std::fs::File::open(path)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("{}", path.display()))?;
+    let mut hash = Sha256::new();
+    std::io::copy(&mut file, &mut hash).into_diagnostic()?;
+    Ok(format!("sha256:{:x}", hash.finalize()))
+}
+
+/// Writes a text file.
+pub fn write(path: &Path, text: &str) -> Result<()> {
+    std::fs::write(path, text)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
+/// Writes what a command found as JSON, where it was asked to.
+pub fn write_json(path: Option<&PathBuf>, value: &impl Serialize) -> Result<()> {
+    let Some(path) = path else { return Ok(()) };
+    let mut text = serde_json::to_string_pretty(value).into_diagnostic()?;
+    text.push('\n');
+    write(path, &text)
+}
+
+/// Turns an analysis error into what the user is told, with what to do next.
+pub fn explain(error: analysis::AnalysisError) -> miette::Report {
+    let help = match &error {
+        analysis::AnalysisError::Inconclusive { need, unit, .. } => {
+            format!("record for longer: {need} {unit} at least")
+        }
+        analysis::AnalysisError::NoRate => "add `--rate HZ`, or map a time column".to_owned(),
+        analysis::AnalysisError::NoChannel { .. } => {
+            "name one of the channels that are there".to_owned()
+        }
+        _ => "see `imu-stand help` and docs/ARCHITECTURE.md".to_owned(),
+    };
+    miette::miette!(help = help, "{error}")
+}

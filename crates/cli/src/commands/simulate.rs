@@ -1,0 +1,63 @@
+//! `imu-stand simulate`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use imu_stand::write_capture;
+use miette::{IntoDiagnostic, Result, WrapErr};
+use model::file::ModelFile;
+
+/// What `simulate` takes.
+#[derive(Args)]
+pub struct Arguments {
+    /// The model file; without it the paper's stand
+    #[arg(long)]
+    model: Option<PathBuf>,
+    /// Length, s
+    #[arg(long, default_value_t = 600.0)]
+    seconds: f64,
+    /// Sample rate, Hz; without it the model's
+    #[arg(long)]
+    rate: Option<f64>,
+    /// Seed: the same seed gives the same capture
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The capture to write, .csv or .csv.gz
+    #[arg(long)]
+    out: PathBuf,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// Runs it.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let model = match &arguments.model {
+        None => ModelFile::paper(),
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .into_diagnostic()
+                .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+            ModelFile::parse(&text).map_err(|error| {
+                miette::miette!(
+                    help = "docs/model-file.md lists keys, effects and units",
+                    "{}: {error}",
+                    path.display()
+                )
+            })?
+        }
+    };
+    let rate = arguments.rate.unwrap_or(model.rate_hz);
+    let record = model::simulate(&model, arguments.seconds, rate, arguments.seed)
+        .map_err(|error| miette::miette!(help = "see `imu-stand simulate --help`", "{error}"))?;
+    write_capture(&arguments.out, &record)?;
+    if !arguments.quiet {
+        println!(
+            "{}: {} rows at {rate} Hz, seed {}",
+            arguments.out.display(),
+            record.len(),
+            arguments.seed
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,156 @@
+//! What people read in a terminal.
+
+use std::fmt::Write;
+
+use analysis::result::{Diagnosis, Finding, Verdict};
+
+/// Columns of a terminal that text is wrapped to.
+const WIDTH: usize = 100;
+
+/// A wrapped paragraph, indented, with a lead before its first line.
+#[must_use]
+pub fn item(lead: &str, text: &str) -> String {
+    let indent = " ".repeat(4);
+    let mut out = format!("{indent}{lead}");
+    let mut column = out.chars().count();
+    let mut first = true;
+    for word in text.split_whitespace() {
+        let length = word.chars().count();
+        if !first && column + 1 + length > WIDTH {
+            out.push('\n');
+            out.push_str(&indent);
+            out.push_str("  ");
+            column = indent.len() + 2;
+        } else if !first {
+            out.push(' ');
+            column += 1;
+        }
+        out.push_str(word);
+        column += length;
+        first = false;
+    }
+    out
+}
+
+/// What the line did: frames in order and frames that were not.
+#[must_use]
+pub fn link(counts: &wire::LinkCounts) -> String {
+    format!(
+        "{} frames in order, {} rejected",
+        counts.frames,
+        counts.rejected()
+    )
+}
+
+/// A diagnosis, verdict first.
+#[must_use]
+pub fn diagnosis(d: &Diagnosis) -> String {
+    let mut out = String::new();
+    let verdict = match d.verdict {
+        Verdict::Adequate => {
+            "adequate: white noise, random walk and a constant bias describe this record"
+        }
+        Verdict::Extended => "extended: the simulation lacks the causes below",
+        Verdict::Unexplained => {
+            "unexplained: the record has structure that no effect of the library explains"
+        }
+    };
+    let input = &d.input;
+    let _ = writeln!(
+        out,
+        "{}: {:.0} s at {:.4} Hz, {} samples",
+        input.file, input.seconds, input.rate_hz, input.samples
+    );
+    let _ = writeln!(out, "verdict  {verdict}");
+    for finding in &d.findings {
+        write_finding(&mut out, finding);
+    }
+    for unexplained in &d.unexplained {
+        let _ = writeln!(out, "\nunexplained on {}", unexplained.channel);
+        let _ = writeln!(out, "{}", item("", &unexplained.what));
+    }
+    if !d.not_tested.is_empty() {
+        let _ = writeln!(out, "\nnot tested");
+        for not in &d.not_tested {
+            let _ = writeln!(out, "{}", item(&format!("{}: ", not.cause), &not.why));
+        }
+    }
+    if !d.detection_limits.is_empty() {
+        let _ = writeln!(out, "\nsmallest size that this run would have found");
+        for limit in &d.detection_limits {
+            let _ = writeln!(
+                out,
+                "    {:<22} {:<8} {} {:.3e} {}",
+                limit.cause, limit.channel, limit.parameter, limit.value, limit.unit
+            );
+        }
+    }
+    out
+}
+
+fn write_finding(out: &mut String, finding: &Finding) {
+    let _ = writeln!(
+        out,
+        "\n{} on {}",
+        finding.cause,
+        finding.channels.join(", ")
+    );
+    for (name, parameter) in &finding.parameters {
+        let error = parameter
+            .std_error
+            .map_or_else(String::new, |e| format!(" +- {e:.2e}"));
+        let _ = writeln!(
+            out,
+            "    {name:<24} {:.5}{error} {}",
+            parameter.value, parameter.unit
+        );
+    }
+    if !finding.what.is_empty() {
+        let _ = writeln!(out, "{}", item("", &finding.what));
+    }
+    for rival in &finding.alternatives {
+        let _ = writeln!(
+            out,
+            "    or: {} (log odds {:.1})",
+            rival.cause, rival.log_odds
+        );
+    }
+    if let Some(experiment) = &finding.experiment {
+        let _ = writeln!(out, "{}", item("to decide: ", experiment));
+    }
+    let Some(gain) = &finding.gain else { return };
+    if let Some(nats) = gain.held_out_log_score_nats {
+        let error = gain
+            .std_error
+            .map_or_else(String::new, |e| format!(" +- {e:.1}"));
+        let _ = writeln!(out, "    held-out gain            {nats:.1}{error} nats");
+    }
+    if let Some(bic) = gain.delta_bic {
+        let _ = writeln!(out, "    delta BIC                {bic:.1}");
+    }
+    for (over, [before, after]) in &gain.angle_rms_deg {
+        let _ = writeln!(
+            out,
+            "    angle error over {over:<7} {before:.3} -> {after:.3} deg rms"
+        );
+    }
+    if finding.confirmed_on_held_out_data == Some(false) {
+        let _ = writeln!(
+            out,
+            "    detected in the whole run, not confirmed on held-out data"
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn long_text_is_wrapped_and_indented() {
+        let text = super::item("why: ", &"word ".repeat(40));
+        assert!(text.lines().count() > 1);
+        assert!(
+            text.lines()
+                .all(|line| line.starts_with("    ") && line.chars().count() <= super::WIDTH)
+        );
+    }
+}

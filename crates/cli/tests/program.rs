@@ -1,0 +1,257 @@
+//! The program as a user runs it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_imu-stand"))
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
+/// A folder of this test's own, new at each run.
+fn folder(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).expect("a folder for the test");
+    path
+}
+
+fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(path).expect("the JSON is there"))
+        .expect("it is JSON")
+}
+
+#[test]
+fn wrong_usage_exits_2_and_a_missing_file_1_with_what_to_do() {
+    assert_eq!(run(&["diagnose"]).status.code(), Some(2));
+    assert_eq!(run(&["no-such-command"]).status.code(), Some(2));
+    let missing = run(&["analyze", "no-such-file.csv"]);
+    assert_eq!(missing.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&missing.stderr);
+    assert!(
+        said.contains("no-such-file.csv") && said.contains("help"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_simulated_run_is_reproducible_and_its_analysis_has_the_contracts_shape() {
+    let folder = folder("analysis");
+    let [a, b, out] = ["a.csv", "b.csv.gz", "a.json"].map(|name| folder.join(name));
+    for path in [&a, &b] {
+        let made = run(&[
+            "simulate",
+            "--seconds",
+            "120",
+            "--seed",
+            "7",
+            "--out",
+            path.to_str().unwrap(),
+        ]);
+        assert!(
+            made.status.success(),
+            "{}",
+            String::from_utf8_lossy(&made.stderr)
+        );
+    }
+    let made = run(&[
+        "analyze",
+        a.to_str().unwrap(),
+        "--json",
+        out.to_str().unwrap(),
+        "--quiet",
+    ]);
+    assert!(
+        made.status.success(),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
+    assert!(made.stdout.is_empty(), "--quiet prints nothing");
+    let analysis = json(&out);
+    assert_eq!(analysis["format"], "imu-stand-analysis/1");
+    let gyro = &analysis["channels"]["gyro_z"];
+    assert_eq!(gyro["unit"], "deg/s");
+    for key in ["tau_s", "deviation", "low", "high", "edf", "n"] {
+        assert!(gyro["deviations"]["oadev"][0][key].is_number(), "{key}");
+    }
+    for (term, unit) in [
+        ("angle_random_walk", "deg/sqrt(h)"),
+        ("bias_instability", "deg/h"),
+        ("rate_random_walk", "deg/s/sqrt(s)"),
+        ("rate_ramp", "deg/s^2"),
+        ("quantization_noise", "deg"),
+    ] {
+        assert_eq!(gyro["parameters"][term]["unit"], unit, "{term}");
+    }
+    // The paper's stand: 5.27 deg/sqrt(h). 2400 samples know sigma to 1.4 %; six of those.
+    let arw = gyro["parameters"]["angle_random_walk"]["value"]
+        .as_f64()
+        .unwrap();
+    assert!((arw / 5.27 - 1.0).abs() < 0.09, "{arw}");
+    // The same seed gives the same rows, compressed or not.
+    let again = folder.join("b.json");
+    assert!(
+        run(&[
+            "analyze",
+            b.to_str().unwrap(),
+            "--json",
+            again.to_str().unwrap()
+        ])
+        .status
+        .success()
+    );
+    assert_eq!(analysis["channels"], json(&again)["channels"]);
+}
+
+#[test]
+fn what_is_put_into_a_model_is_found_and_the_extended_model_simulates() {
+    let folder = folder("loop");
+    let [model, run_csv, out, found, again] =
+        ["m.toml", "run.csv", "d.json", "found.toml", "again.csv"].map(|name| folder.join(name));
+    // The paper's stand with a line of half the noise's standard deviation: d' is far above the detection limit.
+    let made = run(&[
+        "simulate",
+        "--seconds",
+        "60",
+        "--out",
+        folder.join("paper.csv").to_str().unwrap(),
+    ]);
+    assert!(made.status.success());
+    let mut stand = model::file::ModelFile::paper();
+    let effect = "[[effect]]\ncause = \"line\"\nchannels = [\"gyro_z\"]\nfrequency = { value = 3.7, unit = \"Hz\" }\n\
+                  amplitude = { value = 0.2, unit = \"deg/s\" }\n";
+    let text = format!("{}\n{effect}", stand.to_toml());
+    stand = model::file::ModelFile::parse(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    std::fs::write(&model, stand.to_toml()).unwrap();
+    let simulate = |model: &Path, out: &Path| {
+        run(&[
+            "simulate",
+            "--model",
+            model.to_str().unwrap(),
+            "--seed",
+            "3",
+            "--out",
+            out.to_str().unwrap(),
+        ])
+    };
+    assert!(simulate(&model, &run_csv).status.success());
+    let made = run(&[
+        "diagnose",
+        run_csv.to_str().unwrap(),
+        "--json",
+        out.to_str().unwrap(),
+        "--model-out",
+        found.to_str().unwrap(),
+    ]);
+    assert!(
+        made.status.success(),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
+    let diagnosis = json(&out);
+    assert_eq!(diagnosis["format"], "imu-stand-diagnosis/1");
+    assert_eq!(diagnosis["verdict"], "extended", "{diagnosis}");
+    let line = diagnosis["findings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|f| f["cause"] == "line")
+        .expect("a line");
+    assert_eq!(line["channels"], serde_json::json!(["gyro_z"]));
+    let frequency = line["parameters"]["frequency"]["value"].as_f64().unwrap();
+    assert!((frequency - 3.7).abs() < 0.002, "{frequency}");
+    assert!(
+        simulate(&found, &again).status.success(),
+        "the extended model is a simulator"
+    );
+}
+
+#[test]
+fn a_model_file_with_an_unknown_effect_is_an_error_that_names_the_line() {
+    let folder = folder("model");
+    let path = folder.join("m.toml");
+    let text = format!(
+        "{}\n[[effect]]\ncause = \"gremlins\"\n",
+        model::file::ModelFile::paper().to_toml()
+    );
+    std::fs::write(&path, &text).unwrap();
+    let out = folder.join("c.csv");
+    let made = run(&[
+        "simulate",
+        "--model",
+        path.to_str().unwrap(),
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert_eq!(made.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&made.stderr);
+    assert!(
+        said.contains("line ") && said.contains("gremlins"),
+        "{said}"
+    );
+    assert!(!out.exists());
+}
+
+/// Measured records: `IMU_STAND_DATA` names their folder.
+fn measured(file: &str) -> Option<PathBuf> {
+    match std::env::var_os("IMU_STAND_DATA") {
+        Some(folder) => Some(Path::new(&folder).join(file)),
+        None => {
+            println!("NOT RUN: {file} is looked for where IMU_STAND_DATA points, and it is unset");
+            None
+        }
+    }
+}
+
+#[test]
+fn measured_records_are_analyzed_and_diagnosed_by_column_mapping() {
+    let axes =
+        "gyro_x=gx_dps,gyro_y=gy_dps,gyro_z=gz_dps,acc_x=ax_mps2,acc_y=ay_mps2,acc_z=az_mps2";
+    for (file, more) in [
+        ("adis16405_run1_20hz_600s.csv.gz", ""),
+        ("mpu6050_static_20hz_600s.csv.gz", ",temp=temp_c"),
+    ] {
+        let Some(path) = measured(file) else { return };
+        let folder = folder(file);
+        let columns = format!("time=time_s,{axes}{more}");
+        let units = "gyro=deg/s,acc=m/s2,temp=degC";
+        let out = folder.join("out.json");
+        for (command, format) in [
+            ("analyze", "imu-stand-analysis/1"),
+            ("diagnose", "imu-stand-diagnosis/1"),
+        ] {
+            let made = run(&[
+                command,
+                path.to_str().unwrap(),
+                "--columns",
+                &columns,
+                "--units",
+                units,
+                "--json",
+                out.to_str().unwrap(),
+            ]);
+            assert!(
+                made.status.success(),
+                "{}",
+                String::from_utf8_lossy(&made.stderr)
+            );
+            assert_eq!(json(&out)["format"], format);
+        }
+        // Static records at constant temperature, far from any motor: nothing of the stand's own may be blamed.
+        for finding in json(&out)["findings"].as_array().unwrap() {
+            let cause = finding["cause"].as_str().unwrap();
+            assert!(
+                ![
+                    "motor_bias",
+                    "motor_noise",
+                    "supply_sensitivity",
+                    "base_motion"
+                ]
+                .contains(&cause),
+                "{cause}"
+            );
+        }
+    }
+}
