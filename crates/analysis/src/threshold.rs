@@ -34,7 +34,7 @@ pub fn shaped(columns: usize) -> f64 {
 #[must_use]
 pub fn step(n: usize) -> f64 {
     let grown = (n as f64).ln().ln() / 12_000f64.ln().ln();
-    quantile(1, 220.0 * grown)
+    1.08 * quantile(1, 220.0 * grown)
 }
 
 /// A line at any of `n` half-cycle frequencies.
