@@ -67,7 +67,12 @@ pub fn edf(kind: Deviation, noise: NoiseType, m: usize, run_samples: &[usize]) -
         Deviation::Ohdev => (3, false, true),
         Deviation::Totdev | Deviation::Mtotdev => return total_edf(kind, noise, m, run_samples),
     };
-    let strides = if overlapping { m.min(FINE_STRIDES) } else { 1 };
+    let strides = match (overlapping, noise) {
+        (false, _) => 1,
+        // White phase is as rough as the samples: every stride counts.
+        (true, NoiseType::WhitePhase) if !modified => m,
+        (true, _) => m.min(FINE_STRIDES),
+    };
     let covariance = covariance(noise, order, modified, m, strides);
     // Σᵢⱼ over M terms of a run: M s(0)² + 2 Σₗ (M − l) s(l)², summed over runs.
     let span = if modified {
@@ -112,7 +117,6 @@ fn covariance(
         } else {
             &[20.0, -15.0, 6.0, -1.0]
         };
-        // A fine stride would dilute the isolated lags; every sample counts as one of m.
         return (0..=order * strides)
             .map(|lag| {
                 if lag.is_multiple_of(strides) {
@@ -239,6 +243,15 @@ mod tests {
                 "m = {m}: {got} {expected}"
             );
         }
+    }
+
+    #[test]
+    fn white_phase_overlapped_agrees_with_the_closed_form_of_the_handbook() {
+        // NIST SP 1065, table 5: (N + 1)(N − 2m)/(2(N − m)) for N phase points.
+        let (n, m) = (12_001.0, 400.0);
+        let expected = (n + 1.0) * (n - 2.0 * m) / (2.0 * (n - m));
+        let got = edf(Deviation::Oadev, NoiseType::WhitePhase, 400, &[12_000]);
+        assert!((got / expected - 1.0).abs() < 0.06, "{got} {expected}");
     }
 
     #[test]

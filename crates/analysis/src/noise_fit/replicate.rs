@@ -4,7 +4,7 @@ use rand_core::Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 
 use super::NoiseFit;
-use super::likelihood::{Model, maximize};
+use super::likelihood::maximize;
 use super::spectrum::{Coefficients, Spectrum};
 
 /// Another record of the same model: every bin drawn anew, in place.
@@ -64,14 +64,12 @@ pub fn misfit(
             })
             .collect()
     };
-    let Model { .. } = fit.model;
     let (c, ramp) = (fit.maximum.coefficients, fit.maximum.ramp);
     let observed = logs(spectrum, &c, ramp);
     let mut copy = spectrum.clone();
     let replicates: Vec<Vec<f64>> = (0..count)
         .map(|_| {
             replicate(&mut copy, &c, ramp, rng);
-            // Coefficients at zero start a little above it, or a warm start could not leave it.
             let found = maximize(&copy, fit.model, None, Some(&c));
             logs(&copy, &found.coefficients, found.ramp)
         })
