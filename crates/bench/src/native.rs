@@ -1,0 +1,517 @@
+//! The firmware's logic on the host, with this stand as its hardware: some thousand times faster than real time.
+//!
+//! The logic is the image's own ([`firmware::Stand`], [`firmware::acquire`]); what the chip adds - when each SPI byte
+//! ends, when the converter samples, when the main loop gets round to a millisecond - is a [`Timeline`]. A tick that
+//! comes before the last one's work is done (overrun) does not happen here: that is for the image to show.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::ops::ControlFlow;
+use std::rc::Rc;
+
+use adis16250::Adis16250;
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use firmware::{Board, Job, Sensors};
+use wire::{Request, encode_request, reset_cause};
+
+use crate::run::Cable;
+use crate::{AccSelect, Ending, Run, SerialByte, Stand};
+
+const CLOCK_HZ: f64 = 16e6;
+const CYCLES_PER_TICK: u64 = 64;
+const CYCLES_PER_MS: u64 = 16_000;
+const EEPROM_LEN: usize = 512;
+const WATCHDOG_CYCLES: u64 = 16_300 * 16;
+/// A byte of 8N1 has ten bits of 16 (divisor + 1) cycles.
+const fn byte_cycles(divisor: u16) -> u64 {
+    160 * (divisor as u64 + 1)
+}
+
+/// When the chip does what, in cycles of 16 MHz. The defaults are counted from the code's waits; a measured one comes
+/// from the image itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Timeline {
+    /// Power-on (or reset) to the start of timer 1.
+    pub start: u64,
+    /// Power-on to the first frame of the set-up.
+    pub configure: u64,
+    /// Ends of the SPI bytes of an acquisition, after the tick.
+    pub spi_bytes: Vec<u64>,
+    /// Sampling instants of the three conversions, after the tick.
+    pub adc: [u64; 3],
+    /// The interrupt of the tick gives the processor back, after the tick.
+    pub acquired: u64,
+    /// The sample is framed and queued, after the tick.
+    pub framed: u64,
+    /// The guard takes the processor, before the tick.
+    pub guard: u64,
+    /// Writing a byte of EEPROM.
+    pub eeprom: u64,
+    /// Bytes that the transmit queue holds.
+    pub queue: usize,
+    /// What the health frame says of the stack, bytes: the host's is not the board's.
+    pub stack_free: u16,
+}
+
+impl Default for Timeline {
+    fn default() -> Self {
+        // A byte takes 64 cycles and some 30 around it; a round of three frames with its pause of 12 us about 1000.
+        let spi_bytes = (0..24)
+            .map(|n: u64| 250 + (n / 6) * 1000 + (n % 6) * 95)
+            .collect();
+        Timeline {
+            start: 3_700_000,
+            configure: 3_600_000,
+            spi_bytes,
+            // 1.5 ADC cycles of 128 after each start.
+            adc: [250, 2_300, 4_300],
+            acquired: 6_200,
+            framed: 14_000,
+            guard: 1_024,
+            eeprom: 136_000,
+            queue: 223,
+            stack_free: 0,
+        }
+    }
+}
+
+/// What the parts of the board share.
+struct Chip {
+    stand: Stand,
+    timeline: Timeline,
+    /// Cycles since power came on.
+    now: u64,
+    hz: f64,
+    /// The tick whose acquisition runs, and how many SPI bytes it has sent.
+    tick: Option<(u64, usize)>,
+    conversion: Option<u16>,
+    job: Option<Job>,
+    eeprom: [u8; EEPROM_LEN],
+    eeprom_until: u64,
+    divisor: Option<u16>,
+    next_divisor: Option<u16>,
+    period: u16,
+    /// Ends of the bytes that are queued or on their way.
+    line: VecDeque<u64>,
+    line_free: u64,
+    sent: VecDeque<(u64, u8)>,
+    reboot: bool,
+    cause: u8,
+    restarts: u16,
+    last_tick: u64,
+}
+
+impl Chip {
+    fn seconds(&self, cycle: u64) -> f64 {
+        cycle as f64 / self.hz
+    }
+
+    /// When the next SPI byte ends.
+    fn spi_time(&mut self) -> u64 {
+        match &mut self.tick {
+            Some((tick, sent)) if *sent < self.timeline.spi_bytes.len() => {
+                self.now = *tick + self.timeline.spi_bytes[*sent];
+                *sent += 1;
+            }
+            _ => self.now += 95,
+        }
+        self.now
+    }
+
+    fn byte(&mut self, mosi: u8) -> u8 {
+        let t = self.spi_time();
+        let t = self.seconds(t);
+        self.stand.spi_byte(mosi, t)
+    }
+}
+
+type Shared = Rc<RefCell<Chip>>;
+
+struct GyroSpi {
+    chip: Shared,
+    axis: usize,
+}
+
+impl ErrorType for GyroSpi {
+    type Error = Infallible;
+}
+
+impl SpiDevice for GyroSpi {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        let mut chip = self.chip.borrow_mut();
+        let t = chip.seconds(chip.now);
+        chip.stand.select(self.axis, true, t);
+        for operation in operations {
+            match operation {
+                Operation::Read(into) => into.iter_mut().for_each(|place| *place = chip.byte(0)),
+                Operation::Write(from) => from.iter().for_each(|&out| {
+                    chip.byte(out);
+                }),
+                Operation::Transfer(into, from) => {
+                    for (place, &out) in into.iter_mut().zip(from.iter()) {
+                        *place = chip.byte(out);
+                    }
+                }
+                Operation::TransferInPlace(both) => {
+                    both.iter_mut().for_each(|place| *place = chip.byte(*place));
+                }
+                Operation::DelayNs(ns) => chip.now += u64::from(*ns) * 16 / 1000,
+            }
+        }
+        let t = chip.seconds(chip.now);
+        chip.stand.select(self.axis, false, t);
+        Ok(())
+    }
+}
+
+struct Delay(Shared);
+
+impl DelayNs for Delay {
+    fn delay_ns(&mut self, ns: u32) {
+        self.0.borrow_mut().now += u64::from(ns) * 16 / 1000;
+    }
+}
+
+struct HostSensors {
+    chip: Shared,
+    gyros: [Adis16250<GyroSpi>; 3],
+}
+
+impl Sensors for HostSensors {
+    type Spi = GyroSpi;
+    type Delay = Delay;
+
+    fn gyros(&mut self) -> &mut [Adis16250<GyroSpi>; 3] {
+        &mut self.gyros
+    }
+
+    fn delay(&mut self) -> Delay {
+        Delay(Rc::clone(&self.chip))
+    }
+
+    fn adc_start(&mut self, channel: u8) {
+        let chip = &mut *self.chip.borrow_mut();
+        let axis = usize::from(channel.min(2));
+        let at = chip
+            .tick
+            .map_or(chip.now, |(tick, _)| tick + chip.timeline.adc[axis]);
+        let t = chip.seconds(at.max(chip.now));
+        chip.conversion = Some(chip.stand.acc_counts(axis, t));
+    }
+
+    fn adc_finish(&mut self) -> Option<u16> {
+        self.chip.borrow_mut().conversion.take()
+    }
+}
+
+struct HostBoard(Shared);
+
+impl Board for HostBoard {
+    fn send(&mut self, frame: &[u8]) -> bool {
+        let chip = &mut *self.0.borrow_mut();
+        let now = chip.now;
+        let byte = byte_cycles(chip.divisor.unwrap_or(25));
+        // A byte leaves the queue for the transmitter's buffer when the one before it begins to shift.
+        while chip.line.front().is_some_and(|&end| end < now + 2 * byte) {
+            chip.line.pop_front();
+        }
+        if chip.timeline.queue.saturating_sub(chip.line.len()) < frame.len() {
+            return false;
+        }
+        for &out in frame {
+            chip.line_free = chip.line_free.max(now) + byte;
+            chip.line.push_back(chip.line_free);
+            chip.sent.push_back((chip.line_free, out));
+        }
+        true
+    }
+
+    fn set_motor(&mut self, duty: i16) {
+        let chip = &mut *self.0.borrow_mut();
+        let t = chip.seconds(chip.now);
+        // Fast PWM is high for OCR2 + 1 of 256 counts; at 0 the output is disconnected.
+        let magnitude = if duty == 0 {
+            0.0
+        } else {
+            (f64::from(duty.abs()) + 1.0) / 256.0
+        };
+        chip.stand.set_motor(magnitude.copysign(f64::from(duty)), t);
+    }
+
+    fn set_period(&mut self, ticks: u16) {
+        self.0.borrow_mut().period = ticks;
+    }
+
+    fn set_baud(&mut self, divisor: u16) {
+        let chip = &mut *self.0.borrow_mut();
+        if chip.divisor.is_none() {
+            chip.divisor = Some(divisor);
+        } else {
+            chip.next_divisor = Some(divisor);
+        }
+    }
+
+    fn set_acc_range(&mut self, range: u8) {
+        let chip = &mut *self.0.borrow_mut();
+        let t = chip.seconds(chip.now);
+        let select = AccSelect {
+            select1: range & 1 != 0,
+            select2: range & 2 != 0,
+            awake: true,
+        };
+        chip.stand.set_acc_pins(select, t);
+    }
+
+    fn post(&mut self, job: Job) -> bool {
+        let chip = &mut *self.0.borrow_mut();
+        let free = chip.job.is_none();
+        if free {
+            chip.job = Some(job);
+        }
+        free
+    }
+
+    fn eeprom_read(&mut self, address: u16) -> u8 {
+        self.0.borrow().eeprom[usize::from(address) % EEPROM_LEN]
+    }
+
+    fn eeprom_is_ready(&mut self) -> bool {
+        let chip = self.0.borrow();
+        chip.now >= chip.eeprom_until
+    }
+
+    fn eeprom_write(&mut self, address: u16, byte: u8) {
+        let chip = &mut *self.0.borrow_mut();
+        chip.eeprom[usize::from(address) % EEPROM_LEN] = byte;
+        chip.eeprom_until = chip.now + chip.timeline.eeprom;
+    }
+
+    fn reboot(&mut self) {
+        self.0.borrow_mut().reboot = true;
+    }
+
+    fn reset_cause(&self) -> u8 {
+        self.0.borrow().cause
+    }
+
+    fn restarts(&self) -> u16 {
+        self.0.borrow().restarts
+    }
+
+    fn stack_free(&self) -> u16 {
+        self.0.borrow().timeline.stack_free
+    }
+
+    fn ticks_since(&self) -> u16 {
+        let chip = self.0.borrow();
+        ((chip.now - chip.last_tick) / CYCLES_PER_TICK) as u16
+    }
+}
+
+/// The host's bytes with the cycle at which each has arrived.
+fn arrivals(requests: &[crate::TimedRequest], hz: f64) -> VecDeque<(u64, u8)> {
+    let mut bytes = VecDeque::new();
+    let mut free = 0;
+    for timed in requests {
+        let mut line = [0; Request::FRAME_LEN];
+        let len = encode_request(&timed.request, &mut line).unwrap_or(0);
+        free = free.max((timed.at_us as f64 * 1e-6 * hz) as u64);
+        for &byte in &line[..len] {
+            free += byte_cycles(25);
+            bytes.push_back((free, byte));
+        }
+    }
+    bytes
+}
+
+/// Runs the firmware's logic on the stand of `run` and hands each received byte to `receive`, in order. A callback that
+/// breaks ends the run.
+pub fn native(
+    run: &Run,
+    timeline: &Timeline,
+    mut receive: impl FnMut(SerialByte) -> ControlFlow<()>,
+) -> Ending {
+    let hz = CLOCK_HZ * (1.0 + run.scenario.crystal_ppm * 1e-6);
+    let end = (run.seconds * hz) as u64;
+    let chip = Rc::new(RefCell::new(Chip {
+        stand: Stand::new(&run.scenario),
+        timeline: timeline.clone(),
+        now: 0,
+        hz,
+        tick: None,
+        conversion: None,
+        job: None,
+        eeprom: [0xff; EEPROM_LEN],
+        eeprom_until: 0,
+        divisor: None,
+        next_divisor: None,
+        period: 12_500,
+        line: VecDeque::new(),
+        line_free: 0,
+        sent: VecDeque::new(),
+        reboot: false,
+        cause: reset_cause::POWER_ON,
+        restarts: 0,
+        last_tick: 0,
+    }));
+    let mut cable = Cable::new(&run.scenario);
+    let mut received = arrivals(&run.requests, hz);
+    let mut deliver = |chip: &Shared, until: u64| {
+        let chip = &mut *chip.borrow_mut();
+        while chip.sent.front().is_some_and(|&(at, _)| at <= until) {
+            let Some((at, byte)) = chip.sent.pop_front() else {
+                break;
+            };
+            let byte = SerialByte {
+                time_s: at as f64 / hz,
+                byte,
+            };
+            if cable
+                .carry(byte)
+                .is_some_and(|byte| receive(byte).is_break())
+            {
+                return ControlFlow::Break(());
+            }
+        }
+        ControlFlow::Continue(())
+    };
+    loop {
+        if life(&chip, &mut received, end, &mut deliver).is_break() {
+            return Ending::Stopped;
+        }
+        let mut board = chip.borrow_mut();
+        if !board.reboot {
+            return Ending::Complete;
+        }
+        board.reboot = false;
+        board.now += WATCHDOG_CYCLES;
+        (board.job, board.divisor, board.next_divisor, board.period) = (None, None, None, 12_500);
+        board.cause = reset_cause::WATCHDOG;
+        board.restarts = board.restarts.saturating_add(1);
+        // What had not left the transmitter is lost with the reset.
+        let now = board.now - WATCHDOG_CYCLES;
+        board.sent.retain(|&(at, _)| at <= now);
+        board.line.clear();
+        board.line_free = board.now;
+        let t = board.seconds(board.now);
+        board.stand.set_motor(0.0, t);
+    }
+}
+
+/// From a start to a reset or the end.
+fn life(
+    chip: &Shared,
+    received: &mut VecDeque<(u64, u8)>,
+    end: u64,
+    deliver: &mut impl FnMut(&Shared, u64) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    let timeline = chip.borrow().timeline.clone();
+    let power = chip.borrow().now;
+    let start = power + timeline.start;
+    let gyros = [0, 1, 2].map(|axis| {
+        Adis16250::new(GyroSpi {
+            chip: Rc::clone(chip),
+            axis,
+        })
+    });
+    let mut sensors = HostSensors {
+        chip: Rc::clone(chip),
+        gyros,
+    };
+    let board = &mut HostBoard(Rc::clone(chip));
+    chip.borrow_mut().now = power + timeline.configure;
+    let mut stand = firmware::Stand::boot(board);
+    let misconfigured = firmware::configure(&mut sensors, stand.sens_avg());
+    stand.started(board, misconfigured);
+    // Before the receiver is on, bytes are lost.
+    while received
+        .front()
+        .is_some_and(|&(at, _)| at < power + timeline.configure)
+    {
+        received.pop_front();
+    }
+    chip.borrow_mut().now = start;
+    let mut period = chip.borrow().period;
+    let (mut tick, mut t_ticks) = (start, 0u32);
+    let mut millisecond = start + CYCLES_PER_MS;
+    loop {
+        tick += u64::from(period) * CYCLES_PER_TICK;
+        if tick + timeline.framed > end {
+            return deliver(chip, end);
+        }
+        // What is due before the guard closes is done when it is due; the rest waits until the sample is framed.
+        let quiet = tick.saturating_sub(timeline.guard);
+        work(chip, &mut stand, received, &mut millisecond, quiet, None);
+        if chip.borrow().reboot {
+            let now = chip.borrow().now;
+            return deliver(chip, now);
+        }
+        {
+            let chip = &mut *chip.borrow_mut();
+            (chip.now, chip.tick, chip.last_tick) = (tick, Some((tick, 0)), tick);
+        }
+        let mut raw = firmware::acquire(&mut sensors);
+        let job = {
+            let chip = &mut *chip.borrow_mut();
+            chip.tick = None;
+            chip.job.take()
+        };
+        raw.job = job.map(|job| firmware::acquire::work(&mut sensors, job));
+        t_ticks = t_ticks.wrapping_add(u32::from(period));
+        period = chip.borrow().period;
+        // A job may have taken the processor for longer.
+        let framed = {
+            let chip = &mut *chip.borrow_mut();
+            chip.now = chip.now.max(tick + timeline.acquired) + timeline.framed - timeline.acquired;
+            chip.now
+        };
+        stand.on_sample(board, &raw, t_ticks, false);
+        work(
+            chip,
+            &mut stand,
+            received,
+            &mut millisecond,
+            framed,
+            Some(framed),
+        );
+        let now = chip.borrow().now;
+        deliver(chip, now)?;
+    }
+}
+
+/// What is due until `until`: received bytes and milliseconds. With `late`, all of it at that cycle, bytes first, as
+/// the main loop does it.
+fn work(
+    chip: &Shared,
+    stand: &mut firmware::Stand,
+    received: &mut VecDeque<(u64, u8)>,
+    millisecond: &mut u64,
+    until: u64,
+    late: Option<u64>,
+) {
+    let board = &mut HostBoard(Rc::clone(chip));
+    loop {
+        let byte = received.front().copied().filter(|&(at, _)| at <= until);
+        let byte_first = byte.is_some_and(|(at, _)| late.is_some() || at <= *millisecond);
+        if let Some((at, byte)) = byte.filter(|_| byte_first) {
+            received.pop_front();
+            chip.borrow_mut().now = late.unwrap_or(at);
+            stand.on_byte(board, byte);
+        } else if *millisecond <= until {
+            chip.borrow_mut().now = late.unwrap_or(*millisecond);
+            *millisecond += CYCLES_PER_MS;
+            stand.on_millisecond(board);
+        } else {
+            return;
+        }
+        let chip = &mut *chip.borrow_mut();
+        if chip.reboot {
+            return;
+        }
+        if chip.next_divisor.is_some() && chip.line_free <= chip.now {
+            chip.divisor = chip.next_divisor.take();
+        }
+    }
+}
