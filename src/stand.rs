@@ -677,7 +677,7 @@ impl Stand {
             detail,
         };
         let mut frame = [0; Reply::FRAME_LEN];
-        if wire::encode_reply(&reply, &mut frame).is_err() && board.send(&frame) {
+        if wire::encode_reply(&reply, &mut frame).is_err() || !board.send(&frame) {
             self.faults.record(Fault::ReportDropped);
         }
     }
@@ -702,7 +702,7 @@ impl Stand {
             scale: self.config.scale,
         };
         let mut frame = [0; Hello::FRAME_LEN];
-        if wire::encode_hello(&hello, &mut frame).is_err() && board.send(&frame) {
+        if wire::encode_hello(&hello, &mut frame).is_err() || !board.send(&frame) {
             self.faults.record(Fault::ReportDropped);
         }
     }
@@ -717,7 +717,7 @@ impl Stand {
             faults: self.faults,
         };
         let mut frame = [0; Health::FRAME_LEN];
-        if wire::encode_health(&health, &mut frame).is_err() && board.send(&frame) {
+        if wire::encode_health(&health, &mut frame).is_err() || !board.send(&frame) {
             self.faults.record(Fault::ReportDropped);
         }
     }
