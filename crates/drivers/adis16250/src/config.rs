@@ -226,7 +226,7 @@ pub enum Pace {
 }
 
 impl Pace {
-    /// The longest clock frequency, Hz (Rev. B, page 15).
+    /// The highest clock frequency, Hz (Rev. B, page 15).
     #[must_use]
     pub const fn clock_max_hz(self) -> u32 {
         match self {

@@ -1,0 +1,200 @@
+//! From counts to acceleration, in fixed point.
+
+use crate::{Axis, Range, ReadCounts};
+
+/// Zero and scale of an output, as a converter sees it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scale {
+    zero_q4: i32,
+    micro_g_per_count_q4: i32,
+}
+
+impl Scale {
+    /// For a converter whose reference is the part's supply: independent of the supply, as zero is VDD/2 and the
+    /// sensitivity is in proportion to VDD. `adc_bits` up to 16.
+    #[must_use]
+    pub const fn ratiometric(range: Range, adc_bits: u8) -> Self {
+        let adc_bits = if adc_bits > 16 { 16 } else { adc_bits };
+        // Scale, µg for each count = 3300 mV · 10^6 / (sensitivity · 2^bits). 3300 · 10^6 / sensitivity for the four
+        // ranges, so that nothing is divided at run time:
+        let micro_g_full_scale: u32 = match range {
+            Range::G1_5 => 4_125_000,
+            Range::G2 => 5_500_000,
+            Range::G4 => 11_000_000,
+            Range::G6 => 16_500_000,
+        };
+        let half: u32 = if adc_bits == 0 {
+            0
+        } else {
+            1 << (adc_bits as u32 - 1)
+        };
+        Scale {
+            zero_q4: (half << 4).cast_signed(),
+            micro_g_per_count_q4: (((micro_g_full_scale << 4) + half) >> adc_bits).cast_signed(),
+        }
+    }
+
+    /// For a converter with a reference of its own. All in mV; `None` where one of them is 0 or where full scale is
+    /// beyond 26 bits.
+    #[must_use]
+    pub const fn with_reference(
+        range: Range,
+        supply_mv: u16,
+        reference_mv: u16,
+        adc_bits: u8,
+    ) -> Option<Self> {
+        if supply_mv == 0 || reference_mv == 0 || adc_bits == 0 || adc_bits > 16 {
+            return None;
+        }
+        let (supply, reference, full) = (supply_mv as u64, reference_mv as u64, 1_u64 << adc_bits);
+        let zero = (supply * full * 8 + reference / 2) / reference;
+        // µg for each count = reference / 2^bits / (S33 · VDD / 3300 mV) · 10^6, and sixteen times that.
+        let micro_g = 16 * reference * 3_300_000_000_u64;
+        let per = full * range.millivolts_per_g() as u64 * supply;
+        let scale = (micro_g + per / 2) / per;
+        if zero > 0x03FF_FFFF || scale > 0x03FF_FFFF {
+            None
+        } else {
+            Some(Scale {
+                zero_q4: zero as i32,
+                micro_g_per_count_q4: scale as i32,
+            })
+        }
+    }
+
+    /// Measured by a flip: the counts with the axis up (+1 g) and with the axis down (-1 g), each the mean of many
+    /// readings in sixteenths of a count. `None` where up is not above down: then the axis, or the range inputs, are
+    /// not what they are thought to be.
+    #[must_use]
+    pub const fn from_flip(up_q4: u32, down_q4: u32) -> Option<Self> {
+        if up_q4 <= down_q4 || up_q4 > 0x00FF_FFFF {
+            return None;
+        }
+        let span = up_q4 - down_q4;
+        // 2 g over the span, in sixteenths of a µg for each count: 2 · 10^6 · 16 · 16 / span.
+        let scale = (512_000_000 + span / 2) / span;
+        Some(Scale {
+            zero_q4: ((up_q4 + down_q4) >> 1).cast_signed(),
+            micro_g_per_count_q4: scale.cast_signed(),
+        })
+    }
+
+    /// The reading at 0 g, sixteenths of a count.
+    #[must_use]
+    pub const fn zero_q4(&self) -> i32 {
+        self.zero_q4
+    }
+
+    /// Sixteenths of a µg for each count.
+    #[must_use]
+    pub const fn micro_g_per_count_q4(&self) -> i32 {
+        self.micro_g_per_count_q4
+    }
+
+    /// Acceleration in µg, saturating at 2147 g, rounded down. No division and no 64-bit arithmetic.
+    #[must_use]
+    pub const fn micro_g(&self, counts: u16) -> i32 {
+        let from_zero_q4 = ((counts as i32) << 4).saturating_sub(self.zero_q4);
+        // Whole counts and sixteenths apart, so that 1023 counts of 16 mg stay inside 32 bits.
+        let (whole, sixteenths) = (from_zero_q4 >> 4, from_zero_q4 & 0x0F);
+        let part = sixteenths.saturating_mul(self.micro_g_per_count_q4) >> 4;
+        (whole.saturating_mul(self.micro_g_per_count_q4)).saturating_add(part) >> 4
+    }
+}
+
+/// The three accelerations in µg, all with the same scale.
+///
+/// # Errors
+/// Those of the converter.
+pub fn acceleration<C: ReadCounts>(converter: &mut C, scale: &Scale) -> Result<[i32; 3], C::Error> {
+    let mut one = |axis| Ok(scale.micro_g(converter.read_counts(axis)?));
+    Ok([one(Axis::X)?, one(Axis::Y)?, one(Axis::Z)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The part as its formula has it: V = VDD/2 + S · VDD/3.3 V · a, converted without rounding.
+    fn counts(range: Range, supply_v: f64, reference_v: f64, bits: u8, acceleration_g: f64) -> f64 {
+        let sensitivity = f64::from(range.millivolts_per_g()) / 1000.0 * supply_v / 3.3;
+        (supply_v / 2.0 + sensitivity * acceleration_g) / reference_v * f64::from(1_u32 << bits)
+    }
+
+    const RANGES: [(Range, f64); 4] = [
+        (Range::G1_5, 1.5),
+        (Range::G2, 2.0),
+        (Range::G4, 4.0),
+        (Range::G6, 6.0),
+    ];
+
+    #[test]
+    fn a_ratiometric_reading_does_not_depend_on_the_supply() {
+        for (range, full_g) in RANGES {
+            for bits in [8, 10, 12, 16] {
+                let scale = Scale::ratiometric(range, bits);
+                for supply_v in [2.2, 3.3, 3.6] {
+                    for step in -8_i32..=8 {
+                        let g = full_g * f64::from(step) / 8.0;
+                        let reading = counts(range, supply_v, supply_v, bits, g).round();
+                        let lsb_g = 1.0
+                            / (counts(range, 3.3, 3.3, bits, 1.0)
+                                - counts(range, 3.3, 3.3, bits, 0.0));
+                        let found = f64::from(scale.micro_g(reading as u16)) * 1e-6;
+                        let scale_step = full_g / lsb_g / 16.0 * 1e-6; // the scale's own rounding, at full range
+                        assert!(
+                            (found - g).abs() <= 0.51 * lsb_g + scale_step + 2e-6,
+                            "{range:?} {bits} bits: {found} for {g}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn another_reference_is_accounted_for() {
+        let scale = Scale::with_reference(Range::G2, 3300, 5000, 10).unwrap();
+        for step in -8_i32..=8 {
+            let g = f64::from(step) / 4.0;
+            let reading = counts(Range::G2, 3.3, 5.0, 10, g).round();
+            assert!(
+                (f64::from(scale.micro_g(reading as u16)) * 1e-6 - g).abs() < 0.51 / 122.88,
+                "{g} g"
+            );
+        }
+        assert_eq!(Scale::with_reference(Range::G2, 3300, 0, 10), None);
+        assert_eq!(Scale::with_reference(Range::G2, 0, 5000, 10), None);
+    }
+
+    #[test]
+    fn a_flip_finds_zero_and_scale() {
+        // 20 counts beside the middle, 3 % less sensitive than typical.
+        let (zero, per_g) = (532.0_f64, 248.2 * 0.97);
+        let scale = Scale::from_flip(
+            ((zero + per_g) * 16.0) as u32,
+            ((zero - per_g) * 16.0) as u32,
+        )
+        .unwrap();
+        assert!((f64::from(scale.micro_g(532)) * 1e-6).abs() < 0.001);
+        assert!(
+            (f64::from(scale.micro_g((zero + per_g).round() as u16)) * 1e-6 - 1.0).abs() < 0.003
+        );
+        assert_eq!(
+            Scale::from_flip(500 * 16, 532 * 16),
+            None,
+            "an axis that reads less when it points up"
+        );
+    }
+
+    #[test]
+    fn nothing_overflows_at_the_ends() {
+        let steepest = Scale::from_flip(17, 16).unwrap();
+        assert_eq!(steepest.micro_g(0xFFFF), i32::MAX >> 4);
+        assert_eq!(
+            Scale::ratiometric(Range::G6, 200),
+            Scale::ratiometric(Range::G6, 16)
+        );
+        let _ = Scale::ratiometric(Range::G6, 0).micro_g(0xFFFF);
+    }
+}
