@@ -239,3 +239,42 @@ fn ref_requests() {
     request_is("request_load_config", 26, Command::LoadConfig);
     request_is("request_default_config", 27, Command::DefaultConfig);
 }
+
+#[test]
+fn the_page_and_the_crate_give_the_same_lengths_counters_and_codes() {
+    let page = include_str!("../../../docs/wire-format.md");
+    for (code, name, len, frame_len) in [
+        (1, "hello | board -> PC", Hello::LEN, Hello::FRAME_LEN),
+        (2, "sample | board -> PC", Sample::LEN, Sample::FRAME_LEN),
+        (3, "health | board -> PC", Health::LEN, Health::FRAME_LEN),
+        (4, "reply | board -> PC", Reply::LEN, Reply::FRAME_LEN),
+        (
+            0x10,
+            "request | PC -> board",
+            Request::LEN,
+            Request::FRAME_LEN,
+        ),
+    ] {
+        let row = format!("| {code:#04x} | {name} | {len} | {frame_len} |");
+        assert!(page.contains(&row), "{row}");
+    }
+    for fault in Fault::all() {
+        let (name, place) = (fault.name(), fault as usize);
+        let row = match name.strip_suffix("_x") {
+            Some(stem) => format!(
+                "| {place}, {}, {} | `{stem}_x, _y, _z` |",
+                place + 1,
+                place + 2
+            ),
+            None if name.ends_with("_y") || name.ends_with("_z") => continue,
+            None => format!("| {place} | `{name}` |"),
+        };
+        assert!(page.contains(&row), "{row}");
+    }
+    for code in 0..=u8::MAX {
+        if let Some(status) = Status::from_code(code) {
+            let row = format!("| {code} | `{status:?}` |");
+            assert!(page.contains(&row), "{row}");
+        }
+    }
+}
