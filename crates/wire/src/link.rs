@@ -38,6 +38,7 @@ pub struct LinkStats {
     /// Missing since the last health frame.
     missing: u64,
     restarts: Option<u16>,
+    t_ticks: Option<u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -74,8 +75,14 @@ impl LinkStats {
     }
 
     fn sample(&mut self, sample: &Sample) -> u16 {
+        // Time that runs backwards by more than the numbers do is a start whose hello frame was lost.
+        let backwards = |last: u32| sample.t_ticks.wrapping_sub(last) > u32::MAX / 2;
+        if self.t_ticks.is_some_and(backwards) && !self.is_repeated(sample.seq) {
+            self.restarted();
+        }
         let gap = self.gap_to(sample.seq);
         self.losses.received += 1;
+        self.t_ticks = Some(sample.t_ticks);
         match gap {
             Some(gap) => {
                 self.expected = Some(sample.seq.wrapping_add(1));
@@ -88,13 +95,18 @@ impl LinkStats {
     /// Counts what is missing before `seq`; `None` where `seq` was there already.
     fn gap_to(&mut self, seq: u16) -> Option<u16> {
         let gap = seq.wrapping_sub(self.expected.unwrap_or(seq));
-        // The last 64 numbers before the expected one are a repetition, not a gap of nearly 65536.
-        if gap >= u16::MAX - 63 {
+        if self.is_repeated(seq) {
             self.losses.out_of_order += 1;
             return None;
         }
         self.missing += u64::from(gap);
         Some(gap)
+    }
+
+    /// The last 64 numbers before the expected one are a repetition, not a gap of nearly 65536.
+    fn is_repeated(&self, seq: u16) -> bool {
+        self.expected
+            .is_some_and(|expected| seq.wrapping_sub(expected) >= u16::MAX - 63)
     }
 
     fn health(&mut self, health: &Health) -> u16 {
@@ -156,6 +168,7 @@ impl LinkStats {
         self.missing = 0;
         self.expected = None;
         self.bracket = None;
+        self.t_ticks = None;
     }
 }
 
