@@ -19,6 +19,8 @@ enum Command {
     Analyze(commands::analyze::Arguments),
     /// What the simulation gets wrong, the causes, the extended model, the measured gain.
     Diagnose(commands::diagnose::Arguments),
+    /// The simulated stand with something hidden in it: capture, analysis, diagnosis in one go.
+    Run(commands::run::Arguments),
     /// A capture straight from a model file.
     Simulate(commands::simulate::Arguments),
     /// A capture from the board's serial port.
@@ -29,6 +31,7 @@ fn main() -> miette::Result<()> {
     match Program::parse().command {
         Command::Analyze(arguments) => commands::analyze::run(&arguments),
         Command::Diagnose(arguments) => commands::diagnose::run(&arguments),
+        Command::Run(arguments) => commands::run::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Capture(arguments) => commands::capture::run(&arguments),
     }

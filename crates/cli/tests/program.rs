@@ -194,6 +194,50 @@ fn a_model_file_with_an_unknown_effect_is_an_error_that_names_the_line() {
     assert!(!out.exists());
 }
 
+#[test]
+fn a_fault_hidden_in_the_stand_goes_through_the_boards_logic_and_is_named() {
+    let folder = folder("run");
+    let [out, found] = ["c.csv", "d.json"].map(|name| folder.join(name));
+    let made = run(&["run", "--out", out.to_str().unwrap()]);
+    assert_eq!(
+        made.status.code(),
+        Some(1),
+        "without a simulated ATmega16 `run` says so"
+    );
+    let made = run(&[
+        "run",
+        "--native",
+        "--hide",
+        "motor-coupling",
+        "--seed",
+        "11",
+        "--out",
+        out.to_str().unwrap(),
+        "--json",
+        found.to_str().unwrap(),
+    ]);
+    assert!(
+        made.status.success(),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
+    let said = String::from_utf8_lossy(&made.stdout);
+    let diagnosis = json(&found);
+    let named = diagnosis["findings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .any(|finding| {
+            finding["cause"] == "motor_bias"
+                || finding["alternatives"]
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .any(|rival| rival["cause"] == "motor_bias")
+        });
+    assert!(named, "{said}");
+}
+
 /// Measured records: `IMU_STAND_DATA` names their folder.
 fn measured(file: &str) -> Option<PathBuf> {
     match std::env::var_os("IMU_STAND_DATA") {

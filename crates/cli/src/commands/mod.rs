@@ -3,6 +3,7 @@
 pub mod analyze;
 pub mod capture;
 pub mod diagnose;
+pub mod run;
 pub mod simulate;
 
 use std::path::{Path, PathBuf};
