@@ -3,6 +3,8 @@
 //! Prequential Bayes score: the marginal likelihood m of the first n_j samples (mean and coefficients flat, white
 //! variance by Jeffreys, in closed form; random walk and sizes of stationary terms mixed over a grid), and for each of
 //! twelve blocks ln m(1..n_j) - ln m(1..n_{j-1}) of the extended model minus the same of the model without the term.
+//! A regressor that has not moved yet (a step before its time) has no coefficient: it is left out, and the blocks
+//! until it has moved count nothing.
 
 use std::rc::Rc;
 
@@ -14,8 +16,13 @@ use crate::search::{Form, State};
 /// Blocks, and the part of the record before the first.
 const BLOCKS: usize = 12;
 const BEFORE: f64 = 0.4;
-/// Random walks of the mixture.
-const WALKS: u32 = 12;
+/// Random walks of the mixture, evenly spaced in ln(q / s2) from the least that the length can show to [`MOST_WALK`]:
+/// the same prior for every model, for a model that lacks a slow term makes up for it by its random walk.
+const WALKS: u32 = 24;
+/// A random walk whose step is as large as the white noise.
+const MOST_WALK: f64 = 0.0;
+/// Part of a regressor's whole variance that a prefix must have for its coefficient to be one.
+const MOVED: f64 = 1e-3;
 
 /// Score of a term.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -60,7 +67,7 @@ fn marginal(
     };
     let n = panel.bins.n as f64;
     let low = least_walk(panel.bins.n).min(walk - 4.0);
-    let step = (walk + 3.0 - low) / f64::from(WALKS);
+    let step = (MOST_WALK.max(walk + 3.0) - low) / f64::from(WALKS);
     let mut all = vec![];
     let mut best = (f64::NEG_INFINITY, vec![], walk);
     for size in sizes {
@@ -108,6 +115,16 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
     let ends: Vec<usize> = (0..=BLOCKS)
         .map(|j| ((BEFORE + (1.0 - BEFORE) * j as f64 / BLOCKS as f64) * n as f64).round() as usize)
         .collect();
+    let moved = |column: &[f64], end: usize| variance(&column[..end]) > MOVED * variance(column);
+    let moved: Vec<Vec<bool>> = ends
+        .iter()
+        .map(|&end| {
+            values
+                .iter()
+                .map(|term| term.iter().all(|c| moved(c, end)))
+                .collect()
+        })
+        .collect();
     let models: Vec<Option<usize>> = (0..state.terms.len()).map(Some).chain([None]).collect();
     let mut log_m = vec![vec![]; models.len()];
     let windows: Vec<(&'static str, usize)> = [("10s", 10.0), ("100s", 100.0)]
@@ -127,7 +144,7 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
             let used: Vec<usize> = columns
                 .iter()
                 .enumerate()
-                .filter(|(i, _)| Some(*i) != *skip)
+                .filter(|(i, _)| Some(*i) != *skip && moved[j][*i])
                 .flat_map(|(_, c)| c.clone())
                 .collect();
             let prefix = marginal(&panel, state, &used, *skip, state.noise.log_walk);
@@ -138,7 +155,7 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
             let shapes: Vec<&Vec<f64>> = values
                 .iter()
                 .enumerate()
-                .filter(|(i, _)| Some(*i) != *skip)
+                .filter(|(i, _)| Some(*i) != *skip && moved[j][*i])
                 .flat_map(|(_, c)| c)
                 .collect();
             let rest: Vec<f64> = (0..n)
@@ -166,7 +183,14 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
     (0..state.terms.len())
         .map(|i| {
             let gains: Vec<f64> = (1..=BLOCKS)
-                .map(|j| (log_m[full][j] - log_m[full][j - 1]) - (log_m[i][j] - log_m[i][j - 1]))
+                .map(|j| {
+                    let of = |m: usize| log_m[m][j] - log_m[m][j - 1];
+                    if moved[j - 1][i] {
+                        of(full) - of(i)
+                    } else {
+                        0.0
+                    }
+                })
                 .collect();
             let nats: f64 = gains.iter().sum();
             let mean = nats / BLOCKS as f64;
@@ -185,6 +209,11 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
             }
         })
         .collect()
+}
+
+fn variance(x: &[f64]) -> f64 {
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / x.len() as f64
 }
 
 /// Angle errors of windows that start in (from, to), the filter's level held from their start.

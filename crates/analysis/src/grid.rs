@@ -175,6 +175,8 @@ pub fn lay_out(
     }
     let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
+    let drivers = drivers(record, &places, n, &dct);
+    let motion_of = |y: &[f64]| motion(&mut dct.forward(y), &drivers, n, rate_hz);
     let mut targets = vec![];
     for channel in gyros {
         let (scale, unit) = match channel.unit.as_str() {
@@ -222,18 +224,14 @@ pub fn lay_out(
             y = given.clone();
             crate::kalman::fill(&mut y, fit.1, fit.1 * fit.0.log_walk.exp(), &mut rng);
         }
-        let moves = unit == "deg/s" && motion(&dct.forward(&y), n, rate_hz) > MOTION_RMS;
+        let moves = unit == "deg/s" && motion_of(&y) > MOTION_RMS;
         let spikes = if moves {
             vec![]
         } else {
             spikes(&given, &mut y, &mut fit, &dct, &bins, &mut rng)
         };
         let lost = [lost, spikes.clone()].concat();
-        let motion_rms = if unit == "deg/s" {
-            motion(&dct.forward(&y), n, rate_hz)
-        } else {
-            0.0
-        };
+        let motion_rms = if unit == "deg/s" { motion_of(&y) } else { 0.0 };
         targets.push(Target {
             name: channel.name.clone(),
             axis: channel.axis,
@@ -329,8 +327,27 @@ fn white_of(y: &[f64]) -> f64 {
     d.iter().map(|d| d * d).sum::<f64>() / (2.0 * d.len().max(1) as f64)
 }
 
-/// Excess rms in the band of base motion, white noise taken off.
-fn motion(c: &[f64], n: usize, rate_hz: f64) -> f64 {
+/// Coefficients of what can drive a gyro's bias on a base at rest: motor command, supply, temperatures. Where the base
+/// moves, and where the motor turns it, they explain nothing away.
+fn drivers(record: &Record, places: &[usize], n: usize, dct: &Dct) -> Vec<Vec<f64>> {
+    if matches!(record.header.base, Some(Base::Moving | Base::Turntable)) {
+        return vec![];
+    }
+    record
+        .channels
+        .iter()
+        .filter(|c| {
+            matches!(
+                c.quantity,
+                Quantity::Pwm | Quantity::Supply | Quantity::Temp
+            )
+        })
+        .map(|c| dct.forward(&interpolated(&spread(&c.values, places, n, &[]))))
+        .collect()
+}
+
+/// Excess rms in the band of base motion, white noise and what follows the `drivers` taken off.
+fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64) -> f64 {
     let k_of = |f: f64| ((2.0 * f / rate_hz * n as f64) as usize).clamp(1, n - 1);
     let (low, high) = (k_of(MOTION_BAND_HZ.0), k_of(MOTION_BAND_HZ.1));
     let mut above: Vec<f64> = c[high..].iter().map(|v| v * v).collect();
@@ -341,8 +358,28 @@ fn motion(c: &[f64], n: usize, rate_hz: f64) -> f64 {
     } else {
         *above.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.4549
     };
-    let band: f64 = c[low..high].iter().map(|v| v * v - white).sum();
-    (band.max(0.0) / n as f64).sqrt()
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let band = &mut c[low..high];
+    let mut orthogonal: Vec<Vec<f64>> = vec![];
+    for driver in drivers {
+        let mut x = driver[low..high].to_vec();
+        let before = dot(&x, &x);
+        for o in &orthogonal {
+            let share = dot(&x, o);
+            x.iter_mut().zip(o).for_each(|(x, o)| *x -= share * o);
+        }
+        let length = dot(&x, &x);
+        // What is left of a driver that the others make up is rounding.
+        if length <= 1e-9 * before.max(f64::MIN_POSITIVE) {
+            continue;
+        }
+        x.iter_mut().for_each(|x| *x /= length.sqrt());
+        let share = dot(band, &x);
+        band.iter_mut().zip(&x).for_each(|(c, x)| *c -= share * x);
+        orthogonal.push(x);
+    }
+    let excess: f64 = band.iter().map(|v| v * v - white).sum();
+    (excess.max(0.0) / n as f64).sqrt()
 }
 
 fn signal(
