@@ -6,18 +6,19 @@ use std::process::Command;
 use crate::step::{Failure, run};
 use crate::toolchain;
 
-/// Builds the firmware for the ATmega16; returns the ELF. memory.x makes the link fail where it does not fit.
-///
-/// # Errors
-/// Toolchain or build.
-pub fn build(root: &Path) -> Result<PathBuf, Failure> {
+/// Where the image's build keeps its files.
+fn target(root: &Path) -> PathBuf {
+    root.join("target/avr")
+}
+
+/// A cargo that compiles for the ATmega16.
+fn cargo(root: &Path, arguments: &[&str]) -> Result<Command, Failure> {
     let toolchain = toolchain::find()?;
-    let target = root.join("target/avr");
     let mut command = Command::new(&toolchain.cargo);
     command
         .current_dir(root)
-        .arg("fw")
-        .env("CARGO_TARGET_DIR", &target)
+        .args(arguments)
+        .env("CARGO_TARGET_DIR", target(root))
         .env("RUSTC", &toolchain.rustc);
     // -Zbuild-std on a rustc that is not a nightly.
     command.env("RUSTC_BOOTSTRAP", "1");
@@ -31,8 +32,34 @@ pub fn build(root: &Path) -> Result<PathBuf, Failure> {
     ] {
         command.env_remove(variable);
     }
-    run("the build of the image", &mut command)?;
-    let elf = target.join("avr-none/firmware/firmware.elf");
+    Ok(command)
+}
+
+/// Compiles the firmware for the ATmega16 without linking it.
+///
+/// # Errors
+/// Toolchain or compilation.
+pub fn check(root: &Path) -> Result<(), Failure> {
+    let arguments = [
+        "check",
+        "-p",
+        "firmware",
+        "--profile",
+        "firmware",
+        "--target",
+        "avr-none",
+        "-Zbuild-std=core",
+    ];
+    run("the check of the firmware", &mut cargo(root, &arguments)?)
+}
+
+/// Builds the firmware for the ATmega16; returns the ELF. memory.x makes the link fail where it does not fit.
+///
+/// # Errors
+/// Toolchain or build.
+pub fn build(root: &Path) -> Result<PathBuf, Failure> {
+    run("the build of the image", &mut cargo(root, &["fw"])?)?;
+    let elf = target(root).join("avr-none/firmware/firmware.elf");
     let hex = elf.with_extension("hex");
     let mut objcopy = Command::new("avr-objcopy");
     objcopy

@@ -13,7 +13,7 @@ use step::{Failure, run};
 const USAGE: &str = "usage: cargo xtask COMMAND
 
   test     sets up what is missing and runs every check and test
-  demo     simulates the paper's stand with a hidden effect, analyzes and diagnoses it
+  demo     hides something in the simulated stand, captures 600 s, analyzes and diagnoses; a number after it is the seed
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}";
 
 fn main() -> ExitCode {
@@ -44,7 +44,7 @@ fn cargo(root: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// Packages that need neither the AVR toolchain nor simavr's libraries: the workspace's default members.
+/// no_std crates, tested each alone as well: a run of the workspace unites features.
 const ALONE: &[&str] = &["wire", "adis16250", "mma7260qt"];
 
 fn test(root: &Path) -> Result<(), Failure> {
@@ -78,7 +78,8 @@ fn test(root: &Path) -> Result<(), Failure> {
         run(name, &mut cargo(root, arguments))?;
         println!("== {name}: {:.0} s", from.elapsed().as_secs_f64());
     }
-    build_image(root)?;
+    println!("== firmware for the ATmega16");
+    image::check(root)?;
     println!("all passed in {:.0} s", start.elapsed().as_secs_f64());
     Ok(())
 }
@@ -100,12 +101,8 @@ fn build_image(root: &Path) -> Result<(), Failure> {
 fn demo(root: &Path) -> Result<(), Failure> {
     run(
         "the build",
-        &mut cargo(
-            root,
-            &["build", "--release", "--quiet", "--bin", "imu-stand"],
-        ),
+        &mut cargo(root, &["build", "--release", "--bin", "imu-stand"]),
     )?;
-    let program = root.join("target/release/imu-stand");
     let folder = root.join("target/demo");
     std::fs::create_dir_all(&folder).map_err(|error| {
         Failure::new(
@@ -113,18 +110,17 @@ fn demo(root: &Path) -> Result<(), Failure> {
             "make room or rights for it",
         )
     })?;
-    let file = |name: &str| folder.join(name).display().to_string();
-    let (capture, found) = (file("capture.csv"), file("diagnosis.json"));
-    run(
-        "simulate",
-        Command::new(&program).args(["simulate", "--seconds", "600", "--out", &capture]),
-    )?;
-    run(
-        "analyze",
-        Command::new(&program).args(["analyze", &capture, "--json", &file("analysis.json")]),
-    )?;
-    run(
-        "diagnose",
-        Command::new(&program).args(["diagnose", &capture, "--json", &found]),
-    )
+    let seed = std::env::args().nth(2).unwrap_or_else(|| "2009".to_owned());
+    let mut program = Command::new(root.join("target/release/imu-stand"));
+    program.args(["run", "--native", "--seconds", "600", "--seed", &seed]);
+    for (option, file) in [
+        ("--out", "capture.csv"),
+        ("--analysis", "analysis.json"),
+        ("--json", "diagnosis.json"),
+    ] {
+        program.arg(option).arg(folder.join(file));
+    }
+    run("the demo", &mut program)?;
+    println!("capture, analysis and diagnosis: {}", folder.display());
+    Ok(())
 }
