@@ -7,6 +7,7 @@ use model::record::Base;
 use crate::diagnosis::Searched;
 use crate::grid::Grid;
 use crate::result::{Alternative, Finding, Gain};
+use crate::search::Form;
 use crate::{evidence, gain, scale, threshold};
 
 pub(crate) fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {
@@ -85,9 +86,11 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
                     delta_bic: Some(term.lr - size * n),
                     allan_misfit_before: Some(misfit[0]),
                     allan_misfit_after: Some(misfit[1]),
+                    // The filter behind the angles knows the random walk alone: of a stationary term it says nothing.
                     angle_rms_deg: score
                         .angle
                         .iter()
+                        .filter(|_| !matches!(term.form, Form::Covariance(..)))
                         .map(|(k, v)| ((*k).to_owned(), *v))
                         .collect(),
                     ablation_nats: Some(term.lr / 2.0),
