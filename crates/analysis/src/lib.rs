@@ -5,6 +5,7 @@
 pub mod allan;
 pub mod analyze;
 pub mod attitude;
+pub mod audit;
 pub mod checks;
 mod common;
 pub mod contest;

@@ -1,0 +1,274 @@
+//! Low bits: missing ones, and one that sticks.
+//!
+//! Missing bits need no noise model. Where all counts are one residue apart by 2^k, every change is a multiple of 2^k;
+//! a change of a finer converter is even with a chance below 1/2, however small or large its noise.
+//!
+//! A bit that sticks moves the share of ones. With the reading normal about what its neighbours predict, L, the square
+//! wave s of period P = 2^(b+1) (+1 where bit b is 0) has the mean
+//! E s = sum over odd m of 4/(pi m) exp(-2 pi^2 sigma^2 m^2 / P^2) sin(2 pi m (L + 1/2) / P),
+//! nearly 0 for the lowest bits and far from it where P exceeds 4 sigma. A bit stuck at v in a share f of the samples
+//! moves the share of ones q to q + f (v - q).
+
+use std::f64::consts::PI;
+
+use model::Parameter;
+
+use super::{Audit, Gyro, LEAST_READINGS, tails};
+use crate::audit::local::Local;
+use crate::result::{Alternative, Finding};
+
+/// Most low bits that are looked at.
+const BITS: u32 = 8;
+/// Share of the readings that have to lie on the coarse grid; the rails may lie beside it.
+const ON_GRID: f64 = 0.97;
+/// A bit is tested while its weight is below this many sigma: beyond, the level decides it, not the noise.
+const WITHIN_SIGMA: f64 = 2.0;
+/// Least noise, counts: below it the level decides even the lowest bit.
+const LEAST_SIGMA: f64 = 0.9;
+/// Rounds in which the level is freed of the shift that the sticking bit itself makes.
+const ROUNDS: usize = 6;
+
+/// Coarse grid that the counts lie on.
+struct Coarse {
+    bits: u32,
+    residue: i32,
+    changes: u64,
+}
+
+fn coarse(counts: &[i32], known: &[bool]) -> Option<Coarse> {
+    let mut found = None;
+    for bits in 1..=BITS {
+        let step = 1 << bits;
+        let mut tally = vec![0u64; step as usize];
+        let mut all = 0u64;
+        for (c, _) in counts.iter().zip(known).filter(|(_, k)| **k) {
+            tally[c.rem_euclid(step) as usize] += 1;
+            all += 1;
+        }
+        let (residue, most) = tally
+            .iter()
+            .enumerate()
+            .max_by_key(|(_, t)| **t)
+            .map(|(r, t)| (r as i32, *t))?;
+        if (most as f64) < ON_GRID * all as f64 {
+            break;
+        }
+        // Pairs that do not share a reading are independent.
+        let changes: Vec<bool> = counts
+            .chunks_exact(2)
+            .zip(known.chunks_exact(2))
+            .filter(|(c, k)| k[0] && k[1] && c[0] != c[1])
+            .map(|(c, _)| (c[1] - c[0]).rem_euclid(step) == 0)
+            .collect();
+        let even = changes.iter().filter(|e| **e).count() as u64;
+        let trials = changes.len() as u64;
+        if (even as f64) < ON_GRID * trials as f64
+            || tails::hits_at_least(even, trials, 0.5) > super::FALSE_ALARM
+        {
+            break;
+        }
+        found = Some(Coarse {
+            bits,
+            residue,
+            changes: trials,
+        });
+    }
+    found
+}
+
+/// Mean of the square wave of period `period` (+1 in its first half) under N(`level`, `sigma`^2), rounded.
+fn square(level: f64, sigma: f64, period: f64) -> f64 {
+    let mut sum = 0.0;
+    for j in 0..200 {
+        let m = f64::from(2 * j + 1);
+        let size = 4.0 / (PI * m) * (-2.0 * (PI * sigma * m / period).powi(2)).exp();
+        sum += size * (2.0 * PI * m * (level + 0.5) / period).sin();
+        if size < 1e-9 {
+            break;
+        }
+    }
+    sum.clamp(-1.0, 1.0)
+}
+
+/// A bit whose share of ones the noise does not explain.
+struct Stuck {
+    bit: u32,
+    value: u8,
+    fraction: f64,
+    error: f64,
+    z: f64,
+}
+
+/// Share of ones of a bit against the expected one. A bit that sticks moves the level too: in the share f of the
+/// samples by 2^b times the chance that it would have been the other. `from` is an estimate that frees the level of it.
+fn stuck(
+    counts: &[i32],
+    local: &Local,
+    known: &[bool],
+    bit: u32,
+    from: Option<&Stuck>,
+) -> Option<Stuck> {
+    let weight = f64::from(1u32 << bit);
+    // Of the samples that would read otherwise, about half, the share f is moved: that widens the spread as well.
+    let moved = from.map_or(0.0, |s| 0.5 * s.fraction * (1.0 - 0.5 * s.fraction));
+    let sigma = local.unrounded_sigma();
+    let sigma = (sigma * sigma - weight * weight * moved)
+        .max(0.25 * sigma * sigma)
+        .sqrt();
+    let one = |level: f64| 0.5 * (1.0 - square(level, sigma, 2.0 * weight));
+    let (mut ones, mut expected, mut variance, mut n) = (0.0, 0.0, 0.0, 0.0);
+    for (i, c) in counts.iter().enumerate().filter(|(i, _)| known[*i]) {
+        let level = local.level[i];
+        let shift = from.map_or(0.0, |s| {
+            weight * s.fraction * (f64::from(s.value) - one(level))
+        });
+        let p = one(level - shift);
+        ones += f64::from((c >> bit) & 1);
+        expected += p;
+        variance += p * (1.0 - p);
+        n += 1.0;
+    }
+    if n == 0.0 || variance <= 0.0 {
+        return None;
+    }
+    let (q, share, spread) = (expected / n, ones / n, variance.sqrt() / n);
+    let high = share > q;
+    let room = if high { 1.0 - q } else { q };
+    Some(Stuck {
+        bit,
+        value: u8::from(high),
+        fraction: ((share - q).abs() / room).min(1.0),
+        error: spread / room,
+        z: (share - q) / spread,
+    })
+}
+
+pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
+    let Some((counts, local)) = &g.counts else {
+        return;
+    };
+    let name = g.channel.name.as_str();
+    let known: Vec<bool> = (0..counts.len()).map(|i| g.known(i)).collect();
+    if let Some(c) = coarse(counts, &known) {
+        let chance = 0.5f64.powi(c.changes.min(900) as i32);
+        let what = format!(
+            "the {} lowest bits of {name} never change: its step is {} counts ({} changes, all of whole steps)",
+            c.bits,
+            1 << c.bits,
+            c.changes
+        );
+        audit.check("low_bits", name, f64::from(c.bits), chance, what.clone());
+        // One bit at 1 throughout is no grid that a converter makes.
+        let sticks = c.bits == 1 && c.residue == 1;
+        let mut finding = Finding {
+            cause: if sticks { "stuck_bit" } else { "coarse_lsb" }.into(),
+            channels: vec![name.into()],
+            what,
+            ..Finding::default()
+        };
+        if sticks {
+            finding.parameters = parameters(0, 1, 1.0, None);
+        } else {
+            finding.parameters.insert(
+                "missing_bits".into(),
+                Parameter::exact(f64::from(c.bits), "1"),
+            );
+            if c.bits == 1 {
+                finding.alternatives.push(Alternative {
+                    cause: "stuck_bit".into(),
+                    log_odds: 0.0,
+                });
+                finding.experiment = Some("read a register with known odd contents over the same line: a stuck line shows there too".into());
+            }
+        }
+        audit.findings.push(finding);
+        audit.suppress(
+            &["stuck_bit", "stale_samples", "outliers", "kurtosis"],
+            name,
+            "coarse_lsb",
+        );
+        return;
+    }
+    let sigma = local.unrounded_sigma();
+    if known.iter().filter(|k| **k).count() < LEAST_READINGS {
+        return;
+    }
+    let tested: Vec<Stuck> = (0..BITS)
+        .filter(|b| sigma >= LEAST_SIGMA && f64::from(1u32 << b) <= WITHIN_SIGMA * sigma)
+        .filter_map(|b| stuck(counts, local, &known, b, None))
+        .collect();
+    let Some(worst) = tested.iter().max_by(|a, b| a.z.abs().total_cmp(&b.z.abs())) else {
+        audit.untested(
+            "stuck_bit",
+            &format!("{name}: the noise is less than a count, so the level alone decides the bits"),
+        );
+        return;
+    };
+    let chance = (tested.len() as f64 * tails::two_sided(worst.z)).min(1.0);
+    let z = worst.z;
+    let mut freed: Option<Stuck> = None;
+    for _ in 0..ROUNDS {
+        let from = freed.as_ref().unwrap_or(worst);
+        freed =
+            stuck(counts, local, &known, worst.bit, Some(from)).filter(|s| s.value == worst.value);
+        if freed.is_none() {
+            break;
+        }
+    }
+    let worst = freed.as_ref().unwrap_or(worst);
+    let what = format!(
+        "bit {} of {name} reads {} too often: it sticks in {:.1} +- {:.1} % of the samples ({:.1} sigma)",
+        worst.bit,
+        worst.value,
+        100.0 * worst.fraction,
+        100.0 * worst.error,
+        z.abs()
+    );
+    if audit.check("bit_share", name, z, chance, what.clone()) {
+        audit.findings.push(Finding {
+            cause: "stuck_bit".into(),
+            channels: vec![name.into()],
+            parameters: parameters(worst.bit, worst.value, worst.fraction, Some(worst.error)),
+            what,
+            ..Finding::default()
+        });
+        audit.suppress(&["outliers", "kurtosis"], name, "stuck_bit");
+    }
+}
+
+fn parameters(bit: u32, value: u8, fraction: f64, error: Option<f64>) -> model::effect::Parameters {
+    let mut share = Parameter::exact(fraction, "1");
+    share.std_error = error;
+    [
+        ("bit".to_owned(), Parameter::exact(f64::from(bit), "1")),
+        ("value".to_owned(), Parameter::exact(f64::from(value), "1")),
+        ("fraction".to_owned(), share),
+    ]
+    .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_square_wave_agrees_with_a_sum_over_codes() {
+        use statrs::distribution::{ContinuousCDF, Normal};
+        for (level, sigma, bit) in [
+            (0.3, 2.0, 2u32),
+            (-5.2, 5.3, 3),
+            (11.7, 0.7, 0),
+            (3.0, 4.0, 2),
+        ] {
+            let normal = Normal::new(level, sigma).unwrap();
+            let direct: f64 = (-200i32..200)
+                .map(|c| {
+                    let p = normal.cdf(f64::from(c) + 0.5) - normal.cdf(f64::from(c) - 0.5);
+                    if (c >> bit) & 1 == 0 { p } else { -p }
+                })
+                .sum();
+            let series = square(level, sigma, f64::from(1u32 << (bit + 1)));
+            assert!((direct - series).abs() < 1e-6, "{direct} {series}");
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! Audits of frames and counts: what is wrong with a record before anybody fits a model to it.
+//!
+//! Each audit takes the record alone. It needs no fit, so it also works where the base moves or the noise is not what
+//! the model says: every reading is held against its own neighbourhood ([`local`]). Chances are those of one channel
+//! and one audit; [`FALSE_ALARM`] is what each may spend.
+
+mod bits;
+mod frames;
+pub mod local;
+mod outliers;
+mod repeats;
+mod saturation;
+pub mod tails;
+mod timing;
+
+use std::collections::BTreeMap;
+
+use model::record::{Channel, Quantity, Record};
+
+use crate::result::{Check, Finding, NotTested, Parameter, Unexplained};
+use local::Local;
+
+/// Chance of a false alarm of one audit on one channel.
+pub const FALSE_ALARM: f64 = 2e-5;
+/// Least readings of a channel that an audit of its distribution takes.
+pub const LEAST_READINGS: usize = 200;
+/// Most times that a finding lists.
+pub const MOST_TIMES: usize = 1000;
+
+/// A check that a fault of frames or counts makes fail: no news, and no second cause.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Suppression {
+    /// Cause or check id that says nothing new on this channel.
+    pub id: String,
+    /// The channel.
+    pub channel: String,
+    /// The cause that explains it.
+    pub by: String,
+}
+
+/// What the audits say.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Audit {
+    /// Faults found.
+    pub findings: Vec<Finding>,
+    /// By gyro: whether a row's reading may be used.
+    pub usable: BTreeMap<String, Vec<bool>>,
+    /// What not to say a second time.
+    pub suppressed: Vec<Suppression>,
+    /// One per audit and channel that could be made.
+    pub checks: Vec<Check>,
+    /// Audits that could not be made.
+    pub not_tested: Vec<NotTested>,
+    /// What is wrong and has no name in the library.
+    pub unexplained: Vec<Unexplained>,
+    /// Rows before which frames were lost without a gap of the sequence numbers, and how many.
+    pub silently_lost: Vec<(usize, u64)>,
+}
+
+impl Audit {
+    /// Whether `id` on `channel` is explained by another fault.
+    #[must_use]
+    pub fn is_suppressed(&self, id: &str, channel: &str) -> bool {
+        self.suppressed
+            .iter()
+            .any(|s| s.id == id && s.channel == channel)
+    }
+
+    /// Rows of a channel that are not to be used.
+    #[must_use]
+    pub fn masked(&self, channel: &str) -> Vec<usize> {
+        self.usable
+            .get(channel)
+            .map_or(vec![], |u| (0..u.len()).filter(|i| !u[*i]).collect())
+    }
+
+    fn mask(&mut self, channel: &str, row: usize) {
+        if let Some(u) = self.usable.get_mut(channel).and_then(|u| u.get_mut(row)) {
+            *u = false;
+        }
+    }
+
+    fn suppress(&mut self, ids: &[&str], channel: &str, by: &str) {
+        self.suppressed.extend(ids.iter().map(|id| Suppression {
+            id: (*id).into(),
+            channel: channel.into(),
+            by: by.into(),
+        }));
+    }
+
+    fn check(
+        &mut self,
+        id: &str,
+        channel: &str,
+        statistic: f64,
+        p_value: f64,
+        what: String,
+    ) -> bool {
+        let fails = p_value < FALSE_ALARM;
+        self.checks.push(Check {
+            id: id.into(),
+            channel: channel.into(),
+            statistic,
+            p_value: Some(p_value),
+            threshold: FALSE_ALARM,
+            fails_before: fails,
+            fails_after: false,
+            what,
+        });
+        fails
+    }
+
+    /// A check against a plain limit.
+    fn limit(&mut self, id: &str, channel: &str, statistic: f64, limit: f64, what: String) -> bool {
+        let fails = statistic > limit;
+        self.checks.push(Check {
+            id: id.into(),
+            channel: channel.into(),
+            statistic,
+            p_value: None,
+            threshold: limit,
+            fails_before: fails,
+            fails_after: false,
+            what,
+        });
+        fails
+    }
+
+    fn untested(&mut self, cause: &str, why: &str) {
+        let entry = NotTested {
+            cause: cause.into(),
+            why: why.into(),
+        };
+        if !self.not_tested.contains(&entry) {
+            self.not_tested.push(entry);
+        }
+    }
+}
+
+/// A gyro, its neighbourhoods known.
+struct Gyro<'a> {
+    channel: &'a Channel,
+    /// Counts and their neighbourhoods, where the record has counts.
+    counts: Option<(&'a [i32], Local)>,
+    /// Neighbourhoods of the scaled readings.
+    local: Local,
+}
+
+impl Gyro<'_> {
+    fn known(&self, row: usize) -> bool {
+        self.channel.values[row].is_finite()
+    }
+}
+
+/// Times of the rows, s from the first.
+fn times(record: &Record, rows: usize) -> Vec<f64> {
+    let ticks = record.t_ticks.as_ref().zip(record.header.tick_s);
+    if let Some((t, tick)) = ticks.filter(|(t, _)| t.len() == rows && rows > 0) {
+        return t
+            .iter()
+            .map(|v| (v.saturating_sub(t[0])) as f64 * tick)
+            .collect();
+    }
+    let rate = crate::grid::rate_of(record).unwrap_or(1.0);
+    match record.seq.as_ref().filter(|s| s.len() == rows && rows > 0) {
+        Some(s) => s
+            .iter()
+            .map(|v| v.saturating_sub(s[0]) as f64 / rate)
+            .collect(),
+        None => (0..rows).map(|i| i as f64 / rate).collect(),
+    }
+}
+
+fn counted(
+    cause: &str,
+    channels: Vec<String>,
+    count: f64,
+    error: Option<f64>,
+    rows: &[f64],
+    what: String,
+) -> Finding {
+    let mut count = Parameter::exact(count, "1");
+    count.std_error = error;
+    Finding {
+        cause: cause.into(),
+        channels,
+        parameters: [("count".to_owned(), count)].into(),
+        times_s: rows.iter().copied().take(MOST_TIMES).collect(),
+        what,
+        ..Finding::default()
+    }
+}
+
+/// Audit a record. Any record: what cannot be audited is listed in [`Audit::not_tested`].
+#[must_use]
+pub fn audit(record: &Record) -> Audit {
+    let rows = record.len();
+    let mut audit = Audit::default();
+    let gyros: Vec<Gyro<'_>> = record
+        .all(Quantity::Gyro)
+        .filter(|c| c.values.len() == rows)
+        .map(|channel| {
+            let local = Local::new(&channel.values);
+            let counts = channel
+                .counts
+                .as_deref()
+                .filter(|c| c.len() == rows)
+                .map(|c| {
+                    let y: Vec<f64> = c
+                        .iter()
+                        .zip(&channel.values)
+                        .map(|(c, v)| {
+                            if v.is_finite() {
+                                f64::from(*c)
+                            } else {
+                                f64::NAN
+                            }
+                        })
+                        .collect();
+                    (c, Local::new(&y))
+                });
+            Gyro {
+                channel,
+                counts,
+                local,
+            }
+        })
+        .collect();
+    for g in &gyros {
+        audit.usable.insert(
+            g.channel.name.clone(),
+            (0..rows).map(|i| g.known(i)).collect(),
+        );
+    }
+    let at = times(record, rows);
+    frames::audit(record, &gyros, &at, &mut audit);
+    timing::audit(record, &gyros, &at, &mut audit);
+    for g in &gyros {
+        if (0..rows).filter(|i| g.known(*i)).count() < LEAST_READINGS {
+            continue;
+        }
+        bits::audit(g, &mut audit);
+        saturation::audit(g, &mut audit);
+    }
+    if gyros.iter().any(|g| g.counts.is_none()) {
+        for cause in ["coarse_lsb", "stuck_bit", "saturation"] {
+            audit.untested(cause, "the record holds no counts: record what the converter delivers, before any scaling or averaging");
+        }
+    }
+    repeats::audit(record, &gyros, &at, &mut audit);
+    for g in &gyros {
+        outliers::audit(g, &at, &mut audit);
+    }
+    audit
+}

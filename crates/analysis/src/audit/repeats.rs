@@ -1,0 +1,234 @@
+//! Repeats that no flag tells: frames with every gyro reading as in the frame before.
+//!
+//! Differences of neighbours d have a smooth distribution; repeats add to d = 0 alone. The expected share at 0 is that of
+//! the curve ln p(d) = a - c d^2 through its neighbours d = +-1 .. +-K, K below the spread of d, whatever the base does
+//! and however alike neighbours are. Where the noise is below a count, pairs farther apart tell the share instead. Three
+//! gyros agree with the product of theirs: (1 / (2 sqrt(pi) sigma))^3 for white noise of sigma counts.
+
+use model::record::Record;
+
+use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted, tails};
+use crate::audit::local::{robust_sigma, width};
+
+/// Distances of the pairs that tell the chance of agreement.
+const LAGS: std::ops::RangeInclusive<usize> = 20..=25;
+/// Excess over the expected share, relative, that a single gyro has to show: the share itself is that well known.
+const EXCESS: f64 = 0.1;
+
+/// Share of agreeing pairs `lag` apart of one gyro.
+fn share(values: &[f64], lag: usize) -> f64 {
+    let (mut same, mut all) = (0.0, 0.0);
+    for (a, b) in values.iter().zip(&values[lag.min(values.len())..]) {
+        if a.is_finite() && b.is_finite() {
+            all += 1.0;
+            same += f64::from(u8::from(a == b));
+        }
+    }
+    if all > 0.0 { same / all } else { 0.0 }
+}
+
+fn differences(values: &[f64], lag: usize) -> Vec<f64> {
+    values.windows(lag + 1).map(|w| w[lag] - w[0]).collect()
+}
+
+/// Share of differences 0 that the others predict, with its relative error; `None` where the noise is below a step.
+fn bridged(d: &[f64], step: f64) -> Option<(f64, f64)> {
+    let finite = d.iter().filter(|v| v.is_finite()).count() as f64;
+    let spread = robust_sigma(d) / step;
+    if spread < 1.5 {
+        return None;
+    }
+    let reach = ((0.7 * spread) as usize).clamp(2, 400);
+    let mut tally = vec![0.0f64; reach + 1];
+    for v in d.iter().filter(|v| v.is_finite()) {
+        let k = (v / step).round().abs();
+        if k >= 1.0 && k <= reach as f64 {
+            tally[k as usize] += 0.5;
+        }
+    }
+    // Poisson regression of ln p on (1, k^2), by Newton's method from the mean.
+    let total: f64 = tally.iter().sum();
+    if total < 20.0 {
+        return None;
+    }
+    let scale = (reach * reach) as f64;
+    let (mut a, mut c) = ((total / reach as f64).ln(), 0.0);
+    let mut variance = 1.0;
+    for _ in 0..30 {
+        let (mut g, mut h) = ([0.0; 2], [0.0; 3]);
+        for (k, y) in tally.iter().enumerate().skip(1) {
+            let x = (k * k) as f64 / scale;
+            let mean = (a + c * x).exp();
+            g[0] += y - mean;
+            g[1] += (y - mean) * x;
+            h[0] += mean;
+            h[1] += mean * x;
+            h[2] += mean * x * x;
+        }
+        let det = h[0] * h[2] - h[1] * h[1];
+        let step = (
+            (h[2] * g[0] - h[1] * g[1]) / det,
+            (h[0] * g[1] - h[1] * g[0]) / det,
+        );
+        a += step.0;
+        c += step.1;
+        // Each bin is the mean of two, and neighbours share a reading.
+        variance = 0.5 * h[2] / det;
+        if step.0.abs() < 1e-10 {
+            break;
+        }
+    }
+    (a.is_finite() && variance.is_finite()).then(|| (a.exp() / finite, (1.5 * variance).sqrt()))
+}
+
+/// Chance that a reading agrees with the one before, without a fault, and the relative error of that.
+fn agreement(values: &[f64], step: Option<f64>) -> (f64, f64) {
+    let d = differences(values, 1);
+    let step = step.unwrap_or_else(|| {
+        d.iter()
+            .map(|v| v.abs())
+            .filter(|v| *v > 0.0)
+            .fold(f64::INFINITY, f64::min)
+    });
+    bridged(&d, step).unwrap_or_else(|| {
+        let far: f64 = LAGS.map(|l| share(values, l)).sum::<f64>() / LAGS.count() as f64;
+        let (near, wide) = (
+            robust_sigma(&d),
+            robust_sigma(&differences(values, *LAGS.start())),
+        );
+        let raised = if near > 0.0 {
+            (wide / near).max(1.0)
+        } else {
+            1.0
+        };
+        ((far * raised).min(1.0), 0.02)
+    })
+}
+
+pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
+    let rows = at.len();
+    if gyros.is_empty() || rows < LEAST_READINGS.max(4 * LAGS.end()) {
+        return;
+    }
+    let varies = |g: &Gyro<'_>| width(&g.channel.values, 0.0) > 0.0;
+    let gyros: Vec<&Gyro<'_>> = gyros.iter().filter(|g| varies(g)).collect();
+    let columns: Vec<&[f64]> = gyros.iter().map(|g| g.channel.values.as_slice()).collect();
+    if columns.is_empty() {
+        return;
+    }
+    let flagged = |i: usize| {
+        gyros
+            .iter()
+            .any(|g| !audit.usable.get(&g.channel.name).is_some_and(|u| u[i]) && g.known(i))
+    };
+    let same = |lag: usize, i: usize| columns.iter().all(|c| c[i] == c[i - lag]);
+    let repeated: Vec<usize> = (1..rows).filter(|i| same(1, *i) && !flagged(*i)).collect();
+    // With missing bits the step is theirs.
+    let step = |g: &Gyro<'_>| {
+        let bits = audit
+            .findings
+            .iter()
+            .find(|f| f.cause == "coarse_lsb" && f.channels[0] == g.channel.name)
+            .and_then(|f| f.parameters.get("missing_bits"))
+            .map_or(0.0, |p| p.value);
+        let lsb = g.channel.lsb.filter(|_| g.counts.is_some());
+        lsb.map(|l| l * bits.exp2())
+    };
+    let chances: Vec<(f64, f64)> = gyros
+        .iter()
+        .zip(&columns)
+        .map(|(g, c)| agreement(c, step(g)))
+        .collect();
+    let product: f64 = chances.iter().map(|p| p.0).product::<f64>() * rows as f64;
+    let together: f64 = LAGS
+        .map(|l| (l..rows).filter(|i| same(l, *i)).count() as f64)
+        .sum::<f64>()
+        / LAGS.count() as f64;
+    // Often equal readings share their level, which a product of means does not see.
+    let expected = if chances.iter().all(|p| p.0 < 0.15) {
+        product
+    } else {
+        product.max(1.3 * together + 3.0)
+    };
+    let observed = repeated.len() as u64;
+    let chance = tails::at_least(observed, expected);
+    let names: Vec<String> = gyros.iter().map(|g| g.channel.name.clone()).collect();
+    let what = format!(
+        "{observed} frames repeat all of {} from the frame before, {expected:.2} are expected",
+        names.join(", ")
+    );
+    if audit.check(
+        "repeated_frames",
+        "record",
+        observed as f64,
+        chance,
+        what.clone(),
+    ) {
+        let times: Vec<f64> = repeated.iter().map(|i| at[*i]).collect();
+        let count = (observed as f64 - expected).round().max(1.0);
+        for name in &names {
+            repeated.iter().for_each(|i| audit.mask(name, *i));
+        }
+        let mut finding = counted(
+            "stale_samples",
+            names,
+            count,
+            Some(expected.sqrt()),
+            &times,
+            what,
+        );
+        if record.flags.is_some() {
+            finding.what.push_str("; the new-data flags do not tell");
+        }
+        audit.findings.push(finding);
+        return;
+    }
+    if columns.len() < 2 {
+        return;
+    }
+    for ((g, values), (p, known)) in gyros.iter().zip(&columns).zip(&chances) {
+        let name = g.channel.name.as_str();
+        let rest = audit.usable.get(name).cloned().unwrap_or_default();
+        let own: Vec<usize> = (1..rows)
+            .filter(|i| values[*i] == values[*i - 1] && rest.get(*i).copied().unwrap_or(false))
+            .collect();
+        let expected = p * rows as f64;
+        let error = (expected * (1.0 - p) * 1.2 + (known * expected).powi(2)).sqrt();
+        let z = (own.len() as f64 - expected) / error.max(1.0);
+        let chance = if expected < 30.0 {
+            tails::at_least(own.len() as u64, expected * (1.0 + 3.0 * known))
+        } else {
+            tails::upper_normal(z)
+        };
+        let what = format!(
+            "{} readings of {name} repeat the one before, {expected:.1} are expected",
+            own.len()
+        );
+        let excess = own.len() as f64 - expected;
+        let told = audit.is_suppressed("stale_samples", name);
+        let relative = excess > EXCESS * expected;
+        if audit.check(
+            "repeated_readings",
+            name,
+            z,
+            if relative && !told { chance } else { 1.0 },
+            what.clone(),
+        ) && chance < FALSE_ALARM
+        {
+            // Which of them is a repeat by chance cannot be told where those are the many.
+            if excess > expected {
+                own.iter().for_each(|i| audit.mask(name, *i));
+            }
+            let times: Vec<f64> = own.iter().map(|i| at[*i]).collect();
+            let times = if excess > expected { times } else { vec![] };
+            audit.findings.push(counted(
+                "stale_samples",
+                vec![name.to_owned()],
+                excess.round(),
+                Some(error),
+                &times,
+                what,
+            ));
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Chances far out.
+
+use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, Normal, Poisson};
+
+/// P(Z > z) of the standard normal.
+#[must_use]
+pub fn upper_normal(z: f64) -> f64 {
+    Normal::standard().sf(z)
+}
+
+/// Two-sided tail of the standard normal.
+#[must_use]
+pub fn two_sided(z: f64) -> f64 {
+    (2.0 * upper_normal(z.abs())).min(1.0)
+}
+
+/// P(X >= `observed`) of a Poisson variable of that mean.
+#[must_use]
+pub fn at_least(observed: u64, mean: f64) -> f64 {
+    match observed.checked_sub(1) {
+        None => 1.0,
+        Some(below) => Poisson::new(mean.max(1e-12)).map_or(1.0, |p| p.sf(below)),
+    }
+}
+
+/// P(X >= `hits`) of `trials` trials of chance `p`.
+#[must_use]
+pub fn hits_at_least(hits: u64, trials: u64, p: f64) -> f64 {
+    match hits.checked_sub(1) {
+        None => 1.0,
+        Some(below) => Binomial::new(p, trials).map_or(1.0, |b| b.sf(below)),
+    }
+}
+
+/// Distance in sigma that one of `n` normal samples reaches with chance `chance`, either side.
+#[must_use]
+pub fn farthest(n: usize, chance: f64) -> f64 {
+    // Bonferroni; two_sided is monotonic, so halving finds it.
+    let each = chance / n.max(1) as f64;
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if two_sided(middle) > each {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_farthest_of_12000_samples_lies_at_5_7_sigma_once_in_10000() {
+        // Phi(-5.7) = 6.0e-9, twice, times 12000 = 1.4e-4.
+        let z = farthest(12_000, 1.4e-4);
+        assert!((z - 5.7).abs() < 0.02, "{z}");
+    }
+
+    #[test]
+    fn poisson_tail_agrees_with_its_sum() {
+        // P(X >= 3), mean 2: 1 - e^-2 (1 + 2 + 2)
+        assert!((at_least(3, 2.0) - (1.0 - (-2f64).exp() * 5.0)).abs() < 1e-12);
+        assert!(at_least(0, 2.0) == 1.0);
+    }
+}
