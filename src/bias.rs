@@ -14,9 +14,7 @@ pub struct BiasNull {
     number: u16,
     wanted: u16,
     have: u16,
-    sum: [i32; 3],
-    low: [i16; 3],
-    high: [i16; 3],
+    axes: [AxisSum; 3],
 }
 
 /// What a further sample brought.
@@ -38,9 +36,11 @@ impl BiasNull {
             number,
             wanted,
             have: 0,
-            sum: [0; 3],
-            low: [i16::MAX; 3],
-            high: [i16::MIN; 3],
+            axes: [AxisSum {
+                sum: 0,
+                low: i16::MAX,
+                high: i16::MIN,
+            }; 3],
         }
     }
 
@@ -51,18 +51,11 @@ impl BiasNull {
     }
 
     /// Takes a sample, counts.
+    #[inline(never)]
     pub fn take(&mut self, gyro: [i16; 3]) -> Outcome {
         let mut moving = false;
-        for (((&value, sum), low), high) in gyro
-            .iter()
-            .zip(&mut self.sum)
-            .zip(&mut self.low)
-            .zip(&mut self.high)
-        {
-            *sum = sum.wrapping_add(i32::from(value));
-            *low = value.min(*low);
-            *high = value.max(*high);
-            moving |= high.wrapping_sub(*low) > SPREAD_AT_REST;
+        for (&value, axis) in gyro.iter().zip(&mut self.axes) {
+            moving |= axis.take(value);
         }
         if moving {
             return Outcome::Moving;
@@ -72,10 +65,10 @@ impl BiasNull {
             return Outcome::Running;
         }
         let mut mean = [0; 3];
-        for (mean, &sum) in mean.iter_mut().zip(&self.sum) {
+        for (mean, axis) in mean.iter_mut().zip(&self.axes) {
             // |sum| <= 16384 * 8191 < 2^27.
-            let whole_q8 = divide_q8(sum.unsigned_abs(), self.have);
-            *mean = if sum < 0 {
+            let whole_q8 = divide_q8(axis.sum.unsigned_abs(), self.have);
+            *mean = if axis.sum < 0 {
                 whole_q8.wrapping_neg()
             } else {
                 whole_q8
@@ -88,7 +81,26 @@ impl BiasNull {
     }
 }
 
+#[derive(Clone, Copy, Debug)]
+struct AxisSum {
+    sum: i32,
+    low: i16,
+    high: i16,
+}
+
+impl AxisSum {
+    /// Whether the spread is more than that of a stand at rest.
+    #[inline(never)]
+    fn take(&mut self, value: i16) -> bool {
+        self.sum = self.sum.wrapping_add(i32::from(value));
+        self.low = value.min(self.low);
+        self.high = value.max(self.high);
+        self.high.wrapping_sub(self.low) > SPREAD_AT_REST
+    }
+}
+
 /// `sum / n` in Q8, rounded down, a bit at a time: a tenth of the flash of a general 32-bit division.
+#[inline(never)]
 fn divide_q8(sum: u32, n: u16) -> i32 {
     let n = u32::from(n);
     let (mut quotient, mut rest) = (0u32, 0u32);

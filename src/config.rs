@@ -8,15 +8,22 @@ pub const SLOTS: [u16; 2] = [16, 80];
 /// Format of a stored copy; another number is not read.
 const FORMAT: u8 = 1;
 
-/// The set-up.
+/// The set-up. The order of its fields is the format of a stored copy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
 pub struct Config {
+    /// Bias, Q16.16 deg/s.
+    pub bias: [i32; 3],
+    /// Scale, Q8.24 deg/s for each count.
+    pub scale: [i32; 3],
     /// The board's number.
     pub board_id: u16,
     /// Time from sample to sample, ticks of 4 us.
     pub period_ticks: u16,
     /// UBRR.
     pub baud_divisor: u16,
+    /// Motor ramp, steps a second.
+    pub ramp_per_s: u16,
     /// Bits 10:8 of SENS/AVG: 4, 2, 1.
     pub gyro_range: u8,
     /// Bits 2:0 of SENS/AVG.
@@ -25,12 +32,6 @@ pub struct Config {
     pub acc_range: u8,
     /// Largest motor command.
     pub max_duty: u8,
-    /// Motor ramp, steps a second.
-    pub ramp_per_s: u16,
-    /// Bias, Q16.16 deg/s.
-    pub bias: [i32; 3],
-    /// Scale, Q8.24 deg/s for each count.
-    pub scale: [i32; 3],
 }
 
 /// 0.07326 deg/s for each count at the 320 deg/s range (data sheet), in Q8.24.
@@ -66,6 +67,7 @@ impl Config {
 
     /// Whether range and filter are ones that the part has, with the taps that a narrow range demands.
     #[must_use]
+    #[inline(never)]
     pub fn gyro_is_valid(range: u8, filter: u8) -> bool {
         match range {
             4 => filter <= 6,
@@ -76,33 +78,28 @@ impl Config {
     }
 
     /// As it is stored.
-    #[must_use]
     #[inline(never)]
+    #[must_use]
     pub fn to_bytes(&self, generation: u8) -> [u8; STORED_LEN] {
+        // SAFETY: plain integers in C order, largest first, so without padding; the assertion below holds it to that.
+        let fields: &[u8; FIELDS_LEN] = unsafe { &*core::ptr::from_ref(self).cast() };
         let mut bytes = [0; STORED_LEN];
-        let mut put = Put {
-            bytes: &mut bytes,
-            at: 0,
-        };
-        put.all(&[FORMAT, generation]);
-        put.all(&self.board_id.to_le_bytes());
-        put.all(&self.period_ticks.to_le_bytes());
-        put.all(&self.baud_divisor.to_le_bytes());
-        put.all(&[
-            self.gyro_range,
-            self.gyro_filter,
-            self.acc_range,
-            self.max_duty,
-        ]);
-        put.all(&self.ramp_per_s.to_le_bytes());
-        for value in self.bias.iter().chain(&self.scale) {
-            put.all(&value.to_le_bytes());
-        }
         let mut crc = wire::crc::INIT;
-        for &byte in put.bytes.iter().take(put.at) {
+        let body = [FORMAT, generation]
+            .into_iter()
+            .chain(fields.iter().copied());
+        let mut places = bytes.iter_mut();
+        for (byte, place) in body.zip(places.by_ref()) {
+            *place = byte;
             crc = wire::crc::update(crc, byte);
         }
-        put.all(&(!crc).to_le_bytes());
+        for (place, byte) in bytes
+            .iter_mut()
+            .rev()
+            .zip(wire::crc::finish(crc).to_be_bytes())
+        {
+            *place = byte;
+        }
         bytes
     }
 
@@ -114,74 +111,29 @@ impl Config {
         for &byte in bytes {
             crc = wire::crc::update(crc, byte);
         }
-        let mut take = Take { bytes, at: 0 };
-        let format = take.u8();
-        let generation = take.u8();
-        let config = Self {
-            board_id: take.u16(),
-            period_ticks: take.u16(),
-            baud_divisor: take.u16(),
-            gyro_range: take.u8(),
-            gyro_filter: take.u8(),
-            acc_range: take.u8(),
-            max_duty: take.u8(),
-            ramp_per_s: take.u16(),
-            bias: take.three(),
-            scale: take.three(),
-        };
+        let [format, generation, fields @ .., _, _, _, _] = bytes;
+        let mut config = Self::default();
+        // SAFETY: as above; every pattern of bits is a value of every field.
+        let places: &mut [u8; FIELDS_LEN] =
+            unsafe { &mut *core::ptr::from_mut(&mut config).cast() };
+        *places = *fields;
         let in_order = crc == wire::crc::RESIDUE
-            && format == FORMAT
-            && (MIN_PERIOD..=MAX_PERIOD).contains(&config.period_ticks)
+            && *format == FORMAT
+            && config.period_ticks >= MIN_PERIOD
+            && config.period_ticks <= MAX_PERIOD
             && Self::gyro_is_valid(config.gyro_range, config.gyro_filter)
             && config.acc_range <= 3;
-        in_order.then_some((config, generation))
+        in_order.then_some((config, *generation))
     }
 }
 
-struct Take<'a> {
-    bytes: &'a [u8; STORED_LEN],
-    at: usize,
-}
-
-impl Take<'_> {
-    #[inline(never)]
-    fn u8(&mut self) -> u8 {
-        let byte = self.bytes.get(self.at).copied().unwrap_or(0);
-        self.at = self.at.wrapping_add(1);
-        byte
-    }
-
-    #[inline(never)]
-    fn u16(&mut self) -> u16 {
-        u16::from_le_bytes([self.u8(), self.u8()])
-    }
-
-    #[inline(never)]
-    fn three(&mut self) -> [i32; 3] {
-        let mut values = [0; 3];
-        for value in &mut values {
-            *value = i32::from_le_bytes([self.u8(), self.u8(), self.u8(), self.u8()]);
-        }
-        values
-    }
-}
-
-struct Put<'a> {
-    bytes: &'a mut [u8; STORED_LEN],
-    at: usize,
-}
-
-impl Put<'_> {
-    #[inline(never)]
-    fn all(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            if let Some(place) = self.bytes.get_mut(self.at) {
-                *place = byte;
-            }
-            self.at = self.at.wrapping_add(1);
-        }
-    }
-}
+/// Bytes of the fields; stored as they lie in memory, little endian on the board and on every host that it is tested on.
+const FIELDS_LEN: usize = STORED_LEN - 6;
+const _: () = assert!(
+    size_of::<Config>() == FIELDS_LEN,
+    "no padding between the fields"
+);
+const _: () = assert!(cfg!(target_endian = "little"));
 
 #[cfg(test)]
 mod tests {

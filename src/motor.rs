@@ -20,6 +20,7 @@ pub struct Motor {
 impl Motor {
     /// At rest. Limits: largest magnitude 0..=255; largest change, steps a second.
     #[must_use]
+    #[inline(never)]
     pub fn new(max_duty: u8, ramp_per_s: u16) -> Self {
         // steps/s -> Q6 steps/ms: * 64 / 1000, which is 4194 / 2^16 to 8e-5; at least the smallest there is.
         let ramp_q6 = (u32::from(ramp_per_s).wrapping_mul(4_194) >> 16).max(1);
@@ -44,6 +45,7 @@ impl Motor {
     }
 
     /// New command; what is beyond the limit is cut to it. Returns the command that holds.
+    #[inline(never)]
     pub fn command(&mut self, duty: i16) -> i16 {
         // Not `clamp`, which panics where the limits are crossed.
         self.target = duty.min(self.max_duty).max(self.max_duty.wrapping_neg());
@@ -58,6 +60,7 @@ impl Motor {
 
     /// Whether it turns or is to turn.
     #[must_use]
+    #[inline(never)]
     pub fn is_on(&self) -> bool {
         self.output_q6 != 0 || self.target != 0
     }
@@ -70,6 +73,7 @@ impl Motor {
     }
 
     /// A millisecond has passed. True when the motor was cut because the PC fell silent.
+    #[inline(never)]
     pub fn on_millisecond(&mut self) -> bool {
         if self.alive_ms > 0 {
             self.alive_ms = self.alive_ms.wrapping_sub(1);

@@ -97,6 +97,7 @@ impl Board for AvrBoard {
         serial::send(frame)
     }
 
+    #[inline(never)]
     fn set_motor(&mut self, duty: i16) {
         // SAFETY: timer 2 and port D's upper pins are the motor's.
         let (timer, port) = unsafe { (&*TC2::ptr(), &*PORTD::ptr()) };
@@ -122,6 +123,7 @@ impl Board for AvrBoard {
         tick::set_period(ticks);
     }
 
+    #[inline(never)]
     fn set_baud(&mut self, divisor: u16) {
         if self.baud.is_none() && serial::is_unset() {
             serial::set_baud(divisor);
@@ -130,6 +132,7 @@ impl Board for AvrBoard {
         }
     }
 
+    #[inline(never)]
     fn set_acc_range(&mut self, range: u8) {
         // Open drain: an output that is low, or an input that the pull-up to 3.3 V holds high.
         // SAFETY: port C is the accelerometer's.
@@ -140,6 +143,7 @@ impl Board for AvrBoard {
         tick::post(job)
     }
 
+    #[inline(never)]
     fn eeprom_read(&mut self, address: u16) -> u8 {
         // SAFETY: the EEPROM is used here alone.
         let eeprom = unsafe { &*EEPROM::ptr() };
@@ -182,6 +186,7 @@ impl Board for AvrBoard {
         self.restarts
     }
 
+    #[inline(never)]
     fn stack_free(&self) -> u16 {
         // SAFETY: reads SRAM above the statics.
         unsafe {

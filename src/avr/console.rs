@@ -23,21 +23,35 @@ impl Console {
         let asked = self.at_start && byte == b'?';
         self.at_start = asked || byte == 0;
         if asked {
-            let [major, minor, patch] = VERSION;
-            let mut text: String<40> = String::new();
-            let written = uwrite!(
-                text,
-                "imu {}.{}.{} reset {} stack {}\r\n\0",
-                major,
-                minor,
-                patch,
-                board.reset_cause(),
-                board.stack_free()
-            );
-            if written.is_ok() {
-                board.send(text.as_bytes());
-            }
+            answer(board);
         }
         asked
     }
+}
+
+/// Version, reset cause, stack, each as `letter number`: every string would be copied to the SRAM, letters are not.
+#[inline(never)]
+fn answer(board: &mut AvrBoard) {
+    let [major, minor, patch] = VERSION;
+    let mut text: String<48> = String::new();
+    let values = [
+        major.into(),
+        minor.into(),
+        patch.into(),
+        board.reset_cause().into(),
+        board.stack_free(),
+    ];
+    for (letter, value) in (b'v'..).zip(values) {
+        number(&mut text, letter, value);
+    }
+    if text.push('\0').is_ok() {
+        board.send(text.as_bytes());
+    }
+}
+
+/// One formatting of a number in the image, not one for each.
+#[inline(never)]
+fn number(text: &mut String<48>, letter: u8, value: u16) {
+    // Five numbers of at most five digits with a letter and a blank each fit.
+    let _fits = text.push(letter as char).is_ok() && uwrite!(text, "{} ", value).is_ok();
 }

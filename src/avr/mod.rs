@@ -15,6 +15,8 @@ macro_rules! bits {
 
 mod board;
 mod console;
+mod memory;
+mod ring;
 mod sensors;
 mod serial;
 mod tick;
@@ -37,7 +39,8 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 fn main() -> ! {
     board::paint_stack();
     let mut board = board::AvrBoard::start();
-    let (mut received, sensors) = (serial::start(), sensors::start());
+    serial::start();
+    let sensors = sensors::start();
     let mut stand = Stand::boot(&mut board);
     let misconfigured = configure(sensors, stand.sens_avg());
     stand.started(&mut board, misconfigured);
@@ -56,7 +59,7 @@ fn main() -> ! {
             // The watchdog is fed by samples alone: a tick that stalls is a reset, and a reset stops the motor.
             asm::wdr();
         }
-        while let Some(byte) = received.dequeue() {
+        while let Some(byte) = serial::received() {
             if !console.takes(&mut board, byte) {
                 stand.on_byte(&mut board, byte);
             }

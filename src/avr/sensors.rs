@@ -49,6 +49,7 @@ fn port_b() -> &'static avr_device::atmega16::portb::RegisterBlock {
     unsafe { &*PORTB::ptr() }
 }
 
+#[inline(never)]
 fn byte(out: u8) -> Result<u8, Stalled> {
     let spi = spi();
     spi.spdr.write(|w| bits!(w, out));
@@ -128,16 +129,25 @@ impl DelayNs for Delay {
         self.delay_us((ns >> 10).wrapping_add(1));
     }
 
+    #[inline(never)]
     fn delay_us(&mut self, us: u32) {
-        // Four passes of four cycles to the microsecond.
-        for _ in 0..us {
-            avr_device::asm::delay_cycles(9);
+        // A pass takes 16 cycles: the count in 16 bits, the nops, the branch. No caller waits for longer than 16 bits
+        // of microseconds hold.
+        let mut left = us as u16;
+        while left != 0 {
+            for _ in 0..2 {
+                avr_device::asm::nop();
+            }
+            avr_device::asm::nop();
+            avr_device::asm::nop();
+            left = left.wrapping_sub(1);
         }
     }
 
+    #[inline(never)]
     fn delay_ms(&mut self, ms: u32) {
-        for _ in 0..ms {
-            avr_device::asm::delay_cycles(15_990);
+        for _ in 0..ms as u16 {
+            self.delay_us(1_000);
         }
     }
 }

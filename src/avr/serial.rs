@@ -4,13 +4,14 @@ use core::ptr::addr_of_mut;
 
 use avr_device::atmega16::USART;
 use firmware::Stand;
-use heapless::spsc::{Consumer, Producer, Queue};
 use wire::Fault;
 
+use super::ring::Ring;
+
 /// Room for the longest burst of a second: hello or reply, health and two samples.
-const TX_LEN: usize = 224;
-/// Two requests.
-const RX_LEN: usize = 40;
+static TX: Ring<256> = Ring::new();
+/// Three requests.
+static RX: Ring<64> = Ring::new();
 const UDRE: u8 = 1 << 5;
 const TXC: u8 = 1 << 6;
 const FE: u8 = 1 << 4;
@@ -21,11 +22,6 @@ const RXEN_TXEN: u8 = 1 << 4 | 1 << 3;
 /// URSEL, 8 data bits, no parity, 1 stop bit.
 const UCSRC_8N1: u8 = 1 << 7 | 3 << 1;
 
-static mut TX: Queue<u8, TX_LEN> = Queue::new();
-static mut RX: Queue<u8, RX_LEN> = Queue::new();
-static mut TX_IN: Option<Producer<'static, u8>> = None;
-static mut TX_OUT: Option<Consumer<'static, u8>> = None;
-static mut RX_IN: Option<Producer<'static, u8>> = None;
 /// Losses that the interrupts saw: overrun, framing.
 static mut LOST: [u8; 2] = [0; 2];
 
@@ -34,20 +30,18 @@ fn usart() -> &'static avr_device::atmega16::usart::RegisterBlock {
     unsafe { &*USART::ptr() }
 }
 
-/// Sets up the rings and switches the USART on; the interrupts wait for the global enable. Called once.
-pub fn start() -> Consumer<'static, u8> {
-    // SAFETY: called once, before interrupts are on.
-    let received = unsafe {
-        let (tx_in, tx_out) = (*addr_of_mut!(TX)).split();
-        let (rx_in, rx_out) = (*addr_of_mut!(RX)).split();
-        (TX_IN, TX_OUT, RX_IN) = (Some(tx_in), Some(tx_out), Some(rx_in));
-        rx_out
-    };
+/// Switches the USART on; the interrupts wait for the global enable.
+pub fn start() {
     usart().ucsrb.write(|w| bits!(w, RXCIE | RXEN_TXEN));
-    received
+}
+
+/// The next received byte.
+pub fn received() -> Option<u8> {
+    RX.pop()
 }
 
 /// Sets the divisor. Order as on silicon: UBRRH (URSEL = 0), UBRRL, UCSRC.
+#[inline(never)]
 pub fn set_baud(divisor: u16) {
     usart()
         .ubrrh()
@@ -63,27 +57,17 @@ pub fn is_unset() -> bool {
 
 /// Whether bytes wait in the receive ring.
 pub fn has_received() -> bool {
-    // SAFETY: reads the length only.
-    unsafe {
-        (*addr_of_mut!(RX_IN))
-            .as_ref()
-            .is_some_and(|ring| ring.len() > 0)
-    }
+    !RX.is_empty()
 }
 
 /// Queues all of it or nothing.
+#[inline(never)]
 pub fn send(frame: &[u8]) -> bool {
-    // SAFETY: the producer is the main loop's; the interrupts have the consumer.
-    let Some(ring) = (unsafe { &mut *addr_of_mut!(TX_IN) }) else {
-        return false;
-    };
-    if ring.capacity().wrapping_sub(ring.len()) < frame.len() {
+    if (TX.room() as usize) < frame.len() {
         return false;
     }
     for &byte in frame {
-        if ring.enqueue(byte).is_err() {
-            return false;
-        }
+        TX.push(byte);
     }
     // A single-bit write, which the interrupts cannot split.
     usart().ucsrb.modify(|r, w| bits!(w, r.bits() | UDRIE));
@@ -92,13 +76,7 @@ pub fn send(frame: &[u8]) -> bool {
 
 /// Whether the last byte has left the shift register.
 pub fn is_idle() -> bool {
-    // SAFETY: reads the length only.
-    let empty = unsafe {
-        (*addr_of_mut!(TX_IN))
-            .as_ref()
-            .is_none_or(|ring| ring.len() == 0)
-    };
-    empty && usart().ucsra.read().bits() & (UDRE | TXC) == UDRE | TXC
+    TX.is_empty() && usart().ucsra.read().bits() & (UDRE | TXC) == UDRE | TXC
 }
 
 /// Hands what the interrupts lost to the counters.
@@ -128,9 +106,7 @@ pub fn unmask(was: u8) {
 
 #[avr_device::interrupt(atmega16)]
 fn USART_UDRE() {
-    // SAFETY: the consumer is this interrupt's.
-    let next = unsafe { (*addr_of_mut!(TX_OUT)).as_mut().and_then(Consumer::dequeue) };
-    match next {
+    match TX.pop() {
         Some(byte) => {
             usart().ucsra.write(|w| bits!(w, TXC));
             usart().udr.write(|w| bits!(w, byte));
@@ -150,9 +126,7 @@ fn USART_RXC() {
         if status & FE != 0 {
             lost[1] = lost[1].saturating_add(1);
         }
-        let full = (*addr_of_mut!(RX_IN))
-            .as_mut()
-            .is_none_or(|ring| ring.enqueue(byte).is_err());
+        let full = !RX.push(byte);
         if status & DOR != 0 || full {
             lost[0] = lost[0].saturating_add(1);
         }

@@ -54,8 +54,8 @@ static mut SHARED: Shared = Shared {
     raw: Raw::new(),
     job: None,
     t_ticks: 0,
-    period: 12_500,
-    next_period: 12_500,
+    period: 0,
+    next_period: 0,
     masked_ucsrb: 0,
     missed: 0,
     milliseconds: 0,
@@ -101,6 +101,7 @@ pub unsafe fn start(sensors: &'static mut AvrSensors) {
     timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
 }
 
+#[inline(never)]
 fn set_compare(period: u16) {
     let last = period.wrapping_sub(1);
     timer1().ocr1a.write(|w| bits!(w, last));
@@ -110,12 +111,14 @@ fn set_compare(period: u16) {
 }
 
 /// The time from tick to tick, from the next tick on.
+#[inline(never)]
 pub fn set_period(ticks: u16) {
     // SAFETY: interrupts are off.
     interrupt::free(|_| unsafe { (*shared()).next_period = ticks });
 }
 
 /// Posts a job for the slot after the next sample; false while one waits.
+#[inline(never)]
 pub fn post(job: Job) -> bool {
     interrupt::free(|_| {
         // SAFETY: interrupts are off.
@@ -129,6 +132,7 @@ pub fn post(job: Job) -> bool {
 }
 
 /// Timer ticks since the tick.
+#[inline(never)]
 pub fn ticks_since() -> u16 {
     interrupt::free(|_| timer1().tcnt1.read().bits())
 }

@@ -197,11 +197,13 @@ impl FaultCounts {
     }
 
     /// Counts `fault` once more.
+    #[inline(never)]
     pub fn record(&mut self, fault: Fault) {
         self.record_many(fault, 1);
     }
 
     /// Counts `fault` `times` more.
+    #[inline(never)]
     pub fn record_many(&mut self, fault: Fault, times: u16) {
         // The discriminants are 0 .. COUNT without a gap (the array `all` would not fit otherwise, and a test holds
         // it to that), so there always is a counter; asking for it this way keeps a panic out of the image.
