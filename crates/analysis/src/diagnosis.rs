@@ -8,6 +8,7 @@ use model::effects::{EFFECTS, effect};
 use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
 use model::record::Record;
 
+use crate::audit::audit;
 use crate::checks::{self, LEAST_CHANCE};
 use crate::common::{Shared, common};
 use crate::error::AnalysisError;
@@ -65,9 +66,11 @@ pub(crate) struct VarianceFound {
 /// [`AnalysisError::Inconclusive`] when the record is too short, [`AnalysisError::NoChannel`] when it holds no gyro,
 /// [`AnalysisError::NoRate`] when its sample rate is unknown, [`AnalysisError::Constant`] when a gyro never changes.
 pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed, AnalysisError> {
-    let grid = lay_out(record, &|_| vec![], options.seed)?;
+    let audited = audit(record);
+    let record = &*losses::renumbered(record, &audited);
+    let grid = lay_out(record, &|name| audited.masked(name), options.seed)?;
     let searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();
-    let mut findings = losses::findings(record, &searched, &grid);
+    let mut findings = losses::findings(&audited, &searched, &grid);
     let mut scale_not_tested = vec![];
     for s in &searched {
         findings.extend(motion_finding(s, &grid));
@@ -83,6 +86,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     }
     let shared = common(&searched, &grid);
     let mut checks: Vec<Check> = searched.iter().flat_map(channel_checks).collect();
+    losses::suppress(&mut checks, &audited);
     let mut unexplained = left_over(&checks, &shared);
     for s in &searched {
         let note = |what: &String| Unexplained {
@@ -92,10 +96,13 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         unexplained.extend(s.state.notes.iter().map(note));
     }
     checks.extend(shared.checks);
+    checks.extend(audited.checks);
+    unexplained.extend(audited.unexplained);
     findings.extend(shared.finding);
     let findings = joined(findings);
     let mut not_tested = not_tested(&searched);
     not_tested.extend(scale_not_tested);
+    not_tested.extend(audited.not_tested);
     let verdict = match (unexplained.is_empty(), findings.is_empty()) {
         (false, _) => Verdict::Unexplained,
         (true, true) => Verdict::Adequate,

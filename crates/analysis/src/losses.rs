@@ -1,77 +1,75 @@
-//! Faults of frames and samples that the grid itself shows: gaps of the sequence numbers, readings flagged as not new,
-//! single samples that the noise cannot have made.
+//! What the audits found, on the grid of the search: single far readings are the ones that either saw, and frames lost
+//! without a gap of the numbers get their places.
 
-use model::effects::effect;
-use model::record::{Axis, Record, flag};
+use std::borrow::Cow;
 
+use model::record::Record;
+
+use crate::audit::{Audit, MOST_TIMES};
 use crate::diagnosis::Searched;
 use crate::grid::Grid;
-use crate::result::{Finding, Parameter};
+use crate::result::{Check, Finding, Parameter};
 
-/// Most times that a finding lists.
-const MOST_TIMES: usize = 1000;
-
-fn counted(cause: &str, channels: Vec<String>, times: Vec<f64>, count: usize) -> Option<Finding> {
-    let title = effect(cause)?.docs().title;
-    (count > 0).then(|| Finding {
-        cause: cause.into(),
-        what: format!(
-            "{title}: {count} on {}, first at {:.2} s",
-            channels.join(", "),
-            times.first().unwrap_or(&0.0)
-        ),
-        channels,
-        parameters: [("count".to_owned(), Parameter::exact(count as f64, "1"))].into(),
-        times_s: times.into_iter().take(MOST_TIMES).collect(),
-        ..Finding::default()
-    })
+/// The record with sequence numbers that count the silently lost frames too.
+pub(crate) fn renumbered<'a>(record: &'a Record, audit: &Audit) -> Cow<'a, Record> {
+    if audit.silently_lost.is_empty() {
+        return Cow::Borrowed(record);
+    }
+    let mut record = record.clone();
+    let rows = record.len();
+    let mut seq = record
+        .seq
+        .take()
+        .unwrap_or_else(|| (0..rows as u64).collect());
+    for (row, lost) in &audit.silently_lost {
+        seq[*row..].iter_mut().for_each(|s| *s += lost);
+    }
+    record.seq = Some(seq);
+    Cow::Owned(record)
 }
 
-/// All that the grid shows.
-pub(crate) fn findings(record: &Record, searched: &[Searched<'_>], grid: &Grid) -> Vec<Finding> {
-    let time = |place: usize| place as f64 / grid.rate_hz;
-    let names: Vec<String> = searched.iter().map(|s| s.target.name.clone()).collect();
-    let mut all = vec![];
-    let lost = grid.n - record.len();
-    let gaps: Vec<f64> = record
-        .seq
-        .as_ref()
-        .filter(|_| lost > 0)
-        .map_or(vec![], |seq| {
-            seq.windows(2)
-                .filter(|w| w[1] > w[0] + 1)
-                .map(|w| time((w[0] + 1 - seq[0]) as usize))
-                .collect()
-        });
-    all.extend(counted("dropped_samples", names, gaps, lost));
-    if let Some(flags) = &record.flags {
-        for axis in Axis::ALL {
-            let own: Vec<String> = searched
-                .iter()
-                .filter(|s| s.target.axis == Some(axis))
-                .map(|s| s.target.name.clone())
-                .collect();
-            let stale: Vec<f64> = flags
-                .iter()
-                .enumerate()
-                .filter(|(_, f)| **f & (flag::NEW_DATA_X << axis.index()) == 0)
-                .map(|(i, _)| time(i))
-                .collect();
-            let count = stale.len();
-            if !own.is_empty() {
-                all.extend(counted("stale_samples", own, stale, count));
-            }
-        }
-    }
+/// The audits' findings, with the far readings that only the whitened residual shows.
+pub(crate) fn findings(audit: &Audit, searched: &[Searched<'_>], grid: &Grid) -> Vec<Finding> {
+    let mut all = audit.findings.clone();
     for s in searched {
-        let times: Vec<f64> = s.target.spikes.iter().map(|i| time(*i)).collect();
-        let count = times.len();
-        all.extend(counted(
-            "outliers",
-            vec![s.target.name.clone()],
-            times,
-            count,
-        ));
+        let name = &s.target.name;
+        if s.target.spikes.is_empty() || audit.is_suppressed("outliers", name) {
+            continue;
+        }
+        let mut times: Vec<f64> = s
+            .target
+            .spikes
+            .iter()
+            .map(|i| *i as f64 / grid.rate_hz)
+            .collect();
+        let mut count = times.len() as f64;
+        let own = |f: &Finding| f.cause == "outliers" && f.channels == [name.as_str()];
+        if let Some(i) = all.iter().position(own) {
+            let first = all.remove(i);
+            count += first.parameters.get("count").map_or(0.0, |p| p.value);
+            times.extend(first.times_s);
+            times.sort_by(f64::total_cmp);
+        }
+        all.push(Finding {
+            cause: "outliers".into(),
+            channels: vec![name.clone()],
+            what: format!(
+                "{count} single readings of {name} are none that the noise makes, the first at {:.2} s",
+                times[0]
+            ),
+            parameters: [("count".to_owned(), Parameter::exact(count, "1"))].into(),
+            times_s: times.into_iter().take(MOST_TIMES).collect(),
+            ..Finding::default()
+        });
     }
     all
+}
+
+/// Checks of the residual that a fault of the counts explains fail no longer.
+pub(crate) fn suppress(checks: &mut [Check], audit: &Audit) {
+    for c in checks.iter_mut().filter(|c| c.fails_after) {
+        if audit.is_suppressed(&c.id, &c.channel) {
+            c.fails_after = false;
+        }
+    }
 }

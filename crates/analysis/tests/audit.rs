@@ -143,6 +143,17 @@ fn clean_records_pass() {
 }
 
 #[test]
+fn one_gyro_alone_and_two_pass() {
+    let mut rng = rng(2);
+    for run in 0..60 {
+        let mut r = record(PLAIN, &mut rng);
+        r.channels.truncate(1 + run % 2);
+        let a = audit(&r);
+        assert!(a.findings.is_empty(), "{:?}", causes(&a));
+    }
+}
+
+#[test]
 fn noise_below_a_count_is_no_fault() {
     for (k, sigma) in [0.05, 0.2, 0.3, 0.5, 0.8, 1.5].into_iter().enumerate() {
         silent(World { sigma, ..PLAIN }, 25, 10 + k as u64);
@@ -277,7 +288,7 @@ fn one_gyro_that_repeats_is_told() {
     for _ in 0..20 {
         let mut r = record(PLAIN, &mut rng);
         let rows: Vec<bool> = (0..12_000)
-            .map(|i| i > 0 && rng.next_u32() % 40 == 0)
+            .map(|i| i > 0 && rng.next_u32().is_multiple_of(40))
             .collect();
         alter(&mut r, 2, |i, c| if rows[i] { c[i - 1] } else { c[i] });
         let a = audit(&r);
@@ -357,7 +368,9 @@ fn a_sticking_bit_is_named() {
             let mut hits = 0;
             for _ in 0..10 {
                 let mut r = record(PLAIN, &mut rng);
-                let at: Vec<bool> = (0..12_000).map(|_| rng.next_u32() % 10 == 0).collect();
+                let at: Vec<bool> = (0..12_000)
+                    .map(|_| rng.next_u32().is_multiple_of(10))
+                    .collect();
                 alter(&mut r, 1, |i, c| match (at[i], value) {
                     (true, 1) => c[i] | (1 << bit),
                     (true, _) => c[i] & !(1 << bit),

@@ -16,12 +16,12 @@ const LAGS: std::ops::RangeInclusive<usize> = 20..=25;
 const EXCESS: f64 = 0.1;
 
 /// Share of agreeing pairs `lag` apart of one gyro.
-fn share(values: &[f64], lag: usize) -> f64 {
+fn share(values: &[f64], lag: usize, step: f64) -> f64 {
     let (mut same, mut all) = (0.0, 0.0);
     for (a, b) in values.iter().zip(&values[lag.min(values.len())..]) {
         if a.is_finite() && b.is_finite() {
             all += 1.0;
-            same += f64::from(u8::from(a == b));
+            same += f64::from(u8::from(equal(*a, *b, step)));
         }
     }
     if all > 0.0 { same / all } else { 0.0 }
@@ -81,17 +81,20 @@ fn bridged(d: &[f64], step: f64) -> Option<(f64, f64)> {
     (a.is_finite() && variance.is_finite()).then(|| (a.exp() / finite, (1.5 * variance).sqrt()))
 }
 
+/// Smallest distance between two readings that is no dust of the arithmetic: the step of a channel that does not say.
+fn smallest_step(values: &[f64]) -> f64 {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let dust = 1e-6 * robust_sigma(&sorted);
+    let gaps = sorted.windows(2).map(|w| w[1] - w[0]);
+    gaps.filter(|g| *g > dust).fold(f64::INFINITY, f64::min)
+}
+
 /// Chance that a reading agrees with the one before, without a fault, and the relative error of that.
-fn agreement(values: &[f64], step: Option<f64>) -> (f64, f64) {
+fn agreement(values: &[f64], step: f64) -> (f64, f64) {
     let d = differences(values, 1);
-    let step = step.unwrap_or_else(|| {
-        d.iter()
-            .map(|v| v.abs())
-            .filter(|v| *v > 0.0)
-            .fold(f64::INFINITY, f64::min)
-    });
     bridged(&d, step).unwrap_or_else(|| {
-        let far: f64 = LAGS.map(|l| share(values, l)).sum::<f64>() / LAGS.count() as f64;
+        let far: f64 = LAGS.map(|l| share(values, l, step)).sum::<f64>() / LAGS.count() as f64;
         let (near, wide) = (
             robust_sigma(&d),
             robust_sigma(&differences(values, *LAGS.start())),
@@ -105,6 +108,11 @@ fn agreement(values: &[f64], step: Option<f64>) -> (f64, f64) {
     })
 }
 
+/// Whether two readings are the same.
+fn equal(a: f64, b: f64, step: f64) -> bool {
+    (a - b).abs() < 0.5 * step
+}
+
 pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
     let rows = at.len();
     if gyros.is_empty() || rows < LEAST_READINGS.max(4 * LAGS.end()) {
@@ -116,13 +124,6 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
     if columns.is_empty() {
         return;
     }
-    let flagged = |i: usize| {
-        gyros
-            .iter()
-            .any(|g| !audit.usable.get(&g.channel.name).is_some_and(|u| u[i]) && g.known(i))
-    };
-    let same = |lag: usize, i: usize| columns.iter().all(|c| c[i] == c[i - lag]);
-    let repeated: Vec<usize> = (1..rows).filter(|i| same(1, *i) && !flagged(*i)).collect();
     // With missing bits the step is theirs.
     let step = |g: &Gyro<'_>| {
         let bits = audit
@@ -132,12 +133,23 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
             .and_then(|f| f.parameters.get("missing_bits"))
             .map_or(0.0, |p| p.value);
         let lsb = g.channel.lsb.filter(|_| g.counts.is_some());
-        lsb.map(|l| l * bits.exp2())
+        lsb.map_or_else(|| smallest_step(&g.channel.values), |l| l * bits.exp2())
     };
-    let chances: Vec<(f64, f64)> = gyros
+    let steps: Vec<f64> = gyros.iter().map(|g| step(g)).collect();
+    let flagged = |i: usize| {
+        gyros
+            .iter()
+            .any(|g| !audit.usable.get(&g.channel.name).is_some_and(|u| u[i]) && g.known(i))
+    };
+    let same = |lag: usize, i: usize| {
+        let mut all = columns.iter().zip(&steps);
+        all.all(|(c, s)| equal(c[i], c[i - lag], *s))
+    };
+    let repeated: Vec<usize> = (1..rows).filter(|i| same(1, *i) && !flagged(*i)).collect();
+    let chances: Vec<(f64, f64)> = columns
         .iter()
-        .zip(&columns)
-        .map(|(g, c)| agreement(c, step(g)))
+        .zip(&steps)
+        .map(|(c, s)| agreement(c, *s))
         .collect();
     let product: f64 = chances.iter().map(|p| p.0).product::<f64>() * rows as f64;
     let together: f64 = LAGS
@@ -151,7 +163,13 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         product.max(1.3 * together + 3.0)
     };
     let observed = repeated.len() as u64;
-    let chance = tails::at_least(observed, expected);
+    let doubt = chances.iter().map(|p| p.1 * p.1).sum::<f64>().sqrt();
+    // A single gyro repeats by chance so often that the doubt of its share decides; that is the test below.
+    let chance = if columns.len() > 1 {
+        tails::at_least(observed, expected * (1.0 + 3.0 * doubt))
+    } else {
+        1.0
+    };
     let names: Vec<String> = gyros.iter().map(|g| g.channel.name.clone()).collect();
     let what = format!(
         "{observed} frames repeat all of {} from the frame before, {expected:.2} are expected",
@@ -183,14 +201,13 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         audit.findings.push(finding);
         return;
     }
-    if columns.len() < 2 {
-        return;
-    }
-    for ((g, values), (p, known)) in gyros.iter().zip(&columns).zip(&chances) {
+    for (((g, values), (p, known)), step) in gyros.iter().zip(&columns).zip(&chances).zip(&steps) {
         let name = g.channel.name.as_str();
         let rest = audit.usable.get(name).cloned().unwrap_or_default();
         let own: Vec<usize> = (1..rows)
-            .filter(|i| values[*i] == values[*i - 1] && rest.get(*i).copied().unwrap_or(false))
+            .filter(|i| {
+                equal(values[*i], values[*i - 1], *step) && rest.get(*i).copied().unwrap_or(false)
+            })
             .collect();
         let expected = p * rows as f64;
         let error = (expected * (1.0 - p) * 1.2 + (known * expected).powi(2)).sqrt();
