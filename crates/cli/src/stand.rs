@@ -40,6 +40,8 @@ pub struct Plan {
     pub run: Run,
     /// What was hidden, in words.
     pub hidden: String,
+    /// The gyro it was hidden in, 0, 1, 2; `None` where nothing was.
+    pub channel: Option<usize>,
 }
 
 /// Plans a run: a sound stand in a lively environment, the motor spinning free in steps (the belt is off, so the table
@@ -112,6 +114,7 @@ pub fn plan(hidden: Hidden, seconds: f64, seed: u64) -> Plan {
     let words = fault
         .as_ref()
         .map_or_else(|| "nothing".to_owned(), |fault| format!("{fault:?}"));
+    let channel = fault.as_ref().map(|_| gyro);
     scenario.faults.extend(fault);
     let mut steps = vec![];
     let mut at = 10.0;
@@ -127,6 +130,7 @@ pub fn plan(hidden: Hidden, seconds: f64, seed: u64) -> Plan {
             requests,
         },
         hidden: words,
+        channel,
     }
 }
 
