@@ -117,10 +117,14 @@ fn demo(root: &Path) -> Result<(), Failure> {
         ("--out", "capture.csv"),
         ("--analysis", "analysis.json"),
         ("--json", "diagnosis.json"),
+        ("--report", "report.html"),
     ] {
         program.arg(option).arg(folder.join(file));
     }
     run("the demo", &mut program)?;
-    println!("capture, analysis and diagnosis: {}", folder.display());
+    println!(
+        "capture, analysis and diagnosis beside the report: {}",
+        folder.display()
+    );
     Ok(())
 }

@@ -1,5 +1,10 @@
 //! The program `imu-stand`.
 
+/// `println!` for output that may be cut short: a reader like `head` that has had enough is no failure.
+macro_rules! say {
+    ($($words:tt)*) => { $crate::commands::say(format_args!($($words)*)) };
+}
+
 mod commands;
 
 use clap::{Parser, Subcommand};
@@ -19,6 +24,8 @@ enum Command {
     Analyze(commands::analyze::Arguments),
     /// What the simulation gets wrong, the causes, the extended model, the measured gain.
     Diagnose(commands::diagnose::Arguments),
+    /// One self-contained HTML file: the verdict, and the figures that it rests on.
+    Report(commands::report::Arguments),
     /// The simulated stand with something hidden in it: capture, analysis, diagnosis in one go.
     Run(commands::run::Arguments),
     /// A capture straight from a model file.
@@ -31,6 +38,7 @@ fn main() -> miette::Result<()> {
     match Program::parse().command {
         Command::Analyze(arguments) => commands::analyze::run(&arguments),
         Command::Diagnose(arguments) => commands::diagnose::run(&arguments),
+        Command::Report(arguments) => commands::report::run(&arguments),
         Command::Run(arguments) => commands::run::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Capture(arguments) => commands::capture::run(&arguments),

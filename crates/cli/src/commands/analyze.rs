@@ -59,30 +59,33 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 fn print(analysis: &Analysis) {
     for (name, channel) in &analysis.channels {
-        println!("{name}");
+        say!("{name}");
         parameters(channel);
         for warning in &channel.warnings {
-            println!("{}", text::item("warning: ", warning));
+            say!("{}", text::item("warning: ", warning));
         }
-        println!("  paper's procedure");
+        say!("  paper's procedure");
         interval("angle random walk", &channel.paper.angle_random_walk);
         interval(
             "in-run bias stability",
             &channel.paper.in_run_bias_stability,
         );
         for note in &channel.paper.notes {
-            println!("{}", text::item("note: ", note));
+            say!("{}", text::item("note: ", note));
         }
         for (deviation, points) in &channel.deviations {
             let name = format!("{deviation:?}").to_lowercase();
-            println!(
+            say!(
                 "  {name}, {:<12}   tau s   deviation  95 % interval",
                 channel.unit
             );
             for point in points {
-                println!(
+                say!(
                     "    {:>25.4} {:>11.5} {:>10.5} .. {:.5}",
-                    point.tau_s, point.deviation, point.low, point.high
+                    point.tau_s,
+                    point.deviation,
+                    point.low,
+                    point.high
                 );
             }
         }
@@ -101,13 +104,13 @@ fn parameters(channel: &ChannelAnalysis) {
 fn interval(name: &str, interval: &analysis::analyze::Interval) {
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
     match interval.value {
-        Some(value) => println!(
+        Some(value) => say!(
             "  {name:<24} {value:>10.4} [{} .. {}] {}",
             number(interval.low),
             number(interval.high),
             interval.unit
         ),
-        None => println!(
+        None => say!(
             "  {name:<24} not established; at most {} {}",
             number(interval.high),
             interval.unit

@@ -121,7 +121,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     imu_stand::write_capture(&arguments.out, &builder.build())?;
     if !arguments.quiet {
-        println!(
+        say!(
             "{}: {} samples, {}",
             arguments.out.display(),
             builder.len(),

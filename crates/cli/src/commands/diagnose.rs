@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use analysis::DiagnoseOptions;
 use analysis::result::Diagnosis;
 use clap::Args;
+use imu_stand::report::Subject;
 use imu_stand::text;
 use miette::Result;
 use serde::Serialize;
@@ -28,6 +29,9 @@ pub struct Arguments {
     /// Write the extended model
     #[arg(long, value_name = "FILE")]
     model_out: Option<PathBuf>,
+    /// Write a report, one self-contained HTML file
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 /// Several captures, each diagnosed by itself.
@@ -39,26 +43,45 @@ struct Several {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    if arguments.captures.len() > 1 && arguments.model_out.is_some() {
-        miette::bail!(
-            help = "diagnose them one by one",
-            "--model-out takes the model of one capture"
-        );
+    let one_only = [
+        ("--model-out", arguments.model_out.is_some()),
+        ("--report", arguments.report.is_some()),
+    ];
+    for (option, given) in one_only {
+        if given && arguments.captures.len() > 1 {
+            miette::bail!(
+                help = "diagnose them one by one",
+                "{option} is for one capture"
+            );
+        }
     }
     let mut runs = Vec::new();
     for path in &arguments.captures {
         let read = arguments.input.read(path)?;
+        let hash = super::digest(path)?;
         let options = DiagnoseOptions {
             seed: arguments.seed,
             file: super::name(path),
-            hash: Some(super::digest(path)?),
+            hash: Some(hash.clone()),
         };
         let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
         if let Some(path) = &arguments.model_out {
             super::write(path, &found.extended_model.to_toml())?;
         }
         if !arguments.input.quiet {
-            print!("{}", text::diagnosis(&found.diagnosis));
+            say!("{}", text::diagnosis(&found.diagnosis).trim_end());
+        }
+        if let Some(page) = &arguments.report {
+            let subject = Subject {
+                record: &read.record,
+                diagnosed: &found,
+                rate_hz: arguments.input.rate,
+                command: &super::report::command(),
+                seed: arguments.seed,
+                hash: Some(&hash),
+                hidden: None,
+            };
+            super::report::write(page, &subject, arguments.input.quiet)?;
         }
         runs.push(found.diagnosis);
     }

@@ -3,6 +3,7 @@
 pub mod analyze;
 pub mod capture;
 pub mod diagnose;
+pub mod report;
 pub mod run;
 pub mod simulate;
 
@@ -62,6 +63,15 @@ impl Input {
             );
         }
         Ok(read)
+    }
+}
+
+/// Prints a line. Ends the program where the reader has gone: with success if it merely had enough, else with 1.
+pub fn say(line: std::fmt::Arguments<'_>) {
+    use std::io::Write as _;
+    if let Err(error) = writeln!(std::io::stdout(), "{line}") {
+        let enough = error.kind() == std::io::ErrorKind::BrokenPipe;
+        std::process::exit(i32::from(!enough));
     }
 }
 

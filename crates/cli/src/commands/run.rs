@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use analysis::{AnalyzeOptions, DiagnoseOptions};
 use clap::Args;
 use imu_stand::capture::{ReadOptions, read_capture};
+use imu_stand::report::Subject;
 use imu_stand::stand::{Hidden, plan, run_native};
 use imu_stand::{text, write_capture};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -34,6 +35,9 @@ pub struct Arguments {
     /// Write the diagnosis as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write a report, one self-contained HTML file
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     /// Print nothing but errors
     #[arg(long, short)]
     quiet: bool,
@@ -78,23 +82,35 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let analysis = analysis::analyze(&read.record, &options).map_err(super::explain)?;
     super::write_json(arguments.analysis.as_ref(), &analysis)?;
-    let hash = Some(super::digest(&arguments.out)?);
+    let hash = super::digest(&arguments.out)?;
     let options = DiagnoseOptions {
         seed: arguments.seed,
         file,
-        hash,
+        hash: Some(hash.clone()),
     };
     let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
     super::write_json(arguments.json.as_ref(), &found.diagnosis)?;
     if !arguments.quiet {
-        println!(
+        say!(
             "{}: {} samples, {}",
             arguments.out.display(),
             record.len(),
             text::link(&link)
         );
-        print!("{}", text::diagnosis(&found.diagnosis));
-        println!("\nhidden in the stand: {}", plan.hidden);
+        say!("{}", text::diagnosis(&found.diagnosis).trim_end());
+        say!("\nhidden in the stand: {}", plan.hidden);
+    }
+    if let Some(page) = &arguments.report {
+        let subject = Subject {
+            record: &read.record,
+            diagnosed: &found,
+            rate_hz: None,
+            command: &super::report::command(),
+            seed: arguments.seed,
+            hash: Some(&hash),
+            hidden: Some(&plan.hidden),
+        };
+        super::report::write(page, &subject, arguments.quiet)?;
     }
     Ok(())
 }

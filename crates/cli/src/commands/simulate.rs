@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .map_err(|error| miette::miette!(help = "see `imu-stand simulate --help`", "{error}"))?;
     write_capture(&arguments.out, &record)?;
     if !arguments.quiet {
-        println!(
+        say!(
             "{}: {} rows at {rate} Hz, seed {}",
             arguments.out.display(),
             record.len(),

@@ -1,0 +1,423 @@
+//! The report: one self-contained HTML file, verdict first, then the figures that it rests on.
+
+pub mod plot;
+pub mod replicates;
+mod tables;
+
+use analysis::result::{Diagnosed, Evidence, SeriesStyle, Verdict};
+use analysis::sampling::Sampling;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use model::record::Record;
+
+use plot::{AFTER, BEFORE, Drawn, Figure, Layer, MEASURED, number};
+use replicates::{Against, Places};
+
+/// Replicates behind the bands.
+const REPLICATES: usize = 199;
+/// Columns of a thinned signal.
+const COLUMNS: usize = 700;
+const STYLE: &str = include_str!("style.css");
+
+/// What a report is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// The record.
+    pub record: &'a Record,
+    /// What was found in it.
+    pub diagnosed: &'a Diagnosed,
+    /// Sample rate given by the user, Hz.
+    pub rate_hz: Option<f64>,
+    /// The command that makes this report again.
+    pub command: &'a str,
+    /// Seed of whatever is random.
+    pub seed: u64,
+    /// Digest of the file.
+    pub hash: Option<&'a str>,
+    /// What was hidden in the stand, where it was a simulated one.
+    pub hidden: Option<&'a str>,
+}
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Plot(#[from] plot::PlotError),
+    /// The record has no rate.
+    #[error(transparent)]
+    Analysis(#[from] analysis::AnalysisError),
+}
+
+/// Makes the report.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
+    let diagnosis = &subject.diagnosed.diagnosis;
+    let channels = channels(subject)?;
+    let evidence = subject
+        .diagnosed
+        .evidence
+        .iter()
+        .map(evidence)
+        .collect::<Result<Vec<_>, _>>()?;
+    let title = format!("{}: {}", diagnosis.input.file, headline(subject.diagnosed));
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                (tables::verdict(subject, headline(subject.diagnosed)))
+                @if !evidence.is_empty() {
+                    section {
+                        h2 { "What convicts each cause" }
+                        @for figure in &evidence { (figure) }
+                    }
+                }
+                section {
+                    h2 { "The measurement beside its simulation" }
+                    p.lead {
+                        "Both models are simulated in the world that the run saw: its temperatures, supply, motor "
+                        "command and accelerations. " b.before { "Before" } " is white noise, a random walk and a "
+                        "constant bias; " b.after { "after" } " adds the causes found. Bands hold 95 % of "
+                        (REPLICATES) " replicates, with every parameter at its estimate."
+                    }
+                    @for channel in &channels { (channel) }
+                }
+                (tables::details(subject))
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+fn headline(diagnosed: &Diagnosed) -> &'static str {
+    match diagnosed.diagnosis.verdict {
+        Verdict::Adequate => "the model describes this run",
+        Verdict::Extended => "the simulation lacks something, and here is what",
+        Verdict::Unexplained => "something is left that no known cause explains",
+    }
+}
+
+/// The figures of every channel of the model, those with something to say first and open.
+fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
+    let (record, diagnosed) = (subject.record, subject.diagnosed);
+    let (before, after) = (&diagnosed.baseline_model, &diagnosed.extended_model);
+    let sampling = Sampling::of(record, subject.rate_hz)?;
+    let places = Places::new(&sampling, record.len());
+    let simulate = |model: &model::file::ModelFile, stream: u64| {
+        let seed = subject.seed ^ stream;
+        let all = replicates::replicate(model, record, &places, REPLICATES, seed)?;
+        Ok((replicates::one(model, record, seed)?, all))
+    };
+    let simulated = simulate(before, 0x6265_666f_7265).and_then(|b| {
+        let a = simulate(after, 0x0061_6674_6572)?;
+        Ok::<_, model::simulate::SimulateError>((b, a))
+    });
+    let ((one_before, all_before), (one_after, all_after)) = match simulated {
+        Ok(both) => both,
+        Err(error) => {
+            return Ok(vec![html! {
+                p.warning { "Not simulated: " (error) ". The bands and the simulated signal are left out." }
+            }]);
+        }
+    };
+    let said = |name: &str| {
+        let d = &diagnosed.diagnosis;
+        d.findings
+            .iter()
+            .any(|f| f.channels.iter().any(|c| c == name))
+            || d.unexplained.iter().any(|u| u.channel == name)
+    };
+    let mut out = Vec::new();
+    for (index, channel) in after.channels.iter().enumerate() {
+        let Some(measured) = record.channel(&channel.name) else {
+            continue;
+        };
+        let before_index = before
+            .channels
+            .iter()
+            .position(|c| c.name == channel.name)
+            .unwrap_or(index);
+        let view = View {
+            name: &channel.name,
+            unit: &channel.unit,
+            values: &measured.values,
+            simulated: [&one_before[before_index], &one_after[index]],
+            tau0: sampling.tau0,
+            extended: said(&channel.name),
+        };
+        let own = places.curves(&measured.values);
+        let against = [
+            replicates::against(&own, &all_before[before_index]),
+            replicates::against(&own, &all_after[index]),
+        ];
+        let at = places.abscissae(&measured.values);
+        out.push((said(&channel.name), view.figures(&own, &at, &against)?));
+    }
+    // Where nothing is said of any channel, the first is as good as another.
+    let all_quiet = out.iter().all(|(said, _)| !said);
+    out.sort_by_key(|(said, _)| !said);
+    let names: Vec<_> = {
+        let mut names: Vec<_> = after
+            .channels
+            .iter()
+            .filter(|c| record.channel(&c.name).is_some())
+            .map(|c| c.name.clone())
+            .collect();
+        names.sort_by_key(|name| !said(name));
+        names
+    };
+    Ok(out
+        .into_iter()
+        .zip(names)
+        .enumerate()
+        .map(|(k, ((said, figures), name))| {
+            html! {
+                details open[said || (all_quiet && k == 0)] {
+                    summary { code { (name) } }
+                    (figures)
+                }
+            }
+        })
+        .collect())
+}
+
+/// One channel, measured and simulated.
+struct View<'a> {
+    name: &'a str,
+    unit: &'a str,
+    values: &'a [f64],
+    simulated: [&'a [f64]; 2],
+    tau0: f64,
+    extended: bool,
+}
+
+impl View<'_> {
+    fn figures(
+        &self,
+        own: &replicates::Curves,
+        at: &replicates::Abscissae,
+        against: &[Against; 2],
+    ) -> Result<Markup, ReportError> {
+        let [before, after] = against;
+        let name = self.name;
+        let same = !self.extended;
+        Ok(html! {
+            figure {
+                (self.signal()?)
+                figcaption {
+                    b { "Signal. " }
+                    "Measured, then simulated by the "
+                    @if same { "model" } @else { "model before and after the extension" }
+                    ", on one scale. Alike to the eye is no test: the figures below are."
+                }
+            }
+            .pair {
+                figure {
+                    (self.allan(own, at, against)?)
+                    figcaption {
+                        b { "Overlapping Allan deviation" } " of " code { (name) } ", up to a tenth of the run. The bands "
+                        "hold whole curves, not points. Chance of a curve as far off: "
+                        (chance(before.adev_p))
+                        @if !same { " before, " (chance(after.adev_p)) " after" }
+                        "."
+                    }
+                }
+                figure {
+                    (self.angle(own, at, against)?)
+                    figcaption {
+                        b { "Angle by integration" } ", less the mean of the first " (number(at.calibration_s, 2))
+                        " s. Bands hold 95 % of the replicates at each instant."
+                    }
+                }
+            }
+        })
+    }
+
+    fn signal(&self) -> Result<Markup, ReportError> {
+        let time: Vec<f64> = (0..self.values.len())
+            .map(|k| k as f64 * self.tau0)
+            .collect();
+        let mut panels = vec![("measured", MEASURED, self.values)];
+        if self.extended {
+            panels.push(("simulated before", BEFORE, self.simulated[0]));
+            panels.push(("simulated after", AFTER, self.simulated[1]));
+        } else {
+            panels.push(("simulated", AFTER, self.simulated[1]));
+        }
+        let finite = || {
+            panels
+                .iter()
+                .flat_map(|(_, _, values)| values.iter())
+                .copied()
+                .filter(|v| v.is_finite())
+        };
+        let (low, high) = (
+            finite().fold(f64::MAX, f64::min),
+            finite().fold(f64::MIN, f64::max),
+        );
+        let margin = ((high - low) * 0.04).max(f64::MIN_POSITIVE);
+        let last = panels.len() - 1;
+        let mut out = Vec::new();
+        for (k, (label, colour, values)) in panels.iter().enumerate() {
+            let figure = Figure {
+                x_label: if k == last {
+                    "time, s".into()
+                } else {
+                    String::new()
+                },
+                y_label: self.unit.to_owned(),
+                width: plot::WIDE,
+                height: if k == last { 200 } else { 178 },
+                y_range: (low < high).then_some(low - margin..high + margin),
+                layers: vec![Drawn::new(
+                    label,
+                    *colour,
+                    Layer::Line(plot::envelope(&time, values, COLUMNS)),
+                )],
+                ..Figure::default()
+            };
+            out.push(drawing(&figure)?);
+        }
+        Ok(html! { @for panel in out { (panel) } })
+    }
+
+    fn bands(&self, x: &[f64], of: impl Fn(usize) -> replicates::Band) -> Vec<Drawn> {
+        let shown: &[(usize, &str, _)] = if self.extended {
+            &[(0, "before", BEFORE), (1, "after", AFTER)]
+        } else {
+            &[(1, "model", AFTER)]
+        };
+        let mut layers = Vec::new();
+        for (k, label, colour) in shown {
+            let band = of(*k);
+            let area = x
+                .iter()
+                .zip(band.low.iter().zip(&band.high))
+                .map(|(x, (low, high))| (*x, *low, *high))
+                .collect();
+            layers.push(Drawn::new(label, *colour, Layer::Band(area)));
+        }
+        layers
+    }
+
+    fn allan(
+        &self,
+        own: &replicates::Curves,
+        at: &replicates::Abscissae,
+        against: &[Against; 2],
+    ) -> Result<Markup, ReportError> {
+        let mut layers = self.bands(&at.tau_s, |k| against[k].adev.clone());
+        let points: Vec<_> = at
+            .tau_s
+            .iter()
+            .zip(&own.ln_adev)
+            .map(|(tau, ln)| (*tau, ln.exp()))
+            .collect();
+        layers.push(Drawn {
+            label: None,
+            colour: MEASURED,
+            layer: Layer::Line(points.clone()),
+        });
+        layers.push(Drawn::new("measured", MEASURED, Layer::Points(points)));
+        let figure = Figure {
+            x_label: "cluster time, s".into(),
+            y_label: format!("deviation, {}", self.unit),
+            log_x: true,
+            log_y: true,
+            width: plot::HALF,
+            height: 380,
+            layers,
+            ..Figure::default()
+        };
+        drawing(&figure)
+    }
+
+    fn angle(
+        &self,
+        own: &replicates::Curves,
+        at: &replicates::Abscissae,
+        against: &[Against; 2],
+    ) -> Result<Markup, ReportError> {
+        let mut layers = self.bands(&at.angle_s, |k| against[k].angle.clone());
+        let points = at.angle_s.iter().copied().zip(own.angle.iter().copied());
+        layers.push(Drawn::new(
+            "measured",
+            MEASURED,
+            Layer::Line(points.collect()),
+        ));
+        let unit = self
+            .unit
+            .strip_suffix("/s")
+            .map_or_else(|| format!("{} s", self.unit), str::to_owned);
+        let figure = Figure {
+            x_label: "time since the calibration, s".into(),
+            y_label: format!("angle, {unit}"),
+            width: plot::HALF,
+            height: 380,
+            layers,
+            ..Figure::default()
+        };
+        drawing(&figure)
+    }
+}
+
+fn evidence(evidence: &Evidence) -> Result<Markup, ReportError> {
+    let layers = evidence
+        .series
+        .iter()
+        .enumerate()
+        .map(|(k, series)| {
+            let points: Vec<_> = series
+                .x
+                .iter()
+                .copied()
+                .zip(series.y.iter().copied())
+                .collect();
+            let layer = match series.style {
+                SeriesStyle::Points => Layer::Points(points),
+                SeriesStyle::Line => Layer::Line(points),
+            };
+            Drawn::new(&series.label, plot::colour(k, &series.label), layer)
+        })
+        .collect();
+    let figure = Figure {
+        x_label: evidence.x_label.clone(),
+        y_label: evidence.y_label.clone(),
+        log_x: evidence.log_x,
+        log_y: evidence.log_y,
+        width: plot::WIDE,
+        height: 400,
+        layers,
+        ..Figure::default()
+    };
+    Ok(html! {
+        figure {
+            (drawing(&figure)?)
+            figcaption { b { (evidence.title) ". " } (evidence.caption) }
+        }
+    })
+}
+
+/// A figure with its legend above it.
+fn drawing(figure: &Figure) -> Result<Markup, ReportError> {
+    let svg = figure.svg()?;
+    Ok(html! { (figure.legend()) (PreEscaped(svg)) })
+}
+
+/// A chance as a reader wants it: never 0, because replicates are finite.
+fn chance(p: f64) -> String {
+    let floor = 1.0 / (REPLICATES as f64 + 1.0);
+    if p <= floor * 1.001 {
+        format!("at most {}", number(floor, 1))
+    } else {
+        number(p, 2)
+    }
+}

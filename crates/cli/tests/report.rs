@@ -1,0 +1,130 @@
+//! The report as a reader gets it: a file that needs nothing beside it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+fn program() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_imu-stand"))
+}
+
+/// A folder of this test's own, new at each run.
+fn folder(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).expect("a folder for the test");
+    path
+}
+
+fn succeed(command: &mut Command) {
+    let output = command.output().expect("the program starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+}
+
+/// A run with a bias that follows the temperature, its report and its diagnosis.
+fn reported(name: &str) -> (PathBuf, String, serde_json::Value) {
+    let folder = folder(name);
+    let arguments = [
+        "run", "--native", "--hide", "tempco", "--seed", "5", "--quiet",
+    ];
+    succeed(
+        program()
+            .current_dir(&folder)
+            .args(arguments)
+            .args(["--out", "run.csv", "--report", "r.html", "--json", "d.json"]),
+    );
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("it was written");
+    let diagnosis = serde_json::from_str(&read("d.json")).expect("it is JSON");
+    let page = read("r.html");
+    (folder, page, diagnosis)
+}
+
+#[test]
+fn the_report_is_one_file_that_refers_to_no_other() {
+    let (_, page, _) = reported("self_contained");
+    for reference in [
+        "<script", "<link", "<img", "src=", "href=", "url(", "@import",
+    ] {
+        assert!(!page.contains(reference), "{reference}");
+    }
+    // The name of the SVG format is the only address in it.
+    let addresses = page.matches("http").count();
+    assert_eq!(
+        addresses,
+        page.matches("xmlns=\"http://www.w3.org/2000/svg\"").count()
+    );
+}
+
+#[test]
+fn the_report_says_the_verdict_first_and_what_the_json_says() {
+    let (_, page, diagnosis) = reported("says");
+    let at = |text: &str| {
+        page.find(text)
+            .unwrap_or_else(|| panic!("{text} is missing"))
+    };
+    let verdict = diagnosis["verdict"].as_str().unwrap();
+    let body = at("<body>");
+    assert!(page[body..].find(verdict).unwrap() < page[body..].find("<svg").unwrap());
+    let mut causes = 0;
+    for finding in diagnosis["findings"].as_array().unwrap() {
+        at(&finding["cause"].as_str().unwrap().replace('_', " "));
+        causes += 1;
+    }
+    assert!(
+        causes > 0,
+        "a bias of this size on the temperature is found"
+    );
+    for check in diagnosis["checks"].as_array().unwrap() {
+        at(&check["id"].as_str().unwrap().replace('_', " "));
+    }
+    for not in diagnosis["not_tested"].as_array().unwrap() {
+        at(&not["cause"].as_str().unwrap().replace('_', " "));
+    }
+    // Each gyro: the signal in two panels, or three where something was found; Allan curves; the angle. And a figure
+    // for each cause.
+    assert!(page.matches("<svg").count() >= 3 * 4 + causes);
+    at("imu-stand run --native --hide tempco --seed 5");
+    at("sha256:");
+    at("Hidden in the simulated stand");
+}
+
+#[test]
+fn the_same_record_and_seed_give_the_same_report() {
+    let (folder, _, _) = reported("again");
+    let make = || {
+        succeed(
+            program()
+                .current_dir(&folder)
+                .args(["report", "run.csv", "--out", "again.html"]),
+        );
+        std::fs::read_to_string(folder.join("again.html")).unwrap()
+    };
+    assert!(make() == make());
+}
+
+#[test]
+fn a_reader_that_has_had_enough_is_no_failure() {
+    let folder = folder("pipe");
+    succeed(program().current_dir(&folder).args([
+        "simulate",
+        "--seconds",
+        "120",
+        "--out",
+        "c.csv",
+    ]));
+    let mut child = program()
+        .current_dir(&folder)
+        .args(["diagnose", "c.csv"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success() && said.is_empty(),
+        "{:?} {said}",
+        output.status
+    );
+}
