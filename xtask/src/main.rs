@@ -103,8 +103,9 @@ fn demo(root: &Path) -> Result<(), Failure> {
         "the build",
         &mut cargo(root, &["build", "--release", "--bin", "imu-stand"]),
     )?;
-    let folder = root.join("target/demo");
-    std::fs::create_dir_all(&folder).map_err(|error| {
+    // Relative to the root, so that the command in the report can be typed again.
+    let folder = Path::new("target/demo");
+    std::fs::create_dir_all(root.join(folder)).map_err(|error| {
         Failure::new(
             &format!("{}: {error}", folder.display()),
             "make room or rights for it",
@@ -112,7 +113,9 @@ fn demo(root: &Path) -> Result<(), Failure> {
     })?;
     let seed = std::env::args().nth(2).unwrap_or_else(|| "2009".to_owned());
     let mut program = Command::new(root.join("target/release/imu-stand"));
-    program.args(["run", "--native", "--seconds", "600", "--seed", &seed]);
+    program
+        .current_dir(root)
+        .args(["run", "--native", "--seconds", "600", "--seed", &seed]);
     for (option, file) in [
         ("--out", "capture.csv"),
         ("--analysis", "analysis.json"),

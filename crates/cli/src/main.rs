@@ -24,6 +24,8 @@ enum Command {
     Analyze(commands::analyze::Arguments),
     /// What the simulation gets wrong, the causes, the extended model, the measured gain.
     Diagnose(commands::diagnose::Arguments),
+    /// Which of many runs represents them, and which do not and in what.
+    Representative(commands::representative::Arguments),
     /// One self-contained HTML file: the verdict, and the figures that it rests on.
     Report(commands::report::Arguments),
     /// The simulated stand with something hidden in it: capture, analysis, diagnosis in one go.
@@ -38,6 +40,7 @@ fn main() -> miette::Result<()> {
     match Program::parse().command {
         Command::Analyze(arguments) => commands::analyze::run(&arguments),
         Command::Diagnose(arguments) => commands::diagnose::run(&arguments),
+        Command::Representative(arguments) => commands::representative::run(&arguments),
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Run(arguments) => commands::run::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),

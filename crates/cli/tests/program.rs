@@ -299,3 +299,65 @@ fn measured_records_are_analyzed_and_diagnosed_by_column_mapping() {
         }
     }
 }
+
+#[test]
+fn of_many_runs_the_one_that_is_noisier_is_not_the_representative_one() {
+    let folder = folder("representative");
+    let mut noisy = model::file::ModelFile::paper();
+    for channel in &mut noisy.channels {
+        // 2400 samples know sigma to 1.4 %; this is 35 times that.
+        if let Some(parameter) = channel.baseline.get_mut("angle_random_walk") {
+            parameter.value *= 1.5;
+        }
+    }
+    let model = folder.join("noisy.toml");
+    std::fs::write(&model, noisy.to_toml()).unwrap();
+    let names = ["a.csv", "b.csv", "c.csv", "noisy.csv", "d.csv"];
+    let paths: Vec<String> = names
+        .iter()
+        .map(|name| folder.join(name).to_str().unwrap().to_owned())
+        .collect();
+    for (seed, path) in paths.iter().enumerate() {
+        let seed = seed.to_string();
+        let mut arguments = vec![
+            "simulate",
+            "--seconds",
+            "120",
+            "--seed",
+            &seed,
+            "--out",
+            path,
+        ];
+        if path.ends_with("noisy.csv") {
+            arguments.extend(["--model", model.to_str().unwrap()]);
+        }
+        assert!(run(&arguments).status.success());
+    }
+    let out = folder.join("r.json");
+    let mut arguments = vec!["representative", "--json", out.to_str().unwrap()];
+    arguments.extend(paths.iter().map(String::as_str));
+    let made = run(&arguments);
+    let said = String::from_utf8_lossy(&made.stdout);
+    assert!(
+        made.status.success(),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
+    let answer = json(&out);
+    assert_eq!(answer["files"][3], "noisy.csv");
+    assert_ne!(answer["run"], 3, "{said}");
+    let odd = answer["odd"].as_array().unwrap();
+    assert!(
+        odd.iter()
+            .any(|odd| odd["run"] == 3 && odd["figure"] == "angle_random_walk"),
+        "{said}"
+    );
+
+    let few = run(&["representative", &paths[0], &paths[1]]);
+    assert_eq!(few.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&few.stderr);
+    assert!(
+        said.contains("4 runs") && said.contains("name 4 captures"),
+        "{said}"
+    );
+}

@@ -4,6 +4,7 @@ pub mod analyze;
 pub mod capture;
 pub mod diagnose;
 pub mod report;
+pub mod representative;
 pub mod run;
 pub mod simulate;
 
@@ -111,6 +112,9 @@ pub fn write_json(path: Option<&PathBuf>, value: &impl Serialize) -> Result<()> 
 /// Turns an analysis error into what the user is told, with what to do next.
 pub fn explain(error: analysis::AnalysisError) -> miette::Report {
     let help = match &error {
+        analysis::AnalysisError::Inconclusive {
+            need, unit: "runs", ..
+        } => format!("name {need} captures of the same stand at least"),
         analysis::AnalysisError::Inconclusive { need, unit, .. } => {
             format!("record for longer: {need} {unit} at least")
         }

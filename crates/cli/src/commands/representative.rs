@@ -1,0 +1,86 @@
+//! `imu-stand representative`.
+
+use std::path::PathBuf;
+
+use analysis::Representative;
+use clap::Args;
+use imu_stand::text;
+use miette::Result;
+use serde::Serialize;
+
+use super::Input;
+
+/// What `representative` takes.
+#[derive(Args)]
+pub struct Arguments {
+    /// Captures of one stand, .csv or .csv.gz, four at least
+    #[arg(required = true)]
+    captures: Vec<PathBuf>,
+    #[command(flatten)]
+    input: Input,
+    /// Seed of whatever is random
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Write the result as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// The answer with the names of the files, by whose index it speaks.
+#[derive(Serialize)]
+struct Answer<'a> {
+    format: &'static str,
+    files: Vec<String>,
+    #[serde(flatten)]
+    found: &'a Representative,
+}
+
+/// Runs it.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let records = arguments
+        .captures
+        .iter()
+        .map(|path| Ok(arguments.input.read(path)?.record))
+        .collect::<Result<Vec<_>>>()?;
+    let found = analysis::representative(&records, arguments.seed).map_err(super::explain)?;
+    let files: Vec<String> = arguments.captures.iter().map(|p| super::name(p)).collect();
+    if !arguments.input.quiet {
+        print(&files, &found);
+    }
+    let answer = Answer {
+        format: "imu-stand-representative/1",
+        files,
+        found: &found,
+    };
+    super::write_json(arguments.json.as_ref(), &answer)
+}
+
+fn print(files: &[String], found: &Representative) {
+    say!("representative  {}", files[found.run]);
+    if found.odd.is_empty() {
+        say!("no run stands out (limit |z| = {:.1})", found.limit);
+    }
+    for odd in &found.odd {
+        let what = format!(
+            "{} of {} is {:.1} spreads from the others' median (limit {:.1})",
+            odd.figure.replace('_', " "),
+            odd.channel,
+            odd.z,
+            found.limit
+        );
+        say!(
+            "{}",
+            text::item(&format!("not {}: ", files[odd.run]), &what)
+        );
+    }
+    for figure in &found.figures {
+        say!(
+            "    {:<10} {:<18} median {:.4e}, run to run {:.1e} {}",
+            figure.channel,
+            figure.figure.replace('_', " "),
+            figure.pooled,
+            figure.spread,
+            figure.unit
+        );
+    }
+}
