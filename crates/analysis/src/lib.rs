@@ -24,6 +24,7 @@ pub mod noise_fit;
 pub mod noise_id;
 pub mod optimise;
 pub mod paper;
+pub mod paper_model;
 pub mod plan;
 pub mod representative;
 pub mod result;

@@ -9,13 +9,13 @@ use crate::allan::{Deviation, Phase, TauGrid, deviation};
 use crate::noise_fit::{NoiseFit, Spectrum, Term, replicate};
 
 /// Cluster times of the line, s.
-const LINE_S: (f64, f64) = (0.1, 10.0);
+pub(crate) const LINE_S: (f64, f64) = (0.1, 10.0);
 /// Cluster times of the flat level, s.
-const FLAT_S: (f64, f64) = (10.0, 100.0);
+pub(crate) const FLAT_S: (f64, f64) = (10.0, 100.0);
 /// Length of a record over the longest cluster time that the paper asks for.
 const LENGTH_OVER_TAU: f64 = 10.0;
 /// Points for each decade in both fits.
-const PER_DECADE: u32 = 20;
+pub(crate) const PER_DECADE: u32 = 20;
 /// Draws behind an interval.
 const REPLICATES: usize = 400;
 
@@ -191,15 +191,5 @@ fn free_slope(ms: &[usize], tau0: f64, of: &dyn Fn(usize) -> Option<f64>) -> Opt
         .iter()
         .filter_map(|m| of(*m).map(|s| ((*m as f64 * tau0).ln(), s.ln())))
         .collect();
-    if points.len() < 3 {
-        return None;
-    }
-    let n = points.len() as f64;
-    let (x, y) = (
-        points.iter().map(|p| p.0).sum::<f64>() / n,
-        points.iter().map(|p| p.1).sum::<f64>() / n,
-    );
-    let xy: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
-    let xx: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
-    Some(xy / xx)
+    (points.len() >= 3).then(|| crate::paper_model::slope(&points))
 }

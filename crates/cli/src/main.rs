@@ -24,6 +24,8 @@ enum Command {
     Analyze(commands::analyze::Arguments),
     /// What the simulation gets wrong, the causes, the extended model, the measured gain.
     Diagnose(commands::diagnose::Arguments),
+    /// The paper's figures 3, 4, 5 and 8 and its two numbers again, and what does not fit in them.
+    Paper(commands::paper::Arguments),
     /// Which of many runs represents them, and which do not and in what.
     Representative(commands::representative::Arguments),
     /// One self-contained HTML file: the verdict, and the figures that it rests on.
@@ -40,6 +42,7 @@ fn main() -> miette::Result<()> {
     match Program::parse().command {
         Command::Analyze(arguments) => commands::analyze::run(&arguments),
         Command::Diagnose(arguments) => commands::diagnose::run(&arguments),
+        Command::Paper(arguments) => commands::paper::run(&arguments),
         Command::Representative(arguments) => commands::representative::run(&arguments),
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Run(arguments) => commands::run::run(&arguments),

@@ -3,6 +3,7 @@
 pub mod analyze;
 pub mod capture;
 pub mod diagnose;
+pub mod paper;
 pub mod report;
 pub mod representative;
 pub mod run;
