@@ -48,8 +48,9 @@ pub trait Board {
 /// Where the set-up comes from, as the hello frame says it.
 mod source {
     pub const BUILT_IN: u8 = 0;
+    /// The first of the EEPROM's copies; the second is one more.
     pub const STORED: u8 = 1;
-    pub const SET: u8 = 2;
+    pub const SET: u8 = 3;
 }
 
 /// Milliseconds from health frame to health frame.

@@ -28,7 +28,7 @@ pub use adis16250::{Adis16250, Outputs, register, status};
 pub use gyro::{GyroChain, Stimulus, bartlett};
 pub use mma7260qt::{AccSelect, Mma7260Qt};
 pub use motor::Motor;
-pub use native::{Timeline, native};
+pub use native::{Timeline, native, native_live};
 pub use random::{Stream, standard_normal, uniform};
 pub use run::{Ending, Run, SerialByte, TimedRequest, duty_profile};
 pub use scenario::{Fault, Scenario};

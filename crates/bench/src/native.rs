@@ -326,11 +326,30 @@ fn arrivals(requests: &[crate::TimedRequest], hz: f64) -> VecDeque<(u64, u8)> {
     bytes
 }
 
+/// What the board's receiver gets: requests that were planned, and bytes that somebody sends while the run lasts.
+struct Incoming<'a> {
+    /// Bytes with the cycle at which each has arrived.
+    queue: VecDeque<(u64, u8)>,
+    listen: &'a mut dyn FnMut(f64) -> Vec<u8>,
+}
+
 /// Runs the firmware's logic on the stand of `run` and hands each received byte to `receive`, in order. A callback that
 /// breaks ends the run.
 pub fn native(
     run: &Run,
     timeline: &Timeline,
+    receive: impl FnMut(SerialByte) -> ControlFlow<()>,
+) -> Ending {
+    native_live(run, timeline, |_| Vec::new(), receive)
+}
+
+/// As [`native`], with somebody at the other end of the line: each simulated millisecond `listen` is told the time, s
+/// since power came on, and returns the bytes that have arrived at the board by then. It may wait, so that the run
+/// keeps pace with a clock on the wall; what was sent in between is handed out after each sample.
+pub fn native_live(
+    run: &Run,
+    timeline: &Timeline,
+    mut listen: impl FnMut(f64) -> Vec<u8>,
     mut receive: impl FnMut(SerialByte) -> ControlFlow<()>,
 ) -> Ending {
     let hz = CLOCK_HZ * (1.0 + run.scenario.crystal_ppm * 1e-6);
@@ -357,7 +376,10 @@ pub fn native(
         last_tick: 0,
     }));
     let mut cable = Cable::new(&run.scenario);
-    let mut received = arrivals(&run.requests, hz);
+    let mut received = Incoming {
+        queue: arrivals(&run.requests, hz),
+        listen: &mut listen,
+    };
     let mut deliver = |chip: &Shared, until: u64| {
         let chip = &mut *chip.borrow_mut();
         while chip.sent.front().is_some_and(|&(at, _)| at <= until) {
@@ -403,7 +425,7 @@ pub fn native(
 /// From a start to a reset or the end.
 fn life(
     chip: &Shared,
-    received: &mut VecDeque<(u64, u8)>,
+    received: &mut Incoming<'_>,
     end: u64,
     deliver: &mut impl FnMut(&Shared, u64) -> ControlFlow<()>,
 ) -> ControlFlow<()> {
@@ -426,11 +448,14 @@ fn life(
     let misconfigured = firmware::configure(&mut sensors, stand.sens_avg());
     stand.started(board, misconfigured);
     // Before the receiver is on, bytes are lost.
+    let lost_until = chip.borrow().seconds(power + timeline.configure);
+    drop((received.listen)(lost_until));
     while received
+        .queue
         .front()
         .is_some_and(|&(at, _)| at < power + timeline.configure)
     {
-        received.pop_front();
+        received.queue.pop_front();
     }
     chip.borrow_mut().now = start;
     let mut period = chip.borrow().period;
@@ -486,20 +511,23 @@ fn life(
 fn work(
     chip: &Shared,
     stand: &mut firmware::Stand,
-    received: &mut VecDeque<(u64, u8)>,
+    received: &mut Incoming<'_>,
     millisecond: &mut u64,
     until: u64,
     late: Option<u64>,
 ) {
     let board = &mut HostBoard(Rc::clone(chip));
     loop {
-        let byte = received.front().copied().filter(|&(at, _)| at <= until);
+        let byte = (received.queue.front().copied()).filter(|&(at, _)| at <= until);
         let byte_first = byte.is_some_and(|(at, _)| late.is_some() || at <= *millisecond);
         if let Some((at, byte)) = byte.filter(|_| byte_first) {
-            received.pop_front();
+            received.queue.pop_front();
             chip.borrow_mut().now = late.unwrap_or(at);
             stand.on_byte(board, byte);
         } else if *millisecond <= until {
+            let t = chip.borrow().seconds(*millisecond);
+            let bytes = (received.listen)(t);
+            (received.queue).extend(bytes.into_iter().map(|byte| (*millisecond, byte)));
             chip.borrow_mut().now = late.unwrap_or(*millisecond);
             *millisecond += CYCLES_PER_MS;
             stand.on_millisecond(board);

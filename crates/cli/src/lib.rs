@@ -1,6 +1,7 @@
 //! The program `imu-stand` as a library: captures in and out, and what the commands share.
 
 pub mod capture;
+pub mod link;
 pub mod report;
 pub mod stand;
 pub mod text;

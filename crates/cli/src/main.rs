@@ -36,6 +36,8 @@ enum Command {
     Simulate(commands::simulate::Arguments),
     /// A capture from the board's serial port.
     Capture(commands::capture::Arguments),
+    /// Read and set the board's configuration over the line.
+    Board(commands::board::Arguments),
 }
 
 fn main() -> miette::Result<()> {
@@ -48,5 +50,6 @@ fn main() -> miette::Result<()> {
         Command::Run(arguments) => commands::run::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Capture(arguments) => commands::capture::run(&arguments),
+        Command::Board(arguments) => commands::board::run(&arguments),
     }
 }

@@ -44,9 +44,9 @@ impl Default for Calibration {
 /// GYRO_OUT at the 320 deg/s range: deg/s a count (ADIS16250 data sheet).
 const GYRO_LSB_DPS: f64 = 0.073_26;
 /// TEMP_OUT: degC a count, and the temperature of count 0 (ADIS16250 data sheet).
-const TEMP: (f64, f64) = (0.1453, 25.0);
+pub const TEMP: (f64, f64) = (0.1453, 25.0);
 /// SUPPLY_OUT: V a count (ADIS16250 data sheet).
-const SUPPLY_LSB_V: f64 = 1.8315e-3;
+pub const SUPPLY_LSB_V: f64 = 1.8315e-3;
 
 /// Collects frames.
 #[derive(Clone, Debug)]

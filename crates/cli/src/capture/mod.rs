@@ -7,7 +7,7 @@ mod header;
 mod read;
 mod write;
 
-pub use build::{Calibration, RecordBuilder};
+pub use build::{Calibration, RecordBuilder, SUPPLY_LSB_V, TEMP};
 pub use error::CaptureError;
 pub use foreign::ColumnMapping;
 pub use read::{Read, ReadOptions, read_capture, read_from};

@@ -1,6 +1,7 @@
 //! The commands: arguments, files, and what is printed.
 
 pub mod analyze;
+pub mod board;
 pub mod capture;
 pub mod diagnose;
 pub mod paper;

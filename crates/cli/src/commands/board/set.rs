@@ -1,0 +1,332 @@
+//! Changing the set-up, keeping it, and starting anew.
+
+use std::time::{Duration, Instant};
+
+use clap::{Subcommand, ValueEnum};
+use imu_stand::link::{self, LinkError, baud_of, divisor};
+use miette::Result;
+use wire::{Axis, Command, Hello, Sample, Status};
+
+use super::Session;
+use super::show::{ACC_RANGES_G, Q16, Q24, gyro_range_dps};
+
+/// An axis as people write it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[allow(missing_docs)]
+pub enum AxisName {
+    X,
+    Y,
+    Z,
+}
+
+impl From<AxisName> for Axis {
+    fn from(name: AxisName) -> Self {
+        match name {
+            AxisName::X => Axis::X,
+            AxisName::Y => Axis::Y,
+            AxisName::Z => Axis::Z,
+        }
+    }
+}
+
+/// What can be set.
+#[derive(Subcommand)]
+pub enum Set {
+    /// Samples a second, 4 to 256
+    Rate {
+        /// Hz; the board rounds to whole ticks
+        hz: f64,
+    },
+    /// Range and filter of the gyros; the scale factors become those of the range again
+    Gyro {
+        /// Full scale, deg/s: 320, 160 or 80; without it as it is
+        #[arg(long)]
+        range: Option<u16>,
+        /// M: 2^M taps in each of two stages, 0 to 6; without it as it is
+        #[arg(long)]
+        filter: Option<u8>,
+    },
+    /// Full scale of the accelerometer, g: 1.5, 2, 4 or 6
+    AccRange {
+        /// g
+        g: f64,
+    },
+    /// Bias that is subtracted from a gyro
+    Bias {
+        /// x, y or z
+        axis: AxisName,
+        /// deg/s
+        #[arg(allow_negative_numbers = true)]
+        dps: f64,
+    },
+    /// Scale factor of a gyro
+    Scale {
+        /// x, y or z
+        axis: AxisName,
+        /// deg/s for each count
+        dps_per_count: f64,
+    },
+    /// Speed of the line, on both ends
+    Baud {
+        /// 9600, 19200, 38400, 76800, 250000, 500000, ...
+        baud: u32,
+    },
+    /// Largest command and largest change of the command of the motor
+    MotorLimits {
+        /// 0 to 255
+        #[arg(long)]
+        max_duty: u8,
+        /// Steps a second
+        #[arg(long)]
+        ramp: u16,
+    },
+    /// Number of the board
+    BoardId {
+        /// 0 for none
+        id: u16,
+    },
+}
+
+/// A value in fixed point.
+pub fn fixed(value: f64, unit: f64, what: &str) -> Result<i32> {
+    let scaled = (value * unit).round();
+    if scaled.is_finite() && scaled.abs() <= f64::from(i32::MAX) {
+        return Ok(scaled as i32);
+    }
+    miette::bail!(
+        help = "biases are some deg/s, scale factors about 0.07 deg/s for each count",
+        "{what}: {value} does not fit into the board's fixed point"
+    )
+}
+
+pub fn run(session: &mut Session, set: &Set) -> Result<()> {
+    let hello = session.link.ask_hello()?;
+    let command = match *set {
+        Set::Rate { hz } => rate(&hello, hz)?,
+        Set::Gyro { range, filter } => gyro(&hello, range, filter)?,
+        Set::AccRange { g } => {
+            let Some(range) = ACC_RANGES_G.iter().position(|full| *full == g) else {
+                miette::bail!(
+                    help = "write `board set acc-range 1.5`",
+                    "the accelerometer has ranges of 1.5, 2, 4 and 6 g, not {g} g"
+                );
+            };
+            Command::SetAccRange { range: range as u8 }
+        }
+        Set::Bias { axis, dps } => Command::SetBias {
+            axis: axis.into(),
+            value: fixed(dps, Q16, "bias")?,
+        },
+        Set::Scale {
+            axis,
+            dps_per_count,
+        } => {
+            if dps_per_count <= 0.0 {
+                miette::bail!(
+                    help = "0.07326 is the nominal one at 320 deg/s",
+                    "a scale factor of {dps_per_count} deg/s for each count turns the rate around or off"
+                );
+            }
+            Command::SetScale {
+                axis: axis.into(),
+                value: fixed(dps_per_count, Q24, "scale")?,
+            }
+        }
+        Set::Baud { baud } => return set_baud(session, &hello, baud),
+        Set::MotorLimits { max_duty, ramp } => Command::MotorLimits {
+            max_duty,
+            ramp_per_s: ramp,
+        },
+        Set::BoardId { id } => Command::SetBoardId { board_id: id },
+    };
+    session.link.ask(command)?;
+    session.show_info()?;
+    if !session.quiet && matches!(command, Command::SetGyro { .. }) {
+        say!(
+            "  the scale factors are those of the range again; biases and `calibrate` were for the old set-up"
+        );
+    }
+    unsaved(session);
+    Ok(())
+}
+
+fn unsaved(session: &Session) {
+    if !session.quiet {
+        say!("  until the next reset; `imu-stand board store` keeps it");
+    }
+}
+
+/// Share of a line's capacity that samples may take: the rest is for health, hello, replies.
+const LINE_SHARE: f64 = 0.85;
+
+fn rate(hello: &Hello, hz: f64) -> Result<Command> {
+    if !(hz > 0.0 && hz.is_finite()) {
+        miette::bail!(help = "write `board set rate 20`", "{hz} is no sample rate");
+    }
+    let ticks = (1e9 / f64::from(hello.tick_ns.max(1)) / hz).round();
+    if ticks > f64::from(u16::MAX) || ticks < 1.0 {
+        return Err(LinkError::Refused {
+            command: "set rate",
+            code: Command::SetRate { period_ticks: 0 }.code(),
+            status: Status::BadArgument,
+        }
+        .into());
+    }
+    let (needed, has) = (
+        hz * Sample::FRAME_LEN as f64 * 10.0,
+        baud_of(hello.baud_divisor),
+    );
+    if needed > LINE_SHARE * has {
+        let fits = [38_400u32, 76_800, 250_000, 500_000]
+            .into_iter()
+            .find(|baud| f64::from(*baud) * LINE_SHARE > needed);
+        let help = match fits {
+            Some(baud) => format!("`imu-stand board set baud {baud}` first"),
+            None => "no speed that the board has carries that".to_owned(),
+        };
+        miette::bail!(
+            help = help,
+            "samples at {hz} Hz need {needed:.0} bit/s, the line has {has:.0}: the board would drop frames"
+        );
+    }
+    Ok(Command::SetRate {
+        period_ticks: ticks as u16,
+    })
+}
+
+fn gyro(hello: &Hello, range: Option<u16>, filter: Option<u8>) -> Result<Command> {
+    if range.is_none() && filter.is_none() {
+        miette::bail!(
+            help = "write `board set gyro --range 160 --filter 3`",
+            "nothing to set: neither range nor filter"
+        );
+    }
+    let code = match range {
+        None => hello.gyro_range,
+        Some(dps) => {
+            let code = [4u8, 2, 1]
+                .into_iter()
+                .find(|code| gyro_range_dps(*code) == Some(f64::from(dps)));
+            let Some(code) = code else {
+                miette::bail!(
+                    help = "write `board set gyro --range 320`",
+                    "the gyros have ranges of 320, 160 and 80 deg/s, not {dps} deg/s"
+                );
+            };
+            code
+        }
+    };
+    Ok(Command::SetGyro {
+        range: code,
+        filter: filter.unwrap_or(hello.gyro_filter),
+    })
+}
+
+/// Sets both ends. A reply that is lost leaves open which speed the board has: it is looked for at both.
+fn set_baud(session: &mut Session, hello: &Hello, baud: u32) -> Result<()> {
+    let Some(new) = divisor(baud) else {
+        miette::bail!(
+            help = "9600, 19200, 38400, 76800, 250000 and 500000 baud are within 0.2 %",
+            "the board's 16 MHz come no nearer than 2 % to {baud} baud"
+        );
+    };
+    let rate = super::show::rate_hz(hello).unwrap_or(0.0);
+    if rate * Sample::FRAME_LEN as f64 * 10.0 > LINE_SHARE * f64::from(baud) {
+        miette::bail!(
+            help = "lower the rate first: `imu-stand board set rate 20`",
+            "{baud} baud do not carry the samples of {rate:.1} Hz"
+        );
+    }
+    let link = &mut session.link;
+    let old = link.baud();
+    let command = Command::SetBaud { divisor: new };
+    match link.ask_any(command, |_| {}) {
+        Ok(reply) => drop(link::done(&command, reply)?),
+        Err(LinkError::Unknown { .. } | LinkError::NoReply { .. }) => {}
+        Err(error) => return Err(error.into()),
+    }
+    // What was queued on the board goes out at the old speed first.
+    std::thread::sleep(Duration::from_millis(150));
+    link.set_own_baud(baud)?;
+    if link.ask(Command::Ping).is_err() {
+        link.set_own_baud(old)?;
+        let at_old = link.ask(Command::Ping).is_ok();
+        let where_is = if at_old {
+            format!("it still answers at {old} baud")
+        } else {
+            format!("it answers neither there nor at {old} baud")
+        };
+        return Err(LinkError::NotAsAsked {
+            what: format!("the board does not answer at {baud} baud; {where_is}"),
+            help: "a reset brings the stored speed back, 38400 baud if none is stored; long cables want slow lines"
+                .to_owned(),
+        }
+        .into());
+    }
+    session.show_info()?;
+    if !session.quiet {
+        say!("  from now on: --baud {baud}");
+    }
+    unsaved(session);
+    Ok(())
+}
+
+/// Whether the hello frame says that the set-up is the stored one.
+fn is_stored(hello: &Hello) -> bool {
+    matches!(hello.config_source, 1 | 2)
+}
+
+pub fn store(session: &mut Session) -> Result<()> {
+    let before = session.link.ask_hello()?;
+    match session.link.ask(Command::StoreConfig) {
+        Ok(_) => {}
+        // The reply was lost: a set-up that was not stored and now is has been stored by this.
+        Err(LinkError::Unknown { .. })
+            if !is_stored(&before) && is_stored(&session.link.ask_hello()?) => {}
+        Err(error) => return Err(error.into()),
+    }
+    session.show_info()
+}
+
+pub fn load(session: &mut Session) -> Result<()> {
+    session.link.ask(Command::LoadConfig)?;
+    session.show_info()
+}
+
+pub fn defaults(session: &mut Session) -> Result<()> {
+    session.link.ask(Command::DefaultConfig)?;
+    session.show_info()?;
+    unsaved(session);
+    Ok(())
+}
+
+/// How long a board may take to come back: 16 ms of watchdog, 250 ms of sensors' start, and a hello frame.
+const BACK_WITHIN: Duration = Duration::from_secs(4);
+
+pub fn reboot(session: &mut Session) -> Result<()> {
+    let before = session.link.ask_hello()?;
+    match session.link.ask(Command::Reboot) {
+        Ok(_) | Err(LinkError::Unknown { .. }) => {}
+        Err(error) => return Err(error.into()),
+    }
+    // What was changed and not stored goes with the reset, the speed of the line with it.
+    session.link.hello = None;
+    let began = Instant::now();
+    while session.link.hello.is_none() && began.elapsed() < BACK_WITHIN {
+        session.link.read()?;
+        while session.link.next().is_some() {}
+    }
+    let restarted = |hello: &Hello| hello.restarts != before.restarts || hello.next_seq == 0;
+    let hello = match session.link.hello {
+        Some(hello) => hello,
+        None => session.link.ask_hello()?,
+    };
+    if !restarted(&hello) {
+        return Err(LinkError::NotAsAsked {
+            what: "the board answers as before: it has not restarted".to_owned(),
+            help: "repeat the command".to_owned(),
+        }
+        .into());
+    }
+    session.show_info()
+}

@@ -1,0 +1,569 @@
+//! The line to a board: frames in, numbered requests out, and what to do when nothing comes back.
+
+mod error;
+
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Read, Write};
+use std::time::{Duration, Instant};
+
+use serialport::SerialPort;
+use wire::link::{LinkStats, Losses};
+use wire::{
+    Command, Decoder, Frame, Health, Hello, LinkCounts, Reply, Request, Sample, Status,
+    encode_request,
+};
+
+pub use error::{LinkError, name, words};
+
+/// Speed of the line after a reset, baud.
+pub const DEFAULT_BAUD: u32 = 38_400;
+/// Crystal of the board, Hz: the speeds that it can have are this over 16 (divisor + 1).
+const CLOCK_HZ: f64 = 16e6;
+/// How long a read waits for the first byte.
+const READ_WAIT: Duration = Duration::from_millis(20);
+/// How long a reply may take: 60 ms of queue at 38400 baud, and the slot after the next sample, 250 ms at 4 Hz.
+const REPLY_WAIT: Duration = Duration::from_millis(700);
+/// How often a command that may be repeated is sent.
+const TRIES: u32 = 3;
+/// How long a board may say that it is busy.
+const BUSY_FOR: Duration = Duration::from_secs(3);
+
+/// How long a reply is waited for, and how often the request may be sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// For each try.
+    pub wait: Duration,
+    /// Tries; 1 where a second one could do harm.
+    pub tries: u32,
+}
+
+impl Patience {
+    /// What is right for a command. A lost reply looks like a lost request, so what must not happen twice is sent once:
+    ///
+    /// | command | why not twice |
+    /// |---|---|
+    /// | reboot | the second one hits the board as it starts |
+    /// | clear counters | clears what was counted since the first, unseen |
+    /// | set baud | the board has left the old speed |
+    /// | bias null, self-test | measures anew, or is refused as busy |
+    /// | store set-up | overwrites the other copy too: then both are the same |
+    /// | motor profile | begins anew |
+    /// | write register COMMAND | a reset or a flash update, again |
+    #[must_use]
+    pub fn of(command: &Command) -> Self {
+        let once = |wait| Patience { wait, tries: 1 };
+        match command {
+            Command::Reboot | Command::ClearCounters | Command::SetBaud { .. } => once(REPLY_WAIT),
+            // 42 bytes of 8.5 ms; where a byte takes twice that, still.
+            Command::StoreConfig => once(Duration::from_secs(2)),
+            Command::SelfTest { .. } | Command::BiasNull { .. } => once(Duration::from_secs(3)),
+            Command::MotorProfile { .. } => once(REPLY_WAIT),
+            Command::WriteRegister { address, .. }
+                if *address & !1 == adis16250::Register::Command.address() =>
+            {
+                once(REPLY_WAIT)
+            }
+            _ => Patience {
+                wait: REPLY_WAIT,
+                tries: TRIES,
+            },
+        }
+    }
+}
+
+/// What came over a line so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Heard {
+    /// Bytes.
+    pub bytes: u64,
+    /// Frames, and what was none.
+    pub counts: LinkCounts,
+    /// Samples lost, and by whom.
+    pub losses: Losses,
+}
+
+impl std::fmt::Display for Heard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.bytes == 0 {
+            return f.write_str("not a byte");
+        }
+        let (counts, lost) = (&self.counts, &self.losses);
+        write!(
+            f,
+            "{} bytes, {} frames in order, {} rejected ({} stuffing, {} CRC, {} length, {} unknown); samples lost: {} by \
+             the board, {} by the line, {} unattributed",
+            self.bytes,
+            counts.frames,
+            counts.rejected(),
+            counts.bad_cobs,
+            counts.bad_crc,
+            counts.bad_length,
+            counts.unknown_version + counts.unknown_kind + counts.unknown_value,
+            lost.device,
+            lost.line,
+            lost.unattributed
+        )
+    }
+}
+
+impl Heard {
+    /// What has come since `before`.
+    #[must_use]
+    pub fn since(&self, before: &Heard) -> Heard {
+        let (now, then) = (&self.counts, &before.counts);
+        let (lost, had) = (&self.losses, &before.losses);
+        Heard {
+            bytes: self.bytes - before.bytes,
+            counts: LinkCounts {
+                frames: now.frames - then.frames,
+                bad_cobs: now.bad_cobs - then.bad_cobs,
+                bad_crc: now.bad_crc - then.bad_crc,
+                bad_length: now.bad_length - then.bad_length,
+                unknown_version: now.unknown_version - then.unknown_version,
+                unknown_kind: now.unknown_kind - then.unknown_kind,
+                unknown_value: now.unknown_value - then.unknown_value,
+            },
+            losses: Losses {
+                received: lost.received - had.received,
+                device: lost.device - had.device,
+                line: lost.line - had.line,
+                unattributed: lost.unattributed.saturating_sub(had.unattributed),
+                out_of_order: lost.out_of_order - had.out_of_order,
+                restarts: lost.restarts - had.restarts,
+            },
+        }
+    }
+
+    /// What silence of this kind means, and what to do.
+    #[must_use]
+    pub fn remedy(&self, baud: u32) -> String {
+        if self.bytes == 0 {
+            return "the line is dead: is the board powered, the cable a crossed one (TXD to RXD), and this its port?"
+                .to_owned();
+        }
+        if self.counts.unknown_version > 0 {
+            return "board and program speak different versions of the format: flash the firmware that came with this \
+                    program, or use the program that came with the firmware"
+                .to_owned();
+        }
+        if self.counts.frames == 0 {
+            return format!(
+                "bytes arrive but no frame: the speed is probably not {baud} baud. After a reset the board has what is \
+                 stored, 38400 if nothing is: try `--baud 38400`, or the one you set"
+            );
+        }
+        "the board talks but does not hear: check the wire from the PC's TXD to PD0 (docs/hardware.md); `board health` of a \
+         moment ago would show rx_framing and rx_bad_frame"
+            .to_owned()
+    }
+}
+
+/// A board on a serial port.
+pub struct Link {
+    port: Box<dyn SerialPort>,
+    name: String,
+    baud: u32,
+    decoder: Decoder,
+    stats: LinkStats,
+    bytes: u64,
+    number: u16,
+    frames: VecDeque<Frame>,
+    buffer: Vec<u8>,
+    /// The last hello frame.
+    pub hello: Option<Hello>,
+    /// The last health frame.
+    pub health: Option<Health>,
+    /// The last sample.
+    pub sample: Option<Sample>,
+}
+
+impl Link {
+    /// Opens a port by its name, `/dev/ttyUSB0` or `COM3`, and forgets what had been received before.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`], which names the ports that there are.
+    pub fn open(name: &str, baud: u32) -> Result<Self, LinkError> {
+        let open = |error: serialport::Error| LinkError::Open {
+            port: name.to_owned(),
+            why: error.description.clone(),
+            help: help_to_open(&error),
+        };
+        let port = serialport::new(name, baud)
+            .timeout(READ_WAIT)
+            .open()
+            .map_err(open)?;
+        port.clear(serialport::ClearBuffer::Input).map_err(open)?;
+        // Another program may have asked a moment ago: its replies must not look like ours.
+        let number = (std::process::id() as u16).wrapping_mul(257);
+        Ok(Self {
+            port,
+            name: name.to_owned(),
+            baud,
+            decoder: Decoder::new(),
+            stats: LinkStats::new(),
+            bytes: 0,
+            number,
+            frames: VecDeque::new(),
+            buffer: vec![0; 4096],
+            hello: None,
+            health: None,
+            sample: None,
+        })
+    }
+
+    /// Name of the port.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Speed of the line, baud.
+    #[must_use]
+    pub fn baud(&self) -> u32 {
+        self.baud
+    }
+
+    /// What came so far.
+    #[must_use]
+    pub fn heard(&self) -> Heard {
+        Heard {
+            bytes: self.bytes,
+            counts: *self.decoder.counts(),
+            losses: self.stats.losses(),
+        }
+    }
+
+    /// Reads what has arrived, waiting for some milliseconds if nothing has; frames are then at [`next`](Self::next).
+    /// Returns the bytes.
+    ///
+    /// # Errors
+    /// [`LinkError::Gone`].
+    pub fn read(&mut self) -> Result<&[u8], LinkError> {
+        let count = match self.port.read(&mut self.buffer) {
+            Ok(0) => {
+                return Err(LinkError::Gone {
+                    port: self.name.clone(),
+                    why: "the other end has hung up".to_owned(),
+                });
+            }
+            Ok(count) => count,
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock
+                ) =>
+            {
+                0
+            }
+            Err(error) => return Err(self.gone(&error)),
+        };
+        self.bytes += count as u64;
+        let bytes = self.buffer.get(..count).unwrap_or_default();
+        for &byte in bytes {
+            if let Some(Ok(frame)) = self.decoder.push(byte) {
+                self.stats.push(&frame);
+                match frame {
+                    Frame::Hello(hello) => self.hello = Some(hello),
+                    Frame::Health(health) => self.health = Some(health),
+                    Frame::Sample(sample) => self.sample = Some(sample),
+                    Frame::Reply(_) => {}
+                }
+                self.frames.push_back(frame);
+            }
+        }
+        Ok(bytes)
+    }
+
+    /// The next frame that was read.
+    #[allow(clippy::should_implement_trait)]
+    pub fn next(&mut self) -> Option<Frame> {
+        self.frames.pop_front()
+    }
+
+    fn gone(&self, error: &std::io::Error) -> LinkError {
+        LinkError::Gone {
+            port: self.name.clone(),
+            why: error.to_string(),
+        }
+    }
+
+    /// Sends a request and returns its number; the reply is whoever reads' to look for.
+    ///
+    /// # Errors
+    /// [`LinkError::Gone`].
+    pub fn send(&mut self, command: Command) -> Result<u16, LinkError> {
+        self.number = self.number.wrapping_add(1);
+        self.send_as(self.number, command)?;
+        Ok(self.number)
+    }
+
+    fn send_as(&mut self, number: u16, command: Command) -> Result<(), LinkError> {
+        let mut line = [0; Request::FRAME_LEN];
+        let encoded = encode_request(&Request { number, command }, &mut line);
+        debug_assert!(encoded.is_ok(), "the buffer has the length of a request");
+        self.port
+            .write_all(&line)
+            .and_then(|()| self.port.flush())
+            .map_err(|error| self.gone(&error))
+    }
+
+    /// Asks, waits, asks again where that does no harm ([`Patience::of`]), and gives back the reply, whatever its status
+    /// but [`Status::Busy`], which is waited out.
+    ///
+    /// # Errors
+    /// [`LinkError::NoReply`], [`LinkError::Unknown`], [`LinkError::Gone`].
+    pub fn ask_any(
+        &mut self,
+        command: Command,
+        mut watch: impl FnMut(&Frame),
+    ) -> Result<Reply, LinkError> {
+        let patience = Patience::of(&command);
+        let (began, before) = (Instant::now(), self.heard());
+        let mut number = self.send(command)?;
+        let mut tries = 1;
+        let mut sent = Instant::now();
+        loop {
+            while let Some(frame) = self.next() {
+                watch(&frame);
+                let Frame::Reply(reply) = frame else { continue };
+                if reply.number != number || reply.command != command.code() {
+                    continue;
+                }
+                if reply.status != Status::Busy || began.elapsed() > BUSY_FOR {
+                    return Ok(reply);
+                }
+                std::thread::sleep(Duration::from_millis(100));
+                number = self.send(command)?;
+                sent = Instant::now();
+            }
+            if sent.elapsed() > patience.wait {
+                if tries >= patience.tries {
+                    let heard = self.heard().since(&before);
+                    return Err(self.no_reply(&command, patience, heard));
+                }
+                tries += 1;
+                // The same number: the late reply to the last try is as good as one to this.
+                self.send_as(number, command)?;
+                sent = Instant::now();
+            }
+            self.read()?;
+        }
+    }
+
+    /// As [`ask_any`](Self::ask_any), where anything but done is an error.
+    ///
+    /// # Errors
+    /// [`LinkError::Refused`] and those of [`ask_any`](Self::ask_any).
+    pub fn ask(&mut self, command: Command) -> Result<Reply, LinkError> {
+        done(&command, self.ask_any(command, |_| {})?)
+    }
+
+    fn no_reply(&self, command: &Command, patience: Patience, heard: Heard) -> LinkError {
+        let remedy = heard.remedy(self.baud);
+        if patience.tries == 1 && heard.counts.frames > 0 {
+            return LinkError::Unknown {
+                command: name(command),
+                heard: Box::new(heard),
+                help: "the request or its reply was lost on the line: look with `imu-stand board info` and `board health`, then \
+                       repeat it"
+                    .to_owned(),
+            };
+        }
+        LinkError::NoReply {
+            command: name(command),
+            tries: patience.tries,
+            wait_ms: patience.wait.as_millis(),
+            heard: Box::new(heard),
+            help: remedy,
+        }
+    }
+
+    /// Asks the board who it is and how it is set.
+    ///
+    /// # Errors
+    /// As [`ask`](Self::ask); [`LinkError::NotAsAsked`] where the reply came and the frame did not.
+    pub fn ask_hello(&mut self) -> Result<Hello, LinkError> {
+        // The hello frame is sent before the reply, so one that comes is younger than the question. It may be lost.
+        for _ in 0..TRIES {
+            self.hello = None;
+            self.ask(Command::GetHello)?;
+            if let Some(hello) = self.hello {
+                return Ok(hello);
+            }
+        }
+        Err(self.frame_lost("hello"))
+    }
+
+    /// Asks the board for its counters; with `clear` they start anew.
+    ///
+    /// # Errors
+    /// As [`ask_hello`](Self::ask_hello).
+    pub fn ask_health(&mut self, clear: bool) -> Result<Health, LinkError> {
+        for _ in 0..TRIES {
+            self.health = None;
+            self.ask(Command::Counters)?;
+            let Some(health) = self.health else { continue };
+            if clear {
+                // What came with the reply is lost with a line that loses; what is shown was read before.
+                self.ask(Command::ClearCounters)?;
+                return Ok(self.health.unwrap_or(health));
+            }
+            return Ok(health);
+        }
+        Err(self.frame_lost("health"))
+    }
+
+    fn frame_lost(&self, what: &str) -> LinkError {
+        LinkError::NotAsAsked {
+            what: format!(
+                "the board replied {TRIES} times, and its {what} frame never arrived; heard so far: {}",
+                self.heard()
+            ),
+            help: "the line loses frames: a shorter cable, a common ground, or a slower speed"
+                .to_owned(),
+        }
+    }
+
+    /// Reads for a time and hands over each frame.
+    ///
+    /// # Errors
+    /// [`LinkError::Gone`].
+    pub fn watch(
+        &mut self,
+        duration: Duration,
+        mut each: impl FnMut(&Frame),
+    ) -> Result<(), LinkError> {
+        let end = Instant::now() + duration;
+        while Instant::now() < end {
+            self.read()?;
+            while let Some(frame) = self.next() {
+                each(&frame);
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets the speed of this end of the line; what was received at the old one is forgotten.
+    ///
+    /// # Errors
+    /// [`LinkError::Gone`].
+    pub fn set_own_baud(&mut self, baud: u32) -> Result<(), LinkError> {
+        let gone = |error: serialport::Error| LinkError::Gone {
+            port: self.name.clone(),
+            why: error.description,
+        };
+        self.port.set_baud_rate(baud).map_err(gone)?;
+        self.port
+            .clear(serialport::ClearBuffer::Input)
+            .map_err(gone)?;
+        self.baud = baud;
+        self.frames.clear();
+        Ok(())
+    }
+}
+
+/// A reply that says done, or the error that it is.
+///
+/// # Errors
+/// [`LinkError::Refused`].
+pub fn done(command: &Command, reply: Reply) -> Result<Reply, LinkError> {
+    if reply.status == Status::Ok {
+        return Ok(reply);
+    }
+    Err(LinkError::Refused {
+        command: name(command),
+        code: command.code(),
+        status: reply.status,
+    })
+}
+
+/// The divisor whose speed is nearest to `baud`, if within the 2 % that an 8N1 receiver forgives.
+#[must_use]
+pub fn divisor(baud: u32) -> Option<u16> {
+    let exact = CLOCK_HZ / 16.0 / f64::from(baud.max(1)) - 1.0;
+    let rounded = exact.round();
+    let error = (exact + 1.0) / (rounded + 1.0) - 1.0;
+    ((0.0..4096.0).contains(&rounded) && error.abs() <= 0.02).then_some(rounded as u16)
+}
+
+/// The speed that a divisor gives, baud.
+#[must_use]
+pub fn baud_of(divisor: u16) -> f64 {
+    CLOCK_HZ / 16.0 / (f64::from(divisor) + 1.0)
+}
+
+/// What to do about a port that does not open.
+fn help_to_open(error: &serialport::Error) -> String {
+    let ports = serialport::available_ports().unwrap_or_default();
+    let names: Vec<&str> = ports.iter().map(|port| port.port_name.as_str()).collect();
+    let there = if names.is_empty() {
+        "the system sees no serial port: plug the adapter in".to_owned()
+    } else {
+        format!("ports that there are: {}", names.join(", "))
+    };
+    match error.kind {
+        serialport::ErrorKind::Io(ErrorKind::PermissionDenied) => {
+            "you may not use this port: on Linux join its group (`sudo usermod -aG dialout $USER`) and log in again"
+                .to_owned()
+        }
+        serialport::ErrorKind::NoDevice => {
+            format!("another program may have it open: close it; {there}")
+        }
+        _ => there,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speeds_are_those_of_the_data_sheets_table_and_the_marginal_ones_are_refused() {
+        assert_eq!(divisor(38_400), Some(25));
+        assert_eq!(divisor(250_000), Some(3));
+        assert_eq!(divisor(9_600), Some(103));
+        assert_eq!(divisor(115_200), None, "-3.5 %");
+        assert_eq!(divisor(230_400), None, "+8.5 %");
+        assert_eq!(divisor(57_600), None, "+2.1 %");
+        assert!((baud_of(25) - 38_461.5).abs() < 0.1);
+    }
+
+    #[test]
+    fn what_must_not_happen_twice_is_sent_once() {
+        let axis = wire::Axis::X;
+        let write = |address| Command::WriteRegister {
+            gyro: axis,
+            address,
+            value: 0,
+        };
+        for once in [
+            Command::Reboot,
+            Command::ClearCounters,
+            Command::SetBaud { divisor: 3 },
+            Command::BiasNull { samples: 1 },
+            Command::StoreConfig,
+            write(0x3e),
+            write(0x3f),
+        ] {
+            assert_eq!(Patience::of(&once).tries, 1, "{once:?}");
+        }
+        for again in [Command::Ping, Command::KeepAlive, write(0x38)] {
+            assert!(Patience::of(&again).tries > 1, "{again:?}");
+        }
+    }
+
+    #[test]
+    fn silence_is_explained_by_what_was_heard() {
+        let none = Heard::default();
+        assert!(none.remedy(38_400).contains("dead"));
+        let mut noise = Heard {
+            bytes: 100,
+            ..Heard::default()
+        };
+        assert!(noise.remedy(9600).contains("9600 baud"));
+        noise.counts.frames = 3;
+        assert!(noise.remedy(9600).contains("does not hear"));
+        noise.counts.unknown_version = 1;
+        assert!(noise.remedy(9600).contains("version"));
+    }
+}

@@ -1,0 +1,183 @@
+//! A simulated board behind a real serial device (a pseudo-terminal), and the program run as a user runs it.
+#![allow(dead_code)] // Each test binary uses its own part.
+
+use std::io::{Read as _, Write as _};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use bench::{Run, Scenario, Timeline};
+use serialport::{SerialPort as _, TTYPort};
+use wire::{Decoder, Frame, RequestDecoder};
+
+/// The program with these arguments, waited for.
+pub fn run(arguments: &[&str]) -> Output {
+    program(arguments).output().expect("the program starts")
+}
+
+/// The program with these arguments.
+pub fn program(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_imu-stand"));
+    command.args(arguments).env_remove("IMU_STAND_PORT");
+    command
+}
+
+/// What it printed, both ways, on one line: errors are wrapped to the width of a terminal.
+pub fn said(output: &Output) -> String {
+    let both =
+        [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    let words: Vec<&str> = both
+        .iter()
+        .flat_map(|text| text.split_whitespace())
+        .filter(|word| *word != "│")
+        .collect();
+    words.join(" ")
+}
+
+/// A folder of this test's own, new at each run.
+pub fn folder(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).expect("a folder for the test");
+    path
+}
+
+/// A file as JSON.
+pub fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(path).expect("the JSON is there"))
+        .expect("it is JSON")
+}
+
+/// What the cable swallows.
+#[derive(Clone, Debug, Default)]
+pub struct Swallow {
+    /// Replies to commands of these codes: each entry one reply.
+    pub replies: Vec<u8>,
+    /// Requests of these codes: each entry one request.
+    pub requests: Vec<u8>,
+    /// Sample frames with these sequence numbers.
+    pub samples: Vec<u16>,
+}
+
+/// The simulated board, in real time, on a pseudo-terminal.
+pub struct Board {
+    path: String,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Board {
+    /// A sound stand.
+    pub fn start() -> Self {
+        Self::with(Scenario::quiet(1), Swallow::default())
+    }
+
+    /// This stand, behind this cable.
+    pub fn with(scenario: Scenario, swallow: Swallow) -> Self {
+        let (master, slave) = TTYPort::pair().expect("a pseudo-terminal");
+        let path = slave.name().expect("it has a name");
+        let stop = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&stop);
+        // The slave stays open here, so that the line lives on between two runs of the program.
+        let thread = std::thread::spawn(move || {
+            let _slave = slave;
+            serve(master, scenario, swallow, &flag);
+        });
+        Board {
+            path,
+            stop,
+            thread: Some(thread),
+        }
+    }
+
+    /// The device.
+    pub fn port(&self) -> &str {
+        &self.path
+    }
+
+    /// `imu-stand board --port P ...`
+    pub fn ask(&self, arguments: &[&str]) -> Output {
+        let mut all = vec!["board", "--port", &self.path];
+        all.extend(arguments);
+        run(&all)
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn taken(list: &mut Vec<u8>, code: u8) -> bool {
+    let at = list.iter().position(|c| *c == code);
+    at.map(|at| list.remove(at)).is_some()
+}
+
+fn serve(master: TTYPort, scenario: Scenario, swallow: Swallow, stop: &AtomicBool) {
+    let port = std::cell::RefCell::new(master);
+    port.borrow_mut()
+        .set_timeout(Duration::ZERO)
+        .expect("a pseudo-terminal takes a timeout");
+    let swallow = std::cell::RefCell::new(swallow);
+    let run = Run {
+        scenario,
+        seconds: 1e5,
+        requests: vec![],
+    };
+    let began = Instant::now();
+    let mut requests = RequestDecoder::new();
+    let mut request = Vec::new();
+    let listen = |t: f64| {
+        let due = Duration::from_secs_f64(t);
+        if let Some(early) = due.checked_sub(began.elapsed()) {
+            std::thread::sleep(early);
+        }
+        let mut buffer = [0; 256];
+        let count = port.borrow_mut().read(&mut buffer).unwrap_or(0);
+        let mut through = Vec::new();
+        for &byte in &buffer[..count] {
+            request.push(byte);
+            let decoded = requests.push(byte);
+            if byte == 0 {
+                let lost = matches!(&decoded, Some(Ok(r))
+                    if taken(&mut swallow.borrow_mut().requests, r.command.code()));
+                if !lost {
+                    through.append(&mut request);
+                }
+                request.clear();
+            }
+        }
+        through
+    };
+    let (mut frames, mut frame) = (Decoder::new(), Vec::new());
+    bench::native_live(&run, &Timeline::default(), listen, |received| {
+        frame.push(received.byte);
+        let decoded = frames.push(received.byte);
+        if received.byte == 0 {
+            let swallow = &mut *swallow.borrow_mut();
+            let lost = match &decoded {
+                Some(Ok(Frame::Reply(reply))) => taken(&mut swallow.replies, reply.command),
+                Some(Ok(Frame::Sample(sample))) => swallow.samples.contains(&sample.seq),
+                _ => false,
+            };
+            if !lost {
+                // A line that nobody reads overflows.
+                let _ = port.borrow_mut().write_all(&frame);
+            }
+            frame.clear();
+        }
+        if stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+}
