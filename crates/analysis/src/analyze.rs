@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::allan::{Deviation, Phase, TauGrid, deviation};
 use crate::edf::{NoiseType, chi_square_interval, edf};
 use crate::error::AnalysisError;
-use crate::noise_fit::{Estimated, Misfit, NoiseFit, Spectrum, Term, fit, misfit};
+use crate::noise_fit::{Estimated, Misfit, NoiseFit, Ramp, Spectrum, Term, fit, misfit};
 use crate::noise_id::identify;
 use crate::paper::{Figure, paper_figures};
 use crate::sampling::Sampling;
@@ -365,6 +365,14 @@ fn analyze_channel(
             &units.quantization_noise,
         ),
     };
+    let walk = fitted.term(Term::RandomWalk);
+    if walk.value.is_some() && walk.low == 0.0 && fitted.term(Term::Flicker).value.is_none() {
+        out.warnings.push(
+            "slow noise is there, but the record is too short to tell a rate random walk from a bias instability: the \
+             interval of each allows for the other. `imu-stand plan` says what to record"
+                .into(),
+        );
+    }
     out.fitted = TauGrid::Octave
         .factors(phase.longest_run() / 2)
         .into_iter()
@@ -409,7 +417,7 @@ fn misfit_warning(found: &Misfit, fitted: &NoiseFit, tau0: f64) -> String {
             Term::RandomWalk => "K",
             Term::Quantization => "Q",
         })
-        .chain(fitted.model.ramp.then_some("R"))
+        .chain((fitted.model.ramp != Ramp::Absent).then_some("R"))
         .collect();
     format!(
         "the fitted terms ({}) do not describe the curve: sup |z| = {:.1} at {:.3} s, where the deviation is {:.1} % {} the \

@@ -5,13 +5,25 @@
 
 use super::spectrum::{Bin, Coefficients, Spectrum};
 
+/// How a rate ramp enters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ramp {
+    /// Not at all.
+    Absent,
+    /// At its best value: for likelihood ratios against [`Ramp::Absent`].
+    Profiled,
+    /// Integrated out (restricted likelihood): a ramp that was fitted takes a degree of freedom from the slow noise, which
+    /// would read too small otherwise. The constant is out in the same way, as coefficient 0.
+    Restricted,
+}
+
 /// Which terms may be above zero, and whether a ramp is part of the mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Model {
     /// Of [`super::Term::ALL`].
     pub terms: [bool; 4],
-    /// Whether a rate ramp is fitted.
-    pub ramp: bool,
+    /// Whether a rate ramp is fitted, and how.
+    pub ramp: Ramp,
 }
 
 /// A point of highest likelihood.
@@ -43,12 +55,14 @@ fn residual(bin: &Bin, ramp: f64) -> f64 {
 
 /// Log likelihood, with the ramp at its best where there is one.
 fn evaluate(spectrum: &Spectrum, model: Model, c: &Coefficients) -> (f64, f64) {
-    let ramp = if model.ramp {
-        ramp_given(spectrum, c).0
-    } else {
-        0.0
+    let (ramp, mut sum) = match model.ramp {
+        Ramp::Absent => (0.0, 0.0),
+        Ramp::Profiled => (ramp_given(spectrum, c).0, 0.0),
+        Ramp::Restricted => {
+            let (ramp, precision) = ramp_given(spectrum, c);
+            (ramp, precision.ln())
+        }
     };
-    let mut sum = 0.0;
     for bin in &spectrum.bins {
         let v = Spectrum::variance(bin, c);
         sum += bin.count * v.ln() + residual(bin, ramp) / v;
@@ -120,16 +134,27 @@ fn climb(spectrum: &Spectrum, model: Model, fixed: Option<usize>, mut c: Coeffic
     for _ in 0..60 {
         let mut gradient = [0.0; 4];
         let mut fisher = [[0.0; 4]; 4];
+        // What the ramp's precision adds to the slope of the restricted likelihood.
+        let mut leverage = [0.0; 4];
+        let mut precision = 0.0;
         for bin in &spectrum.bins {
             let v = Spectrum::variance(bin, &c);
             let inverse = 1.0 / v;
+            let part = bin.rr * inverse;
+            precision += part;
             let pull = 0.5 * (residual(bin, ramp) * inverse - bin.count) * inverse;
             let weight = 0.5 * bin.count * inverse * inverse;
             for i in 0..4 {
                 gradient[i] += bin.shape[i] * pull;
+                leverage[i] += 0.5 * bin.shape[i] * part * inverse;
                 for j in i..4 {
                     fisher[i][j] += bin.shape[i] * bin.shape[j] * weight;
                 }
+            }
+        }
+        if model.ramp == Ramp::Restricted {
+            for (g, l) in gradient.iter_mut().zip(leverage) {
+                *g += l / precision;
             }
         }
         let mut active: Vec<usize> = (0..4)

@@ -1,15 +1,16 @@
 //! N, B, K, Q and R of a record by exact likelihood, with intervals.
 //!
 //! White noise, random walk and a constant are always in the model. Flicker, quantization noise of the angle and a ramp
-//! enter when the likelihood asks for them: white noise alone gets no bias instability. Intervals are profile
-//! likelihood within the model chosen; those of the ramp are averaged over the random walk, because the two hide each
-//! other and a plug-in interval is too narrow.
+//! enter when the likelihood asks for them: white noise alone gets no bias instability. Values are those of the model
+//! chosen. Intervals are profile likelihoods of the model that has *every* term, the ramp integrated out: what the
+//! record does not establish may be there all the same, and has to be allowed for. The interval of the ramp is averaged
+//! over the random walk, because the two hide each other and a plug-in interval is too narrow.
 
 mod likelihood;
 mod replicate;
 mod spectrum;
 
-pub use likelihood::{Maximum, Model};
+pub use likelihood::{Maximum, Model, Ramp};
 pub use replicate::{Misfit, misfit, replicate};
 pub use spectrum::{Bin, Coefficients, Spectrum, Term, model_allan_variance};
 
@@ -19,6 +20,9 @@ use likelihood::{maximize, profile_interval, ramp_given};
 
 /// Half of χ²(1) at 95 %: the fall of the log likelihood at the ends of an interval, nats.
 const DROP_95: f64 = 1.920_73;
+
+/// Likelihood ratio from which the random walk, always in the model, is given as a value: 2.5 % where there is none.
+const ESTABLISHES_WALK: f64 = 3.84;
 
 /// Likelihood ratio a further variance needs to enter: chance 1e-4 where there is none, the boundary counted (half the
 /// mass of the ratio is at 0).
@@ -69,77 +73,39 @@ impl NoiseFit {
     }
 }
 
+/// Every term at once.
+const EVERYTHING: Model = Model {
+    terms: [true; 4],
+    ramp: Ramp::Restricted,
+};
+
 /// Fit the terms to a spectrum.
 #[must_use]
 pub fn fit(spectrum: &Spectrum) -> NoiseFit {
-    let mut model = Model {
-        terms: [true, false, true, false],
-        ramp: false,
-    };
-    let mut maximum = maximize(spectrum, model, None, None);
-    loop {
-        let candidates = [
-            (
-                Model {
-                    terms: with(model.terms, Term::Flicker),
-                    ..model
-                },
-                ENTER_VARIANCE,
-            ),
-            (
-                Model {
-                    terms: with(model.terms, Term::Quantization),
-                    ..model
-                },
-                ENTER_VARIANCE,
-            ),
-            (
-                Model {
-                    ramp: true,
-                    ..model
-                },
-                ENTER_RAMP,
-            ),
-        ];
-        let best = candidates
-            .into_iter()
-            .filter(|(candidate, _)| *candidate != model)
-            .map(|(candidate, threshold)| {
-                let found = maximize(spectrum, candidate, None, None);
-                (
-                    2.0 * (found.log_likelihood - maximum.log_likelihood) - threshold,
-                    candidate,
-                    found,
-                )
-            })
-            .max_by(|a, b| a.0.total_cmp(&b.0));
-        match best {
-            Some((score, candidate, found)) if score > 0.0 => {
-                model = candidate;
-                maximum = found;
-            }
-            _ => break,
-        }
-    }
+    let (model, maximum) = choose(spectrum);
     let tau0 = spectrum.tau0;
+    let without_walk = Model {
+        terms: without(model.terms, Term::RandomWalk),
+        ..model
+    };
+    let walk_established = 2.0
+        * (maximum.log_likelihood - maximize(spectrum, without_walk, None, None).log_likelihood)
+        > ESTABLISHES_WALK;
+    let top = maximize(spectrum, EVERYTHING, None, None);
     let terms = Term::ALL.map(|term| {
         let t = term as usize;
-        let inside = model.terms[t];
-        // A term outside the model is let in for its own upper limit, the others refitted.
-        let wider = Model {
-            terms: with(model.terms, term),
-            ..model
-        };
-        let top = if inside {
-            maximum
-        } else {
-            maximize(spectrum, wider, None, None)
-        };
-        let (low, high) = profile_interval(spectrum, wider, t, &top, DROP_95);
+        let (low, high) = profile_interval(spectrum, EVERYTHING, t, &top, DROP_95);
         let (low, high) = (term.letter(low, tau0), term.letter(high, tau0));
-        if inside && low > 0.0 {
+        let established = match term {
+            Term::RandomWalk => walk_established,
+            _ => model.terms[t],
+        };
+        if established {
+            // The model chosen lies within the likelihood of the full one, but not always within its 95 %.
+            let value = term.letter(maximum.coefficients[t], tau0);
+            let (low, high) = (low.min(value), high.max(value));
             Estimated {
-                value: Some(term.letter(maximum.coefficients[t], tau0)),
+                value: Some(value),
                 std_error: Some((high - low) / (2.0 * 1.959_964)),
                 low,
                 high,
@@ -168,6 +134,51 @@ pub fn fit(spectrum: &Spectrum) -> NoiseFit {
     }
 }
 
+/// The model that the record asks for, and its maximum.
+fn choose(spectrum: &Spectrum) -> (Model, Maximum) {
+    let mut model = Model {
+        terms: [true, false, true, false],
+        ramp: Ramp::Absent,
+    };
+    let mut maximum = maximize(spectrum, model, None, None);
+    loop {
+        let mut candidates = vec![];
+        for term in [Term::Flicker, Term::Quantization] {
+            if !model.terms[term as usize] {
+                let terms = with(model.terms, term);
+                candidates.push((Model { terms, ..model }, ENTER_VARIANCE));
+            }
+        }
+        if model.ramp == Ramp::Absent {
+            let ramp = Ramp::Profiled;
+            candidates.push((Model { ramp, ..model }, ENTER_RAMP));
+        }
+        let best = candidates
+            .into_iter()
+            .map(|(candidate, threshold)| {
+                let found = maximize(spectrum, candidate, None, None);
+                let ratio = 2.0 * (found.log_likelihood - maximum.log_likelihood);
+                (ratio - threshold, candidate, found)
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        match best {
+            Some((score, candidate, found)) if score > 0.0 => {
+                (model, maximum) = (candidate, found);
+                if model.ramp == Ramp::Profiled {
+                    model.ramp = Ramp::Restricted;
+                    maximum = maximize(spectrum, model, None, Some(&found.coefficients));
+                }
+            }
+            _ => return (model, maximum),
+        }
+    }
+}
+
+fn without(mut terms: [bool; 4], term: Term) -> [bool; 4] {
+    terms[term as usize] = false;
+    terms
+}
+
 fn with(mut terms: [bool; 4], term: Term) -> [bool; 4] {
     terms[term as usize] = true;
     terms
@@ -178,7 +189,7 @@ fn ramp_interval(spectrum: &Spectrum, model: Model, maximum: &Maximum, k_high: f
     const POINTS: usize = 24;
     let walk = Term::RandomWalk as usize;
     let with_ramp = Model {
-        ramp: true,
+        ramp: Ramp::Restricted,
         ..model
     };
     let mut start = maximum.coefficients;
@@ -190,11 +201,7 @@ fn ramp_interval(spectrum: &Spectrum, model: Model, maximum: &Maximum, k_high: f
             let found = maximize(spectrum, with_ramp, Some((walk, q)), Some(&start));
             start = found.coefficients;
             let (mean, precision) = ramp_given(spectrum, &found.coefficients);
-            (
-                found.log_likelihood - 0.5 * precision.ln(),
-                mean,
-                precision.sqrt().recip(),
-            )
+            (found.log_likelihood, mean, precision.sqrt().recip())
         })
         .collect();
     let top = parts.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
@@ -226,7 +233,7 @@ fn ramp_interval(spectrum: &Spectrum, model: Model, maximum: &Maximum, k_high: f
         0.5 * (a + b)
     };
     let (low, high) = (quantile(0.025), quantile(0.975));
-    if model.ramp && low * high > 0.0 {
+    if model.ramp != Ramp::Absent && low * high > 0.0 {
         Estimated {
             value: Some(quantile(0.5)),
             std_error: Some((high - low) / (2.0 * 1.959_964)),
