@@ -1,35 +1,30 @@
 //! What the board is set to, and how it outlives a power cut: two copies in EEPROM, each with a generation and a
 //! CRC, of which the older one is overwritten. A cut at any byte leaves the other.
 
-/// Bytes of one stored copy: format, generation, the fields, CRC-32C.
-pub const STORED_LEN: usize = 42;
+use wire::fields::SetUp;
+use zerocopy::little_endian::{I32, U16, U32};
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
+
+/// Bytes of one stored copy.
+pub const STORED_LEN: usize = size_of::<Stored>();
 /// Where the two copies begin. Address 0 is left alone: a known weak spot when power sags.
 pub const SLOTS: [u16; 2] = [16, 80];
+const _: () = assert!(SLOTS[0] as usize + STORED_LEN <= SLOTS[1] as usize);
 /// Format of a stored copy; another number is not read.
-const FORMAT: u8 = 1;
+const FORMAT: u8 = 2;
 
-/// The set-up. The order of its fields is the format of a stored copy.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The set-up. The order of its fields is the format of a stored copy, and begins as a hello frame has it.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned,
+)]
 #[repr(C)]
 pub struct Config {
-    /// Bias, Q16.16 deg/s.
-    pub bias: [i32; 3],
-    /// Scale, Q8.24 deg/s for each count.
-    pub scale: [i32; 3],
+    /// What the hello frame says; bias in Q16.16 deg/s, scale in Q8.24 deg/s for each count.
+    pub set_up: SetUp,
     /// The board's number.
-    pub board_id: u16,
-    /// Time from sample to sample, ticks of 4 us.
-    pub period_ticks: u16,
-    /// UBRR.
-    pub baud_divisor: u16,
+    pub board_id: U16,
     /// Motor ramp, steps a second.
-    pub ramp_per_s: u16,
-    /// Bits 10:8 of SENS/AVG: 4, 2, 1.
-    pub gyro_range: u8,
-    /// Bits 2:0 of SENS/AVG.
-    pub gyro_filter: u8,
-    /// g-select2, g-select1.
-    pub acc_range: u8,
+    pub ramp_per_s: U16,
     /// Largest motor command.
     pub max_duty: u8,
 }
@@ -38,102 +33,162 @@ pub struct Config {
 pub const SCALE_320: i32 = 1_229_099;
 /// Fastest rate: 256 Hz, the gyro's own.
 pub const MIN_PERIOD: u16 = 976;
-/// Slowest: 4 Hz; a 16-bit timer of 4 us holds no more than 262 ms.
+/// A 16-bit timer of 4 us holds no more than 262 ms; slower rates take every n-th of its periods.
 pub const MAX_PERIOD: u16 = 62_500;
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            board_id: 0,
-            period_ticks: 12_500,
-            baud_divisor: 25,
-            gyro_range: 4,
-            gyro_filter: 2,
-            acc_range: 0,
-            max_duty: 255,
-            ramp_per_s: crate::motor::DEFAULT_RAMP_PER_S,
-            bias: [0; 3],
-            scale: [SCALE_320; 3],
-        }
-    }
-}
+/// Slowest rate: 1 Hz.
+const MAX_SAMPLE_TICKS: u32 = 250_000;
+/// Largest UBRR.
+const MAX_DIVISOR: u16 = 4_095;
 
 impl Config {
+    /// All zero: not in order.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            set_up: SetUp {
+                period_ticks: U16::ZERO,
+                baud_divisor: U16::ZERO,
+                gyro_range: 0,
+                gyro_filter: 0,
+                gyro_sample_period: 0,
+                acc_range: 0,
+                config_source: 0,
+                bias: [I32::ZERO; 3],
+                scale: [I32::ZERO; 3],
+                periods_per_sample: 0,
+            },
+            board_id: U16::ZERO,
+            ramp_per_s: U16::ZERO,
+            max_duty: 0,
+        }
+    }
+
+    /// The built-in set-up; the board keeps its number.
+    #[inline(never)]
+    pub fn set_default(&mut self) {
+        self.set_up.period_ticks.set(12_500);
+        self.set_up.periods_per_sample = 1;
+        self.set_up.baud_divisor.set(25);
+        self.set_up.gyro_range = 4;
+        self.set_up.gyro_filter = 2;
+        self.set_up.gyro_sample_period = 1;
+        self.set_up.acc_range = 0;
+        self.set_up.bias = [I32::ZERO; 3];
+        self.set_scale_of_range();
+        self.ramp_per_s.set(crate::motor::DEFAULT_RAMP_PER_S);
+        self.max_duty = 255;
+    }
+
+    /// The nominal scale of the range.
+    #[inline(never)]
+    pub fn set_scale_of_range(&mut self) {
+        let shift = match self.set_up.gyro_range {
+            4 => 0,
+            2 => 1,
+            _ => 2,
+        };
+        for scale in &mut self.set_up.scale {
+            scale.set(SCALE_320 >> shift);
+        }
+    }
+
     /// SENS/AVG of the gyros.
     #[must_use]
     pub fn sens_avg(&self) -> u16 {
-        u16::from(self.gyro_range) << 8 | u16::from(self.gyro_filter)
+        u16::from_le_bytes([self.set_up.gyro_filter, self.set_up.gyro_range])
     }
 
-    /// Whether range and filter are ones that the part has, with the taps that a narrow range demands.
+    /// Whether every field is in its range, and range and filter are a pair that the gyro has: a narrow range demands
+    /// taps.
     #[must_use]
     #[inline(never)]
-    pub fn gyro_is_valid(range: u8, filter: u8) -> bool {
-        match range {
-            4 => filter <= 6,
-            2 => (2..=6).contains(&filter),
-            1 => (4..=6).contains(&filter),
-            _ => false,
-        }
-    }
-
-    /// As it is stored.
-    #[inline(never)]
-    #[must_use]
-    pub fn to_bytes(&self, generation: u8) -> [u8; STORED_LEN] {
-        // SAFETY: plain integers in C order, largest first, so without padding; the assertion below holds it to that.
-        let fields: &[u8; FIELDS_LEN] = unsafe { &*core::ptr::from_ref(self).cast() };
-        let mut bytes = [0; STORED_LEN];
-        let mut crc = wire::crc::INIT;
-        let body = [FORMAT, generation]
-            .into_iter()
-            .chain(fields.iter().copied());
-        let mut places = bytes.iter_mut();
-        for (byte, place) in body.zip(places.by_ref()) {
-            *place = byte;
-            crc = wire::crc::update(crc, byte);
-        }
-        for (place, byte) in bytes
-            .iter_mut()
-            .rev()
-            .zip(wire::crc::finish(crc).to_be_bytes())
-        {
-            *place = byte;
-        }
-        bytes
-    }
-
-    /// From what is stored, with its generation; `None` when format, CRC or a field is not in order.
-    #[inline(never)]
-    #[must_use]
-    pub fn from_bytes(bytes: &[u8; STORED_LEN]) -> Option<(Self, u8)> {
-        let mut crc = wire::crc::INIT;
-        for &byte in bytes {
-            crc = wire::crc::update(crc, byte);
-        }
-        let [format, generation, fields @ .., _, _, _, _] = bytes;
-        let mut config = Self::default();
-        // SAFETY: as above; every pattern of bits is a value of every field.
-        let places: &mut [u8; FIELDS_LEN] =
-            unsafe { &mut *core::ptr::from_mut(&mut config).cast() };
-        *places = *fields;
-        let in_order = crc == wire::crc::RESIDUE
-            && *format == FORMAT
-            && config.period_ticks >= MIN_PERIOD
-            && config.period_ticks <= MAX_PERIOD
-            && Self::gyro_is_valid(config.gyro_range, config.gyro_filter)
-            && config.acc_range <= 3;
-        in_order.then_some((config, *generation))
+    pub fn is_in_order(&self) -> bool {
+        let fewest_taps = match self.set_up.gyro_range {
+            4 => 0,
+            2 => 2,
+            1 => 4,
+            _ => return false,
+        };
+        let period = self.set_up.period_ticks.get();
+        let sample = u32::from(period).wrapping_mul(self.set_up.periods_per_sample.into());
+        self.set_up.gyro_filter >= fewest_taps
+            && self.set_up.gyro_filter <= 6
+            && self.set_up.acc_range <= 3
+            && period >= MIN_PERIOD
+            && period <= MAX_PERIOD
+            && sample >= u32::from(period)
+            && sample <= MAX_SAMPLE_TICKS
+            && self.set_up.baud_divisor.get() <= MAX_DIVISOR
     }
 }
 
-/// Bytes of the fields; stored as they lie in memory, little endian on the board and on every host that it is tested on.
-const FIELDS_LEN: usize = STORED_LEN - 6;
-const _: () = assert!(
-    size_of::<Config>() == FIELDS_LEN,
-    "no padding between the fields"
-);
-const _: () = assert!(cfg!(target_endian = "little"));
+impl Default for Config {
+    fn default() -> Self {
+        let mut config = Self::new();
+        config.set_default();
+        config
+    }
+}
+
+/// A copy as it lies in the EEPROM.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned)]
+#[repr(C)]
+pub struct Stored {
+    format: u8,
+    /// One more than the copy before, wrapping.
+    pub generation: u8,
+    /// The set-up.
+    pub config: Config,
+    crc: U32,
+}
+
+impl Stored {
+    /// Nothing yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            format: 0,
+            generation: 0,
+            config: Config::new(),
+            crc: U32::ZERO,
+        }
+    }
+
+    /// Takes `config`, with its CRC.
+    #[inline(never)]
+    pub fn seal(&mut self, generation: u8, config: &Config) {
+        self.format = FORMAT;
+        self.generation = generation;
+        self.config = *config;
+        let register = self.register(STORED_LEN - size_of::<U32>());
+        self.crc.set(wire::crc::finish(register));
+    }
+
+    /// The CRC's register after the first `len` bytes.
+    #[inline(never)]
+    fn register(&self, len: usize) -> u32 {
+        let mut register = wire::crc::INIT;
+        for &byte in self.as_bytes().iter().take(len) {
+            register = wire::crc::update(register, byte);
+        }
+        register
+    }
+
+    /// Whether format, CRC and every field are in order.
+    #[inline(never)]
+    #[must_use]
+    pub fn is_in_order(&self) -> bool {
+        self.register(STORED_LEN) == wire::crc::RESIDUE
+            && self.format == FORMAT
+            && self.config.is_in_order()
+    }
+}
+
+impl Default for Stored {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -141,23 +196,47 @@ mod tests {
 
     #[test]
     fn what_is_stored_comes_back_and_one_wrong_bit_does_not() {
-        let config = Config {
-            bias: [1, -2, 3],
-            board_id: 7,
+        let mut config = Config {
+            board_id: 7.into(),
             ..Config::default()
         };
-        let bytes = config.to_bytes(9);
-        assert_eq!(Config::from_bytes(&bytes), Some((config, 9)));
+        config.set_up.bias = [1, -2, 3].map(I32::new);
+        let mut stored = Stored::new();
+        stored.seal(9, &config);
+        let bytes = stored.as_bytes().to_vec();
+        let read = Stored::read_from_bytes(&bytes).unwrap();
+        assert!(read.is_in_order());
+        assert_eq!((read.config, read.generation), (config, 9));
         for bit in 0..STORED_LEN * 8 {
-            let mut bad = bytes;
+            let mut bad = bytes.clone();
             bad[bit / 8] ^= 1 << (bit % 8);
-            assert_eq!(Config::from_bytes(&bad), None, "bit {bit}");
+            assert!(
+                !Stored::read_from_bytes(&bad).unwrap().is_in_order(),
+                "bit {bit}"
+            );
         }
     }
 
     #[test]
     fn an_erased_eeprom_is_no_configuration() {
-        assert_eq!(Config::from_bytes(&[0xff; STORED_LEN]), None);
-        assert_eq!(Config::from_bytes(&[0; STORED_LEN]), None);
+        for byte in [0xff, 0] {
+            assert!(
+                !Stored::read_from_bytes(&[byte; STORED_LEN])
+                    .unwrap()
+                    .is_in_order()
+            );
+        }
+    }
+
+    #[test]
+    fn rates_from_1_to_256_hz_are_in_order_and_no_others() {
+        let with = |period: u16, every: u8| {
+            let mut config = Config::default();
+            config.set_up.period_ticks.set(period);
+            config.set_up.periods_per_sample = every;
+            config.is_in_order()
+        };
+        assert!(with(976, 1) && with(12_500, 1) && with(62_500, 1) && with(50_000, 5));
+        assert!(!with(975, 1) && !with(62_501, 1) && !with(50_001, 5) && !with(12_500, 0));
     }
 }

@@ -11,6 +11,7 @@
 pub mod acquire;
 pub mod bias;
 pub mod config;
+pub mod math;
 pub mod motor;
 pub mod stand;
 

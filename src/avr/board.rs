@@ -119,8 +119,8 @@ impl Board for AvrBoard {
         timer.tccr2.write(|w| bits!(w, FAST_PWM | PWM_TO_PIN));
     }
 
-    fn set_period(&mut self, ticks: u16) {
-        tick::set_period(ticks);
+    fn set_period(&mut self, ticks: u16, every: u8) {
+        tick::set_period(ticks, every);
     }
 
     #[inline(never)]

@@ -35,13 +35,18 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     unsafe { firmware_contains_a_reachable_panic() }
 }
 
+/// All zeros: in .bss, which costs no flash.
+static mut STAND: Stand = Stand::new();
+
 #[avr_device::entry]
 fn main() -> ! {
     board::paint_stack();
     let mut board = board::AvrBoard::start();
     serial::start();
     let sensors = sensors::start();
-    let mut stand = Stand::boot(&mut board);
+    // SAFETY: the one reference to it.
+    let stand = unsafe { &mut *core::ptr::addr_of_mut!(STAND) };
+    stand.boot(&mut board);
     let misconfigured = configure(sensors, stand.sens_avg());
     stand.started(&mut board, misconfigured);
     // SAFETY: called once, before interrupts are on; from here on the sensors are the tick's.
@@ -64,7 +69,7 @@ fn main() -> ! {
                 stand.on_byte(&mut board, byte);
             }
         }
-        serial::count_losses(&mut stand);
+        serial::count_losses(stand);
         while tick::take_millisecond() {
             stand.on_millisecond(&mut board);
         }

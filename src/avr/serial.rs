@@ -87,7 +87,7 @@ pub fn count_losses(stand: &mut Stand) {
     });
     for (&times, fault) in lost.iter().zip([Fault::RxOverrun, Fault::RxFraming]) {
         if times > 0 {
-            stand.count(fault, u16::from(times));
+            stand.count(fault, times);
         }
     }
 }

@@ -39,9 +39,13 @@ struct Shared {
     raw: Raw,
     job: Option<Job>,
     t_ticks: u32,
-    /// Period in force, and the one to change to at the next tick.
+    /// Period in force, and the one to change to at the next sample.
     period: u16,
     next_period: u16,
+    /// Every n-th period has a sample; how many are left until then; the n to change to.
+    every: u8,
+    skip: u8,
+    next_every: u8,
     masked_ucsrb: u8,
     missed: u16,
     milliseconds: u8,
@@ -56,6 +60,9 @@ static mut SHARED: Shared = Shared {
     t_ticks: 0,
     period: 0,
     next_period: 0,
+    every: 0,
+    skip: 0,
+    next_every: 0,
     masked_ucsrb: 0,
     missed: 0,
     milliseconds: 0,
@@ -110,11 +117,14 @@ fn set_compare(period: u16) {
         .write(|w| bits!(w, last.wrapping_sub(GUARD_TICKS)));
 }
 
-/// The time from tick to tick, from the next tick on.
+/// The period of the timer, and that every n-th has a sample: from the next sample on.
 #[inline(never)]
-pub fn set_period(ticks: u16) {
-    // SAFETY: interrupts are off.
-    interrupt::free(|_| unsafe { (*shared()).next_period = ticks });
+pub fn set_period(ticks: u16, every: u8) {
+    interrupt::free(|_| {
+        // SAFETY: interrupts are off.
+        let shared = unsafe { &mut *shared() };
+        (shared.next_period, shared.next_every) = (ticks, every);
+    });
 }
 
 /// Posts a job for the slot after the next sample; false while one waits.

@@ -27,32 +27,9 @@ impl<'a> Writer<'a> {
         writer
     }
 
-    #[cfg_attr(target_arch = "avr", inline(never))]
     pub(crate) fn u8(&mut self, byte: u8) {
         self.register = crc::update(self.register, byte);
         self.stuff(byte);
-    }
-
-    #[cfg_attr(target_arch = "avr", inline(never))]
-    pub(crate) fn u16(&mut self, value: u16) {
-        for byte in value.to_le_bytes() {
-            self.u8(byte);
-        }
-    }
-
-    #[cfg_attr(target_arch = "avr", inline(never))]
-    pub(crate) fn u32(&mut self, value: u32) {
-        for byte in value.to_le_bytes() {
-            self.u8(byte);
-        }
-    }
-
-    pub(crate) fn i16(&mut self, value: i16) {
-        self.u16(value.cast_unsigned());
-    }
-
-    pub(crate) fn i32(&mut self, value: i32) {
-        self.u32(value.cast_unsigned());
     }
 
     /// The frame's length on the line.
@@ -123,7 +100,7 @@ impl<const N: usize> Deframer<N> {
             len: 0,
             run: 0,
             state: State::Empty,
-            register: crc::INIT,
+            register: 0,
         }
     }
 
@@ -136,6 +113,7 @@ impl<const N: usize> Deframer<N> {
             State::Overlong | State::BadCobs => {}
             State::Empty => {
                 self.state = State::Filling;
+                self.register = crc::INIT;
                 self.code(byte);
             }
             State::Filling if self.run == 0 => {
@@ -173,7 +151,6 @@ impl<const N: usize> Deframer<N> {
         self.state = State::Empty;
         self.len = 0;
         self.run = 0;
-        self.register = crc::INIT;
         match state {
             State::Empty => None,
             State::Overlong => Some(Err(Broken::Length)),
@@ -188,46 +165,5 @@ impl<const N: usize> Deframer<N> {
                     .ok_or(Broken::Length),
             ),
         }
-    }
-}
-
-/// Takes the fields of a payload one after the other; `None` past the end.
-pub(crate) struct Reader<'a>(pub(crate) &'a [u8]);
-
-impl Reader<'_> {
-    #[inline(never)]
-    pub(crate) fn u8(&mut self) -> Option<u8> {
-        let (&byte, rest) = self.0.split_first()?;
-        self.0 = rest;
-        Some(byte)
-    }
-
-    #[inline(never)]
-    pub(crate) fn u16(&mut self) -> Option<u16> {
-        let (bytes, rest) = self.0.split_first_chunk()?;
-        self.0 = rest;
-        Some(u16::from_le_bytes(*bytes))
-    }
-
-    #[inline(never)]
-    pub(crate) fn u32(&mut self) -> Option<u32> {
-        let (bytes, rest) = self.0.split_first_chunk()?;
-        self.0 = rest;
-        Some(u32::from_le_bytes(*bytes))
-    }
-
-    pub(crate) fn i16(&mut self) -> Option<i16> {
-        Some(self.u16()?.cast_signed())
-    }
-
-    pub(crate) fn i32(&mut self) -> Option<i32> {
-        Some(self.u32()?.cast_signed())
-    }
-
-    pub(crate) fn three<T>(
-        &mut self,
-        mut one: impl FnMut(&mut Self) -> Option<T>,
-    ) -> Option<[T; 3]> {
-        Some([one(self)?, one(self)?, one(self)?])
     }
 }

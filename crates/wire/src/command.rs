@@ -1,8 +1,37 @@
 //! What the PC asks of the board.
 
-use crate::cobs::{Reader, Writer};
+use zerocopy::IntoBytes;
+
 use crate::frame::write_frame;
-use crate::{EncodeError, OVERHEAD, kind};
+use crate::{EncodeError, OVERHEAD, fields, kind};
+
+/// The codes of the commands on the wire.
+#[allow(missing_docs)]
+pub mod code {
+    pub const PING: u8 = 1;
+    pub const GET_HELLO: u8 = 2;
+    pub const KEEP_ALIVE: u8 = 3;
+    pub const COUNTERS: u8 = 4;
+    pub const CLEAR_COUNTERS: u8 = 5;
+    pub const REBOOT: u8 = 6;
+    pub const SET_RATE: u8 = 16;
+    pub const SET_BAUD: u8 = 17;
+    pub const SET_GYRO: u8 = 18;
+    pub const SET_ACC_RANGE: u8 = 19;
+    pub const BIAS_NULL: u8 = 32;
+    pub const SET_BIAS: u8 = 33;
+    pub const SET_SCALE: u8 = 34;
+    pub const MOTOR_DUTY: u8 = 48;
+    pub const MOTOR_PROFILE: u8 = 49;
+    pub const MOTOR_LIMITS: u8 = 50;
+    pub const READ_REGISTER: u8 = 64;
+    pub const WRITE_REGISTER: u8 = 65;
+    pub const SELF_TEST: u8 = 66;
+    pub const STORE_CONFIG: u8 = 80;
+    pub const LOAD_CONFIG: u8 = 81;
+    pub const DEFAULT_CONFIG: u8 = 82;
+    pub const SET_BOARD_ID: u8 = 83;
+}
 
 macro_rules! coded {
     ($(#[$outer:meta])* $enum:ident { $($(#[$doc:meta])* $name:ident = $code:literal,)* }) => {
@@ -115,8 +144,10 @@ pub enum Command {
     Reboot,
     /// Sets the time from sample to sample.
     SetRate {
-        /// Timer ticks of [`Hello::tick_ns`](crate::Hello::tick_ns).
+        /// Period of the sample timer, ticks of [`Hello::tick_ns`](crate::Hello::tick_ns).
         period_ticks: u16,
+        /// Periods from sample to sample; 0 is taken as 1.
+        periods_per_sample: u8,
     },
     /// Replies, then sets the speed of the line.
     SetBaud {
@@ -224,47 +255,52 @@ pub struct Request {
 
 impl Request {
     /// Bytes of the payload, version and kind included; the same for every command.
-    pub const LEN: usize = 13;
+    pub const LEN: usize = 2 + size_of::<fields::Request>();
     /// Bytes on the line.
     pub const FRAME_LEN: usize = Self::LEN + OVERHEAD;
 }
-
-/// Bytes that every request has for arguments; unused ones, at the end, are 0.
-const ARGUMENTS: u8 = 8;
 
 impl Command {
     /// The code on the wire.
     #[must_use]
     pub const fn code(&self) -> u8 {
         match self {
-            Command::Ping => 1,
-            Command::GetHello => 2,
-            Command::KeepAlive => 3,
-            Command::Counters => 4,
-            Command::ClearCounters => 5,
-            Command::Reboot => 6,
-            Command::SetRate { .. } => 16,
-            Command::SetBaud { .. } => 17,
-            Command::SetGyro { .. } => 18,
-            Command::SetAccRange { .. } => 19,
-            Command::BiasNull { .. } => 32,
-            Command::SetBias { .. } => 33,
-            Command::SetScale { .. } => 34,
-            Command::MotorDuty { .. } => 48,
-            Command::MotorProfile { .. } => 49,
-            Command::MotorLimits { .. } => 50,
-            Command::ReadRegister { .. } => 64,
-            Command::WriteRegister { .. } => 65,
-            Command::SelfTest { .. } => 66,
-            Command::StoreConfig => 80,
-            Command::LoadConfig => 81,
-            Command::DefaultConfig => 82,
-            Command::SetBoardId { .. } => 83,
+            Command::Ping => code::PING,
+            Command::GetHello => code::GET_HELLO,
+            Command::KeepAlive => code::KEEP_ALIVE,
+            Command::Counters => code::COUNTERS,
+            Command::ClearCounters => code::CLEAR_COUNTERS,
+            Command::Reboot => code::REBOOT,
+            Command::SetRate { .. } => code::SET_RATE,
+            Command::SetBaud { .. } => code::SET_BAUD,
+            Command::SetGyro { .. } => code::SET_GYRO,
+            Command::SetAccRange { .. } => code::SET_ACC_RANGE,
+            Command::BiasNull { .. } => code::BIAS_NULL,
+            Command::SetBias { .. } => code::SET_BIAS,
+            Command::SetScale { .. } => code::SET_SCALE,
+            Command::MotorDuty { .. } => code::MOTOR_DUTY,
+            Command::MotorProfile { .. } => code::MOTOR_PROFILE,
+            Command::MotorLimits { .. } => code::MOTOR_LIMITS,
+            Command::ReadRegister { .. } => code::READ_REGISTER,
+            Command::WriteRegister { .. } => code::WRITE_REGISTER,
+            Command::SelfTest { .. } => code::SELF_TEST,
+            Command::StoreConfig => code::STORE_CONFIG,
+            Command::LoadConfig => code::LOAD_CONFIG,
+            Command::DefaultConfig => code::DEFAULT_CONFIG,
+            Command::SetBoardId { .. } => code::SET_BOARD_ID,
         }
     }
 
-    /// Writes the arguments; returns how many bytes they took.
-    fn write(&self, writer: &mut Writer<'_>) -> u8 {
+    /// The argument bytes; unused ones, at the end, are 0.
+    fn arguments(&self) -> [u8; 8] {
+        let word = |value: u16| {
+            let [low, high] = value.to_le_bytes();
+            [low, high, 0, 0, 0, 0, 0, 0]
+        };
+        let long = |axis: Axis, value: i32| {
+            let [a, b, c, d] = value.to_le_bytes();
+            [axis as u8, a, b, c, d, 0, 0, 0]
+        };
         match *self {
             Command::Ping
             | Command::GetHello
@@ -274,34 +310,23 @@ impl Command {
             | Command::Reboot
             | Command::StoreConfig
             | Command::LoadConfig
-            | Command::DefaultConfig => 0,
+            | Command::DefaultConfig => [0; 8],
             Command::SetRate {
-                period_ticks: value,
+                period_ticks,
+                periods_per_sample,
+            } => {
+                let [a, b] = period_ticks.to_le_bytes();
+                [a, b, periods_per_sample, 0, 0, 0, 0, 0]
             }
-            | Command::SetBaud { divisor: value }
+            Command::SetBaud { divisor: value }
             | Command::BiasNull { samples: value }
-            | Command::SetBoardId { board_id: value } => {
-                writer.u16(value);
-                2
-            }
-            Command::SetGyro { range, filter } => {
-                writer.u8(range);
-                writer.u8(filter);
-                2
-            }
-            Command::SetAccRange { range } => {
-                writer.u8(range);
-                1
-            }
+            | Command::SetBoardId { board_id: value } => word(value),
+            Command::SetGyro { range, filter } => [range, filter, 0, 0, 0, 0, 0, 0],
+            Command::SetAccRange { range } => [range, 0, 0, 0, 0, 0, 0, 0],
             Command::SetBias { axis, value } | Command::SetScale { axis, value } => {
-                writer.u8(axis as u8);
-                writer.i32(value);
-                5
+                long(axis, value)
             }
-            Command::MotorDuty { duty } => {
-                writer.i16(duty);
-                2
-            }
+            Command::MotorDuty { duty } => word(duty.cast_unsigned()),
             Command::MotorProfile {
                 shape,
                 amplitude,
@@ -309,118 +334,201 @@ impl Command {
                 period_ms,
                 cycles,
             } => {
-                writer.u8(shape as u8);
-                writer.i16(amplitude);
-                writer.i16(offset);
-                writer.u16(period_ms);
-                writer.u8(cycles);
-                8
+                let ([a, b], [c, d], [e, f]) = (
+                    amplitude.to_le_bytes(),
+                    offset.to_le_bytes(),
+                    period_ms.to_le_bytes(),
+                );
+                [shape as u8, a, b, c, d, e, f, cycles]
             }
             Command::MotorLimits {
                 max_duty,
                 ramp_per_s,
             } => {
-                writer.u8(max_duty);
-                writer.u16(ramp_per_s);
-                3
+                let [a, b] = ramp_per_s.to_le_bytes();
+                [max_duty, a, b, 0, 0, 0, 0, 0]
             }
-            Command::ReadRegister { gyro, address } => {
-                writer.u8(gyro as u8);
-                writer.u8(address);
-                2
-            }
+            Command::ReadRegister { gyro, address } => [gyro as u8, address, 0, 0, 0, 0, 0, 0],
             Command::WriteRegister {
                 gyro,
                 address,
                 value,
             } => {
-                writer.u8(gyro as u8);
-                writer.u8(address);
-                writer.u16(value);
-                4
+                let [a, b] = value.to_le_bytes();
+                [gyro as u8, address, a, b, 0, 0, 0, 0]
             }
-            Command::SelfTest { sensor } => {
-                writer.u8(sensor as u8);
-                1
-            }
+            Command::SelfTest { sensor } => [sensor as u8, 0, 0, 0, 0, 0, 0, 0],
         }
     }
+}
 
-    /// The command of a code and its arguments, or why there is none: [`Status::UnknownCommand`] or
-    /// [`Status::BadArgument`].
-    pub(crate) fn read(code: u8, reader: &mut Reader<'_>) -> Result<Self, Status> {
-        const BAD: Status = Status::BadArgument;
-        let mut byte = || reader.u8().ok_or(BAD);
-        let command = match code {
-            1 => Command::Ping,
-            2 => Command::GetHello,
-            3 => Command::KeepAlive,
-            4 => Command::Counters,
-            5 => Command::ClearCounters,
-            6 => Command::Reboot,
-            16 => Command::SetRate {
-                period_ticks: reader.u16().ok_or(BAD)?,
-            },
-            17 => Command::SetBaud {
-                divisor: reader.u16().ok_or(BAD)?,
-            },
-            18 => Command::SetGyro {
-                range: byte()?,
-                filter: byte()?,
-            },
-            19 => Command::SetAccRange { range: byte()? },
-            32 => Command::BiasNull {
-                samples: reader.u16().ok_or(BAD)?,
-            },
-            33 => Command::SetBias {
-                axis: Axis::from_code(byte()?).ok_or(BAD)?,
-                value: reader.i32().ok_or(BAD)?,
-            },
-            34 => Command::SetScale {
-                axis: Axis::from_code(byte()?).ok_or(BAD)?,
-                value: reader.i32().ok_or(BAD)?,
-            },
-            48 => Command::MotorDuty {
-                duty: reader.i16().ok_or(BAD)?,
-            },
-            49 => Command::MotorProfile {
-                shape: Shape::from_code(byte()?).ok_or(BAD)?,
-                amplitude: reader.i16().ok_or(BAD)?,
-                offset: reader.i16().ok_or(BAD)?,
-                period_ms: reader.u16().ok_or(BAD)?,
-                cycles: reader.u8().ok_or(BAD)?,
-            },
-            50 => Command::MotorLimits {
-                max_duty: byte()?,
-                ramp_per_s: reader.u16().ok_or(BAD)?,
-            },
-            64 => Command::ReadRegister {
-                gyro: Axis::from_code(byte()?).ok_or(BAD)?,
-                address: byte()?,
-            },
-            65 => Command::WriteRegister {
-                gyro: Axis::from_code(byte()?).ok_or(BAD)?,
-                address: byte()?,
-                value: reader.u16().ok_or(BAD)?,
-            },
-            66 => Command::SelfTest {
-                sensor: Sensor::from_code(byte()?).ok_or(BAD)?,
-            },
-            80 => Command::StoreConfig,
-            81 => Command::LoadConfig,
-            82 => Command::DefaultConfig,
-            83 => Command::SetBoardId {
-                board_id: reader.u16().ok_or(BAD)?,
-            },
-            _ => return Err(Status::UnknownCommand),
+/// An undamaged request, as it came: what the board works from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    /// Chosen by the PC, comes back in the reply.
+    pub number: u16,
+    /// One of [`code`], if the command exists.
+    pub code: u8,
+    /// The argument bytes.
+    pub arguments: [u8; 8],
+}
+
+impl Asked {
+    /// How many argument bytes the command has; `None` where no command has the code.
+    #[must_use]
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    const fn arguments_len(code: u8) -> Option<u8> {
+        Some(match code {
+            code::PING..=code::REBOOT | code::STORE_CONFIG..=code::DEFAULT_CONFIG => 0,
+            code::SET_ACC_RANGE | code::SELF_TEST => 1,
+            code::SET_BAUD..=code::SET_GYRO
+            | code::BIAS_NULL
+            | code::MOTOR_DUTY
+            | code::READ_REGISTER
+            | code::SET_BOARD_ID => 2,
+            code::SET_RATE | code::MOTOR_LIMITS => 3,
+            code::WRITE_REGISTER => 4,
+            code::SET_BIAS | code::SET_SCALE => 5,
+            code::MOTOR_PROFILE => 8,
+            _ => return None,
+        })
+    }
+
+    /// Why the request is refused, whatever its arguments mean: the command does not exist, or bytes that it does not
+    /// use are not 0 (they may come to mean something).
+    #[must_use]
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub fn refusal(&self) -> Option<Status> {
+        let Some(used) = Self::arguments_len(self.code) else {
+            return Some(Status::UnknownCommand);
         };
-        // What is left over is unused, and must say so: it may come to mean something.
-        while let Some(unused) = reader.u8() {
-            if unused != 0 {
-                return Err(BAD);
+        for (&byte, place) in self.arguments.iter().zip(0u8..) {
+            if place >= used && byte != 0 {
+                return Some(Status::BadArgument);
             }
         }
-        Ok(command)
+        None
+    }
+
+    /// An argument of one byte.
+    #[must_use]
+    #[inline]
+    pub const fn u8<const AT: usize>(&self) -> u8 {
+        const { assert!(AT < 8) };
+        self.arguments[AT]
+    }
+
+    /// An argument of two bytes.
+    #[must_use]
+    #[inline]
+    pub const fn u16<const AT: usize>(&self) -> u16 {
+        const { assert!(AT + 1 < 8) };
+        u16::from_le_bytes([self.arguments[AT], self.arguments[AT + 1]])
+    }
+
+    /// A signed argument of two bytes.
+    #[must_use]
+    #[inline]
+    pub const fn i16<const AT: usize>(&self) -> i16 {
+        self.u16::<AT>().cast_signed()
+    }
+
+    /// A signed argument of four bytes.
+    #[must_use]
+    #[inline]
+    pub const fn i32<const AT: usize>(&self) -> i32 {
+        const { assert!(AT + 3 < 8) };
+        let at = &self.arguments;
+        i32::from_le_bytes([at[AT], at[AT + 1], at[AT + 2], at[AT + 3]])
+    }
+
+    /// The command with its arguments.
+    ///
+    /// # Errors
+    /// [`Status::UnknownCommand`] or [`Status::BadArgument`]; what is refused by a board for the values of its
+    /// arguments is a command here.
+    pub fn command(&self) -> Result<Command, Status> {
+        const BAD: Status = Status::BadArgument;
+        if let Some(status) = self.refusal() {
+            return Err(status);
+        }
+        let axis = || Axis::from_code(self.u8::<0>()).ok_or(BAD);
+        Ok(match self.code {
+            code::PING => Command::Ping,
+            code::GET_HELLO => Command::GetHello,
+            code::KEEP_ALIVE => Command::KeepAlive,
+            code::COUNTERS => Command::Counters,
+            code::CLEAR_COUNTERS => Command::ClearCounters,
+            code::REBOOT => Command::Reboot,
+            code::SET_RATE => Command::SetRate {
+                period_ticks: self.u16::<0>(),
+                periods_per_sample: self.u8::<2>(),
+            },
+            code::SET_BAUD => Command::SetBaud {
+                divisor: self.u16::<0>(),
+            },
+            code::SET_GYRO => Command::SetGyro {
+                range: self.u8::<0>(),
+                filter: self.u8::<1>(),
+            },
+            code::SET_ACC_RANGE => Command::SetAccRange {
+                range: self.u8::<0>(),
+            },
+            code::BIAS_NULL => Command::BiasNull {
+                samples: self.u16::<0>(),
+            },
+            code::SET_BIAS => Command::SetBias {
+                axis: axis()?,
+                value: self.i32::<1>(),
+            },
+            code::SET_SCALE => Command::SetScale {
+                axis: axis()?,
+                value: self.i32::<1>(),
+            },
+            code::MOTOR_DUTY => Command::MotorDuty {
+                duty: self.i16::<0>(),
+            },
+            code::MOTOR_PROFILE => Command::MotorProfile {
+                shape: Shape::from_code(self.u8::<0>()).ok_or(BAD)?,
+                amplitude: self.i16::<1>(),
+                offset: self.i16::<3>(),
+                period_ms: self.u16::<5>(),
+                cycles: self.u8::<7>(),
+            },
+            code::MOTOR_LIMITS => Command::MotorLimits {
+                max_duty: self.u8::<0>(),
+                ramp_per_s: self.u16::<1>(),
+            },
+            code::READ_REGISTER => Command::ReadRegister {
+                gyro: axis()?,
+                address: self.u8::<1>(),
+            },
+            code::WRITE_REGISTER => Command::WriteRegister {
+                gyro: axis()?,
+                address: self.u8::<1>(),
+                value: self.u16::<2>(),
+            },
+            code::SELF_TEST => Command::SelfTest {
+                sensor: Sensor::from_code(self.u8::<0>()).ok_or(BAD)?,
+            },
+            code::STORE_CONFIG => Command::StoreConfig,
+            code::LOAD_CONFIG => Command::LoadConfig,
+            code::DEFAULT_CONFIG => Command::DefaultConfig,
+            code::SET_BOARD_ID => Command::SetBoardId {
+                board_id: self.u16::<0>(),
+            },
+            _ => return Err(Status::UnknownCommand),
+        })
+    }
+}
+
+impl From<&fields::Request> for Asked {
+    fn from(request: &fields::Request) -> Self {
+        Asked {
+            number: request.number.get(),
+            code: request.command,
+            arguments: request.arguments,
+        }
     }
 }
 
@@ -429,12 +537,10 @@ impl Command {
 /// # Errors
 /// [`EncodeError::BufferTooSmall`] below [`Request::FRAME_LEN`].
 pub fn encode_request(request: &Request, out: &mut [u8]) -> Result<usize, EncodeError> {
-    write_frame(out, kind::REQUEST, Request::FRAME_LEN, |writer| {
-        writer.u16(request.number);
-        writer.u8(request.command.code());
-        let used = request.command.write(writer);
-        for _ in used..ARGUMENTS {
-            writer.u8(0);
-        }
-    })
+    let request = fields::Request {
+        number: request.number.into(),
+        command: request.command.code(),
+        arguments: request.command.arguments(),
+    };
+    write_frame(kind::REQUEST, request.as_bytes(), out)
 }

@@ -1,7 +1,9 @@
 //! From the bytes of a line to frames.
 
-use crate::cobs::{Broken, Deframer, Reader};
-use crate::{Command, Frame, MAX_FRAME, Request, Status, VERSION, kind};
+use zerocopy::FromBytes;
+
+use crate::cobs::{Broken, Deframer};
+use crate::{Asked, Frame, MAX_FRAME, Request, Status, VERSION, fields, kind};
 
 /// Why what ended at a delimiter is no frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -205,37 +207,43 @@ impl RequestDecoder {
         }
     }
 
+    /// Takes the next byte; a delimiter may bring a request as it came, or why there is none.
+    pub fn ask(&mut self, byte: u8) -> Option<Result<Asked, DecodeError>> {
+        Some(match self.deframer.push(byte)? {
+            Ok(payload) => asked_of(payload),
+            Err(broken) => Err(broken.into()),
+        })
+    }
+
     /// Takes the next byte; a delimiter may bring a request, or why there is none.
     pub fn push(&mut self, byte: u8) -> Option<Result<Request, RequestError>> {
-        Some(match self.deframer.push(byte)? {
-            Ok(payload) => request_of(payload),
-            Err(broken) => Err(RequestError::Frame(broken.into())),
+        Some(match self.ask(byte)? {
+            Ok(asked) => asked
+                .command()
+                .map(|command| Request {
+                    number: asked.number,
+                    command,
+                })
+                .map_err(|status| RequestError::Refused {
+                    number: asked.number,
+                    command: asked.code,
+                    status,
+                }),
+            Err(error) => Err(RequestError::Frame(error)),
         })
     }
 }
 
-fn request_of(payload: &[u8]) -> Result<Request, RequestError> {
-    let (&[version, kind_byte], fields) = payload
-        .split_first_chunk()
-        .ok_or(RequestError::Frame(DecodeError::BadLength))?;
+fn asked_of(payload: &[u8]) -> Result<Asked, DecodeError> {
+    let (&[version, kind_byte], fields) =
+        payload.split_first_chunk().ok_or(DecodeError::BadLength)?;
     if version != VERSION {
-        return Err(RequestError::Frame(DecodeError::UnknownVersion(version)));
+        return Err(DecodeError::UnknownVersion(version));
     }
     if kind_byte != kind::REQUEST {
-        return Err(RequestError::Frame(DecodeError::UnknownKind(kind_byte)));
+        return Err(DecodeError::UnknownKind(kind_byte));
     }
-    if payload.len() != Request::LEN {
-        return Err(RequestError::Frame(DecodeError::BadLength));
-    }
-    let mut reader = Reader(fields);
-    let (Some(number), Some(code)) = (reader.u16(), reader.u8()) else {
-        return Err(RequestError::Frame(DecodeError::BadLength));
-    };
-    Command::read(code, &mut reader)
-        .map(|command| Request { number, command })
-        .map_err(|status| RequestError::Refused {
-            number,
-            command: code,
-            status,
-        })
+    fields::Request::ref_from_bytes(fields)
+        .map(Asked::from)
+        .map_err(|_| DecodeError::BadLength)
 }

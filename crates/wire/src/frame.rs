@@ -1,7 +1,8 @@
 //! What the board says: hello, sample, health, reply.
 
-use crate::cobs::{Reader, Writer};
-use crate::{Health, OVERHEAD, Status, kind};
+use zerocopy::{FromBytes, IntoBytes};
+
+use crate::{Health, OVERHEAD, Status, fields, kind};
 
 /// The bits of [`Sample::flags`].
 pub mod flags {
@@ -79,7 +80,7 @@ pub struct Hello {
     pub next_seq: u16,
     /// Length of a timer tick, the unit of [`Sample::t_ticks`], ns.
     pub tick_ns: u32,
-    /// Time from sample to sample, timer ticks.
+    /// Period of the sample timer, timer ticks; a sample is taken at every [`periods_per_sample`](Self::periods_per_sample)-th.
     pub period_ticks: u16,
     /// The USART's UBRR: the line runs at 16 MHz / 16 / (divisor + 1) baud.
     pub baud_divisor: u16,
@@ -97,57 +98,15 @@ pub struct Hello {
     pub bias: [i32; 3],
     /// Scale factor of each gyro, Q8.24 deg/s for each count.
     pub scale: [i32; 3],
+    /// Periods of the sample timer from sample to sample: 1 but for rates that its 16 bits do not hold.
+    pub periods_per_sample: u8,
 }
 
 impl Hello {
     /// Bytes of the payload, version and kind included.
-    pub const LEN: usize = 49;
+    pub const LEN: usize = 2 + size_of::<fields::Hello>();
     /// Bytes on the line.
     pub const FRAME_LEN: usize = Self::LEN + OVERHEAD;
-
-    fn write(&self, writer: &mut Writer<'_>) {
-        for byte in self.firmware {
-            writer.u8(byte);
-        }
-        writer.u16(self.board_id);
-        writer.u8(self.reset_cause);
-        writer.u16(self.restarts);
-        writer.u16(self.next_seq);
-        writer.u32(self.tick_ns);
-        writer.u16(self.period_ticks);
-        writer.u16(self.baud_divisor);
-        writer.u8(self.gyro_range);
-        writer.u8(self.gyro_filter);
-        writer.u8(self.gyro_sample_period);
-        writer.u8(self.acc_range);
-        writer.u8(self.config_source);
-        for value in self.bias {
-            writer.i32(value);
-        }
-        for value in self.scale {
-            writer.i32(value);
-        }
-    }
-
-    fn read(reader: &mut Reader<'_>) -> Option<Self> {
-        Some(Hello {
-            firmware: reader.three(Reader::u8)?,
-            board_id: reader.u16()?,
-            reset_cause: reader.u8()?,
-            restarts: reader.u16()?,
-            next_seq: reader.u16()?,
-            tick_ns: reader.u32()?,
-            period_ticks: reader.u16()?,
-            baud_divisor: reader.u16()?,
-            gyro_range: reader.u8()?,
-            gyro_filter: reader.u8()?,
-            gyro_sample_period: reader.u8()?,
-            acc_range: reader.u8()?,
-            config_source: reader.u8()?,
-            bias: reader.three(Reader::i32)?,
-            scale: reader.three(Reader::i32)?,
-        })
-    }
 }
 
 /// Sample frame: everything that was measured at one tick.
@@ -175,43 +134,9 @@ pub struct Sample {
 
 impl Sample {
     /// Bytes of the payload, version and kind included.
-    pub const LEN: usize = 44;
+    pub const LEN: usize = 2 + size_of::<fields::Sample>();
     /// Bytes on the line.
     pub const FRAME_LEN: usize = Self::LEN + OVERHEAD;
-
-    fn write(&self, writer: &mut Writer<'_>) {
-        writer.u16(self.seq);
-        writer.u32(self.t_ticks);
-        for count in self.gyro {
-            writer.i16(count);
-        }
-        for count in self.temp {
-            writer.i16(count);
-        }
-        writer.u16(self.supply);
-        for count in self.acc {
-            writer.u16(count);
-        }
-        writer.i16(self.pwm);
-        writer.u16(self.flags);
-        for value in self.rate {
-            writer.i32(value);
-        }
-    }
-
-    fn read(reader: &mut Reader<'_>) -> Option<Self> {
-        Some(Sample {
-            seq: reader.u16()?,
-            t_ticks: reader.u32()?,
-            gyro: reader.three(Reader::i16)?,
-            temp: reader.three(Reader::i16)?,
-            supply: reader.u16()?,
-            acc: reader.three(Reader::u16)?,
-            pwm: reader.i16()?,
-            flags: reader.u16()?,
-            rate: reader.three(Reader::i32)?,
-        })
-    }
 }
 
 /// Reply frame: the one answer to a request.
@@ -232,30 +157,9 @@ pub struct Reply {
 
 impl Reply {
     /// Bytes of the payload, version and kind included.
-    pub const LEN: usize = 22;
+    pub const LEN: usize = 2 + size_of::<fields::Reply>();
     /// Bytes on the line.
     pub const FRAME_LEN: usize = Self::LEN + OVERHEAD;
-
-    fn write(&self, writer: &mut Writer<'_>) {
-        writer.u16(self.number);
-        writer.u8(self.command);
-        writer.u8(self.status as u8);
-        writer.i32(self.value);
-        for value in self.detail {
-            writer.i32(value);
-        }
-    }
-
-    /// `None` for a status code that is not in the table too.
-    fn read(reader: &mut Reader<'_>) -> Option<Self> {
-        Some(Reply {
-            number: reader.u16()?,
-            command: reader.u8()?,
-            status: Status::from_code(reader.u8()?)?,
-            value: reader.i32()?,
-            detail: reader.three(Reader::i32)?,
-        })
-    }
 }
 
 /// A frame from the board.
@@ -284,13 +188,21 @@ impl Frame {
     }
 
     /// The fields after version and kind.
-    pub(crate) fn read(kind_byte: u8, fields: &[u8]) -> Option<Self> {
-        let mut reader = Reader(fields);
+    pub(crate) fn read(kind_byte: u8, bytes: &[u8]) -> Option<Self> {
         match kind_byte {
-            kind::HELLO => Hello::read(&mut reader).map(Frame::Hello),
-            kind::SAMPLE => Sample::read(&mut reader).map(Frame::Sample),
-            kind::HEALTH => Health::read(&mut reader).map(Frame::Health),
-            kind::REPLY => Reply::read(&mut reader).map(Frame::Reply),
+            kind::HELLO => Some(Frame::Hello(Hello::from(
+                fields::Hello::ref_from_bytes(bytes).ok()?,
+            ))),
+            kind::SAMPLE => Some(Frame::Sample(Sample::from(
+                fields::Sample::ref_from_bytes(bytes).ok()?,
+            ))),
+            kind::HEALTH => Some(Frame::Health(Health::from(
+                fields::Health::ref_from_bytes(bytes).ok()?,
+            ))),
+            kind::REPLY => fields::Reply::ref_from_bytes(bytes)
+                .ok()?
+                .reply()
+                .map(Frame::Reply),
             _ => None,
         }
     }
@@ -320,74 +232,35 @@ impl core::fmt::Display for EncodeError {
 
 impl core::error::Error for EncodeError {}
 
-/// Checks the room, then writes.
-#[inline(always)]
-pub(crate) fn write_frame(
-    out: &mut [u8],
-    kind_byte: u8,
-    frame_len: usize,
-    fields: impl FnOnce(&mut Writer<'_>),
-) -> Result<usize, EncodeError> {
-    if out.len() < frame_len {
-        return Err(EncodeError::BufferTooSmall {
-            need: frame_len,
-            have: out.len(),
-        });
-    }
-    let mut writer = Writer::new(out, kind_byte);
-    fields(&mut writer);
-    Ok(writer.finish())
-}
-
 /// Writes a frame as it goes on the line, delimiter included; returns its length.
 ///
 /// # Errors
 /// [`EncodeError::BufferTooSmall`]; [`MAX_FRAME`](crate::MAX_FRAME) bytes are always enough.
 pub fn encode(frame: &Frame, out: &mut [u8]) -> Result<usize, EncodeError> {
     match frame {
-        Frame::Hello(hello) => encode_hello(hello, out),
-        Frame::Sample(sample) => encode_sample(sample, out),
-        Frame::Health(health) => encode_health(health, out),
-        Frame::Reply(reply) => encode_reply(reply, out),
+        Frame::Hello(hello) => write_frame(kind::HELLO, fields::Hello::from(hello).as_bytes(), out),
+        Frame::Sample(sample) => {
+            write_frame(kind::SAMPLE, fields::Sample::from(sample).as_bytes(), out)
+        }
+        Frame::Health(health) => {
+            write_frame(kind::HEALTH, fields::Health::from(health).as_bytes(), out)
+        }
+        Frame::Reply(reply) => write_frame(kind::REPLY, fields::Reply::from(reply).as_bytes(), out),
     }
 }
 
-/// Writes a hello frame, without the detour over [`Frame`].
-///
-/// # Errors
-/// [`EncodeError::BufferTooSmall`] below [`Hello::FRAME_LEN`].
-pub fn encode_hello(hello: &Hello, out: &mut [u8]) -> Result<usize, EncodeError> {
-    write_frame(out, kind::HELLO, Hello::FRAME_LEN, |writer| {
-        hello.write(writer)
-    })
-}
-
-/// Writes a sample frame, without the detour over [`Frame`].
-///
-/// # Errors
-/// [`EncodeError::BufferTooSmall`] below [`Sample::FRAME_LEN`].
-pub fn encode_sample(sample: &Sample, out: &mut [u8]) -> Result<usize, EncodeError> {
-    write_frame(out, kind::SAMPLE, Sample::FRAME_LEN, |writer| {
-        sample.write(writer)
-    })
-}
-
-/// Writes a health frame, without the detour over [`Frame`].
-///
-/// # Errors
-/// [`EncodeError::BufferTooSmall`] below [`Health::FRAME_LEN`].
-pub fn encode_health(health: &Health, out: &mut [u8]) -> Result<usize, EncodeError> {
-    write_frame(out, kind::HEALTH, Health::FRAME_LEN, |writer| {
-        health.write(writer)
-    })
-}
-
-/// Writes a reply frame, without the detour over [`Frame`].
-///
-/// # Errors
-/// [`EncodeError::BufferTooSmall`] below [`Reply::FRAME_LEN`].
-pub fn encode_reply(reply: &Reply, out: &mut [u8]) -> Result<usize, EncodeError> {
-    write_frame(out, kind::REPLY, Reply::FRAME_LEN, |writer| {
-        reply.write(writer)
-    })
+/// Checks the room, then writes.
+pub(crate) fn write_frame(
+    kind_byte: u8,
+    fields: &[u8],
+    out: &mut [u8],
+) -> Result<usize, EncodeError> {
+    let need = 2 + fields.len() + OVERHEAD;
+    if out.len() < need {
+        return Err(EncodeError::BufferTooSmall {
+            need,
+            have: out.len(),
+        });
+    }
+    Ok(fields::encode(kind_byte, fields, out))
 }

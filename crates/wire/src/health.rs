@@ -1,7 +1,5 @@
 //! What went wrong on the board, counted.
 
-use crate::cobs::{Reader, Writer};
-
 macro_rules! faults {
     ($($(#[$doc:meta])* $name:ident = $number:literal, $text:literal;)*) => {
         /// Everything that the board counts. The discriminant is the counter's place in the health frame.
@@ -181,7 +179,7 @@ impl Fault {
 
 /// One counter for each [`Fault`]. Counts saturate: 65535 reads "at least 65535".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FaultCounts([u16; Fault::COUNT]);
+pub struct FaultCounts(pub(crate) [u16; Fault::COUNT]);
 
 impl Default for FaultCounts {
     fn default() -> Self {
@@ -251,33 +249,9 @@ pub struct Health {
 
 impl Health {
     /// Bytes of the payload, version and kind included.
-    pub const LEN: usize = 12 + 2 * Fault::COUNT;
+    pub const LEN: usize = 2 + size_of::<crate::fields::Health>();
     /// Bytes on the line.
     pub const FRAME_LEN: usize = Self::LEN + crate::OVERHEAD;
-
-    pub(crate) fn write(&self, writer: &mut Writer<'_>) {
-        writer.u32(self.uptime_s);
-        writer.u16(self.next_seq);
-        writer.u16(self.tick_busy_max);
-        writer.u16(self.stack_free);
-        for &count in &self.faults.0 {
-            writer.u16(count);
-        }
-    }
-
-    pub(crate) fn read(reader: &mut Reader<'_>) -> Option<Self> {
-        let mut health = Health {
-            uptime_s: reader.u32()?,
-            next_seq: reader.u16()?,
-            tick_busy_max: reader.u16()?,
-            stack_free: reader.u16()?,
-            faults: FaultCounts::new(),
-        };
-        for count in &mut health.faults.0 {
-            *count = reader.u16()?;
-        }
-        Some(health)
-    }
 }
 
 #[cfg(test)]

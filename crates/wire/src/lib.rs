@@ -31,16 +31,14 @@ mod cobs;
 mod command;
 pub mod crc;
 mod decode;
+pub mod fields;
 mod frame;
 mod health;
 pub mod link;
 
-pub use command::{Axis, Command, Request, Sensor, Shape, Status, encode_request};
+pub use command::{Asked, Axis, Command, Request, Sensor, Shape, Status, code, encode_request};
 pub use decode::{DecodeError, Decoder, LinkCounts, RequestDecoder, RequestError};
-pub use frame::{
-    EncodeError, Frame, Hello, Reply, Sample, encode, encode_health, encode_hello, encode_reply,
-    encode_sample, flags, reset_cause,
-};
+pub use frame::{EncodeError, Frame, Hello, Reply, Sample, encode, flags, reset_cause};
 pub use health::{Fault, FaultCounts, Health};
 
 /// Version of the format that this crate writes and reads; the first byte of every payload.

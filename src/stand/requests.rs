@@ -1,0 +1,402 @@
+//! What the PC asks for: every request gets one reply, now or when it is done.
+
+use adis16250::{Register, control};
+use wire::{Asked, Sensor, Status, code};
+use zerocopy::FromZeros;
+use zerocopy::little_endian::I32;
+
+use super::{Board, Pending, Stand, source};
+use crate::acquire::Job;
+use crate::bias::{BiasNull, MAX_SAMPLES, MIN_SAMPLES};
+use crate::motor::FULL;
+
+/// What becomes of a request at once.
+enum Answer {
+    Now(Status),
+    /// The reply comes when it is done, or has been sent.
+    Later,
+}
+
+/// Time for a gyro's self-test, ms: the data sheet's 25 ms (unverified) with margin; see the driver.
+const SELF_TEST_MS: u8 = 40;
+
+/// A gyro's self-test: a job at a time, none of them long.
+pub(super) struct SelfTest {
+    /// 0: none runs.
+    step: u8,
+    wait_ms: u8,
+    axis: u8,
+}
+
+/// Steps of the self-test, each with the job that it waits for.
+mod step {
+    pub const CLEAR_STATUS: u8 = 1;
+    pub const START: u8 = 2;
+    pub const HAS_ENDED: u8 = 3;
+    pub const VERDICT: u8 = 4;
+}
+
+impl SelfTest {
+    pub(super) const fn new() -> Self {
+        Self {
+            step: 0,
+            wait_ms: 0,
+            axis: 0,
+        }
+    }
+}
+
+impl Stand {
+    #[inline(never)]
+    pub(super) fn on_request<B: Board>(&mut self, board: &mut B, asked: &Asked) {
+        let answer = match asked.refusal() {
+            Some(status) => Answer::Now(status),
+            None => self.carry_out(board, asked),
+        };
+        if let Answer::Now(status) = answer {
+            self.reply(board, asked.into(), status);
+        }
+    }
+
+    #[inline(never)]
+    fn carry_out<B: Board>(&mut self, board: &mut B, asked: &Asked) -> Answer {
+        let axis = asked.u8::<0>();
+        let status = match asked.code {
+            code::PING => Status::Ok,
+            code::GET_HELLO => {
+                self.hello(board);
+                Status::Ok
+            }
+            code::KEEP_ALIVE => {
+                self.motor.keep_alive();
+                Status::Ok
+            }
+            code::COUNTERS => {
+                self.health(board);
+                Status::Ok
+            }
+            code::CLEAR_COUNTERS => {
+                self.health(board);
+                self.health.faults.zero();
+                Status::Ok
+            }
+            code::REBOOT => {
+                self.reply(board, asked.into(), Status::Ok);
+                self.motor.cut();
+                board.set_motor(0);
+                board.reboot();
+                return Answer::Later;
+            }
+            code::SET_RATE..=code::SET_ACC_RANGE => return self.set_up(board, asked),
+            code::BIAS_NULL => {
+                let samples = asked.u16::<0>();
+                if !(MIN_SAMPLES..=MAX_SAMPLES).contains(&samples) {
+                    Status::BadArgument
+                } else if !self.null.is_none() {
+                    Status::Busy
+                } else if self.motor.is_on() {
+                    Status::Moving
+                } else {
+                    self.null = asked.into();
+                    self.null_samples = samples;
+                    self.bias_null = BiasNull::new();
+                    return Answer::Later;
+                }
+            }
+            code::SET_BIAS => {
+                let bias = &mut self.config.set_up.bias;
+                let done = set(bias, axis, asked.i32::<1>());
+                self.changed(done)
+            }
+            code::SET_SCALE => {
+                let value = asked.i32::<1>();
+                let done = value > 0 && set(&mut self.config.set_up.scale, axis, value);
+                self.changed(done)
+            }
+            code::MOTOR_DUTY => {
+                let duty = asked.i16::<0>();
+                if !(-FULL..=FULL).contains(&duty) {
+                    Status::BadArgument
+                } else if duty != 0 && !self.motor.is_alive() {
+                    Status::NoKeepAlive
+                } else {
+                    let holds = self.motor.command(duty);
+                    self.answer.value.set(holds.into());
+                    Status::Ok
+                }
+            }
+            code::MOTOR_PROFILE => {
+                let shape = asked.u8::<0>();
+                if shape != 0 && !self.motor.is_alive() {
+                    Status::NoKeepAlive
+                } else {
+                    done(self.motor.profile(
+                        shape,
+                        asked.i16::<1>(),
+                        asked.i16::<3>(),
+                        asked.u16::<5>(),
+                        asked.u8::<7>(),
+                    ))
+                }
+            }
+            code::MOTOR_LIMITS => {
+                self.config.max_duty = asked.u8::<0>();
+                self.config.ramp_per_s.set(asked.u16::<1>());
+                self.motor.limit(self.config.max_duty, asked.u16::<1>());
+                self.changed(true)
+            }
+            code::READ_REGISTER => {
+                return self.post(
+                    board,
+                    asked,
+                    Job::Read {
+                        axis,
+                        address: asked.u8::<1>(),
+                    },
+                );
+            }
+            code::WRITE_REGISTER => {
+                let (address, value) = (asked.u8::<1>(), asked.u16::<2>());
+                return self.post(
+                    board,
+                    asked,
+                    Job::Write {
+                        axis,
+                        address,
+                        value,
+                    },
+                );
+            }
+            code::SELF_TEST => return self.begin_self_test(asked),
+            code::STORE_CONFIG => {
+                if self.begin_store(asked.into()) {
+                    return Answer::Later;
+                }
+                Status::Busy
+            }
+            code::LOAD_CONFIG => {
+                if self.load(board) {
+                    self.apply(board);
+                    Status::Ok
+                } else {
+                    Status::NoConfig
+                }
+            }
+            code::DEFAULT_CONFIG => {
+                self.config.set_default();
+                self.config.set_up.config_source = source::BUILT_IN;
+                self.apply(board);
+                Status::Ok
+            }
+            code::SET_BOARD_ID => {
+                self.config.board_id.set(asked.u16::<0>());
+                self.changed(true)
+            }
+            // What has a code but no arm here: none.
+            _ => Status::Unsupported,
+        };
+        Answer::Now(status)
+    }
+
+    /// What changes several things at once, or nothing when one of them is out of range.
+    #[inline(never)]
+    fn set_up<B: Board>(&mut self, board: &mut B, asked: &Asked) -> Answer {
+        let was = self.config;
+        let set_up = &mut self.config.set_up;
+        match asked.code {
+            code::SET_RATE => {
+                set_up.period_ticks.set(asked.u16::<0>());
+                set_up.periods_per_sample = asked.u8::<2>().max(1);
+            }
+            code::SET_BAUD => set_up.baud_divisor.set(asked.u16::<0>()),
+            code::SET_GYRO => {
+                (set_up.gyro_range, set_up.gyro_filter) = (asked.u8::<0>(), asked.u8::<1>())
+            }
+            _ => set_up.acc_range = asked.u8::<0>(),
+        }
+        if !self.config.is_in_order() {
+            self.config = was;
+            return Answer::Now(Status::BadArgument);
+        }
+        let set_up = &mut self.config.set_up;
+        set_up.config_source = source::SET;
+        match asked.code {
+            code::SET_RATE => {
+                board.set_period(set_up.period_ticks.get(), set_up.periods_per_sample)
+            }
+            code::SET_BAUD => {
+                let divisor = set_up.baud_divisor.get();
+                self.reply(board, asked.into(), Status::Ok);
+                board.set_baud(divisor);
+                return Answer::Later;
+            }
+            code::SET_GYRO => {
+                let job = Job::Configure {
+                    sens_avg: self.config.sens_avg(),
+                };
+                let answer = self.post(board, asked, job);
+                match answer {
+                    Answer::Now(_) => self.config = was,
+                    Answer::Later => self.config.set_scale_of_range(),
+                }
+                return answer;
+            }
+            _ => board.set_acc_range(set_up.acc_range),
+        }
+        Answer::Now(Status::Ok)
+    }
+
+    #[inline(never)]
+    fn changed(&mut self, in_range: bool) -> Status {
+        if in_range {
+            self.config.set_up.config_source = source::SET;
+        }
+        done(in_range)
+    }
+
+    /// Posts work whose end answers the request.
+    #[inline(never)]
+    fn post<B: Board>(&mut self, board: &mut B, asked: &Asked, job: Job) -> Answer {
+        if self.job.is_none() && board.post(job) {
+            self.job = asked.into();
+            Answer::Later
+        } else {
+            Answer::Now(Status::Busy)
+        }
+    }
+
+    /// Work on the gyros has ended.
+    #[inline(never)]
+    pub(super) fn job_done<B: Board>(&mut self, board: &mut B, result: Result<u16, Status>) {
+        let configured = matches!(self.job.code, Pending::OWN | code::SET_GYRO);
+        if let Ok(wrong) = result
+            && configured
+        {
+            self.note_configured(wrong as u8);
+        }
+        let (value, mut status) = match result {
+            Ok(value) => (value, Status::Ok),
+            Err(status) => (0, status),
+        };
+        match self.job.code {
+            Pending::OWN => {
+                self.job = Pending::NONE;
+                return;
+            }
+            code::SELF_TEST => match self.next_self_test(value, status) {
+                Some(end) => status = end,
+                None => return,
+            },
+            code::SET_GYRO if value != 0 => {
+                self.answer.value.set(value.into());
+                status = Status::ReadBackWrong;
+            }
+            _ => self.answer.value.set(value.into()),
+        }
+        let asked = core::mem::replace(&mut self.job, Pending::NONE);
+        self.reply(board, asked, status);
+    }
+
+    /// The jobs of the self-test are posted from the millisecond, where a slot is free.
+    #[inline(never)]
+    fn begin_self_test(&mut self, asked: &Asked) -> Answer {
+        let sensor = asked.u8::<0>();
+        if sensor == Sensor::Accelerometer as u8 {
+            // The MMA7260QT has no self-test.
+            Answer::Now(Status::Unsupported)
+        } else if sensor > Sensor::GyroZ as u8 {
+            Answer::Now(Status::BadArgument)
+        } else if !self.job.is_none() {
+            Answer::Now(Status::Busy)
+        } else {
+            self.job = asked.into();
+            self.self_test = SelfTest {
+                step: step::CLEAR_STATUS,
+                wait_ms: 1,
+                axis: sensor,
+            };
+            // Its rate is not to be trusted until the end.
+            self.misconfigured |= 1 << sensor;
+            Answer::Later
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn step_self_test<B: Board>(&mut self, board: &mut B) {
+        let test = &mut self.self_test;
+        if test.step == 0 || test.wait_ms == 0 {
+            return;
+        }
+        test.wait_ms = test.wait_ms.wrapping_sub(1);
+        if test.wait_ms > 0 {
+            return;
+        }
+        let axis = test.axis;
+        let job = match test.step {
+            step::START => Job::Write {
+                axis,
+                address: Register::MscCtrl.address(),
+                value: control::MSC_SELF_TEST,
+            },
+            step::HAS_ENDED => Job::Read {
+                axis,
+                address: Register::MscCtrl.address(),
+            },
+            _ => Job::Read {
+                axis,
+                address: Register::Status.address(),
+            },
+        };
+        if !board.post(job) {
+            test.wait_ms = 1;
+        }
+    }
+
+    /// A job of the self-test has ended; the status of the test, when that was the last.
+    #[inline(never)]
+    fn next_self_test(&mut self, value: u16, status: Status) -> Option<Status> {
+        let test = &mut self.self_test;
+        test.wait_ms = 1;
+        let end = match (test.step, status) {
+            // The bit that starts it need not read back: it clears itself.
+            (step::START, Status::Ok | Status::ReadBackWrong) => {
+                test.wait_ms = SELF_TEST_MS;
+                test.step = step::HAS_ENDED;
+                return None;
+            }
+            (_, Status::Ok) => match test.step {
+                step::CLEAR_STATUS => {
+                    test.step = step::START;
+                    return None;
+                }
+                step::HAS_ENDED if value & control::MSC_SELF_TEST == 0 => {
+                    test.step = step::VERDICT;
+                    return None;
+                }
+                step::VERDICT if value & control::STATUS_SELF_TEST_FAILED == 0 => Status::Ok,
+                _ => Status::SelfTestFailed,
+            },
+            _ => status,
+        };
+        test.step = 0;
+        self.misconfigured &= !(1u8.wrapping_shl(test.axis.into()));
+        Some(end)
+    }
+}
+
+fn done(in_range: bool) -> Status {
+    if in_range {
+        Status::Ok
+    } else {
+        Status::BadArgument
+    }
+}
+
+#[inline(never)]
+fn set(values: &mut [I32; 3], axis: u8, value: i32) -> bool {
+    let Some(place) = values.get_mut(axis as usize) else {
+        return false;
+    };
+    place.set(value);
+    true
+}
