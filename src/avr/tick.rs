@@ -31,7 +31,7 @@ pub struct Taken {
     /// Time of the tick.
     pub t_ticks: u32,
     /// Ticks since the last one that was taken whose samples are lost.
-    pub missed: u16,
+    pub missed: u8,
 }
 
 struct Shared {
@@ -42,12 +42,11 @@ struct Shared {
     /// Period in force, and the one to change to at the next sample.
     period: u16,
     next_period: u16,
-    /// Every n-th period has a sample; how many are left until then; the n to change to.
-    every: u8,
+    /// Periods without a sample that are left, and the n, of which every n-th has one.
     skip: u8,
     next_every: u8,
     masked_ucsrb: u8,
-    missed: u16,
+    missed: u8,
     milliseconds: u8,
     ready: bool,
     ticked: bool,
@@ -60,7 +59,6 @@ static mut SHARED: Shared = Shared {
     t_ticks: 0,
     period: 0,
     next_period: 0,
-    every: 0,
     skip: 0,
     next_every: 0,
     masked_ucsrb: 0,
@@ -94,6 +92,7 @@ pub unsafe fn start(sensors: &'static mut AvrSensors) {
         (*shared()).sensors = Some(sensors);
         set_compare((*shared()).next_period);
         (*shared()).period = (*shared()).next_period;
+        (*shared()).skip = (*shared()).next_every.wrapping_sub(1);
         // Watchdog: 1 s, longer than the slowest tick.
         let watchdog = &*avr_device::atmega16::WDT::ptr();
         asm::wdr();
@@ -226,6 +225,14 @@ fn TIMER1_COMPB() {
     timer1().timsk.write(|w| bits!(w, OCIE1A));
     // SAFETY: this interrupt is off until it ends, so it never meets itself; the main loop looks with interrupts off.
     let shared = unsafe { &mut *shared() };
+    shared.t_ticks = shared.t_ticks.wrapping_add(u32::from(shared.period));
+    if shared.skip > 0 {
+        shared.skip = shared.skip.wrapping_sub(1);
+        // The clock runs, so the board lives; the main loop feeds at samples, and those are seconds apart.
+        asm::wdr();
+        timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
+        return;
+    }
     shared.masked_ucsrb = serial::mask();
     shared.ticked = false;
     // Only compare A is left to wake it; the bound is for a wake-up that nobody explains.
@@ -247,7 +254,6 @@ fn TIMER1_COMPB() {
         unmask();
     }
     interrupt::free(|_| {
-        shared.t_ticks = shared.t_ticks.wrapping_add(u32::from(shared.period));
         if shared.ready {
             shared.missed = shared.missed.saturating_add(1);
             // The job's result must not be lost with the sample.
@@ -259,6 +265,7 @@ fn TIMER1_COMPB() {
             shared.period = shared.next_period;
             set_compare(shared.period);
         }
+        shared.skip = shared.next_every.wrapping_sub(1);
         timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
     });
 }
