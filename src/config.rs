@@ -114,8 +114,7 @@ impl Config {
         self.set_up.gyro_filter >= fewest_taps
             && self.set_up.gyro_filter <= 6
             && self.set_up.acc_range <= 3
-            && period >= MIN_PERIOD
-            && period <= MAX_PERIOD
+            && (MIN_PERIOD..=MAX_PERIOD).contains(&period)
             && sample >= u32::from(period)
             && sample <= MAX_SAMPLE_TICKS
             && self.set_up.baud_divisor.get() <= MAX_DIVISOR

@@ -6,7 +6,7 @@
 use core::cell::UnsafeCell;
 use core::ptr::{read_volatile, write_volatile};
 
-/// Holds up to `N - 1` bytes; `N` is a power of two, at most 256.
+/// Holds up to `N - 1` bytes; `N` is at most 255.
 pub struct Ring<const N: usize> {
     bytes: UnsafeCell<[u8; N]>,
     /// Next to write; the writer's.
@@ -19,10 +19,18 @@ pub struct Ring<const N: usize> {
 unsafe impl<const N: usize> Sync for Ring<N> {}
 
 impl<const N: usize> Ring<N> {
-    const MASK: u8 = {
-        assert!(N.is_power_of_two() && N <= 256);
+    const LAST: u8 = {
+        assert!(N > 1 && N <= 255);
         (N - 1) as u8
     };
+
+    fn after(at: u8) -> u8 {
+        if at >= Self::LAST {
+            0
+        } else {
+            at.wrapping_add(1)
+        }
+    }
 
     /// Empty.
     pub const fn new() -> Self {
@@ -44,15 +52,20 @@ impl<const N: usize> Ring<N> {
     }
 
     fn place(&self, at: u8) -> *mut u8 {
-        self.bytes
-            .get()
-            .cast::<u8>()
-            .wrapping_add((at & Self::MASK) as usize)
+        self.bytes.get().cast::<u8>().wrapping_add(at as usize)
     }
 
     /// Bytes that still fit.
     pub fn room(&self) -> u8 {
-        self.tail().wrapping_sub(self.head()).wrapping_sub(1) & Self::MASK
+        let (head, tail) = (self.head(), self.tail());
+        let used = head.wrapping_sub(tail);
+        // Behind the tail the head has wrapped.
+        let used = if head < tail {
+            used.wrapping_add(N as u8)
+        } else {
+            used
+        };
+        Self::LAST.wrapping_sub(used)
     }
 
     /// Whether nothing is in it.
@@ -67,10 +80,10 @@ impl<const N: usize> Ring<N> {
             return false;
         }
         let head = self.head();
-        // SAFETY: the mask keeps the place inside; the reader does not look at it before the head moves.
+        // SAFETY: the head stays inside; the reader does not look at it before the head moves.
         unsafe {
             write_volatile(self.place(head), byte);
-            write_volatile(self.head.get(), head.wrapping_add(1) & Self::MASK);
+            write_volatile(self.head.get(), Self::after(head));
         }
         true
     }
@@ -82,10 +95,10 @@ impl<const N: usize> Ring<N> {
             return None;
         }
         let tail = self.tail();
-        // SAFETY: the mask keeps the place inside; the writer does not reuse it before the tail moves.
+        // SAFETY: the tail stays inside; the writer does not reuse it before the tail moves.
         unsafe {
             let byte = read_volatile(self.place(tail));
-            write_volatile(self.tail.get(), tail.wrapping_add(1) & Self::MASK);
+            write_volatile(self.tail.get(), Self::after(tail));
             Some(byte)
         }
     }

@@ -8,8 +8,8 @@ use wire::Fault;
 
 use super::ring::Ring;
 
-/// Room for the longest burst of a second: hello or reply, health and two samples.
-static TX: Ring<256> = Ring::new();
+/// Room for a sample, a health frame and the next sample: 190 bytes.
+static TX: Ring<192> = Ring::new();
 /// Three requests.
 static RX: Ring<64> = Ring::new();
 const UDRE: u8 = 1 << 5;

@@ -92,7 +92,7 @@ struct Chip {
     eeprom_until: u64,
     divisor: Option<u16>,
     next_divisor: Option<u16>,
-    period: u16,
+    period: u32,
     /// Ends of the bytes that are queued or on their way.
     line: VecDeque<u64>,
     line_free: u64,
@@ -240,8 +240,8 @@ impl Board for HostBoard {
         chip.stand.set_motor(magnitude.copysign(f64::from(duty)), t);
     }
 
-    fn set_period(&mut self, ticks: u16) {
-        self.0.borrow_mut().period = ticks;
+    fn set_period(&mut self, ticks: u16, every: u8) {
+        self.0.borrow_mut().period = u32::from(ticks) * u32::from(every);
     }
 
     fn set_baud(&mut self, divisor: u16) {
@@ -444,7 +444,8 @@ fn life(
     };
     let board = &mut HostBoard(Rc::clone(chip));
     chip.borrow_mut().now = power + timeline.configure;
-    let mut stand = firmware::Stand::boot(board);
+    let mut stand = firmware::Stand::new();
+    stand.boot(board);
     let misconfigured = firmware::configure(&mut sensors, stand.sens_avg());
     stand.started(board, misconfigured);
     // Before the receiver is on, bytes are lost.
@@ -484,7 +485,7 @@ fn life(
             chip.job.take()
         };
         raw.job = job.map(|job| firmware::acquire::work(&mut sensors, job));
-        t_ticks = t_ticks.wrapping_add(u32::from(period));
+        t_ticks = t_ticks.wrapping_add(period);
         period = chip.borrow().period;
         // A job may have taken the processor for longer.
         let framed = {

@@ -39,7 +39,7 @@ def request(number, code, fmt, *arguments):
 
 
 SAMPLE = "HI3h3hH3HhH3i"
-HELLO = "3BHBHHIHH5B3i3i"
+HELLO = "3BHBHHIHH5B3i3iB"
 HEALTH = "IHHH36H"
 REPLY = "HBBi3i"
 
@@ -50,7 +50,7 @@ vectors = {
         -4801, 20971499, -(1 << 31)),
     "hello": line(
         1, HELLO, 1, 2, 3, 0xBEEF, 0x09, 5, 0, 4000, 12500, 25, 4, 2, 1, 0, 1,
-        65536, -32768, 0, 1229099, 614549, 307275),
+        65536, -32768, 0, 1229099, 614549, 307275, 3),
     "health": line(3, HEALTH, 86400, 0xFFFF, 12499, 300, *range(0, 36 * 1000, 1000)),
     "health_saturated": line(3, HEALTH, 0xFFFFFFFF, 0, 0, 0, *[65535] * 36),
     "reply_ok": line(4, REPLY, 258, 1, 0, 0, 0, 0, 0),
@@ -58,7 +58,7 @@ vectors = {
     "reply_moving": line(4, REPLY, 2, 32, 5, 0, 0, 0, 0),
     "request_ping": request(1, 1, ""),
     "request_keep_alive": request(0x0203, 3, ""),
-    "request_set_rate": request(7, 16, "H", 12500),
+    "request_set_rate": request(7, 16, "HB", 62500, 4),
     "request_set_baud": request(8, 17, "H", 3),
     "request_set_gyro": request(9, 18, "BB", 1, 4),
     "request_set_acc_range": request(10, 19, "B", 3),

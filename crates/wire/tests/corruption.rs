@@ -42,6 +42,7 @@ fn the_board_accepts_no_damaged_request_and_loses_no_intact_one() {
             },
             _ => Command::SetRate {
                 period_ticks: 12_500,
+                periods_per_sample: 1,
             },
         };
         let request = Request { number, command };

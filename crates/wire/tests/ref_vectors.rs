@@ -83,6 +83,7 @@ fn ref_hello() {
             config_source: 1,
             bias: [65_536, -32_768, 0],
             scale: [1_229_099, 614_549, 307_275],
+            periods_per_sample: 3,
         }),
     );
 }
@@ -148,7 +149,8 @@ fn ref_requests() {
         "request_set_rate",
         7,
         Command::SetRate {
-            period_ticks: 12_500,
+            period_ticks: 62_500,
+            periods_per_sample: 4,
         },
     );
     request_is("request_set_baud", 8, Command::SetBaud { divisor: 3 });

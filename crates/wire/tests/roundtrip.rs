@@ -19,11 +19,11 @@ prop_compose! {
     fn hello()(
         (firmware, board_id, reset_cause, restarts, next_seq) in any::<([u8; 3], u16, u8, u16, u16)>(),
         (tick_ns, period_ticks, baud_divisor, bias, scale) in any::<(u32, u16, u16, [i32; 3], [i32; 3])>(),
-        [gyro_range, gyro_filter, gyro_sample_period, acc_range, config_source] in any::<[u8; 5]>(),
+        [gyro_range, gyro_filter, gyro_sample_period, acc_range, config_source, periods_per_sample] in any::<[u8; 6]>(),
     ) -> Hello {
         Hello {
             firmware, board_id, reset_cause, restarts, next_seq, tick_ns, period_ticks, baud_divisor,
-            gyro_range, gyro_filter, gyro_sample_period, acc_range, config_source, bias, scale,
+            gyro_range, gyro_filter, gyro_sample_period, acc_range, config_source, bias, scale, periods_per_sample,
         }
     }
 }
@@ -92,7 +92,10 @@ fn command() -> impl Strategy<Value = Command> {
             Command::LoadConfig,
             Command::DefaultConfig,
         ]),
-        any::<u16>().prop_map(|period_ticks| Command::SetRate { period_ticks }),
+        any::<(u16, u8)>().prop_map(|(period_ticks, periods_per_sample)| Command::SetRate {
+            period_ticks,
+            periods_per_sample
+        }),
         any::<u16>().prop_map(|divisor| Command::SetBaud { divisor }),
         any::<(u8, u8)>().prop_map(|(range, filter)| Command::SetGyro { range, filter }),
         any::<u8>().prop_map(|range| Command::SetAccRange { range }),

@@ -75,7 +75,8 @@ impl RecordBuilder {
         let tick_s = f64::from(hello.tick_ns) * 1e-9;
         if tick_s > 0.0 && hello.period_ticks > 0 {
             self.calibration.tick_s = tick_s;
-            self.calibration.rate_hz = 1.0 / (tick_s * f64::from(hello.period_ticks));
+            let periods = f64::from(hello.periods_per_sample.max(1));
+            self.calibration.rate_hz = 1.0 / (tick_s * f64::from(hello.period_ticks) * periods);
         }
         // Ranges of 320, 160 and 80 deg/s (SENS/AVG bits 10:8) share their codes.
         match hello.gyro_range {
