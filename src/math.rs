@@ -62,7 +62,7 @@ mod tests {
     #[test]
     fn a_product_with_a_scale_is_exact_to_its_last_bit() {
         for counts in [0, 1, 68 << 8, u16::MAX] {
-            let exact = i64::from(counts) * i64::from(crate::config::SCALE_320) >> 16;
+            let exact = (i64::from(counts) * i64::from(crate::config::SCALE_320)) >> 16;
             assert!((i64::from(scaled(counts, crate::config::SCALE_320)) - exact).abs() <= 1);
         }
     }

@@ -35,24 +35,6 @@ fn cargo(root: &Path, arguments: &[&str]) -> Result<Command, Failure> {
     Ok(command)
 }
 
-/// Compiles the firmware for the ATmega16 without linking it.
-///
-/// # Errors
-/// Toolchain or compilation.
-pub fn check(root: &Path) -> Result<(), Failure> {
-    let arguments = [
-        "check",
-        "-p",
-        "firmware",
-        "--profile",
-        "firmware",
-        "--target",
-        "avr-none",
-        "-Zbuild-std=core",
-    ];
-    run("the check of the firmware", &mut cargo(root, &arguments)?)
-}
-
 /// Builds the firmware for the ATmega16; returns the ELF. memory.x makes the link fail where it does not fit.
 ///
 /// # Errors

@@ -79,7 +79,7 @@ fn test(root: &Path) -> Result<(), Failure> {
         println!("== {name}: {:.0} s", from.elapsed().as_secs_f64());
     }
     println!("== firmware for the ATmega16");
-    image::check(root)?;
+    build_image(root)?;
     println!("all passed in {:.0} s", start.elapsed().as_secs_f64());
     Ok(())
 }
