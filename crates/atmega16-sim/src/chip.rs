@@ -336,14 +336,14 @@ impl Chip {
                 self.tccr0 = value & 0x7f;
                 let timer = self.timer(0, now);
                 timer.set_divider(divider_01(value)?);
-                timer.set_mode_8(value >> 6 & 1 | value >> 2 & 2)?;
+                timer.set_mode_8((value >> 6 & 1) | (value >> 2 & 2))?;
             }
             r::TCCR2 => {
                 self.tccr2 = value & 0x7f;
                 self.pins_changed = true;
                 let timer = self.timer(2, now);
                 timer.set_divider(divider_2(value));
-                timer.set_mode_8(value >> 6 & 1 | value >> 2 & 2)?;
+                timer.set_mode_8((value >> 6 & 1) | (value >> 2 & 2))?;
             }
             r::TCCR1A | r::TCCR1B => {
                 let which = usize::from(address == r::TCCR1B);

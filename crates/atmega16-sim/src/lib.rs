@@ -108,7 +108,7 @@ pub struct Mcu {
     /// One instruction runs before the next interrupt.
     shielded: bool,
     slept: u64,
-    min_stack: u16,
+    stack: StackWatch,
     watched: bool,
     resets: Resets,
 }
@@ -132,7 +132,7 @@ impl Mcu {
             asleep: false,
             shielded: false,
             slept: 0,
-            min_stack: u16::MAX,
+            stack: StackWatch::default(),
             watched: false,
             resets: Resets::default(),
         };
@@ -243,14 +243,14 @@ impl Mcu {
     /// Looks at the stack pointer after every instruction from now on: two to three times slower while awake.
     pub fn watch_stack(&mut self) {
         self.watched = true;
-        self.min_stack = u16::MAX;
+        self.stack = StackWatch::default();
     }
 
     /// The lowest stack pointer since [`Mcu::watch_stack`], leaving out the time after a reset before the program
     /// sets it; `None` when not watched.
     #[must_use]
     pub fn min_stack_pointer(&self) -> Option<u16> {
-        (self.watched && self.min_stack != u16::MAX).then_some(self.min_stack)
+        self.stack.lowest.filter(|_| self.watched)
     }
 
     /// SRAM, from 0x60 on.
@@ -360,9 +360,36 @@ impl Mcu {
     }
 
     fn look_at_stack(&mut self) {
-        let pointer = self.core.stack_pointer();
-        if self.watched && usize::from(pointer) >= SRAM {
-            self.min_stack = self.min_stack.min(pointer);
+        if self.watched {
+            let pointer = self.core.stack_pointer();
+            self.stack.see(pointer);
+        }
+    }
+}
+
+/// The lowest stack pointer, seen after each instruction.
+#[derive(Clone, Copy, Debug, Default)]
+struct StackWatch {
+    last: u16,
+    /// Looks for which a changed high byte may wait for its low byte.
+    half: u8,
+    lowest: Option<u16>,
+}
+
+impl StackWatch {
+    fn see(&mut self, pointer: u16) {
+        /// gcc's prologue restores SREG between the two bytes.
+        const PATIENCE: u8 = 3;
+        let [low, high] = pointer.to_le_bytes();
+        let [last_low, last_high] = self.last.to_le_bytes();
+        self.half = match self.half {
+            _ if low != last_low => 0,
+            0 if high != last_high => PATIENCE,
+            half => half.saturating_sub(1),
+        };
+        self.last = pointer;
+        if self.half == 0 && usize::from(pointer) >= SRAM {
+            self.lowest = Some(self.lowest.map_or(pointer, |lowest| lowest.min(pointer)));
         }
     }
 }

@@ -113,6 +113,8 @@ impl Timer {
                 top: Top::Max,
                 pwm: true,
             },
+            // While it stands, a program may pass through any mode on its way to another.
+            _ if self.divider == 0 => self.mode,
             _ => return Err(UP_AND_DOWN),
         };
         self.release();
@@ -130,6 +132,7 @@ impl Timer {
             7 => (Top::Fixed(0x3ff), true),
             14 => (Top::Capture, true),
             15 => (Top::CompareA, true),
+            _ if self.divider == 0 && !matches!(wgm, 0 | 4..=7 | 12 | 14 | 15) => return Ok(()),
             13 => return Err(Unmodelled("a reserved mode of timer 1")),
             _ => return Err(UP_AND_DOWN),
         };

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Recorder, load, run_to_end, variable};
+use common::{Recorder, byte, load, run, run_to_end, variable};
 
 fn send(divisor: u16, double: u8, flags: &[&str]) -> (Recorder, Vec<u8>) {
     let (divisor, double) = (format!("-DDIVISOR={divisor}"), format!("-DDOUBLE={double}"));
@@ -60,4 +60,61 @@ fn two_bytes_are_taken_at_once_and_txc_comes_when_all_is_out() {
     let end = board.port_b.last().unwrap();
     let last = board.uart.last().unwrap().0;
     assert!(end.0 > last && end.0 - last < 30, "TXC once, at the end");
+}
+
+fn receive(delay_ms: u32, feed: impl Fn(&mut atmega16_sim::Mcu)) -> (Vec<u8>, Vec<u8>) {
+    let mut mcu = load("receive.c", &[&format!("-DDELAY={delay_ms}")]);
+    let mut board = Recorder::new();
+    while board.port_b.is_empty() {
+        run(&mut mcu, &mut board, 10);
+    }
+    feed(&mut mcu);
+    run_to_end(&mut mcu, &mut board);
+    let taken = usize::from(byte(&mcu, "taken"));
+    (
+        variable(&mcu, "bytes", taken),
+        variable(&mcu, "status", taken),
+    )
+}
+
+#[test]
+fn bytes_arrive_at_the_hosts_pace() {
+    let sent: Vec<u8> = (0..10).map(|n| n * 25).collect();
+    let (bytes, status) = receive(0, |mcu| sent.iter().for_each(|&byte| mcu.send(byte)));
+    assert_eq!(bytes, sent);
+    assert!(status.iter().all(|&s| s == 0));
+}
+
+#[test]
+fn two_bytes_and_the_shift_register_hold_what_nobody_takes_and_the_rest_is_an_overrun() {
+    let (bytes, status) = receive(40, |mcu| (1..=10).for_each(|byte| mcu.send(byte)));
+    assert_eq!(bytes, [1, 2, 3]);
+    assert_eq!(status, [0, 0, 1 << 3]);
+}
+
+#[test]
+fn a_stop_bit_that_is_low_is_a_framing_error() {
+    let (bytes, status) = receive(0, |mcu| {
+        mcu.send(0x41);
+        mcu.send_without_stop_bit(0x42);
+        mcu.send_at(mcu.cycle() + 60_000, 0x43);
+    });
+    assert_eq!(bytes, [0x41, 0x42, 0x43]);
+    assert_eq!(status, [0, 1 << 4, 0]);
+}
+
+#[test]
+fn a_host_two_percent_off_is_heard_and_one_ten_percent_off_is_not() {
+    let sent: Vec<u8> = (1..=10).map(|n| n * 23).collect();
+    let at = |bit: f64| {
+        receive(0, |mcu| {
+            mcu.set_host_bit(Some(bit));
+            sent.iter().for_each(|&byte| mcu.send(byte));
+        })
+    };
+    for off in [0.98, 1.02] {
+        assert_eq!(at(416.0 * off), (sent.clone(), vec![0; 10]), "{off}");
+    }
+    let (bytes, status) = at(416.0 * 1.1);
+    assert!(bytes != sent || status.iter().any(|&s| s != 0));
 }

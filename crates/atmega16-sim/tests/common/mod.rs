@@ -42,7 +42,10 @@ pub fn load(name: &str, flags: &[&str]) -> Mcu {
 
 /// Records everything, answers SPI with what it got inverted, and each ADC input with its volts.
 pub struct Recorder {
+    /// Changes of port B.
     pub port_b: Vec<(u64, u8)>,
+    /// Changes of port C.
+    pub port_c: Vec<(u64, u8)>,
     pub uart: Vec<(u64, u8)>,
     pub spi: Vec<(u64, u8, Pins)>,
     pub adc: Vec<(u64, u8)>,
@@ -55,6 +58,7 @@ impl Recorder {
     pub fn new() -> Self {
         Recorder {
             port_b: Vec::new(),
+            port_c: Vec::new(),
             uart: Vec::new(),
             spi: Vec::new(),
             adc: Vec::new(),
@@ -64,9 +68,17 @@ impl Recorder {
         }
     }
 
-    /// Cycles of the writes of port B.
+    /// Cycles at which port B changed.
     pub fn marks(&self) -> Vec<u64> {
         self.port_b.iter().map(|&(at, _)| at).collect()
+    }
+
+    /// When port B first became `value`.
+    pub fn mark(&self, value: u8) -> u64 {
+        let found = self.port_b.iter().find(|&&(_, b)| b == value);
+        found
+            .unwrap_or_else(|| panic!("mark {value} in {:?}", self.port_b))
+            .0
     }
 }
 
@@ -86,7 +98,12 @@ impl Board for Recorder {
         self.uart.push((at, byte));
     }
     fn pins_changed(&mut self, at: u64, pins: &Pins) {
-        self.port_b.push((at, pins.port[Port::B as usize]));
+        for (port, list) in [(Port::B, &mut self.port_b), (Port::C, &mut self.port_c)] {
+            let value = pins.port[port as usize];
+            if list.last().map_or(0, |&(_, last)| last) != value {
+                list.push((at, value));
+            }
+        }
     }
     fn motor_changed(&mut self, at: u64, motor: &Pwm) {
         self.motor.push((at, *motor));
@@ -117,4 +134,14 @@ pub fn variable(mcu: &Mcu, name: &str, len: usize) -> Vec<u8> {
 pub fn word(mcu: &Mcu, name: &str) -> u16 {
     let bytes = variable(mcu, name, 2);
     u16::from_le_bytes([bytes[0], bytes[1]])
+}
+
+/// A byte.
+pub fn byte(mcu: &Mcu, name: &str) -> u8 {
+    variable(mcu, name, 1)[0]
+}
+
+/// Differences of neighbours.
+pub fn steps(times: &[u64]) -> Vec<u64> {
+    times.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }

@@ -1,7 +1,5 @@
 /* Sends BYTES bytes by polling; UBRR, U2X by the command line; marks port B at each write of UDR. */
-#include <avr/interrupt.h>
-#include <avr/io.h>
-#include <avr/sleep.h>
+#include "mark.h"
 
 volatile uint8_t after_ubrrh, after_ucsrc;
 
@@ -24,8 +22,5 @@ int main(void) {
     }
     while (!(UCSRA & 1 << TXC)) {}
     PORTB = 0;
-    MCUCR = 1 << SE;
-    cli();
-    sleep_cpu();
-    return 0;
+    end();
 }
