@@ -1,0 +1,323 @@
+//! One run: what is planted, what the diagnosis says, and how that is graded.
+
+use std::time::Instant;
+
+use analysis::result::{Diagnosis, Finding};
+use analysis::{DiagnoseOptions, diagnose};
+use model::file::EffectModel;
+
+use crate::foreign::{FOREIGN, add, foreign};
+use crate::plant::{
+    BY_COUNT, BY_STRENGTH, Truth, as_effect, asked_from, id_of, needs, plant, plant_counted,
+};
+use crate::random::Draw;
+use crate::stand::{GYROS, Needs, Stand};
+
+/// Families of runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Family {
+    /// Nothing is wrong; 600 s at 20 Hz.
+    Clean,
+    /// Nothing is wrong; other rates and lengths.
+    Elsewhere,
+    /// One effect, by its place in [`BY_STRENGTH`].
+    One(usize),
+    /// One effect that is counted, by its place in [`BY_COUNT`].
+    Counted(usize),
+    /// Two effects.
+    Pair,
+    /// An effect that the library does not have, by its place in [`FOREIGN`].
+    Foreign(usize),
+}
+
+impl Family {
+    /// A number that no other family has.
+    #[must_use]
+    pub fn number(self) -> u64 {
+        match self {
+            Self::Clean => 1,
+            Self::Elsewhere => 2,
+            Self::Pair => 3,
+            Self::One(i) => 100 + i as u64,
+            Self::Counted(i) => 200 + i as u64,
+            Self::Foreign(i) => 300 + i as u64,
+        }
+    }
+
+    /// The row of the tables.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Clean => "nothing",
+            Self::Elsewhere => "nothing, other rates",
+            Self::Pair => "two",
+            Self::One(i) => BY_STRENGTH[i],
+            Self::Counted(i) => BY_COUNT[i],
+            Self::Foreign(i) => FOREIGN[i],
+        }
+    }
+}
+
+/// How an effect was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hit {
+    /// As the cause.
+    Named,
+    /// Among the alternatives of a cause named.
+    InSet,
+    /// Not.
+    Missed,
+}
+
+/// An estimate beside the truth.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// Row of the tables.
+    pub label: &'static str,
+    /// Parameter.
+    pub parameter: String,
+    /// Estimate, standard error, truth.
+    pub value: f64,
+    /// Standard error.
+    pub std_error: f64,
+    /// Truth.
+    pub truth: f64,
+}
+
+/// What a run gave.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Family.
+    pub family: Family,
+    /// Number in it.
+    pub index: u64,
+    /// Row, strength and result of each effect planted.
+    pub truths: Vec<(&'static str, f64, Hit)>,
+    /// Causes named that are not true.
+    pub wrong: Vec<String>,
+    /// What is unexplained.
+    pub unexplained: Vec<String>,
+    /// Estimates of what was named.
+    pub estimates: Vec<Estimate>,
+    /// Rate random walks of the axes.
+    pub walks: [f64; 3],
+    /// Strength of a foreign effect.
+    pub strength: f64,
+    /// Seconds that the diagnosis took.
+    pub seconds: f64,
+}
+
+impl Outcome {
+    /// Every effect found, nothing else said.
+    #[must_use]
+    pub fn right(&self) -> bool {
+        self.truths.iter().all(|t| t.2 != Hit::Missed) && self.quiet()
+    }
+
+    /// Nothing wrong or unexplained said.
+    #[must_use]
+    pub fn quiet(&self) -> bool {
+        self.wrong.is_empty() && self.unexplained.is_empty()
+    }
+}
+
+/// A cause that is a part of another: naming it is neither right nor wrong.
+fn part_of(named: &str, truth: &str) -> bool {
+    matches!(
+        (named, truth),
+        ("line", "am_line")
+            | ("temperature", "temperature_quadratic")
+            | ("gauss_markov" | "flicker" | "bias_step", "telegraph")
+    )
+}
+
+fn holds(f: &Finding, cause: &str) -> bool {
+    f.cause == cause || f.alternatives.iter().any(|a| a.cause == cause)
+}
+
+fn about(f: &Finding, truth: &Truth) -> bool {
+    truth.channel.is_empty() || f.channels.contains(&truth.channel)
+}
+
+fn grade(d: &Diagnosis, truths: &[Truth], allowed: &[&str]) -> (Vec<Hit>, Vec<String>, Vec<Estimate>) {
+    let mut estimates = vec![];
+    let hits = truths
+        .iter()
+        .map(|t| {
+            let own = d.findings.iter().filter(|f| about(f, t));
+            if let Some(f) = own.clone().find(|f| f.cause == t.cause) {
+                let of_channel = f.per_channel.get(&t.channel).unwrap_or(&f.parameters);
+                for (name, p) in of_channel {
+                    if let (Some(e), Some(truth)) = (p.std_error, t.parameters.get(name)) {
+                        estimates.push(Estimate {
+                            label: t.label,
+                            parameter: name.clone(),
+                            value: p.value,
+                            std_error: e,
+                            truth: truth.value,
+                        });
+                    }
+                }
+                Hit::Named
+            } else if own.clone().any(|f| holds(f, t.cause)) {
+                Hit::InSet
+            } else {
+                Hit::Missed
+            }
+        })
+        .collect();
+    let wrong = d
+        .findings
+        .iter()
+        .filter(|f| {
+            !allowed.contains(&f.cause.as_str())
+                && !truths.iter().any(|t| {
+                    about(f, t) && (holds(f, t.cause) || part_of(&f.cause, t.cause))
+                })
+        })
+        .map(|f| format!("{} on {}", f.cause, f.channels.join("+")))
+        .collect();
+    (hits, wrong, estimates)
+}
+
+/// Rates and lengths of [`Family::Elsewhere`].
+pub const ELSEWHERE: [(f64, f64); 6] = [
+    (1.0, 7200.0),
+    (5.0, 1200.0),
+    (20.0, 60.0),
+    (20.0, 3600.0),
+    (100.0, 300.0),
+    (1000.0, 60.0),
+];
+
+/// A strength: half of them from `from` on, half below it down to 3.
+fn strength(draw: &mut Draw, from: f64) -> f64 {
+    if draw.chance(0.5) {
+        draw.by_ratio(from, 2.0 * from)
+    } else {
+        draw.by_ratio(3.0, from)
+    }
+}
+
+/// Run case `index` of a family.
+///
+/// # Panics
+/// When a simulated run cannot be diagnosed: that is a defect of the diagnosis.
+#[must_use]
+pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
+    let draw = &mut Draw::of(seed, family.number(), index);
+    let mut truths: Vec<Truth> = vec![];
+    let mut strange = f64::NAN;
+    let mut allowed: Vec<&str> = vec![];
+    let (rate_hz, seconds) = match family {
+        Family::Elsewhere => ELSEWHERE[index as usize % ELSEWHERE.len()],
+        _ => (20.0, 600.0),
+    };
+    let needed = match family {
+        Family::One(i) => needs(BY_STRENGTH[i]),
+        Family::Pair => Needs { temperature: true, supply: true, motor: true, vibration: true },
+        Family::Foreign(_) => Needs { temperature: true, motor: true, ..Needs::default() },
+        _ => Needs::default(),
+    };
+    let mut stand = Stand::draw(draw, seconds, rate_hz, needed);
+    let axis = draw.of_many(3);
+    let mut unknown = None;
+    match family {
+        Family::Clean | Family::Elsewhere => {}
+        Family::One(i) => {
+            let label = BY_STRENGTH[i];
+            let axis = match label {
+                "cross_axis" | "scale_error" => axis.min(1),
+                _ => axis,
+            };
+            let wanted = strength(draw, asked_from(label));
+            truths.push(plant(draw, &mut stand, label, axis, wanted));
+            if label == "scale_error" {
+                allowed.push("base_motion");
+            }
+        }
+        Family::Counted(i) => truths.push(plant_counted(draw, &stand, BY_COUNT[i], axis)),
+        Family::Pair => pair(draw, &mut stand, &mut truths),
+        Family::Foreign(i) => {
+            let wanted = draw.by_ratio(25.0, 40.0);
+            let f = foreign(draw, &stand, FOREIGN[i], axis, wanted);
+            strange = f.strength;
+            unknown = Some(f);
+        }
+    }
+    let effects: Vec<EffectModel> = truths.iter().filter_map(as_effect).collect();
+    let mut record = stand
+        .record(&effects, draw.seed())
+        .expect("a stand of this crate can be simulated");
+    for t in truths.iter().filter(|t| as_effect(t).is_none()) {
+        add(&mut record, &t.channel, t.signal.as_deref().unwrap_or(&[]), draw);
+    }
+    if let Some(f) = &unknown {
+        f.act(&mut record, GYROS[axis], &stand, axis, draw);
+    }
+    let begun = Instant::now();
+    let d = diagnose(&record, &DiagnoseOptions { seed: index, ..DiagnoseOptions::default() })
+        .expect("a simulated run can be diagnosed")
+        .diagnosis;
+    let seconds = begun.elapsed().as_secs_f64();
+    let (hits, wrong, estimates) = grade(&d, &truths, &allowed);
+    Outcome {
+        family,
+        index,
+        truths: truths.iter().zip(hits).map(|(t, h)| (t.label, t.strength, h)).collect(),
+        wrong,
+        unexplained: d
+            .unexplained
+            .iter()
+            .map(|u| format!("{}: {}", u.channel, u.what))
+            .collect(),
+        estimates,
+        walks: stand.walk_of_rate,
+        strength: strange,
+        seconds,
+    }
+}
+
+/// Two effects, each as strong as asked beside the other.
+fn pair(draw: &mut Draw, stand: &mut Stand, truths: &mut Vec<Truth>) {
+    // Those that need a moving base exclude most others.
+    let fit: Vec<&'static str> = BY_STRENGTH
+        .into_iter()
+        .filter(|l| !matches!(*l, "cross_axis" | "scale_error"))
+        .collect();
+    loop {
+        truths.clear();
+        let first = fit[draw.of_many(fit.len())];
+        let second = fit[draw.of_many(fit.len())];
+        if id_of(first) == id_of(second) {
+            continue;
+        }
+        for label in [first, second] {
+            let axis = draw.of_many(3);
+            let from = asked_from(label);
+            let wanted = draw.by_ratio(1.1 * from, 2.2 * from);
+            truths.push(plant(draw, stand, label, axis, wanted));
+        }
+        // A parabola holds a line.
+        if truths[0].channel == truths[1].channel {
+            let ids = [truths[0].cause, truths[1].cause];
+            if ids.contains(&"temperature") && ids.contains(&"temperature_quadratic")
+                || ids.contains(&"line") && ids.contains(&"am_line")
+            {
+                continue;
+            }
+            if let (Some(a), Some(b)) = (truths[0].signal.clone(), truths[1].signal.clone()) {
+                let axis = GYROS.iter().position(|g| *g == truths[0].channel).unwrap_or(0);
+                let meter = crate::strength::Meter::new(stand, axis);
+                let left = |x: &[f64], y: &[f64]| {
+                    meter.of_signal(&meter.energy(&meter.beyond(x, &[y.to_vec()])))
+                };
+                truths[0].strength = left(&a, &b);
+                truths[1].strength = left(&b, &a);
+            }
+        }
+        if truths.iter().all(|t| t.strength >= asked_from(t.label)) {
+            return;
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! Effects that the library does not have. They act on the readings of a finished run; what they are is known here alone.
+
+use model::record::Record;
+
+use crate::random::Draw;
+use crate::stand::{LSB, Stand};
+use crate::strength::{Meter, of_variance, size_for};
+
+/// What there is.
+pub const FOREIGN: [&str; 14] = [
+    "chirp",
+    "square wave",
+    "comb of harmonics",
+    "bursts of ringing",
+    "backlash in temperature",
+    "rate of temperature",
+    "duty times temperature",
+    "sawtooth",
+    "jumps at random",
+    "swinging variance",
+    "growing variance",
+    "heavy tails",
+    "skewed noise",
+    "dead band",
+];
+
+/// What it does to a channel: adds a signal, or makes new noise out of old.
+pub struct Foreign {
+    /// Its name.
+    pub name: &'static str,
+    /// Its d' where that is defined.
+    pub strength: f64,
+    change: Change,
+}
+
+enum Change {
+    Add(Vec<f64>),
+    /// Factor on the white noise.
+    Scale(Vec<f64>),
+    /// Every reading within this distance of the middle reads the middle, deg/s.
+    DeadBand(f64),
+    /// Noise in place of the white noise, of variance 1, as a share of it.
+    Noise(Vec<f64>, f64),
+}
+
+/// One of them, on an axis of a stand, at a strength of `wanted`.
+#[must_use]
+pub fn foreign(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: f64) -> Foreign {
+    let n = stand.samples();
+    let t = |i: usize| i as f64 / stand.rate_hz;
+    let tau = std::f64::consts::TAU;
+    let temperature = &stand.world.temperature[axis];
+    let mean = temperature.iter().sum::<f64>() / n as f64;
+    let shape: Option<Vec<f64>> = match name {
+        "chirp" => {
+            let (from, to) = (draw.between(0.5, 3.0), draw.between(4.0, 9.0));
+            Some(
+                (0..n)
+                    .map(|i| {
+                        let f = from + (to - from) * t(i) / stand.seconds / 2.0;
+                        (tau * f * t(i)).sin()
+                    })
+                    .collect(),
+            )
+        }
+        "square wave" => {
+            let period = draw.between(5.0, 40.0);
+            Some((0..n).map(|i| if (t(i) / period).fract() < 0.5 { 1.0 } else { -1.0 }).collect())
+        }
+        "comb of harmonics" => {
+            let f = draw.between(0.4, 1.5);
+            let phases: Vec<f64> = (0..6).map(|_| draw.between(0.0, tau)).collect();
+            Some(
+                (0..n)
+                    .map(|i| {
+                        let term = |(k, p): (usize, &f64)| (tau * f * (k + 1) as f64 * t(i) + p).sin();
+                        phases.iter().enumerate().map(term).sum()
+                    })
+                    .collect(),
+            )
+        }
+        "bursts of ringing" => {
+            let (f, decay) = (draw.between(0.8, 6.0), draw.between(0.5, 3.0));
+            let mut y = vec![0.0; n];
+            let mut at = 5.0;
+            while at < stand.seconds {
+                let first = (at * stand.rate_hz) as usize;
+                for (i, v) in y.iter_mut().enumerate().skip(first) {
+                    let s = t(i) - at;
+                    *v += (-s / decay).exp() * (tau * f * s).sin();
+                }
+                at += 15.0 * draw.exponential() + 3.0;
+            }
+            Some(y)
+        }
+        "backlash in temperature" => {
+            // What follows the temperature only after it has moved through the play.
+            let play = 0.4 * swing(temperature);
+            let mut held = temperature[0];
+            Some(
+                temperature
+                    .iter()
+                    .map(|v| {
+                        held = held.clamp(v - play, v + play);
+                        // Minus what a linear term takes.
+                        held - 0.6 * v
+                    })
+                    .collect(),
+            )
+        }
+        "rate of temperature" => {
+            let w = (2.0 * stand.rate_hz) as usize;
+            Some((0..n).map(|i| temperature[(i + w).min(n - 1)] - temperature[i.saturating_sub(w)]).collect())
+        }
+        "duty times temperature" => {
+            Some((0..n).map(|i| stand.world.duty[i] * (temperature[i] - mean)).collect())
+        }
+        "sawtooth" => {
+            let period = draw.between(20.0, 90.0);
+            Some((0..n).map(|i| (t(i) / period).fract() - 0.5).collect())
+        }
+        "jumps at random" => {
+            let mut level = 0.0;
+            let mut left = 0.0;
+            Some(
+                (0..n)
+                    .map(|_| {
+                        if left <= 0.0 {
+                            level = draw.normal();
+                            left = 25.0 * draw.exponential();
+                        }
+                        left -= 1.0 / stand.rate_hz;
+                        level
+                    })
+                    .collect(),
+            )
+        }
+        _ => None,
+    };
+    if let Some(unit) = shape {
+        let meter = Meter::new(stand, axis);
+        let energy = meter.energy(&unit);
+        let strength = |size: f64| {
+            let scaled: Vec<f64> = energy.iter().map(|e| e * size * size).collect();
+            meter.of_signal(&scaled)
+        };
+        let size = size_for(wanted, &strength);
+        let change = Change::Add(unit.iter().map(|v| size * v).collect());
+        return Foreign { name, strength: strength(size), change };
+    }
+    match name {
+        "swinging variance" | "growing variance" => {
+            let period = draw.between(30.0, 150.0);
+            let growing = name == "growing variance";
+            let law = |depth: f64| -> Vec<f64> {
+                (0..n)
+                    .map(|i| {
+                        if growing {
+                            1.0 + depth * t(i) / stand.seconds
+                        } else {
+                            (1.0 + depth.min(0.999) * (tau * t(i) / period).sin()).max(1e-3)
+                        }
+                    })
+                    .collect()
+            };
+            let depth = size_for(wanted, &|x| of_variance(&law(x)));
+            let found = law(depth);
+            let change = Change::Scale(found.iter().map(|v| v.sqrt()).collect());
+            Foreign { name, strength: of_variance(&found), change }
+        }
+        "heavy tails" => {
+            // Laplace noise, mixed in so that the kurtosis shows.
+            let noise = (0..n).map(|_| draw.sign() * draw.exponential() / 2f64.sqrt()).collect();
+            Foreign { name, strength: f64::NAN, change: Change::Noise(noise, 1.0) }
+        }
+        "skewed noise" => {
+            let noise = (0..n).map(|_| draw.exponential() - 1.0).collect();
+            Foreign { name, strength: f64::NAN, change: Change::Noise(noise, 0.7) }
+        }
+        _ => {
+            let band = stand.white(axis).sqrt() * draw.between(0.5, 1.2);
+            Foreign { name, strength: f64::NAN, change: Change::DeadBand(band) }
+        }
+    }
+}
+
+fn swing(values: &[f64]) -> f64 {
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    high - low
+}
+
+/// Add a signal to a channel, and let the converter round again.
+pub fn add(record: &mut Record, channel: &str, signal: &[f64], draw: &mut Draw) {
+    change_readings(record, channel, draw, |i, v| v + signal[i]);
+}
+
+fn change_readings(
+    record: &mut Record,
+    channel: &str,
+    draw: &mut Draw,
+    new: impl Fn(usize, f64) -> f64,
+) {
+    let Some(c) = record.channels.iter_mut().find(|c| c.name == channel) else { return };
+    let Some(counts) = &mut c.counts else { return };
+    for (i, count) in counts.iter_mut().enumerate() {
+        // Within its step the rate is anywhere.
+        let inside = draw.between(-0.5, 0.5);
+        let v = new(i, LSB * (f64::from(*count) + inside));
+        *count = (v / LSB).round() as i32;
+        c.values[i] = LSB * f64::from(*count);
+    }
+}
+
+impl Foreign {
+    /// Act on a channel of a run.
+    pub fn act(&self, record: &mut Record, channel: &str, stand: &Stand, axis: usize, draw: &mut Draw) {
+        let sigma = stand.white(axis).sqrt();
+        let level = |record: &Record| -> Vec<f64> {
+            // The local level, which the noise is taken from.
+            let w = (2.0 * stand.rate_hz) as usize;
+            let v = record.channel(channel).map(|c| c.values.clone()).unwrap_or_default();
+            let mut sums = vec![0.0];
+            for x in &v {
+                sums.push(sums[sums.len() - 1] + x);
+            }
+            (0..v.len())
+                .map(|i| {
+                    let (a, b) = (i.saturating_sub(w), (i + w).min(v.len()));
+                    (sums[b] - sums[a]) / (b - a) as f64
+                })
+                .collect()
+        };
+        match &self.change {
+            Change::Add(signal) => add(record, channel, signal, draw),
+            Change::Scale(factor) => {
+                let at = level(record);
+                change_readings(record, channel, draw, |i, v| at[i] + factor[i] * (v - at[i]));
+            }
+            Change::DeadBand(band) => {
+                let middle = stand.bias[axis];
+                change_readings(record, channel, draw, |_, v| {
+                    if (v - middle).abs() < *band { middle } else { v }
+                });
+            }
+            Change::Noise(noise, share) => {
+                let at = level(record);
+                let keep = (1.0 - share).sqrt();
+                change_readings(record, channel, draw, |i, v| {
+                    at[i] + keep * (v - at[i]) + share.sqrt() * sigma * noise[i]
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Measures what the diagnosis can and cannot tell: false alarms on clean runs, causes named at known strengths, pairs,
+//! effects that the library does not have, intervals, limits. `cargo xtask campaign` runs it and writes docs/power.md.
+//!
+//! Strength is d', the square root of twice the expected log likelihood ratio against a baseline whose random walk is
+//! refitted. It is computed here from the simulated signals and densities, not asked of the engine.
+
+pub mod case;
+pub mod foreign;
+pub mod motor;
+pub mod plant;
+pub mod random;
+pub mod report;
+pub mod stand;
+pub mod strength;
+pub mod tally;
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+pub use case::{Family, Hit, Outcome};
+
+/// How many runs of each family.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// Clean runs.
+    pub clean: u64,
+    /// Clean runs at other rates and lengths.
+    pub elsewhere: u64,
+    /// Runs for each cause with a strength.
+    pub one: u64,
+    /// Runs for each cause that is counted.
+    pub counted: u64,
+    /// Runs with two effects.
+    pub pairs: u64,
+    /// Runs for each foreign effect.
+    pub foreign: u64,
+}
+
+/// Minutes.
+pub const FAST: Size = Size { clean: 200, elsewhere: 12, one: 24, counted: 8, pairs: 60, foreign: 6 };
+/// At most an hour on two cores.
+pub const DEFAULT: Size =
+    Size { clean: 2400, elsewhere: 120, one: 160, counted: 60, pairs: 600, foreign: 40 };
+/// Hours.
+pub const FULL: Size =
+    Size { clean: 10_000, elsewhere: 600, one: 800, counted: 200, pairs: 3000, foreign: 150 };
+
+/// All cases of a size, family by family, those that `only` (a row of the tables) leaves.
+#[must_use]
+pub fn cases(size: Size, only: Option<&str>) -> Vec<(Family, u64)> {
+    let mut families = vec![
+        (Family::Clean, size.clean),
+        (Family::Elsewhere, size.elsewhere),
+        (Family::Pair, size.pairs),
+    ];
+    families.extend((0..plant::BY_STRENGTH.len()).map(|i| (Family::One(i), size.one)));
+    families.extend((0..plant::BY_COUNT.len()).map(|i| (Family::Counted(i), size.counted)));
+    families.extend((0..foreign::FOREIGN.len()).map(|i| (Family::Foreign(i), size.foreign)));
+    families
+        .into_iter()
+        .filter(|(f, _)| only.is_none_or(|o| f.label() == o))
+        .flat_map(|(f, count)| (0..count).map(move |i| (f, i)))
+        .collect()
+}
+
+/// Run cases on `threads` threads; `seen` is told of each as it ends.
+pub fn run_all(
+    seed: u64,
+    cases: &[(Family, u64)],
+    threads: usize,
+    seen: &(dyn Fn(&Outcome) + Sync),
+) -> Vec<Outcome> {
+    let next = AtomicUsize::new(0);
+    let mut all: Vec<Outcome> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads.max(1))
+            .map(|_| {
+                scope.spawn(|| {
+                    let mut own = vec![];
+                    while let Some((family, index)) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let outcome = case::run(seed, *family, *index);
+                        seen(&outcome);
+                        own.push(outcome);
+                    }
+                    own
+                })
+            })
+            .collect();
+        workers
+            .into_iter()
+            .flat_map(|w| match w.join() {
+                Ok(own) => own,
+                Err(panic) => std::panic::resume_unwind(panic),
+            })
+            .collect()
+    });
+    all.sort_by_key(|o| (o.family, o.index));
+    all
+}

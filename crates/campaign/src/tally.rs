@@ -1,0 +1,129 @@
+//! Rates with their binomial bounds, power curves, coverage.
+
+use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
+
+/// The oracle's limit: d' that one test at 1 % finds 95 times in 100.
+pub const ORACLE: f64 = 4.22;
+
+/// So many of so many.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Rate {
+    /// Hits.
+    pub hits: u64,
+    /// Trials.
+    pub trials: u64,
+}
+
+impl Rate {
+    /// Count a trial.
+    pub fn count(&mut self, hit: bool) {
+        self.hits += u64::from(hit);
+        self.trials += 1;
+    }
+
+    /// Of an iterator.
+    pub fn of(all: impl IntoIterator<Item = bool>) -> Self {
+        let mut rate = Self::default();
+        all.into_iter().for_each(|hit| rate.count(hit));
+        rate
+    }
+
+    /// Share, NaN without trials.
+    #[must_use]
+    pub fn share(self) -> f64 {
+        self.hits as f64 / self.trials as f64
+    }
+
+    /// 95 % interval (Clopper and Pearson, 1934).
+    #[must_use]
+    pub fn interval(self) -> (f64, f64) {
+        let (k, n) = (self.hits as f64, self.trials as f64);
+        let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |d| d.inverse_cdf(p));
+        let low = if self.hits == 0 { 0.0 } else { quantile(k, n - k + 1.0, 0.025) };
+        let high = if self.hits == self.trials { 1.0 } else { quantile(k + 1.0, n - k, 0.975) };
+        (low, high)
+    }
+
+    /// Chance of no more hits than these at a true rate of `p`.
+    #[must_use]
+    pub fn at_most(self, p: f64) -> f64 {
+        Binomial::new(p, self.trials).map_or(f64::NAN, |b| b.cdf(self.hits))
+    }
+
+    /// Chance of no fewer hits than these at a true rate of `p`.
+    #[must_use]
+    pub fn at_least(self, p: f64) -> f64 {
+        if self.hits == 0 {
+            return 1.0;
+        }
+        Binomial::new(p, self.trials).map_or(f64::NAN, |b| b.sf(self.hits - 1))
+    }
+}
+
+/// The strength at which a logistic curve of ln d' reaches 95 %, with its standard error; `None` where the data do not
+/// hold both outcomes.
+#[must_use]
+pub fn d95(runs: &[(f64, bool)]) -> Option<(f64, f64)> {
+    let hits = runs.iter().filter(|r| r.1).count();
+    if hits < 5 || hits + 3 > runs.len() {
+        return None;
+    }
+    // Newton's method, with half a hit and half a miss far off as a prior, so that separable data converge.
+    let mut data: Vec<(f64, f64, f64)> =
+        runs.iter().map(|r| (r.0.ln(), f64::from(u8::from(r.1)), 1.0)).collect();
+    data.push((1.5f64.ln(), 0.0, 0.5));
+    data.push((40f64.ln(), 1.0, 0.5));
+    let (mut a, mut b) = (-8.0f64, 5.0f64);
+    let mut inverse = [0.0; 3];
+    for _ in 0..60 {
+        let (mut ga, mut gb, mut aa, mut ab, mut bb) = (0.0, 0.0, 1e-9, 0.0, 1e-9);
+        for (x, y, w) in &data {
+            let p = 1.0 / (1.0 + (-(a + b * x)).exp());
+            let v = w * (p * (1.0 - p)).max(1e-9);
+            ga += w * (y - p);
+            gb += w * (y - p) * x;
+            aa += v;
+            ab += v * x;
+            bb += v * x * x;
+        }
+        let det = aa * bb - ab * ab;
+        inverse = [bb / det, -ab / det, aa / det];
+        let step = (inverse[0] * ga + inverse[1] * gb, inverse[1] * ga + inverse[2] * gb);
+        let damp = (2.0 / step.0.abs().max(step.1.abs()).max(2.0)).min(1.0);
+        a += damp * step.0;
+        b += damp * step.1;
+    }
+    if b < 0.5 {
+        return None;
+    }
+    let x = (19f64.ln() - a) / b;
+    // Delta method: dx/da = -1/b, dx/db = -x/b.
+    let variance = (inverse[0] + 2.0 * x * inverse[1] + x * x * inverse[2]) / (b * b);
+    Some((x.exp(), x.exp() * variance.max(0.0).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bound_of_no_hit_in_n_is_one_minus_the_root_of_a_fortieth() {
+        let (low, high) = Rate { hits: 0, trials: 100 }.interval();
+        assert!(low == 0.0 && (high - (1.0 - 0.025f64.powf(0.01))).abs() < 1e-6, "{high}");
+    }
+
+    #[test]
+    fn a_logistic_curve_gives_its_own_point_back() {
+        // p = 0.95 at d' = 6 with slope 8.
+        let mut runs = vec![];
+        let mut state = 7u64;
+        for i in 0..4000 {
+            let d = 3.0 * (i as f64 / 4000.0 * 4f64.ln()).exp();
+            let p = 1.0 / (1.0 + (-(19f64.ln() + 8.0 * (d / 6.0).ln())).exp());
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            runs.push((d, ((state >> 11) as f64 / (1u64 << 53) as f64) < p));
+        }
+        let (x, error) = d95(&runs).expect("both outcomes");
+        assert!((x - 6.0).abs() < 4.0 * error && error < 0.2, "{x} +- {error}");
+    }
+}
