@@ -1,5 +1,6 @@
 //! Toolchain, image, tests: what a newcomer types.
 
+mod campaign;
 mod image;
 mod step;
 mod toolchain;
@@ -14,6 +15,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
 
   test     sets up what is missing and runs every check and test
   demo     hides something in the simulated stand, captures 600 s, analyzes and diagnoses; a number after it is the seed
+  campaign measures by rates what the diagnosis can tell, and writes docs/power.md: up to an hour on two cores;
+           --quick for minutes, --full for hours, --seed N for a run that was made before, --help for the rest
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}";
 
 fn main() -> ExitCode {
@@ -23,6 +26,7 @@ fn main() -> ExitCode {
         Some("test") => test(&root),
         Some("demo") => demo(&root),
         Some("image") => build_image(&root),
+        Some("campaign") => campaign::measure(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

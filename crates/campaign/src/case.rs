@@ -6,7 +6,7 @@ use analysis::result::{Diagnosis, Finding};
 use analysis::{DiagnoseOptions, diagnose};
 use model::file::EffectModel;
 
-use crate::foreign::{FOREIGN, add, foreign};
+use crate::foreign::{self, FOREIGN, add, foreign};
 use crate::plant::{
     BY_COUNT, BY_STRENGTH, Truth, as_effect, asked_from, id_of, needs, plant, plant_counted,
 };
@@ -139,7 +139,11 @@ fn about(f: &Finding, truth: &Truth) -> bool {
     truth.channel.is_empty() || f.channels.contains(&truth.channel)
 }
 
-fn grade(d: &Diagnosis, truths: &[Truth], allowed: &[&str]) -> (Vec<Hit>, Vec<String>, Vec<Estimate>) {
+fn grade(
+    d: &Diagnosis,
+    truths: &[Truth],
+    allowed: &[&str],
+) -> (Vec<Hit>, Vec<String>, Vec<Estimate>) {
     let mut estimates = vec![];
     let hits = truths
         .iter()
@@ -171,9 +175,9 @@ fn grade(d: &Diagnosis, truths: &[Truth], allowed: &[&str]) -> (Vec<Hit>, Vec<St
         .iter()
         .filter(|f| {
             !allowed.contains(&f.cause.as_str())
-                && !truths.iter().any(|t| {
-                    about(f, t) && (holds(f, t.cause) || part_of(&f.cause, t.cause))
-                })
+                && !truths
+                    .iter()
+                    .any(|t| about(f, t) && (holds(f, t.cause) || part_of(&f.cause, t.cause)))
         })
         .map(|f| format!("{} on {}", f.cause, f.channels.join("+")))
         .collect();
@@ -215,8 +219,17 @@ pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
     };
     let needed = match family {
         Family::One(i) => needs(BY_STRENGTH[i]),
-        Family::Pair => Needs { temperature: true, supply: true, motor: true, vibration: true },
-        Family::Foreign(_) => Needs { temperature: true, motor: true, ..Needs::default() },
+        Family::Pair => Needs {
+            temperature: true,
+            supply: true,
+            motor: true,
+            vibration: true,
+        },
+        Family::Foreign(_) => Needs {
+            temperature: true,
+            motor: true,
+            ..Needs::default()
+        },
         _ => Needs::default(),
     };
     let mut stand = Stand::draw(draw, seconds, rate_hz, needed);
@@ -246,25 +259,47 @@ pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
         }
     }
     let effects: Vec<EffectModel> = truths.iter().filter_map(as_effect).collect();
-    let mut record = stand
+    let mut measured = stand.clone();
+    if unknown
+        .as_ref()
+        .is_some_and(foreign::Foreign::replaces_noise)
+    {
+        measured.walk_of_angle[axis] = 0.0;
+    }
+    let mut record = measured
         .record(&effects, draw.seed())
         .expect("a stand of this crate can be simulated");
     for t in truths.iter().filter(|t| as_effect(t).is_none()) {
-        add(&mut record, &t.channel, t.signal.as_deref().unwrap_or(&[]), draw);
+        add(
+            &mut record,
+            &t.channel,
+            t.signal.as_deref().unwrap_or(&[]),
+            draw,
+        );
     }
     if let Some(f) = &unknown {
         f.act(&mut record, GYROS[axis], &stand, axis, draw);
     }
     let begun = Instant::now();
-    let d = diagnose(&record, &DiagnoseOptions { seed: index, ..DiagnoseOptions::default() })
-        .expect("a simulated run can be diagnosed")
-        .diagnosis;
+    let d = diagnose(
+        &record,
+        &DiagnoseOptions {
+            seed: index,
+            ..DiagnoseOptions::default()
+        },
+    )
+    .expect("a simulated run can be diagnosed")
+    .diagnosis;
     let seconds = begun.elapsed().as_secs_f64();
     let (hits, wrong, estimates) = grade(&d, &truths, &allowed);
     Outcome {
         family,
         index,
-        truths: truths.iter().zip(hits).map(|(t, h)| (t.label, t.strength, h)).collect(),
+        truths: truths
+            .iter()
+            .zip(hits)
+            .map(|(t, h)| (t.label, t.strength, h))
+            .collect(),
         wrong,
         unexplained: d
             .unexplained
@@ -306,15 +341,26 @@ fn pair(draw: &mut Draw, stand: &mut Stand, truths: &mut Vec<Truth>) {
             {
                 continue;
             }
-            if let (Some(a), Some(b)) = (truths[0].signal.clone(), truths[1].signal.clone()) {
-                let axis = GYROS.iter().position(|g| *g == truths[0].channel).unwrap_or(0);
-                let meter = crate::strength::Meter::new(stand, axis);
-                let left = |x: &[f64], y: &[f64]| {
-                    meter.of_signal(&meter.energy(&meter.beyond(x, &[y.to_vec()])))
-                };
-                truths[0].strength = left(&a, &b);
-                truths[1].strength = left(&b, &a);
-            }
+            let axis = GYROS
+                .iter()
+                .position(|g| *g == truths[0].channel)
+                .unwrap_or(0);
+            let meter = crate::strength::Meter::new(stand, axis);
+            let beside = |x: &Truth, y: &Truth| match (&x.signal, &y.signal, &y.density) {
+                (Some(x), Some(y), _) => {
+                    meter.of_signal(&meter.energy(&meter.beyond(x, std::slice::from_ref(y))))
+                }
+                (Some(s), _, Some(d)) => meter.over(d).of_signal(&meter.energy(s)),
+                // What two processes leave of each other is not worked out.
+                (None, None, Some(_)) if x.density.is_some() => 0.0,
+                _ => x.strength,
+            };
+            let left = [
+                beside(&truths[0], &truths[1]),
+                beside(&truths[1], &truths[0]),
+            ];
+            truths[0].strength = left[0];
+            truths[1].strength = left[1];
         }
         if truths.iter().all(|t| t.strength >= asked_from(t.label)) {
             return;

@@ -35,7 +35,7 @@ pub struct Foreign {
 
 enum Change {
     Add(Vec<f64>),
-    /// Factor on the white noise.
+    /// White noise of this size over the usual one.
     Scale(Vec<f64>),
     /// Every reading within this distance of the middle reads the middle, deg/s.
     DeadBand(f64),
@@ -43,9 +43,45 @@ enum Change {
     Noise(Vec<f64>, f64),
 }
 
-/// One of them, on an axis of a stand, at a strength of `wanted`.
+/// Largest rms of what is added, deg/s: a gyro that reads more below 1 Hz has been turned, whoever looks at it.
+const LARGEST_RMS: f64 = 0.28;
+
+/// One of them, on an axis of a stand, at a strength of `wanted`; weaker where that would need more than
+/// [`LARGEST_RMS`] however it is drawn.
 #[must_use]
-pub fn foreign(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: f64) -> Foreign {
+pub fn foreign(
+    draw: &mut Draw,
+    stand: &Stand,
+    name: &'static str,
+    axis: usize,
+    wanted: f64,
+) -> Foreign {
+    let rms = |f: &Foreign| match &f.change {
+        Change::Add(signal) => {
+            let n = signal.len() as f64;
+            let mean = signal.iter().sum::<f64>() / n;
+            (signal.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+        }
+        _ => 0.0,
+    };
+    const TRIES: usize = 12;
+    for _ in 0..TRIES {
+        let f = one(draw, stand, name, axis, wanted);
+        if rms(&f) <= LARGEST_RMS {
+            return f;
+        }
+    }
+    let mut f = one(draw, stand, name, axis, wanted);
+    let down = (LARGEST_RMS / rms(&f)).min(1.0);
+    if let Change::Add(signal) = &mut f.change {
+        signal.iter_mut().for_each(|v| *v *= down);
+        let meter = Meter::new(stand, axis);
+        f.strength = meter.of_signal(&meter.energy(signal));
+    }
+    f
+}
+
+fn one(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: f64) -> Foreign {
     let n = stand.samples();
     let t = |i: usize| i as f64 / stand.rate_hz;
     let tau = std::f64::consts::TAU;
@@ -65,7 +101,17 @@ pub fn foreign(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, 
         }
         "square wave" => {
             let period = draw.between(5.0, 40.0);
-            Some((0..n).map(|i| if (t(i) / period).fract() < 0.5 { 1.0 } else { -1.0 }).collect())
+            Some(
+                (0..n)
+                    .map(|i| {
+                        if (t(i) / period).fract() < 0.5 {
+                            1.0
+                        } else {
+                            -1.0
+                        }
+                    })
+                    .collect(),
+            )
         }
         "comb of harmonics" => {
             let f = draw.between(0.4, 1.5);
@@ -73,7 +119,8 @@ pub fn foreign(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, 
             Some(
                 (0..n)
                     .map(|i| {
-                        let term = |(k, p): (usize, &f64)| (tau * f * (k + 1) as f64 * t(i) + p).sin();
+                        let term =
+                            |(k, p): (usize, &f64)| (tau * f * (k + 1) as f64 * t(i) + p).sin();
                         phases.iter().enumerate().map(term).sum()
                     })
                     .collect(),
@@ -110,11 +157,17 @@ pub fn foreign(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, 
         }
         "rate of temperature" => {
             let w = (2.0 * stand.rate_hz) as usize;
-            Some((0..n).map(|i| temperature[(i + w).min(n - 1)] - temperature[i.saturating_sub(w)]).collect())
+            Some(
+                (0..n)
+                    .map(|i| temperature[(i + w).min(n - 1)] - temperature[i.saturating_sub(w)])
+                    .collect(),
+            )
         }
-        "duty times temperature" => {
-            Some((0..n).map(|i| stand.world.duty[i] * (temperature[i] - mean)).collect())
-        }
+        "duty times temperature" => Some(
+            (0..n)
+                .map(|i| stand.world.duty[i] * (temperature[i] - mean))
+                .collect(),
+        ),
         "sawtooth" => {
             let period = draw.between(20.0, 90.0);
             Some((0..n).map(|i| (t(i) / period).fract() - 0.5).collect())
@@ -146,7 +199,11 @@ pub fn foreign(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, 
         };
         let size = size_for(wanted, &strength);
         let change = Change::Add(unit.iter().map(|v| size * v).collect());
-        return Foreign { name, strength: strength(size), change };
+        return Foreign {
+            name,
+            strength: strength(size),
+            change,
+        };
     }
     match name {
         "swinging variance" | "growing variance" => {
@@ -166,20 +223,38 @@ pub fn foreign(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, 
             let depth = size_for(wanted, &|x| of_variance(&law(x)));
             let found = law(depth);
             let change = Change::Scale(found.iter().map(|v| v.sqrt()).collect());
-            Foreign { name, strength: of_variance(&found), change }
+            Foreign {
+                name,
+                strength: of_variance(&found),
+                change,
+            }
         }
         "heavy tails" => {
             // Laplace noise, mixed in so that the kurtosis shows.
-            let noise = (0..n).map(|_| draw.sign() * draw.exponential() / 2f64.sqrt()).collect();
-            Foreign { name, strength: f64::NAN, change: Change::Noise(noise, 1.0) }
+            let noise = (0..n)
+                .map(|_| draw.sign() * draw.exponential() / 2f64.sqrt())
+                .collect();
+            Foreign {
+                name,
+                strength: f64::NAN,
+                change: Change::Noise(noise, 1.0),
+            }
         }
         "skewed noise" => {
             let noise = (0..n).map(|_| draw.exponential() - 1.0).collect();
-            Foreign { name, strength: f64::NAN, change: Change::Noise(noise, 0.7) }
+            Foreign {
+                name,
+                strength: f64::NAN,
+                change: Change::Noise(noise, 0.7),
+            }
         }
         _ => {
             let band = stand.white(axis).sqrt() * draw.between(0.5, 1.2);
-            Foreign { name, strength: f64::NAN, change: Change::DeadBand(band) }
+            Foreign {
+                name,
+                strength: f64::NAN,
+                change: Change::DeadBand(band),
+            }
         }
     }
 }
@@ -187,7 +262,9 @@ pub fn foreign(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, 
 fn swing(values: &[f64]) -> f64 {
     let (low, high) = values
         .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {
+            (l.min(v), h.max(v))
+        });
     high - low
 }
 
@@ -202,7 +279,9 @@ fn change_readings(
     draw: &mut Draw,
     new: impl Fn(usize, f64) -> f64,
 ) {
-    let Some(c) = record.channels.iter_mut().find(|c| c.name == channel) else { return };
+    let Some(c) = record.channels.iter_mut().find(|c| c.name == channel) else {
+        return;
+    };
     let Some(counts) = &mut c.counts else { return };
     for (i, count) in counts.iter_mut().enumerate() {
         // Within its step the rate is anywhere.
@@ -214,42 +293,45 @@ fn change_readings(
 }
 
 impl Foreign {
+    /// Whether it brings the white noise of its channel itself, so that the stand has to leave it out.
+    #[must_use]
+    pub fn replaces_noise(&self) -> bool {
+        matches!(self.change, Change::Scale(_) | Change::Noise(..))
+    }
+
     /// Act on a channel of a run.
-    pub fn act(&self, record: &mut Record, channel: &str, stand: &Stand, axis: usize, draw: &mut Draw) {
+    pub fn act(
+        &self,
+        record: &mut Record,
+        channel: &str,
+        stand: &Stand,
+        axis: usize,
+        draw: &mut Draw,
+    ) {
         let sigma = stand.white(axis).sqrt();
-        let level = |record: &Record| -> Vec<f64> {
-            // The local level, which the noise is taken from.
-            let w = (2.0 * stand.rate_hz) as usize;
-            let v = record.channel(channel).map(|c| c.values.clone()).unwrap_or_default();
-            let mut sums = vec![0.0];
-            for x in &v {
-                sums.push(sums[sums.len() - 1] + x);
-            }
-            (0..v.len())
-                .map(|i| {
-                    let (a, b) = (i.saturating_sub(w), (i + w).min(v.len()));
-                    (sums[b] - sums[a]) / (b - a) as f64
-                })
-                .collect()
-        };
         match &self.change {
             Change::Add(signal) => add(record, channel, signal, draw),
             Change::Scale(factor) => {
-                let at = level(record);
-                change_readings(record, channel, draw, |i, v| at[i] + factor[i] * (v - at[i]));
+                let noise: Vec<f64> = factor.iter().map(|f| f * sigma * draw.normal()).collect();
+                add(record, channel, &noise, draw);
             }
             Change::DeadBand(band) => {
                 let middle = stand.bias[axis];
                 change_readings(record, channel, draw, |_, v| {
-                    if (v - middle).abs() < *band { middle } else { v }
+                    if (v - middle).abs() < *band {
+                        middle
+                    } else {
+                        v
+                    }
                 });
             }
             Change::Noise(noise, share) => {
-                let at = level(record);
-                let keep = (1.0 - share).sqrt();
-                change_readings(record, channel, draw, |i, v| {
-                    at[i] + keep * (v - at[i]) + share.sqrt() * sigma * noise[i]
-                });
+                let (own, normal) = (share.sqrt() * sigma, (1.0 - share).sqrt() * sigma);
+                let mixed: Vec<f64> = noise
+                    .iter()
+                    .map(|e| own * e + normal * draw.normal())
+                    .collect();
+                add(record, channel, &mixed, draw);
             }
         }
     }

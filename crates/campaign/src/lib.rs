@@ -36,13 +36,32 @@ pub struct Size {
 }
 
 /// Minutes.
-pub const FAST: Size = Size { clean: 200, elsewhere: 12, one: 24, counted: 8, pairs: 60, foreign: 6 };
+pub const QUICK: Size = Size {
+    clean: 200,
+    elsewhere: 12,
+    one: 24,
+    counted: 8,
+    pairs: 60,
+    foreign: 6,
+};
 /// At most an hour on two cores.
-pub const DEFAULT: Size =
-    Size { clean: 2400, elsewhere: 120, one: 160, counted: 60, pairs: 600, foreign: 40 };
+pub const DEFAULT: Size = Size {
+    clean: 2400,
+    elsewhere: 120,
+    one: 160,
+    counted: 60,
+    pairs: 600,
+    foreign: 40,
+};
 /// Hours.
-pub const FULL: Size =
-    Size { clean: 10_000, elsewhere: 600, one: 800, counted: 200, pairs: 3000, foreign: 150 };
+pub const FULL: Size = Size {
+    clean: 10_000,
+    elsewhere: 600,
+    one: 800,
+    counted: 200,
+    pairs: 3000,
+    foreign: 150,
+};
 
 /// All cases of a size, family by family, those that `only` (a row of the tables) leaves.
 #[must_use]
@@ -75,7 +94,9 @@ pub fn run_all(
             .map(|_| {
                 scope.spawn(|| {
                     let mut own = vec![];
-                    while let Some((family, index)) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    while let Some((family, index)) =
+                        cases.get(next.fetch_add(1, Ordering::Relaxed))
+                    {
                         let outcome = case::run(seed, *family, *index);
                         seen(&outcome);
                         own.push(outcome);

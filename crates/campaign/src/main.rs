@@ -15,7 +15,7 @@ use clap::Parser;
 struct Arguments {
     /// Minutes instead of an hour; too few runs for the bars.
     #[arg(long, conflicts_with = "full")]
-    fast: bool,
+    quick: bool,
     /// Hours, for narrower bounds.
     #[arg(long)]
     full: bool,
@@ -44,13 +44,20 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let a = Arguments::parse();
-    let (mut size, name) = match (a.fast, a.full) {
-        (true, _) => (campaign::FAST, "--fast "),
+    let (mut size, name) = match (a.quick, a.full) {
+        (true, _) => (campaign::QUICK, "--quick "),
         (_, true) => (campaign::FULL, "--full "),
         _ => (campaign::DEFAULT, ""),
     };
     if let Some(n) = a.runs {
-        size = Size { clean: n, elsewhere: n, one: n, counted: n, pairs: n, foreign: n };
+        size = Size {
+            clean: n,
+            elsewhere: n,
+            one: n,
+            counted: n,
+            pairs: n,
+            foreign: n,
+        };
     }
     let seed = a
         .seed
@@ -61,8 +68,13 @@ fn main() -> ExitCode {
         .unwrap_or(1);
     let all = cases(size, a.only.as_deref());
     if all.is_empty() {
-        eprintln!("error: no row of the tables is called {:?}", a.only.unwrap_or_default());
-        eprintln!("help:  rows are the causes of docs/effects.md, \"nothing\", \"two\", and the foreign effects of docs/power.md");
+        eprintln!(
+            "error: no row of the tables is called {:?}",
+            a.only.unwrap_or_default()
+        );
+        eprintln!(
+            "help:  rows are the causes of docs/effects.md, \"nothing\", \"two\", and the foreign effects of docs/power.md"
+        );
         return ExitCode::from(2);
     }
     let list = a.list || a.only.is_some();
@@ -73,7 +85,7 @@ fn main() -> ExitCode {
         if list && report::worth_a_line(o) {
             println!("{}", report::line(o));
         }
-        if !list && (n % 20 == 0 || n == all.len()) {
+        if !list && (n.is_multiple_of(20) || n == all.len()) {
             let left = begun.elapsed().as_secs_f64() / n as f64 * (all.len() - n) as f64;
             print!("\r{n} of {} runs, {:.0} min left  ", all.len(), left / 60.0);
             let _ = std::io::stdout().flush();

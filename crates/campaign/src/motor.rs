@@ -23,10 +23,18 @@ pub fn current(draw: &mut Draw, duty: &[f64], rate_hz: f64) -> Vec<f64> {
                 if speed == 0.0 && drive.abs() <= coulomb {
                     continue;
                 }
-                let against = if speed == 0.0 { drive.signum() } else { speed.signum() };
+                let against = if speed == 0.0 {
+                    drive.signum()
+                } else {
+                    speed.signum()
+                };
                 let next = speed + dt / tau * (drive - coulomb * against);
                 // Friction stops a rotor, it does not turn it back.
-                speed = if speed != 0.0 && next.signum() != speed.signum() { 0.0 } else { next };
+                speed = if speed != 0.0 && next.signum() != speed.signum() {
+                    0.0
+                } else {
+                    next
+                };
             }
             sum / STEPS as f64
         })

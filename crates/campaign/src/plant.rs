@@ -89,6 +89,8 @@ pub struct Truth {
     pub parameters: Parameters,
     /// Signal that it adds to its channel, where it is one.
     pub signal: Option<Vec<f64>>,
+    /// Variance that it adds to the coefficients of its channel, by bin, where it is a process.
+    pub density: Option<Vec<f64>>,
 }
 
 /// The environment that a cause needs.
@@ -105,7 +107,11 @@ pub fn needs(cause: &str) -> Needs {
 /// The cause id of a row.
 #[must_use]
 pub fn id_of(label: &'static str) -> &'static str {
-    if label == CURRENT { "motor_bias" } else { label }
+    if label == CURRENT {
+        "motor_bias"
+    } else {
+        label
+    }
 }
 
 fn parameters_of(cause: &str, values: &[(&str, f64)]) -> Parameters {
@@ -113,7 +119,10 @@ fn parameters_of(cause: &str, values: &[(&str, f64)]) -> Parameters {
     values
         .iter()
         .map(|(name, value)| {
-            let unit = specs.iter().find(|s| s.name == *name).map_or("1", |s| s.unit);
+            let unit = specs
+                .iter()
+                .find(|s| s.name == *name)
+                .map_or("1", |s| s.unit);
             ((*name).to_owned(), Parameter::exact(*value, unit))
         })
         .collect()
@@ -125,7 +134,13 @@ fn blank(stand: &Stand) -> Simulation {
     let zeros = || std::array::from_fn(|_| vec![0.0; n]);
     let times: Vec<f64> = (0..n).map(|i| i as f64 / stand.rate_hz).collect();
     let mut motion: [Vec<f64>; 3] = zeros();
-    let setting = |key: &str| stand.excitation.iter().find(|(k, _)| *k == key).map(|s| s.1);
+    let setting = |key: &str| {
+        stand
+            .excitation
+            .iter()
+            .find(|(k, _)| *k == key)
+            .map(|s| s.1)
+    };
     if let (Some(turn), Some(period)) = (setting("turn_dps"), setting("turn_period_s")) {
         let w = std::f64::consts::TAU / period;
         motion[2] = times.iter().map(|t| turn * (w * t).sin()).collect();
@@ -161,6 +176,28 @@ fn signal_of(stand: &Stand, cause: &str, parameters: &Parameters, axis: usize) -
     std::mem::take(&mut run.rate[axis])
 }
 
+/// Largest process, deg/s rms: slower ones, which a random walk hides better, would need more for the strength, and what
+/// moves that much below 1 Hz is a turn of the base to anyone who has the gyro alone.
+const LARGEST_RMS: f64 = 0.25;
+
+/// The first draw (time, (size, strength, density)) of a process that is not too large.
+fn within(drawn: &mut dyn FnMut() -> (f64, (f64, f64, Vec<f64>))) -> (f64, (f64, f64, Vec<f64>)) {
+    const TRIES: usize = 100;
+    let mut last = drawn();
+    for _ in 0..TRIES {
+        if last.1.0 <= LARGEST_RMS {
+            break;
+        }
+        last = drawn();
+    }
+    last
+}
+
+/// Density of a process of variance 1 with one pole, rad per sample.
+fn one_pole(pole: f64, w: f64) -> f64 {
+    (1.0 - pole * pole) / (1.0 + pole * pole - 2.0 * pole * w.cos())
+}
+
 /// Plant `label` on `axis` of a stand at a strength of `wanted`. The stand's excitation may gain a turn or a sway.
 ///
 /// # Panics
@@ -176,22 +213,31 @@ pub fn plant(
     let seconds = stand.seconds;
     let cause = id_of(label);
     let channel = GYROS[axis].to_owned();
-    let of_shape = |stand: &Stand, shape: &[(&str, f64)], sized: &[(&str, f64)], less: &[Vec<f64>]| {
-        let all = |size: f64| {
-            let scaled: Vec<(&str, f64)> = sized.iter().map(|(k, v)| (*k, v * size)).collect();
-            parameters_of(cause, &[shape, &scaled[..]].concat())
+    let of_shape =
+        |stand: &Stand, shape: &[(&str, f64)], sized: &[(&str, f64)], less: &[Vec<f64>]| {
+            let all = |size: f64| {
+                let scaled: Vec<(&str, f64)> = sized.iter().map(|(k, v)| (*k, v * size)).collect();
+                parameters_of(cause, &[shape, &scaled[..]].concat())
+            };
+            let meter = Meter::new(stand, axis);
+            let unit = signal_of(stand, cause, &all(1.0), axis);
+            let seen = if less.is_empty() {
+                unit.clone()
+            } else {
+                meter.beyond(&unit, less)
+            };
+            let energy = meter.energy(&seen);
+            let strength = |size: f64| {
+                let scaled: Vec<f64> = energy.iter().map(|e| e * size * size).collect();
+                meter.of_signal(&scaled)
+            };
+            let size = size_for(wanted, &strength);
+            (
+                all(size),
+                strength(size),
+                unit.iter().map(|v| v * size).collect::<Vec<f64>>(),
+            )
         };
-        let meter = Meter::new(stand, axis);
-        let unit = signal_of(stand, cause, &all(1.0), axis);
-        let seen = if less.is_empty() { unit.clone() } else { meter.beyond(&unit, less) };
-        let energy = meter.energy(&seen);
-        let strength = |size: f64| {
-            let scaled: Vec<f64> = energy.iter().map(|e| e * size * size).collect();
-            meter.of_signal(&scaled)
-        };
-        let size = size_for(wanted, &strength);
-        (all(size), strength(size), unit.iter().map(|v| v * size).collect::<Vec<f64>>())
-    };
     let of_density = |stand: &Stand, density: &dyn Fn(f64, f64) -> f64| {
         let meter = Meter::new(stand, axis);
         let strength = |size: f64| {
@@ -199,7 +245,8 @@ pub fn plant(
             meter.of_density(&all)
         };
         let size = size_for(wanted, &strength);
-        (size, strength(size))
+        let all: Vec<f64> = meter.omega().iter().map(|w| density(size, *w)).collect();
+        (size, strength(size), all)
     };
     let sign = draw.sign();
     let truth = |parameters, strength, signal| Truth {
@@ -209,6 +256,11 @@ pub fn plant(
         strength,
         parameters,
         signal,
+        density: None,
+    };
+    let process = |parameters, strength, density| Truth {
+        density: Some(density),
+        ..truth(parameters, strength, None)
     };
     match label {
         "temperature" => {
@@ -225,7 +277,12 @@ pub fn plant(
         }
         "warm_up" => {
             let tau = draw.by_ratio(seconds / 60.0, seconds / 4.0);
-            let (p, d, s) = of_shape(stand, &[("time_constant", tau)], &[("amplitude", sign)], &[]);
+            let (p, d, s) = of_shape(
+                stand,
+                &[("time_constant", tau)],
+                &[("amplitude", sign)],
+                &[],
+            );
             truth(p, d, Some(s))
         }
         "rate_ramp" => {
@@ -253,8 +310,12 @@ pub fn plant(
         "motor_bias" => {
             let both = stand.world.duty.iter().any(|d| *d < 0.0);
             let size = f64::from(u8::from(both && draw.chance(0.4)));
-            let (p, d, s) =
-                of_shape(stand, &[("by_magnitude", size)], &[("at_full_duty", sign)], &[]);
+            let (p, d, s) = of_shape(
+                stand,
+                &[("by_magnitude", size)],
+                &[("at_full_duty", sign)],
+                &[],
+            );
             truth(p, d, Some(s))
         }
         CURRENT => {
@@ -282,11 +343,16 @@ pub fn plant(
             let inside = length / seconds;
             let strength = |x: f64| {
                 let n = stand.samples() as f64;
-                (n * ((1.0 + inside * x).ln() - inside * (1.0 + x).ln())).max(0.0).sqrt()
+                (n * ((1.0 + inside * x).ln() - inside * (1.0 + x).ln()))
+                    .max(0.0)
+                    .sqrt()
             };
             let size = size_for(wanted, &strength);
-            let values =
-                [("start", start), ("end", start + length), ("variance_increase", size)];
+            let values = [
+                ("start", start),
+                ("end", start + length),
+                ("variance_increase", size),
+            ];
             truth(parameters_of(cause, &values), strength(size), None)
         }
         "g_sensitivity" => {
@@ -305,8 +371,10 @@ pub fn plant(
         }
         "cross_axis" => {
             let turn = draw.between(7.0, 28.0);
-            stand.excitation =
-                vec![("turn_dps", turn), ("turn_period_s", draw.between(15.0, 60.0))];
+            stand.excitation = vec![
+                ("turn_dps", turn),
+                ("turn_period_s", draw.between(15.0, 60.0)),
+            ];
             let (p, d, s) = of_shape(stand, &[], &[("from_gyro_z", sign)], &[]);
             truth(p, d, Some(s))
         }
@@ -323,28 +391,34 @@ pub fn plant(
             truth(p, relative.abs() / error, None)
         }
         "gauss_markov" => {
-            let tau = draw.by_ratio(0.2, 10.0);
-            let pole = (-1.0 / (tau * stand.rate_hz)).exp();
-            let density = |sigma: f64, w: f64| {
-                sigma * sigma * (1.0 - pole * pole) / (1.0 + pole * pole - 2.0 * pole * w.cos())
-            };
-            let (sigma, d) = of_density(stand, &density);
+            let (tau, (sigma, d, density)) = within(&mut || {
+                let tau = draw.by_ratio(0.2, 10.0);
+                let pole = (-1.0 / (tau * stand.rate_hz)).exp();
+                (
+                    tau,
+                    of_density(stand, &|sigma, w| sigma * sigma * one_pole(pole, w)),
+                )
+            });
             let values = [("sigma", sigma), ("correlation_time", tau)];
-            truth(parameters_of(cause, &values), d, None)
+            process(parameters_of(cause, &values), d, density)
         }
         "telegraph" => {
-            let dwell = draw.by_ratio(3.0, 40.0);
-            let pole = (-2.0 / (dwell * stand.rate_hz)).exp();
-            let density = |half: f64, w: f64| {
-                half * half * (1.0 - pole * pole) / (1.0 + pole * pole - 2.0 * pole * w.cos())
-            };
-            let (half, d) = of_density(stand, &density);
-            truth(parameters_of(cause, &[("half_height", half), ("dwell_time", dwell)]), d, None)
+            let (dwell, (half, d, density)) = within(&mut || {
+                let dwell = draw.by_ratio(3.0, 40.0);
+                let pole = (-2.0 / (dwell * stand.rate_hz)).exp();
+                (
+                    dwell,
+                    of_density(stand, &|half, w| half * half * one_pole(pole, w)),
+                )
+            });
+            let values = [("half_height", half), ("dwell_time", dwell)];
+            process(parameters_of(cause, &values), d, density)
         }
         "flicker" => {
             // Two-sided density B^2 / (2 pi f): B^2 / w per sample.
-            let (b, d) = of_density(stand, &|b, w| b * b / w);
-            truth(parameters_of(cause, &[("bias_instability", b * 3600.0)]), d, None)
+            let (b, d, density) = of_density(stand, &|b, w| b * b / w);
+            let p = parameters_of(cause, &[("bias_instability", b * 3600.0)]);
+            process(p, d, density)
         }
         "low_pass" => {
             let white = stand.white(axis);
@@ -358,15 +432,19 @@ pub fn plant(
                         (1.0 - rho * rho) / (1.0 + rho * rho - 2.0 * rho * w.cos()) - 1.0
                     }
             };
-            let (rho, d) = of_density(stand, &density);
-            truth(parameters_of(cause, &[("lag1_correlation", of(rho))]), d, None)
+            let (rho, d, density) = of_density(stand, &density);
+            let p = parameters_of(cause, &[("lag1_correlation", of(rho))]);
+            process(p, d, density)
         }
         "common_noise" => {
             let whites: Vec<f64> = (0..3).map(|i| stand.white(i)).collect();
             let strength = |s: f64| of_common(&whites, s * s, stand.samples());
             let sigma = size_for(wanted, &strength);
             let p = parameters_of(cause, &[("sigma", sigma)]);
-            Truth { channel: String::new(), ..truth(p, strength(sigma), None) }
+            Truth {
+                channel: String::new(),
+                ..truth(p, strength(sigma), None)
+            }
         }
         other => unreachable!("{other} has no strength"),
     }
@@ -378,7 +456,10 @@ pub fn plant_counted(draw: &mut Draw, stand: &Stand, label: &'static str, axis: 
     let sigma = stand.white(axis).sqrt();
     let (values, everywhere): (Vec<(&str, f64)>, bool) = match label {
         "base_motion" => (
-            vec![("peak", draw.by_ratio(1.5, 20.0)), ("frequency", draw.between(0.05, 0.5))],
+            vec![
+                ("peak", draw.by_ratio(1.5, 20.0)),
+                ("frequency", draw.between(0.05, 0.5)),
+            ],
             false,
         ),
         "outliers" => (
@@ -405,20 +486,31 @@ pub fn plant_counted(draw: &mut Draw, stand: &Stand, label: &'static str, axis: 
         "stale_samples" => {
             let silent = draw.chance(0.5);
             let count = 15.0 + draw.of_many(60) as f64;
-            (vec![("count", count), ("silent", f64::from(u8::from(silent)))], silent)
+            (
+                vec![("count", count), ("silent", f64::from(u8::from(silent)))],
+                silent,
+            )
         }
         "dropped_samples" => (vec![("count", 5.0 + draw.of_many(60) as f64)], true),
         "timestamp_jitter" => (vec![("sigma", draw.by_ratio(0.4e-3, 5e-3))], true),
-        "clock_rate" => (vec![("ppm", draw.sign() * draw.by_ratio(300.0, 3000.0))], true),
+        "clock_rate" => (
+            vec![("ppm", draw.sign() * draw.by_ratio(300.0, 3000.0))],
+            true,
+        ),
         other => unreachable!("{other} is not counted"),
     };
     Truth {
         label,
         cause: label,
-        channel: if everywhere { String::new() } else { GYROS[axis].to_owned() },
+        channel: if everywhere {
+            String::new()
+        } else {
+            GYROS[axis].to_owned()
+        },
         strength: f64::NAN,
         parameters: parameters_of(label, &values),
         signal: None,
+        density: None,
     }
 }
 
@@ -427,7 +519,11 @@ pub fn plant_counted(draw: &mut Draw, stand: &Stand, label: &'static str, axis: 
 pub fn as_effect(truth: &Truth) -> Option<EffectModel> {
     (truth.label != CURRENT).then(|| EffectModel {
         cause: truth.cause.to_owned(),
-        channels: if truth.channel.is_empty() { vec![] } else { vec![truth.channel.clone()] },
+        channels: if truth.channel.is_empty() {
+            vec![]
+        } else {
+            vec![truth.channel.clone()]
+        },
         parameters: truth.parameters.clone(),
     })
 }

@@ -253,7 +253,10 @@ fn world(draw: &mut Draw, samples: usize, rate_hz: f64, needs: Needs) -> World {
     let heater = needs.temperature || draw.chance(0.5);
     let mut temperature = vec![draw.between(18.0, 32.0); samples];
     let mut add = |values: Vec<f64>| {
-        temperature.iter_mut().zip(values).for_each(|(t, v)| *t += v);
+        temperature
+            .iter_mut()
+            .zip(values)
+            .for_each(|(t, v)| *t += v);
     };
     if heater {
         let swing = draw.between(3.0, 10.0);

@@ -7,6 +7,7 @@ use analysis::optimise::golden;
 use crate::stand::Stand;
 
 /// The spectrum that a channel of a stand has, on the bins of its length.
+#[derive(Clone)]
 pub struct Meter {
     dct: Dct,
     bins: Bins,
@@ -47,6 +48,18 @@ impl Meter {
     #[must_use]
     pub fn omega(&self) -> &[f64] {
         &self.bins.at.omega
+    }
+
+    /// The same channel with a process beside its noise that adds `density` to the variance of each coefficient.
+    #[must_use]
+    pub fn over(&self, density: &[f64]) -> Self {
+        let mut other = self.clone();
+        other
+            .clean
+            .iter_mut()
+            .zip(density)
+            .for_each(|(v, d)| *v += d);
+        other
     }
 
     /// Energy of a signal in each bin.

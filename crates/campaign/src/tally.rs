@@ -1,9 +1,17 @@
 //! Rates with their binomial bounds, power curves, coverage.
 
-use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
+use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF, Normal};
 
 /// The oracle's limit: d' that one test at 1 % finds 95 times in 100.
 pub const ORACLE: f64 = 4.22;
+
+/// Chance that the oracle, one two-sided test at 1 %, finds an effect of strength `d`.
+#[must_use]
+pub fn oracle(d: f64) -> f64 {
+    let normal = Normal::standard();
+    let limit = normal.inverse_cdf(0.995);
+    normal.sf(limit - d) + normal.cdf(-limit - d)
+}
 
 /// So many of so many.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,9 +46,18 @@ impl Rate {
     #[must_use]
     pub fn interval(self) -> (f64, f64) {
         let (k, n) = (self.hits as f64, self.trials as f64);
-        let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |d| d.inverse_cdf(p));
-        let low = if self.hits == 0 { 0.0 } else { quantile(k, n - k + 1.0, 0.025) };
-        let high = if self.hits == self.trials { 1.0 } else { quantile(k + 1.0, n - k, 0.975) };
+        let quantile =
+            |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |d| d.inverse_cdf(p));
+        let low = if self.hits == 0 {
+            0.0
+        } else {
+            quantile(k, n - k + 1.0, 0.025)
+        };
+        let high = if self.hits == self.trials {
+            1.0
+        } else {
+            quantile(k + 1.0, n - k, 0.975)
+        };
         (low, high)
     }
 
@@ -69,8 +86,10 @@ pub fn d95(runs: &[(f64, bool)]) -> Option<(f64, f64)> {
         return None;
     }
     // Newton's method, with half a hit and half a miss far off as a prior, so that separable data converge.
-    let mut data: Vec<(f64, f64, f64)> =
-        runs.iter().map(|r| (r.0.ln(), f64::from(u8::from(r.1)), 1.0)).collect();
+    let mut data: Vec<(f64, f64, f64)> = runs
+        .iter()
+        .map(|r| (r.0.ln(), f64::from(u8::from(r.1)), 1.0))
+        .collect();
     data.push((1.5f64.ln(), 0.0, 0.5));
     data.push((40f64.ln(), 1.0, 0.5));
     let (mut a, mut b) = (-8.0f64, 5.0f64);
@@ -88,7 +107,10 @@ pub fn d95(runs: &[(f64, bool)]) -> Option<(f64, f64)> {
         }
         let det = aa * bb - ab * ab;
         inverse = [bb / det, -ab / det, aa / det];
-        let step = (inverse[0] * ga + inverse[1] * gb, inverse[1] * ga + inverse[2] * gb);
+        let step = (
+            inverse[0] * ga + inverse[1] * gb,
+            inverse[1] * ga + inverse[2] * gb,
+        );
         let damp = (2.0 / step.0.abs().max(step.1.abs()).max(2.0)).min(1.0);
         a += damp * step.0;
         b += damp * step.1;
@@ -108,8 +130,20 @@ mod tests {
 
     #[test]
     fn the_bound_of_no_hit_in_n_is_one_minus_the_root_of_a_fortieth() {
-        let (low, high) = Rate { hits: 0, trials: 100 }.interval();
-        assert!(low == 0.0 && (high - (1.0 - 0.025f64.powf(0.01))).abs() < 1e-6, "{high}");
+        let (low, high) = Rate {
+            hits: 0,
+            trials: 100,
+        }
+        .interval();
+        assert!(
+            low == 0.0 && (high - (1.0 - 0.025f64.powf(0.01))).abs() < 1e-6,
+            "{high}"
+        );
+    }
+
+    #[test]
+    fn the_oracle_finds_its_limit_95_times_in_100() {
+        assert!((oracle(ORACLE) - 0.95).abs() < 1e-3 && (oracle(0.0) - 0.01).abs() < 1e-6);
     }
 
     #[test]
@@ -120,10 +154,15 @@ mod tests {
         for i in 0..4000 {
             let d = 3.0 * (i as f64 / 4000.0 * 4f64.ln()).exp();
             let p = 1.0 / (1.0 + (-(19f64.ln() + 8.0 * (d / 6.0).ln())).exp());
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             runs.push((d, ((state >> 11) as f64 / (1u64 << 53) as f64) < p));
         }
         let (x, error) = d95(&runs).expect("both outcomes");
-        assert!((x - 6.0).abs() < 4.0 * error && error < 0.2, "{x} +- {error}");
+        assert!(
+            (x - 6.0).abs() < 4.0 * error && error < 0.2,
+            "{x} +- {error}"
+        );
     }
 }

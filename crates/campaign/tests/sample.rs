@@ -1,0 +1,90 @@
+//! A sample of the campaign with a fresh seed. Each limit is the worst count that an engine as good as the bar asks
+//! would reach once in a thousand runs of this test, by the binomial distribution: it fails when the engine is worse,
+//! not when the draw is unlucky. `IMU_STAND_SEED=N` repeats a draw.
+
+use std::hash::{BuildHasher, Hasher};
+
+use campaign::plant::asked_from;
+use campaign::tally::Rate;
+use campaign::{Family, Hit, Outcome, Size, cases, report, run_all};
+
+const SAMPLE: Size = Size {
+    clean: 60,
+    elsewhere: 6,
+    one: 6,
+    counted: 2,
+    pairs: 12,
+    foreign: 1,
+};
+/// Chance that an engine that just meets a bar fails the test on it.
+const UNLUCKY: f64 = 1e-3;
+
+/// Not worse than a bar of "at least" by more than the draw explains.
+fn at_least(what: &str, rate: Rate, asked: f64) -> Option<String> {
+    println!("{what}: {} of {}, asked {asked}", rate.hits, rate.trials);
+    (rate.at_most(asked) < UNLUCKY).then(|| {
+        format!(
+            "{what}: {} of {}, asked at least {asked}",
+            rate.hits, rate.trials
+        )
+    })
+}
+
+fn at_most(what: &str, rate: Rate, asked: f64) -> Option<String> {
+    println!("{what}: {} of {}, asked {asked}", rate.hits, rate.trials);
+    (rate.at_least(asked) < UNLUCKY).then(|| {
+        format!(
+            "{what}: {} of {}, asked at most {asked}",
+            rate.hits, rate.trials
+        )
+    })
+}
+
+#[test]
+fn a_fresh_sample_of_the_campaign_is_not_worse_than_its_bars() {
+    let seed = std::env::var("IMU_STAND_SEED")
+        .ok()
+        .and_then(|s| s.parse().ok())
+        .unwrap_or_else(|| std::hash::RandomState::new().build_hasher().finish() >> 16);
+    println!("IMU_STAND_SEED={seed}");
+    let threads = std::thread::available_parallelism().map_or(1, Into::into);
+    let all = run_all(seed, &cases(SAMPLE, None), threads, &|o| {
+        if report::worth_a_line(o) {
+            println!("{}", report::line(o));
+        }
+    });
+    let of = |keep: &dyn Fn(&Outcome) -> bool, hit: &dyn Fn(&Outcome) -> bool| {
+        Rate::of(all.iter().filter(|o| keep(o)).map(hit))
+    };
+    let strong = |o: &Outcome| {
+        matches!(o.family, Family::One(_)) && o.truths.iter().all(|t| t.1 >= asked_from(t.0))
+    };
+    let pair = |o: &Outcome| o.family == Family::Pair;
+    let planted = |o: &Outcome| !o.truths.is_empty();
+    let counted = |o: &Outcome| matches!(o.family, Family::Counted(_));
+    let found = |o: &Outcome| o.truths.iter().all(|t| t.2 != Hit::Missed);
+    let pairs = Rate::of(
+        all.iter()
+            .filter(|o| pair(o))
+            .flat_map(|o| o.truths.iter().map(|t| t.2 != Hit::Missed)),
+    );
+    let worse: Vec<String> = [
+        at_most(
+            "alarms on clean runs",
+            of(&|o| o.family == Family::Clean, &|o| !o.quiet()),
+            0.005,
+        ),
+        at_least(
+            "one effect, named alone",
+            of(&strong, &Outcome::right),
+            0.98,
+        ),
+        at_least("counted faults, found", of(&counted, &found), 0.98),
+        at_least("two effects, each found", pairs, 0.98),
+        at_most("wrong names", of(&planted, &|o| !o.wrong.is_empty()), 0.02),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    assert!(worse.is_empty(), "seed {seed}: {}", worse.join("; "));
+}
