@@ -140,7 +140,7 @@ fn remedy(code: u8, status: Status) -> &'static str {
         Status::UnknownCommand | Status::Unsupported => {
             "`imu-stand board info` shows the firmware's version; `imu-stand flash` writes a newer one"
         }
-        Status::BadArgument if is(Command::SetRate { period_ticks: 0 }) => {
+        Status::BadArgument if code == wire::code::SET_RATE => {
             "the board samples at 4 Hz to 256 Hz; see docs/wire-format.md"
         }
         Status::BadArgument
@@ -180,7 +180,7 @@ mod tests {
     fn a_refusal_says_what_and_what_to_do() {
         let error = LinkError::Refused {
             command: "set rate",
-            code: Command::SetRate { period_ticks: 0 }.code(),
+            code: wire::code::SET_RATE,
             status: Status::BadArgument,
         };
         assert_eq!(

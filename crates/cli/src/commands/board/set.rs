@@ -164,10 +164,12 @@ fn rate(hello: &Hello, hz: f64) -> Result<Command> {
         miette::bail!(help = "write `board set rate 20`", "{hz} is no sample rate");
     }
     let ticks = (1e9 / f64::from(hello.tick_ns.max(1)) / hz).round();
-    if ticks > f64::from(u16::MAX) || ticks < 1.0 {
+    // A period that the 16-bit timer cannot hold is that many shorter ones.
+    let periods = (ticks / f64::from(u16::MAX)).ceil();
+    if periods > f64::from(u8::MAX) || ticks < 1.0 {
         return Err(LinkError::Refused {
             command: "set rate",
-            code: Command::SetRate { period_ticks: 0 }.code(),
+            code: wire::code::SET_RATE,
             status: Status::BadArgument,
         }
         .into());
@@ -190,7 +192,8 @@ fn rate(hello: &Hello, hz: f64) -> Result<Command> {
         );
     }
     Ok(Command::SetRate {
-        period_ticks: ticks as u16,
+        period_ticks: (ticks / periods).round() as u16,
+        periods_per_sample: periods as u8,
     })
 }
 

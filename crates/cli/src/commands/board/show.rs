@@ -32,6 +32,7 @@ pub struct Info {
     pub rate_hz: f64,
     tick_s: f64,
     period_ticks: u16,
+    periods_per_sample: u8,
     /// Speed of the line.
     pub baud: f64,
     /// Full scale of the gyros; null where the code is none of the part's.
@@ -62,7 +63,9 @@ pub fn gyro_range_dps(code: u8) -> Option<f64> {
 /// Samples a second; `None` where the frame makes no sense.
 pub fn rate_hz(hello: &Hello) -> Option<f64> {
     // Whole nanoseconds: 4000 ns times 1000 is 250 Hz and not 249.999.
-    let period_ns = u64::from(hello.tick_ns) * u64::from(hello.period_ticks);
+    let period_ns = u64::from(hello.tick_ns)
+        * u64::from(hello.period_ticks)
+        * u64::from(hello.periods_per_sample.max(1));
     (period_ns > 0).then(|| 1e9 / period_ns as f64)
 }
 
@@ -92,6 +95,7 @@ impl Info {
             rate_hz: rate_hz(hello).unwrap_or(f64::NAN),
             tick_s: f64::from(hello.tick_ns) / 1e9,
             period_ticks: hello.period_ticks,
+            periods_per_sample: hello.periods_per_sample,
             baud: baud_of(hello.baud_divisor),
             gyro_range_dps: gyro_range_dps(hello.gyro_range),
             gyro_filter: hello.gyro_filter,
