@@ -56,6 +56,12 @@ fn test(root: &Path) -> Result<(), Failure> {
     if !toolchain::has("cc") {
         toolchain::install("a C compiler, which Rust links with", &["gcc", "libc6-dev"])?;
     }
+    if !toolchain::has("avrdude") {
+        toolchain::install(
+            "avrdude, which `imu-stand flash` is tested with",
+            &["avrdude"],
+        )?;
+    }
     match std::env::var_os("IMU_STAND_DATA") {
         Some(folder) => println!("measured records: {}", Path::new(&folder).display()),
         None => println!(

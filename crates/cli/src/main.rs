@@ -38,6 +38,8 @@ enum Command {
     Capture(commands::capture::Arguments),
     /// Read and set the board's configuration over the line.
     Board(commands::board::Arguments),
+    /// The firmware onto the board, by avrdude; fuses are checked, and written only on request.
+    Flash(commands::flash::Arguments),
 }
 
 fn main() -> miette::Result<()> {
@@ -51,5 +53,6 @@ fn main() -> miette::Result<()> {
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Capture(arguments) => commands::capture::run(&arguments),
         Command::Board(arguments) => commands::board::run(&arguments),
+        Command::Flash(arguments) => commands::flash::run(&arguments),
     }
 }

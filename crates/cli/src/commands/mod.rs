@@ -4,6 +4,7 @@ pub mod analyze;
 pub mod board;
 pub mod capture;
 pub mod diagnose;
+pub mod flash;
 pub mod paper;
 pub mod report;
 pub mod representative;

@@ -1,0 +1,440 @@
+//! `imu-stand flash` with the real avrdude, on a programmer that is simulated behind a pseudo-terminal: STK500 version 1
+//! (Atmel AVR061), and behind that an ATmega16's serial programming (data sheet, "Serial Programming").
+#![cfg(unix)]
+
+mod common;
+
+use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::Output;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use common::{folder, json, run, said};
+use serialport::{SerialPort as _, TTYPort};
+
+const PAGE: usize = 128;
+
+/// The part, as far as a programmer sees it.
+#[derive(Clone)]
+struct Part {
+    flash: Vec<u8>,
+    eeprom: Vec<u8>,
+    low: u8,
+    high: u8,
+    lock: u8,
+    signature: [u8; 3],
+    erased: u32,
+    /// A page that does not take what is written.
+    bad_page: Option<usize>,
+}
+
+impl Part {
+    fn as_delivered() -> Self {
+        Part {
+            flash: vec![0x55; 16_384],
+            eeprom: vec![0x42; 512],
+            low: 0xe1,
+            high: 0x99,
+            lock: 0xff,
+            signature: [0x1e, 0x94, 0x03],
+            erased: 0,
+            bad_page: None,
+        }
+    }
+
+    fn ours() -> Self {
+        Part {
+            low: 0x3f,
+            high: 0xc1,
+            ..Part::as_delivered()
+        }
+    }
+
+    /// An instruction of the serial programming; what is clocked out with its last byte.
+    fn instruction(&mut self, [a, b, c, d]: [u8; 4]) -> u8 {
+        match (a, b) {
+            (0xac, 0x80) => {
+                self.flash.fill(0xff);
+                if self.high & 0x08 != 0 {
+                    self.eeprom.fill(0xff);
+                }
+                self.lock = 0xff;
+                self.erased += 1;
+                0
+            }
+            (0xac, 0xa0) => {
+                self.low = d;
+                0
+            }
+            (0xac, 0xa8) => {
+                self.high = d;
+                0
+            }
+            (0xac, _) if b & 0xe0 == 0xe0 => {
+                self.lock = d;
+                0
+            }
+            (0x30, _) => self.signature[usize::from(c & 3).min(2)],
+            (0x50, 0x00) => self.low,
+            (0x58, 0x08) => self.high,
+            (0x58, 0x00) => self.lock,
+            _ => 0,
+        }
+    }
+}
+
+/// A programmer with a part on it.
+struct Programmer {
+    path: String,
+    part: Arc<Mutex<Part>>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Programmer {
+    fn with(part: Part) -> Self {
+        let (mut master, slave) = TTYPort::pair().expect("a pseudo-terminal");
+        let path = slave.name().expect("it has a name");
+        master
+            .set_timeout(Duration::from_millis(20))
+            .expect("it takes a timeout");
+        let (part, stop) = (Arc::new(Mutex::new(part)), Arc::new(AtomicBool::new(false)));
+        let (of_thread, flag) = (Arc::clone(&part), Arc::clone(&stop));
+        let thread = std::thread::spawn(move || {
+            let _slave = slave;
+            let mut line = Line { port: master, flag };
+            let mut at = 0;
+            while answer(&mut line, &of_thread, &mut at).is_some() {}
+        });
+        Programmer {
+            path,
+            part,
+            stop,
+            thread: Some(thread),
+        }
+    }
+
+    fn part(&self) -> Part {
+        self.part.lock().expect("no test panics inside").clone()
+    }
+
+    /// `imu-stand flash ...` on this programmer.
+    fn flash(&self, arguments: &[&str]) -> Output {
+        let mut all = vec![
+            "flash",
+            "--programmer",
+            "stk500v1",
+            "--programmer-port",
+            &self.path,
+            "--programmer-baud",
+            "115200",
+        ];
+        all.extend(arguments);
+        run(&all)
+    }
+}
+
+impl Drop for Programmer {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Line {
+    port: TTYPort,
+    flag: Arc<AtomicBool>,
+}
+
+impl Line {
+    /// The next byte; `None` when the test is over.
+    fn byte(&mut self) -> Option<u8> {
+        let mut byte = [0];
+        loop {
+            match self.port.read(&mut byte) {
+                Ok(1) => return Some(byte[0]),
+                _ if self.flag.load(Ordering::Relaxed) => return None,
+                _ => {}
+            }
+        }
+    }
+
+    fn bytes(&mut self, count: usize) -> Option<Vec<u8>> {
+        (0..count).map(|_| self.byte()).collect()
+    }
+}
+
+/// Takes a command of AVR061 and answers it.
+fn answer(line: &mut Line, part: &Mutex<Part>, at: &mut usize) -> Option<()> {
+    let command = line.byte()?;
+    let mut out = vec![0x14];
+    let part_of = |work: &mut dyn FnMut(&mut Part)| work(&mut part.lock().expect("no panic"));
+    match command {
+        // Get parameter: a version, any.
+        0x41 => {
+            line.bytes(1)?;
+            out.push(2);
+        }
+        0x40 => drop(line.bytes(2)?),
+        0x42 => drop(line.bytes(20)?),
+        0x45 => {
+            let count = line.byte()?;
+            line.bytes(usize::from(count).saturating_sub(1))?;
+        }
+        // Universal.
+        0x56 => {
+            let bytes = line.bytes(4)?;
+            let four = [bytes[0], bytes[1], bytes[2], bytes[3]];
+            part_of(&mut |part| out.push(part.instruction(four)));
+        }
+        // Load address, in words.
+        0x55 => {
+            let bytes = line.bytes(2)?;
+            *at = 2 * usize::from(u16::from_le_bytes([bytes[0], bytes[1]]));
+        }
+        // Program page.
+        0x64 => {
+            let head = line.bytes(3)?;
+            let data = line.bytes(usize::from(u16::from_be_bytes([head[0], head[1]])))?;
+            part_of(&mut |part| {
+                let bad = part.bad_page == Some(*at / PAGE);
+                for (place, byte) in part.flash[*at..].iter_mut().zip(&data) {
+                    // Flash is written from ones to zeros.
+                    *place &= if bad { 0 } else { *byte };
+                }
+            });
+        }
+        // Read page.
+        0x74 => {
+            let head = line.bytes(3)?;
+            let count = usize::from(u16::from_be_bytes([head[0], head[1]]));
+            part_of(&mut |part| out.extend(&part.flash[*at..*at + count]));
+        }
+        0x75 => part_of(&mut |part| out.extend(part.signature)),
+        _ => {}
+    }
+    // The end of a command; without it the two are out of step.
+    if line.byte()? != 0x20 {
+        out = vec![0x15];
+    } else {
+        out.push(0x10);
+    }
+    line.port.write_all(&out).ok()
+}
+
+/// An Intel hex file with these bytes from address 0.
+fn hex(folder: &Path, bytes: &[u8]) -> PathBuf {
+    let mut text = String::new();
+    for (k, row) in bytes.chunks(16).enumerate() {
+        let address = (k * 16) as u16;
+        let mut line = vec![row.len() as u8];
+        line.extend(address.to_be_bytes());
+        line.push(0);
+        line.extend(row);
+        let sum = line.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
+        line.push(sum.wrapping_neg());
+        text.push(':');
+        line.iter().for_each(|byte| text += &format!("{byte:02X}"));
+        text.push('\n');
+    }
+    text.push_str(":00000001FF\n");
+    let path = folder.join("image.hex");
+    std::fs::write(&path, text).expect("the folder takes a file");
+    path
+}
+
+fn image() -> Vec<u8> {
+    (0..1000u32).map(|k| (k * 7 + k / 256) as u8).collect()
+}
+
+#[test]
+fn an_image_goes_onto_a_board_that_is_set_right_and_the_set_up_stays() {
+    let programmer = Programmer::with(Part::ours());
+    let folder = folder("flash_ours");
+    let file = hex(&folder, &image());
+    let out = folder.join("flash.json");
+    let done = programmer.flash(&[file.to_str().unwrap(), "--json", out.to_str().unwrap()]);
+    let said = said(&done);
+    assert_eq!(done.status.code(), Some(0), "{said}");
+    let part = programmer.part();
+    assert_eq!(&part.flash[..1000], image());
+    assert!(part.flash[1008..].iter().all(|byte| *byte == 0xff));
+    assert_eq!(part.erased, 1);
+    assert!(part.eeprom.iter().all(|byte| *byte == 0x42), "EESAVE");
+    assert_eq!((part.low, part.high, part.lock), (0x3f, 0xc1, 0xff));
+    let answer = json(&out);
+    assert_eq!(answer["written"], true);
+    assert_eq!(answer["fuses"]["low"], 0x3f);
+    assert_eq!(answer["deviations"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn a_new_part_is_neither_flashed_nor_fused_unasked() {
+    let programmer = Programmer::with(Part::as_delivered());
+    let folder = folder("flash_new");
+    let file = hex(&folder, &image());
+    let file = file.to_str().unwrap();
+    for arguments in [vec![file], vec![file, "--write-fuses"]] {
+        // Without a terminal nobody says yes.
+        let refused = programmer.flash(&arguments);
+        assert_eq!(refused.status.code(), Some(1));
+        let said = said(&refused);
+        assert!(said.contains("CKSEL") && said.contains("1 MHz"), "{said}");
+        let part = programmer.part();
+        assert_eq!((part.low, part.high, part.erased), (0xe1, 0x99, 0));
+        assert!(part.flash.iter().all(|byte| *byte == 0x55));
+    }
+    let done = programmer.flash(&[file, "--write-fuses", "--yes"]);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    let part = programmer.part();
+    assert_eq!((part.low, part.high, part.lock), (0x2f, 0xc1, 0xff));
+    assert_eq!(&part.flash[..1000], image());
+    assert!(
+        part.eeprom.iter().all(|byte| *byte == 0x42),
+        "EESAVE was written first"
+    );
+}
+
+#[test]
+fn fuses_can_be_kept_and_then_the_lost_eeprom_is_told() {
+    let programmer = Programmer::with(Part::as_delivered());
+    let folder = folder("flash_keep");
+    let file = hex(&folder, &image());
+    let done = programmer.flash(&[file.to_str().unwrap(), "--keep-fuses"]);
+    let said = said(&done);
+    assert_eq!(done.status.code(), Some(0), "{said}");
+    assert!(said.contains("EEPROM was erased"), "{said}");
+    let part = programmer.part();
+    assert_eq!((part.low, part.high), (0xe1, 0x99));
+    assert!(part.eeprom.iter().all(|byte| *byte == 0xff));
+}
+
+#[test]
+fn a_locked_part_is_left_alone_unless_told_otherwise() {
+    let programmer = Programmer::with(Part {
+        lock: 0xfc,
+        ..Part::ours()
+    });
+    let folder = folder("flash_locked");
+    let file = hex(&folder, &image());
+    let refused = programmer.flash(&[file.to_str().unwrap()]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(said(&refused).contains("--unlock"));
+    assert_eq!(programmer.part().erased, 0);
+    let done = programmer.flash(&[file.to_str().unwrap(), "--unlock"]);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    assert_eq!(programmer.part().lock, 0xff);
+}
+
+#[test]
+fn a_dry_run_prints_calls_that_avrdude_takes_and_makes_none() {
+    let programmer = Programmer::with(Part::ours());
+    let folder = folder("flash_dry");
+    let file = hex(&folder, &image());
+    let dry = programmer.flash(&[file.to_str().unwrap(), "--dry-run", "--write-fuses"]);
+    assert_eq!(dry.status.code(), Some(0));
+    assert_eq!(programmer.part().erased, 0);
+    let calls: Vec<String> = String::from_utf8(dry.stdout)
+        .unwrap()
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(str::to_owned)
+        .collect();
+    assert_eq!(calls.len(), 4);
+    for call in &calls {
+        // -n: avrdude does all but write.
+        let done = std::process::Command::new("sh")
+            .args(["-c", &format!("{call} -n")])
+            .output()
+            .expect("a shell");
+        assert!(done.status.success(), "{call}: {}", said(&done));
+    }
+    let part = programmer.part();
+    assert_eq!((part.low, part.high), (0x3f, 0xc1));
+    assert!(
+        part.flash.iter().all(|byte| *byte == 0x55),
+        "-n writes nothing"
+    );
+}
+
+#[test]
+fn fuses_are_checked_without_an_image() {
+    let programmer = Programmer::with(Part::as_delivered());
+    let done = programmer.flash(&["--check"]);
+    let said = said(&done);
+    assert_eq!(done.status.code(), Some(0), "{said}");
+    assert!(said.contains("low 0xe1, high 0x99"), "{said}");
+    assert!(
+        said.contains("BODEN is wrong") && said.contains("EESAVE could be better"),
+        "{said}"
+    );
+}
+
+#[test]
+fn what_avrdude_complains_of_is_explained() {
+    let folder = folder("flash_errors");
+    let file = hex(&folder, &image());
+    let file = file.to_str().unwrap();
+    let wrong = Programmer::with(Part {
+        signature: [0x1e, 0x95, 0x02],
+        ..Part::ours()
+    });
+    let refused = wrong.flash(&[file]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(
+        said(&refused).contains("is no ATmega16"),
+        "{}",
+        said(&refused)
+    );
+
+    let worn = Programmer::with(Part {
+        bad_page: Some(3),
+        ..Part::ours()
+    });
+    let refused = worn.flash(&[file]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(
+        said(&refused).contains("read back differs"),
+        "{}",
+        said(&refused)
+    );
+
+    let none = run(&["flash", file, "--programmer", "no-such-thing"]);
+    assert_eq!(none.status.code(), Some(1));
+    assert!(
+        said(&none).contains("lists the programmers"),
+        "{}",
+        said(&none)
+    );
+    let absent = run(&[
+        "flash",
+        file,
+        "-c",
+        "usbasp",
+        "--avrdude",
+        "no-such-avrdude",
+    ]);
+    assert!(
+        said(&absent).contains("apt-get install avrdude"),
+        "{}",
+        said(&absent)
+    );
+    let program = env!("CARGO_BIN_EXE_imu-stand");
+    let foreign = run(&["flash", program, "-c", "usbasp"]);
+    assert!(
+        said(&foreign).contains("not one for an AVR"),
+        "{}",
+        said(&foreign)
+    );
+    let text = run(&["flash", "Cargo.toml", "-c", "usbasp"]);
+    assert!(
+        said(&text).contains("neither ELF nor Intel hex"),
+        "{}",
+        said(&text)
+    );
+}
