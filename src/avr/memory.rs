@@ -26,7 +26,7 @@ pub unsafe extern "C" fn memcpy(to: *mut u8, from: *const u8, n: usize) -> *mut 
 /// # Safety
 /// As C has it.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn memset(to: *mut u8, byte: i32, n: usize) -> *mut u8 {
+pub unsafe extern "C" fn memset(to: *mut u8, byte: core::ffi::c_int, n: usize) -> *mut u8 {
     let (mut at, mut left) = (to, n);
     while left != 0 {
         // SAFETY: the caller's.

@@ -119,6 +119,14 @@ impl SpiDevice for GyroSpi {
     }
 }
 
+/// Ten cycles.
+#[inline(always)]
+fn ten_nops() {
+    use avr_device::asm::nop;
+    (nop(), nop(), nop(), nop(), nop());
+    (nop(), nop(), nop(), nop(), nop());
+}
+
 /// Waits by counting cycles of 62.5 ns.
 #[derive(Clone, Copy)]
 pub struct Delay;
@@ -131,15 +139,11 @@ impl DelayNs for Delay {
 
     #[inline(never)]
     fn delay_us(&mut self, us: u32) {
-        // A pass takes 16 cycles: the count in 16 bits, the nops, the branch. No caller waits for longer than 16 bits
-        // of microseconds hold.
+        // A pass takes 16 cycles: ten nops, the count in 16 bits and its test (4), the branch (2). No caller waits for
+        // longer than 16 bits of microseconds hold.
         let mut left = us as u16;
         while left != 0 {
-            for _ in 0..2 {
-                avr_device::asm::nop();
-            }
-            avr_device::asm::nop();
-            avr_device::asm::nop();
+            ten_nops();
             left = left.wrapping_sub(1);
         }
     }

@@ -45,7 +45,7 @@ pub fn build(root: &Path) -> Result<PathBuf, Failure> {
     let hex = elf.with_extension("hex");
     let mut objcopy = Command::new("avr-objcopy");
     objcopy
-        .args(["-O", "ihex", "-R", ".eeprom"])
+        .args(["-O", "ihex", "-R", ".eeprom", "-R", ".noinit"])
         .arg(&elf)
         .arg(&hex);
     run("avr-objcopy", &mut objcopy)?;

@@ -7,7 +7,8 @@ use object::{LittleEndian, Object, ObjectSection, ObjectSymbol};
 /// Size of the flash, bytes.
 pub const FLASH: usize = 16 * 1024;
 const EEPROM: usize = 512;
-/// Where the linker puts EEPROM and fuses.
+/// Where the linker puts RAM (which no programmer fills), EEPROM and fuses.
+const RAM_ADDRESS: u32 = 0x80_0000;
 const EEPROM_ADDRESS: u32 = 0x81_0000;
 const FUSE_ADDRESS: u32 = 0x82_0000;
 const LOCK_ADDRESS: u32 = 0x83_0000;
@@ -123,7 +124,8 @@ impl Image {
             end: end as u32,
         };
         match address {
-            0..EEPROM_ADDRESS => {
+            RAM_ADDRESS..EEPROM_ADDRESS => {}
+            0..RAM_ADDRESS => {
                 let end = address as usize + bytes.len();
                 if end > FLASH {
                     return Err(does_not_fit("flash", FLASH));

@@ -47,6 +47,8 @@ pub trait Board {
     fn pins_changed(&mut self, at: u64, pins: &Pins);
     /// OC2 puts out something else.
     fn motor_changed(&mut self, _at: u64, _motor: &Pwm) {}
+    /// An interrupt is taken, its number counted from 0 (reset). `at` is the cycle of its flag, if the processor slept.
+    fn interrupt(&mut self, _at: u64, _vector: u8) {}
     /// The voltage at AVCC, V.
     fn avcc_volts(&self) -> f64 {
         5.0
@@ -325,6 +327,7 @@ impl Mcu {
                 let wake = if self.asleep { WAKE } else { 0 };
                 self.asleep = false;
                 self.core.chip_mut().taken(vector);
+                board.interrupt(now, vector);
                 self.core.call(vector);
                 self.core.set_cycle(now + ENTRY + wake);
                 self.look_at_stack();

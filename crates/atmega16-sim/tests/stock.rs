@@ -4,28 +4,36 @@
 
 mod common;
 
+use std::cell::RefCell;
 use std::ffi::{c_int, c_void};
 
 use atmega16_sim::{Image, Mcu};
 use common::{Recorder, compile};
 use simavr_ffi as ffi;
 
+/// Bytes that went out, with their cycles.
+struct Heard {
+    avr: *mut ffi::avr_t,
+    bytes: RefCell<Vec<(u64, u8)>>,
+}
+
 /// simavr as it comes, but for a sleep that does not wait in real time.
 struct Stock {
     image: Image,
     avr: *mut ffi::avr_t,
     marks: Vec<(u64, u8)>,
-    uart: Box<Vec<(u64, u8)>>,
+    heard: &'static Heard,
 }
 
 unsafe extern "C" fn no_sleep(_: *mut ffi::avr_t, _: ffi::avr_cycle_count_t) {}
 
 unsafe extern "C" fn on_byte(irq: *mut ffi::avr_irq_t, value: u32, param: *mut c_void) {
-    // SAFETY: registered below with these.
+    // SAFETY: registered below with this, which is never freed.
     unsafe {
-        let (avr, list) = *param.cast::<(*mut ffi::avr_t, *mut Vec<(u64, u8)>)>();
+        let heard = &*param.cast::<Heard>();
         assert!(!irq.is_null());
-        (*list).push(((*avr).cycle, value as u8));
+        let at = (*heard.avr).cycle;
+        heard.bytes.borrow_mut().push((at, value as u8));
     }
 }
 
@@ -38,9 +46,8 @@ fn uart_irq(avr: *mut ffi::avr_t, which: c_int) -> *mut ffi::avr_irq_t {
 impl Stock {
     fn new(name: &str, flags: &[&str]) -> Self {
         let image = Image::read(&compile(name, "atmega16", flags)).expect("it is an image");
-        let mut uart = Box::new(Vec::new());
         // SAFETY: simavr's own way to make a chip; all pointers live as long as it, which is until the test ends.
-        let avr = unsafe {
+        let (avr, heard) = unsafe {
             let avr = ffi::avr_make_mcu_by_name(c"atmega16".as_ptr());
             ffi::avr_init(avr);
             (*avr).set_log(ffi::LOG_NONE as u8);
@@ -51,20 +58,24 @@ impl Stock {
             (*avr).sleep = Some(no_sleep);
             (*avr).codeend = image.flash.len() as u32;
             std::ptr::copy_nonoverlapping(image.flash.as_ptr(), (*avr).flash, image.flash.len());
-            let param = Box::leak(Box::new((avr, &raw mut *uart)));
+            let heard: &'static Heard = Box::leak(Box::new(Heard {
+                avr,
+                bytes: RefCell::default(),
+            }));
+            let param = std::ptr::from_ref(heard).cast_mut().cast();
             let output = uart_irq(avr, ffi::UART_IRQ_OUTPUT as c_int);
-            ffi::avr_irq_register_notify(output, Some(on_byte), std::ptr::from_mut(param).cast());
+            ffi::avr_irq_register_notify(output, Some(on_byte), param);
             // No usleep while a program polls, nothing on standard output.
             let mut none = 0u32;
             let set = u32::from_be_bytes(*b"uas0");
             ffi::avr_ioctl(avr, set, std::ptr::from_mut(&mut none).cast());
-            avr
+            (avr, heard)
         };
         Stock {
             image,
             avr,
             marks: Vec::new(),
-            uart,
+            heard,
         }
     }
 
@@ -125,7 +136,7 @@ fn rows() -> Vec<(&'static str, String, String, String)> {
     row(
         "USART, UBRR 25 and then UCSRC: cycles from byte to byte",
         &4160,
-        &tens(apart(&stock.uart)),
+        &tens(apart(&stock.heard.bytes.borrow())),
         &apart(&board.uart),
     );
     row(

@@ -20,6 +20,8 @@ mod native;
 mod random;
 mod run;
 pub mod scenario;
+#[cfg(feature = "simavr")]
+pub mod simavr;
 mod stand;
 mod supply;
 mod thermal;
@@ -28,7 +30,7 @@ pub use adis16250::{Adis16250, Outputs, register, status};
 pub use gyro::{GyroChain, Stimulus, bartlett};
 pub use mma7260qt::{AccSelect, Mma7260Qt};
 pub use motor::Motor;
-pub use native::{Timeline, native, native_live};
+pub use native::{Instants, Timeline, native, native_live};
 pub use random::{Stream, standard_normal, uniform};
 pub use run::{Ending, Run, SerialByte, TimedRequest, duty_profile};
 pub use scenario::{Fault, Scenario};

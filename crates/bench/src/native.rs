@@ -19,7 +19,7 @@ use wire::{Request, encode_request, reset_cause};
 use crate::run::Cable;
 use crate::{AccSelect, Ending, Run, SerialByte, Stand};
 
-const CLOCK_HZ: f64 = 16e6;
+pub(crate) const CLOCK_HZ: f64 = 16e6;
 const CYCLES_PER_TICK: u64 = 64;
 const CYCLES_PER_MS: u64 = 16_000;
 const EEPROM_LEN: usize = 512;
@@ -27,6 +27,15 @@ const WATCHDOG_CYCLES: u64 = 16_300 * 16;
 /// A byte of 8N1 has ten bits of 16 (divisor + 1) cycles.
 const fn byte_cycles(divisor: u16) -> u64 {
     160 * (divisor as u64 + 1)
+}
+
+/// When the parts are asked in a tick, in cycles after it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Instants {
+    /// Ends of the SPI bytes.
+    pub spi_bytes: Vec<u64>,
+    /// Sampling instants of the three conversions.
+    pub adc: [u64; 3],
 }
 
 /// When the chip does what, in cycles of 16 MHz. The defaults are counted from the code's waits; a measured one comes
@@ -53,6 +62,9 @@ pub struct Timeline {
     pub queue: usize,
     /// What the health frame says of the stack, bytes: the host's is not the board's.
     pub stack_free: u16,
+    /// The instants of each tick since the start, where the image's own are known: serial interrupts move those behind
+    /// the first round by some cycles. Ticks behind the last have those of `spi_bytes` and `adc`.
+    pub recorded: Vec<Instants>,
 }
 
 impl Default for Timeline {
@@ -73,6 +85,7 @@ impl Default for Timeline {
             eeprom: 136_000,
             queue: 223,
             stack_free: 0,
+            recorded: Vec::new(),
         }
     }
 }
@@ -101,6 +114,8 @@ struct Chip {
     cause: u8,
     restarts: u16,
     last_tick: u64,
+    /// Ticks since power came on, this one not counted.
+    ticks: usize,
 }
 
 impl Chip {
@@ -110,14 +125,24 @@ impl Chip {
 
     /// When the next SPI byte ends.
     fn spi_time(&mut self) -> u64 {
+        let recorded = self.timeline.recorded.get(self.ticks);
+        let ends = recorded.map_or(&self.timeline.spi_bytes, |instants| &instants.spi_bytes);
         match &mut self.tick {
-            Some((tick, sent)) if *sent < self.timeline.spi_bytes.len() => {
-                self.now = *tick + self.timeline.spi_bytes[*sent];
+            Some((tick, sent)) if *sent < ends.len() => {
+                self.now = *tick + ends[*sent];
                 *sent += 1;
             }
             _ => self.now += 95,
         }
         self.now
+    }
+
+    /// When the converter holds an input.
+    fn adc_time(&self, axis: usize) -> u64 {
+        let recorded = self.timeline.recorded.get(self.ticks);
+        let after = recorded.map_or(&self.timeline.adc, |instants| &instants.adc)[axis];
+        let at = self.tick.map_or(self.now, |(tick, _)| tick + after);
+        at.max(self.now)
     }
 
     fn byte(&mut self, mosi: u8) -> u8 {
@@ -194,10 +219,8 @@ impl Sensors for HostSensors {
     fn adc_start(&mut self, channel: u8) {
         let chip = &mut *self.chip.borrow_mut();
         let axis = usize::from(channel.min(2));
-        let at = chip
-            .tick
-            .map_or(chip.now, |(tick, _)| tick + chip.timeline.adc[axis]);
-        let t = chip.seconds(at.max(chip.now));
+        let at = chip.adc_time(axis);
+        let t = chip.seconds(at);
         chip.conversion = Some(chip.stand.acc_counts(axis, t));
     }
 
@@ -374,6 +397,7 @@ pub fn native_live(
         cause: reset_cause::POWER_ON,
         restarts: 0,
         last_tick: 0,
+        ticks: 0,
     }));
     let mut cable = Cable::new(&run.scenario);
     let mut received = Incoming {
@@ -482,6 +506,7 @@ fn life(
         let job = {
             let chip = &mut *chip.borrow_mut();
             chip.tick = None;
+            chip.ticks += 1;
             chip.job.take()
         };
         raw.job = job.map(|job| firmware::acquire::work(&mut sensors, job));

@@ -1,0 +1,613 @@
+//! The firmware's image on a simulated ATmega16, with this stand at its pins.
+//!
+//! What the board's wiring is, this file says once more: chip selects at PB2, PB3, PB4 (x, y, z), the accelerometer's
+//! outputs at ADC 0, 1, 2 and its g-select pins at PC0, PC1 (open drain), the motor's pulse width at PD7 (OC2) and its
+//! direction at PD6.
+
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+
+use atmega16_sim::{Board, LoadError, Mcu, Pins, Port, Pwm, ResetCause, Stop};
+use wire::{Request, encode_request};
+
+use crate::native::{CLOCK_HZ, Instants, Timeline};
+use crate::run::Cable;
+use crate::{AccSelect, Ending, Run, Scenario, SerialByte, Stand, TimedRequest};
+
+const SELECTS: [u8; 3] = [2, 3, 4];
+const DIRECTION: u8 = 6;
+/// CPOL = CPHA = 1.
+const SPI_MODE: u8 = 3;
+/// Cycles of a bit at the part's fastest clock, 2.5 MHz, rounded up.
+const SPI_MIN_CYCLES: u8 = 7;
+/// Compare A of timer 1: the tick.
+const TICK_VECTOR: u8 = 6;
+
+/// What happens at the pins, in cycles since power came on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// A chip select goes low or high.
+    Select {
+        /// 0, 1, 2.
+        axis: usize,
+        /// Low.
+        selected: bool,
+    },
+    /// Eight bits have gone both ways.
+    Spi {
+        /// From the board.
+        mosi: u8,
+        /// To the board.
+        miso: u8,
+        /// Cycles of the eight bits.
+        cycles: u64,
+    },
+    /// The converter holds an input.
+    Adc {
+        /// 0..=7.
+        channel: u8,
+    },
+    /// An interrupt is taken.
+    Interrupt {
+        /// Its number, reset being 0.
+        vector: u8,
+    },
+    /// The motor's command changes, -1..=1.
+    Motor {
+        /// Signed by the direction pin.
+        duty: f64,
+    },
+}
+
+/// The byte of a gyro's answer that goes to the board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// 0, 1, 2.
+    pub axis: usize,
+    /// The word that it answers: the frame before this one.
+    pub asked: u16,
+    /// The high byte (first on the wire) or the low one.
+    pub is_high: bool,
+    /// What the part says.
+    pub byte: u8,
+}
+
+/// Probes and clips on the board's lines: sees what happens there, and can put something else on them.
+pub trait Probe {
+    /// Something has happened at cycle `at`.
+    fn event(&mut self, _at: u64, _event: Event) {}
+    /// What arrives at MISO at `t` s of what the selected gyro says.
+    fn miso(&mut self, _t: f64, answer: Answer) -> u8 {
+        answer.byte
+    }
+    /// What arrives at an ADC input at `t` s of the voltage there.
+    fn volts(&mut self, _t: f64, _channel: u8, volts: f64) -> f64 {
+        volts
+    }
+    /// Whether a chip select's level arrives at its gyro at `t` s.
+    fn select_arrives(&mut self, _t: f64, _axis: usize) -> bool {
+        true
+    }
+}
+
+/// No probe.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoProbe;
+
+impl Probe for NoProbe {}
+
+/// What the gyros' data sheet asks of the board's SPI, and how often it was not so.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Discipline {
+    /// Frames of 16 bits with one gyro.
+    pub frames: u64,
+    /// Selections with another number of bits.
+    pub broken_frames: u64,
+    /// Bytes with no gyro or several selected.
+    pub unselected_bytes: u64,
+    /// Bytes in another mode than 3 or faster than 2.5 MHz.
+    pub wrong_clock: u64,
+    /// Shortest time from one frame's start to the next with the same gyro, cycles.
+    pub shortest_period: Option<u64>,
+    /// Shortest time from one frame's end to the next with the same gyro, cycles.
+    pub shortest_stall: Option<u64>,
+}
+
+/// Why the image no longer runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Died {
+    /// Cycles since power came on.
+    pub at: u64,
+    /// Address of the next instruction, bytes.
+    pub program_counter: u32,
+    /// What happened.
+    pub stop: Stop,
+}
+
+impl std::fmt::Display for Died {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let seconds = self.at as f64 / CLOCK_HZ;
+        write!(
+            f,
+            "the image stopped after {seconds:.6} s at {:#06x}: ",
+            self.program_counter
+        )?;
+        match self.stop {
+            Stop::Crashed { at } => write!(f, "no instruction at {at:#06x}"),
+            Stop::Halted => write!(f, "asleep, with nothing left to wake it"),
+            Stop::Unmodelled(what) => write!(f, "it uses {what}, which the simulator has not"),
+            other => write!(f, "{other:?}"),
+        }
+    }
+}
+
+impl std::error::Error for Died {}
+
+/// Why a run through the image could not be made.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum SimavrError {
+    /// The file is no image of an ATmega16.
+    Image(LoadError),
+    /// The image stopped.
+    Died(Died),
+}
+
+impl std::fmt::Display for SimavrError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            SimavrError::Image(error) => error.fmt(f),
+            SimavrError::Died(died) => died.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for SimavrError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            SimavrError::Image(error) => std::error::Error::source(error),
+            SimavrError::Died(_) => None,
+        }
+    }
+}
+
+impl From<LoadError> for SimavrError {
+    fn from(error: LoadError) -> Self {
+        SimavrError::Image(error)
+    }
+}
+
+impl From<Died> for SimavrError {
+    fn from(died: Died) -> Self {
+        SimavrError::Died(died)
+    }
+}
+
+/// The stand at the chip's pins.
+struct World<P> {
+    stand: Stand,
+    probe: P,
+    hz: f64,
+    selected: [bool; 3],
+    /// Bytes since a select went low.
+    bytes: [u32; 3],
+    /// The last whole frame from the board, and the one that is being sent.
+    asked: [u16; 3],
+    asking: [u16; 3],
+    frame_start: [Option<u64>; 3],
+    frame_end: [Option<u64>; 3],
+    discipline: Discipline,
+    acc_range: Option<u8>,
+    pwm: Pwm,
+    reverse: bool,
+    duty: f64,
+    sent: VecDeque<(u64, u8)>,
+}
+
+impl<P: Probe> World<P> {
+    fn new(scenario: &Scenario, hz: f64, probe: P) -> Self {
+        World {
+            stand: Stand::new(scenario),
+            probe,
+            hz,
+            selected: [false; 3],
+            bytes: [0; 3],
+            asked: [0; 3],
+            asking: [0; 3],
+            frame_start: [None; 3],
+            frame_end: [None; 3],
+            discipline: Discipline::default(),
+            acc_range: None,
+            pwm: Pwm::default(),
+            reverse: false,
+            duty: 0.0,
+            sent: VecDeque::new(),
+        }
+    }
+
+    fn seconds(&self, cycle: u64) -> f64 {
+        cycle as f64 / self.hz
+    }
+
+    fn select(&mut self, at: u64, axis: usize, selected: bool) {
+        let t = self.seconds(at);
+        self.probe.event(at, Event::Select { axis, selected });
+        let shortest = |so_far: &mut Option<u64>, since: Option<u64>| {
+            if let Some(since) = since {
+                let time = at - since;
+                *so_far = Some(so_far.map_or(time, |least| least.min(time)));
+            }
+        };
+        self.selected[axis] = selected;
+        if selected {
+            shortest(&mut self.discipline.shortest_period, self.frame_start[axis]);
+            shortest(&mut self.discipline.shortest_stall, self.frame_end[axis]);
+            self.frame_start[axis] = Some(at);
+            self.bytes[axis] = 0;
+        } else {
+            self.frame_end[axis] = Some(at);
+            if self.bytes[axis] == 2 {
+                self.discipline.frames += 1;
+                self.asked[axis] = self.asking[axis];
+            } else {
+                self.discipline.broken_frames += 1;
+            }
+        }
+        if self.probe.select_arrives(t, axis) {
+            self.stand.select(axis, selected, t);
+        }
+    }
+
+    fn turn(&mut self, at: u64) {
+        let duty = if self.reverse {
+            -self.pwm.high
+        } else {
+            self.pwm.high
+        };
+        // Where the pulse has no width the direction means nothing.
+        if duty != self.duty {
+            self.duty = duty;
+            let t = self.seconds(at);
+            self.stand.set_motor(duty, t);
+            self.probe.event(at, Event::Motor { duty });
+        }
+    }
+}
+
+impl<P: Probe> Board for World<P> {
+    fn spi_byte(&mut self, at: u64, mosi: u8, pins: &Pins) -> u8 {
+        let t = self.seconds(at);
+        let cycles = 8 * u64::from(pins.spi_clock);
+        if pins.spi_mode != SPI_MODE || pins.spi_clock < SPI_MIN_CYCLES {
+            self.discipline.wrong_clock += 1;
+        }
+        let mut miso = self.stand.spi_byte(mosi, t);
+        match self.selected {
+            [true, false, false] | [false, true, false] | [false, false, true] => {
+                let axis = self
+                    .selected
+                    .iter()
+                    .position(|&selected| selected)
+                    .unwrap_or(0);
+                let is_high = self.bytes[axis].is_multiple_of(2);
+                self.asking[axis] = self.asking[axis] << 8 | u16::from(mosi);
+                self.bytes[axis] += 1;
+                let asked = self.asked[axis];
+                miso = self.probe.miso(
+                    t,
+                    Answer {
+                        axis,
+                        asked,
+                        is_high,
+                        byte: miso,
+                    },
+                );
+            }
+            _ => self.discipline.unselected_bytes += 1,
+        }
+        self.probe.event(at, Event::Spi { mosi, miso, cycles });
+        miso
+    }
+
+    fn adc_volts(&mut self, at: u64, channel: u8) -> f64 {
+        let t = self.seconds(at);
+        let volts = match channel {
+            0..=2 => self.stand.acc_volts(usize::from(channel), t),
+            _ => 0.0,
+        };
+        self.probe.event(at, Event::Adc { channel });
+        self.probe.volts(t, channel, volts)
+    }
+
+    fn aref_volts(&self) -> f64 {
+        self.stand.aref_volts()
+    }
+
+    fn uart_byte(&mut self, at: u64, byte: u8) {
+        self.sent.push_back((at, byte));
+    }
+
+    fn pins_changed(&mut self, at: u64, pins: &Pins) {
+        for (axis, bit) in SELECTS.into_iter().enumerate() {
+            let low = pins.is_low(Port::B, bit);
+            if low != self.selected[axis] {
+                self.select(at, axis, low);
+            }
+        }
+        // A pin that is let go is pulled up to 3.3 V.
+        let range = u8::from(!pins.is_low(Port::C, 1)) << 1 | u8::from(!pins.is_low(Port::C, 0));
+        if self.acc_range != Some(range) {
+            self.acc_range = Some(range);
+            let select = AccSelect {
+                select1: range & 1 != 0,
+                select2: range & 2 != 0,
+                awake: true,
+            };
+            let t = self.seconds(at);
+            self.stand.set_acc_pins(select, t);
+        }
+        self.reverse = pins.is_high(Port::D, DIRECTION);
+        self.turn(at);
+    }
+
+    fn motor_changed(&mut self, at: u64, motor: &Pwm) {
+        self.pwm = *motor;
+        self.turn(at);
+    }
+
+    fn interrupt(&mut self, at: u64, vector: u8) {
+        self.probe.event(at, Event::Interrupt { vector });
+    }
+}
+
+/// The image on the stand.
+pub struct Simulated<P = NoProbe> {
+    mcu: Mcu,
+    world: World<P>,
+    cable: Cable,
+    requests: VecDeque<(u64, Vec<u8>)>,
+}
+
+impl<P: Probe> Simulated<P> {
+    /// Power comes on.
+    ///
+    /// # Errors
+    /// [`LoadError`] for what is no image of an ATmega16.
+    pub fn new(image: &[u8], scenario: &Scenario, probe: P) -> Result<Self, LoadError> {
+        let hz = CLOCK_HZ * (1.0 + scenario.crystal_ppm * 1e-6);
+        Ok(Simulated {
+            mcu: Mcu::new(image)?,
+            world: World::new(scenario, hz, probe),
+            cable: Cable::new(scenario),
+            requests: VecDeque::new(),
+        })
+    }
+
+    /// The chip.
+    #[must_use]
+    pub fn mcu(&self) -> &Mcu {
+        &self.mcu
+    }
+
+    /// The chip, to meddle with: reset it, cut its power, send it bytes.
+    pub fn mcu_mut(&mut self) -> &mut Mcu {
+        &mut self.mcu
+    }
+
+    /// The stand, for looking only.
+    #[must_use]
+    pub fn stand(&self) -> &Stand {
+        &self.world.stand
+    }
+
+    /// The probe.
+    #[must_use]
+    pub fn probe(&self) -> &P {
+        &self.world.probe
+    }
+
+    /// The probe.
+    pub fn probe_mut(&mut self) -> &mut P {
+        &mut self.world.probe
+    }
+
+    /// What the board's SPI has been like so far.
+    #[must_use]
+    pub fn discipline(&self) -> Discipline {
+        self.world.discipline
+    }
+
+    /// The motor's command at the pins, -1..=1.
+    #[must_use]
+    pub fn duty(&self) -> f64 {
+        self.world.duty
+    }
+
+    /// Seconds since power came on.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.world.seconds(self.mcu.cycle())
+    }
+
+    /// Cycles for each second of the stand.
+    #[must_use]
+    pub fn hz(&self) -> f64 {
+        self.world.hz
+    }
+
+    /// The host will send requests at their times, which must not lie behind those given before.
+    pub fn request(&mut self, requests: &[TimedRequest]) {
+        for timed in requests {
+            let mut line = [0; Request::FRAME_LEN];
+            let len = encode_request(&timed.request, &mut line).unwrap_or(0);
+            let at = (timed.at_us as f64 * 1e-6 * self.world.hz) as u64;
+            self.requests.push_back((at, line[..len].to_vec()));
+        }
+    }
+
+    /// The host sends bytes now.
+    pub fn send(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.mcu.send(byte);
+        }
+    }
+
+    /// The chip's power goes and comes back at once; the sensors keep theirs.
+    pub fn power_cycle(&mut self) {
+        self.mcu.power_cycle();
+    }
+
+    /// A reset of the chip.
+    pub fn reset(&mut self, cause: ResetCause) {
+        self.mcu.reset(cause);
+    }
+
+    /// Runs until `t` s since power first came on, and hands each byte that the host receives to `receive`, in order.
+    /// A callback that breaks stops it there.
+    ///
+    /// # Errors
+    /// [`Died`] when the image stops.
+    pub fn run_until(
+        &mut self,
+        t: f64,
+        receive: &mut dyn FnMut(SerialByte) -> ControlFlow<()>,
+    ) -> Result<Ending, Died> {
+        /// Requests are put on the line in pieces of this many cycles.
+        const PIECE: u64 = 800_000;
+        let end = (t * self.world.hz) as u64;
+        loop {
+            let until = end.min(self.mcu.cycle() + PIECE);
+            while self.requests.front().is_some_and(|&(at, _)| at <= until) {
+                if let Some((at, bytes)) = self.requests.pop_front() {
+                    bytes
+                        .into_iter()
+                        .for_each(|byte| self.mcu.send_at(at, byte));
+                }
+            }
+            let stop = self.mcu.run_until(until, &mut self.world);
+            while let Some((at, byte)) = self.world.sent.pop_front() {
+                let time_s = self.world.seconds(at);
+                let byte = SerialByte { time_s, byte };
+                if self
+                    .cable
+                    .carry(byte)
+                    .is_some_and(|byte| receive(byte).is_break())
+                {
+                    return Ok(Ending::Stopped);
+                }
+            }
+            if stop != Stop::Reached {
+                let (at, program_counter) = (self.mcu.cycle(), self.mcu.program_counter());
+                return Err(Died {
+                    at,
+                    program_counter,
+                    stop,
+                });
+            }
+            if self.mcu.cycle() >= end {
+                return Ok(Ending::Complete);
+            }
+        }
+    }
+}
+
+/// Runs the image on the stand of `run` and hands each received byte to `receive`, in order. A callback that breaks ends
+/// the run.
+///
+/// # Errors
+/// [`SimavrError`] for an image that cannot be loaded, and for one that stops.
+pub fn simavr(
+    image: &[u8],
+    run: &Run,
+    mut receive: impl FnMut(SerialByte) -> ControlFlow<()>,
+) -> Result<Ending, SimavrError> {
+    let mut simulated = Simulated::new(image, &run.scenario, NoProbe)?;
+    simulated.request(&run.requests);
+    Ok(simulated.run_until(run.seconds, &mut receive)?)
+}
+
+/// As [`simavr`], with somebody at the other end of the line: each simulated millisecond `listen` is told the time, s
+/// since power came on, and returns the bytes that the host begins to send then. It may wait, so that the run keeps pace
+/// with a clock on the wall.
+///
+/// # Errors
+/// As [`simavr`].
+pub fn simavr_live(
+    image: &[u8],
+    run: &Run,
+    mut listen: impl FnMut(f64) -> Vec<u8>,
+    mut receive: impl FnMut(SerialByte) -> ControlFlow<()>,
+) -> Result<Ending, SimavrError> {
+    let mut simulated = Simulated::new(image, &run.scenario, NoProbe)?;
+    simulated.request(&run.requests);
+    let mut millisecond = 0u64;
+    while (millisecond as f64) * 1e-3 < run.seconds {
+        millisecond += 1;
+        let t = (millisecond as f64 * 1e-3).min(run.seconds);
+        if simulated.run_until(t, &mut receive)? == Ending::Stopped {
+            return Ok(Ending::Stopped);
+        }
+        let bytes = listen(t);
+        simulated.send(&bytes);
+    }
+    Ok(Ending::Complete)
+}
+
+/// Notes when the image does what in each tick.
+#[derive(Clone, Debug, Default)]
+struct Clockwork {
+    configure: Option<u64>,
+    ticks: Vec<(u64, Instants)>,
+}
+
+impl Probe for Clockwork {
+    fn event(&mut self, at: u64, event: Event) {
+        match (event, self.ticks.last_mut()) {
+            (
+                Event::Interrupt {
+                    vector: TICK_VECTOR,
+                },
+                _,
+            ) => {
+                self.ticks.push((at, Instants::default()));
+            }
+            (Event::Spi { cycles, .. }, None) => {
+                self.configure.get_or_insert(at - cycles);
+            }
+            (Event::Spi { .. }, Some((tick, instants))) => instants.spi_bytes.push(at - *tick),
+            (Event::Adc { channel }, Some((tick, instants))) => {
+                if let Some(place) = instants.adc.get_mut(usize::from(channel)) {
+                    *place = at - *tick;
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// As [`simavr`], and what the run says of the image's times: a [`Timeline`] with the sampling instants of every tick, so
+/// that the firmware's logic on the host can ask the world at the same cycles.
+///
+/// # Errors
+/// As [`simavr`].
+pub fn simavr_timed(
+    image: &[u8],
+    run: &Run,
+    mut receive: impl FnMut(SerialByte) -> ControlFlow<()>,
+) -> Result<Timeline, SimavrError> {
+    let mut simulated = Simulated::new(image, &run.scenario, Clockwork::default())?;
+    simulated.request(&run.requests);
+    simulated.run_until(run.seconds, &mut receive)?;
+    let probe = simulated.probe();
+    let mut timeline = Timeline::default();
+    if let (Some(configure), [(first, instants), (second, _), ..]) =
+        (probe.configure, probe.ticks.as_slice())
+    {
+        timeline.configure = configure;
+        timeline.start = first - (second - first);
+        timeline.spi_bytes.clone_from(&instants.spi_bytes);
+        timeline.adc = instants.adc;
+        timeline.recorded = probe.ticks.iter().map(|(_, each)| each.clone()).collect();
+    }
+    Ok(timeline)
+}
