@@ -2,6 +2,7 @@
 
 mod campaign;
 mod image;
+mod peers;
 mod step;
 mod toolchain;
 
@@ -17,7 +18,9 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   demo     hides something in the simulated stand, captures 600 s, analyzes and diagnoses; a number after it is the seed
   campaign measures by rates what the diagnosis can tell, and writes docs/power.md: up to an hour on two cores;
            --quick for minutes, --full for hours, --seed N for a run that was made before, --help for the rest
-  image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}";
+  image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}
+  compare-peers
+           Allan family against allantools (in a venv) and the crate `allan`: speed, memory, agreement; `--long` adds 1e8";
 
 fn main() -> ExitCode {
     let command = std::env::args().nth(1);
@@ -27,6 +30,7 @@ fn main() -> ExitCode {
         Some("demo") => demo(&root),
         Some("image") => build_image(&root),
         Some("campaign") => campaign::measure(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("compare-peers") => peers::compare(&root, std::env::args().any(|a| a == "--long")),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

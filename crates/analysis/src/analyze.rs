@@ -7,7 +7,7 @@ use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
-use crate::allan::{Deviation, Phase, TauGrid, deviation};
+use crate::allan::{Deviation, Phase, TauGrid};
 use crate::edf::{NoiseType, chi_square_interval, edf};
 use crate::error::AnalysisError;
 use crate::noise_fit::{Estimated, Misfit, NoiseFit, Ramp, Spectrum, Term, fit, misfit};
@@ -443,14 +443,8 @@ fn curve(
     let runs = phase.run_lengths();
     let mut noise = NoiseType::WhiteRate;
     let factors = grid.factors(kind.longest(phase.longest_run()));
-    let estimates = match kind {
-        Deviation::Oadev => phase.overlapping_allan(tau0, &factors),
-        _ => factors
-            .into_iter()
-            .filter_map(|m| deviation(phase, kind, tau0, m))
-            .collect(),
-    };
-    estimates
+    phase
+        .curve(kind, tau0, &factors)
         .into_iter()
         .map(|e| {
             if let Some(found) = identify(phase, e.m) {

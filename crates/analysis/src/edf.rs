@@ -66,6 +66,7 @@ pub fn edf(kind: Deviation, noise: NoiseType, m: usize, run_samples: &[usize]) -
         Deviation::Hdev => (3, false, false),
         Deviation::Ohdev => (3, false, true),
         Deviation::Totdev | Deviation::Mtotdev => return total_edf(kind, noise, m, run_samples),
+        Deviation::Theo1 => return theo1_edf(noise, m, run_samples),
     };
     let strides = match (overlapping, noise) {
         (false, _) => 1,
@@ -197,6 +198,40 @@ fn total_edf(kind: Deviation, noise: NoiseType, m: usize, run_samples: &[usize])
         .iter()
         .filter(|n| kind.longest(**n) >= m)
         .map(|n| (b * *n as f64 / m as f64 - c).max(1.0))
+        .sum()
+}
+
+/// Degrees of freedom of Theo1 by the fitted forms of NIST SP 1065 (2008), table 12, with N phase points and r = 0.75 m.
+fn theo1_edf(noise: NoiseType, m: usize, run_samples: &[usize]) -> f64 {
+    run_samples
+        .iter()
+        .filter(|n| Deviation::Theo1.longest(**n) >= m)
+        .map(|n| {
+            let (n, r) = ((n + 1) as f64, 0.75 * m as f64);
+            let edf = match noise {
+                NoiseType::WhitePhase => {
+                    0.86 * (n + 1.0) * (n - 4.0 / 3.0 * r) / (n - r) * (r / (r + 1.14))
+                }
+                NoiseType::FlickerPhase => {
+                    (4.798 * n * n - 6.374 * n * r + 12.387 * r) / ((r + 36.6).sqrt() * (n - r))
+                        * (r / (r + 0.3))
+                }
+                NoiseType::WhiteRate => {
+                    ((4.1 * n + 0.8) / r - (3.1 * n + 6.5) / n)
+                        * (r.powf(1.5) / (r.powf(1.5) + 5.2))
+                }
+                NoiseType::FlickerRate => {
+                    (2.0 * n * n - 1.3 * n * r - 3.5 * r) / (n * r)
+                        * (r.powi(3) / (r.powi(3) + 2.3))
+                }
+                NoiseType::RandomWalkRate => {
+                    (4.4 * n - 2.0) / (2.9 * r)
+                        * ((4.4 * n - 1.0).powi(2) - 8.6 * r * (4.4 * n - 1.0) + 11.4 * r * r)
+                        / (4.4 * n - 3.0).powi(2)
+                }
+            };
+            edf.max(1.0)
+        })
         .sum()
 }
 

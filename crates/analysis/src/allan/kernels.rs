@@ -54,16 +54,29 @@ pub(crate) fn third_differences<T: PhasePoint>(x: &[T], m: usize, stride: usize)
     let Some(terms) = x.len().checked_sub(3 * m).filter(|t| *t > 0) else {
         return (0.0, 0);
     };
-    let (a, b, c, e) = (&x[..terms], &x[m..], &x[2 * m..], &x[3 * m..]);
-    let mut sums = [0.0f64; LANES];
-    let mut n = 0;
-    for k in (0..terms).step_by(stride) {
-        let middle = c[k] - b[k];
-        let value = ((e[k] - a[k]) - (middle + middle + middle)).to_f64();
-        sums[n % LANES] += value * value;
-        n += 1;
+    let d = |a: T, b: T, c: T, e: T| {
+        let middle = c - b;
+        ((e - a) - (middle + middle + middle)).to_f64()
+    };
+    if stride > 1 {
+        let squares = (0..terms)
+            .step_by(stride)
+            .map(|k| d(x[k], x[k + m], x[k + 2 * m], x[k + 3 * m]).powi(2));
+        return (squares.sum(), terms.div_ceil(stride));
     }
-    (sums.iter().sum(), n)
+    let part = |from: usize| x[from..from + terms].as_chunks::<LANES>();
+    let ((a8, a), (b8, b), (c8, c), (e8, e)) = (part(0), part(m), part(2 * m), part(3 * m));
+    let mut sums = [0.0f64; LANES];
+    for (((a, b), c), e) in a8.iter().zip(b8).zip(c8).zip(e8) {
+        for lane in 0..LANES {
+            let value = d(a[lane], b[lane], c[lane], e[lane]);
+            sums[lane] += value * value;
+        }
+    }
+    for (((a, b), c), e) in a.iter().zip(b).zip(c).zip(e) {
+        sums[0] += d(*a, *b, *c, *e).powi(2);
+    }
+    (sums.iter().sum(), terms)
 }
 
 /// Σⱼ (Σᵢ₌ⱼ..ⱼ₊ₘ₋₁ x[i+2m] − 2x[i+m] + x[i])², by a running inner sum, and the number of terms.
@@ -136,6 +149,31 @@ mod tests {
     }
 
     #[test]
+    fn theo1_is_the_double_sum_of_its_definition() {
+        let y = nist();
+        let phase = single(&y);
+        let x: Vec<f64> = std::iter::once(0.0)
+            .chain(y.iter().scan(0.0, |sum, v| {
+                *sum += v;
+                Some(*sum)
+            }))
+            .collect();
+        for m in [10, 100, 1000] {
+            let mut sum = 0.0;
+            for i in 0..x.len() - m {
+                for delta in 0..m / 2 {
+                    let value = (x[i] - x[i + m / 2 - delta]) + (x[i + m] - x[i + m / 2 + delta]);
+                    sum += value * value / (m / 2 - delta) as f64;
+                }
+            }
+            let expected = (sum / (0.75 * (x.len() - m) as f64)).sqrt() / m as f64;
+            let got = deviation(&phase, Deviation::Theo1, 0.5, m).unwrap();
+            assert!((got.deviation / expected - 1.0).abs() < 1e-10, "{m}");
+            assert_eq!(got.tau_s, 0.375 * m as f64);
+        }
+    }
+
+    #[test]
     fn a_pure_rate_ramp_reads_r_tau_over_sqrt_2() {
         let (rate_ramp_r, tau0) = (0.25, 0.5);
         let y: Vec<f64> = (0..64).map(|k| rate_ramp_r * k as f64 * tau0).collect();
@@ -193,6 +231,10 @@ mod tests {
         );
         for kind in Deviation::ALL {
             for m in [1, 5, 100] {
+                if kind == Deviation::Theo1 && (m < 10 || m % 2 != 0) {
+                    assert_eq!(deviation(&a, kind, 0.05, m), None);
+                    continue;
+                }
                 let (a, b) = (
                     deviation(&a, kind, 0.05, m).unwrap(),
                     deviation(&b, kind, 0.05, m).unwrap(),
@@ -229,7 +271,8 @@ mod tests {
             let phase = single(&y);
             for kind in Deviation::ALL {
                 let longest = kind.longest(n);
-                if longest > 0 {
+                // Theo1 has no factor below 10.
+                if longest > 0 && (kind != Deviation::Theo1 || longest >= 10) {
                     assert!(
                         deviation(&phase, kind, 1.0, longest).is_some(),
                         "{} {n}",
@@ -237,7 +280,8 @@ mod tests {
                     );
                 }
                 assert!(
-                    deviation(&phase, kind, 1.0, longest + 1).is_none(),
+                    deviation(&phase, kind, 1.0, longest + 2).is_none()
+                        && deviation(&phase, kind, 1.0, longest + 1).is_none(),
                     "{} {n}",
                     kind.name()
                 );

@@ -33,11 +33,14 @@ pub enum Deviation {
     Totdev,
     /// Modified total, without correction of its bias. Eq. (27).
     Mtotdev,
+    /// Theo1, whose cluster time is 0.75·m·τ₀ (m even, from 10). Eq. (30). Unbiased for white rate noise; for other noise
+    /// it differs from the Allan deviation by a factor that depends on the noise.
+    Theo1,
 }
 
 impl Deviation {
     /// All of them, in the order of the documentation.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Adev,
         Self::Oadev,
         Self::Mdev,
@@ -46,6 +49,7 @@ impl Deviation {
         Self::Ohdev,
         Self::Totdev,
         Self::Mtotdev,
+        Self::Theo1,
     ];
 
     /// `oadev`, ...: the name in options and JSON.
@@ -60,6 +64,7 @@ impl Deviation {
             Self::Ohdev => "ohdev",
             Self::Totdev => "totdev",
             Self::Mtotdev => "mtotdev",
+            Self::Theo1 => "theo1",
         }
     }
 
@@ -71,6 +76,8 @@ impl Deviation {
             Self::Mdev | Self::Tdev | Self::Mtotdev => (n + 1) / 3,
             Self::Hdev | Self::Ohdev => n / 3,
             Self::Totdev => n.saturating_sub(1),
+            Self::Theo1 if n >= 10 => n / 2 * 2,
+            Self::Theo1 => 0,
         }
     }
 }
@@ -152,6 +159,13 @@ impl std::str::FromStr for TauGrid {
                 }),
         }
     }
+}
+
+/// Cluster time of a deviation at the averaging factor `m`: m·τ₀, but 0.75·m·τ₀ for [`Deviation::Theo1`].
+#[must_use]
+pub fn cluster_time(kind: Deviation, m: usize, tau0: f64) -> f64 {
+    let stride = if kind == Deviation::Theo1 { 0.75 } else { 1.0 };
+    stride * m as f64 * tau0
 }
 
 /// One deviation of integrated readings at the averaging factor `m`; `None` where no run is long enough.

@@ -146,6 +146,17 @@ impl Phase {
             .collect()
     }
 
+    /// Deviations of one kind at all of `ms` (ascending); those no run is long enough for are left out.
+    #[must_use]
+    pub fn curve(&self, kind: Deviation, tau0: f64, ms: &[usize]) -> Vec<Estimate> {
+        if kind == Deviation::Oadev {
+            return self.overlapping_allan(tau0, ms);
+        }
+        ms.iter()
+            .filter_map(|m| super::deviation(self, kind, tau0, *m))
+            .collect()
+    }
+
     fn new(points: Runs, unit_per_count: f64, runs: &[Range<usize>]) -> Self {
         Self {
             runs: points,
@@ -207,6 +218,7 @@ impl Phase {
                     Deviation::Ohdev => kernels::third_differences(x, m, 1),
                     Deviation::Totdev => total::total(x, m),
                     Deviation::Mtotdev => total::modified_total(x, m),
+                    Deviation::Theo1 => total::theo1(x, m),
                 };
                 out.0 += squares;
                 out.1 += n;
@@ -226,6 +238,7 @@ impl Phase {
             Deviation::Adev | Deviation::Oadev | Deviation::Totdev => 1.0 / (2.0 * mf * mf),
             Deviation::Mdev | Deviation::Tdev | Deviation::Mtotdev => 1.0 / (2.0 * mf.powi(4)),
             Deviation::Hdev | Deviation::Ohdev => 1.0 / (6.0 * mf * mf),
+            Deviation::Theo1 => 1.0 / (0.75 * mf * mf),
         };
         let mut deviation = (squares * factor / n as f64).sqrt() * self.unit_per_count;
         if kind == Deviation::Tdev {
@@ -233,7 +246,7 @@ impl Phase {
         }
         Some(Estimate {
             m,
-            tau_s: mf * tau0,
+            tau_s: super::cluster_time(kind, m, tau0),
             deviation,
             n,
         })
