@@ -1,9 +1,10 @@
-//! The simulated stand as a source of captures: a scenario of the bench, the firmware's logic on it, and the frames.
+//! The simulated stand as a source of captures: a scenario of the bench, the firmware on it (its image in a simulated
+//! ATmega16, or its logic on the host), and the frames.
 
 use std::ops::ControlFlow;
 
 use bench::scenario::StallFlags;
-use bench::{Fault, Run, Scenario, Timeline, duty_profile, uniform};
+use bench::{Fault, Run, Scenario, SerialByte, Timeline, duty_profile, uniform};
 use model::record::Record;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -134,19 +135,58 @@ pub fn plan(hidden: Hidden, seconds: f64, seed: u64) -> Plan {
     }
 }
 
-/// Runs the firmware's logic on the planned stand; `progress` is told the time, s.
-pub fn run_native(plan: &Plan, mut progress: impl FnMut(f64)) -> (Record, LinkCounts) {
-    let (mut decoder, mut builder) = (Decoder::new(), RecordBuilder::new(Calibration::default()));
-    bench::native(&plan.run, &Timeline::default(), |received| {
-        match decoder.push(received.byte) {
+/// What a host makes of a run's bytes.
+struct Receiver<F> {
+    decoder: Decoder,
+    builder: RecordBuilder,
+    progress: F,
+}
+
+impl<F: FnMut(f64)> Receiver<F> {
+    fn new(progress: F) -> Self {
+        Receiver {
+            decoder: Decoder::new(),
+            builder: RecordBuilder::new(Calibration::default()),
+            progress,
+        }
+    }
+
+    fn push(&mut self, received: SerialByte) -> ControlFlow<()> {
+        match self.decoder.push(received.byte) {
             Some(Ok(Frame::Sample(sample))) => {
-                builder.push(&sample, received.time_s);
-                progress(received.time_s);
+                self.builder.push(&sample, received.time_s);
+                (self.progress)(received.time_s);
             }
-            Some(Ok(Frame::Hello(hello))) => builder.hello(&hello),
+            Some(Ok(Frame::Hello(hello))) => self.builder.hello(&hello),
             _ => {}
         }
         ControlFlow::Continue(())
-    });
-    (builder.build(), *decoder.counts())
+    }
+
+    fn finish(self) -> (Record, LinkCounts) {
+        (self.builder.build(), *self.decoder.counts())
+    }
+}
+
+/// Runs the firmware's logic on the planned stand; `progress` is told the time, s.
+pub fn run_native(plan: &Plan, progress: impl FnMut(f64)) -> (Record, LinkCounts) {
+    let mut receiver = Receiver::new(progress);
+    bench::native(&plan.run, &Timeline::default(), |byte| receiver.push(byte));
+    receiver.finish()
+}
+
+/// Runs an image of the firmware (an ELF file's bytes) on a simulated ATmega16 on the planned stand; `progress` is told
+/// the time, s.
+///
+/// # Errors
+/// [`SimavrError`](bench::simavr::SimavrError) for what is no image of an ATmega16, and for an image that stops.
+#[cfg(feature = "simavr")]
+pub fn run_image(
+    plan: &Plan,
+    image: &[u8],
+    progress: impl FnMut(f64),
+) -> Result<(Record, LinkCounts), bench::simavr::SimavrError> {
+    let mut receiver = Receiver::new(progress);
+    bench::simavr::simavr(image, &plan.run, |byte| receiver.push(byte))?;
+    Ok(receiver.finish())
 }

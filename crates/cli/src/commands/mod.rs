@@ -6,6 +6,8 @@ pub mod capture;
 pub mod diagnose;
 pub mod flash;
 pub mod paper;
+#[cfg(unix)]
+pub mod pty;
 pub mod report;
 pub mod representative;
 pub mod run;

@@ -6,17 +6,25 @@ use analysis::{AnalyzeOptions, DiagnoseOptions};
 use clap::Args;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
-use imu_stand::stand::{Hidden, plan, run_native};
+use imu_stand::stand::{Hidden, Plan, plan, run_native};
 use imu_stand::{text, write_capture};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Result;
+use model::record::Record;
 
 /// What `run` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// Run the firmware's logic on the host instead of its image on a simulated ATmega16
+    /// Run the firmware's logic on the host instead of its image on a simulated ATmega16: some hundred times faster
     #[arg(long)]
     native: bool,
+    /// The firmware's image, an ELF file
+    #[arg(long, value_name = "FILE", default_value = IMAGE, conflicts_with = "native")]
+    image: PathBuf,
+    /// Show the simulated board as a serial device in real time, for `capture`, `board` and others to work on: nothing
+    /// is captured or analyzed here. The stand is as --hide says, and nobody drives its motor
+    #[arg(long, conflicts_with_all = ["out", "analysis", "json", "report"])]
+    pty: bool,
     /// What to hide in the stand
     #[arg(long, value_enum, default_value_t = Hidden::Random)]
     hide: Hidden,
@@ -43,13 +51,17 @@ pub struct Arguments {
     quiet: bool,
 }
 
+/// Where `cargo xtask image` puts it.
+const IMAGE: &str = "target/avr/avr-none/firmware/firmware.elf";
+
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    if !arguments.native {
-        miette::bail!(
-            help = "`imu-stand run --native` runs the firmware's own logic on the host, on the same simulated stand",
-            "this build has no simulated ATmega16"
-        );
+    let board = board(arguments)?;
+    if arguments.pty {
+        #[cfg(unix)]
+        return super::pty::run(&board, arguments.hide, arguments.seconds, arguments.seed);
+        #[cfg(not(unix))]
+        miette::bail!("this system has no pseudo-terminals: --pty works on Linux and macOS");
     }
     if !(60.0..=86_400.0).contains(&arguments.seconds) {
         miette::bail!(
@@ -68,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         ProgressStyle::with_template("stand {bar:40} {pos}/{len} s")
             .unwrap_or(ProgressStyle::default_bar()),
     );
-    let (record, link) = run_native(&plan, |time| bar.set_position(time as u64));
+    let (record, link) = sample(&board, &plan, |time| bar.set_position(time as u64))?;
     bar.finish_and_clear();
     write_capture(&arguments.out, &record)?;
 
@@ -113,4 +125,68 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         super::report::write(page, &subject, arguments.quiet)?;
     }
     Ok(())
+}
+
+/// What plays the board.
+pub enum Board {
+    /// The firmware's logic on the host.
+    Native,
+    /// Its image, an ELF file's bytes, on a simulated ATmega16.
+    #[cfg(feature = "simavr")]
+    Image(Vec<u8>),
+}
+
+#[cfg(feature = "simavr")]
+fn board(arguments: &Arguments) -> Result<Board> {
+    if arguments.native {
+        return Ok(Board::Native);
+    }
+    let file = &arguments.image;
+    let image = std::fs::read(file).map_err(|error| {
+        miette::miette!(
+            help = "`cargo xtask image` builds it; `--image FILE` takes another; `--native` runs without",
+            "{}: {error}",
+            file.display()
+        )
+    })?;
+    Ok(Board::Image(image))
+}
+
+#[cfg(not(feature = "simavr"))]
+fn board(arguments: &Arguments) -> Result<Board> {
+    if !arguments.native {
+        miette::bail!(
+            help = "`cargo build --release -p imu-stand --features simavr` builds it in (`cargo xtask demo` does so); `imu-stand run --native` runs the firmware's own logic on the host, on the same simulated stand",
+            "this build has no simulated ATmega16 to run {}",
+            arguments.image.display()
+        );
+    }
+    Ok(Board::Native)
+}
+
+fn sample(
+    board: &Board,
+    plan: &Plan,
+    progress: impl FnMut(f64),
+) -> Result<(Record, wire::LinkCounts)> {
+    match board {
+        Board::Native => Ok(run_native(plan, progress)),
+        #[cfg(feature = "simavr")]
+        Board::Image(image) => {
+            imu_stand::stand::run_image(plan, image, progress).map_err(image_error)
+        }
+    }
+}
+
+/// What to do about an image that does not load or stops.
+#[cfg(feature = "simavr")]
+pub fn image_error(error: bench::simavr::SimavrError) -> miette::Report {
+    use bench::simavr::SimavrError;
+    let help = match error {
+        SimavrError::Image(_) => "`cargo xtask image` builds one: give the .elf, not the .hex",
+        _ => {
+            "the image is at fault, not the stand: `cargo xtask test` checks the one of this source"
+        }
+    };
+    miette::miette!(help = help, "{error}")
 }
