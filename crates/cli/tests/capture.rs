@@ -287,3 +287,32 @@ fn samples_that_the_line_lost_are_charged_to_the_line() {
     assert_eq!(answer["lost_by_line"], 3);
     assert_eq!(answer["lost_by_board"], 0);
 }
+
+#[test]
+fn a_monitor_shows_what_the_board_sends_and_writes_its_last_view() {
+    let board = Board::with(Scenario::lively(5), Swallow::default());
+    let folder = folder("monitor");
+    let out = folder.join("view.json");
+    let done = run(&[
+        "monitor",
+        "--port",
+        board.port(),
+        "--seconds",
+        "5",
+        "--json",
+        out.to_str().unwrap(),
+    ]);
+    let said = said(&done);
+    assert_eq!(done.status.code(), Some(0), "{said}");
+    assert!(
+        said.contains("Allan deviation, deg/h") && said.contains("0 missing"),
+        "{said}"
+    );
+    let view = json(&out);
+    assert!(view["samples"].as_u64().unwrap() > 60, "{view}");
+    // Angle random walk of 5.27 deg/sqrt(h): 0.088 deg/s at 1 s, 0.39 deg/s at 0.05 s; 60 samples know it to 10 %.
+    let first = view["allan"][0][0]["deviation"].as_f64().unwrap();
+    assert!((0.2..0.6).contains(&first), "{first}");
+    let supply = view["supply_v"].as_f64().unwrap();
+    assert!((4.5..5.5).contains(&supply), "{supply}");
+}

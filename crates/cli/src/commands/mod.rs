@@ -5,6 +5,7 @@ pub mod board;
 pub mod capture;
 pub mod diagnose;
 pub mod flash;
+pub mod monitor;
 pub mod paper;
 #[cfg(unix)]
 pub mod pty;
