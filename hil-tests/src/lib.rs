@@ -128,3 +128,27 @@ pub fn hear(run: &Run) -> Result<Heard, SimavrError> {
     simavr(&image(), run, |byte| heard.push(byte))?;
     Ok(heard)
 }
+
+/// The seed of a test that draws: fresh, printed, and replayed by `IMU_STAND_SEED`.
+///
+/// # Panics
+/// For a seed that is no number.
+#[must_use]
+pub fn seed() -> u64 {
+    use std::hash::{BuildHasher, Hasher};
+    let seed = std::env::var("IMU_STAND_SEED").map_or_else(
+        |_| std::hash::RandomState::new().build_hasher().finish(),
+        |text| {
+            text.parse()
+                .unwrap_or_else(|_| panic!("IMU_STAND_SEED is no number: {text}"))
+        },
+    );
+    println!("IMU_STAND_SEED={seed}");
+    seed
+}
+
+/// A generator of a seed.
+#[must_use]
+pub fn generator(seed: u64) -> rand_xoshiro::Xoshiro256PlusPlus {
+    rand_core::SeedableRng::seed_from_u64(seed)
+}

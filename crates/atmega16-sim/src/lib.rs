@@ -230,6 +230,13 @@ impl Mcu {
         self.core.chip_mut().release(port, mask);
     }
 
+    /// Writes a register of [`register`] as the program could: for planting what an error in it would do.
+    pub fn write_register(&mut self, address: u8, value: u8) {
+        let now = self.cycle();
+        // What it asks of the processor concerns an instruction, and none is running.
+        let _effect = self.core.chip_mut().write(address, value, now);
+    }
+
     /// What OC2 puts out, from timer 2's registers. A pin left connected while its timer stands counts as high.
     #[must_use]
     pub fn motor_pwm(&self) -> Pwm {

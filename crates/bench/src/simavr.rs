@@ -576,7 +576,10 @@ impl Probe for Clockwork {
             }
             (Event::Spi { .. }, Some((tick, instants))) => instants.spi_bytes.push(at - *tick),
             (Event::Adc { channel }, Some((tick, instants))) => {
-                if let Some(place) = instants.adc.get_mut(usize::from(channel)) {
+                // A reset within the tick would convert once more.
+                if let Some(place) = instants.adc.get_mut(usize::from(channel))
+                    && *place == 0
+                {
                     *place = at - *tick;
                 }
             }

@@ -1,0 +1,165 @@
+//! The image in the simulated ATmega16 and its logic on the host say the same in the same world, byte for byte.
+//!
+//! Masked are the two fields of the health frame that tell of the processor itself: how long a tick's work took, and how
+//! deep the stack went. The instants at which the parts are asked within a tick are the image's own, measured in the run:
+//! serial interrupts move those behind the first round by some cycles, and what a part says changes in between.
+
+use bench::scenario::StallFlags;
+use bench::simavr::simavr_timed;
+use bench::{Fault, Run, Scenario, Timeline, duty_profile, native};
+use hil_tests::{Heard, at, image, run};
+use wire::{Axis, Command, Frame, Sensor};
+
+/// The frames as bytes again, without what tells of the processor.
+fn masked(heard: &Heard) -> Vec<(Frame, Vec<u8>)> {
+    heard
+        .frames
+        .iter()
+        .map(|(_, frame)| {
+            let mut frame = *frame;
+            if let Frame::Health(health) = &mut frame {
+                (health.tick_busy_max, health.stack_free) = (0, 0);
+            }
+            let mut bytes = [0; 256];
+            let len = wire::encode(&frame, &mut bytes).expect("a frame fits");
+            (frame, bytes[..len].to_vec())
+        })
+        .collect()
+}
+
+fn both(run: &Run) -> (Heard, Heard, Heard) {
+    let (mut own, mut host, mut rough) = <(Heard, Heard, Heard)>::default();
+    let timeline = simavr_timed(&image(), run, |byte| own.push(byte)).expect("it runs");
+    native(run, &timeline, |byte| host.push(byte));
+    let constant = Timeline {
+        recorded: Vec::new(),
+        ..timeline
+    };
+    native(run, &constant, |byte| rough.push(byte));
+    (own, host, rough)
+}
+
+fn compare(run: &Run) {
+    let (own, host, rough) = both(run);
+    assert_eq!(own.link().rejected(), 0);
+    let (own, host, rough) = (masked(&own), masked(&host), masked(&rough));
+    for (n, (a, b)) in own.iter().zip(&host).enumerate() {
+        assert_eq!(a.0, b.0, "frame {n} of the image, then of the host");
+        assert_eq!(a.1, b.1);
+    }
+    assert!(
+        own.len().abs_diff(host.len()) <= 1,
+        "{} and {} frames",
+        own.len(),
+        host.len()
+    );
+    let other = own.iter().zip(&rough).filter(|(a, b)| a.1 != b.1).count();
+    println!(
+        "{} frames, all bytes the same; with the first tick's instants in every tick {other} differ",
+        own.len()
+    );
+}
+
+#[test]
+fn a_lively_stand_with_the_motor_driven() {
+    let mut run = run(Scenario::lively(3), 200.0);
+    run.requests = duty_profile(&[(2.0, 150), (20.0, -200), (40.0, 60), (150.0, 255)], 190.0);
+    compare(&run);
+}
+
+#[test]
+fn a_stand_with_one_of_each_fault() {
+    let scenario = Scenario::lively(4)
+        .with(Fault::Tempco {
+            gyro: 0,
+            dps_per_c: 0.1,
+            dps_per_c2: 0.0,
+        })
+        .with(Fault::Vibration {
+            axis: 1,
+            frequency_hz: 3.3,
+            amplitude_dps: 0.2,
+            linear_g: 0.02,
+        })
+        .with(Fault::Stall {
+            gyro: 2,
+            count: 5,
+            length_s: 0.3,
+            flags: StallFlags::NewDataClear,
+        })
+        .with(Fault::DeadSpi {
+            gyro: 1,
+            start_s: 20.0,
+            end_s: 22.0,
+            level: false,
+        })
+        .with(Fault::DeadSpi {
+            gyro: 0,
+            start_s: 30.0,
+            end_s: 31.0,
+            level: true,
+        })
+        .with(Fault::Glitches {
+            gyro: 0,
+            count: 9,
+            height_dps: 40.0,
+        });
+    compare(&run(scenario, 60.0));
+}
+
+#[test]
+fn a_host_that_asks_for_everything() {
+    let mut run = run(Scenario::lively(5), 60.0);
+    let asked = [
+        Command::Ping,
+        Command::BiasNull { samples: 100 },
+        Command::ReadRegister {
+            gyro: Axis::Y,
+            address: 0x38,
+        },
+        Command::WriteRegister {
+            gyro: Axis::Z,
+            address: 0x36,
+            value: 1,
+        },
+        Command::SetAccRange { range: 2 },
+        Command::SetGyro {
+            range: 2,
+            filter: 4,
+        },
+        Command::SetBias {
+            axis: Axis::X,
+            value: 12_345,
+        },
+        Command::SetScale {
+            axis: Axis::Z,
+            value: 1_200_000,
+        },
+        Command::Counters,
+        Command::StoreConfig,
+        Command::MotorDuty { duty: 10 },
+        Command::SelfTest {
+            sensor: Sensor::GyroX,
+        },
+        Command::DefaultConfig,
+        Command::LoadConfig,
+        Command::SetRate {
+            period_ticks: 5_000,
+            periods_per_sample: 1,
+        },
+        Command::SetRate {
+            period_ticks: 50_000,
+            periods_per_sample: 2,
+        },
+        Command::SetRate {
+            period_ticks: 12_500,
+            periods_per_sample: 1,
+        },
+        Command::ClearCounters,
+    ];
+    run.requests = (0..)
+        .zip(asked)
+        .map(|(n, command)| at(2.0 + 3.1 * f64::from(n), n, command))
+        .collect();
+    compare(&run);
+}

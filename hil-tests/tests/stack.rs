@@ -1,0 +1,103 @@
+//! The stack never meets the statics, whatever is asked while a tick is being served.
+
+use bench::Scenario;
+use bench::simavr::{NoProbe, Simulated};
+use hil_tests::{Heard, at, generator, image, run, seed};
+use wire::{Axis, Command, Sensor, Shape};
+
+#[test]
+fn the_deepest_stack_leaves_room_with_every_command_at_any_phase_of_the_tick() {
+    let seconds = 120.0;
+    let mut run = run(Scenario::lively(21), seconds);
+    let asked = [
+        Command::Ping,
+        Command::KeepAlive,
+        Command::GetHello,
+        Command::Counters,
+        Command::ReadRegister {
+            gyro: Axis::Y,
+            address: 0x38,
+        },
+        Command::WriteRegister {
+            gyro: Axis::Z,
+            address: 0x36,
+            value: 1,
+        },
+        Command::SetAccRange { range: 0 },
+        Command::SetGyro {
+            range: 4,
+            filter: 2,
+        },
+        Command::SetBias {
+            axis: Axis::X,
+            value: 12_345,
+        },
+        Command::SetScale {
+            axis: Axis::Z,
+            value: 1_200_000,
+        },
+        Command::MotorDuty { duty: 10 },
+        Command::MotorProfile {
+            shape: Shape::Sine,
+            amplitude: 50,
+            offset: 0,
+            period_ms: 700,
+            cycles: 0,
+        },
+        Command::MotorLimits {
+            max_duty: 200,
+            ramp_per_s: 500,
+        },
+        Command::BiasNull { samples: 20 },
+        Command::SelfTest {
+            sensor: Sensor::GyroX,
+        },
+        Command::SelfTest {
+            sensor: Sensor::Accelerometer,
+        },
+        Command::StoreConfig,
+        Command::LoadConfig,
+        Command::DefaultConfig,
+        Command::SetBoardId { board_id: 3 },
+    ];
+    let rng = &mut generator(seed());
+    let mut t = 1.0;
+    let mut number = 0;
+    while t < seconds - 2.0 {
+        let which = bench::uniform(rng, 0.0, asked.len() as f64) as usize;
+        run.requests.push(at(t, number, asked[which]));
+        number += 1;
+        t += bench::uniform(rng, 0.008, 0.08);
+    }
+    let mut simulated = Simulated::new(&image(), &run.scenario, NoProbe).expect("an image");
+    simulated.request(&run.requests);
+    simulated.mcu_mut().watch_stack();
+    let mut heard = Heard::default();
+    let ended = simulated.run_until(seconds, &mut |byte| heard.push(byte));
+    let lowest = simulated.mcu().min_stack_pointer().expect("watched");
+    let end = simulated
+        .mcu()
+        .image()
+        .symbol("_end")
+        .expect("the linker's")
+        & 0xffff;
+    println!(
+        "{number} requests: deepest stack {} B, {} B between it and the statics, which end at {end:#x}",
+        0x45f - u32::from(lowest),
+        (u32::from(lowest) + 1).saturating_sub(end)
+    );
+    assert!(
+        u32::from(lowest) >= end,
+        "the stack went down to {lowest:#x}, the statics end at {end:#x}"
+    );
+    ended.expect("it runs");
+    assert_eq!(heard.link().rejected(), 0);
+    let health = heard.last_health();
+    let said = u32::from(health.stack_free);
+    let left = u32::from(lowest) + 1 - end;
+    // The board looks at what it painted; a byte that happens to be the paint's colour hides one.
+    assert!(
+        said.abs_diff(left) <= 4,
+        "the board says {said} B were left, there were {left}"
+    );
+}
