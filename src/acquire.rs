@@ -4,7 +4,7 @@
 //! (data sheet notes, partly unverified). The frames go round the three gyros, so that each has its pause while the
 //! others are served, and the ADC converts meanwhile.
 
-use adis16250::{Access, Adis16250, Command, Register, Word};
+use adis16250::{Adis16250, Command, Register, Word};
 use embedded_hal::{delay::DelayNs, spi::SpiDevice};
 use wire::Status;
 
@@ -30,6 +30,10 @@ pub trait Sensors {
 /// Pause between two rounds over the gyros, us: a round takes about 33 us, a gyro wants 40 us.
 const ROUND_STALL_US: u32 = 12;
 
+/// Pause after a frame when one gyro is spoken to alone, us: 40 us from frame to frame, of which a frame takes 10 us.
+/// The data sheet's pace for slow sample periods is kept, as a gyro that has just been powered may have one.
+const FRAME_STALL_US: u32 = 100;
+
 /// What one tick delivered, as it came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Raw {
@@ -46,11 +50,11 @@ pub struct Raw {
     /// Bit per axis: a conversion did not end.
     pub adc_stalled: u8,
     /// What became of the job that was posted before this tick.
-    pub job: Option<Result<u16, Status>>,
+    pub done: Done,
 }
 
 impl Raw {
-    /// Nothing has come yet.
+    /// Nothing has come yet; all zeros.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -60,7 +64,7 @@ impl Raw {
             acc: [0; 3],
             spi_stalled: 0,
             adc_stalled: 0,
-            job: None,
+            done: Done::NONE,
         }
     }
 }
@@ -71,55 +75,91 @@ impl Default for Raw {
     }
 }
 
-/// Work on the gyros' registers, done in the slot after a sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Job {
+/// Kinds of work on the gyros' registers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Task {
+    /// Nothing to do.
+    #[default]
+    None,
     /// Read a register.
-    Read {
-        /// Gyro 0..=2.
-        axis: u8,
-        /// Even byte address.
-        address: u8,
-    },
-    /// Write a register.
-    Write {
-        /// Gyro 0..=2.
-        axis: u8,
-        /// Even byte address.
-        address: u8,
-        /// 16 bits.
-        value: u16,
-    },
-    /// Bring range and filter of all three into line; the result has a bit for each axis that did not read back.
-    Configure {
-        /// SENS/AVG.
-        sens_avg: u16,
-    },
+    Read,
+    /// Write a register, and read it back where it can be read.
+    Write,
+    /// Bring range and filter of all three into line: `value` is SENS/AVG; the result has a bit for each axis that did
+    /// not read back.
+    Configure,
 }
 
+/// Work on the gyros' registers, done in the slot after a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Job {
+    /// What to do.
+    pub task: Task,
+    /// Gyro 0..=2.
+    pub axis: u8,
+    /// Even byte address.
+    pub address: u8,
+    /// 16 bits.
+    pub value: u16,
+}
+
+/// The end of a [`Job`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Done {
+    /// What it was; [`Task::None`] where none has ended.
+    pub task: Task,
+    /// [`Status::BadArgument`] for a register that is not there, [`Status::NotAnswering`] when SPI stalls.
+    pub status: Status,
+    /// The register, or bits of axes.
+    pub value: u16,
+}
+
+impl Done {
+    /// None has ended; all zeros.
+    pub const NONE: Self = Self {
+        task: Task::None,
+        status: Status::Ok,
+        value: 0,
+    };
+}
+
+/// One frame with one gyro.
+#[inline(never)]
+fn exchange<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Result<Word, Status> {
+    let Some(gyro) = sensors.gyros().get_mut(axis as usize) else {
+        return Err(Status::BadArgument);
+    };
+    gyro.exchange(command).map_err(|_| Status::NotAnswering)
+}
+
+/// One frame with each gyro: what they answer to the command of the round before.
 #[inline(never)]
 fn round<S: Sensors>(sensors: &mut S, command: Command, into: &mut [Word; 3], stalled: &mut u8) {
-    let mut bit = 1;
-    for (gyro, word) in sensors.gyros().iter_mut().zip(into) {
-        match gyro.exchange(command) {
-            Ok(reply) => *word = reply,
-            Err(_) => *stalled |= bit,
-        }
+    let (mut axis, mut bit) = (0, 1);
+    for word in into {
+        *word = match exchange(sensors, axis, command) {
+            Ok(reply) => reply,
+            Err(_) => {
+                *stalled |= bit;
+                Word(0)
+            }
+        };
+        axis = axis.wrapping_add(1);
         bit <<= 1;
     }
 }
 
 /// One sample. The first thing it does is to start the ADC, the second is the first SPI frame.
-pub fn acquire<S: Sensors>(sensors: &mut S) -> Raw {
-    let mut raw = Raw::new();
-    let mut ignored = [Word(0); 3];
+pub fn acquire<S: Sensors>(sensors: &mut S, raw: &mut Raw) {
     let mut delay = sensors.delay();
     sensors.adc_start(0);
+    (raw.spi_stalled, raw.adc_stalled) = (0, 0);
+    let stalled = &mut raw.spi_stalled;
     round(
         sensors,
         Command::read(Register::GyroOut),
-        &mut ignored,
-        &mut raw.spi_stalled,
+        &mut raw.gyro,
+        stalled,
     );
     sensors.sampled();
     delay.delay_us(ROUND_STALL_US);
@@ -127,98 +167,99 @@ pub fn acquire<S: Sensors>(sensors: &mut S) -> Raw {
         sensors,
         Command::read(Register::TempOut),
         &mut raw.gyro,
-        &mut raw.spi_stalled,
+        stalled,
     );
-    convert(sensors, &mut raw, 0);
+    raw.acc[0] = convert(sensors, &mut raw.adc_stalled, 0);
     sensors.adc_start(1);
     round(
         sensors,
         Command::read(Register::SupplyOut),
         &mut raw.temp,
-        &mut raw.spi_stalled,
+        stalled,
     );
     delay.delay_us(ROUND_STALL_US);
     round(
         sensors,
         Command::read(Register::SupplyOut),
         &mut raw.supply,
-        &mut raw.spi_stalled,
+        stalled,
     );
-    convert(sensors, &mut raw, 1);
+    raw.acc[1] = convert(sensors, &mut raw.adc_stalled, 1);
     sensors.adc_start(2);
-    convert(sensors, &mut raw, 2);
-    raw
+    raw.acc[2] = convert(sensors, &mut raw.adc_stalled, 2);
 }
 
-#[inline(never)]
-fn convert<S: Sensors>(sensors: &mut S, raw: &mut Raw, channel: u8) {
-    match sensors.adc_finish() {
-        Some(counts) => {
-            if let Some(place) = raw.acc.get_mut(channel as usize) {
-                *place = counts;
-            }
-        }
-        None => raw.adc_stalled |= 1 << channel,
-    }
+fn convert<S: Sensors>(sensors: &mut S, stalled: &mut u8, channel: u8) -> u16 {
+    sensors.adc_finish().unwrap_or_else(|| {
+        *stalled |= 1 << channel;
+        0
+    })
 }
 
 /// Does a job, after the sample and before the next tick.
-///
-/// # Errors
-/// [`Status::BadArgument`] for a register that is not there, [`Status::NotAnswering`] when SPI stalls.
-#[inline(never)]
-pub fn work<S: Sensors>(sensors: &mut S, job: Job) -> Result<u16, Status> {
-    let mut delay = sensors.delay();
-    match job {
-        Job::Read { axis, address } => {
-            let gyro = sensors
-                .gyros()
-                .get_mut(axis as usize)
-                .ok_or(Status::BadArgument)?;
-            let register = Register::from_address(address).ok_or(Status::BadArgument)?;
-            let word = gyro
-                .read(register, &mut delay)
-                .map_err(|_| Status::NotAnswering)?;
-            Ok(word.bits())
-        }
-        Job::Write {
-            axis,
-            address,
-            value,
-        } => {
-            let gyro = sensors
-                .gyros()
-                .get_mut(axis as usize)
-                .ok_or(Status::BadArgument)?;
-            let register = Register::from_address(address).ok_or(Status::BadArgument)?;
-            gyro.write(register, value, &mut delay)
-                .map_err(|_| Status::NotAnswering)?;
-            if register.access() == Access::Write {
-                return Ok(value);
+pub fn work<S: Sensors>(sensors: &mut S, job: Job) -> Done {
+    let mut done = Done {
+        task: job.task,
+        ..Done::NONE
+    };
+    match job.task {
+        Task::None => {}
+        Task::Configure => done.value = configure(sensors, job.value).into(),
+        Task::Read | Task::Write => match reach(sensors, job) {
+            Ok(value) => {
+                done.value = value;
+                if matches!(job.task, Task::Write) && value != job.value {
+                    done.status = Status::ReadBackWrong;
+                }
             }
-            let word = gyro
-                .read(register, &mut delay)
-                .map_err(|_| Status::NotAnswering)?;
-            if word.bits() == value {
-                Ok(value)
-            } else {
-                Err(Status::ReadBackWrong)
-            }
-        }
-        Job::Configure { sens_avg } => Ok(u16::from(configure(sensors, sens_avg))),
+            Err(status) => done.status = status,
+        },
     }
+    done
+}
+
+/// One frame with one gyro, and the pause that it wants after it.
+#[inline(never)]
+fn frame<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Result<Word, Status> {
+    let reply = exchange(sensors, axis, command);
+    sensors.delay().delay_us(FRAME_STALL_US);
+    reply
+}
+
+/// Reads the job's register, after writing it where that is asked for.
+#[inline(never)]
+fn reach<S: Sensors>(sensors: &mut S, job: Job) -> Result<u16, Status> {
+    let (axis, address) = (job.axis, job.address & !1);
+    let read = Command::read_at(address);
+    if matches!(job.task, Task::Read) {
+        read.ok_or(Status::BadArgument)?;
+    } else {
+        let [low, high] = job.value.to_le_bytes();
+        let low = Command::write_at(address, low).ok_or(Status::BadArgument)?;
+        let high = Command::write_at(address | 1, high).ok_or(Status::BadArgument)?;
+        frame(sensors, axis, low)?;
+        frame(sensors, axis, high)?;
+    }
+    let Some(read) = read else {
+        return Ok(job.value);
+    };
+    frame(sensors, axis, read)?;
+    // The reply comes with any next frame; one that asks for ENDURANCE disturbs nothing.
+    frame(sensors, axis, Command::read(Register::Endurance)).map(Word::bits)
 }
 
 /// Sets range and filter of all three gyros and reads them back; a bit for each axis that does not read as written.
 #[inline(never)]
 pub fn configure<S: Sensors>(sensors: &mut S, sens_avg: u16) -> u8 {
-    let mut delay = sensors.delay();
-    let mut wrong = 0;
-    let mut bit = 1;
-    for gyro in sensors.gyros() {
-        let done = gyro.write(Register::SensAvg, sens_avg, &mut delay).is_ok()
-            && matches!(gyro.read(Register::SensAvg, &mut delay), Ok(word) if word.bits() == sens_avg);
-        if !done {
+    let (mut wrong, mut bit) = (0, 1);
+    for axis in 0..3 {
+        let job = Job {
+            task: Task::Write,
+            axis,
+            address: Register::SensAvg.address(),
+            value: sens_avg,
+        };
+        if reach(sensors, job) != Ok(sens_avg) {
             wrong |= bit;
         }
         bit <<= 1;

@@ -86,30 +86,39 @@ impl BiasNull {
         self.have = self.have.wrapping_add(1);
     }
 
-    /// Mean rate of an axis and its standard error, Q16.16 deg/s, by a scale in Q8.24 deg/s for each count; `None` when
-    /// the mean is that of a rotation.
-    ///
-    /// The standard error is that of white noise whose variance is half the mean square of the steps from sample to
-    /// sample, so that a drift does not count as noise.
-    #[inline(never)]
+    /// What [`mean`](Self::mean) says of a stand that turns; no bias is as large.
+    pub const ROTATION: i32 = i32::MIN;
+
+    /// Mean rate of an axis, Q16.16 deg/s, by a scale in Q8.24 deg/s for each count.
     #[must_use]
-    pub fn mean(&self, axis: u8, scale: i32) -> Option<(i32, i32)> {
-        let sum = self.axes.get(axis as usize)?;
+    pub fn mean(&self, axis: u8, scale: i32) -> i32 {
+        let Some(sum) = self.axes.get(axis as usize) else {
+            return Self::ROTATION;
+        };
         // |sum| <= 16384 * 8191 < 2^27; what passes this has |sum| << 8 < 2^29.
         let magnitude = sum.sum.unsigned_abs();
         if divide(magnitude, self.have) >= u32::from(LARGEST_BIAS) {
-            return None;
+            return Self::ROTATION;
         }
         let mean = scaled(divide(magnitude << 8, self.have) as u16, scale);
-        // Steps squared, mean in Q6; half of it is the variance, a further division by n the mean's, in Q20.
-        let square_q6 = divide(sum.steps << 6, self.have.wrapping_sub(1));
-        let error_q10 = root(divide(square_q6 << 13, self.have));
-        let mean = if sum.sum < 0 {
+        if sum.sum < 0 {
             mean.wrapping_neg()
         } else {
             mean
+        }
+    }
+
+    /// Standard error of the mean, in its unit: that of white noise whose variance is half the mean square of the steps
+    /// from sample to sample, so that a drift does not count as noise.
+    #[must_use]
+    pub fn error(&self, axis: u8, scale: i32) -> i32 {
+        let Some(sum) = self.axes.get(axis as usize) else {
+            return 0;
         };
-        Some((mean, scaled(error_q10, scale) >> 2))
+        // Steps squared, mean in Q6; half of it is the variance, a further division by n the mean's, in Q20.
+        let square_q6 = divide(sum.steps << 6, self.have.wrapping_sub(1));
+        let error_q10 = root(divide(square_q6 << 13, self.have));
+        scaled(error_q10, scale) >> 2
     }
 }
 
@@ -153,7 +162,7 @@ mod tests {
             take(&mut null, [-3, -5, -3, -5, -3, -5, -3, -5]),
             Outcome::Resting
         );
-        let (mean, error) = null.mean(0, UNIT).unwrap();
+        let (mean, error) = (null.mean(0, UNIT), null.error(0, UNIT));
         assert_eq!(mean, -4 << 16);
         // Steps of 2: variance 2, of the mean of eight 1/4.
         assert!((error - 32_768).abs() < 128, "{error}");
@@ -170,7 +179,7 @@ mod tests {
         let mut null = BiasNull::new();
         let counts: Vec<i16> = (0..n).map(|_| (0..4).map(|_| uniform()).sum()).collect();
         assert_eq!(take(&mut null, counts.iter().copied()), Outcome::Resting);
-        let (_, error) = null.mean(0, UNIT).unwrap();
+        let error = null.error(0, UNIT);
         let expected = 9.22 / f64::from(n).sqrt() * 65_536.0;
         assert!(
             (f64::from(error) / expected - 1.0).abs() < 0.05,
@@ -184,12 +193,16 @@ mod tests {
         assert_eq!(take(&mut null, [0, 0, 61]), Outcome::Moving);
         let mut steady = BiasNull::new();
         assert_eq!(take(&mut steady, [1365, 1365]), Outcome::Resting);
-        assert_eq!(steady.mean(0, UNIT), None, "100 deg/s is no bias");
+        assert_eq!(
+            steady.mean(0, UNIT),
+            BiasNull::ROTATION,
+            "100 deg/s is no bias"
+        );
         let mut full = BiasNull::new();
         assert_eq!(
             take(&mut full, (0..MAX_SAMPLES).map(|_| -8192)),
             Outcome::Resting
         );
-        assert_eq!(full.mean(0, UNIT), None);
+        assert_eq!(full.mean(0, UNIT), BiasNull::ROTATION);
     }
 }

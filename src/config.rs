@@ -33,10 +33,10 @@ pub struct Config {
 pub const SCALE_320: i32 = 1_229_099;
 /// Fastest rate: 256 Hz, the gyro's own.
 pub const MIN_PERIOD: u16 = 976;
-/// A 16-bit timer of 4 us holds no more than 262 ms; slower rates take every n-th of its periods.
+/// A 16-bit timer of 4 us holds no more than 262 ms; slower rates take every n-th of its periods, n up to 4.
 pub const MAX_PERIOD: u16 = 62_500;
-/// Slowest rate: 1 Hz.
-const MAX_SAMPLE_TICKS: u32 = 250_000;
+/// Most periods of a sample: 1 Hz is the slowest rate.
+const MAX_PERIODS: u8 = 4;
 /// Largest UBRR.
 const MAX_DIVISOR: u16 = 4_095;
 
@@ -109,14 +109,11 @@ impl Config {
             1 => 4,
             _ => return false,
         };
-        let period = self.set_up.period_ticks.get();
-        let sample = u32::from(period).wrapping_mul(self.set_up.periods_per_sample.into());
         self.set_up.gyro_filter >= fewest_taps
             && self.set_up.gyro_filter <= 6
             && self.set_up.acc_range <= 3
-            && (MIN_PERIOD..=MAX_PERIOD).contains(&period)
-            && sample >= u32::from(period)
-            && sample <= MAX_SAMPLE_TICKS
+            && (MIN_PERIOD..=MAX_PERIOD).contains(&self.set_up.period_ticks.get())
+            && (1..=MAX_PERIODS).contains(&self.set_up.periods_per_sample)
             && self.set_up.baud_divisor.get() <= MAX_DIVISOR
     }
 }
@@ -235,7 +232,7 @@ mod tests {
             config.set_up.periods_per_sample = every;
             config.is_in_order()
         };
-        assert!(with(976, 1) && with(12_500, 1) && with(62_500, 1) && with(50_000, 5));
-        assert!(!with(975, 1) && !with(62_501, 1) && !with(50_001, 5) && !with(12_500, 0));
+        assert!(with(976, 1) && with(12_500, 1) && with(62_500, 4));
+        assert!(!with(975, 1) && !with(62_501, 1) && !with(50_000, 5) && !with(12_500, 0));
     }
 }

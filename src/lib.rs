@@ -15,7 +15,7 @@ pub mod math;
 pub mod motor;
 pub mod stand;
 
-pub use acquire::{Job, Raw, Sensors, acquire, configure};
+pub use acquire::{Done, Job, Raw, Sensors, Task, acquire, configure};
 pub use stand::{Board, Stand};
 
 /// Length of a tick of the time stamps, ns: 16 MHz / 64 in timer 1.

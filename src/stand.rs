@@ -7,7 +7,7 @@ use zerocopy::{FromZeros, IntoBytes};
 mod requests;
 mod store;
 
-use crate::acquire::{Job, Raw};
+use crate::acquire::{Job, Raw, Task};
 use crate::bias::{BiasNull, Outcome};
 use crate::config::Config;
 use crate::motor::Motor;
@@ -215,9 +215,11 @@ impl Stand {
             self.step_bias_null(board, in_order, &sample);
         }
         sample.flags.set(seen);
-        self.say(board, kind::SAMPLE, sample.as_bytes(), Fault::FrameDropped);
-        if let Some(result) = raw.job {
-            self.job_done(board, result);
+        if !say(board, kind::SAMPLE, sample.as_bytes()) {
+            self.record(Fault::FrameDropped, 0);
+        }
+        if !matches!(raw.done.task, Task::None) {
+            self.job_done(board, raw.done);
         }
         let busy = board.ticks_since();
         if busy > self.health.tick_busy_max.get() {
@@ -234,12 +236,17 @@ impl Stand {
             self.record_each(Fault::GyroRecoveredX, back);
             self.unset = true;
         }
-        let job = Job::Configure {
-            sens_avg: self.config.sens_avg(),
-        };
-        if self.unset && self.job.is_none() && board.post(job) {
+        if self.unset && self.job.is_none() && board.post(self.configure_job()) {
             self.unset = false;
             self.job.code = Pending::OWN;
+        }
+    }
+
+    fn configure_job(&self) -> Job {
+        Job {
+            task: Task::Configure,
+            value: self.config.sens_avg(),
+            ..Job::default()
         }
     }
 
@@ -289,7 +296,6 @@ impl Stand {
         seen
     }
 
-    #[inline(never)]
     fn accelerometer(&mut self, axis: u8, raw: &Raw, sample: &mut Sample) -> u16 {
         let at = axis as usize;
         if at >= 3 {
@@ -309,7 +315,6 @@ impl Stand {
     }
 
     /// One supply for three gyros: the first that answers says what it is.
-    #[inline(never)]
     fn supply(&mut self, silent: u8, raw: &Raw, sample: &mut Sample) -> u16 {
         let mut bit = 1;
         for word in raw.supply {
@@ -348,13 +353,13 @@ impl Stand {
         let mut largest = 0;
         for axis in 0..3 {
             let scale = self.config.set_up.scale[axis as usize].get();
-            match self.bias_null.mean(axis, scale) {
-                Some((mean, error)) => {
-                    self.answer.detail[axis as usize].set(mean);
-                    largest = error.max(largest);
-                }
-                None => moving = true,
-            }
+            let (mean, error) = (
+                self.bias_null.mean(axis, scale),
+                self.bias_null.error(axis, scale),
+            );
+            moving |= mean == BiasNull::ROTATION;
+            self.answer.detail[axis as usize].set(mean);
+            largest = error.max(largest);
         }
         let asked = core::mem::replace(&mut self.null, Pending::NONE);
         if moving {
@@ -397,25 +402,16 @@ impl Stand {
         }
     }
 
-    /// Sends a frame, or counts that it did not fit.
-    #[inline(never)]
-    fn say<B: Board>(&mut self, board: &mut B, kind: u8, fields: &[u8], lost: Fault) {
-        let mut frame = [0; wire::MAX_FRAME];
-        let len = wire::fields::encode(kind, fields, &mut frame);
-        if !frame.get(..len).is_some_and(|frame| board.send(frame)) {
-            self.record(lost, 0);
-        }
-    }
-
     /// The one reply to a request, with what [`answer`](Self::answer) says.
     #[inline(never)]
     fn reply<B: Board>(&mut self, board: &mut B, asked: Pending, status: Status) {
-        let mut reply = self.answer;
-        self.answer = Reply::new_zeroed();
-        reply.number.set(asked.number);
-        reply.command = asked.code;
-        reply.status = status as u8;
-        self.say(board, kind::REPLY, reply.as_bytes(), Fault::ReportDropped);
+        self.answer.number.set(asked.number);
+        self.answer.command = asked.code;
+        self.answer.status = status as u8;
+        if !say(board, kind::REPLY, self.answer.as_bytes()) {
+            self.record(Fault::ReportDropped, 0);
+        }
+        self.answer.zero();
     }
 
     #[inline(never)]
@@ -429,14 +425,17 @@ impl Stand {
             tick_ns: crate::TICK_NS.into(),
             set_up: self.config.set_up,
         };
-        self.say(board, kind::HELLO, hello.as_bytes(), Fault::ReportDropped);
+        if !say(board, kind::HELLO, hello.as_bytes()) {
+            self.record(Fault::ReportDropped, 0);
+        }
     }
 
     #[inline(never)]
     fn health<B: Board>(&mut self, board: &mut B) {
         self.health.stack_free.set(board.stack_free());
-        let health = self.health;
-        self.say(board, kind::HEALTH, health.as_bytes(), Fault::ReportDropped);
+        if !say(board, kind::HEALTH, self.health.as_bytes()) {
+            self.record(Fault::ReportDropped, 0);
+        }
     }
 
     #[inline(never)]
@@ -456,6 +455,14 @@ impl Stand {
         board.set_acc_range(set_up.acc_range);
         self.unset = true;
     }
+}
+
+/// Sends a frame; false, and nothing sent, when it does not fit.
+#[inline(never)]
+fn say<B: Board>(board: &mut B, kind: u8, fields: &[u8]) -> bool {
+    let mut frame = [0; wire::MAX_FRAME];
+    let len = wire::fields::encode(kind, fields, &mut frame);
+    frame.get(..len).is_some_and(|frame| board.send(frame))
 }
 
 impl Default for Stand {

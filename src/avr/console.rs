@@ -2,8 +2,8 @@
 //! so that the frame after it is intact. No frame begins with 0x3F: the longest request is shorter.
 
 use firmware::{Board, VERSION};
-use heapless::String;
-use ufmt::uwrite;
+use heapless::Vec;
+use ufmt::{uWrite, uwrite};
 
 use super::board::AvrBoard;
 
@@ -32,26 +32,37 @@ impl Console {
 /// Version, reset cause, stack, each as `letter number`: every string would be copied to the SRAM, letters are not.
 #[inline(never)]
 fn answer(board: &mut AvrBoard) {
+    let mut text = Text(Vec::new());
     let [major, minor, patch] = VERSION;
-    let mut text: String<48> = String::new();
-    let values = [
-        major.into(),
-        minor.into(),
-        patch.into(),
-        board.reset_cause().into(),
-        board.stack_free(),
-    ];
-    for (letter, value) in (b'v'..).zip(values) {
-        number(&mut text, letter, value);
-    }
-    if text.push('\0').is_ok() {
-        board.send(text.as_bytes());
+    text.number(b'v', major.into());
+    text.number(b'w', minor.into());
+    text.number(b'x', patch.into());
+    text.number(b'y', board.reset_cause().into());
+    text.number(b'z', board.stack_free());
+    let _room = text.0.push(0);
+    board.send(&text.0);
+}
+
+/// Five numbers of at most four hexadecimal digits with a letter and a blank each, and the delimiter.
+struct Text(Vec<u8, 31>);
+
+impl Text {
+    #[inline(never)]
+    fn number(&mut self, letter: u8, value: u16) {
+        let _room = self.0.push(letter);
+        let _room = uwrite!(self, "{:x}", value);
+        let _room = self.0.push(b' ');
     }
 }
 
-/// One formatting of a number in the image, not one for each.
-#[inline(never)]
-fn number(text: &mut String<48>, letter: u8, value: u16) {
-    // Five numbers of at most five digits with a letter and a blank each fit.
-    let _fits = text.push(letter as char).is_ok() && uwrite!(text, "{} ", value).is_ok();
+impl uWrite for Text {
+    type Error = ();
+
+    #[inline(never)]
+    fn write_str(&mut self, digits: &str) -> Result<(), ()> {
+        for &digit in digits.as_bytes() {
+            let _room = self.0.push(digit);
+        }
+        Ok(())
+    }
 }

@@ -43,24 +43,25 @@ fn main() -> ! {
     board::paint_stack();
     let mut board = board::AvrBoard::start();
     serial::start();
-    let sensors = sensors::start();
+    // SAFETY: interrupts are off; from their start on the sensors are the tick's.
+    let sensors = unsafe { sensors::start() };
     // SAFETY: the one reference to it.
     let stand = unsafe { &mut *core::ptr::addr_of_mut!(STAND) };
     stand.boot(&mut board);
     let misconfigured = configure(sensors, stand.sens_avg());
     stand.started(&mut board, misconfigured);
-    // SAFETY: called once, before interrupts are on; from here on the sensors are the tick's.
-    unsafe { tick::start(sensors) };
+    // SAFETY: called once, before interrupts are on.
+    unsafe { tick::start() };
     // SAFETY: everything that the interrupts touch is set up.
     unsafe { interrupt::enable() };
 
     let mut console = console::Console::new();
     loop {
-        if let Some(sample) = tick::take() {
-            if sample.missed > 0 {
-                stand.count(Fault::TickOverrun, sample.missed);
+        if let Some((tick, missed)) = tick::take() {
+            if missed > 0 {
+                stand.count(Fault::TickOverrun, missed);
             }
-            stand.on_sample(&mut board, &sample.raw, sample.t_ticks, sample.missed > 0);
+            stand.on_sample(&mut board, &tick.raw, tick.t_ticks, missed > 0);
             // The watchdog is fed by samples alone: a tick that stalls is a reset, and a reset stops the motor.
             asm::wdr();
         }

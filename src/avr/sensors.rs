@@ -169,12 +169,24 @@ static mut SENSORS: AvrSensors = AvrSensors {
     ],
 };
 
-/// Sets up SPI and ADC and waits until the gyros have started. Called once, at start.
-pub fn start() -> &'static mut AvrSensors {
-    let all = SELECTS[0] | SELECTS[1] | SELECTS[2];
+/// The one set of them.
+///
+/// # Safety
+/// One user at a time: the start, and from then on the tick.
+pub unsafe fn all() -> &'static mut AvrSensors {
+    // SAFETY: the caller's.
+    unsafe { &mut *core::ptr::addr_of_mut!(SENSORS) }
+}
+
+/// Sets up SPI and ADC and waits until the gyros have started.
+///
+/// # Safety
+/// Once, before interrupts are on.
+pub unsafe fn start() -> &'static mut AvrSensors {
+    let selects = SELECTS[0] | SELECTS[1] | SELECTS[2];
     let port = port_b();
-    port.portb.write(|w| bits!(w, all | SCK));
-    port.ddrb.write(|w| bits!(w, all | MOSI | SCK));
+    port.portb.write(|w| bits!(w, selects | SCK));
+    port.ddrb.write(|w| bits!(w, selects | MOSI | SCK));
     spi().spsr.write(|w| bits!(w, SPI2X));
     spi().spcr.write(|w| bits!(w, SPCR));
     // SAFETY: port A and C are set up here, before anything else uses them.
@@ -187,8 +199,8 @@ pub fn start() -> &'static mut AvrSensors {
     }
     adc().adcsra.write(|w| bits!(w, ADC_ON | ADSC));
     Delay.delay_ms(u32::from(firmware::SENSOR_START_MS));
-    // SAFETY: called once; the one reference goes to the caller.
-    unsafe { &mut *core::ptr::addr_of_mut!(SENSORS) }
+    // SAFETY: the caller's.
+    unsafe { all() }
 }
 
 fn adc() -> &'static avr_device::atmega16::adc::RegisterBlock {

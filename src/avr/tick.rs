@@ -9,10 +9,10 @@ use core::ptr::addr_of_mut;
 
 use avr_device::atmega16::{CPU, TC0, TC1};
 use avr_device::{asm, interrupt};
-use firmware::{Job, Raw, acquire};
+use firmware::acquire::work;
+use firmware::{Done, Job, Raw, Task, acquire};
 
-use super::sensors::AvrSensors;
-use super::serial;
+use super::{sensors, serial};
 
 /// Compare B comes this many ticks of 4 us before compare A: 1024 cycles, more than the longest section with
 /// interrupts off and the longest interrupt together (hil-tests/tests/timing.rs measures the jitter).
@@ -25,19 +25,21 @@ const SLEEP_IDLE: u8 = 1 << 6;
 const AWAKE: u8 = 0;
 
 /// A sample on its way to the main loop.
-pub struct Taken {
+pub struct Tick {
     /// What the sensors said.
     pub raw: Raw,
     /// Time of the tick.
     pub t_ticks: u32,
-    /// Ticks since the last one that was taken whose samples are lost.
-    pub missed: u8,
 }
 
+/// All zeros at first, which costs no flash.
 struct Shared {
-    sensors: Option<&'static mut AvrSensors>,
-    raw: Raw,
-    job: Option<Job>,
+    /// One is written by the tick while the main loop reads the other.
+    ticks: [Tick; 2],
+    /// Which of them is the main loop's.
+    reading: bool,
+    /// [`Task::None`]: the slot is free.
+    job: Job,
     t_ticks: u32,
     /// Period in force, and the one to change to at the next sample.
     period: u16,
@@ -53,9 +55,19 @@ struct Shared {
 }
 
 static mut SHARED: Shared = Shared {
-    sensors: None,
-    raw: Raw::new(),
-    job: None,
+    ticks: [const {
+        Tick {
+            raw: Raw::new(),
+            t_ticks: 0,
+        }
+    }; 2],
+    reading: false,
+    job: Job {
+        task: Task::None,
+        axis: 0,
+        address: 0,
+        value: 0,
+    },
     t_ticks: 0,
     period: 0,
     next_period: 0,
@@ -86,10 +98,9 @@ fn timer1() -> &'static avr_device::atmega16::tc1::RegisterBlock {
 ///
 /// # Safety
 /// Once, before interrupts are on.
-pub unsafe fn start(sensors: &'static mut AvrSensors) {
+pub unsafe fn start() {
     // SAFETY: interrupts are off.
     unsafe {
-        (*shared()).sensors = Some(sensors);
         set_compare((*shared()).next_period);
         (*shared()).period = (*shared()).next_period;
         (*shared()).skip = (*shared()).next_every.wrapping_sub(1);
@@ -132,9 +143,9 @@ pub fn post(job: Job) -> bool {
     interrupt::free(|_| {
         // SAFETY: interrupts are off.
         let waiting = unsafe { &mut (*shared()).job };
-        let free = waiting.is_none();
+        let free = matches!(waiting.task, Task::None);
         if free {
-            *waiting = Some(job);
+            *waiting = job;
         }
         free
     })
@@ -146,8 +157,8 @@ pub fn ticks_since() -> u16 {
     interrupt::free(|_| timer1().tcnt1.read().bits())
 }
 
-/// The sample that waits, if one does.
-pub fn take() -> Option<Taken> {
+/// The sample that waits, if one does, and how many ticks before it are lost. It is the caller's until the next call.
+pub fn take() -> Option<(&'static Tick, u8)> {
     interrupt::free(|_| {
         // SAFETY: interrupts are off.
         let shared = unsafe { &mut *shared() };
@@ -155,13 +166,17 @@ pub fn take() -> Option<Taken> {
             return None;
         }
         shared.ready = false;
+        shared.reading = !shared.reading;
         let missed = core::mem::take(&mut shared.missed);
-        Some(Taken {
-            raw: shared.raw,
-            t_ticks: shared.t_ticks,
-            missed,
-        })
+        // SAFETY: the tick writes to the other one, until this function turns them round.
+        Some((unsafe { &*place(shared.reading) }, missed))
     })
+}
+
+fn place(second: bool) -> *mut Tick {
+    // SAFETY: a static.
+    let first = unsafe { &raw mut (*shared()).ticks[0] };
+    if second { first.wrapping_add(1) } else { first }
 }
 
 /// Whether a millisecond has passed that nobody has taken yet.
@@ -236,36 +251,35 @@ fn TIMER1_COMPB() {
     shared.masked_ucsrb = serial::mask();
     shared.ticked = false;
     // Only compare A is left to wake it; the bound is for a wake-up that nobody explains.
-    for _ in 0..4 {
+    for _ in 0..4u8 {
         sleep_now();
         // SAFETY: a byte that the compare A interrupt sets.
         if unsafe { core::ptr::read_volatile(&raw const shared.ticked) } {
             break;
         }
     }
-    let mut raw = Raw::new();
-    if let Some(sensors) = &mut shared.sensors {
-        raw = acquire(*sensors);
-        let job = interrupt::free(|_| shared.job.take());
-        if let Some(job) = job {
-            raw.job = Some(firmware::acquire::work(*sensors, job));
-        }
-    } else {
-        unmask();
+    // SAFETY: the sensors are the tick's from its start on, the place is the one that the main loop does not read.
+    let (sensors, tick) = unsafe { (sensors::all(), &mut *place(!shared.reading)) };
+    acquire(sensors, &mut tick.raw);
+    tick.t_ticks = shared.t_ticks;
+    // One that nobody took is overwritten; the end of a job stays, or it would never be answered.
+    let lost = shared.ready;
+    if !matches!(shared.job.task, Task::None) {
+        tick.raw.done = work(sensors, shared.job);
+        shared.job.task = Task::None;
+    } else if !lost {
+        tick.raw.done = Done::NONE;
     }
-    interrupt::free(|_| {
-        if shared.ready {
-            shared.missed = shared.missed.saturating_add(1);
-            // The job's result must not be lost with the sample.
-            raw.job = raw.job.or(shared.raw.job);
-        }
-        shared.raw = raw;
-        shared.ready = true;
-        if shared.period != shared.next_period {
-            shared.period = shared.next_period;
-            set_compare(shared.period);
-        }
-        shared.skip = shared.next_every.wrapping_sub(1);
-        timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
-    });
+    // Until the return, so that a tick that is late already does not come in on top of this one.
+    interrupt::disable();
+    if lost {
+        shared.missed = shared.missed.saturating_add(1);
+    }
+    shared.ready = true;
+    if shared.period != shared.next_period {
+        shared.period = shared.next_period;
+        set_compare(shared.period);
+    }
+    shared.skip = shared.next_every.wrapping_sub(1);
+    timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
 }

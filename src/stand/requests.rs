@@ -6,7 +6,7 @@ use zerocopy::FromZeros;
 use zerocopy::little_endian::I32;
 
 use super::{Board, Pending, Stand, source};
-use crate::acquire::Job;
+use crate::acquire::{Done, Job, Task};
 use crate::bias::{BiasNull, MAX_SAMPLES, MIN_SAMPLES};
 use crate::motor::FULL;
 
@@ -146,26 +146,24 @@ impl Stand {
                 self.changed(true)
             }
             code::READ_REGISTER => {
-                return self.post(
-                    board,
-                    asked,
-                    Job::Read {
-                        axis,
-                        address: asked.u8::<1>(),
-                    },
-                );
+                let (task, address) = (Task::Read, asked.u8::<1>());
+                let job = Job {
+                    task,
+                    axis,
+                    address,
+                    value: 0,
+                };
+                return self.post(board, asked, job);
             }
             code::WRITE_REGISTER => {
-                let (address, value) = (asked.u8::<1>(), asked.u16::<2>());
-                return self.post(
-                    board,
-                    asked,
-                    Job::Write {
-                        axis,
-                        address,
-                        value,
-                    },
-                );
+                let (task, address, value) = (Task::Write, asked.u8::<1>(), asked.u16::<2>());
+                let job = Job {
+                    task,
+                    axis,
+                    address,
+                    value,
+                };
+                return self.post(board, asked, job);
             }
             code::SELF_TEST => return self.begin_self_test(asked),
             code::STORE_CONFIG => {
@@ -175,7 +173,9 @@ impl Stand {
                 Status::Busy
             }
             code::LOAD_CONFIG => {
-                if self.load(board) {
+                if !self.store.is_idle() {
+                    Status::Busy
+                } else if self.load(board) {
                     self.apply(board);
                     Status::Ok
                 } else {
@@ -231,10 +231,7 @@ impl Stand {
                 return Answer::Later;
             }
             code::SET_GYRO => {
-                let job = Job::Configure {
-                    sens_avg: self.config.sens_avg(),
-                };
-                let answer = self.post(board, asked, job);
+                let answer = self.post(board, asked, self.configure_job());
                 match answer {
                     Answer::Now(_) => self.config = was,
                     Answer::Later => self.config.set_scale_of_range(),
@@ -267,17 +264,11 @@ impl Stand {
 
     /// Work on the gyros has ended.
     #[inline(never)]
-    pub(super) fn job_done<B: Board>(&mut self, board: &mut B, result: Result<u16, Status>) {
-        let configured = matches!(self.job.code, Pending::OWN | code::SET_GYRO);
-        if let Ok(wrong) = result
-            && configured
-        {
-            self.note_configured(wrong as u8);
+    pub(super) fn job_done<B: Board>(&mut self, board: &mut B, done: Done) {
+        let (value, mut status) = (done.value, done.status);
+        if matches!(done.task, Task::Configure) {
+            self.note_configured(value as u8);
         }
-        let (value, mut status) = match result {
-            Ok(value) => (value, Status::Ok),
-            Err(status) => (0, status),
-        };
         match self.job.code {
             Pending::OWN => {
                 self.job = Pending::NONE;
@@ -332,20 +323,16 @@ impl Stand {
             return;
         }
         let axis = test.axis;
-        let job = match test.step {
-            step::START => Job::Write {
-                axis,
-                address: Register::MscCtrl.address(),
-                value: control::MSC_SELF_TEST,
-            },
-            step::HAS_ENDED => Job::Read {
-                axis,
-                address: Register::MscCtrl.address(),
-            },
-            _ => Job::Read {
-                axis,
-                address: Register::Status.address(),
-            },
+        let (task, register) = match test.step {
+            step::START => (Task::Write, Register::MscCtrl),
+            step::HAS_ENDED => (Task::Read, Register::MscCtrl),
+            _ => (Task::Read, Register::Status),
+        };
+        let job = Job {
+            task,
+            axis,
+            address: register.address(),
+            value: control::MSC_SELF_TEST,
         };
         if !board.post(job) {
             test.wait_ms = 1;

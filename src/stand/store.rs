@@ -1,7 +1,7 @@
 //! The two stored copies of the set-up: written a byte at a time while everything else goes on.
 
 use wire::{Fault, Status};
-use zerocopy::{FromZeros, IntoBytes};
+use zerocopy::IntoBytes;
 
 use super::{Board, Pending, Stand, source};
 use crate::config::{SLOTS, STORED_LEN, Stored};
@@ -27,6 +27,11 @@ impl Store {
         }
     }
 
+    /// Whether none is under way.
+    pub(super) fn is_idle(&self) -> bool {
+        self.asked.is_none()
+    }
+
     /// Where copy 0 or 1 begins.
     fn slot(place: u8) -> u16 {
         if place == 0 { SLOTS[0] } else { SLOTS[1] }
@@ -35,9 +40,8 @@ impl Store {
 
 impl Stand {
     /// Starts; false while a copy is under way.
-    #[inline(never)]
     pub(super) fn begin_store(&mut self, asked: Pending) -> bool {
-        if !self.store.asked.is_none() {
+        if !self.store.is_idle() {
             return false;
         }
         self.store.asked = asked;
@@ -48,7 +52,6 @@ impl Stand {
         true
     }
 
-    #[inline(never)]
     pub(super) fn step_store<B: Board>(&mut self, board: &mut B) {
         if self.store.asked.is_none() || !board.eeprom_is_ready() {
             return;
@@ -79,12 +82,11 @@ impl Stand {
         self.reply(board, asked, status);
     }
 
-    /// Takes the newer of the two stored copies that are in order; false when neither is.
-    #[inline(never)]
+    /// Takes the newer of the two stored copies that are in order; false when neither is. Not while one is written.
     pub(super) fn load<B: Board>(&mut self, board: &mut B) -> bool {
         let mut found = false;
         for place in 0..2 {
-            let mut copy = Stored::new_zeroed();
+            let copy = &mut self.store.copy;
             let mut all = 0xff;
             for (byte, address) in copy.as_mut_bytes().iter_mut().zip(Store::slot(place)..) {
                 *byte = board.eeprom_read(address);
@@ -98,12 +100,13 @@ impl Stand {
                 continue;
             }
             // Generations wrap: the newer one is ahead by less than half the circle.
-            let ahead = copy.generation.wrapping_sub(self.store.generation);
+            let generation = copy.generation;
+            let ahead = generation.wrapping_sub(self.store.generation);
             if !found || ahead < 128 {
                 found = true;
-                self.config = copy.config;
+                self.config = self.store.copy.config;
                 self.config.set_up.config_source = source::STORED.wrapping_add(place);
-                self.store.generation = copy.generation;
+                self.store.generation = generation;
                 self.store.newest = place;
             }
         }

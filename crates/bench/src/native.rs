@@ -485,6 +485,7 @@ fn life(
     chip.borrow_mut().now = start;
     let mut period = chip.borrow().period;
     let (mut tick, mut t_ticks) = (start, 0u32);
+    let mut raw = firmware::Raw::new();
     let mut millisecond = start + CYCLES_PER_MS;
     loop {
         tick += u64::from(period) * CYCLES_PER_TICK;
@@ -502,14 +503,14 @@ fn life(
             let chip = &mut *chip.borrow_mut();
             (chip.now, chip.tick, chip.last_tick) = (tick, Some((tick, 0)), tick);
         }
-        let mut raw = firmware::acquire(&mut sensors);
+        firmware::acquire(&mut sensors, &mut raw);
         let job = {
             let chip = &mut *chip.borrow_mut();
             chip.tick = None;
             chip.ticks += 1;
             chip.job.take()
         };
-        raw.job = job.map(|job| firmware::acquire::work(&mut sensors, job));
+        raw.done = firmware::acquire::work(&mut sensors, job.unwrap_or_default());
         t_ticks = t_ticks.wrapping_add(period);
         period = chip.borrow().period;
         // A job may have taken the processor for longer.

@@ -115,6 +115,7 @@ pub struct Request {
 
 /// Writes a payload of these fields as it goes on the line; returns the frame's length. `out` has to take it
 /// ([`crate::MAX_FRAME`] bytes always do): what does not fit is lost.
+#[cfg_attr(target_arch = "avr", inline(never))]
 pub fn encode(kind: u8, fields: &[u8], out: &mut [u8]) -> usize {
     let mut writer = crate::cobs::Writer::new(out, kind);
     for &byte in fields {

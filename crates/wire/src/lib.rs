@@ -22,7 +22,9 @@
 //! assert_eq!(frames, [Ok(Frame::Sample(sample))]);
 //! ```
 #![no_std]
-#![forbid(unsafe_code)]
+// The AVR's CRC is a few lines of assembly.
+#![cfg_attr(not(target_arch = "avr"), forbid(unsafe_code))]
+#![cfg_attr(target_arch = "avr", deny(unsafe_code), feature(asm_experimental_arch))]
 
 #[cfg(test)]
 extern crate std;

@@ -111,43 +111,90 @@ impl Register {
 
 /// The 16 bits of a frame from the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Command(u16);
+pub struct Command([u8; 2]);
 
 impl Command {
     /// Asks for a register; the reply comes with the next frame.
     #[must_use]
     #[inline]
     pub const fn read(register: Register) -> Self {
-        Command(u16::from_be_bytes([register.address(), 0]))
+        Command([register.address(), 0])
+    }
+
+    /// As [`read`](Self::read), by an address that came from outside: a link, a script. `None` where no register that
+    /// can be read has it.
+    #[must_use]
+    #[inline]
+    pub const fn read_at(address: u8) -> Option<Self> {
+        if has(READABLE, address) {
+            Some(Command([address & !1, 0]))
+        } else {
+            None
+        }
+    }
+
+    /// Writes one byte by its address, low bytes even, high bytes odd. `None` where no register that can be written
+    /// has it.
+    #[must_use]
+    #[inline]
+    pub const fn write_at(address: u8, value: u8) -> Option<Self> {
+        if has(WRITABLE, address) {
+            Some(Command([0x80 | address, value]))
+        } else {
+            None
+        }
     }
 
     /// Writes the low byte of a register.
     #[must_use]
     #[inline]
     pub const fn write_low(register: Register, value: u8) -> Self {
-        Command(u16::from_be_bytes([0x80 | register.address(), value]))
+        Command([0x80 | register.address(), value])
     }
 
     /// Writes the high byte of a register.
     #[must_use]
     #[inline]
     pub const fn write_high(register: Register, value: u8) -> Self {
-        Command(u16::from_be_bytes([0x80 | register.address() | 1, value]))
+        Command([0x80 | register.address() | 1, value])
     }
 
     /// The 16 bits.
     #[must_use]
     #[inline]
     pub const fn bits(self) -> u16 {
-        self.0
+        u16::from_be_bytes(self.0)
     }
 
     /// The two bytes in the order of the bus.
     #[must_use]
     #[inline]
     pub const fn bytes(self) -> [u8; 2] {
-        self.0.to_be_bytes()
+        self.0
     }
+}
+
+/// Whether the register of `address` is in a set that has a bit for each register.
+#[cfg_attr(target_arch = "avr", inline(never))]
+const fn has(set: u32, address: u8) -> bool {
+    address < 0x40 && set >> (address >> 1) & 1 != 0
+}
+
+/// A bit for each register that can be read.
+const READABLE: u32 = set_without(Access::Write);
+/// A bit for each register that can be written.
+const WRITABLE: u32 = set_without(Access::Read);
+
+const fn set_without(access: Access) -> u32 {
+    let all = Register::all();
+    let (mut set, mut at) = (0, 0);
+    while at < all.len() {
+        if all[at].access() as u8 != access as u8 {
+            set |= 1 << (all[at].address() >> 1);
+        }
+        at += 1;
+    }
+    set
 }
 
 /// Bits of the control registers.

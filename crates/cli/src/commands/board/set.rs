@@ -156,6 +156,9 @@ fn unsaved(session: &Session) {
     }
 }
 
+/// Longest period of the board's timer, ticks; slower rates take every second, third or fourth.
+const LONGEST_PERIOD: f64 = 62_500.0;
+
 /// Share of a line's capacity that samples may take: the rest is for health, hello, replies.
 const LINE_SHARE: f64 = 0.85;
 
@@ -165,8 +168,8 @@ fn rate(hello: &Hello, hz: f64) -> Result<Command> {
     }
     let ticks = (1e9 / f64::from(hello.tick_ns.max(1)) / hz).round();
     // A period that the 16-bit timer cannot hold is that many shorter ones.
-    let periods = (ticks / f64::from(u16::MAX)).ceil();
-    if periods > f64::from(u8::MAX) || ticks < 1.0 {
+    let periods = (ticks / LONGEST_PERIOD).ceil();
+    if periods > 4.0 || ticks < 1.0 {
         return Err(LinkError::Refused {
             command: "set rate",
             code: wire::code::SET_RATE,
