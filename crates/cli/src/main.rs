@@ -36,6 +36,8 @@ enum Command {
     Simulate(commands::simulate::Arguments),
     /// A capture from the board's serial port.
     Capture(commands::capture::Arguments),
+    /// A live view: rates, temperatures, supply, what is lost, the board's counters, Allan deviations as they grow.
+    Monitor(commands::monitor::Arguments),
     /// Read and set the board's configuration over the line.
     Board(commands::board::Arguments),
     /// The firmware onto the board, by avrdude; fuses are checked, and written only on request.
@@ -52,6 +54,7 @@ fn main() -> miette::Result<()> {
         Command::Run(arguments) => commands::run::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Capture(arguments) => commands::capture::run(&arguments),
+        Command::Monitor(arguments) => commands::monitor::run(&arguments),
         Command::Board(arguments) => commands::board::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
     }
