@@ -173,6 +173,12 @@ impl Spectrum {
         bin.shape.iter().zip(c).map(|(s, c)| s * c).sum()
     }
 
+    /// Variance of a coefficient at the angular frequency `w` per sample, 0 < w ≤ π.
+    #[must_use]
+    pub fn variance_at(w: f64, c: &Coefficients) -> f64 {
+        Term::ALL.iter().zip(c).map(|(t, c)| t.shape(w) * c).sum()
+    }
+
     /// Weights of the bins in the Allan variance at `m`: σ²(mτ₀) = Σ weight · Σ c² / N, by the transfer function
     /// 2 sin⁴(mw/2)/(m sin(w/2))², averaged over a bin that holds more than a period of it.
     #[must_use]

@@ -7,6 +7,7 @@ pub mod diagnose;
 pub mod flash;
 pub mod monitor;
 pub mod paper;
+pub mod plan;
 #[cfg(unix)]
 pub mod pty;
 pub mod report;
