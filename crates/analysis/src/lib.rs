@@ -32,7 +32,6 @@ pub mod sampling;
 pub mod scale;
 pub mod scan;
 pub mod search;
-pub mod separate;
 pub mod synthetic;
 pub mod threshold;
 pub mod units;

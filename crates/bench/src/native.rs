@@ -343,7 +343,8 @@ fn arrivals(requests: &[crate::TimedRequest], hz: f64) -> VecDeque<(u64, u8)> {
         free = free.max((timed.at_us as f64 * 1e-6 * hz) as u64);
         for &byte in &line[..len] {
             free += byte_cycles(25);
-            bytes.push_back((free, byte));
+            // The receiver has it in the middle of the stop bit: after the tenth of its sixteenths.
+            bytes.push_back((free - byte_cycles(25) * 6 / 160, byte));
         }
     }
     bytes

@@ -84,7 +84,7 @@ pub trait Probe {
     fn volts(&mut self, _t: f64, _channel: u8, volts: f64) -> f64 {
         volts
     }
-    /// Whether a chip select's level arrives at its gyro at `t` s.
+    /// Whether a chip select that goes low at `t` s reaches its gyro.
     fn select_arrives(&mut self, _t: f64, _axis: usize) -> bool {
         true
     }
@@ -253,9 +253,9 @@ impl<P: Probe> World<P> {
                 self.discipline.broken_frames += 1;
             }
         }
-        if self.probe.select_arrives(t, axis) {
-            self.stand.select(axis, selected, t);
-        }
+        // A wire that has come off is pulled up at the gyro.
+        let arrives = selected && self.probe.select_arrives(t, axis);
+        self.stand.select(axis, arrives, t);
     }
 
     fn turn(&mut self, at: u64) {
