@@ -3,6 +3,7 @@
 mod campaign;
 mod image;
 mod peers;
+mod size;
 mod step;
 mod toolchain;
 
@@ -19,6 +20,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   campaign measures by rates what the diagnosis can tell, and writes docs/power.md: up to an hour on two cores;
            --quick for minutes, --full for hours, --seed N for a run that was made before, --help for the rest
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}
+  size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt
   compare-peers
            Allan family against allantools (in a venv) and the crate `allan`: speed, memory, agreement; `--long` adds 1e8";
 
@@ -30,6 +32,7 @@ fn main() -> ExitCode {
         Some("demo") => demo(&root),
         Some("image") => build_image(&root),
         Some("campaign") => campaign::measure(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("size") => size::report(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("compare-peers") => peers::compare(&root, std::env::args().any(|a| a == "--long")),
         _ => {
             eprintln!("{USAGE}");

@@ -7,7 +7,7 @@ use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
-use crate::allan::{Deviation, Phase, TauGrid};
+use crate::allan::{Deviation, Gapped, Phase, TauGrid};
 use crate::edf::{NoiseType, chi_square_interval, edf};
 use crate::error::AnalysisError;
 use crate::noise_fit::{Estimated, Misfit, NoiseFit, Ramp, Spectrum, Term, fit, misfit};
@@ -73,6 +73,9 @@ pub struct AnalysisInput {
     pub gaps: usize,
     /// Samples lost in them, as far as they can be counted.
     pub lost_samples: u64,
+    /// Scatter of the sample times about an even grid, s rms, where times are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub jitter_s: Option<f64>,
 }
 
 /// A deviation at one cluster time, with its 95 % interval.
@@ -278,6 +281,7 @@ pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, An
             channels: present(),
             gaps: sampling.runs.len().saturating_sub(1),
             lost_samples: sampling.lost,
+            jitter_s: sampling.jitter_s,
         },
         channels,
     })
@@ -327,12 +331,12 @@ fn analyze_channel(
         }
         _ => Phase::from_values(&channel.values, &runs),
     };
-    if runs.len() > 1 {
-        out.warnings.push(format!(
-            "{} interruptions: no difference spans one, so cluster times end at {:.6} s and intervals are wider",
-            runs.len() - 1,
-            (phase.longest_run() / 2) as f64 * tau0
-        ));
+    let spectrum = (phase.samples() >= FIT_NEEDS)
+        .then(|| Spectrum::with_gaps(&channel.values, &runs, &sampling.slots, tau0));
+    let fitted = spectrum.as_ref().map(fit);
+    let gapped = (runs.len() > 1).then(|| Gapped::new(&channel.values, &runs, &sampling.slots));
+    if let Some(gapped) = &gapped {
+        out.warnings.push(gaps_note(gapped, &phase, tau0));
     }
     for kind in &options.deviations {
         let scale = if *kind == Deviation::Tdev {
@@ -340,18 +344,21 @@ fn analyze_channel(
         } else {
             &units.reading
         };
-        out.deviations
-            .insert(*kind, curve(&phase, *kind, tau0, options.taus, scale));
+        let points = match &gapped {
+            Some(gapped) if *kind == Deviation::Oadev => {
+                gapped_curve(gapped, &phase, fitted.as_ref(), tau0, options.taus, scale)
+            }
+            _ => curve(&phase, *kind, tau0, options.taus, scale),
+        };
+        out.deviations.insert(*kind, points);
     }
-    if phase.samples() < FIT_NEEDS {
+    let (Some(spectrum), Some(fitted)) = (spectrum, fitted) else {
         out.warnings.push(format!(
             "inconclusive: noise parameters need {FIT_NEEDS} samples, the channel has {}",
             phase.samples()
         ));
         return out;
-    }
-    let spectrum = Spectrum::of(&channel.values, &runs, tau0);
-    let fitted = fit(&spectrum);
+    };
     out.parameters = NoiseParameters {
         angle_random_walk: Interval::estimated(fitted.term(Term::White), &units.angle_random_walk),
         bias_instability: Interval::estimated(fitted.term(Term::Flicker), &units.bias_instability),
@@ -373,13 +380,16 @@ fn analyze_channel(
                 .into(),
         );
     }
+    let longest = gapped.as_ref().map_or(phase.longest_run(), |g| {
+        g.lengths().into_iter().max().unwrap_or(0)
+    });
     out.fitted = TauGrid::Octave
-        .factors(phase.longest_run() / 2)
+        .factors(longest / 2)
         .into_iter()
         .map(|m| [m as f64 * tau0, fitted.deviation(m) * units.reading.factor])
         .collect();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
-    let ms = TauGrid::Octave.factors(phase.longest_run() / 5);
+    let ms = TauGrid::Octave.factors(longest / 5);
     if let Some(found) = misfit(&spectrum, &fitted, &ms, MISFIT_REPLICATES, &mut rng)
         && found.p_value < MISFIT_P
     {
@@ -430,6 +440,63 @@ fn misfit_warning(found: &Misfit, fitted: &NoiseFit, tau0: f64) -> String {
         if found.ratio > 1.0 { "above" } else { "below" },
         found.p_value
     )
+}
+
+fn gaps_note(gapped: &Gapped, phase: &Phase, tau0: f64) -> String {
+    let longest = gapped.lengths().into_iter().max().unwrap_or(0);
+    format!(
+        "{} gaps, {:.2} % of the sample times empty: overlapping Allan deviations are of means over the samples that are \
+         there, up to {:.6} s, and their intervals count the differences that are left; other deviations end at the \
+         longest run without a gap, {:.6} s. Nothing is filled in",
+        phase.run_lengths().len() - 1,
+        100.0 * (1.0 - gapped.filled()),
+        (longest / 2) as f64 * tau0,
+        phase.longest_run() as f64 * tau0
+    )
+}
+
+/// The overlapping Allan curve of a record with gaps. The freedom is that of the grid, less the share of differences that
+/// the gaps took.
+fn gapped_curve(
+    gapped: &Gapped,
+    phase: &Phase,
+    fitted: Option<&NoiseFit>,
+    tau0: f64,
+    grid: TauGrid,
+    scale: &Scale,
+) -> Vec<DeviationPoint> {
+    let lengths = gapped.lengths();
+    let longest = lengths.iter().copied().max().unwrap_or(0) / 2;
+    let mut noise = NoiseType::WhiteRate;
+    grid.factors(longest)
+        .into_iter()
+        .filter_map(|m| {
+            let white_share = fitted.map_or(1.0, |f| {
+                let [white, ..] = f.maximum.coefficients;
+                (white / m as f64 / f.deviation(m).powi(2)).min(1.0)
+            });
+            let found = gapped.overlapping_allan(tau0, m, white_share)?;
+            // Where no run is long enough to tell, the fit does: by the slope of its curve.
+            noise = identify(phase, m)
+                .or_else(|| {
+                    let f = fitted?;
+                    let slope = (f.deviation(2 * m) / f.deviation(m)).log2();
+                    Some(NoiseType::nearest(-1.0 - 2.0 * slope))
+                })
+                .unwrap_or(noise);
+            let share = found.estimate.n as f64 / found.possible as f64;
+            let edf = (edf(Deviation::Oadev, noise, m, &lengths) * share).max(1.0);
+            let (low, high) = chi_square_interval(found.estimate.deviation, edf, 0.95);
+            Some(DeviationPoint {
+                tau_s: found.estimate.tau_s,
+                deviation: found.estimate.deviation * scale.factor,
+                low: low * scale.factor,
+                high: high * scale.factor,
+                edf,
+                n: found.estimate.n,
+            })
+        })
+        .collect()
 }
 
 /// A curve with its intervals. Where too few clusters are left to identify the noise, the last type identified holds.

@@ -32,6 +32,7 @@ pub mod sampling;
 pub mod scale;
 pub mod scan;
 pub mod search;
+pub mod separate;
 pub mod synthetic;
 pub mod threshold;
 pub mod units;

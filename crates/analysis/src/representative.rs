@@ -175,7 +175,13 @@ fn figures_of(
             return Err(short());
         }
         let runs = sampling.runs_of(&channel.values);
-        let n = fit(&Spectrum::of(&channel.values, &runs, sampling.tau0)).term(Term::White);
+        let n = fit(&Spectrum::with_gaps(
+            &channel.values,
+            &runs,
+            &sampling.slots,
+            sampling.tau0,
+        ))
+        .term(Term::White);
         let (Some(value), Some(error)) = (n.value, n.std_error) else {
             return Err(short());
         };

@@ -10,6 +10,12 @@ use crate::error::AnalysisError;
 /// come in bursts and not for sampling times.
 const BURSTY_SHARE: f64 = 0.05;
 
+/// Slots that a gap of unknown length is taken for: more than any record has.
+const UNKNOWN_GAP: u64 = 1 << 40;
+
+/// Jitter, in parts of the interval, that a reader is told of.
+const JITTER_TOLD: f64 = 0.02;
+
 /// Evenly spaced stretches of a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampling {
@@ -17,6 +23,11 @@ pub struct Sampling {
     pub tau0: f64,
     /// Rows that follow each other without a gap, in order.
     pub runs: Vec<Range<usize>>,
+    /// Place of each row on the grid of sample times: one more for each interval. Where nothing tells how long a gap is,
+    /// it is taken as too long to bridge.
+    pub slots: Vec<u64>,
+    /// Scatter of the sample times about an even grid, s rms, where the device's clock or the times of the rows tell it.
+    pub jitter_s: Option<f64>,
     /// Samples lost in the gaps, as far as they can be counted.
     pub lost: u64,
     /// What a reader of the results has to know.
@@ -72,19 +83,16 @@ impl Sampling {
         }
 
         let n = record.len();
-        let mut cut = vec![false; n];
-        let mut lost = 0u64;
+        // Intervals since the row before: 1 where nothing is missing, `None` where the gap's length is not known.
+        let mut steps: Vec<Option<u64>> = vec![Some(1); n];
         if let Some(seq) = &record.seq {
             let mut backwards = 0usize;
             for i in 1..n.min(seq.len()) {
                 match seq[i].checked_sub(seq[i - 1]) {
                     Some(1) => {}
-                    Some(step) if step > 1 => {
-                        cut[i] = true;
-                        lost += step - 1;
-                    }
+                    Some(step) if step > 1 => steps[i] = Some(step),
                     _ => {
-                        cut[i] = true;
+                        steps[i] = None;
                         backwards += 1;
                     }
                 }
@@ -97,7 +105,7 @@ impl Sampling {
         }
         if let (Some(times), Some(interval)) = (&device, &device_interval) {
             // A jump of the clock that the sequence number does not show is an interruption all the same.
-            lost += jumps(times, interval.regular_s, &mut cut);
+            jumps(times, interval.regular_s, &mut steps);
         } else if record.seq.is_none()
             && let (Some(times), Some(interval)) = (&record.host_time_s, &host_interval)
         {
@@ -109,16 +117,40 @@ impl Sampling {
                     tau0
                 ));
             } else {
-                lost += jumps(times, interval.regular_s, &mut cut);
+                jumps(times, interval.regular_s, &mut steps);
             }
         }
         let mut runs = Vec::new();
         let mut start = 0;
-        for (i, &c) in cut.iter().enumerate() {
-            if c {
-                runs.push(start..i);
-                start = i;
+        let mut lost = 0;
+        let mut slot = 0u64;
+        let mut slots = Vec::with_capacity(n);
+        for (i, step) in steps.iter().enumerate() {
+            if i > 0 {
+                slot += step.unwrap_or(UNKNOWN_GAP);
+                if *step != Some(1) {
+                    runs.push(start..i);
+                    start = i;
+                    lost += step.unwrap_or(1) - 1;
+                }
             }
+            slots.push(slot);
+        }
+        let jitter_s = match (&device, &device_interval) {
+            (Some(times), Some(interval)) => jitter(times, interval.regular_s, &runs),
+            _ => match (&record.host_time_s, &host_interval) {
+                (Some(times), Some(interval)) if !interval.bursty() => {
+                    jitter(times, interval.regular_s, &runs)
+                }
+                _ => None,
+            },
+        };
+        if let Some(jitter) = jitter_s.filter(|j| *j > JITTER_TOLD * tau0) {
+            warnings.push(format!(
+                "the sample times scatter by {jitter:.2e} s rms about an even grid, {:.1} % of the interval: clusters begin and end \
+                 with that uncertainty, which blurs the shortest cluster times by as much; rows are used as they came",
+                100.0 * jitter / tau0
+            ));
         }
         if start < n {
             runs.push(start..n);
@@ -126,6 +158,8 @@ impl Sampling {
         Ok(Self {
             tau0,
             runs,
+            slots,
+            jitter_s,
             lost,
             warnings,
         })
@@ -153,20 +187,31 @@ impl Sampling {
     }
 }
 
-/// Mark the rows before which the times jump by something else than `interval`, and count the samples missing there.
-fn jumps(times: &[f64], interval: f64, cut: &mut [bool]) -> u64 {
-    let mut lost = 0;
+/// Note the rows before which the times jump by something else than `interval`.
+fn jumps(times: &[f64], interval: f64, steps: &mut [Option<u64>]) {
     for (i, pair) in times.windows(2).enumerate() {
-        let steps = (pair[1] - pair[0]) / interval;
-        if let Some(cut) = cut.get_mut(i + 1)
-            && !*cut
-            && !(0.5..=1.5).contains(&steps)
+        let intervals = (pair[1] - pair[0]) / interval;
+        if let Some(step @ Some(1)) = steps.get_mut(i + 1)
+            && !(0.5..=1.5).contains(&intervals)
         {
-            *cut = true;
-            lost += (steps.round() - 1.0).max(0.0) as u64;
+            // Less than half an interval, backwards, or not a time.
+            *step = (intervals > 1.5 && intervals < UNKNOWN_GAP as f64)
+                .then(|| intervals.round() as u64);
         }
     }
-    lost
+}
+
+/// Scatter of the times about even spacing, s rms: second differences over rows without a gap have six times the
+/// variance of independent shifts, whatever the interval and its drift are.
+fn jitter(times: &[f64], interval: f64, runs: &[Range<usize>]) -> Option<f64> {
+    let (mut squares, mut n) = (0.0, 0usize);
+    for run in runs {
+        for t in times.get(run.clone()).unwrap_or_default().windows(3) {
+            squares += ((t[2] - t[1]) - (t[1] - t[0])).powi(2);
+            n += 1;
+        }
+    }
+    (n >= 30 && interval > 0.0).then(|| (squares / (6.0 * n as f64)).sqrt())
 }
 
 /// What a column of times says about the interval.
@@ -259,6 +304,33 @@ mod tests {
         let s = Sampling::of(&r, None).unwrap();
         assert!((s.tau0 / 0.0503424 - 1.0).abs() < 1e-4, "{}", s.tau0);
         assert_eq!((s.runs, s.lost), (vec![0..400, 400..1000], 3));
+    }
+
+    #[test]
+    fn slots_are_true_times_and_jitter_is_measured_and_told() {
+        let mut r = record(2000);
+        let mut state = 12_345u64;
+        r.host_time_s = Some(
+            (0..2000)
+                .map(|i| {
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    let uniform = (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+                    (if i < 700 { i } else { i + 25 }) as f64 * 0.05 + 0.01 * uniform
+                })
+                .collect(),
+        );
+        let s = Sampling::of(&r, None).unwrap();
+        assert_eq!((s.slots[699], s.slots[700], s.lost), (699, 725, 25));
+        // Uniform over 10 ms: 2.89 ms rms.
+        let jitter = s.jitter_s.unwrap();
+        assert!((jitter / 2.887e-3 - 1.0).abs() < 0.05, "{jitter}");
+        assert!(
+            s.warnings[0].contains("5.8 %") || s.warnings[0].contains("5.7 %"),
+            "{:?}",
+            s.warnings
+        );
     }
 
     #[test]

@@ -115,11 +115,21 @@ fn missing_readings_are_gaps() {
     let z = &analysis.channels["gyro_z"];
     // Runs of 4000, 4998 and 2999 samples; n − 2m + 1 each.
     assert_eq!(z.deviations[&Deviation::Oadev][0].n, 3999 + 4997 + 2998);
-    assert!(
-        z.warnings[0].contains("2 interruptions"),
-        "{:?}",
-        z.warnings
+    assert!(z.warnings[0].contains("2 gaps"), "{:?}", z.warnings);
+    // Clusters bridge them: the curve ends where that of the whole record does, with a little less freedom.
+    let whole = analyze(&white(3), &AnalyzeOptions::default()).unwrap();
+    let (gaps, whole) = (
+        &z.deviations[&Deviation::Oadev],
+        &whole.channels["gyro_z"].deviations[&Deviation::Oadev],
     );
+    assert_eq!(gaps.len(), whole.len());
+    for (a, b) in gaps.iter().zip(whole) {
+        assert!(a.n <= b.n && a.edf <= b.edf * 1.001, "{a:?} {b:?}");
+        assert!(
+            (a.deviation / b.deviation - 1.0).abs() < 0.02,
+            "{a:?} {b:?}"
+        );
+    }
     assert!(z.parameters.angle_random_walk.value.is_some());
 }
 

@@ -2,6 +2,7 @@
 
 pub mod capture;
 pub mod link;
+pub mod monitor;
 pub mod report;
 pub mod stand;
 pub mod text;

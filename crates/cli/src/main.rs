@@ -26,6 +26,8 @@ enum Command {
     Diagnose(commands::diagnose::Arguments),
     /// The paper's figures 3, 4, 5 and 8 and its two numbers again, and what does not fit in them.
     Paper(commands::paper::Arguments),
+    /// How long to record, and with which excitation, for an answer that is still missing.
+    Plan(commands::plan::Arguments),
     /// Which of many runs represents them, and which do not and in what.
     Representative(commands::representative::Arguments),
     /// One self-contained HTML file: the verdict, and the figures that it rests on.
@@ -36,6 +38,8 @@ enum Command {
     Simulate(commands::simulate::Arguments),
     /// A capture from the board's serial port.
     Capture(commands::capture::Arguments),
+    /// A live view: rates, temperatures, supply, what is lost, the board's counters, Allan deviations as they grow.
+    Monitor(commands::monitor::Arguments),
     /// Read and set the board's configuration over the line.
     Board(commands::board::Arguments),
     /// The firmware onto the board, by avrdude; fuses are checked, and written only on request.
@@ -47,11 +51,13 @@ fn main() -> miette::Result<()> {
         Command::Analyze(arguments) => commands::analyze::run(&arguments),
         Command::Diagnose(arguments) => commands::diagnose::run(&arguments),
         Command::Paper(arguments) => commands::paper::run(&arguments),
+        Command::Plan(arguments) => commands::plan::run(&arguments),
         Command::Representative(arguments) => commands::representative::run(&arguments),
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Run(arguments) => commands::run::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Capture(arguments) => commands::capture::run(&arguments),
+        Command::Monitor(arguments) => commands::monitor::run(&arguments),
         Command::Board(arguments) => commands::board::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
     }

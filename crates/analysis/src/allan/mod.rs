@@ -1,10 +1,13 @@
 //! The Allan family: estimators on integrated readings, their grids of cluster times and the streaming form.
 
+mod gapped;
 mod kernels;
 mod phase;
 mod streaming;
 mod total;
 
+pub(crate) use gapped::segments;
+pub use gapped::{Gapped, GappedEstimate};
 pub use kernels::Estimate;
 pub use phase::{Phase, PhasePoint};
 pub use streaming::Streaming;

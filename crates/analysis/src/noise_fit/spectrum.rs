@@ -102,48 +102,68 @@ impl Spectrum {
     /// out), so nothing has to be known about what happened in a gap.
     #[must_use]
     pub fn of(values: &[f64], runs: &[Range<usize>], tau0: f64) -> Self {
-        let top = std::f64::consts::PI;
         let longest = runs
             .iter()
             .map(ExactSizeIterator::len)
             .max()
             .unwrap_or(0)
-            .max(2) as f64;
-        let index = |w: f64| ((top / w).ln() * BINS_PER_LN) as usize;
-        let mut bins = vec![Bin::default(); index(top / longest) + 1];
-        for run in runs.iter().filter(|r| r.len() > 1) {
-            let n = run.len() as f64;
-            let dct = Dct::new(run.len());
-            let c = dct.forward(&values[run.clone()]);
-            let times: Vec<f64> = (0..run.len())
-                .map(|i| (i as f64 - (n - 1.0) / 2.0) * tau0)
-                .collect();
-            let r = dct.forward(&times);
-            for k in 1..run.len() {
-                let w = top * k as f64 / n;
-                let bin = &mut bins[index(w)];
-                bin.w += w;
-                bin.width += top / n;
-                bin.count += 1.0;
-                bin.cc += c[k] * c[k];
-                bin.cr += c[k] * r[k];
-                bin.rr += r[k] * r[k];
-                for (s, term) in bin.shape.iter_mut().zip(Term::ALL) {
-                    *s += term.shape(w);
+            .max(2);
+        let mut bins = Bins::new(longest);
+        for run in runs {
+            bins.add_run(values, run, tau0, 0.0);
+        }
+        bins.finish(tau0, runs.iter().map(ExactSizeIterator::len).sum())
+    }
+
+    /// Of a record with gaps, bridged at low frequency.
+    ///
+    /// Above a frequency set by the gaps the coefficients are those of the runs, as in [`Spectrum::of`]. Below it they are
+    /// those of the means over blocks of so many slots of the grid (over the samples that are there, `slots` being their
+    /// places), with the variance that each term has in such means: aliases are summed, and white noise has the mean of
+    /// 1/samples. So the slow terms see the whole length of the record, and nothing is filled in. Blocks that are less
+    /// than half as full as the record part it.
+    #[must_use]
+    pub fn with_gaps(values: &[f64], runs: &[Range<usize>], slots: &[u64], tau0: f64) -> Self {
+        if runs.len() < 2 {
+            return Self::of(values, runs, tau0);
+        }
+        let stretches = crate::allan::segments(runs, slots);
+        let candidates: Vec<(usize, Vec<BlockRun>)> = BLOCK_SIZES
+            .into_iter()
+            .map(|size| (size, block_runs(values, &stretches, slots, tau0, size)))
+            .collect();
+        let reach = |(size, blocks): &(usize, Vec<BlockRun>)| {
+            size * blocks.iter().map(|b| b.means.len()).max().unwrap_or(0)
+        };
+        let longest_run = runs.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+        let best = candidates.iter().map(reach).max().unwrap_or(0);
+        let Some((size, blocks)) = candidates
+            .iter()
+            .find(|c| reach(c) * 10 >= best * 9 && reach(c) > longest_run && reach(c) >= 64 * c.0)
+        else {
+            return Self::of(values, runs, tau0);
+        };
+        let top = std::f64::consts::PI;
+        let limit = top * PASSED / *size as f64;
+        let mut bins = Bins::new(size * best.div_ceil(*size));
+        for run in runs {
+            bins.add_run(values, run, tau0, limit);
+        }
+        for run in blocks {
+            let n = run.means.len() as f64;
+            let dct = Dct::new(run.means.len());
+            let scale = (*size as f64).sqrt();
+            let (c, r) = (dct.forward(&run.means), dct.forward(&run.times));
+            for k in 1..run.means.len() {
+                let w = top * k as f64 / n / *size as f64;
+                if w >= limit {
+                    break;
                 }
+                let shape = block_shape(w, *size, run.inverse_counts);
+                bins.add(w, top / n / *size as f64, c[k] * scale, r[k] * scale, shape);
             }
         }
-        bins.retain(|b| b.count > 0.0);
-        bins.reverse();
-        for bin in &mut bins {
-            bin.w /= bin.count;
-            bin.shape = bin.shape.map(|s| s / bin.count);
-        }
-        Self {
-            tau0,
-            samples: runs.iter().map(ExactSizeIterator::len).sum(),
-            bins,
-        }
+        bins.finish(tau0, runs.iter().map(ExactSizeIterator::len).sum())
     }
 
     /// Variance of the coefficients of a bin.
@@ -151,6 +171,12 @@ impl Spectrum {
     #[must_use]
     pub fn variance(bin: &Bin, c: &Coefficients) -> f64 {
         bin.shape.iter().zip(c).map(|(s, c)| s * c).sum()
+    }
+
+    /// Variance of a coefficient at the angular frequency `w` per sample, 0 < w ≤ π.
+    #[must_use]
+    pub fn variance_at(w: f64, c: &Coefficients) -> f64 {
+        Term::ALL.iter().zip(c).map(|(t, c)| t.shape(w) * c).sum()
     }
 
     /// Weights of the bins in the Allan variance at `m`: σ²(mτ₀) = Σ weight · Σ c² / N, by the transfer function
@@ -174,6 +200,146 @@ impl Spectrum {
                 2.0 * sin4 / (mf * (b.w / 2.0).sin()).powi(2) / self.samples as f64
             })
             .collect()
+    }
+}
+
+/// Sizes of blocks tried, in slots.
+const BLOCK_SIZES: [usize; 7] = [8, 16, 32, 64, 128, 256, 512];
+/// Part of the frequencies of block means that is used: near their Nyquist frequency the aliases grow.
+const PASSED: f64 = 0.25;
+
+/// Means over neighbouring blocks of slots.
+struct BlockRun {
+    means: Vec<f64>,
+    /// Of their centres, s.
+    times: Vec<f64>,
+    /// Mean of 1/samples.
+    inverse_counts: f64,
+}
+
+fn block_runs(
+    values: &[f64],
+    stretches: &[Vec<Range<usize>>],
+    slots: &[u64],
+    tau0: f64,
+    size: usize,
+) -> Vec<BlockRun> {
+    let mut out = Vec::new();
+    for rows in stretches {
+        let (first, last) = (rows[0].start, rows[rows.len() - 1].end - 1);
+        let length = (slots[last] - slots[first]) as usize + 1;
+        let present: usize = rows.iter().map(ExactSizeIterator::len).sum();
+        let needed = (0.5 * size as f64 * present as f64 / length as f64).max(1.0);
+        let mut sums = vec![(0.0, 0u32); length / size];
+        for row in rows.iter().cloned().flatten() {
+            if let Some(block) = sums.get_mut((slots[row] - slots[first]) as usize / size) {
+                block.0 += values[row];
+                block.1 += 1;
+            }
+        }
+        let full: Vec<bool> = sums.iter().map(|b| f64::from(b.1) >= needed).collect();
+        let mut at = 0;
+        for part in full.chunk_by(|a, b| a == b) {
+            let blocks = &sums[at..at + part.len()];
+            at += part.len();
+            if part[0] && part.len() > 1 {
+                let n = blocks.len() as f64;
+                out.push(BlockRun {
+                    means: blocks.iter().map(|b| b.0 / f64::from(b.1)).collect(),
+                    times: (0..blocks.len())
+                        .map(|i| (i as f64 - (n - 1.0) / 2.0) * tau0 * size as f64)
+                        .collect(),
+                    inverse_counts: blocks.iter().map(|b| 1.0 / f64::from(b.1)).sum::<f64>() / n,
+                });
+            }
+        }
+    }
+    out
+}
+
+/// Variance of √size times a coefficient of block means, at the frequency `w` per sample, for unit coefficients.
+fn block_shape(w: f64, size: usize, inverse_counts: f64) -> [f64; 4] {
+    let top = std::f64::consts::TAU;
+    let l = size as f64;
+    let mut shape = [0.0; 4];
+    for j in 0..size {
+        let alias = w + top * j as f64 / l;
+        let mean = ((l * alias / 2.0).sin() / (l * (alias / 2.0).sin())).powi(2);
+        let folded = alias.min(top - alias);
+        for (s, term) in shape.iter_mut().zip(Term::ALL) {
+            *s += mean * term.shape(folded);
+        }
+    }
+    // The white part sums to 1 over a full block.
+    shape[Term::White as usize] = l * inverse_counts;
+    shape
+}
+
+/// Bins of a spectrum while it is made, from the highest frequency down.
+struct Bins {
+    bins: Vec<Bin>,
+}
+
+impl Bins {
+    fn index(w: f64) -> usize {
+        ((std::f64::consts::PI / w).ln() * BINS_PER_LN) as usize
+    }
+
+    fn new(longest: usize) -> Self {
+        let lowest = std::f64::consts::PI / longest as f64;
+        Self {
+            // One more: rounding must not lose the lowest.
+            bins: vec![Bin::default(); Self::index(lowest) + 2],
+        }
+    }
+
+    fn add(&mut self, w: f64, width: f64, c: f64, r: f64, shape: [f64; 4]) {
+        let bin = &mut self.bins[Self::index(w)];
+        bin.w += w;
+        bin.width += width;
+        bin.count += 1.0;
+        bin.cc += c * c;
+        bin.cr += c * r;
+        bin.rr += r * r;
+        for (sum, s) in bin.shape.iter_mut().zip(shape) {
+            *sum += s;
+        }
+    }
+
+    /// The coefficients of a run, but for the constant and those below `lowest`.
+    fn add_run(&mut self, values: &[f64], run: &Range<usize>, tau0: f64, lowest: f64) {
+        if run.len() < 2 {
+            return;
+        }
+        let n = run.len() as f64;
+        let dct = Dct::new(run.len());
+        let c = dct.forward(&values[run.clone()]);
+        let times: Vec<f64> = (0..run.len())
+            .map(|i| (i as f64 - (n - 1.0) / 2.0) * tau0)
+            .collect();
+        let r = dct.forward(&times);
+        for k in 1..run.len() {
+            let w = std::f64::consts::PI * k as f64 / n;
+            if w >= lowest {
+                let shape = Term::ALL.map(|t| t.shape(w));
+                self.add(w, std::f64::consts::PI / n, c[k], r[k], shape);
+            }
+        }
+    }
+
+    fn finish(self, tau0: f64, samples: usize) -> Spectrum {
+        let mut bins = self.bins;
+        bins.retain(|b| b.count > 0.0);
+        bins.reverse();
+        for bin in &mut bins {
+            bin.w /= bin.count;
+            bin.shape = bin.shape.map(|s| s / bin.count);
+        }
+        Spectrum {
+            tau0,
+            samples,
+            bins,
+        }
     }
 }
 

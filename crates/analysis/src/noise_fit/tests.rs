@@ -229,3 +229,50 @@ fn an_interval_allows_for_a_term_too_small_to_be_established() {
     assert!(covered > 49, "{covered} of {runs}");
     assert!(established < 6, "{established}");
 }
+
+/// Values, runs and slots of what is left of `y` after each sample was lost with a chance of `percent` in 100.
+fn thinned(
+    y: &[f64],
+    percent: u64,
+    rng: &mut Xoshiro256PlusPlus,
+) -> (Vec<f64>, Vec<std::ops::Range<usize>>, Vec<u64>) {
+    let left: Vec<usize> = (0..y.len())
+        .filter(|_| rand_core::Rng::next_u64(rng) % 100 >= percent)
+        .collect();
+    let mut runs = Vec::new();
+    let mut start = 0;
+    for part in left.chunk_by(|a, b| *b == a + 1) {
+        runs.push(start..start + part.len());
+        start += part.len();
+    }
+    let values = left.iter().map(|i| y[*i]).collect();
+    (values, runs, left.iter().map(|i| *i as u64).collect())
+}
+
+#[test]
+fn slow_noise_is_measured_across_many_short_gaps_as_well_as_without_them() {
+    // One sample in twenty lost: runs of a second, which know nothing of the walk.
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(61);
+    let (runs, tau0) = (60, 0.05);
+    let truth = crate::synthetic::Truth {
+        n: 0.088,
+        k: 0.005,
+        ..Default::default()
+    };
+    let (mut n_in, mut k_in, mut gapped_width, mut whole_width) = (0, 0, 0.0, 0.0);
+    for _ in 0..runs {
+        let y = truth.record(12_000, tau0, &mut rng);
+        let (left, rows, slots) = thinned(&y, 5, &mut rng);
+        let found = fit(&Spectrum::with_gaps(&left, &rows, &slots, tau0));
+        let (n, k) = (found.term(Term::White), found.term(Term::RandomWalk));
+        n_in += usize::from(n.low <= truth.n && truth.n <= n.high);
+        k_in += usize::from(k.low <= truth.k && truth.k <= k.high);
+        gapped_width += k.high - k.low;
+        let k = fit(&whole(&y, tau0)).term(Term::RandomWalk);
+        whole_width += k.high - k.low;
+    }
+    // Binomial(60, 0.95): 49 or fewer has a chance of 5e-4.
+    assert!(n_in > 49 && k_in > 49, "{n_in} {k_in}");
+    let ratio = gapped_width / whole_width;
+    assert!((0.9..1.15).contains(&ratio), "{ratio}");
+}

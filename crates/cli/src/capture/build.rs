@@ -72,11 +72,13 @@ impl RecordBuilder {
 
     /// The board says how it is set: rate, tick and range are taken from it.
     pub fn hello(&mut self, hello: &wire::Hello) {
-        let tick_s = f64::from(hello.tick_ns) * 1e-9;
-        if tick_s > 0.0 && hello.period_ticks > 0 {
-            self.calibration.tick_s = tick_s;
-            let periods = f64::from(hello.periods_per_sample.max(1));
-            self.calibration.rate_hz = 1.0 / (tick_s * f64::from(hello.period_ticks) * periods);
+        // Whole nanoseconds: 4000 ns times 12500 is 20 Hz and not 19.999.
+        let period_ns = u64::from(hello.tick_ns)
+            * u64::from(hello.period_ticks)
+            * u64::from(hello.periods_per_sample.max(1));
+        if period_ns > 0 {
+            self.calibration.tick_s = f64::from(hello.tick_ns) / 1e9;
+            self.calibration.rate_hz = 1e9 / period_ns as f64;
         }
         // Ranges of 320, 160 and 80 deg/s (SENS/AVG bits 10:8) share their codes.
         match hello.gyro_range {
@@ -89,6 +91,17 @@ impl RecordBuilder {
         if let Some(millivolt) = [800.0, 600.0, 300.0, 200.0].get(usize::from(hello.acc_range)) {
             self.calibration.acc_counts_per_g = 1024.0 / 3.3 * millivolt * 1e-3;
         }
+    }
+
+    /// What the counts mean, as far as is known.
+    #[must_use]
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// Forgets the rows.
+    pub fn clear(&mut self) {
+        self.rows.clear();
     }
 
     /// Rows so far.

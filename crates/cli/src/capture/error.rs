@@ -98,6 +98,28 @@ pub enum CaptureError {
         /// What is wrong with it.
         expected: String,
     },
+    /// A capture would overwrite a file.
+    #[error("{} is there already", path.display())]
+    #[diagnostic(
+        code(capture::exists),
+        help("`--resume` goes on with it; or name another file with `--out`")
+    )]
+    Exists {
+        /// Which file.
+        path: PathBuf,
+    },
+    /// A file that a capture cannot go on in.
+    #[error("cannot go on in {}: {why}", path.display())]
+    #[diagnostic(
+        code(capture::resume),
+        help("leave the file as it is and name another one with `--out`")
+    )]
+    Resume {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        why: String,
+    },
     /// No rows at all.
     #[error("there is no row of data")]
     #[diagnostic(

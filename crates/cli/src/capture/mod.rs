@@ -1,15 +1,19 @@
 //! Captures: the CSV of the stand and foreign CSV by mapping, both become a [`Record`](model::record::Record).
 
 mod build;
+mod continuity;
 mod error;
 mod foreign;
 mod header;
+mod live;
 mod read;
 mod write;
 
 pub use build::{Calibration, RecordBuilder, SUPPLY_LSB_V, TEMP};
+pub use continuity::{Continuity, Place, Restart};
 pub use error::CaptureError;
 pub use foreign::ColumnMapping;
+pub use live::Live;
 pub use read::{Read, ReadOptions, read_capture, read_from};
 pub use write::{write_capture, write_to};
 

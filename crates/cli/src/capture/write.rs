@@ -35,6 +35,12 @@ pub fn write_capture(path: &Path, record: &Record) -> Result<(), CaptureError> {
 /// # Errors
 /// The stream's.
 pub fn write_to(out: &mut impl Write, record: &Record) -> std::io::Result<()> {
+    write_head(out, record)?;
+    write_rows(out, record)
+}
+
+/// The header and the names of the columns.
+pub(super) fn write_head(out: &mut impl Write, record: &Record) -> std::io::Result<()> {
     let header = &record.header;
     if !header.entries.iter().any(|(key, _)| key == "format") {
         writeln!(out, "# format: imu-stand-capture/1")?;
@@ -74,7 +80,11 @@ pub fn write_to(out: &mut impl Write, record: &Record) -> std::io::Result<()> {
     if record.flags.is_some() {
         names.push("flags");
     }
-    writeln!(out, "{}", names.join(","))?;
+    writeln!(out, "{}", names.join(","))
+}
+
+/// The rows.
+pub(super) fn write_rows(out: &mut impl Write, record: &Record) -> std::io::Result<()> {
     let mut row = String::new();
     for k in 0..record.len() {
         use std::fmt::Write as _;

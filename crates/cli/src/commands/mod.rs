@@ -5,7 +5,9 @@ pub mod board;
 pub mod capture;
 pub mod diagnose;
 pub mod flash;
+pub mod monitor;
 pub mod paper;
+pub mod plan;
 #[cfg(unix)]
 pub mod pty;
 pub mod report;
@@ -17,6 +19,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use imu_stand::capture::Read;
+use imu_stand::link::{DEFAULT_BAUD, Link};
 use imu_stand::{ColumnMapping, ReadOptions, read_capture};
 use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::Serialize;
@@ -69,6 +72,41 @@ impl Input {
             );
         }
         Ok(read)
+    }
+}
+
+/// Where the board is; the same for every command that talks to one.
+#[derive(Args)]
+pub struct Line {
+    /// The serial port, /dev/ttyUSB0 or COM3; without it the environment's IMU_STAND_PORT
+    #[arg(long, global = true, value_name = "PORT")]
+    port: Option<String>,
+    /// Speed of the line
+    #[arg(long, global = true, default_value_t = DEFAULT_BAUD)]
+    baud: u32,
+}
+
+impl Line {
+    /// Name of the port. Ends the program with 2 where none was given.
+    pub fn port(&self) -> String {
+        let set = || std::env::var("IMU_STAND_PORT").ok();
+        self.port.clone().or_else(set).unwrap_or_else(|| {
+            clap::Error::raw(
+                clap::error::ErrorKind::MissingRequiredArgument,
+                "which board? name its serial port: `--port /dev/ttyUSB0` or `--port COM3`, or set IMU_STAND_PORT\n",
+            )
+            .exit()
+        })
+    }
+
+    /// Whether a port was named on the command line.
+    pub fn is_named(&self) -> bool {
+        self.port.is_some()
+    }
+
+    /// Opens it.
+    pub fn open(&self) -> Result<Link> {
+        Ok(Link::open(&self.port(), self.baud)?)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The line to a board: frames in, numbered requests out, and what to do when nothing comes back.
 
 mod error;
+mod feed;
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -14,6 +15,7 @@ use wire::{
 };
 
 pub use error::{LinkError, name, words};
+pub use feed::{Change, Feed};
 
 /// Speed of the line after a reset, baud.
 pub const DEFAULT_BAUD: u32 = 38_400;
@@ -160,7 +162,8 @@ impl Heard {
 
 /// A board on a serial port.
 pub struct Link {
-    port: Box<dyn SerialPort>,
+    /// `None` while it is gone.
+    port: Option<Box<dyn SerialPort>>,
     name: String,
     baud: u32,
     decoder: Decoder,
@@ -183,20 +186,11 @@ impl Link {
     /// # Errors
     /// [`LinkError::Open`], which names the ports that there are.
     pub fn open(name: &str, baud: u32) -> Result<Self, LinkError> {
-        let open = |error: serialport::Error| LinkError::Open {
-            port: name.to_owned(),
-            why: error.description.clone(),
-            help: help_to_open(&error),
-        };
-        let port = serialport::new(name, baud)
-            .timeout(READ_WAIT)
-            .open()
-            .map_err(open)?;
-        port.clear(serialport::ClearBuffer::Input).map_err(open)?;
+        let port = open_port(name, baud)?;
         // Another program may have asked a moment ago: its replies must not look like ours.
         let number = (std::process::id() as u16).wrapping_mul(257);
         Ok(Self {
-            port,
+            port: Some(port),
             name: name.to_owned(),
             baud,
             decoder: Decoder::new(),
@@ -209,6 +203,19 @@ impl Link {
             health: None,
             sample: None,
         })
+    }
+
+    /// Opens the port again, after it was gone or to get rid of what waits in its buffers. A frame that was cut in two is
+    /// dropped and counted.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`].
+    pub fn reopen(&mut self) -> Result<(), LinkError> {
+        // Closed first: a port may be open once only.
+        self.port = None;
+        self.port = Some(open_port(&self.name, self.baud)?);
+        let _cut = self.decoder.push(0);
+        Ok(())
     }
 
     /// Name of the port.
@@ -239,7 +246,11 @@ impl Link {
     /// # Errors
     /// [`LinkError::Gone`].
     pub fn read(&mut self) -> Result<&[u8], LinkError> {
-        let count = match self.port.read(&mut self.buffer) {
+        let read = match &mut self.port {
+            Some(port) => port.read(&mut self.buffer),
+            None => Ok(0),
+        };
+        let count = match read {
             Ok(0) => {
                 return Err(LinkError::Gone {
                     port: self.name.clone(),
@@ -301,10 +312,11 @@ impl Link {
         let mut line = [0; Request::FRAME_LEN];
         let encoded = encode_request(&Request { number, command }, &mut line);
         debug_assert!(encoded.is_ok(), "the buffer has the length of a request");
-        self.port
-            .write_all(&line)
-            .and_then(|()| self.port.flush())
-            .map_err(|error| self.gone(&error))
+        let sent = match &mut self.port {
+            Some(port) => port.write_all(&line).and_then(|()| port.flush()),
+            None => Err(ErrorKind::NotConnected.into()),
+        };
+        sent.map_err(|error| self.gone(&error))
     }
 
     /// Asks, waits, asks again where that does no harm ([`Patience::of`]), and gives back the reply, whatever its status
@@ -452,10 +464,10 @@ impl Link {
             port: self.name.clone(),
             why: error.description,
         };
-        self.port.set_baud_rate(baud).map_err(gone)?;
-        self.port
-            .clear(serialport::ClearBuffer::Input)
-            .map_err(gone)?;
+        if let Some(port) = &mut self.port {
+            port.set_baud_rate(baud).map_err(gone)?;
+            port.clear(serialport::ClearBuffer::Input).map_err(gone)?;
+        }
         self.baud = baud;
         self.frames.clear();
         Ok(())
@@ -490,6 +502,21 @@ pub fn divisor(baud: u32) -> Option<u16> {
 #[must_use]
 pub fn baud_of(divisor: u16) -> f64 {
     CLOCK_HZ / 16.0 / (f64::from(divisor) + 1.0)
+}
+
+/// Opens a port and forgets what had been received before.
+fn open_port(name: &str, baud: u32) -> Result<Box<dyn SerialPort>, LinkError> {
+    let open = |error: serialport::Error| LinkError::Open {
+        port: name.to_owned(),
+        why: error.description.clone(),
+        help: help_to_open(&error),
+    };
+    let port = serialport::new(name, baud)
+        .timeout(READ_WAIT)
+        .open()
+        .map_err(open)?;
+    port.clear(serialport::ClearBuffer::Input).map_err(open)?;
+    Ok(port)
 }
 
 /// What to do about a port that does not open.

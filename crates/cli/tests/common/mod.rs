@@ -5,14 +5,14 @@ use std::io::{Read as _, Write as _};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use bench::{Run, Scenario, Timeline};
 use serialport::{SerialPort as _, TTYPort};
-use wire::{Decoder, Frame, RequestDecoder};
+use wire::{Decoder, Frame, Request, RequestDecoder, encode_request};
 
 /// The program with these arguments, waited for.
 pub fn run(arguments: &[&str]) -> Output {
@@ -23,6 +23,19 @@ pub fn run(arguments: &[&str]) -> Output {
 pub fn program(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_imu-stand"));
     command.args(arguments).env_remove("IMU_STAND_PORT");
+    command
+}
+
+/// The same, without the pseudo-terminals' own ends, which a process inherits here: only without them does it see that
+/// a port is gone.
+pub fn program_alone(arguments: &[&str]) -> Command {
+    const CLOSE: &str = "for fd in /proc/self/fd/*; do fd=${fd##*/}; [ $fd -gt 2 ] && eval \"exec $fd>&-\"; done; \
+                         exec \"$@\"";
+    let mut command = Command::new("bash");
+    command
+        .args(["-c", CLOSE, "bash", env!("CARGO_BIN_EXE_imu-stand")])
+        .args(arguments)
+        .env_remove("IMU_STAND_PORT");
     command
 }
 
@@ -63,9 +76,16 @@ pub struct Swallow {
     pub samples: Vec<u16>,
 }
 
+/// Both ends of the line; `None` while it is unplugged.
+type Ends = Arc<Mutex<Option<(TTYPort, TTYPort)>>>;
+
 /// The simulated board, in real time, on a pseudo-terminal.
 pub struct Board {
-    path: String,
+    /// A link to the device, whose name changes when it is plugged in again.
+    path: PathBuf,
+    ends: Ends,
+    /// Bytes that the board is sent by somebody else.
+    aside: Arc<Mutex<Vec<u8>>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -78,30 +98,58 @@ impl Board {
 
     /// This stand, behind this cable.
     pub fn with(scenario: Scenario, swallow: Swallow) -> Self {
-        let (master, slave) = TTYPort::pair().expect("a pseudo-terminal");
-        let path = slave.name().expect("it has a name");
+        static NUMBER: AtomicUsize = AtomicUsize::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let name = format!("port-{}-{number}", std::process::id());
         let stop = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&stop);
+        let mut board = Board {
+            path: Path::new(env!("CARGO_TARGET_TMPDIR")).join(name),
+            ends: Arc::default(),
+            aside: Arc::default(),
+            stop: Arc::clone(&stop),
+            thread: None,
+        };
+        board.plug();
+        let (ends, aside) = (Arc::clone(&board.ends), Arc::clone(&board.aside));
+        board.thread = Some(std::thread::spawn(move || {
+            serve(&ends, &aside, scenario, swallow, &stop);
+        }));
+        board
+    }
+
+    /// Plugs the cable in.
+    pub fn plug(&self) {
+        let (mut master, slave) = TTYPort::pair().expect("a pseudo-terminal");
+        (master.set_timeout(Duration::ZERO)).expect("a pseudo-terminal takes a timeout");
+        let device = slave.name().expect("it has a name");
+        let _ = std::fs::remove_file(&self.path);
+        std::os::unix::fs::symlink(device, &self.path).expect("a link to it");
         // The slave stays open here, so that the line lives on between two runs of the program.
-        let thread = std::thread::spawn(move || {
-            let _slave = slave;
-            serve(master, scenario, swallow, &flag);
-        });
-        Board {
-            path,
-            stop,
-            thread: Some(thread),
-        }
+        *self.ends.lock().unwrap() = Some((master, slave));
+    }
+
+    /// Pulls it out; the board goes on.
+    pub fn unplug(&self) {
+        let _ = std::fs::remove_file(&self.path);
+        *self.ends.lock().unwrap() = None;
+    }
+
+    /// Sends the board a command without the program's knowledge.
+    pub fn send_aside(&self, command: wire::Command) {
+        let mut line = [0; Request::FRAME_LEN];
+        let request = Request { number: 7, command };
+        let length = encode_request(&request, &mut line).expect("it fits");
+        self.aside.lock().unwrap().extend(&line[..length]);
     }
 
     /// The device.
     pub fn port(&self) -> &str {
-        &self.path
+        self.path.to_str().expect("a plain path")
     }
 
     /// `imu-stand board --port P ...`
     pub fn ask(&self, arguments: &[&str]) -> Output {
-        let mut all = vec!["board", "--port", &self.path];
+        let mut all = vec!["board", "--port", self.port()];
         all.extend(arguments);
         run(&all)
     }
@@ -113,6 +161,7 @@ impl Drop for Board {
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
+        let _ = std::fs::remove_file(&self.path);
     }
 }
 
@@ -121,11 +170,13 @@ fn taken(list: &mut Vec<u8>, code: u8) -> bool {
     at.map(|at| list.remove(at)).is_some()
 }
 
-fn serve(master: TTYPort, scenario: Scenario, swallow: Swallow, stop: &AtomicBool) {
-    let port = std::cell::RefCell::new(master);
-    port.borrow_mut()
-        .set_timeout(Duration::ZERO)
-        .expect("a pseudo-terminal takes a timeout");
+fn serve(
+    ends: &Ends,
+    aside: &Mutex<Vec<u8>>,
+    scenario: Scenario,
+    swallow: Swallow,
+    stop: &AtomicBool,
+) {
     let swallow = std::cell::RefCell::new(swallow);
     let run = Run {
         scenario,
@@ -141,8 +192,11 @@ fn serve(master: TTYPort, scenario: Scenario, swallow: Swallow, stop: &AtomicBoo
             std::thread::sleep(early);
         }
         let mut buffer = [0; 256];
-        let count = port.borrow_mut().read(&mut buffer).unwrap_or(0);
-        let mut through = Vec::new();
+        let count = match &mut *ends.lock().unwrap() {
+            Some((master, _)) => master.read(&mut buffer).unwrap_or(0),
+            None => 0,
+        };
+        let mut through = std::mem::take(&mut *aside.lock().unwrap());
         for &byte in &buffer[..count] {
             request.push(byte);
             let decoded = requests.push(byte);
@@ -168,9 +222,9 @@ fn serve(master: TTYPort, scenario: Scenario, swallow: Swallow, stop: &AtomicBoo
                 Some(Ok(Frame::Sample(sample))) => swallow.samples.contains(&sample.seq),
                 _ => false,
             };
-            if !lost {
+            if let (false, Some((master, _))) = (lost, &mut *ends.lock().unwrap()) {
                 // A line that nobody reads overflows.
-                let _ = port.borrow_mut().write_all(&frame);
+                let _ = master.write_all(&frame);
             }
             frame.clear();
         }

@@ -10,40 +10,12 @@ mod show;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use imu_stand::link::{DEFAULT_BAUD, Link};
+use imu_stand::link::Link;
 use miette::Result;
 
 use show::Info;
 
-/// Where the board is; the same for every command that talks to one.
-#[derive(Args)]
-pub struct Line {
-    /// The serial port, /dev/ttyUSB0 or COM3; without it the environment's IMU_STAND_PORT
-    #[arg(long, global = true, value_name = "PORT")]
-    port: Option<String>,
-    /// Speed of the line
-    #[arg(long, global = true, default_value_t = DEFAULT_BAUD)]
-    baud: u32,
-}
-
-impl Line {
-    /// Name of the port. Ends the program with 2 where none was given.
-    pub fn port(&self) -> String {
-        let set = || std::env::var("IMU_STAND_PORT").ok();
-        self.port.clone().or_else(set).unwrap_or_else(|| {
-            clap::Error::raw(
-                clap::error::ErrorKind::MissingRequiredArgument,
-                "which board? name its serial port: `--port /dev/ttyUSB0` or `--port COM3`, or set IMU_STAND_PORT\n",
-            )
-            .exit()
-        })
-    }
-
-    /// Opens it.
-    pub fn open(&self) -> Result<Link> {
-        Ok(Link::open(&self.port(), self.baud)?)
-    }
-}
+use super::Line;
 
 /// What `board` takes.
 #[derive(Args)]
@@ -115,7 +87,7 @@ impl Session {
 pub fn run(arguments: &Arguments) -> Result<()> {
     if let Action::Calibrate(calibrate) = &arguments.action
         && calibrate.dry_run
-        && arguments.line.port.is_none()
+        && !arguments.line.is_named()
     {
         return calibrate::dry_run(calibrate, arguments.quiet, arguments.json.as_ref());
     }

@@ -1,0 +1,577 @@
+//! `imu-stand plan`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use analysis::noise_fit::{Spectrum, Term, fit};
+use analysis::plan::{KnownNoise, expected, seconds_for};
+use analysis::sampling::Sampling;
+use analysis::separate::{PRESETS, TOLD_APART, separation};
+use analysis::synthetic::Truth;
+use clap::Args;
+use miette::{IntoDiagnostic, Result, WrapErr};
+use model::ModelFile;
+use model::effects::{EFFECTS, effect};
+use model::record::Quantity;
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::Serialize;
+
+use super::Input;
+
+/// Half of a 95 % interval in standard errors.
+const Z_95: f64 = 1.959_964;
+/// Longest record that `--separate` lays out, s.
+const LONGEST_S: f64 = 36.0 * 3600.0;
+/// Most samples that `--check` simulates in all.
+const CHECK_SAMPLES: f64 = 2e8;
+
+/// What `plan` takes.
+#[derive(Args)]
+pub struct Arguments {
+    /// A capture whose noise is the present knowledge; without it and without --model the paper's figures
+    capture: Option<PathBuf>,
+    /// A model file instead of a capture
+    #[arg(long, value_name = "FILE", conflicts_with = "capture")]
+    model: Option<PathBuf>,
+    /// How well a term is wanted, 95 %: `"K within 20 %"`, several separated by commas; of N, B, K
+    #[arg(long, value_name = "TERM within X %")]
+    want: Option<String>,
+    /// Two causes to be told apart: `temperature,rate_ramp`
+    #[arg(long, value_name = "CAUSE,CAUSE")]
+    separate: Option<String>,
+    /// The gyro, where there are several
+    #[arg(long, value_name = "NAME")]
+    channel: Option<String>,
+    /// Simulate so many records as long as planned, and count how many keep the promise of --want
+    #[arg(long, value_name = "RECORDS")]
+    check: Option<usize>,
+    /// Seed of the check
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Write the plan as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    #[command(flatten)]
+    input: Input,
+}
+
+/// The plan, as `--json` writes it.
+#[derive(Debug, Serialize)]
+struct Plan {
+    format: &'static str,
+    noise: Noise,
+    want: Vec<Wanted>,
+    separate: Vec<Told>,
+}
+
+/// What is known of the noise, deg/s and s.
+#[derive(Debug, Serialize)]
+struct Noise {
+    from: String,
+    rate_hz: f64,
+    n: f64,
+    b: f64,
+    k: f64,
+    notes: Vec<String>,
+}
+
+impl Noise {
+    fn known(&self) -> KnownNoise {
+        KnownNoise {
+            angle_random_walk_n: self.n,
+            bias_instability_b: self.b,
+            rate_random_walk_k: self.k,
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Wanted {
+    term: &'static str,
+    within_percent: f64,
+    seconds: f64,
+    /// At a quarter of the rate and at four times it.
+    seconds_at: [(f64, f64); 2],
+    /// Share of simulated records whose estimate is within the wanted part of the truth.
+    checked_share: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct Told {
+    cause: String,
+    rival: String,
+    parameter: &'static str,
+    unit: &'static str,
+    excitation: &'static str,
+    /// Length in s, smallest size shown, smallest size told apart.
+    sizes: Vec<(f64, f64, f64)>,
+    /// Why there are none.
+    why: Option<String>,
+}
+
+/// Runs it.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.want.is_none() && arguments.separate.is_none() {
+        miette::bail!(
+            help = "write `--want \"K within 20 %\"` or `--separate temperature,rate_ramp`",
+            "nothing to plan for"
+        );
+    }
+    let noise = noise(arguments)?;
+    let quiet = arguments.input.quiet;
+    if !quiet {
+        say!(
+            "noise  N {:.3} deg/sqrt(h), B {:.1} deg/h, K {:.2e} deg/s/sqrt(s), {} Hz, from {}",
+            noise.n * 60.0,
+            noise.b * 3600.0,
+            noise.k,
+            noise.rate_hz,
+            noise.from
+        );
+        for note in &noise.notes {
+            say!("       {note}");
+        }
+    }
+    let mut plan = Plan {
+        format: "imu-stand-plan/1",
+        noise,
+        want: Vec::new(),
+        separate: Vec::new(),
+    };
+    if let Some(text) = &arguments.want {
+        for (term, within_percent) in wishes(text)? {
+            let wanted = want(&plan.noise, term, within_percent, arguments)?;
+            plan.want.push(wanted);
+        }
+        if !quiet {
+            print_want(&plan);
+        }
+    }
+    if let Some(text) = &arguments.separate {
+        let causes: Vec<&str> = text.split(',').map(str::trim).collect();
+        let [a, b] = causes[..] else {
+            miette::bail!(
+                help = "write `--separate temperature,rate_ramp`",
+                "--separate: `{text}` is not two causes"
+            );
+        };
+        for (cause, rival) in [(a, b), (b, a)] {
+            plan.separate.extend(separate(&plan.noise, cause, rival)?);
+        }
+        if !quiet {
+            print_separate(&plan);
+        }
+    }
+    super::write_json(arguments.json.as_ref(), &plan)
+}
+
+fn wishes(text: &str) -> Result<Vec<(Term, f64)>> {
+    let bad = |item: &str| {
+        miette::miette!(
+            help = "write `--want \"K within 20 %\"`; the terms are N, B and K",
+            "--want: `{}` is not of the form `TERM within X %`",
+            item.trim()
+        )
+    };
+    text.split(',')
+        .map(|item| {
+            let words: Vec<&str> = item.split_whitespace().collect();
+            let (letter, percent) = match words[..] {
+                [letter, "within", percent] => (letter, percent.trim_end_matches('%')),
+                [letter, "within", percent, "%"] => (letter, percent),
+                _ => return Err(bad(item)),
+            };
+            let term = match letter {
+                "N" | "n" => Term::White,
+                "B" | "b" => Term::Flicker,
+                "K" | "k" => Term::RandomWalk,
+                _ => return Err(bad(item)),
+            };
+            let percent: f64 = percent.parse().map_err(|_| bad(item))?;
+            if percent > 0.0 && percent <= 100.0 {
+                Ok((term, percent))
+            } else {
+                Err(bad(item))
+            }
+        })
+        .collect()
+}
+
+fn letter(term: Term) -> &'static str {
+    match term {
+        Term::White => "N",
+        Term::Flicker => "B",
+        Term::RandomWalk => "K",
+        Term::Quantization => "Q",
+    }
+}
+
+/// What is known of the noise: of a capture, a model file, or the paper's.
+fn noise(arguments: &Arguments) -> Result<Noise> {
+    if let Some(path) = &arguments.capture {
+        return of_capture(arguments, path);
+    }
+    let (model, from) = match &arguments.model {
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .into_diagnostic()
+                .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+            let model = ModelFile::parse(&text)
+                .map_err(|error| miette::miette!("{}: {error}", path.display()))?;
+            (model, super::name(path))
+        }
+        None => (ModelFile::paper(), "the paper".to_owned()),
+    };
+    let wanted = |name: &str| {
+        arguments
+            .channel
+            .as_deref()
+            .map_or(name.starts_with("gyro"), |c| c == name)
+    };
+    let channel = model
+        .channels
+        .iter()
+        .find(|c| wanted(&c.name))
+        .ok_or_else(|| {
+            let names: Vec<&str> = model.channels.iter().map(|c| c.name.as_str()).collect();
+            miette::miette!("no such gyro in {from}; there are {}", names.join(", "))
+        })?;
+    let baseline = |key: &str| channel.baseline.get(key).map_or(0.0, |p| p.value);
+    let b = model
+        .effects
+        .iter()
+        .filter(|e| e.cause == "flicker")
+        .filter(|e| e.channels.is_empty() || e.channels.contains(&channel.name))
+        .find_map(|e| e.parameters.get("bias_instability"))
+        .map_or(0.0, |p| p.value / 3600.0);
+    Ok(Noise {
+        from: format!("{from}, {}", channel.name),
+        rate_hz: arguments.input.rate.unwrap_or(model.rate_hz),
+        n: baseline("angle_random_walk") / 60.0,
+        b,
+        k: baseline("rate_random_walk"),
+        notes: Vec::new(),
+    })
+}
+
+fn of_capture(arguments: &Arguments, path: &std::path::Path) -> Result<Noise> {
+    let record = arguments.input.read(path)?.record;
+    let channel = record
+        .channels
+        .iter()
+        .find(|c| match &arguments.channel {
+            Some(name) => c.name == *name,
+            None => c.quantity == Quantity::Gyro,
+        })
+        .ok_or_else(|| {
+            let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
+            miette::miette!(
+                help = "`--channel NAME` names one, `--columns` maps a foreign file",
+                "{} has no such gyro; it has {}",
+                path.display(),
+                names.join(", ")
+            )
+        })?;
+    let sampling = Sampling::of(&record, arguments.input.rate).map_err(super::explain)?;
+    let runs = sampling.runs_of(&channel.values);
+    let found = fit(&Spectrum::with_gaps(
+        &channel.values,
+        &runs,
+        &sampling.slots,
+        sampling.tau0,
+    ));
+    let mut notes = Vec::new();
+    let mut value = |term: Term| {
+        let e = found.term(term);
+        e.value.unwrap_or_else(|| {
+            notes.push(format!(
+                "{} is not established in this capture: planned as absent, it is {:.2e} deg/s{} at the most",
+                letter(term),
+                e.high,
+                if term == Term::RandomWalk { "/sqrt(s)" } else { "" }
+            ));
+            0.0
+        })
+    };
+    let (n, b, k) = (
+        value(Term::White),
+        value(Term::Flicker),
+        value(Term::RandomWalk),
+    );
+    Ok(Noise {
+        from: format!("{}, {}", super::name(path), channel.name),
+        rate_hz: 1.0 / sampling.tau0,
+        n,
+        b,
+        k,
+        notes,
+    })
+}
+
+fn want(noise: &Noise, term: Term, within_percent: f64, arguments: &Arguments) -> Result<Wanted> {
+    let known = noise.known();
+    let size = match term {
+        Term::White => noise.n,
+        Term::Flicker => noise.b,
+        _ => noise.k,
+    };
+    if size <= 0.0 {
+        miette::bail!(
+            help = "plan from a longer capture, or write a model file with the size you expect and give it by --model",
+            "how long it takes to measure {} depends on its size, which {} does not tell",
+            letter(term),
+            noise.from
+        );
+    }
+    let relative = within_percent / 100.0 / Z_95;
+    let at = |rate: f64| seconds_for(&known, rate, term, relative).map_err(super::explain);
+    let rate = noise.rate_hz;
+    let seconds = at(rate)?;
+    let seconds_at = [(rate / 4.0, at(rate / 4.0)?), (rate * 4.0, at(rate * 4.0)?)];
+    let checked_share = match arguments.check {
+        None => None,
+        Some(records) => Some(check(
+            noise,
+            term,
+            within_percent,
+            seconds,
+            records,
+            arguments,
+        )?),
+    };
+    Ok(Wanted {
+        term: letter(term),
+        within_percent,
+        seconds,
+        seconds_at,
+        checked_share,
+    })
+}
+
+fn check(
+    noise: &Noise,
+    term: Term,
+    within_percent: f64,
+    seconds: f64,
+    records: usize,
+    arguments: &Arguments,
+) -> Result<f64> {
+    let samples = (seconds * noise.rate_hz).ceil();
+    if samples * records as f64 > CHECK_SAMPLES {
+        miette::bail!(
+            help = "fewer records, or a lower `--rate`",
+            "--check {records}: {records} records of {samples} samples take too long"
+        );
+    }
+    let truth = Truth {
+        n: noise.n,
+        b: noise.b,
+        k: noise.k,
+        ..Truth::default()
+    };
+    let samples = samples as usize;
+    let tau0 = 1.0 / noise.rate_hz;
+    let size = match term {
+        Term::White => noise.n,
+        Term::Flicker => noise.b,
+        _ => noise.k,
+    };
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(arguments.seed);
+    let kept = (0..records)
+        .filter(|_| {
+            let y = truth.record(samples, tau0, &mut rng);
+            let found = fit(&Spectrum::of(&y, std::slice::from_ref(&(0..samples)), tau0));
+            found
+                .term(term)
+                .value
+                .is_some_and(|v| (v / size - 1.0).abs() <= within_percent / 100.0)
+        })
+        .count();
+    Ok(kept as f64 / records.max(1) as f64)
+}
+
+fn duration(seconds: f64) -> String {
+    if seconds < 120.0 {
+        format!("{seconds:.0} s")
+    } else if seconds < 7200.0 {
+        format!("{:.0} min", seconds / 60.0)
+    } else if seconds < 48.0 * 3600.0 {
+        format!("{:.1} h", seconds / 3600.0)
+    } else {
+        format!("{:.1} days", seconds / 86_400.0)
+    }
+}
+
+fn print_want(plan: &Plan) {
+    for w in &plan.want {
+        let [slower, faster] = w.seconds_at;
+        say!(
+            "{} within {} % (95 %)  record {} at {} Hz ({:.0} s); {} at {} Hz, {} at {} Hz",
+            w.term,
+            w.within_percent,
+            duration(w.seconds),
+            plan.noise.rate_hz,
+            w.seconds.ceil(),
+            duration(slower.1),
+            slower.0,
+            duration(faster.1),
+            faster.0
+        );
+        if let Some(share) = w.checked_share {
+            say!(
+                "    checked: {:.1} % of simulated records of that length are within it",
+                100.0 * share
+            );
+        }
+    }
+    say!("what a record of a given length tells (half of the 95 % interval):");
+    let mut lengths = vec![600.0, 3600.0, 8.0 * 3600.0, 24.0 * 3600.0];
+    lengths.extend(plan.want.iter().map(|w| w.seconds));
+    lengths.sort_by(f64::total_cmp);
+    for seconds in lengths {
+        let e = expected(&plan.noise.known(), plan.noise.rate_hz, seconds);
+        let part = |name: &str, relative: Option<f64>| {
+            relative.map_or(format!("{name} absent"), |r| {
+                // Beyond this the symmetric interval means nothing: the term is not established.
+                if Z_95 * r > 1.0 {
+                    format!("{name} not established")
+                } else {
+                    format!("{name} +- {:.2} %", 100.0 * Z_95 * r)
+                }
+            })
+        };
+        say!(
+            "    {:>9}  {:<16} {:<22} {}",
+            duration(seconds),
+            part("N", e.n),
+            part("B", e.b),
+            part("K", e.k)
+        );
+    }
+}
+
+/// Lengths laid out by `--separate`, s.
+fn lengths() -> Vec<f64> {
+    std::iter::successors(Some(600.0), |s| Some(s * 3.0))
+        .take_while(|s| *s <= LONGEST_S)
+        .collect()
+}
+
+fn separate(noise: &Noise, cause: &str, rival: &str) -> Result<Vec<Told>> {
+    let find = |id: &str| {
+        effect(id).ok_or_else(|| {
+            let known: Vec<&str> = EFFECTS.iter().map(|e| e.id()).collect();
+            miette::miette!(
+                help = format!("the causes are {}", known.join(", ")),
+                "--separate: `{id}` is no cause"
+            )
+        })
+    };
+    let (a, b) = (find(cause)?, find(rival)?);
+    let mut out = Vec::new();
+    for preset in PRESETS {
+        let settings: BTreeMap<String, f64> = preset
+            .settings
+            .iter()
+            .map(|(key, value)| ((*key).to_owned(), *value))
+            .collect();
+        let mut told = Told {
+            cause: cause.to_owned(),
+            rival: rival.to_owned(),
+            parameter: "",
+            unit: "",
+            excitation: preset.name,
+            sizes: Vec::new(),
+            why: None,
+        };
+        for seconds in lengths() {
+            match separation(a, b, &settings, &noise.known(), noise.rate_hz, seconds) {
+                Ok(found) => {
+                    told.parameter = found.parameter;
+                    told.unit = a
+                        .parameters()
+                        .iter()
+                        .find(|p| p.name == found.parameter)
+                        .map_or("", |p| p.unit);
+                    told.sizes.push((seconds, found.shown, found.told_apart));
+                }
+                Err(why) => told.why = Some(why),
+            }
+        }
+        out.push(told);
+    }
+    Ok(out)
+}
+
+fn print_separate(plan: &Plan) {
+    for direction in plan.separate.chunk_by(|a, b| a.cause == b.cause) {
+        let (cause, rival) = (&direction[0].cause, &direction[0].rival);
+        let Some(told) = direction.iter().find(|t| !t.sizes.is_empty()) else {
+            let why = direction.iter().find_map(|t| t.why.as_deref());
+            say!(
+                "{cause} against {rival}: {}",
+                why.unwrap_or("nothing moves")
+            );
+            continue;
+        };
+        say!(
+            "{cause} against {rival}: smallest {} that shows / that is not taken for {rival}, {} (d = {TOLD_APART})",
+            told.parameter,
+            told.unit
+        );
+        let lengths: String = lengths()
+            .into_iter()
+            .map(|s| format!("{:<20}", duration(s)))
+            .collect();
+        say!("    {:<62}{}", "excitation", lengths.trim_end());
+        for told in direction {
+            if told.sizes.is_empty() {
+                let why = told.why.as_deref().unwrap_or("nothing moves");
+                say!("    {:<62}{why}", told.excitation);
+                continue;
+            }
+            let sizes: String = told
+                .sizes
+                .iter()
+                .map(|(_, shown, apart)| {
+                    let apart = if apart.is_finite() {
+                        format!("{apart:.2e}")
+                    } else {
+                        "never".to_owned()
+                    };
+                    format!("{:<20}", format!("{shown:.2e} / {apart}"))
+                })
+                .collect();
+            say!("    {:<62}{}", told.excitation, sizes.trim_end());
+        }
+        let first = |t: &&Told| t.sizes.first().map_or(f64::INFINITY, |s| s.2);
+        if let Some(best) = direction
+            .iter()
+            .min_by(|a, b| first(a).total_cmp(&first(b)))
+            .filter(|t| first(t).is_finite())
+        {
+            say!("    record: {}", best.excitation);
+        }
+    }
+    say!(
+        "least sizes that can work: a random walk refitted under each hypothesis takes a part of d"
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wishes_are_read_and_what_is_none_is_told() {
+        assert_eq!(
+            wishes("K within 20 %, N within 1%").unwrap(),
+            [(Term::RandomWalk, 20.0), (Term::White, 1.0)]
+        );
+        for bad in ["", "K 20", "R within 5 %", "K within 0 %", "K within x %"] {
+            let error = wishes(bad).unwrap_err().to_string();
+            assert!(error.contains("TERM within X %"), "{bad}: {error}");
+        }
+    }
+}

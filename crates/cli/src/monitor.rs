@@ -1,0 +1,465 @@
+//! What a live view shows: the last second of every channel, what was lost, the board's counters, and Allan deviations
+//! that grow with the run at constant memory.
+
+use std::collections::VecDeque;
+use std::fmt::Write;
+
+use analysis::allan::{Deviation, Streaming};
+use analysis::edf::{NoiseType, chi_square_interval, edf};
+use serde::Serialize;
+use wire::{Frame, Hello, Sample, flags};
+
+use crate::RecordBuilder;
+use crate::capture::{Calibration, Continuity, STANDARD_GRAVITY, SUPPLY_LSB_V, TEMP};
+use crate::link::Heard;
+
+/// Longest averaging time, as a power of two of samples: 2^17 at 20 Hz are 1.8 h, and 4 MB for each gyro.
+const OCTAVES: u32 = 17;
+/// Confidence of the intervals.
+const CONFIDENCE: f64 = 0.683;
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// A deviation so far.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Point {
+    /// Averaging time, s.
+    pub tau_s: f64,
+    /// deg/s.
+    pub deviation: f64,
+    /// Of the 68.3 % interval, deg/s.
+    pub low: f64,
+    /// Of the 68.3 % interval, deg/s.
+    pub high: f64,
+}
+
+/// A gyro over the last second.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Recent {
+    /// Mean rate, scaled by the nominal factor, no bias subtracted, deg/s; null where there was no sample.
+    pub mean_dps: Option<f64>,
+    /// Spread about it, deg/s.
+    pub rms_dps: Option<f64>,
+    /// degC.
+    pub temp_c: Option<f64>,
+}
+
+/// All that is shown.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Snapshot {
+    /// Names the shape of this file.
+    pub format: &'static str,
+    /// Since the first sample, s.
+    pub seconds: f64,
+    /// Samples.
+    pub samples: u64,
+    /// Sample instants without one.
+    pub missing: u64,
+    /// Restarts of the board.
+    pub restarts: u64,
+    /// Hz, as the board says.
+    pub rate_hz: f64,
+    /// The board's clock against this computer's, ppm; null before a minute has passed.
+    pub clock_ppm: Option<f64>,
+    /// x, y, z.
+    pub gyros: [Recent; 3],
+    /// x, y, z, m/s^2.
+    pub acc_mps2: [Option<f64>; 3],
+    /// V.
+    pub supply_v: Option<f64>,
+    /// Motor command.
+    pub pwm: Option<i16>,
+    /// Flags of the last second's samples: set in any of them (and NEW, missing in any of them).
+    pub flags: Vec<&'static str>,
+    /// Overlapping Allan deviation, x, y, z.
+    pub allan: [Vec<Point>; 3],
+    /// Counters of the board that are not 0.
+    pub counters: Vec<(&'static str, u16)>,
+}
+
+/// Collects frames.
+pub struct View {
+    calibration: Calibration,
+    hello: Option<Hello>,
+    follow: Continuity,
+    streams: [Streaming<i64>; 3],
+    /// Lengths of the runs without a gap, samples.
+    runs: Vec<usize>,
+    /// First reading of each gyro: taken out, so that sums stay small.
+    zero: Option<[i16; 3]>,
+    recent: VecDeque<Sample>,
+    samples: u64,
+    missing: u64,
+    restarts: u64,
+    first: Option<(u64, f64)>,
+    last: Option<(u64, f64)>,
+    counters: Vec<(&'static str, u16)>,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl View {
+    /// Nothing yet.
+    #[must_use]
+    pub fn new() -> Self {
+        let calibration = Calibration::default();
+        Self {
+            hello: None,
+            follow: follow(&calibration),
+            streams: streams(&calibration),
+            runs: vec![0],
+            zero: None,
+            recent: VecDeque::new(),
+            samples: 0,
+            missing: 0,
+            restarts: 0,
+            first: None,
+            last: None,
+            counters: Vec::new(),
+            calibration,
+        }
+    }
+
+    /// The board, as it says.
+    #[must_use]
+    pub fn hello(&self) -> Option<&Hello> {
+        self.hello.as_ref()
+    }
+
+    /// The line was opened anew.
+    pub fn reconnected(&mut self) {
+        self.follow.fresh();
+    }
+
+    /// A frame that arrived at `host_s`.
+    pub fn push(&mut self, frame: &Frame, host_s: f64) {
+        match frame {
+            Frame::Sample(sample) => self.sample(sample, host_s),
+            Frame::Hello(hello) => self.set(hello),
+            Frame::Health(health) => {
+                self.counters = health
+                    .faults
+                    .iter()
+                    .filter(|(_, count)| *count > 0)
+                    .map(|(fault, count)| (fault.name(), count))
+                    .collect();
+            }
+            Frame::Reply(_) => {}
+        }
+    }
+
+    fn set(&mut self, hello: &Hello) {
+        let mut builder = RecordBuilder::new(Calibration::default());
+        builder.hello(hello);
+        if hello.next_seq == 0 || self.hello.is_some_and(|h| h.restarts != hello.restarts) {
+            self.follow.restarted();
+        }
+        if *builder.calibration() != self.calibration {
+            // Other counts: what was summed does not go with them.
+            self.calibration = builder.calibration().clone();
+            self.follow = follow(&self.calibration);
+            self.streams = streams(&self.calibration);
+            (self.runs, self.zero) = (vec![0], None);
+            (self.first, self.last) = (None, None);
+            self.recent.clear();
+        }
+        self.hello = Some(*hello);
+    }
+
+    fn sample(&mut self, sample: &Sample, host_s: f64) {
+        let (place, restart) = self.follow.place(sample, host_s);
+        self.samples += 1;
+        self.missing += place.missing;
+        if restart.is_some() {
+            self.restarts += 1;
+            (self.first, self.last) = (None, None);
+        }
+        self.first.get_or_insert((place.t_ticks, host_s));
+        self.last = Some((place.t_ticks, host_s));
+        let zero = *self.zero.get_or_insert(sample.gyro);
+        let in_order = sample.flags & flags::IN_ORDER == flags::IN_ORDER
+            && sample.flags & flags::GYRO_NOT_ANSWERING == 0;
+        if place.missing > 0 || !in_order {
+            self.streams.iter_mut().for_each(Streaming::gap);
+            self.runs.push(0);
+        }
+        if in_order {
+            for ((stream, gyro), zero) in self.streams.iter_mut().zip(sample.gyro).zip(zero) {
+                stream.push(i64::from(gyro) - i64::from(zero));
+            }
+            if let Some(run) = self.runs.last_mut() {
+                *run += 1;
+            }
+        }
+        self.recent.push_back(*sample);
+        let second = self.calibration.rate_hz.ceil().max(1.0) as usize;
+        while self.recent.len() > second {
+            self.recent.pop_front();
+        }
+    }
+
+    /// What there is to show.
+    #[must_use]
+    pub fn snapshot(&self) -> Snapshot {
+        let c = &self.calibration;
+        let n = self.recent.len() as f64;
+        let some = |value: f64| (n > 0.0).then_some(value);
+        let mean = |of: &dyn Fn(&Sample) -> f64| some(self.recent.iter().map(of).sum::<f64>() / n);
+        let elapsed = self
+            .first
+            .zip(self.last)
+            .map(|(first, last)| ((last.0 - first.0) as f64 * c.tick_s, last.1 - first.1));
+        Snapshot {
+            format: "imu-stand-monitor/1",
+            seconds: elapsed.map_or(0.0, |(device, _)| device),
+            samples: self.samples,
+            missing: self.missing,
+            restarts: self.restarts,
+            rate_hz: c.rate_hz,
+            // Host times jitter by a frame's length; over a minute that is some 100 ppm.
+            clock_ppm: elapsed
+                .filter(|(device, _)| *device > 60.0)
+                .map(|(device, host)| (device / host - 1.0) * 1e6),
+            gyros: [0, 1, 2].map(|k| {
+                let mean_dps = mean(&|s| f64::from(s.gyro[k]) * c.gyro_lsb_dps);
+                let squares = mean_dps
+                    .and_then(|m| mean(&|s| (f64::from(s.gyro[k]) * c.gyro_lsb_dps - m).powi(2)));
+                Recent {
+                    mean_dps,
+                    rms_dps: squares.map(f64::sqrt),
+                    temp_c: mean(&|s| f64::from(s.temp[k]) * TEMP.0 + TEMP.1),
+                }
+            }),
+            acc_mps2: [0, 1, 2].map(|k| {
+                mean(&|s| f64::from(s.acc[k])).map(|counts| {
+                    (counts - c.acc_zero_counts) / c.acc_counts_per_g * STANDARD_GRAVITY
+                })
+            }),
+            supply_v: mean(&|s| f64::from(s.supply) * SUPPLY_LSB_V),
+            pwm: self.recent.back().map(|s| s.pwm),
+            flags: self.flags(),
+            allan: [0, 1, 2].map(|k| self.points(k)),
+            counters: self.counters.clone(),
+        }
+    }
+
+    fn flags(&self) -> Vec<&'static str> {
+        let any = self.recent.iter().fold(0, |all, s| all | s.flags);
+        let all = self.recent.iter().fold(u16::MAX, |all, s| all & s.flags);
+        let stale = [
+            (flags::NEW_X, "gyro x repeats itself"),
+            (flags::NEW_Y, "gyro y repeats itself"),
+            (flags::NEW_Z, "gyro z repeats itself"),
+        ];
+        let set = [
+            (flags::ERROR_X, "gyro x alarm"),
+            (flags::ERROR_Y, "gyro y alarm"),
+            (flags::ERROR_Z, "gyro z alarm"),
+            (flags::GYRO_NOT_ANSWERING, "a gyro does not answer"),
+            (flags::ACC_AT_RAIL, "acc at its rail"),
+            (flags::TICK_OVERRUN, "tick overrun"),
+            (flags::BIAS_NULL, "bias null running"),
+            (flags::SUPPLY_OUT_OF_RANGE, "supply out of range"),
+            (flags::ACC_NOT_CONVERTED, "acc not converted"),
+            (flags::GYRO_MISCONFIGURED, "a gyro is set wrongly"),
+        ];
+        let stale = stale.iter().filter(|(bit, _)| all & bit == 0);
+        let set = set.iter().filter(|(bit, _)| any & bit != 0);
+        stale.chain(set).map(|(_, name)| *name).collect()
+    }
+
+    fn points(&self, axis: usize) -> Vec<Point> {
+        let estimates = self.streams[axis].estimates();
+        let mut out = Vec::new();
+        for (k, e) in estimates.iter().enumerate() {
+            // Kind of noise by the slope to the next longer time; the last one's is that before it.
+            let pair = estimates
+                .get(k..k + 2)
+                .or(estimates.get(k.saturating_sub(1)..=k));
+            let alpha = match pair {
+                Some([a, b]) if a.deviation > 0.0 && b.deviation > 0.0 => {
+                    -2.0 * (b.deviation / a.deviation).log2() - 1.0
+                }
+                _ => 0.0,
+            };
+            let free = edf(Deviation::Oadev, NoiseType::nearest(alpha), e.m, &self.runs);
+            // Below that an interval spans a factor of three: no figure to show.
+            if free < 3.0 {
+                continue;
+            }
+            let (low, high) = chi_square_interval(e.deviation, free, CONFIDENCE);
+            out.push(Point {
+                tau_s: e.tau_s,
+                deviation: e.deviation,
+                low,
+                high,
+            });
+        }
+        out
+    }
+
+    /// A page of a terminal.
+    #[must_use]
+    pub fn page(&self, port: &str, heard: &Heard) -> String {
+        let s = self.snapshot();
+        let mut out = String::new();
+        let number = |value: Option<f64>, width: usize, digits: usize| match value {
+            Some(value) => format!("{value:>width$.digits$}"),
+            None => format!("{:>width$}", "-"),
+        };
+        let board = self.hello.map_or_else(
+            || "board that has not said who it is".to_owned(),
+            |h| {
+                let [major, minor, patch] = h.firmware;
+                format!("board {}, firmware {major}.{minor}.{patch}", h.board_id)
+            },
+        );
+        let _ = writeln!(out, "{board}, on {port}");
+        let clock = s
+            .clock_ppm
+            .map_or_else(String::new, |ppm| format!(", its clock {ppm:+.0} ppm"));
+        let _ = writeln!(
+            out,
+            "{:.0} s at {:.4} Hz{clock}: {} samples, {} missing, {} restarts",
+            s.seconds, s.rate_hz, s.samples, s.missing, s.restarts
+        );
+        let _ = writeln!(out, "line: {heard}\n");
+        let _ = writeln!(out, "last second    deg/s       rms    degC      m/s^2");
+        for (k, axis) in AXES.iter().enumerate() {
+            let gyro = &s.gyros[k];
+            let _ = writeln!(
+                out,
+                "  {axis}       {} {} {} {}",
+                number(gyro.mean_dps, 11, 4),
+                number(gyro.rms_dps, 9, 4),
+                number(gyro.temp_c, 7, 2),
+                number(s.acc_mps2[k], 10, 3)
+            );
+        }
+        let pwm = s.pwm.map_or_else(|| "-".to_owned(), |pwm| pwm.to_string());
+        let _ = writeln!(out, "  supply {} V   motor {pwm}", number(s.supply_v, 6, 3));
+        let flags = if s.flags.is_empty() {
+            "in order".to_owned()
+        } else {
+            s.flags.join(", ")
+        };
+        let _ = writeln!(out, "  {flags}\n");
+        let _ = writeln!(out, "Allan deviation, deg/h (68 % interval)");
+        let longest = s.allan.iter().map(Vec::len).max().unwrap_or(0);
+        if longest == 0 {
+            let _ = writeln!(out, "  not enough samples yet");
+        }
+        for row in 0..longest {
+            let tau = s
+                .allan
+                .iter()
+                .find_map(|points| points.get(row))
+                .map(|p| p.tau_s);
+            let _ = write!(out, "  {} s", number(tau, 9, 2));
+            for points in &s.allan {
+                let _ = match points.get(row) {
+                    Some(p) => write!(
+                        out,
+                        "  {:>8.1} ({:.1}..{:.1})",
+                        p.deviation * 3600.0,
+                        p.low * 3600.0,
+                        p.high * 3600.0
+                    ),
+                    None => write!(out, "{:>24}", "-"),
+                };
+            }
+            let _ = writeln!(out);
+        }
+        let counters: Vec<String> = s
+            .counters
+            .iter()
+            .map(|(name, count)| format!("{name} {count}"))
+            .collect();
+        let counters = if counters.is_empty() {
+            "all 0".to_owned()
+        } else {
+            counters.join(", ")
+        };
+        let _ = writeln!(out, "\nboard's counters: {counters}");
+        out
+    }
+}
+
+fn follow(c: &Calibration) -> Continuity {
+    Continuity::new(c.tick_s, (1.0 / c.rate_hz / c.tick_s).round() as u64)
+}
+
+fn streams(c: &Calibration) -> [Streaming<i64>; 3] {
+    [0, 1, 2].map(|_| Streaming::new(1.0 / c.rate_hz, c.gyro_lsb_dps, OCTAVES))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(k: u32) -> Sample {
+        // A square wave of +-1 count: mean and spread are known.
+        let gyro = if k.is_multiple_of(2) { 11 } else { 9 };
+        Sample {
+            seq: k as u16,
+            t_ticks: 12_500 * k,
+            gyro: [gyro, -gyro, 0],
+            temp: [0, 10, -10],
+            supply: 2_730,
+            acc: [512, 512, 760],
+            flags: flags::IN_ORDER,
+            ..Sample::default()
+        }
+    }
+
+    #[test]
+    fn the_last_second_is_in_the_units_that_are_named() {
+        let mut view = View::new();
+        for k in 0..100 {
+            view.push(&Frame::Sample(sample(k)), f64::from(k) * 0.05);
+        }
+        let s = view.snapshot();
+        assert_eq!((s.samples, s.missing, s.restarts), (100, 0, 0));
+        let lsb = 0.073_26;
+        assert!((s.gyros[0].mean_dps.unwrap() - 10.0 * lsb).abs() < 1e-9);
+        assert!((s.gyros[0].rms_dps.unwrap() - lsb).abs() < 1e-9);
+        assert!((s.gyros[1].temp_c.unwrap() - 26.453).abs() < 1e-9);
+        assert!((s.acc_mps2[2].unwrap() - 9.8).abs() < 0.02);
+        assert!((s.supply_v.unwrap() - 5.0).abs() < 1e-3);
+        // Alternating +-1 count: the deviation at one sample is 2 / sqrt 2 counts, at two samples 0.
+        assert!((s.allan[0][0].deviation - 2.0 * lsb / 2f64.sqrt()).abs() < 1e-9);
+        assert_eq!(s.allan[0][1].deviation, 0.0);
+        let page = view.page("P", &Heard::default());
+        assert!(
+            page.contains("in order") && page.contains("all 0"),
+            "{page}"
+        );
+    }
+
+    #[test]
+    fn no_difference_spans_a_gap_and_a_silent_gyro_is_named() {
+        let mut view = View::new();
+        for k in (0..50).chain(60..100) {
+            let mut sample = sample(k);
+            if k == 99 {
+                sample.flags = flags::NEW_X | flags::NEW_Z | flags::GYRO_NOT_ANSWERING;
+            }
+            if k >= 60 {
+                // A step over the gap, which no deviation may see.
+                sample.gyro[0] += 500;
+            }
+            view.push(&Frame::Sample(sample), f64::from(k) * 0.05);
+        }
+        let s = view.snapshot();
+        assert_eq!(s.missing, 10);
+        assert!(
+            s.allan[0].iter().all(|point| point.deviation < 0.2),
+            "{:?}",
+            s.allan[0]
+        );
+        assert_eq!(s.flags, ["gyro y repeats itself", "a gyro does not answer"]);
+    }
+}

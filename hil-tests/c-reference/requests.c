@@ -1,0 +1,320 @@
+#include <stddef.h>
+
+#include "bias.h"
+#include "board.h"
+#include "gyro.h"
+#include "motor.h"
+#include "serial.h"
+#include "stand.h"
+#include "store.h"
+#include "tick.h"
+
+/* The reply comes when it is done, or has been sent. */
+#define LATER 0xff
+/* A gyro's self-test takes 25 ms, with margin. */
+#define SELF_TEST_MS 40
+
+static struct pending storing;
+
+/* A gyro's self-test: a job at a time, each posted from the millisecond. */
+static struct {
+    enum { IDLE, CLEAR_STATUS, START, HAS_ENDED, VERDICT } step;
+    uint8_t wait_ms; /* 0: its job is under way */
+    uint8_t axis;
+} self_test;
+
+/* How many argument bytes a command has; 0xff where no command has the code. */
+static uint8_t arguments_of(uint8_t code)
+{
+    switch (code) {
+    case CODE_PING ... CODE_REBOOT:
+    case CODE_STORE_CONFIG ... CODE_DEFAULT_CONFIG:
+        return 0;
+    case CODE_SET_ACC_RANGE:
+    case CODE_SELF_TEST:
+        return 1;
+    case CODE_SET_BAUD ... CODE_SET_GYRO:
+    case CODE_BIAS_NULL:
+    case CODE_MOTOR_DUTY:
+    case CODE_READ_REGISTER:
+    case CODE_SET_BOARD_ID:
+        return 2;
+    case CODE_SET_RATE:
+    case CODE_MOTOR_LIMITS:
+        return 3;
+    case CODE_WRITE_REGISTER:
+        return 4;
+    case CODE_SET_BIAS ... CODE_SET_SCALE:
+        return 5;
+    case CODE_MOTOR_PROFILE:
+        return 8;
+    default:
+        return 0xff;
+    }
+}
+
+static uint8_t changed(void)
+{
+    config.set_up.config_source = SOURCE_SET;
+    return STATUS_OK;
+}
+
+static uint8_t pend(struct pending *pending, const struct request *request)
+{
+    pending->code = request->command;
+    pending->number = request->number;
+    return LATER;
+}
+
+/* Posts work whose end answers the request. */
+static uint8_t post(const struct request *request, uint8_t what, uint8_t axis, uint8_t address, uint16_t value)
+{
+    if (stand_job.code || !tick_post(what, axis, address, value))
+        return STATUS_BUSY;
+    return pend(&stand_job, request);
+}
+
+static uint8_t begin_self_test(const struct request *request)
+{
+    enum { ACCELEROMETER = 3 };
+    uint8_t sensor = request->u8;
+    if (sensor == ACCELEROMETER)
+        return STATUS_UNSUPPORTED; /* the MMA7260QT has none */
+    if (sensor > ACCELEROMETER)
+        return STATUS_BAD_ARGUMENT;
+    if (stand_job.code)
+        return STATUS_BUSY;
+    self_test.step = CLEAR_STATUS;
+    self_test.wait_ms = 1;
+    self_test.axis = sensor;
+    stand_misconfigured |= (uint8_t)(1 << sensor); /* its rate is not to be trusted until the end */
+    return pend(&stand_job, request);
+}
+
+static uint8_t begin_bias_null(const struct request *request)
+{
+    if (request->u16 < BIAS_MIN_SAMPLES || request->u16 > BIAS_MAX_SAMPLES)
+        return STATUS_BAD_ARGUMENT;
+    if (stand_null.code)
+        return STATUS_BUSY;
+    if (motor_is_on())
+        return STATUS_MOVING;
+    stand_null_samples = request->u16;
+    bias_begin();
+    return pend(&stand_null, request);
+}
+
+static uint8_t carry_out(const struct request *request)
+{
+    struct set_up *set_up = &config.set_up;
+    switch (request->command) {
+    case CODE_PING:
+        return STATUS_OK;
+    case CODE_GET_HELLO:
+        stand_hello();
+        return STATUS_OK;
+    case CODE_KEEP_ALIVE:
+        motor_keep_alive();
+        return STATUS_OK;
+    case CODE_COUNTERS:
+        stand_health();
+        return STATUS_OK;
+    case CODE_CLEAR_COUNTERS:
+        stand_health();
+        stand_clear_counters();
+        return STATUS_OK;
+    case CODE_REBOOT:
+        stand_reply(CODE_REBOOT, request->number, STATUS_OK);
+        motor_cut();
+        board_set_motor(0);
+        board_reboot();
+    case CODE_SET_RATE: {
+        uint8_t every = request->rate.periods_per_sample;
+        if (every == 0)
+            every = 1;
+        if (!config_rate_in_order(request->rate.period_ticks, every))
+            return STATUS_BAD_ARGUMENT;
+        set_up->period_ticks = request->rate.period_ticks;
+        set_up->periods_per_sample = every;
+        tick_set_period(set_up->period_ticks, every);
+        return changed();
+    }
+    case CODE_SET_BAUD:
+        if (!config_baud_in_order(request->u16))
+            return STATUS_BAD_ARGUMENT;
+        set_up->baud_divisor = request->u16;
+        changed();
+        stand_reply(CODE_SET_BAUD, request->number, STATUS_OK);
+        serial_set_baud_later(request->u16);
+        return LATER;
+    case CODE_SET_GYRO: {
+        uint8_t range = request->gyro.range, filter = request->gyro.filter;
+        if (!config_gyro_in_order(range, filter))
+            return STATUS_BAD_ARGUMENT;
+        uint8_t status = post(request, JOB_CONFIGURE, 0, 0, (uint16_t)(range << 8 | filter));
+        if (status == LATER) {
+            set_up->gyro_range = range;
+            set_up->gyro_filter = filter;
+            config_set_scale_of_range();
+            changed();
+        }
+        return status;
+    }
+    case CODE_SET_ACC_RANGE:
+        if (request->u8 > 3)
+            return STATUS_BAD_ARGUMENT;
+        set_up->acc_range = request->u8;
+        sensors_set_acc_range(request->u8);
+        return changed();
+    case CODE_BIAS_NULL:
+        return begin_bias_null(request);
+    case CODE_SET_BIAS:
+        if (request->axis.axis > 2)
+            return STATUS_BAD_ARGUMENT;
+        set_up->bias[request->axis.axis] = request->axis.value;
+        return changed();
+    case CODE_SET_SCALE:
+        if (request->axis.axis > 2 || request->axis.value <= 0)
+            return STATUS_BAD_ARGUMENT;
+        set_up->scale[request->axis.axis] = request->axis.value;
+        return changed();
+    case CODE_MOTOR_DUTY:
+        if (request->i16 < -MOTOR_FULL || request->i16 > MOTOR_FULL)
+            return STATUS_BAD_ARGUMENT;
+        if (request->i16 && !motor_is_alive())
+            return STATUS_NO_KEEP_ALIVE;
+        stand_answer.value = motor_command(request->i16);
+        return STATUS_OK;
+    case CODE_MOTOR_PROFILE:
+        if (request->profile.shape != SHAPE_STOP && !motor_is_alive())
+            return STATUS_NO_KEEP_ALIVE;
+        return motor_profile(request->profile.shape, request->profile.amplitude, request->profile.offset,
+                             request->profile.period_ms, request->profile.cycles)
+                   ? STATUS_OK
+                   : STATUS_BAD_ARGUMENT;
+    case CODE_MOTOR_LIMITS:
+        config.max_duty = request->limits.max_duty;
+        config.ramp_per_s = request->limits.ramp_per_s;
+        motor_limit(config.max_duty, config.ramp_per_s);
+        return changed();
+    case CODE_READ_REGISTER:
+        return post(request, JOB_READ, request->reg.gyro, request->reg.address, 0);
+    case CODE_WRITE_REGISTER:
+        return post(request, JOB_WRITE, request->reg.gyro, request->reg.address, request->reg.value);
+    case CODE_SELF_TEST:
+        return begin_self_test(request);
+    case CODE_STORE_CONFIG:
+        return store_begin() ? pend(&storing, request) : STATUS_BUSY;
+    case CODE_LOAD_CONFIG:
+        if (!store_is_idle())
+            return STATUS_BUSY;
+        if (!store_load())
+            return STATUS_NO_CONFIG;
+        stand_apply();
+        return STATUS_OK;
+    case CODE_DEFAULT_CONFIG:
+        config_set_default();
+        set_up->config_source = SOURCE_BUILT_IN;
+        stand_apply();
+        return STATUS_OK;
+    case CODE_SET_BOARD_ID:
+        config.board_id = request->u16;
+        return changed();
+    default:
+        return STATUS_UNSUPPORTED;
+    }
+}
+
+void stand_on_request(const struct request *request)
+{
+    uint8_t status = STATUS_OK, used = arguments_of(request->command);
+    if (used == 0xff) {
+        status = STATUS_UNKNOWN_COMMAND;
+    } else {
+        /* Bytes that it does not use may come to mean something. */
+        for (uint8_t at = used; at < sizeof request->bytes; at++) {
+            if (request->bytes[at])
+                status = STATUS_BAD_ARGUMENT;
+        }
+    }
+    if (status == STATUS_OK)
+        status = carry_out(request);
+    if (status != LATER)
+        stand_reply(request->command, request->number, status);
+}
+
+/* A job of the self-test has ended; its status when that was the last, else LATER. */
+static uint8_t next_self_test(uint16_t value, uint8_t status)
+{
+    self_test.wait_ms = 1;
+    /* The bit that starts it need not read back: it clears itself. */
+    if (self_test.step == START && (status == STATUS_OK || status == STATUS_READ_BACK_WRONG)) {
+        self_test.wait_ms = SELF_TEST_MS;
+        self_test.step = HAS_ENDED;
+        return LATER;
+    }
+    if (status == STATUS_OK) {
+        if (self_test.step == CLEAR_STATUS) {
+            self_test.step = START;
+            return LATER;
+        }
+        if (self_test.step == HAS_ENDED && !(value & MSC_SELF_TEST)) {
+            self_test.step = VERDICT;
+            return LATER;
+        }
+        if (self_test.step != VERDICT || (value & GYRO_STATUS_SELF_TEST_FAILED))
+            status = STATUS_SELF_TEST_FAILED;
+    }
+    self_test.step = IDLE;
+    stand_misconfigured &= (uint8_t) ~(1 << self_test.axis);
+    return status;
+}
+
+void requests_on_sample(void)
+{
+    const struct gyro_job *done = tick_fetch_done();
+    if (done == NULL)
+        return;
+    uint16_t value = done->value;
+    uint8_t status = done->status;
+    switch (stand_job.code) {
+    case CODE_OWN:
+        stand_note_configured((uint8_t)value);
+        stand_job.code = 0;
+        return;
+    case CODE_SELF_TEST:
+        status = next_self_test(value, status);
+        if (status == LATER)
+            return;
+        break;
+    case CODE_SET_GYRO:
+        stand_note_configured((uint8_t)value);
+        if (value)
+            status = STATUS_READ_BACK_WRONG;
+        /* fall through */
+    default:
+        stand_answer.value = value;
+    }
+    stand_reply_pending(&stand_job, status);
+}
+
+static void step_self_test(void)
+{
+    if (self_test.step == IDLE || self_test.wait_ms == 0 || --self_test.wait_ms)
+        return;
+    bool posted;
+    if (self_test.step == START)
+        posted = tick_post(JOB_WRITE, self_test.axis, MSC_CTRL, MSC_SELF_TEST);
+    else
+        posted = tick_post(JOB_READ, self_test.axis, self_test.step == HAS_ENDED ? MSC_CTRL : GYRO_STATUS, 0);
+    if (!posted)
+        self_test.wait_ms = 1;
+}
+
+void requests_on_millisecond(void)
+{
+    uint8_t stored = store_step();
+    if (stored != STORE_GOES_ON)
+        stand_reply_pending(&storing, stored);
+    step_self_test();
+}

@@ -1,0 +1,691 @@
+// A session that any image of the board can be put through: sensors that answer by a script, a host that sends
+// everything there is to send. Included by tests/c_reference.rs and examples/cost.rs.
+//
+// The sensors answer by how often they were asked, not by when, and the host counts from the image's first tick. So two
+// images that do the same work at different speeds have to say the same.
+
+use atmega16_sim::{Board, CLOCK_HZ, Mcu, Pins, Port, Pwm, Stop};
+use wire::{Command, Decoder, Frame, Health, Shape, code, encode_request, kind};
+
+const SELECTS: [u8; 3] = [2, 3, 4];
+const DIRECTION: u8 = 6;
+const TICK_VECTOR: u8 = 6;
+const MILLISECOND: u64 = CLOCK_HZ as u64 / 1_000;
+
+/// Registers of a gyro that the script knows.
+mod register {
+    pub const SUPPLY_OUT: u8 = 0x02;
+    pub const GYRO_OUT: u8 = 0x04;
+    pub const TEMP_OUT: u8 = 0x0C;
+    pub const MSC_CTRL: u8 = 0x34;
+    pub const SENS_AVG: u8 = 0x38;
+    pub const STATUS: u8 = 0x3C;
+}
+
+/// Spreads a number over 64 bits (SplitMix64's finalizer).
+fn spread(number: u64) -> u64 {
+    let mut z = number.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+#[derive(Default)]
+struct Gyro {
+    registers: [u16; 32],
+    /// How often GYRO_OUT was asked for.
+    asked: u64,
+    /// What the next frame will bring.
+    reply: u16,
+    frame: u16,
+    bytes: u8,
+}
+
+impl Gyro {
+    /// A whole frame has come.
+    fn take(&mut self, axis: u64, quiet: bool) {
+        let [first, value] = self.frame.to_be_bytes();
+        let place = usize::from(first & 0x3F) / 2;
+        if first & 0x80 != 0 {
+            let mut bytes = self.registers[place].to_le_bytes();
+            bytes[usize::from(first & 1)] = value;
+            self.registers[place] = u16::from_le_bytes(bytes);
+            if first & 0x3E == register::MSC_CTRL {
+                // The self-test ends at once; y's fails.
+                self.registers[place] &= !0x0400;
+                if first & 1 == 1 && value & 4 != 0 && axis == 1 {
+                    self.registers[usize::from(register::STATUS) / 2] = 0x0020;
+                }
+            }
+            return;
+        }
+        self.reply = match first & 0x3E {
+            register::GYRO_OUT => {
+                let n = self.asked;
+                self.asked += 1;
+                gyro_word(axis, n, quiet)
+            }
+            register::TEMP_OUT => 0x8000 | (spread(self.asked << 2 | axis) as u16 & 0x0FFF),
+            register::SUPPLY_OUT if self.asked % 64 == 7 => 0x8000 | 2_593,
+            register::SUPPLY_OUT if self.asked % 64 == 9 => 0x8000 | 2_867,
+            register::SUPPLY_OUT => 0x8000 | (2_594 + (spread(self.asked) % 273) as u16),
+            register::STATUS => std::mem::take(&mut self.registers[place]),
+            // z does not keep its filter.
+            register::SENS_AVG if axis == 2 && self.registers[place] == 0x0204 => 0x0203,
+            _ => self.registers[place],
+        };
+    }
+}
+
+/// Any 14 bits, the extremes among them, now and then stale, in error, or with the line stuck; at rest when `quiet`.
+fn gyro_word(axis: u64, n: u64, quiet: bool) -> u16 {
+    let bits = spread(n << 8 | axis);
+    let counts = if quiet {
+        (bits % 23) as u16 & 0x3FFF
+    } else {
+        match bits >> 60 {
+            0 => 0x1FFF,
+            1 => 0x2000,
+            _ => bits as u16 & 0x3FFF,
+        }
+    };
+    match (bits >> 40) % 97 {
+        0 if !quiet => 0x0000,
+        1 if !quiet => 0xFFFF,
+        2 => counts,
+        3 => 0xC000 | counts,
+        _ => 0x8000 | counts,
+    }
+}
+
+/// What is round the chip.
+#[derive(Default)]
+pub struct Script {
+    gyros: [Gyro; 3],
+    selected: [bool; 3],
+    quiet: bool,
+    converted: [u64; 8],
+    /// When the chip's first tick was.
+    first_tick: Option<u64>,
+    /// When the first gyro was selected after each tick.
+    pub instants: Vec<u64>,
+    ticked: bool,
+    /// Every byte that the image sent.
+    pub line: Vec<u8>,
+    /// Share of the motor's pulse with its direction, at each change.
+    pub motor: Vec<(f64, bool)>,
+    pub acc_pins: Vec<u8>,
+    reverse: bool,
+}
+
+impl Board for Script {
+    fn spi_byte(&mut self, _at: u64, mosi: u8, _pins: &Pins) -> u8 {
+        let mut miso = 0xFF;
+        for (gyro, &selected) in self.gyros.iter_mut().zip(&self.selected) {
+            if selected {
+                let [high, low] = gyro.reply.to_be_bytes();
+                miso = if gyro.bytes == 0 { high } else { low };
+                gyro.frame = gyro.frame << 8 | u16::from(mosi);
+                gyro.bytes += 1;
+            }
+        }
+        miso
+    }
+
+    fn adc_volts(&mut self, _at: u64, channel: u8) -> f64 {
+        let n = self.converted[usize::from(channel)];
+        self.converted[usize::from(channel)] += 1;
+        let bits = spread(n << 16 | u64::from(channel) << 8);
+        match bits % 53 {
+            0 => 0.0,
+            1 => 3.3,
+            _ => (bits >> 32) as f64 / 2f64.powi(32) * 3.3,
+        }
+    }
+
+    fn aref_volts(&self) -> f64 {
+        3.3
+    }
+
+    fn uart_byte(&mut self, _at: u64, byte: u8) {
+        self.line.push(byte);
+    }
+
+    fn pins_changed(&mut self, at: u64, pins: &Pins) {
+        for (axis, bit) in SELECTS.into_iter().enumerate() {
+            let low = pins.is_low(Port::B, bit);
+            if low == self.selected[axis] {
+                continue;
+            }
+            self.selected[axis] = low;
+            let gyro = &mut self.gyros[axis];
+            if low {
+                gyro.bytes = 0;
+                if std::mem::take(&mut self.ticked) {
+                    self.instants.push(at);
+                }
+            } else if gyro.bytes == 2 {
+                gyro.take(axis as u64, self.quiet);
+            }
+        }
+        let acc = pins.ddr[Port::C as usize];
+        if self.acc_pins.last() != Some(&acc) {
+            self.acc_pins.push(acc);
+        }
+        self.reverse = pins.is_high(Port::D, DIRECTION);
+    }
+
+    fn motor_changed(&mut self, _at: u64, motor: &Pwm) {
+        let now = (motor.high, self.reverse && motor.high > 0.0);
+        if self.motor.last() != Some(&now) {
+            self.motor.push(now);
+        }
+    }
+
+    fn interrupt(&mut self, at: u64, vector: u8) {
+        if vector == TICK_VECTOR {
+            self.first_tick.get_or_insert(at);
+            self.ticked = true;
+        }
+    }
+}
+
+/// What the host does, and when: ms after the first tick.
+enum Deed {
+    Send(Vec<u8>),
+    SendWithoutStopBit(u8),
+    /// The stand comes to rest, or moves again.
+    Quiet(bool),
+    /// A bit of the EEPROM's byte at an address flips.
+    Flip(usize),
+}
+
+fn request(number: u16, command: Command) -> Deed {
+    let mut line = [0; wire::MAX_FRAME];
+    let len = encode_request(&wire::Request { number, command }, &mut line).expect("there is room");
+    Deed::Send(line[..len].to_vec())
+}
+
+fn raw_request(number: u16, code: u8, arguments: [u8; 8]) -> Deed {
+    let mut fields = number.to_le_bytes().to_vec();
+    fields.push(code);
+    fields.extend(arguments);
+    let mut line = [0; wire::MAX_FRAME];
+    let len = wire::fields::encode(kind::REQUEST, &fields, &mut line);
+    Deed::Send(line[..len].to_vec())
+}
+
+/// Commands that are answered at once, good ones and bad.
+fn plain_commands() -> Vec<(u8, [u8; 8])> {
+    let mut all = Vec::new();
+    let mut ask = |code: u8, arguments: &[u8]| {
+        let mut eight = [0; 8];
+        eight[..arguments.len()].copy_from_slice(arguments);
+        all.push((code, eight));
+    };
+    for code in [
+        code::PING,
+        code::GET_HELLO,
+        code::COUNTERS,
+        0,
+        7,
+        20,
+        67,
+        84,
+        255,
+    ] {
+        ask(code, &[]);
+    }
+    ask(code::PING, &[0, 0, 0, 0, 0, 0, 0, 1]);
+    ask(code::SET_ACC_RANGE, &[3]);
+    ask(code::SET_ACC_RANGE, &[4]);
+    ask(code::SET_ACC_RANGE, &[2, 1]);
+    for axis in 0..4 {
+        ask(code::SET_BIAS, &[axis, 0x12, 0x34 ^ axis, axis, 0]);
+        ask(code::SET_SCALE, &[axis, 0xEB, 0xC0, 0x12, 0]);
+    }
+    ask(code::SET_SCALE, &[0, 0, 0, 0, 0]);
+    ask(code::SET_SCALE, &[0, 0, 0, 0, 0x80]);
+    // Far out of range, so that the rate saturates.
+    ask(code::SET_BIAS, &[1, 0, 0, 0, 0x80]);
+    ask(code::SET_BIAS, &[2, 0xFF, 0xFF, 0xFF, 0x7F]);
+    ask(code::SET_RATE, &[0xCF, 0x03, 0]);
+    ask(code::SET_RATE, &[0x25, 0xF4, 0]);
+    ask(code::SET_RATE, &[0x51, 0xC3, 5]);
+    ask(code::SET_BAUD, &[0x00, 0x10]);
+    ask(code::SET_GYRO, &[3, 2]);
+    ask(code::SET_GYRO, &[2, 1]);
+    ask(code::SET_GYRO, &[1, 3]);
+    ask(code::SET_GYRO, &[4, 7]);
+    ask(code::MOTOR_DUTY, &[100, 0]);
+    ask(code::MOTOR_DUTY, &[0, 1]);
+    ask(code::MOTOR_DUTY, &[0, 0]);
+    ask(code::MOTOR_PROFILE, &[3, 100, 0, 0, 0, 200, 0, 0]);
+    ask(code::MOTOR_PROFILE, &[0, 9, 9, 9, 9, 9, 9, 9]);
+    ask(code::SELF_TEST, &[3]);
+    ask(code::SELF_TEST, &[4]);
+    ask(code::BIAS_NULL, &[1, 0]);
+    ask(code::BIAS_NULL, &[1, 64]);
+    ask(code::SET_BOARD_ID, &[0x39, 0x30]);
+    ask(code::LOAD_CONFIG, &[]);
+    ask(code::GET_HELLO, &[]);
+    all
+}
+
+/// Everything that the host does.
+fn deeds() -> Vec<(u64, Deed)> {
+    let mut all: Vec<(u64, Deed)> = Vec::new();
+    let mut number = 0;
+    let mut next = || {
+        number += 1;
+        number
+    };
+    // 20 ms after a tick or 5 ms before one: neither on the edge of a sample, nor of the health frame.
+    let mut at = 20;
+    for (code, arguments) in plain_commands() {
+        all.push((at, raw_request(next(), code, arguments)));
+        at += 50;
+    }
+    // Damage of all kinds, then a request in order.
+    for bytes in [
+        vec![5, 1, 16, 3, 0],
+        vec![255, 1, 2, 3, 0],
+        vec![1, 0],
+        vec![9; 40],
+        vec![0, 0, 0],
+        vec![7, 1, 16, 3, 2, 1, 9, 1, 1, 1, 1, 1, 1, 1, 5, 1, 2, 3, 4, 0],
+        b"?".to_vec(),
+        b"??\0".to_vec(),
+        b"ping?\0".to_vec(),
+    ] {
+        all.push((at, Deed::Send(bytes)));
+        at += 50;
+    }
+    for byte in [0x55, 0] {
+        all.push((at, Deed::SendWithoutStopBit(byte)));
+        at += 50;
+    }
+    all.push((at, Deed::Send(vec![0])));
+    at += 50;
+    // Work on the gyros; the second of a pair finds the first one busy.
+    let on_gyros = [
+        (
+            Command::SetGyro {
+                range: 2,
+                filter: 4,
+            },
+            200,
+        ),
+        (
+            Command::SetGyro {
+                range: 2,
+                filter: 4,
+            },
+            5,
+        ),
+        (
+            Command::SetGyro {
+                range: 4,
+                filter: 2,
+            },
+            195,
+        ),
+        (
+            Command::SetGyro {
+                range: 4,
+                filter: 2,
+            },
+            200,
+        ),
+        (
+            Command::ReadRegister {
+                gyro: wire::Axis::Y,
+                address: 0x38,
+            },
+            100,
+        ),
+        (
+            Command::ReadRegister {
+                gyro: wire::Axis::Y,
+                address: 0x3E,
+            },
+            100,
+        ),
+        (
+            Command::ReadRegister {
+                gyro: wire::Axis::Y,
+                address: 0x06,
+            },
+            100,
+        ),
+        (
+            Command::ReadRegister {
+                gyro: wire::Axis::Y,
+                address: 0x40,
+            },
+            100,
+        ),
+        (
+            Command::WriteRegister {
+                gyro: wire::Axis::X,
+                address: 0x14,
+                value: 0x0123,
+            },
+            100,
+        ),
+        (
+            Command::WriteRegister {
+                gyro: wire::Axis::X,
+                address: 0x02,
+                value: 1,
+            },
+            100,
+        ),
+        (
+            Command::WriteRegister {
+                gyro: wire::Axis::Z,
+                address: 0x38,
+                value: 0x0204,
+            },
+            100,
+        ),
+        (
+            Command::WriteRegister {
+                gyro: wire::Axis::Z,
+                address: 0x38,
+                value: 0x0402,
+            },
+            100,
+        ),
+        (
+            Command::WriteRegister {
+                gyro: wire::Axis::X,
+                address: 0x3E,
+                value: 0x0010,
+            },
+            100,
+        ),
+        (
+            Command::SelfTest {
+                sensor: wire::Sensor::GyroX,
+            },
+            400,
+        ),
+        (
+            Command::SelfTest {
+                sensor: wire::Sensor::GyroY,
+            },
+            5,
+        ),
+        (
+            Command::SelfTest {
+                sensor: wire::Sensor::GyroZ,
+            },
+            395,
+        ),
+        (
+            Command::SelfTest {
+                sensor: wire::Sensor::GyroZ,
+            },
+            400,
+        ),
+    ];
+    for (command, pause) in on_gyros {
+        all.push((at, request(next(), command)));
+        at += pause;
+    }
+    all.push((
+        at,
+        raw_request(next(), code::READ_REGISTER, [3, 0x38, 0, 0, 0, 0, 0, 0]),
+    ));
+    at += 100;
+    // The motor: refused, driven, limited, left alone; profiles of all shapes.
+    let alive =
+        |all: &mut Vec<(u64, Deed)>, from: u64, ms: u64, number: &mut dyn FnMut() -> u16| {
+            for keep in 0..ms / 100 {
+                all.push((from + keep * 100, request(number(), Command::KeepAlive)));
+            }
+        };
+    for (command, ms) in [
+        (Command::MotorDuty { duty: 200 }, 700),
+        (Command::MotorDuty { duty: -255 }, 1300),
+        (
+            Command::MotorLimits {
+                max_duty: 90,
+                ramp_per_s: 2000,
+            },
+            200,
+        ),
+        (Command::MotorDuty { duty: 200 }, 600),
+        (Command::BiasNull { samples: 4 }, 100),
+        (
+            Command::MotorLimits {
+                max_duty: 255,
+                ramp_per_s: 65_535,
+            },
+            100,
+        ),
+        (
+            Command::MotorProfile {
+                shape: Shape::Steps,
+                amplitude: 50,
+                offset: -20,
+                period_ms: 300,
+                cycles: 2,
+            },
+            1000,
+        ),
+        (
+            Command::MotorProfile {
+                shape: Shape::Triangle,
+                amplitude: 255,
+                offset: 30,
+                period_ms: 700,
+                cycles: 0,
+            },
+            1500,
+        ),
+        (
+            Command::MotorProfile {
+                shape: Shape::Sine,
+                amplitude: -200,
+                offset: 10,
+                period_ms: 999,
+                cycles: 1,
+            },
+            1500,
+        ),
+    ] {
+        alive(&mut all, at, ms, &mut next);
+        all.push((at + 10, request(next(), command)));
+        at += ms;
+    }
+    at += 500;
+    // Bias: moving, then at rest, and another one meanwhile.
+    all.push((at, request(next(), Command::BiasNull { samples: 10 })));
+    at += 200;
+    all.push((at, Deed::Quiet(true)));
+    at += 100;
+    all.push((at, request(next(), Command::BiasNull { samples: 33 })));
+    all.push((at + 50, request(next(), Command::BiasNull { samples: 33 })));
+    at += 2500;
+    all.push((at, Deed::Quiet(false)));
+    at += 50;
+    // EEPROM: store twice, spoil the newer, load; store, and spoil both.
+    for command in [
+        Command::StoreConfig,
+        Command::SetBoardId { board_id: 77 },
+        Command::StoreConfig,
+        Command::GetHello,
+        Command::DefaultConfig,
+        Command::LoadConfig,
+        Command::GetHello,
+    ] {
+        all.push((at, request(next(), command)));
+        at += 700;
+    }
+    all.push((at, request(next(), Command::StoreConfig)));
+    all.push((at + 100, request(next(), Command::StoreConfig)));
+    at += 700;
+    for spoilt in [20, 90] {
+        all.push((at, Deed::Flip(spoilt)));
+        all.push((at + 50, request(next(), Command::LoadConfig)));
+        all.push((at + 150, request(next(), Command::GetHello)));
+        at += 500;
+    }
+    // Fast: 256 Hz at 250 kBd, with everything going on; slow: 1 Hz.
+    all.push((at, request(next(), Command::SetBaud { divisor: 3 })));
+    at += 100;
+    all.push((
+        at,
+        request(
+            next(),
+            Command::SetRate {
+                period_ticks: 976,
+                periods_per_sample: 1,
+            },
+        ),
+    ));
+    at += 1_000;
+    all.push((
+        at,
+        request(
+            next(),
+            Command::SetRate {
+                period_ticks: 50_000,
+                periods_per_sample: 5,
+            },
+        ),
+    ));
+    at += 3_500;
+    all.push((
+        at,
+        request(
+            next(),
+            Command::SetRate {
+                period_ticks: 12_500,
+                periods_per_sample: 1,
+            },
+        ),
+    ));
+    at += 2_000;
+    all.push((at, request(next(), Command::ClearCounters)));
+    all.push((at + 100, request(next(), Command::Counters)));
+    at += 300;
+    all.push((at, Deed::Send(Vec::new())));
+    all
+}
+
+/// Peak-to-peak jitter of the sampling instants, cycles: every period is a multiple of timer 1's 64 cycles.
+pub fn jitter(script: &Script) -> u64 {
+    let Some(&first) = script.instants.first() else {
+        return u64::MAX;
+    };
+    let late: Vec<i64> = script
+        .instants
+        .iter()
+        .map(|&at| ((at - first) as i64 + 32).rem_euclid(64) - 32)
+        .collect();
+    late.iter()
+        .max()
+        .unwrap_or(&0)
+        .abs_diff(*late.iter().min().unwrap_or(&0))
+}
+
+/// How many undamaged requests the session has.
+pub fn requests() -> usize {
+    deeds()
+        .iter()
+        .filter(|(_, deed)| matches!(deed, Deed::Send(bytes) if bytes.len() == wire::Request::FRAME_LEN))
+        .count()
+}
+
+/// Runs until `until`, and says what is wrong where the image stops.
+///
+/// # Errors
+/// An image that stops.
+pub fn run(mcu: &mut Mcu, script: &mut Script, until: u64) -> Result<(), String> {
+    match mcu.run_until(until, script) {
+        Stop::Reached => Ok(()),
+        stop => Err(format!(
+            "stopped at {:#06x} after {} cycles: {stop:?}",
+            mcu.program_counter(),
+            mcu.cycle()
+        )),
+    }
+}
+
+/// Power on, until the first tick; its cycle.
+///
+/// # Errors
+/// An image that stops, or does not tick within a second.
+pub fn start(mcu: &mut Mcu, script: &mut Script) -> Result<u64, String> {
+    for millisecond in 1..1_000 {
+        run(mcu, script, millisecond * MILLISECOND)?;
+        if let Some(first) = script.first_tick {
+            return Ok(first);
+        }
+    }
+    Err("no tick within a second".to_owned())
+}
+
+/// Puts an image through the session.
+///
+/// # Errors
+/// An image that stops.
+pub fn play(mcu: &mut Mcu) -> Result<Script, String> {
+    let mut script = Script::default();
+    let first = start(mcu, &mut script)?;
+    for (ms, deed) in deeds() {
+        run(mcu, &mut script, first + ms * MILLISECOND)?;
+        match deed {
+            Deed::Send(bytes) => bytes.into_iter().for_each(|byte| mcu.send(byte)),
+            Deed::SendWithoutStopBit(byte) => mcu.send_without_stop_bit(byte),
+            Deed::Quiet(quiet) => script.quiet = quiet,
+            Deed::Flip(address) => {
+                let mut bytes = mcu.eeprom().to_vec();
+                bytes[address] ^= 1;
+                mcu.set_eeprom(&bytes);
+            }
+        }
+    }
+    Ok(script)
+}
+
+/// The longest work of a tick that a health frame told of, timer ticks.
+pub fn busy_max(script: &Script) -> u16 {
+    let mut decoder = Decoder::new();
+    let frames = script.line.iter().filter_map(|&byte| decoder.push(byte));
+    let healths = frames.filter_map(|frame| match frame {
+        Ok(Frame::Health(health)) => Some(health.tick_busy_max),
+        _ => None,
+    });
+    healths.max().unwrap_or(0)
+}
+
+/// What came over the line, frame by frame, without what depends on the image's speed and stack.
+pub fn frames(line: &[u8]) -> Vec<String> {
+    line.split_inclusive(|&byte| byte == 0)
+        .map(|bytes| {
+            let mut decoder = Decoder::new();
+            let frame = bytes.iter().find_map(|&byte| decoder.push(byte));
+            match (frame, bytes) {
+                (Some(Ok(Frame::Health(health))), _) => {
+                    let health = Health {
+                        tick_busy_max: 0,
+                        stack_free: 0,
+                        ..health
+                    };
+                    format!("{health:?}")
+                }
+                (Some(Ok(frame)), _) => format!("{bytes:02x?} {frame:?}"),
+                // The console's last number is the free stack.
+                (_, [b'v', ..]) => {
+                    let text = String::from_utf8_lossy(bytes);
+                    text.split(" z").next().unwrap_or_default().to_owned()
+                }
+                (frame, _) => format!("{bytes:02x?} {frame:?}"),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,290 @@
+#include "stand.h"
+
+#include <avr/io.h>
+#include <string.h>
+
+#include "bias.h"
+#include "board.h"
+#include "frame.h"
+#include "gyro.h"
+#include "motor.h"
+#include "serial.h"
+#include "store.h"
+#include "tick.h"
+
+#define TICK_NS 4000
+#define HEALTH_MS 1000
+/* SUPPLY_OUT at 4.75 V and 5.25 V. */
+#define SUPPLY_LOWEST 2594
+#define SUPPLY_HIGHEST 2866
+#define ADC_MAX 1023
+
+struct pending stand_job, stand_null;
+uint16_t stand_null_samples;
+struct reply stand_answer;
+uint8_t stand_misconfigured;
+static struct health health;
+static uint8_t silent; /* bit per axis: not answering at the last sample */
+static bool unset;     /* the gyros have to be set up (anew) */
+
+void stand_count(uint8_t fault, uint8_t times)
+{
+    uint16_t *count = &health.faults[fault];
+    if (__builtin_add_overflow(*count, times, count))
+        *count = UINT16_MAX;
+}
+
+void stand_count_each(uint8_t fault, uint8_t axes)
+{
+    for (; axes; axes >>= 1, fault++) {
+        if (axes & 1)
+            stand_count(fault, 1);
+    }
+}
+
+static void report(uint8_t kind, void *payload, uint8_t length)
+{
+    if (!frame_send(kind, payload, length))
+        stand_count(FAULT_REPORT_DROPPED, 1);
+}
+
+void stand_hello(void)
+{
+    struct hello hello = {
+        .firmware = {FIRMWARE_VERSION},
+        .board_id = config.board_id,
+        .reset_cause = board_reset_cause(),
+        .restarts = board_restarts(),
+        .next_seq = health.next_seq,
+        .tick_ns = TICK_NS,
+        .set_up = config.set_up,
+    };
+    report(KIND_HELLO, &hello, sizeof hello);
+}
+
+void stand_health(void)
+{
+    health.stack_free = board_stack_free();
+    report(KIND_HEALTH, &health, sizeof health);
+}
+
+void stand_clear_counters(void)
+{
+    memset(health.faults, 0, sizeof health.faults);
+}
+
+void stand_reply(uint8_t code, uint16_t number, uint8_t status)
+{
+    stand_answer.number = number;
+    stand_answer.command = code;
+    stand_answer.status = status;
+    report(KIND_REPLY, &stand_answer, sizeof stand_answer);
+    memset(&stand_answer, 0, sizeof stand_answer);
+}
+
+void stand_reply_pending(struct pending *pending, uint8_t status)
+{
+    uint8_t code = pending->code;
+    pending->code = 0;
+    stand_reply(code, pending->number, status);
+}
+
+void stand_note_configured(uint8_t wrong)
+{
+    stand_misconfigured = wrong;
+    stand_count_each(FAULT_GYRO_REGISTER_MISMATCH_X, wrong);
+}
+
+void stand_apply(void)
+{
+    motor_limit(config.max_duty, config.ramp_per_s);
+    board_set_motor(0);
+    tick_set_period(config.set_up.period_ticks, config.set_up.periods_per_sample);
+    serial_set_baud_later(config.set_up.baud_divisor);
+    sensors_set_acc_range(config.set_up.acc_range);
+    unset = true;
+}
+
+void stand_boot(void)
+{
+    if (board_reset_cause() & _BV(WDRF))
+        stand_count(FAULT_WATCHDOG_RESET, 1);
+    if (board_reset_cause() & _BV(BORF))
+        stand_count(FAULT_BROWN_OUT_RESET, 1);
+    if (!store_load())
+        config_set_default();
+    stand_apply();
+}
+
+void stand_started(uint8_t wrong)
+{
+    unset = false;
+    stand_note_configured(wrong);
+    stand_hello();
+}
+
+/* Q16.16 deg/s: counts times scale, less bias. */
+static int32_t rate_of(int16_t counts, int32_t scale_q24, int32_t bias)
+{
+    int32_t rate = counts * (scale_q24 >> 8) + ((int32_t)counts * (uint8_t)scale_q24 >> 8);
+    int32_t result;
+    if (__builtin_sub_overflow(rate, bias, &result))
+        result = rate < 0 ? INT32_MIN : INT32_MAX;
+    return result;
+}
+
+/* One gyro's part of the sample; its flags. */
+static uint16_t take_gyro(uint8_t axis, const struct raw *raw, struct sample *sample)
+{
+    uint16_t word = raw->gyro[axis];
+    bool stalled = raw->spi_stalled & 1 << axis;
+    if (stalled)
+        stand_count(FAULT_SPI_STALLED, 1);
+    if (stalled || word == 0 || word == 0xffff) {
+        stand_count(FAULT_GYRO_NOT_ANSWERING_X + axis, 1);
+        return FLAG_GYRO_NOT_ANSWERING;
+    }
+    int16_t counts = (int16_t)(word << 2) >> 2;
+    sample->gyro[axis] = counts;
+    sample->temp[axis] = (int16_t)(raw->temp[axis] << 4) >> 4;
+    sample->rate[axis] = rate_of(counts, config.set_up.scale[axis], config.set_up.bias[axis]);
+    uint16_t flags = 0;
+    if (word & 0x8000)
+        flags = FLAG_NEW_X << axis;
+    else
+        stand_count(FAULT_GYRO_STALE_X + axis, 1);
+    if (word & 0x4000) {
+        flags |= FLAG_ERROR_X << axis;
+        stand_count(FAULT_GYRO_ERROR_ALARM_X + axis, 1);
+    }
+    return flags;
+}
+
+static uint16_t take_accelerometer(uint8_t axis, const struct raw *raw, struct sample *sample)
+{
+    uint16_t counts = raw->acc[axis];
+    sample->acc[axis] = counts;
+    if (raw->adc_stalled & 1 << axis) {
+        stand_count(FAULT_ADC_STALLED, 1);
+        return FLAG_ACC_NOT_CONVERTED;
+    }
+    if (counts == 0 || counts >= ADC_MAX) {
+        stand_count(FAULT_ACC_AT_RAIL_X + axis, 1);
+        return FLAG_ACC_AT_RAIL;
+    }
+    return 0;
+}
+
+/* One supply for three gyros: the first that answers says what it is. */
+static uint16_t take_supply(const struct raw *raw, struct sample *sample)
+{
+    for (uint8_t axis = 0; axis < 3; axis++) {
+        if (silent & 1 << axis)
+            continue;
+        uint16_t counts = raw->supply[axis] & 0x0fff;
+        sample->supply = counts;
+        if (counts >= SUPPLY_LOWEST && counts <= SUPPLY_HIGHEST)
+            return 0;
+        stand_count(FAULT_SUPPLY_OUT_OF_RANGE, 1);
+        return FLAG_SUPPLY_OUT_OF_RANGE;
+    }
+    return 0;
+}
+
+/* A gyro that answers again may have lost its set-up with its power. */
+static void look_after_gyros(uint8_t silent_now)
+{
+    uint8_t back = silent & (uint8_t)~silent_now;
+    silent = silent_now;
+    if (back) {
+        stand_count_each(FAULT_GYRO_RECOVERED_X, back);
+        unset = true;
+    }
+    if (unset && stand_job.code == 0 && tick_post(JOB_CONFIGURE, 0, 0, config_sens_avg())) {
+        unset = false;
+        stand_job.code = CODE_OWN;
+    }
+}
+
+static void end_bias_null(bool moving)
+{
+    int32_t largest = 0;
+    for (uint8_t axis = 0; axis < 3; axis++) {
+        int32_t error;
+        if (!bias_mean(axis, config.set_up.scale[axis], &stand_answer.detail[axis], &error))
+            moving = true;
+        else if (error > largest)
+            largest = error;
+    }
+    if (moving) {
+        memset(stand_answer.detail, 0, sizeof stand_answer.detail);
+        stand_reply_pending(&stand_null, STATUS_MOVING);
+        return;
+    }
+    stand_answer.value = largest;
+    memcpy(config.set_up.bias, stand_answer.detail, sizeof config.set_up.bias);
+    config.set_up.config_source = SOURCE_SET;
+    stand_reply_pending(&stand_null, STATUS_OK);
+}
+
+/* Only samples in order count: a gyro that is silent or stale would be averaged as if it were at rest. */
+static void step_bias_null(bool in_order, const struct sample *sample)
+{
+    bool moving = motor_is_on();
+    if (in_order && !moving)
+        moving = !bias_take(sample->gyro);
+    if (moving || bias_have() >= stand_null_samples)
+        end_bias_null(moving);
+}
+
+void stand_on_sample(const struct raw *raw, uint8_t missed)
+{
+    struct sample sample;
+    memset(&sample, 0, sizeof sample);
+    uint16_t flags = 0;
+    if (missed) {
+        stand_count(FAULT_TICK_OVERRUN, missed);
+        health.next_seq += missed;
+        flags = FLAG_TICK_OVERRUN;
+    }
+    sample.seq = health.next_seq++;
+    sample.t_ticks = raw->t_ticks;
+    sample.pwm = motor_output();
+    uint8_t silent_now = 0;
+    for (uint8_t axis = 0; axis < 3; axis++) {
+        uint16_t gyro = take_gyro(axis, raw, &sample);
+        if (gyro == FLAG_GYRO_NOT_ANSWERING)
+            silent_now |= (uint8_t)(1 << axis);
+        flags |= gyro | take_accelerometer(axis, raw, &sample);
+    }
+    look_after_gyros(silent_now);
+    if (stand_misconfigured & ~silent_now)
+        flags |= FLAG_GYRO_MISCONFIGURED;
+    flags |= take_supply(raw, &sample);
+    if (stand_null.code) {
+        bool in_order = (flags & FLAGS_IN_ORDER) == FLAGS_IN_ORDER;
+        flags |= FLAG_BIAS_NULL;
+        step_bias_null(in_order, &sample);
+    }
+    sample.flags = flags;
+    if (!frame_send(KIND_SAMPLE, &sample, sizeof sample))
+        stand_count(FAULT_FRAME_DROPPED, 1);
+    requests_on_sample();
+    uint16_t busy = tick_since();
+    if (busy > health.tick_busy_max)
+        health.tick_busy_max = busy;
+}
+
+void stand_on_millisecond(void)
+{
+    static uint16_t millisecond;
+    if (motor_on_millisecond())
+        stand_count(FAULT_MOTOR_TIMEOUT, 1);
+    board_set_motor(motor_output());
+    requests_on_millisecond();
+    if (++millisecond >= HEALTH_MS) {
+        millisecond = 0;
+        health.uptime_s++;
+        stand_health();
+    }
+}

@@ -1,0 +1,50 @@
+/* The work below the tick: scaling, framing, counting, answering. */
+#pragma once
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sensors.h"
+#include "wire.h"
+
+/* Reads the stored set-up and applies it. */
+void stand_boot(void);
+/* What gyro_configure returned at start; says hello. */
+void stand_started(uint8_t misconfigured);
+void stand_on_sample(const struct raw *raw, uint8_t missed);
+void stand_on_millisecond(void);
+void stand_on_request(const struct request *request);
+/* Counts a fault so many times more. */
+void stand_count(uint8_t fault, uint8_t times);
+/* Counts a fault for each axis that has its bit set; fault is that of x. */
+void stand_count_each(uint8_t fault, uint8_t axes);
+
+/* Between stand.c and requests.c. */
+
+/* A request that is answered when it is done; code 0: none. */
+struct pending {
+    uint8_t code;
+    uint16_t number;
+};
+/* What the board does unasked, and nobody is told of. */
+#define CODE_OWN 0xff
+
+extern struct pending stand_job, stand_null;
+extern uint16_t stand_null_samples;
+/* What the next reply says beside its status. */
+extern struct reply stand_answer;
+/* Bit per axis: not set up as the hello frame says. */
+extern uint8_t stand_misconfigured;
+
+void stand_hello(void);
+void stand_health(void);
+void stand_clear_counters(void);
+/* Applies the set-up to motor, clock, line and sensors. */
+void stand_apply(void);
+void stand_note_configured(uint8_t wrong);
+/* The one reply to a request. */
+void stand_reply(uint8_t code, uint16_t number, uint8_t status);
+/* The same for one that was pending, and is no more. */
+void stand_reply_pending(struct pending *pending, uint8_t status);
+void requests_on_sample(void);
+void requests_on_millisecond(void);

@@ -1,0 +1,177 @@
+#include "store.h"
+
+#include <avr/io.h>
+#include <util/atomic.h>
+
+#include "frame.h"
+#include "motor.h"
+#include "stand.h"
+
+#define FORMAT 2
+/* 0.07326 deg/s for each count at 320 deg/s, Q8.24. */
+#define SCALE_320 1229099L
+#define MIN_PERIOD 976
+#define MAX_PERIOD 62500U
+#define MAX_PERIODS 4 /* 1 Hz is the slowest rate */
+#define MAX_DIVISOR 4095
+
+struct stored {
+    uint8_t format;
+    uint8_t generation;
+    struct config config;
+    uint32_t crc;
+};
+_Static_assert(sizeof(struct stored) == 45, "the format of a stored copy");
+
+/* Address 0 is left alone: a known weak spot when power sags. */
+#define SLOT(place) ((place) ? 80 : 16)
+
+struct config config;
+static struct stored copy;
+static bool storing;
+static uint8_t at, generation, newest;
+
+void config_set_scale_of_range(void)
+{
+    int32_t scale = SCALE_320;
+    if (config.set_up.gyro_range != 4)
+        scale = config.set_up.gyro_range == 2 ? SCALE_320 >> 1 : SCALE_320 >> 2;
+    for (uint8_t axis = 0; axis < 3; axis++)
+        config.set_up.scale[axis] = scale;
+}
+
+void config_set_default(void)
+{
+    struct set_up *set_up = &config.set_up;
+    set_up->period_ticks = 12500;
+    set_up->periods_per_sample = 1;
+    set_up->baud_divisor = 25;
+    set_up->gyro_range = 4;
+    set_up->gyro_filter = 2;
+    set_up->gyro_sample_period = 1;
+    set_up->acc_range = 0;
+    for (uint8_t axis = 0; axis < 3; axis++)
+        set_up->bias[axis] = 0;
+    config_set_scale_of_range();
+    config.ramp_per_s = MOTOR_DEFAULT_RAMP_PER_S;
+    config.max_duty = MOTOR_FULL;
+}
+
+uint16_t config_sens_avg(void)
+{
+    return (uint16_t)(config.set_up.gyro_range << 8 | config.set_up.gyro_filter);
+}
+
+bool config_rate_in_order(uint16_t ticks, uint8_t every)
+{
+    return ticks >= MIN_PERIOD && ticks <= MAX_PERIOD && every >= 1 && every <= MAX_PERIODS;
+}
+
+bool config_baud_in_order(uint16_t divisor)
+{
+    return divisor <= MAX_DIVISOR;
+}
+
+/* A narrow range demands taps. */
+bool config_gyro_in_order(uint8_t range, uint8_t filter)
+{
+    uint8_t fewest_taps = range == 4 ? 0 : range == 2 ? 2 : range == 1 ? 4 : 7;
+    return filter >= fewest_taps && filter <= 6;
+}
+
+static uint8_t eeprom_read(uint16_t address)
+{
+    EEAR = address;
+    EECR |= _BV(EERE);
+    return EEDR;
+}
+
+static void eeprom_write(uint16_t address, uint8_t byte)
+{
+    EEAR = address;
+    EEDR = byte;
+    ATOMIC_BLOCK(ATOMIC_FORCEON)
+    {
+        EECR = _BV(EEMWE);
+        EECR = _BV(EEMWE) | _BV(EEWE); /* within four cycles */
+    }
+}
+
+static bool copy_is_in_order(void)
+{
+    const struct set_up *set_up = &copy.config.set_up;
+    return crc_update(CRC_INIT, &copy, sizeof copy) == CRC_RESIDUE && copy.format == FORMAT &&
+           config_gyro_in_order(set_up->gyro_range, set_up->gyro_filter) && set_up->acc_range <= 3 &&
+           config_rate_in_order(set_up->period_ticks, set_up->periods_per_sample) &&
+           config_baud_in_order(set_up->baud_divisor);
+}
+
+bool store_load(void)
+{
+    bool found = false;
+    for (uint8_t place = 0; place < 2; place++) {
+        uint8_t all = 0xff;
+        uint16_t address = SLOT(place);
+        for (uint8_t *to = (uint8_t *)&copy; to < (uint8_t *)(&copy + 1); to++, address++) {
+            *to = eeprom_read(address);
+            all &= *to;
+        }
+        if (!copy_is_in_order()) {
+            if (all != 0xff) /* an erased one is not spoilt */
+                stand_count(FAULT_CONFIG_INVALID, 1);
+            continue;
+        }
+        /* Generations wrap: the newer one is ahead by less than half the circle. */
+        if (!found || (uint8_t)(copy.generation - generation) < 128) {
+            found = true;
+            config = copy.config;
+            config.set_up.config_source = SOURCE_STORED + place;
+            generation = copy.generation;
+            newest = place;
+        }
+    }
+    return found;
+}
+
+bool store_is_idle(void)
+{
+    return !storing;
+}
+
+bool store_begin(void)
+{
+    if (storing)
+        return false;
+    storing = true;
+    at = 0;
+    copy.format = FORMAT;
+    copy.generation = (uint8_t)(generation + 1);
+    copy.config = config;
+    copy.crc = ~crc_update(CRC_INIT, &copy, sizeof copy - sizeof copy.crc);
+    return true;
+}
+
+uint8_t store_step(void)
+{
+    if (!storing || (EECR & _BV(EEWE)))
+        return STORE_GOES_ON;
+    uint8_t place = newest ^ 1;
+    uint16_t address = SLOT(place);
+    const uint8_t *bytes = (const uint8_t *)&copy;
+    if (at < sizeof copy) {
+        eeprom_write(address + at, bytes[at]);
+        at++;
+        return STORE_GOES_ON;
+    }
+    storing = false;
+    for (uint8_t left = sizeof copy; left; left--) {
+        if (eeprom_read(address++) != *bytes++) {
+            stand_count(FAULT_CONFIG_NOT_STORED, 1);
+            return STATUS_NOT_STORED;
+        }
+    }
+    generation = copy.generation;
+    newest = place;
+    config.set_up.config_source = SOURCE_STORED + place;
+    return STATUS_OK;
+}

@@ -1,0 +1,196 @@
+#include "tick.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+#include <avr/wdt.h>
+#include <stddef.h>
+#include <util/atomic.h>
+
+#include "serial.h"
+
+/* Timer 1 counts 4 us ticks to the period (compare A). Compare B comes 64 us before that, interrupts whatever runs,
+ * masks the other interrupts and sleeps. The compare A that wakes it is then alone, and waking takes the same number of
+ * cycles every time: no jitter. After the first round over the sensors the masks fall. */
+#define GUARD_TICKS 16
+#define TIMSK_ALL (_BV(OCIE1A) | _BV(OCIE1B) | _BV(OCIE0))
+
+/* The interrupt fills one, the main loop works on the other. */
+static struct raw raws[2];
+static volatile uint8_t filling;
+static volatile bool ready;
+static volatile uint8_t missed_ticks, milliseconds;
+static volatile bool ticked;
+static uint32_t t_ticks;
+static uint16_t period, next_period;
+static uint8_t skip, next_every;
+static uint8_t masked_ucsrb;
+
+enum slot { FREE, POSTED, DONE };
+static volatile uint8_t slot;
+static struct gyro_job job;
+
+static void set_compare(uint16_t ticks)
+{
+    uint16_t last = ticks - 1;
+    OCR1A = last;
+    OCR1B = last - GUARD_TICKS;
+}
+
+void tick_start(void)
+{
+    period = next_period;
+    skip = next_every - 1;
+    set_compare(period);
+    wdt_enable(WDTO_1S); /* longer than the slowest tick */
+    OCR0 = 249; /* CTC, clock / 64: 1 kHz */
+    TCCR0 = _BV(WGM01) | _BV(CS01) | _BV(CS00);
+    TCNT1 = 0;
+    TCCR1B = _BV(WGM12) | _BV(CS11) | _BV(CS10);
+    TIMSK = TIMSK_ALL;
+}
+
+void tick_stop(void)
+{
+    TIMSK = 0;
+}
+
+void tick_set_period(uint16_t ticks, uint8_t every)
+{
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        next_period = ticks;
+        next_every = every;
+    }
+}
+
+const struct raw *tick_take(uint8_t *missed)
+{
+    const struct raw *taken = NULL;
+    ATOMIC_BLOCK(ATOMIC_FORCEON)
+    {
+        if (ready) {
+            ready = false;
+            *missed = missed_ticks;
+            missed_ticks = 0;
+            taken = &raws[filling];
+            filling ^= 1;
+        }
+    }
+    return taken;
+}
+
+bool tick_take_millisecond(void)
+{
+    bool any = false;
+    ATOMIC_BLOCK(ATOMIC_FORCEON)
+    {
+        if (milliseconds) {
+            milliseconds--;
+            any = true;
+        }
+    }
+    return any;
+}
+
+uint16_t tick_since(void)
+{
+    uint16_t ticks;
+    ATOMIC_BLOCK(ATOMIC_FORCEON)
+    {
+        ticks = TCNT1;
+    }
+    return ticks;
+}
+
+bool tick_post(uint8_t what, uint8_t axis, uint8_t address, uint16_t value)
+{
+    if (slot != FREE)
+        return false;
+    job.what = what;
+    job.axis = axis;
+    job.address = address;
+    job.value = value;
+    __asm__ volatile("" ::: "memory");
+    slot = POSTED;
+    return true;
+}
+
+const struct gyro_job *tick_fetch_done(void)
+{
+    if (slot != DONE)
+        return NULL;
+    slot = FREE;
+    __asm__ volatile("" ::: "memory");
+    return &job;
+}
+
+/* sei takes effect after the next instruction, so no interrupt slips in before the sleep. */
+static inline void sleep_now(void)
+{
+    MCUCR = _BV(SE); /* idle */
+    sei();
+    sleep_cpu();
+    MCUCR = 0;
+}
+
+void tick_sleep_unless_work(void)
+{
+    cli();
+    if (ready || milliseconds || serial_has_received())
+        sei();
+    else
+        sleep_now();
+}
+
+static void unmask(void)
+{
+    serial_unmask(masked_ucsrb);
+    TIMSK = _BV(OCIE1A) | _BV(OCIE0);
+}
+
+ISR(TIMER0_COMP_vect)
+{
+    if (milliseconds != UINT8_MAX)
+        milliseconds++;
+}
+
+ISR(TIMER1_COMPA_vect)
+{
+    ticked = true;
+}
+
+ISR(TIMER1_COMPB_vect)
+{
+    TIMSK = _BV(OCIE1A);
+    t_ticks += period;
+    if (skip) {
+        skip--;
+        /* The clock runs, so the board lives; the main loop feeds at samples, and those are seconds apart. */
+        wdt_reset();
+        TIMSK = TIMSK_ALL;
+        return;
+    }
+    masked_ucsrb = serial_mask();
+    ticked = false;
+    struct raw *raw = &raws[filling];
+    /* Only compare A is left to wake it; the bound is for a wake-up that nobody explains. */
+    for (uint8_t left = 4; left && !ticked; left--)
+        sleep_now();
+    sensors_acquire(raw, unmask);
+    raw->t_ticks = t_ticks;
+    if (slot == POSTED) {
+        gyro_work(&job);
+        slot = DONE;
+    }
+    cli();
+    if (ready && missed_ticks != UINT8_MAX)
+        missed_ticks++;
+    ready = true;
+    if (period != next_period) {
+        period = next_period;
+        set_compare(period);
+    }
+    skip = next_every - 1;
+    TIMSK = TIMSK_ALL;
+}

@@ -1,0 +1,27 @@
+/* The sample clock: the sampling instant is moved by nothing else that goes on. */
+#pragma once
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "gyro.h"
+#include "sensors.h"
+
+/* Starts both timers and the watchdog; once, with interrupts off. */
+void tick_start(void);
+/* Stops both: no more samples. */
+void tick_stop(void);
+/* The period of the timer, and that every n-th has a sample: from the next sample on. */
+void tick_set_period(uint16_t ticks, uint8_t every);
+/* The sample that waits, or NULL; it is the caller's until the next call. Ticks lost before it go to missed. */
+const struct raw *tick_take(uint8_t *missed);
+/* Whether a millisecond has passed that nobody has taken yet. */
+bool tick_take_millisecond(void);
+/* Timer ticks since the tick. */
+uint16_t tick_since(void);
+/* Work on the gyros for the slot after the next sample; false while some waits or is not yet fetched. */
+bool tick_post(uint8_t what, uint8_t axis, uint8_t address, uint16_t value);
+/* The work that is done, or NULL; fetched once. */
+const struct gyro_job *tick_fetch_done(void);
+/* Sleeps until the next interrupt, unless something waits already. */
+void tick_sleep_unless_work(void);

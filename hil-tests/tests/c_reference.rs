@@ -1,0 +1,114 @@
+//! The C reference says, byte for byte, what the Rust image says.
+
+use std::path::{Path, PathBuf};
+use std::process::Command as Process;
+
+use atmega16_sim::Mcu;
+use hil_tests::image;
+
+#[allow(dead_code)]
+#[path = "../c-reference/session.rs"]
+mod session;
+
+/// Builds the C reference as its README says.
+fn reference() -> Vec<u8> {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("c-reference");
+    let elf = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("reference.elf");
+    let run = Process::new("sh")
+        .current_dir(&source)
+        .args(["-c", "exec avr-gcc @flags *.c -o \"$0\""])
+        .arg(&elf)
+        .output()
+        .expect("a shell runs");
+    assert!(
+        run.status.success(),
+        "avr-gcc (apt-get install gcc-avr avr-libc): {}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+    std::fs::read(&elf).expect("avr-gcc wrote it")
+}
+
+fn assert_same(of_rust: &[String], of_c: &[String]) {
+    for (n, (of_rust, of_c)) in of_rust.iter().zip(of_c).enumerate() {
+        assert_eq!(of_rust, of_c, "frame {n} (left: Rust, right: C)");
+    }
+    assert_eq!(of_rust.len(), of_c.len());
+}
+
+#[test]
+fn it_sends_byte_for_byte_what_the_rust_image_sends() {
+    let play = |name: &str, elf: &[u8]| {
+        let mut mcu = Mcu::new(elf).expect("it is an image");
+        session::play(&mut mcu).unwrap_or_else(|error| panic!("the {name} image {error}"))
+    };
+    let (rust, c) = (play("Rust", &image()), play("C", &reference()));
+    let (of_rust, of_c) = (session::frames(&rust.line), session::frames(&c.line));
+    // At 256 Hz a request comes at any moment of the tick's work, and what is sent first depends on its speed: up to
+    // there all in one order, over the whole session each kind of frame in its own.
+    let slow = |frames: &[String]| {
+        let fast = frames
+            .iter()
+            .position(|frame| frame.contains("command: 16, status: Ok"));
+        fast.expect("the rate is set")
+    };
+    let until = slow(&of_c);
+    assert_same(&of_rust[..until], &of_c[..until]);
+    for kind in ["Hello {", "Sample(", "Health {", "Reply {"] {
+        let of_kind = |frames: &[String]| -> Vec<String> {
+            let found = frames.iter().filter(|frame| frame.contains(kind));
+            found.cloned().collect()
+        };
+        let (of_rust, of_c) = (of_kind(&of_rust), of_kind(&of_c));
+        assert!(!of_c.is_empty(), "{kind}");
+        assert_same(&of_rust, &of_c);
+    }
+    assert_eq!(rust.motor, c.motor, "the motor's pulses");
+    assert_eq!(rust.acc_pins, c.acc_pins, "g-select");
+
+    // What they agree on is a whole session: every request answered once, every kind of frame, every status.
+    let replies: Vec<_> = of_c
+        .iter()
+        .filter(|frame| frame.contains("Reply {"))
+        .collect();
+    assert_eq!(replies.len(), session::requests());
+    for status in [
+        "Ok",
+        "UnknownCommand",
+        "Unsupported",
+        "BadArgument",
+        "Busy",
+        "Moving",
+        "ReadBackWrong",
+        "SelfTestFailed",
+        "NoKeepAlive",
+        "NoConfig",
+    ] {
+        let said = format!("status: {status},");
+        assert!(
+            replies.iter().any(|reply| reply.contains(&said)),
+            "{status}"
+        );
+    }
+    println!(
+        "{} frames, {} replies, {} bytes",
+        of_c.len(),
+        replies.len(),
+        c.line.len()
+    );
+}
+
+#[test]
+fn both_take_each_sample_at_the_same_instant_of_the_tick() {
+    for (name, elf) in [("Rust", image()), ("C", reference())] {
+        let mut mcu = Mcu::new(&elf).expect("it is an image");
+        let script =
+            session::play(&mut mcu).unwrap_or_else(|error| panic!("the {name} image {error}"));
+        let jitter = session::jitter(&script);
+        assert_eq!(
+            jitter,
+            0,
+            "{name}: cycles, peak to peak, over {} ticks",
+            script.instants.len()
+        );
+    }
+}
