@@ -1,6 +1,6 @@
 //! Omnibus checks of whitened residuals: they show that something is left, the search says what.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Gamma, Normal};
 
 use crate::likelihood::Panel;
 use crate::scan::residual;
@@ -57,6 +57,7 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
     vec![
         ljung_box(e),
         bands(u, rate_hz),
+        tiles(e, rate_hz),
         variance_cusum(e, rate_hz),
         kurtosis(e, rate_hz),
     ]
@@ -86,32 +87,124 @@ fn ljung_box(e: &[f64]) -> Outcome {
     }
 }
 
-fn bands(u: &[f64], rate_hz: f64) -> Outcome {
+/// A band of the whitened coefficients: its first one and its end, energy over the model's, chance times the bands.
+pub(crate) struct Band {
+    pub from: usize,
+    pub to: usize,
+    pub energy: f64,
+    pub chance: f64,
+}
+
+/// All bands of a record.
+pub(crate) fn all_bands(u: &[f64]) -> Vec<Band> {
     let n = u.len();
     let edge = |b: usize| (20f64 * (n as f64 / 20.0).powf(b as f64 / BANDS as f64)) as usize;
-    let mut worst = (1.0, 0.0, 0.0, 0.0);
-    for b in 0..BANDS {
-        let (low, high) = (if b == 0 { 1 } else { edge(b) }, edge(b + 1).min(n));
-        if high <= low {
-            continue;
-        }
-        let degrees = (high - low) as f64;
-        let energy: f64 = u[low..high].iter().map(|v| v * v).sum();
-        let upper = chi_tail(energy, degrees);
-        let p = (2.0 * upper.min(1.0 - upper) * BANDS as f64).min(1.0);
-        if p < worst.0 {
-            let hz = |k: usize| k as f64 / n as f64 * rate_hz / 2.0;
-            worst = (p, energy / degrees, hz(low), hz(high));
-        }
-    }
+    (0..BANDS)
+        .map(|b| (if b == 0 { 1 } else { edge(b) }, edge(b + 1).min(n)))
+        .filter(|(from, to)| to > from)
+        .map(|(from, to)| {
+            let degrees = (to - from) as f64;
+            let sum: f64 = u[from..to].iter().map(|v| v * v).sum();
+            let upper = chi_tail(sum, degrees);
+            Band {
+                from,
+                to,
+                energy: sum / degrees,
+                chance: (2.0 * upper.min(1.0 - upper) * BANDS as f64).min(1.0),
+            }
+        })
+        .collect()
+}
+
+fn bands(u: &[f64], rate_hz: f64) -> Outcome {
+    let hz = |k: usize| k as f64 / u.len() as f64 * rate_hz / 2.0;
+    // Where no band stands out, the one farthest from the model is told.
+    let worst = all_bands(u).into_iter().min_by(|a, b| {
+        let off = |x: &Band| -(x.energy.max(1e-12).ln() * (x.to - x.from) as f64).abs();
+        (a.chance, off(a))
+            .partial_cmp(&(b.chance, off(b)))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    let Some(worst) = worst else {
+        return Outcome {
+            id: "band_energy",
+            statistic: 1.0,
+            p_value: 1.0,
+            what: "too short for bands".into(),
+        };
+    };
     Outcome {
         id: "band_energy",
-        statistic: worst.1,
-        p_value: worst.0,
+        statistic: worst.energy,
+        p_value: worst.chance,
         what: format!(
             "energy of the whitened residual over the model's in {BANDS} bands; {:.3} from {:.4} to {:.4} Hz stands out most",
-            worst.1, worst.2, worst.3
+            worst.energy,
+            hz(worst.from),
+            hz(worst.to)
         ),
+    }
+}
+
+/// Segments of the record, coefficients in a tile, and most tiles of a segment.
+const SEGMENTS: [usize; 2] = [10, 60];
+const TILE: usize = 50;
+const MOST_TILES: usize = 24;
+
+/// Energies in tiles of time and frequency: a tone that wanders, rings or comes and goes fills some of them more than
+/// others, though each band and each stretch of time may have its share.
+fn tiles(e: &[f64], rate_hz: f64) -> Outcome {
+    let mut worst = (1.0f64, 0.0, String::new());
+    for segments in SEGMENTS {
+        let length = e.len() / segments;
+        if length < TILE {
+            continue;
+        }
+        let dct = crate::likelihood::Dct::new(length);
+        let count = (length / TILE).clamp(1, MOST_TILES);
+        let mut sum = 0.0;
+        let mut most = (0.0, 0, 0, 0.0);
+        for s in 0..segments {
+            let c = dct.forward(&e[s * length..(s + 1) * length]);
+            for t in 0..count {
+                let part = &c[t * length / count..(t + 1) * length / count];
+                let degrees = part.len() as f64;
+                let energy: f64 = part.iter().map(|v| v * v).sum();
+                let square = (energy - degrees).powi(2) / (2.0 * degrees);
+                sum += square;
+                if square > most.0 {
+                    most = (square, s, t, energy / degrees);
+                }
+            }
+        }
+        // Sum of squared deviations of chi-square energies: a gamma distribution of its mean and variance.
+        let tiles = (segments * count) as f64;
+        let variance = tiles * (2.0 + 12.0 * count as f64 / length as f64);
+        let p = Gamma::new(tiles * tiles / variance, tiles / variance).map_or(1.0, |g| g.sf(sum));
+        let p = (p * SEGMENTS.len() as f64).min(1.0);
+        if p < worst.0 || worst.2.is_empty() {
+            let (seconds, hz) = (length as f64 / rate_hz, 0.5 * rate_hz / count as f64);
+            let what = format!(
+                "energy of the whitened residual over the model's in {tiles:.0} tiles of {seconds:.1} s and {hz:.2} Hz; {:.2} from {:.1} to {:.1} s, {:.2} to {:.2} Hz stands out most",
+                most.3,
+                most.1 as f64 * seconds,
+                (most.1 + 1) as f64 * seconds,
+                most.2 as f64 * hz,
+                (most.2 + 1) as f64 * hz
+            );
+            worst = (p, sum / tiles, what);
+        }
+    }
+    let what = if worst.2.is_empty() {
+        "too short for tiles".into()
+    } else {
+        worst.2
+    };
+    Outcome {
+        id: "time_frequency",
+        statistic: worst.1,
+        p_value: worst.0,
+        what,
     }
 }
 
@@ -177,5 +270,44 @@ fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
             e[far].abs(),
             far as f64 / rate_hz
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    fn white(n: usize, seed: u64) -> Vec<f64> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
+    }
+
+    #[test]
+    fn tiles_of_white_noise_fail_as_often_as_their_chance_says() {
+        let runs = 600;
+        let below = |p: f64| {
+            (0..runs)
+                .filter(|s| tiles(&white(3000, *s), 20.0).p_value < p)
+                .count()
+        };
+        // Two scales that hardly depend on each other: 1 in 100, with five sigma of room; half that would be suspicious.
+        assert!(below(0.01) <= 18, "{}", below(0.01));
+        let half = below(0.5);
+        assert!(half > 150 && half < 400, "{half}");
+    }
+
+    #[test]
+    fn a_chirp_that_no_band_shows_fills_tiles() {
+        let n = 12_000;
+        let mut e = white(n, 7);
+        for (i, v) in e.iter_mut().enumerate() {
+            let t = i as f64 / 20.0;
+            *v += 0.33 * (std::f64::consts::TAU * (1.0 + 6.0 * t / 1200.0) * t).sin();
+        }
+        assert!(tiles(&e, 20.0).p_value < 1e-8);
     }
 }

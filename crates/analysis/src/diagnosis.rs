@@ -21,7 +21,7 @@ use crate::result::{
     Parameter, Unexplained, Verdict,
 };
 use crate::search::{Search, State};
-use crate::{evidence, losses, scan, threshold};
+use crate::{beyond, doubt, evidence, losses, scan, threshold};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -72,10 +72,30 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     let searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();
     let mut findings = losses::findings(&audited, &searched, &grid);
     let mut scale_not_tested = vec![];
+    let mut checks: Vec<Check> = searched.iter().flat_map(channel_checks).collect();
+    losses::suppress(&mut checks, &audited);
+    let mut nearest = vec![];
+    let mut doubts = vec![];
     for s in &searched {
         findings.extend(motion_finding(s, &grid));
-        findings.extend(term_findings(s, &grid, options.seed));
-        findings.extend(variance_finding(s));
+        let failing = |id: &str| {
+            let own = checks.iter().filter(|c| c.channel == s.target.name);
+            own.filter(|c| c.id == id).any(|c| c.fails_after)
+        };
+        if failing("kurtosis") {
+            // Single far readings of a noise whose bulk is not normal are its tails.
+            let tails =
+                |f: &Finding| f.cause == "outliers" && f.channels == [s.target.name.as_str()];
+            doubts.extend(findings.extract_if(.., |f| tails(f)).map(|f| Unexplained {
+                channel: s.target.name.clone(),
+                what: format!("noise with tails: {}", f.what),
+            }));
+        }
+        let of_terms = term_findings(s, &grid, options.seed);
+        let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance_finding(s), &failing);
+        findings.extend(kept);
+        nearest.extend(doubted);
+        doubts.extend(told);
         match scale_finding(s, &grid) {
             Ok(found) => findings.extend(found),
             Err((cause, why)) => scale_not_tested.push(NotTested {
@@ -85,8 +105,6 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         }
     }
     let shared = common(&searched, &grid);
-    let mut checks: Vec<Check> = searched.iter().flat_map(channel_checks).collect();
-    losses::suppress(&mut checks, &audited);
     let mut unexplained = left_over(&checks, &shared);
     for s in &searched {
         let note = |what: &String| Unexplained {
@@ -95,6 +113,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         };
         unexplained.extend(s.state.notes.iter().map(note));
     }
+    unexplained.extend(doubts);
     checks.extend(shared.checks);
     checks.extend(audited.checks);
     unexplained.extend(audited.unexplained);
@@ -134,7 +153,10 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     };
     let diagnosed = Diagnosed {
         baseline_model: model(&|s| baseline_of(s, &s.baseline, &grid), vec![]),
-        extended_model: model(&|s| baseline_of(s, &s.state, &grid), effects_of(&findings)),
+        extended_model: model(
+            &|s| baseline_of(s, &s.state, &grid),
+            effects_of(findings.iter().chain(&nearest)),
+        ),
         evidence: searched
             .iter()
             .flat_map(|s| evidence::of_channel(s, &grid))
@@ -401,7 +423,8 @@ fn baseline_of(s: &Searched<'_>, state: &State, grid: &Grid) -> Parameters {
     all
 }
 
-fn effects_of(findings: &[Finding]) -> Vec<EffectModel> {
+/// The effects of the extended model: the causes, and what stands for the unexplained in it.
+fn effects_of<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<EffectModel> {
     let mut all = vec![];
     for f in findings {
         let Some(e) = effect(&f.cause) else { continue };
@@ -441,16 +464,21 @@ fn limits(s: &Searched<'_>, findings: &[Finding]) -> Vec<DetectionLimit> {
     let mut all = vec![];
     for c in &s.search.candidates {
         let id = c.effect.id();
-        if findings
+        let told = findings
             .iter()
-            .any(|f| f.cause == id && f.channels.contains(&s.target.name))
-        {
+            .any(|f| f.cause == id && f.channels.contains(&s.target.name));
+        // Of several shapes that estimate one parameter, the first is the effect's own.
+        let listed = |name: &str| {
+            all.iter()
+                .any(|l: &DetectionLimit| l.cause == id && l.parameter == name)
+        };
+        if told || id == beyond::ID {
             continue;
         }
         let (Hypothesis::Regression(r), [column, ..]) = (&c.hypothesis, c.columns()) else {
             continue;
         };
-        if r.columns.len() > 1 {
+        if r.columns.len() > 1 || listed(r.columns[0].parameter) {
             continue;
         }
         let solution = s

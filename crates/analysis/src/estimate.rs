@@ -154,7 +154,8 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
                     found
                         .location
                         .push(frequency(*carrier, own[0].0.hypot(own[1].0)));
-                    let bands = own[2].0.hypot(own[3].0).hypot(own[4].0.hypot(own[5].0));
+                    // Two side bands of half its size tell the frequency of the swing.
+                    let bands = own[2].0.hypot(own[3].0) / 2f64.sqrt();
                     let (_, error) = frequency(*carrier, bands);
                     found
                         .location

@@ -105,7 +105,13 @@ fn blocks(values: &[f64], count: usize) -> Vec<f64> {
 
 /// One figure for each term of a channel.
 pub(crate) fn of_channel(s: &Searched<'_>, grid: &Grid) -> Vec<Evidence> {
-    s.state.terms.iter().map(|t| of_term(s, grid, t)).collect()
+    let named = |t: &&Term| t.effect.id() != crate::beyond::ID;
+    s.state
+        .terms
+        .iter()
+        .filter(named)
+        .map(|t| of_term(s, grid, t))
+        .collect()
 }
 
 fn series(label: &str, style: SeriesStyle, x: Vec<f64>, y: Vec<f64>) -> Series {
@@ -159,7 +165,11 @@ fn of_term(s: &Searched<'_>, grid: &Grid, term: &Term) -> Evidence {
                 .and_then(|f| grid.signals.iter().find(|g| g.name == *f));
             let (x, order) = match followed {
                 Some(signal) => {
-                    evidence.x_label = signal.name.clone();
+                    evidence.x_label = if signal.unit.is_empty() || signal.unit == "1" {
+                        signal.name.clone()
+                    } else {
+                        format!("{}, {}", signal.name, signal.unit)
+                    };
                     let x = blocks(&signal.smooth, count);
                     let mut order: Vec<usize> = (0..count).collect();
                     order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));

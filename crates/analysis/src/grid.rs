@@ -176,7 +176,8 @@ pub fn lay_out(
     let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
     let drivers = drivers(record, &places, n, &dct);
-    let motion_of = |y: &[f64]| motion(&mut dct.forward(y), &drivers, n, rate_hz);
+    let turns = matches!(record.header.base, Some(Base::Moving | Base::Turntable));
+    let motion_of = |y: &[f64]| motion(&mut dct.forward(y), &drivers, n, rate_hz, turns);
     let mut targets = vec![];
     for channel in gyros {
         let (scale, unit) = match channel.unit.as_str() {
@@ -346,10 +347,17 @@ fn drivers(record: &Record, places: &[usize], n: usize, dct: &Dct) -> Vec<Vec<f6
         .collect()
 }
 
-/// Excess rms in the band of base motion, white noise and what follows the `drivers` taken off.
-fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64) -> f64 {
+/// Half cycles of the slowest motion that is looked for where the header says that the base moves.
+const SLOWEST_MOTION: usize = 3;
+
+/// Excess rms in the band of base motion, white noise and what follows the `drivers` taken off. Where the base is known to
+/// move (`turns`), slower motion counts too; else that is drift.
+fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64, turns: bool) -> f64 {
     let k_of = |f: f64| ((2.0 * f / rate_hz * n as f64) as usize).clamp(1, n - 1);
-    let (low, high) = (k_of(MOTION_BAND_HZ.0), k_of(MOTION_BAND_HZ.1));
+    let (mut low, high) = (k_of(MOTION_BAND_HZ.0), k_of(MOTION_BAND_HZ.1));
+    if turns {
+        low = low.min(SLOWEST_MOTION);
+    }
     let mut above: Vec<f64> = c[high..].iter().map(|v| v * v).collect();
     let middle = above.len() / 2;
     // Median of chi-square(1) is 0.4549.
@@ -403,6 +411,7 @@ fn signal(
         name: c.name.clone(),
         quantity: c.quantity,
         axis: c.axis,
+        unit: c.unit.clone(),
         values,
         smooth,
         lsb: c.lsb,

@@ -128,6 +128,59 @@ pub fn sinusoid(n: usize, omega: f64) -> [Vec<f64>; 2] {
     ]
 }
 
+/// A line of that frequency and phase whose amplitude swings with the angular frequency `beat`: cosine and sine of the
+/// swing.
+#[must_use]
+pub fn swings(n: usize, carrier: f64, phase: f64, beat: f64) -> [Vec<f64>; 2] {
+    let line = |t: f64| (carrier * t + phase).cos();
+    [
+        (0..n)
+            .map(|i| line(i as f64) * (beat * i as f64).cos())
+            .collect(),
+        (0..n)
+            .map(|i| line(i as f64) * (beat * i as f64).sin())
+            .collect(),
+    ]
+}
+
+/// Likelihood ratio of a swing of a line's amplitude with the angular frequency k pi / n, for k = 0..n: its two side
+/// bands have the amplitude and the phase that the line and one swing leave them, two unknowns instead of four.
+#[must_use]
+pub fn beats(
+    panel: &Panel,
+    noise: &Noise,
+    columns: &[usize],
+    solution: &Solution,
+    carrier: f64,
+    phase: f64,
+) -> Vec<f64> {
+    let n = panel.bins.n;
+    let g = noise.everywhere(n);
+    let r = residual(panel, columns, solution);
+    let weighted: Vec<f64> = r.iter().zip(&g).map(|(r, g)| r / g).collect();
+    let z = panel.dct.inverse(&weighted);
+    let mut spectrum: Vec<Complex<f64>> = z
+        .iter()
+        .enumerate()
+        .map(|(i, v)| Complex::new(v * (carrier * i as f64 + phase).cos(), 0.0))
+        .collect();
+    spectrum.resize(2 * n, Complex::new(0.0, 0.0));
+    FftPlanner::<f64>::new()
+        .plan_fft_forward(2 * n)
+        .process(&mut spectrum);
+    let centre = carrier / std::f64::consts::PI * n as f64;
+    let at = |k: f64| 1.0 / g[(k.round().max(1.0) as usize).min(n - 1)];
+    let count = (n - 1) as f64;
+    (0..n)
+        .map(|k| {
+            // Energy of a swing over its noise: a quarter of the samples, half of it in each side band.
+            let energy = n as f64 / 8.0 * (at(centre + k as f64) + at((centre - k as f64).abs()));
+            let drop = spectrum[k].norm_sqr() / energy;
+            -count * (1.0 - (drop / solution.rss).min(0.999)).ln()
+        })
+        .collect()
+}
+
 /// A stretch of larger (or smaller) variance of unit-variance residuals: (LR, start, end, increase).
 #[must_use]
 pub fn segment(u: &[f64]) -> (f64, usize, usize, f64) {

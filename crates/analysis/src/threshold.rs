@@ -43,10 +43,12 @@ pub fn line(n: usize) -> f64 {
     quantile(2, 3.0 * n as f64)
 }
 
-/// Side bands at any of `places` distances.
+/// A swing of a line with any of `places` frequencies, two unknowns each. It is sought only where a line is certain, so
+/// that its chance is one for each line, not for each channel.
 #[must_use]
 pub fn side_bands(places: usize) -> f64 {
-    quantile(4, 2.0 * places.max(1) as f64)
+    const BY_LINE: f64 = 1e-3;
+    2.0 * (2.0 * places.max(1) as f64 / BY_LINE).ln()
 }
 
 /// A stationary term with `dimensions` coordinates, one of which is a size that cannot be negative.

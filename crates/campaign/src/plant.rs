@@ -180,17 +180,23 @@ fn signal_of(stand: &Stand, cause: &str, parameters: &Parameters, axis: usize) -
 /// moves that much below 1 Hz is a turn of the base to anyone who has the gyro alone.
 const LARGEST_RMS: f64 = 0.25;
 
-/// The first draw (time, (size, strength, density)) of a process that is not too large.
-fn within(drawn: &mut dyn FnMut() -> (f64, (f64, f64, Vec<f64>))) -> (f64, (f64, f64, Vec<f64>)) {
-    const TRIES: usize = 100;
-    let mut last = drawn();
+/// A drawn process: its time, and its size, strength and density.
+type Process = (f64, (f64, f64, Vec<f64>));
+
+/// The first draw that is as strong as wanted, or else the strongest of many.
+fn strongest(wanted: f64, drawn: &mut dyn FnMut() -> Process) -> Process {
+    const TRIES: usize = 40;
+    let mut best = drawn();
     for _ in 0..TRIES {
-        if last.1.0 <= LARGEST_RMS {
+        if best.1.1 >= 0.99 * wanted {
             break;
         }
-        last = drawn();
+        let other = drawn();
+        if other.1.1 > best.1.1 {
+            best = other;
+        }
     }
-    last
+    best
 }
 
 /// Density of a process of variance 1 with one pole, rad per sample.
@@ -238,13 +244,13 @@ pub fn plant(
                 unit.iter().map(|v| v * size).collect::<Vec<f64>>(),
             )
         };
-    let of_density = |stand: &Stand, density: &dyn Fn(f64, f64) -> f64| {
+    let of_density = |stand: &Stand, largest: f64, density: &dyn Fn(f64, f64) -> f64| {
         let meter = Meter::new(stand, axis);
         let strength = |size: f64| {
             let all: Vec<f64> = meter.omega().iter().map(|w| density(size, *w)).collect();
             meter.of_density(&all)
         };
-        let size = size_for(wanted, &strength);
+        let size = size_for(wanted, &strength).min(largest);
         let all: Vec<f64> = meter.omega().iter().map(|w| density(size, *w)).collect();
         (size, strength(size), all)
     };
@@ -391,24 +397,28 @@ pub fn plant(
             truth(p, relative.abs() / error, None)
         }
         "gauss_markov" => {
-            let (tau, (sigma, d, density)) = within(&mut || {
+            let (tau, (sigma, d, density)) = strongest(wanted, &mut || {
                 let tau = draw.by_ratio(0.2, 10.0);
                 let pole = (-1.0 / (tau * stand.rate_hz)).exp();
                 (
                     tau,
-                    of_density(stand, &|sigma, w| sigma * sigma * one_pole(pole, w)),
+                    of_density(stand, LARGEST_RMS, &|sigma, w| {
+                        sigma * sigma * one_pole(pole, w)
+                    }),
                 )
             });
             let values = [("sigma", sigma), ("correlation_time", tau)];
             process(parameters_of(cause, &values), d, density)
         }
         "telegraph" => {
-            let (dwell, (half, d, density)) = within(&mut || {
+            let (dwell, (half, d, density)) = strongest(wanted, &mut || {
                 let dwell = draw.by_ratio(3.0, 40.0);
                 let pole = (-2.0 / (dwell * stand.rate_hz)).exp();
                 (
                     dwell,
-                    of_density(stand, &|half, w| half * half * one_pole(pole, w)),
+                    of_density(stand, LARGEST_RMS, &|half, w| {
+                        half * half * one_pole(pole, w)
+                    }),
                 )
             });
             let values = [("half_height", half), ("dwell_time", dwell)];
@@ -416,7 +426,7 @@ pub fn plant(
         }
         "flicker" => {
             // Two-sided density B^2 / (2 pi f): B^2 / w per sample.
-            let (b, d, density) = of_density(stand, &|b, w| b * b / w);
+            let (b, d, density) = of_density(stand, f64::INFINITY, &|b, w| b * b / w);
             let p = parameters_of(cause, &[("bias_instability", b * 3600.0)]);
             process(p, d, density)
         }
@@ -432,7 +442,7 @@ pub fn plant(
                         (1.0 - rho * rho) / (1.0 + rho * rho - 2.0 * rho * w.cos()) - 1.0
                     }
             };
-            let (rho, d, density) = of_density(stand, &density);
+            let (rho, d, density) = of_density(stand, f64::INFINITY, &density);
             let p = parameters_of(cause, &[("lag1_correlation", of(rho))]);
             process(p, d, density)
         }

@@ -106,6 +106,8 @@ pub struct Signal {
     pub quantity: Quantity,
     /// Axis, where it has one.
     pub axis: Option<Axis>,
+    /// Unit of the readings.
+    pub unit: String,
     /// Readings on the grid.
     pub values: Vec<f64>,
     /// The same without reading noise, as a local-level smoother gives it.

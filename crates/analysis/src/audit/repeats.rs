@@ -90,22 +90,27 @@ fn smallest_step(values: &[f64]) -> f64 {
     gaps.filter(|g| *g > dust).fold(f64::INFINITY, f64::min)
 }
 
-/// Chance that a reading agrees with the one before, without a fault, and the relative error of that.
+/// Chance that a reading agrees with the one before, without a fault, and the relative error of that. Readings that
+/// agree as often when they lie far apart share a code, not a moment.
 fn agreement(values: &[f64], step: f64) -> (f64, f64) {
     let d = differences(values, 1);
-    bridged(&d, step).unwrap_or_else(|| {
-        let far: f64 = LAGS.map(|l| share(values, l, step)).sum::<f64>() / LAGS.count() as f64;
-        let (near, wide) = (
-            robust_sigma(&d),
-            robust_sigma(&differences(values, *LAGS.start())),
-        );
-        let raised = if near > 0.0 {
-            (wide / near).max(1.0)
-        } else {
-            1.0
-        };
-        ((far * raised).min(1.0), 0.02)
-    })
+    let far: f64 = LAGS.map(|l| share(values, l, step)).sum::<f64>() / LAGS.count() as f64;
+    match bridged(&d, step) {
+        Some((p, error)) if p >= far => (p, error),
+        Some((_, error)) => (far, error.max(0.02)),
+        None => {
+            let (near, wide) = (
+                robust_sigma(&d),
+                robust_sigma(&differences(values, *LAGS.start())),
+            );
+            let raised = if near > 0.0 {
+                (wide / near).max(1.0)
+            } else {
+                1.0
+            };
+            ((far * raised).min(1.0), 0.02)
+        }
+    }
 }
 
 /// Whether two readings are the same.

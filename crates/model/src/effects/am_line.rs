@@ -55,22 +55,21 @@ impl Effect for AmLine {
         Some("line")
     }
 
-    /// Coefficients: carrier cos, sin, upper side band cos, sin, lower side band cos, sin.
+    /// Coefficients: carrier cos, sin; then, of the line itself, its swing's cos and sin.
     fn describe(&self, found: &Found) -> Parameters {
         let mut all = Parameters::new();
-        let [c, s, uc, us, lc, ls, ..] = found.coefficients[..] else { return all };
+        let [c, s, a, b, ..] = found.coefficients[..] else { return all };
         let amplitude = c.0.hypot(s.0);
         let error = (c.1 * s.1).sqrt();
-        // Each side band of an AM line has the amplitude depth x amplitude / 2.
-        let bands = uc.0.hypot(us.0) + lc.0.hypot(ls.0);
-        let bands_error = uc.1.hypot(lc.1);
-        let depth = bands / amplitude;
-        let depth_error = depth * ((bands_error / bands).powi(2) + (error / amplitude).powi(2)).sqrt();
+        let swing_error = (a.1 * b.1).sqrt();
+        // The size of two noisy coefficients is too large by their noise.
+        let swing = (a.0 * a.0 + b.0 * b.0 - swing_error * swing_error).max(0.0).sqrt();
+        let depth = swing / amplitude;
+        let depth_error = (swing_error / amplitude).hypot(depth * error / amplitude);
         all.insert("amplitude".into(), Parameter::estimated(amplitude, error, &found.unit));
         all.insert("depth".into(), Parameter::estimated(depth, depth_error, "1"));
         all.insert("phase".into(), Parameter::exact((-s.0).atan2(c.0), "rad"));
-        let (upper, lower) = ((-us.0).atan2(uc.0), (-ls.0).atan2(lc.0));
-        all.insert("modulation_phase".into(), Parameter::exact(half_difference(upper, lower, (-s.0).atan2(c.0)), "rad"));
+        all.insert("modulation_phase".into(), Parameter::exact((-b.0).atan2(a.0), "rad"));
         for (name, at) in ["frequency", "modulation_frequency"].iter().zip(&found.location) {
             all.insert((*name).into(), Parameter::estimated(at.0, at.1, "Hz"));
         }
@@ -98,11 +97,4 @@ impl Effect for AmLine {
             }
         }
     }
-}
-
-/// Phase of the swing: half of upper minus lower, on the branch whose mean is the carrier's phase.
-fn half_difference(upper: f64, lower: f64, carrier: f64) -> f64 {
-    let swing = (upper - lower) / 2.0;
-    let off = (swing + lower - carrier).cos();
-    if off < 0.0 { swing + std::f64::consts::PI } else { swing }
 }

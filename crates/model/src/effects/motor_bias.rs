@@ -1,7 +1,10 @@
 //! The motor current shifts the rate.
 
+use std::sync::Arc;
+
+use crate::parameter::Parameter;
 use crate::record::Base;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Regression, optional, parameter, value};
+use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Found, Regression, Shape, optional, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -18,7 +21,9 @@ impl Effect for MotorBias {
 
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
-            parameter("at_full_duty", "deg/s", "shift at full duty"),
+            optional("at_full_duty", "deg/s", "shift at full duty, once the motor has its speed; 0 where it is left out"),
+            optional("surge_at_full_duty", "deg/s", "shift beyond that right after a step from standstill to full duty"),
+            optional("surge_time", "s", "time in which the surge falls to 1/e: the motor's mechanical time constant"),
             optional("by_magnitude", "1", "1 where the shift follows |duty|, else it follows the sign too"),
         ];
         PARAMETERS
@@ -27,9 +32,9 @@ impl Effect for MotorBias {
     fn docs(&self) -> Docs {
         Docs {
             title: "Motor shifts the bias",
-            physics: "b(t) = at_full_duty x duty, or x |duty| where both directions are driven and the magnitude fits better: magnetic field or ground shift of the motor current.",
+            physics: "b(t) = at_full_duty x duty, or x |duty| where both directions are driven and the magnitude fits better: magnetic field or ground shift of the motor current. Current surges until the motor has spun up: with w' = (duty - w) / surge_time, surge_at_full_duty x (duty - w) is added.",
             excitation: "A motor command that changes, while the axis itself does not turn.",
-            test: "Least squares on the command, random walk refitted.",
+            test: "Least squares on the command, and on the surge over a grid of times, refined; random walk refitted.",
             figure: "Rate in time blocks against duty.",
         }
     }
@@ -59,11 +64,24 @@ impl Effect for MotorBias {
                 follows: Some(signal.name.clone()),
             })
         };
-        match (high - low < LEAST_CHANGE, low < 0.0 && high > 0.0) {
-            (true, _) => Err("the motor command does not change: switch the motor during the record".into()),
-            (false, false) => Ok(vec![regression(duty, false)]),
-            (false, true) => Ok(vec![regression(duty, false), regression(size, true)]),
+        if high - low < LEAST_CHANGE {
+            return Err("the motor command does not change: switch the motor during the record".into());
         }
+        let surge = Hypothesis::Shaped(Arc::new(Surge { duty: duty.clone(), rate_hz: view.rate_hz }));
+        let mut all = vec![regression(duty, false)];
+        if low < 0.0 && high > 0.0 {
+            all.push(regression(size, true));
+        }
+        all.push(surge);
+        Ok(all)
+    }
+
+    fn describe(&self, found: &Found) -> Parameters {
+        let mut all = crate::effect::columns_as_parameters(self.parameters(), found);
+        if let Some((time, error)) = found.location.first() {
+            all.insert("surge_time".into(), Parameter::estimated(*time, *error, "s"));
+        }
+        all
     }
 
     fn stage(&self) -> Stage {
@@ -72,12 +90,52 @@ impl Effect for MotorBias {
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let full = value(parameters, "at_full_duty");
+        let (surge, time) = (value(parameters, "surge_at_full_duty"), value(parameters, "surge_time"));
         let by_size = value(parameters, "by_magnitude") != 0.0;
+        let extra = (surge != 0.0 && time > 0.0).then(|| lagging(&simulation.duty, time * simulation.rate_hz));
         for &axis in channels {
-            for (rate, d) in simulation.rate[axis].iter_mut().zip(&simulation.duty) {
+            for (i, (rate, d)) in simulation.rate[axis].iter_mut().zip(&simulation.duty).enumerate() {
                 *rate += full * if by_size { d.abs() } else { *d };
+                *rate += surge * extra.as_ref().map_or(0.0, |e| e[i]);
             }
         }
+    }
+}
+
+/// What the command is ahead of a speed that follows it with a time constant of `tau` samples, averaged over each
+/// sample. The command is held from sample to sample, and the motor has its speed at the start.
+fn lagging(duty: &[f64], tau: f64) -> Vec<f64> {
+    let keep = (-1.0 / tau).exp();
+    let mean = tau * (1.0 - keep);
+    let mut speed = duty.first().copied().unwrap_or(0.0);
+    duty.iter()
+        .map(|d| {
+            let ahead = d - speed;
+            speed = d - keep * ahead;
+            mean * ahead
+        })
+        .collect()
+}
+
+/// The surge, by its time.
+struct Surge {
+    duty: Vec<f64>,
+    rate_hz: f64,
+}
+
+impl Shape for Surge {
+    fn coordinate(&self) -> (&'static str, &'static str) {
+        ("surge_time", "s")
+    }
+
+    /// From half a sample to a few seconds, which no small motor needs.
+    fn grid(&self) -> Vec<f64> {
+        let least = (0.5 / self.rate_hz).max(0.03);
+        [1.0, 3.0, 9.0, 27.0, 81.0].iter().map(|k| k * least).filter(|t| *t < 4.0).collect()
+    }
+
+    fn columns(&self, at: f64) -> Vec<Column> {
+        vec![Column { parameter: "surge_at_full_duty", values: lagging(&self.duty, at * self.rate_hz) }]
     }
 }
 

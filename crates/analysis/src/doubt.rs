@@ -1,0 +1,126 @@
+//! Names that the record does not bear out.
+//!
+//! Lines, steps, ramps and stationary processes can stand for a part of almost anything. Where a check still fails on
+//! the model that holds them, and in the place where they act, they are the library's nearest description of something
+//! else: they stay in the model, and the answer tells them as what is unexplained comes closest to.
+
+use crate::beyond;
+use crate::checks::{self, LEAST_CHANCE};
+use crate::diagnosis::Searched;
+use crate::result::{Finding, Unexplained};
+use crate::search::{Form, Term};
+
+/// Share of a term's energy in bands that fail, from which on the failure is the term's.
+const SHARE: f64 = 0.25;
+
+/// Whether a term is a shape of time or frequency alone, which follows no recorded channel.
+fn generic(t: &Term) -> bool {
+    t.follows.is_none()
+}
+
+/// For each term of a channel, whether the checks doubt it; and whether they doubt the law of its variance.
+fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<bool>, bool) {
+    let panel = &s.search.panel;
+    let g = s.state.noise.over(&panel.bins);
+    let n = panel.bins.n as f64;
+    let fails: Vec<(f64, f64)> = checks::all_bands(&s.u[1])
+        .into_iter()
+        .filter(|b| b.chance < LEAST_CHANCE)
+        .map(|b| (b.from as f64, b.to as f64))
+        .collect();
+    let inside: Vec<bool> = panel
+        .bins
+        .at
+        .omega
+        .iter()
+        .map(|w| {
+            let k = w * n / std::f64::consts::PI;
+            fails.iter().any(|(from, to)| k >= *from && k < *to)
+        })
+        .collect();
+    let share = |energy: &[f64]| {
+        let all: f64 = energy.iter().zip(&g).map(|(e, g)| e / g).sum();
+        let hit: f64 = energy
+            .iter()
+            .zip(&g)
+            .zip(&inside)
+            .filter(|(_, i)| **i)
+            .map(|((e, g), _)| e / g)
+            .sum();
+        all > 0.0 && hit > SHARE * all
+    };
+    let crowd = !s.state.notes.is_empty();
+    let somewhere = failing("ljung_box") || failing("time_frequency");
+    let mut at = 0;
+    let terms = s
+        .state
+        .terms
+        .iter()
+        .map(|t| {
+            let own = &s.state.solution.beta[at..at + t.columns.len()];
+            at += t.columns.len();
+            let in_band = if t.columns.is_empty() {
+                !fails.is_empty()
+            } else {
+                let mut sum = vec![0.0; panel.bins.n];
+                for (c, b) in t.columns.iter().zip(own) {
+                    sum.iter_mut()
+                        .zip(panel.column(*c).iter())
+                        .for_each(|(s, x)| *s += b * x);
+                }
+                share(&panel.bins.products(&sum, &sum))
+            };
+            let spectral = matches!(
+                t.form,
+                Form::Covariance(..) | Form::Line(_) | Form::SideBands(..)
+            );
+            in_band || generic(t) && (crowd || somewhere && spectral)
+        })
+        .collect();
+    (terms, failing("variance_in_time") || failing("kurtosis"))
+}
+
+/// Take the doubted names of a channel out of its findings, given as one for each term and then the rest; what follows a
+/// combination without a name goes the same way.
+pub(crate) fn withdraw(
+    s: &Searched<'_>,
+    of_terms: Vec<Finding>,
+    of_variance: Option<Finding>,
+    failing: &dyn Fn(&str) -> bool,
+) -> (Vec<Finding>, Vec<Finding>, Vec<Unexplained>) {
+    let (terms, variance) = doubted(s, failing);
+    let name = s.target.name.as_str();
+    let mut unexplained = vec![];
+    let (mut kept, mut nearest) = (vec![], vec![]);
+    for ((finding, doubt), term) in of_terms.into_iter().zip(terms).zip(&s.state.terms) {
+        if term.effect.id() == beyond::ID {
+            unexplained.push(Unexplained {
+                channel: name.into(),
+                what: format!(
+                    "follows the {}, which no effect of the library does (likelihood ratio {:.0})",
+                    term.follows.as_deref().unwrap_or_default(),
+                    term.lr
+                ),
+            });
+        } else if doubt {
+            nearest.push(finding);
+        } else {
+            kept.push(finding);
+        }
+    }
+    match of_variance {
+        Some(finding) if variance => nearest.push(finding),
+        other => kept.extend(other),
+    }
+    if !nearest.is_empty() {
+        let told: Vec<&str> = nearest.iter().map(|f| f.what.as_str()).collect();
+        unexplained.push(Unexplained {
+            channel: name.into(),
+            what: format!(
+                "nearest in the library, though checks fail on it: {}",
+                told.join("; ")
+            ),
+        });
+    }
+    (kept, nearest, unexplained)
+}

@@ -1,0 +1,361 @@
+//! Forward stagewise search for the causes in one channel: every hypothesis of every effect is weighed with the random
+//! walk refitted, the best one joins, covariance terms are challenged by what they may have swallowed, and what the
+//! others make superfluous is dropped. The search knows hypotheses, not effects.
+
+mod refine;
+mod rivals;
+mod weigh;
+
+use std::sync::Arc;
+
+use model::effect::{Effect, Hypothesis, Shape, View};
+use model::effects::EFFECTS;
+
+use crate::beyond;
+use crate::likelihood::{Noise, Panel, Solution};
+
+/// Most terms on one channel.
+const MOST_TERMS: usize = 8;
+/// Most lines, and most steps, that are told as separate causes.
+const MOST_ALIKE: usize = 2;
+/// Scores closer than this (twice 3 nats) leave the answer open.
+pub const RIVAL_SPAN: f64 = 6.0;
+/// Fewest cycles of a line in the record.
+const LEAST_CYCLES: f64 = 3.0;
+/// Longest beat that side bands are sought at, Hz, and fewest beats in the record.
+const FASTEST_BEAT_HZ: f64 = 0.6;
+const LEAST_BEATS: f64 = 3.0;
+
+/// What an accepted or weighed term is made of.
+#[derive(Clone)]
+pub enum Form {
+    /// Columns of a regression.
+    Columns,
+    /// Columns of a shape at its coordinate.
+    Shaped(Arc<dyn Shape>, f64),
+    /// A step at that time in samples, with its standard error.
+    Step(f64, f64),
+    /// A line of that angular frequency.
+    Line(f64),
+    /// A line with side bands at that distance, both rad per sample.
+    SideBands(f64, f64),
+    /// A stationary term of the noise.
+    Covariance(Arc<dyn model::effect::Covariance>, Vec<f64>),
+}
+
+/// A term of the model of a channel.
+#[derive(Clone)]
+pub struct Term {
+    /// The effect.
+    pub effect: &'static dyn Effect,
+    /// Number of its hypothesis in the list of candidates.
+    pub candidate: usize,
+    /// What it is made of.
+    pub form: Form,
+    /// Columns of the panel that it uses.
+    pub columns: Vec<usize>,
+    /// Names of the coefficients.
+    pub names: Vec<&'static str>,
+    /// Values held fixed.
+    pub fixed: Vec<(&'static str, f64, &'static str)>,
+    /// The channel that it follows.
+    pub follows: Option<String>,
+    /// Likelihood ratio against the model without it.
+    pub lr: f64,
+    /// What a false one reaches once in the stated number of clean channels.
+    pub threshold: f64,
+    /// Effects that leave the answer open, with their log odds.
+    pub alternatives: Vec<(&'static dyn Effect, f64)>,
+    /// Coefficients found by other means than the fit.
+    pub stated: Option<Vec<(f64, f64)>>,
+}
+
+impl Term {
+    /// Likelihood ratio beyond the threshold.
+    #[must_use]
+    pub fn score(&self) -> f64 {
+        self.lr - self.threshold
+    }
+
+    fn is_covariance(&self) -> bool {
+        matches!(self.form, Form::Covariance(..))
+    }
+}
+
+/// A hypothesis under test.
+pub struct Candidate {
+    /// Its effect.
+    pub effect: &'static dyn Effect,
+    /// The hypothesis.
+    pub hypothesis: Hypothesis,
+    columns: Vec<usize>,
+    grid: Vec<(f64, Vec<usize>)>,
+    siblings: usize,
+    /// What it has to reach beyond its threshold.
+    handicap: f64,
+}
+
+impl Candidate {
+    /// Columns of the panel that a regression uses.
+    #[must_use]
+    pub fn columns(&self) -> &[usize] {
+        &self.columns
+    }
+}
+
+/// A model of a channel.
+#[derive(Clone)]
+pub struct State {
+    /// Terms.
+    pub terms: Vec<Term>,
+    /// Noise shape, the covariance terms in it.
+    pub noise: Noise,
+    /// Its fit.
+    pub solution: Solution,
+    /// Structure that was seen and that no single effect explains.
+    pub notes: Vec<String>,
+}
+
+impl State {
+    /// All columns in use, term by term.
+    #[must_use]
+    pub fn columns(&self) -> Vec<usize> {
+        self.terms
+            .iter()
+            .flat_map(|t| t.columns.iter().copied())
+            .collect()
+    }
+
+    /// Angular frequency of the first line, and phase p of its cos(w t + p).
+    fn carrier(&self) -> Option<(f64, f64)> {
+        let mut at = 0;
+        for t in &self.terms {
+            if let (Form::Line(omega), [c, s, ..]) = (&t.form, &self.solution.beta[at..]) {
+                return Some((*omega, (-s).atan2(*c)));
+            }
+            at += t.columns.len();
+        }
+        None
+    }
+}
+
+/// The search on one channel.
+pub struct Search<'a> {
+    /// Data and columns.
+    pub panel: Panel,
+    /// What the effects see.
+    pub view: View<'a>,
+    /// Hypotheses.
+    pub candidates: Vec<Candidate>,
+    /// What cannot be tested, with the reason.
+    pub not_tested: Vec<(&'static str, String)>,
+}
+
+impl<'a> Search<'a> {
+    /// Lay out all hypotheses for a channel.
+    #[must_use]
+    pub fn new(panel: Panel, view: View<'a>) -> Self {
+        let mut candidates = vec![];
+        let mut not_tested = vec![];
+        let unknown: &'static dyn Effect = &beyond::EFFECT;
+        for effect in EFFECTS.iter().copied().chain([unknown]) {
+            // A cause of the library that does as well goes before a combination that has no name.
+            let handicap = if effect.id() == beyond::ID {
+                RIVAL_SPAN
+            } else {
+                0.0
+            };
+            match effect.hypotheses(&view) {
+                Err(why) => not_tested.push((effect.id(), why)),
+                Ok(hypotheses) => {
+                    let siblings = hypotheses.len();
+                    for hypothesis in hypotheses {
+                        let columns = match &hypothesis {
+                            Hypothesis::Regression(r) => {
+                                r.columns.iter().map(|c| panel.add(&c.values)).collect()
+                            }
+                            _ => vec![],
+                        };
+                        let grid = match &hypothesis {
+                            Hypothesis::Shaped(s) => s
+                                .grid()
+                                .into_iter()
+                                .map(|at| {
+                                    (
+                                        at,
+                                        s.columns(at)
+                                            .iter()
+                                            .map(|c| panel.add(&c.values))
+                                            .collect(),
+                                    )
+                                })
+                                .collect(),
+                            _ => vec![],
+                        };
+                        candidates.push(Candidate {
+                            effect,
+                            hypothesis,
+                            columns,
+                            grid,
+                            siblings,
+                            handicap,
+                        });
+                    }
+                }
+            }
+        }
+        Self {
+            panel,
+            view,
+            candidates,
+            not_tested,
+        }
+    }
+
+    /// The state with these terms, fitted from a starting noise.
+    #[must_use]
+    pub fn refit(&self, terms: Vec<Term>, start: f64) -> State {
+        let mut noise = Noise::new(start);
+        for t in &terms {
+            if let Form::Covariance(c, theta) = &t.form {
+                noise.terms.push((Arc::clone(c), theta.clone()));
+            }
+        }
+        let columns: Vec<usize> = terms
+            .iter()
+            .flat_map(|t| t.columns.iter().copied())
+            .collect();
+        let (noise, solution) = self.panel.fit(&noise, &columns);
+        let mut state = State {
+            terms,
+            noise,
+            solution,
+            notes: vec![],
+        };
+        let mut fitted = state.noise.terms.iter();
+        for t in &mut state.terms {
+            if let Form::Covariance(_, theta) = &mut t.form
+                && let Some((_, best)) = fitted.next()
+            {
+                theta.clone_from(best);
+            }
+        }
+        state
+    }
+
+    fn without(&self, state: &State, i: usize) -> State {
+        let mut terms = state.terms.clone();
+        terms.remove(i);
+        self.refit(terms, state.noise.log_walk)
+    }
+
+    /// Likelihood ratio of each term given the others.
+    fn reweigh(&self, state: &mut State) {
+        for i in 0..state.terms.len() {
+            let rest = self.without(state, i);
+            let covariance = state.terms[i].is_covariance();
+            state.terms[i].lr =
+                2.0 * (state.solution.log_likelihood - rest.solution.log_likelihood);
+            // A refit that starts well may beat one that starts badly; never report less than nothing.
+            if covariance {
+                state.terms[i].lr = state.terms[i].lr.max(0.0);
+            }
+        }
+    }
+
+    /// Total score: likelihood beyond what all thresholds ask.
+    fn total(state: &State) -> f64 {
+        2.0 * state.solution.log_likelihood - state.terms.iter().map(|t| t.threshold).sum::<f64>()
+    }
+
+    /// Search.
+    #[must_use]
+    pub fn run(&self, start: &Noise) -> (State, State) {
+        let (noise, solution) = self.panel.fit(&Noise::new(start.log_walk), &[]);
+        let baseline = State {
+            terms: vec![],
+            noise,
+            solution,
+            notes: vec![],
+        };
+        let mut state = baseline.clone();
+        while state.terms.len() < MOST_TERMS {
+            let offers = self.offers(&state, &|_| true);
+            let Some(best) = Self::simplest_best(offers) else {
+                break;
+            };
+            if best.score() <= 0.0 {
+                break;
+            }
+            let next = self.accept(&state, best);
+            if Self::total(&next) <= Self::total(&state) {
+                break;
+            }
+            state = self.swap(next);
+        }
+        loop {
+            self.reweigh(&mut state);
+            let Some(i) = (0..state.terms.len())
+                .filter(|i| state.terms[*i].score() < 0.0)
+                .min_by(|a, b| state.terms[*a].score().total_cmp(&state.terms[*b].score()))
+            else {
+                break;
+            };
+            state = self.without(&state, i);
+        }
+        state = crate::contest::hold(self, state);
+        let notes = self.crowds(&mut state);
+        self.find_rivals(&mut state);
+        state.notes = notes;
+        (baseline, state)
+    }
+
+    /// The best offer; where it extends another that would pass too, that one: the extension has to earn its place.
+    fn simplest_best(offers: Vec<Term>) -> Option<Term> {
+        let best = offers
+            .iter()
+            .max_by(|a, b| a.score().total_cmp(&b.score()))?;
+        let narrower = offers
+            .iter()
+            .filter(|o| {
+                // Side bands come after their line; another line beside it is no narrower case of them.
+                matches!(best.form, Form::Columns)
+                    && best.effect.extends() == Some(o.effect.id())
+                    && o.score() > 0.0
+            })
+            .max_by(|a, b| a.score().total_cmp(&b.score()));
+        Some(narrower.unwrap_or(best).clone())
+    }
+
+    /// A covariance term that swallowed a regressor gives way to it.
+    fn swap(&self, state: State) -> State {
+        let mut best = state;
+        let covariances: Vec<usize> = (0..best.terms.len())
+            .filter(|i| best.terms[*i].is_covariance())
+            .collect();
+        for i in covariances.into_iter().rev() {
+            if best.terms.get(i).is_none_or(|t| !t.is_covariance()) {
+                continue;
+            }
+            let mut rest = self.without(&best, i);
+            // Up to three terms may share what the one took.
+            for _ in 0..3 {
+                let offers = self.offers(&rest, &|c| {
+                    !matches!(c.hypothesis, Hypothesis::Covariance(_))
+                });
+                let Some(offer) = Self::simplest_best(offers) else {
+                    break;
+                };
+                if offer.score() <= 0.0 {
+                    break;
+                }
+                rest = self.accept(&rest, offer);
+                if Self::total(&rest) > Self::total(&best) {
+                    best = rest;
+                    break;
+                }
+            }
+        }
+        best
+    }
+}

@@ -1,0 +1,92 @@
+//! What the search says of its own answer: effects that would do as well, and crowds of terms that no one cause makes.
+
+use super::{Form, MOST_ALIKE, RIVAL_SPAN, Search, State};
+
+impl Search<'_> {
+    /// More lines or more steps than separate causes make are one structure that the library does not have: the
+    /// strongest line stays, the steps go, and a note says what is seen.
+    pub(super) fn crowds(&self, state: &mut State) -> Vec<String> {
+        let mut notes = vec![];
+        let hz = |w: f64| w * self.view.rate_hz / std::f64::consts::TAU;
+        let lines: Vec<(f64, f64)> = state
+            .terms
+            .iter()
+            .filter_map(|t| match t.form {
+                Form::Line(w) | Form::SideBands(w, _) => Some((hz(w), t.lr)),
+                _ => None,
+            })
+            .collect();
+        if lines.len() > MOST_ALIKE {
+            let (low, high) = lines
+                .iter()
+                .fold((f64::INFINITY, 0.0f64), |(l, h), (f, _)| {
+                    (l.min(*f), h.max(*f))
+                });
+            notes.push(format!(
+                "{} lines from {low:.3} to {high:.3} Hz: no steady line but a band, a chirp or harmonics",
+                lines.len()
+            ));
+            let strongest = lines.iter().map(|l| l.1).fold(0.0, f64::max);
+            state.terms.retain(|t| {
+                !matches!(t.form, Form::Line(_) | Form::SideBands(..)) || t.lr == strongest
+            });
+        }
+        let times: Vec<f64> = state
+            .terms
+            .iter()
+            .filter_map(|t| match t.form {
+                Form::Step(at, _) => Some(at / self.view.rate_hz),
+                _ => None,
+            })
+            .collect();
+        if times.len() > MOST_ALIKE {
+            let told: Vec<String> = times.iter().map(|t| format!("{t:.1}")).collect();
+            notes.push(format!(
+                "jumps at {} s: more than single events make",
+                told.join(", ")
+            ));
+            state.terms.retain(|t| !matches!(t.form, Form::Step(..)));
+        }
+        if !notes.is_empty() {
+            *state = self.refit(std::mem::take(&mut state.terms), state.noise.log_walk);
+            self.reweigh(state);
+        }
+        notes
+    }
+
+    /// Put every other effect that would do as well in the place of a term beside it.
+    pub(super) fn find_rivals(&self, state: &mut State) {
+        for i in 0..state.terms.len() {
+            if state.terms[i].stated.is_some() {
+                continue;
+            }
+            let rest = self.without(state, i);
+            let own = state.terms[i].effect.id();
+            let extended = state.terms[i].effect.extends();
+            let score = state.terms[i].score();
+            let mut alternatives = std::mem::take(&mut state.terms[i].alternatives);
+            for offer in self.offers(&rest, &|c| {
+                c.effect.id() != own && c.effect.id() != crate::beyond::ID
+            }) {
+                let close = offer.score() > 0.0 && offer.score() > score - RIVAL_SPAN;
+                // The narrower case of an extension that needed more than it is no rival.
+                if !close
+                    || extended == Some(offer.effect.id())
+                    || offer.effect.extends() == Some(own)
+                {
+                    continue;
+                }
+                let odds = (offer.score() - score) / 2.0;
+                match alternatives
+                    .iter_mut()
+                    .find(|a| a.0.id() == offer.effect.id())
+                {
+                    Some(a) => a.1 = a.1.max(odds),
+                    None => alternatives.push((offer.effect, odds)),
+                }
+            }
+            alternatives.sort_by(|a, b| b.1.total_cmp(&a.1));
+            state.terms[i].alternatives = alternatives;
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! What each hypothesis offers to a model: its best place, its likelihood ratio, its threshold.
+
+use std::sync::Arc;
+
+use model::effect::Hypothesis;
+
+use super::{Candidate, FASTEST_BEAT_HZ, Form, LEAST_BEATS, LEAST_CYCLES, Search, State, Term};
+use crate::likelihood::Noise;
+use crate::{scan, threshold};
+
+impl Search<'_> {
+    /// Best term that candidate `i` offers to `state`; `quick` leaves out refinements.
+    pub(super) fn weigh(
+        &self,
+        state: &State,
+        walks: &[(Noise, Vec<f64>, f64)],
+        i: usize,
+    ) -> Option<Term> {
+        let candidate = &self.candidates[i];
+        let null = state.solution.log_likelihood;
+        let own = state.columns();
+        let term = |form, columns: Vec<usize>, names, lr, threshold| Term {
+            effect: candidate.effect,
+            candidate: i,
+            form,
+            columns,
+            names,
+            fixed: vec![],
+            follows: None,
+            lr,
+            threshold,
+            alternatives: vec![],
+            stated: None,
+        };
+        let n = self.panel.bins.n;
+        match &candidate.hypothesis {
+            Hypothesis::Regression(r) => {
+                let columns = [own, candidate.columns.clone()].concat();
+                let lr = 2.0 * (self.panel.profile(walks, &columns) - null);
+                let names = r.columns.iter().map(|c| c.parameter).collect();
+                // In the place of a narrower term, only the columns beyond it are new.
+                let held: usize = state
+                    .terms
+                    .iter()
+                    .filter(|t| candidate.effect.extends() == Some(t.effect.id()))
+                    .map(|t| t.columns.len())
+                    .sum();
+                let new = r.columns.len().saturating_sub(held).max(1);
+                let limit = threshold::regression(new, candidate.siblings) + candidate.handicap;
+                let mut t = term(Form::Columns, candidate.columns.clone(), names, lr, limit);
+                t.fixed.clone_from(&r.fixed);
+                t.follows.clone_from(&r.follows);
+                Some(t)
+            }
+            Hypothesis::Shaped(shape) => {
+                let (at, columns, lr) = candidate
+                    .grid
+                    .iter()
+                    .map(|(at, c)| {
+                        (
+                            *at,
+                            c,
+                            2.0 * (self
+                                .panel
+                                .profile(walks, &[own.clone(), c.clone()].concat())
+                                - null),
+                        )
+                    })
+                    .max_by(|a, b| a.2.total_cmp(&b.2))?;
+                let names: Vec<_> = shape.columns(at).iter().map(|c| c.parameter).collect();
+                let limit = threshold::shaped(names.len());
+                Some(term(
+                    Form::Shaped(Arc::clone(shape), at),
+                    columns.clone(),
+                    names,
+                    lr,
+                    limit,
+                ))
+            }
+            Hypothesis::Step => {
+                let margin = (0.5 * self.view.rate_hz).max(4.0);
+                let noises: Vec<Noise> = walks.iter().step_by(2).map(|w| w.0.clone()).collect();
+                let curve = scan::steps(&self.panel, &noises, &own, null);
+                let inside: Vec<_> = curve
+                    .into_iter()
+                    .filter(|(t, _)| *t >= margin && *t <= n as f64 - margin)
+                    .collect();
+                let (at, lr) = inside.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
+                let weight = |l: f64| ((l - lr) / 2.0).exp();
+                let near = |t: f64| (t - at).abs() < 0.1 * n as f64;
+                let (mut sum, mut square) = (0.0, 0.0);
+                for (t, l) in inside.iter().filter(|(t, _)| near(*t)) {
+                    sum += weight(*l);
+                    square += weight(*l) * (t - at).powi(2);
+                }
+                let error = (square / sum).sqrt().max(0.5);
+                Some(term(
+                    Form::Step(at, error),
+                    vec![],
+                    vec!["height"],
+                    lr,
+                    threshold::step(n),
+                ))
+            }
+            Hypothesis::Line => {
+                let lr = scan::lines(&self.panel, &state.noise, &own, &state.solution);
+                let least = (2.0 * LEAST_CYCLES) as usize;
+                let k = (least..n - 1).max_by(|a, b| lr[*a].total_cmp(&lr[*b]))?;
+                let omega = std::f64::consts::PI * k as f64 / n as f64;
+                Some(term(
+                    Form::Line(omega),
+                    vec![],
+                    vec!["cosine", "sine"],
+                    lr[k],
+                    threshold::line(n),
+                ))
+            }
+            Hypothesis::SideBands => {
+                let (carrier, phase) = state.carrier()?;
+                let lr = scan::beats(
+                    &self.panel,
+                    &state.noise,
+                    &own,
+                    &state.solution,
+                    carrier,
+                    phase,
+                );
+                let widest = (2.0 * FASTEST_BEAT_HZ / self.view.rate_hz * n as f64) as usize;
+                let bin = std::f64::consts::PI / n as f64;
+                let d = ((2.0 * LEAST_BEATS) as usize..=widest.min(n - 1))
+                    .filter(|d| carrier > bin * (d + 1) as f64)
+                    .filter(|d| carrier + bin * (d + 1) as f64 <= std::f64::consts::PI)
+                    .max_by(|a, b| lr[*a].total_cmp(&lr[*b]))?;
+                Some(term(
+                    Form::SideBands(carrier, d as f64 * bin),
+                    vec![],
+                    vec!["cosine", "sine", "in_phase", "quadrature"],
+                    lr[d],
+                    threshold::side_bands(widest),
+                ))
+            }
+            Hypothesis::Covariance(c) => {
+                let best = c
+                    .starts(n)
+                    .into_iter()
+                    .map(|theta| {
+                        let mut noise = state.noise.clone();
+                        noise.terms.push((Arc::clone(c), theta));
+                        self.panel.fit(&noise, &own)
+                    })
+                    .max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;
+                let lr = 2.0 * (best.1.log_likelihood - null);
+                let theta = best.0.terms.last().map(|t| t.1.clone())?;
+                let limit = threshold::covariance(c.dimensions());
+                Some(term(
+                    Form::Covariance(Arc::clone(c), theta),
+                    vec![],
+                    vec![],
+                    lr,
+                    limit,
+                ))
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether a candidate may still join.
+    pub(super) fn open(&self, state: &State, i: usize) -> bool {
+        let c = &self.candidates[i];
+        match &c.hypothesis {
+            Hypothesis::Step | Hypothesis::Line => !self.view.moving,
+            Hypothesis::SideBands => state.terms.iter().all(|t| t.candidate != i),
+            Hypothesis::Covariance(_) => {
+                !self.view.moving && state.terms.iter().all(|t| t.effect.id() != c.effect.id())
+            }
+            Hypothesis::Regression(r) => {
+                !self.view.moving
+                    && state
+                        .terms
+                        .iter()
+                        .all(|t| t.effect.id() != c.effect.id() || t.follows != r.follows)
+            }
+            Hypothesis::Shaped(_) => {
+                !self.view.moving && state.terms.iter().all(|t| t.candidate != i)
+            }
+            _ => false,
+        }
+    }
+
+    /// What every open candidate offers, those that extend a term in its place.
+    pub(super) fn offers(&self, state: &State, allow: &dyn Fn(&Candidate) -> bool) -> Vec<Term> {
+        let walks = self.panel.walks(&state.noise);
+        (0..self.candidates.len())
+            .filter(|i| allow(&self.candidates[*i]) && self.open(state, *i))
+            .filter_map(|i| self.weigh(state, &walks, i))
+            .filter(|t| t.lr.is_finite())
+            .collect()
+    }
+}
