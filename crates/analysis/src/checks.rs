@@ -151,61 +151,105 @@ const SEGMENTS: [usize; 2] = [10, 60];
 const TILE: usize = 50;
 const MOST_TILES: usize = 24;
 
-/// Energies in tiles of time and frequency: a tone that wanders, rings or comes and goes fills some of them more than
-/// others, though each band and each stretch of time may have its share.
-fn tiles(e: &[f64], rate_hz: f64) -> Outcome {
-    let mut worst = (1.0f64, 0.0, String::new());
-    for segments in SEGMENTS {
+/// Squared deviations of the energies in tiles of time and frequency, each over its variance.
+struct Tiles {
+    /// Samples of a segment.
+    length: usize,
+    /// By segment, by tile of it: squared deviation, energy over the model's.
+    of: Vec<Vec<(f64, f64)>>,
+}
+
+impl Tiles {
+    fn new(e: &[f64], segments: usize) -> Option<Self> {
         let length = e.len() / segments;
         if length < TILE {
-            continue;
+            return None;
         }
         let dct = crate::likelihood::Dct::new(length);
         let count = (length / TILE).clamp(1, MOST_TILES);
-        let mut sum = 0.0;
-        let mut most = (0.0, 0, 0, 0.0);
-        for s in 0..segments {
-            let c = dct.forward(&e[s * length..(s + 1) * length]);
-            for t in 0..count {
-                let part = &c[t * length / count..(t + 1) * length / count];
-                let degrees = part.len() as f64;
-                let energy: f64 = part.iter().map(|v| v * v).sum();
-                let square = (energy - degrees).powi(2) / (2.0 * degrees);
-                sum += square;
-                if square > most.0 {
-                    most = (square, s, t, energy / degrees);
-                }
+        let of = (0..segments)
+            .map(|s| {
+                let c = dct.forward(&e[s * length..(s + 1) * length]);
+                (0..count)
+                    .map(|t| {
+                        let part = &c[t * length / count..(t + 1) * length / count];
+                        let degrees = part.len() as f64;
+                        let energy: f64 = part.iter().map(|v| v * v).sum();
+                        (
+                            (energy - degrees).powi(2) / (2.0 * degrees),
+                            energy / degrees,
+                        )
+                    })
+                    .collect()
+            })
+            .collect();
+        Some(Self { length, of })
+    }
+
+    fn count(&self) -> usize {
+        self.of.first().map_or(1, Vec::len)
+    }
+
+    /// Chance of a larger sum of the squared deviations of `tiles` tiles: a gamma distribution of its mean and variance.
+    fn chance(&self, sum: f64, tiles: usize) -> f64 {
+        let tiles = tiles as f64;
+        let variance = tiles * (2.0 + 12.0 * self.count() as f64 / self.length as f64);
+        Gamma::new(tiles * tiles / variance, tiles / variance).map_or(1.0, |g| g.sf(sum))
+    }
+}
+
+/// Frequencies, as shares of half the sample rate, at which the energy comes and goes.
+pub(crate) fn unsteady(e: &[f64]) -> Vec<(f64, f64)> {
+    let mut all = vec![];
+    for tiles in SEGMENTS.iter().filter_map(|s| Tiles::new(e, *s)) {
+        let count = tiles.count();
+        for t in 0..count {
+            let sum: f64 = tiles.of.iter().map(|s| s[t].0).sum();
+            if tiles.chance(sum, tiles.of.len()) * (count as f64) < LEAST_CHANCE {
+                all.push((t as f64 / count as f64, (t + 1) as f64 / count as f64));
             }
         }
-        // Sum of squared deviations of chi-square energies: a gamma distribution of its mean and variance.
-        let tiles = (segments * count) as f64;
-        let variance = tiles * (2.0 + 12.0 * count as f64 / length as f64);
-        let p = Gamma::new(tiles * tiles / variance, tiles / variance).map_or(1.0, |g| g.sf(sum));
-        let p = (p * SEGMENTS.len() as f64).min(1.0);
-        if p < worst.0 || worst.2.is_empty() {
-            let (seconds, hz) = (length as f64 / rate_hz, 0.5 * rate_hz / count as f64);
-            let what = format!(
-                "energy of the whitened residual over the model's in {tiles:.0} tiles of {seconds:.1} s and {hz:.2} Hz; {:.2} from {:.1} to {:.1} s, {:.2} to {:.2} Hz stands out most",
-                most.3,
-                most.1 as f64 * seconds,
-                (most.1 + 1) as f64 * seconds,
-                most.2 as f64 * hz,
-                (most.2 + 1) as f64 * hz
-            );
-            worst = (p, sum / tiles, what);
+    }
+    all
+}
+
+/// Energies in tiles of time and frequency: a tone that wanders, rings or comes and goes fills some of them more than
+/// others, though each band and each stretch of time may have its share.
+fn tiles(e: &[f64], rate_hz: f64) -> Outcome {
+    let mut worst: Option<Outcome> = None;
+    for tiles in SEGMENTS.iter().filter_map(|s| Tiles::new(e, *s)) {
+        let (segments, count) = (tiles.of.len(), tiles.count());
+        let sum: f64 = tiles.of.iter().flatten().map(|t| t.0).sum();
+        let p = (tiles.chance(sum, segments * count) * SEGMENTS.len() as f64).min(1.0);
+        if worst.as_ref().is_some_and(|w| w.p_value <= p) {
+            continue;
         }
+        let most = (0..segments)
+            .flat_map(|s| (0..count).map(move |t| (s, t)))
+            .max_by(|a, b| tiles.of[a.0][a.1].0.total_cmp(&tiles.of[b.0][b.1].0))
+            .unwrap_or((0, 0));
+        let (seconds, hz) = (tiles.length as f64 / rate_hz, 0.5 * rate_hz / count as f64);
+        worst = Some(Outcome {
+            id: "time_frequency",
+            statistic: sum / (segments * count) as f64,
+            p_value: p,
+            what: format!(
+                "energy of the whitened residual over the model's in {} tiles of {seconds:.1} s and {hz:.2} Hz; {:.2} from {:.1} to {:.1} s, {:.2} to {:.2} Hz stands out most",
+                segments * count,
+                tiles.of[most.0][most.1].1,
+                most.0 as f64 * seconds,
+                (most.0 + 1) as f64 * seconds,
+                most.1 as f64 * hz,
+                (most.1 + 1) as f64 * hz
+            ),
+        });
     }
-    let what = if worst.2.is_empty() {
-        "too short for tiles".into()
-    } else {
-        worst.2
-    };
-    Outcome {
+    worst.unwrap_or_else(|| Outcome {
         id: "time_frequency",
-        statistic: worst.1,
-        p_value: worst.0,
-        what,
-    }
+        statistic: 1.0,
+        p_value: 1.0,
+        what: "too short for tiles".into(),
+    })
 }
 
 fn variance_cusum(e: &[f64], rate_hz: f64) -> Outcome {

@@ -50,7 +50,12 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<bool>, bool
         all > 0.0 && hit > SHARE * all
     };
     let crowd = !s.state.notes.is_empty();
-    let somewhere = failing("ljung_box") || failing("time_frequency");
+    let correlated = failing("ljung_box");
+    let unsteady = checks::unsteady(&s.e[1]);
+    let wanders = |omega: f64| {
+        let at = omega / std::f64::consts::PI;
+        unsteady.iter().any(|(from, to)| at >= *from && at < *to)
+    };
     let mut at = 0;
     let terms = s
         .state
@@ -70,11 +75,13 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<bool>, bool
                 }
                 share(&panel.bins.products(&sum, &sum))
             };
-            let spectral = matches!(
-                t.form,
-                Form::Covariance(..) | Form::Line(_) | Form::SideBands(..)
-            );
-            in_band || generic(t) && (crowd || somewhere && spectral)
+            let elsewhere = match &t.form {
+                Form::Covariance(..) => correlated || !unsteady.is_empty(),
+                Form::Line(omega) | Form::SideBands(omega, _) => wanders(*omega),
+                _ => false,
+            };
+            let line = matches!(t.form, Form::Line(_) | Form::SideBands(..));
+            !(line && s.state.wandering) && (in_band || generic(t) && (crowd || elsewhere))
         })
         .collect();
     (terms, failing("variance_in_time") || failing("kurtosis"))

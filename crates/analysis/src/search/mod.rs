@@ -114,6 +114,8 @@ pub struct State {
     pub solution: Solution,
     /// Structure that was seen and that no single effect explains.
     pub notes: Vec<String>,
+    /// Whether its line is one of a narrow crowd: a line still, though no steady one.
+    pub wandering: bool,
 }
 
 impl State {
@@ -231,6 +233,7 @@ impl<'a> Search<'a> {
             noise,
             solution,
             notes: vec![],
+            wandering: false,
         };
         let mut fitted = state.noise.terms.iter();
         for t in &mut state.terms {
@@ -277,6 +280,7 @@ impl<'a> Search<'a> {
             noise,
             solution,
             notes: vec![],
+            wandering: false,
         };
         let mut state = baseline.clone();
         while state.terms.len() < MOST_TERMS {

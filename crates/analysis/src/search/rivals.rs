@@ -2,6 +2,9 @@
 
 use super::{Form, MOST_ALIKE, RIVAL_SPAN, Search, State};
 
+/// Span of a crowd of lines over their frequency, below which they are one that wanders.
+const WANDERING: f64 = 0.02;
+
 impl Search<'_> {
     /// More lines or more steps than separate causes make are one structure that the library does not have: the
     /// strongest line stays, the steps go, and a note says what is seen.
@@ -22,8 +25,14 @@ impl Search<'_> {
                 .fold((f64::INFINITY, 0.0f64), |(l, h), (f, _)| {
                     (l.min(*f), h.max(*f))
                 });
+            state.wandering = high - low < WANDERING * high;
+            let seen = if state.wandering {
+                "one line whose frequency or amplitude wanders"
+            } else {
+                "no steady line but a band, a chirp or harmonics"
+            };
             notes.push(format!(
-                "{} lines from {low:.3} to {high:.3} Hz: no steady line but a band, a chirp or harmonics",
+                "{} lines from {low:.3} to {high:.3} Hz: {seen}",
                 lines.len()
             ));
             let strongest = lines.iter().map(|l| l.1).fold(0.0, f64::max);
@@ -48,7 +57,9 @@ impl Search<'_> {
             state.terms.retain(|t| !matches!(t.form, Form::Step(..)));
         }
         if !notes.is_empty() {
+            let wandering = state.wandering;
             *state = self.refit(std::mem::take(&mut state.terms), state.noise.log_walk);
+            state.wandering = wandering;
             self.reweigh(state);
         }
         notes

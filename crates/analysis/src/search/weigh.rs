@@ -174,11 +174,11 @@ impl Search<'_> {
                 !self.view.moving && state.terms.iter().all(|t| t.effect.id() != c.effect.id())
             }
             Hypothesis::Regression(r) => {
+                let other = |t: &Term| r.columns.iter().all(|c| !t.names.contains(&c.parameter));
                 !self.view.moving
-                    && state
-                        .terms
-                        .iter()
-                        .all(|t| t.effect.id() != c.effect.id() || t.follows != r.follows)
+                    && state.terms.iter().all(|t| {
+                        t.effect.id() != c.effect.id() || t.follows != r.follows || other(t)
+                    })
             }
             Hypothesis::Shaped(_) => {
                 !self.view.moving && state.terms.iter().all(|t| t.candidate != i)

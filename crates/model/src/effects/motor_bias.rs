@@ -22,6 +22,7 @@ impl Effect for MotorBias {
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
             optional("at_full_duty", "deg/s", "shift at full duty, once the motor has its speed; 0 where it is left out"),
+            optional("while_turning", "deg/s", "shift beyond that while the motor turns forward, the opposite backward: the current that friction takes"),
             optional("surge_at_full_duty", "deg/s", "shift beyond that right after a step from standstill to full duty"),
             optional("surge_time", "s", "time in which the surge falls to 1/e: the motor's mechanical time constant"),
             optional("by_magnitude", "1", "1 where the shift follows |duty|, else it follows the sign too"),
@@ -32,7 +33,7 @@ impl Effect for MotorBias {
     fn docs(&self) -> Docs {
         Docs {
             title: "Motor shifts the bias",
-            physics: "b(t) = at_full_duty x duty, or x |duty| where both directions are driven and the magnitude fits better: magnetic field or ground shift of the motor current. Current surges until the motor has spun up: with w' = (duty - w) / surge_time, surge_at_full_duty x (duty - w) is added.",
+            physics: "b(t) = at_full_duty x duty, or x |duty| where both directions are driven and the magnitude fits better: magnetic field or ground shift of the motor current. Current surges until the motor has spun up: with w' = (duty - w) / surge_time, surge_at_full_duty x (duty - w) is added. Dry friction takes the same current at any speed: while_turning x sign(duty).",
             excitation: "A motor command that changes, while the axis itself does not turn.",
             test: "Least squares on the command, and on the surge over a grid of times, refined; random walk refitted.",
             figure: "Rate in time blocks against duty.",
@@ -68,9 +69,18 @@ impl Effect for MotorBias {
             return Err("the motor command does not change: switch the motor during the record".into());
         }
         let surge = Hypothesis::Shaped(Arc::new(Surge { duty: duty.clone(), rate_hz: view.rate_hz }));
-        let mut all = vec![regression(duty, false)];
+        let mut all = vec![regression(duty.clone(), false)];
         if low < 0.0 && high > 0.0 {
             all.push(regression(size, true));
+        }
+        let turning: Vec<f64> = duty.iter().map(|d| direction(*d)).collect();
+        // A command of two levels cannot tell them apart.
+        if likeness(&turning, &duty) < MOST_ALIKE {
+            all.push(Hypothesis::Regression(Regression {
+                columns: vec![Column { parameter: "while_turning", values: turning }],
+                fixed: vec![],
+                follows: Some(signal.name.clone()),
+            }));
         }
         all.push(surge);
         Ok(all)
@@ -96,11 +106,33 @@ impl Effect for MotorBias {
         for &axis in channels {
             for (i, (rate, d)) in simulation.rate[axis].iter_mut().zip(&simulation.duty).enumerate() {
                 *rate += full * if by_size { d.abs() } else { *d };
+                *rate += value(parameters, "while_turning") * direction(*d);
                 *rate += surge * extra.as_ref().map_or(0.0, |e| e[i]);
             }
         }
     }
 }
+
+/// 1 forward, -1 backward, 0 at rest.
+fn direction(duty: f64) -> f64 {
+    if duty == 0.0 { 0.0 } else { duty.signum() }
+}
+
+/// Correlation of two columns.
+fn likeness(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().max(1) as f64;
+    let (ma, mb) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
+    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
+    for (x, y) in a.iter().zip(b) {
+        ab += (x - ma) * (y - mb);
+        aa += (x - ma).powi(2);
+        bb += (y - mb).powi(2);
+    }
+    if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 1.0 }
+}
+
+/// Correlation of direction and command, above which one stands for both.
+const MOST_ALIKE: f64 = 0.97;
 
 /// What the command is ahead of a speed that follows it with a time constant of `tau` samples, averaged over each
 /// sample. The command is held from sample to sample, and the motor has its speed at the start.
