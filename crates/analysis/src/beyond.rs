@@ -83,9 +83,16 @@ fn combinations(view: &View<'_>) -> Vec<(String, Vec<f64>)> {
             format!("cube of {}", t.name),
             c.iter().map(|v| v.powi(3)).collect(),
         ));
-        for other in [motor, supply].into_iter().flatten() {
-            let name = format!("{} times {}", other.name, t.name);
-            all.push((name, product(&centred(&other.smooth), &c)));
+        // The command has a zero of its own; the supply has none that means anything.
+        if let Some(m) = motor {
+            all.push((
+                format!("{} times {}", m.name, t.name),
+                product(&m.smooth, &c),
+            ));
+        }
+        if let Some(u) = supply {
+            let name = format!("{} times {}", u.name, t.name);
+            all.push((name, product(&centred(&u.smooth), &c)));
         }
         if let Some(m) = motor {
             let size: Vec<f64> = m.smooth.iter().map(|v| v.abs()).collect();

@@ -7,6 +7,10 @@ use crate::diagnosis::Searched;
 use crate::findings::sentence;
 use crate::grid::Grid;
 use crate::result::{Check, Finding, Unexplained};
+use crate::threshold;
+
+/// Correlation in sigma that each pair has to show before a source is said to be that of all axes.
+const LEAST_OF_ALL: f64 = 0.5;
 
 /// What the axes share.
 pub(crate) struct Shared {
@@ -38,10 +42,19 @@ pub(crate) fn common(searched: &[Searched<'_>], grid: &Grid) -> Shared {
             let r = ab / (aa * bb).sqrt();
             let z = r.clamp(-0.999_999, 0.999_999).atanh() * ((grid.n - first) as f64 - 3.0).sqrt();
             let p = checks::normal_tail(z);
-            pairs.push((a, b, r, p));
+            pairs.push((a, b, r, p, z));
         }
     }
-    let fails: Vec<_> = pairs.iter().filter(|p| p.3 < LEAST_CHANCE).collect();
+    // A source that all axes share shows in all pairs: their sum tells it from d' 1.7 times smaller on than any one pair.
+    let joint = pairs.iter().map(|p| p.4).sum::<f64>() / (pairs.len().max(1) as f64).sqrt();
+    let together = pairs.len() > 1
+        && checks::normal_tail(joint) < 2.0 * threshold::FALSE_ALARM
+        && joint > 0.0
+        && pairs.iter().all(|p| p.4 > LEAST_OF_ALL);
+    let fails: Vec<_> = pairs
+        .iter()
+        .filter(|p| together || p.3 < LEAST_CHANCE)
+        .collect();
     let of = searched
         .iter()
         .flat_map(|s| &s.search.candidates)
@@ -88,7 +101,7 @@ pub(crate) fn common(searched: &[Searched<'_>], grid: &Grid) -> Shared {
             ..Finding::default()
         });
     }
-    for (a, b, r, p) in &pairs {
+    for (a, b, r, p, _) in &pairs {
         let fails = *p < LEAST_CHANCE;
         let explained = shared.finding.is_some();
         shared.checks.push(Check {

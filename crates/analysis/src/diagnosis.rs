@@ -245,7 +245,7 @@ fn variance(s: &Searched<'_>) -> Option<VarianceFound> {
                     found.coefficients = vec![(gamma, error)];
                     (
                         lr,
-                        threshold::regression(1, 2),
+                        threshold::variance_law(),
                         shape.iter().map(|d| 1.0 + gamma * d).collect::<Vec<f64>>(),
                     )
                 }
@@ -255,11 +255,10 @@ fn variance(s: &Searched<'_>) -> Option<VarianceFound> {
                     let error = (1.0 + increase)
                         * (2.0 / inside.max(1.0) + 2.0 / (n - inside).max(1.0)).sqrt();
                     found.coefficients = vec![(increase, error)];
-                    let block = n / 240.0 / rate_hz;
-                    found.location = vec![
-                        (start as f64 / rate_hz, block),
-                        (end as f64 / rate_hz, block),
-                    ];
+                    let (first, last) = scan::ends(e, start, end, increase);
+                    found.location = [first, last]
+                        .map(|(at, error)| (at / rate_hz, error / rate_hz))
+                        .to_vec();
                     let law = (0..e.len())
                         .map(|i| {
                             if i >= start && i < end {

@@ -8,9 +8,8 @@ use crate::search::{Form, State};
 /// Points of the random walk that coefficients are averaged over.
 const WALKS: u32 = 28;
 
-/// Random walks with their posterior weights (flat in the random walk's size, restricted likelihood).
-#[must_use]
-pub fn mixture(
+/// Random walks with the logarithms of their posterior weights (flat in the random walk's size, restricted likelihood).
+fn weighted(
     panel: &Panel,
     noise: &Noise,
     columns: &[usize],
@@ -19,7 +18,7 @@ pub fn mixture(
     let high = (noise.log_walk + 4.0).max(least_walk(panel.bins.n) + 14.0);
     let low = least_walk(panel.bins.n);
     let step = (high - low) / f64::from(WALKS);
-    let points: Vec<_> = (0..=WALKS)
+    (0..=WALKS)
         .map(|i| {
             let log_walk = low + step * f64::from(i);
             let trial = Noise {
@@ -32,7 +31,17 @@ pub fn mixture(
                 -0.5 * (free * s.rss.ln() + s.log_det_noise + s.log_det_normal) + 0.5 * log_walk;
             (restricted, s)
         })
-        .collect();
+        .collect()
+}
+
+/// Random walks with their posterior weights.
+#[must_use]
+pub fn mixture(
+    panel: &Panel,
+    noise: &Noise,
+    columns: &[usize],
+) -> Vec<(f64, crate::likelihood::Solution)> {
+    let points = weighted(panel, noise, columns);
     let top = points.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
     let sum: f64 = points.iter().map(|p| (p.0 - top).exp()).sum();
     points
@@ -161,9 +170,11 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
                         .location
                         .push((distance * rate_hz / std::f64::consts::TAU, error));
                 }
-                Form::Shaped(shape, at) => found
-                    .location
-                    .push((*at, shape_error(panel, state, t, shape.as_ref(), *at))),
+                Form::Shaped(shape, at) => {
+                    let (place, coefficients) = shaped(panel, state, t, shape.as_ref(), *at);
+                    found.location.push(place);
+                    found.coefficients = coefficients;
+                }
                 Form::Covariance(_, theta) => {
                     let own = theta
                         .iter()
@@ -181,38 +192,62 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
         .collect()
 }
 
-/// Standard error of a shape's coordinate: the curvature of the likelihood in its logarithm.
-fn shape_error(
+/// Values of a shape's coordinate that it is averaged over, and how far they reach in its logarithm.
+const SHAPES: i32 = 12;
+const REACH: f64 = 1.2;
+
+/// A shape's coordinate and the coefficients of its columns, averaged over both the coordinate (flat in its logarithm,
+/// within `bounds`) and the random walk: where a slow shape and a slow walk take each other's part, errors at fixed
+/// values of either are too small.
+fn shaped(
     panel: &Panel,
     state: &State,
     term: &crate::search::Term,
     shape: &dyn model::effect::Shape,
     at: f64,
-) -> f64 {
-    let g = state.noise.over(&panel.bins);
+) -> ((f64, f64), Vec<(f64, f64)>) {
     let others: Vec<usize> = state
         .columns()
         .into_iter()
         .filter(|c| !term.columns.contains(c))
         .collect();
     let width = panel.width();
-    let l = |x: f64| {
+    let grid = shape.grid();
+    let (low, high) = (grid[0].ln(), grid[grid.len() - 1].ln());
+    let mut all: Vec<(f64, f64, crate::likelihood::Solution)> = vec![];
+    for i in -SHAPES..=SHAPES {
+        let x = at.ln() + REACH * f64::from(i) / f64::from(SHAPES);
+        if x < low - 0.7 || x > high + 0.7 {
+            continue;
+        }
         let added: Vec<usize> = shape
-            .columns(x)
+            .columns(x.exp())
             .iter()
             .map(|c| panel.add(&c.values))
             .collect();
-        let l = panel
-            .solve(&g, &[others.clone(), added].concat())
-            .log_likelihood;
+        let columns = [added, others.clone()].concat();
+        for (weight, s) in weighted(panel, &state.noise, &columns) {
+            all.push((x, weight, s));
+        }
         panel.truncate(width);
-        l
-    };
-    let h: f64 = 0.15;
-    let curvature = (l(at * h.exp()) - 2.0 * l(at) + l(at * (-h).exp())) / (h * h);
-    if curvature < 0.0 {
-        at / (-curvature).sqrt()
-    } else {
-        f64::NAN
     }
+    let top = all.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = all.iter().map(|p| (p.1 - top).exp()).collect();
+    let sum: f64 = weights.iter().sum();
+    let mean_of = |f: &dyn Fn(usize) -> f64| -> f64 {
+        (0..all.len()).map(|i| weights[i] * f(i)).sum::<f64>() / sum
+    };
+    let x = mean_of(&|i| all[i].0);
+    let spread = mean_of(&|i| (all[i].0 - x).powi(2)).sqrt();
+    let coefficients = (0..term.columns.len())
+        .map(|c| {
+            let mean = mean_of(&|i| all[i].2.beta[c]);
+            let variance = mean_of(&|i| {
+                let s = &all[i].2;
+                s.white * s.inverse[c][c] + (s.beta[c] - mean).powi(2)
+            });
+            (mean, variance.sqrt())
+        })
+        .collect();
+    ((x.exp(), x.exp() * spread), coefficients)
 }

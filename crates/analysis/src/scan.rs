@@ -217,6 +217,52 @@ pub fn segment(u: &[f64]) -> (f64, usize, usize, f64) {
     best
 }
 
+/// Start and end of a stretch of other variance, in samples, with their standard errors: each one averaged over all
+/// samples by its likelihood, the other one and the sizes held.
+#[must_use]
+pub fn ends(u: &[f64], start: usize, end: usize, increase: f64) -> ((f64, f64), (f64, f64)) {
+    let outside: Vec<f64> = u[..start].iter().chain(&u[end..]).map(|v| v * v).collect();
+    let variance = outside.iter().sum::<f64>() / outside.len().max(1) as f64;
+    let inside = variance * (1.0 + increase);
+    // What a sample says for being inside.
+    let says: Vec<f64> = u
+        .iter()
+        .map(|v| 0.5 * ((variance / inside).ln() + v * v * (1.0 / variance - 1.0 / inside)))
+        .collect();
+    let weigh = |places: std::ops::Range<usize>, logs: &[f64]| {
+        let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (mut sum, mut mean, mut square) = (0.0, 0.0, 0.0);
+        for (i, l) in places.zip(logs) {
+            let w = (l - top).exp();
+            sum += w;
+            mean += w * i as f64;
+            square += w * (i * i) as f64;
+        }
+        mean /= sum;
+        // A place between samples cannot be told.
+        (mean, (square / sum - mean * mean).max(1.0 / 12.0).sqrt())
+    };
+    let mut logs: Vec<f64> = says[..end]
+        .iter()
+        .rev()
+        .scan(0.0, |sum, v| {
+            *sum += v;
+            Some(*sum)
+        })
+        .collect();
+    logs.reverse();
+    let first = weigh(0..end, &logs);
+    let logs: Vec<f64> = says[start..]
+        .iter()
+        .scan(0.0, |sum, v| {
+            *sum += v;
+            Some(*sum)
+        })
+        .collect();
+    let last = weigh(start + 1..u.len() + 1, &logs);
+    (first, last)
+}
+
 /// Likelihood of variance 1 + gamma x shape, its scale profiled: (LR, gamma, standard error).
 #[must_use]
 pub fn variance_law(u: &[f64], shape: &[f64]) -> (f64, f64, f64) {

@@ -57,6 +57,12 @@ pub fn covariance(dimensions: usize) -> f64 {
     quantile(dimensions, 1.0)
 }
 
+/// A law of the variance with one size: no random walk is refitted under it.
+#[must_use]
+pub fn variance_law() -> f64 {
+    quantile(1, 1.0)
+}
+
 /// A stretch of other variance: any of about 28 000 pairs of ends, strongly overlapping.
 #[must_use]
 pub fn segment() -> f64 {

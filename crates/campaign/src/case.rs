@@ -5,6 +5,7 @@ use std::time::Instant;
 use analysis::result::{Diagnosis, Finding};
 use analysis::{DiagnoseOptions, diagnose};
 use model::file::EffectModel;
+use model::record::Record;
 
 use crate::foreign::{self, FOREIGN, add, foreign};
 use crate::plant::{
@@ -203,16 +204,21 @@ fn strength(draw: &mut Draw, from: f64) -> f64 {
     }
 }
 
-/// Run case `index` of a family.
-///
-/// # Panics
-/// When a simulated run cannot be diagnosed: that is a defect of the diagnosis.
-#[must_use]
-pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
+/// A run as planted, before the diagnosis.
+struct Planted {
+    record: Record,
+    truths: Vec<Truth>,
+    allowed: Vec<&'static str>,
+    walks: [f64; 3],
+    /// Strength of a foreign effect.
+    strange: f64,
+}
+
+fn planted(seed: u64, family: Family, index: u64) -> Planted {
     let draw = &mut Draw::of(seed, family.number(), index);
     let mut truths: Vec<Truth> = vec![];
     let mut strange = f64::NAN;
-    let mut allowed: Vec<&str> = vec![];
+    let mut allowed: Vec<&'static str> = vec![];
     let (rate_hz, seconds) = match family {
         Family::Elsewhere => ELSEWHERE[index as usize % ELSEWHERE.len()],
         _ => (20.0, 600.0),
@@ -280,6 +286,61 @@ pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
     if let Some(f) = &unknown {
         f.act(&mut record, GYROS[axis], &stand, axis, draw);
     }
+    Planted {
+        record,
+        truths,
+        allowed,
+        walks: stand.walk_of_rate,
+        strange,
+    }
+}
+
+/// What case `index` of a family plants, in words, and the whole answer.
+///
+/// # Panics
+/// As [`run`].
+#[must_use]
+pub fn describe(seed: u64, family: Family, index: u64) -> (String, Diagnosis) {
+    let p = planted(seed, family, index);
+    let options = DiagnoseOptions {
+        seed: index,
+        ..DiagnoseOptions::default()
+    };
+    let d = diagnose(&p.record, &options).expect("a simulated run can be diagnosed");
+    let told: Vec<String> = p
+        .truths
+        .iter()
+        .map(|t| {
+            let values: Vec<String> = t
+                .parameters
+                .iter()
+                .map(|(k, p)| format!("{k} {:.4}", p.value))
+                .collect();
+            format!(
+                "{} on {} (d' {:.1}): {}",
+                t.label,
+                t.channel,
+                t.strength,
+                values.join(", ")
+            )
+        })
+        .collect();
+    (told.join("; "), d.diagnosis)
+}
+
+/// Run case `index` of a family.
+///
+/// # Panics
+/// When a simulated run cannot be diagnosed: that is a defect of the diagnosis.
+#[must_use]
+pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
+    let Planted {
+        record,
+        truths,
+        allowed,
+        walks,
+        strange,
+    } = planted(seed, family, index);
     let begun = Instant::now();
     let d = diagnose(
         &record,
@@ -307,7 +368,7 @@ pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
             .map(|u| format!("{}: {}", u.channel, u.what))
             .collect(),
         estimates,
-        walks: stand.walk_of_rate,
+        walks,
         strength: strange,
         seconds,
     }

@@ -37,6 +37,9 @@ struct Arguments {
     /// Where to write the report; nowhere where it is not given.
     #[arg(long)]
     out: Option<PathBuf>,
+    /// With `--only` and a seed: plant this one run and print the whole answer.
+    #[arg(long, requires_all = ["only", "seed"])]
+    run: Option<u64>,
     /// Date to print in the report.
     #[arg(long, default_value = "")]
     date: String,
@@ -76,6 +79,17 @@ fn main() -> ExitCode {
             "help:  rows are the causes of docs/effects.md, \"nothing\", \"two\", and the foreign effects of docs/power.md"
         );
         return ExitCode::from(2);
+    }
+    if let (Some(index), Some((family, _))) = (a.run, all.first()) {
+        let (told, d) = campaign::case::describe(seed, *family, index);
+        println!("planted: {told}");
+        for f in &d.findings {
+            println!("named {} on {}: {}", f.cause, f.channels.join("+"), f.what);
+        }
+        for u in &d.unexplained {
+            println!("unexplained on {}: {}", u.channel, u.what);
+        }
+        return ExitCode::SUCCESS;
     }
     let list = a.list || a.only.is_some();
     let begun = Instant::now();

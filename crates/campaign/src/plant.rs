@@ -426,7 +426,7 @@ pub fn plant(
         }
         "flicker" => {
             // Two-sided density B^2 / (2 pi f): B^2 / w per sample.
-            let (b, d, density) = of_density(stand, f64::INFINITY, &|b, w| b * b / w);
+            let (b, d, density) = of_density(stand, LARGEST_RMS, &|b, w| b * b / w);
             let p = parameters_of(cause, &[("bias_instability", b * 3600.0)]);
             process(p, d, density)
         }

@@ -168,6 +168,13 @@ pub fn page(all: &[Outcome], command: &str, date: &str, seconds: f64) -> String 
         if date.is_empty() { "" } else { ", " },
         seconds / 60.0
     );
+    if all.len() < crate::cases(crate::DEFAULT, None).len() {
+        let _ = writeln!(
+            out,
+            "A sample, shorter than the {} runs of the campaign proper: read the intervals, not the shares.\n",
+            crate::cases(crate::DEFAULT, None).len()
+        );
+    }
     out.push_str(METHOD);
     bars(&mut out, all);
     clean(&mut out, all);

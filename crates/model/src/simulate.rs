@@ -27,6 +27,8 @@ const TICK_S: f64 = 4e-6;
 const TICK_TOLERANCE_PPM: f64 = 100.0;
 /// Standard gravity, m/s^2.
 const STANDARD_GRAVITY: f64 = 9.80665;
+/// Step of a channel whose model states none, deg/s: a file holds counts, and these are far below the noise of any gyro.
+const STEPLESS_DPS: f64 = 1e-6;
 /// Limits of the 14-bit word.
 const COUNT_LIMIT: i32 = 8191;
 /// Time a frame spends on the line, s, and its spread.
@@ -288,14 +290,14 @@ fn run(
     }
     stage(Stage::Output, &mut s);
     for (axis, own) in lsb.iter().enumerate() {
-        let unit = own.unwrap_or(0.07326);
+        let unit = own.unwrap_or(STEPLESS_DPS);
         s.counts[axis] = (0..samples)
             .map(|i| {
                 let w = s.scale[axis] * s.motion[axis][i] + s.rate[axis][i] + s.white[axis][i];
+                let limit = if own.is_some() { COUNT_LIMIT } else { i32::MAX - 1 };
                 (w / unit)
                     .round()
-                    .clamp(f64::from(-COUNT_LIMIT - 1), f64::from(COUNT_LIMIT))
-                    as i32
+                    .clamp(f64::from(-limit - 1), f64::from(limit)) as i32
             })
             .collect();
     }
@@ -359,7 +361,7 @@ fn frames(
             Some(axis),
             "deg/s",
             counts,
-            lsb[i].unwrap_or(0.07326),
+            lsb[i].unwrap_or(STEPLESS_DPS),
             0.0,
             0.0,
         );
@@ -468,7 +470,7 @@ fn header(s: &Simulation, model: &ModelFile) -> Header {
         (_, true) => (Base::Moving, "moving"),
         _ => (Base::Static, "static"),
     };
-    let lsb = model.channels.iter().find_map(|c| c.lsb).unwrap_or(0.07326);
+    let lsb = model.channels.iter().find_map(|c| c.lsb).unwrap_or(STEPLESS_DPS);
     let entries = [
         ("format", "imu-stand-capture/1".to_owned()),
         ("rate_hz", s.rate_hz.to_string()),

@@ -86,3 +86,19 @@ fn a_run_is_the_same_from_the_same_seed_and_has_the_stated_noise() {
             .is_some_and(|f| f.iter().all(|f| *f == 7))
     );
 }
+
+#[test]
+fn a_channel_without_a_step_is_not_rounded() {
+    let mut model = ModelFile::paper();
+    for c in &mut model.channels {
+        c.lsb = None;
+        if let Some(p) = c.baseline.get_mut("angle_random_walk") {
+            p.value = 0.01;
+        }
+    }
+    // 0.01 deg/sqrt(h) at 20 Hz is 7.5e-4 deg/s, a hundredth of the stand's step: rounded to it, readings would be equal.
+    let record = model::simulate(&model, 100.0, 20.0, 3).expect("a record");
+    let y = &record.channel("gyro_x").expect("gyro_x").values;
+    let equal = y.windows(2).filter(|w| w[0] == w[1]).count();
+    assert!(equal < 10, "{equal} of {} repeat", y.len());
+}

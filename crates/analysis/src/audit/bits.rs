@@ -147,6 +147,9 @@ fn stuck(
 /// Half width of the kernel of the smooth density, in sigma: wide against the comb that a low bit makes.
 const KERNEL: f64 = 0.5;
 
+/// Nats that the smooth density has to gain over the normal one before the counts are told not to be normal.
+const CLEARLY_NOT_NORMAL: f64 = 20.0;
+
 /// Log likelihood of the counts when a bit sticks: a code takes the share f of the one that differs in that bit alone.
 fn stuck_likelihood(counts: &[i32], local: &Local, known: &[bool], s: &Stuck) -> f64 {
     let weight = f64::from(1u32 << s.bit);
@@ -298,7 +301,15 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         z.abs()
     );
     if audit.check("bit_share", name, z, chance, what.clone()) {
-        if stuck_likelihood(counts, local, &known, worst) < smooth_likelihood(local, &known) {
+        let smooth = smooth_likelihood(local, &known);
+        if stuck_likelihood(counts, local, &known, worst) < smooth {
+            let sound = Stuck {
+                fraction: 0.0,
+                ..*worst
+            };
+            if smooth - stuck_likelihood(counts, local, &known, &sound) < CLEARLY_NOT_NORMAL {
+                return;
+            }
             audit.unexplained.push(Unexplained {
                 channel: name.into(),
                 what: format!(

@@ -29,6 +29,8 @@ pub struct Local {
     pub residual: Vec<f64>,
     /// Robust standard deviation of the residuals.
     pub sigma: f64,
+    /// Whether parabolas predict best: the base moves, and the prediction errs by the motion as well.
+    pub bent: bool,
 }
 
 /// Half the width between the 10 % and 90 % points over that of the standard normal.
@@ -140,6 +142,7 @@ impl Local {
                 level,
                 residual,
                 sigma,
+                bent: false,
             }
         };
         let all = MEANS
@@ -148,11 +151,12 @@ impl Local {
             .chain(PARABOLAS.iter().map(|w| (*w, true)));
         let mut best: Option<Self> = None;
         for (half, bent) in all {
-            let next = of(if bent {
+            let mut next = of(if bent {
                 parabolas(&clean, half)
             } else {
                 means(&clean, half)
             });
+            next.bent = bent;
             if best.as_ref().is_none_or(|b| next.sigma < BETTER * b.sigma) {
                 best = Some(next);
             }

@@ -9,6 +9,9 @@ use super::{Audit, FALSE_ALARM, Gyro, counted, tails};
 /// Two farther than this apart are single ones.
 const ALONE: usize = 2;
 
+/// Where the base moves the prediction errs by the motion too, in its bends more than elsewhere.
+const MOVING: f64 = 1.3;
+
 pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     let name = g.channel.name.as_str();
     let n = g.local.residual.len();
@@ -16,7 +19,7 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
         return;
     }
     let step = g.channel.lsb.unwrap_or(0.0);
-    let limit = tails::farthest(n, FALSE_ALARM);
+    let limit = tails::farthest(n, FALSE_ALARM) * if g.local.bent { MOVING } else { 1.0 };
     // Where the noise is within a count, a residual of one or two counts is rounding.
     let z: Vec<f64> = g
         .local
@@ -36,7 +39,11 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
         .copied()
         .filter(|v| v.is_finite())
         .fold(0.0, f64::max);
-    let chance = (n as f64 * tails::two_sided(most)).min(1.0);
+    let chance = if g.local.bent && most < limit {
+        1.0
+    } else {
+        (n as f64 * tails::two_sided(most)).min(1.0)
+    };
     let what = format!(
         "{} readings of {name} lie more than {limit:.1} sigma from their neighbours, the farthest {most:.1}",
         single.len()
