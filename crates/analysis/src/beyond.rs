@@ -98,7 +98,7 @@ fn combinations(view: &View<'_>) -> Vec<(String, Vec<f64>)> {
             let size: Vec<f64> = m.smooth.iter().map(|v| v.abs()).collect();
             all.push((
                 format!("size of {} times {}", m.name, t.name),
-                product(&centred(&size), &c),
+                product(&size, &c),
             ));
         }
     }
