@@ -1,6 +1,7 @@
 //! The program `imu-stand` as a library: captures in and out, and what the commands share.
 
 pub mod capture;
+pub mod export;
 pub mod link;
 pub mod monitor;
 pub mod report;

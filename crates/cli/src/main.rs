@@ -38,6 +38,8 @@ enum Command {
     Simulate(commands::simulate::Arguments),
     /// A capture from the board's serial port.
     Capture(commands::capture::Arguments),
+    /// The data for other programs, or N, B, K in the units and conventions of filters and simulators.
+    Export(commands::export::Arguments),
     /// A live view: rates, temperatures, supply, what is lost, the board's counters, Allan deviations as they grow.
     Monitor(commands::monitor::Arguments),
     /// Read and set the board's configuration over the line.
@@ -57,6 +59,7 @@ fn main() -> miette::Result<()> {
         Command::Run(arguments) => commands::run::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Capture(arguments) => commands::capture::run(&arguments),
+        Command::Export(arguments) => commands::export::run(&arguments),
         Command::Monitor(arguments) => commands::monitor::run(&arguments),
         Command::Board(arguments) => commands::board::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),

@@ -4,6 +4,7 @@ pub mod analyze;
 pub mod board;
 pub mod capture;
 pub mod diagnose;
+pub mod export;
 pub mod flash;
 pub mod monitor;
 pub mod paper;

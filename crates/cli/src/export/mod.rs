@@ -1,0 +1,4 @@
+//! What others read: noise figures in the units and conventions of filters and simulators, and the data themselves.
+
+pub mod data;
+pub mod noise;

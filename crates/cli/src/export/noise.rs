@@ -1,0 +1,383 @@
+//! N, B and K for programs that take them, each in its own convention.
+//!
+//! Here N and K are those of IEEE Std 952 in continuous time, two-sided: the noise of a rate has the density N^2 + K^2 / (2 pi f)^2
+//! at frequencies of either sign. Sampled at f_s by averaging, its white part has a standard deviation of N sqrt(f_s),
+//! and its random walk takes steps of K / sqrt(f_s). Every consumer is described by what *it* does with its numbers at
+//! each step; `crates/cli/tests/export.rs` writes those steps down once more and gets N and K back from what they simulate.
+
+use std::fmt::Write;
+
+use analysis::analyze::{Analysis, ChannelAnalysis, Interval};
+
+/// Who takes the numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Consumer {
+    /// Kalibr's imu.yaml, read by OpenVINS and others too
+    Kalibr,
+    /// VINS-Mono and VINS-Fusion: acc_n, gyr_n, acc_w, gyr_w of their yaml
+    Vins,
+    /// MATLAB's imuSensor: gyroparams and accelparams
+    Matlab,
+    /// Gazebo Sim, and PX4 with it: the imu element of SDF
+    Gz,
+    /// gnss-ins-sim: the dictionary of an IMU
+    GnssInsSim,
+}
+
+/// Reported units to SI.
+const DEG: f64 = std::f64::consts::PI / 180.0;
+/// sqrt(s) in sqrt(h).
+const ROOT_HOUR: f64 = 60.0;
+
+/// A figure in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Figure {
+    /// Established.
+    Known(f64),
+    /// Not established; at most this.
+    AtMost(f64),
+    /// Nothing is known.
+    Unknown,
+}
+
+impl Figure {
+    fn of(interval: &Interval, to_si: f64) -> Self {
+        match (interval.value, interval.high) {
+            (Some(value), _) if value > 0.0 => Figure::Known(value * to_si),
+            (_, Some(high)) if high > 0.0 => Figure::AtMost(high * to_si),
+            _ => Figure::Unknown,
+        }
+    }
+
+    /// For a filter, which has to expect it: the limit where there is no value.
+    #[must_use]
+    pub fn expected(self) -> Option<f64> {
+        match self {
+            Figure::Known(value) | Figure::AtMost(value) => Some(value),
+            Figure::Unknown => None,
+        }
+    }
+
+    /// For a simulation, which must not invent it: 0 where there is no value.
+    #[must_use]
+    pub fn simulated(self) -> f64 {
+        match self {
+            Figure::Known(value) => value,
+            Figure::AtMost(_) | Figure::Unknown => 0.0,
+        }
+    }
+
+    fn remark(self) -> String {
+        match self {
+            Figure::Known(_) => String::new(),
+            Figure::AtMost(limit) => {
+                format!("not established by this record; 95 % limit {limit:.6e}")
+            }
+            Figure::Unknown => "this record says nothing about it".to_owned(),
+        }
+    }
+}
+
+/// A sensor axis in SI units: rad/s and m/s^2.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisNoise {
+    /// gyro_x, ...
+    pub name: String,
+    /// N, U/sqrt(Hz).
+    pub white: Figure,
+    /// B, U.
+    pub flicker: Figure,
+    /// K, U/s/sqrt(Hz).
+    pub walk: Figure,
+}
+
+/// What a record says of an IMU.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImuNoise {
+    /// File that was analyzed.
+    pub file: String,
+    /// Its length, s.
+    pub seconds: f64,
+    /// Its sample rate, Hz.
+    pub rate_hz: f64,
+    /// x, y, z, those there are, rad/s.
+    pub gyro: Vec<AxisNoise>,
+    /// x, y, z, those there are, m/s^2.
+    pub acc: Vec<AxisNoise>,
+}
+
+impl ImuNoise {
+    /// From an analysis. Channels whose units are neither those of a gyro nor of an accelerometer are left out.
+    #[must_use]
+    pub fn of(analysis: &Analysis) -> Self {
+        let axis = |name: &str, channel: &ChannelAnalysis, to_si: f64, flicker: f64| AxisNoise {
+            name: name.to_owned(),
+            white: Figure::of(&channel.parameters.angle_random_walk, to_si / ROOT_HOUR),
+            flicker: Figure::of(&channel.parameters.bias_instability, flicker),
+            walk: Figure::of(&channel.parameters.rate_random_walk, to_si),
+        };
+        let of = |unit: &str, to_si: f64, flicker: f64| {
+            analysis
+                .channels
+                .iter()
+                .filter(|(name, channel)| {
+                    channel.unit == unit && (name.starts_with("gyro") || name.starts_with("acc"))
+                })
+                .map(|(name, channel)| axis(name, channel, to_si, flicker))
+                .collect()
+        };
+        Self {
+            file: analysis.input.file.clone(),
+            seconds: analysis.input.seconds,
+            rate_hz: analysis.input.rate_hz,
+            gyro: of("deg/s", DEG, DEG / 3600.0),
+            acc: of("m/s^2", 1.0, 1.0),
+        }
+    }
+
+    /// The text that a consumer reads, for a sensor that is sampled at `rate_hz` there.
+    #[must_use]
+    pub fn text(&self, consumer: Consumer, rate_hz: f64) -> String {
+        match consumer {
+            Consumer::Kalibr => self.kalibr(rate_hz),
+            Consumer::Vins => self.vins(rate_hz),
+            Consumer::Matlab => self.matlab(rate_hz),
+            Consumer::Gz => self.gz(rate_hz),
+            Consumer::GnssInsSim => self.gnss_ins_sim(),
+        }
+    }
+
+    fn origin(&self, comment: &str) -> String {
+        format!(
+            "{comment} from {}: {:.0} s at {:.4} Hz, by imu-stand {}\n",
+            self.file,
+            self.seconds,
+            self.rate_hz,
+            env!("CARGO_PKG_VERSION")
+        )
+    }
+
+    /// Continuous time, two-sided densities, one number for all axes: their root mean square.
+    fn kalibr(&self, rate_hz: f64) -> String {
+        let mut out = self.origin("#");
+        out.push_str(
+            "# Continuous time, two-sided: discrete white noise is density * sqrt(rate), a step of the bias walk / sqrt(rate).\n\
+             # One number for all axes: their root mean square. A walk that is not established stands at its 95 % limit.\n\
+             # What no random walk describes (flicker, temperature, vibration) is not in these numbers: `imu-stand diagnose`.\n",
+        );
+        for (axes, name, unit) in [
+            (&self.acc, "accelerometer", "m/s^2"),
+            (&self.gyro, "gyroscope", "rad/s"),
+        ] {
+            if axes.is_empty() {
+                let _ = writeln!(
+                    out,
+                    "# no {name} in the record; Kalibr wants both:\n# {name}_noise_density: \n# {name}_random_walk: "
+                );
+                continue;
+            }
+            for axis in axes {
+                let figure =
+                    |f: Figure| f.expected().map_or("?".to_owned(), |v| format!("{v:.6e}"));
+                let remark = axis.walk.remark();
+                let _ = writeln!(
+                    out,
+                    "# {}: density {}, walk {}{}",
+                    axis.name,
+                    figure(axis.white),
+                    figure(axis.walk),
+                    if remark.is_empty() {
+                        remark
+                    } else {
+                        format!(" ({remark})")
+                    }
+                );
+            }
+            let white = rms(axes.iter().map(|axis| axis.white.expected()));
+            let walk = rms(axes.iter().map(|axis| axis.walk.expected()));
+            let _ = writeln!(out, "{name}_noise_density: {white:.6e}  # {unit}/sqrt(Hz)");
+            let _ = writeln!(out, "{name}_random_walk: {walk:.6e}  # {unit}/s/sqrt(Hz)");
+        }
+        let _ = writeln!(out, "rostopic: /imu0");
+        let _ = writeln!(out, "update_rate: {rate_hz}  # Hz");
+        out
+    }
+
+    /// Discrete numbers for one rate: VINS integrates them with dt where a density wants sqrt(dt).
+    fn vins(&self, rate_hz: f64) -> String {
+        let mut out = self.origin("#");
+        let _ = writeln!(
+            out,
+            "# For {rate_hz} Hz and no other rate. VINS adds dt^2/2 * n^2 to a variance at each step, and dt^2 * w^2 to that of \
+             the\n# bias; so n = N sqrt(2 rate), w = K sqrt(rate). A walk that is not established stands at its 95 % limit."
+        );
+        for (axes, name, unit) in [(&self.acc, "acc", "m/s^2"), (&self.gyro, "gyr", "rad/s")] {
+            if axes.is_empty() {
+                let _ = writeln!(out, "# {name}_n, {name}_w: not in the record");
+                continue;
+            }
+            let white = rms(axes.iter().map(|axis| axis.white.expected()));
+            let walk = rms(axes.iter().map(|axis| axis.walk.expected()));
+            let n = white * (2.0 * rate_hz).sqrt();
+            let w = walk * rate_hz.sqrt();
+            let _ = writeln!(out, "{name}_n: {n:.6e}  # {unit}");
+            let _ = writeln!(out, "{name}_w: {w:.6e}  # {unit}/s");
+        }
+        out
+    }
+
+    /// Continuous time; two-sided with NoiseType "single-sided", whose steps are N sqrt(fs) and K / sqrt(fs).
+    fn matlab(&self, rate_hz: f64) -> String {
+        let mut out = self.origin("%");
+        out.push_str(
+            "% imuSensor scales its noise by sqrt(fs/2) by default (NoiseType \"double-sided\"), which is short of N by sqrt(2);\n\
+             % \"single-sided\" scales by sqrt(fs). Where a release has no NoiseType: NoiseDensity * sqrt(2), RandomWalk / sqrt(2).\n\
+             % A term that the record does not establish is 0 here, and its 95 % limit stands beside it.\n",
+        );
+        let _ = writeln!(
+            out,
+            "imu = imuSensor('accel-gyro', 'SampleRate', {rate_hz});"
+        );
+        for (axes, of, params) in [
+            (&self.gyro, "Gyroscope", "gyroparams"),
+            (&self.acc, "Accelerometer", "accelparams"),
+        ] {
+            if axes.is_empty() {
+                let _ = writeln!(out, "% no {of} in the record");
+                continue;
+            }
+            let unit = if of == "Gyroscope" { "rad/s" } else { "m/s^2" };
+            let _ = writeln!(out, "imu.{of} = {params}( ...");
+            for (name, of_axis, per) in [
+                (
+                    "NoiseDensity",
+                    (|axis| axis.white) as fn(&AxisNoise) -> Figure,
+                    "/sqrt(Hz)",
+                ),
+                ("BiasInstability", |axis| axis.flicker, ", B of IEEE 952"),
+                ("RandomWalk", |axis| axis.walk, "*sqrt(Hz)"),
+            ] {
+                let values: Vec<String> = axes
+                    .iter()
+                    .map(|axis| format!("{:.6e}", of_axis(axis).simulated()))
+                    .collect();
+                let remarks: Vec<String> = axes
+                    .iter()
+                    .filter(|axis| !of_axis(axis).remark().is_empty())
+                    .map(|axis| format!("{}: {}", axis.name, of_axis(axis).remark()))
+                    .collect();
+                let _ = writeln!(
+                    out,
+                    "    '{name}', [{}], ... % {unit}{per}{}{}",
+                    values.join(" "),
+                    if remarks.is_empty() { "" } else { "; " },
+                    remarks.join("; ")
+                );
+            }
+            out.push_str("    'NoiseType', 'single-sided');\n");
+        }
+        out
+    }
+
+    /// White noise for one rate; the bias is a first-order process that looks like K over any run.
+    fn gz(&self, rate_hz: f64) -> String {
+        let corr = self.long();
+        let mut out = String::from("<!--\n");
+        out.push_str(&self.origin(" "));
+        let _ = writeln!(
+            out,
+            "  stddev is per sample, for {rate_hz} Hz and no other rate: N sqrt(rate). dynamic_bias_stddev is K, a density: the bias\n  \
+             steps by K sqrt(dt). Its correlation time is ten times the record: over shorter times it is a random walk.\n  \
+             A term that the record does not establish is left out. PX4's own plugin for Gazebo Classic takes N and K as they\n  \
+             are in Kalibr's file. bias_mean is 0: Gazebo draws its sign at random."
+        );
+        out.push_str("-->\n");
+        let _ = writeln!(out, "<sensor name=\"imu\" type=\"imu\">");
+        let _ = writeln!(out, "  <update_rate>{rate_hz}</update_rate>");
+        out.push_str("  <imu>\n");
+        for (axes, element) in [
+            (&self.gyro, "angular_velocity"),
+            (&self.acc, "linear_acceleration"),
+        ] {
+            if axes.is_empty() {
+                continue;
+            }
+            let _ = writeln!(out, "    <{element}>");
+            for axis in axes {
+                let letter = axis.name.chars().last().unwrap_or('x');
+                let _ = writeln!(out, "      <{letter}>\n        <noise type=\"gaussian\">");
+                let _ = writeln!(out, "          <mean>0</mean>");
+                let stddev = axis.white.simulated() * rate_hz.sqrt();
+                let _ = writeln!(out, "          <stddev>{stddev:.6e}</stddev>");
+                if let Figure::Known(walk) = axis.walk {
+                    let _ = writeln!(
+                        out,
+                        "          <dynamic_bias_stddev>{walk:.6e}</dynamic_bias_stddev>"
+                    );
+                    let _ = writeln!(
+                        out,
+                        "          <dynamic_bias_correlation_time>{corr:.0}</dynamic_bias_correlation_time>"
+                    );
+                }
+                let _ = writeln!(out, "        </noise>\n      </{letter}>");
+            }
+            let _ = writeln!(out, "    </{element}>");
+        }
+        out.push_str("  </imu>\n</sensor>\n");
+        out
+    }
+
+    /// deg/sqrt(h), deg/h; the bias is a Gauss-Markov process given by its standard deviation.
+    fn gnss_ins_sim(&self) -> String {
+        let corr = self.long();
+        let mut out = self.origin("#");
+        let _ = writeln!(
+            out,
+            "# arw and vrw: N, for any rate. gnss-ins-sim has no random walk of the bias, but a Gauss-Markov process with the\n\
+             # standard deviation b_stability: K sqrt(b_corr / 2) makes it one over times far below b_corr, ten times the record.\n\
+             # A term that the record does not establish is 0. Its own `b_stability` is no flicker floor B."
+        );
+        out.push_str("import numpy as np\n\nimu_err = {\n");
+        for (axes, name, noise, to_n, to_b) in [
+            (&self.gyro, "gyro", "arw", ROOT_HOUR / DEG, 3600.0 / DEG),
+            (&self.acc, "accel", "vrw", ROOT_HOUR, 1.0),
+        ] {
+            let list = |of: &dyn Fn(&AxisNoise) -> f64| {
+                let values: Vec<String> = axes
+                    .iter()
+                    .map(|axis| format!("{:.6e}", of(axis)))
+                    .collect();
+                // All keys are needed, whether the record has the sensor or not.
+                if values.is_empty() {
+                    "0.0, 0.0, 0.0".to_owned()
+                } else {
+                    values.join(", ")
+                }
+            };
+            let zero = vec!["0.0"; axes.len().max(3)].join(", ");
+            let n = list(&|axis| axis.white.simulated() * to_n);
+            let b = list(&|axis| axis.walk.simulated() * (corr / 2.0).sqrt() * to_b);
+            let c = list(&|_| corr);
+            let _ = writeln!(out, "    '{name}_b': np.array([{zero}]),");
+            let _ = writeln!(out, "    '{name}_{noise}': np.array([{n}]),");
+            let _ = writeln!(out, "    '{name}_b_stability': np.array([{b}]),");
+            let _ = writeln!(out, "    '{name}_b_corr': np.array([{c}]),");
+        }
+        out.push_str("}\n");
+        out
+    }
+
+    /// A correlation time over which a process looks like a random walk for as long as anybody has looked, s.
+    fn long(&self) -> f64 {
+        (10.0 * self.seconds).max(3600.0).round()
+    }
+}
+
+/// Root mean square of those that are known; 0 where none is.
+fn rms(values: impl Iterator<Item = Option<f64>>) -> f64 {
+    let known: Vec<f64> = values.flatten().collect();
+    if known.is_empty() {
+        return 0.0;
+    }
+    (known.iter().map(|v| v * v).sum::<f64>() / known.len() as f64).sqrt()
+}
