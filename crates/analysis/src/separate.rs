@@ -204,6 +204,14 @@ fn signals(world: &World) -> Vec<Signal> {
         name: name.to_owned(),
         quantity,
         axis,
+        unit: match quantity {
+            Quantity::Gyro => "deg/s",
+            Quantity::Acc => "m/s^2",
+            Quantity::Temp => "degC",
+            Quantity::Supply => "V",
+            Quantity::Pwm | Quantity::Other => "1",
+        }
+        .to_owned(),
         values: values.to_vec(),
         smooth: values.to_vec(),
         lsb: None,
