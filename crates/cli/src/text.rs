@@ -75,17 +75,55 @@ pub fn diagnosis(d: &Diagnosis) -> String {
             let _ = writeln!(out, "{}", item(&format!("{}: ", not.cause), &not.why));
         }
     }
-    if !d.detection_limits.is_empty() {
-        let _ = writeln!(out, "\nsmallest size that this run would have found");
-        for limit in &d.detection_limits {
-            let _ = writeln!(
-                out,
-                "    {:<22} {:<8} {} {:.3e} {}",
-                limit.cause, limit.channel, limit.parameter, limit.value, limit.unit
-            );
+    write_limits(&mut out, d);
+    out
+}
+
+/// Detection limits: a line for each cause, a column for each channel.
+fn write_limits(out: &mut String, d: &Diagnosis) {
+    let mut channels: Vec<&str> = Vec::new();
+    let mut rows: Vec<(String, Vec<(&str, f64)>)> = Vec::new();
+    for limit in &d.detection_limits {
+        if !channels.contains(&limit.channel.as_str()) {
+            channels.push(&limit.channel);
+        }
+        let what = format!("{} {}, {}", limit.cause, limit.parameter, limit.unit);
+        let cell = (limit.channel.as_str(), limit.value);
+        match rows.iter_mut().find(|(row, _)| *row == what) {
+            Some((_, cells)) => cells.push(cell),
+            None => rows.push((what, vec![cell])),
         }
     }
-    out
+    if rows.is_empty() {
+        return;
+    }
+    channels.sort_unstable();
+    let title = "smallest size that this run would have found";
+    let _ = write!(out, "\n{title:<48}");
+    for channel in &channels {
+        let _ = write!(out, " {channel:>11}");
+    }
+    let _ = writeln!(out);
+    for (what, cells) in rows {
+        let mut line = format!("    {what:<44}");
+        for channel in &channels {
+            let cell = cells.iter().find(|(name, _)| name == channel);
+            let text = cell.map_or_else(|| "-".to_owned(), |(_, value)| short(*value));
+            let _ = write!(line, " {text:>11}");
+        }
+        let _ = writeln!(out, "{line}");
+    }
+}
+
+/// Two digits: a limit is no measurement.
+fn short(value: f64) -> String {
+    match value.abs() {
+        0.01..100.0 => {
+            let digits = (1.0 - value.abs().log10().floor()).max(0.0) as usize;
+            format!("{value:.digits$}")
+        }
+        _ => format!("{value:.1e}"),
+    }
 }
 
 fn write_finding(out: &mut String, finding: &Finding) {
@@ -144,6 +182,12 @@ fn write_finding(out: &mut String, finding: &Finding) {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn limits_have_two_digits() {
+        let shorts = [0.038_21, 0.411, 4.24, 42.4, 2.003e-4, 1234.0].map(super::short);
+        assert_eq!(shorts, ["0.038", "0.41", "4.2", "42", "2.0e-4", "1.2e3"]);
+    }
+
     #[test]
     fn long_text_is_wrapped_and_indented() {
         let text = super::item("why: ", &"word ".repeat(40));

@@ -128,3 +128,26 @@ fn a_reader_that_has_had_enough_is_no_failure() {
         output.status
     );
 }
+
+#[test]
+fn the_convicting_figures_can_be_had_as_files() {
+    let (folder, _, _) = reported("report_figures");
+    let arguments = [
+        "report",
+        "run.csv",
+        "--out",
+        "again.html",
+        "--figures",
+        "figures",
+    ];
+    succeed(program().current_dir(&folder).args(arguments));
+    let figures = folder.join("figures");
+    let svg = std::fs::read_to_string(figures.join("temperature-gyro_x.svg")).unwrap();
+    assert!(
+        svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox="),
+        "{}",
+        &svg[..100]
+    );
+    assert_eq!(svg.matches("<svg ").count(), svg.matches("</svg>").count());
+    assert!(svg.contains("degC"));
+}

@@ -294,7 +294,11 @@ fn run(
         s.counts[axis] = (0..samples)
             .map(|i| {
                 let w = s.scale[axis] * s.motion[axis][i] + s.rate[axis][i] + s.white[axis][i];
-                let limit = if own.is_some() { COUNT_LIMIT } else { i32::MAX - 1 };
+                let limit = if own.is_some() {
+                    COUNT_LIMIT
+                } else {
+                    i32::MAX - 1
+                };
                 (w / unit)
                     .round()
                     .clamp(f64::from(-limit - 1), f64::from(limit)) as i32
@@ -470,7 +474,11 @@ fn header(s: &Simulation, model: &ModelFile) -> Header {
         (_, true) => (Base::Moving, "moving"),
         _ => (Base::Static, "static"),
     };
-    let lsb = model.channels.iter().find_map(|c| c.lsb).unwrap_or(STEPLESS_DPS);
+    let lsb = model
+        .channels
+        .iter()
+        .find_map(|c| c.lsb)
+        .unwrap_or(STEPLESS_DPS);
     let entries = [
         ("format", "imu-stand-capture/1".to_owned()),
         ("rate_hz", s.rate_hz.to_string()),

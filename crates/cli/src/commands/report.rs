@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use analysis::DiagnoseOptions;
+use analysis::result::Diagnosed;
 use clap::Args;
+use imu_stand::report::standalone::figures;
 use imu_stand::report::{Subject, report};
-use miette::Result;
+use miette::{IntoDiagnostic, Result, WrapErr};
 
 use super::Input;
 
@@ -22,6 +24,9 @@ pub struct Arguments {
     /// The report to write
     #[arg(long, default_value = "report.html")]
     out: PathBuf,
+    /// Write the figures that convict as SVG files, too, into this folder
+    #[arg(long, value_name = "FOLDER")]
+    figures: Option<PathBuf>,
 }
 
 /// Runs it.
@@ -43,7 +48,28 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         hash: Some(&hash),
         hidden: None,
     };
+    if let Some(folder) = &arguments.figures {
+        write_figures(folder, &diagnosed, arguments.input.quiet)?;
+    }
     write(&arguments.out, &subject, arguments.input.quiet)
+}
+
+fn write_figures(folder: &Path, diagnosed: &Diagnosed, quiet: bool) -> Result<()> {
+    let figures = figures(diagnosed).map_err(|error| miette::miette!("no figures: {error}"))?;
+    std::fs::create_dir_all(folder)
+        .into_diagnostic()
+        .wrap_err_with(|| folder.display().to_string())?;
+    if figures.is_empty() && !quiet {
+        say!("no figure: nothing was found that one could convict");
+    }
+    for (name, svg) in figures {
+        let path = folder.join(name);
+        super::write(&path, &svg)?;
+        if !quiet {
+            say!("figure: {}", path.display());
+        }
+    }
+    Ok(())
 }
 
 /// Makes a report and writes it.

@@ -2,9 +2,10 @@
 
 pub mod plot;
 pub mod replicates;
+pub mod standalone;
 mod tables;
 
-use analysis::result::{Diagnosed, Evidence, SeriesStyle, Verdict};
+use analysis::result::{Diagnosed, Evidence, Verdict};
 use analysis::sampling::Sampling;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use model::record::Record;
@@ -370,37 +371,9 @@ impl View<'_> {
 }
 
 fn evidence(evidence: &Evidence) -> Result<Markup, ReportError> {
-    let layers = evidence
-        .series
-        .iter()
-        .enumerate()
-        .map(|(k, series)| {
-            let points: Vec<_> = series
-                .x
-                .iter()
-                .copied()
-                .zip(series.y.iter().copied())
-                .collect();
-            let layer = match series.style {
-                SeriesStyle::Points => Layer::Points(points),
-                SeriesStyle::Line => Layer::Line(points),
-            };
-            Drawn::new(&series.label, plot::colour(k, &series.label), layer)
-        })
-        .collect();
-    let figure = Figure {
-        x_label: evidence.x_label.clone(),
-        y_label: evidence.y_label.clone(),
-        log_x: evidence.log_x,
-        log_y: evidence.log_y,
-        width: plot::WIDE,
-        height: 400,
-        layers,
-        ..Figure::default()
-    };
     Ok(html! {
         figure {
-            (drawing(&figure)?)
+            (drawing(&standalone::figure(evidence))?)
             figcaption { b { (evidence.title) ". " } (evidence.caption) }
         }
     })

@@ -109,7 +109,7 @@ pub struct PlotError {
 }
 
 /// A colour as the page writes it.
-fn css(colour: RGBColor) -> String {
+pub(super) fn css(colour: RGBColor) -> String {
     format!("#{:02x}{:02x}{:02x}", colour.0, colour.1, colour.2)
 }
 

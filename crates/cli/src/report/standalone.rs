@@ -1,0 +1,99 @@
+//! The figures that convict, as files of their own: for a page of somebody else's.
+
+use analysis::result::{Diagnosed, Evidence, SeriesStyle};
+use maud::{PreEscaped, html};
+
+use super::ReportError;
+use super::plot::{self, Drawn, Figure, Layer};
+
+/// Height of title and legend.
+const HEAD: u32 = 74;
+
+/// The figure of an evidence.
+#[must_use]
+pub fn figure(evidence: &Evidence) -> Figure {
+    let layers = evidence
+        .series
+        .iter()
+        .enumerate()
+        .map(|(k, series)| {
+            let points: Vec<_> = series
+                .x
+                .iter()
+                .copied()
+                .zip(series.y.iter().copied())
+                .collect();
+            let layer = match series.style {
+                SeriesStyle::Points => Layer::Points(points),
+                SeriesStyle::Line => Layer::Line(points),
+            };
+            Drawn::new(&series.label, plot::colour(k, &series.label), layer)
+        })
+        .collect();
+    Figure {
+        x_label: evidence.x_label.clone(),
+        y_label: evidence.y_label.clone(),
+        log_x: evidence.log_x,
+        log_y: evidence.log_y,
+        width: plot::WIDE,
+        height: 400,
+        layers,
+        ..Figure::default()
+    }
+}
+
+/// All figures that convict, `cause-channel.svg` and the SVG, with title and legend on white.
+///
+/// # Errors
+/// [`ReportError`] where one cannot be drawn.
+pub fn figures(diagnosed: &Diagnosed) -> Result<Vec<(String, String)>, ReportError> {
+    let mut out: Vec<(String, String)> = Vec::new();
+    for evidence in &diagnosed.evidence {
+        let stem = format!("{}-{}", evidence.cause, evidence.channel);
+        let again = out
+            .iter()
+            .filter(|(name, _)| name.starts_with(&stem))
+            .count();
+        let name = match again {
+            0 => format!("{stem}.svg"),
+            n => format!("{stem}-{}.svg", n + 1),
+        };
+        out.push((name, alone(evidence)?));
+    }
+    Ok(out)
+}
+
+fn alone(evidence: &Evidence) -> Result<String, ReportError> {
+    let figure = figure(evidence);
+    let (width, height) = (figure.width, figure.height + HEAD);
+    let place = format!(
+        "<svg y=\"{HEAD}\" width=\"{width}\" height=\"{}\" ",
+        figure.height
+    );
+    let drawn = figure.svg()?.replacen("<svg ", &place, 1);
+    let labels: Vec<_> = figure
+        .layers
+        .iter()
+        .filter_map(|layer| Some((layer.label.clone()?, plot::css(layer.colour))))
+        .collect();
+    let mut x = 88;
+    let mut marks = Vec::new();
+    for (label, colour) in labels {
+        marks.push((x, label.clone(), colour));
+        // 8 units a letter at this size, and a gap.
+        x += 60 + 8 * label.chars().count() as u32;
+    }
+    let page = html! {
+        svg xmlns="http://www.w3.org/2000/svg" viewBox=(format!("0 0 {width} {height}"))
+            font-family="system-ui, sans-serif" role="img" aria-label=(evidence.title) {
+            rect width=(width) height=(height) fill="#ffffff" {}
+            text x="88" y="30" font-size="20" font-weight="600" fill="#1b1f24" { (evidence.title) }
+            @for (x, label, colour) in &marks {
+                rect x=(x) y="48" width="18" height="10" fill=(colour) {}
+                text x=(x + 26) y="58" font-size="15" fill="#1b1f24" { (label) }
+            }
+            (PreEscaped(drawn))
+        }
+    };
+    Ok(page.into_string())
+}
