@@ -21,30 +21,67 @@ struct Program {
 #[derive(Subcommand)]
 enum Command {
     /// Allan deviations, N, B, K, R, Q and the paper's two figures, with intervals.
+    #[command(
+        after_help = "Examples:\n  imu-stand analyze run.csv --json analysis.json\n  imu-stand analyze their.csv.gz --columns time=t,gyro_x=gx --units gyro=rad/s"
+    )]
     Analyze(commands::analyze::Arguments),
     /// What the simulation gets wrong, the causes, the extended model, the measured gain.
+    #[command(
+        after_help = "Example:\n  imu-stand diagnose run.csv --json diagnosis.json --model-out model.toml --report report.html"
+    )]
     Diagnose(commands::diagnose::Arguments),
     /// The paper's figures 3, 4, 5 and 8 and its two numbers again, and what does not fit in them.
+    #[command(
+        after_help = "Examples:\n  imu-stand paper --out paper\n  imu-stand paper --capture run.csv --channel gyro_x"
+    )]
     Paper(commands::paper::Arguments),
     /// How long to record, and with which excitation, for an answer that is still missing.
+    #[command(
+        after_help = "Examples:\n  imu-stand plan --want 'K within 20 %'\n  imu-stand plan run.csv --separate temperature,rate_ramp"
+    )]
     Plan(commands::plan::Arguments),
     /// Which of many runs represents them, and which do not and in what.
+    #[command(
+        after_help = "Example:\n  imu-stand representative run1.csv run2.csv run3.csv run4.csv run5.csv"
+    )]
     Representative(commands::representative::Arguments),
     /// One self-contained HTML file: the verdict, and the figures that it rests on.
+    #[command(
+        after_help = "Example:\n  imu-stand report run.csv --out report.html --figures figures"
+    )]
     Report(commands::report::Arguments),
     /// The simulated stand with something hidden in it: capture, analysis, diagnosis in one go.
+    #[command(
+        after_help = "Example:\n  imu-stand run --native --hide random --seed 7 --out run.csv --report report.html"
+    )]
     Run(commands::run::Arguments),
     /// A capture straight from a model file.
+    #[command(
+        after_help = "Example:\n  imu-stand simulate --model model.toml --seconds 600 --seed 1 --out simulated.csv"
+    )]
     Simulate(commands::simulate::Arguments),
     /// A capture from the board's serial port.
+    #[command(
+        after_help = "Examples:\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv.gz --seconds 600\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv.gz --resume"
+    )]
     Capture(commands::capture::Arguments),
     /// The data for other programs, or N, B, K in the units and conventions of filters and simulators.
+    #[command(
+        after_help = "Examples:\n  imu-stand export run.csv --out run.parquet\n  imu-stand export run.csv --to kalibr --out imu.yaml"
+    )]
     Export(commands::export::Arguments),
     /// A live view: rates, temperatures, supply, what is lost, the board's counters, Allan deviations as they grow.
+    #[command(after_help = "Example:\n  imu-stand monitor --port /dev/ttyUSB0")]
     Monitor(commands::monitor::Arguments),
     /// Read and set the board's configuration over the line.
+    #[command(
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 info\n  imu-stand board --port /dev/ttyUSB0 set rate 50\n  imu-stand board --port /dev/ttyUSB0 bias-null --store\n  imu-stand board --port /dev/ttyUSB0 motor --shape sine --amplitude 120 --period-ms 5000 --seconds 60"
+    )]
     Board(commands::board::Arguments),
     /// The firmware onto the board, by avrdude; fuses are checked, and written only on request.
+    #[command(
+        after_help = "Examples:\n  imu-stand flash --programmer usbasp --dry-run\n  imu-stand flash firmware.hex --programmer stk500v1 --programmer-port /dev/ttyACM0"
+    )]
     Flash(commands::flash::Arguments),
 }
 
@@ -63,5 +100,45 @@ fn main() -> miette::Result<()> {
         Command::Monitor(arguments) => commands::monitor::run(&arguments),
         Command::Board(arguments) => commands::board::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn every_command_has_an_example_and_every_example_is_understood() {
+        for command in Program::command().get_subcommands() {
+            let help = command.get_after_help().map(ToString::to_string);
+            let help = help.unwrap_or_default();
+            let examples: Vec<&str> = help
+                .lines()
+                .map(str::trim)
+                .filter(|line| line.starts_with("imu-stand "))
+                .collect();
+            assert!(!examples.is_empty(), "{} has none", command.get_name());
+            for example in examples {
+                // As a shell takes it: what is in quotes is one word.
+                let words: Vec<&str> = example
+                    .split('\'')
+                    .enumerate()
+                    .flat_map(|(k, part)| match k % 2 {
+                        0 => part.split_whitespace().collect(),
+                        _ => vec![part],
+                    })
+                    .collect();
+                assert_eq!(words.get(1), Some(&command.get_name()), "{example}");
+                if let Err(error) = Program::try_parse_from(words) {
+                    panic!("{example}: {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_arguments_of_no_command_contradict_each_other() {
+        Program::command().debug_assert();
     }
 }

@@ -124,7 +124,7 @@ pub enum CaptureError {
     #[error("there is no row of data")]
     #[diagnostic(
         code(capture::empty),
-        help("record again: the file ends after its column names")
+        help("the file is empty or ends after its column names: was it copied whole?")
     )]
     Empty,
 }

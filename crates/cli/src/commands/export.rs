@@ -164,9 +164,7 @@ fn noise(arguments: &Arguments, consumer: Consumer) -> Result<()> {
 /// From a file of `analyze --json`, or made of a capture.
 fn analysis(arguments: &Arguments) -> Result<Analysis> {
     if arguments.file.extension().is_some_and(|e| e == "json") {
-        let text = std::fs::read_to_string(&arguments.file)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("cannot read {}", arguments.file.display()))?;
+        let text = super::read_text(&arguments.file)?;
         let analysis: Analysis = serde_json::from_str(&text).map_err(|error| {
             miette::miette!(
                 help = "`imu-stand analyze C --json A` writes one",

@@ -67,7 +67,7 @@ impl Input {
             .wrap_err_with(|| format!("cannot read {}", path.display()))?;
         if read.skipped > 0 {
             eprintln!(
-                "{}: {} rows cannot be read and are left out",
+                "{}: rows that cannot be read and are left out: {}",
                 path.display(),
                 read.skipped
             );
@@ -138,11 +138,26 @@ pub fn digest(path: &Path) -> Result<String> {
     Ok(format!("sha256:{:x}", hash.finalize()))
 }
 
+/// Reads a text file.
+pub fn read_text(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path).map_err(|error| {
+        miette::miette!(
+            help = "is the path right, and is it a text file?",
+            "cannot read {}: {error}",
+            path.display()
+        )
+    })
+}
+
 /// Writes a text file.
 pub fn write(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot write {}", path.display()))
+    std::fs::write(path, text).map_err(|error| {
+        miette::miette!(
+            help = "does its folder exist, and may you write there?",
+            "cannot write {}: {error}",
+            path.display()
+        )
+    })
 }
 
 /// Writes what a command found as JSON, where it was asked to.
@@ -166,7 +181,7 @@ pub fn explain(error: analysis::AnalysisError) -> miette::Report {
         analysis::AnalysisError::NoChannel { .. } => {
             "name one of the channels that are there".to_owned()
         }
-        _ => "see `imu-stand help` and docs/ARCHITECTURE.md".to_owned(),
+        _ => "`--help` after the command lists its options, with an example".to_owned(),
     };
     miette::miette!(help = help, "{error}")
 }

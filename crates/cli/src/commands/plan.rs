@@ -9,7 +9,7 @@ use analysis::sampling::Sampling;
 use analysis::separate::{PRESETS, TOLD_APART, separation};
 use analysis::synthetic::Truth;
 use clap::Args;
-use miette::{IntoDiagnostic, Result, WrapErr};
+use miette::Result;
 use model::ModelFile;
 use model::effects::{EFFECTS, effect};
 use model::record::Quantity;
@@ -214,9 +214,7 @@ fn noise(arguments: &Arguments) -> Result<Noise> {
     }
     let (model, from) = match &arguments.model {
         Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .into_diagnostic()
-                .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+            let text = super::read_text(path)?;
             let model = ModelFile::parse(&text)
                 .map_err(|error| miette::miette!("{}: {error}", path.display()))?;
             (model, super::name(path))

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use imu_stand::write_capture;
-use miette::{IntoDiagnostic, Result, WrapErr};
+use miette::Result;
 use model::file::ModelFile;
 
 /// What `simulate` takes.
@@ -35,9 +35,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let model = match &arguments.model {
         None => ModelFile::paper(),
         Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .into_diagnostic()
-                .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+            let text = super::read_text(path)?;
             ModelFile::parse(&text).map_err(|error| {
                 miette::miette!(
                     help = "docs/model-file.md lists keys, effects and units",

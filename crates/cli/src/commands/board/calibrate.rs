@@ -78,9 +78,7 @@ struct Written {
 
 /// Reads a file of either kind.
 fn load(path: &Path) -> Result<(Calibration, Vec<String>)> {
-    let text = std::fs::read_to_string(path)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+    let text = super::super::read_text(path)?;
     let calibration = if text.trim_start().starts_with('{') {
         from_json(&text, path)?
     } else {
