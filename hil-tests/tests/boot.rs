@@ -34,7 +34,11 @@ fn a_reboot_by_command_is_answered_and_comes_back_by_the_watchdog_with_its_cause
     run.requests = vec![at(5.0, 1, Command::Reboot), at(12.0, 2, Command::GetHello)];
     let heard = hear(&run).expect("it runs");
     let replies: Vec<_> = heard.replies().map(|(_, reply)| reply).collect();
-    assert!(replies.iter().all(|reply| reply.status == Status::Ok));
+    let answered: Vec<_> = replies
+        .iter()
+        .map(|reply| (reply.number, reply.status))
+        .collect();
+    assert_eq!(answered, [(1, Status::Ok), (2, Status::Ok)]);
     let hellos: Vec<_> = heard.hellos().collect();
     let causes: Vec<_> = hellos.iter().map(|(_, hello)| hello.reset_cause).collect();
     assert_eq!(

@@ -4,6 +4,8 @@ pub mod capture;
 pub mod export;
 pub mod link;
 pub mod monitor;
+#[cfg(unix)]
+pub mod pty;
 pub mod report;
 pub mod stand;
 pub mod text;

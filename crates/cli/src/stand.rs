@@ -13,6 +13,15 @@ use wire::{Decoder, Frame, LinkCounts};
 use crate::RecordBuilder;
 use crate::capture::Calibration;
 
+/// What plays the board.
+pub enum Board {
+    /// The firmware's logic on the host.
+    Native,
+    /// Its image, an ELF file's bytes, on a simulated ATmega16.
+    #[cfg(feature = "simavr")]
+    Image(Vec<u8>),
+}
+
 /// What can be wrong with the simulated stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Hidden {

@@ -9,8 +9,6 @@ pub mod flash;
 pub mod monitor;
 pub mod paper;
 pub mod plan;
-#[cfg(unix)]
-pub mod pty;
 pub mod report;
 pub mod representative;
 pub mod run;

@@ -1,14 +1,21 @@
 //! `imu-stand run`.
 
 use std::path::PathBuf;
+#[cfg(unix)]
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
 
 use analysis::{AnalyzeOptions, DiagnoseOptions};
 use clap::Args;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
-use imu_stand::stand::{Hidden, Plan, plan, run_native};
+use imu_stand::stand::{Board, Hidden, Plan, plan, run_native};
 use imu_stand::{text, write_capture};
 use indicatif::{ProgressBar, ProgressStyle};
+#[cfg(unix)]
+use miette::IntoDiagnostic;
 use miette::Result;
 use model::record::Record;
 
@@ -59,7 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let board = board(arguments)?;
     if arguments.pty {
         #[cfg(unix)]
-        return super::pty::run(&board, arguments.hide, arguments.seconds, arguments.seed);
+        return serve(board, arguments);
         #[cfg(not(unix))]
         miette::bail!("this system has no pseudo-terminals: --pty works on Linux and macOS");
     }
@@ -127,13 +134,26 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// What plays the board.
-pub enum Board {
-    /// The firmware's logic on the host.
-    Native,
-    /// Its image, an ELF file's bytes, on a simulated ATmega16.
-    #[cfg(feature = "simavr")]
-    Image(Vec<u8>),
+#[cfg(unix)]
+fn serve(board: Board, arguments: &Arguments) -> Result<()> {
+    use imu_stand::pty::{self, Line, PtyError};
+    let mut plan = plan(arguments.hide, arguments.seconds, arguments.seed);
+    // Whoever opens the port drives the motor.
+    plan.run.requests.clear();
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).into_diagnostic()?;
+    let (line, name) = Line::open().into_diagnostic()?;
+    say!(
+        "the board is at {name} for {} s, in real time; Ctrl-C ends it",
+        arguments.seconds
+    );
+    say!("  imu-stand capture --port {name} --out capture.csv");
+    match pty::serve(line, &board, &plan.run, &stop) {
+        #[cfg(feature = "simavr")]
+        Err(PtyError::Image(error)) => Err(image_error(error)),
+        other => other.map_err(|error: PtyError| miette::Report::msg(error)),
+    }
 }
 
 #[cfg(feature = "simavr")]

@@ -1,21 +1,36 @@
-//! `imu-stand run --pty`: the simulated board as a serial device, in real time.
+//! The simulated board as a serial device, in real time: a pseudo-terminal on which everything works that works on a
+//! board's port.
 
-use std::io::{ErrorKind, Read, Write};
+use std::cell::RefCell;
+use std::io::{self, ErrorKind, Read, Write};
 use std::ops::ControlFlow;
 use std::os::fd::AsRawFd;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use bench::{Run, SerialByte, Timeline, native_live};
-use imu_stand::stand::{Hidden, plan};
-use miette::{IntoDiagnostic, Result, WrapErr};
 use serialport::{SerialPort, TTYPort};
 
-use super::run::Board;
+use crate::stand::Board;
+
+/// Why the board cannot be served any longer.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PtyError {
+    /// No pair of terminals.
+    #[error("cannot make a pseudo-terminal")]
+    Open(#[source] serialport::Error),
+    /// This end has failed.
+    #[error("the pseudo-terminal failed")]
+    Line(#[source] io::Error),
+    /// The image does not load, or stopped.
+    #[cfg(feature = "simavr")]
+    #[error(transparent)]
+    Image(#[from] bench::simavr::SimavrError),
+}
 
 /// The board's end of a pseudo-terminal.
-struct Line {
+pub struct Line {
     port: TTYPort,
     /// Bytes on their way to whoever has the other end open.
     out: Vec<u8>,
@@ -23,11 +38,12 @@ struct Line {
 
 impl Line {
     /// Opens a pair; returns this end and the other's name.
-    fn open() -> Result<(Self, String)> {
-        let (mut port, other) = TTYPort::pair()
-            .into_diagnostic()
-            .wrap_err("cannot make a pseudo-terminal")?;
-        port.set_timeout(Duration::ZERO).into_diagnostic()?;
+    ///
+    /// # Errors
+    /// [`PtyError::Open`].
+    pub fn open() -> Result<(Self, String), PtyError> {
+        let (mut port, other) = TTYPort::pair().map_err(PtyError::Open)?;
+        port.set_timeout(Duration::ZERO).map_err(PtyError::Open)?;
         let name = other.name().unwrap_or_default();
         Ok((
             Line {
@@ -60,7 +76,7 @@ impl Line {
     }
 
     /// What the other end has sent.
-    fn take(&mut self) -> Result<Vec<u8>> {
+    fn take(&mut self) -> io::Result<Vec<u8>> {
         let mut buffer = [0; 256];
         match self.port.read(&mut buffer) {
             Ok(count) => Ok(buffer[..count].to_vec()),
@@ -71,36 +87,29 @@ impl Line {
             {
                 Ok(Vec::new())
             }
-            Err(error) => Err(error).into_diagnostic().wrap_err("the pseudo-terminal"),
+            Err(error) => Err(error),
         }
     }
 }
 
-/// Runs until the time is over or Ctrl-C comes.
-pub fn run(board: &Board, hide: Hidden, seconds: f64, seed: u64) -> Result<()> {
-    let mut plan = plan(hide, seconds, seed);
-    // Whoever opens the port drives the motor.
-    plan.run.requests.clear();
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).into_diagnostic()?;
-    let (line, name) = Line::open()?;
-    say!("the board is at {name} for {seconds} s, in real time; Ctrl-C ends it");
-    say!("  imu-stand capture --port {name} --out capture.csv");
-    let line = std::cell::RefCell::new(line);
+/// Plays the board of `run` at the line's end, in real time, until the run is over or `stop` is set.
+///
+/// # Errors
+/// [`PtyError`].
+pub fn serve(line: Line, board: &Board, run: &Run, stop: &AtomicBool) -> Result<(), PtyError> {
+    let line = RefCell::new(line);
     let begun = Instant::now();
     let mut failure = None;
     let listen = |t: f64| {
-        let wait = Duration::from_secs_f64(t).saturating_sub(begun.elapsed());
-        std::thread::sleep(wait);
+        std::thread::sleep(Duration::from_secs_f64(t).saturating_sub(begun.elapsed()));
         let mut line = line.borrow_mut();
         line.flush();
         line.take().unwrap_or_else(|error| {
             failure.get_or_insert(error);
-            stop.store(true, Ordering::Relaxed);
             Vec::new()
         })
     };
+    // The board speaks many times a second: soon enough to look whether it is to stop.
     let receive = |received: SerialByte| {
         line.borrow_mut().out.push(received.byte);
         if stop.load(Ordering::Relaxed) {
@@ -109,25 +118,14 @@ pub fn run(board: &Board, hide: Hidden, seconds: f64, seed: u64) -> Result<()> {
             ControlFlow::Continue(())
         }
     };
-    play(board, &plan.run, listen, receive)?;
-    failure.map_or(Ok(()), Err)
-}
-
-fn play(
-    board: &Board,
-    run: &Run,
-    listen: impl FnMut(f64) -> Vec<u8>,
-    receive: impl FnMut(SerialByte) -> ControlFlow<()>,
-) -> Result<()> {
     match board {
         Board::Native => {
             native_live(run, &Timeline::default(), listen, receive);
         }
         #[cfg(feature = "simavr")]
         Board::Image(image) => {
-            bench::simavr::simavr_live(image, run, listen, receive)
-                .map_err(super::run::image_error)?;
+            bench::simavr::simavr_live(image, run, listen, receive)?;
         }
     }
-    Ok(())
+    failure.map_or(Ok(()), |error| Err(PtyError::Line(error)))
 }

@@ -1,0 +1,133 @@
+//! From 1 Hz to 256 Hz nothing is lost.
+
+use bench::Scenario;
+use bench::simavr::{NoProbe, Simulated};
+use hil_tests::{Heard, at, image, run};
+use wire::{Command, Fault, Sample, Status};
+
+/// Ticks of 4 us; a byte at divisor 3 takes 40 us.
+const FASTEST: u16 = 976;
+
+/// Runs at a rate; the host sets line and rate, then stays silent.
+fn heard_at(period_ticks: u16, periods_per_sample: u8, divisor: u16, seconds: f64) -> Heard {
+    let run = run(Scenario::lively(31), seconds);
+    let mut simulated = Simulated::new(&image(), &run.scenario, NoProbe).expect("an image");
+    simulated.request(&[
+        at(1.0, 1, Command::SetBaud { divisor }),
+        at(
+            1.5,
+            2,
+            Command::SetRate {
+                period_ticks,
+                periods_per_sample,
+            },
+        ),
+    ]);
+    let mut heard = Heard::default();
+    simulated
+        .run_until(seconds, &mut |byte| heard.push(byte))
+        .expect("it runs");
+    assert_eq!(heard.link().rejected(), 0);
+    let replies: Vec<_> = heard
+        .replies()
+        .map(|(_, reply)| (reply.number, reply.status))
+        .collect();
+    assert_eq!(replies, [(1, Status::Ok), (2, Status::Ok)]);
+    heard
+}
+
+/// Samples in order from the new rate on: no number is missing, no tick.
+fn assert_whole(heard: &Heard, ticks: u32) -> usize {
+    let samples: Vec<Sample> = heard.samples().map(|(_, sample)| sample).collect();
+    for pair in samples.windows(2) {
+        assert_eq!(pair[1].seq, pair[0].seq.wrapping_add(1));
+    }
+    let from = (samples.windows(2))
+        .rposition(|pair| pair[1].t_ticks.wrapping_sub(pair[0].t_ticks) != ticks)
+        .map_or(0, |last| last + 1);
+    assert!(samples.len() > from + 2, "the rate has been taken");
+    // What counts as lost on the way there: one period of the old rate and one of the change.
+    assert!(
+        f64::from(samples[from].t_ticks) * 4e-6 < 6.0,
+        "{} ticks",
+        samples[from].t_ticks
+    );
+    let health = heard.last_health();
+    for fault in [
+        Fault::TickOverrun,
+        Fault::FrameDropped,
+        Fault::ReportDropped,
+        Fault::SpiStalled,
+    ] {
+        assert_eq!(health.faults.get(fault), 0, "{}", fault.name());
+    }
+    samples.len()
+}
+
+/// A minute; with `IMU_STAND_LONG` set ten.
+#[test]
+fn at_256_hz_and_250_kbd_nothing_is_lost() {
+    let begun = std::time::Instant::now();
+    let seconds = if std::env::var_os("IMU_STAND_LONG").is_some() {
+        600.0
+    } else {
+        60.0
+    };
+    let heard = heard_at(FASTEST, 1, 3, seconds);
+    let samples = assert_whole(&heard, FASTEST.into());
+    let health = heard.last_health();
+    println!(
+        "{samples} samples in {seconds} s, the longest tick's work {:.3} ms of {:.3}; {:.1} s of host time",
+        f64::from(health.tick_busy_max) * 4e-3,
+        f64::from(FASTEST) * 4e-3,
+        begun.elapsed().as_secs_f64()
+    );
+    assert!(samples as f64 > (seconds - 2.0) * 256.0);
+}
+
+#[test]
+fn at_1_hz_the_watchdog_stays_quiet_and_nothing_is_lost() {
+    let heard = heard_at(62_500, 4, 25, 30.0);
+    assert_whole(&heard, 250_000);
+    assert_eq!(heard.last_health().faults.get(Fault::WatchdogReset), 0);
+}
+
+#[test]
+fn too_fast_for_the_line_drops_whole_samples_and_says_how_many() {
+    let heard = {
+        let run = run(Scenario::lively(31), 10.0);
+        let mut simulated = Simulated::new(&image(), &run.scenario, NoProbe).expect("an image");
+        let rate = |period_ticks| Command::SetRate {
+            period_ticks,
+            periods_per_sample: 1,
+        };
+        // While the line is full, health frames do not fit either: they come when the rate is back.
+        simulated.request(&[at(1.5, 2, rate(FASTEST)), at(6.0, 3, rate(12_500))]);
+        let mut heard = Heard::default();
+        simulated
+            .run_until(10.0, &mut |byte| heard.push(byte))
+            .expect("it runs");
+        heard
+    };
+    assert_eq!(heard.link().rejected(), 0, "no frame is damaged");
+    let samples: Vec<(f64, Sample)> = heard.samples().collect();
+    let (at_s, health) = heard.healths().last().expect("a health frame");
+    let seen: Vec<Sample> = samples
+        .iter()
+        .filter(|&&(t, _)| t <= at_s)
+        .map(|&(_, s)| s)
+        .collect();
+    let gaps: u32 = seen
+        .windows(2)
+        .map(|pair| u32::from(pair[1].seq.wrapping_sub(pair[0].seq)) - 1)
+        .sum();
+    let counted = u32::from(health.faults.get(Fault::FrameDropped))
+        + u32::from(health.faults.get(Fault::TickOverrun));
+    println!("{gaps} numbers missing, {counted} counted when the health frame was made");
+    assert!(gaps > 500);
+    // Between the making of the health frame and its end on the line, what was queued before it goes out.
+    assert!(
+        counted.abs_diff(gaps) <= 12,
+        "{counted} counted, {gaps} missing"
+    );
+}
