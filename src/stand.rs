@@ -15,8 +15,8 @@ use store::Store;
 
 /// The rest of the board, as the stand sees it.
 pub trait Board {
-    /// Queues a whole frame for the line; false, and nothing queued, when it does not fit.
-    fn send(&mut self, frame: &[u8]) -> bool;
+    /// Queues a frame of these fields for the line (see [`wire::fields`]); false, and nothing queued, when it does not fit.
+    fn send(&mut self, kind: u8, fields: &[u8]) -> bool;
     /// Puts out the motor command, -255..=255.
     fn set_motor(&mut self, duty: i16);
     /// Sets the period of the sample timer, and that every n-th period has a sample.
@@ -215,7 +215,7 @@ impl Stand {
             self.step_bias_null(board, in_order, &sample);
         }
         sample.flags.set(seen);
-        if !say(board, kind::SAMPLE, sample.as_bytes()) {
+        if !board.send(kind::SAMPLE, sample.as_bytes()) {
             self.record(Fault::FrameDropped, 0);
         }
         if !matches!(raw.done.task, Task::None) {
@@ -408,7 +408,7 @@ impl Stand {
         self.answer.number.set(asked.number);
         self.answer.command = asked.code;
         self.answer.status = status as u8;
-        if !say(board, kind::REPLY, self.answer.as_bytes()) {
+        if !board.send(kind::REPLY, self.answer.as_bytes()) {
             self.record(Fault::ReportDropped, 0);
         }
         self.answer.zero();
@@ -425,7 +425,7 @@ impl Stand {
             tick_ns: crate::TICK_NS.into(),
             set_up: self.config.set_up,
         };
-        if !say(board, kind::HELLO, hello.as_bytes()) {
+        if !board.send(kind::HELLO, hello.as_bytes()) {
             self.record(Fault::ReportDropped, 0);
         }
     }
@@ -433,7 +433,7 @@ impl Stand {
     #[inline(never)]
     fn health<B: Board>(&mut self, board: &mut B) {
         self.health.stack_free.set(board.stack_free());
-        if !say(board, kind::HEALTH, self.health.as_bytes()) {
+        if !board.send(kind::HEALTH, self.health.as_bytes()) {
             self.record(Fault::ReportDropped, 0);
         }
     }
@@ -455,14 +455,6 @@ impl Stand {
         board.set_acc_range(set_up.acc_range);
         self.unset = true;
     }
-}
-
-/// Sends a frame; false, and nothing sent, when it does not fit.
-#[inline(never)]
-fn say<B: Board>(board: &mut B, kind: u8, fields: &[u8]) -> bool {
-    let mut frame = [0; wire::MAX_FRAME];
-    let len = wire::fields::encode(kind, fields, &mut frame);
-    frame.get(..len).is_some_and(|frame| board.send(frame))
 }
 
 impl Default for Stand {

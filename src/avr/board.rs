@@ -93,8 +93,8 @@ impl AvrBoard {
 }
 
 impl Board for AvrBoard {
-    fn send(&mut self, frame: &[u8]) -> bool {
-        serial::send(frame)
+    fn send(&mut self, kind: u8, fields: &[u8]) -> bool {
+        serial::send(kind, fields)
     }
 
     #[inline(never)]

@@ -5,7 +5,7 @@ use firmware::{Board, VERSION};
 use heapless::Vec;
 use ufmt::{uWrite, uwrite};
 
-use super::board::AvrBoard;
+use super::{board::AvrBoard, serial};
 
 /// Sees every received byte first.
 pub struct Console {
@@ -40,7 +40,7 @@ fn answer(board: &mut AvrBoard) {
     text.number(b'y', board.reset_cause().into());
     text.number(b'z', board.stack_free());
     let _room = text.0.push(0);
-    board.send(&text.0);
+    serial::send_plain(&text.0);
 }
 
 /// Five numbers of at most four hexadecimal digits with a letter and a blank each, and the delimiter.

@@ -24,6 +24,32 @@ impl<const N: usize> Ring<N> {
         (N - 1) as u8
     };
 
+    /// Writes a byte ahead of what the reader sees: `offset` from the next place, less than [`room`](Self::room).
+    /// The writer's.
+    #[inline(never)]
+    pub fn put(&self, offset: u8, byte: u8) {
+        // SAFETY: inside, and behind the head the reader does not look.
+        unsafe { write_volatile(self.place(Self::further(self.head(), offset)), byte) }
+    }
+
+    /// Shows the reader `len` bytes that [`put`](Self::put) has written. The writer's.
+    pub fn advance(&self, len: u8) {
+        // SAFETY: a byte, written once.
+        unsafe { write_volatile(self.head.get(), Self::further(self.head(), len)) }
+    }
+
+    /// `at + by`, round the ring; `by` is at most [`LAST`](Self::LAST).
+    #[inline(always)]
+    fn further(at: u8, by: u8) -> u8 {
+        // Places up to the end, which is not one.
+        let left = Self::LAST.wrapping_sub(at);
+        if by > left {
+            by.wrapping_sub(left).wrapping_sub(1)
+        } else {
+            at.wrapping_add(by)
+        }
+    }
+
     fn after(at: u8) -> u8 {
         if at >= Self::LAST {
             0

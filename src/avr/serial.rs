@@ -5,6 +5,7 @@ use core::ptr::addr_of_mut;
 use avr_device::atmega16::USART;
 use firmware::Stand;
 use wire::Fault;
+use wire::fields::{encode_by, frame_len};
 
 use super::ring::Ring;
 
@@ -60,18 +61,32 @@ pub fn has_received() -> bool {
     !RX.is_empty()
 }
 
-/// Queues all of it or nothing.
+/// Queues a frame, or nothing. It is framed where it lies in the ring.
 #[inline(never)]
-pub fn send(frame: &[u8]) -> bool {
-    if (TX.room() as usize) < frame.len() {
+pub fn send(kind: u8, fields: &[u8]) -> bool {
+    if (TX.room() as usize) < frame_len(fields.len()) {
         return false;
     }
-    for &byte in frame {
+    let len = encode_by(kind, fields, |at, byte| TX.put(at, byte));
+    TX.advance(len);
+    begin();
+    true
+}
+
+/// Queues all of it or nothing.
+pub fn send_plain(text: &[u8]) {
+    if (TX.room() as usize) < text.len() {
+        return;
+    }
+    for &byte in text {
         TX.push(byte);
     }
+    begin();
+}
+
+fn begin() {
     // A single-bit write, which the interrupts cannot split.
     usart().ucsrb.modify(|r, w| bits!(w, r.bits() | UDRIE));
-    true
 }
 
 /// Whether the last byte has left the shift register.

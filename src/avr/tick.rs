@@ -36,8 +36,8 @@ pub struct Tick {
 struct Shared {
     /// One is written by the tick while the main loop reads the other.
     ticks: [Tick; 2],
-    /// Which of them is the main loop's.
-    reading: bool,
+    /// Which of them is the main loop's: 0, 1.
+    reading: u8,
     /// [`Task::None`]: the slot is free.
     job: Job,
     t_ticks: u32,
@@ -61,7 +61,7 @@ static mut SHARED: Shared = Shared {
             t_ticks: 0,
         }
     }; 2],
-    reading: false,
+    reading: 0,
     job: Job {
         task: Task::None,
         axis: 0,
@@ -166,17 +166,17 @@ pub fn take() -> Option<(&'static Tick, u8)> {
             return None;
         }
         shared.ready = false;
-        shared.reading = !shared.reading;
+        shared.reading ^= 1;
         let missed = core::mem::take(&mut shared.missed);
         // SAFETY: the tick writes to the other one, until this function turns them round.
         Some((unsafe { &*place(shared.reading) }, missed))
     })
 }
 
-fn place(second: bool) -> *mut Tick {
+fn place(which: u8) -> *mut Tick {
     // SAFETY: a static.
-    let first = unsafe { &raw mut (*shared()).ticks[0] };
-    if second { first.wrapping_add(1) } else { first }
+    let first = unsafe { &raw mut (*shared()).ticks };
+    first.cast::<Tick>().wrapping_add(which.into())
 }
 
 /// Whether a millisecond has passed that nobody has taken yet.
@@ -252,7 +252,7 @@ fn TIMER1_COMPB() {
     shared.ticked = false;
     // Chosen before the sleep, and the compiler kept from moving it: the choice takes longer for one place than for the
     // other, and after the wake-up that is jitter.
-    let free = core::hint::black_box(place(!shared.reading));
+    let free = core::hint::black_box(place(shared.reading ^ 1));
     // Only compare A is left to wake it; the bound is for a wake-up that nobody explains.
     for _ in 0..4u8 {
         sleep_now();

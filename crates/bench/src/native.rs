@@ -83,7 +83,7 @@ impl Default for Timeline {
             framed: 14_000,
             guard: 1_024,
             eeprom: 136_000,
-            queue: 223,
+            queue: 191,
             stack_free: 0,
             recorded: Vec::new(),
         }
@@ -232,7 +232,10 @@ impl Sensors for HostSensors {
 struct HostBoard(Shared);
 
 impl Board for HostBoard {
-    fn send(&mut self, frame: &[u8]) -> bool {
+    fn send(&mut self, kind: u8, fields: &[u8]) -> bool {
+        let mut frame = [0; wire::MAX_FRAME];
+        let len = wire::fields::encode(kind, fields, &mut frame);
+        let frame = &frame[..len];
         let chip = &mut *self.0.borrow_mut();
         let now = chip.now;
         let byte = byte_cycles(chip.divisor.unwrap_or(25));

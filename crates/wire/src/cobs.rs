@@ -2,11 +2,10 @@
 
 use crate::crc;
 
-/// Writes a payload into a buffer, stuffed as it comes; [`Writer::finish`] adds CRC and delimiter.
-///
-/// The caller has checked that the buffer takes the whole frame; should it not, bytes are lost, never memory.
-pub(crate) struct Writer<'a> {
-    out: &'a mut [u8],
+/// Puts out a payload, stuffed as it comes; [`Writer::finish`] adds CRC and delimiter.
+pub(crate) struct Writer<P> {
+    /// Puts a byte at its place in the frame; a place behind it may have been written before.
+    put: P,
     /// Where the next byte goes.
     at: u8,
     /// Where the code of the block being written goes.
@@ -14,10 +13,10 @@ pub(crate) struct Writer<'a> {
     register: u32,
 }
 
-impl<'a> Writer<'a> {
-    pub(crate) fn new(out: &'a mut [u8], kind: u8) -> Self {
+impl<P: FnMut(u8, u8)> Writer<P> {
+    pub(crate) fn new(put: P, kind: u8) -> Self {
         let mut writer = Writer {
-            out,
+            put,
             at: 1,
             code_at: 0,
             register: crc::INIT,
@@ -33,31 +32,24 @@ impl<'a> Writer<'a> {
     }
 
     /// The frame's length on the line.
-    pub(crate) fn finish(mut self) -> usize {
+    pub(crate) fn finish(mut self) -> u8 {
         for byte in crc::finish(self.register).to_le_bytes() {
             self.stuff(byte);
         }
-        self.put(self.code_at, self.at.wrapping_sub(self.code_at));
-        self.put(self.at, crate::DELIMITER);
-        usize::from(self.at.wrapping_add(1))
+        (self.put)(self.code_at, self.at.wrapping_sub(self.code_at));
+        (self.put)(self.at, crate::DELIMITER);
+        self.at.wrapping_add(1)
     }
 
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn stuff(&mut self, byte: u8) {
         if byte == crate::DELIMITER {
-            self.put(self.code_at, self.at.wrapping_sub(self.code_at));
+            (self.put)(self.code_at, self.at.wrapping_sub(self.code_at));
             self.code_at = self.at;
         } else {
-            self.put(self.at, byte);
+            (self.put)(self.at, byte);
         }
         self.at = self.at.wrapping_add(1);
-    }
-
-    #[inline(always)]
-    fn put(&mut self, at: u8, byte: u8) {
-        if let Some(place) = self.out.get_mut(usize::from(at)) {
-            *place = byte;
-        }
     }
 }
 

@@ -115,9 +115,25 @@ pub struct Request {
 
 /// Writes a payload of these fields as it goes on the line; returns the frame's length. `out` has to take it
 /// ([`crate::MAX_FRAME`] bytes always do): what does not fit is lost.
-#[cfg_attr(target_arch = "avr", inline(never))]
 pub fn encode(kind: u8, fields: &[u8], out: &mut [u8]) -> usize {
-    let mut writer = crate::cobs::Writer::new(out, kind);
+    let len = encode_by(kind, fields, |at, byte| {
+        if let Some(place) = out.get_mut(usize::from(at)) {
+            *place = byte;
+        }
+    });
+    usize::from(len)
+}
+
+/// Length on the line of a frame with so many bytes of fields.
+#[must_use]
+pub const fn frame_len(fields: usize) -> usize {
+    2 + fields + crate::OVERHEAD
+}
+
+/// As [`encode`], by a function that puts a byte at its place in the frame, counted from 0. Places come in ascending order
+/// but for the codes of the stuffing, which are written when their block ends.
+pub fn encode_by(kind: u8, fields: &[u8], put: impl FnMut(u8, u8)) -> u8 {
+    let mut writer = crate::cobs::Writer::new(put, kind);
     for &byte in fields {
         writer.u8(byte);
     }
