@@ -346,3 +346,35 @@ fn silence_is_an_error_that_says_what_was_heard() {
         "{said}"
     );
 }
+
+#[test]
+fn sensors_test_themselves_and_a_profile_is_driven() {
+    let board = Board::start();
+    let folder = folder("board_self_test");
+    let (tested, driven) = (folder.join("t.json"), folder.join("m.json"));
+    let said = common::said(&board.ask(&["self-test", "--json", tested.to_str().unwrap()]));
+    assert!(said.contains("gyro x passed"), "{said}");
+    let answer = json(&tested);
+    let sensors = answer["sensors"].as_array().unwrap();
+    assert_eq!(sensors.len(), 4);
+    assert!(sensors[..3].iter().all(|s| s["passed"] == true), "{answer}");
+    assert_success(&board.ask(&[
+        "motor",
+        "--shape",
+        "triangle",
+        "--amplitude",
+        "90",
+        "--period-ms",
+        "1000",
+        "--seconds",
+        "2.5",
+        "--json",
+        driven.to_str().unwrap(),
+    ]));
+    let answer = json(&driven);
+    let of = |key: &str| answer[key].as_i64().unwrap();
+    // 20 samples a period see the peaks to within a step of the triangle.
+    assert!((60..=90).contains(&of("largest_pwm_seen")), "{answer}");
+    assert!((-90..=-60).contains(&of("smallest_pwm_seen")), "{answer}");
+    assert_eq!(answer["stopped"], true);
+}

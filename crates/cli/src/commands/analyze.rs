@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use analysis::AnalyzeOptions;
 use analysis::analyze::{Analysis, ChannelAnalysis};
 use clap::Args;
+use imu_stand::report::plot::number;
 use imu_stand::text;
 use miette::Result;
 
@@ -58,37 +59,54 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn print(analysis: &Analysis) {
-    for (name, channel) in &analysis.channels {
+    // Gyros first: they are what the stand is for.
+    let gyros =
+        |is: bool| move |(name, _): &(&String, &ChannelAnalysis)| name.starts_with("gyro") == is;
+    let all = || analysis.channels.iter();
+    let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (name, channel) in all().filter(gyros(true)).chain(all().filter(gyros(false))) {
         say!("{name}");
         parameters(channel);
         for warning in &channel.warnings {
             say!("{}", text::item("warning: ", warning));
         }
-        say!("  paper's procedure");
+        say!("  by the paper's procedure");
         interval("angle random walk", &channel.paper.angle_random_walk);
         interval(
             "in-run bias stability",
             &channel.paper.in_run_bias_stability,
         );
         for note in &channel.paper.notes {
-            say!("{}", text::item("note: ", note));
+            match notes.iter_mut().find(|(known, _)| known == note) {
+                Some((_, channels)) => channels.push(name),
+                None => notes.push((note, vec![name])),
+            }
         }
         for (deviation, points) in &channel.deviations {
             let name = format!("{deviation:?}").to_lowercase();
             say!(
-                "  {name}, {:<12}   tau s   deviation  95 % interval",
-                channel.unit
+                "  {:<28} tau s   deviation  95 % interval",
+                format!("{name}, {}", channel.unit)
             );
             for point in points {
                 say!(
-                    "    {:>25.4} {:>11.5} {:>10.5} .. {:.5}",
-                    point.tau_s,
-                    point.deviation,
-                    point.low,
-                    point.high
+                    "    {:>29} {:>11} {:>11} .. {}",
+                    number(point.tau_s, 4),
+                    number(point.deviation, 4),
+                    number(point.low, 4),
+                    number(point.high, 4)
                 );
             }
         }
+    }
+    if !notes.is_empty() {
+        say!("\non the paper's procedure");
+    }
+    for (note, channels) in notes {
+        say!(
+            "{}",
+            text::item(&format!("{}: ", channels.join(", ")), note)
+        );
     }
 }
 
@@ -102,17 +120,18 @@ fn parameters(channel: &ChannelAnalysis) {
 }
 
 fn interval(name: &str, interval: &analysis::analyze::Interval) {
-    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
+    let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| number(v, 4));
     match interval.value {
         Some(value) => say!(
-            "  {name:<24} {value:>10.4} [{} .. {}] {}",
-            number(interval.low),
-            number(interval.high),
+            "  {name:<24} {:>10} [{} .. {}] {}",
+            number(value, 4),
+            shown(interval.low),
+            shown(interval.high),
             interval.unit
         ),
         None => say!(
             "  {name:<24} not established; at most {} {}",
-            number(interval.high),
+            shown(interval.high),
             interval.unit
         ),
     }

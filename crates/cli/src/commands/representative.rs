@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use analysis::Representative;
 use clap::Args;
+use imu_stand::report::plot::number;
 use imu_stand::text;
 use miette::Result;
 use serde::Serialize;
@@ -75,11 +76,11 @@ fn print(files: &[String], found: &Representative) {
     }
     for figure in &found.figures {
         say!(
-            "    {:<10} {:<18} median {:.4e}, run to run {:.1e} {}",
+            "    {:<10} {:<18} median {}, run to run {} {}",
             figure.channel,
             figure.figure.replace('_', " "),
-            figure.pooled,
-            figure.spread,
+            number(figure.pooled, 4),
+            number(figure.spread, 2),
             figure.unit
         );
     }

@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use imu_stand::link::Link;
 use miette::Result;
+use wire::Command;
 
 use show::Info;
 
@@ -101,6 +102,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         quiet: arguments.quiet,
     };
     let session = &mut session;
+    // A board that is just starting, or is not there, is found out by what may be repeated.
+    session.link.ask(Command::Ping)?;
     match &arguments.action {
         Action::Info => session.show_info(),
         Action::Health(health) => show::health(session, health),
