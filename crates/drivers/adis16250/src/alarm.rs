@@ -79,6 +79,44 @@ pub struct Alarm {
 }
 
 impl Alarm {
+    /// The alarm that these contents of ALM_CTRL, ALM_MAG and ALM_SMPL make; `None` where it is off.
+    ///
+    /// # Errors
+    /// ALM_CTRL where its source is none.
+    pub(crate) const fn from_bits(
+        number: AlarmNumber,
+        control: u16,
+        magnitude: u16,
+        samples: u16,
+    ) -> Result<Option<Self>, u16> {
+        let bits = control.wrapping_shr(number.control_shift() as u32);
+        let source = match bits & 0b0111 {
+            0b000 => return Ok(None),
+            0b001 => AlarmSource::Supply,
+            0b010 => AlarmSource::Rate,
+            0b101 => AlarmSource::Aux,
+            0b110 => AlarmSource::Temperature,
+            _ => return Err(control),
+        };
+        let trigger = if bits & 0b1000 == 0 {
+            Trigger::Level
+        } else {
+            Trigger::Change {
+                samples: samples as u8,
+            }
+        };
+        let threshold = match source {
+            AlarmSource::Rate | AlarmSource::Temperature => (magnitude << 2).cast_signed() >> 2,
+            AlarmSource::Supply | AlarmSource::Aux => (magnitude & 0x3FFF).cast_signed(),
+        };
+        Ok(Some(Alarm {
+            source,
+            trigger,
+            above: magnitude & 0x8000 != 0,
+            threshold,
+        }))
+    }
+
     /// Content of ALM_MAG.
     #[must_use]
     pub const fn magnitude_bits(&self) -> u16 {

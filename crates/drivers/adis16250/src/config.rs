@@ -1,5 +1,6 @@
 //! Range, filter, sample period, pace, data-ready line.
 
+use crate::RateCounts;
 use crate::register::control;
 
 /// Measurement range; bits 10:8 of SENS/AVG.
@@ -102,6 +103,12 @@ impl Filter {
     #[must_use]
     pub const fn taps(self) -> u8 {
         1 << self as u8
+    }
+
+    /// By how many sample periods the filter delays: N - 1. It has settled after twice that.
+    #[must_use]
+    pub const fn delay_samples(self) -> u8 {
+        self.taps() - 1
     }
 }
 
@@ -301,6 +308,23 @@ pub enum Stimulus {
 }
 
 impl Stimulus {
+    /// Least and most by which the output of a good part moves at a range, counts (*unverified*; narrower ranges by their
+    /// scale).
+    #[must_use]
+    pub const fn response(self, range: Range) -> (RateCounts, RateCounts) {
+        let times = match range {
+            Range::Dps320 => 1,
+            Range::Dps160 => 2,
+            Range::Dps80 => 4,
+        };
+        let (least, most) = (439 * times, 1_092 * times);
+        match self {
+            Stimulus::None => (RateCounts(0), RateCounts(0)),
+            Stimulus::Positive => (RateCounts(least), RateCounts(most)),
+            Stimulus::Negative => (RateCounts(-most), RateCounts(-least)),
+        }
+    }
+
     /// The high byte of MSC_CTRL.
     #[must_use]
     pub const fn bits(self) -> u8 {

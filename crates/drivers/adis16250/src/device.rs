@@ -40,6 +40,8 @@ pub enum Error<E> {
     SelfTest(Status),
     /// The part says that its flash was not written.
     Flash(Status),
+    /// The output was not refreshed since it was read before.
+    StaleOutput(Word),
     /// The register holds what the data sheet does not offer.
     UnknownContent {
         /// Which one.
@@ -66,6 +68,7 @@ impl<E: core::fmt::Debug> core::fmt::Display for Error<E> {
             }
             Error::SelfTest(status) => write!(f, "self-test failed, status {:#06x}", status.0),
             Error::Flash(status) => write!(f, "flash not written, status {:#06x}", status.0),
+            Error::StaleOutput(word) => write!(f, "no new data: {:#06x}", word.0),
             Error::UnknownContent { register, bits } => write!(f, "{register:?} holds {bits:#06x}"),
         }
     }
@@ -355,6 +358,14 @@ impl<S: SpiDevice> Adis16250<S> {
         self.write_checked(Register::GyroScale, scale.min(0x0FFF), delay)
     }
 
+    /// GYRO_SCALE as the part has it, in 1/2048.
+    ///
+    /// # Errors
+    /// [`Error::Spi`].
+    pub fn scale(&mut self, delay: &mut impl DelayNs) -> Result<u16, Error<S::Error>> {
+        Ok(self.read(Register::GyroScale, delay)?.unsigned_12())
+    }
+
     /// Writes all registers that the flash keeps to it; ENDURANCE counts it, and 20 000 times (*unverified*) is what it
     /// is made for.
     ///
@@ -413,6 +424,29 @@ impl<S: SpiDevice> Adis16250<S> {
         )
     }
 
+    /// One alarm as the part has it; `None` where it is off.
+    ///
+    /// # Errors
+    /// [`Error::Spi`]; [`Error::UnknownContent`] for a source that no output has.
+    pub fn alarm(
+        &mut self,
+        number: AlarmNumber,
+        delay: &mut impl DelayNs,
+    ) -> Result<Option<Alarm>, Error<S::Error>> {
+        let registers = [
+            Register::AlmCtrl,
+            number.magnitude_register(),
+            number.samples_register(),
+        ];
+        let [control, magnitude, samples] = self.read_many(registers, delay)?.map(Word::bits);
+        Alarm::from_bits(number, control, magnitude, samples).map_err(|bits| {
+            Error::UnknownContent {
+                register: Register::AlmCtrl,
+                bits,
+            }
+        })
+    }
+
     /// Sets how both alarms report.
     ///
     /// # Errors
@@ -449,7 +483,7 @@ impl<S: SpiDevice> Adis16250<S> {
         self.sample_period(delay)
     }
 
-    fn frame(
+    pub(crate) fn frame(
         &mut self,
         command: Command,
         delay: &mut impl DelayNs,

@@ -36,12 +36,15 @@
 mod alarm;
 mod config;
 mod device;
+mod gpio;
+mod outputs;
 mod register;
 mod word;
 
 pub use alarm::{Alarm, AlarmNumber, AlarmOutput, AlarmSource, Trigger};
 pub use config::{DataReady, Filter, Line, Pace, Polarity, Range, SamplePeriod, SensAvg, Stimulus};
 pub use device::{Adis16250, Error};
+pub use gpio::{GpioCtrl, LineUse};
 pub use register::{Access, Command, Register, control};
 pub use word::{
     AngleCounts, AuxCounts, OffsetCounts, RateCounts, Status, SupplyCounts, TemperatureCounts, Word,
