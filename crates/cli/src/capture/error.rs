@@ -120,6 +120,20 @@ pub enum CaptureError {
         /// Why.
         why: String,
     },
+    /// A file of arrays that cannot be read.
+    #[error("{}: {why}", path.display())]
+    #[diagnostic(
+        code(capture::table),
+        help(
+            "NPZ, NPY, Parquet, .mat (version 5 to 7), .txt and .dat are read by their endings, everything else as CSV"
+        )
+    )]
+    Table {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
     /// No rows at all.
     #[error("there is no row of data")]
     #[diagnostic(

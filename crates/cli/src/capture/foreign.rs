@@ -80,6 +80,9 @@ fn pairs(
     Ok(list)
 }
 
+/// Unit of a gyro channel that holds the angle.
+pub(crate) const ANGLE: &str = "deg";
+
 /// What a channel's name says that it is.
 pub(crate) fn meaning(name: &str) -> (Quantity, Option<Axis>) {
     let (stem, axis) = match name.rsplit_once('_') {
@@ -118,6 +121,10 @@ pub(crate) fn convert(
         (Quantity::Gyro, "rad/s") => 180.0 / std::f64::consts::PI,
         (Quantity::Gyro, "deg/h") => 1.0 / 3600.0,
         (Quantity::Gyro, "mdps") => 1e-3,
+        // Angles: what is read is differenced into a rate.
+        (Quantity::Gyro, "deg") => return Ok((ANGLE.to_owned(), 1.0)),
+        (Quantity::Gyro, "rad") => return Ok((ANGLE.to_owned(), 180.0 / std::f64::consts::PI)),
+        (Quantity::Gyro, "arcsec") => return Ok((ANGLE.to_owned(), 1.0 / 3600.0)),
         (Quantity::Acc, "m/s2" | "m/s^2" | "mps2") => 1.0,
         (Quantity::Acc, "g") => STANDARD_GRAVITY,
         (Quantity::Acc, "mg") => STANDARD_GRAVITY * 1e-3,
@@ -130,7 +137,7 @@ pub(crate) fn convert(
             return Err(CaptureError::Option {
                 option: "--units",
                 why: format!("`{unit}` is no unit of {ours}"),
-                help: "gyro: deg/s, rad/s, deg/h, mdps; acc: m/s2, g, mg; temp: degC, K; supply: V, mV".to_owned(),
+                help: "gyro: deg/s, rad/s, deg/h, mdps, or of an angle deg, rad, arcsec; acc: m/s2, g, mg; temp: degC, K; supply: V, mV".to_owned(),
             });
         }
     };

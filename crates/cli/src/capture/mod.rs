@@ -1,5 +1,6 @@
-//! Captures: the CSV of the stand and foreign CSV by mapping, both become a [`Record`](model::record::Record).
+//! Captures: the CSV of the stand, foreign CSV and files of arrays by mapping; all become a [`Record`](model::record::Record).
 
+mod angle;
 mod build;
 mod continuity;
 mod error;
@@ -7,6 +8,7 @@ mod foreign;
 mod header;
 mod live;
 mod read;
+mod tables;
 mod write;
 
 pub use build::{Calibration, RecordBuilder, SUPPLY_LSB_V, TEMP};

@@ -4,10 +4,12 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use model::record::{Channel, Quantity, Record};
+use model::record::{Channel, Header, Quantity, Record};
 
+use super::angle::difference_angles;
 use super::foreign::{convert, example, meaning};
 use super::header::Lines;
+use super::tables::{Table, read_table};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
 
 /// How to read.
@@ -30,7 +32,8 @@ pub struct Read {
     pub skipped: usize,
 }
 
-/// Reads a capture, `.csv` or `.csv.gz`.
+/// Reads a capture, `.csv` or `.csv.gz`, or by their endings files of arrays: `.npz`, `.npy`, `.parquet`, `.mat`, and
+/// columns of text in `.txt`, `.dat`, `.tsv`. A gyro given in units of an angle is differenced into a rate.
 ///
 /// # Errors
 /// [`CaptureError`], which says what to do.
@@ -39,6 +42,9 @@ pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureE
         path: path.to_owned(),
         source,
     };
+    if let Some(table) = read_table(path) {
+        return from_table(table?, options);
+    }
     let file = BufReader::new(File::open(path).map_err(io)?);
     let read = if path.extension().is_some_and(|e| e == "gz") {
         read_from(
@@ -149,6 +155,15 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
             Err(error) => return Err(error),
         }
     }
+    finish(header, columns, cells, skipped)
+}
+
+fn finish(
+    header: Header,
+    columns: Vec<Column>,
+    cells: Vec<Vec<f64>>,
+    skipped: usize,
+) -> Result<Read, CaptureError> {
     if cells.first().is_none_or(Vec::is_empty) {
         return Err(CaptureError::Empty);
     }
@@ -159,7 +174,128 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
     for (column, values) in columns.into_iter().zip(cells) {
         place(&mut record, column, values);
     }
+    difference_angles(&mut record)?;
     Ok(Read { record, skipped })
+}
+
+/// From the columns of a file of arrays. Without a mapping, names of ours are taken as they are: in the units the file
+/// states, in counts with the header's scales where it says `counts`, else in deg/s and m/s^2.
+fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError> {
+    let mut lines = Lines::default();
+    lines.entries.extend(
+        table
+            .about
+            .iter()
+            .enumerate()
+            .map(|(i, (key, value))| (i + 1, key.clone(), value.clone())),
+    );
+    let mut header = lines.header()?;
+    header.rate_hz = options.rate_hz.or(header.rate_hz);
+    let unit_of = |name: &str| {
+        let key = format!("unit of {name}");
+        let found = table.about.iter().find(|(k, _)| *k == key);
+        found.map(|(_, unit)| unit.as_str())
+    };
+    let columns = if !options.mapping.columns.is_empty() {
+        mapped_columns(&table.names, &options.mapping)?
+    } else if let [name] = &table.names[..] {
+        // A single series needs no name.
+        let (quantity, _) = meaning(name);
+        let unit = options.mapping.unit(name, quantity).or(unit_of(name));
+        vec![measured(0, name, quantity, unit)?]
+    } else {
+        let has = |name: &str| table.names.iter().any(|n| n == name);
+        let (mut columns, mut counted) = (Vec::new(), Vec::new());
+        for (at, name) in table.names.iter().enumerate() {
+            let (quantity, _) = meaning(name);
+            let unit = options.mapping.unit(name, quantity).or(unit_of(name));
+            let role = match name.as_str() {
+                "seq" => Role::Seq,
+                "t_ticks" if lines.get("tick_s").is_some() => Role::Ticks,
+                "flags" => Role::Flags,
+                "host_time_s" => Role::Time,
+                "time" | "time_s" if !has("host_time_s") => Role::Time,
+                _ if quantity == Quantity::Other => continue,
+                _ if unit == Some("counts") => {
+                    counted.push((at, name.clone()));
+                    continue;
+                }
+                _ => measured(at, name, quantity, unit)?.role,
+            };
+            columns.push(Column {
+                at,
+                name: name.clone(),
+                role,
+            });
+        }
+        if !counted.is_empty() {
+            let names: Vec<String> = counted.iter().map(|(_, name)| name.clone()).collect();
+            let own = own_columns(&names, &lines, &options.mapping)?;
+            columns.extend(own.into_iter().map(|c| Column {
+                at: counted[c.at].0,
+                ..c
+            }));
+        }
+        if !columns.iter().any(|c| {
+            matches!(
+                c.role,
+                Role::Measured {
+                    quantity: Quantity::Gyro | Quantity::Acc,
+                    ..
+                }
+            )
+        }) {
+            return Err(CaptureError::Columns {
+                why: "no array has a name of the stand's captures (gyro_x, acc_x, ...)".to_owned(),
+                columns: table.names.clone(),
+                example: example(&table.names),
+            });
+        }
+        columns
+    };
+    let mut cells = Vec::new();
+    for column in &columns {
+        let values = table.columns[column.at].clone();
+        let whole = |v: f64| v >= 0.0 && v.fract() == 0.0;
+        let bad = values.iter().position(|v| match column.role {
+            Role::Seq | Role::Ticks => !whole(*v),
+            Role::Flags => !whole(*v) || *v > 65_535.0,
+            Role::Time => !v.is_finite(),
+            Role::Measured { counts, .. } => {
+                v.is_infinite() || (counts && !v.is_nan() && v.fract() != 0.0)
+            }
+        });
+        if let Some(row) = bad {
+            return Err(CaptureError::BadRow {
+                line: row as u64 + 1,
+                column: column.name.clone(),
+                found: values[row].to_string(),
+                expected: "not a number of the kind that this column has".to_owned(),
+            });
+        }
+        cells.push(values);
+    }
+    finish(header, columns, cells, 0)
+}
+
+fn measured(
+    at: usize,
+    name: &str,
+    quantity: Quantity,
+    unit: Option<&str>,
+) -> Result<Column, CaptureError> {
+    let (unit, scale) = convert(quantity, unit)?;
+    Ok(Column {
+        at,
+        name: name.to_owned(),
+        role: Role::Measured {
+            quantity,
+            unit,
+            zero: 0.0,
+            scale,
+            counts: false,
+        },
+    })
 }
 
 /// The columns of the stand's own format.

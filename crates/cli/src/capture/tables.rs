@@ -1,0 +1,369 @@
+//! Files of others that hold arrays: NPZ and NPY, Parquet, MATLAB's .mat, columns of text. Each becomes named columns.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Read as _};
+use std::path::Path;
+
+use parquet::basic::{LogicalType, TimeUnit};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::DataType;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+
+use super::CaptureError;
+
+/// Named columns of one length.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Table {
+    pub names: Vec<String>,
+    pub columns: Vec<Vec<f64>>,
+    /// What else the file says, as `key: value`; a unit as `unit of COLUMN`.
+    pub about: Vec<(String, String)>,
+}
+
+/// Reads a file by its ending; `None` where it is none of these.
+pub(crate) fn read_table(path: &Path) -> Option<Result<Table, CaptureError>> {
+    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+    let read: fn(&Path) -> Result<Arrays, String> = match ending.as_str() {
+        "npz" => npz,
+        "npy" => npy,
+        "parquet" | "pq" => parquet_file,
+        "mat" => mat,
+        "txt" | "dat" | "tsv" | "asc" => text,
+        _ => return None,
+    };
+    Some(
+        read(path)
+            .and_then(Arrays::table)
+            .map_err(|why| CaptureError::Table {
+                path: path.to_owned(),
+                why,
+            }),
+    )
+}
+
+/// Arrays as they stand in a file: name and columns; several of them are called `name[0]`, `name[1]`, ...
+#[derive(Default)]
+struct Arrays {
+    columns: Vec<(String, Vec<f64>)>,
+    about: Vec<(String, String)>,
+}
+
+impl Arrays {
+    /// Takes an array of up to two dimensions; the longer one is time. `by_rows` says that the last index runs fastest.
+    fn add(&mut self, name: &str, shape: &[usize], values: Vec<f64>, by_rows: bool) {
+        let (rows, columns) = match *shape {
+            [] | [1] | [1, 1] => {
+                if let [value] = values[..] {
+                    self.about.push((name.to_owned(), value.to_string()));
+                }
+                return;
+            }
+            [n] => (n, 1),
+            [a, b] => (a, b),
+            _ => return,
+        };
+        if rows == 1 || columns == 1 {
+            self.columns.push((name.to_owned(), values));
+            return;
+        }
+        let (time, count, time_runs_fastest) = if rows >= columns {
+            (rows, columns, !by_rows)
+        } else {
+            (columns, rows, by_rows)
+        };
+        for k in 0..count {
+            let column = (0..time).map(|i| {
+                if time_runs_fastest {
+                    values[k * time + i]
+                } else {
+                    values[i * count + k]
+                }
+            });
+            self.columns
+                .push((format!("{name}[{k}]"), column.collect()));
+        }
+    }
+
+    /// The columns that have the length of most of the numbers.
+    fn table(self) -> Result<Table, String> {
+        let mut numbers: BTreeMap<usize, usize> = BTreeMap::new();
+        for (_, column) in &self.columns {
+            *numbers.entry(column.len()).or_default() += column.len();
+        }
+        let Some(length) = numbers
+            .into_iter()
+            .max_by_key(|(_, numbers)| *numbers)
+            .map(|(length, _)| length)
+            .filter(|length| *length > 0)
+        else {
+            return Err("it holds no array of numbers with one or two dimensions".to_owned());
+        };
+        let (names, columns) = self
+            .columns
+            .into_iter()
+            .filter(|(_, column)| column.len() == length)
+            .unzip();
+        Ok(Table {
+            names,
+            columns,
+            about: self.about,
+        })
+    }
+}
+
+fn open(path: &Path) -> Result<File, String> {
+    File::open(path).map_err(|error| error.to_string())
+}
+
+fn npy(path: &Path) -> Result<Arrays, String> {
+    let mut out = Arrays::default();
+    npy_array(&mut out, "values", BufReader::new(open(path)?))?;
+    Ok(out)
+}
+
+fn npz(path: &Path) -> Result<Arrays, String> {
+    let bad = |error: zip::result::ZipError| format!("it is no NPZ: {error}");
+    let mut archive = zip::ZipArchive::new(BufReader::new(open(path)?)).map_err(bad)?;
+    let mut out = Arrays::default();
+    for i in 0..archive.len() {
+        let mut entry = archive.by_index(i).map_err(bad)?;
+        let name = entry.name().map_err(bad)?.into_owned();
+        if let Some(name) = name.strip_suffix(".npy") {
+            npy_array(&mut out, name, &mut entry)
+                .map_err(|why| format!("array `{name}`: {why}"))?;
+        } else if name == "about.json" {
+            let mut text = String::new();
+            entry
+                .read_to_string(&mut text)
+                .map_err(|error| format!("about.json: {error}"))?;
+            let about: BTreeMap<String, String> =
+                serde_json::from_str(&text).map_err(|error| format!("about.json: {error}"))?;
+            out.about.extend(about);
+        }
+    }
+    Ok(out)
+}
+
+/// Adds an array; one of text or objects is left out.
+fn npy_array(out: &mut Arrays, name: &str, input: impl std::io::Read) -> Result<(), String> {
+    fn cells<T: npyz::Deserialize>(
+        file: npyz::NpyFile<impl std::io::Read>,
+        number: fn(T) -> f64,
+    ) -> Result<Vec<f64>, String> {
+        let cells = file.into_vec::<T>().map_err(|error| error.to_string())?;
+        Ok(cells.into_iter().map(number).collect())
+    }
+    let file = npyz::NpyFile::new(input).map_err(|error| error.to_string())?;
+    let shape: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
+    let by_rows = file.order() == npyz::Order::C;
+    let npyz::DType::Plain(kind) = file.dtype() else {
+        return Err("a structured array: save its fields as arrays of their own".to_owned());
+    };
+    let values = match &kind.to_string()[1..] {
+        "f8" => cells::<f64>(file, |v| v)?,
+        "f4" => cells::<f32>(file, f64::from)?,
+        "i8" => cells::<i64>(file, |v| v as f64)?,
+        "i4" => cells::<i32>(file, f64::from)?,
+        "i2" => cells::<i16>(file, f64::from)?,
+        "i1" => cells::<i8>(file, f64::from)?,
+        "u8" => cells::<u64>(file, |v| v as f64)?,
+        "u4" => cells::<u32>(file, f64::from)?,
+        "u2" => cells::<u16>(file, f64::from)?,
+        "u1" => cells::<u8>(file, f64::from)?,
+        "b1" => cells::<bool>(file, |v| f64::from(u8::from(v)))?,
+        _ => return Ok(()),
+    };
+    out.add(name, &shape, values, by_rows);
+    Ok(())
+}
+
+fn mat(path: &Path) -> Result<Arrays, String> {
+    let mut start = [0; 10];
+    let mut file = open(path)?;
+    if file.read_exact(&mut start).is_ok() && &start == b"MATLAB 7.3" {
+        return Err(
+            "it is of version 7.3: save it again with `save(FILE, '-v7')`, or write a Parquet file"
+                .to_owned(),
+        );
+    }
+    let file = matfile::MatFile::parse(Cursor::new(start).chain(file))
+        .map_err(|error| format!("it is no .mat of version 5 to 7: {error}"))?;
+    let mut out = Arrays::default();
+    for array in file.arrays() {
+        use matfile::NumericData as N;
+        let values: Vec<f64> = match array.data() {
+            N::Double { real, .. } => real.clone(),
+            N::Single { real, .. } => real.iter().map(|v| f64::from(*v)).collect(),
+            N::Int8 { real, .. } => real.iter().map(|v| f64::from(*v)).collect(),
+            N::UInt8 { real, .. } => real.iter().map(|v| f64::from(*v)).collect(),
+            N::Int16 { real, .. } => real.iter().map(|v| f64::from(*v)).collect(),
+            N::UInt16 { real, .. } => real.iter().map(|v| f64::from(*v)).collect(),
+            N::Int32 { real, .. } => real.iter().map(|v| f64::from(*v)).collect(),
+            N::UInt32 { real, .. } => real.iter().map(|v| f64::from(*v)).collect(),
+            N::Int64 { real, .. } => real.iter().map(|v| *v as f64).collect(),
+            N::UInt64 { real, .. } => real.iter().map(|v| *v as f64).collect(),
+        };
+        out.add(array.name(), array.size(), values, false);
+    }
+    Ok(out)
+}
+
+fn parquet_file(path: &Path) -> Result<Arrays, String> {
+    let bad = |error: parquet::errors::ParquetError| format!("it is no Parquet file: {error}");
+    let reader = SerializedFileReader::new(open(path)?).map_err(bad)?;
+    let metadata = reader.metadata();
+    let mut out = Arrays::default();
+    for entry in metadata
+        .file_metadata()
+        .key_value_metadata()
+        .into_iter()
+        .flatten()
+    {
+        // What libraries keep for themselves is nothing about the stand.
+        if let Some(value) = &entry.value
+            && !["pandas", "ARROW:schema"].contains(&entry.key.as_str())
+        {
+            out.about.push((entry.key.clone(), value.clone()));
+        }
+    }
+    let schema = metadata.file_metadata().schema_descr();
+    for (at, column) in schema.columns().iter().enumerate() {
+        if column.max_rep_level() > 0 {
+            continue;
+        }
+        let present = column.max_def_level();
+        let scale = match column.logical_type_ref() {
+            Some(LogicalType::Timestamp(stamp)) => match stamp.unit {
+                TimeUnit::MILLIS => Some(1e-3),
+                TimeUnit::MICROS => Some(1e-6),
+                TimeUnit::NANOS => Some(1e-9),
+            },
+            _ => None,
+        };
+        let mut cells: Vec<f64> = Vec::new();
+        let mut first = None;
+        let mut known = true;
+        for group in 0..reader.num_row_groups() {
+            let group = reader.get_row_group(group).map_err(bad)?;
+            let rows = group.metadata().num_rows() as usize;
+            let part = match group.get_column_reader(at).map_err(bad)? {
+                ColumnReader::DoubleColumnReader(r) => numbers(r, rows, present, |v| *v),
+                ColumnReader::FloatColumnReader(r) => numbers(r, rows, present, |v| f64::from(*v)),
+                ColumnReader::Int32ColumnReader(r) => numbers(r, rows, present, |v| f64::from(*v)),
+                ColumnReader::BoolColumnReader(r) => {
+                    numbers(r, rows, present, |v| f64::from(u8::from(*v)))
+                }
+                ColumnReader::Int64ColumnReader(r) => match scale {
+                    // From the first stamp on: nanoseconds since 1970 have more digits than an f64.
+                    Some(scale) => numbers(r, rows, present, |v| {
+                        let first = *first.get_or_insert(*v);
+                        (*v - first) as f64 * scale
+                    }),
+                    None => numbers(r, rows, present, |v| *v as f64),
+                },
+                _ => {
+                    known = false;
+                    break;
+                }
+            };
+            cells.extend(part.map_err(bad)?);
+        }
+        if known {
+            out.columns.push((column.name().to_owned(), cells));
+        }
+    }
+    Ok(out)
+}
+
+/// The cells of a column, NaN where there is nothing.
+fn numbers<T: DataType>(
+    mut reader: ColumnReaderImpl<T>,
+    rows: usize,
+    present: i16,
+    mut number: impl FnMut(&T::T) -> f64,
+) -> Result<Vec<f64>, parquet::errors::ParquetError> {
+    let (mut values, mut levels) = (Vec::new(), Vec::new());
+    let mut read = 0;
+    while read < rows {
+        let (records, _, _) =
+            reader.read_records(rows - read, Some(&mut levels), None, &mut values)?;
+        if records == 0 {
+            break;
+        }
+        read += records;
+    }
+    if present == 0 {
+        return Ok(values.iter().map(number).collect());
+    }
+    let mut values = values.iter();
+    Ok(levels
+        .iter()
+        .map(|level| {
+            if *level < present {
+                return f64::NAN;
+            }
+            values.next().map_or(f64::NAN, &mut number)
+        })
+        .collect())
+}
+
+/// Columns of numbers between blanks, commas or semicolons, with names in the first line or without; `#` and `%` begin
+/// comments, of which `# key: value` are kept.
+fn text(path: &Path) -> Result<Arrays, String> {
+    let mut names: Vec<String> = Vec::new();
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    let mut out = Arrays::default();
+    for (number, line) in BufReader::new(open(path)?).lines().enumerate() {
+        let line = line.map_err(|error| error.to_string())?;
+        let line = line.trim_start_matches('\u{feff}').trim();
+        if let Some(comment) = line.strip_prefix(['#', '%']) {
+            if let Some((key, value)) = comment.split_once(':') {
+                let (key, value) = (key.trim(), value.trim());
+                if !key.is_empty() && !key.contains(' ') {
+                    out.about.push((key.to_owned(), value.to_owned()));
+                }
+            }
+            continue;
+        }
+        let cells: Vec<&str> = line
+            .split(|c: char| c.is_whitespace() || c == ',' || c == ';')
+            .filter(|cell| !cell.is_empty())
+            .collect();
+        if cells.is_empty() {
+            continue;
+        }
+        let parsed: Result<Vec<f64>, &str> = cells
+            .iter()
+            .map(|cell| cell.parse().map_err(|_| *cell))
+            .collect();
+        match parsed {
+            Err(_) if columns.is_empty() && names.is_empty() => {
+                names = cells.into_iter().map(str::to_owned).collect();
+            }
+            Err(cell) => return Err(format!("line {}: `{cell}` is no number", number + 1)),
+            Ok(cells) => {
+                if columns.is_empty() {
+                    columns = vec![Vec::new(); cells.len()];
+                }
+                if cells.len() != columns.len() {
+                    return Err(format!(
+                        "line {}: {} numbers, the lines before have {}",
+                        number + 1,
+                        cells.len(),
+                        columns.len()
+                    ));
+                }
+                columns.iter_mut().zip(cells).for_each(|(c, v)| c.push(v));
+            }
+        }
+    }
+    if names.len() != columns.len() {
+        names = match columns.len() {
+            1 => vec!["values".to_owned()],
+            n => (1..=n).map(|k| format!("column_{k}")).collect(),
+        };
+    }
+    out.columns = names.into_iter().zip(columns).collect();
+    Ok(out)
+}

@@ -1,0 +1,155 @@
+//! Files of arrays that others wrote: numpy 2 (`imu.npz`), scipy's savemat (`imu.mat`), pandas with pyarrow
+//! (`imu.parquet`). 50 rows at 10 Hz of a gyro (k/2, −k/4, 2) deg/s, and what else such files hold: text, scalars, big-endian
+//! integers, column order, nulls, row groups, stamps in nanoseconds.
+
+use std::path::{Path, PathBuf};
+
+use imu_stand::{ColumnMapping, ReadOptions, read_capture};
+use model::record::Record;
+
+fn data(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data")
+        .join(name)
+}
+
+fn read(path: &Path, columns: &str, units: &str) -> Result<Record, String> {
+    let some = |text: &str| (!text.is_empty()).then(|| text.to_owned());
+    let mapping = ColumnMapping::parse(some(columns).as_deref(), some(units).as_deref())
+        .map_err(|error| error.to_string())?;
+    let options = ReadOptions {
+        mapping,
+        ..ReadOptions::default()
+    };
+    read_capture(path, &options)
+        .map(|read| read.record)
+        .map_err(|error| error.to_string())
+}
+
+fn values<'a>(record: &'a Record, name: &str) -> &'a [f64] {
+    &record.channel(name).unwrap().values
+}
+
+#[test]
+fn npz_and_mat_give_the_columns_of_their_matrices() {
+    for name in ["imu.npz", "imu.mat"] {
+        let columns = "time=t,gyro_x=gyr[0],gyro_y=gyr[1],gyro_z=gyr[2],acc_x=acc_raw";
+        let record = read(&data(name), columns, "gyro=rad/s").unwrap();
+        let degrees = 180.0 / std::f64::consts::PI;
+        assert_eq!(record.len(), 50, "{name}");
+        assert!(
+            (values(&record, "gyro_x")[3] - 1.5 * degrees).abs() < 1e-9,
+            "{name}"
+        );
+        assert!(
+            (values(&record, "gyro_y")[49] + 12.25 * degrees).abs() < 1e-9,
+            "{name}"
+        );
+        assert_eq!(values(&record, "acc_x")[49], 147.0, "{name}");
+        assert!(
+            (record.host_time_s.unwrap()[10] - 1.0).abs() < 1e-12,
+            "{name}"
+        );
+    }
+    // A scalar is a key of the header.
+    let record = read(&data("imu.npz"), "gyro_x=gyr[0]", "").unwrap();
+    assert_eq!(record.header.rate_hz, Some(10.0));
+}
+
+#[test]
+fn parquet_gives_nulls_as_missing_and_stamps_as_seconds() {
+    let columns = "time=stamp,gyro_x=gx,gyro_y=gy,temp=temp";
+    let record = read(&data("imu.parquet"), columns, "").unwrap();
+    assert!(values(&record, "gyro_x")[7].is_nan());
+    assert_eq!(values(&record, "gyro_x")[8], 4.0);
+    assert_eq!(values(&record, "gyro_y")[45], -11.25);
+    assert_eq!(values(&record, "temp")[49], 49.0);
+    let times = record.host_time_s.unwrap();
+    assert!(
+        times[0] == 0.0 && (times[49] - 4.9).abs() < 1e-6,
+        "{times:?}"
+    );
+}
+
+#[test]
+fn what_cannot_be_read_is_named_with_what_there_is() {
+    let error = read(&data("imu.parquet"), "", "").unwrap_err();
+    assert!(error.contains("stamp, gx, gy, temp"), "{error}");
+    let error = read(&data("imu.npz"), "gyro_x=gyr", "").unwrap_err();
+    assert!(error.contains("gyr[0]"), "{error}");
+    let folder = tempfile();
+    for (name, text, expected) in [
+        ("cut.npz", "PK", "it is no NPZ"),
+        ("new.mat", "MATLAB 7.3 MAT-file, and so on", "-v7"),
+        ("short.txt", "1 2\n3\n", "line 2: 1 numbers"),
+        ("none.txt", "# nothing\n", "no array of numbers"),
+    ] {
+        let path = folder.join(name);
+        std::fs::write(&path, text).unwrap();
+        let error = read(&path, "", "").unwrap_err();
+        assert!(error.contains(expected), "{name}: {error}");
+    }
+}
+
+#[test]
+fn columns_of_text_and_angles_become_rates() {
+    let folder = tempfile();
+    // One series without a name, as clock tools write it.
+    let path = folder.join("frequency.txt");
+    std::fs::write(&path, "# rate_hz: 2\n1.5e-3\n2.5e-3\n\n-1e-3\n").unwrap();
+    let record = read(&path, "", "").unwrap();
+    assert_eq!(values(&record, "values"), [1.5e-3, 2.5e-3, -1e-3]);
+    assert_eq!(record.header.rate_hz, Some(2.0));
+    // Angles: 1 rad in the first half second, a gap, 2 rad in the last.
+    let path = folder.join("angle.dat");
+    std::fs::write(&path, "t a\n0 0\n0.5 1\n2.0 9\n2.5 11\n3 12\n").unwrap();
+    let record = read(&path, "time=t,gyro_z=a", "gyro=rad").unwrap();
+    let gyro = record.channel("gyro_z").unwrap();
+    let turn = 360.0 / std::f64::consts::PI;
+    assert_eq!(gyro.unit, "deg/s");
+    assert!((gyro.values[0] - turn).abs() < 1e-9 && gyro.values[1].is_nan());
+    assert!((gyro.values[2] - 2.0 * turn).abs() < 1e-9 && gyro.values[4].is_nan());
+    let error = read(&path, "gyro_z=a", "gyro=deg").unwrap_err();
+    assert!(error.contains("time between its rows"), "{error}");
+}
+
+fn tempfile() -> PathBuf {
+    let folder = std::env::temp_dir().join(format!(
+        "imu-stand-tables-{}-{:?}",
+        std::process::id(),
+        std::thread::current().id()
+    ));
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+#[test]
+fn what_our_own_export_writes_is_read_back_scaled_and_raw() {
+    let mut model = model::ModelFile::paper();
+    model.excitation.extend([
+        ("vibration_g".to_owned(), 0.1),
+        ("heater_degc".to_owned(), 3.0),
+    ]);
+    let record = model::simulate(&model, 20.0, 20.0, 4).unwrap();
+    let folder = tempfile();
+    for raw in [false, true] {
+        let table = imu_stand::export::data::Table::of(&record, raw);
+        let (npz, parquet) = (folder.join("own.npz"), folder.join("own.parquet"));
+        table.write_npz(&npz).unwrap();
+        table.write_parquet(&parquet).unwrap();
+        for path in [npz, parquet] {
+            let back = read(&path, "", "").unwrap();
+            assert_eq!(back.seq, record.seq, "{path:?}");
+            for channel in &record.channels {
+                let got = back.channel(&channel.name).unwrap();
+                assert_eq!(got.unit, channel.unit, "{path:?} {}", channel.name);
+                for (a, b) in got.values.iter().zip(&channel.values) {
+                    assert!((a - b).abs() < 1e-9, "{path:?} {}: {a} {b}", channel.name);
+                }
+                if raw {
+                    assert_eq!(got.counts, channel.counts, "{path:?} {}", channel.name);
+                }
+            }
+        }
+    }
+}
