@@ -94,6 +94,16 @@ pub fn is_idle() -> bool {
     TX.is_empty() && usart().ucsra.read().bits() & (UDRE | TXC) == UDRE | TXC
 }
 
+/// Sends what is queued, with interrupts off. On a line so slow that it takes more than a second the watchdog ends it.
+pub fn drain() {
+    while let Some(byte) = TX.pop() {
+        while usart().ucsra.read().bits() & UDRE == 0 {}
+        usart().ucsra.write(|w| bits!(w, TXC));
+        usart().udr.write(|w| bits!(w, byte));
+    }
+    while usart().ucsra.read().bits() & TXC == 0 {}
+}
+
 /// Hands what the interrupts lost to the counters.
 pub fn count_losses(stand: &mut Stand) {
     let lost = avr_device::interrupt::free(|_| {

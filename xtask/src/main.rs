@@ -16,7 +16,8 @@ use step::{Failure, run};
 const USAGE: &str = "usage: cargo xtask COMMAND
 
   test     sets up what is missing and runs every check and test
-  demo     hides something in the simulated stand, captures 600 s, analyzes and diagnoses; a number after it is the seed
+  demo     hides something in the simulated stand, runs the image on it in the simulated ATmega16 for 600 s, captures,
+           analyzes and diagnoses; a number after it is the seed
   campaign measures by rates what the diagnosis can tell, and writes docs/power.md: up to an hour on two cores;
            --quick for minutes, --full for hours, --seed N for a run that was made before, --help for the rest
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}
@@ -75,13 +76,14 @@ fn test(root: &Path) -> Result<(), Failure> {
             "measured records: IMU_STAND_DATA is unset, tests on them will say so and not run"
         ),
     }
+    run("format", &mut cargo(root, &["fmt", "--all", "--check"]))?;
+    toolchain::simulator()?;
+    println!("== firmware for the ATmega16");
+    build_image(root)?;
+    let lints = "clippy --workspace --all-targets --quiet -- -D warnings";
     let mut steps: Vec<(String, Vec<&str>)> = vec![
-        ("format".into(), vec!["fmt", "--all", "--check"]),
-        (
-            "lints".into(),
-            vec!["clippy", "--all-targets", "--quiet", "--", "-D", "warnings"],
-        ),
-        ("tests".into(), vec!["test", "--quiet"]),
+        ("lints".into(), lints.split(' ').collect()),
+        ("tests".into(), vec!["test", "--workspace", "--quiet"]),
     ];
     for package in ALONE {
         steps.push((
@@ -95,8 +97,6 @@ fn test(root: &Path) -> Result<(), Failure> {
         run(name, &mut cargo(root, arguments))?;
         println!("== {name}: {:.0} s", from.elapsed().as_secs_f64());
     }
-    println!("== firmware for the ATmega16");
-    build_image(root)?;
     println!("all passed in {:.0} s", start.elapsed().as_secs_f64());
     Ok(())
 }
@@ -116,9 +116,12 @@ fn build_image(root: &Path) -> Result<(), Failure> {
 }
 
 fn demo(root: &Path) -> Result<(), Failure> {
+    toolchain::simulator()?;
+    build_image(root)?;
+    let build = "build --release -p imu-stand --features simavr";
     run(
         "the build",
-        &mut cargo(root, &["build", "--release", "--bin", "imu-stand"]),
+        &mut cargo(root, &build.split(' ').collect::<Vec<_>>()),
     )?;
     // Relative to the root, so that the command in the report can be typed again.
     let folder = Path::new("target/demo");
@@ -132,7 +135,7 @@ fn demo(root: &Path) -> Result<(), Failure> {
     let mut program = Command::new(root.join("target/release/imu-stand"));
     program
         .current_dir(root)
-        .args(["run", "--native", "--seconds", "600", "--seed", &seed]);
+        .args(["run", "--seconds", "600", "--seed", &seed]);
     for (option, file) in [
         ("--out", "capture.csv"),
         ("--analysis", "analysis.json"),

@@ -98,6 +98,41 @@ fn has_source(rustc: &Path) -> bool {
             .exists()
 }
 
+/// What the simulated ATmega16 is built with: simavr's sources come with its crate.
+const SIMULATOR_PACKAGES: &[&str] = &[
+    "gcc",
+    "make",
+    "pkg-config",
+    "libelf-dev",
+    "libclang-dev",
+    "zlib1g-dev",
+    "libzstd-dev",
+];
+
+/// Makes sure of what the simulator crate needs, installing what is missing.
+///
+/// # Errors
+/// Where it cannot be installed.
+pub fn simulator() -> Result<(), Failure> {
+    let says = |program: &str, argument: &[&str]| {
+        Command::new(program)
+            .args(argument)
+            .output()
+            .ok()
+            .filter(|output| output.status.success())
+            .map(|output| String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let has_libelf = says("pkg-config", &["--exists", "libelf", "zlib", "libzstd"]).is_some();
+    // LIBCLANG_PATH is how bindgen is told of one elsewhere.
+    let has_libclang = std::env::var_os("LIBCLANG_PATH").is_some()
+        || says("ldconfig", &["-p"]).is_some_and(|list| list.contains("libclang"))
+        || says("/sbin/ldconfig", &["-p"]).is_some_and(|list| list.contains("libclang"));
+    if has_libelf && has_libclang && has("make") {
+        return Ok(());
+    }
+    install("what the simulator is built with", SIMULATOR_PACKAGES)
+}
+
 fn which(program: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     std::env::split_paths(&path)
