@@ -72,8 +72,8 @@ pub struct Snapshot {
     pub flags: Vec<&'static str>,
     /// Overlapping Allan deviation, x, y, z.
     pub allan: [Vec<Point>; 3],
-    /// Counters of the board that are not 0.
-    pub counters: Vec<(&'static str, u16)>,
+    /// Counters of the board that are not 0; null before it has sent them.
+    pub counters: Option<Vec<(&'static str, u16)>>,
 }
 
 /// Collects frames.
@@ -92,7 +92,7 @@ pub struct View {
     restarts: u64,
     first: Option<(u64, f64)>,
     last: Option<(u64, f64)>,
-    counters: Vec<(&'static str, u16)>,
+    counters: Option<Vec<(&'static str, u16)>>,
 }
 
 impl Default for View {
@@ -118,7 +118,7 @@ impl View {
             restarts: 0,
             first: None,
             last: None,
-            counters: Vec::new(),
+            counters: None,
             calibration,
         }
     }
@@ -140,12 +140,12 @@ impl View {
             Frame::Sample(sample) => self.sample(sample, host_s),
             Frame::Hello(hello) => self.set(hello),
             Frame::Health(health) => {
-                self.counters = health
-                    .faults
-                    .iter()
-                    .filter(|(_, count)| *count > 0)
-                    .map(|(fault, count)| (fault.name(), count))
-                    .collect();
+                let counted = health.faults.iter().filter(|(_, count)| *count > 0);
+                self.counters = Some(
+                    counted
+                        .map(|(fault, count)| (fault.name(), count))
+                        .collect(),
+                );
             }
             Frame::Reply(_) => {}
         }
@@ -373,15 +373,14 @@ impl View {
             }
             let _ = writeln!(out);
         }
-        let counters: Vec<String> = s
-            .counters
-            .iter()
-            .map(|(name, count)| format!("{name} {count}"))
-            .collect();
-        let counters = if counters.is_empty() {
-            "all 0".to_owned()
-        } else {
-            counters.join(", ")
+        let counters = match s.counters.as_deref() {
+            None => "not sent yet".to_owned(),
+            Some([]) => "all 0".to_owned(),
+            Some(counters) => counters
+                .iter()
+                .map(|(name, count)| format!("{name} {count}"))
+                .collect::<Vec<_>>()
+                .join(", "),
         };
         let _ = writeln!(out, "\nboard's counters: {counters}");
         out
@@ -434,7 +433,7 @@ mod tests {
         assert_eq!(s.allan[0][1].deviation, 0.0);
         let page = view.page("P", &Heard::default());
         assert!(
-            page.contains("in order") && page.contains("all 0"),
+            page.contains("in order") && page.contains("not sent yet"),
             "{page}"
         );
     }

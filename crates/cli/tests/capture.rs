@@ -139,6 +139,22 @@ fn ctrl_c_ends_a_capture_cleanly_and_its_header_says_how_the_board_was_set() {
         .filter(|byte| matches!(decoder.push(**byte), Some(Ok(wire::Frame::Sample(_)))))
         .count();
     assert_eq!(samples, record.len());
+    let replayed = folder.join("again.csv");
+    let raw = folder.join("run.raw");
+    let done = run(&[
+        "capture",
+        "--replay",
+        raw.to_str().unwrap(),
+        "--out",
+        replayed.to_str().unwrap(),
+    ]);
+    assert_eq!(done.status.code(), Some(0), "{}", common::said(&done));
+    let again = self::record(&replayed);
+    assert_eq!(
+        (&again.seq, &again.t_ticks, &again.flags),
+        (&record.seq, &record.t_ticks, &record.flags)
+    );
+    assert_eq!(again.channels, record.channels);
     // A second capture does not overwrite the first.
     let again = run(&[
         "capture",

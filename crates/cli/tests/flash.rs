@@ -252,6 +252,77 @@ fn image() -> Vec<u8> {
     (0..1000u32).map(|k| (k * 7 + k / 256) as u8).collect()
 }
 
+/// The same bytes as the linker leaves them: an ELF for AVR with a section in flash and one in EEPROM.
+fn elf(folder: &Path, bytes: &[u8]) -> PathBuf {
+    const HEAD: u32 = 52;
+    const SEGMENT: u32 = 32;
+    let names = b"\0.text\0.eeprom\0.shstrtab\0";
+    let eeprom = [0x11u8; 16];
+    let text_at = HEAD + 2 * SEGMENT;
+    let eeprom_at = text_at + bytes.len() as u32;
+    let names_at = eeprom_at + eeprom.len() as u32;
+    let sections_at = (names_at + names.len() as u32).next_multiple_of(4);
+    let mut out = b"\x7fELF\x01\x01\x01".to_vec();
+    out.resize(16, 0);
+    let mut put = |values: &[(u32, usize)]| {
+        for (value, width) in values {
+            out.extend(&value.to_le_bytes()[..*width]);
+        }
+    };
+    // Executable, AVR, version 1, entry 0, then where headers are and how large.
+    put(&[
+        (2, 2),
+        (83, 2),
+        (1, 4),
+        (0, 4),
+        (HEAD, 4),
+        (sections_at, 4),
+        (0, 4),
+    ]);
+    put(&[(HEAD, 2), (SEGMENT, 2), (2, 2), (40, 2), (4, 2), (3, 2)]);
+    for (at, address, length) in [(text_at, 0, bytes.len()), (eeprom_at, 0x81_0000, 16)] {
+        let length = length as u32;
+        put(&[
+            (1, 4),
+            (at, 4),
+            (address, 4),
+            (address, 4),
+            (length, 4),
+            (length, 4),
+            (5, 4),
+            (1, 4),
+        ]);
+    }
+    out.extend(bytes);
+    out.extend(eeprom);
+    out.extend(names);
+    out.resize(sections_at as usize, 0);
+    let mut section = |name: u32, kind: u32, flags: u32, address: u32, at: u32, length: usize| {
+        for value in [name, kind, flags, address, at, length as u32, 0, 0, 1, 0] {
+            out.extend(value.to_le_bytes());
+        }
+    };
+    section(0, 0, 0, 0, 0, 0);
+    section(1, 1, 6, 0, text_at, bytes.len());
+    section(7, 1, 3, 0x81_0000, eeprom_at, eeprom.len());
+    section(15, 3, 0, 0, names_at, names.len());
+    let path = folder.join("image.elf");
+    std::fs::write(&path, out).expect("the folder takes a file");
+    path
+}
+
+#[test]
+fn an_elf_goes_into_flash_alone() {
+    let programmer = Programmer::with(Part::ours());
+    let folder = folder("flash_elf");
+    let file = elf(&folder, &image());
+    let done = programmer.flash(&[file.to_str().unwrap()]);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    let part = programmer.part();
+    assert_eq!(&part.flash[..1000], image());
+    assert!(part.eeprom.iter().all(|byte| *byte == 0x42));
+}
+
 #[test]
 fn an_image_goes_onto_a_board_that_is_set_right_and_the_set_up_stays() {
     let programmer = Programmer::with(Part::ours());

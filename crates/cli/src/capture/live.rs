@@ -63,7 +63,8 @@ pub struct Live {
 }
 
 impl Live {
-    /// Begins a file. `about` are further lines for its header; `start_unix_s` is the zero of the host times.
+    /// Begins a file. `about` are further lines for its header; `start_unix_s` is the zero of the host times, where it is
+    /// known: a file without it cannot be resumed.
     ///
     /// # Errors
     /// [`CaptureError::Exists`] where there is one, [`CaptureError::Io`].
@@ -71,7 +72,7 @@ impl Live {
         path: &Path,
         calibration: &Calibration,
         about: &[(String, String)],
-        start_unix_s: f64,
+        start_unix_s: Option<f64>,
     ) -> Result<Self, CaptureError> {
         let file = OpenOptions::new().write(true).create_new(true).open(path);
         let file = file.map_err(|source| match source.kind() {
@@ -82,7 +83,8 @@ impl Live {
         })?;
         let builder = RecordBuilder::new(calibration.clone());
         let mut head = builder.build();
-        (head.header.entries).push((START.to_owned(), format!("{start_unix_s:.3}")));
+        let start = start_unix_s.map(|start| (START.to_owned(), format!("{start:.3}")));
+        head.header.entries.extend(start);
         head.header.entries.extend_from_slice(about);
         let mut sink = Sink::new(file, path);
         write_head(&mut sink, &head)
@@ -94,7 +96,7 @@ impl Live {
             follow: follow(calibration),
             builder,
             places: Vec::new(),
-            start_unix_s,
+            start_unix_s: start_unix_s.unwrap_or(0.0),
             rows: 0,
         })
     }

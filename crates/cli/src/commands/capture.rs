@@ -1,7 +1,7 @@
 //! `imu-stand capture`.
 
 use std::fs::{File, OpenOptions};
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,7 +13,8 @@ use imu_stand::capture::{Calibration, Live, Restart};
 use imu_stand::link::{Change, Feed, Link};
 use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::Serialize;
-use wire::{Frame, Hello, Sample};
+use wire::link::LinkStats;
+use wire::{Decoder, Frame, Hello, Sample};
 
 use super::Line;
 
@@ -31,6 +32,9 @@ pub struct Arguments {
     /// Go on with the file where it ends; the time between is a gap in it
     #[arg(long)]
     resume: bool,
+    /// Decode the raw bytes of an earlier capture again, instead of a port
+    #[arg(long, value_name = "RAW", conflicts_with_all = ["port", "baud", "seconds", "resume"])]
+    replay: Option<PathBuf>,
     /// Write what was captured and lost as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -67,6 +71,7 @@ struct Answer {
 struct Capture<'a> {
     arguments: &'a Arguments,
     raw: File,
+    is_terminal: bool,
     start: Instant,
     /// What `start` is in the file's host time, s.
     start_s: f64,
@@ -90,6 +95,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             path: arguments.out.clone(),
         }
         .into());
+    }
+    if let Some(raw) = &arguments.replay {
+        return replay(arguments, raw);
     }
     let mut feed = Feed::new(arguments.line.open()?);
     let stop = Arc::new(AtomicBool::new(false));
@@ -128,6 +136,7 @@ impl<'a> Capture<'a> {
         Ok(Self {
             arguments,
             raw,
+            is_terminal: std::io::stderr().is_terminal(),
             start: Instant::now(),
             start_s: 0.0,
             start_unix_s: unix_s(),
@@ -176,18 +185,21 @@ impl<'a> Capture<'a> {
             self.give_up_on_hello()?;
             if heard.elapsed() > SILENCE && !feed.is_gone() {
                 heard = Instant::now();
-                eprintln!(
+                self.alert(&format!(
                     "no frame for {} s: {}",
                     SILENCE.as_secs(),
                     feed.link.heard().remedy(feed.link.baud())
-                );
+                ));
             }
             if shown.elapsed() > SHOW {
                 shown = Instant::now();
                 if let Some(live) = &mut self.live {
                     live.flush()?;
                 }
-                if !self.arguments.quiet {
+                if !self.arguments.quiet && self.is_terminal {
+                    // One line that changes.
+                    eprint!("\r{}\x1b[K", self.figures(&feed.link));
+                } else if !self.arguments.quiet {
                     eprintln!("{}", self.figures(&feed.link));
                 }
             }
@@ -214,8 +226,14 @@ impl<'a> Capture<'a> {
         )
     }
 
+    /// Words to whoever watches, on a line of their own.
+    fn alert(&self, what: &str) {
+        let begin = if self.is_terminal { "\r\x1b[K" } else { "" };
+        eprintln!("{begin}{what}");
+    }
+
     fn tell(&mut self, what: &str) -> Result<()> {
-        eprintln!("{what}");
+        self.alert(what);
         let now = self.now();
         if let Some(live) = &mut self.live {
             live.note(now, what)?;
@@ -251,10 +269,10 @@ impl<'a> Capture<'a> {
         self.missing += place.missing;
         if let Some(Restart { instants, .. }) = restart {
             self.restarts += 1;
-            eprintln!(
+            self.alert(&format!(
                 "the board has started anew; {} sample instants are without data",
                 instants - 1
-            );
+            ));
         }
         Ok(())
     }
@@ -304,7 +322,7 @@ impl<'a> Capture<'a> {
             (self.start_unix_s, self.rows) = (before, 0);
             live
         } else {
-            Live::create(&path, calibration, about, self.start_unix_s)?
+            Live::create(&path, calibration, about, Some(self.start_unix_s))?
         };
         self.live = Some(live);
         self.files.push(super::name(&path));
@@ -349,6 +367,9 @@ impl<'a> Capture<'a> {
             self.waiting[0].1 -= HELLO_WITHIN.as_secs_f64() + 1.0;
             self.give_up_on_hello()?;
         }
+        if self.is_terminal && !self.arguments.quiet {
+            eprintln!();
+        }
         let heard = link.heard();
         if self.live.is_none() && self.files.is_empty() {
             miette::bail!(
@@ -388,6 +409,104 @@ impl<'a> Capture<'a> {
         }
         super::write_json(self.arguments.json.as_ref(), &answer)
     }
+}
+
+/// Makes a capture of raw bytes. They carry no time of arrival: host times are the device's, from the first sample on.
+fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
+    let bytes = std::fs::read(path)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+    let (mut decoder, mut stats) = (Decoder::new(), LinkStats::new());
+    let mut frames = Vec::new();
+    for byte in bytes {
+        if let Some(Ok(frame)) = decoder.push(byte) {
+            stats.push(&frame);
+            frames.push(frame);
+        }
+    }
+    // The set-up of the first samples is that of the first hello, wherever it stands.
+    let first = frames.iter().find_map(|frame| match frame {
+        Frame::Hello(hello) => Some(*hello),
+        _ => None,
+    });
+    let mut builder = RecordBuilder::new(Calibration::default());
+    if let Some(hello) = &first {
+        builder.hello(hello);
+    }
+    let mut calibration = builder.calibration().clone();
+    let about = [("replayed_from".to_owned(), super::name(path))];
+    let mut files = vec![arguments.out.clone()];
+    let mut live = Live::create(&arguments.out, &calibration, &about, None)?;
+    if first.is_none() {
+        live.note(
+            0.0,
+            "no hello frame: rate and ranges are assumed to be the built-in ones",
+        )?;
+    }
+    let (mut time, mut last, mut restarts) = (0.0, None, None);
+    let (mut rows, mut missing) = (0, 0);
+    for frame in &frames {
+        match frame {
+            Frame::Sample(sample) => {
+                let forward = last.map_or(0, |last| sample.t_ticks.wrapping_sub(last));
+                time += if forward > u32::MAX / 2 {
+                    1.0 / calibration.rate_hz
+                } else {
+                    f64::from(forward) * calibration.tick_s
+                };
+                last = Some(sample.t_ticks);
+                missing += live.push(sample, time)?.0.missing;
+                rows += 1;
+            }
+            Frame::Hello(hello) => {
+                let fresh = restarts.is_some_and(|before| before != hello.restarts);
+                if last.is_some() && (fresh || hello.next_seq == 0) {
+                    live.restarted();
+                }
+                restarts = Some(hello.restarts);
+                builder.hello(hello);
+                if !live.fits(builder.calibration()) {
+                    calibration = builder.calibration().clone();
+                    let next = free_name(&arguments.out, files.len() + 1);
+                    std::mem::replace(&mut live, Live::create(&next, &calibration, &about, None)?)
+                        .finish()?;
+                    files.push(next);
+                }
+            }
+            Frame::Health(_) | Frame::Reply(_) => {}
+        }
+    }
+    live.finish()?;
+    if rows == 0 {
+        miette::bail!(
+            help = "is it the .raw file of a capture?",
+            "{} holds no sample: {}",
+            path.display(),
+            imu_stand::text::link(decoder.counts())
+        );
+    }
+    let losses = stats.losses();
+    let answer = Answer {
+        format: "imu-stand-captured/1",
+        files: files.iter().map(|file| super::name(file)).collect(),
+        seconds: time,
+        rows,
+        missing,
+        lost_by_board: losses.device,
+        lost_by_line: losses.line,
+        lost_unattributed: losses.unattributed,
+        frames_rejected: decoder.counts().rejected(),
+        restarts: losses.restarts,
+        reconnections: 0,
+    };
+    if !arguments.quiet {
+        say!(
+            "{}: {rows} samples, {missing} missing, {}",
+            answer.files.join(", "),
+            imu_stand::text::link(decoder.counts())
+        );
+    }
+    super::write_json(arguments.json.as_ref(), &answer)
 }
 
 /// The raw bytes' file: run.csv and run.csv.gz have run.raw.
