@@ -8,6 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
 use crate::allan::{Deviation, Gapped, Phase, TauGrid};
+use crate::angles::{Angle, Attitude, angle, attitude};
 use crate::edf::{NoiseType, chi_square_interval, edf};
 use crate::error::AnalysisError;
 use crate::noise_fit::{Estimated, Misfit, NoiseFit, Ramp, Spectrum, Term, fit, misfit};
@@ -191,6 +192,9 @@ pub struct ChannelAnalysis {
     /// Overlapping Allan deviation of the fitted parameters at the cluster times of the octave grid: `[τ in s, σ]`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fitted: Vec<[f64; 2]>,
+    /// The integral, with what the fit predicts for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle: Option<Angle>,
 }
 
 /// An analysis, exactly as `--json` writes it.
@@ -202,6 +206,9 @@ pub struct Analysis {
     pub input: AnalysisInput,
     /// By channel.
     pub channels: BTreeMap<String, ChannelAnalysis>,
+    /// The attitude, where there are three gyros.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attitude: Option<Attitude>,
 }
 
 /// Analyze a record.
@@ -283,6 +290,13 @@ pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, An
             lost_samples: sampling.lost,
             jitter_s: sampling.jitter_s,
         },
+        attitude: attitude(record, &sampling).filter(|_| {
+            channels
+                .keys()
+                .filter(|name| name.starts_with("gyro_"))
+                .count()
+                == 3
+        }),
         channels,
     })
 }
@@ -312,6 +326,7 @@ fn analyze_channel(
         },
         warnings: sampling.warnings.clone(),
         fitted: Vec::new(),
+        angle: None,
     };
     let mut readings = runs.iter().flat_map(|r| &channel.values[r.clone()]);
     let Some(first) = readings.next() else {
@@ -388,6 +403,9 @@ fn analyze_channel(
         .into_iter()
         .map(|m| [m as f64 * tau0, fitted.deviation(m) * units.reading.factor])
         .collect();
+    if channel.quantity == Quantity::Gyro {
+        out.angle = angle(channel, &runs, &fitted, &units.integral);
+    }
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let ms = TauGrid::Octave.factors(longest / 5);
     if let Some(found) = misfit(&spectrum, &fitted, &ms, MISFIT_REPLICATES, &mut rng)

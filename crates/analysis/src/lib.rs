@@ -4,6 +4,7 @@
 
 pub mod allan;
 pub mod analyze;
+pub mod angles;
 pub mod attitude;
 pub mod audit;
 pub mod beyond;

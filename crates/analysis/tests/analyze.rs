@@ -277,3 +277,46 @@ fn the_measured_adis16405_has_the_noise_its_makers_state() {
         println!("{name}: {:?} {:?}", channel.paper, channel.warnings);
     }
 }
+
+#[test]
+fn the_integrated_angle_stays_within_its_prediction_and_a_turn_is_seen_by_the_attitude() {
+    let z = &analyze(&white(11), &AnalyzeOptions::default()).unwrap();
+    let angle = z.channels["gyro_z"].angle.as_ref().unwrap();
+    assert!((angle.calibration_s - 60.0).abs() < 0.1);
+    assert_eq!(angle.points.len(), 20);
+    for p in &angle.points {
+        // Beyond 4 of its standard deviations a point lies with a chance of 6e-5; they hang together.
+        assert!((p.angle - p.expected).abs() < 4.0 * p.sigma, "{p:?}");
+    }
+    assert!(z.attitude.is_none(), "one gyro gives no attitude");
+    // Three gyros at rest for 60 s, then a turn about y by 90 degrees in 30 s.
+    let mut record = white(12);
+    let rest = record.channels[0].values.clone();
+    let axis = |name: &str, axis, turn: f64| Channel {
+        name: name.into(),
+        axis: Some(axis),
+        values: rest
+            .iter()
+            .enumerate()
+            .map(|(i, v)| 1e-3 * v + if (4000..4600).contains(&i) { turn } else { 0.0 })
+            .collect(),
+        counts: None,
+        lsb: None,
+        ..record.channels[0].clone()
+    };
+    record.channels = vec![
+        axis("gyro_x", Axis::X, 0.0),
+        axis("gyro_y", Axis::Y, 3.0),
+        axis("gyro_z", Axis::Z, 0.0),
+    ];
+    let attitude = analyze(&record, &AnalyzeOptions::default())
+        .unwrap()
+        .attitude
+        .unwrap();
+    let last = attitude.points.last().unwrap();
+    assert!((last.angle_deg - 90.0).abs() < 0.5, "{last:?}");
+    assert!(
+        (last.quaternion[2] - 0.5f64.sqrt()).abs() < 0.01,
+        "{last:?}"
+    );
+}

@@ -82,6 +82,19 @@ fn print(analysis: &Analysis) {
                 None => notes.push((note, vec![name])),
             }
         }
+        if let Some(last) = channel.angle.as_ref().and_then(|a| a.points.last())
+            && let Some(angle) = &channel.angle
+        {
+            say!(
+                "  angle {} s after {} s of calibration: {} {}, expected {} +- {}",
+                number(last.t_s, 4),
+                number(angle.calibration_s, 3),
+                number(last.angle, 3),
+                angle.unit,
+                number(last.expected, 3),
+                number(last.sigma, 3)
+            );
+        }
         for (deviation, points) in &channel.deviations {
             let name = format!("{deviation:?}").to_lowercase();
             say!(
@@ -98,6 +111,16 @@ fn print(analysis: &Analysis) {
                 );
             }
         }
+    }
+    if let Some(attitude) = &analysis.attitude
+        && let Some(last) = attitude.points.last()
+    {
+        let [w, x, y, z] = last.quaternion;
+        say!(
+            "attitude of the three gyros after {} s: {} deg from the start, quaternion ({w:.6}, {x:.6}, {y:.6}, {z:.6})",
+            number(last.t_s, 4),
+            number(last.angle_deg, 3)
+        );
     }
     if !notes.is_empty() {
         say!("\non the paper's procedure");

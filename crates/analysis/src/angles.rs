@@ -1,0 +1,143 @@
+//! What the integrated rates of a record say: the angle of each gyro beside its prediction, and the attitude of all three.
+
+use std::ops::Range;
+
+use model::record::{Axis, Channel, Quantity, Record};
+use serde::{Deserialize, Serialize};
+
+use crate::attitude::{angle_between, angle_growth, integrate};
+use crate::noise_fit::NoiseFit;
+use crate::sampling::Sampling;
+use crate::units::{Scale, Units};
+
+/// Part of the longest run whose mean is taken for the bias.
+const CALIBRATION: f64 = 0.1;
+/// Points reported.
+const POINTS: usize = 20;
+/// Samples below which nothing is integrated.
+const NEEDED: usize = 40;
+
+/// A channel integrated over its longest run without a gap, the mean of its first tenth taken out as the bias.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Angle {
+    /// Unit of `angle`, `expected` and `sigma`.
+    pub unit: String,
+    /// Length over which the bias was taken, s.
+    pub calibration_s: f64,
+    /// The integral at instants after it.
+    pub points: Vec<Integrated>,
+}
+
+/// The integral at one instant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Integrated {
+    /// Since the end of the calibration, s.
+    pub t_s: f64,
+    /// Measured.
+    pub angle: f64,
+    /// Expected of the fitted rate ramp; 0 without one.
+    pub expected: f64,
+    /// Standard deviation that the fitted noise predicts, the error of the bias counted.
+    pub sigma: f64,
+}
+
+/// The attitude of three gyros, integrated as a quaternion over the longest run that all have, from the end of a tenth of
+/// it that gives the biases.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Attitude {
+    /// Length over which the biases were taken, s.
+    pub calibration_s: f64,
+    /// At instants after it.
+    pub points: Vec<Orientation>,
+}
+
+/// The attitude at one instant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Orientation {
+    /// Since the end of the calibration, s.
+    pub t_s: f64,
+    /// From body axes then to body axes at the start: w, x, y, z.
+    pub quaternion: [f64; 4],
+    /// Angle from the start, deg.
+    pub angle_deg: f64,
+}
+
+pub(crate) fn angle(
+    channel: &Channel,
+    runs: &[Range<usize>],
+    fit: &NoiseFit,
+    scale: &Scale,
+) -> Option<Angle> {
+    let longest = runs.iter().map(ExactSizeIterator::len).max()?;
+    if longest < NEEDED {
+        return None;
+    }
+    let calibration_s = CALIBRATION * longest as f64 * fit.tau0;
+    let points = angle_growth(&channel.values, runs, fit, calibration_s, POINTS)
+        .into_iter()
+        .map(|p| Integrated {
+            t_s: p.t_s,
+            angle: p.angle * scale.factor,
+            expected: p.expected * scale.factor,
+            sigma: p.sigma * scale.factor,
+        })
+        .collect();
+    Some(Angle {
+        unit: scale.unit.clone(),
+        calibration_s,
+        points,
+    })
+}
+
+pub(crate) fn attitude(record: &Record, sampling: &Sampling) -> Option<Attitude> {
+    let gyro = |axis: Axis| -> Option<(&Channel, f64)> {
+        let channel = record
+            .channels
+            .iter()
+            .find(|c| c.quantity == Quantity::Gyro && c.axis == Some(axis))?;
+        let reading = Units::of(channel.quantity, &channel.unit).reading;
+        (reading.unit == "deg/s").then_some((channel, reading.factor.to_radians()))
+    };
+    let gyros = [gyro(Axis::X)?, gyro(Axis::Y)?, gyro(Axis::Z)?];
+    // A reading missing on one axis interrupts all.
+    let together: Vec<f64> = (0..record.len())
+        .map(|i| gyros.iter().map(|(c, _)| c.values[i]).sum())
+        .collect();
+    let run = sampling
+        .runs_of(&together)
+        .into_iter()
+        .max_by_key(ExactSizeIterator::len)
+        .filter(|r| r.len() >= NEEDED)?;
+    let calibration = (CALIBRATION * run.len() as f64).round() as usize;
+    let (still, rest) = (
+        run.start..run.start + calibration,
+        run.start + calibration..run.end,
+    );
+    let bias = gyros.map(|(c, _)| c.values[still.clone()].iter().sum::<f64>() / calibration as f64);
+    let rates: Vec<[f64; 3]> = rest
+        .map(|i| {
+            std::array::from_fn(|axis| {
+                let (channel, to_si) = gyros[axis];
+                (channel.values[i] - bias[axis]) * to_si
+            })
+        })
+        .collect();
+    let start = [1.0, 0.0, 0.0, 0.0];
+    let path = integrate(&rates, sampling.tau0, start);
+    let mut next = 1;
+    let mut points = Vec::new();
+    for (i, quaternion) in path {
+        if i > 0 && i * POINTS >= next * (rates.len() - 1) {
+            next = i * POINTS / (rates.len() - 1) + 1;
+            points.push(Orientation {
+                t_s: i as f64 * sampling.tau0,
+                quaternion,
+                angle_deg: angle_between(start, quaternion).to_degrees(),
+            });
+        }
+    }
+    Some(Attitude {
+        calibration_s: calibration as f64 * sampling.tau0,
+        points,
+    })
+}
