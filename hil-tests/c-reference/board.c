@@ -4,6 +4,7 @@
 #include <avr/wdt.h>
 #include <stdlib.h>
 
+#include "serial.h"
 #include "tick.h"
 
 #define PAINT 0xc5
@@ -67,7 +68,9 @@ void board_set_motor(int16_t duty)
 void board_reboot(void)
 {
     tick_stop();
-    wdt_enable(WDTO_120MS);
+    while (!serial_is_idle()) /* bounded by the watchdog, still at 1 s */
+        ;
+    wdt_enable(WDTO_15MS);
     for (;;)
         ;
 }

@@ -105,6 +105,8 @@ pub struct Script {
     /// When the first gyro was selected after each tick.
     pub instants: Vec<u64>,
     ticked: bool,
+    /// The board resets: its ticks begin anew, and are not compared with those before.
+    pub reset: bool,
     /// Every byte that the image sent.
     pub line: Vec<u8>,
     /// Share of the motor's pulse with its direction, at each change.
@@ -180,7 +182,7 @@ impl Board for Script {
     fn interrupt(&mut self, at: u64, vector: u8) {
         if vector == TICK_VECTOR {
             self.first_tick.get_or_insert(at);
-            self.ticked = true;
+            self.ticked = !self.reset;
         }
     }
 }

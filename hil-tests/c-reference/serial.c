@@ -36,9 +36,14 @@ void serial_set_baud_later(uint16_t divisor)
     waiting = true;
 }
 
+bool serial_is_idle(void)
+{
+    return serial_tx.head == serial_tx.tail && (~UCSRA & (_BV(UDRE) | _BV(TXC))) == 0;
+}
+
 void serial_work(void)
 {
-    if (waiting && serial_tx.head == serial_tx.tail && (~UCSRA & (_BV(UDRE) | _BV(TXC))) == 0) {
+    if (waiting && serial_is_idle()) {
         serial_set_baud(waiting_divisor);
         waiting = false;
     }

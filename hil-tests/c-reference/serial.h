@@ -22,6 +22,8 @@ void serial_set_baud_later(uint16_t divisor);
 /* Sets the divisor that waits, if the line is idle. */
 void serial_work(void);
 
+/* Whether the last byte has left the shift register. */
+bool serial_is_idle(void);
 bool serial_has_received(void);
 /* The next received byte, or -1. */
 int16_t serial_receive(void);

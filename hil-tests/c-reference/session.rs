@@ -19,6 +19,8 @@ enum Deed {
     SendWithoutStopBit(u8),
     /// The stand comes to rest, or moves again.
     Quiet(bool),
+    /// From here on the ticks' phase means nothing: a reset comes.
+    LastTick,
     /// A bit of the EEPROM's byte at an address flips.
     Flip(usize),
 }
@@ -394,7 +396,12 @@ fn deeds() -> Vec<(u64, Deed)> {
     at += 2_000;
     all.push((at, request(next(), Command::ClearCounters)));
     all.push((at + 100, request(next(), Command::Counters)));
-    at += 300;
+    // Four frames, so that the reply waits behind others in the ring; then the start, which is heard.
+    all.push((at + 200, request(next(), Command::Counters)));
+    all.push((at + 201, request(next(), Command::GetHello)));
+    all.push((at + 202, Deed::LastTick));
+    all.push((at + 202, request(next(), Command::Reboot)));
+    at += 1_000;
     all.push((at, Deed::Send(Vec::new())));
     all
 }
@@ -463,6 +470,7 @@ pub fn play(mcu: &mut Mcu) -> Result<Script, String> {
         run(mcu, &mut script, first + ms * MILLISECOND)?;
         match deed {
             Deed::Send(bytes) => bytes.into_iter().for_each(|byte| mcu.send(byte)),
+            Deed::LastTick => script.reset = true,
             Deed::SendWithoutStopBit(byte) => mcu.send_without_stop_bit(byte),
             Deed::Quiet(quiet) => script.quiet = quiet,
             Deed::Flip(address) => {
