@@ -165,6 +165,19 @@ pub struct NoiseParameters {
     pub quantization_noise: Interval,
 }
 
+impl NoiseParameters {
+    pub(crate) fn of(fitted: &NoiseFit, units: &Units) -> Self {
+        let term = |term: Term, scale: &Scale| Interval::estimated(fitted.term(term), scale);
+        Self {
+            angle_random_walk: term(Term::White, &units.angle_random_walk),
+            bias_instability: term(Term::Flicker, &units.bias_instability),
+            rate_random_walk: term(Term::RandomWalk, &units.rate_random_walk),
+            rate_ramp: Interval::estimated(fitted.rate_ramp, &units.rate_ramp),
+            quantization_noise: term(Term::Quantization, &units.quantization_noise),
+        }
+    }
+}
+
 /// The paper's figures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Paper {
@@ -374,19 +387,7 @@ fn analyze_channel(
         ));
         return out;
     };
-    out.parameters = NoiseParameters {
-        angle_random_walk: Interval::estimated(fitted.term(Term::White), &units.angle_random_walk),
-        bias_instability: Interval::estimated(fitted.term(Term::Flicker), &units.bias_instability),
-        rate_random_walk: Interval::estimated(
-            fitted.term(Term::RandomWalk),
-            &units.rate_random_walk,
-        ),
-        rate_ramp: Interval::estimated(fitted.rate_ramp, &units.rate_ramp),
-        quantization_noise: Interval::estimated(
-            fitted.term(Term::Quantization),
-            &units.quantization_noise,
-        ),
-    };
+    out.parameters = NoiseParameters::of(&fitted, &units);
     let walk = fitted.term(Term::RandomWalk);
     if walk.value.is_some() && walk.low == 0.0 && fitted.term(Term::Flicker).value.is_none() {
         out.warnings.push(

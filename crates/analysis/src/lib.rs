@@ -29,6 +29,7 @@ pub mod optimise;
 pub mod paper;
 pub mod paper_model;
 pub mod plan;
+pub mod pooled;
 pub mod representative;
 pub mod result;
 pub mod sampling;

@@ -7,10 +7,12 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
 use crate::allan::{Deviation, Phase, deviation};
+use crate::analyze::NoiseParameters;
 use crate::edf::{NoiseType, edf};
 use crate::error::AnalysisError;
 use crate::noise_fit::{Spectrum, Term, fit};
 use crate::noise_id::identify;
+use crate::pooled::{Pooled, pool};
 use crate::sampling::Sampling;
 use crate::units::Units;
 
@@ -40,6 +42,22 @@ pub struct RunFigure {
     pub spread: f64,
     /// Distance of each run from the median, in its own scale.
     pub z: Vec<f64>,
+    /// Mean over the runs that are not odd, their run-to-run spread beyond the errors, and the test of equality. Sizes
+    /// are pooled as logarithms; `mean` and its interval are sizes again, `run_to_run` is in parts of them.
+    pub over_runs: Option<Pooled>,
+    /// Whether the runs differ, after correction for the number of figures (Holm, 5 %); `None` where errors are unknown.
+    pub differ: Option<bool>,
+}
+
+/// N, B, K, Q and R of all runs that are not odd, by one likelihood: each run has a constant of its own, the noise is one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Together {
+    /// The channel.
+    pub channel: String,
+    /// Runs in it.
+    pub runs: usize,
+    /// The parameters, as `analyze` gives them.
+    pub parameters: NoiseParameters,
 }
 
 /// A run that does not represent the others.
@@ -66,6 +84,8 @@ pub struct Representative {
     pub limit: f64,
     /// All figures.
     pub figures: Vec<RunFigure>,
+    /// Noise parameters of the runs together, by channel; empty where the sample rates differ.
+    pub together: Vec<Together>,
 }
 
 /// Compare runs of the same stand by the gyros (without any, by all channels) that all of them have.
@@ -110,8 +130,11 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
         .map(|r| Sampling::of(r, None))
         .collect::<Result<Vec<_>, _>>()?;
     let mut figures = Vec::new();
+    let mut spectra = Vec::new();
     for name in &names {
-        figures.extend(figures_of(records, &samplings, name)?);
+        let (of_channel, of_runs) = figures_of(records, &samplings, name)?;
+        figures.extend(of_channel);
+        spectra.push(of_runs);
     }
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let limit = limit(records.len(), figures.len(), &mut rng);
@@ -128,6 +151,9 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
             }
         }
     }
+    let is_odd = |run: usize| odd.iter().any(|o| o.run == run);
+    pool_figures(&mut figures, &is_odd);
+    let together = together(records, &samplings, &names, &spectra, &is_odd);
     let distance = |run: usize| figures.iter().map(|f| f.z[run].powi(2)).sum::<f64>();
     let run = (0..records.len())
         .min_by(|a, b| {
@@ -142,14 +168,91 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
         odd,
         limit,
         figures,
+        together,
     })
 }
+
+/// Adds to each figure what its runs say together; the tests of equality are corrected for their number by Holm's method.
+fn pool_figures(figures: &mut [RunFigure], is_odd: &dyn Fn(usize) -> bool) {
+    for figure in figures.iter_mut() {
+        let sizes = figure.figure != "bias";
+        let (mut x, mut errors) = (Vec::new(), Vec::new());
+        for (run, (value, error)) in figure.values.iter().zip(&figure.std_errors).enumerate() {
+            if !is_odd(run) {
+                x.push(if sizes { value.ln() } else { *value });
+                errors.push(if sizes { error / value } else { *error });
+            }
+        }
+        figure.over_runs = pool(&x, &errors).map(|mut p| {
+            if sizes {
+                p.mean = p.mean.exp();
+                p.mean_low = p.mean_low.exp();
+                p.mean_high = p.mean_high.exp();
+            }
+            p
+        });
+    }
+    let mut tests: Vec<(usize, f64)> = figures
+        .iter()
+        .enumerate()
+        .filter_map(|(i, f)| Some((i, f.over_runs?.equal_p?)))
+        .collect();
+    tests.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let count = tests.len();
+    let mut differ = true;
+    for (rank, (i, p)) in tests.into_iter().enumerate() {
+        differ &= p * ((count - rank) as f64) < FALSE_ALARM;
+        figures[i].differ = Some(differ);
+    }
+}
+
+fn together(
+    records: &[Record],
+    samplings: &[Sampling],
+    names: &[String],
+    spectra: &[Vec<Spectrum>],
+    is_odd: &dyn Fn(usize) -> bool,
+) -> Vec<Together> {
+    let tau0 = samplings[0].tau0;
+    if samplings
+        .iter()
+        .any(|s| (s.tau0 / tau0 - 1.0).abs() > SAME_RATE)
+    {
+        return Vec::new();
+    }
+    names
+        .iter()
+        .zip(spectra)
+        .filter_map(|(name, spectra)| {
+            let channel = records[0].channel(name)?;
+            let chosen: Vec<Spectrum> = spectra
+                .iter()
+                .enumerate()
+                .filter(|(run, _)| !is_odd(*run))
+                .map(|(_, s)| s.clone())
+                .collect();
+            let fitted = fit(&Spectrum::together(&chosen));
+            Some(Together {
+                channel: name.clone(),
+                runs: chosen.len(),
+                parameters: NoiseParameters::of(
+                    &fitted,
+                    &Units::of(channel.quantity, &channel.unit),
+                ),
+            })
+        })
+        .collect()
+}
+
+/// Relative difference of sample intervals up to which runs have the same.
+const SAME_RATE: f64 = 1e-3;
 
 fn figures_of(
     records: &[Record],
     samplings: &[Sampling],
     name: &str,
-) -> Result<Vec<RunFigure>, AnalysisError> {
+) -> Result<(Vec<RunFigure>, Vec<Spectrum>), AnalysisError> {
+    let mut spectra = Vec::new();
     let mut rows: Vec<[(f64, f64); 3]> = Vec::new();
     let channels: Vec<_> = records.iter().filter_map(|r| r.channel(name)).collect();
     let units = Units::of(channels[0].quantity, &channels[0].unit);
@@ -175,13 +278,9 @@ fn figures_of(
             return Err(short());
         }
         let runs = sampling.runs_of(&channel.values);
-        let n = fit(&Spectrum::with_gaps(
-            &channel.values,
-            &runs,
-            &sampling.slots,
-            sampling.tau0,
-        ))
-        .term(Term::White);
+        let spectrum = Spectrum::with_gaps(&channel.values, &runs, &sampling.slots, sampling.tau0);
+        let n = fit(&spectrum).term(Term::White);
+        spectra.push(spectrum);
         let (Some(value), Some(error)) = (n.value, n.std_error) else {
             return Err(short());
         };
@@ -211,7 +310,7 @@ fn figures_of(
         ("slow_deviation", units.reading.unit.clone(), true),
         ("bias", units.reading.unit, false),
     ];
-    Ok(titles
+    let figures = titles
         .into_iter()
         .enumerate()
         .map(|(i, (figure, unit, positive))| {
@@ -243,9 +342,12 @@ fn figures_of(
                 pooled,
                 spread: if positive { spread * pooled } else { spread },
                 z,
+                over_runs: None,
+                differ: None,
             }
         })
-        .collect())
+        .collect();
+    Ok((figures, spectra))
 }
 
 fn median(x: &[f64]) -> f64 {
@@ -345,6 +447,21 @@ mod tests {
             "{answer:?}"
         );
         assert_ne!(answer.run, 5);
+        // The others are one noise: N of eleven runs together, 0.39/sqrt(20) deg/sqrt(s), 5.23 deg/sqrt(h).
+        let together = &answer.together[0];
+        assert_eq!(together.runs, 11);
+        let n = &together.parameters.angle_random_walk;
+        assert!(n.low.unwrap() < 5.232 && 5.232 < n.high.unwrap(), "{n:?}");
+        assert!(n.std_error.unwrap() / n.value.unwrap() < 0.012, "{n:?}");
+        let figure = |name: &str| answer.figures.iter().find(|f| f.figure == name).unwrap();
+        let noise = figure("angle_random_walk");
+        assert_eq!(noise.differ, Some(false), "{noise:?}");
+        // Biases scatter by 0.1 deg/s.
+        let bias = figure("bias").over_runs.unwrap();
+        assert!(
+            bias.run_to_run_low < 0.1 && 0.1 < bias.run_to_run_high,
+            "{bias:?}"
+        );
         assert!(representative(&runs[..3], 1).is_err());
     }
 }

@@ -166,6 +166,21 @@ impl Spectrum {
         bins.finish(tau0, runs.iter().map(ExactSizeIterator::len).sum())
     }
 
+    /// Several records of the same noise at the same rate as one: each keeps its own constant.
+    #[must_use]
+    pub fn together(spectra: &[Self]) -> Self {
+        let mut bins: Vec<Bin> = spectra
+            .iter()
+            .flat_map(|s| s.bins.iter().copied())
+            .collect();
+        bins.sort_by(|a, b| a.w.total_cmp(&b.w));
+        Self {
+            tau0: spectra.first().map_or(0.0, |s| s.tau0),
+            samples: spectra.iter().map(|s| s.samples).sum(),
+            bins,
+        }
+    }
+
     /// Variance of the coefficients of a bin.
     #[inline]
     #[must_use]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use analysis::AnalyzeOptions;
-use analysis::analyze::{Analysis, ChannelAnalysis};
+use analysis::analyze::{Analysis, ChannelAnalysis, NoiseParameters};
 use clap::Args;
 use imu_stand::report::plot::number;
 use imu_stand::text;
@@ -66,7 +66,7 @@ fn print(analysis: &Analysis) {
     let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
     for (name, channel) in all().filter(gyros(true)).chain(all().filter(gyros(false))) {
         say!("{name}");
-        parameters(channel);
+        parameters(&channel.parameters);
         for warning in &channel.warnings {
             say!("{}", text::item("warning: ", warning));
         }
@@ -133,8 +133,8 @@ fn print(analysis: &Analysis) {
     }
 }
 
-fn parameters(channel: &ChannelAnalysis) {
-    let p = &channel.parameters;
+/// N, B, K, R and Q, a line each.
+pub fn parameters(p: &NoiseParameters) {
     interval("N angle random walk", &p.angle_random_walk);
     interval("B bias instability", &p.bias_instability);
     interval("K rate random walk", &p.rate_random_walk);

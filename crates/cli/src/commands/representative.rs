@@ -74,14 +74,44 @@ fn print(files: &[String], found: &Representative) {
             text::item(&format!("not {}: ", files[odd.run]), &what)
         );
     }
+    say!("over the runs that do not stand out (95 %):");
     for figure in &found.figures {
+        let Some(pooled) = figure.over_runs else {
+            continue;
+        };
+        // Sizes scatter in parts of themselves, biases in their unit.
+        let (factor, unit) = if figure.figure == "bias" {
+            (1.0, figure.unit.as_str())
+        } else {
+            (100.0, "%")
+        };
         say!(
-            "    {:<10} {:<18} median {}, run to run {} {}",
+            "    {:<10} {:<18} {} ({} .. {}) {}, run to run {} ({} .. {}) {unit}{}",
             figure.channel,
             figure.figure.replace('_', " "),
-            number(figure.pooled, 4),
-            number(figure.spread, 2),
-            figure.unit
+            number(pooled.mean, 4),
+            number(pooled.mean_low, 4),
+            number(pooled.mean_high, 4),
+            figure.unit,
+            number(factor * pooled.run_to_run, 3),
+            number(factor * pooled.run_to_run_low, 3),
+            number(factor * pooled.run_to_run_high, 3),
+            match figure.differ {
+                Some(true) => ": the runs differ",
+                Some(false) => ": no more than their errors",
+                None => "",
+            }
         );
+    }
+    if found.together.is_empty() {
+        say!("the sample rates differ: no noise parameters of the runs together");
+    }
+    for together in &found.together {
+        say!(
+            "  {}: noise of {} runs together",
+            together.channel,
+            together.runs
+        );
+        super::analyze::parameters(&together.parameters);
     }
 }
