@@ -17,7 +17,7 @@ mod register {
 }
 
 /// Spreads a number over 64 bits (SplitMix64's finalizer).
-fn spread(number: u64) -> u64 {
+pub fn spread(number: u64) -> u64 {
     let mut z = number.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -112,6 +112,8 @@ pub struct Script {
     /// Share of the motor's pulse with its direction, at each change.
     pub motor: Vec<(f64, bool)>,
     pub acc_pins: Vec<u8>,
+    /// What the EEPROM held at the end.
+    pub eeprom: Vec<u8>,
     reverse: bool,
 }
 

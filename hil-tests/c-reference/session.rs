@@ -5,11 +5,15 @@
 // images that do the same work at different speeds have to say the same.
 
 use atmega16_sim::{CLOCK_HZ, Mcu, Stop};
-use wire::{Command, Decoder, Frame, Health, Shape, code, encode_request, kind};
+use wire::{Command, Shape, code, encode_request, kind};
 
+#[path = "hearing.rs"]
+mod hearing;
 #[path = "script.rs"]
 mod script;
+pub use hearing::{busy_max, frames, jitter};
 pub use script::Script;
+use script::spread;
 
 const MILLISECOND: u64 = CLOCK_HZ as u64 / 1_000;
 
@@ -406,22 +410,6 @@ fn deeds() -> Vec<(u64, Deed)> {
     all
 }
 
-/// Peak-to-peak jitter of the sampling instants, cycles: every period is a multiple of timer 1's 64 cycles.
-pub fn jitter(script: &Script) -> u64 {
-    let Some(&first) = script.instants.first() else {
-        return u64::MAX;
-    };
-    let late: Vec<i64> = script
-        .instants
-        .iter()
-        .map(|&at| ((at - first) as i64 + 32).rem_euclid(64) - 32)
-        .collect();
-    late.iter()
-        .max()
-        .unwrap_or(&0)
-        .abs_diff(*late.iter().min().unwrap_or(&0))
-}
-
 /// How many undamaged requests the session has.
 pub fn requests() -> usize {
     deeds()
@@ -459,15 +447,98 @@ pub fn start(mcu: &mut Mcu, script: &mut Script) -> Result<u64, String> {
     Err("no tick within a second".to_owned())
 }
 
+/// Requests by chance, one after each tick: commands that there are, with arguments that are small, extreme or anything,
+/// and codes that no command has. Without a reboot, and at the rate and speed of the start: at others, what comes first
+/// is a matter of the image's speed.
+fn chance(seed: u64) -> Vec<(u64, Deed)> {
+    const CODES: [u8; 21] = [
+        code::PING,
+        code::GET_HELLO,
+        code::KEEP_ALIVE,
+        code::COUNTERS,
+        code::CLEAR_COUNTERS,
+        code::SET_GYRO,
+        code::SET_ACC_RANGE,
+        code::BIAS_NULL,
+        code::SET_BIAS,
+        code::SET_SCALE,
+        code::MOTOR_DUTY,
+        code::MOTOR_PROFILE,
+        code::MOTOR_LIMITS,
+        code::READ_REGISTER,
+        code::WRITE_REGISTER,
+        code::SELF_TEST,
+        code::STORE_CONFIG,
+        code::LOAD_CONFIG,
+        code::DEFAULT_CONFIG,
+        code::SET_BOARD_ID,
+        code::KEEP_ALIVE,
+    ];
+    let mut all = vec![(1, Deed::Quiet(seed % 2 == 0))];
+    for n in 0..CHANCE_REQUESTS {
+        let bits = |salt: u64| spread(seed ^ spread(n << 8 | salt));
+        let code = match bits(0) % 16 {
+            0 => (bits(1) % 13 * 7) as u8,
+            _ => CODES[(bits(1) % CODES.len() as u64) as usize],
+        };
+        if matches!(code, code::REBOOT | code::SET_RATE | code::SET_BAUD) {
+            continue;
+        }
+        // As many bytes as the command has, more often than not.
+        let used = wire::Asked {
+            number: 0,
+            code,
+            arguments: [1; 8],
+        };
+        let mut arguments = [0; 8];
+        for (place, byte) in (0..).zip(&mut arguments) {
+            let mut unused = used;
+            unused.arguments = [0; 8];
+            unused.arguments[place] = 1;
+            if unused.refusal().is_some() && bits(2) % 8 != 0 {
+                break;
+            }
+            let any = bits(10 + place as u64);
+            *byte = match any % 4 {
+                0 => (any >> 8) as u8 % 5,
+                1 => 0,
+                2 => 0xFF,
+                _ => (any >> 8) as u8,
+            };
+        }
+        all.push((20 + 50 * n, raw_request(n as u16, code, arguments)));
+    }
+    all.push((20 + 50 * CHANCE_REQUESTS + 40, Deed::LastTick));
+    all
+}
+
+/// Requests in [`chance`], at most.
+const CHANCE_REQUESTS: u64 = 400;
+
 /// Puts an image through the session.
 ///
 /// # Errors
 /// An image that stops.
 pub fn play(mcu: &mut Mcu) -> Result<Script, String> {
+    act(mcu, deeds())
+}
+
+/// Puts an image through requests by chance.
+///
+/// # Errors
+/// An image that stops.
+pub fn play_by_chance(mcu: &mut Mcu, seed: u64) -> Result<Script, String> {
+    act(mcu, chance(seed))
+}
+
+/// Requests end 25.3 ms after a tick, not when a millisecond ends.
+const OFF_THE_EDGE: u64 = MILLISECOND * 2 / 5;
+
+fn act(mcu: &mut Mcu, deeds: Vec<(u64, Deed)>) -> Result<Script, String> {
     let mut script = Script::default();
     let first = start(mcu, &mut script)?;
-    for (ms, deed) in deeds() {
-        run(mcu, &mut script, first + ms * MILLISECOND)?;
+    for (ms, deed) in deeds {
+        run(mcu, &mut script, first + ms * MILLISECOND + OFF_THE_EDGE)?;
         match deed {
             Deed::Send(bytes) => bytes.into_iter().for_each(|byte| mcu.send(byte)),
             Deed::LastTick => script.reset = true,
@@ -480,43 +551,6 @@ pub fn play(mcu: &mut Mcu) -> Result<Script, String> {
             }
         }
     }
+    script.eeprom = mcu.eeprom().to_vec();
     Ok(script)
-}
-
-/// The longest work of a tick that a health frame told of, timer ticks.
-pub fn busy_max(script: &Script) -> u16 {
-    let mut decoder = Decoder::new();
-    let frames = script.line.iter().filter_map(|&byte| decoder.push(byte));
-    let healths = frames.filter_map(|frame| match frame {
-        Ok(Frame::Health(health)) => Some(health.tick_busy_max),
-        _ => None,
-    });
-    healths.max().unwrap_or(0)
-}
-
-/// What came over the line, frame by frame, without what depends on the image's speed and stack.
-pub fn frames(line: &[u8]) -> Vec<String> {
-    line.split_inclusive(|&byte| byte == 0)
-        .map(|bytes| {
-            let mut decoder = Decoder::new();
-            let frame = bytes.iter().find_map(|&byte| decoder.push(byte));
-            match (frame, bytes) {
-                (Some(Ok(Frame::Health(health))), _) => {
-                    let health = Health {
-                        tick_busy_max: 0,
-                        stack_free: 0,
-                        ..health
-                    };
-                    format!("{health:?}")
-                }
-                (Some(Ok(frame)), _) => format!("{bytes:02x?} {frame:?}"),
-                // The console's last number is the free stack.
-                (_, [b'v', ..]) => {
-                    let text = String::from_utf8_lossy(bytes);
-                    text.split(" z").next().unwrap_or_default().to_owned()
-                }
-                (frame, _) => format!("{bytes:02x?} {frame:?}"),
-            }
-        })
-        .collect()
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 
 use atmega16_sim::Mcu;
-use hil_tests::image;
+use hil_tests::{image, seed};
 
 #[allow(dead_code)]
 #[path = "../c-reference/session.rs"]
@@ -65,6 +65,7 @@ fn it_sends_byte_for_byte_what_the_rust_image_sends() {
     }
     assert_eq!(rust.motor, c.motor, "the motor's pulses");
     assert_eq!(rust.acc_pins, c.acc_pins, "g-select");
+    assert_eq!(rust.eeprom, c.eeprom);
 
     // What they agree on is a whole session: every request answered once, every kind of frame, every status.
     let replies: Vec<_> = of_c
@@ -96,6 +97,27 @@ fn it_sends_byte_for_byte_what_the_rust_image_sends() {
         replies.len(),
         c.line.len()
     );
+}
+
+#[test]
+fn it_answers_requests_by_chance_as_the_rust_image_does() {
+    let reference = reference();
+    let seed = seed();
+    for draw in 0..4 {
+        let play = |name: &str, elf: &[u8]| {
+            let mut mcu = Mcu::new(elf).expect("it is an image");
+            session::play_by_chance(&mut mcu, seed.wrapping_add(draw))
+                .unwrap_or_else(|error| panic!("the {name} image {error}"))
+        };
+        let (rust, c) = (play("Rust", &image()), play("C", &reference));
+        let of_c = session::frames(&c.line);
+        assert_same(&session::frames(&rust.line), &of_c);
+        assert_eq!(rust.motor, c.motor, "the motor's pulses");
+        assert_eq!(rust.acc_pins, c.acc_pins, "g-select");
+        assert_eq!(rust.eeprom, c.eeprom);
+        let replies = of_c.iter().filter(|frame| frame.contains("Reply {"));
+        println!("{} frames, {} replies", of_c.len(), replies.count());
+    }
 }
 
 #[test]
