@@ -474,7 +474,7 @@ fn chance(seed: u64) -> Vec<(u64, Deed)> {
         code::SET_BOARD_ID,
         code::KEEP_ALIVE,
     ];
-    let mut all = vec![(1, Deed::Quiet(seed % 2 == 0))];
+    let mut all = vec![(1, Deed::Quiet(seed.is_multiple_of(2)))];
     for n in 0..CHANCE_REQUESTS {
         let bits = |salt: u64| spread(seed ^ spread(n << 8 | salt));
         let code = match bits(0) % 16 {

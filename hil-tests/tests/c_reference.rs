@@ -6,7 +6,7 @@ use std::process::Command as Process;
 use atmega16_sim::Mcu;
 use hil_tests::{image, seed};
 
-#[allow(dead_code)]
+#[allow(dead_code, unused_imports)]
 #[path = "../c-reference/session.rs"]
 mod session;
 
