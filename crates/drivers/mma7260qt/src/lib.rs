@@ -40,8 +40,9 @@
 
 mod scale;
 
-pub use scale::{Scale, acceleration};
+pub use scale::{Scale, acceleration, acceleration_each};
 
+use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::OutputPin;
 
 /// From power-on, or from the end of sleep, until the outputs are right, µs: the most of both (*unverified*).
@@ -236,6 +237,30 @@ impl<G1: OutputPin, G2: OutputPin, S: OutputPin> Mma7260qt<G1, G2, S> {
     /// Where the pin could not be set.
     pub fn wake(&mut self) -> Result<(), PinError<G1, G2, S>> {
         self.sleep.set_high().map_err(Error::Sleep)
+    }
+
+    /// [`set_range`](Self::set_range), then the time that it takes.
+    ///
+    /// # Errors
+    /// Where a pin could not be set.
+    pub fn set_range_and_wait(
+        &mut self,
+        range: Range,
+        delay: &mut impl DelayNs,
+    ) -> Result<(), PinError<G1, G2, S>> {
+        self.set_range(range)?;
+        delay.delay_us(RANGE_CHANGE_US);
+        Ok(())
+    }
+
+    /// [`wake`](Self::wake), then the time that it takes.
+    ///
+    /// # Errors
+    /// Where the pin could not be set.
+    pub fn wake_and_wait(&mut self, delay: &mut impl DelayNs) -> Result<(), PinError<G1, G2, S>> {
+        self.wake()?;
+        delay.delay_us(WAKE_US);
+        Ok(())
     }
 
     /// Gives the pins back: g-select1, g-select2, sleep.

@@ -79,6 +79,38 @@ impl Scale {
         })
     }
 
+    /// Whether a measured zero and scale are within what the data sheet allows a part at this range, for a ratiometric
+    /// converter of `adc_bits`: zero 10 % and sensitivity 7.5 % to either side (*unverified*). After a flip this tells a
+    /// part in order from a broken one, and from one at another range.
+    #[must_use]
+    pub const fn is_within_limits(&self, range: Range, adc_bits: u8) -> bool {
+        let typical = Scale::ratiometric(range, adc_bits);
+        let off = self.zero_q4.abs_diff(typical.zero_q4);
+        let (measured, nominal) = (
+            self.micro_g_per_count_q4.unsigned_abs(),
+            typical.micro_g_per_count_q4.unsigned_abs(),
+        );
+        // Sensitivity is the inverse of the scale: nominal / measured is in 0.925 ..= 1.075.
+        let thousand = nominal.saturating_mul(1_000);
+        off.saturating_mul(10) <= typical.zero_q4.unsigned_abs()
+            && thousand >= measured.saturating_mul(925)
+            && thousand <= measured.saturating_mul(1_075)
+    }
+
+    /// The range at which a measured scale is within limits: settles on hardware which g-select input is which. `None`
+    /// where it fits none.
+    #[must_use]
+    pub const fn range(&self, adc_bits: u8) -> Option<Range> {
+        let mut code = 0;
+        while let Some(range) = Range::from_code(code) {
+            if self.is_within_limits(range, adc_bits) {
+                return Some(range);
+            }
+            code += 1;
+        }
+        None
+    }
+
     /// The reading at 0 g, sixteenths of a count.
     #[must_use]
     pub const fn zero_q4(&self) -> i32 {
@@ -109,6 +141,19 @@ impl Scale {
 pub fn acceleration<C: ReadCounts>(converter: &mut C, scale: &Scale) -> Result<[i32; 3], C::Error> {
     let mut one = |axis| Ok(scale.micro_g(converter.read_counts(axis)?));
     Ok([one(Axis::X)?, one(Axis::Y)?, one(Axis::Z)?])
+}
+
+/// The three accelerations in µg, each axis with a scale of its own, as flips find them.
+///
+/// # Errors
+/// Those of the converter.
+pub fn acceleration_each<C: ReadCounts>(
+    converter: &mut C,
+    scales: &[Scale; 3],
+) -> Result<[i32; 3], C::Error> {
+    let mut one = |axis, scale: &Scale| Ok(scale.micro_g(converter.read_counts(axis)?));
+    let [x, y, z] = scales;
+    Ok([one(Axis::X, x)?, one(Axis::Y, y)?, one(Axis::Z, z)?])
 }
 
 #[cfg(test)]
@@ -184,6 +229,57 @@ mod tests {
             Scale::from_flip(500 * 16, 532 * 16),
             None,
             "an axis that reads less when it points up"
+        );
+    }
+
+    #[test]
+    fn a_flip_tells_the_range_and_a_part_that_is_out_of_limits() {
+        for (range, _) in RANGES {
+            let flip = |zero_error: f64, sensitivity_error: f64| {
+                let half = counts(range, 3.3, 3.3, 10, 0.0);
+                let per_g = counts(range, 3.3, 3.3, 10, 1.0) - half;
+                let (zero, per_g) = (half * (1.0 + zero_error), per_g * (1.0 + sensitivity_error));
+                Scale::from_flip(
+                    ((zero + per_g) * 16.0) as u32,
+                    ((zero - per_g) * 16.0) as u32,
+                )
+                .unwrap()
+            };
+            for (zero, sensitivity) in [(0.0, 0.0), (0.095, 0.07), (-0.095, -0.07)] {
+                let scale = flip(zero, sensitivity);
+                assert!(
+                    scale.is_within_limits(range, 10),
+                    "{range:?} {zero} {sensitivity}"
+                );
+                assert_eq!(scale.range(10), Some(range));
+            }
+            for (zero, sensitivity) in [(0.105, 0.0), (-0.105, 0.0), (0.0, 0.08), (0.0, -0.08)] {
+                let scale = flip(zero, sensitivity);
+                assert!(
+                    !scale.is_within_limits(range, 10),
+                    "{range:?} {zero} {sensitivity}"
+                );
+                assert_eq!(scale.range(10), None);
+            }
+        }
+    }
+
+    #[test]
+    fn each_axis_has_its_own_scale() {
+        let scales = [Range::G1_5, Range::G2, Range::G6].map(|range| Scale::ratiometric(range, 10));
+        let mut adc = |axis| Ok::<u16, ()>(if axis == Axis::Y { 512 - 62 } else { 512 + 62 });
+        let [x, y, z] = acceleration_each(&mut adc, &scales).unwrap();
+        assert!((x - 249_756).abs() < 10 && (y + 333_008).abs() < 10 && (z - 999_023).abs() < 10);
+        let mut broken = |axis| {
+            if axis == Axis::Z {
+                Err("no conversion")
+            } else {
+                Ok(512)
+            }
+        };
+        assert_eq!(
+            acceleration_each(&mut broken, &scales),
+            Err("no conversion")
         );
     }
 

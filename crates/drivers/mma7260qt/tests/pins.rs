@@ -1,5 +1,6 @@
 //! What the three inputs see, in order. The truth table is written out again here.
 
+use embedded_hal_mock::eh1::delay::{CheckedDelay, Transaction as Pause};
 use embedded_hal_mock::eh1::digital::{Mock as Pin, State, Transaction};
 use mma7260qt::{Axis, Error, Mma7260qt, Range, ReadCounts, Scale, acceleration};
 
@@ -43,6 +44,23 @@ fn the_part_sleeps_low_and_wakes_high() {
     part.set_range(Range::G6).unwrap();
     part.wake().unwrap();
     let (mut g_select1, mut g_select2, mut sleep) = part.release();
+    g_select1.done();
+    g_select2.done();
+    sleep.done();
+}
+
+#[test]
+fn waiting_takes_the_time_of_the_data_sheet_after_the_pins() {
+    use State::{High, Low};
+    let mut delay = CheckedDelay::new(&[Pause::delay_us(5_400), Pause::delay_us(2_000)]);
+    let (g_select1, g_select2) = (pin(&[Low, Low]), pin(&[Low, High]));
+    let mut part =
+        Mma7260qt::new(g_select1, g_select2, pin(&[High, Low, High]), Range::G1_5).unwrap();
+    part.set_range_and_wait(Range::G4, &mut delay).unwrap();
+    part.sleep().unwrap();
+    part.wake_and_wait(&mut delay).unwrap();
+    let (mut g_select1, mut g_select2, mut sleep) = part.release();
+    delay.done();
     g_select1.done();
     g_select2.done();
     sleep.done();
