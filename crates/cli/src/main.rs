@@ -108,32 +108,41 @@ mod tests {
     use super::*;
     use clap::CommandFactory as _;
 
+    /// A line as a shell takes it: what is in quotes is one word.
+    fn words(line: &str) -> Vec<&str> {
+        let parts = line.split('\'').enumerate();
+        parts
+            .flat_map(|(k, part)| match k % 2 {
+                0 => part.split_whitespace().collect(),
+                _ => vec![part],
+            })
+            .collect()
+    }
+
+    /// The examples of a command; each has to be understood and to be about it.
+    fn check(command: &clap::Command) {
+        let help = command.get_after_help().map(ToString::to_string);
+        let help = help.unwrap_or_default();
+        let examples: Vec<&str> = help
+            .lines()
+            .map(str::trim)
+            .filter(|line| line.starts_with("imu-stand "))
+            .collect();
+        assert!(!examples.is_empty(), "{} has none", command.get_name());
+        for example in examples {
+            let words = words(example);
+            assert!(words.contains(&command.get_name()), "{example}");
+            if let Err(error) = Program::try_parse_from(words) {
+                panic!("{example}: {error}");
+            }
+        }
+    }
+
     #[test]
     fn every_command_has_an_example_and_every_example_is_understood() {
         for command in Program::command().get_subcommands() {
-            let help = command.get_after_help().map(ToString::to_string);
-            let help = help.unwrap_or_default();
-            let examples: Vec<&str> = help
-                .lines()
-                .map(str::trim)
-                .filter(|line| line.starts_with("imu-stand "))
-                .collect();
-            assert!(!examples.is_empty(), "{} has none", command.get_name());
-            for example in examples {
-                // As a shell takes it: what is in quotes is one word.
-                let words: Vec<&str> = example
-                    .split('\'')
-                    .enumerate()
-                    .flat_map(|(k, part)| match k % 2 {
-                        0 => part.split_whitespace().collect(),
-                        _ => vec![part],
-                    })
-                    .collect();
-                assert_eq!(words.get(1), Some(&command.get_name()), "{example}");
-                if let Err(error) = Program::try_parse_from(words) {
-                    panic!("{example}: {error}");
-                }
-            }
+            check(command);
+            command.get_subcommands().for_each(check);
         }
     }
 

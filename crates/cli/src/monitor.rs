@@ -348,28 +348,24 @@ impl View {
         };
         let _ = writeln!(out, "  {flags}\n");
         let _ = writeln!(out, "Allan deviation, deg/h (68 % interval)");
-        let longest = s.allan.iter().map(Vec::len).max().unwrap_or(0);
-        if longest == 0 {
+        let mut taus: Vec<f64> = s.allan.iter().flatten().map(|p| p.tau_s).collect();
+        taus.sort_by(f64::total_cmp);
+        taus.dedup();
+        if taus.is_empty() {
             let _ = writeln!(out, "  not enough samples yet");
         }
-        for row in 0..longest {
-            let tau = s
-                .allan
-                .iter()
-                .find_map(|points| points.get(row))
-                .map(|p| p.tau_s);
-            let _ = write!(out, "  {} s", number(tau, 9, 2));
+        for tau in taus {
+            let _ = write!(out, "  {tau:>9.2} s");
             for points in &s.allan {
-                let _ = match points.get(row) {
-                    Some(p) => write!(
-                        out,
-                        "  {:>8.1} ({:.1}..{:.1})",
-                        p.deviation * 3600.0,
-                        p.low * 3600.0,
-                        p.high * 3600.0
-                    ),
-                    None => write!(out, "{:>24}", "-"),
-                };
+                let point = points.iter().find(|p| p.tau_s == tau);
+                let cell = point.map_or_else(
+                    || "-".to_owned(),
+                    |p| {
+                        let [low, value, high] = [p.low, p.deviation, p.high].map(|v| v * 3600.0);
+                        format!("{value:.1} ({low:.1} .. {high:.1})")
+                    },
+                );
+                let _ = write!(out, "{cell:>31}");
             }
             let _ = writeln!(out);
         }

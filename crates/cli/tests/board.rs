@@ -378,3 +378,17 @@ fn sensors_test_themselves_and_a_profile_is_driven() {
     assert!((-90..=-60).contains(&of("smallest_pwm_seen")), "{answer}");
     assert_eq!(answer["stopped"], true);
 }
+
+#[test]
+fn a_slow_board_is_waited_for() {
+    let board = Board::start();
+    assert_success(&board.ask(&["set", "rate", "1"]));
+    assert_eq!(assert_success(&board.ask(&["get", "rate"])).trim(), "1");
+    // Work on the gyros is done beside a sample, once a second.
+    let said = assert_success(&board.ask(&["register", "read", "y", "SENS_AVG"]));
+    assert!(said.contains("0x0402"), "{said}");
+    let said = assert_success(&board.ask(&["self-test", "gyro-z"]));
+    assert!(said.contains("gyro z passed"), "{said}");
+    let said = assert_success(&board.ask(&["bias-null", "--samples", "3"]));
+    assert!(!said.contains("reply was lost"), "{said}");
+}

@@ -141,7 +141,7 @@ fn remedy(code: u8, status: Status) -> &'static str {
             "`imu-stand board info` shows the firmware's version; `imu-stand flash` writes a newer one"
         }
         Status::BadArgument if code == wire::code::SET_RATE => {
-            "the board samples at 4 Hz to 256 Hz; see docs/wire-format.md"
+            "the board samples at 1 Hz to 256 Hz; see docs/wire-format.md"
         }
         Status::BadArgument
             if is(Command::SetGyro {
@@ -188,6 +188,6 @@ mod tests {
             "the board refuses `set rate`: an argument is out of range"
         );
         let help = miette::Diagnostic::help(&error).unwrap().to_string();
-        assert!(help.contains("4 Hz to 256 Hz"), "{help}");
+        assert!(help.contains("1 Hz to 256 Hz"), "{help}");
     }
 }

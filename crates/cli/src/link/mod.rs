@@ -23,12 +23,16 @@ pub const DEFAULT_BAUD: u32 = 38_400;
 const CLOCK_HZ: f64 = 16e6;
 /// How long a read waits for the first byte.
 const READ_WAIT: Duration = Duration::from_millis(20);
-/// How long a reply may take: 60 ms of queue at 38400 baud, and the slot after the next sample, 250 ms at 4 Hz.
+/// How long a reply may take: 60 ms of queue at 38400 baud, behind a health and a hello frame.
 const REPLY_WAIT: Duration = Duration::from_millis(700);
+/// How long work on the gyros may take, which is done beside a sample and told with the next: two of them at 1 Hz.
+const GYRO_WAIT: Duration = Duration::from_millis(2_700);
+/// A self-test is four such works, and 40 ms.
+const SELF_TEST_WAIT: Duration = Duration::from_secs(11);
 /// How often a command that may be repeated is sent.
 const TRIES: u32 = 3;
-/// How long a board may say that it is busy.
-const BUSY_FOR: Duration = Duration::from_secs(3);
+/// How long a board may say that it is busy: with a self-test, at the most.
+const BUSY_FOR: Duration = Duration::from_secs(12);
 
 /// How long a reply is waited for, and how often the request may be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,13 +62,20 @@ impl Patience {
             Command::Reboot | Command::ClearCounters | Command::SetBaud { .. } => once(REPLY_WAIT),
             // 42 bytes of 8.5 ms; where a byte takes twice that, still.
             Command::StoreConfig => once(Duration::from_secs(2)),
-            Command::SelfTest { .. } | Command::BiasNull { .. } => once(Duration::from_secs(3)),
+            Command::SelfTest { .. } => once(SELF_TEST_WAIT),
+            Command::BiasNull { .. } => once(Duration::from_secs(3)),
             Command::MotorProfile { .. } => once(REPLY_WAIT),
             Command::WriteRegister { address, .. }
                 if *address & !1 == adis16250::Register::Command.address() =>
             {
-                once(REPLY_WAIT)
+                once(GYRO_WAIT)
             }
+            Command::ReadRegister { .. }
+            | Command::WriteRegister { .. }
+            | Command::SetGyro { .. } => Patience {
+                wait: GYRO_WAIT,
+                tries: TRIES,
+            },
             _ => Patience {
                 wait: REPLY_WAIT,
                 tries: TRIES,
@@ -92,18 +103,28 @@ impl std::fmt::Display for Heard {
         let (counts, lost) = (&self.counts, &self.losses);
         write!(
             f,
-            "{} bytes, {} frames in order, {} rejected ({} stuffing, {} CRC, {} length, {} unknown); samples lost: {} by \
-             the board, {} by the line, {} unattributed",
+            "{} bytes, {} frames in order, {} rejected",
             self.bytes,
             counts.frames,
-            counts.rejected(),
-            counts.bad_cobs,
-            counts.bad_crc,
-            counts.bad_length,
-            counts.unknown_version + counts.unknown_kind + counts.unknown_value,
-            lost.device,
-            lost.line,
-            lost.unattributed
+            counts.rejected()
+        )?;
+        if counts.rejected() > 0 {
+            write!(
+                f,
+                " ({} stuffing, {} CRC, {} length, {} unknown)",
+                counts.bad_cobs,
+                counts.bad_crc,
+                counts.bad_length,
+                counts.unknown_version + counts.unknown_kind + counts.unknown_value
+            )?;
+        }
+        if lost.device + lost.line + lost.unattributed == 0 {
+            return f.write_str("; no sample lost");
+        }
+        write!(
+            f,
+            "; samples lost: {} by the board, {} by the line, {} unattributed",
+            lost.device, lost.line, lost.unattributed
         )
     }
 }

@@ -36,32 +36,59 @@ pub struct Arguments {
 #[derive(Subcommand)]
 enum Action {
     /// Who the board is, why it started last, how it is set
+    #[command(
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 info\n  imu-stand board --port /dev/ttyUSB0 info --json board.json"
+    )]
     Info,
     /// What went wrong on the board, by name: the counters of docs/wire-format.md
+    #[command(after_help = "Example:\n  imu-stand board --port /dev/ttyUSB0 health --all")]
     Health(show::HealthArguments),
     /// One value of the set-up, for scripts
+    #[command(after_help = "Example:\n  imu-stand board --port /dev/ttyUSB0 get rate")]
     Get(show::GetArguments),
     /// Change the set-up; it holds until the next reset, or for good after `store`
+    #[command(
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 set rate 50\n  imu-stand board --port /dev/ttyUSB0 set gyro --range 160 --filter 3\n  imu-stand board --port /dev/ttyUSB0 set acc-range 2\n  imu-stand board --port /dev/ttyUSB0 set bias y -0.25\n  imu-stand board --port /dev/ttyUSB0 set baud 250000\n  imu-stand board --port /dev/ttyUSB0 set motor-limits --max-duty 200 --ramp 400"
+    )]
     #[command(subcommand)]
     Set(set::Set),
     /// Measure the gyros' bias at rest; the board subtracts it from then on
+    #[command(
+        after_help = "Example:\n  imu-stand board --port /dev/ttyUSB0 bias-null --samples 1200 --store"
+    )]
     BiasNull(null::Arguments),
     /// Write bias and scale of a diagnosis (JSON) or of a model file (TOML) to the board
+    #[command(
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 calibrate diagnosis.json --dry-run\n  imu-stand board --port /dev/ttyUSB0 calibrate model.toml --store"
+    )]
     Calibrate(calibrate::Arguments),
     /// Turn the motor for as long as this program runs; Ctrl-C stops it
+    #[command(
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 motor --duty 100 --seconds 10\n  imu-stand board --port /dev/ttyUSB0 motor --shape sine --amplitude 120 --period-ms 5000"
+    )]
     Motor(motor::Arguments),
     /// Read and write registers of the gyros
+    #[command(
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 register list\n  imu-stand board --port /dev/ttyUSB0 register read x all\n  imu-stand board --port /dev/ttyUSB0 register write z ALM_MAG1 0x8123"
+    )]
     #[command(subcommand)]
     Register(register::Register),
     /// Let a sensor test itself
+    #[command(
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 self-test\n  imu-stand board --port /dev/ttyUSB0 self-test gyro-y"
+    )]
     SelfTest(register::SelfTestArguments),
     /// Keep the set-up over resets (EEPROM)
+    #[command(after_help = "Example:\n  imu-stand board --port /dev/ttyUSB0 store")]
     Store,
     /// Take the stored set-up again
+    #[command(after_help = "Example:\n  imu-stand board --port /dev/ttyUSB0 load")]
     Load,
     /// Take the built-in set-up; what is stored stays
+    #[command(after_help = "Example:\n  imu-stand board --port /dev/ttyUSB0 defaults")]
     Defaults,
     /// Reset the board and wait until it is back
+    #[command(after_help = "Example:\n  imu-stand board --port /dev/ttyUSB0 reboot")]
     Reboot,
 }
 

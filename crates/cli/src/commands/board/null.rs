@@ -29,8 +29,8 @@ const WITHOUT: u32 = 10;
 const SILENCE: Duration = Duration::from_secs(3);
 /// Time without a sample in order after which a measurement is given up: the board would wait for ever.
 const STUCK: Duration = Duration::from_secs(5);
-/// How long the sample behind a reply may take.
-const LAST_WITHIN: Duration = Duration::from_millis(500);
+/// How long the sample behind a reply may take, at 1 Hz.
+const LAST_WITHIN: Duration = Duration::from_millis(1_500);
 /// Requests sent at the most; a further one only where the board does not measure.
 const TRIES: u32 = 3;
 

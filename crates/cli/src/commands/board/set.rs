@@ -32,7 +32,7 @@ impl From<AxisName> for Axis {
 /// What can be set.
 #[derive(Subcommand)]
 pub enum Set {
-    /// Samples a second, 4 to 256
+    /// Samples a second, 1 to 256
     Rate {
         /// Hz; the board rounds to whole ticks
         hz: f64,
