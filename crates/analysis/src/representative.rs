@@ -5,6 +5,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::allan::{Deviation, Phase, deviation};
 use crate::analyze::NoiseParameters;
@@ -69,8 +70,10 @@ pub struct Odd {
     pub channel: String,
     /// In what.
     pub figure: String,
-    /// Its distance.
+    /// Its distance from the others, in spreads.
     pub z: f64,
+    /// Distance beyond which it stands out.
+    pub limit: f64,
 }
 
 /// The answer.
@@ -80,8 +83,10 @@ pub struct Representative {
     pub run: usize,
     /// Runs that stand out, after correction for the number of looks.
     pub odd: Vec<Odd>,
-    /// |z| beyond which a run stands out.
+    /// |z| beyond which a run stands out of the median of all.
     pub limit: f64,
+    /// Distance from the mean of the others, in their spread, beyond which it stands out as well.
+    pub limit_alone: f64,
     /// All figures.
     pub figures: Vec<RunFigure>,
     /// Noise parameters of the runs together, by channel; empty where the sample rates differ.
@@ -90,9 +95,10 @@ pub struct Representative {
 
 /// Compare runs of the same stand by the gyros (without any, by all channels) that all of them have.
 ///
-/// Distances are from the median, over the robust run-to-run spread or the figure's own error, whichever is larger. The
-/// limit is simulated: equal Gaussian runs of the same number exceed it anywhere with a chance of at most 5 %, the
-/// number of figures counted (Bonferroni).
+/// A run stands out by its distance from the median of all, over their robust spread, which several odd runs do not hide;
+/// or by its distance from the mean of the others, over their spread, which sees a single odd run among few (Student's t).
+/// A spread is never taken as less than the figure's own error. Each way may accuse runs that are alike in 2.5 % of the cases,
+/// runs and figures counted (the first limit is simulated, the second exact, both with Bonferroni's correction).
 ///
 /// # Errors
 /// [`AnalysisError::Inconclusive`] below 4 runs or with runs too short to fit, [`AnalysisError::NoRate`] and
@@ -138,15 +144,22 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
     }
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let limit = limit(records.len(), figures.len(), &mut rng);
+    let limit_alone = limit_alone(records.len(), figures.len());
     let mut odd = Vec::new();
     for figure in &figures {
         for (run, z) in figure.z.iter().enumerate() {
-            if z.abs() > limit {
+            let alone = from_the_others(figure, run);
+            let found = [(*z, limit), (alone, limit_alone)]
+                .into_iter()
+                .filter(|(z, limit)| z.abs() > *limit)
+                .max_by(|a, b| (a.0.abs() / a.1).total_cmp(&(b.0.abs() / b.1)));
+            if let Some((z, limit)) = found {
                 odd.push(Odd {
                     run,
                     channel: figure.channel.clone(),
                     figure: figure.figure.clone(),
-                    z: *z,
+                    z,
+                    limit,
                 });
             }
         }
@@ -167,6 +180,7 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
         run,
         odd,
         limit,
+        limit_alone,
         figures,
         together,
     })
@@ -363,6 +377,36 @@ fn scatter(x: &[f64]) -> f64 {
     1.4826 * median(&x.iter().map(|v| (v - centre).abs()).collect::<Vec<_>>())
 }
 
+/// A figure on the scale on which runs are compared, with its error: sizes as logarithms.
+fn compared(figure: &RunFigure, run: usize) -> (f64, f64) {
+    let (value, error) = (figure.values[run], figure.std_errors[run]);
+    if figure.figure == "bias" {
+        (value, error)
+    } else {
+        (value.ln(), error / value)
+    }
+}
+
+/// Distance of a run from the mean of the others, in the spread that one more of them would have.
+fn from_the_others(figure: &RunFigure, run: usize) -> f64 {
+    let others: Vec<f64> = (0..figure.values.len())
+        .filter(|other| *other != run)
+        .map(|other| compared(figure, other).0)
+        .collect();
+    let n = others.len() as f64;
+    let mean = others.iter().sum::<f64>() / n;
+    let variance = others.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let (x, error) = compared(figure, run);
+    let spread = (variance * (1.0 + 1.0 / n)).sqrt().max(error);
+    (x - mean) / spread.max(f64::MIN_POSITIVE)
+}
+
+/// Student's t with n − 2 degrees of freedom, two-sided, for all runs and figures.
+fn limit_alone(runs: usize, figures: usize) -> f64 {
+    let tail = FALSE_ALARM / 2.0 / (2 * runs * figures) as f64;
+    StudentsT::new(0.0, 1.0, runs as f64 - 2.0).map_or(f64::INFINITY, |t| t.inverse_cdf(1.0 - tail))
+}
+
 fn limit(runs: usize, figures: usize, rng: &mut impl Rng) -> f64 {
     let mut largest: Vec<f64> = (0..DRAWS)
         .map(|_| {
@@ -374,7 +418,7 @@ fn limit(runs: usize, figures: usize, rng: &mut impl Rng) -> f64 {
         })
         .collect();
     largest.sort_by(f64::total_cmp);
-    let tail = FALSE_ALARM / figures as f64;
+    let tail = FALSE_ALARM / 2.0 / figures as f64;
     largest[(((1.0 - tail) * DRAWS as f64) as usize).min(DRAWS - 1)]
 }
 
@@ -463,5 +507,26 @@ mod tests {
             "{bias:?}"
         );
         assert!(representative(&runs[..3], 1).is_err());
+    }
+
+    #[test]
+    fn one_noisier_run_of_six_is_seen() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(13);
+        let runs: Vec<Record> = (0..6)
+            .map(|i| {
+                let b = bias(&mut rng);
+                run(if i == 2 { 0.55 } else { 0.39 }, b, &mut rng)
+            })
+            .collect();
+        let answer = representative(&runs, 1).unwrap();
+        assert!(
+            answer
+                .odd
+                .iter()
+                .any(|o| o.run == 2 && o.figure == "angle_random_walk")
+                && answer.odd.iter().all(|o| o.run == 2),
+            "{:?}",
+            answer.odd
+        );
     }
 }

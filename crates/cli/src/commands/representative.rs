@@ -59,15 +59,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn print(files: &[String], found: &Representative) {
     say!("representative  {}", files[found.run]);
     if found.odd.is_empty() {
-        say!("no run stands out (limit |z| = {:.1})", found.limit);
+        say!(
+            "no run stands out (limits: {:.1} spreads from the median, {:.1} from the others' mean)",
+            found.limit,
+            found.limit_alone
+        );
     }
     for odd in &found.odd {
         let what = format!(
-            "{} of {} is {:.1} spreads from the others' median (limit {:.1})",
+            "{} of {} is {:.1} spreads from the others (limit {:.1})",
             odd.figure.replace('_', " "),
             odd.channel,
             odd.z,
-            found.limit
+            odd.limit
         );
         say!(
             "{}",
