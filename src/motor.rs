@@ -184,6 +184,9 @@ impl Motor {
             self.cut();
             return true;
         }
+        if !self.is_on() {
+            return false;
+        }
         if self.shape != shape::STOP {
             self.step_profile();
         }

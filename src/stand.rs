@@ -390,8 +390,12 @@ impl Stand {
             self.record(Fault::MotorTimeout, 0);
         }
         board.set_motor(self.motor.output());
-        self.step_store(board);
-        self.step_self_test(board);
+        if !self.store.is_idle() {
+            self.step_store(board);
+        }
+        if self.self_test.waits() {
+            self.step_self_test(board);
+        }
         self.millisecond = self.millisecond.wrapping_add(1);
         if self.millisecond >= HEALTH_MS {
             self.millisecond = 0;

@@ -45,6 +45,6 @@ int main(void)
         while (tick_take_millisecond())
             stand_on_millisecond();
         serial_work();
-        tick_sleep_unless_work();
+        tick_sleep_until_work();
     }
 }

@@ -20,6 +20,7 @@ static struct raw raws[2];
 static volatile uint8_t filling;
 static volatile bool ready;
 static volatile uint8_t missed_ticks, milliseconds;
+static uint8_t counted; /* of the milliseconds, by the main loop; both wrap */
 static volatile bool ticked;
 static uint32_t t_ticks;
 static uint16_t period, next_period;
@@ -82,15 +83,10 @@ const struct raw *tick_take(uint8_t *missed)
 
 bool tick_take_millisecond(void)
 {
-    bool any = false;
-    ATOMIC_BLOCK(ATOMIC_FORCEON)
-    {
-        if (milliseconds) {
-            milliseconds--;
-            any = true;
-        }
-    }
-    return any;
+    if (milliseconds == counted)
+        return false;
+    counted++;
+    return true;
 }
 
 uint16_t tick_since(void)
@@ -134,13 +130,17 @@ static inline void sleep_now(void)
     MCUCR = 0;
 }
 
-void tick_sleep_unless_work(void)
+/* A transmitted byte wakes the processor, and is no work. */
+void tick_sleep_until_work(void)
 {
-    cli();
-    if (ready || milliseconds || serial_has_received())
-        sei();
-    else
+    for (;;) {
+        cli();
+        if (ready || milliseconds != counted || serial_has_received()) {
+            sei();
+            return;
+        }
         sleep_now();
+    }
 }
 
 static void unmask(void)
@@ -151,8 +151,7 @@ static void unmask(void)
 
 ISR(TIMER0_COMP_vect)
 {
-    if (milliseconds != UINT8_MAX)
-        milliseconds++;
+    milliseconds++;
 }
 
 ISR(TIMER1_COMPA_vect)

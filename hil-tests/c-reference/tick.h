@@ -24,4 +24,4 @@ bool tick_post(uint8_t what, uint8_t axis, uint8_t address, uint16_t value);
 /* The work that is done, or NULL; fetched once. */
 const struct gyro_job *tick_fetch_done(void);
 /* Sleeps until the next interrupt, unless something waits already. */
-void tick_sleep_unless_work(void);
+void tick_sleep_until_work(void);

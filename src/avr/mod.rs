@@ -75,6 +75,6 @@ fn main() -> ! {
             stand.on_millisecond(&mut board);
         }
         board.work();
-        tick::sleep_unless_work();
+        tick::sleep_until_work();
     }
 }

@@ -100,7 +100,7 @@ impl<const N: usize> Ring<N> {
     }
 
     /// Adds a byte; false when it is full. The writer's.
-    #[inline(never)]
+    #[inline(always)]
     pub fn push(&self, byte: u8) -> bool {
         if self.room() == 0 {
             return false;
@@ -114,8 +114,8 @@ impl<const N: usize> Ring<N> {
         true
     }
 
-    /// Takes a byte. The reader's.
-    #[inline(never)]
+    /// Takes a byte. The reader's. In line: a call would have the interrupt save every register that a call may change.
+    #[inline(always)]
     pub fn pop(&self) -> Option<u8> {
         if self.is_empty() {
             return None;

@@ -49,7 +49,6 @@ struct Shared {
     next_every: u8,
     masked_ucsrb: u8,
     missed: u8,
-    milliseconds: u8,
     ready: bool,
     ticked: bool,
 }
@@ -75,10 +74,13 @@ static mut SHARED: Shared = Shared {
     next_every: 0,
     masked_ucsrb: 0,
     missed: 0,
-    milliseconds: 0,
     ready: false,
     ticked: false,
 };
+
+/// Milliseconds that have passed, and those that the main loop has taken; both wrap.
+static mut MILLISECONDS: u8 = 0;
+static mut TAKEN: u8 = 0;
 
 fn shared() -> *mut Shared {
     addr_of_mut!(SHARED)
@@ -181,24 +183,32 @@ fn place(which: u8) -> *mut Tick {
 
 /// Whether a millisecond has passed that nobody has taken yet.
 pub fn take_millisecond() -> bool {
-    interrupt::free(|_| {
-        // SAFETY: interrupts are off.
-        let passed = unsafe { &mut (*shared()).milliseconds };
-        let any = *passed > 0;
-        *passed = passed.saturating_sub(1);
-        any
-    })
+    // SAFETY: a byte that the interrupt counts, and one that is touched here alone.
+    unsafe {
+        let waits = milliseconds_wait();
+        if waits {
+            TAKEN = TAKEN.wrapping_add(1);
+        }
+        waits
+    }
 }
 
-/// Sleeps until the next interrupt, unless something waits already.
-pub fn sleep_unless_work() {
-    interrupt::disable();
-    // SAFETY: interrupts are off.
-    let waits = unsafe { (*shared()).ready || (*shared()).milliseconds > 0 };
-    if waits || serial::has_received() {
-        // SAFETY: they were on.
-        unsafe { interrupt::enable() };
-    } else {
+fn milliseconds_wait() -> bool {
+    // SAFETY: as above.
+    unsafe { core::ptr::read_volatile(&raw const MILLISECONDS) != TAKEN }
+}
+
+/// Sleeps until there is work: a transmitted byte wakes the processor, and is none.
+pub fn sleep_until_work() {
+    loop {
+        interrupt::disable();
+        // SAFETY: interrupts are off.
+        let sampled = unsafe { core::ptr::read_volatile(&raw const (*shared()).ready) };
+        if sampled || milliseconds_wait() || serial::has_received() {
+            // SAFETY: they were on.
+            unsafe { interrupt::enable() };
+            return;
+        }
         sleep_now();
     }
 }
@@ -224,9 +234,9 @@ pub fn unmask() {
 
 #[avr_device::interrupt(atmega16)]
 fn TIMER0_COMP() {
-    // SAFETY: the main loop takes it with interrupts off.
-    let passed = unsafe { &mut (*shared()).milliseconds };
-    *passed = passed.saturating_add(1);
+    // SAFETY: counted here, compared by the main loop: a byte is read at once. Should the main loop be late by 256 ms, it
+    // loses them; by a second, the watchdog has it.
+    unsafe { MILLISECONDS = MILLISECONDS.wrapping_add(1) };
 }
 
 #[avr_device::interrupt(atmega16)]

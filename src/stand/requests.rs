@@ -44,6 +44,11 @@ impl SelfTest {
             axis: 0,
         }
     }
+
+    /// Whether its next job is to be posted when its time has come.
+    pub(super) fn waits(&self) -> bool {
+        self.wait_ms > 0
+    }
 }
 
 impl Stand {
@@ -315,9 +320,6 @@ impl Stand {
     #[inline(never)]
     pub(super) fn step_self_test<B: Board>(&mut self, board: &mut B) {
         let test = &mut self.self_test;
-        if test.step == 0 || test.wait_ms == 0 {
-            return;
-        }
         test.wait_ms = test.wait_ms.wrapping_sub(1);
         if test.wait_ms > 0 {
             return;

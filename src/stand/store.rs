@@ -52,8 +52,10 @@ impl Stand {
         true
     }
 
+    /// A byte more of the copy that is under way, when the EEPROM is ready; after the last one, the reply.
+    #[inline(never)]
     pub(super) fn step_store<B: Board>(&mut self, board: &mut B) {
-        if self.store.asked.is_none() || !board.eeprom_is_ready() {
+        if !board.eeprom_is_ready() {
             return;
         }
         // The copy that is not the newest is overwritten.
