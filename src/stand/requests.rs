@@ -47,7 +47,7 @@ impl SelfTest {
 
     /// Whether its next job is to be posted when its time has come.
     pub(super) fn waits(&self) -> bool {
-        self.wait_ms > 0
+        self.step != 0 && self.wait_ms > 0
     }
 }
 
