@@ -154,9 +154,7 @@ impl View {
     fn set(&mut self, hello: &Hello) {
         let mut builder = RecordBuilder::new(Calibration::default());
         builder.hello(hello);
-        if hello.next_seq == 0 || self.hello.is_some_and(|h| h.restarts != hello.restarts) {
-            self.follow.restarted();
-        }
+        self.follow.hello(hello, self.hello.map(|h| h.restarts));
         if *builder.calibration() != self.calibration {
             // Other counts: what was summed does not go with them.
             self.calibration = builder.calibration().clone();

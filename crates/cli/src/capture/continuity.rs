@@ -2,7 +2,7 @@
 //!
 //! On the wire, sequence numbers have 16 bits and times 32, and both begin anew when the board does. Here they go on.
 
-use wire::Sample;
+use wire::{Hello, Sample};
 
 /// A reset whose hello frame was lost shows as a clock that disagrees with the PC's by more than this, s ...
 const CLOCKS_AGREE_S: f64 = 2.0;
@@ -44,8 +44,17 @@ pub struct Continuity {
     tick_s: f64,
     ticks_per_sample: u64,
     last: Option<Last>,
-    restarted: bool,
+    restarted: Restarted,
     fresh: bool,
+}
+
+/// What hello frames say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Restarted {
+    No,
+    /// The next number is 0: a start, or a wrap of the numbers.
+    Perhaps,
+    Yes,
 }
 
 impl Continuity {
@@ -56,7 +65,7 @@ impl Continuity {
             tick_s,
             ticks_per_sample: ticks_per_sample.max(1),
             last: None,
-            restarted: false,
+            restarted: Restarted::No,
             fresh: false,
         }
     }
@@ -77,9 +86,16 @@ impl Continuity {
         self
     }
 
-    /// The board says that it has started anew.
-    pub fn restarted(&mut self) {
-        self.restarted = self.last.is_some();
+    /// A hello frame: `before` is the count of restarts in the last one.
+    pub fn hello(&mut self, hello: &Hello, before: Option<u16>) {
+        if self.last.is_none() {
+            return;
+        }
+        if before.is_some_and(|before| before != hello.restarts) {
+            self.restarted = Restarted::Yes;
+        } else if hello.next_seq == 0 && self.restarted == Restarted::No {
+            self.restarted = Restarted::Perhaps;
+        }
     }
 
     /// The line was opened anew: the next sample's host time is its own, and no buffer's.
@@ -116,7 +132,13 @@ impl Continuity {
         let disagree = (ticks as f64 - elapsed).abs() * self.tick_s
             > CLOCKS_AGREE_S.max(CLOCKS_AGREE * elapsed * self.tick_s);
         let backwards = turns == 0.0 && forward > u32::MAX / 2;
-        let is_restart = self.restarted || backwards || (self.fresh && disagree);
+        let told = match self.restarted {
+            Restarted::No => false,
+            // Numbers wrap while time goes on.
+            Restarted::Perhaps => raw.1 <= last.sample.1,
+            Restarted::Yes => true,
+        };
+        let is_restart = told || backwards || (self.fresh && disagree);
         let (place, restart) = if is_restart {
             let instants = (elapsed / self.ticks_per_sample as f64).round().max(1.0) as u64;
             let place = (
@@ -146,7 +168,7 @@ impl Continuity {
             place,
             host_s,
         });
-        (self.restarted, self.fresh) = (false, false);
+        (self.restarted, self.fresh) = (Restarted::No, false);
         (
             Place {
                 seq: place.0,
@@ -206,13 +228,30 @@ mod tests {
     fn a_restart_goes_on_by_this_computers_clock() {
         let mut follow = Continuity::new(4e-6, 12_500);
         follow.place(&sample(199, 2_500_000), 10.0);
-        follow.restarted();
+        follow.hello(&Hello::default(), Some(0));
         let (place, restart) = follow.place(&sample(0, 12_500), 10.76);
         assert_eq!(place, at(214, 2_500_000 + 15 * 12_500, 14));
         let restart = restart.expect("it was told");
         assert_eq!((restart.seq_offset, restart.t_offset), (214, 2_675_000));
         let (place, again) = follow.place(&sample(1, 25_000), 10.81);
         assert_eq!((place, again), (at(215, 2_700_000, 0), None));
+    }
+
+    #[test]
+    fn a_hello_where_the_numbers_wrap_is_no_restart_and_one_with_another_count_is() {
+        let mut follow = Continuity::new(4e-6, 12_500);
+        let at_wrap = 65_536 * 12_500;
+        follow.place(&sample(65_535, at_wrap - 12_500), 3_276.75);
+        let hello = Hello {
+            restarts: 3,
+            ..Hello::default()
+        };
+        follow.hello(&hello, Some(3));
+        let (place, restart) = follow.place(&sample(0, at_wrap), 3_276.8);
+        assert_eq!((place, restart), (at(65_536, u64::from(at_wrap), 0), None));
+        follow.hello(&hello, Some(2));
+        let later = follow.place(&sample(9_000, at_wrap + 9_000 * 12_500), 3_726.8);
+        assert!(later.1.is_some());
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use flate2::write::GzEncoder;
-use wire::Sample;
+use wire::{Hello, Sample};
 
 use super::write::{write_head, write_rows};
 use super::{Calibration, CaptureError, Continuity, Place, RecordBuilder, Restart};
@@ -159,9 +159,9 @@ impl Live {
         self.builder.calibration() == calibration
     }
 
-    /// The board says that it has started anew.
-    pub fn restarted(&mut self) {
-        self.follow.restarted();
+    /// A hello frame: `before` is the count of restarts in the last one.
+    pub fn hello(&mut self, hello: &Hello, before: Option<u16>) {
+        self.follow.hello(hello, before);
     }
 
     /// The line was opened anew.

@@ -290,10 +290,7 @@ impl<'a> Capture<'a> {
             ];
             return self.open(&calibration, &about);
         };
-        // Sent at a start with number 0, and with another count of restarts ever after.
-        if hello.next_seq == 0 || before.is_some_and(|before| before != hello.restarts) {
-            live.restarted();
-        }
+        live.hello(hello, before);
         if live.fits(&calibration) {
             return Ok(());
         }
@@ -459,11 +456,7 @@ fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
                 rows += 1;
             }
             Frame::Hello(hello) => {
-                let fresh = restarts.is_some_and(|before| before != hello.restarts);
-                if last.is_some() && (fresh || hello.next_seq == 0) {
-                    live.restarted();
-                }
-                restarts = Some(hello.restarts);
+                live.hello(hello, restarts.replace(hello.restarts));
                 builder.hello(hello);
                 if !live.fits(builder.calibration()) {
                     calibration = builder.calibration().clone();
