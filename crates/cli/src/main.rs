@@ -62,7 +62,7 @@ enum Command {
     Simulate(commands::simulate::Arguments),
     /// A capture from the board's serial port.
     #[command(
-        after_help = "Examples:\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv.gz --seconds 600\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv.gz --resume\n  imu-stand capture --replay run.raw --out again.csv"
+        after_help = "Examples:\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv.gz --seconds 600\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv.gz --resume\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv --shape sine --amplitude 120 --period-ms 8000\n  imu-stand capture --replay run.raw --out again.csv"
     )]
     Capture(commands::capture::Arguments),
     /// The data for other programs, or N, B, K in the units and conventions of filters and simulators.

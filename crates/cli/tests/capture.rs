@@ -332,3 +332,60 @@ fn a_monitor_shows_what_the_board_sends_and_writes_its_last_view() {
     let supply = view["supply_v"].as_f64().unwrap();
     assert!((4.5..5.5).contains(&supply), "{supply}");
 }
+
+#[test]
+fn the_motor_is_driven_while_the_capture_runs_and_stands_at_its_end() {
+    let board = Board::start();
+    let folder = folder("capture_motor");
+    let out = folder.join("run.csv");
+    let child = start(
+        &board,
+        &out,
+        &[
+            "--shape",
+            "triangle",
+            "--amplitude",
+            "90",
+            "--period-ms",
+            "1000",
+        ],
+    );
+    wait_for_rows(&out, 70);
+    end(child);
+    let driven = record(&out);
+    assert!(holes(&driven).is_empty());
+    assert_eq!(driven.header.base, Some(model::record::Base::Turntable));
+    let pwm = &driven.channel("pwm").unwrap().values;
+    let (low, high) = pwm.iter().fold((0.0, 0.0), |(low, high): (f64, f64), v| {
+        (low.min(*v), high.max(*v))
+    });
+    assert!(
+        (-90.0..=-60.0).contains(&low) && (60.0..=90.0).contains(&high),
+        "{low} {high}"
+    );
+    assert_eq!(pwm.last(), Some(&0.0), "{:?}", &pwm[pwm.len() - 20..]);
+    let health = folder.join("health.json");
+    let asked = board.ask(&["health", "--json", health.to_str().unwrap()]);
+    assert_eq!(asked.status.code(), Some(0));
+    assert_eq!(
+        json(&health)["counters"]["motor_timeout"],
+        0,
+        "never starved"
+    );
+
+    // A board that restarts has its motor off, and it stays so: nobody may be watching.
+    board.send_aside(wire::Command::Reboot);
+    wait(1.0);
+    let second = folder.join("second.csv");
+    let child = start(&board, &second, &["--duty", "80", "--base", "static"]);
+    wait_for_rows(&second, 20);
+    board.send_aside(wire::Command::Reboot);
+    wait_for_rows(&second, 60);
+    let said = end(child);
+    assert!(said.contains("the motor stays off"), "{said}");
+    let again = record(&second);
+    assert_eq!(again.header.base, Some(model::record::Base::Static));
+    let pwm = &again.channel("pwm").unwrap().values;
+    assert!(pwm.iter().any(|v| *v > 70.0), "{pwm:?}");
+    assert_eq!(pwm.last(), Some(&0.0));
+}

@@ -1,7 +1,7 @@
 //! `imu-stand board`: what the board is, how it is set, and setting it.
 
 mod calibrate;
-mod motor;
+pub mod motor;
 mod null;
 mod register;
 mod set;
@@ -93,7 +93,7 @@ enum Action {
 }
 
 /// What all actions share.
-struct Session {
+pub(crate) struct Session {
     link: Link,
     json: Option<PathBuf>,
     quiet: bool,

@@ -13,11 +13,11 @@ use wire::{Command, Frame, Shape};
 use super::Session;
 
 /// From keep-alive to keep-alive: three fit into the 200 ms that the board waits.
-const KEEP_ALIVE: Duration = Duration::from_millis(60);
+pub const KEEP_ALIVE: Duration = Duration::from_millis(60);
 /// The board answers each; without an answer for so long it has stopped the motor on its own.
 const DEAF: Duration = Duration::from_secs(1);
 /// How long a ramp down may take.
-const RAMP_DOWN: Duration = Duration::from_secs(10);
+pub const RAMP_DOWN: Duration = Duration::from_secs(10);
 
 /// Shape of a profile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -30,11 +30,11 @@ pub enum ShapeName {
     Sine,
 }
 
-/// What `motor` takes.
+/// How the motor is driven.
 #[derive(Args)]
-pub struct Arguments {
+pub struct Drive {
     /// Constant command, -255 to 255
-    #[arg(long, allow_negative_numbers = true, required_unless_present = "shape", conflicts_with = "shape",
+    #[arg(long, allow_negative_numbers = true, conflicts_with = "shape",
           value_parser = clap::value_parser!(i16).range(-255..=255))]
     duty: Option<i16>,
     /// Periodic command instead
@@ -53,6 +53,13 @@ pub struct Arguments {
     /// Periods; 0 for as long as this program runs
     #[arg(long, default_value_t = 0)]
     cycles: u8,
+}
+
+/// What `motor` takes.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    drive: Drive,
     /// How long, s; without it until Ctrl-C
     #[arg(long)]
     seconds: Option<f64>,
@@ -84,7 +91,12 @@ struct Turning {
 }
 
 pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
-    let command = command(arguments)?;
+    let Some(command) = arguments.drive.command() else {
+        miette::bail!(
+            help = "write `board motor --duty 100`, or `--shape sine --amplitude 120 --period-ms 5000`",
+            "neither duty nor shape"
+        );
+    };
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).into_diagnostic()?;
@@ -99,7 +111,7 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
                 .seconds
                 .is_some_and(|seconds| began.elapsed().as_secs_f64() >= seconds)
     };
-    let steady = arguments.duty.filter(|duty| *duty != 0).is_some();
+    let steady = arguments.drive.duty.filter(|duty| *duty != 0).is_some();
     let turned = turn(session, &mut turning, steady, end);
     // Whatever happened, the motor is told to stop; if the board does not hear it, it stops by itself.
     let stopped = halt(&mut session.link, &mut turning);
@@ -107,8 +119,8 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     stopped?;
     let answer = Answer {
         format: "imu-stand-motor/1",
-        duty_asked: arguments.duty,
-        duty_after_limits: arguments.duty.map(|_| reply.value),
+        duty_asked: arguments.drive.duty,
+        duty_after_limits: arguments.drive.duty.map(|_| reply.value),
         seconds: began.elapsed().as_secs_f64(),
         keep_alives_sent: turning.sent,
         keep_alives_answered: turning.answered,
@@ -130,30 +142,26 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-fn command(arguments: &Arguments) -> Result<Command> {
-    if let Some(duty) = arguments.duty {
-        return Ok(Command::MotorDuty { duty });
+impl Drive {
+    /// The command that starts it, if it is asked for.
+    pub fn command(&self) -> Option<Command> {
+        if let Some(duty) = self.duty {
+            return Some(Command::MotorDuty { duty });
+        }
+        // clap has seen to it that a shape has an amplitude and a period.
+        let (shape, amplitude, period_ms) = (self.shape?, self.amplitude?, self.period_ms?);
+        Some(Command::MotorProfile {
+            shape: match shape {
+                ShapeName::Steps => Shape::Steps,
+                ShapeName::Triangle => Shape::Triangle,
+                ShapeName::Sine => Shape::Sine,
+            },
+            amplitude,
+            offset: self.offset,
+            period_ms,
+            cycles: self.cycles,
+        })
     }
-    // clap has seen to it that a shape has an amplitude and a period.
-    let (Some(shape), Some(amplitude), Some(period_ms)) =
-        (arguments.shape, arguments.amplitude, arguments.period_ms)
-    else {
-        miette::bail!(
-            help = "write `board motor --duty 100`",
-            "neither duty nor shape"
-        );
-    };
-    Ok(Command::MotorProfile {
-        shape: match shape {
-            ShapeName::Steps => Shape::Steps,
-            ShapeName::Triangle => Shape::Triangle,
-            ShapeName::Sine => Shape::Sine,
-        },
-        amplitude,
-        offset: arguments.offset,
-        period_ms,
-        cycles: arguments.cycles,
-    })
 }
 
 /// Keeps the motor alive until `end`; shows each second what the board does.

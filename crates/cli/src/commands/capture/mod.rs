@@ -1,5 +1,7 @@
 //! `imu-stand capture`.
 
+mod replay;
+
 use std::fs::{File, OpenOptions};
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -7,16 +9,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use imu_stand::RecordBuilder;
 use imu_stand::capture::{Calibration, Live, Restart};
-use imu_stand::link::{Change, Feed, Link};
+use imu_stand::link::{self, Change, Feed, Link};
 use miette::{IntoDiagnostic, Result, WrapErr};
+use model::record::Base;
 use serde::Serialize;
-use wire::link::LinkStats;
-use wire::{Decoder, Frame, Hello, Sample};
+use wire::{Command, Frame, Hello, Reply, Sample};
 
 use super::Line;
+use super::board::motor::{Drive, KEEP_ALIVE, RAMP_DOWN};
 
 /// What `capture` takes.
 #[derive(Args)]
@@ -32,6 +35,11 @@ pub struct Arguments {
     /// Go on with the file where it ends; the time between is a gap in it
     #[arg(long)]
     resume: bool,
+    /// What the base under the stand does; turntable where the motor is driven, else static
+    #[arg(long, value_enum)]
+    base: Option<BaseName>,
+    #[command(flatten, next_help_heading = "Motor, driven while the capture runs")]
+    drive: Drive,
     /// Decode the raw bytes of an earlier capture again, instead of a port
     #[arg(long, value_name = "RAW", conflicts_with_all = ["port", "baud", "seconds", "resume"])]
     replay: Option<PathBuf>,
@@ -41,6 +49,38 @@ pub struct Arguments {
     /// Print nothing but errors
     #[arg(long, short)]
     quiet: bool,
+}
+
+/// What the base does, as people write it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BaseName {
+    /// At rest, the table too
+    Static,
+    /// Moved by something else than our motor
+    Moving,
+    /// Our motor turns the table
+    Turntable,
+}
+
+impl Arguments {
+    /// What a board's hello frame says, and what the base does.
+    fn calibration(&self, hello: Option<&Hello>) -> Calibration {
+        let base = match self.base {
+            Some(BaseName::Static) => Base::Static,
+            Some(BaseName::Moving) => Base::Moving,
+            Some(BaseName::Turntable) => Base::Turntable,
+            None if self.drive.command().is_some() => Base::Turntable,
+            None => Base::Static,
+        };
+        let mut builder = RecordBuilder::new(Calibration {
+            base,
+            ..Calibration::default()
+        });
+        if let Some(hello) = hello {
+            builder.hello(hello);
+        }
+        builder.calibration().clone()
+    }
 }
 
 /// Silence after which the user is told.
@@ -67,6 +107,19 @@ struct Answer {
     reconnections: u64,
 }
 
+/// What the capture does with the motor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Motor {
+    /// Nothing, or nothing any more.
+    Off,
+    /// It starts as soon as rows are written.
+    Wanted(Command),
+    /// It was asked for under this number; when.
+    Asked(Command, u16, Instant),
+    /// It turns; when the last keep-alive went out.
+    Alive(Instant),
+}
+
 /// A capture under way: files, clock, and what happened.
 struct Capture<'a> {
     arguments: &'a Arguments,
@@ -77,6 +130,7 @@ struct Capture<'a> {
     start_s: f64,
     start_unix_s: f64,
     live: Option<Live>,
+    motor: Motor,
     /// Samples that wait for the first hello.
     waiting: Vec<(Sample, f64)>,
     restarts_of_board: Option<u16>,
@@ -97,7 +151,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .into());
     }
     if let Some(raw) = &arguments.replay {
-        return replay(arguments, raw);
+        return replay::replay(arguments, raw);
     }
     let mut feed = Feed::new(arguments.line.open()?);
     let stop = Arc::new(AtomicBool::new(false));
@@ -105,13 +159,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).into_diagnostic()?;
     let mut capture = Capture::start(arguments)?;
     let began = Instant::now();
-    let is_over = || {
+    let is_over = |_: &Feed| {
         stop.load(Ordering::Relaxed)
             || arguments
                 .seconds
                 .is_some_and(|seconds| began.elapsed().as_secs_f64() >= seconds)
     };
     let listened = capture.listen(&mut feed, is_over);
+    let listened = listened.and(capture.halt(&mut feed));
     // What has arrived is kept, whatever ended it.
     let finished = capture.finish(&feed.link);
     listened.and(finished)
@@ -141,6 +196,7 @@ impl<'a> Capture<'a> {
             start_s: 0.0,
             start_unix_s: unix_s(),
             live: None,
+            motor: arguments.drive.command().map_or(Motor::Off, Motor::Wanted),
             waiting: Vec::new(),
             restarts_of_board: None,
             files: Vec::new(),
@@ -156,11 +212,54 @@ impl<'a> Capture<'a> {
         self.start_s + self.start.elapsed().as_secs_f64()
     }
 
-    fn listen(&mut self, feed: &mut Feed, is_over: impl Fn() -> bool) -> Result<()> {
+    /// Starts the motor once the file is open, and keeps it alive. After a restart of the board, or a port that was gone,
+    /// it stays off: nobody may be watching.
+    fn drive(&mut self, feed: &mut Feed) -> Result<()> {
+        match self.motor {
+            Motor::Wanted(command) if self.live.is_some() && !feed.is_gone() => {
+                feed.link.send(Command::KeepAlive)?;
+                let number = feed.link.send(command)?;
+                self.motor = Motor::Asked(command, number, Instant::now());
+            }
+            Motor::Asked(command, _, asked) if asked.elapsed() > ASK => {
+                self.motor = Motor::Wanted(command);
+            }
+            Motor::Alive(last) if last.elapsed() >= KEEP_ALIVE && !feed.is_gone() => {
+                // A port that fails here is gone for the reader, too.
+                let _ = feed.link.send(Command::KeepAlive);
+                self.motor = Motor::Alive(Instant::now());
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A reply; to the motor's command it says whether it turns.
+    fn replied(&mut self, reply: Reply) -> Result<()> {
+        if let Motor::Asked(command, number, _) = self.motor
+            && reply.number == number
+            && reply.command == command.code()
+        {
+            link::done(&command, reply)?;
+            self.motor = Motor::Alive(Instant::now());
+            self.tell("the motor is driven")?;
+        }
+        Ok(())
+    }
+
+    fn motor_is_off(&mut self) -> Result<()> {
+        if matches!(self.motor, Motor::Alive(_) | Motor::Asked(..)) {
+            self.motor = Motor::Off;
+            self.tell("the motor stays off from here on")?;
+        }
+        Ok(())
+    }
+
+    fn listen(&mut self, feed: &mut Feed, is_over: impl Fn(&Feed) -> bool) -> Result<()> {
         // A port that fails right here is gone for the loop below, which waits for it.
         let _ = feed.ask();
         let (mut heard, mut shown, mut asked) = (Instant::now(), Instant::now(), Instant::now());
-        while !is_over() {
+        while !is_over(feed) {
             let mut written = Ok(());
             let raw = &mut self.raw;
             let change = feed.poll(|bytes| written = raw.write_all(bytes));
@@ -175,7 +274,8 @@ impl<'a> Capture<'a> {
                 match frame {
                     Frame::Sample(sample) => self.sample(&sample)?,
                     Frame::Hello(hello) => self.hello(&hello)?,
-                    Frame::Health(_) | Frame::Reply(_) => {}
+                    Frame::Reply(reply) => self.replied(reply)?,
+                    Frame::Health(_) => {}
                 }
             }
             if self.live.is_none() && asked.elapsed() > ASK && !feed.is_gone() {
@@ -183,6 +283,7 @@ impl<'a> Capture<'a> {
                 let _ = feed.ask();
             }
             self.give_up_on_hello()?;
+            self.drive(feed)?;
             if heard.elapsed() > SILENCE && !feed.is_gone() {
                 heard = Instant::now();
                 self.alert(&format!(
@@ -202,6 +303,26 @@ impl<'a> Capture<'a> {
                 } else if !self.arguments.quiet {
                     eprintln!("{}", self.figures(&feed.link));
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets the motor run down, at its ramp, and captures that, too.
+    fn halt(&mut self, feed: &mut Feed) -> Result<()> {
+        if !matches!(self.motor, Motor::Alive(_)) {
+            return Ok(());
+        }
+        let began = Instant::now();
+        let mut stood = None;
+        // Asked again and again: a request may be lost. Two samples later than the first at 0 it stands.
+        while began.elapsed() < RAMP_DOWN {
+            feed.link.send(Command::MotorDuty { duty: 0 })?;
+            let until = Instant::now() + Duration::from_millis(300);
+            self.listen(feed, |_| Instant::now() >= until)?;
+            let stands = feed.link.sample.is_some_and(|sample| sample.pwm == 0);
+            if stands && stood.replace(()).is_some() {
+                break;
             }
         }
         Ok(())
@@ -273,14 +394,13 @@ impl<'a> Capture<'a> {
                 "the board has started anew; {} sample instants are without data",
                 instants - 1
             ));
+            self.motor_is_off()?;
         }
         Ok(())
     }
 
     fn hello(&mut self, hello: &Hello) -> Result<()> {
-        let mut builder = RecordBuilder::new(Calibration::default());
-        builder.hello(hello);
-        let calibration = builder.calibration().clone();
+        let calibration = self.arguments.calibration(Some(hello));
         let before = self.restarts_of_board.replace(hello.restarts);
         let Some(live) = &mut self.live else {
             let [major, minor, patch] = hello.firmware;
@@ -342,7 +462,7 @@ impl<'a> Capture<'a> {
         if self.live.is_some() || self.now() - first < HELLO_WITHIN.as_secs_f64() {
             return Ok(());
         }
-        self.open(&Calibration::default(), &[])?;
+        self.open(&self.arguments.calibration(None), &[])?;
         self.tell(
             "the board has not said how it is set: rate and ranges are assumed to be the built-in ones (20 Hz, 320 deg/s, \
              1.5 g)",
@@ -406,100 +526,6 @@ impl<'a> Capture<'a> {
         }
         super::write_json(self.arguments.json.as_ref(), &answer)
     }
-}
-
-/// Makes a capture of raw bytes. They carry no time of arrival: host times are the device's, from the first sample on.
-fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
-    let bytes = std::fs::read(path)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot read {}", path.display()))?;
-    let (mut decoder, mut stats) = (Decoder::new(), LinkStats::new());
-    let mut frames = Vec::new();
-    for byte in bytes {
-        if let Some(Ok(frame)) = decoder.push(byte) {
-            stats.push(&frame);
-            frames.push(frame);
-        }
-    }
-    // The set-up of the first samples is that of the first hello, wherever it stands.
-    let first = frames.iter().find_map(|frame| match frame {
-        Frame::Hello(hello) => Some(*hello),
-        _ => None,
-    });
-    let mut builder = RecordBuilder::new(Calibration::default());
-    if let Some(hello) = &first {
-        builder.hello(hello);
-    }
-    let mut calibration = builder.calibration().clone();
-    let about = [("replayed_from".to_owned(), super::name(path))];
-    let mut files = vec![arguments.out.clone()];
-    let mut live = Live::create(&arguments.out, &calibration, &about, None)?;
-    if first.is_none() {
-        live.note(
-            0.0,
-            "no hello frame: rate and ranges are assumed to be the built-in ones",
-        )?;
-    }
-    let (mut time, mut last, mut restarts) = (0.0, None, None);
-    let (mut rows, mut missing) = (0, 0);
-    for frame in &frames {
-        match frame {
-            Frame::Sample(sample) => {
-                let forward = last.map_or(0, |last| sample.t_ticks.wrapping_sub(last));
-                time += if forward > u32::MAX / 2 {
-                    1.0 / calibration.rate_hz
-                } else {
-                    f64::from(forward) * calibration.tick_s
-                };
-                last = Some(sample.t_ticks);
-                missing += live.push(sample, time)?.0.missing;
-                rows += 1;
-            }
-            Frame::Hello(hello) => {
-                live.hello(hello, restarts.replace(hello.restarts));
-                builder.hello(hello);
-                if !live.fits(builder.calibration()) {
-                    calibration = builder.calibration().clone();
-                    let next = free_name(&arguments.out, files.len() + 1);
-                    std::mem::replace(&mut live, Live::create(&next, &calibration, &about, None)?)
-                        .finish()?;
-                    files.push(next);
-                }
-            }
-            Frame::Health(_) | Frame::Reply(_) => {}
-        }
-    }
-    live.finish()?;
-    if rows == 0 {
-        miette::bail!(
-            help = "is it the .raw file of a capture?",
-            "{} holds no sample: {}",
-            path.display(),
-            imu_stand::text::link(decoder.counts())
-        );
-    }
-    let losses = stats.losses();
-    let answer = Answer {
-        format: "imu-stand-captured/1",
-        files: files.iter().map(|file| super::name(file)).collect(),
-        seconds: time,
-        rows,
-        missing,
-        lost_by_board: losses.device,
-        lost_by_line: losses.line,
-        lost_unattributed: losses.unattributed,
-        frames_rejected: decoder.counts().rejected(),
-        restarts: losses.restarts,
-        reconnections: 0,
-    };
-    if !arguments.quiet {
-        say!(
-            "{}: {rows} samples, {missing} missing, {}",
-            answer.files.join(", "),
-            imu_stand::text::link(decoder.counts())
-        );
-    }
-    super::write_json(arguments.json.as_ref(), &answer)
 }
 
 /// The raw bytes' file: run.csv and run.csv.gz have run.raw.

@@ -1,0 +1,100 @@
+//! Raw bytes, decoded again.
+
+use std::path::Path;
+
+use imu_stand::capture::Live;
+use miette::{IntoDiagnostic, Result, WrapErr};
+use wire::link::LinkStats;
+use wire::{Decoder, Frame};
+
+use super::{Answer, Arguments, free_name};
+
+/// Makes a capture of raw bytes. They carry no time of arrival: host times are the device's, from the first sample on.
+pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
+    let bytes = std::fs::read(path)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+    let (mut decoder, mut stats) = (Decoder::new(), LinkStats::new());
+    let mut frames = Vec::new();
+    for byte in bytes {
+        if let Some(Ok(frame)) = decoder.push(byte) {
+            stats.push(&frame);
+            frames.push(frame);
+        }
+    }
+    // The set-up of the first samples is that of the first hello, wherever it stands.
+    let first = frames.iter().find_map(|frame| match frame {
+        Frame::Hello(hello) => Some(*hello),
+        _ => None,
+    });
+    let mut calibration = arguments.calibration(first.as_ref());
+    let about = [("replayed_from".to_owned(), super::super::name(path))];
+    let mut files = vec![arguments.out.clone()];
+    let mut live = Live::create(&arguments.out, &calibration, &about, None)?;
+    if first.is_none() {
+        live.note(
+            0.0,
+            "no hello frame: rate and ranges are assumed to be the built-in ones",
+        )?;
+    }
+    let (mut time, mut last, mut restarts) = (0.0, None, None);
+    let (mut rows, mut missing) = (0, 0);
+    for frame in &frames {
+        match frame {
+            Frame::Sample(sample) => {
+                let forward = last.map_or(0, |last| sample.t_ticks.wrapping_sub(last));
+                time += if forward > u32::MAX / 2 {
+                    1.0 / calibration.rate_hz
+                } else {
+                    f64::from(forward) * calibration.tick_s
+                };
+                last = Some(sample.t_ticks);
+                missing += live.push(sample, time)?.0.missing;
+                rows += 1;
+            }
+            Frame::Hello(hello) => {
+                live.hello(hello, restarts.replace(hello.restarts));
+                let now = arguments.calibration(Some(hello));
+                if !live.fits(&now) {
+                    calibration = now;
+                    let next = free_name(&arguments.out, files.len() + 1);
+                    std::mem::replace(&mut live, Live::create(&next, &calibration, &about, None)?)
+                        .finish()?;
+                    files.push(next);
+                }
+            }
+            Frame::Health(_) | Frame::Reply(_) => {}
+        }
+    }
+    live.finish()?;
+    if rows == 0 {
+        miette::bail!(
+            help = "is it the .raw file of a capture?",
+            "{} holds no sample: {}",
+            path.display(),
+            imu_stand::text::link(decoder.counts())
+        );
+    }
+    let losses = stats.losses();
+    let answer = Answer {
+        format: "imu-stand-captured/1",
+        files: files.iter().map(|file| super::super::name(file)).collect(),
+        seconds: time,
+        rows,
+        missing,
+        lost_by_board: losses.device,
+        lost_by_line: losses.line,
+        lost_unattributed: losses.unattributed,
+        frames_rejected: decoder.counts().rejected(),
+        restarts: losses.restarts,
+        reconnections: 0,
+    };
+    if !arguments.quiet {
+        say!(
+            "{}: {rows} samples, {missing} missing, {}",
+            answer.files.join(", "),
+            imu_stand::text::link(decoder.counts())
+        );
+    }
+    super::super::write_json(arguments.json.as_ref(), &answer)
+}
