@@ -383,3 +383,46 @@ fn what_cannot_be_exported_is_told() {
     let ending = run(&["export", "c.csv", "--out", "c.xyz"]);
     assert!(said(&ending).contains("does not say"), "{}", said(&ending));
 }
+
+#[test]
+fn what_is_exported_is_read_again_and_gives_the_same_figures() {
+    let folder = folder("export_again");
+    let path = |name: &str| folder.join(name).display().to_string();
+    let capture = path("c.csv");
+    let made = run(&[
+        "simulate",
+        "--seconds",
+        "120",
+        "--seed",
+        "9",
+        "--out",
+        &capture,
+    ]);
+    assert_eq!(made.status.code(), Some(0), "{}", said(&made));
+    let figures = |file: &str| {
+        let out = path("a.json");
+        let done = run(&["analyze", file, "--json", &out, "--quiet"]);
+        assert_eq!(done.status.code(), Some(0), "{file}: {}", said(&done));
+        json(Path::new(&out))["channels"]["gyro_z"]["parameters"].clone()
+    };
+    let truth = figures(&capture);
+    for (name, raw) in [
+        ("c.npz", false),
+        ("c.parquet", false),
+        ("r.npz", true),
+        ("r.parquet", true),
+    ] {
+        let out = path(name);
+        let mut arguments = vec!["export", &capture, "--out", &out];
+        arguments.extend(raw.then_some("--raw"));
+        let done = run(&arguments);
+        assert_eq!(done.status.code(), Some(0), "{name}: {}", said(&done));
+        let again = figures(&out);
+        let n =
+            |figures: &serde_json::Value| figures["angle_random_walk"]["value"].as_f64().unwrap();
+        assert!(
+            (n(&again) / n(&truth) - 1.0).abs() < 1e-9,
+            "{name}: {again} {truth}"
+        );
+    }
+}
