@@ -29,7 +29,7 @@ pub fn program(arguments: &[&str]) -> Command {
 /// The same, without the pseudo-terminals' own ends, which a process inherits here: only without them does it see that
 /// a port is gone.
 pub fn program_alone(arguments: &[&str]) -> Command {
-    const CLOSE: &str = "for fd in /proc/self/fd/*; do fd=${fd##*/}; [ $fd -gt 2 ] && eval \"exec $fd>&-\"; done; \
+    const CLOSE: &str = "for fd in /dev/fd/*; do fd=${fd##*/}; [ $fd -gt 2 ] && eval \"exec $fd>&-\"; done; \
                          exec \"$@\"";
     let mut command = Command::new("bash");
     command
