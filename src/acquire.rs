@@ -85,8 +85,7 @@ pub enum Task {
     Read,
     /// Write a register, and read it back where it can be read.
     Write,
-    /// Bring range and filter of all three into line: `value` is SENS/AVG; the result has a bit for each axis that did
-    /// not read back.
+    /// Bring range and filter of all three into line: `value` is SENS/AVG; the result is that of [`configure`].
     Configure,
 }
 
@@ -248,7 +247,11 @@ fn reach<S: Sensors>(sensors: &mut S, job: Job) -> Result<u16, Status> {
     frame(sensors, axis, Command::read(Register::Endurance)).map(Word::bits)
 }
 
-/// Sets range and filter of all three gyros and reads them back; a bit for each axis that does not read as written.
+/// GYRO_SCALE as the parts leave the factory: 1.
+const FACTORY_SCALE: u16 = 0x0800;
+
+/// Sets range and filter of all three gyros and reads them back; bits 0..=2 for each axis that does not read as written,
+/// bits 3..=5 for each whose GYRO_SCALE is not what the part was calibrated to.
 #[inline(never)]
 pub fn configure<S: Sensors>(sensors: &mut S, sens_avg: u16) -> u8 {
     let (mut wrong, mut bit) = (0, 1);
@@ -259,8 +262,15 @@ pub fn configure<S: Sensors>(sensors: &mut S, sens_avg: u16) -> u8 {
             address: Register::SensAvg.address(),
             value: sens_avg,
         };
+        let scale = Job {
+            task: Task::Read,
+            address: Register::GyroScale.address(),
+            ..job
+        };
         if reach(sensors, job) != Ok(sens_avg) {
             wrong |= bit;
+        } else if !matches!(reach(sensors, scale), Ok(scale) if scale & 0x0fff == FACTORY_SCALE) {
+            wrong |= bit << 3;
         }
         bit <<= 1;
     }

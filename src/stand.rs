@@ -399,6 +399,8 @@ impl Stand {
         self.millisecond = self.millisecond.wrapping_add(1);
         if self.millisecond >= HEALTH_MS {
             self.millisecond = 0;
+            // What does not read back is tried anew each second.
+            self.unset |= self.misconfigured & !self.silent != 0;
             self.health
                 .uptime_s
                 .set(self.health.uptime_s.get().wrapping_add(1));
@@ -444,8 +446,11 @@ impl Stand {
 
     #[inline(never)]
     fn note_configured(&mut self, wrong: u8) {
-        self.misconfigured = wrong;
+        let now = (wrong | wrong >> 3) & 7;
+        self.record_each(Fault::GyroRecoveredX, self.misconfigured & !now);
+        self.misconfigured = now;
         self.record_each(Fault::GyroRegisterMismatchX, wrong);
+        self.record_each(Fault::GyroScaleImpossibleX, wrong >> 3);
     }
 
     #[inline(never)]

@@ -258,6 +258,14 @@ fn TIMER1_COMPB() {
         timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
         return;
     }
+    if timer1().tcnt1.read().bits() <= timer1().ocr1b.read().bits() {
+        // Compare A has gone by: something held this up for longer than the guard. Waiting for the next one would make
+        // that late too, and so on for ever; the main loop gets the time until then.
+        shared.missed = shared.missed.saturating_add(1);
+        shared.skip = shared.next_every.wrapping_sub(1);
+        timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
+        return;
+    }
     shared.masked_ucsrb = serial::mask();
     shared.ticked = false;
     // Chosen before the sleep, and the compiler kept from moving it: the choice takes longer for one place than for the

@@ -283,9 +283,12 @@ impl Stand {
                 Some(end) => status = end,
                 None => return,
             },
-            code::SET_GYRO if value != 0 => {
-                self.answer.value.set(value.into());
-                status = Status::ReadBackWrong;
+            code::SET_GYRO => {
+                let wrong = value & 7;
+                self.answer.value.set(wrong.into());
+                if wrong != 0 {
+                    status = Status::ReadBackWrong;
+                }
             }
             _ => self.answer.value.set(value.into()),
         }
