@@ -10,6 +10,9 @@
 /* From frame to frame, at any sample period. */
 #define PAUSE_US 100
 
+/* GYRO_SCALE as the parts leave the factory: 1. */
+#define FACTORY_SCALE 0x0800
+
 enum access { NONE, READ, WRITABLE, BOTH };
 
 /* By address / 2. */
@@ -69,6 +72,8 @@ uint8_t gyro_configure(uint16_t sens_avg)
         uint16_t value;
         if (!write(axis, SENS_AVG, sens_avg) || !read(axis, SENS_AVG, &value) || value != sens_avg)
             wrong |= (uint8_t)(1 << axis);
+        else if (!read(axis, GYRO_SCALE, &value) || (value & 0x0fff) != FACTORY_SCALE)
+            wrong |= (uint8_t)(8 << axis);
     }
     return wrong;
 }

@@ -9,6 +9,7 @@ enum gyro_register {
     SUPPLY_OUT = 0x02,
     GYRO_OUT = 0x04,
     TEMP_OUT = 0x0c,
+    GYRO_SCALE = 0x16,
     MSC_CTRL = 0x34,
     SENS_AVG = 0x38,
     GYRO_STATUS = 0x3c,
@@ -27,5 +28,6 @@ struct gyro_job {
 };
 
 void gyro_work(struct gyro_job *job);
-/* Sets range and filter of all three and reads them back; a bit for each axis that does not read as written. */
+/* Sets range and filter of all three and reads them back; bits 0..2 for each axis that does not read as written, bits 3..5
+ * for each whose GYRO_SCALE is not what the part was calibrated to. */
 uint8_t gyro_configure(uint16_t sens_avg);

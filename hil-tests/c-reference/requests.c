@@ -289,6 +289,7 @@ void requests_on_sample(void)
         break;
     case CODE_SET_GYRO:
         stand_note_configured((uint8_t)value);
+        value &= 7;
         if (value)
             status = STATUS_READ_BACK_WRONG;
         /* fall through */

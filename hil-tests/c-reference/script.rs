@@ -10,6 +10,7 @@ const TICK_VECTOR: u8 = 6;
 mod register {
     pub const SUPPLY_OUT: u8 = 0x02;
     pub const GYRO_OUT: u8 = 0x04;
+    pub const GYRO_SCALE: u8 = 0x16;
     pub const TEMP_OUT: u8 = 0x0C;
     pub const MSC_CTRL: u8 = 0x34;
     pub const SENS_AVG: u8 = 0x38;
@@ -24,7 +25,6 @@ pub fn spread(number: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-#[derive(Default)]
 struct Gyro {
     registers: [u16; 32],
     /// How often GYRO_OUT was asked for.
@@ -33,6 +33,20 @@ struct Gyro {
     reply: u16,
     frame: u16,
     bytes: u8,
+}
+
+impl Default for Gyro {
+    fn default() -> Self {
+        let mut registers = [0; 32];
+        registers[usize::from(register::GYRO_SCALE) / 2] = 0x0800;
+        Gyro {
+            registers,
+            asked: 0,
+            reply: 0,
+            frame: 0,
+            bytes: 0,
+        }
+    }
 }
 
 impl Gyro {

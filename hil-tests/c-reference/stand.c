@@ -91,8 +91,11 @@ void stand_reply_pending(struct pending *pending, uint8_t status)
 
 void stand_note_configured(uint8_t wrong)
 {
-    stand_misconfigured = wrong;
-    stand_count_each(FAULT_GYRO_REGISTER_MISMATCH_X, wrong);
+    uint8_t now = (wrong | wrong >> 3) & 7;
+    stand_count_each(FAULT_GYRO_RECOVERED_X, stand_misconfigured & (uint8_t)~now);
+    stand_misconfigured = now;
+    stand_count_each(FAULT_GYRO_REGISTER_MISMATCH_X, wrong & 7);
+    stand_count_each(FAULT_GYRO_SCALE_IMPOSSIBLE_X, wrong >> 3);
 }
 
 void stand_apply(void)
@@ -284,6 +287,9 @@ void stand_on_millisecond(void)
     requests_on_millisecond();
     if (++millisecond >= HEALTH_MS) {
         millisecond = 0;
+        /* What does not read back is tried anew each second. */
+        if (stand_misconfigured & (uint8_t)~silent)
+            unset = true;
         health.uptime_s++;
         stand_health();
     }

@@ -170,6 +170,14 @@ ISR(TIMER1_COMPB_vect)
         TIMSK = TIMSK_ALL;
         return;
     }
+    if (TCNT1 <= OCR1B) {
+        /* Compare A has gone by: the main loop gets the time until the next guard. */
+        if (missed_ticks != UINT8_MAX)
+            missed_ticks++;
+        skip = next_every - 1;
+        TIMSK = TIMSK_ALL;
+        return;
+    }
     masked_ucsrb = serial_mask();
     ticked = false;
     struct raw *raw = &raws[filling];

@@ -2,16 +2,24 @@
 //! the capture file alone. Drawn fresh at each run; `IMU_STAND_SEED` replays a run, `IMU_STAND_IMAGE_DRAWS` sets how many.
 //!
 //! Many draws are graded through the firmware's logic on the host (crates/cli/tests/hidden_effect.rs). Here a few go
-//! through the image: each has to lead to the same words as the same draw on the host, and what was hidden has to be
+//! through the image: each has to lead to the same words as the same draw on the
+//! host, asked at the same instants, and what was hidden has to be
 //! named at a rate that an engine of 90 % would miss once in a thousand runs.
+
+use std::ops::ControlFlow;
 
 use analysis::DiagnoseOptions;
 use analysis::result::Diagnosis;
+use bench::simavr::simavr_timed;
+use bench::{SerialByte, native};
 use hil_tests::{generator, image, seed};
 use imu_stand::ReadOptions;
+use imu_stand::RecordBuilder;
+use imu_stand::capture::Calibration;
 use imu_stand::capture::{read_from, write_to};
-use imu_stand::stand::{Hidden, plan, run_image, run_native};
+use imu_stand::stand::{Hidden, plan};
 use model::record::Record;
+use wire::{Decoder, Frame, LinkCounts};
 
 const NAMED: f64 = 0.90;
 const CHANCE: f64 = 1e-3;
@@ -35,6 +43,34 @@ fn at_most(k: usize, n: usize, p: f64) -> f64 {
         sum += term;
     }
     sum.min(1.0)
+}
+
+/// Makes a record of a board's bytes.
+struct Receiver {
+    decoder: Decoder,
+    builder: RecordBuilder,
+}
+
+impl Receiver {
+    fn new() -> Self {
+        Receiver {
+            decoder: Decoder::new(),
+            builder: RecordBuilder::new(Calibration::default()),
+        }
+    }
+
+    fn push(&mut self, received: SerialByte) -> ControlFlow<()> {
+        match self.decoder.push(received.byte) {
+            Some(Ok(Frame::Sample(sample))) => self.builder.push(&sample, received.time_s),
+            Some(Ok(Frame::Hello(hello))) => self.builder.hello(&hello),
+            _ => {}
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn finish(self) -> (Record, LinkCounts) {
+        (self.builder.build(), *self.decoder.counts())
+    }
 }
 
 /// What the diagnosis says of the capture file of a record.
@@ -72,7 +108,9 @@ fn what_is_hidden_in_the_stand_is_named_through_the_image() {
         let (hidden, causes) = FAULTS[which];
         let own = seed.wrapping_add(0x9e37_79b9_7f4a_7c15u64.wrapping_mul(draw as u64 + 1));
         let plan = plan(hidden, 600.0, own);
-        let (record, link) = run_image(&plan, &image, |_| {}).expect("the image runs");
+        let (mut through, mut host) = (Receiver::new(), Receiver::new());
+        let timeline = simavr_timed(&image, &plan.run, |byte| through.push(byte)).expect("it runs");
+        let (record, link) = through.finish();
         assert_eq!(link.rejected(), 0, "every frame arrives in order");
         assert!(
             (11_980..=12_000).contains(&record.len()),
@@ -80,8 +118,8 @@ fn what_is_hidden_in_the_stand_is_named_through_the_image() {
             record.len()
         );
         let found = diagnosed(&record, own);
-        let (host, _) = run_native(&plan, |_| {});
-        let on_host = diagnosed(&host, own);
+        native(&plan.run, &timeline, |byte| host.push(byte));
+        let on_host = diagnosed(&host.finish().0, own);
         println!(
             "draw {draw}: hidden {}; said {}",
             plan.hidden,
