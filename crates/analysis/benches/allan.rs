@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use analysis::allan::{Deviation, Phase, Streaming, TauGrid, deviation};
+use analysis::allan::{Deviation, Gapped, Phase, Streaming, TauGrid, deviation};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -74,6 +74,39 @@ fn bench(c: &mut Criterion) {
                 stream.push(*v);
             }
             stream.estimates()
+        });
+    });
+    group.finish();
+
+    // Where peers need the square of the readings.
+    let few = 5000;
+    let short = Phase::from_values(&y, std::slice::from_ref(&(0..few)));
+    let mut group = c.benchmark_group("octaves, 5e3 readings");
+    group
+        .throughput(Throughput::Elements(few as u64))
+        .sample_size(10);
+    for kind in [Deviation::Mtotdev, Deviation::Theo1] {
+        let ms = TauGrid::Octave.factors(kind.longest(few));
+        group.bench_function(kind.name(), |b| {
+            b.iter(|| black_box(&short).curve(kind, 1.0, &ms));
+        });
+    }
+    group.finish();
+
+    // Every fiftieth reading lost.
+    let runs: Vec<_> = (0..N / 50).map(|i| i * 49..(i + 1) * 49).collect();
+    let slots: Vec<u64> = (0..N as u64 / 50 * 49).map(|i| i + i / 49).collect();
+    let gapped = Gapped::new(&y, &runs, &slots);
+    let ms = TauGrid::Octave.factors(N / 3);
+    let mut group = c.benchmark_group("octaves, 1e6 slots, 2 % empty");
+    group
+        .throughput(Throughput::Elements(N as u64))
+        .sample_size(10);
+    group.bench_function("oadev", |b| {
+        b.iter(|| {
+            ms.iter()
+                .filter_map(|m| black_box(&gapped).overlapping_allan(1.0, *m, 1.0))
+                .count()
         });
     });
     group.finish();

@@ -49,6 +49,26 @@ fn cells() -> Vec<(&'static str, Truth, f64, usize)> {
             600.0,
             1,
         ),
+        (
+            "600 s: N, K 0.0005, R 0.002",
+            Truth {
+                k: 5e-4,
+                r: 0.002,
+                ..paper
+            },
+            600.0,
+            1,
+        ),
+        (
+            "600 s: N, K 0.005, R 0.005",
+            Truth {
+                k: 5e-3,
+                r: 0.005,
+                ..paper
+            },
+            600.0,
+            1,
+        ),
         ("2 h: N, K", Truth { k: 3e-4, ..quiet }, 7200.0, 4),
         (
             "2 h: N, B, K",
