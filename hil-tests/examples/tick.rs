@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use atmega16_sim::{CLOCK_HZ, Mcu};
 
-#[allow(dead_code)]
+#[allow(dead_code, unused_imports)]
 #[path = "../c-reference/session.rs"]
 mod session;
 

@@ -94,65 +94,81 @@ fn words(diagnosis: &Diagnosis) -> Vec<String> {
         .collect()
 }
 
+/// Draws, runs, diagnoses; whether what was hidden has been named.
+fn is_named(draw: u64, seed: u64, image: &[u8]) -> bool {
+    let own = seed.wrapping_add(0x9e37_79b9_7f4a_7c15u64.wrapping_mul(draw + 1));
+    let which = (bench::uniform(&mut generator(!own), 0.0, 7.0) as usize).min(6);
+    let (hidden, causes) = FAULTS[which];
+    let plan = plan(hidden, 600.0, own);
+    let (mut through, mut host) = (Receiver::new(), Receiver::new());
+    let timeline = simavr_timed(image, &plan.run, |byte| through.push(byte)).expect("it runs");
+    let (record, link) = through.finish();
+    assert_eq!(link.rejected(), 0, "every frame arrives in order");
+    assert!(
+        (11_980..=12_000).contains(&record.len()),
+        "{}",
+        record.len()
+    );
+    let found = diagnosed(&record, own);
+    native(&plan.run, &timeline, |byte| host.push(byte));
+    let on_host = diagnosed(&host.finish().0, own);
+    println!(
+        "draw {draw}: hidden {}; said {}",
+        plan.hidden,
+        words(&found).join(", ")
+    );
+    assert_eq!(
+        words(&found),
+        words(&on_host),
+        "the image, then the same draw on the host"
+    );
+    let channel = plan
+        .channel
+        .map(|axis| ["gyro_x", "gyro_y", "gyro_z"][axis]);
+    let is_it = |finding: &analysis::result::Finding| {
+        channel.is_some_and(|channel| finding.channels.iter().any(|c| c == channel))
+            && std::iter::once(finding.cause.as_str())
+                .chain(
+                    finding
+                        .alternatives
+                        .iter()
+                        .map(|rival| rival.cause.as_str()),
+                )
+                .any(|name| causes.contains(&name))
+    };
+    match causes {
+        [] => found.findings.is_empty(),
+        _ => found.findings.iter().any(is_it),
+    }
+}
+
 #[test]
 fn what_is_hidden_in_the_stand_is_named_through_the_image() {
-    let draws = std::env::var("IMU_STAND_IMAGE_DRAWS").map_or(4, |text| {
+    let draws: u64 = std::env::var("IMU_STAND_IMAGE_DRAWS").map_or(4, |text| {
         text.parse().expect("IMU_STAND_IMAGE_DRAWS is a number")
     });
     let seed = seed();
-    let rng = &mut generator(seed);
     let image = image();
-    let mut named = 0;
-    for draw in 0..draws {
-        let which = (bench::uniform(rng, 0.0, 7.0) as usize).min(6);
-        let (hidden, causes) = FAULTS[which];
-        let own = seed.wrapping_add(0x9e37_79b9_7f4a_7c15u64.wrapping_mul(draw as u64 + 1));
-        let plan = plan(hidden, 600.0, own);
-        let (mut through, mut host) = (Receiver::new(), Receiver::new());
-        let timeline = simavr_timed(&image, &plan.run, |byte| through.push(byte)).expect("it runs");
-        let (record, link) = through.finish();
-        assert_eq!(link.rejected(), 0, "every frame arrives in order");
-        assert!(
-            (11_980..=12_000).contains(&record.len()),
-            "{}",
-            record.len()
-        );
-        let found = diagnosed(&record, own);
-        native(&plan.run, &timeline, |byte| host.push(byte));
-        let on_host = diagnosed(&host.finish().0, own);
-        println!(
-            "draw {draw}: hidden {}; said {}",
-            plan.hidden,
-            words(&found).join(", ")
-        );
-        assert_eq!(
-            words(&found),
-            words(&on_host),
-            "the image, then the same draw on the host"
-        );
-        let channel = plan
-            .channel
-            .map(|axis| ["gyro_x", "gyro_y", "gyro_z"][axis]);
-        let is_it = |finding: &analysis::result::Finding| {
-            channel.is_some_and(|channel| finding.channels.iter().any(|c| c == channel))
-                && std::iter::once(finding.cause.as_str())
-                    .chain(
-                        finding
-                            .alternatives
-                            .iter()
-                            .map(|rival| rival.cause.as_str()),
-                    )
-                    .any(|name| causes.contains(&name))
-        };
-        let right = match causes {
-            [] => found.findings.is_empty(),
-            _ => found.findings.iter().any(is_it),
-        };
-        named += usize::from(right);
-    }
+    let workers = 2;
+    let named: usize = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..workers)
+            .map(|worker| {
+                let image = &image;
+                scope.spawn(move || {
+                    (worker..draws)
+                        .step_by(workers as usize)
+                        .filter(|&draw| is_named(draw, seed, image))
+                        .count()
+                })
+            })
+            .collect();
+        (workers.into_iter())
+            .map(|worker| worker.join().expect("every draw runs"))
+            .sum()
+    });
     println!("named {named} of {draws}");
     assert!(
-        at_most(named, draws, NAMED) > CHANCE,
+        at_most(named, draws as usize, NAMED) > CHANCE,
         "named {named} of {draws}"
     );
 }

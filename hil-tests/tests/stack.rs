@@ -7,7 +7,7 @@ use wire::{Axis, Command, Sensor, Shape};
 
 #[test]
 fn the_deepest_stack_leaves_room_with_every_command_at_any_phase_of_the_tick() {
-    let seconds = 120.0;
+    let seconds = 60.0;
     let mut run = run(Scenario::lively(21), seconds);
     let asked = [
         Command::Ping,

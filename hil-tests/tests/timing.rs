@@ -116,6 +116,17 @@ fn the_sampling_instant_has_no_jitter_over_600_s_with_line_and_commands_busy() {
     }
     assert_eq!(watch.periods.keys().next(), Some(&800_000));
     let discipline = simulated.discipline();
+    // The data sheet's 40 us from frame to frame and 30 us between them, in cycles.
+    assert!(
+        discipline
+            .shortest_period
+            .is_some_and(|cycles| cycles >= 640)
+    );
+    assert!(
+        discipline
+            .shortest_stall
+            .is_some_and(|cycles| cycles >= 480)
+    );
     println!("{discipline:?}");
     assert_eq!(
         (
