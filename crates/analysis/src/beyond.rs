@@ -21,6 +21,8 @@ pub static EFFECT: Beyond = Beyond;
 const SLOPE_S: f64 = 2.0;
 /// Lag of a thermometer that sits elsewhere, s.
 const LAG_S: f64 = 40.0;
+/// Plays of a hysteresis, as shares of the swing.
+const PLAYS: [f64; 2] = [0.3, 0.7];
 /// Smallest changes that a combination is made of: degC, counts of the motor command, V, m/s^2 rms.
 const LEAST_TEMPERATURE: f64 = 0.5;
 const LEAST_COMMAND: f64 = 8.0;
@@ -51,6 +53,18 @@ fn lagged(values: &[f64], tau: f64) -> Vec<f64> {
         .map(|v| {
             y += gain * (v - y);
             y
+        })
+        .collect()
+}
+
+/// What follows a signal only once it has moved through a play of twice `half`.
+fn played(values: &[f64], half: f64) -> Vec<f64> {
+    let mut held = values.first().copied().unwrap_or(0.0);
+    values
+        .iter()
+        .map(|v| {
+            held = held.clamp(v - half, v + half);
+            held
         })
         .collect()
 }

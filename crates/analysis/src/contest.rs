@@ -67,6 +67,42 @@ pub fn two_level(y: &[f64], x: &Coordinates) -> f64 {
     sum + 0.5 * (std::f64::consts::TAU * (1e4 * white + half * half) * y.len() as f64).ln()
 }
 
+/// Covariance of the coordinates at a highest point of `l`: the inverse of its curvature, all coordinates free. One that
+/// the data do not bend, such as a random walk of nearly nothing, is held.
+fn covariance_of(l: &dyn Fn(&Coordinates) -> f64, x: &Coordinates) -> Vec<Vec<f64>> {
+    const H: f64 = 0.06;
+    let at = |moves: &[(usize, f64)]| {
+        let mut y = *x;
+        for (i, by) in moves {
+            y[*i] += by * H;
+        }
+        l(&y)
+    };
+    let middle = l(x);
+    let second = |i: usize, j: usize| {
+        if i == j {
+            return (at(&[(i, 1.0)]) - 2.0 * middle + at(&[(i, -1.0)])) / (H * H);
+        }
+        (at(&[(i, 1.0), (j, 1.0)]) - at(&[(i, 1.0), (j, -1.0)]) - at(&[(i, -1.0), (j, 1.0)])
+            + at(&[(i, -1.0), (j, -1.0)]))
+            / (4.0 * H * H)
+    };
+    let count = x.len();
+    let bends: Vec<bool> = (0..count).map(|i| second(i, i) < -0.05).collect();
+    let information: Vec<Vec<f64>> = (0..count)
+        .map(|i| {
+            (0..count)
+                .map(|j| match (i == j, bends[i] && bends[j]) {
+                    (_, true) => -second(i.min(j), i.max(j)),
+                    (true, false) => 1e12,
+                    (false, false) => 0.0,
+                })
+                .collect()
+        })
+        .collect();
+    crate::likelihood::invert(&information).0
+}
+
 /// The AR(1)-like term of the library: stationary, two coordinates, no filter.
 fn stationary(search: &Search<'_>) -> Option<(usize, &'static dyn Effect, Arc<dyn Covariance>)> {
     search
@@ -242,24 +278,19 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         return open;
     }
     let x: Coordinates = [best.1[0], best.1[1], best.1[2], best.1[3]];
-    let curvature = |i: usize| {
-        let h = 0.05;
-        let at = |d: f64| {
-            let mut y = x;
-            y[i] += d;
-            two_level(&blocks, &y)
-        };
-        1.0 / (-(at(h) - 2.0 * at(0.0) + at(-h)) / (h * h))
-            .max(1e-6)
-            .sqrt()
-    };
+    let errors = covariance_of(&|y| two_level(&blocks, y), &x);
+    // ln of the half height is x2 + x0 / 2.
+    let half_error = (errors[2][2] + errors[0][2] + 0.25 * errors[0][0])
+        .max(0.0)
+        .sqrt();
+    let dwell_error = errors[3][3].max(0.0).sqrt();
     let half = (x[2] + 0.5 * x[0]).exp();
     let dwell = x[3].exp() * length as f64 / search.view.rate_hz;
     let mut settled = rival;
     if let Some(t) = settled.terms.last_mut() {
         t.stated = Some(vec![
-            (half, half * curvature(2)),
-            (dwell, dwell * curvature(3)),
+            (half, half * half_error),
+            (dwell, dwell * dwell_error),
         ]);
         t.lr = 2.0 * (ahead - MARGIN) + t.threshold;
     }

@@ -43,15 +43,24 @@ pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
         return Err("acc_z and the accelerometer across the axis are needed".into());
     };
     let n = grid.n;
-    let tilt: Vec<f64> = side
-        .values
-        .iter()
-        .zip(&up.values)
-        .map(|(s, u)| s.atan2(*u).to_degrees())
+    let across = acc(if along == Axis::Y { Axis::X } else { Axis::Y });
+    // The roll is atan(y / z). The pitch is that of x against both others, and its rate about the body's y is smaller
+    // by the cosine of the roll.
+    let pitches = along == Axis::X;
+    let other = |i: usize| across.filter(|_| pitches).map_or(0.0, |a| a.values[i]);
+    let tilt: Vec<f64> = (0..n)
+        .map(|i| {
+            let vertical = up.values[i].hypot(other(i)).copysign(up.values[i]);
+            side.values[i].atan2(vertical).to_degrees()
+        })
         .collect();
+    let leaning = |i: usize| (other(i).atan2(up.values[i])).cos();
     // Central difference of the tilt, and the rate averaged with the same weights (trapezoids).
     let tilt_rate: Vec<f64> = (0..n)
-        .map(|i| (tilt[(i + 1).min(n - 1)] - tilt[i.saturating_sub(1)]) * grid.rate_hz / 2.0)
+        .map(|i| {
+            let change = tilt[(i + 1).min(n - 1)] - tilt[i.saturating_sub(1)];
+            change * leaning(i).abs() * grid.rate_hz / 2.0
+        })
         .collect();
     let y = &target.y;
     let rate: Vec<f64> = (0..n)

@@ -7,7 +7,7 @@ use crate::stand::{LSB, Stand};
 use crate::strength::{Meter, of_variance, size_for};
 
 /// What there is.
-pub const FOREIGN: [&str; 14] = [
+pub const FOREIGN: [&str; 22] = [
     "chirp",
     "square wave",
     "comb of harmonics",
@@ -22,7 +22,18 @@ pub const FOREIGN: [&str; 14] = [
     "heavy tails",
     "skewed noise",
     "dead band",
+    "creep",
+    "line that changes its pitch",
+    "line that comes and goes",
+    "bursts of noise",
+    "noise that follows temperature",
+    "codes that are missing",
+    "jumps that relax",
+    "random walk for a while",
 ];
+/// How many of them, from the first, were looked at while the engine was made. The others were written before, and what
+/// the engine says to them was first seen in the campaign that graded it.
+pub const SEEN: usize = 14;
 
 /// What it does to a channel: adds a signal, or makes new noise out of old.
 pub struct Foreign {
@@ -39,6 +50,8 @@ enum Change {
     Scale(Vec<f64>),
     /// Every reading within this distance of the middle reads the middle, deg/s.
     DeadBand(f64),
+    /// Every so many counts a code that never comes: its readings move up by one.
+    Missing(i32),
     /// Noise in place of the white noise, of variance 1, as a share of it.
     Noise(Vec<f64>, f64),
 }
@@ -188,6 +201,69 @@ fn one(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: 
                     .collect(),
             )
         }
+        "creep" => {
+            // After it was handled, a mount settles by the logarithm of time.
+            let (at, first) = (
+                stand.seconds * draw.between(0.0, 0.5),
+                draw.by_ratio(0.5, 5.0),
+            );
+            let since = |i: usize| (t(i) - at).max(0.0);
+            Some((0..n).map(|i| (1.0 + since(i) / first).ln()).collect())
+        }
+        "line that changes its pitch" => {
+            let (f, period) = (draw.between(1.0, 8.0), draw.between(20.0, 120.0));
+            let turns = draw.between(0.2, 0.8) * period / 2.0;
+            let phase = |i: usize| tau * f * t(i) + turns * (tau * t(i) / period).sin();
+            Some((0..n).map(|i| phase(i).sin()).collect())
+        }
+        "line that comes and goes" => {
+            let f = draw.between(0.5, 8.0);
+            let (mut on, mut left) = (draw.chance(0.5), 0.0);
+            Some(
+                (0..n)
+                    .map(|i| {
+                        if left <= 0.0 {
+                            on = !on;
+                            left = draw.between(10.0, 60.0);
+                        }
+                        left -= 1.0 / stand.rate_hz;
+                        f64::from(u8::from(on)) * (tau * f * t(i)).sin()
+                    })
+                    .collect(),
+            )
+        }
+        "jumps that relax" => {
+            let decay = draw.between(3.0, 15.0);
+            let (mut y, mut left) = (0.0, 5.0);
+            Some(
+                (0..n)
+                    .map(|_| {
+                        left -= 1.0 / stand.rate_hz;
+                        y *= (-1.0 / (decay * stand.rate_hz)).exp();
+                        if left <= 0.0 {
+                            y += draw.sign() * draw.between(0.5, 1.5);
+                            left = 10.0 + 30.0 * draw.exponential();
+                        }
+                        y
+                    })
+                    .collect(),
+            )
+        }
+        "random walk for a while" => {
+            let length = stand.seconds * draw.between(0.15, 0.4);
+            let start = draw.between(0.05 * stand.seconds, 0.95 * stand.seconds - length);
+            let mut y = 0.0;
+            Some(
+                (0..n)
+                    .map(|i| {
+                        if (start..start + length).contains(&t(i)) {
+                            y += draw.normal();
+                        }
+                        y
+                    })
+                    .collect(),
+            )
+        }
         _ => None,
     };
     if let Some(unit) = shape {
@@ -229,6 +305,39 @@ fn one(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: 
                 change,
             }
         }
+        "bursts of noise" | "noise that follows temperature" => {
+            let (low, high) = extremes(temperature);
+            let (mut on, mut left) = (false, draw.between(5.0, 40.0));
+            let shape: Vec<f64> = (0..n)
+                .map(|i| {
+                    if name != "bursts of noise" {
+                        return (temperature[i] - low) / (high - low);
+                    }
+                    left -= 1.0 / stand.rate_hz;
+                    if left <= 0.0 {
+                        on = !on;
+                        left = if on {
+                            draw.between(2.0, 10.0)
+                        } else {
+                            draw.between(20.0, 60.0)
+                        };
+                    }
+                    f64::from(u8::from(on))
+                })
+                .collect();
+            let law = |size: f64| shape.iter().map(|s| 1.0 + size * s).collect::<Vec<f64>>();
+            let found = law(size_for(wanted, &|x| of_variance(&law(x))));
+            Foreign {
+                name,
+                strength: of_variance(&found),
+                change: Change::Scale(found.iter().map(|v| v.sqrt()).collect()),
+            }
+        }
+        "codes that are missing" => Foreign {
+            name,
+            strength: f64::NAN,
+            change: Change::Missing([3, 5, 6, 7, 10][draw.of_many(5)]),
+        },
         "heavy tails" => {
             // Laplace noise, mixed in so that the kurtosis shows.
             let noise = (0..n)
@@ -259,12 +368,16 @@ fn one(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: 
     }
 }
 
-fn swing(values: &[f64]) -> f64 {
-    let (low, high) = values
+fn extremes(values: &[f64]) -> (f64, f64) {
+    values
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {
             (l.min(v), h.max(v))
-        });
+        })
+}
+
+fn swing(values: &[f64]) -> f64 {
+    let (low, high) = extremes(values);
     high - low
 }
 
@@ -323,6 +436,13 @@ impl Foreign {
                     } else {
                         v
                     }
+                });
+            }
+            Change::Missing(every) => {
+                change_readings(record, channel, draw, |_, v| {
+                    let code = (v / LSB).round() as i32;
+                    let next = code.rem_euclid(*every) == 0;
+                    LSB * f64::from(code + i32::from(next))
                 });
             }
             Change::Noise(noise, share) => {

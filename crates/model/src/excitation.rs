@@ -177,13 +177,16 @@ impl World {
         for i in 0..samples {
             let (roll, roll_rate) = sway(i, 0.0);
             let (pitch, pitch_rate) = sway(i, 1.0);
-            acc[0][i] -= pitch.to_radians().sin();
-            acc[1][i] += roll.to_radians().sin();
-            acc[2][i] += pitch.to_radians().cos() * roll.to_radians().cos();
+            // Gravity and rates in the axes of the body, turned by the pitch first and then by the roll.
+            let (sin_pitch, cos_pitch) = pitch.to_radians().sin_cos();
+            let (sin_roll, cos_roll) = roll.to_radians().sin_cos();
+            acc[0][i] -= sin_pitch;
+            acc[1][i] += cos_pitch * sin_roll;
+            acc[2][i] += cos_pitch * cos_roll;
             motion[0][i] = roll_rate;
-            motion[1][i] = pitch_rate;
+            motion[1][i] = pitch_rate * cos_roll;
             let w = std::f64::consts::TAU / get("turn_period_s");
-            motion[2][i] = get("turn_dps") * (w * time(i)).sin();
+            motion[2][i] = get("turn_dps") * (w * time(i)).sin() - pitch_rate * sin_roll;
         }
         Self {
             temperature: std::array::from_fn(|_| temperature.clone()),
