@@ -93,6 +93,15 @@ fn combinations(view: &View<'_>) -> Vec<(String, Vec<f64>)> {
             format!("{} behind a lag", t.name),
             lagged(&t.smooth, LAG_S * view.rate_hz),
         ));
+        for share in PLAYS {
+            let what = format!(
+                "{} with a play of {:.1} {}",
+                t.name,
+                share * t.range(),
+                t.unit
+            );
+            all.push((what, played(&t.smooth, 0.5 * share * t.range())));
+        }
         all.push((
             format!("cube of {}", t.name),
             c.iter().map(|v| v.powi(3)).collect(),

@@ -23,48 +23,90 @@ const MOST_BLOCKS: usize = 6000;
 /// ln of variance, ln of random-walk step over it, ln of half height over the white sigma, ln of dwell in blocks.
 type Coordinates = [f64; 4];
 
+/// Levels of the two-level process, in half heights.
+const TWO: [f64; 2] = [1.0, -1.0];
+/// Levels that stand for any: five of a normal distribution.
+const MANY: [f64; 5] = [-1.5, -0.7, 0.0, 0.7, 1.5];
+
 /// Log likelihood of block means under white noise + random walk + two levels, the mean taken out.
 #[must_use]
 pub fn two_level(y: &[f64], x: &Coordinates) -> f64 {
+    levels_likelihood(y, x, &TWO)
+}
+
+/// The same for jumps between any of `levels`, all equally likely.
+fn levels_likelihood<const K: usize>(y: &[f64], x: &Coordinates, levels: &[f64; K]) -> f64 {
     let white = x[0].exp();
     let walk = white * x[1].exp();
     let half = x[2].exp() * white.sqrt();
-    let switch = 0.5 * (1.0 - (-2.0 * (-x[3]).exp()).exp());
-    let levels = [half, -half];
+    let others = (K - 1) as f64;
+    // Two levels keep their share of 1/2 for ever, many theirs of 1/K.
+    let share = K as f64 / others;
+    let switch = (1.0 - (-share * (-x[3]).exp()).exp()) / share;
+    let start = 1e4 * white + half * half;
     // State by level: log weight, mean and variance of the slow level.
-    let mut states = [
-        (0.5f64.ln(), 0.0, 1e4 * white + half * half),
-        (0.5f64.ln(), 0.0, 1e4 * white + half * half),
-    ];
+    let mut states = [(-(K as f64).ln(), 0.0, start); K];
     let mut sum = 0.0;
     for (t, v) in y.iter().enumerate() {
-        let mut merged = [(f64::NEG_INFINITY, 0.0, 0.0); 2];
+        let mut merged = [(f64::NEG_INFINITY, 0.0, 0.0); K];
         for (j, level) in levels.iter().enumerate() {
-            let mut parts = [(0.0, 0.0, 0.0); 2];
+            let mut parts = [(0.0, 0.0, 0.0); K];
             for (i, (w, m, p)) in states.iter().enumerate() {
-                let moved = if i == j { 1.0 - switch } else { switch };
+                let moved = if i == j {
+                    1.0 - switch
+                } else {
+                    switch / others
+                };
                 let p = p + if t > 0 { walk } else { 0.0 };
                 let s = p + white;
-                let nu = v - m - level;
+                let nu = v - m - half * level;
                 let l = w + moved.ln() - 0.5 * ((std::f64::consts::TAU * s).ln() + nu * nu / s);
                 parts[i] = (l, m + p / s * nu, p * white / s);
             }
-            let top = parts[0].0.max(parts[1].0);
-            let (a, b) = ((parts[0].0 - top).exp(), (parts[1].0 - top).exp());
-            let m = (a * parts[0].1 + b * parts[1].1) / (a + b);
-            let p = (a * (parts[0].2 + (parts[0].1 - m).powi(2))
-                + b * (parts[1].2 + (parts[1].1 - m).powi(2)))
-                / (a + b);
-            merged[j] = (top + (a + b).ln(), m, p);
+            let top = parts.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
+            let weights = parts.map(|p| (p.0 - top).exp());
+            let all: f64 = weights.iter().sum();
+            let m = weights
+                .iter()
+                .zip(&parts)
+                .map(|(w, p)| w * p.1)
+                .sum::<f64>()
+                / all;
+            let p = weights
+                .iter()
+                .zip(&parts)
+                .map(|(w, p)| w * (p.2 + (p.1 - m).powi(2)))
+                .sum::<f64>()
+                / all;
+            merged[j] = (top + all.ln(), m, p);
         }
-        let top = merged[0].0.max(merged[1].0);
-        let total = top + ((merged[0].0 - top).exp() + (merged[1].0 - top).exp()).ln();
+        let top = merged.iter().map(|m| m.0).fold(f64::NEG_INFINITY, f64::max);
+        let total = top + merged.iter().map(|m| (m.0 - top).exp()).sum::<f64>().ln();
         sum += total;
         states = merged.map(|(w, m, p)| (w - total, m, p));
     }
     // The diffuse start integrates the mean out. Its prior density is put back, and the factor of sqrt(count) by which
     // that integral differs from the density of the coefficients k >= 1 of the orthonormal DCT.
-    sum + 0.5 * (std::f64::consts::TAU * (1e4 * white + half * half) * y.len() as f64).ln()
+    sum + 0.5 * (std::f64::consts::TAU * start * y.len() as f64).ln()
+}
+
+/// Nats that many levels are ahead of two, from where the two are at their best.
+fn many_ahead(y: &[f64], two: &Coordinates) -> f64 {
+    let inside = |x: &[f64]| {
+        [
+            x[0],
+            x[1].clamp(-25.0, 2.0),
+            x[2].clamp(-6.0, 6.0),
+            x[3].clamp(0.7, (y.len() as f64 / 3.0).ln()),
+        ]
+    };
+    let objective = |x: &[f64]| {
+        let clamped = inside(x);
+        let outside: f64 = x.iter().zip(&clamped).map(|(a, b)| (a - b).powi(2)).sum();
+        outside - levels_likelihood(y, &clamped, &MANY)
+    };
+    let best = crate::optimise::nelder_mead(&objective, two, &[0.1, 2.0, 0.3, 0.7], 60);
+    -objective(&best) - two_level(y, two)
 }
 
 /// Covariance of the coordinates at a highest point of `l`: the inverse of its curvature, all coordinates free. One that
@@ -287,6 +329,11 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     let half = (x[2] + 0.5 * x[0]).exp();
     let dwell = x[3].exp() * length as f64 / search.view.rate_hz;
     let mut settled = rival;
+    if many_ahead(&blocks, &x) > MARGIN {
+        settled
+            .notes
+            .push("jumps between more than two levels".into());
+    }
     if let Some(t) = settled.terms.last_mut() {
         t.stated = Some(vec![
             (half, half * half_error),

@@ -84,7 +84,13 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<bool>, bool
             !(line && s.state.wandering) && (in_band || generic(t) && (crowd || elsewhere))
         })
         .collect();
-    (terms, failing("variance_in_time") || failing("kurtosis"))
+    // What is left over in the mean or the spectrum comes and goes, and its squares with it.
+    let variance = failing("variance_in_time")
+        || failing("kurtosis")
+        || correlated
+        || failing("time_frequency")
+        || crowd;
+    (terms, variance)
 }
 
 /// Take the doubted names of a channel out of its findings, given as one for each term and then the rest; what follows a

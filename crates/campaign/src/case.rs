@@ -259,6 +259,10 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         Family::Pair => pair(draw, &mut stand, &mut truths),
         Family::Foreign(i) => {
             let wanted = draw.by_ratio(25.0, 40.0);
+            // What follows the temperature along a loop follows it along a line as well.
+            if FOREIGN[i] == "backlash in temperature" {
+                allowed.extend(["temperature", "temperature_quadratic"]);
+            }
             let f = foreign(draw, &stand, FOREIGN[i], axis, wanted);
             strange = f.strength;
             unknown = Some(f);

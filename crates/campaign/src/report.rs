@@ -203,7 +203,8 @@ is measured beside the other; two processes on one channel are not drawn.
 Thresholds were chosen on seeds below 1000 and are graded here on another one; `cargo xtask campaign` draws a fresh seed
 each time. *Named*: the cause stands in the answer, first or among the alternatives that the record leaves open. *Alone*:
 and nothing else is named or unexplained. *Wrong*: a cause that is not there, on that channel, is named; a part of the
-truth (a line for one that swings, a slope for a parabola, Gauss-Markov for telegraph noise) is no hit and no wrong name.
+truth (a line for one that swings, a slope for a parabola or a loop in temperature, Gauss-Markov for telegraph noise) is
+no hit and no wrong name.
 Bounds are 95 % intervals of Clopper and Pearson.
 
 Generator and engine share the model of the effects, so this is an upper bound of what unknown sensors allow; the

@@ -308,7 +308,8 @@ impl<'a> Search<'a> {
             state = self.without(&state, i);
         }
         state = crate::contest::hold(self, state);
-        let notes = self.crowds(&mut state);
+        let mut notes = std::mem::take(&mut state.notes);
+        notes.extend(self.crowds(&mut state));
         self.find_rivals(&mut state);
         state.notes = notes;
         (baseline, state)
