@@ -29,9 +29,8 @@ pub struct Outcome {
 /// Whitened coefficients, and the same in time: independent N(0, 1) under the model.
 #[must_use]
 pub fn whitened(panel: &Panel, state: &State) -> (Vec<f64>, Vec<f64>) {
-    let n = panel.bins.n;
     let r = residual(panel, &state.columns(), &state.solution);
-    let g = state.noise.everywhere(n);
+    let g = state.noise.everywhere(&panel.bins);
     let u: Vec<f64> = r
         .iter()
         .zip(&g)

@@ -326,7 +326,9 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         .max(0.0)
         .sqrt();
     let dwell_error = errors[3][3].max(0.0).sqrt();
-    let half = (x[2] + 0.5 * x[0]).exp();
+    // A block in which the level switches reads anything between the levels: half a block's worth for each switch.
+    let mixed = (0.5 * (-x[3]).exp()).min(0.3);
+    let half = (x[2] + 0.5 * x[0]).exp() / (1.0 - mixed);
     let dwell = x[3].exp() * length as f64 / search.view.rate_hz;
     let mut settled = rival;
     if many_ahead(&blocks, &x) > MARGIN {

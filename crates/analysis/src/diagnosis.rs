@@ -47,6 +47,8 @@ pub(crate) struct Searched<'a> {
     pub u: [Vec<f64>; 2],
     /// The law of the variance, where one was found.
     pub variance: Option<VarianceFound>,
+    /// Smallest sizes that the search would have named, whether it did or not.
+    limits: Vec<DetectionLimit>,
 }
 
 /// A law of the variance that was found.
@@ -172,7 +174,15 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             },
             baseline,
             checks,
-            detection_limits: searched.iter().flat_map(|s| limits(s, &findings)).collect(),
+            detection_limits: searched
+                .iter()
+                .flat_map(|s| s.limits.iter().cloned())
+                .filter(|l| {
+                    !findings
+                        .iter()
+                        .any(|f| f.cause == l.cause && f.channels.contains(&l.channel))
+                })
+                .collect(),
             findings,
             unexplained,
             not_tested,
@@ -209,7 +219,10 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         e: [e0, e1],
         u: [u0, u1],
         variance: None,
+        limits: vec![],
     };
+    s.limits = limits(&s);
+    s.search.panel.release(&s.state.columns());
     if !target.moving {
         s.variance = variance(&s);
     }
@@ -451,9 +464,9 @@ fn effects_of<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<EffectMode
     all
 }
 
-/// Smallest size of each regression that was looked for and not found: at d' = 6.3 of its own standard error with the
+/// Smallest size of each regression that was looked for: at d' = 6.3 of its own standard error with the
 /// random walk averaged, which the search names 95 times in 100.
-fn limits(s: &Searched<'_>, findings: &[Finding]) -> Vec<DetectionLimit> {
+fn limits(s: &Searched<'_>) -> Vec<DetectionLimit> {
     const D_PRIME: f64 = 6.3;
     if s.target.moving {
         return vec![];
@@ -463,15 +476,12 @@ fn limits(s: &Searched<'_>, findings: &[Finding]) -> Vec<DetectionLimit> {
     let mut all = vec![];
     for c in &s.search.candidates {
         let id = c.effect.id();
-        let told = findings
-            .iter()
-            .any(|f| f.cause == id && f.channels.contains(&s.target.name));
         // Of several shapes that estimate one parameter, the first is the effect's own.
         let listed = |name: &str| {
             all.iter()
                 .any(|l: &DetectionLimit| l.cause == id && l.parameter == name)
         };
-        if told || id == beyond::ID {
+        if id == beyond::ID {
             continue;
         }
         let (Hypothesis::Regression(r), [column, ..]) = (&c.hypothesis, c.columns()) else {

@@ -128,10 +128,7 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
     let errors = noise_errors(panel, state);
     let n = panel.bins.n as f64;
     let (mut column, mut coordinate) = (0, 1);
-    let g = |omega: f64| {
-        let k = ((omega / std::f64::consts::PI * n).round() as usize).clamp(1, panel.bins.n - 1);
-        state.noise.everywhere(panel.bins.n)[k]
-    };
+    let g = |omega: f64| state.noise.at(omega);
     state
         .terms
         .iter()

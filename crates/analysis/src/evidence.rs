@@ -39,9 +39,8 @@ pub(crate) fn allan_misfit(s: &Searched<'_>, _rate_hz: f64, seed: u64) -> [f64; 
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x616c_6c61_6e21);
     let y = &s.target.y;
     let panel = &s.search.panel;
-    let n = y.len();
     let mut against = |state: &State| {
-        let g = state.noise.everywhere(n);
+        let g = state.noise.everywhere(&panel.bins);
         let white = state.solution.white;
         let fitted = modelled(panel, state, &state.terms.iter().collect::<Vec<_>>());
         let measured: Vec<f64> = y.iter().zip(&fitted).map(|(y, f)| y - f).collect();

@@ -277,7 +277,7 @@ fn spikes(
     let n = y.len();
     let mut found: Vec<usize> = vec![];
     for _ in 0..PASSES {
-        let g = fit.0.everywhere(n);
+        let g = fit.0.everywhere(bins);
         let c: Vec<f64> = dct
             .forward(y)
             .iter()
@@ -427,7 +427,7 @@ fn smoothed(values: &[f64], dct: &Dct, bins: &Rc<Bins>) -> Vec<f64> {
         return values.to_vec();
     }
     let (noise, _) = panel.fit(&Noise::new(-12.0), &[]);
-    let g = noise.everywhere(values.len());
+    let g = noise.everywhere(bins);
     for (v, g) in c.iter_mut().zip(g).skip(1) {
         *v *= 1.0 - 1.0 / g;
     }

@@ -5,7 +5,7 @@
 //! g_k = h(w_k) + lambda / (2 - 2 cos w_k) + further densities, w_k = pi k / N. What a fit needs of the data are sums
 //! of products of coefficients over bins in which g hardly changes: singly at low frequency, then 1 % wide.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -72,6 +72,8 @@ pub struct Bins {
     pub at: Frequencies,
     /// Random-walk shape 1 / (2 - 2 cos w).
     walk: Vec<f64>,
+    /// The same at every coefficient, that of k = 0 in the place of which k = 1 stands, once it is asked for.
+    fine: OnceCell<(Frequencies, Vec<f64>)>,
 }
 
 fn walk_shape(omega: f64) -> f64 {
@@ -104,7 +106,24 @@ impl Bins {
             start,
             at: Frequencies { omega, cosine },
             walk,
+            fine: OnceCell::new(),
         }
+    }
+
+    fn fine(&self) -> &(Frequencies, Vec<f64>) {
+        self.fine.get_or_init(|| {
+            let omega: Vec<f64> = (0..self.n)
+                .map(|k| std::f64::consts::PI * k.max(1) as f64 / self.n as f64)
+                .collect();
+            let cosine: Vec<f64> = omega.iter().map(|w| w.cos()).collect();
+            let walk = omega.iter().map(|w| walk_shape(*w)).collect();
+            (Frequencies { omega, cosine }, walk)
+        })
+    }
+
+    /// Random-walk shape 1 / (2 - 2 cos w) at every coefficient.
+    pub(crate) fn walks(&self) -> &[f64] {
+        &self.fine().1
     }
 
     /// Sums of a[k] b[k] over each bin.
@@ -169,23 +188,37 @@ impl Noise {
 
     /// g at every coefficient k = 0..n; that of k = 0, which no likelihood uses, is infinite.
     #[must_use]
-    pub fn everywhere(&self, n: usize) -> Vec<f64> {
-        self.first(n, n)
+    pub fn everywhere(&self, bins: &Bins) -> Vec<f64> {
+        self.first(bins, bins.n)
     }
 
-    /// g at the first `count` of `n` coefficients; as [`Noise::everywhere`].
+    /// g at the first `count` coefficients; as [`Noise::everywhere`].
     #[must_use]
-    pub fn first(&self, n: usize, count: usize) -> Vec<f64> {
-        let omega: Vec<f64> = (0..count)
-            .map(|k| std::f64::consts::PI * k.max(1) as f64 / n as f64)
-            .collect();
-        let cosine = omega.iter().map(|w| w.cos()).collect();
-        let walk: Vec<f64> = omega.iter().map(|w| walk_shape(*w)).collect();
-        let mut g = self.shape(&Frequencies { omega, cosine }, &walk);
+    pub fn first(&self, bins: &Bins, count: usize) -> Vec<f64> {
+        let (at, walk) = bins.fine();
+        let mut g = if count < bins.n {
+            let few = Frequencies {
+                omega: at.omega[..count].to_vec(),
+                cosine: at.cosine[..count].to_vec(),
+            };
+            self.shape(&few, &walk[..count])
+        } else {
+            self.shape(at, walk)
+        };
         if let Some(first) = g.first_mut() {
             *first = f64::INFINITY;
         }
         g
+    }
+
+    /// g at one angular frequency, rad per sample.
+    #[must_use]
+    pub fn at(&self, omega: f64) -> f64 {
+        let at = Frequencies {
+            omega: vec![omega],
+            cosine: vec![omega.cos()],
+        };
+        self.shape(&at, &[walk_shape(omega)])[0]
     }
 }
 
@@ -256,6 +289,15 @@ impl Panel {
     pub fn truncate(&self, length: usize) {
         self.columns.borrow_mut().truncate(length);
         self.pairs.borrow_mut().retain(|k, _| k.1 < length);
+    }
+
+    /// Let go of all columns but the data and `kept`; sums of products that were asked for before stay known.
+    pub fn release(&self, kept: &[usize]) {
+        for (i, c) in self.columns.borrow_mut().iter_mut().enumerate() {
+            if i > 0 && !kept.contains(&i) {
+                *c = Rc::default();
+            }
+        }
     }
 
     /// Columns held, the data included.

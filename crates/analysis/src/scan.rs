@@ -40,13 +40,15 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
     let mut planner = DctPlanner::new();
     let dst = planner.plan_dst1(m - 1);
     let fft = FftPlanner::<f64>::new().plan_fft_forward(m);
-    let half: Vec<f64> = (0..m)
-        .map(|k| 2.0 * (std::f64::consts::PI * k.max(1) as f64 / (2.0 * n as f64)).sin())
+    // 2 sin(w / 2).
+    let half: Vec<f64> = panel.bins.walks()[..m]
+        .iter()
+        .map(|w| 1.0 / w.sqrt())
         .collect();
     let scale = -(2.0 / n as f64).sqrt();
     let mut best = vec![f64::NEG_INFINITY; m];
     for noise in walks {
-        let g = noise.first(n, m);
+        let g = noise.first(&panel.bins, m);
         let solution = panel.solve(&noise.over(&panel.bins), columns);
         // <step at t, x> under this noise, for all t.
         let against = |x: &[f64]| {
@@ -98,7 +100,7 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
 #[must_use]
 pub fn lines(panel: &Panel, noise: &Noise, columns: &[usize], solution: &Solution) -> Vec<f64> {
     let n = panel.bins.n;
-    let g = noise.everywhere(n);
+    let g = noise.everywhere(&panel.bins);
     let r = residual(panel, columns, solution);
     let weighted: Vec<f64> = r.iter().zip(&g).map(|(r, g)| r / g).collect();
     let z = panel.dct.inverse(&weighted);
@@ -155,7 +157,7 @@ pub fn beats(
     phase: f64,
 ) -> Vec<f64> {
     let n = panel.bins.n;
-    let g = noise.everywhere(n);
+    let g = noise.everywhere(&panel.bins);
     let r = residual(panel, columns, solution);
     let weighted: Vec<f64> = r.iter().zip(&g).map(|(r, g)| r / g).collect();
     let z = panel.dct.inverse(&weighted);

@@ -171,7 +171,7 @@ impl<'a> Search<'a> {
                 Err(why) => not_tested.push((effect.id(), why)),
                 Ok(hypotheses) => {
                     let siblings = hypotheses.len();
-                    for hypothesis in hypotheses {
+                    for mut hypothesis in hypotheses {
                         let columns = match &hypothesis {
                             Hypothesis::Regression(r) => {
                                 r.columns.iter().map(|c| panel.add(&c.values)).collect()
@@ -194,6 +194,10 @@ impl<'a> Search<'a> {
                                 .collect(),
                             _ => vec![],
                         };
+                        // The panel has them now.
+                        if let Hypothesis::Regression(r) = &mut hypothesis {
+                            r.columns.iter_mut().for_each(|c| c.values = vec![]);
+                        }
                         candidates.push(Candidate {
                             effect,
                             hypothesis,
