@@ -131,7 +131,7 @@ fn combinations(view: &View<'_>) -> Vec<(String, Vec<f64>)> {
     }
     for a in view
         .all(Quantity::Acc)
-        .filter(|a| a.std_dev() >= LEAST_VIBRATION)
+        .filter(|a| a.std_dev() >= LEAST_VIBRATION && !view.sways())
     {
         let square = centred(&a.values).iter().map(|v| v * v).collect();
         all.push((format!("square of {}", a.name), square));

@@ -119,6 +119,14 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     checks.extend(shared.checks);
     checks.extend(audited.checks);
     unexplained.extend(audited.unexplained);
+    // What was found on the channel may have bent the distribution; then the residual decides.
+    let bent = |name: &str| {
+        let found = |s: &&Searched<'_>| !s.state.terms.is_empty() || s.variance.is_some();
+        let tails = |c: &Check| c.id == "kurtosis" && c.channel == name && c.fails_after;
+        let mut own = searched.iter().filter(|s| s.target.name == name);
+        own.any(|s| found(&s)) && !checks.iter().any(tails)
+    };
+    unexplained.extend(audited.not_normal.into_iter().filter(|u| !bent(&u.channel)));
     findings.extend(shared.finding);
     let findings = joined(findings);
     let mut not_tested = not_tested(&searched);
@@ -324,7 +332,7 @@ fn channel_checks(s: &Searched<'_>) -> Vec<Check> {
             threshold: LEAST_CHANCE,
             fails_before: b.p_value < LEAST_CHANCE,
             // A base that moves is told as an input; what it leaves in the residual is no riddle.
-            fails_after: a.p_value < LEAST_CHANCE && !s.target.moving,
+            fails_after: a.p_value < LEAST_CHANCE && !s.target.moving && !s.search.view.sways(),
             what: if a.p_value < LEAST_CHANCE {
                 a.what
             } else {
@@ -347,6 +355,7 @@ fn left_over(checks: &[Check], shared: &Shared) -> Vec<Unexplained> {
 
 fn not_tested(searched: &[Searched<'_>]) -> Vec<NotTested> {
     let mut all: Vec<(NotTested, Vec<&str>)> = vec![];
+    let sways = searched.iter().any(|s| s.search.view.sways());
     for s in searched {
         let mut own: Vec<(&'static str, String)> = s.search.not_tested.clone();
         if s.target.moving {
@@ -364,6 +373,21 @@ fn not_tested(searched: &[Searched<'_>]) -> Vec<NotTested> {
                 )
             };
             for c in s.search.candidates.iter().filter(|c| slow(&c.hypothesis)) {
+                if own.iter().all(|o| o.0 != c.effect.id()) {
+                    own.push((c.effect.id(), why.to_owned()));
+                }
+            }
+        }
+        if sways && !s.target.moving {
+            let why = "the base sways, and turns a little about this axis too: record it at rest";
+            let unsafe_here =
+                |h: &Hypothesis| matches!(h, Hypothesis::Line | Hypothesis::Covariance(_));
+            for c in s
+                .search
+                .candidates
+                .iter()
+                .filter(|c| unsafe_here(&c.hypothesis))
+            {
                 if own.iter().all(|o| o.0 != c.effect.id()) {
                     own.push((c.effect.id(), why.to_owned()));
                 }

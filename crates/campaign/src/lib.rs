@@ -37,11 +37,11 @@ pub struct Size {
 
 /// Minutes.
 pub const QUICK: Size = Size {
-    clean: 200,
+    clean: 300,
     elsewhere: 12,
-    one: 24,
+    one: 26,
     counted: 8,
-    pairs: 60,
+    pairs: 80,
     foreign: 6,
 };
 /// At most an hour on two cores.

@@ -183,6 +183,13 @@ impl View<'_> {
         self.signals.iter().filter(move |s| s.quantity == quantity)
     }
 
+    /// Whether the base sways: some gyro sees motion that no turntable makes. Small true rates about the other axes come
+    /// with it.
+    #[must_use]
+    pub fn sways(&self) -> bool {
+        self.base != Some(Base::Turntable) && self.signals.iter().any(|s| s.moving)
+    }
+
     /// Length of the record, s.
     #[must_use]
     pub fn seconds(&self) -> f64 {

@@ -323,7 +323,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             if smooth - stuck_likelihood(counts, local, &known, &sound) < CLEARLY_NOT_NORMAL {
                 return;
             }
-            audit.unexplained.push(Unexplained {
+            audit.not_normal.push(Unexplained {
                 channel: name.into(),
                 what: format!(
                     "the counts of {name} are not normally distributed about their level ({:.1} sigma at bit {}), and no bit that sticks makes them so",

@@ -8,6 +8,8 @@
 /// Half widths of the means, in samples, widest first: where the level stands still, the noise of a narrow mean would
 /// be counted twice, in the level and in the spread about it.
 const MEANS: &[usize] = &[400, 100, 40, 20, 10];
+/// Half width up to which a neighbourhood is narrow.
+const NARROW: usize = 20;
 /// Half widths of the parabolas.
 const PARABOLAS: &[usize] = &[10, 5];
 /// Half width of the median that keeps spikes out of the neighbourhoods.
@@ -31,6 +33,9 @@ pub struct Local {
     pub sigma: f64,
     /// Whether parabolas predict best: the base moves, and the prediction errs by the motion as well.
     pub bent: bool,
+    /// Readings at either end whose prediction leans on one side alone, where the neighbourhood is narrow because the
+    /// level moves.
+    pub edge: usize,
 }
 
 /// Half the width between the 10 % and 90 % points over that of the standard normal.
@@ -143,6 +148,7 @@ impl Local {
                 residual,
                 sigma,
                 bent: false,
+                edge: 0,
             }
         };
         let all = MEANS
@@ -157,6 +163,7 @@ impl Local {
                 means(&clean, half)
             });
             next.bent = bent;
+            next.edge = if half <= NARROW { half } else { 0 };
             if best.as_ref().is_none_or(|b| next.sigma < BETTER * b.sigma) {
                 best = Some(next);
             }

@@ -53,6 +53,8 @@ pub struct Audit {
     pub not_tested: Vec<NotTested>,
     /// What is wrong and has no name in the library.
     pub unexplained: Vec<Unexplained>,
+    /// Channels whose counts are not normal about their level; a noise that changes makes them so as well.
+    pub not_normal: Vec<Unexplained>,
     /// Rows before which frames were lost without a gap of the sequence numbers, and how many.
     pub silently_lost: Vec<(usize, u64)>,
 }

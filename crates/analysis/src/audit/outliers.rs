@@ -27,6 +27,11 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
         .iter()
         .zip(g.local.spread())
         .map(|(r, s)| ((r.abs() - 0.5 * step).max(0.0)) / s.max(0.3 * step))
+        .enumerate()
+        .map(|(i, z)| {
+            let inside = i >= g.local.edge && i + g.local.edge < n;
+            if inside { z } else { 0.0 }
+        })
         .collect();
     let far: Vec<usize> = (0..n).filter(|i| z[*i] > limit).collect();
     let single: Vec<usize> = far

@@ -168,10 +168,13 @@ impl Search<'_> {
     pub(super) fn open(&self, state: &State, i: usize) -> bool {
         let c = &self.candidates[i];
         match &c.hypothesis {
-            Hypothesis::Step | Hypothesis::Line => !self.view.moving,
+            Hypothesis::Step => !self.view.moving,
+            Hypothesis::Line => !self.view.moving && !self.view.sways(),
             Hypothesis::SideBands => state.terms.iter().all(|t| t.candidate != i),
             Hypothesis::Covariance(_) => {
-                !self.view.moving && state.terms.iter().all(|t| t.effect.id() != c.effect.id())
+                !self.view.moving
+                    && !self.view.sways()
+                    && state.terms.iter().all(|t| t.effect.id() != c.effect.id())
             }
             Hypothesis::Regression(r) => {
                 let other = |t: &Term| r.columns.iter().all(|c| !t.names.contains(&c.parameter));
