@@ -1,5 +1,9 @@
-//! How long a diagnosis takes: `cargo run --release -p analysis --example speed -- SECONDS RATE`.
+//! How long a diagnosis takes, and a baseline fit: `cargo run --release -p analysis --example speed -- SECONDS RATE`.
+//! Processor time of one core counts; on a machine that does other things, hold `time` beside it.
 
+use std::rc::Rc;
+
+use analysis::likelihood::{Bins, Dct, Noise, Panel};
 use analysis::{DiagnoseOptions, diagnose};
 use model::ModelFile;
 
@@ -28,6 +32,26 @@ fn main() {
         begun.elapsed().as_secs_f64(),
         d.findings.len(),
         d.unexplained.len()
+    );
+    let y: Vec<f64> = record.channels[0]
+        .values
+        .iter()
+        .copied()
+        .cycle()
+        .take(1_000_000)
+        .collect();
+    let (dct, bins) = (Dct::new(y.len()), Rc::new(Bins::new(y.len())));
+    let mut fastest = f64::INFINITY;
+    for _ in 0..5 {
+        let begun = std::time::Instant::now();
+        let panel = Panel::new(&dct, &bins, &y);
+        let fit = panel.fit(&Noise::new(-12.0), &[]);
+        fastest = fastest.min(begun.elapsed().as_secs_f64());
+        assert!(fit.1.white > 0.0);
+    }
+    println!(
+        "baseline fit of 1e6 samples, transform included: {:.1} ms, fastest of 5",
+        1e3 * fastest
     );
     for f in &d.findings {
         println!("  {}", f.what);

@@ -231,6 +231,7 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     };
     s.limits = limits(&s);
     s.search.panel.release(&s.state.columns());
+    grid.dct.keep_no_more();
     if !target.moving {
         s.variance = variance(&s);
     }

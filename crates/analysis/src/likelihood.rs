@@ -5,7 +5,7 @@
 //! g_k = h(w_k) + lambda / (2 - 2 cos w_k) + further densities, w_k = pi k / N. What a fit needs of the data are sums
 //! of products of coefficients over bins in which g hardly changes: singly at low frequency, then 1 % wide.
 
-use std::cell::{OnceCell, RefCell};
+use std::cell::{Cell, OnceCell, RefCell};
 use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -18,11 +18,30 @@ const SINGLE: usize = 256;
 /// Width of the other bins over their frequency.
 const WIDTH: f64 = 0.01;
 
+/// Coefficients of columns that the channels of a record have in common, by a digest of their samples.
+type Known = HashMap<[u64; 2], Rc<Vec<f64>>>;
+
 /// The orthonormal DCT-II of one length.
 #[derive(Clone)]
 pub struct Dct {
     plan: Arc<dyn TransformType2And3<f64>>,
     n: usize,
+    known: Rc<RefCell<Known>>,
+    /// Whether what the channels have in common is known: those of the first are, and no later one's own are kept.
+    complete: Rc<Cell<bool>>,
+}
+
+/// Two sums over the samples' bits and places: columns that agree in both are the same.
+fn digest(x: &[f64]) -> [u64; 2] {
+    let step = |h: u64, v: u64, by: u64| (h ^ v).wrapping_mul(by).rotate_left(29);
+    x.iter()
+        .fold([0x243f_6a88_85a3_08d3, x.len() as u64], |[a, b], v| {
+            let bits = v.to_bits();
+            [
+                step(a, bits, 0x9e37_79b9_7f4a_7c15),
+                step(b, bits, 0xc2b2_ae3d_27d4_eb4f),
+            ]
+        })
 }
 
 impl Dct {
@@ -32,7 +51,14 @@ impl Dct {
         Self {
             plan: DctPlanner::new().plan_dct2(n),
             n,
+            known: Rc::default(),
+            complete: Rc::default(),
         }
+    }
+
+    /// Keep no further columns for other channels.
+    pub fn keep_no_more(&self) {
+        self.complete.set(true);
     }
 
     /// Coefficients of `x`.
@@ -270,6 +296,21 @@ impl Panel {
             columns: RefCell::new(vec![Rc::new(dct.forward(y))]),
             pairs: RefCell::default(),
         }
+    }
+
+    /// Add a column that other channels may have as well; returns its number.
+    pub fn add_common(&self, values: &[f64]) -> usize {
+        let key = digest(values);
+        let known = self.dct.known.borrow().get(&key).map(Rc::clone);
+        let c = known.unwrap_or_else(|| {
+            let c = Rc::new(self.dct.forward(values));
+            if !self.dct.complete.get() {
+                self.dct.known.borrow_mut().insert(key, Rc::clone(&c));
+            }
+            c
+        });
+        self.columns.borrow_mut().push(c);
+        self.columns.borrow().len() - 1
     }
 
     /// Add a column of samples; returns its number.

@@ -259,6 +259,9 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         Family::Pair => pair(draw, &mut stand, &mut truths),
         Family::Foreign(i) => {
             let wanted = draw.by_ratio(25.0, 40.0);
+            if FOREIGN[i] == "line that comes and goes" {
+                allowed.push("line");
+            }
             // What follows the temperature along a loop follows it along a line as well.
             if FOREIGN[i] == "backlash in temperature" {
                 allowed.extend(["temperature", "temperature_quadratic"]);

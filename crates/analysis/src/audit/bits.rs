@@ -149,6 +149,9 @@ const KERNEL: f64 = 0.5;
 
 /// Nats that the smooth density has to gain over the normal one before the counts are told not to be normal.
 const CLEARLY_NOT_NORMAL: f64 = 20.0;
+/// The same for each reading of a long record, in which the level's own error adds up; noise with an exponential tail
+/// gains 0.07.
+const BY_READING: f64 = 0.003;
 
 /// Log likelihood of the counts when a bit sticks: a code takes the share f of the one that differs in that bit alone.
 fn stuck_likelihood(counts: &[i32], local: &Local, known: &[bool], s: &Stuck) -> f64 {
@@ -320,7 +323,8 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
                 fraction: 0.0,
                 ..*worst
             };
-            if smooth - stuck_likelihood(counts, local, &known, &sound) < CLEARLY_NOT_NORMAL {
+            let gained = smooth - stuck_likelihood(counts, local, &known, &sound);
+            if gained < CLEARLY_NOT_NORMAL.max(BY_READING * counts.len() as f64) {
                 return;
             }
             audit.not_normal.push(Unexplained {

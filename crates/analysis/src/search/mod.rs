@@ -173,9 +173,11 @@ impl<'a> Search<'a> {
                     let siblings = hypotheses.len();
                     for mut hypothesis in hypotheses {
                         let columns = match &hypothesis {
-                            Hypothesis::Regression(r) => {
-                                r.columns.iter().map(|c| panel.add(&c.values)).collect()
-                            }
+                            Hypothesis::Regression(r) => r
+                                .columns
+                                .iter()
+                                .map(|c| panel.add_common(&c.values))
+                                .collect(),
                             _ => vec![],
                         };
                         let grid = match &hypothesis {
@@ -187,7 +189,7 @@ impl<'a> Search<'a> {
                                         at,
                                         s.columns(at)
                                             .iter()
-                                            .map(|c| panel.add(&c.values))
+                                            .map(|c| panel.add_common(&c.values))
                                             .collect(),
                                     )
                                 })
@@ -333,7 +335,14 @@ impl<'a> Search<'a> {
                     && o.score() > 0.0
             })
             .max_by(|a, b| a.score().total_cmp(&b.score()));
-        Some(narrower.unwrap_or(best).clone())
+        let best = narrower.unwrap_or(best);
+        // Of one effect's shapes that do about as well, the first listed is the plain one.
+        let plain = offers
+            .iter()
+            .filter(|o| o.effect.id() == best.effect.id() && o.candidate < best.candidate)
+            .filter(|_| matches!(best.form, Form::Columns | Form::Shaped(..)))
+            .find(|o| o.score() > 0.0 && o.score() > best.score() - RIVAL_SPAN);
+        Some(plain.unwrap_or(best).clone())
     }
 
     /// A covariance term that swallowed a regressor gives way to it.

@@ -1,5 +1,7 @@
 //! What the search says of its own answer: effects that would do as well, and crowds of terms that no one cause makes.
 
+use model::effect::Hypothesis;
+
 use super::{Form, MOST_ALIKE, RIVAL_SPAN, Search, State};
 
 /// Span of a crowd of lines over their frequency, below which they are one that wanders.
@@ -39,6 +41,21 @@ impl Search<'_> {
             state.terms.retain(|t| {
                 !matches!(t.form, Form::Line(_) | Form::SideBands(..)) || t.lr == strongest
             });
+            // What wanders swings in no single time: it is a line and no more.
+            let line = self
+                .candidates
+                .iter()
+                .position(|c| matches!(c.hypothesis, Hypothesis::Line));
+            for t in &mut state.terms {
+                if let (Form::SideBands(carrier, _), Some(i)) = (&t.form, line) {
+                    t.form = Form::Line(*carrier);
+                    t.effect = self.candidates[i].effect;
+                    t.candidate = i;
+                    t.columns.truncate(2);
+                    t.names.truncate(2);
+                    t.threshold = crate::threshold::line(self.panel.bins.n);
+                }
+            }
         }
         let times: Vec<f64> = state
             .terms
