@@ -2,7 +2,6 @@
 //! so that the frame after it is intact. No frame begins with 0x3F: the longest request is shorter.
 
 use firmware::{Board, VERSION};
-use heapless::Vec;
 use ufmt::{uWrite, uwrite};
 
 use super::{board::AvrBoard, serial};
@@ -32,36 +31,38 @@ impl Console {
 /// Version, reset cause, stack, each as `letter number`: every string would be copied to the SRAM, letters are not.
 #[inline(never)]
 fn answer(board: &mut AvrBoard) {
-    let mut text = Text(Vec::new());
+    if !serial::has_room(LONGEST) {
+        return;
+    }
     let [major, minor, patch] = VERSION;
-    text.number(b'v', major.into());
-    text.number(b'w', minor.into());
-    text.number(b'x', patch.into());
-    text.number(b'y', board.reset_cause().into());
-    text.number(b'z', board.stack_free());
-    let _room = text.0.push(0);
-    serial::send_plain(&text.0);
+    number(b'v', major.into());
+    number(b'w', minor.into());
+    number(b'x', patch.into());
+    number(b'y', board.reset_cause().into());
+    number(b'z', board.stack_free());
+    serial::say(0);
 }
 
 /// Five numbers of at most four hexadecimal digits with a letter and a blank each, and the delimiter.
-struct Text(Vec<u8, 31>);
+const LONGEST: u8 = 31;
 
-impl Text {
-    #[inline(never)]
-    fn number(&mut self, letter: u8, value: u16) {
-        let _room = self.0.push(letter);
-        let _room = uwrite!(self, "{:x}", value);
-        let _room = self.0.push(b' ');
-    }
+#[inline(never)]
+fn number(letter: u8, value: u16) {
+    serial::say(letter);
+    let Ok(()) = uwrite!(&mut Line, "{:x}", value);
+    serial::say(b' ');
 }
 
-impl uWrite for Text {
-    type Error = ();
+/// The line, straight.
+struct Line;
+
+impl uWrite for Line {
+    type Error = core::convert::Infallible;
 
     #[inline(never)]
-    fn write_str(&mut self, digits: &str) -> Result<(), ()> {
+    fn write_str(&mut self, digits: &str) -> Result<(), core::convert::Infallible> {
         for &digit in digits.as_bytes() {
-            let _room = self.0.push(digit);
+            serial::say(digit);
         }
         Ok(())
     }

@@ -73,14 +73,15 @@ pub fn send(kind: u8, fields: &[u8]) -> bool {
     true
 }
 
-/// Queues all of it or nothing.
-pub fn send_plain(text: &[u8]) {
-    if (TX.room() as usize) < text.len() {
-        return;
-    }
-    for &byte in text {
-        TX.push(byte);
-    }
+/// Whether so many plain bytes fit.
+pub fn has_room(bytes: u8) -> bool {
+    TX.room() >= bytes
+}
+
+/// Queues a plain byte, for which there is room.
+#[inline(never)]
+pub fn say(byte: u8) {
+    TX.push(byte);
     begin();
 }
 
