@@ -424,7 +424,7 @@ fn analyze_channel(
             n / tau0.sqrt() / lsb
         ));
     }
-    let figures = paper_figures(&phase, &spectrum, &fitted, &mut rng);
+    let figures = paper_figures(&phase, gapped.as_ref(), &spectrum, &fitted, &mut rng);
     out.paper = Paper {
         angle_random_walk: Interval::figure(figures.angle_random_walk, &units.angle_random_walk),
         in_run_bias_stability: Interval::figure(
@@ -490,10 +490,7 @@ fn gapped_curve(
     grid.factors(longest)
         .into_iter()
         .filter_map(|m| {
-            let white_share = fitted.map_or(1.0, |f| {
-                let [white, ..] = f.maximum.coefficients;
-                (white / m as f64 / f.deviation(m).powi(2)).min(1.0)
-            });
+            let white_share = fitted.map_or(1.0, |f| f.white_share(m));
             let found = gapped.overlapping_allan(tau0, m, white_share)?;
             // Where no run is long enough to tell, the fit does: by the slope of its curve.
             noise = identify(phase, m)

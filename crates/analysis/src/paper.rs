@@ -5,7 +5,7 @@
 
 use rand_core::Rng;
 
-use crate::allan::{Deviation, Phase, TauGrid, deviation};
+use crate::allan::{Deviation, Gapped, Phase, TauGrid, deviation};
 use crate::noise_fit::{NoiseFit, Spectrum, Term, replicate};
 
 /// Cluster times of the line, s.
@@ -47,6 +47,7 @@ pub struct PaperFigures {
 #[must_use]
 pub fn paper_figures(
     phase: &Phase,
+    gapped: Option<&Gapped>,
     spectrum: &Spectrum,
     fit: &NoiseFit,
     rng: &mut impl Rng,
@@ -54,9 +55,12 @@ pub fn paper_figures(
     let tau0 = spectrum.tau0;
     let seconds = phase.samples() as f64 * tau0;
     let mut out = PaperFigures::default();
+    let longest = gapped.map_or(phase.longest_run(), |g| {
+        g.lengths().into_iter().max().unwrap_or(0)
+    });
     let factors = |(low, high): (f64, f64)| -> Vec<usize> {
         TauGrid::Log(PER_DECADE)
-            .factors(phase.longest_run() / 2)
+            .factors(longest / 2)
             .into_iter()
             .filter(|m| (low * 0.999..=high * 1.001).contains(&(*m as f64 * tau0)))
             .collect()
@@ -69,7 +73,12 @@ pub fn paper_figures(
             .collect();
         (!logs.is_empty()).then(|| logs.iter().sum::<f64>() / logs.len() as f64)
     };
-    let observed = |m: usize| deviation(phase, Deviation::Oadev, tau0, m).map(|e| e.deviation);
+    let observed = |m: usize| match gapped {
+        Some(g) => g
+            .overlapping_allan(tau0, m, fit.white_share(m))
+            .map(|e| e.estimate.deviation),
+        None => deviation(phase, Deviation::Oadev, tau0, m).map(|e| e.deviation),
+    };
     let figure = |ms: &[usize],
                   slope: f64,
                   rng: &mut dyn FnMut() -> Vec<f64>|

@@ -295,18 +295,19 @@ pub fn profile_interval(
         }
         bisect(&mut below, inside, outside)
     };
-    let shape_scale = spectrum.bins[0].shape[term];
-    let white = maximum
-        .coefficients
+    // Where the term is strongest, a thousandth of all there is.
+    let strongest = spectrum
+        .bins
         .iter()
-        .zip(spectrum.bins[0].shape)
-        .map(|(c, s)| c * s)
-        .sum::<f64>();
+        .max_by(|a, b| a.shape[term].total_cmp(&b.shape[term]))
+        .unwrap_or(&spectrum.bins[0]);
+    let shape_scale = strongest.shape[term];
+    let there = Spectrum::variance(strongest, &maximum.coefficients);
     let mut inside = peak;
     let mut outside = if peak > 0.0 {
         peak * 1.1
     } else {
-        1e-3 * white / shape_scale
+        1e-3 * there / shape_scale
     };
     for _ in 0..80 {
         if below(outside) <= 0.0 {

@@ -66,6 +66,13 @@ impl NoiseFit {
         self.terms[term as usize]
     }
 
+    /// Part of white noise in the Allan variance of the fitted model at `m`, 0..1.
+    #[must_use]
+    pub fn white_share(&self, m: usize) -> f64 {
+        let [white, ..] = self.maximum.coefficients;
+        (white / m as f64 / self.deviation(m).powi(2)).min(1.0)
+    }
+
     /// Allan deviation of the fitted model at `m`, U.
     #[must_use]
     pub fn deviation(&self, m: usize) -> f64 {

@@ -82,6 +82,12 @@ fn white_noise_alone_gets_no_bias_instability_and_its_limits_are_small() {
         let b = fit.term(Term::Flicker);
         assert_eq!(b.value, None);
         assert!(b.high > 0.0 && b.high < 0.088, "{b:?}");
+        // Q²/τ₀² is known to √(2/4000)/√2 = 1.6 % of the white variance: six of that are 0.31 N√τ₀.
+        let q = fit.term(Term::Quantization);
+        assert!(
+            q.high > 0.0 && q.high < 0.31 * 0.088 * 0.05f64.sqrt(),
+            "{q:?}"
+        );
         assert_eq!(fit.rate_ramp.value, None);
         false_walks += usize::from(fit.term(Term::RandomWalk).value.is_some());
     }
