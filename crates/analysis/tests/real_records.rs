@@ -154,17 +154,17 @@ fn ref_adis16405_no_slow_cause_is_named_that_another_part_does_not_repeat() {
 }
 
 #[test]
-fn ref_adis16405_no_slow_cause_is_named_of_hours_at_100_hz_that_the_other_half_does_not_repeat() {
+fn ref_adis16405_no_slow_cause_is_named_at_100_hz_that_another_part_does_not_repeat() {
     let file = "adis16405_run1_100hz.csv.gz";
-    let halves: Vec<_> = [0..500_000, 500_000..1_000_000]
+    let parts: Vec<_> = [0..60_000, 500_000..560_000]
         .into_iter()
         .enumerate()
         .map(|(i, rows)| {
-            let of = format!("adis16405 at 100 Hz, half {i}");
+            let of = format!("adis16405 at 100 Hz, part {i}");
             slow(&told(&of, &record(file, 100.0, rows, 1)))
         })
         .collect();
-    assert_eq!(halves[0], halves[1]);
+    assert_eq!(parts[0], parts[1]);
 }
 
 #[test]

@@ -91,6 +91,16 @@ fn square(level: f64, sigma: f64, period: f64) -> f64 {
     sum.clamp(-1.0, 1.0)
 }
 
+/// Standard deviation of the readings before they were rounded, far ones left out. A spread between two shares of the
+/// readings would be a whole number of counts where the level stands still.
+fn unrounded(local: &Local) -> f64 {
+    const FAR: f64 = 4.5;
+    let limit = FAR * local.sigma.max(1.0);
+    let near = local.residual.iter().filter(|r| r.abs() < limit);
+    let (sum, count) = near.fold((0.0, 0.0), |(s, n), r| (s + r * r, n + 1.0));
+    (sum / f64::max(count, 1.0) - 1.0 / 12.0).max(1e-4).sqrt()
+}
+
 /// A bit whose share of ones the noise does not explain.
 struct Stuck {
     bit: u32,
@@ -112,7 +122,7 @@ fn stuck(
     let weight = f64::from(1u32 << bit);
     // Of the samples that would read otherwise, about half, the share f is moved: that widens the spread as well.
     let moved = from.map_or(0.0, |s| 0.5 * s.fraction * (1.0 - 0.5 * s.fraction));
-    let sigma = local.unrounded_sigma();
+    let sigma = unrounded(local);
     let sigma = (sigma * sigma - weight * weight * moved)
         .max(0.25 * sigma * sigma)
         .sqrt();
@@ -157,7 +167,7 @@ const BY_READING: f64 = 0.003;
 fn stuck_likelihood(counts: &[i32], local: &Local, known: &[bool], s: &Stuck) -> f64 {
     let weight = f64::from(1u32 << s.bit);
     let moved = 0.5 * s.fraction * (1.0 - 0.5 * s.fraction);
-    let whole = local.unrounded_sigma();
+    let whole = unrounded(local);
     let sigma = (whole * whole - weight * weight * moved)
         .max(0.25 * whole * whole)
         .sqrt();
@@ -281,7 +291,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         );
         return;
     }
-    let sigma = local.unrounded_sigma();
+    let sigma = unrounded(local);
     if known.iter().filter(|k| **k).count() < LEAST_READINGS {
         return;
     }
