@@ -285,7 +285,7 @@ fn bars(out: &mut String, all: &[Outcome]) {
             wrong,
         ),
         bar(
-            "foreign effects of d' >= 25, kept from the engine until it was done: told as unexplained",
+            "foreign effects of d' >= 25 that were kept from the engine (see there): told as unexplained",
             true,
             0.90,
             told(false),
