@@ -98,6 +98,8 @@ struct Chip {
     hz: f64,
     /// The tick whose acquisition runs, and how many SPI bytes it has sent.
     tick: Option<(u64, usize)>,
+    /// The conversion that runs: its axis, and when its input is held.
+    holding: Option<(usize, u64)>,
     conversion: Option<u16>,
     job: Option<Job>,
     eeprom: [u8; EEPROM_LEN],
@@ -144,8 +146,18 @@ impl Chip {
         at.max(self.now)
     }
 
+    /// Holds the converter's input, if that is due by `until`: the world must not be asked ahead of its time.
+    fn hold(&mut self, until: u64) {
+        if let Some((axis, at)) = self.holding.filter(|&(_, at)| at <= until) {
+            self.holding = None;
+            let t = self.seconds(at);
+            self.conversion = Some(self.stand.acc_counts(axis, t));
+        }
+    }
+
     fn byte(&mut self, mosi: u8) -> u8 {
         let t = self.spi_time();
+        self.hold(t);
         let t = self.seconds(t);
         self.stand.spi_byte(mosi, t)
     }
@@ -219,12 +231,13 @@ impl Sensors for HostSensors {
         let chip = &mut *self.chip.borrow_mut();
         let axis = usize::from(channel.min(2));
         let at = chip.adc_time(axis);
-        let t = chip.seconds(at);
-        chip.conversion = Some(chip.stand.acc_counts(axis, t));
+        chip.holding = Some((axis, at));
     }
 
     fn adc_finish(&mut self) -> Option<u16> {
-        self.chip.borrow_mut().conversion.take()
+        let chip = &mut *self.chip.borrow_mut();
+        chip.hold(u64::MAX);
+        chip.conversion.take()
     }
 }
 
@@ -386,6 +399,7 @@ pub fn native_live(
         now: 0,
         hz,
         tick: None,
+        holding: None,
         conversion: None,
         job: None,
         eeprom: [0xff; EEPROM_LEN],
