@@ -1,5 +1,7 @@
 //! Consistent overhead byte stuffing in one pass, with the CRC computed on the way.
 
+use heapless::Vec;
+
 use crate::crc;
 
 /// Puts out a payload, stuffed as it comes; [`Writer::finish`] adds CRC and delimiter.
@@ -69,8 +71,7 @@ pub(crate) enum Broken {
 /// Whatever was received, a delimiter brings it back to the start of a frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Deframer<const N: usize> {
-    body: [u8; N],
-    len: u8,
+    body: Vec<u8, N, u8>,
     /// Bytes until the next code byte; 0 before the first byte of a frame and when a code byte is due.
     run: u8,
     state: State,
@@ -88,8 +89,7 @@ enum State {
 impl<const N: usize> Deframer<N> {
     pub(crate) const fn new() -> Self {
         Deframer {
-            body: [0; N],
-            len: 0,
+            body: Vec::new(),
             run: 0,
             state: State::Empty,
             register: 0,
@@ -106,6 +106,7 @@ impl<const N: usize> Deframer<N> {
             State::Empty => {
                 self.state = State::Filling;
                 self.register = crc::INIT;
+                self.body.clear();
                 self.code(byte);
             }
             State::Filling if self.run == 0 => {
@@ -128,20 +129,15 @@ impl<const N: usize> Deframer<N> {
     }
 
     fn append(&mut self, byte: u8) {
-        match self.body.get_mut(usize::from(self.len)) {
-            Some(place) => {
-                *place = byte;
-                self.len = self.len.wrapping_add(1);
-                self.register = crc::update(self.register, byte);
-            }
-            None => self.state = State::Overlong,
+        match self.body.push(byte) {
+            Ok(()) => self.register = crc::update(self.register, byte),
+            Err(_) => self.state = State::Overlong,
         }
     }
 
     fn end(&mut self) -> Option<Result<&[u8], Broken>> {
-        let (state, len, run, register) = (self.state, self.len, self.run, self.register);
+        let (state, run, register) = (self.state, self.run, self.register);
         self.state = State::Empty;
-        self.len = 0;
         self.run = 0;
         match state {
             State::Empty => None,
@@ -149,11 +145,11 @@ impl<const N: usize> Deframer<N> {
             State::BadCobs => Some(Err(Broken::Cobs)),
             State::Filling if run != 0 => Some(Err(Broken::Cobs)),
             // Version, kind and CRC are there in every payload.
-            State::Filling if len < 6 => Some(Err(Broken::Length)),
+            State::Filling if self.body.len() < 6 => Some(Err(Broken::Length)),
             State::Filling if register != crc::RESIDUE => Some(Err(Broken::Crc)),
             State::Filling => Some(
                 self.body
-                    .get(..usize::from(len.wrapping_sub(4)))
+                    .get(..self.body.len().wrapping_sub(4))
                     .ok_or(Broken::Length),
             ),
         }
