@@ -94,6 +94,7 @@ impl Config {
 
     /// SENS/AVG of the gyros.
     #[must_use]
+    #[inline(never)]
     pub fn sens_avg(&self) -> u16 {
         u16::from_le_bytes([self.set_up.gyro_filter, self.set_up.gyro_range])
     }

@@ -228,7 +228,6 @@ impl Stand {
     }
 
     /// A gyro that answers again may have lost its set-up with its power.
-    #[inline(never)]
     fn look_after_gyros<B: Board>(&mut self, board: &mut B, silent: u8) {
         let back = self.silent & !silent;
         self.silent = silent;

@@ -18,6 +18,7 @@ const POWER_ON: u8 = 1;
 const EERE: u8 = 1;
 const EEWE: u8 = 1 << 1;
 const EEMWE: u8 = 1 << 2;
+const STACK_POINTER: *const usize = 0x5d as *const usize;
 /// What untouched stack looks like.
 const PAINT: u8 = 0xc5;
 /// End of SRAM + 1.
@@ -36,9 +37,7 @@ static mut RESTARTS: u16 = 0;
 pub fn paint_stack() {
     // SAFETY: from the end of the statics to well below the stack pointer nothing lives yet.
     unsafe {
-        let low = core::ptr::read_volatile(0x5d as *const u8);
-        let high = core::ptr::read_volatile(0x5e as *const u8);
-        let top = (u16::from_le_bytes([low, high]) as usize).wrapping_sub(8) as *mut u8;
+        let top = core::ptr::read_volatile(STACK_POINTER).wrapping_sub(8) as *mut u8;
         let mut at = core::ptr::addr_of_mut!(_end);
         while at < top {
             core::ptr::write_volatile(at, PAINT);

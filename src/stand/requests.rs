@@ -76,13 +76,11 @@ impl Stand {
                 self.motor.keep_alive();
                 Status::Ok
             }
-            code::COUNTERS => {
+            code::COUNTERS | code::CLEAR_COUNTERS => {
                 self.health(board);
-                Status::Ok
-            }
-            code::CLEAR_COUNTERS => {
-                self.health(board);
-                self.health.faults.zero();
+                if asked.code == code::CLEAR_COUNTERS {
+                    self.health.faults.zero();
+                }
                 Status::Ok
             }
             code::REBOOT => {
@@ -145,28 +143,23 @@ impl Stand {
                 }
             }
             code::MOTOR_LIMITS => {
-                self.config.max_duty = asked.u8::<0>();
-                self.config.ramp_per_s.set(asked.u16::<1>());
-                self.motor.limit(self.config.max_duty, asked.u16::<1>());
+                let (most, ramp) = (asked.u8::<0>(), asked.u16::<1>());
+                self.config.max_duty = most;
+                self.config.ramp_per_s.set(ramp);
+                self.motor.limit(most, ramp);
                 self.changed(true)
             }
-            code::READ_REGISTER => {
-                let (task, address) = (Task::Read, asked.u8::<1>());
+            code::READ_REGISTER | code::WRITE_REGISTER => {
+                // A read has no value: its bytes are 0.
                 let job = Job {
-                    task,
+                    task: if asked.code == code::READ_REGISTER {
+                        Task::Read
+                    } else {
+                        Task::Write
+                    },
                     axis,
-                    address,
-                    value: 0,
-                };
-                return self.post(board, asked, job);
-            }
-            code::WRITE_REGISTER => {
-                let (task, address, value) = (Task::Write, asked.u8::<1>(), asked.u16::<2>());
-                let job = Job {
-                    task,
-                    axis,
-                    address,
-                    value,
+                    address: asked.u8::<1>(),
+                    value: asked.u16::<2>(),
                 };
                 return self.post(board, asked, job);
             }
