@@ -30,6 +30,7 @@ void serial_set_baud_later(uint16_t divisor)
 {
     if (!waiting && UBRRL == 0) {
         serial_set_baud(divisor);
+        UDR = 0; /* ends a frame that power went in the middle of */
         return;
     }
     waiting_divisor = divisor;

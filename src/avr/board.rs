@@ -126,6 +126,7 @@ impl Board for AvrBoard {
     fn set_baud(&mut self, divisor: u16) {
         if self.baud.is_none() && serial::is_unset() {
             serial::set_baud(divisor);
+            serial::delimit();
         } else {
             self.baud = Some(divisor);
         }

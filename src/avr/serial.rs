@@ -51,6 +51,12 @@ pub fn set_baud(divisor: u16) {
     usart().ucsrc().write(|w| bits!(w, UCSRC_8N1));
 }
 
+/// Sends a delimiter past the queue, which has to be empty: power may have gone in the middle of a frame, and this ends what
+/// the host has of it.
+pub fn delimit() {
+    usart().udr.write(|w| bits!(w, 0));
+}
+
 /// Whether no divisor has been set since the reset.
 pub fn is_unset() -> bool {
     usart().ubrrl.read().bits() == 0
