@@ -37,12 +37,28 @@ pub(crate) fn alternatives(all: &[(&'static dyn Effect, f64)]) -> Vec<Alternativ
         .collect()
 }
 
+/// Decimal places that show two digits of a standard error.
+fn decimals(error: f64) -> usize {
+    if error > 0.0 && error.is_finite() {
+        (1.0 - error.log10().floor()).clamp(0.0, 9.0) as usize
+    } else {
+        4
+    }
+}
+
 pub(crate) fn sentence(title: &str, channel: &str, parameters: &Parameters) -> String {
     let values: Vec<String> = parameters
         .iter()
-        .map(|(name, p)| match p.std_error {
-            Some(e) => format!("{name} {:.4} +- {e:.4} {}", p.value, p.unit),
-            None => format!("{name} {:.4} {}", p.value, p.unit),
+        .map(|(name, p)| {
+            let unit = if p.unit == "1" { "" } else { &p.unit };
+            let text = match p.std_error {
+                Some(error) => {
+                    let places = decimals(error);
+                    format!("{name} {:.places$} +- {error:.places$} {unit}", p.value)
+                }
+                None => format!("{name} {:.4} {unit}", p.value),
+            };
+            text.trim_end().to_owned()
         })
         .collect();
     format!("{title} on {channel}: {}", values.join(", "))

@@ -137,11 +137,11 @@ fn write_finding(out: &mut String, finding: &Finding) {
         let error = parameter
             .std_error
             .map_or_else(String::new, |e| format!(" +- {e:.2e}"));
-        let _ = writeln!(
-            out,
-            "    {name:<24} {:.5}{error} {}",
-            parameter.value, parameter.unit
-        );
+        let unit = match parameter.unit.as_str() {
+            "1" => String::new(),
+            unit => format!(" {unit}"),
+        };
+        let _ = writeln!(out, "    {name:<24} {:.5}{error}{unit}", parameter.value);
     }
     if !finding.what.is_empty() {
         let _ = writeln!(out, "{}", item("", &finding.what));
