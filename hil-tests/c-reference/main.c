@@ -24,7 +24,10 @@ int main(void)
         const struct raw *raw = tick_take(&missed);
         if (raw) {
             stand_on_sample(raw, missed);
-            /* Fed by samples alone: a tick that stalls is a reset, and a reset stops the motor. */
+            /* Fed by the sample clock alone, and from here: a tick that stalls is a reset, a main loop that hangs is one,
+             * and a reset stops the motor. */
+            wdt_reset();
+        } else if (tick_take_passed()) {
             wdt_reset();
         }
         for (int16_t byte; (byte = serial_receive()) >= 0;) {

@@ -19,6 +19,7 @@
 static struct raw raws[2];
 static volatile uint8_t filling;
 static volatile bool ready;
+static volatile bool passed; /* a period without a sample */
 static volatile uint8_t missed_ticks, milliseconds;
 static uint8_t counted; /* of the milliseconds, by the main loop; both wrap */
 static volatile bool ticked;
@@ -79,6 +80,13 @@ const struct raw *tick_take(uint8_t *missed)
         }
     }
     return taken;
+}
+
+bool tick_take_passed(void)
+{
+    bool any = passed;
+    passed = false;
+    return any;
 }
 
 bool tick_take_millisecond(void)
@@ -165,8 +173,7 @@ ISR(TIMER1_COMPB_vect)
     t_ticks += period;
     if (skip) {
         skip--;
-        /* The clock runs, so the board lives; the main loop feeds at samples, and those are seconds apart. */
-        wdt_reset();
+        passed = true;
         TIMSK = TIMSK_ALL;
         return;
     }

@@ -16,6 +16,7 @@ void tick_set_period(uint16_t ticks, uint8_t every);
 /* The sample that waits, or NULL; it is the caller's until the next call. Ticks lost before it go to missed. */
 const struct raw *tick_take(uint8_t *missed);
 /* Whether a millisecond has passed that nobody has taken yet. */
+bool tick_take_passed(void);
 bool tick_take_millisecond(void);
 /* Timer ticks since the tick. */
 uint16_t tick_since(void);

@@ -1,7 +1,9 @@
 //! The image starts, says who it is, and samples.
 
+use atmega16_sim::{Board, CLOCK_HZ, Image, Mcu, Pins, Stop};
 use bench::Scenario;
-use hil_tests::{at, hear, run};
+use bench::simavr::{NoProbe, Simulated};
+use hil_tests::{Heard, at, hear, image, run};
 use wire::{Command, Status, flags, reset_cause};
 
 #[test]
@@ -66,4 +68,80 @@ fn a_reboot_by_command_is_answered_and_comes_back_by_the_watchdog_with_its_cause
     }
     let health = heard.last_health();
     assert_eq!(health.faults.get(wire::Fault::WatchdogReset), 1);
+}
+
+#[test]
+fn a_power_cut_in_the_middle_of_a_frame_costs_no_hello_of_the_start_behind_it() {
+    let mut simulated = Simulated::new(&image(), &Scenario::quiet(7), NoProbe).expect("an image");
+    let mut heard = Heard::default();
+    let (mut t, mut last) = (5.0, 0);
+    simulated
+        .run_until(t, &mut |byte| heard.push(byte))
+        .expect("it runs");
+    while last == 0 {
+        t += 0.001;
+        simulated
+            .run_until(t, &mut |byte| {
+                last = byte.byte;
+                heard.push(byte)
+            })
+            .expect("it runs");
+    }
+    simulated.power_cycle();
+    simulated
+        .run_until(t + 1.0, &mut |byte| heard.push(byte))
+        .expect("it runs");
+    let causes: Vec<_> = heard.hellos().map(|(_, hello)| hello.reset_cause).collect();
+    assert_eq!(causes, [reset_cause::POWER_ON; 2]);
+    assert_eq!(heard.link().rejected(), 1, "what was cut off");
+}
+
+/// Parts that answer something, and a host that hears nothing.
+struct Deaf;
+
+impl Board for Deaf {
+    fn spi_byte(&mut self, _at: u64, _mosi: u8, _pins: &Pins) -> u8 {
+        0x80
+    }
+    fn adc_volts(&mut self, _at: u64, _channel: u8) -> f64 {
+        1.65
+    }
+    fn aref_volts(&self) -> f64 {
+        3.3
+    }
+    fn uart_byte(&mut self, _at: u64, _byte: u8) {}
+    fn pins_changed(&mut self, _at: u64, _pins: &Pins) {}
+}
+
+/// At 1 Hz three of four periods of the timer have no sample: they must not keep a board alive whose main loop hangs.
+#[test]
+fn a_main_loop_that_hangs_ends_in_a_watchdog_reset_at_1_hz_too() {
+    let mut simulated = Simulated::new(&image(), &Scenario::quiet(7), NoProbe).expect("an image");
+    let slow = Command::SetRate {
+        period_ticks: 62_500,
+        periods_per_sample: 4,
+    };
+    simulated.request(&[at(1.0, 1, slow), at(2.0, 2, Command::StoreConfig)]);
+    let mut heard = Heard::default();
+    simulated
+        .run_until(4.0, &mut |byte| heard.push(byte))
+        .expect("it runs");
+    assert_eq!(
+        heard.replies().last().map(|(_, reply)| reply.status),
+        Some(Status::Ok)
+    );
+
+    let mut hanging = Image::read(&image()).expect("an image");
+    let (_, first) = (hanging.symbols.iter())
+        .find(|(name, _)| name.contains("5Stand14on_millisecond"))
+        .expect("its first instruction is to be replaced");
+    // rjmp to itself.
+    let place = *first as usize;
+    hanging.flash[place..place + 2].copy_from_slice(&[0xff, 0xcf]);
+    let mut mcu = Mcu::with_image(hanging);
+    mcu.set_eeprom(simulated.mcu().eeprom());
+    let stop = mcu.run_until(5 * u64::from(CLOCK_HZ), &mut Deaf);
+    assert_eq!(stop, Stop::Reached);
+    // A second of watchdog and a quarter of start at a time.
+    assert!(mcu.resets().watchdog >= 3, "{:?}", mcu.resets());
 }

@@ -62,7 +62,10 @@ fn main() -> ! {
                 stand.count(Fault::TickOverrun, missed);
             }
             stand.on_sample(&mut board, &tick.raw, tick.t_ticks, missed > 0);
-            // The watchdog is fed by samples alone: a tick that stalls is a reset, and a reset stops the motor.
+            // The watchdog is fed by the sample clock alone, and from here: a tick that stalls is a reset, a main loop that
+            // hangs is one, and a reset stops the motor.
+            asm::wdr();
+        } else if tick::take_passed() {
             asm::wdr();
         }
         while let Some(byte) = serial::received() {

@@ -50,6 +50,8 @@ struct Shared {
     masked_ucsrb: u8,
     missed: u8,
     ready: bool,
+    /// A period without a sample has passed.
+    passed: bool,
     ticked: bool,
 }
 
@@ -75,6 +77,7 @@ static mut SHARED: Shared = Shared {
     masked_ucsrb: 0,
     missed: 0,
     ready: false,
+    passed: false,
     ticked: false,
 };
 
@@ -181,6 +184,17 @@ fn place(which: u8) -> *mut Tick {
     first.cast::<Tick>().wrapping_add(which.into())
 }
 
+/// Whether a period without a sample has passed that nobody has taken yet.
+pub fn take_passed() -> bool {
+    // SAFETY: a byte, which the tick only ever sets; one that is set in between is of the same second.
+    unsafe {
+        let passed = &raw mut (*shared()).passed;
+        let any = core::ptr::read_volatile(passed);
+        core::ptr::write_volatile(passed, false);
+        any
+    }
+}
+
 /// Whether a millisecond has passed that nobody has taken yet.
 pub fn take_millisecond() -> bool {
     // SAFETY: a byte that the interrupt counts, and one that is touched here alone.
@@ -253,8 +267,7 @@ fn TIMER1_COMPB() {
     shared.t_ticks = shared.t_ticks.wrapping_add(u32::from(shared.period));
     if shared.skip > 0 {
         shared.skip = shared.skip.wrapping_sub(1);
-        // The clock runs, so the board lives; the main loop feeds at samples, and those are seconds apart.
-        asm::wdr();
+        shared.passed = true;
         timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
         return;
     }
