@@ -8,9 +8,11 @@ use crate::step::{Failure, run};
 
 /// Where the page goes.
 const PAGE: &str = "docs/power.md";
+/// Where runs are noted as they end, so that the same seed takes up a campaign that was cut off.
+const LOGS: &str = "target/campaign";
 
 /// Builds the campaign in the dev profile, which compiles the crates of the engine at the level of a release, and runs
-/// it with `arguments`. Without `--only` its page goes to docs/power.md.
+/// it with `arguments`. Without `--only` its page goes to docs/power.md, in any case its runs to target/campaign.
 ///
 /// # Errors
 /// When it does not build or run.
@@ -24,6 +26,9 @@ pub fn measure(root: &Path, arguments: &[String]) -> Result<(), Failure> {
     };
     if !(told("--only") || told("--out") || told("--help")) {
         program.args(["--out", PAGE]);
+    }
+    if !(told("--log") || told("--from") || told("--run") || told("--help")) {
+        program.args(["--log", LOGS]);
     }
     if let Some(date) = today().filter(|_| !told("--date")) {
         program.args(["--date", &date]);

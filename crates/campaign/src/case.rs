@@ -6,6 +6,7 @@ use analysis::result::{Diagnosis, Finding};
 use analysis::{DiagnoseOptions, diagnose};
 use model::file::EffectModel;
 use model::record::Record;
+use serde::{Deserialize, Serialize};
 
 use crate::foreign::{self, FOREIGN, add, foreign};
 use crate::plant::{
@@ -60,7 +61,7 @@ impl Family {
 }
 
 /// How an effect was found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Hit {
     /// As the cause.
     Named,

@@ -268,16 +268,11 @@ fn one(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: 
     };
     if let Some(unit) = shape {
         let meter = Meter::new(stand, axis);
-        let energy = meter.energy(&unit);
-        let strength = |size: f64| {
-            let scaled: Vec<f64> = energy.iter().map(|e| e * size * size).collect();
-            meter.of_signal(&scaled)
-        };
-        let size = size_for(wanted, &strength);
+        let (size, strength) = meter.sized(&meter.energy(&unit), wanted);
         let change = Change::Add(unit.iter().map(|v| size * v).collect());
         return Foreign {
             name,
-            strength: strength(size),
+            strength,
             change,
         };
     }

@@ -6,6 +6,7 @@
 
 pub mod case;
 pub mod foreign;
+pub mod log;
 pub mod motor;
 pub mod plant;
 pub mod random;
@@ -14,7 +15,7 @@ pub mod stand;
 pub mod strength;
 pub mod tally;
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 pub use case::{Family, Hit, Outcome};
 
@@ -35,6 +36,23 @@ pub struct Size {
     pub foreign: u64,
 }
 
+impl Size {
+    /// So many of each.
+    #[must_use]
+    pub fn even(n: u64) -> Self {
+        Self {
+            clean: n,
+            elsewhere: n,
+            one: n,
+            counted: n,
+            pairs: n,
+            foreign: n,
+        }
+    }
+}
+
+/// The longest that the campaign proper begins runs, min.
+pub const MINUTES: f64 = 58.0;
 /// Minutes.
 pub const QUICK: Size = Size {
     clean: 300,
@@ -63,9 +81,8 @@ pub const FULL: Size = Size {
     foreign: 150,
 };
 
-/// All cases of a size, family by family, those that `only` (a row of the tables) leaves.
-#[must_use]
-pub fn cases(size: Size, only: Option<&str>) -> Vec<(Family, u64)> {
+/// Every family with its number of runs.
+fn families(size: Size) -> Vec<(Family, u64)> {
     let mut families = vec![
         (Family::Clean, size.clean),
         (Family::Elsewhere, size.elsewhere),
@@ -75,17 +92,36 @@ pub fn cases(size: Size, only: Option<&str>) -> Vec<(Family, u64)> {
     families.extend((0..plant::BY_COUNT.len()).map(|i| (Family::Counted(i), size.counted)));
     families.extend((0..foreign::FOREIGN.len()).map(|i| (Family::Foreign(i), size.foreign)));
     families
-        .into_iter()
-        .filter(|(f, _)| only.is_none_or(|o| f.label() == o))
-        .flat_map(|(f, count)| (0..count).map(move |i| (f, i)))
-        .collect()
 }
 
-/// Run cases on `threads` threads; `seen` is told of each as it ends.
+/// The family whose row of the tables is called `label`.
+#[must_use]
+pub fn family_of(label: &str) -> Option<Family> {
+    families(DEFAULT)
+        .into_iter()
+        .map(|(f, _)| f)
+        .find(|f| f.label() == label)
+}
+
+/// All cases of a size that `only` (a row of the tables) leaves. Families are interleaved: wherever the runs are cut
+/// off, each has had its share of them.
+#[must_use]
+pub fn cases(size: Size, only: Option<&str>) -> Vec<(Family, u64)> {
+    let mut all: Vec<(f64, Family, u64)> = families(size)
+        .into_iter()
+        .filter(|(f, _)| only.is_none_or(|o| f.label() == o))
+        .flat_map(|(f, count)| (0..count).map(move |i| ((i as f64 + 0.5) / count as f64, f, i)))
+        .collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    all.into_iter().map(|(_, f, i)| (f, i)).collect()
+}
+
+/// Run cases on `threads` threads until they are done or `stop` is set; `seen` is told of each as it ends.
 pub fn run_all(
     seed: u64,
     cases: &[(Family, u64)],
     threads: usize,
+    stop: &AtomicBool,
     seen: &(dyn Fn(&Outcome) + Sync),
 ) -> Vec<Outcome> {
     let next = AtomicUsize::new(0);
@@ -94,8 +130,9 @@ pub fn run_all(
             .map(|_| {
                 scope.spawn(|| {
                     let mut own = vec![];
-                    while let Some((family, index)) =
-                        cases.get(next.fetch_add(1, Ordering::Relaxed))
+                    while !stop.load(Ordering::Relaxed)
+                        && let Some((family, index)) =
+                            cases.get(next.fetch_add(1, Ordering::Relaxed))
                     {
                         let outcome = case::run(seed, *family, *index);
                         seen(&outcome);

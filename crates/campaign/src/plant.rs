@@ -232,15 +232,10 @@ pub fn plant(
             } else {
                 meter.beyond(&unit, less)
             };
-            let energy = meter.energy(&seen);
-            let strength = |size: f64| {
-                let scaled: Vec<f64> = energy.iter().map(|e| e * size * size).collect();
-                meter.of_signal(&scaled)
-            };
-            let size = size_for(wanted, &strength);
+            let (size, strength) = meter.sized(&meter.energy(&seen), wanted);
             (
                 all(size),
-                strength(size),
+                strength,
                 unit.iter().map(|v| v * size).collect::<Vec<f64>>(),
             )
         };
@@ -327,14 +322,9 @@ pub fn plant(
         CURRENT => {
             let unit = motor::current(draw, &stand.world.duty, stand.rate_hz);
             let meter = Meter::new(stand, axis);
-            let energy = meter.energy(&unit);
-            let strength = |size: f64| {
-                let scaled: Vec<f64> = energy.iter().map(|e| e * size * size).collect();
-                meter.of_signal(&scaled)
-            };
-            let size = size_for(wanted, &strength);
+            let (size, strength) = meter.sized(&meter.energy(&unit), wanted);
             let signal = unit.iter().map(|v| sign * size * v).collect();
-            truth(Parameters::new(), strength(size), Some(signal))
+            truth(Parameters::new(), strength, Some(signal))
         }
         "motor_noise" => {
             let square: Vec<f64> = stand.world.duty.iter().map(|d| d * d).collect();

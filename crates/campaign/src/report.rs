@@ -156,9 +156,9 @@ fn estimates(all: &[Outcome]) -> BTreeMap<(&'static str, String), Vec<&Estimate>
     by
 }
 
-/// The page.
+/// The page, of runs of which `planned` were to be.
 #[must_use]
-pub fn page(all: &[Outcome], command: &str, date: &str, seconds: f64) -> String {
+pub fn page(all: &[Outcome], command: &str, date: &str, seconds: f64, planned: usize) -> String {
     let mut out = String::new();
     let _ = writeln!(out, "# What the diagnosis can tell, measured\n");
     let _ = writeln!(
@@ -168,11 +168,16 @@ pub fn page(all: &[Outcome], command: &str, date: &str, seconds: f64) -> String 
         if date.is_empty() { "" } else { ", " },
         seconds / 60.0
     );
-    if all.len() < crate::cases(crate::DEFAULT, None).len() {
+    let proper = crate::cases(crate::DEFAULT, None).len();
+    if all.len() < planned {
         let _ = writeln!(
             out,
-            "A sample, shorter than the {} runs of the campaign proper: read the intervals, not the shares.\n",
-            crate::cases(crate::DEFAULT, None).len()
+            "Cut off: {planned} runs were planned, and each row has had its share of those that were made.\n"
+        );
+    } else if all.len() < proper {
+        let _ = writeln!(
+            out,
+            "A sample, shorter than the {proper} runs of the campaign proper: read the intervals, not the shares.\n"
         );
     }
     out.push_str(METHOD);
@@ -185,8 +190,7 @@ pub fn page(all: &[Outcome], command: &str, date: &str, seconds: f64) -> String 
     foreign(&mut out, all);
     intervals(&mut out, all);
     confusion(&mut out, all);
-    let mean = all.iter().map(|o| o.seconds).sum::<f64>() / all.len().max(1) as f64;
-    let _ = writeln!(out, "\nA diagnosis took {:.0} ms on average.", 1e3 * mean);
+    times(&mut out, all);
     out
 }
 
@@ -556,4 +560,30 @@ fn confusion(out: &mut String, all: &[Outcome]) {
         let names: Vec<String> = wrong.iter().map(|(k, n)| format!("{k} {n}")).collect();
         let _ = writeln!(out, "| {label} | {runs} | {} | {left} |", names.join(", "));
     }
+}
+
+/// How long a diagnosis took, with the slowest rows.
+fn times(out: &mut String, all: &[Outcome]) {
+    let mut rows: BTreeMap<Family, (f64, usize)> = BTreeMap::new();
+    for o in all {
+        let row = rows.entry(o.family).or_default();
+        *row = (row.0 + o.seconds, row.1 + 1);
+    }
+    let total: f64 = rows.values().map(|r| r.0).sum();
+    let mut means: Vec<(&str, f64)> = rows
+        .iter()
+        .map(|(f, (sum, n))| (f.label(), sum / *n as f64))
+        .collect();
+    means.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let slowest: Vec<String> = means
+        .iter()
+        .take(5)
+        .map(|(label, s)| format!("{label} {s:.1} s"))
+        .collect();
+    let _ = writeln!(
+        out,
+        "\nA diagnosis took {:.0} ms on average; the slowest rows: {}.",
+        1e3 * total / all.len().max(1) as f64,
+        slowest.join(", ")
+    );
 }

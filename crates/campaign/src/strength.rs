@@ -113,6 +113,17 @@ impl Meter {
         self.against_baseline(&expected, truth)
     }
 
+    /// The multiple of a signal of these energies that is `wanted` strong, and how strong it is.
+    #[must_use]
+    pub fn sized(&self, energy: &[f64], wanted: f64) -> (f64, f64) {
+        let strength = |size: f64| {
+            let scaled: Vec<f64> = energy.iter().map(|e| e * size * size).collect();
+            self.of_signal(&scaled)
+        };
+        let size = size_for(wanted, &strength);
+        (size, strength(size))
+    }
+
     /// d' of a process that adds `density` to the variance of each coefficient, or of a filter that shapes the white
     /// noise (then `density` is what the filter changes, negative where it takes off).
     #[must_use]

@@ -3,6 +3,7 @@
 //! not when the draw is unlucky. `IMU_STAND_SEED=N` repeats a draw.
 
 use std::hash::{BuildHasher, Hasher};
+use std::sync::atomic::AtomicBool;
 
 use campaign::plant::asked_from;
 use campaign::tally::Rate;
@@ -48,7 +49,8 @@ fn a_fresh_sample_of_the_campaign_is_not_worse_than_its_bars() {
         .unwrap_or_else(|| std::hash::RandomState::new().build_hasher().finish() >> 16);
     println!("IMU_STAND_SEED={seed}");
     let threads = std::thread::available_parallelism().map_or(1, Into::into);
-    let all = run_all(seed, &cases(SAMPLE, None), threads, &|o| {
+    let never = AtomicBool::new(false);
+    let all = run_all(seed, &cases(SAMPLE, None), threads, &never, &|o| {
         if report::worth_a_line(o) {
             println!("{}", report::line(o));
         }
