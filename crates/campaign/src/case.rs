@@ -232,11 +232,7 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
             motor: true,
             vibration: true,
         },
-        Family::Foreign(_) => Needs {
-            temperature: true,
-            motor: true,
-            ..Needs::default()
-        },
+        Family::Foreign(i) => foreign::needs(FOREIGN[i]),
         _ => Needs::default(),
     };
     let mut stand = Stand::draw(draw, seconds, rate_hz, needed);
@@ -267,7 +263,7 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
             if FOREIGN[i] == "backlash in temperature" {
                 allowed.extend(["temperature", "temperature_quadratic"]);
             }
-            let f = foreign(draw, &stand, FOREIGN[i], axis, wanted);
+            let f = foreign(draw, &mut stand, FOREIGN[i], axis, wanted);
             strange = f.strength;
             unknown = Some(f);
         }

@@ -3,11 +3,32 @@
 use model::record::Record;
 
 use crate::random::Draw;
-use crate::stand::{LSB, Stand};
+use crate::stand::{LSB, Needs, Stand};
 use crate::strength::{Meter, of_variance, size_for};
 
-/// What there is.
-pub const FOREIGN: [&str; 22] = [
+mod kept_back;
+#[cfg(test)]
+mod library_share;
+
+/// What there is: first those that the engine was developed with or has been changed after, then those kept back.
+pub const FOREIGN: [&str; SEEN + kept_back::NAMES.len()] = {
+    let mut all = [""; SEEN + kept_back::NAMES.len()];
+    let mut i = 0;
+    while i < all.len() {
+        all[i] = if i < SEEN {
+            FIRST[i]
+        } else {
+            kept_back::NAMES[i - SEEN]
+        };
+        i += 1;
+    }
+    all
+};
+/// How many of them, from the first, are no longer unseen: the engine was made with 14 of them, and has been changed
+/// since it was graded on the other eight.
+pub const SEEN: usize = FIRST.len();
+
+const FIRST: [&str; 22] = [
     "chirp",
     "square wave",
     "comb of harmonics",
@@ -31,9 +52,12 @@ pub const FOREIGN: [&str; 22] = [
     "jumps that relax",
     "random walk for a while",
 ];
-/// How many of them, from the first, were looked at while the engine was made. The others were written before, and what
-/// the engine says to them was first seen in the campaign that graded it.
-pub const SEEN: usize = 14;
+
+/// The environment that they need.
+#[must_use]
+pub fn needs(name: &str) -> Needs {
+    kept_back::needs(name)
+}
 
 /// What it does to a channel: adds a signal, or makes new noise out of old.
 pub struct Foreign {
@@ -54,17 +78,19 @@ enum Change {
     Missing(i32),
     /// Noise in place of the white noise, of variance 1, as a share of it.
     Noise(Vec<f64>, f64),
+    /// Lower edges of the codes from the first one on, counts.
+    Edges(i32, Vec<f64>),
 }
 
 /// Largest rms of what is added, deg/s: a gyro that reads more below 1 Hz has been turned, whoever looks at it.
 const LARGEST_RMS: f64 = 0.28;
 
 /// One of them, on an axis of a stand, at a strength of `wanted`; weaker where that would need more than
-/// [`LARGEST_RMS`] however it is drawn.
+/// [`LARGEST_RMS`] however it is drawn. The world of the stand may gain what drives it.
 #[must_use]
 pub fn foreign(
     draw: &mut Draw,
-    stand: &Stand,
+    stand: &mut Stand,
     name: &'static str,
     axis: usize,
     wanted: f64,
@@ -79,12 +105,12 @@ pub fn foreign(
     };
     const TRIES: usize = 12;
     for _ in 0..TRIES {
-        let f = one(draw, stand, name, axis, wanted);
+        let f = any(draw, stand, name, axis, wanted);
         if rms(&f) <= LARGEST_RMS {
             return f;
         }
     }
-    let mut f = one(draw, stand, name, axis, wanted);
+    let mut f = any(draw, stand, name, axis, wanted);
     let down = (LARGEST_RMS / rms(&f)).min(1.0);
     if let Change::Add(signal) = &mut f.change {
         signal.iter_mut().for_each(|v| *v *= down);
@@ -92,6 +118,28 @@ pub fn foreign(
         f.strength = meter.of_signal(&meter.energy(signal));
     }
     f
+}
+
+fn any(
+    draw: &mut Draw,
+    stand: &mut Stand,
+    name: &'static str,
+    axis: usize,
+    wanted: f64,
+) -> Foreign {
+    kept_back::one(draw, stand, name, axis, wanted)
+        .unwrap_or_else(|| one(draw, stand, name, axis, wanted))
+}
+
+/// A signal of this shape, at the size that gives the strength.
+fn of_signal(stand: &Stand, name: &'static str, axis: usize, unit: &[f64], wanted: f64) -> Foreign {
+    let meter = Meter::new(stand, axis);
+    let (size, strength) = meter.sized(&meter.energy(unit), wanted);
+    Foreign {
+        name,
+        strength,
+        change: Change::Add(unit.iter().map(|v| size * v).collect()),
+    }
 }
 
 fn one(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: f64) -> Foreign {
@@ -267,14 +315,7 @@ fn one(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: 
         _ => None,
     };
     if let Some(unit) = shape {
-        let meter = Meter::new(stand, axis);
-        let (size, strength) = meter.sized(&meter.energy(&unit), wanted);
-        let change = Change::Add(unit.iter().map(|v| size * v).collect());
-        return Foreign {
-            name,
-            strength,
-            change,
-        };
+        return of_signal(stand, name, axis, &unit, wanted);
     }
     match name {
         "swinging variance" | "growing variance" => {
@@ -447,6 +488,21 @@ impl Foreign {
                     .map(|e| own * e + normal * draw.normal())
                     .collect();
                 add(record, channel, &mixed, draw);
+            }
+            Change::Edges(first, edges) => {
+                change_readings(record, channel, draw, |_, v| {
+                    let at = v / LSB;
+                    let above = edges.partition_point(|e| *e <= at) as i32;
+                    // Beyond the edges that are known the steps are even.
+                    let code = match above {
+                        0 => at.round() as i32,
+                        k if k == edges.len() as i32 => {
+                            at.round().max(f64::from(first + k - 1)) as i32
+                        }
+                        k => first + k - 1,
+                    };
+                    LSB * f64::from(code)
+                });
             }
         }
     }

@@ -228,11 +228,15 @@ depth 1 and 21 at depth 0.5, and depths are drawn from 0.5 to 1.
 ";
 
 const KEPT: &str = "\
-The first 14 the engine was developed with. The other eight were written before it was done, and nobody looked at what it
-says to them until the campaign of 2026-11-21 with seed 2353998398: 35 of 48 were unexplained, 9 got a name. The misses
-were creep (d' 7..9) and a random walk for a while (d' 12..22), which stay weak within 0.28 deg/s, and one line that comes
-and goes; the names were 5 steps for those two and 4 AM lines for that line. Since then a line that comes and goes is
-called a line, no longer one that swings, so that they are no longer unseen.";
+The engine was developed with the first 14. The next eight were kept back until the campaign of 2026-11-21 with seed
+2353998398, in which 35 of 48 were unexplained and 9 got a name; since then a rule was changed by what it said to one of
+them (a line that comes and goes is called a line, no longer one that swings), so that they count as seen. The misses were
+creep (d' 7..9) and a random walk for a while (d' 12..22), which stay weak within 0.28 deg/s, and one line that comes and
+goes; the names were 5 steps for those two and 4 AM lines for that line.
+
+Kept back, second set (2026-11-21): the other 14, from \"stick and slip\" on. They were written, from physics and
+mathematics, after that change and by someone who had not read how the diagnosis decides; a few runs were made to see that
+they can be drawn. A test holds that no effect of the library describes 95 % of what each adds to the likelihood.";
 
 fn bars(out: &mut String, all: &[Outcome]) {
     let clean = Rate::of(
@@ -289,14 +293,14 @@ fn bars(out: &mut String, all: &[Outcome]) {
             wrong,
         ),
         bar(
-            "foreign effects of d' >= 25 that were kept from the engine (see there): told as unexplained",
+            "foreign effects of d' >= 25, kept back, second set (2026-11-21): told as unexplained",
             true,
             0.90,
             told(false),
         ),
         bar("the same: given a name", false, 0.05, misnamed(false)),
         bar(
-            "foreign effects of d' >= 25 that the engine was developed with: told as unexplained",
+            "foreign effects of d' >= 25 that the engine was developed with or changed after: told as unexplained",
             true,
             0.90,
             told(true),

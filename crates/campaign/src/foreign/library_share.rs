@@ -1,0 +1,472 @@
+//! How much of what a foreign effect adds to the likelihood the closest effect of the library describes. From 95 % on it
+//! would not be foreign.
+
+use std::f64::consts::TAU;
+
+use analysis::likelihood::Dct;
+use analysis::optimise::nelder_mead;
+use model::effect::{Effect, Hypothesis, Signal, VarianceLaw, View};
+use model::effects::EFFECTS;
+use model::record::{Axis, Base, Quantity};
+
+use super::kept_back::{self, Mode, by_difference, by_echo, of_law, shares};
+use super::{Change, foreign};
+use crate::random::Draw;
+use crate::stand::{LSB, Stand};
+use crate::strength::{Meter, of_variance};
+
+/// Share of the gain from which an effect of the library describes it.
+const DESCRIBED: f64 = 0.95;
+/// Draws of each effect that are looked at.
+const DRAWS: u64 = 3;
+
+fn stand(draw: &mut Draw, name: &str) -> Stand {
+    Stand::draw(draw, 600.0, 20.0, super::needs(name))
+}
+
+/// The signals of a stand, as an effect sees them, without reading noise.
+fn signals(stand: &Stand) -> Vec<Signal> {
+    let signal = |name: &str, quantity, axis: Option<usize>, values: Vec<f64>| Signal {
+        name: name.to_owned(),
+        quantity,
+        axis: axis.map(|i| Axis::ALL[i]),
+        unit: String::new(),
+        smooth: values.clone(),
+        values,
+        lsb: None,
+        moving: false,
+    };
+    let scaled = |v: &[f64], by: f64| v.iter().map(|x| x * by).collect::<Vec<_>>();
+    let mut all = vec![
+        signal("supply", Quantity::Supply, None, stand.world.supply.clone()),
+        signal("pwm", Quantity::Pwm, None, scaled(&stand.world.duty, 255.0)),
+    ];
+    for (i, letter) in ["x", "y", "z"].iter().enumerate() {
+        let own = stand.world.temperature[i].clone();
+        all.push(signal(
+            &format!("temp_{letter}"),
+            Quantity::Temp,
+            Some(i),
+            own,
+        ));
+        let force = scaled(&stand.world.acc[i], 9.80665);
+        all.push(signal(
+            &format!("acc_{letter}"),
+            Quantity::Acc,
+            Some(i),
+            force,
+        ));
+    }
+    all
+}
+
+fn hypotheses(effect: &dyn Effect, stand: &Stand, axis: usize) -> Vec<Hypothesis> {
+    let all = signals(stand);
+    let view = View {
+        channel: crate::stand::GYROS[axis],
+        axis: Some(Axis::ALL[axis]),
+        lsb: Some(LSB),
+        white_sigma: stand.white(axis).sqrt(),
+        rate_hz: stand.rate_hz,
+        samples: stand.samples(),
+        base: Some(Base::Static),
+        moving: false,
+        signals: &all,
+    };
+    effect.hypotheses(&view).unwrap_or_default()
+}
+
+/// Sets of columns by which an effect could describe a signal: all its regressions together, each with each value of a
+/// shape, and every step.
+fn columns(effect: &dyn Effect, stand: &Stand, axis: usize) -> Vec<Vec<Vec<f64>>> {
+    let (mut fixed, mut shaped, mut sets) = (vec![], vec![], vec![]);
+    for h in hypotheses(effect, stand, axis) {
+        match h {
+            Hypothesis::Regression(r) => fixed.extend(r.columns.into_iter().map(|c| c.values)),
+            Hypothesis::Shaped(s) => {
+                let at = |x: f64| {
+                    s.columns(x)
+                        .into_iter()
+                        .map(|c| c.values)
+                        .collect::<Vec<_>>()
+                };
+                shaped.extend(s.grid().into_iter().map(at));
+            }
+            Hypothesis::Step => {
+                for at in (40..stand.samples()).step_by(40) {
+                    let step = |i| f64::from(u8::from(i >= at));
+                    sets.push(vec![(0..stand.samples()).map(step).collect()]);
+                }
+            }
+            _ => {}
+        }
+    }
+    sets.extend(shaped.into_iter().map(|s| [fixed.clone(), s].concat()));
+    if !fixed.is_empty() {
+        sets.push(fixed);
+    }
+    sets
+}
+
+/// Share of a signal's gain that the strongest line takes, and a line with two neighbours wherever they lie, of which one
+/// that swings is a case.
+fn of_lines(stand: &Stand, axis: usize, signal: &[f64]) -> (f64, f64) {
+    let (n, meter) = (stand.samples(), Meter::new(stand, axis));
+    let dct = Dct::new(n);
+    let whole = meter.of_signal(&meter.energy(signal)).powi(2);
+    let left = |s: &[f64]| meter.of_signal(&meter.energy(s)).powi(2);
+    let mut rest = signal.to_vec();
+    let mut taken = vec![];
+    for _ in 0..3 {
+        let c = dct.forward(&rest);
+        let weight = |k: usize| {
+            let w = std::f64::consts::PI * k as f64 / n as f64;
+            c[k] * c[k] / (stand.white(axis) + stand.step(axis) / (2.0 - 2.0 * w.cos()))
+        };
+        let mut order: Vec<usize> = (2..n).collect();
+        order.sort_by(|a, b| weight(*b).total_cmp(&weight(*a)));
+        let tries = order
+            .iter()
+            .take(6)
+            .flat_map(|k| [-0.5, 0.0, 0.5].map(|d| *k as f64 + d));
+        let best = tries
+            .map(|k| {
+                let w = std::f64::consts::PI * k / n as f64;
+                let wave = |phase: f64| {
+                    (0..n)
+                        .map(|i| (w * i as f64 + phase).cos())
+                        .collect::<Vec<_>>()
+                };
+                meter.beyond(&rest, &[wave(0.0), wave(TAU / 4.0)])
+            })
+            .min_by(|a, b| left(a).total_cmp(&left(b)))
+            .expect("there are tries");
+        taken.push(1.0 - left(&best) / whole);
+        rest = best;
+    }
+    (taken[0], taken[2])
+}
+
+/// Share of the gain of an expected spectrum that the best process of an effect describes, random walk and white noise
+/// refitted. `truth` is minus twice the log likelihood of what there is.
+fn of_process(
+    stand: &Stand,
+    axis: usize,
+    expected: &[f64],
+    truth: f64,
+    effect: &dyn Effect,
+) -> f64 {
+    let bins = analysis::likelihood::Bins::new(stand.samples());
+    let ones = vec![1.0; stand.samples()];
+    let count = bins.products(&ones, &ones);
+    let walk: Vec<f64> = bins
+        .at
+        .omega
+        .iter()
+        .map(|w| 1.0 / (2.0 - 2.0 * w.cos()))
+        .collect();
+    let n: f64 = count.iter().sum();
+    let minus_two_l = |lambda: f64, density: &dyn Fn(usize) -> f64| {
+        let (mut sum, mut logs) = (0.0, 0.0);
+        for b in 0..count.len() {
+            let g = (density(b) + lambda * walk[b]).max(1e-9);
+            sum += expected[b] / g;
+            logs += count[b] * g.ln();
+        }
+        n * (sum / n).ln() + logs + n
+    };
+    let baseline = (-30..=6)
+        .map(|k| minus_two_l(f64::from(k).exp(), &|_| 1.0))
+        .fold(minus_two_l(0.0, &|_| 1.0), f64::min);
+    let mut best = baseline;
+    for h in hypotheses(effect, stand, axis) {
+        let Hypothesis::Covariance(process) = h else {
+            continue;
+        };
+        let bounds = process.bounds(stand.samples());
+        let white = f64::from(u8::from(!process.filters_white()));
+        let value = |x: &[f64]| {
+            let inside = |(v, (low, high)): (&f64, &(f64, f64))| v.clamp(*low, *high);
+            let theta: Vec<f64> = x[1..].iter().zip(&bounds).map(inside).collect();
+            let density = process.density(&theta, &bins.at);
+            minus_two_l(x[0].min(6.0).exp(), &|b| white + density[b])
+        };
+        for start in process.starts(stand.samples()) {
+            for log_walk in [-16.0, -8.0] {
+                let from = [vec![log_walk], start.clone()].concat();
+                let steps = vec![1.0; from.len()];
+                let once = nelder_mead(&value, &from, &steps, 300);
+                best = best.min(value(&nelder_mead(&value, &once, &steps, 300)));
+            }
+        }
+    }
+    (baseline - best) / (baseline - truth)
+}
+
+/// Minus twice the log likelihood of a spectrum under itself.
+fn saturated(stand: &Stand, expected: &[f64]) -> f64 {
+    let ones = vec![1.0; stand.samples()];
+    let count = analysis::likelihood::Bins::new(stand.samples()).products(&ones, &ones);
+    expected
+        .iter()
+        .zip(&count)
+        .map(|(e, m)| m * (1.0 + (e / m).ln()))
+        .sum()
+}
+
+/// The spectrum that a channel has: its noise, with the white part shaped, and a process beside it.
+fn spectrum(stand: &Stand, axis: usize, shape: &dyn Fn(f64) -> f64, beside: &[f64]) -> Vec<f64> {
+    let bins = analysis::likelihood::Bins::new(stand.samples());
+    let ones = vec![1.0; stand.samples()];
+    let count = bins.products(&ones, &ones);
+    (0..count.len())
+        .map(|b| {
+            let w = bins.at.omega[b];
+            let walk = stand.step(axis) / (2.0 - 2.0 * w.cos());
+            count[b] * (stand.white(axis) * shape(w) + walk) + beside.get(b).copied().unwrap_or(0.0)
+        })
+        .collect()
+}
+
+/// The largest share of a signal's gain that each effect of the library describes.
+fn of_all(stand: &Stand, axis: usize, signal: &[f64]) -> Vec<(&'static str, f64)> {
+    let meter = Meter::new(stand, axis);
+    let whole = meter.of_signal(&meter.energy(signal)).powi(2);
+    let expected = spectrum(stand, axis, &|_| 1.0, &meter.energy(signal));
+    let own = saturated(stand, &expected);
+    let mut all: Vec<_> = EFFECTS
+        .iter()
+        .map(|effect| {
+            let left = |set: &Vec<Vec<f64>>| meter.energy(&meter.beyond(signal, set));
+            let described = columns(*effect, stand, axis)
+                .iter()
+                .map(|set| 1.0 - meter.of_signal(&left(set)).powi(2) / whole)
+                .fold(of_process(stand, axis, &expected, own, *effect), f64::max);
+            (effect.id(), described)
+        })
+        .collect();
+    let (line, swinging) = of_lines(stand, axis, signal);
+    all.extend([("line", line), ("am_line", swinging)]);
+    all
+}
+
+fn hold(what: &str, library: &str, share: f64) {
+    println!("{what}: {library} describes {:.0} %", 100.0 * share);
+    assert!(
+        share < DESCRIBED,
+        "{what} is a case of {library}: {share:.3} of its gain"
+    );
+}
+
+#[test]
+fn no_regression_line_or_process_of_the_library_describes_a_signal() {
+    for name in kept_back::NAMES {
+        for index in 0..DRAWS {
+            let draw = &mut Draw::of(20_261_121, 7, index);
+            let mut stand = stand(draw, name);
+            let axis = draw.of_many(3);
+            let f = foreign(draw, &mut stand, name, axis, 25.0);
+            let (Change::Add(signal), true) = (&f.change, name != "noise with a resonance") else {
+                continue;
+            };
+            println!("{name} #{index}: d' {:.1}", f.strength);
+            for (library, share) in of_all(&stand, axis, signal) {
+                hold(name, library, share);
+            }
+        }
+    }
+}
+
+/// What the share is worth: an effect of the library is described by itself.
+#[test]
+fn a_line_a_swinging_line_a_temperature_term_and_a_step_describe_themselves() {
+    let draw = &mut Draw::of(20_261_121, 11, 0);
+    let stand = stand(draw, "");
+    let of = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
+        (0..stand.samples())
+            .map(|i| 0.1 * f(i as f64 / stand.rate_hz))
+            .collect()
+    };
+    let swing = |t: f64| 1.0 + 0.7 * (TAU * 0.11 * t).cos();
+    for (cause, signal) in [
+        ("line", of(&|t| (TAU * 2.371 * t + 0.4).cos())),
+        ("am_line", of(&|t| swing(t) * (TAU * 2.371 * t + 0.4).cos())),
+        ("bias_step", of(&|t| f64::from(u8::from(t >= 301.7)))),
+        ("temperature", stand.world.temperature[1].clone()),
+    ] {
+        let share = of_all(&stand, 1, &signal)
+            .into_iter()
+            .filter(|(id, _)| *id == cause)
+            .fold(f64::NEG_INFINITY, |most, (_, share)| most.max(share));
+        assert!(share > DESCRIBED, "{cause} describes {share:.3} of itself");
+    }
+    // A process of the library, in its own spectrum.
+    let pole = (-1.0 / (2.0 * stand.rate_hz)).exp();
+    let one_pole = |w: f64| (1.0 - pole * pole) / (1.0 + pole * pole - 2.0 * pole * w.cos());
+    let expected = spectrum(&stand, 1, &|w| 1.0 + 0.1 * one_pole(w), &[]);
+    let own = saturated(&stand, &expected);
+    let gauss_markov = model::effects::effect("gauss_markov").expect("a cause of the library");
+    let share = of_process(&stand, 1, &expected, own, gauss_markov);
+    assert!(
+        share > DESCRIBED,
+        "gauss_markov describes {share:.3} of itself"
+    );
+}
+
+#[test]
+fn no_process_of_the_library_describes_a_shaped_noise() {
+    for index in 0..DRAWS {
+        let draw = &mut Draw::of(20_261_121, 8, index);
+        let stand = stand(draw, "");
+        let axis = draw.of_many(3);
+        let meter = Meter::new(&stand, axis);
+        let hold_all = |what: &str, expected: &[f64]| {
+            let own = saturated(&stand, expected);
+            for effect in EFFECTS {
+                hold(
+                    what,
+                    effect.id(),
+                    of_process(&stand, axis, expected, own, *effect),
+                );
+            }
+        };
+        let share = 0.3;
+        hold_all(
+            "noise of a differenced angle",
+            &spectrum(&stand, axis, &|w| 1.0 + by_difference(share, w), &[]),
+        );
+        for (g, after) in [(0.24, 3), (-0.24, 3), (0.24, 9), (-0.24, 25)] {
+            hold_all(
+                "echo of earlier samples",
+                &spectrum(&stand, axis, &|w| 1.0 + by_echo(g, after, w), &[]),
+            );
+        }
+        for (f, half_width) in [(0.6, 0.03), (0.6, 0.15), (3.0, 0.1), (8.0, 0.3)] {
+            let mode = Mode::new(f, half_width, stand.rate_hz);
+            let with = |size: f64| -> Vec<f64> {
+                meter
+                    .omega()
+                    .iter()
+                    .map(|w| size * mode.density(*w))
+                    .collect()
+            };
+            let size = crate::strength::size_for(25.0, &|x| meter.of_density(&with(x)));
+            hold_all(
+                "noise with a resonance",
+                &spectrum(
+                    &stand,
+                    axis,
+                    &|w| 1.0 + size * mode.density(w) / stand.white(axis),
+                    &[],
+                ),
+            );
+        }
+    }
+}
+
+#[test]
+fn no_law_of_variance_of_the_library_describes_a_changing_variance() {
+    for name in ["noise whose size wanders", "every few samples noisier"] {
+        for index in 0..DRAWS {
+            let draw = &mut Draw::of(20_261_121, 9, index);
+            let mut stand = stand(draw, name);
+            let f = foreign(draw, &mut stand, name, 0, 25.0);
+            let Change::Scale(factor) = &f.change else {
+                panic!("{name} has no law of variance")
+            };
+            let law: Vec<f64> = factor.iter().map(|f| f * f).collect();
+            let whole = of_variance(&law).powi(2);
+            assert!((whole.sqrt() - f.strength).abs() < 1e-9 && (f.strength - 25.0).abs() < 0.1);
+            let n = law.len() as f64;
+            let mean = law.iter().sum::<f64>() / n;
+            // The level is refitted beside the shape.
+            let gain = |shape: &dyn Fn(usize) -> f64| {
+                let (mut sum, mut logs) = (0.0, 0.0);
+                for (i, v) in law.iter().enumerate() {
+                    sum += v / shape(i);
+                    logs += shape(i).ln();
+                }
+                n * mean.ln() - n * (sum / n).ln() - logs
+            };
+            for effect in EFFECTS {
+                for h in hypotheses(*effect, &stand, 0) {
+                    let Hypothesis::Variance(how) = h else {
+                        continue;
+                    };
+                    let mut best = 0.0f64;
+                    match how {
+                        VarianceLaw::Shape { shape, .. } => {
+                            for k in -9..20 {
+                                let a = if k < 0 {
+                                    0.1 * f64::from(k)
+                                } else {
+                                    0.1 * 1.3f64.powi(k)
+                                };
+                                best = best.max(gain(&|i| 1.0 + a * shape[i]));
+                            }
+                        }
+                        VarianceLaw::Segment => {
+                            let step = 100;
+                            for from in (0..law.len()).step_by(step) {
+                                for to in (from + step..=law.len()).step_by(step) {
+                                    let inside =
+                                        law[from..to].iter().sum::<f64>() / (to - from) as f64;
+                                    let outside = (mean * n - inside * (to - from) as f64)
+                                        / (n - (to - from) as f64).max(1.0);
+                                    let share = (to - from) as f64 / n;
+                                    best = best.max(
+                                        n * (mean.ln()
+                                            - share * inside.ln()
+                                            - (1.0 - share) * outside.max(1e-9).ln()),
+                                    );
+                                }
+                            }
+                        }
+                    }
+                    hold(name, effect.id(), best / whole);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn no_stuck_or_missing_bit_describes_uneven_steps() {
+    for index in 0..DRAWS {
+        let draw = &mut Draw::of(20_261_121, 10, index);
+        let mut stand = stand(draw, "");
+        let f = foreign(draw, &mut stand, "uneven steps of the converter", 0, 25.0);
+        let Change::Edges(first, edges) = &f.change else {
+            panic!("no edges")
+        };
+        let (mean, sigma) = (stand.bias[0] / LSB, stand.white(0).sqrt() / LSB);
+        let straight: Vec<f64> = (0..edges.len())
+            .map(|i| f64::from(*first) + i as f64 - 0.5)
+            .collect();
+        let (even, uneven) = (shares(&straight, mean, sigma), shares(edges, mean, sigma));
+        let whole = of_law(&uneven, &even, stand.samples()).powi(2);
+        assert!((whole.sqrt() - f.strength).abs() < 1e-6 && f.strength > 24.0);
+        let mut best = 0.0f64;
+        for bit in 0..6 {
+            for one in [false, true] {
+                for percent in 1..=100 {
+                    let f = f64::from(percent) / 100.0;
+                    let mut law: Vec<f64> = even.iter().map(|p| (1.0 - f) * p).collect();
+                    for (i, p) in even.iter().enumerate() {
+                        let code = first + i as i32;
+                        let read = if one {
+                            code | (1 << bit)
+                        } else {
+                            code & !(1 << bit)
+                        };
+                        if let Some(p_read) = law.get_mut((read - first) as usize) {
+                            *p_read += f * p;
+                        }
+                    }
+                    best = best.max(1.0 - of_law(&uneven, &law, stand.samples()).powi(2) / whole);
+                }
+            }
+        }
+        hold("uneven steps of the converter", "stuck_bit", best);
+    }
+}
