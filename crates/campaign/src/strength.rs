@@ -1,27 +1,31 @@
 //! How strong an effect is: d', the square root of twice the expected log likelihood ratio, the random walk refitted
 //! under the baseline, so that what a random walk can hide does not count.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
 use analysis::likelihood::{Bins, Dct, least_walk};
 use analysis::optimise::golden;
 
 use crate::stand::Stand;
 
-/// The spectrum that a channel of a stand has, on the bins of its length.
-#[derive(Clone)]
-pub struct Meter {
+/// Random walks that are tried first, and the largest of them.
+const WALKS: usize = 24;
+const MOST_WALK: f64 = 2.0;
+
+/// What a length is made of, whatever its noise.
+struct Length {
     dct: Dct,
     bins: Bins,
     count: Vec<f64>,
     walk: Vec<f64>,
-    /// Variance of a coefficient without the effect.
-    clean: Vec<f64>,
+    /// Random walks to try, with 1/g over the bins and the sum of ln g.
+    tried: Vec<(f64, Vec<f64>, f64)>,
 }
 
-impl Meter {
-    /// For an axis of a stand.
-    #[must_use]
-    pub fn new(stand: &Stand, axis: usize) -> Self {
-        let n = stand.samples();
+impl Length {
+    fn new(n: usize) -> Self {
         let bins = Bins::new(n);
         let ones = vec![1.0; n];
         let count = bins.products(&ones, &ones);
@@ -31,23 +35,64 @@ impl Meter {
             .iter()
             .map(|w| 1.0 / (4.0 * (w / 2.0).sin().powi(2)))
             .collect();
-        let clean = walk
-            .iter()
-            .map(|w| stand.white(axis) + stand.step(axis) * w)
+        let low = least_walk(n);
+        let tried = (0..WALKS)
+            .map(|i| {
+                let x = low + (MOST_WALK - low) * i as f64 / (WALKS - 1) as f64;
+                let g: Vec<f64> = walk.iter().map(|w| 1.0 + x.exp() * w).collect();
+                let logs = g.iter().zip(&count).map(|(g, m)| m * g.ln()).sum();
+                (x, g.iter().map(|g| 1.0 / g).collect(), logs)
+            })
             .collect();
         Self {
             dct: Dct::new(n),
             bins,
             count,
             walk,
-            clean,
+            tried,
         }
+    }
+
+    /// That of `n` samples, made once on each thread.
+    fn of(n: usize) -> Rc<Self> {
+        thread_local! {
+            static KNOWN: RefCell<HashMap<usize, Rc<Length>>> = RefCell::default();
+        }
+        KNOWN.with(|k| {
+            Rc::clone(
+                k.borrow_mut()
+                    .entry(n)
+                    .or_insert_with(|| Rc::new(Self::new(n))),
+            )
+        })
+    }
+}
+
+/// The spectrum that a channel of a stand has, on the bins of its length.
+#[derive(Clone)]
+pub struct Meter {
+    length: Rc<Length>,
+    /// Variance of a coefficient without the effect.
+    clean: Vec<f64>,
+}
+
+impl Meter {
+    /// For an axis of a stand.
+    #[must_use]
+    pub fn new(stand: &Stand, axis: usize) -> Self {
+        let length = Length::of(stand.samples());
+        let clean = length
+            .walk
+            .iter()
+            .map(|w| stand.white(axis) + stand.step(axis) * w)
+            .collect();
+        Self { length, clean }
     }
 
     /// Angular frequencies of the bins, rad per sample.
     #[must_use]
     pub fn omega(&self) -> &[f64] {
-        &self.bins.at.omega
+        &self.length.bins.at.omega
     }
 
     /// The same channel with a process beside its noise that adds `density` to the variance of each coefficient.
@@ -65,21 +110,21 @@ impl Meter {
     /// Energy of a signal in each bin.
     #[must_use]
     pub fn energy(&self, signal: &[f64]) -> Vec<f64> {
-        let c = self.dct.forward(signal);
-        self.bins.products(&c, &c)
+        let c = self.length.dct.forward(signal);
+        self.length.bins.products(&c, &c)
     }
 
     /// What is left of a signal when the best multiples of others are taken off, in the metric of the noise.
     #[must_use]
     pub fn beyond(&self, signal: &[f64], others: &[Vec<f64>]) -> Vec<f64> {
         let weighted = |a: &[f64], b: &[f64]| -> f64 {
-            let sums = self.bins.products(a, b);
+            let sums = self.length.bins.products(a, b);
             sums.iter().zip(&self.clean).map(|(s, v)| s / v).sum()
         };
-        let mut c = self.dct.forward(signal);
+        let mut c = self.length.dct.forward(signal);
         let mut basis: Vec<Vec<f64>> = vec![];
         for other in others {
-            let mut x = self.dct.forward(other);
+            let mut x = self.length.dct.forward(other);
             for b in &basis {
                 let share = weighted(&x, b);
                 x.iter_mut().zip(b).for_each(|(x, b)| *x -= share * b);
@@ -95,19 +140,19 @@ impl Meter {
             c.iter_mut().zip(b).for_each(|(c, b)| *c -= share * b);
         }
         c[0] = 0.0;
-        self.dct.inverse(&c)
+        self.length.dct.inverse(&c)
     }
 
     /// d' of a signal of known shape, by its energies.
     #[must_use]
     pub fn of_signal(&self, energy: &[f64]) -> f64 {
         let expected: Vec<f64> = (0..energy.len())
-            .map(|b| self.count[b] * self.clean[b] + energy[b])
+            .map(|b| self.length.count[b] * self.clean[b] + energy[b])
             .collect();
         let truth: f64 = self
             .clean
             .iter()
-            .zip(&self.count)
+            .zip(&self.length.count)
             .map(|(v, m)| m * (1.0 + v.ln()))
             .sum();
         self.against_baseline(&expected, truth)
@@ -134,10 +179,14 @@ impl Meter {
             .zip(density)
             .map(|(v, d)| (v + d).max(1e-9 * v))
             .collect();
-        let expected: Vec<f64> = with.iter().zip(&self.count).map(|(v, m)| v * m).collect();
+        let expected: Vec<f64> = with
+            .iter()
+            .zip(&self.length.count)
+            .map(|(v, m)| v * m)
+            .collect();
         let truth = with
             .iter()
-            .zip(&self.count)
+            .zip(&self.length.count)
             .map(|(v, m)| m * (1.0 + v.ln()))
             .sum();
         self.against_baseline(&expected, truth)
@@ -145,24 +194,32 @@ impl Meter {
 
     /// White noise and random walk refitted to expected energies.
     fn against_baseline(&self, expected: &[f64], truth: f64) -> f64 {
-        let n: f64 = self.count.iter().sum();
+        let n: f64 = self.length.count.iter().sum();
         let minus_two_l = |log_walk: f64| {
             let lambda = log_walk.exp();
             let (mut sum, mut logs) = (0.0, 0.0);
-            for ((e, w), m) in expected.iter().zip(&self.walk).zip(&self.count) {
+            for ((e, w), m) in expected
+                .iter()
+                .zip(&self.length.walk)
+                .zip(&self.length.count)
+            {
                 let g = 1.0 + lambda * w;
                 sum += e / g;
                 logs += m * g.ln();
             }
             n * (sum / n).ln() + logs + n
         };
-        let low = least_walk(self.bins.n);
-        let best = (0..24)
-            .map(|i| low + (2.0 - low) * f64::from(i) / 23.0)
-            .min_by(|a, b| minus_two_l(*a).total_cmp(&minus_two_l(*b)))
-            .unwrap_or(low);
+        let tried = |(_, weight, logs): &(f64, Vec<f64>, f64)| {
+            let sum: f64 = expected.iter().zip(weight).map(|(e, w)| e * w).sum();
+            n * (sum / n).ln() + logs + n
+        };
+        let all: Vec<f64> = self.length.tried.iter().map(tried).collect();
+        let i = (0..WALKS)
+            .min_by(|a, b| all[*a].total_cmp(&all[*b]))
+            .unwrap_or(0);
+        let (low, best) = (self.length.tried[0].0, self.length.tried[i].0);
         let x = golden(&minus_two_l, (best - 1.0).max(low), best + 1.0, 20);
-        let l = minus_two_l(x).min(minus_two_l(low));
+        let l = minus_two_l(x).min(all[0]);
         (l - truth).max(0.0).sqrt()
     }
 }
@@ -187,16 +244,45 @@ pub fn of_common(whites: &[f64], shared: f64, samples: usize) -> f64 {
     (samples as f64 * (own - joint)).max(0.0).sqrt()
 }
 
-/// The size at which a strength, growing with size, reaches `wanted`.
+/// The size at which a strength, growing with size, reaches `wanted`: on logarithmic scales a strength is nearly a straight
+/// line, so that the secant of an enclosing pair (Illinois) finds it in a few steps.
 #[must_use]
 pub fn size_for(wanted: f64, strength: &dyn Fn(f64) -> f64) -> f64 {
+    const ENOUGH: f64 = 1e-9;
+    let off = |x: f64| {
+        // A strength of nothing, which has no logarithm, is far too little.
+        let d = strength(x.exp());
+        if d > 0.0 { (d / wanted).ln() } else { -50.0 }
+    };
     let (mut low, mut high) = (-18.0f64, 8.0f64);
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if strength(middle.exp()) < wanted {
-            low = middle;
+    let (mut below, mut above) = (off(low), off(high));
+    if below >= 0.0 || above <= 0.0 {
+        return if below >= 0.0 { low } else { high }.exp();
+    }
+    let mut last = 0i8;
+    for step in 0..60 {
+        // Where the line is bent the secant creeps: every fourth step halves.
+        let x = if step % 4 == 3 {
+            0.5 * (low + high)
         } else {
-            high = middle;
+            (low * above - high * below) / (above - below)
+        };
+        let y = off(x);
+        if y.abs() < ENOUGH || high - low < ENOUGH {
+            return x.exp();
+        }
+        if y < 0.0 {
+            (low, below) = (x, y);
+            if last == -1 {
+                above *= 0.5;
+            }
+            last = -1;
+        } else {
+            (high, above) = (x, y);
+            if last == 1 {
+                below *= 0.5;
+            }
+            last = 1;
         }
     }
     (0.5 * (low + high)).exp()
