@@ -107,7 +107,8 @@ fn stick_and_slip(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         .collect()
 }
 
-/// A reference whose drift with temperature is a share of the supply, beyond what a line in each of the two takes.
+/// A reference whose drift with temperature is a share of the supply: the product of both about their means. A term in
+/// one of them alone is not in it.
 fn product(stand: &Stand, axis: usize) -> Vec<f64> {
     let about_mean = |v: &[f64]| -> Vec<f64> {
         let mean = v.iter().sum::<f64>() / v.len() as f64;
@@ -115,12 +116,11 @@ fn product(stand: &Stand, axis: usize) -> Vec<f64> {
     };
     let temperature = about_mean(&stand.world.temperature[axis]);
     let supply = about_mean(&stand.world.supply);
-    let product: Vec<f64> = temperature
+    temperature
         .iter()
         .zip(&supply)
         .map(|(t, u)| t * u)
-        .collect();
-    Meter::new(stand, axis).beyond(&product, &[temperature, supply])
+        .collect()
 }
 
 /// Vibration along a slant in spells: the anisoelastic error goes with the mean square over a sample, while the
