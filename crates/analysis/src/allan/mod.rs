@@ -1,5 +1,7 @@
 //! The Allan family: estimators on integrated readings, their grids of cluster times and the streaming form.
 
+mod correlate;
+mod fast;
 mod gapped;
 mod kernels;
 mod phase;
@@ -185,5 +187,5 @@ pub fn deviation(phase: &Phase, kind: Deviation, tau0: f64, m: usize) -> Option<
     if m == 0 {
         return None;
     }
-    phase.deviation(kind, tau0, m)
+    phase.deviation(kind, tau0, m, &mut correlate::Correlator::new())
 }

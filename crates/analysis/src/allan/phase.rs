@@ -2,6 +2,7 @@
 
 use std::ops::{Add, Range, Sub};
 
+use super::correlate::Correlator;
 use super::{Deviation, Estimate, kernels, total};
 
 /// A point of integrated readings: `f64`, or `i64` where the readings are counts and every sum is exact.
@@ -152,8 +153,10 @@ impl Phase {
         if kind == Deviation::Oadev {
             return self.overlapping_allan(tau0, ms);
         }
+        let mut correlator = Correlator::new();
         ms.iter()
-            .filter_map(|m| super::deviation(self, kind, tau0, *m))
+            .filter(|m| **m > 0)
+            .filter_map(|m| self.deviation(kind, tau0, *m, &mut correlator))
             .collect()
     }
 
@@ -206,8 +209,19 @@ impl Phase {
         }
     }
 
-    pub(super) fn deviation(&self, kind: Deviation, tau0: f64, m: usize) -> Option<Estimate> {
-        fn sum<T: PhasePoint>(runs: &[Vec<T>], kind: Deviation, m: usize) -> (f64, usize) {
+    pub(super) fn deviation(
+        &self,
+        kind: Deviation,
+        tau0: f64,
+        m: usize,
+        correlator: &mut Correlator,
+    ) -> Option<Estimate> {
+        fn sum<T: PhasePoint>(
+            runs: &[Vec<T>],
+            kind: Deviation,
+            m: usize,
+            correlator: &mut Correlator,
+        ) -> (f64, usize) {
             let mut out = (0.0, 0);
             for x in runs {
                 let (squares, n) = match kind {
@@ -217,8 +231,8 @@ impl Phase {
                     Deviation::Hdev => kernels::third_differences(x, m, m),
                     Deviation::Ohdev => kernels::third_differences(x, m, 1),
                     Deviation::Totdev => total::total(x, m),
-                    Deviation::Mtotdev => total::modified_total(x, m),
-                    Deviation::Theo1 => total::theo1(x, m),
+                    Deviation::Mtotdev => total::modified_total(x, m, correlator),
+                    Deviation::Theo1 => total::theo1(x, m, correlator),
                 };
                 out.0 += squares;
                 out.1 += n;
@@ -226,8 +240,8 @@ impl Phase {
             out
         }
         let (squares, n) = match &self.runs {
-            Runs::Counts(runs) => sum(runs, kind, m),
-            Runs::Values(runs) => sum(runs, kind, m),
+            Runs::Counts(runs) => sum(runs, kind, m, correlator),
+            Runs::Values(runs) => sum(runs, kind, m, correlator),
         };
         if n == 0 {
             return None;
