@@ -250,9 +250,12 @@ pub fn of_common(whites: &[f64], shared: f64, samples: usize) -> f64 {
 pub fn size_for(wanted: f64, strength: &dyn Fn(f64) -> f64) -> f64 {
     const ENOUGH: f64 = 1e-9;
     let off = |x: f64| {
-        // A strength of nothing, which has no logarithm, is far too little.
-        let d = strength(x.exp());
-        if d > 0.0 { (d / wanted).ln() } else { -50.0 }
+        // Neither nothing has a logarithm nor what overflows.
+        match strength(x.exp()) {
+            d if d.is_nan() || d.is_infinite() => 50.0,
+            d if d > 0.0 => (d / wanted).ln(),
+            _ => -50.0,
+        }
     };
     let (mut low, mut high) = (-18.0f64, 8.0f64);
     let (mut below, mut above) = (off(low), off(high));
@@ -286,4 +289,26 @@ pub fn size_for(wanted: f64, strength: &dyn Fn(f64) -> f64) -> f64 {
         }
     }
     (0.5 * (low + high)).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_size_is_found_whatever_the_strength_does_far_from_it() {
+        let near =
+            |found: f64, size: f64| assert!((found / size - 1.0).abs() < 1e-6, "{found} {size}");
+        near(size_for(8.0, &|x| 3.0 * x), 8.0 / 3.0);
+        near(
+            size_for(8.0, &|x| if x < 0.1 { 0.0 } else { x * x }),
+            8f64.sqrt(),
+        );
+        near(
+            size_for(8.0, &|x| if x > 20.0 { f64::NAN } else { x.exp() - 1.0 }),
+            9f64.ln(),
+        );
+        // Saturates below what is wanted: the largest.
+        near(size_for(8.0, &|x| x.min(2.0)), 8f64.exp());
+    }
 }

@@ -1,0 +1,375 @@
+//! Fourier and cosine transforms of real records, through complex ones of half their length.
+
+use std::cell::{Cell, OnceCell, RefCell};
+use std::collections::HashMap;
+use std::f64::consts::PI;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use rustdct::{DctPlanner, TransformType2And3};
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+
+/// Longest transform whose plan is kept for the next one who asks on the same thread, and most of them.
+const KEPT: usize = 1 << 17;
+const MOST_KEPT: usize = 64;
+
+thread_local! {
+    static PLANS: RefCell<HashMap<usize, Plan>> = RefCell::default();
+}
+
+/// What a real transform of one even length needs.
+#[derive(Clone)]
+struct Plan {
+    half: Arc<dyn Fft<f64>>,
+    /// exp(-i pi k / (2 n)), k = 0 ..= n/2.
+    turn: Rc<Vec<Complex<f64>>>,
+}
+
+impl Plan {
+    fn new(n: usize) -> Self {
+        let known = PLANS.with(|k| k.borrow().get(&n).cloned());
+        if let Some(known) = known {
+            return known;
+        }
+        let turn = (0..=n / 2)
+            .map(|k| Complex::from_polar(1.0, -PI * k as f64 / (2 * n) as f64))
+            .collect();
+        let new = Self {
+            half: FftPlanner::new().plan_fft_forward(n / 2),
+            turn: Rc::new(turn),
+        };
+        if n <= KEPT {
+            PLANS.with(|k| {
+                let mut known = k.borrow_mut();
+                if known.len() >= MOST_KEPT {
+                    known.clear();
+                }
+                known.insert(n, new.clone());
+            });
+        }
+        new
+    }
+}
+
+/// Work space that transforms have in common.
+#[derive(Default)]
+struct Space {
+    packed: Vec<Complex<f64>>,
+    scratch: Vec<Complex<f64>>,
+}
+
+/// The discrete Fourier transform of real sequences of one even length n: F[k] = sum of x[j] exp(-2 pi i j k / n).
+#[derive(Clone)]
+pub struct RealFft {
+    n: usize,
+    plan: Plan,
+    space: Rc<RefCell<Space>>,
+}
+
+impl RealFft {
+    /// Plan for `n` samples.
+    ///
+    /// # Panics
+    /// When `n` is odd or 0.
+    #[must_use]
+    pub fn new(n: usize) -> Self {
+        Self::within(n, Rc::default())
+    }
+
+    fn within(n: usize, space: Rc<RefCell<Space>>) -> Self {
+        assert!(n > 0 && n.is_multiple_of(2), "{n} is no even length");
+        Self {
+            n,
+            plan: Plan::new(n),
+            space,
+        }
+    }
+
+    /// Transform x, of which x[2j] + i x[2j + 1] is `x(j)`, and hand F[k] of k = 0 ..= n/2 to `take`.
+    pub fn run(
+        &self,
+        x: impl Fn(usize) -> Complex<f64>,
+        mut take: impl FnMut(usize, Complex<f64>),
+    ) {
+        let h = self.n / 2;
+        let fill = |z: &mut [Complex<f64>]| z.iter_mut().enumerate().for_each(|(j, z)| *z = x(j));
+        self.packed(fill, |z| {
+            for (k, t) in self.plan.turn.iter().enumerate() {
+                take(k, unpacked(z, k, h, *t));
+            }
+        });
+    }
+
+    /// The complex transform of half the length, in the work space.
+    fn packed(&self, fill: impl FnOnce(&mut [Complex<f64>]), take: impl FnOnce(&[Complex<f64>])) {
+        let Space { packed, scratch } = &mut *self.space.borrow_mut();
+        let zero = Complex::new(0.0, 0.0);
+        packed.resize(self.n / 2, zero);
+        fill(packed);
+        let need = self.plan.half.get_inplace_scratch_len();
+        if scratch.len() < need {
+            scratch.resize(need, zero);
+        }
+        self.plan
+            .half
+            .process_with_scratch(packed, &mut scratch[..need]);
+        take(packed);
+    }
+}
+
+/// F[k] from the transform z of the packed sequence; `turn` is exp(-i pi k / (2 n)), h is n/2.
+#[inline]
+fn unpacked(z: &[Complex<f64>], k: usize, h: usize, turn: Complex<f64>) -> Complex<f64> {
+    let a = z[if k == h { 0 } else { k }];
+    let b = z[if k == 0 { 0 } else { h - k }].conj();
+    let (even, odd) = ((a + b) * 0.5, (a - b) * Complex::new(0.0, -0.5));
+    let square = turn * turn;
+    even + square * square * odd
+}
+
+/// Coefficients of columns that the channels of a record have in common, by a digest of their samples.
+#[derive(Default)]
+pub(crate) struct Known {
+    pub(crate) columns: RefCell<HashMap<[u64; 2], Rc<Vec<f64>>>>,
+    /// Whether what the channels have in common is known: those of the first are, and no later one's own are kept.
+    pub(crate) complete: Cell<bool>,
+}
+
+/// How a cosine transform is made.
+#[derive(Clone)]
+enum Kind {
+    Even(RealFft),
+    Odd(Arc<dyn TransformType2And3<f64>>),
+}
+
+/// The orthonormal DCT-II of one length.
+#[derive(Clone)]
+pub struct Dct {
+    n: usize,
+    kind: Kind,
+    /// The Fourier transform of twice the length, once it is asked for.
+    padded: Rc<OnceCell<RealFft>>,
+    pub(crate) known: Rc<Known>,
+}
+
+impl Dct {
+    /// Plan for `n` samples.
+    #[must_use]
+    pub fn new(n: usize) -> Self {
+        let kind = if n > 0 && n.is_multiple_of(2) {
+            Kind::Even(RealFft::new(n))
+        } else {
+            Kind::Odd(DctPlanner::new().plan_dct2(n))
+        };
+        Self {
+            n,
+            kind,
+            padded: Rc::default(),
+            known: Rc::default(),
+        }
+    }
+
+    /// Keep no further columns for other channels.
+    pub fn keep_no_more(&self) {
+        self.known.complete.set(true);
+    }
+
+    /// Coefficients of `x`.
+    #[must_use]
+    pub fn forward(&self, x: &[f64]) -> Vec<f64> {
+        let n = self.n;
+        let scale = (2.0 / n as f64).sqrt();
+        let mut c = match &self.kind {
+            Kind::Odd(plan) => {
+                let mut c = x.to_vec();
+                plan.process_dct2(&mut c);
+                c.iter_mut().for_each(|v| *v *= scale);
+                c
+            }
+            Kind::Even(fft) => {
+                // Even samples forwards, then odd ones backwards: their spectrum, turned by k/4 of a sample, holds
+                // coefficient k in its real part and n - k in its imaginary one.
+                let mut c = vec![0.0; n];
+                let h = n / 2;
+                let sample = |i: usize| {
+                    if 2 * i < n {
+                        x[2 * i]
+                    } else {
+                        x[2 * (n - 1 - i) + 1]
+                    }
+                };
+                fft.packed(
+                    |z| {
+                        for (j, z) in z.iter_mut().enumerate() {
+                            *z = Complex::new(sample(2 * j), sample(2 * j + 1));
+                        }
+                    },
+                    |z| {
+                        for (k, turn) in fft.plan.turn.iter().enumerate() {
+                            let v = unpacked(z, k, h, *turn) * turn * scale;
+                            c[k] = v.re;
+                            if k > 0 && k < h {
+                                c[n - k] = -v.im;
+                            }
+                        }
+                    },
+                );
+                c
+            }
+        };
+        if let Some(first) = c.first_mut() {
+            *first /= 2f64.sqrt();
+        }
+        c
+    }
+
+    /// Samples from coefficients.
+    #[must_use]
+    pub fn inverse(&self, c: &[f64]) -> Vec<f64> {
+        let n = self.n;
+        match &self.kind {
+            Kind::Odd(plan) => {
+                let scale = (2.0 / n as f64).sqrt();
+                let mut x: Vec<f64> = c.iter().map(|v| v * scale).collect();
+                if let Some(first) = x.first_mut() {
+                    *first *= 2f64.sqrt();
+                }
+                plan.process_dct3(&mut x);
+                x
+            }
+            Kind::Even(fft) => {
+                let (h, scale) = (n / 2, (0.5 * n as f64).sqrt());
+                // The spectrum of the samples in the order that `forward` brings them to.
+                let spectrum = |k: usize| {
+                    if k == 0 {
+                        return Complex::new(c[0] * 2f64.sqrt() * scale, 0.0);
+                    }
+                    Complex::new(c[k], -c[n - k]) * fft.plan.turn[k].conj() * scale
+                };
+                let mut x = vec![0.0; n];
+                fft.packed(
+                    |z| {
+                        for k in 0..=h / 2 {
+                            let (a, b) = (spectrum(k), spectrum(h - k));
+                            let square = fft.plan.turn[k].conj() * fft.plan.turn[k].conj();
+                            let even = (a + b.conj()) * 0.5;
+                            let odd = (a - b.conj()) * 0.5 * square * square;
+                            // Conjugated, so that the forward transform goes back.
+                            let i = Complex::new(0.0, 1.0);
+                            z[k] = (even + i * odd).conj();
+                            if k > 0 {
+                                z[h - k] = even + (i * odd.conj()).conj();
+                            }
+                        }
+                    },
+                    |z| {
+                        let back = 1.0 / h as f64;
+                        let mut put = |i: usize, v: f64| {
+                            let to = if 2 * i < n {
+                                2 * i
+                            } else {
+                                2 * (n - 1 - i) + 1
+                            };
+                            x[to] = v * back;
+                        };
+                        for (j, z) in z.iter().enumerate() {
+                            put(2 * j, z.re);
+                            put(2 * j + 1, -z.im);
+                        }
+                    },
+                );
+                x
+            }
+        }
+    }
+
+    /// Energy of the Fourier transform at twice its frequencies: |sum of z[j] exp(-i pi j k / n)|^2, k = 0..n.
+    #[must_use]
+    pub fn energies(&self, z: &[f64]) -> Vec<f64> {
+        let n = self.n;
+        let fft = self.padded.get_or_init(|| {
+            let space = match &self.kind {
+                Kind::Even(fft) => Rc::clone(&fft.space),
+                Kind::Odd(_) => Rc::default(),
+            };
+            RealFft::within(2 * n, space)
+        });
+        let mut all = vec![0.0; n];
+        let at = |j: usize| z.get(j).copied().unwrap_or(0.0);
+        fft.run(
+            |j| Complex::new(at(2 * j), at(2 * j + 1)),
+            |k, f| {
+                if let Some(e) = all.get_mut(k) {
+                    *e = f.norm_sqr();
+                }
+            },
+        );
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(n: usize) -> Vec<f64> {
+        (0..n)
+            .map(|i| (i as f64 * 0.7).sin() + 0.01 * ((i * 7919) % 101) as f64)
+            .collect()
+    }
+
+    #[test]
+    fn coefficients_are_their_sums_and_go_back() {
+        for n in [2, 3, 4, 6, 7, 10, 16, 27, 30, 64, 101, 202] {
+            let (dct, x) = (Dct::new(n), record(n));
+            let c = dct.forward(&x);
+            for (k, found) in c.iter().enumerate() {
+                let share = if k == 0 { 1.0 } else { 2.0 } / n as f64;
+                let angle = |i: usize| PI * k as f64 * (i as f64 + 0.5) / n as f64;
+                let sum: f64 = x.iter().enumerate().map(|(i, v)| v * angle(i).cos()).sum();
+                assert!((found - share.sqrt() * sum).abs() < 1e-12, "{n} {k}");
+            }
+            for (a, b) in dct.inverse(&c).iter().zip(&x) {
+                assert!((a - b).abs() < 1e-12, "{n}");
+            }
+        }
+    }
+
+    #[test]
+    fn energies_are_those_of_the_padded_transform() {
+        for n in [5, 8, 30] {
+            let x = record(n);
+            for (k, found) in Dct::new(n).energies(&x).iter().enumerate() {
+                let sum: Complex<f64> = x
+                    .iter()
+                    .enumerate()
+                    .map(|(j, v)| Complex::from_polar(*v, -PI * (j * k) as f64 / n as f64))
+                    .sum();
+                assert!((found - sum.norm_sqr()).abs() < 1e-9, "{n} {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_real_transform_is_the_complex_one() {
+        for n in [2, 6, 20] {
+            let x = record(n);
+            let mut seen = 0;
+            RealFft::new(n).run(
+                |j| Complex::new(x[2 * j], x[2 * j + 1]),
+                |k, f| {
+                    let terms = x.iter().enumerate();
+                    let direct: Complex<f64> = terms
+                        .map(|(j, v)| {
+                            Complex::from_polar(*v, -2.0 * PI * (j * k) as f64 / n as f64)
+                        })
+                        .sum();
+                    assert!((f - direct).norm() < 1e-10, "{n} {k}");
+                    seen += 1;
+                },
+            );
+            assert_eq!(seen, n / 2 + 1);
+        }
+    }
+}
