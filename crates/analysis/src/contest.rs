@@ -44,46 +44,57 @@ fn levels_likelihood<const K: usize>(y: &[f64], x: &Coordinates, levels: &[f64; 
     let share = K as f64 / others;
     let switch = (1.0 - (-share * (-x[3]).exp()).exp()) / share;
     let start = 1e4 * white + half * half;
-    // State by level: log weight, mean and variance of the slow level.
-    let mut states = [(-(K as f64).ln(), 0.0, start); K];
-    let mut sum = 0.0;
+    // State by level: weight, mean and variance of the slow level.
+    let mut states = [((K as f64).recip(), 0.0, start); K];
+    let mut sum = -0.5 * y.len() as f64 * std::f64::consts::TAU.ln();
     for (t, v) in y.iter().enumerate() {
-        let mut merged = [(f64::NEG_INFINITY, 0.0, 0.0); K];
-        for (j, level) in levels.iter().enumerate() {
+        // Prediction by level: weight times 1/sqrt(s), mean, 1/s, gain, variance after the reading.
+        let predicted = states.map(|(w, m, p)| {
+            let p = p + if t > 0 { walk } else { 0.0 };
+            let inverse = 1.0 / (p + white);
+            (
+                w * inverse.sqrt(),
+                m,
+                inverse,
+                p * inverse,
+                p * white * inverse,
+            )
+        });
+        // State by level after it, with what it is off at best.
+        let mut merged = [(0.0, 0.0, 0.0, 0.0); K];
+        for (j, (level, merged)) in levels.iter().zip(&mut merged).enumerate() {
+            let off = predicted.map(|(_, m, inverse, ..)| {
+                let nu = v - m - half * level;
+                (nu, 0.5 * nu * nu * inverse)
+            });
+            let least = off.iter().map(|o| o.1).fold(f64::INFINITY, f64::min);
             let mut parts = [(0.0, 0.0, 0.0); K];
-            for (i, (w, m, p)) in states.iter().enumerate() {
+            let (mut all, mut mean) = (0.0, 0.0);
+            for (i, ((nu, q), (w, m, _, gain, after))) in off.iter().zip(&predicted).enumerate() {
                 let moved = if i == j {
                     1.0 - switch
                 } else {
                     switch / others
                 };
-                let p = p + if t > 0 { walk } else { 0.0 };
-                let s = p + white;
-                let nu = v - m - half * level;
-                let l = w + moved.ln() - 0.5 * ((std::f64::consts::TAU * s).ln() + nu * nu / s);
-                parts[i] = (l, m + p / s * nu, p * white / s);
+                let weight = w * moved * (least - q).exp();
+                let at = m + gain * nu;
+                parts[i] = (weight, at, *after);
+                all += weight;
+                mean += weight * at;
             }
-            let top = parts.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
-            let weights = parts.map(|p| (p.0 - top).exp());
-            let all: f64 = weights.iter().sum();
-            let m = weights
+            mean /= all;
+            let variance = parts
                 .iter()
-                .zip(&parts)
-                .map(|(w, p)| w * p.1)
+                .map(|(w, at, after)| w * (after + (at - mean).powi(2)))
                 .sum::<f64>()
                 / all;
-            let p = weights
-                .iter()
-                .zip(&parts)
-                .map(|(w, p)| w * (p.2 + (p.1 - m).powi(2)))
-                .sum::<f64>()
-                / all;
-            merged[j] = (top + all.ln(), m, p);
+            *merged = (all, mean, variance, least);
         }
-        let top = merged.iter().map(|m| m.0).fold(f64::NEG_INFINITY, f64::max);
-        let total = top + merged.iter().map(|m| (m.0 - top).exp()).sum::<f64>().ln();
-        sum += total;
-        states = merged.map(|(w, m, p)| (w - total, m, p));
+        let least = merged.iter().map(|m| m.3).fold(f64::INFINITY, f64::min);
+        let weights = merged.map(|m| m.0 * (least - m.3).exp());
+        let total: f64 = weights.iter().sum();
+        sum += total.ln() - least;
+        states = std::array::from_fn(|j| (weights[j] / total, merged[j].1, merged[j].2));
     }
     // The diffuse start integrates the mean out. Its prior density is put back, and the factor of sqrt(count) by which
     // that integral differs from the density of the coefficients k >= 1 of the orthonormal DCT.

@@ -39,6 +39,7 @@ pub mod search;
 pub mod separate;
 pub mod synthetic;
 pub mod threshold;
+pub mod transform;
 pub mod units;
 
 pub use analyze::{Analysis, AnalyzeOptions, analyze};

@@ -5,31 +5,19 @@
 //! g_k = h(w_k) + lambda / (2 - 2 cos w_k) + further densities, w_k = pi k / N. What a fit needs of the data are sums
 //! of products of coefficients over bins in which g hardly changes: singly at low frequency, then 1 % wide.
 
-use std::cell::{Cell, OnceCell, RefCell};
+use std::cell::{OnceCell, RefCell};
 use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::{Covariance, Frequencies};
-use rustdct::{DctPlanner, TransformType2And3};
+
+pub use crate::transform::Dct;
 
 /// Bins of single coefficients at the low end.
 const SINGLE: usize = 256;
 /// Width of the other bins over their frequency.
 const WIDTH: f64 = 0.01;
-
-/// Coefficients of columns that the channels of a record have in common, by a digest of their samples.
-type Known = HashMap<[u64; 2], Rc<Vec<f64>>>;
-
-/// The orthonormal DCT-II of one length.
-#[derive(Clone)]
-pub struct Dct {
-    plan: Arc<dyn TransformType2And3<f64>>,
-    n: usize,
-    known: Rc<RefCell<Known>>,
-    /// Whether what the channels have in common is known: those of the first are, and no later one's own are kept.
-    complete: Rc<Cell<bool>>,
-}
 
 /// Two sums over the samples' bits and places: columns that agree in both are the same.
 fn digest(x: &[f64]) -> [u64; 2] {
@@ -42,49 +30,6 @@ fn digest(x: &[f64]) -> [u64; 2] {
                 step(b, bits, 0xc2b2_ae3d_27d4_eb4f),
             ]
         })
-}
-
-impl Dct {
-    /// Plan for `n` samples.
-    #[must_use]
-    pub fn new(n: usize) -> Self {
-        Self {
-            plan: DctPlanner::new().plan_dct2(n),
-            n,
-            known: Rc::default(),
-            complete: Rc::default(),
-        }
-    }
-
-    /// Keep no further columns for other channels.
-    pub fn keep_no_more(&self) {
-        self.complete.set(true);
-    }
-
-    /// Coefficients of `x`.
-    #[must_use]
-    pub fn forward(&self, x: &[f64]) -> Vec<f64> {
-        let mut c = x.to_vec();
-        self.plan.process_dct2(&mut c);
-        let scale = (2.0 / self.n as f64).sqrt();
-        c.iter_mut().for_each(|v| *v *= scale);
-        if let Some(first) = c.first_mut() {
-            *first /= 2f64.sqrt();
-        }
-        c
-    }
-
-    /// Samples from coefficients.
-    #[must_use]
-    pub fn inverse(&self, c: &[f64]) -> Vec<f64> {
-        let scale = (2.0 / self.n as f64).sqrt();
-        let mut x: Vec<f64> = c.iter().map(|v| v * scale).collect();
-        if let Some(first) = x.first_mut() {
-            *first *= 2f64.sqrt();
-        }
-        self.plan.process_dct3(&mut x);
-        x
-    }
 }
 
 /// The bins of a length.
@@ -301,11 +246,15 @@ impl Panel {
     /// Add a column that other channels may have as well; returns its number.
     pub fn add_common(&self, values: &[f64]) -> usize {
         let key = digest(values);
-        let known = self.dct.known.borrow().get(&key).map(Rc::clone);
+        let known = self.dct.known.columns.borrow().get(&key).map(Rc::clone);
         let c = known.unwrap_or_else(|| {
             let c = Rc::new(self.dct.forward(values));
-            if !self.dct.complete.get() {
-                self.dct.known.borrow_mut().insert(key, Rc::clone(&c));
+            if !self.dct.known.complete.get() {
+                self.dct
+                    .known
+                    .columns
+                    .borrow_mut()
+                    .insert(key, Rc::clone(&c));
             }
             c
         });

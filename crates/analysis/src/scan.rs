@@ -1,10 +1,9 @@
 //! Scans: a step at all times at once, a line at all frequencies at once, side bands, stretches of larger variance.
 
-use rustdct::DctPlanner;
-use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 use crate::likelihood::{Noise, Panel, Solution};
+use crate::transform::RealFft;
 
 /// Longest grid of step times; beyond it the scan is as fine as this many places.
 const LONGEST_STEP_GRID: usize = 1 << 16;
@@ -37,9 +36,7 @@ fn first_of_residual(
 pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Vec<(f64, f64)> {
     let n = panel.bins.n;
     let m = n.min(LONGEST_STEP_GRID);
-    let mut planner = DctPlanner::new();
-    let dst = planner.plan_dst1(m - 1);
-    let fft = FftPlanner::<f64>::new().plan_fft_forward(m);
+    let fft = RealFft::new(2 * m);
     // 2 sin(w / 2).
     let half: Vec<f64> = panel.bins.walks()[..m]
         .iter()
@@ -50,13 +47,39 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
     for noise in walks {
         let g = noise.first(&panel.bins, m);
         let solution = panel.solve(&noise.over(&panel.bins), columns);
-        // <step at t, x> under this noise, for all t.
-        let against = |x: &[f64]| {
-            let mut b: Vec<f64> = (1..m).map(|k| scale * x[k] / (g[k] * half[k])).collect();
-            dst.process_dst1(&mut b);
-            b
+        // <step at t, x> under this noise, for all t: sums of sines, those of an odd sequence of twice the length; an even
+        // one that comes with it gives sums of the cosines of twice the frequencies.
+        let sums = |x: &[f64], even: &[f64]| -> (Vec<f64>, Vec<f64>) {
+            let b: Vec<f64> = (0..m)
+                .map(|k| {
+                    if k == 0 {
+                        0.0
+                    } else {
+                        scale * x[k] / (g[k] * half[k])
+                    }
+                })
+                .collect();
+            let odd = |i: usize| match i {
+                i if i < m => b[i],
+                i if i == m => 0.0,
+                i => -b[2 * m - i],
+            };
+            let mirrored = |j: usize| match (j, even) {
+                (_, []) | (0, _) => 0.0,
+                (j, e) => 0.5 * (e[j] + e[m - j]),
+            };
+            let (mut sines, mut cosines) = (vec![0.0; m], vec![0.0; m]);
+            fft.run(
+                |j| Complex::new(odd(2 * j) + mirrored(j), odd(2 * j + 1)),
+                |j, f| {
+                    if j < m {
+                        sines[j] = -0.5 * f.im;
+                        cosines[j] = f.re;
+                    }
+                },
+            );
+            (sines, cosines)
         };
-        let a = against(&first_of_residual(panel, columns, &solution, m));
         let d: Vec<f64> = (0..m)
             .map(|k| {
                 if k == 0 {
@@ -66,23 +89,25 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
                 }
             })
             .collect();
-        let mut spectrum: Vec<Complex<f64>> = d.iter().map(|v| Complex::new(*v, 0.0)).collect();
-        fft.process(&mut spectrum);
+        let (a, cosines) = sums(&first_of_residual(panel, columns, &solution, m), &d);
         let total: f64 = d.iter().sum();
-        let crossed: Vec<Vec<f64>> = columns.iter().map(|c| against(&panel.column(*c))).collect();
+        let crossed: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|c| sums(&panel.column(*c), &[]).0)
+            .collect();
         let count = (n - 1) as f64;
         for j in 1..m {
-            let mut b = (total - spectrum[j].re) / n as f64;
+            let mut b = (total - cosines[j]) / n as f64;
             let whole = b;
             for (p, x) in crossed.iter().enumerate() {
                 for (q, y) in crossed.iter().enumerate() {
-                    b -= x[j - 1] * solution.inverse[p][q] * y[j - 1];
+                    b -= x[j] * solution.inverse[p][q] * y[j];
                 }
             }
             if b < 1e-6 * whole {
                 continue;
             }
-            let rss = (solution.rss - a[j - 1] * a[j - 1] / b).max(solution.rss * 1e-9);
+            let rss = (solution.rss - a[j] * a[j] / b).max(solution.rss * 1e-9);
             let l = -0.5 * (count * (rss / count).ln() + solution.log_det_noise);
             best[j] = best[j].max(2.0 * (l - null));
         }
@@ -104,18 +129,14 @@ pub fn lines(panel: &Panel, noise: &Noise, columns: &[usize], solution: &Solutio
     let r = residual(panel, columns, solution);
     let weighted: Vec<f64> = r.iter().zip(&g).map(|(r, g)| r / g).collect();
     let z = panel.dct.inverse(&weighted);
-    let mut spectrum: Vec<Complex<f64>> = z.iter().map(|v| Complex::new(*v, 0.0)).collect();
-    spectrum.resize(2 * n, Complex::new(0.0, 0.0));
-    FftPlanner::<f64>::new()
-        .plan_fft_forward(2 * n)
-        .process(&mut spectrum);
+    let energy = panel.dct.energies(&z);
     let count = (n - 1) as f64;
     (0..n)
         .map(|k| {
             if k == 0 {
                 return 0.0;
             }
-            let drop = spectrum[k].norm_sqr() * 2.0 * g[k] / n as f64;
+            let drop = energy[k] * 2.0 * g[k] / n as f64;
             -count * (1.0 - (drop / solution.rss).min(0.999)).ln()
         })
         .collect()
@@ -161,15 +182,12 @@ pub fn beats(
     let r = residual(panel, columns, solution);
     let weighted: Vec<f64> = r.iter().zip(&g).map(|(r, g)| r / g).collect();
     let z = panel.dct.inverse(&weighted);
-    let mut spectrum: Vec<Complex<f64>> = z
+    let moved: Vec<f64> = z
         .iter()
         .enumerate()
-        .map(|(i, v)| Complex::new(v * (carrier * i as f64 + phase).cos(), 0.0))
+        .map(|(i, v)| v * (carrier * i as f64 + phase).cos())
         .collect();
-    spectrum.resize(2 * n, Complex::new(0.0, 0.0));
-    FftPlanner::<f64>::new()
-        .plan_fft_forward(2 * n)
-        .process(&mut spectrum);
+    let seen = panel.dct.energies(&moved);
     let centre = carrier / std::f64::consts::PI * n as f64;
     let at = |k: f64| 1.0 / g[(k.round().max(1.0) as usize).min(n - 1)];
     let count = (n - 1) as f64;
@@ -177,7 +195,7 @@ pub fn beats(
         .map(|k| {
             // Energy of a swing over its noise: a quarter of the samples, half of it in each side band.
             let energy = n as f64 / 8.0 * (at(centre + k as f64) + at((centre - k as f64).abs()));
-            let drop = spectrum[k].norm_sqr() / energy;
+            let drop = seen[k] / energy;
             -count * (1.0 - (drop / solution.rss).min(0.999)).ln()
         })
         .collect()

@@ -244,46 +244,41 @@ pub fn of_common(whites: &[f64], shared: f64, samples: usize) -> f64 {
     (samples as f64 * (own - joint)).max(0.0).sqrt()
 }
 
-/// The size at which a strength, growing with size, reaches `wanted`: on logarithmic scales a strength is nearly a straight
-/// line, so that the secant of an enclosing pair (Illinois) finds it in a few steps.
+/// The size at which a strength, growing with size, reaches `wanted`: halving until it is enclosed, then, as a strength is
+/// nearly a straight line on logarithmic scales, by the secant of the enclosing pair (Illinois). Far from what is wanted,
+/// where a strength may vanish or overflow, nothing is asked.
 #[must_use]
 pub fn size_for(wanted: f64, strength: &dyn Fn(f64) -> f64) -> f64 {
     const ENOUGH: f64 = 1e-9;
-    let off = |x: f64| {
-        // Neither nothing has a logarithm nor what overflows.
-        match strength(x.exp()) {
-            d if d.is_nan() || d.is_infinite() => 50.0,
-            d if d > 0.0 => (d / wanted).ln(),
-            _ => -50.0,
-        }
-    };
     let (mut low, mut high) = (-18.0f64, 8.0f64);
-    let (mut below, mut above) = (off(low), off(high));
-    if below >= 0.0 || above <= 0.0 {
-        return if below >= 0.0 { low } else { high }.exp();
-    }
+    // How far off, as a logarithm, the ends are that were asked.
+    let (mut below, mut above): (Option<f64>, Option<f64>) = (None, None);
     let mut last = 0i8;
     for step in 0..60 {
         // Where the line is bent the secant creeps: every fourth step halves.
-        let x = if step % 4 == 3 {
-            0.5 * (low + high)
-        } else {
-            (low * above - high * below) / (above - below)
+        let x = match (below, above) {
+            (Some(b), Some(a)) if step % 4 != 3 => (low * a - high * b) / (a - b),
+            _ => 0.5 * (low + high),
         };
-        let y = off(x);
-        if y.abs() < ENOUGH || high - low < ENOUGH {
+        let d = strength(x.exp());
+        let off = if d.is_nan() {
+            50.0
+        } else {
+            (d / wanted).ln().clamp(-50.0, 50.0)
+        };
+        if off.abs() < ENOUGH || high - low < ENOUGH {
             return x.exp();
         }
-        if y < 0.0 {
-            (low, below) = (x, y);
+        if d < wanted {
+            (low, below) = (x, Some(off));
             if last == -1 {
-                above *= 0.5;
+                above = above.map(|a| 0.5 * a);
             }
             last = -1;
         } else {
-            (high, above) = (x, y);
+            (high, above) = (x, Some(off));
             if last == 1 {
-                below *= 0.5;
+                below = below.map(|b| 0.5 * b);
             }
             last = 1;
         }
@@ -304,10 +299,10 @@ mod tests {
             size_for(8.0, &|x| if x < 0.1 { 0.0 } else { x * x }),
             8f64.sqrt(),
         );
-        near(
-            size_for(8.0, &|x| if x > 20.0 { f64::NAN } else { x.exp() - 1.0 }),
-            9f64.ln(),
-        );
+        for beyond in [0.0, f64::NAN, f64::INFINITY] {
+            let overflows = |x: f64| if x > 200.0 { beyond } else { 4.0 * x };
+            near(size_for(8.0, &overflows), 2.0);
+        }
         // Saturates below what is wanted: the largest.
         near(size_for(8.0, &|x| x.min(2.0)), 8f64.exp());
     }

@@ -15,7 +15,7 @@ use model::Parameter;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::{Audit, Gyro, LEAST_READINGS, tails};
-use crate::audit::local::Local;
+use crate::audit::local::{Levels, Local};
 use crate::result::{Alternative, Finding, Unexplained};
 
 /// Most low bits that are looked at.
@@ -77,18 +77,49 @@ fn coarse(counts: &[i32], known: &[bool]) -> Option<Coarse> {
     found
 }
 
-/// Mean of the square wave of period `period` (+1 in its first half) under N(`level`, `sigma`^2), rounded.
-fn square(level: f64, sigma: f64, period: f64) -> f64 {
-    let mut sum = 0.0;
-    for j in 0..200 {
-        let m = f64::from(2 * j + 1);
-        let size = 4.0 / (PI * m) * (-2.0 * (PI * sigma * m / period).powi(2)).exp();
-        sum += size * (2.0 * PI * m * (level + 0.5) / period).sin();
-        if size < 1e-9 {
-            break;
+/// Mean of a square wave (+1 in the first half of its period) of normal readings, rounded.
+struct Square {
+    /// 2 pi over the period.
+    turn: f64,
+    /// Of sin(m turn (level + 1/2)), m = 1, 3, 5, ...
+    sizes: Vec<f64>,
+}
+
+impl Square {
+    fn new(sigma: f64, period: f64) -> Self {
+        let mut sizes = vec![];
+        for j in 0..200 {
+            let m = f64::from(2 * j + 1);
+            sizes.push(4.0 / (PI * m) * (-2.0 * (PI * sigma * m / period).powi(2)).exp());
+            if sizes.last().is_none_or(|s| *s < 1e-9) {
+                break;
+            }
+        }
+        Self {
+            turn: 2.0 * PI / period,
+            sizes,
         }
     }
-    sum.clamp(-1.0, 1.0)
+
+    /// Under N(`level`, sigma^2).
+    fn at(&self, level: f64) -> f64 {
+        let (sine, cosine) = (self.turn * (level + 0.5)).sin_cos();
+        // sin (m + 2)x = 2 cos 2x sin mx - sin (m - 2)x.
+        let twice = 2.0 * (1.0 - 2.0 * sine * sine);
+        let (mut before, mut now, mut sum) = (-sine, sine, 0.0);
+        if self.sizes.len() > 40 {
+            // Long sums of the recurrence lose digits.
+            let x = sine.atan2(cosine);
+            let terms = self.sizes.iter().enumerate();
+            sum = terms.map(|(j, s)| s * ((2 * j + 1) as f64 * x).sin()).sum();
+        } else {
+            for size in &self.sizes {
+                sum += size * now;
+                (before, now) = (now, twice * now - before);
+            }
+        }
+        sum.clamp(-1.0, 1.0)
+    }
 }
 
 /// Standard deviation of the readings before they were rounded, far ones left out. A spread between two shares of the
@@ -113,31 +144,29 @@ struct Stuck {
 /// Share of ones of a bit against the expected one. A bit that sticks moves the level too: in the share f of the
 /// samples by 2^b times the chance that it would have been the other. `from` is an estimate that frees the level of it.
 fn stuck(
-    counts: &[i32],
-    local: &Local,
-    known: &[bool],
+    ones: f64,
+    levels: &Levels,
+    unrounded: f64,
     bit: u32,
     from: Option<&Stuck>,
 ) -> Option<Stuck> {
     let weight = f64::from(1u32 << bit);
     // Of the samples that would read otherwise, about half, the share f is moved: that widens the spread as well.
     let moved = from.map_or(0.0, |s| 0.5 * s.fraction * (1.0 - 0.5 * s.fraction));
-    let sigma = unrounded(local);
-    let sigma = (sigma * sigma - weight * weight * moved)
-        .max(0.25 * sigma * sigma)
+    let sigma = (unrounded * unrounded - weight * weight * moved)
+        .max(0.25 * unrounded * unrounded)
         .sqrt();
-    let one = |level: f64| 0.5 * (1.0 - square(level, sigma, 2.0 * weight));
-    let (mut ones, mut expected, mut variance, mut n) = (0.0, 0.0, 0.0, 0.0);
-    for (i, c) in counts.iter().enumerate().filter(|(i, _)| known[*i]) {
-        let level = local.level[i];
+    let square = Square::new(sigma, 2.0 * weight);
+    let one = |level: f64| 0.5 * (1.0 - square.at(level));
+    let (mut expected, mut variance, mut n) = (0.0, 0.0, 0.0);
+    for (level, readings) in levels.iter() {
         let shift = from.map_or(0.0, |s| {
             weight * s.fraction * (f64::from(s.value) - one(level))
         });
         let p = one(level - shift);
-        ones += f64::from((c >> bit) & 1);
-        expected += p;
-        variance += p * (1.0 - p);
-        n += 1.0;
+        expected += readings * p;
+        variance += readings * p * (1.0 - p);
+        n += readings;
     }
     if n == 0.0 || variance <= 0.0 {
         return None;
@@ -172,7 +201,8 @@ fn stuck_likelihood(counts: &[i32], local: &Local, known: &[bool], s: &Stuck) ->
         .max(0.25 * whole * whole)
         .sqrt();
     let normal = Normal::standard();
-    let one = |level: f64| 0.5 * (1.0 - square(level, sigma, 2.0 * weight));
+    let square = Square::new(sigma, 2.0 * weight);
+    let one = |level: f64| 0.5 * (1.0 - square.at(level));
     (0..counts.len())
         .filter(|i| known[*i])
         .map(|i| {
@@ -246,9 +276,10 @@ fn code_likelihood(counts: &[i32], known: &[bool]) -> f64 {
 }
 
 pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
-    let Some((counts, local)) = &g.counts else {
+    let Some(counts) = g.counts else {
         return;
     };
+    let local = &g.local;
     let name = g.channel.name.as_str();
     let known: Vec<bool> = (0..counts.len()).map(|i| g.known(i)).collect();
     if let Some(c) = coarse(counts, &known) {
@@ -295,9 +326,16 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     if known.iter().filter(|k| **k).count() < LEAST_READINGS {
         return;
     }
+    let levels = Levels::new(&local.level, &known);
+    // How often each bit is 1.
+    let ones = |bit: u32| {
+        let own = counts.iter().zip(&known).filter(|(_, k)| **k);
+        own.map(|(c, _)| u64::from(((c >> bit) & 1) as u32))
+            .sum::<u64>() as f64
+    };
     let tested: Vec<Stuck> = (0..BITS)
         .filter(|b| sigma >= LEAST_SIGMA && f64::from(1u32 << b) <= WITHIN_SIGMA * sigma)
-        .filter_map(|b| stuck(counts, local, &known, b, None))
+        .filter_map(|b| stuck(ones(b), &levels, sigma, b, None))
         .collect();
     let Some(worst) = tested.iter().max_by(|a, b| a.z.abs().total_cmp(&b.z.abs())) else {
         audit.untested(
@@ -308,11 +346,12 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     };
     let chance = (tested.len() as f64 * tails::two_sided(worst.z)).min(1.0);
     let z = worst.z;
+    let own = ones(worst.bit);
     let mut freed: Option<Stuck> = None;
     for _ in 0..ROUNDS {
         let from = freed.as_ref().unwrap_or(worst);
         freed =
-            stuck(counts, local, &known, worst.bit, Some(from)).filter(|s| s.value == worst.value);
+            stuck(own, &levels, sigma, worst.bit, Some(from)).filter(|s| s.value == worst.value);
         if freed.is_none() {
             break;
         }
@@ -388,7 +427,7 @@ mod tests {
                     if (c >> bit) & 1 == 0 { p } else { -p }
                 })
                 .sum();
-            let series = square(level, sigma, f64::from(1u32 << (bit + 1)));
+            let series = Square::new(sigma, f64::from(1u32 << (bit + 1))).at(level);
             assert!((direct - series).abs() < 1e-6, "{direct} {series}");
         }
     }

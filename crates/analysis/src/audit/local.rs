@@ -23,7 +23,7 @@ const SPREAD: usize = 400;
 const CLEARLY: f64 = 1.15;
 
 /// Predictions of one channel.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Local {
     /// What the neighbours predict.
     pub level: Vec<f64>,
@@ -47,16 +47,63 @@ pub fn robust_sigma(values: &[f64]) -> f64 {
 /// Width between the `share` and `1 - share` points of the finite values; 0 of none.
 #[must_use]
 pub fn width(values: &[f64], share: f64) -> f64 {
-    let mut v: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    if v.is_empty() {
+    let (mut low, mut high, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0usize);
+    for v in values.iter().filter(|v| v.is_finite()) {
+        (low, high, count) = (low.min(*v), high.max(*v), count + 1);
+    }
+    if count == 0 {
         return 0.0;
     }
-    let last = v.len() - 1;
-    let mut at = |p: f64| {
-        *v.select_nth_unstable_by((p * last as f64).round() as usize, f64::total_cmp)
-            .1
+    let place = |p: f64| (p * (count - 1) as f64).round() as usize;
+    let places = [place(share), place(1.0 - share)];
+    let [below, above] = if count > COUNTED && high - low < f64::MAX {
+        counted(values, places, low, high)
+    } else {
+        let mut v: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+        let (rest, above, _) = v.select_nth_unstable_by(places[1], f64::total_cmp);
+        let above = *above;
+        let below = if places[0] < places[1] {
+            *rest.select_nth_unstable_by(places[0], f64::total_cmp).1
+        } else {
+            above
+        };
+        [below, above]
     };
-    at(1.0 - share) - at(share)
+    above - below
+}
+
+/// Values beyond which order statistics are found by counting first.
+const COUNTED: usize = 2048;
+
+/// The finite values of two places in their order, ascending: counted in even bins from `low` to `high`, and sorted out in
+/// the bin of the place alone.
+fn counted(values: &[f64], places: [usize; 2], low: f64, high: f64) -> [f64; 2] {
+    const BINS: usize = 2048;
+    let scale = if high > low {
+        (BINS - 1) as f64 / (high - low)
+    } else {
+        0.0
+    };
+    let bin = |v: f64| ((v - low) * scale) as usize;
+    let mut tally = [0u32; BINS];
+    for v in values.iter().filter(|v| v.is_finite()) {
+        tally[bin(*v).min(BINS - 1)] += 1;
+    }
+    places.map(|place| {
+        let (mut b, mut before) = (0, 0);
+        while before + tally[b] as usize <= place {
+            before += tally[b] as usize;
+            b += 1;
+        }
+        let mut inside: Vec<f64> = values
+            .iter()
+            .copied()
+            .filter(|v| v.is_finite() && bin(*v).min(BINS - 1) == b)
+            .collect();
+        *inside
+            .select_nth_unstable_by(place - before, f64::total_cmp)
+            .1
+    })
 }
 
 /// Median of the finite values; NaN of none.
@@ -68,6 +115,40 @@ pub fn median(values: &[f64]) -> f64 {
     }
     let middle = v.len() / 2;
     *v.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Medians of each value and its neighbours within [`MEDIAN`], fewer at the ends, kept sorted as the window moves.
+fn medians(values: &[f64]) -> Vec<f64> {
+    let mut window = [0.0; 2 * MEDIAN + 2];
+    let mut count = 0;
+    let place = |window: &[f64], v: f64| {
+        window
+            .iter()
+            .take_while(|w| w.total_cmp(&v).is_lt())
+            .count()
+    };
+    let enter = |window: &mut [f64; 2 * MEDIAN + 2], count: &mut usize, v: f64| {
+        let at = place(&window[..*count], v);
+        window.copy_within(at..*count, at + 1);
+        window[at] = v;
+        *count += 1;
+    };
+    for v in values.iter().take(MEDIAN) {
+        enter(&mut window, &mut count, *v);
+    }
+    (0..values.len())
+        .map(|i| {
+            if let Some(v) = values.get(i + MEDIAN) {
+                enter(&mut window, &mut count, *v);
+            }
+            if let Some(old) = i.checked_sub(MEDIAN + 1) {
+                let at = place(&window[..count], values[old]);
+                window.copy_within(at + 1..count, at);
+                count -= 1;
+            }
+            window[count / 2]
+        })
+        .collect()
 }
 
 /// Lost readings take the last one before them, spikes the median around them.
@@ -82,12 +163,7 @@ fn cleaned(y: &[f64]) -> Vec<f64> {
             held
         })
         .collect();
-    let medians: Vec<f64> = (0..clean.len())
-        .map(|i| {
-            let around = &clean[i.saturating_sub(MEDIAN)..(i + MEDIAN + 1).min(clean.len())];
-            median(around)
-        })
-        .collect();
+    let medians = medians(&clean);
     let far: Vec<f64> = clean.iter().zip(&medians).map(|(c, m)| c - m).collect();
     let limit = 6.0 * robust_sigma(&far);
     for ((c, m), d) in clean.iter_mut().zip(&medians).zip(&far) {
@@ -98,14 +174,30 @@ fn cleaned(y: &[f64]) -> Vec<f64> {
     clean
 }
 
-/// Mean of the neighbours within `half`, without the reading itself.
-fn means(clean: &[f64], half: usize) -> Vec<f64> {
-    let n = clean.len();
-    let base = median(clean);
-    let mut sums = vec![0.0; n + 1];
-    for (i, v) in clean.iter().enumerate() {
-        sums[i + 1] = sums[i] + v - base;
+/// Cumulated sums of the readings about a level in their midst.
+struct Sums {
+    base: f64,
+    sums: Vec<f64>,
+}
+
+impl Sums {
+    fn new(clean: &[f64]) -> Self {
+        let base = median(clean);
+        let mut sums = Vec::with_capacity(clean.len() + 1);
+        let mut sum = 0.0;
+        sums.push(sum);
+        sums.extend(clean.iter().map(|v| {
+            sum += v - base;
+            sum
+        }));
+        Self { base, sums }
     }
+}
+
+/// Mean of the neighbours within `half`, without the reading itself.
+fn means(clean: &[f64], of: &Sums, half: usize) -> Vec<f64> {
+    let n = clean.len();
+    let Sums { base, sums } = of;
     (0..n)
         .map(|i| {
             let w = half.min(i.max(n - 1 - i)).max(1);
@@ -116,9 +208,9 @@ fn means(clean: &[f64], half: usize) -> Vec<f64> {
         .collect()
 }
 
-fn parabolas(clean: &[f64], half: usize) -> Vec<f64> {
+fn parabolas(clean: &[f64], of: &Sums, half: usize) -> Vec<f64> {
     let n = clean.len();
-    let mut level = means(clean, half);
+    let mut level = means(clean, of, half);
     let w = half as f64;
     let s0 = 2.0 * w;
     let s2: f64 = (1..=half).map(|j| 2.0 * (j * j) as f64).sum();
@@ -140,35 +232,32 @@ impl Local {
     #[must_use]
     pub fn new(y: &[f64]) -> Self {
         let clean = cleaned(y);
-        let of = |level: Vec<f64>| {
-            let residual: Vec<f64> = y.iter().zip(&level).map(|(y, l)| y - l).collect();
-            let sigma = robust_sigma(&residual);
-            Self {
-                level,
-                residual,
-                sigma,
-                bent: false,
-                edge: 0,
-            }
-        };
+        let sums = Sums::new(&clean);
+        let residuals = |level: &[f64]| y.iter().zip(level).map(|(y, l)| y - l).collect::<Vec<_>>();
         let all = MEANS
             .iter()
             .map(|w| (*w, false))
             .chain(PARABOLAS.iter().map(|w| (*w, true)));
         let mut best: Option<Self> = None;
         for (half, bent) in all {
-            let mut next = of(if bent {
-                parabolas(&clean, half)
+            let level = if bent {
+                parabolas(&clean, &sums, half)
             } else {
-                means(&clean, half)
-            });
-            next.bent = bent;
-            next.edge = if half <= NARROW { half } else { 0 };
-            if best.as_ref().is_none_or(|b| next.sigma < BETTER * b.sigma) {
-                best = Some(next);
+                means(&clean, &sums, half)
+            };
+            let residual = residuals(&level);
+            let sigma = robust_sigma(&residual);
+            if best.as_ref().is_none_or(|b| sigma < BETTER * b.sigma) {
+                best = Some(Self {
+                    level,
+                    residual,
+                    sigma,
+                    bent,
+                    edge: if half <= NARROW { half } else { 0 },
+                });
             }
         }
-        best.unwrap_or_else(|| of(clean))
+        best.unwrap_or_default()
     }
 
     /// Standard deviation of the readings before they were rounded to whole counts.
@@ -200,9 +289,92 @@ impl Local {
     }
 }
 
+/// Levels that readings are predicted at, with how many each stands for: what is asked of the level alone, and changes
+/// little over a count, need not be asked of every reading.
+pub struct Levels(Vec<(f64, f64)>);
+
+/// Levels that a count is divided into. A sum over readings of f(level) errs by f''/12 of the square of that.
+const BY_COUNT: f64 = 256.0;
+
+impl Levels {
+    /// Of the readings of which `known` holds, in counts; each between two levels in proportion.
+    #[must_use]
+    pub fn new(level: &[f64], known: &[bool]) -> Self {
+        let own = || {
+            level
+                .iter()
+                .zip(known)
+                .filter(|(_, k)| **k)
+                .map(|(l, _)| *l)
+        };
+        let (low, high) = own().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), l| {
+            (a.min(l), b.max(l))
+        });
+        let places = (high - low) * BY_COUNT;
+        if !(places >= 0.0 && places < 0.25 * level.len() as f64) {
+            return Self(own().map(|l| (l, 1.0)).collect());
+        }
+        let mut weights = vec![0.0; places as usize + 2];
+        for l in own() {
+            let x = (l - low) * BY_COUNT;
+            let (at, share) = (x as usize, x.fract());
+            weights[at] += 1.0 - share;
+            weights[at + 1] += share;
+        }
+        let at = |i: usize| low + i as f64 / BY_COUNT;
+        let used = weights.iter().enumerate().filter(|(_, w)| **w > 0.0);
+        Self(used.map(|(i, w)| (at(i), *w)).collect())
+    }
+
+    /// Each level with its number of readings.
+    pub fn iter(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.0.iter().copied()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn quantiles_by_counting_are_those_by_sorting() {
+        let mut v: Vec<f64> = (0..10_000)
+            .map(|i| f64::from((i * 7919) % 10_007).powi(2))
+            .collect();
+        v[17] = f64::NAN;
+        v[18] = 1e12;
+        let mut sorted: Vec<f64> = v.iter().copied().filter(|v| v.is_finite()).collect();
+        sorted.sort_by(f64::total_cmp);
+        for share in [0.0, 0.01, 0.1, 0.3, 0.5] {
+            let at = |p: f64| sorted[(p * (sorted.len() - 1) as f64).round() as usize];
+            assert_eq!(width(&v, share), at(1.0 - share) - at(share));
+        }
+    }
+
+    #[test]
+    fn a_moving_median_is_the_median_of_each_window() {
+        let y: Vec<f64> = (0..200).map(|i| f64::from((i * 37) % 23)).collect();
+        for (i, m) in medians(&y).into_iter().enumerate() {
+            let around = &y[i.saturating_sub(MEDIAN)..(i + MEDIAN + 1).min(y.len())];
+            assert_eq!(m, median(around), "{i}");
+        }
+        assert_eq!(medians(&y[..3]), [37.0 % 23.0; 3].map(|_| median(&y[..3])));
+    }
+
+    #[test]
+    fn levels_stand_for_their_readings() {
+        let level: Vec<f64> = (0..5000)
+            .map(|i| 3.0 + (f64::from(i) * 0.01).sin())
+            .collect();
+        let mut known = vec![true; 5000];
+        known[7] = false;
+        let levels = Levels::new(&level, &known);
+        assert!(levels.iter().count() < 1000);
+        let own = level.iter().enumerate().filter(|(i, _)| *i != 7);
+        let direct: f64 = own.map(|(_, l)| l.cos()).sum();
+        let binned: f64 = levels.iter().map(|(l, w)| w * l.cos()).sum();
+        assert!((direct - binned).abs() < 0.02, "{direct} {binned}");
+    }
 
     #[test]
     fn a_parabola_is_predicted_exactly() {
@@ -210,7 +382,7 @@ mod tests {
             .map(|i| 0.01 * f64::from(i * i) - f64::from(i))
             .collect();
         for half in [5, 10] {
-            let level = parabolas(&y, half);
+            let level = parabolas(&y, &Sums::new(&y), half);
             assert!((10..90).all(|i| (level[i] - y[i]).abs() < 1e-9));
         }
     }
@@ -219,8 +391,8 @@ mod tests {
     fn a_reading_does_not_predict_itself() {
         let mut y = vec![0.0; 100];
         y[50] = 1.0;
-        assert!(means(&y, 20)[50].abs() < 1e-12);
-        assert!(parabolas(&y, 10)[50].abs() < 1e-12);
+        assert!(means(&y, &Sums::new(&y), 20)[50].abs() < 1e-12);
+        assert!(parabolas(&y, &Sums::new(&y), 10)[50].abs() < 1e-12);
     }
 
     #[test]

@@ -142,10 +142,12 @@ impl Audit {
 /// A gyro, its neighbourhoods known.
 struct Gyro<'a> {
     channel: &'a Channel,
-    /// Counts and their neighbourhoods, where the record has counts.
-    counts: Option<(&'a [i32], Local)>,
-    /// Neighbourhoods of the scaled readings.
+    /// Counts, where the record has them.
+    counts: Option<&'a [i32]>,
+    /// Neighbourhoods of the counts, else of the readings.
     local: Local,
+    /// Neighbourhoods of the readings, where they are no scaled counts.
+    of_readings: Option<Local>,
 }
 
 impl Gyro<'_> {
@@ -193,6 +195,23 @@ fn counted(
     }
 }
 
+/// Whether readings are counts times a unit, an offset added.
+fn scaled(values: &[f64], counts: &[i32]) -> bool {
+    let mut known = values.iter().zip(counts).filter(|(v, _)| v.is_finite());
+    let Some((v0, c0)) = known.next() else {
+        return true;
+    };
+    // Two counts that lie close together give a unit with few digits; the farthest ones are as good as it gets.
+    let Some((v1, c1)) = known.clone().max_by_key(|(_, c)| c.abs_diff(*c0)) else {
+        return true;
+    };
+    if c1 == c0 {
+        return known.all(|(v, _)| v == v0);
+    }
+    let unit = (v1 - v0) / (f64::from(*c1) - f64::from(*c0));
+    known.all(|(v, c)| (v - v0 - unit * (f64::from(*c) - f64::from(*c0))).abs() < 1e-6 * unit.abs())
+}
+
 /// Audit a record. Any record: what cannot be audited is listed in [`Audit::not_tested`].
 #[must_use]
 pub fn audit(record: &Record) -> Audit {
@@ -202,12 +221,10 @@ pub fn audit(record: &Record) -> Audit {
         .all(Quantity::Gyro)
         .filter(|c| c.values.len() == rows)
         .map(|channel| {
-            let local = Local::new(&channel.values);
-            let counts = channel
-                .counts
-                .as_deref()
-                .filter(|c| c.len() == rows)
-                .map(|c| {
+            let counts = channel.counts.as_deref().filter(|c| c.len() == rows);
+            let local = match counts {
+                None => Local::new(&channel.values),
+                Some(c) => {
                     let y: Vec<f64> = c
                         .iter()
                         .zip(&channel.values)
@@ -219,12 +236,15 @@ pub fn audit(record: &Record) -> Audit {
                             }
                         })
                         .collect();
-                    (c, Local::new(&y))
-                });
+                    Local::new(&y)
+                }
+            };
+            let apart = counts.is_some_and(|c| !scaled(&channel.values, c));
             Gyro {
                 channel,
                 counts,
                 local,
+                of_readings: apart.then(|| Local::new(&channel.values)),
             }
         })
         .collect();

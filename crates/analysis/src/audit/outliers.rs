@@ -14,37 +14,42 @@ const MOVING: f64 = 1.3;
 
 pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     let name = g.channel.name.as_str();
-    let n = g.local.residual.len();
-    if n < super::LEAST_READINGS || g.local.sigma <= 0.0 {
+    let (local, step) = match (&g.of_readings, g.counts) {
+        (None, Some(_)) => (&g.local, 1.0),
+        (apart, _) => (
+            apart.as_ref().unwrap_or(&g.local),
+            g.channel.lsb.unwrap_or(0.0),
+        ),
+    };
+    let n = local.residual.len();
+    if n < super::LEAST_READINGS || local.sigma <= 0.0 {
         return;
     }
-    let step = g.channel.lsb.unwrap_or(0.0);
-    let limit = tails::farthest(n, FALSE_ALARM) * if g.local.bent { MOVING } else { 1.0 };
+    let limit = tails::farthest(n, FALSE_ALARM) * if local.bent { MOVING } else { 1.0 };
     // Where the noise is within a count, a residual of one or two counts is rounding.
-    let z: Vec<f64> = g
-        .local
+    let z: Vec<f64> = local
         .residual
         .iter()
-        .zip(g.local.spread())
+        .zip(local.spread())
         .map(|(r, s)| ((r.abs() - 0.5 * step).max(0.0)) / s.max(0.3 * step))
         .enumerate()
         .map(|(i, z)| {
-            let inside = i >= g.local.edge && i + g.local.edge < n;
+            let inside = i >= local.edge && i + local.edge < n;
             if inside { z } else { 0.0 }
         })
         .collect();
     let far: Vec<usize> = (0..n).filter(|i| z[*i] > limit).collect();
-    let single: Vec<usize> = far
-        .iter()
-        .copied()
-        .filter(|i| !far.iter().any(|j| j != i && j.abs_diff(*i) <= ALONE))
+    let near = |a: Option<&usize>, b: usize| a.is_some_and(|a| a.abs_diff(b) <= ALONE);
+    let single: Vec<usize> = (0..far.len())
+        .filter(|i| !near(far.get(i.wrapping_sub(1)), far[*i]) && !near(far.get(i + 1), far[*i]))
+        .map(|i| far[i])
         .collect();
     let most = z
         .iter()
         .copied()
         .filter(|v| v.is_finite())
         .fold(0.0, f64::max);
-    let chance = if g.local.bent && most < limit {
+    let chance = if local.bent && most < limit {
         1.0
     } else {
         (n as f64 * tails::two_sided(most)).min(1.0)

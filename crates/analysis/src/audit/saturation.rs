@@ -9,6 +9,7 @@ use model::Parameter;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::{Audit, FALSE_ALARM, Gyro, tails};
+use crate::audit::local::Levels;
 use crate::result::Finding;
 
 /// Chance of the pile on the last code that light tails may have.
@@ -35,43 +36,50 @@ impl End {
     }
 }
 
-/// The upper end of `counts` with predictions `level`.
-fn end(counts: &[(i32, f64)], sigma: f64) -> Option<End> {
-    let code = counts.iter().map(|c| c.0).max()?;
+/// The upper end of counts with predictions `levels`.
+fn end(
+    counts: impl Iterator<Item = i32> + Clone,
+    levels: impl Iterator<Item = (f64, f64)>,
+    sigma: f64,
+) -> Option<End> {
+    let code = counts.clone().max()?;
     let normal = Normal::standard();
     let above = |edge: f64, level: f64| normal.sf((edge - level) / sigma);
     let edge = f64::from(code);
     let (mut beyond, mut reached) = (0.0, 0.0);
-    for (_, level) in counts {
-        beyond += above(edge + 0.5, *level);
-        reached += above(edge - 0.5, *level);
+    for (level, readings) in levels {
+        beyond += readings * above(edge + 0.5, level);
+        reached += readings * above(edge - 0.5, level);
     }
     Some(End {
         code,
         beyond,
-        pile: counts.iter().filter(|c| c.0 == code).count() as u64,
+        pile: counts.filter(|c| *c == code).count() as u64,
         expected: reached - beyond,
     })
 }
 
 pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
-    let Some((counts, local)) = &g.counts else {
+    let Some(counts) = g.counts else {
         return;
     };
+    let local = &g.local;
     let name = g.channel.name.as_str();
     // A coarse step leaves empty codes beyond the last one, and piles on it: its own finding stands.
     let coarse = |f: &Finding| f.cause == "coarse_lsb" && f.channels[0] == name;
     if local.sigma <= 0.0 || audit.findings.iter().any(coarse) {
         return;
     }
-    let seen: Vec<(i32, f64)> = (0..counts.len())
-        .filter(|i| g.known(*i))
-        .map(|i| (counts[i], local.level[i]))
-        .collect();
+    let known: Vec<bool> = (0..counts.len()).map(|i| g.known(i)).collect();
+    let seen = counts
+        .iter()
+        .zip(&known)
+        .filter(|(_, k)| **k)
+        .map(|(c, _)| *c);
+    let levels = Levels::new(&local.level, &known);
     let sigma = local.unrounded_sigma();
-    let high = end(&seen, sigma);
-    let mirrored: Vec<(i32, f64)> = seen.iter().map(|(c, l)| (-c, -l)).collect();
-    let low = end(&mirrored, sigma);
+    let high = end(seen.clone(), levels.iter(), sigma);
+    let low = end(seen.map(|c| -c), levels.iter().map(|(l, w)| (-l, w)), sigma);
     let (Some(low), Some(high)) = (low, high) else {
         return;
     };
