@@ -177,11 +177,8 @@ fn turning() -> Scenario {
 
 fn listen(clip: Clip, from_s: f64, to_s: f64, end_s: f64) -> Heard {
     let clips = Clips { clip, from_s, to_s };
-    let mut simulated = Simulated::new(&image(), &turning(), clips).expect("an image");
-    let mut heard = Heard::default();
-    simulated
-        .run_until(end_s, &mut |byte| heard.push(byte))
-        .expect("it runs");
+    let simulated = Simulated::new(&image(), &turning(), clips).expect("an image");
+    let heard = hear_out(simulated, end_s);
     assert_eq!(heard.link().rejected(), 0);
     heard
 }
@@ -192,6 +189,25 @@ fn assert_all_samples(heard: &Heard) {
         assert_eq!(usize::from(sample.seq), n);
         assert_eq!(sample.t_ticks, 12_500 * (n as u32 + 1));
     }
+}
+
+/// The request of this number has been carried out.
+fn assert_answered(heard: &Heard, number: u16) {
+    assert!(
+        heard
+            .replies()
+            .any(|(_, reply)| (reply.number, reply.status) == (number, Status::Ok)),
+        "request {number} is answered"
+    );
+}
+
+/// Runs to the end and hears it out.
+fn hear_out<P: Probe>(mut simulated: Simulated<P>, end_s: f64) -> Heard {
+    let mut heard = Heard::default();
+    simulated
+        .run_until(end_s, &mut |byte| heard.push(byte))
+        .expect("it runs");
+    heard
 }
 
 #[test]
@@ -278,10 +294,7 @@ fn a_register_that_does_not_read_back_is_told_and_set_right_by_itself() {
                 filter: 3,
             },
         )]);
-        let mut heard = Heard::default();
-        simulated
-            .run_until(10.0, &mut |byte| heard.push(byte))
-            .expect("it runs");
+        let heard = hear_out(simulated, 10.0);
         let (_, reply) = heard.replies().next().expect("one answer");
         assert_eq!((reply.number, reply.status), (7, Status::ReadBackWrong));
         let health = heard.last_health();
@@ -357,11 +370,7 @@ fn bytes_without_a_stop_bit_are_counted_and_the_next_request_is_answered() {
         }
     });
     assert_eq!(heard.last_health().faults.get(Fault::RxFraming), 5);
-    assert!(
-        heard
-            .replies()
-            .any(|(_, reply)| (reply.number, reply.status) == (3, Status::Ok))
-    );
+    assert_answered(&heard, 3);
     assert_all_samples(&heard);
 }
 
@@ -384,11 +393,7 @@ fn a_flood_at_500_kbd_overruns_the_receiver_is_counted_and_moves_no_sample() {
     let overruns = heard.last_health().faults.get(Fault::RxOverrun);
     println!("{overruns} receiver overruns in 1 s");
     assert!(overruns > 0);
-    assert!(
-        heard
-            .replies()
-            .any(|(_, reply)| (reply.number, reply.status) == (3, Status::Ok))
-    );
+    assert_answered(&heard, 3);
     assert_all_samples(&heard);
 }
 

@@ -92,16 +92,47 @@ impl Line {
     }
 }
 
+/// Holds a simulated board to the clock on the wall. What it is behind, on a busy computer, it makes good at twice the
+/// speed and no faster, so that whoever keeps its motor alive is not too late through no fault of their own.
+#[derive(Debug)]
+pub struct Pace {
+    began: Instant,
+    last: Instant,
+    last_s: f64,
+}
+
+impl Default for Pace {
+    /// Time 0 is now.
+    fn default() -> Self {
+        let began = Instant::now();
+        Pace {
+            began,
+            last: began,
+            last_s: 0.0,
+        }
+    }
+}
+
+impl Pace {
+    /// Waits until `t` s may be reached.
+    pub fn wait(&mut self, t: f64) {
+        let due = self.began + Duration::from_secs_f64(t);
+        let soonest = self.last + Duration::from_secs_f64((t - self.last_s).max(0.0) / 2.0);
+        std::thread::sleep(due.max(soonest).saturating_duration_since(Instant::now()));
+        (self.last, self.last_s) = (Instant::now(), t);
+    }
+}
+
 /// Plays the board of `run` at the line's end, in real time, until the run is over or `stop` is set.
 ///
 /// # Errors
 /// [`PtyError`].
 pub fn serve(line: Line, board: &Board, run: &Run, stop: &AtomicBool) -> Result<(), PtyError> {
     let line = RefCell::new(line);
-    let begun = Instant::now();
+    let mut pace = Pace::default();
     let mut failure = None;
     let listen = |t: f64| {
-        std::thread::sleep(Duration::from_secs_f64(t).saturating_sub(begun.elapsed()));
+        pace.wait(t);
         let mut line = line.borrow_mut();
         line.flush();
         line.take().unwrap_or_else(|error| {
@@ -128,4 +159,21 @@ pub fn serve(line: Line, board: &Board, run: &Run, stop: &AtomicBool) -> Result<
         }
     }
     failure.map_or(Ok(()), |error| Err(PtyError::Line(error)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pace_that_was_held_up_is_made_good_at_twice_the_speed() {
+        let mut pace = Pace::default();
+        std::thread::sleep(Duration::from_millis(60));
+        let begun = Instant::now();
+        (1..=60).for_each(|ms| pace.wait(f64::from(ms) * 1e-3));
+        assert!(begun.elapsed() >= Duration::from_millis(29));
+        // And then it is the wall's again.
+        pace.wait(0.2);
+        assert!(pace.began.elapsed() >= Duration::from_millis(200));
+    }
 }

@@ -6,13 +6,7 @@ mod common;
 use std::time::Duration;
 
 use bench::Scenario;
-use common::{Board, Swallow, folder, json, run, said};
-
-fn assert_success(output: &std::process::Output) -> String {
-    let said = said(output);
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    said
-}
+use common::{Board, Swallow, assert_refused, assert_success, folder, json, run};
 
 #[test]
 fn a_board_says_who_it_is_and_keeps_what_is_set_stored_and_loaded() {
@@ -85,29 +79,21 @@ fn gyros_are_set_by_range_and_filter_and_their_registers_read_and_written() {
 
     // The part wants taps at a narrow range: refused, and nothing has changed.
     let refused = board.ask(&["set", "gyro", "--range", "80"]);
-    assert_eq!(refused.status.code(), Some(1));
-    let said = common::said(&refused);
-    assert!(
-        said.contains("out of range") && said.contains("80 deg/s 4 to 6"),
-        "{said}"
-    );
+    assert_refused(&refused, &["out of range", "80 deg/s 4 to 6"]);
     assert_eq!(
         assert_success(&board.ask(&["get", "gyro-range"])).trim(),
         "160"
     );
     // What would undo the board's own set-up wants a yes.
     let refused = board.ask(&["register", "write", "x", "COMMAND", "1"]);
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(common::said(&refused).contains("--yes"));
+    assert_refused(&refused, &["--yes"]);
 }
 
 #[test]
 fn a_rate_that_the_line_cannot_carry_is_refused_before_it_is_set() {
     let board = Board::start();
     let refused = board.ask(&["set", "rate", "256"]);
-    assert_eq!(refused.status.code(), Some(1));
-    let said = said(&refused);
-    assert!(said.contains("set baud 250000"), "{said}");
+    assert_refused(&refused, &["set baud 250000"]);
     let said = assert_success(&board.ask(&["set", "baud", "250000"]));
     assert!(said.contains("--baud 250000"), "{said}");
     assert_success(&board.ask(&["set", "rate", "250"]));
@@ -198,12 +184,7 @@ fn what_must_not_happen_twice_is_not_sent_twice_but_looked_up() {
     assert!(said.contains("; 1 since power came on"), "{said}");
     // Here nothing can be looked up: the error says so.
     let lost = board.ask(&["health", "--clear"]);
-    assert_eq!(lost.status.code(), Some(1));
-    let said = common::said(&lost);
-    assert!(
-        said.contains("is not known") && said.contains("frames in order"),
-        "{said}"
-    );
+    assert_refused(&lost, &["is not known", "frames in order"]);
 }
 
 #[test]
@@ -315,16 +296,13 @@ fn a_diagnosis_goes_back_to_the_board() {
     let analysis = folder.join("a.json").display().to_string();
     assert_success(&run(&["analyze", &run_csv, "--json", &analysis]));
     let refused = board.ask(&["calibrate", &analysis]);
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(common::said(&refused).contains("holds no bias"));
+    assert_refused(&refused, &["holds no bias"]);
 }
 
 #[test]
 fn silence_is_an_error_that_says_what_was_heard() {
     let missing = run(&["board", "--port", "/dev/no-such-port", "info"]);
-    assert_eq!(missing.status.code(), Some(1));
-    let said_missing = said(&missing);
-    assert!(said_missing.contains("/dev/no-such-port"), "{said_missing}");
+    assert_refused(&missing, &["/dev/no-such-port"]);
     assert_eq!(
         run(&["board", "info"]).status.code(),
         Some(2),
@@ -339,12 +317,7 @@ fn silence_is_an_error_that_says_what_was_heard() {
     let board = Board::with(Scenario::quiet(1), swallow);
     std::thread::sleep(Duration::from_millis(500));
     let deaf = board.ask(&["info"]);
-    assert_eq!(deaf.status.code(), Some(1));
-    let said = said(&deaf);
-    assert!(
-        said.contains("in 3 tries") && said.contains("does not hear"),
-        "{said}"
-    );
+    assert_refused(&deaf, &["in 3 tries", "does not hear"]);
 }
 
 #[test]

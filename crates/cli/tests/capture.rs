@@ -8,7 +8,7 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use bench::Scenario;
-use common::{Board, Swallow, folder, json, run, said};
+use common::{Board, Swallow, assert_refused, assert_success, folder, json, run};
 use imu_stand::capture::{ReadOptions, read_capture};
 use model::record::Record;
 
@@ -62,10 +62,7 @@ fn ended(mut running: Running) -> std::process::Output {
 /// Ends it by Ctrl-C; what it said.
 fn end(running: Running) -> String {
     signal(&running, "-INT");
-    let output = ended(running);
-    let said = said(&output);
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    said
+    assert_success(&ended(running))
 }
 
 fn wait(seconds: f64) {
@@ -148,7 +145,7 @@ fn ctrl_c_ends_a_capture_cleanly_and_its_header_says_how_the_board_was_set() {
         "--out",
         replayed.to_str().unwrap(),
     ]);
-    assert_eq!(done.status.code(), Some(0), "{}", common::said(&done));
+    assert_success(&done);
     let again = self::record(&replayed);
     assert_eq!(
         (&again.seq, &again.t_ticks, &again.flags),
@@ -163,8 +160,7 @@ fn ctrl_c_ends_a_capture_cleanly_and_its_header_says_how_the_board_was_set() {
         "--out",
         out.to_str().unwrap(),
     ]);
-    assert_eq!(again.status.code(), Some(1));
-    assert!(common::said(&again).contains("--resume"));
+    assert_refused(&again, &["--resume"]);
 }
 
 #[test]
@@ -277,12 +273,7 @@ fn a_board_that_is_set_anew_gets_another_file_and_a_resumption_is_refused() {
     assert_eq!(record(&out).header.rate_hz, Some(20.0));
     assert_eq!(record(&second).header.rate_hz, Some(40.0));
     let refused = ended(start(&board, &out, &["--resume"]));
-    assert_eq!(refused.status.code(), Some(1));
-    let said = said(&refused);
-    assert!(
-        said.contains("set differently") && said.contains("rate_hz"),
-        "{said}"
-    );
+    assert_refused(&refused, &["set differently", "rate_hz"]);
 }
 
 #[test]
@@ -318,8 +309,7 @@ fn a_monitor_shows_what_the_board_sends_and_writes_its_last_view() {
         "--json",
         out.to_str().unwrap(),
     ]);
-    let said = said(&done);
-    assert_eq!(done.status.code(), Some(0), "{said}");
+    let said = assert_success(&done);
     assert!(
         said.contains("Allan deviation, deg/h") && said.contains("0 missing"),
         "{said}"
@@ -366,7 +356,7 @@ fn the_motor_is_driven_while_the_capture_runs_and_stands_at_its_end() {
     assert_eq!(pwm.last(), Some(&0.0), "{:?}", &pwm[pwm.len() - 20..]);
     let health = folder.join("health.json");
     let asked = board.ask(&["health", "--json", health.to_str().unwrap()]);
-    assert_eq!(asked.status.code(), Some(0));
+    assert_success(&asked);
     assert_eq!(
         json(&health)["counters"]["motor_timeout"],
         0,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum CaptureError {
     /// The file system says no.
-    #[error("{}: {source}", path.display())]
+    #[error("{} cannot be read or written", path.display())]
     #[diagnostic(
         code(capture::io),
         help("check that the path is right and that the file can be read or written")

@@ -11,7 +11,7 @@ use analysis::{AnalyzeOptions, DiagnoseOptions};
 use clap::Args;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
-use imu_stand::stand::{Board, Hidden, Plan, plan, run_native};
+use imu_stand::stand::{Board, Hidden, Plan, Sizes, plan, run_native};
 use imu_stand::{text, write_capture};
 use indicatif::{ProgressBar, ProgressStyle};
 #[cfg(unix)]
@@ -77,7 +77,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             arguments.seconds
         );
     }
-    let plan = plan(arguments.hide, arguments.seconds, arguments.seed);
+    let plan = plan(
+        arguments.hide,
+        Sizes::Visible,
+        arguments.seconds,
+        arguments.seed,
+    );
     let bar = if arguments.quiet {
         ProgressBar::hidden()
     } else {
@@ -137,7 +142,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 #[cfg(unix)]
 fn serve(board: Board, arguments: &Arguments) -> Result<()> {
     use imu_stand::pty::{self, Line, PtyError};
-    let mut plan = plan(arguments.hide, arguments.seconds, arguments.seed);
+    let mut plan = plan(
+        arguments.hide,
+        Sizes::Visible,
+        arguments.seconds,
+        arguments.seed,
+    );
     // Whoever opens the port drives the motor.
     plan.run.requests.clear();
     let stop = Arc::new(AtomicBool::new(false));

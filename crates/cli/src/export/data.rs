@@ -136,26 +136,9 @@ impl Table {
             .large_file(self.rows() > 100_000_000);
         for column in &self.columns {
             archive.start_file(format!("{}.npy", column.name), options)?;
-            let shape = [self.rows() as u64];
             match &column.cells {
-                Cells::Real(cells) => {
-                    let mut out = npyz::WriteOptions::new()
-                        .default_dtype()
-                        .shape(&shape)
-                        .writer(&mut archive)
-                        .begin_nd()?;
-                    out.extend(cells.iter().copied())?;
-                    out.finish()?;
-                }
-                Cells::Whole(cells) => {
-                    let mut out = npyz::WriteOptions::new()
-                        .default_dtype()
-                        .shape(&shape)
-                        .writer(&mut archive)
-                        .begin_nd()?;
-                    out.extend(cells.iter().copied())?;
-                    out.finish()?;
-                }
+                Cells::Real(cells) => write_npy(&mut archive, cells)?,
+                Cells::Whole(cells) => write_npy(&mut archive, cells)?,
             }
         }
         let about: serde_json::Map<String, serde_json::Value> = self
@@ -255,6 +238,20 @@ impl Table {
         }
         Ok(())
     }
+}
+
+/// One NPY, with its type's own layout.
+fn write_npy<T: npyz::AutoSerialize + Copy>(
+    out: &mut impl Write,
+    cells: &[T],
+) -> std::io::Result<()> {
+    let mut out = npyz::WriteOptions::new()
+        .default_dtype()
+        .shape(&[cells.len() as u64])
+        .writer(out)
+        .begin_nd()?;
+    out.extend(cells.iter().copied())?;
+    out.finish()
 }
 
 /// Time of each row from the first one on, s: the device's, else the host's, else by the rate; NaN where all three lack.

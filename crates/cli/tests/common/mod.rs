@@ -8,9 +8,10 @@ use std::process::{Command, Output};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bench::{Run, Scenario, Timeline};
+use imu_stand::pty::Pace;
 use serialport::{SerialPort as _, TTYPort};
 use wire::{Decoder, Frame, Request, RequestDecoder, encode_request};
 
@@ -49,6 +50,23 @@ pub fn said(output: &Output) -> String {
         .filter(|word| *word != "│")
         .collect();
     words.join(" ")
+}
+
+/// It succeeded; what it said.
+pub fn assert_success(output: &Output) -> String {
+    let said = said(output);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    said
+}
+
+/// It failed and said each of these; all that it said.
+pub fn assert_refused(output: &Output, needles: &[&str]) -> String {
+    let said = said(output);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    for needle in needles {
+        assert!(said.contains(needle), "no `{needle}` in: {said}");
+    }
+    said
 }
 
 /// A folder of this test's own, new at each run.
@@ -183,14 +201,11 @@ fn serve(
         seconds: 1e5,
         requests: vec![],
     };
-    let began = Instant::now();
+    let mut pace = Pace::default();
     let mut requests = RequestDecoder::new();
     let mut request = Vec::new();
     let listen = |t: f64| {
-        let due = Duration::from_secs_f64(t);
-        if let Some(early) = due.checked_sub(began.elapsed()) {
-            std::thread::sleep(early);
-        }
+        pace.wait(t);
         let mut buffer = [0; 256];
         let count = match &mut *ends.lock().unwrap() {
             Some((master, _)) => master.read(&mut buffer).unwrap_or(0),

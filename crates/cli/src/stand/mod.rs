@@ -1,0 +1,123 @@
+//! The simulated stand as a source of captures: a scenario of the bench, the firmware on it (its image in a simulated
+//! ATmega16, or its logic on the host), and the frames.
+
+use std::ops::ControlFlow;
+
+use bench::{Run, Scenario, SerialByte, Timeline, duty_profile, uniform};
+use model::record::Record;
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use wire::{Decoder, Frame, LinkCounts};
+
+use crate::RecordBuilder;
+use crate::capture::Calibration;
+
+mod hidden;
+
+pub use hidden::{Hidden, Sizes};
+
+/// What plays the board.
+pub enum Board {
+    /// The firmware's logic on the host.
+    Native,
+    /// Its image, an ELF file's bytes, on a simulated ATmega16.
+    #[cfg(feature = "simavr")]
+    Image(Vec<u8>),
+}
+
+/// A run of the simulated stand.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What the bench runs.
+    pub run: Run,
+    /// What was hidden, in words.
+    pub hidden: String,
+    /// The gyro it was hidden in, 0, 1, 2; `None` where nothing was, or where it is in all.
+    pub channel: Option<usize>,
+}
+
+/// Plans a run: a sound stand in a lively environment, the motor spinning free in steps (the belt is off, so the table
+/// stays at rest), and one thing wrong.
+#[must_use]
+pub fn plan(hidden: Hidden, sizes: Sizes, seconds: f64, seed: u64) -> Plan {
+    // A stream beside the bench's own, which is seeded by `seed` too.
+    let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x9e37_79b9_7f4a_7c15);
+    let mut scenario = Scenario::lively(seed);
+    scenario.seconds = seconds;
+    let planted = hidden::plant(hidden, sizes, &mut scenario, rng);
+    let mut steps = vec![];
+    let mut at = 10.0;
+    while at < seconds - 5.0 {
+        steps.push((at, uniform(rng, -255.0, 256.0) as i16));
+        at += uniform(rng, 8.0, 30.0);
+    }
+    let requests = duty_profile(&steps, seconds);
+    Plan {
+        run: Run {
+            scenario,
+            seconds,
+            requests,
+        },
+        hidden: planted.words,
+        channel: planted.channel,
+    }
+}
+
+/// What a host makes of a run's bytes.
+pub struct Receiver<F> {
+    decoder: Decoder,
+    builder: RecordBuilder,
+    progress: F,
+}
+
+impl<F: FnMut(f64)> Receiver<F> {
+    /// `progress` is told the time of each sample, s.
+    pub fn new(progress: F) -> Self {
+        Receiver {
+            decoder: Decoder::new(),
+            builder: RecordBuilder::new(Calibration::default()),
+            progress,
+        }
+    }
+
+    /// Takes a byte; it always wants another.
+    pub fn push(&mut self, received: SerialByte) -> ControlFlow<()> {
+        match self.decoder.push(received.byte) {
+            Some(Ok(Frame::Sample(sample))) => {
+                self.builder.push(&sample, received.time_s);
+                (self.progress)(received.time_s);
+            }
+            Some(Ok(Frame::Hello(hello))) => self.builder.hello(&hello),
+            _ => {}
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// The record, and what the line did to its frames.
+    pub fn finish(self) -> (Record, LinkCounts) {
+        (self.builder.build(), *self.decoder.counts())
+    }
+}
+
+/// Runs the firmware's logic on the planned stand; `progress` is told the time, s.
+pub fn run_native(plan: &Plan, progress: impl FnMut(f64)) -> (Record, LinkCounts) {
+    let mut receiver = Receiver::new(progress);
+    bench::native(&plan.run, &Timeline::default(), |byte| receiver.push(byte));
+    receiver.finish()
+}
+
+/// Runs an image of the firmware (an ELF file's bytes) on a simulated ATmega16 on the planned stand; `progress` is told
+/// the time, s.
+///
+/// # Errors
+/// [`SimavrError`](bench::simavr::SimavrError) for what is no image of an ATmega16, and for an image that stops.
+#[cfg(feature = "simavr")]
+pub fn run_image(
+    plan: &Plan,
+    image: &[u8],
+    progress: impl FnMut(f64),
+) -> Result<(Record, LinkCounts), bench::simavr::SimavrError> {
+    let mut receiver = Receiver::new(progress);
+    bench::simavr::simavr(image, &plan.run, |byte| receiver.push(byte))?;
+    Ok(receiver.finish())
+}
