@@ -1,6 +1,7 @@
 //! Toolchain, image, tests: what a newcomer types.
 
 mod campaign;
+mod effects;
 mod image;
 mod peers;
 mod size;
@@ -20,6 +21,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
            analyzes and diagnoses; a number after it is the seed
   campaign measures by rates what the diagnosis can tell, and writes docs/power.md: up to an hour on two cores;
            --quick for minutes, --full for hours, --seed N for a run that was made before, --help for the rest
+  effects  writes docs/effects.md and its figures from the files of the effects; --check tells whether they are current
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}
   size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt
   compare-peers
@@ -33,6 +35,7 @@ fn main() -> ExitCode {
         Some("demo") => demo(&root),
         Some("image") => build_image(&root),
         Some("campaign") => campaign::measure(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("effects") => effects::page(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("size") => size::report(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("compare-peers") => peers::compare(&root, std::env::args().any(|a| a == "--long")),
         _ => {

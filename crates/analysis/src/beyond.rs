@@ -2,8 +2,8 @@
 //! has a cause without a name: the search weighs them beside the effects, and the answer is "unexplained, but follows".
 
 use model::effect::{
-    Column, Docs, Effect, Hypothesis, ParameterSpec, Parameters, Regression, Rival, Signal, Stage,
-    View,
+    Column, Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Regression, Rival,
+    Signal, Stage, View,
 };
 use model::record::Quantity;
 use model::simulate::Simulation;
@@ -155,6 +155,7 @@ impl Effect for Beyond {
             excitation: "",
             test: "",
             figure: "",
+            example: Example::new(Plot::Spectrum, &[]),
         }
     }
 

@@ -2,17 +2,91 @@
 
 use std::fmt::Write as _;
 
+use crate::effect::Effect;
 use crate::effects::EFFECTS;
+use crate::file::{EffectModel, ModelFile};
+use crate::parameter::Parameter;
+
+/// Length of the examples, s.
+pub const EXAMPLE_SECONDS: f64 = 600.0;
+/// Seed of the examples.
+pub const EXAMPLE_SEED: u64 = 1;
+
+/// The run that shows an effect: the stand of the paper with it, or the same without it.
+#[must_use]
+pub fn example(effect: &dyn Effect, with_it: bool) -> ModelFile {
+    let example = effect.docs().example;
+    let unit = |name: &str| {
+        let spec = effect.parameters().iter().find(|s| s.name == name);
+        spec.map_or("1", |s| s.unit)
+    };
+    let parameter =
+        |(name, value): &(&str, f64)| ((*name).to_owned(), Parameter::exact(*value, unit(name)));
+    let mut model = ModelFile::paper();
+    let world = example.world.iter().map(|(k, v)| ((*k).to_owned(), *v));
+    model.excitation.extend(world);
+    if with_it {
+        model.effects.push(EffectModel {
+            cause: effect.id().to_owned(),
+            channels: example.channels.iter().map(|c| (*c).to_owned()).collect(),
+            parameters: example.parameters.iter().map(parameter).collect(),
+        });
+    }
+    model
+}
+
+/// The example in words.
+fn caption(effect: &dyn Effect) -> String {
+    let example = effect.docs().example;
+    let parameters: Vec<String> = example
+        .parameters
+        .iter()
+        .map(|(name, value)| {
+            let spec = effect.parameters().iter().find(|s| s.name == *name);
+            match spec.map_or("1", |s| s.unit) {
+                "1" => format!("`{name}` {value}"),
+                unit => format!("`{name}` {value} {unit}"),
+            }
+        })
+        .collect();
+    let world: Vec<String> = example
+        .world
+        .iter()
+        .map(|(key, value)| format!("`{key}` {value}"))
+        .collect();
+    let world = if world.is_empty() {
+        String::new()
+    } else {
+        format!(", in a world with {}", world.join(", "))
+    };
+    let on = if example.channels.is_empty() {
+        "all axes".to_owned()
+    } else {
+        example.channels.join(", ")
+    };
+    format!("*Simulated: {} on {on}{world}.*", parameters.join(", "))
+}
 
 /// The text of docs/effects.md.
 #[must_use]
 pub fn effects_markdown() -> String {
     let mut out = String::from(
         "# The effects\n\n\
-         Made of `crates/model/src/effects/`, one file each; `RENEW=1 cargo test -p model --test effects_page` renews it.\n\
-         A further effect is one more file there and one more line in `mod.rs`.\n\n\
+         Made of `crates/model/src/effects/`, one file each; `cargo xtask effects` renews this page and its figures, with \
+         `--check` it tells what is old.\n\
+         A further effect is one more file there, which names the kind of its figure and a run that shows it, and one more \
+         line in `mod.rs`.\n\
+         Each figure is a simulated run of the paper's stand, {SECONDS} s at {RATE} Hz with seed {SEED}, beside the same \
+         run without the effect.\n\n\
          | cause | effect |\n|---|---|\n",
     );
+    for (key, value) in [
+        ("{SECONDS}", EXAMPLE_SECONDS.to_string()),
+        ("{RATE}", ModelFile::paper().rate_hz.to_string()),
+        ("{SEED}", EXAMPLE_SEED.to_string()),
+    ] {
+        out = out.replace(key, &value);
+    }
     for e in EFFECTS {
         let _ = writeln!(out, "| [`{0}`](#{0}) | {1} |", e.id(), e.docs().title);
     }
@@ -41,6 +115,13 @@ pub fn effects_markdown() -> String {
         for r in e.rivals() {
             let _ = writeln!(out, "- Not `{}`? {}.", r.cause, r.experiment);
         }
+        let _ = write!(
+            out,
+            "\n![{}, beside a run without it](figures/effects/{}.svg)\n\n{}\n",
+            docs.title,
+            e.id(),
+            caption(*e)
+        );
     }
     out
 }

@@ -4,14 +4,19 @@
 fn golden_effects_page() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/effects.md");
     let text = model::docs::effects_markdown();
-    if std::env::var_os("RENEW").is_some() {
-        std::fs::write(path, &text).expect("docs/effects.md");
-    }
     let page = std::fs::read_to_string(path).expect("docs/effects.md");
-    assert_eq!(
-        page, text,
-        "docs/effects.md is old: RENEW=1 cargo test -p model --test effects_page"
-    );
+    assert_eq!(page, text, "docs/effects.md is old: cargo xtask effects");
+}
+
+#[test]
+fn every_example_is_a_model_file_and_names_what_its_effect_needs() {
+    for e in model::effects::EFFECTS {
+        let example = model::docs::example(*e, true);
+        // The file refuses unknown settings and parameters, and asks for those that are required.
+        let read = model::ModelFile::parse(&example.to_toml())
+            .unwrap_or_else(|error| panic!("{}: {error}", e.id()));
+        assert_eq!(read.effects, example.effects, "{}", e.id());
+    }
 }
 
 #[test]

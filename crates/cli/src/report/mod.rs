@@ -1,5 +1,6 @@
 //! The report: one self-contained HTML file, verdict first, then the figures that it rests on.
 
+pub mod exhibits;
 pub mod plot;
 pub mod replicates;
 pub mod standalone;

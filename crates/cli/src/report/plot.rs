@@ -12,6 +12,9 @@ pub const WIDE: u32 = 1100;
 /// Width of one of two figures beside each other: the same size of letters at half the width.
 pub const HALF: u32 = 540;
 
+/// Radius of a dot, units of the view box.
+pub const DOT: u32 = 3;
+
 /// Colours that keep apart for colour-blind readers and in grey (Okabe and Ito).
 pub const MEASURED: RGBColor = RGBColor(0x1b, 0x1f, 0x24);
 /// Of the baseline model.
@@ -226,7 +229,7 @@ impl Figure {
                     let dots = points
                         .iter()
                         .filter(|p| self.drawable(**p))
-                        .map(|p| Circle::new(place(*p), 3, colour.filled()));
+                        .map(|p| Circle::new(place(*p), DOT, colour.filled()));
                     chart.draw_series(dots)?;
                 }
                 Layer::Band(points) => {

@@ -4,7 +4,7 @@ use analysis::result::{Diagnosed, Evidence, SeriesStyle};
 use maud::{PreEscaped, html};
 
 use super::ReportError;
-use super::plot::{self, Drawn, Figure, Layer};
+use super::plot::{self, Drawn, Figure, Layer, PlotError};
 
 /// Height of title and legend.
 const HEAD: u32 = 74;
@@ -58,13 +58,16 @@ pub fn figures(diagnosed: &Diagnosed) -> Result<Vec<(String, String)>, ReportErr
             0 => format!("{stem}.svg"),
             n => format!("{stem}-{}.svg", n + 1),
         };
-        out.push((name, alone(evidence)?));
+        out.push((name, alone(&evidence.title, &figure(evidence))?));
     }
     Ok(out)
 }
 
-fn alone(evidence: &Evidence) -> Result<String, ReportError> {
-    let figure = figure(evidence);
+/// A figure with title and legend on white.
+///
+/// # Errors
+/// [`PlotError`] where it cannot be drawn.
+pub(super) fn alone(title: &str, figure: &Figure) -> Result<String, PlotError> {
     let (width, height) = (figure.width, figure.height + HEAD);
     let place = format!(
         "<svg y=\"{HEAD}\" width=\"{width}\" height=\"{}\" ",
@@ -85,9 +88,9 @@ fn alone(evidence: &Evidence) -> Result<String, ReportError> {
     }
     let page = html! {
         svg xmlns="http://www.w3.org/2000/svg" viewBox=(format!("0 0 {width} {height}"))
-            font-family="system-ui, sans-serif" role="img" aria-label=(evidence.title) {
+            font-family="system-ui, sans-serif" role="img" aria-label=(title) {
             rect width=(width) height=(height) fill="#ffffff" {}
-            text x="88" y="30" font-size="20" font-weight="600" fill="#1b1f24" { (evidence.title) }
+            text x="88" y="30" font-size="20" font-weight="600" fill="#1b1f24" { (title) }
             @for (x, label, colour) in &marks {
                 rect x=(x) y="48" width="18" height="10" fill=(colour) {}
                 text x=(x + 26) y="58" font-size="15" fill="#1b1f24" { (label) }

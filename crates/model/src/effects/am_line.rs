@@ -1,7 +1,7 @@
 //! A sinusoid whose amplitude swings.
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Found, parameter, optional, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, optional, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -34,6 +34,7 @@ impl Effect for AmLine {
             excitation: "Nothing; several cycles of the swing.",
             test: "After a line: pairs of side bands at equal distances, tested together.",
             figure: "Amplitude spectrum of the whitened rate: a peak with two symmetric neighbours.",
+            example: Example::new(Plot::Lines { from_hz: 2.15, to_hz: 2.65 }, &[("frequency", 2.4), ("amplitude", 0.12), ("modulation_frequency", 0.05), ("depth", 0.8)]),
         }
     }
 

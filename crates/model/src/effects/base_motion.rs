@@ -1,7 +1,7 @@
 //! The base moves.
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Found, parameter, optional, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, optional, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -31,6 +31,7 @@ impl Effect for BaseMotion {
             excitation: "Motion.",
             test: "Excess rms between 0.02 and 0.6 Hz above 0.3 deg/s, more than any bias of this class of part can wander.",
             figure: "The rate in time blocks.",
+            example: Example::new(Plot::RateInTime { block_s: 2.0 }, &[("peak", 3.0), ("frequency", 0.02)]),
         }
     }
 

@@ -1,7 +1,7 @@
 //! The bias jumps once.
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Found, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -30,6 +30,7 @@ impl Effect for BiasStep {
             excitation: "Nothing.",
             test: "Likelihood ratio at all times at once, random walk refitted; largest one taken.",
             figure: "Rate in time blocks with the two levels.",
+            example: Example::new(Plot::RateInTime { block_s: 5.0 }, &[("time", 240.0), ("height", 0.4)]),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The board clock is off.
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -28,6 +28,7 @@ impl Effect for ClockRate {
             excitation: "Device and host times.",
             test: "Audit: slope of host time against device time, against the stated tolerance.",
             figure: "Host time minus device time.",
+            example: Example::new(Plot::HostTime, &[("ppm", 800.0)]).on_all(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Low bits are missing.
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -28,6 +28,7 @@ impl Effect for CoarseLsb {
             excitation: "Nothing.",
             test: "Audit: share of ones in the low bits against the share that the noise makes.",
             figure: "Share of ones by bit.",
+            example: Example::new(Plot::Bits, &[("missing_bits", 2.0)]),
         }
     }
 

@@ -3,7 +3,7 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Found, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -32,6 +32,7 @@ impl Effect for CommonNoise {
             excitation: "At least two gyros.",
             test: "Correlation of the whitened residuals of each pair of axes.",
             figure: "Whitened residual of one axis against another.",
+            example: Example::new(Plot::AxisAgainst("gyro_y"), &[("sigma", 0.5)]).on_all(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The gyro feels the rotation about another axis.
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Regression, optional, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, optional, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -31,6 +31,7 @@ impl Effect for CrossAxis {
             excitation: "Rotation about another axis, while this one is at rest.",
             test: "Least squares on the other gyros that turn, random walk refitted.",
             figure: "Rate in blocks of the other rate against that rate.",
+            example: Example::new(Plot::RateByValue("gyro_z"), &[("from_gyro_z", 0.03)]).in_a_world(&[("turn_dps", 20.0)]),
         }
     }
 

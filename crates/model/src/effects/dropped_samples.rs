@@ -2,7 +2,7 @@
 
 use rand_distr::{Distribution, Uniform};
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -30,6 +30,7 @@ impl Effect for DroppedSamples {
             excitation: "Nothing.",
             test: "Audit: gaps of the sequence numbers, and time that passes without a number.",
             figure: "Gaps over time.",
+            example: Example::new(Plot::Gaps, &[("count", 30.0)]).on_all(),
         }
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -33,6 +33,7 @@ impl Effect for Flicker {
             excitation: "Nothing; the longer the record, the clearer.",
             test: "White variance, random walk and B refitted by maximum likelihood.",
             figure: "Spectrum of the rate with the model before and after: a slope of -1.",
+            example: Example::new(Plot::Spectrum, &[("bias_instability", 300.0)]),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The gyro feels acceleration.
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Regression, optional, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, optional, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -31,6 +31,7 @@ impl Effect for GSensitivity {
             excitation: "Acceleration that changes by more than 0.015 g rms: shaking, tilting, a six-position test.",
             test: "Least squares on each accelerometer axis, random walk refitted.",
             figure: "Rate in blocks of acceleration against acceleration.",
+            example: Example::new(Plot::RateByValue("acc_x"), &[("acc_x", 0.6)]).in_a_world(&[("vibration_g", 0.15)]),
         }
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -34,6 +34,7 @@ impl Effect for GaussMarkov {
             excitation: "Nothing; several correlation times.",
             test: "White variance, random walk, sigma and correlation time refitted by maximum likelihood.",
             figure: "Spectrum of the rate with the model before and after: a shoulder.",
+            example: Example::new(Plot::Spectrum, &[("sigma", 0.2), ("correlation_time", 2.0)]),
         }
     }
 

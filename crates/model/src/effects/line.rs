@@ -1,7 +1,7 @@
 //! A sinusoid in the rate.
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Found, parameter, optional, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, optional, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -31,6 +31,7 @@ impl Effect for Line {
             excitation: "Nothing; more than three cycles.",
             test: "Periodogram of the whitened residual at twice the Fourier frequencies, then the exact likelihood of the refined frequency.",
             figure: "Amplitude spectrum of the whitened rate: one peak.",
+            example: Example::new(Plot::Lines { from_hz: 2.0, to_hz: 2.8 }, &[("frequency", 2.37), ("amplitude", 0.08)]),
         }
     }
 

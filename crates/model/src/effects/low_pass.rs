@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -31,6 +31,7 @@ impl Effect for LowPass {
             excitation: "Nothing.",
             test: "White noise shaped by one pole or by a triangular window, one width each, refitted by maximum likelihood.",
             figure: "Spectrum of the rate with the model before and after: it falls towards half the sample rate.",
+            example: Example::new(Plot::Spectrum, &[("lag1_correlation", 0.5)]),
         }
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::parameter::Parameter;
 use crate::record::Base;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Found, Regression, Shape, optional, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Found, Regression, Shape, optional, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -37,6 +37,7 @@ impl Effect for MotorBias {
             excitation: "A motor command that changes, while the axis itself does not turn.",
             test: "Least squares on the command, and on the surge over a grid of times, refined; random walk refitted.",
             figure: "Rate in time blocks against duty.",
+            example: Example::new(Plot::RateAgainst("pwm"), &[("at_full_duty", 0.4)]).in_a_world(&[("motor_duty", 0.8)]),
         }
     }
 

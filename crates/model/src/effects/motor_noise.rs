@@ -1,6 +1,6 @@
 //! The motor makes the rate noisier.
 
-use crate::effect::{Docs, Effect, Found, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, VarianceLaw, parameter, value};
+use crate::effect::{Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, VarianceLaw, parameter, value};
 use crate::parameter::Parameter;
 use crate::record::Quantity;
 use crate::simulate::Simulation;
@@ -30,6 +30,7 @@ impl Effect for MotorNoise {
             excitation: "A motor command that changes.",
             test: "Likelihood of the whitened residual with a variance that follows duty, or its square.",
             figure: "Mean square of the whitened residual in time blocks against duty.",
+            example: Example::new(Plot::PowerAgainst("pwm"), &[("variance_increase_at_full_duty", 1.5)]).in_a_world(&[("motor_duty", 0.8)]),
         }
     }
 

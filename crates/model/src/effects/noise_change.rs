@@ -1,7 +1,7 @@
 //! The noise is larger for a while.
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Found, VarianceLaw, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, VarianceLaw, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -31,6 +31,7 @@ impl Effect for NoiseChange {
             excitation: "Nothing.",
             test: "Likelihood of all stretches of the whitened residual.",
             figure: "Mean square of the whitened residual in time blocks.",
+            example: Example::new(Plot::PowerInTime, &[("start", 200.0), ("end", 320.0), ("variance_increase", 1.5)]),
         }
     }
 

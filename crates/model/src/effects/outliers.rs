@@ -2,7 +2,7 @@
 
 use rand_distr::{Distribution, Uniform};
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, optional, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, optional, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -31,6 +31,7 @@ impl Effect for Outliers {
             excitation: "Nothing.",
             test: "Audit: distance of the whitened sample against the normal tail of the record length.",
             figure: "The rate around each of them.",
+            example: Example::new(Plot::Around, &[("count", 4.0)]),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The bias runs away at a constant rate.
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Regression, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -28,6 +28,7 @@ impl Effect for RateRamp {
             excitation: "Nothing but time; a longer record shows it better by the power 3/2.",
             test: "Least squares on time, random walk refitted.",
             figure: "Rate in time blocks with the straight line.",
+            example: Example::new(Plot::RateInTime { block_s: 5.0 }, &[("slope", 1e-3)]),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Readings end at a rail.
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, optional};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, optional};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -30,6 +30,7 @@ impl Effect for Saturation {
             excitation: "Rates that reach the limit.",
             test: "Audit: the tail that should lie beyond the extreme readings, and does not.",
             figure: "Histogram of the counts with the normal curve.",
+            example: Example::new(Plot::Histogram, &[("high", 8.0)]),
         }
     }
 

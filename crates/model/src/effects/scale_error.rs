@@ -1,7 +1,7 @@
 //! The scale factor is wrong.
 
 use crate::record::Base;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -30,6 +30,7 @@ impl Effect for ScaleError {
             excitation: "A slow sway of the base whose tilt the accelerometers see.",
             test: "The tilt of the accelerometers regressed on the integrated rate, in a band around the sway.",
             figure: "Tilt from the accelerometers against tilt from the rate.",
+            example: Example::new(Plot::Tilt, &[("relative", 0.15)]).in_a_world(&[("sway_deg", 5.0)]),
         }
     }
 

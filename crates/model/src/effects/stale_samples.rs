@@ -2,7 +2,7 @@
 
 use rand_distr::{Distribution, Uniform};
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, optional, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, optional, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -31,6 +31,7 @@ impl Effect for StaleSamples {
             excitation: "Nothing.",
             test: "Audit: new-data flags, and frames with all gyros equal to the frame before against their chance.",
             figure: "The rate around each of them.",
+            example: Example::new(Plot::Around, &[("count", 40.0)]).on_all(),
         }
     }
 

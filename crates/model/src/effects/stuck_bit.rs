@@ -2,7 +2,7 @@
 
 use rand_distr::{Bernoulli, Distribution};
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -32,6 +32,7 @@ impl Effect for StuckBit {
             excitation: "Nothing.",
             test: "Audit: share of ones in each low bit against the share that the noise makes.",
             figure: "Share of ones by bit.",
+            example: Example::new(Plot::Bits, &[("bit", 2.0), ("value", 1.0), ("fraction", 0.6)]),
         }
     }
 

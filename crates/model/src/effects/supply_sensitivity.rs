@@ -1,6 +1,6 @@
 //! The bias follows the supply.
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Regression, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, parameter, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -29,6 +29,7 @@ impl Effect for SupplySensitivity {
             excitation: "A supply that moves by more than 5 mV.",
             test: "Least squares on the supply channel, random walk refitted.",
             figure: "Rate in time blocks against supply.",
+            example: Example::new(Plot::RateAgainst("supply"), &[("slope", 5.0)]).in_a_world(&[("supply_load_v", 0.06)]),
         }
     }
 

@@ -3,7 +3,7 @@
 use rand_distr::{Distribution, Exp1};
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Found, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -32,6 +32,7 @@ impl Effect for Telegraph {
             excitation: "Nothing; many switches within the record.",
             test: "Likelihood of a two-level hidden Markov chain against Gauss-Markov and steps.",
             figure: "Rate in time blocks with the most probable level.",
+            example: Example::new(Plot::RateInTime { block_s: 2.0 }, &[("half_height", 0.3), ("dwell_time", 40.0)]),
         }
     }
 

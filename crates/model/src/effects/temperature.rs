@@ -1,6 +1,6 @@
 //! The bias follows the temperature of the die.
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Regression, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, parameter, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -29,6 +29,7 @@ impl Effect for Temperature {
             excitation: "A temperature that moves by at least half a degree, best up and down again (a heater cycle).",
             test: "Least squares on the smoothed temperature channel, random walk refitted.",
             figure: "Rate in time blocks, the other terms taken out, against temperature: a straight line.",
+            example: Example::new(Plot::RateAgainst("temp_x"), &[("slope", 0.08)]).in_a_world(&[("heater_degc", 6.0)]),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The bias follows the temperature of the die along a parabola.
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Regression, parameter, optional, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, parameter, optional, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -31,6 +31,7 @@ impl Effect for TemperatureQuadratic {
             excitation: "A temperature swing of a few degrees; the power grows with the square of the swing.",
             test: "Least squares on T and T^2 of the smoothed temperature channel; against a linear term already found, the square alone.",
             figure: "Rate in time blocks, the other terms taken out, against temperature: a parabola.",
+            example: Example::new(Plot::RateAgainst("temp_x"), &[("slope", 0.02), ("curvature", 0.04)]).in_a_world(&[("ambient_degc", 22.0), ("heater_degc", 6.5)]),
         }
     }
 

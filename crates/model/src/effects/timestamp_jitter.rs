@@ -2,7 +2,7 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -30,6 +30,7 @@ impl Effect for TimestampJitter {
             excitation: "Device times.",
             test: "Audit: robust spread of the device times about their line.",
             figure: "Device time minus its line.",
+            example: Example::new(Plot::DeviceTime, &[("sigma", 2e-3)]).on_all(),
         }
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Hypothesis, ParameterSpec, Parameters, Rival, Stage, View, Column, Found, Shape, parameter, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Found, Shape, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -32,6 +32,7 @@ impl Effect for WarmUp {
             excitation: "A record that starts at power-up and lasts several time constants.",
             test: "Least squares on exponentials over a grid of time constants, refined; random walk refitted.",
             figure: "Rate in time blocks with the exponential.",
+            example: Example::new(Plot::RateInTime { block_s: 5.0 }, &[("amplitude", 0.5), ("time_constant", 90.0)]),
         }
     }
 
