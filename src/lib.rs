@@ -7,6 +7,8 @@
 //! - [`acquire`] runs right after the tick, above everything else: SPI and ADC are its own.
 //! - [`Stand`] runs below it: it scales, frames, sends, and answers the PC.
 #![cfg_attr(not(test), no_std)]
+#![cfg_attr(not(target_arch = "avr"), forbid(unsafe_code))]
+#![cfg_attr(target_arch = "avr", deny(unsafe_code), feature(asm_experimental_arch))]
 
 pub mod acquire;
 pub mod bias;

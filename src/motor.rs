@@ -209,14 +209,16 @@ impl Default for Motor {
 /// by 0.0011 at most (0.3 steps of 255).
 #[inline(never)]
 fn sine_q14(part: i16) -> i16 {
-    // x in -1 .. 1 (Q15), y = 4 x (1 - |x|).
-    let x = i32::from(part);
-    let left = 32_768i32.wrapping_sub(x.wrapping_abs());
-    let y = x.wrapping_mul(left) >> 14;
-    // Q14: y + 0.225 (y |y| - y).
-    let square = y.wrapping_mul(y.wrapping_abs()) >> 14;
-    let corrected = y.wrapping_add(square.wrapping_sub(y).wrapping_mul(3_686) >> 14);
-    corrected as i16
+    // x in -1 .. 1 (Q15), y = 4 x (1 - |x|) in Q14, and y + 0.225 (y |y| - y).
+    let y = times_q14(part, 32_768u16.wrapping_sub(part.unsigned_abs()));
+    let square = times_q14(y, y.unsigned_abs());
+    y.wrapping_add(times_q14(square.wrapping_sub(y), 3_686))
+}
+
+/// `a * b / 2^14`, rounded down.
+#[inline(never)]
+fn times_q14(a: i16, b: u16) -> i16 {
+    (i32::from(a).wrapping_mul(b.into()) >> 14) as i16
 }
 
 #[cfg(test)]

@@ -15,7 +15,8 @@ use store::Store;
 
 /// The rest of the board, as the stand sees it.
 pub trait Board {
-    /// Queues a frame of these fields for the line (see [`wire::fields`]); false, and nothing queued, when it does not fit.
+    /// Queues a frame of these fields for the line (see [`wire::fields`]); false, and nothing queued, when there is less room
+    /// than [`wire::fields::room_for`] says.
     fn send(&mut self, kind: u8, fields: &[u8]) -> bool;
     /// Puts out the motor command, -255..=255.
     fn set_motor(&mut self, duty: i16);
@@ -55,6 +56,11 @@ mod source {
 
 /// Milliseconds from health frame to health frame.
 const HEALTH_MS: u16 = 1_000;
+/// Bits of what is owed to the host.
+const HELLO: u8 = 1;
+const HEALTH: u8 = 2;
+/// The counters return to zero once the health frame has told them.
+const CLEAR: u8 = 4;
 /// SUPPLY_OUT of 4.75 V and 5.25 V at 1.8315 mV a count: the part's operating range (data sheet).
 const SUPPLY_COUNTS: core::ops::RangeInclusive<u16> = 2_594..=2_866;
 /// Codes at which the accelerometer's output is at the converter's end.
@@ -92,6 +98,10 @@ pub struct Stand {
     null: Pending,
     null_samples: u16,
     millisecond: u16,
+    /// [`HELLO`], [`HEALTH`], [`CLEAR`]: to be sent as soon as there is room.
+    owed: u8,
+    /// What has been owed since a sample ago: it goes before samples, or a line too slow for the rate would carry nothing else.
+    late: u8,
     motor: Motor,
     config: Config,
     /// What the next reply will say beside its status; zero after each.
@@ -116,6 +126,8 @@ impl Stand {
             null: Pending::NONE,
             null_samples: 0,
             millisecond: 0,
+            owed: 0,
+            late: 0,
             motor: Motor::new(),
             config: Config::new(),
             answer: Reply {
@@ -163,7 +175,7 @@ impl Stand {
     pub fn started<B: Board>(&mut self, board: &mut B, misconfigured: u8) {
         self.unset = false;
         self.note_configured(misconfigured);
-        self.hello(board);
+        self.tell(board, HELLO);
     }
 
     /// Counts what has been lost outside: ticks without a sample, received bytes.
@@ -215,9 +227,11 @@ impl Stand {
             self.step_bias_null(board, in_order, &sample);
         }
         sample.flags.set(seen);
-        if !board.send(kind::SAMPLE, sample.as_bytes()) {
+        self.late &= self.owed;
+        if self.late != 0 || !board.send(kind::SAMPLE, sample.as_bytes()) {
             self.record(Fault::FrameDropped, 0);
         }
+        self.late = self.owed;
         if !matches!(raw.done.task, Task::None) {
             self.job_done(board, raw.done);
         }
@@ -403,7 +417,10 @@ impl Stand {
             self.health
                 .uptime_s
                 .set(self.health.uptime_s.get().wrapping_add(1));
-            self.health(board);
+            self.owed |= HEALTH;
+        }
+        if self.owed != 0 {
+            self.tell(board, 0);
         }
     }
 
@@ -419,27 +436,32 @@ impl Stand {
         self.answer.zero();
     }
 
+    /// Sends what is owed, and `more`, as far as there is room.
     #[inline(never)]
-    fn hello<B: Board>(&mut self, board: &mut B) {
-        let hello = wire::fields::Hello {
-            firmware: crate::VERSION,
-            board_id: self.config.board_id,
-            reset_cause: board.reset_cause(),
-            restarts: board.restarts().into(),
-            next_seq: self.health.next_seq,
-            tick_ns: crate::TICK_NS.into(),
-            set_up: self.config.set_up,
-        };
-        if !board.send(kind::HELLO, hello.as_bytes()) {
-            self.record(Fault::ReportDropped, 0);
+    fn tell<B: Board>(&mut self, board: &mut B, more: u8) {
+        self.owed |= more;
+        if self.owed & HELLO != 0 {
+            let hello = wire::fields::Hello {
+                firmware: crate::VERSION,
+                board_id: self.config.board_id,
+                reset_cause: board.reset_cause(),
+                restarts: board.restarts().into(),
+                next_seq: self.health.next_seq,
+                tick_ns: crate::TICK_NS.into(),
+                set_up: self.config.set_up,
+            };
+            if board.send(kind::HELLO, hello.as_bytes()) {
+                self.owed &= !HELLO;
+            }
         }
-    }
-
-    #[inline(never)]
-    fn health<B: Board>(&mut self, board: &mut B) {
-        self.health.stack_free.set(board.stack_free());
-        if !board.send(kind::HEALTH, self.health.as_bytes()) {
-            self.record(Fault::ReportDropped, 0);
+        if self.owed & HEALTH != 0 {
+            self.health.stack_free.set(board.stack_free());
+            if board.send(kind::HEALTH, self.health.as_bytes()) {
+                if self.owed & CLEAR != 0 {
+                    self.health.faults.zero();
+                }
+                self.owed &= !(HEALTH | CLEAR);
+            }
         }
     }
 

@@ -37,7 +37,9 @@ bool frame_send(uint8_t kind, void *payload, uint8_t length)
     header->version = WIRE_VERSION;
     header->kind = kind;
     uint8_t left = (uint8_t)(length + CRC_BYTES);
-    if (serial_room() < left + CODE_AND_END)
+    /* Only a reply may fill the ring: any other frame leaves room for one. */
+    uint8_t spare = kind == KIND_REPLY ? 0 : sizeof(struct reply) + CRC_BYTES + CODE_AND_END;
+    if (serial_room() < left + CODE_AND_END + spare)
         return false;
     /* Into the ring at once: the interrupt does not see it before the head moves. */
     uint8_t at = serial_head();

@@ -111,17 +111,16 @@ static uint8_t carry_out(const struct request *request)
     case CODE_PING:
         return STATUS_OK;
     case CODE_GET_HELLO:
-        stand_hello();
+        stand_tell(OWED_HELLO);
         return STATUS_OK;
     case CODE_KEEP_ALIVE:
         motor_keep_alive();
         return STATUS_OK;
     case CODE_COUNTERS:
-        stand_health();
+        stand_tell(OWED_HEALTH);
         return STATUS_OK;
     case CODE_CLEAR_COUNTERS:
-        stand_health();
-        stand_clear_counters();
+        stand_tell(OWED_HEALTH | OWED_CLEAR);
         return STATUS_OK;
     case CODE_REBOOT:
         stand_reply(CODE_REBOOT, request->number, STATUS_OK);

@@ -68,16 +68,16 @@ int16_t serial_receive(void)
 void serial_count_losses(void)
 {
     uint8_t overrun, framing;
+    if (!(lost_overrun | lost_framing))
+        return;
     ATOMIC_BLOCK(ATOMIC_FORCEON)
     {
         overrun = lost_overrun;
         framing = lost_framing;
         lost_overrun = lost_framing = 0;
     }
-    if (overrun)
-        stand_count(FAULT_RX_OVERRUN, overrun);
-    if (framing)
-        stand_count(FAULT_RX_FRAMING, framing);
+    stand_count(FAULT_RX_OVERRUN, overrun);
+    stand_count(FAULT_RX_FRAMING, framing);
 }
 
 uint8_t serial_mask(void)

@@ -25,6 +25,8 @@ struct reply stand_answer;
 uint8_t stand_misconfigured;
 static struct health health;
 static uint8_t silent; /* bit per axis: not answering at the last sample */
+static uint8_t owed;   /* to the host, as soon as there is room */
+static uint8_t late;   /* of it, what has been owed since a sample ago */
 static bool unset;     /* the gyros have to be set up (anew) */
 
 void stand_count(uint8_t fault, uint8_t times)
@@ -42,35 +44,30 @@ void stand_count_each(uint8_t fault, uint8_t axes)
     }
 }
 
-static void report(uint8_t kind, void *payload, uint8_t length)
+void stand_tell(uint8_t more)
 {
-    if (!frame_send(kind, payload, length))
-        stand_count(FAULT_REPORT_DROPPED, 1);
-}
-
-void stand_hello(void)
-{
-    struct hello hello = {
-        .firmware = {FIRMWARE_VERSION},
-        .board_id = config.board_id,
-        .reset_cause = board_reset_cause(),
-        .restarts = board_restarts(),
-        .next_seq = health.next_seq,
-        .tick_ns = TICK_NS,
-        .set_up = config.set_up,
-    };
-    report(KIND_HELLO, &hello, sizeof hello);
-}
-
-void stand_health(void)
-{
-    health.stack_free = board_stack_free();
-    report(KIND_HEALTH, &health, sizeof health);
-}
-
-void stand_clear_counters(void)
-{
-    memset(health.faults, 0, sizeof health.faults);
+    owed |= more;
+    if (owed & OWED_HELLO) {
+        struct hello hello = {
+            .firmware = {FIRMWARE_VERSION},
+            .board_id = config.board_id,
+            .reset_cause = board_reset_cause(),
+            .restarts = board_restarts(),
+            .next_seq = health.next_seq,
+            .tick_ns = TICK_NS,
+            .set_up = config.set_up,
+        };
+        if (frame_send(KIND_HELLO, &hello, sizeof hello))
+            owed &= (uint8_t)~OWED_HELLO;
+    }
+    if (owed & OWED_HEALTH) {
+        health.stack_free = board_stack_free();
+        if (frame_send(KIND_HEALTH, &health, sizeof health)) {
+            if (owed & OWED_CLEAR)
+                memset(health.faults, 0, sizeof health.faults);
+            owed &= (uint8_t)~(OWED_HEALTH | OWED_CLEAR);
+        }
+    }
 }
 
 void stand_reply(uint8_t code, uint16_t number, uint8_t status)
@@ -78,7 +75,8 @@ void stand_reply(uint8_t code, uint16_t number, uint8_t status)
     stand_answer.number = number;
     stand_answer.command = code;
     stand_answer.status = status;
-    report(KIND_REPLY, &stand_answer, sizeof stand_answer);
+    if (!frame_send(KIND_REPLY, &stand_answer, sizeof stand_answer))
+        stand_count(FAULT_REPORT_DROPPED, 1);
     memset(&stand_answer, 0, sizeof stand_answer);
 }
 
@@ -123,7 +121,7 @@ void stand_started(uint8_t wrong)
 {
     unset = false;
     stand_note_configured(wrong);
-    stand_hello();
+    stand_tell(OWED_HELLO);
 }
 
 /* Q16.16 deg/s: counts times scale, less bias. */
@@ -270,8 +268,10 @@ void stand_on_sample(const struct raw *raw, uint8_t missed)
         step_bias_null(in_order, &sample);
     }
     sample.flags = flags;
-    if (!frame_send(KIND_SAMPLE, &sample, sizeof sample))
+    /* What has been owed since a sample ago goes before samples. */
+    if ((late & owed) || !frame_send(KIND_SAMPLE, &sample, sizeof sample))
         stand_count(FAULT_FRAME_DROPPED, 1);
+    late = owed;
     requests_on_sample();
     uint16_t busy = tick_since();
     if (busy > health.tick_busy_max)
@@ -291,6 +291,8 @@ void stand_on_millisecond(void)
         if (stand_misconfigured & (uint8_t)~silent)
             unset = true;
         health.uptime_s++;
-        stand_health();
+        owed |= OWED_HEALTH;
     }
+    if (owed)
+        stand_tell(0);
 }

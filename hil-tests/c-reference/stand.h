@@ -36,9 +36,9 @@ extern struct reply stand_answer;
 /* Bit per axis: not set up as the hello frame says. */
 extern uint8_t stand_misconfigured;
 
-void stand_hello(void);
-void stand_health(void);
-void stand_clear_counters(void);
+/* Sends what is owed, and more, as far as there is room; counters are cleared once they have been told. */
+void stand_tell(uint8_t more);
+enum { OWED_HELLO = 1, OWED_HEALTH = 2, OWED_CLEAR = 4 };
 /* Applies the set-up to motor, clock, line and sensors. */
 void stand_apply(void);
 void stand_note_configured(uint8_t wrong);

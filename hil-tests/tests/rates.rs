@@ -96,8 +96,13 @@ fn too_fast_for_the_line_drops_whole_samples_and_says_how_many() {
             period_ticks,
             periods_per_sample: 1,
         };
-        // While the line is full, health frames do not fit either: they come when the rate is back.
-        simulated.request(&[at(1.5, 2, rate(FASTEST)), at(6.0, 3, rate(12_500))]);
+        simulated.request(&[
+            at(1.5, 2, rate(FASTEST)),
+            at(2.5, 4, Command::Ping),
+            at(3.0, 5, Command::GetHello),
+            at(3.5, 6, Command::Counters),
+            at(6.0, 3, rate(12_500)),
+        ]);
         let mut heard = Heard::default();
         simulated
             .run_until(10.0, &mut |byte| heard.push(byte))
@@ -105,6 +110,19 @@ fn too_fast_for_the_line_drops_whole_samples_and_says_how_many() {
         heard
     };
     assert_eq!(heard.link().rejected(), 0, "no frame is damaged");
+    // The full line still carries what is asked for, and the health frame of each second and of the request.
+    let replies: Vec<u16> = heard.replies().map(|(_, reply)| reply.number).collect();
+    assert_eq!(replies, [2, 4, 5, 6, 3]);
+    let during = |t: f64| (2.0..6.0).contains(&t);
+    let hellos: Vec<f64> = (heard.hellos().map(|(t, _)| t))
+        .filter(|&t| during(t))
+        .collect();
+    let healths: Vec<f64> = (heard.healths().map(|(t, _)| t))
+        .filter(|&t| during(t))
+        .collect();
+    println!("full line: hello at {hellos:.2?}, health at {healths:.2?} s");
+    assert!(matches!(hellos[..], [t] if t < 3.2));
+    assert_eq!(healths.len(), 5);
     let samples: Vec<(f64, Sample)> = heard.samples().collect();
     let (at_s, health) = heard.healths().last().expect("a health frame");
     let seen: Vec<Sample> = samples

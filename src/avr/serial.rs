@@ -1,11 +1,11 @@
 //! The USART: two rings between its interrupts and the main loop.
 
-use core::ptr::addr_of_mut;
+use core::ptr::{addr_of_mut, read_volatile};
 
 use avr_device::atmega16::USART;
 use firmware::Stand;
 use wire::Fault;
-use wire::fields::{encode_by, frame_len};
+use wire::fields::{encode_by, room_for};
 
 use super::ring::Ring;
 
@@ -67,10 +67,10 @@ pub fn has_received() -> bool {
     !RX.is_empty()
 }
 
-/// Queues a frame, or nothing. It is framed where it lies in the ring.
+/// Queues a frame, or nothing where there is less room than [`room_for`] says. It is framed where it lies in the ring.
 #[inline(never)]
 pub fn send(kind: u8, fields: &[u8]) -> bool {
-    if (TX.room() as usize) < frame_len(fields.len()) {
+    if (TX.room() as usize) < room_for(kind, fields.len()) {
         return false;
     }
     let len = encode_by(kind, fields, |at, byte| TX.put(at, byte));
@@ -113,15 +113,24 @@ pub fn drain() {
 
 /// Hands what the interrupts lost to the counters.
 pub fn count_losses(stand: &mut Stand) {
-    let lost = avr_device::interrupt::free(|_| {
+    // SAFETY: a byte each; only that it is zero is believed.
+    let any = unsafe {
+        let lost = addr_of_mut!(LOST).cast::<u8>();
+        read_volatile(lost) | read_volatile(lost.wrapping_add(1))
+    };
+    if any != 0 {
+        take_losses(stand);
+    }
+}
+
+#[inline(never)]
+fn take_losses(stand: &mut Stand) {
+    let [overrun, framing] = avr_device::interrupt::free(|_| {
         // SAFETY: interrupts are off.
         unsafe { core::mem::take(&mut *addr_of_mut!(LOST)) }
     });
-    for (&times, fault) in lost.iter().zip([Fault::RxOverrun, Fault::RxFraming]) {
-        if times > 0 {
-            stand.count(fault, times);
-        }
-    }
+    stand.count(Fault::RxOverrun, overrun);
+    stand.count(Fault::RxFraming, framing);
 }
 
 /// Masks both interrupts of the USART; returns what to hand to [`unmask`].

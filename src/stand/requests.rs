@@ -2,7 +2,6 @@
 
 use adis16250::{Register, control};
 use wire::{Asked, Sensor, Status, code};
-use zerocopy::FromZeros;
 use zerocopy::little_endian::I32;
 
 use super::{Board, Pending, Stand, source};
@@ -69,7 +68,7 @@ impl Stand {
         let status = match asked.code {
             code::PING => Status::Ok,
             code::GET_HELLO => {
-                self.hello(board);
+                self.tell(board, super::HELLO);
                 Status::Ok
             }
             code::KEEP_ALIVE => {
@@ -77,10 +76,12 @@ impl Stand {
                 Status::Ok
             }
             code::COUNTERS | code::CLEAR_COUNTERS => {
-                self.health(board);
-                if asked.code == code::CLEAR_COUNTERS {
-                    self.health.faults.zero();
-                }
+                let clear = if asked.code == code::CLEAR_COUNTERS {
+                    super::CLEAR
+                } else {
+                    0
+                };
+                self.tell(board, super::HEALTH | clear);
                 Status::Ok
             }
             code::REBOOT => {

@@ -255,7 +255,9 @@ impl Board for HostBoard {
         while chip.line.front().is_some_and(|&end| end < now + 2 * byte) {
             chip.line.pop_front();
         }
-        if chip.timeline.queue.saturating_sub(chip.line.len()) < frame.len() {
+        if chip.timeline.queue.saturating_sub(chip.line.len())
+            < wire::fields::room_for(kind, fields.len())
+        {
             return false;
         }
         for &out in frame {

@@ -130,6 +130,17 @@ pub const fn frame_len(fields: usize) -> usize {
     2 + fields + crate::OVERHEAD
 }
 
+/// Room that a transmit queue must have before a frame with so many bytes of fields goes in. Only a reply may fill it: any
+/// other frame leaves room for one, so that a request is answered even where the line is too slow for the rate.
+#[must_use]
+pub const fn room_for(kind: u8, fields: usize) -> usize {
+    if kind == crate::kind::REPLY {
+        frame_len(fields)
+    } else {
+        frame_len(fields) + frame_len(size_of::<Reply>())
+    }
+}
+
 /// As [`encode`], by a function that puts a byte at its place in the frame, counted from 0. Places come in ascending order
 /// but for the codes of the stuffing, which are written when their block ends.
 pub fn encode_by(kind: u8, fields: &[u8], put: impl FnMut(u8, u8)) -> u8 {
