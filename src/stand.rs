@@ -285,7 +285,8 @@ impl Stand {
         if stalled {
             self.record(Fault::SpiStalled, 0);
         }
-        if stalled || word.is_stuck() {
+        // A rate may be zero without new data, or -1 count with an alarm; its supply is neither 0 V nor full scale.
+        if stalled || word.is_stuck() && raw.supply[at].is_stuck() {
             self.record(Fault::GyroNotAnsweringX, axis);
             return flags::GYRO_NOT_ANSWERING;
         }

@@ -67,12 +67,10 @@ impl Gyro {
             }
             return;
         }
-        self.reply = match first & 0x3E {
-            register::GYRO_OUT => {
-                let n = self.asked;
-                self.asked += 1;
-                gyro_word(axis, n, quiet)
-            }
+        let asked_for = first & 0x3E;
+        self.asked += u64::from(asked_for == register::GYRO_OUT);
+        self.reply = match asked_for {
+            register::GYRO_OUT => gyro_word(axis, self.asked, quiet),
             register::TEMP_OUT => 0x8000 | (spread(self.asked << 2 | axis) as u16 & 0x0FFF),
             register::SUPPLY_OUT if self.asked % 64 == 7 => 0x8000 | 2_593,
             register::SUPPLY_OUT if self.asked % 64 == 9 => 0x8000 | 2_867,
@@ -82,11 +80,26 @@ impl Gyro {
             register::SENS_AVG if axis == 2 && self.registers[place] == 0x0204 => 0x0203,
             _ => self.registers[place],
         };
+        if matches!(asked_for, register::TEMP_OUT | register::SUPPLY_OUT) {
+            self.reply = stuck(axis, self.asked, quiet).unwrap_or(self.reply);
+        }
     }
 }
 
-/// Any 14 bits, the extremes among them, now and then stale, in error, or with the line stuck; at rest when `quiet`.
+/// The level of the line, where it is stuck for a sample: now and then, not when `quiet`.
+fn stuck(axis: u64, n: u64, quiet: bool) -> Option<u16> {
+    match (spread(n << 8 | axis) >> 40) % 97 {
+        0 if !quiet => Some(0x0000),
+        1 if !quiet => Some(0xFFFF),
+        _ => None,
+    }
+}
+
+/// Any 14 bits, the extremes among them, now and then stale, in error, or as if the line were stuck; at rest when `quiet`.
 fn gyro_word(axis: u64, n: u64, quiet: bool) -> u16 {
+    if let Some(level) = stuck(axis, n, quiet) {
+        return level;
+    }
     let bits = spread(n << 8 | axis);
     let counts = if quiet {
         (bits % 23) as u16 & 0x3FFF
@@ -98,10 +111,10 @@ fn gyro_word(axis: u64, n: u64, quiet: bool) -> u16 {
         }
     };
     match (bits >> 40) % 97 {
-        0 if !quiet => 0x0000,
-        1 if !quiet => 0xFFFF,
         2 => counts,
         3 => 0xC000 | counts,
+        4 if !quiet => 0x0000,
+        5 if !quiet => 0xFFFF,
         _ => 0x8000 | counts,
     }
 }

@@ -135,13 +135,19 @@ static int32_t rate_of(int16_t counts, int32_t scale_q24, int32_t bias)
 }
 
 /* One gyro's part of the sample; its flags. */
+static bool is_stuck(uint16_t word)
+{
+    return word == 0 || word == 0xffff;
+}
+
 static uint16_t take_gyro(uint8_t axis, const struct raw *raw, struct sample *sample)
 {
     uint16_t word = raw->gyro[axis];
     bool stalled = raw->spi_stalled & 1 << axis;
     if (stalled)
         stand_count(FAULT_SPI_STALLED, 1);
-    if (stalled || word == 0 || word == 0xffff) {
+    /* A rate may be zero without new data, or -1 count with an alarm; its supply is neither 0 V nor full scale. */
+    if (stalled || (is_stuck(word) && is_stuck(raw->supply[axis]))) {
         stand_count(FAULT_GYRO_NOT_ANSWERING_X + axis, 1);
         return FLAG_GYRO_NOT_ANSWERING;
     }

@@ -43,8 +43,9 @@ impl Word {
         self.0 & 0x4000 != 0
     }
 
-    /// All zeros or all ones: a data line that is stuck, or a part without power. A part in order answers all zeros
-    /// only for an output without new data that happens to be zero.
+    /// All zeros or all ones: a data line that is stuck, or a part without power. A part in order answers so too: all
+    /// zeros for an output without new data that is zero, all ones for one of -1 with an alarm. The supply is never either,
+    /// so ask of both.
     #[must_use]
     #[inline]
     pub const fn is_stuck(self) -> bool {
