@@ -41,8 +41,7 @@ impl Board {
         assert_eq!(ending, Ending::Complete);
     }
 
-    /// A hello frame that was asked for after a reset: what was on the line at the cut can take the one of the start
-    /// with it.
+    /// A hello frame that was asked for after a reset.
     fn hello(&mut self, at_s: f64) -> wire::Hello {
         self.simulated
             .request(&[at(at_s, 9_100, Command::GetHello)]);

@@ -1,7 +1,7 @@
 //! A ring between one interrupt and the main loop: one side writes, the other reads.
 //!
 //! Indices are single bytes, which the AVR reads and writes in one instruction, so neither side needs the interrupts
-//! off. (`heapless::spsc` does the same with 16-bit indices and a division; it took 500 B more.)
+//! off. (`heapless::spsc` does the same with 16-bit indices and a division.)
 
 use core::cell::UnsafeCell;
 use core::ptr::{read_volatile, write_volatile};

@@ -416,11 +416,10 @@ impl Link {
     /// # Errors
     /// As [`ask`](Self::ask); [`LinkError::NotAsAsked`] where the reply came and the frame did not.
     pub fn ask_hello(&mut self) -> Result<Hello, LinkError> {
-        // The hello frame is sent before the reply, so one that comes is younger than the question. It may be lost.
         for _ in 0..TRIES {
             self.hello = None;
             self.ask(Command::GetHello)?;
-            if let Some(hello) = self.hello {
+            if let Some(hello) = self.wait_for(|link| link.hello)? {
                 return Ok(hello);
             }
         }
@@ -435,7 +434,9 @@ impl Link {
         for _ in 0..TRIES {
             self.health = None;
             self.ask(Command::Counters)?;
-            let Some(health) = self.health else { continue };
+            let Some(health) = self.wait_for(|link| link.health)? else {
+                continue;
+            };
             if clear {
                 // What came with the reply is lost with a line that loses; what is shown was read before.
                 self.ask(Command::ClearCounters)?;
@@ -444,6 +445,18 @@ impl Link {
             return Ok(health);
         }
         Err(self.frame_lost("health"))
+    }
+
+    /// A frame that a request brings: before its reply, or on a full line after it, as soon as there is room. It may be lost.
+    fn wait_for<T>(&mut self, frame: impl Fn(&Self) -> Option<T>) -> Result<Option<T>, LinkError> {
+        let since = Instant::now();
+        loop {
+            let found = frame(self);
+            if found.is_some() || since.elapsed() > REPLY_WAIT {
+                return Ok(found);
+            }
+            self.read()?;
+        }
     }
 
     fn frame_lost(&self, what: &str) -> LinkError {
