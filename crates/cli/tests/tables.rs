@@ -1,4 +1,5 @@
-//! Files of arrays that others wrote: numpy 2 (`imu.npz`), scipy's savemat (`imu.mat`), pandas with pyarrow
+//! Files of arrays that others wrote: numpy 2 (`imu.npz`), scipy's savemat (`imu.mat`), hdf5storage's with one array
+//! in compressed chunks by h5py (`imu73.mat`), pandas with pyarrow
 //! (`imu.parquet`). 50 rows at 10 Hz of a gyro (k/2, −k/4, 2) deg/s, and what else such files hold: text, scalars, big-endian
 //! integers, column order, nulls, row groups, stamps in nanoseconds.
 
@@ -32,7 +33,7 @@ fn values<'a>(record: &'a Record, name: &str) -> &'a [f64] {
 
 #[test]
 fn npz_and_mat_give_the_columns_of_their_matrices() {
-    for name in ["imu.npz", "imu.mat"] {
+    for name in ["imu.npz", "imu.mat", "imu73.mat"] {
         let columns = "time=t,gyro_x=gyr[0],gyro_y=gyr[1],gyro_z=gyr[2],acc_x=acc_raw";
         let record = read(&data(name), columns, "gyro=rad/s").unwrap();
         let degrees = 180.0 / std::f64::consts::PI;
@@ -52,8 +53,13 @@ fn npz_and_mat_give_the_columns_of_their_matrices() {
         );
     }
     // A scalar is a key of the header.
-    let record = read(&data("imu.npz"), "gyro_x=gyr[0]", "").unwrap();
-    assert_eq!(record.header.rate_hz, Some(10.0));
+    for name in ["imu.npz", "imu73.mat"] {
+        let record = read(&data(name), "gyro_x=gyr[0]", "").unwrap();
+        assert_eq!(record.header.rate_hz, Some(10.0));
+    }
+    // A field of a struct.
+    let record = read(&data("imu73.mat"), "gyro_x=gyr[0],temp=run.temp", "").unwrap();
+    assert!((values(&record, "temp")[49] - 24.9).abs() < 1e-12);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Files of others that hold arrays: NPZ and NPY, Parquet, MATLAB's .mat, columns of text. Each becomes named columns.
+//! Files of others that hold arrays: NPZ and NPY, Parquet, MATLAB's .mat, HDF5, columns of text. Each becomes named columns.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -29,6 +29,7 @@ pub(crate) fn read_table(path: &Path) -> Option<Result<Table, CaptureError>> {
         "npy" => npy,
         "parquet" | "pq" => parquet_file,
         "mat" => mat,
+        "h5" | "hdf5" => hdf5,
         "txt" | "dat" | "tsv" | "asc" => text,
         _ => return None,
     };
@@ -182,10 +183,7 @@ fn mat(path: &Path) -> Result<Arrays, String> {
     let mut start = [0; 10];
     let mut file = open(path)?;
     if file.read_exact(&mut start).is_ok() && &start == b"MATLAB 7.3" {
-        return Err(
-            "it is of version 7.3: save it again with `save(FILE, '-v7')`, or write a Parquet file"
-                .to_owned(),
-        );
+        return hdf5(path);
     }
     let file = matfile::MatFile::parse(Cursor::new(start).chain(file))
         .map_err(|error| format!("it is no .mat of version 5 to 7: {error}"))?;
@@ -207,6 +205,64 @@ fn mat(path: &Path) -> Result<Arrays, String> {
         out.add(array.name(), array.size(), values, false);
     }
     Ok(out)
+}
+
+/// HDF5, which MATLAB's .mat of version 7.3 is. An array of a group or struct is called `GROUP.ARRAY`.
+fn hdf5(path: &Path) -> Result<Arrays, String> {
+    let bad = |error: hdf5_pure::Error| {
+        format!(
+            "it cannot be read as HDF5: {error}. In MATLAB, `save(FILE, '-v7')` writes a version without HDF5"
+        )
+    };
+    let file = hdf5_pure::File::open_streaming(path).map_err(bad)?;
+    let mut out = Arrays::default();
+    hdf5_group(&file.root(), "", 0, &mut out).map_err(bad)?;
+    Ok(out)
+}
+
+/// Groups within groups that are followed.
+const DEEPEST: usize = 16;
+
+fn hdf5_group(
+    group: &hdf5_pure::Group,
+    within: &str,
+    depth: usize,
+    out: &mut Arrays,
+) -> Result<(), hdf5_pure::Error> {
+    use hdf5_pure::DType as D;
+    for name in group.datasets()? {
+        let array = group.dataset(&name)?;
+        let attributes = array.attrs()?;
+        // MATLAB keeps text as numbers and an empty array as its size.
+        let class = attributes.get("MATLAB_class").map(|v| format!("{v:?}"));
+        if class.is_some_and(|c| c.contains("char") || c.contains("cell"))
+            || attributes.contains_key("MATLAB_empty")
+        {
+            continue;
+        }
+        let values = match array.dtype()? {
+            D::F64 | D::F32 | D::I8 | D::I16 | D::I32 | D::U8 | D::U16 | D::U32 => {
+                array.read_f64()?
+            }
+            D::I64 => array.read_i64()?.into_iter().map(|v| v as f64).collect(),
+            D::U64 => array.read_u64()?.into_iter().map(|v| v as f64).collect(),
+            _ => continue,
+        };
+        let shape: Vec<usize> = array.shape()?.iter().map(|n| *n as usize).collect();
+        out.add(&format!("{within}{name}"), &shape, values, true);
+    }
+    for name in group.groups()? {
+        // What MATLAB keeps for itself begins so.
+        if !name.starts_with('#') && depth < DEEPEST {
+            hdf5_group(
+                &group.group(&name)?,
+                &format!("{within}{name}."),
+                depth + 1,
+                out,
+            )?;
+        }
+    }
+    Ok(())
 }
 
 fn parquet_file(path: &Path) -> Result<Arrays, String> {

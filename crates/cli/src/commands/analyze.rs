@@ -14,7 +14,7 @@ use super::Input;
 /// What `analyze` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// The capture: .csv, .csv.gz, .npz, .npy, .parquet, .mat (version 5 to 7), .txt
+    /// The capture: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .txt
     capture: PathBuf,
     #[command(flatten)]
     input: Input,

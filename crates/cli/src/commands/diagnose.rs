@@ -15,7 +15,7 @@ use super::Input;
 /// What `diagnose` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// Captures: .csv, .csv.gz, .npz, .npy, .parquet, .mat (version 5 to 7), .txt
+    /// Captures: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .txt
     #[arg(required = true)]
     captures: Vec<PathBuf>,
     #[command(flatten)]
