@@ -6,6 +6,7 @@ mod gapped;
 mod kernels;
 mod phase;
 mod streaming;
+mod theoh;
 mod total;
 
 pub(crate) use gapped::segments;
@@ -13,6 +14,7 @@ pub use gapped::{Gapped, GappedEstimate};
 pub use kernels::Estimate;
 pub use phase::{Phase, PhasePoint};
 pub use streaming::Streaming;
+pub(crate) use theoh::allan_to;
 
 use serde::{Deserialize, Serialize};
 
@@ -41,11 +43,14 @@ pub enum Deviation {
     /// Theo1, whose cluster time is 0.75·m·τ₀ (m even, from 10). Eq. (30). Unbiased for white rate noise; for other noise
     /// it differs from the Allan deviation by a factor that depends on the noise.
     Theo1,
+    /// ThêoH: overlapping Allan up to a fifth of the longest run, beyond it Theo1 freed from its bias (m even), whose
+    /// cluster time is 0.75·m·τ₀. Eq. (31) and (32).
+    Theoh,
 }
 
 impl Deviation {
     /// All of them, in the order of the documentation.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Adev,
         Self::Oadev,
         Self::Mdev,
@@ -55,6 +60,7 @@ impl Deviation {
         Self::Totdev,
         Self::Mtotdev,
         Self::Theo1,
+        Self::Theoh,
     ];
 
     /// `oadev`, ...: the name in options and JSON.
@@ -70,6 +76,7 @@ impl Deviation {
             Self::Totdev => "totdev",
             Self::Mtotdev => "mtotdev",
             Self::Theo1 => "theo1",
+            Self::Theoh => "theoh",
         }
     }
 
@@ -82,7 +89,8 @@ impl Deviation {
             Self::Hdev | Self::Ohdev => n / 3,
             Self::Totdev => n.saturating_sub(1),
             Self::Theo1 if n >= 10 => n / 2 * 2,
-            Self::Theo1 => 0,
+            Self::Theoh if n + 1 >= theoh::NEEDED => n / 2 * 2,
+            Self::Theo1 | Self::Theoh => 0,
         }
     }
 }
@@ -164,13 +172,6 @@ impl std::str::FromStr for TauGrid {
                 }),
         }
     }
-}
-
-/// Cluster time of a deviation at the averaging factor `m`: m·τ₀, but 0.75·m·τ₀ for [`Deviation::Theo1`].
-#[must_use]
-pub fn cluster_time(kind: Deviation, m: usize, tau0: f64) -> f64 {
-    let stride = if kind == Deviation::Theo1 { 0.75 } else { 1.0 };
-    stride * m as f64 * tau0
 }
 
 /// One deviation of integrated readings at the averaging factor `m`; `None` where no run is long enough.

@@ -3,7 +3,7 @@
 use std::ops::{Add, Range, Sub};
 
 use super::correlate::Correlator;
-use super::{Deviation, Estimate, kernels, total};
+use super::{Deviation, Estimate, kernels, theoh, total};
 
 /// A point of integrated readings: `f64`, or `i64` where the readings are counts and every sum is exact.
 pub trait PhasePoint: Copy + Default + Add<Output = Self> + Sub<Output = Self> {
@@ -154,9 +154,39 @@ impl Phase {
             return self.overlapping_allan(tau0, ms);
         }
         let mut correlator = Correlator::new();
+        if kind == Deviation::Theoh {
+            return self.theoh(tau0, ms, &mut correlator);
+        }
         ms.iter()
             .filter(|m| **m > 0)
             .filter_map(|m| self.deviation(kind, tau0, *m, &mut correlator))
+            .collect()
+    }
+
+    /// ThêoH: those of `ms` that its two parts have.
+    fn theoh(&self, tau0: f64, ms: &[usize], correlator: &mut Correlator) -> Vec<Estimate> {
+        let allan_to = theoh::allan_to(self.longest_run);
+        let beyond = |m: usize| m.is_multiple_of(2) && 3 * m > 4 * allan_to;
+        let longest = Deviation::Theoh.longest(self.longest_run);
+        // The factor is for all of them, and costs more than one.
+        let factor = if ms.iter().any(|m| beyond(*m) && *m <= longest) {
+            match &self.runs {
+                Runs::Counts(runs) => theoh::factor(runs, correlator),
+                Runs::Values(runs) => theoh::factor(runs, correlator),
+            }
+        } else {
+            None
+        };
+        ms.iter()
+            .filter_map(|&m| {
+                if m <= allan_to && m <= longest {
+                    return self.deviation(Deviation::Oadev, tau0, m, correlator);
+                }
+                let factor = factor.filter(|_| beyond(m))?;
+                let mut out = self.deviation(Deviation::Theo1, tau0, m, correlator)?;
+                out.deviation *= factor.sqrt();
+                Some(out)
+            })
             .collect()
     }
 
@@ -216,6 +246,9 @@ impl Phase {
         m: usize,
         correlator: &mut Correlator,
     ) -> Option<Estimate> {
+        if kind == Deviation::Theoh {
+            return self.theoh(tau0, &[m], correlator).pop();
+        }
         fn sum<T: PhasePoint>(
             runs: &[Vec<T>],
             kind: Deviation,
@@ -232,7 +265,7 @@ impl Phase {
                     Deviation::Ohdev => kernels::third_differences(x, m, 1),
                     Deviation::Totdev => total::total(x, m),
                     Deviation::Mtotdev => total::modified_total(x, m, correlator),
-                    Deviation::Theo1 => total::theo1(x, m, correlator),
+                    Deviation::Theo1 | Deviation::Theoh => total::theo1(x, m, correlator),
                 };
                 out.0 += squares;
                 out.1 += n;
@@ -252,7 +285,7 @@ impl Phase {
             Deviation::Adev | Deviation::Oadev | Deviation::Totdev => 1.0 / (2.0 * mf * mf),
             Deviation::Mdev | Deviation::Tdev | Deviation::Mtotdev => 1.0 / (2.0 * mf.powi(4)),
             Deviation::Hdev | Deviation::Ohdev => 1.0 / (6.0 * mf * mf),
-            Deviation::Theo1 => 1.0 / (0.75 * mf * mf),
+            Deviation::Theo1 | Deviation::Theoh => 1.0 / (0.75 * mf * mf),
         };
         let mut deviation = (squares * factor / n as f64).sqrt() * self.unit_per_count;
         if kind == Deviation::Tdev {
@@ -260,7 +293,11 @@ impl Phase {
         }
         Some(Estimate {
             m,
-            tau_s: super::cluster_time(kind, m, tau0),
+            tau_s: if kind == Deviation::Theo1 {
+                0.75 * mf * tau0
+            } else {
+                mf * tau0
+            },
             deviation,
             n,
         })
