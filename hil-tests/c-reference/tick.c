@@ -20,7 +20,7 @@ static struct raw raws[2];
 static volatile uint8_t filling;
 static volatile bool ready;
 static volatile bool passed; /* a period without a sample */
-static volatile uint8_t missed_ticks, milliseconds;
+static volatile uint8_t missed_ticks, missed_before, milliseconds;
 static uint8_t counted; /* of the milliseconds, by the main loop; both wrap */
 static volatile bool ticked;
 static uint32_t t_ticks;
@@ -73,8 +73,8 @@ const struct raw *tick_take(uint8_t *missed)
     {
         if (ready) {
             ready = false;
-            *missed = missed_ticks;
-            missed_ticks = 0;
+            *missed = missed_before;
+            missed_ticks -= missed_before;
             taken = &raws[filling];
             filling ^= 1;
         }
@@ -200,6 +200,7 @@ ISR(TIMER1_COMPB_vect)
     cli();
     if (ready && missed_ticks != UINT8_MAX)
         missed_ticks++;
+    missed_before = missed_ticks;
     ready = true;
     if (period != next_period) {
         period = next_period;

@@ -48,7 +48,9 @@ struct Shared {
     skip: u8,
     next_every: u8,
     masked_ucsrb: u8,
+    /// Ticks lost that the main loop does not know of, and how many of them are before the sample that waits.
     missed: u8,
+    before: u8,
     ready: bool,
     /// A period without a sample has passed.
     passed: bool,
@@ -76,6 +78,7 @@ static mut SHARED: Shared = Shared {
     next_every: 0,
     masked_ucsrb: 0,
     missed: 0,
+    before: 0,
     ready: false,
     passed: false,
     ticked: false,
@@ -172,7 +175,8 @@ pub fn take() -> Option<(&'static Tick, u8)> {
         }
         shared.ready = false;
         shared.reading ^= 1;
-        let missed = core::mem::take(&mut shared.missed);
+        let missed = shared.before;
+        shared.missed = shared.missed.wrapping_sub(missed);
         // SAFETY: the tick writes to the other one, until this function turns them round.
         Some((unsafe { &*place(shared.reading) }, missed))
     })
@@ -311,6 +315,7 @@ fn TIMER1_COMPB() {
     if lost {
         shared.missed = shared.missed.saturating_add(1);
     }
+    shared.before = shared.missed;
     shared.ready = true;
     if shared.period != shared.next_period {
         shared.period = shared.next_period;
