@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::diagnosis::Searched;
 use crate::grid::Grid;
-use crate::likelihood::Panel;
+use crate::likelihood::{Dct, Panel};
 use crate::result::{Evidence, Series, SeriesStyle};
 use crate::search::{Form, State, Term};
 
@@ -143,19 +143,22 @@ fn of_term(s: &Searched<'_>, grid: &Grid, term: &Term) -> Evidence {
         caption: term.effect.docs().figure.into(),
     };
     match &term.form {
-        Form::Covariance(..) | Form::Line(_) | Form::SideBands(..) => {
-            spectrum(s, grid, &mut evidence)
+        Form::Covariance(..) => spectrum(s, grid, &mut evidence),
+        Form::Line(omega) => {
+            let seen = beside(s, &others);
+            peak(s, grid, term, *omega, 0.0, &seen, &mut evidence);
+        }
+        Form::SideBands(omega, apart) => {
+            // The line is in the figure with its side bands.
+            let other: Vec<&Term> = others
+                .into_iter()
+                .filter(|t| !matches!(t.form, Form::Line(o) if (o - omega).abs() < *apart))
+                .collect();
+            let seen = beside(s, &other);
+            peak(s, grid, term, *omega, *apart, &seen, &mut evidence);
         }
         _ => {
-            let rest = modelled(panel, &s.state, &others);
-            let mean = s.target.y.iter().sum::<f64>() / s.target.y.len() as f64;
-            let seen: Vec<f64> = s
-                .target
-                .y
-                .iter()
-                .zip(&rest)
-                .map(|(y, r)| y - r - mean)
-                .collect();
+            let seen = beside(s, &others);
             let fitted = modelled(panel, &s.state, &[term]);
             let count = BLOCKS.min(seen.len() / 4);
             let followed = term
@@ -195,6 +198,95 @@ fn of_term(s: &Searched<'_>, grid: &Grid, term: &Term) -> Evidence {
     evidence
 }
 
+/// The readings about their mean, without these terms.
+fn beside(s: &Searched<'_>, terms: &[&Term]) -> Vec<f64> {
+    let rest = modelled(&s.search.panel, &s.state, terms);
+    let mean = s.target.y.iter().sum::<f64>() / s.target.y.len() as f64;
+    let readings = s.target.y.iter().zip(&rest);
+    readings.map(|(y, r)| y - r - mean).collect()
+}
+
+/// Resolutions of the record either side of a line.
+const ABOUT: f64 = 40.0;
+/// Points of the figure of a line.
+const PEAK_POINTS: usize = 640;
+/// Swings of a line either side of it.
+const SWINGS: f64 = 3.0;
+
+/// Amplitude spectrum around a line, with the term and after it is taken out.
+fn peak(
+    s: &Searched<'_>,
+    grid: &Grid,
+    term: &Term,
+    omega: f64,
+    apart: f64,
+    seen: &[f64],
+    evidence: &mut Evidence,
+) {
+    let panel = &s.search.panel;
+    let n = seen.len();
+    // Two points to a resolution.
+    let step = std::f64::consts::PI / n as f64;
+    let reach = (2.0 * ABOUT * step).max(SWINGS * apart);
+    let from = (((omega - reach) / step) as usize).max(4);
+    let to = (((omega + reach) / step).ceil() as usize).min(n - 1);
+    let fitted = modelled(panel, &s.state, &[term]);
+    let left: Vec<f64> = seen.iter().zip(&fitted).map(|(y, f)| y - f).collect();
+    evidence.x_label = "frequency, Hz".into();
+    evidence.y_label = format!("amplitude, {}", s.target.unit);
+    evidence.series = [
+        ("measured, other terms taken out", seen),
+        ("after it is taken out", &left),
+    ]
+    .map(|(label, of)| {
+        let all = amplitudes(&panel.dct, of);
+        // The largest of each stretch, where there are more than a figure shows.
+        let stretch = to.saturating_sub(from) / PEAK_POINTS + 1;
+        let at: Vec<usize> = (from..to)
+            .step_by(stretch)
+            .filter_map(|k| (k..(k + stretch).min(to)).max_by(|i, j| all[*i].total_cmp(&all[*j])))
+            .collect();
+        let hz = |k: &usize| *k as f64 * step / std::f64::consts::TAU * grid.rate_hz;
+        series(
+            label,
+            SeriesStyle::Line,
+            at.iter().map(hz).collect(),
+            at.iter().map(|k| all[*k]).collect(),
+        )
+    })
+    .into();
+}
+
+/// Amplitudes under a Hann window at the angular frequencies pi k / n.
+fn amplitudes(dct: &Dct, values: &[f64]) -> Vec<f64> {
+    let n = values.len();
+    let cell = std::f64::consts::TAU / n as f64;
+    let windowed: Vec<f64> = values
+        .iter()
+        .enumerate()
+        .map(|(i, v)| (1.0 - (cell * (i as f64 + 0.5)).cos()) * v)
+        .collect();
+    let cosines = dct.forward(&windowed);
+    // (-1)^i sin(pi k (i + 1/2) / n) = cos(pi (n - k) (i + 1/2) / n).
+    let turned: Vec<f64> = windowed
+        .iter()
+        .enumerate()
+        .map(|(i, v)| if i % 2 == 0 { *v } else { -v })
+        .collect();
+    let sines = dct.forward(&turned);
+    let scale = (2.0 / n as f64).sqrt();
+    (0..n)
+        .map(|k| {
+            let sine = if k == 0 { 0.0 } else { sines[n - k] };
+            scale * f64::hypot(cosines[k], sine)
+        })
+        .collect()
+}
+
+/// Fewest coefficients behind a point of a density, and the ratio of its ends.
+const LEAST: f64 = 4.0;
+const BAND: f64 = 1.1;
+
 /// Amplitude density of the rate with the models before and after.
 fn spectrum(s: &Searched<'_>, grid: &Grid, evidence: &mut Evidence) {
     let panel = &s.search.panel;
@@ -210,13 +302,19 @@ fn spectrum(s: &Searched<'_>, grid: &Grid, evidence: &mut Evidence) {
     // One-sided density: 2 var / rate.
     let ones: Vec<f64> = vec![1.0; n];
     let counts = panel.bins.products(&ones, &ones);
-    let density: Vec<f64> = panel
-        .bins
-        .products(&c, &c)
-        .iter()
-        .zip(&counts)
-        .map(|(e, m)| (2.0 * e / m / grid.rate_hz).sqrt())
-        .collect();
+    let energies = panel.bins.products(&c, &c);
+    let (mut middles, mut density) = (vec![], vec![]);
+    let (mut first, mut energy, mut count, mut moment) = (0, 0.0, 0.0, 0.0);
+    for (b, (e, m)) in energies.iter().zip(&counts).enumerate() {
+        energy += e;
+        count += m;
+        moment += m * hz[b];
+        if count >= LEAST && hz[b] >= BAND * hz[first] {
+            middles.push(moment / count);
+            density.push((2.0 * energy / count / grid.rate_hz).sqrt());
+            (first, energy, count, moment) = (b + 1, 0.0, 0.0, 0.0);
+        }
+    }
     let model = |state: &State| -> Vec<f64> {
         state
             .noise
@@ -229,7 +327,7 @@ fn spectrum(s: &Searched<'_>, grid: &Grid, evidence: &mut Evidence) {
     evidence.x_label = "frequency, Hz".into();
     evidence.y_label = format!("density, {}/sqrt(Hz)", s.target.unit);
     evidence.series = vec![
-        series("measured", SeriesStyle::Points, hz.clone(), density),
+        series("measured", SeriesStyle::Points, middles, density),
         series(
             "noise model before",
             SeriesStyle::Line,
@@ -238,4 +336,21 @@ fn spectrum(s: &Searched<'_>, grid: &Grid, evidence: &mut Evidence) {
         ),
         series("noise model after", SeriesStyle::Line, hz, model(&s.state)),
     ];
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_stands_at_its_amplitude_and_beside_it_is_nothing() {
+        let n = 4000;
+        let omega = std::f64::consts::PI * 501.0 / n as f64;
+        let wave: Vec<f64> = (0..n)
+            .map(|i| 0.3 * (omega * i as f64 + 0.7).cos())
+            .collect();
+        let all = amplitudes(&Dct::new(n), &wave);
+        assert!((all[501] - 0.3).abs() < 1e-3, "{}", all[501]);
+        assert!(all[470] < 1e-3 && all[540] < 1e-3);
+    }
 }

@@ -33,7 +33,7 @@ impl Effect for AmLine {
             physics: "b(t) = amplitude (1 + depth cos(2 pi modulation_frequency t + modulation_phase)) cos(2 pi frequency t + phase): two vibrations that beat, a rotor with an eccentric load.",
             excitation: "Nothing; several cycles of the swing.",
             test: "After a line: pairs of side bands at equal distances, tested together.",
-            figure: "Amplitude spectrum of the whitened rate: a peak with two symmetric neighbours.",
+            figure: "Amplitude spectrum of the rate around it, other terms taken out: a peak with two symmetric neighbours.",
             example: Example::new(Plot::Lines { from_hz: 2.15, to_hz: 2.65 }, &[("frequency", 2.4), ("amplitude", 0.12), ("modulation_frequency", 0.05), ("depth", 0.8)]),
         }
     }

@@ -30,7 +30,7 @@ impl Effect for Line {
             physics: "b(t) = amplitude cos(2 pi frequency t + phase): vibration of a structure, mains, a switching supply, an unbalanced rotor, seen directly or as an alias.",
             excitation: "Nothing; more than three cycles.",
             test: "Periodogram of the whitened residual at twice the Fourier frequencies, then the exact likelihood of the refined frequency.",
-            figure: "Amplitude spectrum of the whitened rate: one peak.",
+            figure: "Amplitude spectrum of the rate around it, other terms taken out: one peak.",
             example: Example::new(Plot::Lines { from_hz: 2.0, to_hz: 2.8 }, &[("frequency", 2.37), ("amplitude", 0.08)]),
         }
     }
