@@ -34,7 +34,7 @@ pub(crate) fn common(searched: &[Searched<'_>], grid: &Grid) -> Shared {
                 continue;
             }
             let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
-            for (x, y) in a.u[1][first..].iter().zip(&b.u[1][first..]) {
+            for (x, y) in a.u[first..].iter().zip(&b.u[first..]) {
                 ab += x * y;
                 aa += x * x;
                 bb += y * y;

@@ -41,10 +41,12 @@ pub(crate) struct Searched<'a> {
     pub baseline: State,
     pub state: State,
     pub found: Vec<Found>,
-    /// Whitened residual in time, before and after.
-    pub e: [Vec<f64>; 2],
-    /// Whitened coefficients, before and after.
-    pub u: [Vec<f64>; 2],
+    /// Whitened residual in time.
+    pub e: Vec<f64>,
+    /// Whitened coefficients.
+    pub u: Vec<f64>,
+    /// Omnibus checks, before and after.
+    checks: Vec<Check>,
     /// The law of the variance, where one was found.
     pub variance: Option<VarianceFound>,
     /// Smallest sizes that the search would have named, whether it did or not.
@@ -71,10 +73,14 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     let audited = audit(record);
     let record = &*losses::renumbered(record, &audited);
     let grid = lay_out(record, &|name| audited.masked(name), options.seed)?;
-    let searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();
+    let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();
+    grid.dct.forget();
     let mut findings = losses::findings(&audited, &searched, &grid);
     let mut scale_not_tested = vec![];
-    let mut checks: Vec<Check> = searched.iter().flat_map(channel_checks).collect();
+    let mut checks: Vec<Check> = searched
+        .iter_mut()
+        .flat_map(|s| std::mem::take(&mut s.checks))
+        .collect();
     losses::suppress(&mut checks, &audited);
     let mut nearest = vec![];
     let mut doubts = vec![];
@@ -216,16 +222,20 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     let search = Search::new(panel, view);
     let (baseline, state) = search.run(&target.noise);
     let found = estimate::found(&search.panel, &state, &target.unit, grid.rate_hz);
-    let (u0, e0) = checks::whitened(&search.panel, &baseline);
-    let (u1, e1) = checks::whitened(&search.panel, &state);
+    let before = {
+        let (u, e) = checks::whitened(&search.panel, &baseline);
+        checks::all(&u, &e, grid.rate_hz)
+    };
+    let (u, e) = checks::whitened(&search.panel, &state);
     let mut s = Searched {
         target,
         search,
         baseline,
         state,
         found,
-        e: [e0, e1],
-        u: [u0, u1],
+        e,
+        u,
+        checks: vec![],
         variance: None,
         limits: vec![],
     };
@@ -236,17 +246,15 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         s.variance = variance(&s);
     }
     if let Some(v) = &s.variance {
-        s.e[1]
-            .iter_mut()
-            .zip(&v.law)
-            .for_each(|(e, v)| *e /= v.sqrt());
+        s.e.iter_mut().zip(&v.law).for_each(|(e, v)| *e /= v.sqrt());
     }
+    s.checks = channel_checks(&s, before);
     s
 }
 
 /// The best law of the variance, if one passes its threshold.
 fn variance(s: &Searched<'_>) -> Option<VarianceFound> {
-    let e = &s.e[1];
+    let e = &s.e;
     let mut all: Vec<VarianceFound> = s
         .search
         .candidates
@@ -318,10 +326,8 @@ fn variance(s: &Searched<'_>) -> Option<VarianceFound> {
     Some(all.swap_remove(0))
 }
 
-fn channel_checks(s: &Searched<'_>) -> Vec<Check> {
-    let rate_hz = s.search.view.rate_hz;
-    let before = checks::all(&s.u[0], &s.e[0], rate_hz);
-    let after = checks::all(&s.u[1], &s.e[1], rate_hz);
+fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> {
+    let after = checks::all(&s.u, &s.e, s.search.view.rate_hz);
     before
         .into_iter()
         .zip(after)

@@ -23,7 +23,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<bool>, bool
     let panel = &s.search.panel;
     let g = s.state.noise.over(&panel.bins);
     let n = panel.bins.n as f64;
-    let fails: Vec<(f64, f64)> = checks::all_bands(&s.u[1])
+    let fails: Vec<(f64, f64)> = checks::all_bands(&s.u)
         .into_iter()
         .filter(|b| b.chance < LEAST_CHANCE)
         .map(|b| (b.from as f64, b.to as f64))
@@ -51,7 +51,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<bool>, bool
     };
     let crowd = !s.state.notes.is_empty();
     let correlated = failing("ljung_box");
-    let unsteady = checks::unsteady(&s.e[1]);
+    let unsteady = checks::unsteady(&s.e);
     let wanders = |omega: f64| {
         let at = omega / std::f64::consts::PI;
         unsteady.iter().any(|(from, to)| at >= *from && at < *to)

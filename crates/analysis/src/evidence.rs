@@ -15,23 +15,83 @@ const REPLICATES: usize = 32;
 /// Points of a figure of blocks.
 const BLOCKS: usize = 60;
 
-/// Overlapping Allan variance by octaves up to a tenth of the record, from the cumulated sum.
-fn allan(y: &[f64]) -> Vec<f64> {
-    let mut sum = vec![0.0];
-    for v in y {
-        sum.push(sum[sum.len() - 1] + v);
+/// ln of the overlapping Allan deviation at `m` samples, from the cumulated sum.
+fn log_allan(sum: &[f64], m: usize) -> f64 {
+    let count = sum.len() - 2 * m;
+    let total: f64 = (0..count)
+        .map(|i| (sum[i + 2 * m] - 2.0 * sum[i + m] + sum[i]).powi(2))
+        .sum();
+    0.5 * (total / count as f64 / (2.0 * (m * m) as f64)).ln()
+}
+
+fn cumulated(y: &[f64]) -> Vec<f64> {
+    let mut sum = Vec::with_capacity(y.len() + 1);
+    let mut all = 0.0;
+    sum.push(all);
+    sum.extend(y.iter().map(|v| {
+        all += v;
+        all
+    }));
+    sum
+}
+
+/// Octaves from `first` samples up to a tenth of the record.
+fn allan(y: &[f64], first: usize) -> Vec<f64> {
+    let sum = cumulated(y);
+    let octaves = std::iter::successors(Some(first), |m| Some(2 * m));
+    octaves
+        .take_while(|m| *m <= y.len() / 10)
+        .map(|m| log_allan(&sum, m))
+        .collect()
+}
+
+/// Samples of a record whose replicates are made sample by sample; of a longer one, means of blocks are.
+const BY_SAMPLE: usize = 1 << 17;
+/// Blocks that the shortest cluster has which is held against replicates of means.
+const OVERLAP: usize = 8;
+
+/// Mean and standard deviation of the octaves of ln ADEV below `end` samples, for coefficients of variance `v`: second
+/// differences filter the density by 2 sin^4(m w / 2) / (m sin(w / 2))^2; the mean of their squares over a record much
+/// longer than them has twice the mean square of that density, over the length, for its variance.
+fn short_octaves(v: &[f64], walks: &[f64], end: usize) -> Vec<(f64, f64)> {
+    let count = end.ilog2() as usize;
+    let mut sums = vec![(0.0, 0.0); count];
+    for (v, walk) in v.iter().zip(walks).skip(1) {
+        let least = 0.25 / walk;
+        let (mut sine, mut m) = (least, 1.0);
+        for (first, second) in &mut sums {
+            let x = v * 2.0 * sine * sine / (m * m * least);
+            *first += x;
+            *second += x * x;
+            sine *= 4.0 * (1.0 - sine);
+            m *= 2.0;
+        }
     }
-    let mut all = vec![];
-    let mut m = 1;
-    while m <= y.len() / 10 {
-        let count = sum.len() - 2 * m;
-        let total: f64 = (0..count)
-            .map(|i| (sum[i + 2 * m] - 2.0 * sum[i + m] + sum[i]).powi(2))
-            .sum();
-        all.push(0.5 * (total / count as f64 / (2.0 * (m * m) as f64)).ln());
-        m *= 2;
+    let n = v.len() as f64;
+    sums.iter()
+        .map(|(first, second)| {
+            let (mean, variance) = (first / n, 2.0 * second / n / n);
+            let relative = variance / (mean * mean);
+            (0.5 * (mean.ln() - 0.5 * relative), 0.5 * relative.sqrt())
+        })
+        .collect()
+}
+
+/// Variances of the coefficients of means over blocks of `length`, from those of the samples: each keeps
+/// sin(length w / 2) / (length sin(w / 2)) of its size, and those that the blocks cannot tell apart add.
+fn of_blocks(v: &[f64], walks: &[f64], length: usize, blocks: usize) -> Vec<f64> {
+    let mut folded = vec![0.0; blocks];
+    for (k, (v, walk)) in v.iter().zip(walks).enumerate().skip(1) {
+        let turn = k % (2 * blocks);
+        let at = turn.min(2 * blocks - turn);
+        if at < blocks {
+            let angle = std::f64::consts::PI * k as f64 * length as f64 / (2 * walks.len()) as f64;
+            let sine = angle.sin() / length as f64;
+            folded[at] += v * sine * sine * 4.0 * walk / length as f64;
+        }
     }
-    all
+    folded[0] = 0.0;
+    folded
 }
 
 /// sup |z| of ln ADEV against replicates of the model, before and after.
@@ -39,35 +99,56 @@ pub(crate) fn allan_misfit(s: &Searched<'_>, _rate_hz: f64, seed: u64) -> [f64; 
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x616c_6c61_6e21);
     let y = &s.target.y;
     let panel = &s.search.panel;
+    let length = y.len().div_ceil(BY_SAMPLE).next_power_of_two();
     let mut against = |state: &State| {
-        let g = state.noise.everywhere(&panel.bins);
         let white = state.solution.white;
+        let mut v = state.noise.everywhere(&panel.bins);
+        v.iter_mut().for_each(|v| *v *= white);
+        v[0] = 0.0;
         let fitted = modelled(panel, state, &state.terms.iter().collect::<Vec<_>>());
-        let measured: Vec<f64> = y.iter().zip(&fitted).map(|(y, f)| y - f).collect();
-        let target = allan(&measured);
+        let mut measured: Vec<f64> = y.iter().zip(&fitted).map(|(y, f)| y - f).collect();
+        drop(fitted);
+        let mut off = vec![];
+        // Octaves of what is replicated, from the first on.
+        let (mut dct, mut first) = (panel.dct.clone(), 1);
+        if length > 1 {
+            let walks = panel.bins.walks();
+            let sum = cumulated(&measured);
+            for (i, (mean, spread)) in short_octaves(&v, walks, OVERLAP * length)
+                .into_iter()
+                .enumerate()
+            {
+                off.push((log_allan(&sum, 1 << i) - mean) / spread);
+            }
+            let blocks = y.len() / length;
+            v = of_blocks(&v, walks, length, blocks);
+            measured = (0..blocks)
+                .map(|b| (sum[(b + 1) * length] - sum[b * length]) / length as f64)
+                .collect();
+            (dct, first) = (crate::likelihood::Dct::new(blocks), OVERLAP);
+        }
+        let target = allan(&measured, first);
         let (mut sum, mut square) = (vec![0.0; target.len()], vec![0.0; target.len()]);
         for _ in 0..REPLICATES {
-            let c: Vec<f64> = g
+            let c: Vec<f64> = v
                 .iter()
-                .enumerate()
-                .map(|(k, g)| {
+                .map(|v| {
                     let e: f64 = StandardNormal.sample(&mut rng);
-                    if k == 0 { 0.0 } else { (white * g).sqrt() * e }
+                    v.sqrt() * e
                 })
                 .collect();
-            for (i, v) in allan(&panel.dct.inverse(&c)).into_iter().enumerate() {
+            for (i, v) in allan(&dct.inverse(&c), first).into_iter().enumerate() {
                 sum[i] += v;
                 square[i] += v * v;
             }
         }
         let count = REPLICATES as f64;
-        (0..target.len())
-            .map(|i| {
-                let mean = sum[i] / count;
-                let spread = ((square[i] - count * mean * mean) / (count - 1.0)).sqrt();
-                ((target[i] - mean) / spread).abs()
-            })
-            .fold(0.0, f64::max)
+        off.extend((0..target.len()).map(|i| {
+            let mean = sum[i] / count;
+            let spread = ((square[i] - count * mean * mean) / (count - 1.0)).sqrt();
+            (target[i] - mean) / spread
+        }));
+        off.into_iter().map(f64::abs).fold(0.0, f64::max)
     };
     [against(&s.baseline), against(&s.state)]
 }

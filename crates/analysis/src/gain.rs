@@ -158,7 +158,12 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
                 .filter(|(i, _)| Some(*i) != *skip && moved[j][*i])
                 .flat_map(|(_, c)| c)
                 .collect();
-            let rest: Vec<f64> = (0..n)
+            // A filter has forgotten what lies forty of its memories back; windows may reach beyond the block.
+            let memory = 40.0 * (-0.5 * prefix.log_walk).exp() + 1000.0;
+            let from = end - (*end).min(memory as usize);
+            let longest = windows.iter().map(|w| w.1).max().unwrap_or(0);
+            let to = n.min(next + longest);
+            let rest: Vec<f64> = (from..to)
                 .map(|i| {
                     y[i] - shapes
                         .iter()
@@ -170,6 +175,7 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
             for (w, (_, length)) in windows.iter().enumerate() {
                 add_angles(
                     &rest,
+                    from,
                     prefix.log_walk,
                     (*end, *next),
                     *length,
@@ -216,9 +222,10 @@ fn variance(x: &[f64]) -> f64 {
     x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / x.len() as f64
 }
 
-/// Angle errors of windows that start in (from, to), the filter's level held from their start.
+/// Angle errors of windows that start in `span`, the filter's level held from their start; `rest` begins at `from`.
 fn add_angles(
     rest: &[f64],
+    from: usize,
     log_walk: f64,
     span: (usize, usize),
     length: usize,
@@ -227,10 +234,11 @@ fn add_angles(
 ) {
     let lambda = log_walk.exp();
     let (mut level, mut p) = (rest[0], 1.0);
-    for (i, v) in rest.iter().enumerate().take(span.1) {
+    for (j, v) in rest.iter().enumerate().take(span.1 - from) {
+        let i = from + j;
         // Windows start at multiples of their length from the start of the held-out part.
-        if i >= span.0 && i % length == 0 && i + length <= rest.len() {
-            let angle: f64 = rest[i..i + length].iter().map(|v| v - level).sum::<f64>() / rate_hz;
+        if i >= span.0 && i.is_multiple_of(length) && j + length <= rest.len() {
+            let angle: f64 = rest[j..j + length].iter().map(|v| v - level).sum::<f64>() / rate_hz;
             sum.0 += angle * angle;
             sum.1 += 1;
         }

@@ -175,7 +175,13 @@ pub fn lay_out(
     }
     let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
-    let drivers = drivers(record, &places, n, &dct);
+    let mut drivers = drivers(record, &places, n, &dct);
+    // Only the band of motion is asked for.
+    let top = places_of(MOTION_BAND_HZ.1, n, rate_hz);
+    for d in &mut drivers {
+        d.truncate(top);
+        d.shrink_to_fit();
+    }
     let turns = matches!(record.header.base, Some(Base::Moving | Base::Turntable));
     let motion_of = |y: &[f64]| motion(&mut dct.forward(y), &drivers, n, rate_hz, turns);
     let mut targets = vec![];
@@ -350,10 +356,15 @@ fn drivers(record: &Record, places: &[usize], n: usize, dct: &Dct) -> Vec<Vec<f6
 /// Half cycles of the slowest motion that is looked for where the header says that the base moves.
 const SLOWEST_MOTION: usize = 3;
 
+/// Place of a frequency among `n` coefficients.
+fn places_of(hz: f64, n: usize, rate_hz: f64) -> usize {
+    ((2.0 * hz / rate_hz * n as f64) as usize).clamp(1, n - 1)
+}
+
 /// Excess rms in the band of base motion, white noise and what follows the `drivers` taken off. Where the base is known to
 /// move (`turns`), slower motion counts too; else that is drift.
 fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64, turns: bool) -> f64 {
-    let k_of = |f: f64| ((2.0 * f / rate_hz * n as f64) as usize).clamp(1, n - 1);
+    let k_of = |f: f64| places_of(f, n, rate_hz);
     let (mut low, high) = (k_of(MOTION_BAND_HZ.0), k_of(MOTION_BAND_HZ.1));
     if turns {
         low = low.min(SLOWEST_MOTION);

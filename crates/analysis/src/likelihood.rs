@@ -100,16 +100,74 @@ impl Bins {
     /// Sums of a[k] b[k] over each bin.
     #[must_use]
     pub fn products(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
+        self.sums(a, b)
+    }
+
+    fn sums<A, B>(&self, a: &[A], b: &[B]) -> Vec<f64>
+    where
+        A: Copy + Into<f64>,
+        B: Copy + Into<f64>,
+    {
         self.start
             .windows(2)
-            .map(|w| {
-                a[w[0]..w[1]]
-                    .iter()
-                    .zip(&b[w[0]..w[1]])
-                    .map(|(x, y)| x * y)
-                    .sum()
-            })
+            .map(|w| dot(&a[w[0]..w[1]], &b[w[0]..w[1]]))
             .collect()
+    }
+}
+
+/// Sum of products, in eight sums that a processor makes at once.
+fn dot<A, B>(a: &[A], b: &[B]) -> f64
+where
+    A: Copy + Into<f64>,
+    B: Copy + Into<f64>,
+{
+    let (mut eight, mut rest) = ([0.0; 8], 0.0);
+    let (x, y) = (a.chunks_exact(8), b.chunks_exact(8));
+    for (p, q) in x.remainder().iter().zip(y.remainder()) {
+        rest += (*p).into() * (*q).into();
+    }
+    for (p, q) in x.zip(y) {
+        for (sum, (p, q)) in eight.iter_mut().zip(p.iter().zip(q)) {
+            *sum += (*p).into() * (*q).into();
+        }
+    }
+    eight.iter().sum::<f64>() + rest
+}
+
+/// Coefficients of a column.
+#[derive(Clone)]
+pub(crate) enum Column {
+    /// As computed.
+    Whole(Rc<Vec<f64>>),
+    /// Of a long record, where what may explain the data fills memory: rounded by parts in 10^7, each by itself.
+    Short(Rc<Vec<f32>>),
+}
+
+/// Samples beyond which columns that may explain the data are kept short.
+const LONG: usize = 1 << 18;
+
+impl Column {
+    fn new(c: Vec<f64>) -> Self {
+        if c.len() > LONG {
+            Self::Short(Rc::new(c.iter().map(|v| *v as f32).collect()))
+        } else {
+            Self::Whole(Rc::new(c))
+        }
+    }
+
+    fn whole(&self) -> Rc<Vec<f64>> {
+        match self {
+            Self::Whole(c) => Rc::clone(c),
+            Self::Short(c) => Rc::new(c.iter().map(|v| f64::from(*v)).collect()),
+        }
+    }
+
+    fn products(&self, other: &Self, bins: &Bins) -> Vec<f64> {
+        match (self, other) {
+            (Self::Whole(a), Self::Whole(b)) => bins.sums(a, b),
+            (Self::Whole(a), Self::Short(b)) | (Self::Short(b), Self::Whole(a)) => bins.sums(a, b),
+            (Self::Short(a), Self::Short(b)) => bins.sums(a, b),
+        }
     }
 }
 
@@ -208,7 +266,7 @@ pub struct Panel {
     pub dct: Dct,
     /// Bins.
     pub bins: Rc<Bins>,
-    columns: RefCell<Vec<Rc<Vec<f64>>>>,
+    columns: RefCell<Vec<Column>>,
     pairs: RefCell<Pairs>,
 }
 
@@ -238,7 +296,7 @@ impl Panel {
         Self {
             dct: dct.clone(),
             bins: Rc::clone(bins),
-            columns: RefCell::new(vec![Rc::new(dct.forward(y))]),
+            columns: RefCell::new(vec![Column::Whole(Rc::new(dct.forward(y)))]),
             pairs: RefCell::default(),
         }
     }
@@ -246,15 +304,11 @@ impl Panel {
     /// Add a column that other channels may have as well; returns its number.
     pub fn add_common(&self, values: &[f64]) -> usize {
         let key = digest(values);
-        let known = self.dct.known.columns.borrow().get(&key).map(Rc::clone);
+        let known = self.dct.known.columns.borrow().get(&key).cloned();
         let c = known.unwrap_or_else(|| {
-            let c = Rc::new(self.dct.forward(values));
+            let c = Column::new(self.dct.forward(values));
             if !self.dct.known.complete.get() {
-                self.dct
-                    .known
-                    .columns
-                    .borrow_mut()
-                    .insert(key, Rc::clone(&c));
+                self.dct.known.columns.borrow_mut().insert(key, c.clone());
             }
             c
         });
@@ -265,14 +319,14 @@ impl Panel {
     /// Add a column of samples; returns its number.
     pub fn add(&self, values: &[f64]) -> usize {
         let c = self.dct.forward(values);
-        self.columns.borrow_mut().push(Rc::new(c));
+        self.columns.borrow_mut().push(Column::Whole(Rc::new(c)));
         self.columns.borrow().len() - 1
     }
 
     /// Coefficients of a column.
     #[must_use]
     pub fn column(&self, i: usize) -> Rc<Vec<f64>> {
-        Rc::clone(&self.columns.borrow()[i])
+        self.columns.borrow()[i].whole()
     }
 
     /// Forget the columns from `length` on.
@@ -285,7 +339,7 @@ impl Panel {
     pub fn release(&self, kept: &[usize]) {
         for (i, c) in self.columns.borrow_mut().iter_mut().enumerate() {
             if i > 0 && !kept.contains(&i) {
-                *c = Rc::default();
+                *c = Column::Whole(Rc::default());
             }
         }
     }
@@ -302,7 +356,7 @@ impl Panel {
             return Rc::clone(p);
         }
         let columns = self.columns.borrow();
-        let p = Rc::new(self.bins.products(&columns[key.0], &columns[key.1]));
+        let p = Rc::new(columns[key.0].products(&columns[key.1], &self.bins));
         self.pairs.borrow_mut().insert(key, Rc::clone(&p));
         p
     }

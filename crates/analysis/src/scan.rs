@@ -8,6 +8,9 @@ use crate::transform::RealFft;
 /// Longest grid of step times; beyond it the scan is as fine as this many places.
 const LONGEST_STEP_GRID: usize = 1 << 16;
 
+/// Levels that the shape of a variance is divided into.
+const LEVELS: usize = 4096;
+
 /// Residual coefficients of the data under a solution.
 #[must_use]
 pub fn residual(panel: &Panel, columns: &[usize], solution: &Solution) -> Vec<f64> {
@@ -126,9 +129,10 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
 pub fn lines(panel: &Panel, noise: &Noise, columns: &[usize], solution: &Solution) -> Vec<f64> {
     let n = panel.bins.n;
     let g = noise.everywhere(&panel.bins);
-    let r = residual(panel, columns, solution);
-    let weighted: Vec<f64> = r.iter().zip(&g).map(|(r, g)| r / g).collect();
+    let mut weighted = residual(panel, columns, solution);
+    weighted.iter_mut().zip(&g).for_each(|(r, g)| *r /= g);
     let z = panel.dct.inverse(&weighted);
+    drop(weighted);
     let energy = panel.dct.energies(&z);
     let count = (n - 1) as f64;
     (0..n)
@@ -142,28 +146,156 @@ pub fn lines(panel: &Panel, noise: &Noise, columns: &[usize], solution: &Solutio
         .collect()
 }
 
+/// exp(i (omega t + phase)) for t = 0..n, turned on from sample to sample and set anew now and then.
+fn turning(n: usize, omega: f64, phase: f64) -> impl Iterator<Item = Complex<f64>> {
+    const ANEW: usize = 64;
+    let step = Complex::from_polar(1.0, omega);
+    let mut at = Complex::new(1.0, 0.0);
+    (0..n).map(move |t| {
+        at = if t.is_multiple_of(ANEW) {
+            Complex::from_polar(1.0, omega * t as f64 + phase)
+        } else {
+            at * step
+        };
+        at
+    })
+}
+
 /// Cosine and sine of a frequency in rad per sample.
 #[must_use]
 pub fn sinusoid(n: usize, omega: f64) -> [Vec<f64>; 2] {
-    [
-        (0..n).map(|i| (omega * i as f64).cos()).collect(),
-        (0..n).map(|i| (omega * i as f64).sin()).collect(),
-    ]
+    let (cosine, sine) = turning(n, omega, 0.0).map(|c| (c.re, c.im)).unzip();
+    [cosine, sine]
 }
 
 /// A line of that frequency and phase whose amplitude swings with the angular frequency `beat`: cosine and sine of the
 /// swing.
 #[must_use]
 pub fn swings(n: usize, carrier: f64, phase: f64, beat: f64) -> [Vec<f64>; 2] {
-    let line = |t: f64| (carrier * t + phase).cos();
-    [
-        (0..n)
-            .map(|i| line(i as f64) * (beat * i as f64).cos())
-            .collect(),
-        (0..n)
-            .map(|i| line(i as f64) * (beat * i as f64).sin())
-            .collect(),
-    ]
+    let (cosine, sine) = turning(n, carrier, phase)
+        .zip(turning(n, beat, 0.0))
+        .map(|(line, swing)| (line.re * swing.re, line.re * swing.im))
+        .unzip();
+    [cosine, sine]
+}
+
+/// A neighbourhood of one frequency, narrow against 1 over the length of a stretch: sums of a signal turned back by that
+/// frequency over stretches, from which its Fourier integral at any frequency close by is made.
+struct Zoom {
+    omega: f64,
+    stretch: f64,
+    sums: Vec<Complex<f64>>,
+}
+
+impl Zoom {
+    /// Stretches: within a bin of half a cycle, what turns in one of them is a thousandth of a cycle.
+    const STRETCHES: usize = 1024;
+
+    fn new(n: usize, signal: impl Iterator<Item = f64>, omega: f64) -> Self {
+        let length = n.div_ceil(Self::STRETCHES);
+        let mut sums = vec![Complex::new(0.0, 0.0); n.div_ceil(length)];
+        for (i, (v, turned)) in signal.zip(turning(n, -omega, 0.0)).enumerate() {
+            sums[i / length] += turned * v;
+        }
+        Self {
+            omega,
+            stretch: length as f64,
+            sums,
+        }
+    }
+
+    /// Sum of signal[t] exp(-i omega t).
+    fn at(&self, omega: f64) -> Complex<f64> {
+        let off = self.omega - omega;
+        let middle = off * 0.5 * (self.stretch - 1.0);
+        turning(self.sums.len(), off * self.stretch, middle)
+            .zip(&self.sums)
+            .map(|(turn, sum)| turn * sum)
+            .sum()
+    }
+}
+
+/// Frequencies of a state's lines with the places of their cosine and sine among its columns.
+pub type Lines = [(f64, usize)];
+
+/// Half cycles in the record from which a line is sought by its Fourier integral, and within which lines know of each
+/// other.
+const MANY: f64 = 256.0;
+const CLOSE: f64 = 100.0;
+/// Largest density over the least at a line: what leaks out of it into quieter bands then says nothing of its place.
+const EVEN: f64 = 1.3;
+
+/// The frequency within half a cycle of `omega` at which a line explains most, the columns of the state with it; `None`
+/// where the noise about it is not even enough, or the line too slow, for sums in time.
+#[must_use]
+pub fn place_of_line(
+    panel: &Panel,
+    noise: &Noise,
+    columns: &[usize],
+    solution: &Solution,
+    lines: &Lines,
+    omega: f64,
+) -> Option<f64> {
+    let n = panel.bins.n;
+    let bin = std::f64::consts::PI / n as f64;
+    let bare = noise.over(&panel.bins);
+    let least = bare.iter().copied().fold(f64::INFINITY, f64::min);
+    let own = noise.at(omega);
+    if omega < MANY * bin || std::f64::consts::PI - omega < MANY * bin || own > EVEN * least {
+        return None;
+    }
+    let g = noise.everywhere(&panel.bins);
+    let mut r = residual(panel, columns, solution);
+    r.iter_mut().zip(&g).for_each(|(r, g)| *r /= g);
+    let left = Zoom::new(n, panel.dct.inverse(&r).into_iter(), omega);
+    // Of the other lines only near ones depend on where this one is.
+    let near: Vec<(usize, Zoom)> = lines
+        .iter()
+        .filter(|(w, _)| (w - omega).abs() < CLOSE * bin)
+        .flat_map(|(w, column)| {
+            let of = |part: fn(Complex<f64>) -> f64| {
+                Zoom::new(n, turning(n, *w, 0.0).map(move |c| part(c) / own), omega)
+            };
+            [(*column, of(|c| c.re)), (column + 1, of(|c| c.im))]
+        })
+        .collect();
+    let explained = |w: f64| -> f64 {
+        let parts = |z: Complex<f64>| [z.re, -z.im];
+        let a = parts(left.at(w));
+        // Sum of exp(-2 i w t).
+        let turn = Complex::from_polar(1.0, -2.0 * w);
+        let all = (1.0 - Complex::from_polar(1.0, -2.0 * w * n as f64)) / (1.0 - turn);
+        let half = 0.5 * n as f64;
+        let mut b = [
+            [half + 0.5 * all.re, -0.5 * all.im],
+            [-0.5 * all.im, half - 0.5 * all.re],
+        ];
+        b.iter_mut().flatten().for_each(|v| *v /= own);
+        let crossed: Vec<(usize, [f64; 2])> =
+            near.iter().map(|(c, z)| (*c, parts(z.at(w)))).collect();
+        for (i, x) in &crossed {
+            for (j, y) in &crossed {
+                let v = solution.inverse[*i][*j];
+                for p in 0..2 {
+                    for q in 0..2 {
+                        b[p][q] -= x[p] * v * y[q];
+                    }
+                }
+            }
+        }
+        let det = b[0][0] * b[1][1] - b[0][1] * b[1][0];
+        // Nothing is left of a line that the others make.
+        if det < 1e-6 * (half / own).powi(2) {
+            return 0.0;
+        }
+        (a[0] * a[0] * b[1][1] - 2.0 * a[0] * a[1] * b[0][1] + a[1] * a[1] * b[0][0]) / det
+    };
+    Some(crate::optimise::golden(
+        &|w| -explained(w),
+        omega - bin,
+        omega + bin,
+        20,
+    ))
 }
 
 /// Likelihood ratio of a swing of a line's amplitude with the angular frequency k pi / n, for k = 0..n: its two side
@@ -179,13 +311,14 @@ pub fn beats(
 ) -> Vec<f64> {
     let n = panel.bins.n;
     let g = noise.everywhere(&panel.bins);
-    let r = residual(panel, columns, solution);
-    let weighted: Vec<f64> = r.iter().zip(&g).map(|(r, g)| r / g).collect();
+    let mut weighted = residual(panel, columns, solution);
+    weighted.iter_mut().zip(&g).for_each(|(r, g)| *r /= g);
     let z = panel.dct.inverse(&weighted);
+    drop(weighted);
     let moved: Vec<f64> = z
         .iter()
-        .enumerate()
-        .map(|(i, v)| v * (carrier * i as f64 + phase).cos())
+        .zip(turning(n, carrier, phase))
+        .map(|(v, line)| v * line.re)
         .collect();
     let seen = panel.dct.energies(&moved);
     let centre = carrier / std::f64::consts::PI * n as f64;
@@ -288,13 +421,24 @@ pub fn ends(u: &[f64], start: usize, end: usize, increase: f64) -> ((f64, f64), 
 pub fn variance_law(u: &[f64], shape: &[f64]) -> (f64, f64, f64) {
     let top = shape.iter().copied().fold(1e-9, f64::max);
     let n = u.len() as f64;
+    // Samples of nearly the same shape have nearly the same variance: their count, mean shape and squares stand for them.
+    let bottom = shape.iter().copied().fold(top, f64::min);
+    let per_level = (LEVELS - 1) as f64 / (top - bottom).max(f64::MIN_POSITIVE);
+    let mut levels = vec![(0.0, 0.0, 0.0); LEVELS];
+    for (u, d) in u.iter().zip(shape) {
+        let (count, sum, squares) = &mut levels[((d - bottom) * per_level) as usize];
+        *count += 1.0;
+        *sum += d;
+        *squares += u * u;
+    }
+    levels.retain(|l| l.0 > 0.0);
     let minus_l = |x: f64| {
         let gamma = (x.exp() - 1.0) / top;
         let (mut scaled, mut logs) = (0.0, 0.0);
-        for (u, d) in u.iter().zip(shape) {
-            let v = 1.0 + gamma * d;
-            scaled += u * u / v;
-            logs += v.ln();
+        for (count, sum, squares) in &levels {
+            let v = 1.0 + gamma * sum / count;
+            scaled += squares / v;
+            logs += count * v.ln();
         }
         0.5 * (n * (scaled / n).ln() + logs)
     };

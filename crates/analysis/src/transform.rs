@@ -131,7 +131,7 @@ fn unpacked(z: &[Complex<f64>], k: usize, h: usize, turn: Complex<f64>) -> Compl
 /// Coefficients of columns that the channels of a record have in common, by a digest of their samples.
 #[derive(Default)]
 pub(crate) struct Known {
-    pub(crate) columns: RefCell<HashMap<[u64; 2], Rc<Vec<f64>>>>,
+    pub(crate) columns: RefCell<HashMap<[u64; 2], crate::likelihood::Column>>,
     /// Whether what the channels have in common is known: those of the first are, and no later one's own are kept.
     pub(crate) complete: Cell<bool>,
 }
@@ -173,6 +173,11 @@ impl Dct {
     /// Keep no further columns for other channels.
     pub fn keep_no_more(&self) {
         self.known.complete.set(true);
+    }
+
+    /// Let go of the columns that channels have in common.
+    pub fn forget(&self) {
+        self.known.columns.borrow_mut().clear();
     }
 
     /// Coefficients of `x`.

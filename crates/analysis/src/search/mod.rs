@@ -128,6 +128,19 @@ impl State {
             .collect()
     }
 
+    /// Angular frequencies of the lines, with the places of their columns.
+    fn lines(&self) -> Vec<(f64, usize)> {
+        let mut at = 0;
+        let mut all = vec![];
+        for t in &self.terms {
+            if let Form::Line(omega) | Form::SideBands(omega, _) = t.form {
+                all.push((omega, at));
+            }
+            at += t.columns.len();
+        }
+        all
+    }
+
     /// Angular frequency of the first line, and phase p of its cos(w t + p).
     fn carrier(&self) -> Option<(f64, f64)> {
         let mut at = 0;

@@ -42,12 +42,22 @@ impl Search<'_> {
                 make(at.ln())
             }
             Form::Line(omega) => {
-                *omega = crate::optimise::golden(
-                    &|w| with(&scan::sinusoid(n, w)),
-                    *omega - bin,
-                    *omega + bin,
-                    12,
+                let place = scan::place_of_line(
+                    &self.panel,
+                    &state.noise,
+                    &own,
+                    &state.solution,
+                    &state.lines(),
+                    *omega,
                 );
+                *omega = place.unwrap_or_else(|| {
+                    crate::optimise::golden(
+                        &|w| with(&scan::sinusoid(n, w)),
+                        *omega - bin,
+                        *omega + bin,
+                        12,
+                    )
+                });
                 scan::sinusoid(n, *omega).into()
             }
             Form::SideBands(carrier, distance) => {
