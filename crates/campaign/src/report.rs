@@ -235,7 +235,7 @@ creep (d' 7..9) and a random walk for a while (d' 12..22), which stay weak withi
 goes; the names were 5 steps for those two and 4 AM lines for that line.
 
 Kept back, second set (2026-11-21): the other 14, from \"stick and slip\" on. They were written, from physics and
-mathematics, after that change and by someone who had not read how the diagnosis decides; 42 runs were made to see that
+mathematics, after that change and by someone who had not read how the diagnosis decides; 44 runs were made to see that
 they can be drawn, by which one was put right (temperature times supply then held a true term in temperature alone) and
 nothing else was changed. A test holds that no effect of the library describes 95 % of what each adds to the likelihood.";
 
