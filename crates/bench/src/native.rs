@@ -60,7 +60,7 @@ pub struct Timeline {
     pub eeprom: u64,
     /// Bytes that the transmit queue holds.
     pub queue: usize,
-    /// What the health frame says of the stack, bytes: the host's is not the board's.
+    /// What the health frame says of the stack, bytes: the host's is not the board's, and more than its SRAM says so.
     pub stack_free: u16,
     /// The instants of each tick since the start, where the image's own are known: serial interrupts move those behind
     /// the first round by some cycles. Ticks behind the last have those of `spi_bytes` and `adc`.
@@ -83,7 +83,7 @@ impl Default for Timeline {
             guard: 1_024,
             eeprom: 136_000,
             queue: 191,
-            stack_free: 0,
+            stack_free: u16::MAX,
             recorded: Vec::new(),
         }
     }

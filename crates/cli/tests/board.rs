@@ -210,6 +210,10 @@ fn the_motor_turns_for_as_long_as_it_is_kept_alive_and_then_stands() {
     assert_success(&board.ask(&["health", "--json", health.to_str().unwrap()]));
     let health = json(&health);
     assert_eq!(health["counters"]["motor_timeout"], 0, "never starved");
+    assert!(
+        health["stack_free_bytes"].is_null(),
+        "the host's is not the board's"
+    );
     assert_eq!(
         health["counters"].as_object().unwrap().len(),
         wire::Fault::COUNT

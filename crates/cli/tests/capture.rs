@@ -164,6 +164,25 @@ fn ctrl_c_ends_a_capture_cleanly_and_its_header_says_how_the_board_was_set() {
 }
 
 #[test]
+fn a_hang_up_ends_a_capture_as_ctrl_c_does_and_the_raw_bytes_file_is_no_capture() {
+    let board = Board::start();
+    let folder = folder("capture_terminated");
+    for name in ["-TERM", "-HUP"] {
+        let out = folder.join(format!("run{name}.csv"));
+        let child = start(&board, &out, &[]);
+        wait_for_rows(&out, 20);
+        signal(&child, name);
+        assert_success(&ended(child));
+        let text = std::fs::read_to_string(&out).unwrap();
+        assert!(text.contains("the capture ends"), "{name}");
+    }
+    let out = folder.join("run.raw");
+    let refused = ended(start(&board, &out, &[]));
+    assert_refused(&refused, &["where the raw bytes go", "run.csv"]);
+    assert!(!out.exists());
+}
+
+#[test]
 fn an_unplugged_cable_leaves_a_hole_of_its_length_and_a_note() {
     // A system that tells, and one that goes on reading nothing: there the port is opened again after 5 s.
     let tells: (fn(&[&str]) -> _, f64) = (common::program_alone, 2.0);

@@ -371,3 +371,66 @@ fn of_many_runs_the_one_that_is_noisier_is_not_the_representative_one() {
         "{said}"
     );
 }
+
+#[test]
+fn a_run_writes_over_its_own_captures_and_over_no_others() {
+    let folder = folder("run_over");
+    let out = folder.join("c.csv");
+    let again = || {
+        run(&[
+            "run",
+            "--native",
+            "--seconds",
+            "60",
+            "--quiet",
+            "--out",
+            out.to_str().unwrap(),
+        ])
+    };
+    assert!(again().status.success());
+    let first = std::fs::read_to_string(&out).unwrap();
+    assert!(again().status.success(), "the same run once more");
+    // The same rows as a board's: with the time of day at which they were taken.
+    let boards = first.replacen('\n', "\n# start_unix_s: 1763712345.123\n", 1);
+    for text in [boards.as_str(), "not a capture\n"] {
+        std::fs::write(&out, text).unwrap();
+        let refused = again();
+        assert_eq!(refused.status.code(), Some(1));
+        let said = String::from_utf8_lossy(&refused.stderr);
+        assert!(said.contains("there already"), "{said}");
+        assert_eq!(std::fs::read_to_string(&out).unwrap(), text, "as it was");
+    }
+    let nowhere = folder.join("no/c.csv");
+    let refused = run(&["run", "--native", "--out", nowhere.to_str().unwrap()]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("is no folder"));
+}
+
+#[test]
+fn what_cannot_be_read_is_said_once_and_a_cut_file_by_its_name() {
+    let folder = folder("unreadable");
+    let missing = run(&["analyze", folder.join("no.csv").to_str().unwrap()]);
+    let said = String::from_utf8_lossy(&missing.stderr);
+    assert_eq!(said.matches("no.csv").count(), 1, "{said}");
+    assert_eq!(said.matches("No such file").count(), 1, "{said}");
+    let (whole, cut) = (folder.join("w.csv.gz"), folder.join("cut.csv.gz"));
+    let made = run(&[
+        "run",
+        "--native",
+        "--seconds",
+        "60",
+        "--quiet",
+        "--out",
+        whole.to_str().unwrap(),
+    ]);
+    assert!(made.status.success());
+    let bytes = std::fs::read(&whole).unwrap();
+    std::fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
+    let refused = run(&["analyze", cut.to_str().unwrap()]);
+    assert_eq!(refused.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert!(
+        said.contains("ends in the middle") && said.contains("zcat"),
+        "{said}"
+    );
+}

@@ -10,13 +10,26 @@ pub enum CaptureError {
     #[error("{} cannot be read or written", path.display())]
     #[diagnostic(
         code(capture::io),
-        help("check that the path is right and that the file can be read or written")
+        help("is the path right, may you read or write there, is the disk full?")
     )]
     Io {
         /// Which file.
         path: PathBuf,
         /// What it said.
         source: std::io::Error,
+    },
+    /// A compressed file that ends in the middle.
+    #[error("{} ends in the middle: it was cut off, or not copied whole", path.display())]
+    #[diagnostic(
+        code(capture::cut_off),
+        help(
+            "`zcat FILE > whole.csv` gets out what is there, `--skip-bad` leaves out its last row; `capture --resume` goes on \
+             with it, `capture --replay RUN.raw` decodes its raw bytes again"
+        )
+    )]
+    CutOff {
+        /// Which file.
+        path: PathBuf,
     },
     /// A format line that names another format.
     #[error("line {line}: the format is `{found}`, this program reads `imu-stand-capture/1`")]

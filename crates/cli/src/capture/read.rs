@@ -46,7 +46,8 @@ pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureE
         return from_table(table?, options);
     }
     let file = BufReader::new(File::open(path).map_err(io)?);
-    let read = if path.extension().is_some_and(|e| e == "gz") {
+    let is_gz = path.extension().is_some_and(|e| e == "gz");
+    let read = if is_gz {
         read_from(
             BufReader::new(flate2::bufread::MultiGzDecoder::new(file)),
             options,
@@ -56,6 +57,13 @@ pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureE
     };
     // An error of the stream has no path yet.
     read.map_err(|error| match error {
+        CaptureError::Io { source, .. }
+            if is_gz && source.kind() == std::io::ErrorKind::UnexpectedEof =>
+        {
+            CaptureError::CutOff {
+                path: path.to_owned(),
+            }
+        }
         CaptureError::Io { source, .. } => io(source),
         other => other,
     })
@@ -134,17 +142,19 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
                 let at = row.position().map_or(0, csv::Position::line) + number as u64;
                 parse_row(&row, at, &columns, names.len(), &mut values)
             }
-            Err(error) => match error.kind() {
-                csv::ErrorKind::Io(_) => {
-                    return Err(io(std::io::Error::other(error)));
+            Err(error) => {
+                let line = error.position().map_or(0, csv::Position::line) + number as u64;
+                let why = error.to_string();
+                match error.into_kind() {
+                    csv::ErrorKind::Io(source) => return Err(io(source)),
+                    _ => Err(CaptureError::BadRow {
+                        line,
+                        column: names[0].clone(),
+                        found: "?".to_owned(),
+                        expected: format!("not text: {why}"),
+                    }),
                 }
-                _ => Err(CaptureError::BadRow {
-                    line: error.position().map_or(0, csv::Position::line) + number as u64,
-                    column: names[0].clone(),
-                    found: "?".to_owned(),
-                    expected: format!("not text: {error}"),
-                }),
-            },
+            }
         };
         match result {
             Ok(()) => cells

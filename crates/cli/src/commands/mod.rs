@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use imu_stand::capture::Read;
 use imu_stand::link::{DEFAULT_BAUD, Link};
-use imu_stand::{ColumnMapping, ReadOptions, read_capture};
+use imu_stand::{CaptureError, ColumnMapping, ReadOptions, read_capture};
 use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -61,8 +61,18 @@ impl Input {
             rate_hz: self.rate,
             skip_bad: self.skip_bad,
         };
-        let read = read_capture(path, &options)
-            .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+        let read = read_capture(path, &options).map_err(|error| {
+            let says_which = matches!(
+                error,
+                CaptureError::Io { .. } | CaptureError::CutOff { .. } | CaptureError::Table { .. }
+            );
+            let report = miette::Report::new(error);
+            if says_which {
+                report
+            } else {
+                report.wrap_err(format!("cannot read {}", path.display()))
+            }
+        })?;
         if read.skipped > 0 {
             eprintln!(
                 "{}: rows that cannot be read and are left out: {}",

@@ -1,6 +1,8 @@
 //! `imu-stand run`.
 
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
 #[cfg(unix)]
 use std::sync::{
     Arc,
@@ -65,6 +67,13 @@ const IMAGE: &str = "target/avr/avr-none/firmware/firmware.elf";
 pub fn run(arguments: &Arguments) -> Result<()> {
     let board = board(arguments)?;
     if arguments.pty {
+        if arguments.seconds.is_nan() || arguments.seconds <= 0.0 {
+            miette::bail!(
+                help = "write `--seconds 600`",
+                "--seconds: {} is no length",
+                arguments.seconds
+            );
+        }
         #[cfg(unix)]
         return serve(board, arguments);
         #[cfg(not(unix))]
@@ -77,6 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             arguments.seconds
         );
     }
+    may_be_written(&arguments.out)?;
     let plan = plan(
         arguments.hide,
         Sizes::Visible,
@@ -137,6 +147,43 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         super::report::write(page, &subject, arguments.quiet)?;
     }
     Ok(())
+}
+
+/// A simulated run can be had again by its seed, and its file is written over; a capture of a board cannot, and is not.
+fn may_be_written(out: &Path) -> Result<()> {
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        miette::bail!(
+            help = "make it first, or name another file with `--out`",
+            "--out: {} is no folder",
+            folder.display()
+        );
+    }
+    if out.exists() && !is_simulated(out) {
+        miette::bail!(
+            help = "name another file with `--out`",
+            "{} is there already, and is no run of a simulated stand: it is not written over",
+            out.display()
+        );
+    }
+    Ok(())
+}
+
+/// Whether a file's header is that of a capture without the time of day that a board's has.
+fn is_simulated(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else {
+        return false;
+    };
+    let input: Box<dyn Read> = if path.extension().is_some_and(|e| e == "gz") {
+        Box::new(flate2::read::MultiGzDecoder::new(file))
+    } else {
+        Box::new(file)
+    };
+    let header: Vec<String> = (BufReader::new(input).lines())
+        .map_while(|line| line.ok().filter(|line| line.starts_with('#')))
+        .collect();
+    let has = |start: &str| header.iter().any(|line| line.starts_with(start));
+    has("# format: imu-stand-capture/") && !has("# start_unix_s:")
 }
 
 #[cfg(unix)]

@@ -144,6 +144,13 @@ struct Capture<'a> {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    if raw_path(&arguments.out) == arguments.out {
+        miette::bail!(
+            help = "write `--out run.csv` or `--out run.csv.gz`: run.raw is written beside it",
+            "{} is where the raw bytes go",
+            arguments.out.display()
+        );
+    }
     if arguments.out.exists() && !arguments.resume {
         return Err(imu_stand::CaptureError::Exists {
             path: arguments.out.clone(),
