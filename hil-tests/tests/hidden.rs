@@ -1,7 +1,7 @@
 //! Something is wrong with the stand, or nothing: drawn at random and planted by physics. The image in the simulated
 //! ATmega16 samples it, and the diagnosis gets the capture file alone.
 //!
-//! A run of the tests draws five from everything that can be wrong. With `IMU_STAND_LONG` set it goes eight times round all
+//! A run of the tests draws five from everything that can be wrong. With `IMU_STAND_LONG` set it goes four times round all
 //! of it; `IMU_STAND_IMAGE_DRAWS` sets how many, `IMU_STAND_SEED` replays a run. Each has to lead to the same words as
 //! the same draw through the firmware's logic on the host, asked at the same instants; what is named is graded by rates.
 
@@ -52,7 +52,7 @@ fn through_the_image(draw: &Draw, image: &[u8]) -> Graded {
 #[test]
 fn what_is_hidden_in_the_stand_is_named_through_the_image() {
     let usual = match std::env::var_os("IMU_STAND_LONG") {
-        Some(_) => 8 * ROUND,
+        Some(_) => 4 * ROUND,
         None => 5,
     };
     let draws: u64 = std::env::var("IMU_STAND_IMAGE_DRAWS").map_or(usual, |text| {
