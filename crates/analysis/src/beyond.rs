@@ -69,8 +69,11 @@ fn played(values: &[f64], half: f64) -> Vec<f64> {
         .collect()
 }
 
+/// Makes the values of a combination; long records hold one at a time.
+type Maker<'a> = Box<dyn Fn() -> Vec<f64> + 'a>;
+
 /// The combinations that a record allows, each with its name.
-fn combinations(view: &View<'_>) -> Vec<(String, Vec<f64>)> {
+fn combinations<'a>(view: &'a View<'_>) -> Vec<(String, Maker<'a>)> {
     let moves = |s: &&Signal, least: f64| s.range() >= least;
     let temperature = view
         .signal(Quantity::Temp)
@@ -81,17 +84,17 @@ fn combinations(view: &View<'_>) -> Vec<(String, Vec<f64>)> {
     let supply = view
         .signal(Quantity::Supply)
         .filter(|s| moves(s, LEAST_SUPPLY));
-    let mut all = vec![];
+    let mut all: Vec<(String, Maker<'a>)> = vec![];
     if let Some(t) = temperature {
-        let c = centred(&t.smooth);
+        let c = || centred(&t.smooth);
         let reach = ((SLOPE_S * view.rate_hz).round() as usize).max(1);
         all.push((
             format!("rate of change of {}", t.name),
-            slope(&t.smooth, reach),
+            Box::new(move || slope(&t.smooth, reach)),
         ));
         all.push((
             format!("{} behind a lag", t.name),
-            lagged(&t.smooth, LAG_S * view.rate_hz),
+            Box::new(|| lagged(&t.smooth, LAG_S * view.rate_hz)),
         ));
         for share in PLAYS {
             let what = format!(
@@ -100,43 +103,63 @@ fn combinations(view: &View<'_>) -> Vec<(String, Vec<f64>)> {
                 share * t.range(),
                 t.unit
             );
-            all.push((what, played(&t.smooth, 0.5 * share * t.range())));
+            all.push((
+                what,
+                Box::new(move || played(&t.smooth, 0.5 * share * t.range())),
+            ));
         }
         all.push((
             format!("cube of {}", t.name),
-            c.iter().map(|v| v.powi(3)).collect(),
+            Box::new(move || c().iter().map(|v| v.powi(3)).collect()),
         ));
         // The command has a zero of its own; the supply has none that means anything.
         if let Some(m) = motor {
             all.push((
                 format!("{} times {}", m.name, t.name),
-                product(&m.smooth, &c),
+                Box::new(move || product(&m.smooth, &c())),
             ));
         }
         if let Some(u) = supply {
             let name = format!("{} times {}", u.name, t.name);
-            all.push((name, product(&centred(&u.smooth), &c)));
+            all.push((name, Box::new(move || product(&centred(&u.smooth), &c()))));
         }
         if let Some(m) = motor {
-            let size: Vec<f64> = m.smooth.iter().map(|v| v.abs()).collect();
+            let size = || m.smooth.iter().map(|v| v.abs()).collect::<Vec<f64>>();
             all.push((
                 format!("size of {} times {}", m.name, t.name),
-                product(&size, &c),
+                Box::new(move || product(&size(), &c())),
             ));
         }
     }
     if let (Some(m), Some(u)) = (motor, supply) {
         let name = format!("{} times {}", m.name, u.name);
-        all.push((name, product(&m.smooth, &centred(&u.smooth))));
+        all.push((
+            name,
+            Box::new(move || product(&m.smooth, &centred(&u.smooth))),
+        ));
     }
     for a in view
         .all(Quantity::Acc)
         .filter(|a| a.std_dev() >= LEAST_VIBRATION && !view.sways())
     {
-        let square = centred(&a.values).iter().map(|v| v * v).collect();
-        all.push((format!("square of {}", a.name), square));
+        let square = || centred(&a.values).iter().map(|v| v * v).collect();
+        all.push((format!("square of {}", a.name), Box::new(square)));
     }
     all
+}
+
+/// Its hypotheses, each made when it is asked for.
+pub fn one_by_one<'a>(view: &'a View<'_>) -> impl ExactSizeIterator<Item = Hypothesis> + 'a {
+    combinations(view).into_iter().map(|(name, values)| {
+        Hypothesis::Regression(Regression {
+            columns: vec![Column {
+                parameter: "size",
+                values: values(),
+            }],
+            fixed: vec![],
+            follows: Some(name),
+        })
+    })
 }
 
 impl Effect for Beyond {
@@ -164,19 +187,7 @@ impl Effect for Beyond {
     }
 
     fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
-        Ok(combinations(view)
-            .into_iter()
-            .map(|(name, values)| {
-                Hypothesis::Regression(Regression {
-                    columns: vec![Column {
-                        parameter: "size",
-                        values,
-                    }],
-                    fixed: vec![],
-                    follows: Some(name),
-                })
-            })
-            .collect())
+        Ok(one_by_one(view).collect())
     }
 
     fn stage(&self) -> Stage {

@@ -2,6 +2,7 @@
 //! tell, slow channels smoothed, motion of the base noticed.
 
 use std::rc::Rc;
+use std::sync::Arc;
 
 use model::effect::Signal;
 use model::record::{Axis, Base, Channel, Quantity, Record};
@@ -30,7 +31,7 @@ pub struct Target {
     /// Unit per count.
     pub lsb: Option<f64>,
     /// Readings, lost ones filled.
-    pub y: Vec<f64>,
+    pub y: Arc<Vec<f64>>,
     /// Grid places without a reading, spikes included.
     pub lost: Vec<usize>,
     /// Places whose reading the noise cannot have made.
@@ -244,7 +245,7 @@ pub fn lay_out(
             axis: channel.axis,
             unit,
             lsb: channel.lsb.map(|l| l * scale),
-            y,
+            y: Arc::new(y),
             lost,
             spikes,
             motion_rms,
@@ -411,12 +412,12 @@ fn signal(
 ) -> Signal {
     let target = targets.iter().find(|t| t.name == c.name);
     let values = target.map_or_else(
-        || interpolated(&spread(&c.values, places, n, &[])),
-        |t| t.y.clone(),
+        || Arc::new(interpolated(&spread(&c.values, places, n, &[]))),
+        |t| Arc::clone(&t.y),
     );
     let smooth = match c.quantity {
-        Quantity::Temp | Quantity::Supply => smoothed(&values, dct, bins),
-        _ => values.clone(),
+        Quantity::Temp | Quantity::Supply => Arc::new(smoothed(&values, dct, bins)),
+        _ => Arc::clone(&values),
     };
     Signal {
         name: c.name.clone(),

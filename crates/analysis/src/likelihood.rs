@@ -43,8 +43,10 @@ pub struct Bins {
     pub at: Frequencies,
     /// Random-walk shape 1 / (2 - 2 cos w).
     walk: Vec<f64>,
-    /// The same at every coefficient, that of k = 0 in the place of which k = 1 stands, once it is asked for.
-    fine: OnceCell<(Frequencies, Vec<f64>)>,
+    /// Frequencies and random-walk shape at every coefficient, that of k = 0 in the place of which k = 1 stands, each once
+    /// it is asked for.
+    fine: OnceCell<Frequencies>,
+    walks: OnceCell<Vec<f64>>,
 }
 
 fn walk_shape(omega: f64) -> f64 {
@@ -78,23 +80,25 @@ impl Bins {
             at: Frequencies { omega, cosine },
             walk,
             fine: OnceCell::new(),
+            walks: OnceCell::new(),
         }
     }
 
-    fn fine(&self) -> &(Frequencies, Vec<f64>) {
-        self.fine.get_or_init(|| {
-            let omega: Vec<f64> = (0..self.n)
-                .map(|k| std::f64::consts::PI * k.max(1) as f64 / self.n as f64)
-                .collect();
-            let cosine: Vec<f64> = omega.iter().map(|w| w.cos()).collect();
-            let walk = omega.iter().map(|w| walk_shape(*w)).collect();
-            (Frequencies { omega, cosine }, walk)
+    fn angles(&self) -> impl Iterator<Item = f64> {
+        (0..self.n).map(|k| std::f64::consts::PI * k.max(1) as f64 / self.n as f64)
+    }
+
+    fn fine(&self) -> &Frequencies {
+        self.fine.get_or_init(|| Frequencies {
+            omega: self.angles().collect(),
+            cosine: self.angles().map(f64::cos).collect(),
         })
     }
 
     /// Random-walk shape 1 / (2 - 2 cos w) at every coefficient.
     pub(crate) fn walks(&self) -> &[f64] {
-        &self.fine().1
+        self.walks
+            .get_or_init(|| self.angles().map(walk_shape).collect())
     }
 
     /// Sums of a[k] b[k] over each bin.
@@ -224,15 +228,19 @@ impl Noise {
     /// g at the first `count` coefficients; as [`Noise::everywhere`].
     #[must_use]
     pub fn first(&self, bins: &Bins, count: usize) -> Vec<f64> {
-        let (at, walk) = bins.fine();
-        let mut g = if count < bins.n {
+        let walk = &bins.walks()[..count];
+        let mut g = if self.terms.is_empty() {
+            // Where there is no density no frequency is asked for.
+            self.shape(&Frequencies::default(), walk)
+        } else if count < bins.n {
+            let at = bins.fine();
             let few = Frequencies {
                 omega: at.omega[..count].to_vec(),
                 cosine: at.cosine[..count].to_vec(),
             };
-            self.shape(&few, &walk[..count])
+            self.shape(&few, walk)
         } else {
-            self.shape(at, walk)
+            self.shape(bins.fine(), walk)
         };
         if let Some(first) = g.first_mut() {
             *first = f64::INFINITY;
@@ -301,17 +309,21 @@ impl Panel {
         }
     }
 
-    /// Add a column that other channels may have as well; returns its number.
-    pub fn add_common(&self, values: &[f64]) -> usize {
-        let key = digest(values);
-        let known = self.dct.known.columns.borrow().get(&key).cloned();
-        let c = known.unwrap_or_else(|| {
-            let c = Column::new(self.dct.forward(values));
-            if !self.dct.known.complete.get() {
-                self.dct.known.columns.borrow_mut().insert(key, c.clone());
-            }
-            c
-        });
+    /// Add a column of a candidate, which other channels may have in `common`; returns its number.
+    pub fn add_candidate(&self, values: &[f64], common: bool) -> usize {
+        let c = if common {
+            let key = digest(values);
+            let known = self.dct.known.columns.borrow().get(&key).cloned();
+            known.unwrap_or_else(|| {
+                let c = Column::new(self.dct.forward(values));
+                if !self.dct.known.complete.get() {
+                    self.dct.known.columns.borrow_mut().insert(key, c.clone());
+                }
+                c
+            })
+        } else {
+            Column::new(self.dct.forward(values))
+        };
         self.columns.borrow_mut().push(c);
         self.columns.borrow().len() - 1
     }

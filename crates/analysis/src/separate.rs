@@ -1,6 +1,7 @@
 //! What to record to tell two causes apart: the information about one that the other leaves, under an excitation.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use model::effect::{Effect, Hypothesis, Signal, View};
 use model::excitation::World;
@@ -212,8 +213,8 @@ fn signals(world: &World) -> Vec<Signal> {
             Quantity::Pwm | Quantity::Other => "1",
         }
         .to_owned(),
-        values: values.to_vec(),
-        smooth: values.to_vec(),
+        values: Arc::new(values.to_vec()),
+        smooth: Arc::new(values.to_vec()),
         lsb: None,
         moving: false,
     };

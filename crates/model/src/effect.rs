@@ -195,9 +195,9 @@ pub struct Signal {
     /// Unit of the readings.
     pub unit: String,
     /// Readings on the grid.
-    pub values: Vec<f64>,
-    /// The same without reading noise, as a local-level smoother gives it.
-    pub smooth: Vec<f64>,
+    pub values: Arc<Vec<f64>>,
+    /// The same without reading noise, as a local-level smoother gives it; where there is none to take off, the same.
+    pub smooth: Arc<Vec<f64>>,
     /// Unit per count.
     pub lsb: Option<f64>,
     /// For a gyro: whether its true rate visibly moves.

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use model::effect::{Effect, Hypothesis, Shape, View};
 use model::effects::EFFECTS;
+use model::record::Quantity;
 
 use crate::beyond;
 use crate::likelihood::{Noise, Panel, Solution};
@@ -172,58 +173,68 @@ impl<'a> Search<'a> {
     pub fn new(panel: Panel, view: View<'a>) -> Self {
         let mut candidates = vec![];
         let mut not_tested = vec![];
-        let unknown: &'static dyn Effect = &beyond::EFFECT;
-        for effect in EFFECTS.iter().copied().chain([unknown]) {
-            // A cause of the library that does as well goes before a combination that has no name.
-            let handicap = if effect.id() == beyond::ID {
-                RIVAL_SPAN
-            } else {
-                0.0
+        // What follows a thermometer of this axis is no column of another one.
+        let own = |h: &Hypothesis| match h {
+            Hypothesis::Regression(r) => view.signals.iter().any(|s| {
+                s.quantity == Quantity::Temp
+                    && s.axis.is_some()
+                    && r.follows.as_ref().is_some_and(|f| f.contains(&s.name))
+            }),
+            _ => false,
+        };
+        let mut lay_out = |effect: &'static dyn Effect,
+                           mut hypothesis: Hypothesis,
+                           siblings: usize,
+                           handicap: f64| {
+            let common = !own(&hypothesis);
+            let columns = match &mut hypothesis {
+                // The panel has them now.
+                Hypothesis::Regression(r) => r
+                    .columns
+                    .iter_mut()
+                    .map(|c| panel.add_candidate(&std::mem::take(&mut c.values), common))
+                    .collect(),
+                _ => vec![],
             };
+            let grid = match &hypothesis {
+                Hypothesis::Shaped(s) => s
+                    .grid()
+                    .into_iter()
+                    .map(|at| {
+                        let columns = s.columns(at);
+                        let columns = columns
+                            .iter()
+                            .map(|c| panel.add_candidate(&c.values, common));
+                        (at, columns.collect())
+                    })
+                    .collect(),
+                _ => vec![],
+            };
+            candidates.push(Candidate {
+                effect,
+                hypothesis,
+                columns,
+                grid,
+                siblings,
+                handicap,
+            });
+        };
+        for effect in EFFECTS {
             match effect.hypotheses(&view) {
                 Err(why) => not_tested.push((effect.id(), why)),
                 Ok(hypotheses) => {
                     let siblings = hypotheses.len();
-                    for mut hypothesis in hypotheses {
-                        let columns = match &hypothesis {
-                            Hypothesis::Regression(r) => r
-                                .columns
-                                .iter()
-                                .map(|c| panel.add_common(&c.values))
-                                .collect(),
-                            _ => vec![],
-                        };
-                        let grid = match &hypothesis {
-                            Hypothesis::Shaped(s) => s
-                                .grid()
-                                .into_iter()
-                                .map(|at| {
-                                    (
-                                        at,
-                                        s.columns(at)
-                                            .iter()
-                                            .map(|c| panel.add_common(&c.values))
-                                            .collect(),
-                                    )
-                                })
-                                .collect(),
-                            _ => vec![],
-                        };
-                        // The panel has them now.
-                        if let Hypothesis::Regression(r) = &mut hypothesis {
-                            r.columns.iter_mut().for_each(|c| c.values = vec![]);
-                        }
-                        candidates.push(Candidate {
-                            effect,
-                            hypothesis,
-                            columns,
-                            grid,
-                            siblings,
-                            handicap,
-                        });
+                    for hypothesis in hypotheses {
+                        lay_out(*effect, hypothesis, siblings, 0.0);
                     }
                 }
             }
+        }
+        // A cause of the library that does as well goes before a combination that has no name.
+        let unknown = beyond::one_by_one(&view);
+        let siblings = unknown.len();
+        for hypothesis in unknown {
+            lay_out(&beyond::EFFECT, hypothesis, siblings, RIVAL_SPAN);
         }
         Self {
             panel,

@@ -31,8 +31,8 @@ fn signals(stand: &Stand) -> Vec<Signal> {
         quantity,
         axis: axis.map(|i| Axis::ALL[i]),
         unit: String::new(),
-        smooth: values.clone(),
-        values,
+        smooth: values.clone().into(),
+        values: values.into(),
         lsb: None,
         moving: false,
     };
