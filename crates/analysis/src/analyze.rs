@@ -373,9 +373,15 @@ fn analyze_channel(
             &units.reading
         };
         let points = match &gapped {
-            Some(gapped) if *kind == Deviation::Oadev => {
-                gapped_curve(gapped, &phase, fitted.as_ref(), tau0, options.taus, scale)
-            }
+            Some(gapped) if matches!(kind, Deviation::Oadev | Deviation::Ohdev) => gapped_curve(
+                gapped,
+                *kind,
+                &phase,
+                fitted.as_ref(),
+                tau0,
+                options.taus,
+                scale,
+            ),
             _ => curve(&phase, *kind, tau0, options.taus, scale),
         };
         out.deviations.insert(*kind, points);
@@ -406,6 +412,14 @@ fn analyze_channel(
         .collect();
     if channel.quantity == Quantity::Gyro {
         out.angle = angle(channel, &runs, &fitted, &units.integral);
+        if runs.len() > 1 && out.angle.is_some() {
+            out.warnings.push(format!(
+                "the integrated angle is that of the longest run without a gap, {:.6} of {:.6} s: what turned in a gap \
+                 nobody measured",
+                phase.longest_run() as f64 * tau0,
+                phase.samples() as f64 * tau0
+            ));
+        }
     }
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let ms = TauGrid::Octave.factors(longest / 5);
@@ -464,20 +478,22 @@ fn misfit_warning(found: &Misfit, fitted: &NoiseFit, tau0: f64) -> String {
 fn gaps_note(gapped: &Gapped, phase: &Phase, tau0: f64) -> String {
     let longest = gapped.lengths().into_iter().max().unwrap_or(0);
     format!(
-        "{} gaps, {:.2} % of the sample times empty: overlapping Allan deviations are of means over the samples that are \
-         there, up to {:.6} s, and their intervals count the differences that are left; other deviations end at the \
+        "{} gaps, {:.2} % of the sample times empty: overlapping Allan and Hadamard deviations are of means over the \
+         samples that are there, up to {:.6} and {:.6} s, and their intervals count the differences that are left; other deviations end at the \
          longest run without a gap, {:.6} s. Nothing is filled in",
         phase.run_lengths().len() - 1,
         100.0 * (1.0 - gapped.filled()),
         (longest / 2) as f64 * tau0,
+        (longest / 3) as f64 * tau0,
         phase.longest_run() as f64 * tau0
     )
 }
 
-/// The overlapping Allan curve of a record with gaps. The freedom is that of the grid, less the share of differences that
+/// The overlapping Allan or Hadamard curve of a record with gaps. The freedom is that of the grid, less the share of differences that
 /// the gaps took.
 fn gapped_curve(
     gapped: &Gapped,
+    kind: Deviation,
     phase: &Phase,
     fitted: Option<&NoiseFit>,
     tau0: f64,
@@ -485,13 +501,19 @@ fn gapped_curve(
     scale: &Scale,
 ) -> Vec<DeviationPoint> {
     let lengths = gapped.lengths();
-    let longest = lengths.iter().copied().max().unwrap_or(0) / 2;
+    let hadamard = kind == Deviation::Ohdev;
+    let longest = kind.longest(lengths.iter().copied().max().unwrap_or(0));
     let mut noise = NoiseType::WhiteRate;
     grid.factors(longest)
         .into_iter()
         .filter_map(|m| {
-            let white_share = fitted.map_or(1.0, |f| f.white_share(m));
-            let found = gapped.overlapping_allan(tau0, m, white_share)?;
+            let found = if hadamard {
+                let white_share = fitted.map_or(1.0, |f| f.white_share_hadamard(m));
+                gapped.overlapping_hadamard(tau0, m, white_share)?
+            } else {
+                let white_share = fitted.map_or(1.0, |f| f.white_share(m));
+                gapped.overlapping_allan(tau0, m, white_share)?
+            };
             // Where no run is long enough to tell, the fit does: by the slope of its curve.
             noise = identify(phase, m)
                 .or_else(|| {
@@ -501,7 +523,7 @@ fn gapped_curve(
                 })
                 .unwrap_or(noise);
             let share = found.estimate.n as f64 / found.possible as f64;
-            let edf = (edf(Deviation::Oadev, noise, m, &lengths) * share).max(1.0);
+            let edf = (edf(kind, noise, m, &lengths) * share).max(1.0);
             let (low, high) = chi_square_interval(found.estimate.deviation, edf, 0.95);
             Some(DeviationPoint {
                 tau_s: found.estimate.tau_s,

@@ -64,13 +64,12 @@ pub fn angle_growth(
 /// Standard deviation of the angle `t_s` after a calibration of length `calibration_s`, U·s.
 #[must_use]
 pub fn predicted_sigma(fit: &NoiseFit, calibration_s: f64, t_s: f64) -> f64 {
-    let letter = |term: Term| term.letter(fit.maximum.coefficients[term as usize], fit.tau0);
-    let (n, b, k, q) = (
-        letter(Term::White),
-        letter(Term::Flicker),
-        letter(Term::RandomWalk),
-        letter(Term::Quantization),
-    );
+    let letters = Term::ALL.map(|t| t.letter(fit.maximum.coefficients[t as usize], fit.tau0));
+    growth_sigma(letters, calibration_s, t_s)
+}
+
+/// The same from N, B, K and Q.
+pub(crate) fn growth_sigma([n, b, k, q]: [f64; 4], calibration_s: f64, t_s: f64) -> f64 {
     let structure = |tau: f64| {
         n * n * tau - b * b / PI * tau * tau * tau.ln() - k * k * tau.powi(3) / 6.0 + 2.0 * q * q
     };

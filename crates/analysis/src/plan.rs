@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use crate::attitude::growth_sigma;
 use crate::error::AnalysisError;
 use crate::noise_fit::Term;
 
@@ -14,21 +15,70 @@ pub struct KnownNoise {
     pub bias_instability_b: f64,
     /// K, U/√s.
     pub rate_random_walk_k: f64,
+    /// Q, U·s.
+    pub quantization_noise_q: f64,
+    /// R, U/s.
+    pub rate_ramp_r: f64,
 }
 
-/// Relative standard errors that a record would reach; `None` for an absent term.
+/// A figure to be planned for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Letter {
+    /// Angle random walk.
+    N,
+    /// Bias instability.
+    B,
+    /// Rate random walk.
+    K,
+    /// Quantization noise.
+    Q,
+    /// Rate ramp.
+    R,
+}
+
+impl Letter {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::N, Self::B, Self::K, Self::Q, Self::R];
+
+    /// The letter.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::N => "N",
+            Self::B => "B",
+            Self::K => "K",
+            Self::Q => "Q",
+            Self::R => "R",
+        }
+    }
+
+    /// Its size in a known noise.
+    #[must_use]
+    pub fn size(self, noise: &KnownNoise) -> f64 {
+        match self {
+            Self::N => noise.angle_random_walk_n,
+            Self::B => noise.bias_instability_b,
+            Self::K => noise.rate_random_walk_k,
+            Self::Q => noise.quantization_noise_q,
+            Self::R => noise.rate_ramp_r.abs(),
+        }
+    }
+}
+
+/// Relative standard errors that a record would reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Expected {
-    /// Of N.
-    pub n: Option<f64>,
-    /// Of B.
-    pub b: Option<f64>,
-    /// Of K.
-    pub k: Option<f64>,
+pub struct Expected([Option<f64>; 5]);
+
+impl Expected {
+    /// That of a letter; `None` where the term is absent.
+    #[must_use]
+    pub fn of(&self, letter: Letter) -> Option<f64> {
+        self.0[letter as usize]
+    }
 }
 
-/// Relative standard errors of N, B and K from a record of `seconds` at `rate_hz`: the Cramér-Rao bound of the exact
-/// likelihood in the DCT-II domain.
+/// Relative standard errors of N, B, K, Q and R from a record of `seconds` at `rate_hz`: the Cramér-Rao bound of the exact
+/// likelihood in the DCT-II domain. The ramp is a mean: its odd coefficients tell it from the noise.
 #[must_use]
 pub fn expected(noise: &KnownNoise, rate_hz: f64, seconds: f64) -> Expected {
     let tau0 = 1.0 / rate_hz;
@@ -37,25 +87,33 @@ pub fn expected(noise: &KnownNoise, rate_hz: f64, seconds: f64) -> Expected {
         Term::White.coefficient(noise.angle_random_walk_n, tau0),
         Term::Flicker.coefficient(noise.bias_instability_b, tau0),
         Term::RandomWalk.coefficient(noise.rate_random_walk_k, tau0),
+        Term::Quantization.coefficient(noise.quantization_noise_q, tau0),
     ];
-    let mut fisher = [[0.0f64; 3]; 3];
+    let mut fisher = [[0.0f64; 4]; 4];
+    let mut of_ramp = 0.0;
     // Coefficients one by one at low frequency, then 1 % of them at a time.
     let mut k = 1.0;
     while k < samples {
         let count = (0.01 * k).floor().max(1.0).min(samples - k);
         let w = PI * (k + (count - 1.0) / 2.0) / samples;
-        let shape = [1.0, 1.0 / w, 1.0 / (2.0 - 2.0 * w.cos())];
+        let rough = 2.0 - 2.0 * w.cos();
+        let shape = [1.0, 1.0 / w, 1.0 / rough, rough];
         // In parts of the variance: d ln v / d ln c.
         let v: f64 = shape.iter().zip(c).map(|(s, c)| s * c).sum();
-        let part: [f64; 3] = std::array::from_fn(|i| shape[i] * c[i] / v);
-        for i in 0..3 {
-            for j in 0..3 {
+        let part: [f64; 4] = std::array::from_fn(|i| shape[i] * c[i] / v);
+        for i in 0..4 {
+            for j in 0..4 {
                 fisher[i][j] += 0.5 * count * part[i] * part[j];
             }
         }
+        // Of a ramp of τ₀ a sample: √(2/n)·cos(w/2)/(2 sin²(w/2)) where k is odd, else 0.
+        let half = w / 2.0;
+        let square = 2.0 / samples * (tau0 * half.cos() / (2.0 * half.sin().powi(2))).powi(2);
+        let odd = if count < 2.0 { k % 2.0 } else { count / 2.0 };
+        of_ramp += odd * square / v;
         k += count;
     }
-    let present: Vec<usize> = (0..3).filter(|i| c[*i] > 0.0).collect();
+    let present: Vec<usize> = (0..4).filter(|i| c[*i] > 0.0).collect();
     let variance = |wanted: usize| -> Option<f64> {
         let p = present.iter().position(|i| *i == wanted)?;
         // Schur complement by elimination of the others.
@@ -76,14 +134,51 @@ pub fn expected(noise: &KnownNoise, rate_hz: f64, seconds: f64) -> Expected {
     };
     // A letter is the root of its coefficient: half the relative error.
     let relative = |i: usize| variance(i).map(|v| 0.5 * v.sqrt());
-    Expected {
-        n: relative(0),
-        b: relative(1),
-        k: relative(2),
+    let ramp = noise.rate_ramp_r.abs();
+    Expected([
+        relative(0),
+        relative(1),
+        relative(2),
+        relative(3),
+        (ramp > 0.0).then(|| 1.0 / (ramp * of_ramp.sqrt())),
+    ])
+}
+
+/// How well an angle is known `after_s` after a still calibration, from the noise that is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AnglePlan {
+    /// The calibration that serves best, s.
+    pub best_calibration_s: f64,
+    /// Standard deviation of the angle with it, U·s.
+    pub best_sigma: f64,
+    /// The shortest calibration that keeps the promise, s; `None` where none does.
+    pub calibration_s: Option<f64>,
+}
+
+/// The still calibration, up to a day, after which the angle `after_s` later has a standard deviation of `sigma` U·s or
+/// less. A longer one averages white noise away and lets the random walk run: there is a best one. The rate ramp is not
+/// counted: it is a drift that calibration cannot take out.
+#[must_use]
+pub fn calibration_for(noise: &KnownNoise, rate_hz: f64, after_s: f64, sigma: f64) -> AnglePlan {
+    let letters = [Letter::N, Letter::B, Letter::K, Letter::Q].map(|l| l.size(noise));
+    let reached = |calibration: f64| growth_sigma(letters, calibration, after_s);
+    // 1 % steps from one sample on.
+    let steps = std::iter::successors(Some(1.0 / rate_hz), |s| Some(s * 1.01))
+        .take_while(|s| *s <= 86_400.0);
+    let best = steps
+        .clone()
+        .min_by(|a, b| reached(*a).total_cmp(&reached(*b)))
+        .unwrap_or(1.0 / rate_hz);
+    AnglePlan {
+        best_calibration_s: best,
+        best_sigma: reached(best),
+        calibration_s: steps
+            .take_while(|s| *s <= best)
+            .find(|s| reached(*s) <= sigma),
     }
 }
 
-/// Shortest record, s, from which `term` has a relative standard error of `relative`.
+/// Shortest record, s, from which `letter` has a relative standard error of `relative`.
 ///
 /// # Errors
 /// [`AnalysisError::BadOption`] when `relative` is not in 0.001..1 or the term is absent from `noise` (nothing can say
@@ -91,7 +186,7 @@ pub fn expected(noise: &KnownNoise, rate_hz: f64, seconds: f64) -> Expected {
 pub fn seconds_for(
     noise: &KnownNoise,
     rate_hz: f64,
-    term: Term,
+    letter: Letter,
     relative: f64,
 ) -> Result<f64, AnalysisError> {
     if !(0.001..1.0).contains(&relative) {
@@ -108,15 +203,7 @@ pub fn seconds_for(
             expected: "a positive number of samples per second".into(),
         });
     }
-    let reached = |seconds: f64| {
-        let e = expected(noise, rate_hz, seconds);
-        match term {
-            Term::White => e.n,
-            Term::Flicker => e.b,
-            Term::RandomWalk => e.k,
-            Term::Quantization => None,
-        }
-    };
+    let reached = |seconds: f64| expected(noise, rate_hz, seconds).of(letter);
     let longest = 1000.0 * 86_400.0;
     let mut high = 16.0 / rate_hz;
     loop {
@@ -124,14 +211,14 @@ pub fn seconds_for(
             None => {
                 return Err(AnalysisError::BadOption {
                     option: "--want",
-                    found: format!("{term:?}"),
+                    found: letter.name().into(),
                     expected: "a term that the model has with a size of its own".into(),
                 });
             }
             Some(e) if e <= relative => break,
             Some(_) if high > longest => {
                 return Err(AnalysisError::Inconclusive {
-                    what: format!("{term:?} within {} %", 100.0 * relative),
+                    what: format!("{letter:?} within {} %", 100.0 * relative),
                     have: longest,
                     need: f64::INFINITY,
                     unit: "s",
@@ -166,9 +253,9 @@ mod tests {
             angle_random_walk_n: 0.1,
             ..KnownNoise::default()
         };
-        let seconds = seconds_for(&noise, 20.0, Term::White, 0.01).unwrap();
+        let seconds = seconds_for(&noise, 20.0, Letter::N, 0.01).unwrap();
         assert!((seconds * 20.0 / 5001.0 - 1.0).abs() < 0.001, "{seconds}");
-        assert!(seconds_for(&noise, 20.0, Term::RandomWalk, 0.2).is_err());
+        assert!(seconds_for(&noise, 20.0, Letter::K, 0.2).is_err());
     }
 
     #[test]
@@ -179,7 +266,7 @@ mod tests {
             ..KnownNoise::default()
         };
         let (rate, wanted) = (20.0, 0.15);
-        let seconds = seconds_for(&noise, rate, Term::RandomWalk, wanted).unwrap();
+        let seconds = seconds_for(&noise, rate, Letter::K, wanted).unwrap();
         let n = (seconds * rate).round() as usize;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(77);
         let mut gauss = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -205,5 +292,70 @@ mod tests {
             (0.8..1.3).contains(&(sd / wanted)),
             "{sd} {wanted} over {seconds} s"
         );
+    }
+
+    #[test]
+    fn a_record_as_long_as_planned_pins_q_and_r_as_promised() {
+        let noise = KnownNoise {
+            angle_random_walk_n: 0.05,
+            rate_random_walk_k: 0.002,
+            quantization_noise_q: 0.01,
+            rate_ramp_r: 0.002,
+            ..KnownNoise::default()
+        };
+        let truth = crate::synthetic::Truth {
+            n: 0.05,
+            k: 0.002,
+            q: 0.01,
+            r: 0.002,
+            ..Default::default()
+        };
+        let (rate, runs) = (20.0, 150);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(78);
+        for (letter, wanted) in [(Letter::Q, 0.03), (Letter::R, 0.05)] {
+            let seconds = seconds_for(&noise, rate, letter, wanted).unwrap();
+            let n = (seconds * rate).round() as usize;
+            let found: Vec<f64> = (0..runs)
+                .map(|_| {
+                    let y = truth.record(n, 1.0 / rate, &mut rng);
+                    let found = fit(&Spectrum::of(&y, std::slice::from_ref(&(0..n)), 1.0 / rate));
+                    match letter {
+                        Letter::Q => found.term(Term::Quantization).value,
+                        _ => found.rate_ramp.value,
+                    }
+                    .unwrap()
+                        / letter.size(&noise)
+                })
+                .collect();
+            let mean = found.iter().sum::<f64>() / f64::from(runs);
+            let sd = (found.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / f64::from(runs - 1))
+                .sqrt();
+            // Spread of a standard deviation over 150 runs: 6 %; three of them.
+            assert!(
+                (0.82..1.18).contains(&(sd / wanted)) && (mean - 1.0).abs() < 4.0 * wanted / 12.0,
+                "{letter:?}: {mean} {sd} {wanted} over {seconds} s"
+            );
+        }
+    }
+
+    #[test]
+    fn the_best_calibration_is_where_white_noise_and_walk_weigh_the_same() {
+        // Variance N²t + N²t²/c + K²t²c/3 + K²t³/3: least at c = √3·N/K.
+        let noise = KnownNoise {
+            angle_random_walk_n: 0.1,
+            rate_random_walk_k: 0.01,
+            ..KnownNoise::default()
+        };
+        let plan = calibration_for(&noise, 20.0, 50.0, 10.0);
+        let best = 3f64.sqrt() * 10.0;
+        assert!(
+            (plan.best_calibration_s / best - 1.0).abs() < 0.02,
+            "{plan:?}"
+        );
+        let variance = |c: f64| 0.01 * (50.0 + 2500.0 / c) + 1e-4 * (2500.0 * c + 125_000.0) / 3.0;
+        assert!((plan.best_sigma / variance(best).sqrt() - 1.0).abs() < 1e-3);
+        let shortest = plan.calibration_s.unwrap();
+        assert!(variance(shortest).sqrt() <= 10.0 && variance(shortest / 1.02).sqrt() > 10.0);
+        assert_eq!(calibration_for(&noise, 20.0, 50.0, 1.0).calibration_s, None);
     }
 }

@@ -239,7 +239,7 @@ fn weights(noise: &KnownNoise, tau0: f64, samples: usize) -> Vec<f64> {
         Term::White.coefficient(noise.angle_random_walk_n, tau0),
         Term::Flicker.coefficient(noise.bias_instability_b, tau0),
         Term::RandomWalk.coefficient(noise.rate_random_walk_k, tau0),
-        0.0,
+        Term::Quantization.coefficient(noise.quantization_noise_q, tau0),
     ];
     (0..samples)
         .map(|k| {
@@ -292,6 +292,8 @@ mod tests {
         angle_random_walk_n: 5.27 / 60.0,
         bias_instability_b: 0.0,
         rate_random_walk_k: 0.0015,
+        quantization_noise_q: 0.0,
+        rate_ramp_r: 0.0,
     };
 
     fn plan(cause: &str, rival: &str, settings: &[(&str, f64)], seconds: f64) -> Separation {

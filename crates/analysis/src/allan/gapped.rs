@@ -1,4 +1,4 @@
-//! Overlapping Allan deviation of a record with gaps: cluster means over the samples that are there, at their true times.
+//! Overlapping Allan and Hadamard deviations of a record with gaps: cluster means over the samples that are there, at their true times.
 
 use std::ops::Range;
 
@@ -110,11 +110,7 @@ impl Gapped {
         m: usize,
         white_share: f64,
     ) -> Option<GappedEstimate> {
-        let needed = if m < WHOLE_BELOW {
-            m as u32
-        } else {
-            (NEEDED_SHARE * self.filled() * m as f64).ceil().max(1.0) as u32
-        };
+        let needed = self.needed(m);
         let (mut squares, mut inflation, mut n, mut possible) = (0.0, 0.0, 0usize, 0usize);
         for Segment { sums, counts } in &self.segments {
             let Some(terms) = sums.len().checked_sub(2 * m).filter(|t| *t > 0 && m > 0) else {
@@ -135,6 +131,63 @@ impl Gapped {
                 n += 1;
             }
         }
+        self.estimate(squares / 2.0, inflation, n, possible, tau0, m, white_share)
+    }
+
+    /// Overlapping Hadamard deviation at `m`, by the same rules: (ȳ₃ − 2ȳ₂ + ȳ₁)²/6, the white part divided by the mean of
+    /// (m/n₁ + 4m/n₂ + m/n₃)/6. `white_share` is the part of white noise in the Hadamard variance.
+    #[must_use]
+    pub fn overlapping_hadamard(
+        &self,
+        tau0: f64,
+        m: usize,
+        white_share: f64,
+    ) -> Option<GappedEstimate> {
+        let needed = self.needed(m);
+        let (mut squares, mut inflation, mut n, mut possible) = (0.0, 0.0, 0usize, 0usize);
+        for Segment { sums, counts } in &self.segments {
+            let Some(terms) = sums.len().checked_sub(3 * m).filter(|t| *t > 0 && m > 0) else {
+                continue;
+            };
+            possible += terms;
+            for k in 0..terms {
+                let filled: [u32; 3] =
+                    std::array::from_fn(|i| counts[k + (i + 1) * m] - counts[k + i * m]);
+                if filled.iter().any(|f| *f < needed) {
+                    continue;
+                }
+                let mean =
+                    |i: usize| (sums[k + (i + 1) * m] - sums[k + i * m]) / f64::from(filled[i]);
+                let difference = mean(2) - 2.0 * mean(1) + mean(0);
+                squares += difference * difference;
+                let [first, second, third] = filled.map(f64::from);
+                inflation += m as f64 * (1.0 / first + 4.0 / second + 1.0 / third) / 6.0;
+                n += 1;
+            }
+        }
+        self.estimate(squares / 6.0, inflation, n, possible, tau0, m, white_share)
+    }
+
+    /// Samples that a cluster of `m` slots needs.
+    fn needed(&self, m: usize) -> u32 {
+        if m < WHOLE_BELOW {
+            m as u32
+        } else {
+            (NEEDED_SHARE * self.filled() * m as f64).ceil().max(1.0) as u32
+        }
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the sums of one pass")]
+    fn estimate(
+        &self,
+        squares: f64,
+        inflation: f64,
+        n: usize,
+        possible: usize,
+        tau0: f64,
+        m: usize,
+        white_share: f64,
+    ) -> Option<GappedEstimate> {
         if n == 0 {
             return None;
         }
@@ -144,7 +197,7 @@ impl Gapped {
             estimate: Estimate {
                 m,
                 tau_s: m as f64 * tau0,
-                deviation: (squares / (2.0 * n as f64) / inflated).sqrt(),
+                deviation: (squares / n as f64 / inflated).sqrt(),
                 n,
             },
             possible,
@@ -199,6 +252,10 @@ mod tests {
             let b = deviation(&phase, Deviation::Oadev, 0.1, m).unwrap();
             assert_eq!((a.estimate.n, a.possible), (b.n, b.n));
             assert!((a.estimate.deviation / b.deviation - 1.0).abs() < 1e-9);
+            let a = gapped.overlapping_hadamard(0.1, m, 0.5).unwrap();
+            let b = deviation(&phase, Deviation::Ohdev, 0.1, m).unwrap();
+            assert_eq!((a.estimate.n, a.possible), (b.n, b.n));
+            assert!((a.estimate.deviation / b.deviation - 1.0).abs() < 1e-9);
         }
         assert_eq!(gapped.overlapping_allan(0.1, 251, 0.5), None);
     }
@@ -230,23 +287,31 @@ mod tests {
             ),
         ] {
             let runs = 300;
-            let variances: Vec<f64> = (0..runs)
+            // A walk has half the Hadamard variance.
+            let hadamard = expected * if share == 0.0 { 0.5f64.sqrt() } else { 1.0 };
+            let variances: Vec<[f64; 2]> = (0..runs)
                 .map(|_| {
                     let (y, rows, slots) = thinned(&truth.record(n, tau0, &mut rng), 33, &mut rng);
-                    let found = Gapped::new(&y, &rows, &slots)
-                        .overlapping_allan(tau0, m, share)
-                        .unwrap();
-                    (found.estimate.deviation / expected).powi(2)
+                    let gapped = Gapped::new(&y, &rows, &slots);
+                    let square = |found: Option<GappedEstimate>, expected: f64| {
+                        (found.unwrap().estimate.deviation / expected).powi(2)
+                    };
+                    [
+                        square(gapped.overlapping_allan(tau0, m, share), expected),
+                        square(gapped.overlapping_hadamard(tau0, m, share), hadamard),
+                    ]
                 })
                 .collect();
-            let mean = variances.iter().sum::<f64>() / runs as f64;
-            let spread =
-                variances.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (runs - 1) as f64;
-            // Freedom about 50: a standard error of 1.2 % of the mean, and 8 % of the spread.
-            assert!((mean - 1.0).abs() < 0.05, "{truth:?}: {mean}");
-            let freedom = edf(Deviation::Oadev, noise, m, &[n]);
-            let ratio = 2.0 * mean * mean / spread / freedom;
-            assert!((0.75..1.33).contains(&ratio), "{truth:?}: {ratio}");
+            for (i, kind) in [Deviation::Oadev, Deviation::Ohdev].into_iter().enumerate() {
+                let mean = variances.iter().map(|v| v[i]).sum::<f64>() / runs as f64;
+                let spread = variances.iter().map(|v| (v[i] - mean).powi(2)).sum::<f64>()
+                    / (runs - 1) as f64;
+                // Freedom about 50: a standard error of 1.2 % of the mean, and 8 % of the spread.
+                assert!((mean - 1.0).abs() < 0.05, "{kind:?} {truth:?}: {mean}");
+                let freedom = edf(kind, noise, m, &[n]);
+                let ratio = 2.0 * mean * mean / spread / freedom;
+                assert!((0.75..1.33).contains(&ratio), "{kind:?} {truth:?}: {ratio}");
+            }
         }
     }
 

@@ -73,6 +73,20 @@ impl NoiseFit {
         (white / m as f64 / self.deviation(m).powi(2)).min(1.0)
     }
 
+    /// The same in the Hadamard variance: N²/τ, B²·ln(256/27)/2π, K²τ/6 and 10Q²/3τ²; no ramp.
+    #[must_use]
+    pub fn white_share_hadamard(&self, m: usize) -> f64 {
+        let tau = m as f64 * self.tau0;
+        let [n, b, k, q] = Term::ALL.map(|t| {
+            t.letter(self.maximum.coefficients[t as usize], self.tau0)
+                .powi(2)
+        });
+        let white = n / tau;
+        let flicker = b * (256.0f64 / 27.0).ln() / (2.0 * std::f64::consts::PI);
+        let all = white + flicker + k * tau / 6.0 + 10.0 / 3.0 * q / (tau * tau);
+        if all > 0.0 { white / all } else { 1.0 }
+    }
+
     /// Allan deviation of the fitted model at `m`, U.
     #[must_use]
     pub fn deviation(&self, m: usize) -> f64 {

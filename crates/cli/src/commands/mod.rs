@@ -13,6 +13,7 @@ pub mod report;
 pub mod representative;
 pub mod run;
 pub mod simulate;
+mod wish;
 
 use std::path::{Path, PathBuf};
 

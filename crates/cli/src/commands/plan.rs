@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use analysis::noise_fit::{Spectrum, Term, fit};
-use analysis::plan::{KnownNoise, expected, seconds_for};
+use analysis::plan::{KnownNoise, Letter, expected, seconds_for};
 use analysis::sampling::Sampling;
 use analysis::separate::{PRESETS, TOLD_APART, separation};
 use analysis::synthetic::Truth;
@@ -18,9 +18,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use super::Input;
+use super::wish::{WantedAngle, Wish, Z_95, wishes};
 
-/// Half of a 95 % interval in standard errors.
-const Z_95: f64 = 1.959_964;
 /// Longest record that `--separate` lays out, s.
 const LONGEST_S: f64 = 36.0 * 3600.0;
 /// Most samples that `--check` simulates in all.
@@ -34,7 +33,8 @@ pub struct Arguments {
     /// A model file instead of a capture
     #[arg(long, value_name = "FILE", conflicts_with = "capture")]
     model: Option<PathBuf>,
-    /// How well a term is wanted, 95 %: `"K within 20 %"`, several separated by commas; of N, B, K
+    /// How well something is wanted, 95 %: `"K within 20 %"` (of N, B, K, Q, R) or `"angle within 2 deg after 600 s"`;
+    /// several separated by commas
     #[arg(long, value_name = "TERM within X %")]
     want: Option<String>,
     /// Two causes to be told apart: `temperature,rate_ramp`
@@ -62,6 +62,7 @@ struct Plan {
     format: &'static str,
     noise: Noise,
     want: Vec<Wanted>,
+    angle: Vec<WantedAngle>,
     separate: Vec<Told>,
 }
 
@@ -73,6 +74,8 @@ struct Noise {
     n: f64,
     b: f64,
     k: f64,
+    q: f64,
+    r: f64,
     notes: Vec<String>,
 }
 
@@ -82,6 +85,8 @@ impl Noise {
             angle_random_walk_n: self.n,
             bias_instability_b: self.b,
             rate_random_walk_k: self.k,
+            quantization_noise_q: self.q,
+            rate_ramp_r: self.r,
         }
     }
 }
@@ -137,14 +142,34 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         format: "imu-stand-plan/1",
         noise,
         want: Vec::new(),
+        angle: Vec::new(),
         separate: Vec::new(),
     };
     if let Some(text) = &arguments.want {
-        for (term, within_percent) in wishes(text)? {
-            let wanted = want(&plan.noise, term, within_percent, arguments)?;
-            plan.want.push(wanted);
+        for wish in wishes(text)? {
+            match wish {
+                Wish::Term {
+                    letter,
+                    within_percent,
+                } => {
+                    let wanted = want(&plan.noise, letter, within_percent, arguments)?;
+                    plan.want.push(wanted);
+                }
+                Wish::Angle {
+                    within_deg,
+                    after_s,
+                } => plan.angle.push(WantedAngle::plan(
+                    &plan.noise.known(),
+                    plan.noise.rate_hz,
+                    within_deg,
+                    after_s,
+                )),
+            }
         }
         if !quiet {
+            for angle in &plan.angle {
+                say!("{}", angle.sentence());
+            }
             print_want(&plan);
         }
     }
@@ -164,47 +189,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
     }
     super::write_json(arguments.json.as_ref(), &plan)
-}
-
-fn wishes(text: &str) -> Result<Vec<(Term, f64)>> {
-    let bad = |item: &str| {
-        miette::miette!(
-            help = "write `--want \"K within 20 %\"`; the terms are N, B and K",
-            "--want: `{}` is not of the form `TERM within X %`",
-            item.trim()
-        )
-    };
-    text.split(',')
-        .map(|item| {
-            let words: Vec<&str> = item.split_whitespace().collect();
-            let (letter, percent) = match words[..] {
-                [letter, "within", percent] => (letter, percent.trim_end_matches('%')),
-                [letter, "within", percent, "%"] => (letter, percent),
-                _ => return Err(bad(item)),
-            };
-            let term = match letter {
-                "N" | "n" => Term::White,
-                "B" | "b" => Term::Flicker,
-                "K" | "k" => Term::RandomWalk,
-                _ => return Err(bad(item)),
-            };
-            let percent: f64 = percent.parse().map_err(|_| bad(item))?;
-            if percent > 0.0 && percent <= 100.0 {
-                Ok((term, percent))
-            } else {
-                Err(bad(item))
-            }
-        })
-        .collect()
-}
-
-fn letter(term: Term) -> &'static str {
-    match term {
-        Term::White => "N",
-        Term::Flicker => "B",
-        Term::RandomWalk => "K",
-        Term::Quantization => "Q",
-    }
 }
 
 /// What is known of the noise: of a capture, a model file, or the paper's.
@@ -243,12 +227,21 @@ fn noise(arguments: &Arguments) -> Result<Noise> {
         .filter(|e| e.channels.is_empty() || e.channels.contains(&channel.name))
         .find_map(|e| e.parameters.get("bias_instability"))
         .map_or(0.0, |p| p.value / 3600.0);
+    let r = model
+        .effects
+        .iter()
+        .filter(|e| e.cause == "rate_ramp")
+        .filter(|e| e.channels.is_empty() || e.channels.contains(&channel.name))
+        .find_map(|e| e.parameters.get("slope"))
+        .map_or(0.0, |p| p.value);
     Ok(Noise {
         from: format!("{from}, {}", channel.name),
         rate_hz: arguments.input.rate.unwrap_or(model.rate_hz),
         n: baseline("angle_random_walk") / 60.0,
         b,
         k: baseline("rate_random_walk"),
+        q: baseline("quantization_noise"),
+        r,
         notes: Vec::new(),
     })
 }
@@ -280,50 +273,49 @@ fn of_capture(arguments: &Arguments, path: &std::path::Path) -> Result<Noise> {
         sampling.tau0,
     ));
     let mut notes = Vec::new();
-    let mut value = |term: Term| {
-        let e = found.term(term);
+    let mut value = |name: &str, unit: &str, e: analysis::noise_fit::Estimated| {
         e.value.unwrap_or_else(|| {
             notes.push(format!(
-                "{} is not established in this capture: planned as absent, it is {:.2e} deg/s{} at the most",
-                letter(term),
-                e.high,
-                if term == Term::RandomWalk { "/sqrt(s)" } else { "" }
+                "{name} is not established in this capture: planned as absent, it is {:.2e} {unit} at the most",
+                e.high
             ));
             0.0
         })
     };
-    let (n, b, k) = (
-        value(Term::White),
-        value(Term::Flicker),
-        value(Term::RandomWalk),
-    );
+    let n = value("N", "deg/s*sqrt(s)", found.term(Term::White));
+    let b = value("B", "deg/s", found.term(Term::Flicker));
+    let k = value("K", "deg/s/sqrt(s)", found.term(Term::RandomWalk));
+    let q = value("Q", "deg", found.term(Term::Quantization));
+    let r = value("R", "deg/s/s", found.rate_ramp);
     Ok(Noise {
         from: format!("{}, {}", super::name(path), channel.name),
         rate_hz: 1.0 / sampling.tau0,
         n,
         b,
         k,
+        q,
+        r,
         notes,
     })
 }
 
-fn want(noise: &Noise, term: Term, within_percent: f64, arguments: &Arguments) -> Result<Wanted> {
+fn want(
+    noise: &Noise,
+    letter: Letter,
+    within_percent: f64,
+    arguments: &Arguments,
+) -> Result<Wanted> {
     let known = noise.known();
-    let size = match term {
-        Term::White => noise.n,
-        Term::Flicker => noise.b,
-        _ => noise.k,
-    };
-    if size <= 0.0 {
+    if letter.size(&known) <= 0.0 {
         miette::bail!(
             help = "plan from a longer capture, or write a model file with the size you expect and give it by --model",
             "how long it takes to measure {} depends on its size, which {} does not tell",
-            letter(term),
+            letter.name(),
             noise.from
         );
     }
     let relative = within_percent / 100.0 / Z_95;
-    let at = |rate: f64| seconds_for(&known, rate, term, relative).map_err(super::explain);
+    let at = |rate: f64| seconds_for(&known, rate, letter, relative).map_err(super::explain);
     let rate = noise.rate_hz;
     let seconds = at(rate)?;
     let seconds_at = [(rate / 4.0, at(rate / 4.0)?), (rate * 4.0, at(rate * 4.0)?)];
@@ -331,7 +323,7 @@ fn want(noise: &Noise, term: Term, within_percent: f64, arguments: &Arguments) -
         None => None,
         Some(records) => Some(check(
             noise,
-            term,
+            letter,
             within_percent,
             seconds,
             records,
@@ -339,7 +331,7 @@ fn want(noise: &Noise, term: Term, within_percent: f64, arguments: &Arguments) -
         )?),
     };
     Ok(Wanted {
-        term: letter(term),
+        term: letter.name(),
         within_percent,
         seconds,
         seconds_at,
@@ -349,7 +341,7 @@ fn want(noise: &Noise, term: Term, within_percent: f64, arguments: &Arguments) -
 
 fn check(
     noise: &Noise,
-    term: Term,
+    letter: Letter,
     within_percent: f64,
     seconds: f64,
     records: usize,
@@ -366,24 +358,25 @@ fn check(
         n: noise.n,
         b: noise.b,
         k: noise.k,
-        ..Truth::default()
+        q: noise.q,
+        r: noise.r,
     };
     let samples = samples as usize;
     let tau0 = 1.0 / noise.rate_hz;
-    let size = match term {
-        Term::White => noise.n,
-        Term::Flicker => noise.b,
-        _ => noise.k,
-    };
+    let size = letter.size(&noise.known());
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(arguments.seed);
     let kept = (0..records)
         .filter(|_| {
             let y = truth.record(samples, tau0, &mut rng);
             let found = fit(&Spectrum::of(&y, std::slice::from_ref(&(0..samples)), tau0));
-            found
-                .term(term)
-                .value
-                .is_some_and(|v| (v / size - 1.0).abs() <= within_percent / 100.0)
+            let value = match letter {
+                Letter::N => found.term(Term::White).value,
+                Letter::B => found.term(Term::Flicker).value,
+                Letter::K => found.term(Term::RandomWalk).value,
+                Letter::Q => found.term(Term::Quantization).value,
+                Letter::R => found.rate_ramp.value.map(f64::abs),
+            };
+            value.is_some_and(|v| (v / size - 1.0).abs() <= within_percent / 100.0)
         })
         .count();
     Ok(kept as f64 / records.max(1) as f64)
@@ -429,23 +422,17 @@ fn print_want(plan: &Plan) {
     lengths.sort_by(f64::total_cmp);
     for seconds in lengths {
         let e = expected(&plan.noise.known(), plan.noise.rate_hz, seconds);
-        let part = |name: &str, relative: Option<f64>| {
-            relative.map_or(format!("{name} absent"), |r| {
-                // Beyond this the symmetric interval means nothing: the term is not established.
-                if Z_95 * r > 1.0 {
-                    format!("{name} not established")
-                } else {
-                    format!("{name} +- {:.2} %", 100.0 * Z_95 * r)
-                }
+        let parts = Letter::ALL.into_iter().filter_map(|letter| {
+            let relative = e.of(letter)?;
+            // Beyond this the symmetric interval means nothing: the term is not established.
+            Some(if Z_95 * relative > 1.0 {
+                format!("{} not established", letter.name())
+            } else {
+                format!("{} +- {:.2} %", letter.name(), 100.0 * Z_95 * relative)
             })
-        };
-        say!(
-            "    {:>9}  {:<16} {:<22} {}",
-            duration(seconds),
-            part("N", e.n),
-            part("B", e.b),
-            part("K", e.k)
-        );
+        });
+        let line: String = parts.map(|part| format!("{part:<20}")).collect();
+        say!("    {:>9}  {}", duration(seconds), line.trim_end());
     }
 }
 
