@@ -543,20 +543,3 @@ fn print_separate(plan: &Plan) {
         "least sizes that can work: a random walk refitted under each hypothesis takes a part of d"
     );
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn wishes_are_read_and_what_is_none_is_told() {
-        assert_eq!(
-            wishes("K within 20 %, N within 1%").unwrap(),
-            [(Term::RandomWalk, 20.0), (Term::White, 1.0)]
-        );
-        for bad in ["", "K 20", "R within 5 %", "K within 0 %", "K within x %"] {
-            let error = wishes(bad).unwrap_err().to_string();
-            assert!(error.contains("TERM within X %"), "{bad}: {error}");
-        }
-    }
-}

@@ -121,8 +121,12 @@ mod tests {
     #[test]
     fn wishes_are_read_as_people_write_them_and_nothing_else_is() {
         assert_eq!(
-            wishes("q within 5%, angle within 0.5 deg after 60 s").unwrap(),
+            wishes("K within 20 %, q within 5%, angle within 0.5 deg after 60 s").unwrap(),
             [
+                Wish::Term {
+                    letter: Letter::K,
+                    within_percent: 20.0
+                },
                 Wish::Term {
                     letter: Letter::Q,
                     within_percent: 5.0
@@ -134,7 +138,9 @@ mod tests {
             ]
         );
         for bad in [
-            "K",
+            "",
+            "K 20",
+            "K within x %",
             "K within 0 %",
             "X within 5 %",
             "angle within 2 rad after 5 s",
