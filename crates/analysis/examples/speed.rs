@@ -26,7 +26,7 @@ fn memory(key: &str) -> f64 {
     let kb = text.lines().find_map(|l| l.strip_prefix(key));
     kb.and_then(|l| l.split_whitespace().nth(1))
         .and_then(|v| v.parse::<f64>().ok())
-        .map_or(f64::NAN, |kb| kb / 1024.0)
+        .map_or(f64::NAN, |kb| kb * 1.024e-3)
 }
 
 fn planted(what: &str, rate_hz: f64) -> Vec<EffectModel> {
