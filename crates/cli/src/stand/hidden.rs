@@ -246,15 +246,18 @@ fn fault(
             step_dps: sign * sizes.draw(rng, 0.3, 0.8),
             tilt_deg: uniform(rng, 0.0, 1.0),
         },
-        Hidden::Stall | Hidden::SilentStall => Fault::Stall {
+        Hidden::Stall => Fault::Stall {
             gyro,
             count: 15 + uniform(rng, 0.0, 25.0) as usize,
             length_s: uniform(rng, 0.1, 0.4),
-            flags: if hidden == Hidden::Stall {
-                StallFlags::NewDataClear
-            } else {
-                StallFlags::Silent
-            },
+            flags: StallFlags::NewDataClear,
+        },
+        // Neighbours are alike by chance some 600 times in 12 000.
+        Hidden::SilentStall => Fault::Stall {
+            gyro,
+            count: sizes.draw(rng, 60.0, 240.0) as usize,
+            length_s: uniform(rng, 0.1, 0.4),
+            flags: StallFlags::Silent,
         },
         Hidden::WarmUp => Fault::WarmUp {
             gyro,
