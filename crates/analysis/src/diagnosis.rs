@@ -8,12 +8,14 @@ use model::effects::{EFFECTS, effect};
 use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
 use model::record::Record;
 
-use crate::audit::audit;
+use crate::audit::{audit, sign_bit};
 use crate::checks::{self, LEAST_CHANCE};
 use crate::common::{Shared, common};
 use crate::error::AnalysisError;
 use crate::estimate;
-use crate::findings::{joined, motion_finding, scale_finding, term_findings, variance_finding};
+use crate::findings::{
+    blows, joined, motion_finding, scale_finding, term_findings, variance_finding,
+};
 use crate::grid::{Grid, Target, lay_out};
 use crate::likelihood::Panel;
 use crate::result::{
@@ -70,12 +72,15 @@ pub(crate) struct VarianceFound {
 /// [`AnalysisError::Inconclusive`] when the record is too short, [`AnalysisError::NoChannel`] when it holds no gyro,
 /// [`AnalysisError::NoRate`] when its sample rate is unknown, [`AnalysisError::Constant`] when a gyro never changes.
 pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed, AnalysisError> {
+    let (mended, sticking) = sign_bit::mend(record);
+    let record = &*mended;
     let audited = audit(record);
     let record = &*losses::renumbered(record, &audited);
     let grid = lay_out(record, &|name| audited.masked(name), options.seed)?;
     let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();
     grid.dct.forget();
-    let mut findings = losses::findings(&audited, &searched, &grid);
+    let mut findings = sticking;
+    findings.extend(losses::findings(&audited, &searched, &grid));
     let mut scale_not_tested = vec![];
     let mut checks: Vec<Check> = searched
         .iter_mut()
@@ -100,7 +105,10 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             }));
         }
         let of_terms = term_findings(s, &grid, options.seed);
-        let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance_finding(s), &failing);
+        // A bit that sticks makes a noise of its own, which depends on the level.
+        let by_counts = audited.is_suppressed("variance_in_time", &s.target.name);
+        let variance = variance_finding(s).filter(|_| !by_counts);
+        let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance, &failing);
         findings.extend(kept);
         nearest.extend(doubted);
         doubts.extend(told);
@@ -134,7 +142,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     };
     unexplained.extend(audited.not_normal.into_iter().filter(|u| !bent(&u.channel)));
     findings.extend(shared.finding);
-    let findings = joined(findings);
+    let findings = joined(blows(findings));
     let mut not_tested = not_tested(&searched);
     not_tested.extend(scale_not_tested);
     not_tested.extend(audited.not_tested);

@@ -179,6 +179,39 @@ pub(crate) fn motion_finding(s: &Searched<'_>, grid: &Grid) -> Option<Finding> {
 }
 
 /// One finding for one event on several channels, and for one cause on one channel by several terms.
+/// Longest that a blow lasts that shifts a bias, s: far readings within it of the step are the blow itself.
+const BLOW_S: f64 = 1.0;
+
+/// Far readings that lie all at a step of the same channel are told with the step, not as a cause of their own.
+pub(crate) fn blows(mut findings: Vec<Finding>) -> Vec<Finding> {
+    let step = |f: &Finding| f.parameters.get("time").map(|p| p.value);
+    let steps: Vec<(String, f64)> = findings
+        .iter()
+        .filter(|f| f.cause == "bias_step")
+        .filter_map(|f| Some((f.channels.first()?.clone(), step(f)?)))
+        .collect();
+    for (channel, at) in steps {
+        let of_it = |f: &mut Finding| {
+            f.cause == "outliers"
+                && f.channels == [channel.as_str()]
+                && !f.times_s.is_empty()
+                && f.times_s.iter().all(|t| (t - at).abs() < BLOW_S)
+        };
+        let blow: Vec<Finding> = findings.extract_if(.., of_it).collect();
+        let own = findings
+            .iter_mut()
+            .find(|f| f.cause == "bias_step" && f.channels[0] == channel && step(f) == Some(at));
+        if let Some(f) = own.filter(|_| !blow.is_empty()) {
+            let count: usize = blow.iter().map(|b| b.times_s.len()).sum();
+            f.what = format!(
+                "{}; {count} far readings within {BLOW_S} s of it are the blow",
+                f.what
+            );
+        }
+    }
+    findings
+}
+
 pub(crate) fn joined(findings: Vec<Finding>) -> Vec<Finding> {
     let mut all: Vec<Finding> = vec![];
     for f in findings {

@@ -6,14 +6,15 @@
 //! A bit that sticks moves the share of ones. With the reading normal about what its neighbours predict, L, the square
 //! wave s of period P = 2^(b+1) (+1 where bit b is 0) has the mean
 //! E s = sum over odd m of 4/(pi m) exp(-2 pi^2 sigma^2 m^2 / P^2) sin(2 pi m (L + 1/2) / P),
-//! nearly 0 for the lowest bits and far from it where P exceeds 4 sigma. A bit stuck at v in a share f of the samples
-//! moves the share of ones q to q + f (v - q).
+//! nearly 0 for the lowest bits and far from it where P exceeds 4 sigma. That shows that the counts are not what they
+//! should be; which bit sticks is decided by the likelihood of the counts ([`super::stuck`]), for a high one moves the level
+//! and the spread that the share of a lower one is judged by.
 
 use std::f64::consts::PI;
 
 use model::Parameter;
-use statrs::distribution::{ContinuousCDF, Normal};
 
+use super::stuck::Tally;
 use super::{Audit, Gyro, LEAST_READINGS, tails};
 use crate::audit::local::{Levels, Local};
 use crate::result::{Alternative, Finding, Unexplained};
@@ -26,9 +27,6 @@ const ON_GRID: f64 = 0.97;
 const WITHIN_SIGMA: f64 = 2.0;
 /// Least noise, counts: below it the level decides even the lowest bit.
 const LEAST_SIGMA: f64 = 0.9;
-/// Rounds in which the level is freed of the shift that the sticking bit itself makes.
-const ROUNDS: usize = 6;
-
 /// Coarse grid that the counts lie on.
 struct Coarse {
     bits: u32,
@@ -78,7 +76,7 @@ fn coarse(counts: &[i32], known: &[bool]) -> Option<Coarse> {
 }
 
 /// Mean of a square wave (+1 in the first half of its period) of normal readings, rounded.
-struct Square {
+pub(super) struct Square {
     /// 2 pi over the period.
     turn: f64,
     /// Of sin(m turn (level + 1/2)), m = 1, 3, 5, ...
@@ -86,7 +84,7 @@ struct Square {
 }
 
 impl Square {
-    fn new(sigma: f64, period: f64) -> Self {
+    pub(super) fn new(sigma: f64, period: f64) -> Self {
         let mut sizes = vec![];
         for j in 0..200 {
             let m = f64::from(2 * j + 1);
@@ -102,7 +100,7 @@ impl Square {
     }
 
     /// Under N(`level`, sigma^2).
-    fn at(&self, level: f64) -> f64 {
+    pub(super) fn at(&self, level: f64) -> f64 {
         let (sine, cosine) = (self.turn * (level + 0.5)).sin_cos();
         // sin (m + 2)x = 2 cos 2x sin mx - sin (m - 2)x.
         let twice = 2.0 * (1.0 - 2.0 * sine * sine);
@@ -133,55 +131,34 @@ fn unrounded(local: &Local) -> f64 {
 }
 
 /// A bit whose share of ones the noise does not explain.
-struct Stuck {
+struct Share {
     bit: u32,
     value: u8,
-    fraction: f64,
-    error: f64,
     z: f64,
 }
 
-/// Share of ones of a bit against the expected one. A bit that sticks moves the level too: in the share f of the
-/// samples by 2^b times the chance that it would have been the other. `from` is an estimate that frees the level of it.
-fn stuck(
-    ones: f64,
-    levels: &Levels,
-    unrounded: f64,
-    bit: u32,
-    from: Option<&Stuck>,
-) -> Option<Stuck> {
-    let weight = f64::from(1u32 << bit);
-    // Of the samples that would read otherwise, about half, the share f is moved: that widens the spread as well.
-    let moved = from.map_or(0.0, |s| 0.5 * s.fraction * (1.0 - 0.5 * s.fraction));
-    let sigma = (unrounded * unrounded - weight * weight * moved)
-        .max(0.25 * unrounded * unrounded)
-        .sqrt();
-    let square = Square::new(sigma, 2.0 * weight);
-    let one = |level: f64| 0.5 * (1.0 - square.at(level));
-    let (mut expected, mut variance, mut n) = (0.0, 0.0, 0.0);
+/// Share of ones of a bit against the expected one.
+fn share(ones: f64, levels: &Levels, bit: u32, sigma: f64) -> Option<Share> {
+    let square = Square::new(sigma, 2.0 * f64::from(1u32 << bit));
+    let (mut expected, mut variance) = (0.0, 0.0);
     for (level, readings) in levels.iter() {
-        let shift = from.map_or(0.0, |s| {
-            weight * s.fraction * (f64::from(s.value) - one(level))
-        });
-        let p = one(level - shift);
+        let p = 0.5 * (1.0 - square.at(level));
         expected += readings * p;
         variance += readings * p * (1.0 - p);
-        n += readings;
     }
-    if n == 0.0 || variance <= 0.0 {
-        return None;
-    }
-    let (q, share, spread) = (expected / n, ones / n, variance.sqrt() / n);
-    let high = share > q;
-    let room = if high { 1.0 - q } else { q };
-    Some(Stuck {
+    (variance > 0.0).then(|| Share {
         bit,
-        value: u8::from(high),
-        fraction: ((share - q).abs() / room).min(1.0),
-        error: spread / room,
-        z: (share - q) / spread,
+        value: u8::from(ones > expected),
+        z: (ones - expected) / variance.sqrt(),
     })
 }
+
+/// Nats by which a bit that sticks has to describe the counts better than sound ones.
+const CLEARLY_STUCK: f64 = 12.0;
+
+/// Share of what any shape or any code of its own gains over sound counts that it has to gain: the level is only known
+/// to what its neighbours tell, which a hard edge between codes shows.
+const NEARLY_ALL: f64 = 0.95;
 
 /// Half width of the kernel of the smooth density, in sigma: wide against the comb that a low bit makes.
 const KERNEL: f64 = 0.5;
@@ -192,40 +169,12 @@ const CLEARLY_NOT_NORMAL: f64 = 20.0;
 /// gains 0.07.
 const BY_READING: f64 = 0.003;
 
-/// Log likelihood of the counts when a bit sticks: a code takes the share f of the one that differs in that bit alone.
-fn stuck_likelihood(counts: &[i32], local: &Local, known: &[bool], s: &Stuck) -> f64 {
-    let weight = f64::from(1u32 << s.bit);
-    let moved = 0.5 * s.fraction * (1.0 - 0.5 * s.fraction);
-    let whole = unrounded(local);
-    let sigma = (whole * whole - weight * weight * moved)
-        .max(0.25 * whole * whole)
-        .sqrt();
-    let normal = Normal::standard();
-    let square = Square::new(sigma, 2.0 * weight);
-    let one = |level: f64| 0.5 * (1.0 - square.at(level));
-    (0..counts.len())
-        .filter(|i| known[*i])
-        .map(|i| {
-            let (c, at) = (counts[i], local.level[i]);
-            let level = at - weight * s.fraction * (f64::from(s.value) - one(at));
-            let mass = |c: i32| {
-                let z = (f64::from(c) - level) / sigma;
-                normal.cdf(z + 0.5 / sigma) - normal.cdf(z - 0.5 / sigma)
-            };
-            let p = if (c >> s.bit) & 1 == i32::from(s.value) {
-                mass(c) + s.fraction * mass(c ^ (1 << s.bit))
-            } else {
-                (1.0 - s.fraction) * mass(c)
-            };
-            p.max(1e-12).ln()
-        })
-        .sum()
-}
-
 /// Log likelihood of the same counts when their distances from their level have one smooth density, whatever its shape:
 /// a kernel estimate of the others, its spread kept.
 fn smooth_likelihood(local: &Local, known: &[bool]) -> f64 {
-    const BINS_PER_COUNT: f64 = 4.0;
+    /// A quarter of a count, or of a wide spread a sixteenth of the kernel.
+    const FINEST: f64 = 0.25;
+    const OF_KERNEL: f64 = 1.0 / 16.0;
     let r: Vec<f64> = (0..known.len())
         .filter(|i| known[*i])
         .map(|i| local.residual[i])
@@ -236,8 +185,9 @@ fn smooth_likelihood(local: &Local, known: &[bool]) -> f64 {
     let h = KERNEL * variance.sqrt();
     let shrink = (1.0 / (1.0 + KERNEL * KERNEL)).sqrt();
     let h_shrunk = h * shrink;
-    let reach = (6.0 * variance.sqrt() * BINS_PER_COUNT).ceil() as i64;
-    let bin = |v: f64| ((v - mean) * BINS_PER_COUNT).round() as i64;
+    let width = FINEST.max(OF_KERNEL * h);
+    let reach = (6.0 * variance.sqrt() / width).ceil() as i64;
+    let bin = |v: f64| ((v - mean) / width).round() as i64;
     let mut tally = vec![0.0; 2 * reach as usize + 1];
     for v in &r {
         tally[(bin(mean + (v - mean) * shrink).clamp(-reach, reach) + reach) as usize] += 1.0;
@@ -249,7 +199,7 @@ fn smooth_likelihood(local: &Local, known: &[bool]) -> f64 {
                 .iter()
                 .zip(-reach..)
                 .filter(|(t, _)| **t > 0.0)
-                .map(|(t, b)| t * kernel((a - b) as f64 / BINS_PER_COUNT))
+                .map(|(t, b)| t * kernel((a - b) as f64 * width))
                 .sum()
         })
         .collect();
@@ -333,9 +283,9 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         own.map(|(c, _)| u64::from(((c >> bit) & 1) as u32))
             .sum::<u64>() as f64
     };
-    let tested: Vec<Stuck> = (0..BITS)
+    let tested: Vec<Share> = (0..BITS)
         .filter(|b| sigma >= LEAST_SIGMA && f64::from(1u32 << b) <= WITHIN_SIGMA * sigma)
-        .filter_map(|b| stuck(ones(b), &levels, sigma, b, None))
+        .filter_map(|b| share(ones(b), &levels, b, sigma))
         .collect();
     let Some(worst) = tested.iter().max_by(|a, b| a.z.abs().total_cmp(&b.z.abs())) else {
         audit.untested(
@@ -345,55 +295,50 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         return;
     };
     let chance = (tested.len() as f64 * tails::two_sided(worst.z)).min(1.0);
-    let z = worst.z;
-    let own = ones(worst.bit);
-    let mut freed: Option<Stuck> = None;
-    for _ in 0..ROUNDS {
-        let from = freed.as_ref().unwrap_or(worst);
-        freed =
-            stuck(own, &levels, sigma, worst.bit, Some(from)).filter(|s| s.value == worst.value);
-        if freed.is_none() {
-            break;
-        }
+    let told = |z: f64, what: &str| {
+        format!(
+            "bit {} of {name} reads {} more often than normal noise makes it ({z:.1} sigma){what}",
+            worst.bit, worst.value
+        )
+    };
+    if !audit.check("bit_share", name, worst.z, chance, told(worst.z.abs(), "")) {
+        return;
     }
-    let worst = freed.as_ref().unwrap_or(worst);
-    let what = format!(
-        "bit {} of {name} reads {} too often: it sticks in {:.1} +- {:.1} % of the samples ({:.1} sigma)",
-        worst.bit,
-        worst.value,
-        100.0 * worst.fraction,
-        100.0 * worst.error,
-        z.abs()
-    );
-    if audit.check("bit_share", name, z, chance, what.clone()) {
-        let smooth = smooth_likelihood(local, &known).max(code_likelihood(counts, &known));
-        if stuck_likelihood(counts, local, &known, worst) < smooth {
-            let sound = Stuck {
-                fraction: 0.0,
-                ..*worst
-            };
-            let gained = smooth - stuck_likelihood(counts, local, &known, &sound);
-            if gained < CLEARLY_NOT_NORMAL.max(BY_READING * counts.len() as f64) {
-                return;
-            }
+    let tally = Tally::new(counts, local, &known);
+    let sound = tally.sound(sigma);
+    let smooth = smooth_likelihood(local, &known).max(code_likelihood(counts, &known));
+    match tally.best(sigma, BITS) {
+        Some(s) if s.log_likelihood - sound > CLEARLY_STUCK.max(NEARLY_ALL * (smooth - sound)) => {
+            audit.findings.push(Finding {
+                cause: "stuck_bit".into(),
+                channels: vec![name.into()],
+                parameters: parameters(s.bit, s.value, s.fraction, Some(s.error)),
+                what: format!(
+                    "bit {} of {name} reads {} too often: it sticks in {:.1} +- {:.1} % of the samples",
+                    s.bit,
+                    s.value,
+                    100.0 * s.fraction,
+                    100.0 * s.error,
+                ),
+                ..Finding::default()
+            });
+            audit.suppress(
+                &["outliers", "kurtosis", "variance_in_time"],
+                name,
+                "stuck_bit",
+            );
+        }
+        _ if smooth - sound > CLEARLY_NOT_NORMAL.max(BY_READING * counts.len() as f64) => {
             audit.not_normal.push(Unexplained {
                 channel: name.into(),
                 what: format!(
                     "the counts of {name} are not normally distributed about their level ({:.1} sigma at bit {}), and no bit that sticks makes them so",
-                    z.abs(),
+                    worst.z.abs(),
                     worst.bit
                 ),
             });
-            return;
         }
-        audit.findings.push(Finding {
-            cause: "stuck_bit".into(),
-            channels: vec![name.into()],
-            parameters: parameters(worst.bit, worst.value, worst.fraction, Some(worst.error)),
-            what,
-            ..Finding::default()
-        });
-        audit.suppress(&["outliers", "kurtosis"], name, "stuck_bit");
+        _ => {}
     }
 }
 
@@ -411,6 +356,7 @@ fn parameters(bit: u32, value: u8, fraction: f64, error: Option<f64>) -> model::
 #[cfg(test)]
 mod tests {
     use super::*;
+    use statrs::distribution::{ContinuousCDF, Normal};
 
     #[test]
     fn the_square_wave_agrees_with_a_sum_over_codes() {

@@ -10,6 +10,8 @@ pub mod local;
 mod outliers;
 mod repeats;
 mod saturation;
+pub mod sign_bit;
+mod stuck;
 pub mod tails;
 mod timing;
 

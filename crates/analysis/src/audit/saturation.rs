@@ -142,4 +142,6 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     audit
         .findings
         .retain(|f| !(f.cause == "stuck_bit" && f.channels[0] == name));
+    // A tail that is cut off is not normal either.
+    audit.not_normal.retain(|u| u.channel != name);
 }

@@ -3,6 +3,12 @@
 use super::{Form, Search, State, Term};
 use crate::{scan, threshold};
 
+/// The points of a grid beside one of it.
+pub(super) fn neighbours(grid: &[f64], at: f64) -> (f64, f64) {
+    let i = grid.iter().position(|g| *g == at).unwrap_or(0);
+    (grid[i.saturating_sub(1)], grid[(i + 1).min(grid.len() - 1)])
+}
+
 impl Search<'_> {
     /// Build the columns of a scanned term and refine its location.
     pub(super) fn refine(&self, state: &State, mut term: Term) -> Term {
@@ -28,9 +34,7 @@ impl Search<'_> {
                     .collect(),
             ],
             Form::Shaped(shape, at) => {
-                let grid = shape.grid();
-                let i = grid.iter().position(|g| *g == *at).unwrap_or(0);
-                let (low, high) = (grid[i.saturating_sub(1)], grid[(i + 1).min(grid.len() - 1)]);
+                let (low, high) = neighbours(&shape.grid(), *at);
                 let make = |x: f64| -> Vec<Vec<f64>> {
                     shape
                         .columns(x.exp())

@@ -1,11 +1,32 @@
 //! What the search says of its own answer: effects that would do as well, and crowds of terms that no one cause makes.
 
+use std::f64::consts::PI;
+
 use model::effect::Hypothesis;
 
 use super::{Form, MOST_ALIKE, RIVAL_SPAN, Search, State};
 
 /// Span of a crowd of lines over their frequency, below which they are one that wanders.
 const WANDERING: f64 = 0.02;
+
+/// Largest harmonic that is sought; a higher one would fit too many frequencies.
+const HIGHEST_HARMONIC: u32 = 7;
+
+/// Of two lines of (frequency in Hz, likelihood ratio), the lower one and the multiple of it at which the other lies
+/// within three standard errors of a frequency, sqrt(3 / LR) / (pi T) each; `per_record` is 1 / T. Two lines with
+/// nothing to do with each other meet that by chance only.
+fn harmonics(lines: &[(f64, f64)], per_record: f64) -> Option<(f64, u32)> {
+    let [a, b] = lines else {
+        return None;
+    };
+    let (low, high) = if a.0 < b.0 { (a, b) } else { (b, a) };
+    let error = |l: &(f64, f64)| per_record / PI * (3.0 / l.1.max(3.0)).sqrt();
+    (2..=HIGHEST_HARMONIC).find_map(|k| {
+        let off = (high.0 - f64::from(k) * low.0).abs();
+        let limit = 3.0 * (f64::from(k) * error(low)).hypot(error(high));
+        (off < limit).then_some((low.0, k))
+    })
+}
 
 impl Search<'_> {
     /// More lines or more steps than separate causes make are one structure that the library does not have: the
@@ -21,6 +42,12 @@ impl Search<'_> {
                 _ => None,
             })
             .collect();
+        if let Some((low, times)) = harmonics(&lines, self.view.rate_hz / self.panel.bins.n as f64)
+        {
+            notes.push(format!(
+                "lines at {low:.4} Hz and {times} times that: one motion that repeats, and is no sine"
+            ));
+        }
         if lines.len() > MOST_ALIKE {
             let (low, high) = lines
                 .iter()

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use model::effect::Hypothesis;
+use model::effect::{Hypothesis, Shape};
 
 use super::{Candidate, FASTEST_BEAT_HZ, Form, LEAST_BEATS, LEAST_CYCLES, Search, State, Term};
 use crate::likelihood::Noise;
@@ -69,6 +69,12 @@ impl Search<'_> {
                     .max_by(|a, b| a.2.total_cmp(&b.2))?;
                 let names: Vec<_> = shape.columns(at).iter().map(|c| c.parameter).collect();
                 let limit = threshold::shaped(names.len());
+                // Between the points of the grid it may be much better: what is a rival is weighed at its best.
+                let lr = if lr > limit {
+                    lr.max(2.0 * (self.between(walks, &own, shape.as_ref(), at) - null))
+                } else {
+                    lr
+                };
                 Some(term(
                     Form::Shaped(Arc::clone(shape), at),
                     columns.clone(),
@@ -162,6 +168,31 @@ impl Search<'_> {
             }
             _ => None,
         }
+    }
+
+    /// Highest log likelihood of a shape near the point `at` of its grid.
+    fn between(
+        &self,
+        walks: &[(Noise, Vec<f64>, f64)],
+        own: &[usize],
+        shape: &dyn Shape,
+        at: f64,
+    ) -> f64 {
+        const STEPS: usize = 6;
+        let width = self.panel.width();
+        let minus_l = |x: f64| {
+            let added: Vec<usize> = shape
+                .columns(x.exp())
+                .iter()
+                .map(|c| self.panel.add(&c.values))
+                .collect();
+            let l = self.panel.profile(walks, &[own, &added].concat());
+            self.panel.truncate(width);
+            -l
+        };
+        let (low, high) = super::refine::neighbours(&shape.grid(), at);
+        let best = crate::optimise::golden(&minus_l, low.ln(), high.ln(), STEPS);
+        -minus_l(best)
     }
 
     /// Whether a candidate may still join.
