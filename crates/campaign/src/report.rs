@@ -237,7 +237,10 @@ goes; the names were 5 steps for those two and 4 AM lines for that line.
 Kept back, second set (2026-11-21): the other 14, from \"stick and slip\" on. They were written, from physics and
 mathematics, after that change and by someone who had not read how the diagnosis decides; 44 runs were made to see that
 they can be drawn, by which one was put right (temperature times supply then held a true term in temperature alone) and
-nothing else was changed. A test holds that no effect of the library describes 95 % of what each adds to the likelihood.";
+nothing else was changed. A test holds that no effect of the library describes 95 % of what each adds to the likelihood.
+First graded on 2026-11-21 with seed 16172907664231, which nothing was changed after: 247 of 276 unexplained, 30 named.
+Nineteen of those names are one effect, the swing without a period, told as gauss_markov (13) or telegraph (6); no check
+of the residual is left that fails on them.";
 
 fn bars(out: &mut String, all: &[Outcome]) {
     let clean = Rate::of(
