@@ -158,6 +158,17 @@ pub fn read_text(path: &Path) -> Result<String> {
     })
 }
 
+/// Reads a model file.
+pub fn read_model(path: &Path) -> Result<model::ModelFile> {
+    model::ModelFile::parse(&read_text(path)?).map_err(|error| {
+        miette::miette!(
+            help = "docs/model-file.md lists keys, effects and units",
+            "{}: {error}",
+            path.display()
+        )
+    })
+}
+
 /// Writes a text file.
 pub fn write(path: &Path, text: &str) -> Result<()> {
     std::fs::write(path, text).map_err(|error| {

@@ -13,7 +13,7 @@ use analysis::{AnalyzeOptions, DiagnoseOptions};
 use clap::Args;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
-use imu_stand::stand::{Board, Hidden, Plan, Sizes, plan, run_native};
+use imu_stand::stand::{Board, Hidden, Plan, Sizes, plan, plan_fitted, run_native};
 use imu_stand::{text, write_capture};
 use indicatif::{ProgressBar, ProgressStyle};
 #[cfg(unix)]
@@ -37,6 +37,10 @@ pub struct Arguments {
     /// What to hide in the stand
     #[arg(long, value_enum, default_value_t = Hidden::Random)]
     hide: Hidden,
+    /// Hide nothing, but give the parts the errors of this model file, as `diagnose --model-out` writes it: the
+    /// firmware meets the sensors that were fitted
+    #[arg(long, value_name = "FILE", conflicts_with = "hide")]
+    model: Option<PathBuf>,
     /// Length, s
     #[arg(long, default_value_t = 600.0)]
     seconds: f64,
@@ -87,12 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         );
     }
     may_be_written(&arguments.out)?;
-    let plan = plan(
-        arguments.hide,
-        Sizes::Visible,
-        arguments.seconds,
-        arguments.seed,
-    );
+    let plan = planned(arguments)?;
     let bar = if arguments.quiet {
         ProgressBar::hidden()
     } else {
@@ -186,15 +185,30 @@ fn is_simulated(path: &Path) -> bool {
     has("# format: imu-stand-capture/") && !has("# start_unix_s:")
 }
 
+/// What was asked for: a fault, or the parts of a model file.
+fn planned(arguments: &Arguments) -> Result<Plan> {
+    let (seconds, seed) = (arguments.seconds, arguments.seed);
+    let Some(path) = &arguments.model else {
+        return Ok(plan(arguments.hide, Sizes::Visible, seconds, seed));
+    };
+    let model = super::read_model(path)?;
+    let (plan, carried) = plan_fitted(&model, seconds, seed).map_err(|error| {
+        miette::miette!(
+            help = "`imu-stand simulate --model` makes a capture of any model",
+            "{}: {error}",
+            path.display()
+        )
+    })?;
+    for what in &carried.not {
+        eprintln!("warning: not on the stand: {what}");
+    }
+    Ok(plan)
+}
+
 #[cfg(unix)]
 fn serve(board: Board, arguments: &Arguments) -> Result<()> {
     use imu_stand::pty::{self, Line, PtyError};
-    let mut plan = plan(
-        arguments.hide,
-        Sizes::Visible,
-        arguments.seconds,
-        arguments.seed,
-    );
+    let mut plan = planned(arguments)?;
     // Whoever opens the port drives the motor.
     plan.run.requests.clear();
     let stop = Arc::new(AtomicBool::new(false));

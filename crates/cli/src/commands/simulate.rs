@@ -34,16 +34,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let model = match &arguments.model {
         None => ModelFile::paper(),
-        Some(path) => {
-            let text = super::read_text(path)?;
-            ModelFile::parse(&text).map_err(|error| {
-                miette::miette!(
-                    help = "docs/model-file.md lists keys, effects and units",
-                    "{}: {error}",
-                    path.display()
-                )
-            })?
-        }
+        Some(path) => super::read_model(path)?,
     };
     let rate = arguments.rate.unwrap_or(model.rate_hz);
     let record = model::simulate(&model, arguments.seconds, rate, arguments.seed)

@@ -4,6 +4,7 @@
 use std::ops::ControlFlow;
 
 use bench::{Run, Scenario, SerialByte, Timeline, duty_profile, uniform};
+use model::file::ModelFile;
 use model::record::Record;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -12,8 +13,10 @@ use wire::{Decoder, Frame, LinkCounts};
 use crate::RecordBuilder;
 use crate::capture::Calibration;
 
+mod fitted;
 mod hidden;
 
+pub use fitted::{Carried, FittedError};
 pub use hidden::{Hidden, Sizes};
 
 /// What plays the board.
@@ -45,6 +48,38 @@ pub fn plan(hidden: Hidden, sizes: Sizes, seconds: f64, seed: u64) -> Plan {
     let mut scenario = Scenario::lively(seed);
     scenario.seconds = seconds;
     let planted = hidden::plant(hidden, sizes, &mut scenario, rng);
+    Plan {
+        run: driven(scenario, rng),
+        hidden: planted.words,
+        channel: planted.channel,
+    }
+}
+
+/// Plans a run in the same lively environment, on parts that have the errors of a model file, with a list of what of it
+/// the stand has.
+///
+/// # Errors
+/// [`FittedError`] where the model is not of this stand's gyros.
+pub fn plan_fitted(
+    model: &ModelFile,
+    seconds: f64,
+    seed: u64,
+) -> Result<(Plan, Carried), FittedError> {
+    let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x9e37_79b9_7f4a_7c15);
+    let mut scenario = Scenario::lively(seed);
+    scenario.seconds = seconds;
+    let carried = fitted::onto(model, &mut scenario)?;
+    let plan = Plan {
+        run: driven(scenario, rng),
+        hidden: carried.over.join(", "),
+        channel: None,
+    };
+    Ok((plan, carried))
+}
+
+/// The run of a scenario, the motor spinning free in steps.
+fn driven(scenario: Scenario, rng: &mut Xoshiro256PlusPlus) -> Run {
+    let seconds = scenario.seconds;
     let mut steps = vec![];
     let mut at = 10.0;
     while at < seconds - 5.0 {
@@ -52,14 +87,10 @@ pub fn plan(hidden: Hidden, sizes: Sizes, seconds: f64, seed: u64) -> Plan {
         at += uniform(rng, 8.0, 30.0);
     }
     let requests = duty_profile(&steps, seconds);
-    Plan {
-        run: Run {
-            scenario,
-            seconds,
-            requests,
-        },
-        hidden: planted.words,
-        channel: planted.channel,
+    Run {
+        scenario,
+        seconds,
+        requests,
     }
 }
 
