@@ -9,6 +9,7 @@ pub mod attitude;
 pub mod audit;
 pub mod beyond;
 pub mod checks;
+mod column;
 mod common;
 pub mod contest;
 pub mod diagnosis;

@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Frequencies};
 
+use crate::column::{Column, dot};
 pub use crate::transform::Dct;
 
 /// Bins of single coefficients at the low end.
@@ -107,7 +108,7 @@ impl Bins {
         self.sums(a, b)
     }
 
-    fn sums<A, B>(&self, a: &[A], b: &[B]) -> Vec<f64>
+    pub(crate) fn sums<A, B>(&self, a: &[A], b: &[B]) -> Vec<f64>
     where
         A: Copy + Into<f64>,
         B: Copy + Into<f64>,
@@ -116,62 +117,6 @@ impl Bins {
             .windows(2)
             .map(|w| dot(&a[w[0]..w[1]], &b[w[0]..w[1]]))
             .collect()
-    }
-}
-
-/// Sum of products, in eight sums that a processor makes at once.
-fn dot<A, B>(a: &[A], b: &[B]) -> f64
-where
-    A: Copy + Into<f64>,
-    B: Copy + Into<f64>,
-{
-    let (mut eight, mut rest) = ([0.0; 8], 0.0);
-    let (x, y) = (a.chunks_exact(8), b.chunks_exact(8));
-    for (p, q) in x.remainder().iter().zip(y.remainder()) {
-        rest += (*p).into() * (*q).into();
-    }
-    for (p, q) in x.zip(y) {
-        for (sum, (p, q)) in eight.iter_mut().zip(p.iter().zip(q)) {
-            *sum += (*p).into() * (*q).into();
-        }
-    }
-    eight.iter().sum::<f64>() + rest
-}
-
-/// Coefficients of a column.
-#[derive(Clone)]
-pub(crate) enum Column {
-    /// As computed.
-    Whole(Rc<Vec<f64>>),
-    /// Of a long record, where what may explain the data fills memory: rounded by parts in 10^7, each by itself.
-    Short(Rc<Vec<f32>>),
-}
-
-/// Samples beyond which columns that may explain the data are kept short.
-const LONG: usize = 1 << 18;
-
-impl Column {
-    fn new(c: Vec<f64>) -> Self {
-        if c.len() > LONG {
-            Self::Short(Rc::new(c.iter().map(|v| *v as f32).collect()))
-        } else {
-            Self::Whole(Rc::new(c))
-        }
-    }
-
-    fn whole(&self) -> Rc<Vec<f64>> {
-        match self {
-            Self::Whole(c) => Rc::clone(c),
-            Self::Short(c) => Rc::new(c.iter().map(|v| f64::from(*v)).collect()),
-        }
-    }
-
-    fn products(&self, other: &Self, bins: &Bins) -> Vec<f64> {
-        match (self, other) {
-            (Self::Whole(a), Self::Whole(b)) => bins.sums(a, b),
-            (Self::Whole(a), Self::Short(b)) | (Self::Short(b), Self::Whole(a)) => bins.sums(a, b),
-            (Self::Short(a), Self::Short(b)) => bins.sums(a, b),
-        }
     }
 }
 

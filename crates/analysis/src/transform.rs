@@ -22,8 +22,33 @@ thread_local! {
 #[derive(Clone)]
 struct Plan {
     half: Arc<dyn Fft<f64>>,
-    /// exp(-i pi k / (2 n)), k = 0 ..= n/2.
-    turn: Rc<Vec<Complex<f64>>>,
+    turn: Rc<Turns>,
+}
+
+/// exp(-i pi k / (2 n)), k = 0 ..= n/2, each the product of one of few coarse and one of few fine turns: what would be a
+/// table as long as the record takes no memory.
+struct Turns {
+    coarse: Vec<Complex<f64>>,
+    fine: Vec<Complex<f64>>,
+}
+
+impl Turns {
+    const FINE: usize = 1 << 9;
+
+    fn new(n: usize) -> Self {
+        let turn = |k: usize| Complex::from_polar(1.0, -PI * k as f64 / (2 * n) as f64);
+        Self {
+            coarse: (0..=n / 2 / Self::FINE)
+                .map(|c| turn(c * Self::FINE))
+                .collect(),
+            fine: (0..Self::FINE).map(turn).collect(),
+        }
+    }
+
+    #[inline]
+    fn at(&self, k: usize) -> Complex<f64> {
+        self.coarse[k / Self::FINE] * self.fine[k % Self::FINE]
+    }
 }
 
 impl Plan {
@@ -32,12 +57,9 @@ impl Plan {
         if let Some(known) = known {
             return known;
         }
-        let turn = (0..=n / 2)
-            .map(|k| Complex::from_polar(1.0, -PI * k as f64 / (2 * n) as f64))
-            .collect();
         let new = Self {
             half: FftPlanner::new().plan_fft_forward(n / 2),
-            turn: Rc::new(turn),
+            turn: Rc::new(Turns::new(n)),
         };
         if n <= KEPT {
             PLANS.with(|k| {
@@ -95,8 +117,8 @@ impl RealFft {
         let h = self.n / 2;
         let fill = |z: &mut [Complex<f64>]| z.iter_mut().enumerate().for_each(|(j, z)| *z = x(j));
         self.packed(fill, |z| {
-            for (k, t) in self.plan.turn.iter().enumerate() {
-                take(k, unpacked(z, k, h, *t));
+            for k in 0..=h {
+                take(k, unpacked(z, k, h, self.plan.turn.at(k)));
             }
         });
     }
@@ -131,7 +153,7 @@ fn unpacked(z: &[Complex<f64>], k: usize, h: usize, turn: Complex<f64>) -> Compl
 /// Coefficients of columns that the channels of a record have in common, by a digest of their samples.
 #[derive(Default)]
 pub(crate) struct Known {
-    pub(crate) columns: RefCell<HashMap<[u64; 2], crate::likelihood::Column>>,
+    pub(crate) columns: RefCell<HashMap<[u64; 2], crate::column::Column>>,
     /// Whether what the channels have in common is known: those of the first are, and no later one's own are kept.
     pub(crate) complete: Cell<bool>,
 }
@@ -211,8 +233,9 @@ impl Dct {
                         }
                     },
                     |z| {
-                        for (k, turn) in fft.plan.turn.iter().enumerate() {
-                            let v = unpacked(z, k, h, *turn) * turn * scale;
+                        for k in 0..=h {
+                            let turn = fft.plan.turn.at(k);
+                            let v = unpacked(z, k, h, turn) * turn * scale;
                             c[k] = v.re;
                             if k > 0 && k < h {
                                 c[n - k] = -v.im;
@@ -250,14 +273,15 @@ impl Dct {
                     if k == 0 {
                         return Complex::new(c[0] * 2f64.sqrt() * scale, 0.0);
                     }
-                    Complex::new(c[k], -c[n - k]) * fft.plan.turn[k].conj() * scale
+                    Complex::new(c[k], -c[n - k]) * fft.plan.turn.at(k).conj() * scale
                 };
                 let mut x = vec![0.0; n];
                 fft.packed(
                     |z| {
                         for k in 0..=h / 2 {
                             let (a, b) = (spectrum(k), spectrum(h - k));
-                            let square = fft.plan.turn[k].conj() * fft.plan.turn[k].conj();
+                            let turn = fft.plan.turn.at(k).conj();
+                            let square = turn * turn;
                             let even = (a + b.conj()) * 0.5;
                             let odd = (a - b.conj()) * 0.5 * square * square;
                             // Conjugated, so that the forward transform goes back.
