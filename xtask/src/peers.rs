@@ -30,6 +30,8 @@ struct Outcome {
     seconds: f64,
     crate_seconds: f64,
     peak_mib: f64,
+    /// What a plain pass over the readings for each octave takes.
+    pass_seconds: Option<f64>,
     deviations: Vec<(usize, f64)>,
     crate_deviations: Vec<(usize, f64)>,
 }
@@ -62,6 +64,7 @@ impl Outcome {
             };
             match words.first().copied() {
                 Some("seconds") => out.seconds = number(1)?,
+                Some("pass_seconds") => out.pass_seconds = Some(number(1)?),
                 Some("crate_seconds") => out.crate_seconds = number(1)?,
                 Some("peak_kib") => out.peak_mib = number(1)? / 1024.0,
                 Some("dev") => out.deviations.push((number(1)? as usize, number(2)?)),
@@ -141,6 +144,7 @@ pub fn compare(root: &Path, long: bool) -> Result<(), Failure> {
          (input) | agreement |\n|---|---|---|---|---|---|---|---|"
     );
     let mut worst = 0.0f64;
+    let mut passes = Vec::new();
     for (kind, samples) in ROWS.iter().chain(long.then_some(&LONG)) {
         let file = folder.join(format!("{samples}.f64"));
         if !file.exists() {
@@ -162,6 +166,9 @@ pub fn compare(root: &Path, long: bool) -> Result<(), Failure> {
         )?;
         let (difference, common) = disagreement(&own.deviations, &theirs.deviations);
         worst = worst.max(difference);
+        if let Some(pass) = own.pass_seconds {
+            passes.push((*samples, own.seconds, pass));
+        }
         println!(
             "| {kind} | {samples:.0e} | {:.4} s | {:.6} s | {:.1} | {:.0} MiB | {:.0} MiB ({:.0}) | {difference:.1e} over \
              {common} |",
@@ -172,6 +179,17 @@ pub fn compare(root: &Path, long: bool) -> Result<(), Failure> {
             own.peak_mib,
             *samples as f64 * 8.0 / 1_048_576.0,
             samples = *samples as f64,
+        );
+    }
+    println!(
+        "\n| oadev, octaves | this program, integration included | one plain pass over the readings for each octave | ratio |\n\
+         |---|---|---|---|"
+    );
+    for (samples, seconds, pass) in passes {
+        println!(
+            "| {:.0e} | {seconds:.4} s | {pass:.4} s | {:.2} |",
+            samples as f64,
+            seconds / pass
         );
     }
     println!(

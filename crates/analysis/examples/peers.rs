@@ -1,6 +1,6 @@
 //! Our side of `cargo xtask compare-peers`: `peers write FILE SAMPLES`, `peers run KIND FILE`, `peers crate FILE`.
 //!
-//! `run` prints `seconds S`, `peak_kib K` and `dev M SIGMA` lines like the script of the other side; `crate` times the
+//! `run` prints `seconds S`, `peak_kib K`, for `oadev` `pass_seconds S` (one plain pass over the readings an octave) and `dev M SIGMA` lines like the script of the other side; `crate` times the
 //! Rust crate `allan` and, on the same cluster times, this one.
 
 use std::fs::File;
@@ -48,6 +48,9 @@ fn read(path: &str) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
 
 fn run(kind: Deviation, readings: Vec<f64>) -> Result<(), Box<dyn std::error::Error>> {
     let samples = readings.len();
+    if kind == Deviation::Oadev {
+        println!("pass_seconds {}", plain_passes(&readings, kind));
+    }
     let begun = Instant::now();
     let phase = Phase::in_place(readings);
     let curve = phase.curve(kind, 1.0, &TauGrid::Octave.factors(kind.longest(samples)));
@@ -66,6 +69,22 @@ fn run(kind: Deviation, readings: Vec<f64>) -> Result<(), Box<dyn std::error::Er
         println!("dev {} {:e}", e.m, e.deviation);
     }
     Ok(())
+}
+
+/// Seconds that reading the readings from memory takes, once for every octave: sums of eight at a time, nothing else.
+fn plain_passes(readings: &[f64], kind: Deviation) -> f64 {
+    let octaves = TauGrid::Octave.factors(kind.longest(readings.len())).len();
+    let begun = Instant::now();
+    for _ in 0..octaves {
+        let mut sums = [0.0f64; 32];
+        for part in std::hint::black_box(readings).as_chunks::<32>().0 {
+            for (sum, v) in sums.iter_mut().zip(part) {
+                *sum += v;
+            }
+        }
+        std::hint::black_box(sums);
+    }
+    begun.elapsed().as_secs_f64()
 }
 
 fn against_crate(readings: &[f64]) -> Result<(), Box<dyn std::error::Error>> {
