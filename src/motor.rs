@@ -23,6 +23,8 @@ pub struct Motor {
     target: i16,
     /// Output in Q6 steps.
     output_q6: i16,
+    /// The same in whole steps.
+    output: i16,
     max_duty: i16,
     /// Q6 steps a millisecond.
     ramp_q6: i16,
@@ -44,6 +46,7 @@ impl Motor {
         Self {
             target: 0,
             output_q6: 0,
+            output: 0,
             max_duty: 0,
             ramp_q6: 0,
             alive_ms: 0,
@@ -154,9 +157,7 @@ impl Motor {
     /// What is put out now, -255..=255.
     #[must_use]
     pub fn output(&self) -> i16 {
-        // Towards zero, as a division rounds.
-        let round = if self.output_q6 < 0 { 63 } else { 0 };
-        self.output_q6.wrapping_add(round) >> 6
+        self.output
     }
 
     /// Whether it turns or is to turn.
@@ -171,6 +172,7 @@ impl Motor {
     pub fn cut(&mut self) {
         self.target = 0;
         self.output_q6 = 0;
+        self.output = 0;
         self.alive_ms = 0;
         self.shape = shape::STOP;
     }
@@ -178,14 +180,16 @@ impl Motor {
     /// A millisecond has passed. True when the motor was cut because the PC fell silent.
     #[inline(never)]
     pub fn on_millisecond(&mut self) -> bool {
-        if self.alive_ms > 0 {
+        let alive = self.alive_ms > 0;
+        if alive {
             self.alive_ms = self.alive_ms.wrapping_sub(1);
-        } else if self.is_on() {
-            self.cut();
-            return true;
         }
         if !self.is_on() {
             return false;
+        }
+        if !alive {
+            self.cut();
+            return true;
         }
         if self.shape != shape::STOP {
             self.step_profile();
@@ -195,6 +199,9 @@ impl Motor {
             .min(self.ramp_q6)
             .max(self.ramp_q6.wrapping_neg());
         self.output_q6 = self.output_q6.wrapping_add(step);
+        // Towards zero, as a division rounds.
+        let round = if self.output_q6 < 0 { 63 } else { 0 };
+        self.output = self.output_q6.wrapping_add(round) >> 6;
         false
     }
 }

@@ -4,7 +4,7 @@
 
 #define KEEP_ALIVE_MS 200
 
-static int16_t target, output_q6, max_duty, ramp_q6, amplitude, offset;
+static int16_t target, output_q6, output, max_duty, ramp_q6, amplitude, offset;
 static uint32_t phase, phase_per_ms; /* of a period, in 2^-32 */
 static uint8_t alive_ms, shape, cycles;
 
@@ -96,7 +96,7 @@ static void step_profile(void)
 
 int16_t motor_output(void)
 {
-    return output_q6 / 64;
+    return output;
 }
 
 bool motor_is_on(void)
@@ -106,21 +106,25 @@ bool motor_is_on(void)
 
 void motor_cut(void)
 {
-    target = output_q6 = 0;
+    target = output_q6 = output = 0;
     alive_ms = 0;
     shape = SHAPE_STOP;
 }
 
 bool motor_on_millisecond(void)
 {
-    if (alive_ms) {
+    bool alive = alive_ms;
+    if (alive)
         alive_ms--;
-    } else if (motor_is_on()) {
+    if (!motor_is_on())
+        return false;
+    if (!alive) {
         motor_cut();
         return true;
     }
     if (shape != SHAPE_STOP)
         step_profile();
     output_q6 = (int16_t)(output_q6 + clamp((int16_t)(target * 64 - output_q6), ramp_q6));
+    output = output_q6 / 64;
     return false;
 }

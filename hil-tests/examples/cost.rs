@@ -23,6 +23,7 @@ fn measure(path: &str) -> Result<(), String> {
 
     let mut quiet = mcu()?;
     let mut script = session::Script::default();
+    script.quiet = true;
     let first = session::start(&mut quiet, &mut script)?;
     // From the middle of one pause to the middle of another.
     session::run(&mut quiet, &mut script, first + 9 * TICK / 2)?;

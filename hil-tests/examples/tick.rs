@@ -70,6 +70,7 @@ fn measure(path: &str) -> Result<(), String> {
         .collect();
     symbols.sort();
     let mut script = session::Script::default();
+    script.quiet = true;
     let first = session::start(&mut mcu, &mut script)?;
     session::run(&mut mcu, &mut script, first + 9 * TICK / 2)?;
     let (from, slept_before) = (mcu.cycle(), mcu.slept());

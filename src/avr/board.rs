@@ -31,6 +31,10 @@ unsafe extern "C" {
 
 #[unsafe(link_section = ".noinit")]
 static mut RESTARTS: u16 = 0;
+/// Why it started.
+static mut RESET_CAUSE: u8 = 0;
+/// 1 + a divisor that waits for the line to be idle, which has 12 bits; 0: none.
+static mut BAUD: u16 = 0;
 
 /// Fills the free stack with [`PAINT`], so that its depth can be read off later.
 #[inline(always)]
@@ -46,12 +50,9 @@ pub fn paint_stack() {
     }
 }
 
-/// The board but for its sensors.
-pub struct AvrBoard {
-    reset_cause: u8,
-    restarts: u16,
-    baud: Option<u16>,
-}
+/// The board but for its sensors. What it keeps is in statics: as fields they would be handed from function to function, in
+/// registers that each of them has to save.
+pub struct AvrBoard(());
 
 impl AvrBoard {
     /// Reads why it started, and sets the motor's pins to off.
@@ -73,20 +74,18 @@ impl AvrBoard {
         } else {
             restarts.saturating_add(1)
         };
-        Self {
-            reset_cause,
-            restarts: *restarts,
-            baud: None,
-        }
+        // SAFETY: as above.
+        unsafe { RESET_CAUSE = reset_cause };
+        Self(())
     }
 
     /// What has to wait for the line to be idle.
     pub fn work(&mut self) {
-        if let Some(divisor) = self.baud
-            && serial::is_idle()
-        {
-            serial::set_baud(divisor);
-            self.baud = None;
+        // SAFETY: the main loop's alone.
+        let waits = unsafe { BAUD };
+        if waits != 0 && serial::is_idle() {
+            serial::set_baud(waits.wrapping_sub(1));
+            unsafe { BAUD = 0 };
         }
     }
 }
@@ -124,11 +123,12 @@ impl Board for AvrBoard {
 
     #[inline(never)]
     fn set_baud(&mut self, divisor: u16) {
-        if self.baud.is_none() && serial::is_unset() {
+        // SAFETY: as in `work`.
+        if unsafe { BAUD } == 0 && serial::is_unset() {
             serial::set_baud(divisor);
             serial::delimit();
         } else {
-            self.baud = Some(divisor);
+            unsafe { BAUD = divisor.wrapping_add(1) };
         }
     }
 
@@ -180,11 +180,13 @@ impl Board for AvrBoard {
     }
 
     fn reset_cause(&self) -> u8 {
-        self.reset_cause
+        // SAFETY: written at start alone.
+        unsafe { RESET_CAUSE }
     }
 
     fn restarts(&self) -> u16 {
-        self.restarts
+        // SAFETY: as above.
+        unsafe { RESTARTS }
     }
 
     #[inline(never)]

@@ -167,12 +167,13 @@ pub fn ticks_since() -> u16 {
 
 /// The sample that waits, if one does, and how many ticks before it are lost. It is the caller's until the next call.
 pub fn take() -> Option<(&'static Tick, u8)> {
+    // SAFETY: a byte, which only the tick sets.
+    if !unsafe { core::ptr::read_volatile(&raw const (*shared()).ready) } {
+        return None;
+    }
     interrupt::free(|_| {
         // SAFETY: interrupts are off.
         let shared = unsafe { &mut *shared() };
-        if !shared.ready {
-            return None;
-        }
         shared.ready = false;
         shared.reading ^= 1;
         let missed = shared.before;
@@ -196,7 +197,9 @@ pub fn take_passed() -> bool {
     unsafe {
         let passed = &raw mut (*shared()).passed;
         let any = core::ptr::read_volatile(passed);
-        core::ptr::write_volatile(passed, false);
+        if any {
+            core::ptr::write_volatile(passed, false);
+        }
         any
     }
 }
