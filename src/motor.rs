@@ -164,6 +164,11 @@ impl Motor {
     #[must_use]
     #[inline(never)]
     pub fn is_on(&self) -> bool {
+        self.turns()
+    }
+
+    #[inline(always)]
+    fn turns(&self) -> bool {
         self.output_q6 != 0 || self.target != 0 || self.shape != shape::STOP
     }
 
@@ -178,13 +183,13 @@ impl Motor {
     }
 
     /// A millisecond has passed. True when the motor was cut because the PC fell silent.
-    #[inline(never)]
+    #[inline(always)]
     pub fn on_millisecond(&mut self) -> bool {
         let alive = self.alive_ms > 0;
         if alive {
             self.alive_ms = self.alive_ms.wrapping_sub(1);
         }
-        if !self.is_on() {
+        if !self.turns() {
             return false;
         }
         if !alive {

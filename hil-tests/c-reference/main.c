@@ -45,7 +45,7 @@ int main(void)
             }
         }
         serial_count_losses();
-        while (tick_take_millisecond())
+        if (tick_take_millisecond())
             stand_on_millisecond();
         serial_work();
         tick_sleep_until_work();

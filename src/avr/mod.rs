@@ -74,7 +74,7 @@ fn main() -> ! {
             }
         }
         serial::count_losses(stand);
-        while tick::take_millisecond() {
+        if tick::take_millisecond() {
             stand.on_millisecond(&mut board);
         }
         board.work();

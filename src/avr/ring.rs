@@ -26,7 +26,7 @@ impl<const N: usize> Ring<N> {
 
     /// Writes a byte ahead of what the reader sees: `offset` from the next place, less than [`room`](Self::room).
     /// The writer's.
-    #[inline(never)]
+    #[inline(always)]
     pub fn put(&self, offset: u8, byte: u8) {
         // SAFETY: inside, and behind the head the reader does not look.
         unsafe { write_volatile(self.place(Self::further(self.head(), offset)), byte) }
@@ -117,10 +117,10 @@ impl<const N: usize> Ring<N> {
     /// Takes a byte. The reader's. In line: a call would have the interrupt save every register that a call may change.
     #[inline(always)]
     pub fn pop(&self) -> Option<u8> {
-        if self.is_empty() {
+        let tail = self.tail();
+        if self.head() == tail {
             return None;
         }
-        let tail = self.tail();
         // SAFETY: the tail stays inside; the writer does not reuse it before the tail moves.
         unsafe {
             let byte = read_volatile(self.place(tail));

@@ -45,13 +45,16 @@ impl<P: FnMut(u8, u8)> Writer<P> {
 
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn stuff(&mut self, byte: u8) {
-        if byte == crate::DELIMITER {
-            (self.put)(self.code_at, self.at.wrapping_sub(self.code_at));
-            self.code_at = self.at;
+        let at = self.at;
+        // A zero ends the block: its code says how long it is, and the next block's takes the zero's place.
+        let (place, value) = if byte == crate::DELIMITER {
+            let begun = core::mem::replace(&mut self.code_at, at);
+            (begun, at.wrapping_sub(begun))
         } else {
-            (self.put)(self.at, byte);
-        }
-        self.at = self.at.wrapping_add(1);
+            (at, byte)
+        };
+        (self.put)(place, value);
+        self.at = at.wrapping_add(1);
     }
 }
 
