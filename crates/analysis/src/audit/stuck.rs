@@ -11,8 +11,8 @@ use super::bits::Square;
 use crate::audit::local::Local;
 use crate::optimise::golden;
 
-/// Levels told apart in a count.
-const LEVELS_PER_COUNT: f64 = 2.0;
+/// Levels told apart in a count: rounding to them costs n / (24 (4 sigma)^2) nats, one in 12 000 readings.
+const LEVELS_PER_COUNT: f64 = 4.0;
 /// Least and largest spread against the one that was measured: a bit that sticks widens it more than it narrows it.
 const SPREADS: (f64, f64) = (0.25, 1.5);
 /// Rounds of fitting share and spread in turn.
@@ -38,6 +38,13 @@ pub(super) struct Stuck {
     pub error: f64,
     /// Nats.
     pub log_likelihood: f64,
+}
+
+/// Spread (its logarithm) and share, with the log likelihood there.
+struct Place {
+    ln: f64,
+    f: f64,
+    l: f64,
 }
 
 /// The level that a bit which sticks moves to `seen`: bisection, as the moved level grows with the true one wherever it
@@ -129,48 +136,58 @@ impl Tally {
         let places = |from: f64, to: f64| {
             (0..PLACES).map(move |i| from + (to - from) * (i as f64 + 0.5) / PLACES as f64)
         };
-        let (mut best, mut at) = (f64::NEG_INFINITY, None);
+        let apart = ((high - low) / PLACES as f64, 1.0 / PLACES as f64);
+        let mut best: Option<(u32, u8, Place)> = None;
         for bit in (0..bits).filter(|b| f64::from(1u32 << b) <= REACH * sigma) {
             for value in [0, 1] {
-                for ln in places(low, high) {
-                    for f in places(0.0, 1.0) {
-                        let l = self.likelihood(ln.exp(), bit, value, f);
-                        if l > best {
-                            (best, at) = (l, Some((bit, value, ln, f)));
-                        }
-                    }
+                let l = |ln: f64, f: f64| self.likelihood(ln.exp(), bit, value, f);
+                let Some(near) = places(low, high)
+                    .flat_map(|ln| places(0.0, 1.0).map(move |f| (ln, f)))
+                    .map(|(ln, f)| Place { ln, f, l: l(ln, f) })
+                    .max_by(|a, b| a.l.total_cmp(&b.l))
+                else {
+                    continue;
+                };
+                // The peaks are narrower than the places are apart: each bit is weighed at its own.
+                let near = self.climb(bit, value, near, apart, 1);
+                if best.as_ref().is_none_or(|b| near.l > b.2.l) {
+                    best = Some((bit, value, near));
                 }
             }
         }
-        let (bit, value, ln, f) = at?;
-        Some(self.refined(
-            bit,
-            value,
-            (ln, (high - low) / PLACES as f64),
-            (f, 1.0 / PLACES as f64),
-        ))
+        let (bit, value, near) = best?;
+        let top = self.climb(bit, value, near, apart, ROUNDS);
+        Some(self.stuck(bit, value, &top))
     }
 
-    /// From a place of ln sigma and the share, each with the distance to the next one.
-    fn refined(&self, bit: u32, value: u8, ln: (f64, f64), share: (f64, f64)) -> Stuck {
+    /// From a place to the peak by it, spread and share in turn.
+    fn climb(&self, bit: u32, value: u8, from: Place, apart: (f64, f64), rounds: usize) -> Place {
         let l = |ln: f64, f: f64| -self.likelihood(ln.exp(), bit, value, f.clamp(0.0, 1.0));
-        let ((mut ln, mut reach_ln), (mut f, mut reach_f)) = (ln, share);
-        for _ in 0..ROUNDS {
-            f = golden(
-                &|f| l(ln, f),
-                (f - reach_f).max(0.0),
-                (f + reach_f).min(1.0),
-                STEPS,
-            );
+        let (mut ln, mut f) = (from.ln, from.f);
+        let (mut reach_ln, mut reach_f) = apart;
+        for _ in 0..rounds {
             ln = golden(&|ln| l(ln, f), ln - reach_ln, ln + reach_ln, STEPS);
+            let (low, high) = ((f - reach_f).max(0.0), (f + reach_f).min(1.0));
+            f = golden(&|f| l(ln, f), low, high, STEPS);
             reach_ln *= 0.5;
             reach_f *= 0.7;
         }
-        let best = l(ln, f);
+        let top = Place {
+            ln,
+            f,
+            l: -l(ln, f),
+        };
+        if top.l > from.l { top } else { from }
+    }
+
+    fn stuck(&self, bit: u32, value: u8, top: &Place) -> Stuck {
+        let l = |f: f64| -self.likelihood(top.ln.exp(), bit, value, f);
+        let f = top.f;
+        let best = -top.l;
         // The curvature along the share, or at an end of it what the slope leaves.
         let h = 0.01;
         let (below, above) = ((f - h).max(0.0), (f + h).min(1.0));
-        let bend = (l(ln, below) - best + l(ln, above) - best) / ((above - below) / 2.0).powi(2);
+        let bend = (l(below) - best + l(above) - best) / ((above - below) / 2.0).powi(2);
         Stuck {
             bit,
             value,
