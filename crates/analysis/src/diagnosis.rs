@@ -23,7 +23,7 @@ use crate::result::{
     Parameter, Unexplained, Verdict,
 };
 use crate::search::{Search, State};
-use crate::{beyond, doubt, evidence, losses, scan, threshold};
+use crate::{beyond, dead, doubt, evidence, losses, scan, threshold};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -72,7 +72,8 @@ pub(crate) struct VarianceFound {
 /// [`AnalysisError::Inconclusive`] when the record is too short, [`AnalysisError::NoChannel`] when it holds no gyro,
 /// [`AnalysisError::NoRate`] when its sample rate is unknown, [`AnalysisError::Constant`] when a gyro never changes.
 pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed, AnalysisError> {
-    let (mended, sticking) = sign_bit::mend(record);
+    let (alive, dead) = dead::left_out(record);
+    let (mended, sticking) = sign_bit::mend(&alive);
     let record = &*mended;
     let audited = audit(record);
     let record = &*losses::renumbered(record, &audited);
@@ -129,6 +130,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         };
         unexplained.extend(s.state.notes.iter().map(note));
     }
+    unexplained.extend(dead);
     unexplained.extend(doubts);
     checks.extend(shared.checks);
     checks.extend(audited.checks);

@@ -12,6 +12,7 @@ pub mod checks;
 mod column;
 mod common;
 pub mod contest;
+mod dead;
 pub mod diagnosis;
 mod doubt;
 pub mod edf;
