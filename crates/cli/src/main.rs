@@ -86,6 +86,10 @@ enum Command {
 }
 
 fn main() -> miette::Result<()> {
+    // A command that a help proposes is to be copied whole: the terminal may wrap it, the text does not.
+    miette::set_hook(Box::new(|_| {
+        Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())
+    }))?;
     match Program::parse().command {
         Command::Analyze(arguments) => commands::analyze::run(&arguments),
         Command::Diagnose(arguments) => commands::diagnose::run(&arguments),
