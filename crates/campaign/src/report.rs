@@ -234,13 +234,19 @@ them (a line that comes and goes is called a line, no longer one that swings), s
 creep (d' 7..9) and a random walk for a while (d' 12..22), which stay weak within 0.28 deg/s, and one line that comes and
 goes; the names were 5 steps for those two and 4 AM lines for that line.
 
-Kept back, second set (2026-11-21): the other 14, from \"stick and slip\" on. They were written, from physics and
+The second set (2026-11-21): the next 14, from \"stick and slip\" on. They were written, from physics and
 mathematics, after that change and by someone who had not read how the diagnosis decides; 44 runs were made to see that
 they can be drawn, by which one was put right (temperature times supply then held a true term in temperature alone) and
 nothing else was changed. A test holds that no effect of the library describes 95 % of what each adds to the likelihood.
-First graded on 2026-11-21 with seed 16172907664231, which nothing was changed after: 247 of 276 unexplained, 30 named.
+First graded on 2026-11-21 with seed 16172907664231, before any change by it: 247 of 276 unexplained, 30 named.
 Nineteen of those names are one effect, the swing without a period, told as gauss_markov (13) or telegraph (6); no check
-of the residual is left that fails on them.";
+of the residual is left that fails on them. What was changed in the engine since may owe something to them, so that
+they count as seen.
+
+Kept back, third set (2026-11-21): the last 14, from \"ring-down of a spring that stiffens\" on, seven with a structure in
+time and seven of noise and codes. They were written by someone who had not read how the diagnosis decides and who knew of
+its answers to the sets before what stands above; none was diagnosed while they were written. Tests hold that no effect of
+the library describes 95 % of what each adds to the likelihood, nor, of those that are signals, a sum of two.";
 
 fn bars(out: &mut String, all: &[Outcome]) {
     let clean = Rate::of(
@@ -297,7 +303,7 @@ fn bars(out: &mut String, all: &[Outcome]) {
             wrong,
         ),
         bar(
-            "foreign effects of d' >= 25, kept back, second set (2026-11-21): told as unexplained",
+            "foreign effects of d' >= 25, kept back, third set (2026-11-21): told as unexplained",
             true,
             0.90,
             told(false),

@@ -161,7 +161,7 @@ impl Stand {
 }
 
 /// A signal that holds each of its levels for a random time.
-fn held(
+pub(crate) fn held(
     draw: &mut Draw,
     samples: usize,
     rate_hz: f64,
@@ -218,7 +218,7 @@ fn duty(draw: &mut Draw, samples: usize, rate_hz: f64) -> Vec<f64> {
 }
 
 /// Behind a lag of `tau` s.
-fn lagged(values: &[f64], tau: f64, rate_hz: f64) -> Vec<f64> {
+pub(crate) fn lagged(values: &[f64], tau: f64, rate_hz: f64) -> Vec<f64> {
     let gain = 1.0 - (-1.0 / (tau * rate_hz)).exp();
     let mut y = values.first().copied().unwrap_or(0.0);
     values
@@ -231,7 +231,13 @@ fn lagged(values: &[f64], tau: f64, rate_hz: f64) -> Vec<f64> {
 }
 
 /// An Ornstein-Uhlenbeck process.
-fn wander(draw: &mut Draw, samples: usize, rate_hz: f64, sigma: f64, tau: f64) -> Vec<f64> {
+pub(crate) fn wander(
+    draw: &mut Draw,
+    samples: usize,
+    rate_hz: f64,
+    sigma: f64,
+    tau: f64,
+) -> Vec<f64> {
     let keep = (-1.0 / (tau * rate_hz)).exp();
     let step = sigma * (1.0 - keep * keep).sqrt();
     let mut x = sigma * draw.normal();

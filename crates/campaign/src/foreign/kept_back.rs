@@ -363,7 +363,7 @@ fn echo(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted:
     }
 }
 
-fn variance(name: &'static str, wanted: f64, law: &dyn Fn(f64) -> Vec<f64>) -> Foreign {
+pub(super) fn variance(name: &'static str, wanted: f64, law: &dyn Fn(f64) -> Vec<f64>) -> Foreign {
     let size = size_for(wanted, &|x| of_variance(&law(x)));
     let law = law(size);
     Foreign {
