@@ -8,6 +8,7 @@ mod foreign;
 mod header;
 mod live;
 mod read;
+mod stream;
 mod tables;
 mod write;
 
@@ -17,6 +18,7 @@ pub use error::CaptureError;
 pub use foreign::ColumnMapping;
 pub use live::Live;
 pub use read::{Read, ReadOptions, read_capture, read_from};
+pub use stream::unpacked;
 pub use write::{write_capture, write_to};
 
 /// Standard gravity, m/s^2 (CGPM 1901): the unit `g` of accelerometers.

@@ -9,7 +9,7 @@ use imu_stand::report::plot::number;
 use imu_stand::text;
 use miette::Result;
 
-use super::Input;
+use super::{Input, Outputs};
 
 /// What `analyze` takes.
 #[derive(Args)]
@@ -37,6 +37,7 @@ pub struct Arguments {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    Outputs::beside([&arguments.capture]).result("--json", arguments.json.as_ref())?;
     let read = arguments.input.read(&arguments.capture)?;
     let deviations = arguments
         .deviations

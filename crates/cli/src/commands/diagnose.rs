@@ -10,7 +10,7 @@ use imu_stand::text;
 use miette::Result;
 use serde::Serialize;
 
-use super::Input;
+use super::{Input, Outputs};
 
 /// What `diagnose` takes.
 #[derive(Args)]
@@ -55,6 +55,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             );
         }
     }
+    Outputs::beside(&arguments.captures)
+        .result("--json", arguments.json.as_ref())?
+        .result("--model-out", arguments.model_out.as_ref())?
+        .result("--report", arguments.report.as_ref())?;
     let mut runs = Vec::new();
     for path in &arguments.captures {
         let read = arguments.input.read(path)?;

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use analysis::AnalyzeOptions;
 use analysis::analyze::{ANALYSIS_FORMAT, Analysis};
 use clap::{Args, ValueEnum};
-use imu_stand::export::data::Table;
+use imu_stand::export::data::{DataError, Table};
 use imu_stand::export::noise::{Consumer, ImuNoise};
-use miette::{IntoDiagnostic, Result, WrapErr};
+use miette::Result;
 
 use super::Input;
+use super::outputs::{self, Outputs};
 
 /// Into what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -103,23 +104,26 @@ fn data(arguments: &Arguments, to: To) -> Result<()> {
     let Some(out) = &arguments.out else {
         miette::bail!(help = "add `--out FILE`", "data are written to a file");
     };
-    if out == &arguments.file {
+    let is_dash = out.as_os_str() == outputs::DASH;
+    if is_dash && to != To::Csv {
         miette::bail!(
-            help = "name another file with `--out`",
-            "{} would overwrite itself",
-            out.display()
+            help = "name a file, or take `--to csv`",
+            "only text goes to standard output"
         );
     }
+    Outputs::beside([&arguments.file]).data("--out", Some(out))?;
     let read = arguments.input.read(&arguments.file)?;
     let table = Table::of(&read.record, arguments.raw);
     let written = match to {
         To::Npz => table.write_npz(out),
         To::Parquet => table.write_parquet(out),
+        _ if is_dash => return outputs::to_stdout(|mut out| table.csv(&mut out)),
         _ => table.write_csv(out),
     };
-    written
-        .into_diagnostic()
-        .wrap_err_with(|| out.display().to_string())?;
+    written.map_err(|error| match error {
+        DataError::Io(error) => outputs::failed(out, &error),
+        other => miette::miette!("{}: {other}", out.display()),
+    })?;
     if !arguments.input.quiet {
         say!(
             "{}: {} rows of {} columns",
@@ -132,6 +136,7 @@ fn data(arguments: &Arguments, to: To) -> Result<()> {
 }
 
 fn noise(arguments: &Arguments, consumer: Consumer) -> Result<()> {
+    Outputs::beside([&arguments.file]).result("--out", arguments.out.as_ref())?;
     let analysis = analysis(arguments)?;
     let noise = ImuNoise::of(&analysis);
     if noise.gyro.is_empty() && noise.acc.is_empty() {

@@ -7,6 +7,7 @@ pub mod diagnose;
 pub mod export;
 pub mod flash;
 pub mod monitor;
+pub mod outputs;
 pub mod paper;
 pub mod plan;
 pub mod report;
@@ -15,15 +16,18 @@ pub mod run;
 pub mod simulate;
 mod wish;
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use clap::Args;
-use imu_stand::capture::Read;
+use imu_stand::capture::{Read, read_from, unpacked};
 use imu_stand::link::{DEFAULT_BAUD, Link};
 use imu_stand::{CaptureError, ColumnMapping, ReadOptions, read_capture};
 use miette::{IntoDiagnostic, Result, WrapErr};
-use serde::Serialize;
 use sha2::{Digest, Sha256};
+
+pub use outputs::{Outputs, write, write_json};
 
 /// How to read a file; the same for every command that takes captures.
 #[derive(Args)]
@@ -62,7 +66,18 @@ impl Input {
             rate_hz: self.rate,
             skip_bad: self.skip_bad,
         };
-        let read = read_capture(path, &options).map_err(|error| {
+        let read = if path.as_os_str() == outputs::DASH {
+            unpacked(stdin()?).map_or_else(
+                |source| {
+                    let path = PathBuf::from(STDIN);
+                    Err(CaptureError::Io { path, source })
+                },
+                |text| read_from(text, &options),
+            )
+        } else {
+            read_capture(path, &options)
+        };
+        let read = read.map_err(|error| {
             let says_which = matches!(
                 error,
                 CaptureError::Io { .. } | CaptureError::CutOff { .. } | CaptureError::Table { .. }
@@ -120,17 +135,44 @@ impl Line {
     }
 }
 
-/// Prints a line. Ends the program where the reader has gone: with success if it merely had enough, else with 1.
+/// Prints a line, to standard error where a result goes to standard output. Ends the program where the reader has gone:
+/// with success if it merely had enough, else with 1.
 pub fn say(line: std::fmt::Arguments<'_>) {
     use std::io::Write as _;
-    if let Err(error) = writeln!(std::io::stdout(), "{line}") {
+    let said = if outputs::stdout_is_taken() {
+        writeln!(std::io::stderr(), "{line}")
+    } else {
+        writeln!(std::io::stdout(), "{line}")
+    };
+    if let Err(error) = said {
         let enough = error.kind() == std::io::ErrorKind::BrokenPipe;
         std::process::exit(i32::from(!enough));
     }
 }
 
+/// Standard input in messages and reports.
+const STDIN: &str = "standard input";
+
+/// All of standard input; it is read once.
+fn stdin() -> Result<&'static [u8]> {
+    static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+    if let Some(bytes) = BYTES.get() {
+        return Ok(bytes);
+    }
+    let mut bytes = Vec::new();
+    std::io::stdin()
+        .lock()
+        .read_to_end(&mut bytes)
+        .into_diagnostic()
+        .wrap_err(STDIN)?;
+    Ok(BYTES.get_or_init(|| bytes))
+}
+
 /// The file's name for reports.
 pub fn name(path: &Path) -> String {
+    if path.as_os_str() == outputs::DASH {
+        return STDIN.to_owned();
+    }
     path.file_name()
         .unwrap_or(path.as_os_str())
         .to_string_lossy()
@@ -139,10 +181,14 @@ pub fn name(path: &Path) -> String {
 
 /// SHA-256 of a file, in hex.
 pub fn digest(path: &Path) -> Result<String> {
+    let mut hash = Sha256::new();
+    if path.as_os_str() == outputs::DASH {
+        hash.update(stdin()?);
+        return Ok(format!("sha256:{:x}", hash.finalize()));
+    }
     let mut file = std::fs::File::open(path)
         .into_diagnostic()
         .wrap_err_with(|| format!("{}", path.display()))?;
-    let mut hash = Sha256::new();
     std::io::copy(&mut file, &mut hash).into_diagnostic()?;
     Ok(format!("sha256:{:x}", hash.finalize()))
 }
@@ -167,25 +213,6 @@ pub fn read_model(path: &Path) -> Result<model::ModelFile> {
             path.display()
         )
     })
-}
-
-/// Writes a text file.
-pub fn write(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text).map_err(|error| {
-        miette::miette!(
-            help = "does its folder exist, and may you write there?",
-            "cannot write {}: {error}",
-            path.display()
-        )
-    })
-}
-
-/// Writes what a command found as JSON, where it was asked to.
-pub fn write_json(path: Option<&PathBuf>, value: &impl Serialize) -> Result<()> {
-    let Some(path) = path else { return Ok(()) };
-    let mut text = serde_json::to_string_pretty(value).into_diagnostic()?;
-    text.push('\n');
-    write(path, &text)
 }
 
 /// Turns an analysis error into what the user is told, with what to do next.

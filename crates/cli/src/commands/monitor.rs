@@ -39,6 +39,7 @@ const HOME: &str = "\x1b[H\x1b[J";
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    super::Outputs::beside([]).result("--json", arguments.json.as_ref())?;
     let mut feed = Feed::new(arguments.line.open()?);
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);

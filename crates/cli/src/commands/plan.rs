@@ -17,8 +17,8 @@ use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
-use super::Input;
 use super::wish::{WantedAngle, Wish, Z_95, wishes};
+use super::{Input, Outputs};
 
 /// Longest record that `--separate` lays out, s.
 const LONGEST_S: f64 = 36.0 * 3600.0;
@@ -117,6 +117,8 @@ struct Told {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    Outputs::beside(arguments.capture.iter().chain(&arguments.model))
+        .result("--json", arguments.json.as_ref())?;
     if arguments.want.is_none() && arguments.separate.is_none() {
         miette::bail!(
             help = "write `--want \"K within 20 %\"` or `--separate temperature,rate_ramp`",

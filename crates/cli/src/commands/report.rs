@@ -9,7 +9,7 @@ use imu_stand::report::standalone::figures;
 use imu_stand::report::{Subject, report};
 use miette::{IntoDiagnostic, Result, WrapErr};
 
-use super::Input;
+use super::{Input, Outputs};
 
 /// What `report` takes.
 #[derive(Args)]
@@ -31,6 +31,7 @@ pub struct Arguments {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    Outputs::beside([&arguments.capture]).result("--out", Some(&arguments.out))?;
     let read = arguments.input.read(&arguments.capture)?;
     let hash = super::digest(&arguments.capture)?;
     let options = DiagnoseOptions {

@@ -9,7 +9,7 @@ use imu_stand::text;
 use miette::Result;
 use serde::Serialize;
 
-use super::Input;
+use super::{Input, Outputs};
 
 /// What `representative` takes.
 #[derive(Args)]
@@ -38,6 +38,7 @@ struct Answer<'a> {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    Outputs::beside(&arguments.captures).result("--json", arguments.json.as_ref())?;
     let records = arguments
         .captures
         .iter()

@@ -1,8 +1,6 @@
 //! `imu-stand run`.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 #[cfg(unix)]
 use std::sync::{
     Arc,
@@ -20,6 +18,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use miette::IntoDiagnostic;
 use miette::Result;
 use model::record::Record;
+
+use super::outputs::{self, Outputs};
 
 /// What `run` takes.
 #[derive(Args)]
@@ -90,7 +90,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             arguments.seconds
         );
     }
-    may_be_written(&arguments.out)?;
+    if arguments.out.as_os_str() == outputs::DASH {
+        miette::bail!(
+            help = "write `--out run.csv`",
+            "--out: the run is read again from its file, and standard output is none"
+        );
+    }
+    Outputs::beside(&arguments.model)
+        .simulated("--out", Some(&arguments.out))?
+        .result("--analysis", arguments.analysis.as_ref())?
+        .result("--json", arguments.json.as_ref())?
+        .result("--report", arguments.report.as_ref())?;
     let plan = planned(arguments)?;
     let bar = if arguments.quiet {
         ProgressBar::hidden()
@@ -146,43 +156,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         super::report::write(page, &subject, arguments.quiet)?;
     }
     Ok(())
-}
-
-/// A simulated run can be had again by its seed, and its file is written over; a capture of a board cannot, and is not.
-fn may_be_written(out: &Path) -> Result<()> {
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
-    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-        miette::bail!(
-            help = "make it first, or name another file with `--out`",
-            "--out: {} is no folder",
-            folder.display()
-        );
-    }
-    if out.exists() && !is_simulated(out) {
-        miette::bail!(
-            help = "name another file with `--out`",
-            "{} is there already, and is no run of a simulated stand: it is not written over",
-            out.display()
-        );
-    }
-    Ok(())
-}
-
-/// Whether a file's header is that of a capture without the time of day that a board's has.
-fn is_simulated(path: &Path) -> bool {
-    let Ok(file) = File::open(path) else {
-        return false;
-    };
-    let input: Box<dyn Read> = if path.extension().is_some_and(|e| e == "gz") {
-        Box::new(flate2::read::MultiGzDecoder::new(file))
-    } else {
-        Box::new(file)
-    };
-    let header: Vec<String> = (BufReader::new(input).lines())
-        .map_while(|line| line.ok().filter(|line| line.starts_with('#')))
-        .collect();
-    let has = |start: &str| header.iter().any(|line| line.starts_with(start));
-    has("# format: imu-stand-capture/") && !has("# start_unix_s:")
 }
 
 /// What was asked for: a fault, or the parts of a model file.

@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use imu_stand::write_capture;
+use imu_stand::capture::{write_capture, write_to};
 use miette::Result;
 use model::file::ModelFile;
+
+use super::outputs::{self, Outputs};
 
 /// What `simulate` takes.
 #[derive(Args)]
@@ -32,6 +34,7 @@ pub struct Arguments {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    Outputs::beside(&arguments.model).simulated("--out", Some(&arguments.out))?;
     let model = match &arguments.model {
         None => ModelFile::paper(),
         Some(path) => super::read_model(path)?,
@@ -39,7 +42,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let rate = arguments.rate.unwrap_or(model.rate_hz);
     let record = model::simulate(&model, arguments.seconds, rate, arguments.seed)
         .map_err(|error| miette::miette!(help = "see `imu-stand simulate --help`", "{error}"))?;
-    write_capture(&arguments.out, &record)?;
+    if arguments.out.as_os_str() == outputs::DASH {
+        outputs::to_stdout(|mut out| write_to(&mut out, &record))?;
+    } else {
+        write_capture(&arguments.out, &record)?;
+    }
     if !arguments.quiet {
         say!(
             "{}: {} rows at {rate} Hz, seed {}",

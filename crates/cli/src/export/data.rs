@@ -219,7 +219,11 @@ impl Table {
         Ok(())
     }
 
-    fn csv(&self, out: &mut impl Write) -> std::io::Result<()> {
+    /// The same to a stream.
+    ///
+    /// # Errors
+    /// The stream's.
+    pub fn csv(&self, out: &mut impl Write) -> std::io::Result<()> {
         for (key, value) in &self.about {
             writeln!(out, "# {key}: {value}")?;
         }

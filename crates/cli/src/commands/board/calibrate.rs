@@ -19,7 +19,7 @@ use super::show::{Q16, Q24, gyro_range_dps};
 #[derive(Args)]
 pub struct Arguments {
     /// A diagnosis (`diagnose --json`) or a model file (`diagnose --model-out`)
-    file: PathBuf,
+    pub(super) file: PathBuf,
     /// Say what would be written, and write nothing; needs no board
     #[arg(long)]
     pub dry_run: bool,

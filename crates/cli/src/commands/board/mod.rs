@@ -113,6 +113,11 @@ impl Session {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let reads = match &arguments.action {
+        Action::Calibrate(calibrate) => Some(&calibrate.file),
+        _ => None,
+    };
+    super::Outputs::beside(reads).result("--json", arguments.json.as_ref())?;
     if let Action::Calibrate(calibrate) = &arguments.action
         && calibrate.dry_run
         && !arguments.line.is_named()

@@ -151,6 +151,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             arguments.out.display()
         );
     }
+    let own = [arguments.out.clone(), raw_path(&arguments.out)];
+    super::Outputs::beside(own.iter().chain(&arguments.replay))
+        .result("--json", arguments.json.as_ref())?;
     if arguments.out.exists() && !arguments.resume {
         return Err(imu_stand::CaptureError::Exists {
             path: arguments.out.clone(),

@@ -116,6 +116,7 @@ struct Answer {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    super::Outputs::beside(&arguments.image).result("--json", arguments.json.as_ref())?;
     let programmer = &arguments.programmer;
     let image = (!arguments.check)
         .then(|| Image::find(arguments.image.as_deref()))

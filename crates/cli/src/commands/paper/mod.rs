@@ -18,7 +18,7 @@ use model::parameter::Parameter;
 use model::record::{Quantity, Record};
 use serde::Serialize;
 
-use super::Input;
+use super::{Input, Outputs};
 use criticism::{Claim, Hypothesis, LooksAlike};
 
 /// Resolution of the stand's gyro, deg/s.
@@ -177,6 +177,7 @@ fn shown(arguments: &Arguments, stand: &PaperStand) -> Result<Shown> {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    Outputs::beside(&arguments.capture).result("--json", arguments.json.as_ref())?;
     let tau0 = 1.0 / STATED_RATE_HZ;
     let (n, level) = (STATED_ARW_DEG_SQRT_H / 60.0, STATED_FLAT_DEG_H / 3600.0);
     let stand = PaperStand::with_both(Slow::RandomWalk, n, level, tau0)

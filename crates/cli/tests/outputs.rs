@@ -1,0 +1,133 @@
+//! What a command writes goes over nothing that it reads, and over nothing that was measured.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+fn run(folder: &Path, line: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_imu-stand"))
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .output()
+        .expect("the program starts")
+}
+
+/// A folder with `run.csv`, simulated, and `board.csv`, the same as a board would have delivered it.
+fn folder(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("outputs-{name}"));
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).expect("a folder for the test");
+    assert!(
+        run(&path, "simulate --seconds 60 --out run.csv")
+            .status
+            .success()
+    );
+    let text = std::fs::read_to_string(path.join("run.csv")).expect("the run");
+    let recorded = text.replacen("# rate_hz", "# start_unix_s: 1763712345.1\n# rate_hz", 1);
+    std::fs::write(path.join("board.csv"), recorded).expect("the other run");
+    path
+}
+
+#[test]
+fn an_output_never_goes_over_an_input_or_over_what_was_measured() {
+    let folder = folder("kept");
+    for (name, text) in [("m.toml", "rate_hz = 20\n"), ("run.raw", "bytes")] {
+        std::fs::write(folder.join(name), text).expect("a file");
+    }
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("run.csv", folder.join("link")).expect("a link");
+    let before = contents(&folder);
+    let lines = [
+        "analyze run.csv --json run.csv",
+        "analyze run.csv --json ./run.csv",
+        "analyze run.csv --json board.csv",
+        "diagnose run.csv --json run.csv",
+        "diagnose run.csv --report run.csv",
+        "diagnose run.csv --model-out run.csv",
+        "diagnose run.csv --json a.json --report a.json",
+        "diagnose run.csv board.csv --json board.csv",
+        "report run.csv --out run.csv",
+        "representative run.csv run.csv run.csv run.csv --json run.csv",
+        "plan run.csv --want K --json run.csv",
+        "paper --capture run.csv --json run.csv",
+        "simulate --out board.csv",
+        "simulate --out m.toml",
+        "simulate --model m.toml --out m.toml",
+        "run --native --seconds 60 --out board.csv",
+        "run --native --seconds 60 --out n.csv --json board.csv",
+        "export run.csv --out run.csv",
+        "export run.csv --out board.csv",
+        "export run.csv --to kalibr --out run.csv",
+        "analyze board.csv --json run.raw",
+        "analyze run.csv --json - --json no-folder/a.json",
+        #[cfg(unix)]
+        "analyze run.csv --json link",
+    ];
+    for line in lines {
+        let refused = run(&folder, line);
+        let said = String::from_utf8_lossy(&refused.stderr);
+        assert!(matches!(refused.status.code(), Some(1 | 2)), "{line}");
+        assert!(said.contains("--"), "{line}: {said}");
+        assert!(before == contents(&folder), "{line}");
+    }
+    // A simulated run goes over another one, and JSON over JSON.
+    for _ in 0..2 {
+        assert!(
+            run(&folder, "simulate --seconds 60 --out run.csv")
+                .status
+                .success()
+        );
+        assert!(
+            run(&folder, "analyze run.csv --json a.json")
+                .status
+                .success()
+        );
+    }
+}
+
+/// Names and bytes of all files.
+fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files: Vec<_> = std::fs::read_dir(folder)
+        .expect("the folder")
+        .map(|entry| entry.expect("an entry").path())
+        .map(|path| (path.clone(), std::fs::read(path).expect("a file")))
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn a_dash_is_standard_input_and_output_and_nothing_else_is_said_there() {
+    let folder = folder("dash");
+    let child = Command::new(env!("CARGO_BIN_EXE_imu-stand"))
+        .args(["diagnose", "-", "--json", "-"])
+        .current_dir(&folder)
+        .stdin(std::fs::File::open(folder.join("run.csv")).expect("the run"))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .output()
+        .expect("the program runs");
+    let found: serde_json::Value = serde_json::from_slice(&child.stdout).expect("JSON alone");
+    assert_eq!(found["format"], "imu-stand-diagnosis/1");
+    assert!(String::from_utf8_lossy(&child.stderr).contains("verdict"));
+    assert!(!folder.join("-").exists());
+
+    // The digest is that of the bytes, however they came.
+    assert!(
+        run(&folder, "diagnose run.csv --quiet --json d.json")
+            .status
+            .success()
+    );
+    let text = std::fs::read_to_string(folder.join("d.json")).expect("the diagnosis");
+    let by_name: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(found["input"]["hash"], by_name["input"]["hash"]);
+    assert_eq!(found["findings"], by_name["findings"]);
+
+    // The same run as a file and as a stream, and as data for another program.
+    let simulated = run(&folder, "simulate --seconds 60 --out -");
+    let file = std::fs::read(folder.join("run.csv")).expect("the run");
+    assert!(simulated.stdout == file);
+    let exported = run(&folder, "export run.csv --to csv --out -");
+    assert!(String::from_utf8_lossy(&exported.stdout).contains("time_s,seq"));
+    let twice = run(&folder, "diagnose run.csv --json - --report -");
+    assert_eq!(twice.status.code(), Some(1));
+}
