@@ -121,11 +121,6 @@ fn build_image(root: &Path) -> Result<(), Failure> {
 fn demo(root: &Path) -> Result<(), Failure> {
     toolchain::simulator()?;
     build_image(root)?;
-    let build = "build --release -p imu-stand --features simavr";
-    run(
-        "the build",
-        &mut cargo(root, &build.split(' ').collect::<Vec<_>>()),
-    )?;
     // Relative to the root, so that the command in the report can be typed again.
     let folder = Path::new("target/demo");
     std::fs::create_dir_all(root.join(folder)).map_err(|error| {
@@ -135,10 +130,10 @@ fn demo(root: &Path) -> Result<(), Failure> {
         )
     })?;
     let seed = std::env::args().nth(2).unwrap_or_else(|| "2009".to_owned());
-    let mut program = Command::new(root.join("target/release/imu-stand"));
-    program
-        .current_dir(root)
-        .args(["run", "--seconds", "600", "--seed", &seed]);
+    // By cargo, which knows the target folder, wherever the user has set it.
+    let build = "run --release -p imu-stand --features simavr -- run --seconds 600 --seed";
+    let mut program = cargo(root, &build.split(' ').collect::<Vec<_>>());
+    program.arg(&seed);
     for (option, file) in [
         ("--out", "capture.csv"),
         ("--analysis", "analysis.json"),

@@ -135,6 +135,8 @@ pub fn compare(root: &Path, long: bool) -> Result<(), Failure> {
                 "analysis",
                 "--example",
                 "peers",
+                "--target-dir",
+                "target",
             ]),
     )?;
     let ours = root.join("target/release/examples/peers");
