@@ -11,7 +11,7 @@ use crate::allan::{Deviation, Gapped, Phase, TauGrid};
 use crate::angles::{Angle, Attitude, angle, attitude};
 use crate::edf::{NoiseType, chi_square_interval, edf};
 use crate::error::AnalysisError;
-use crate::noise_fit::{Estimated, Misfit, NoiseFit, Ramp, Spectrum, Term, fit, misfit};
+use crate::noise_fit::{Described, Estimated, NoiseFit, Ramp, Spectrum, Term, fit_described};
 use crate::noise_id::identify;
 use crate::paper::{Figure, paper_figures};
 use crate::sampling::Sampling;
@@ -22,10 +22,6 @@ pub const ANALYSIS_FORMAT: &str = "imu-stand-analysis/1";
 
 /// Samples in runs below which no noise parameter is estimated.
 const FIT_NEEDS: usize = 64;
-/// Replicates behind the check of the fit.
-const MISFIT_REPLICATES: usize = 300;
-/// Chance below which the fit is said not to describe the curve.
-const MISFIT_P: f64 = 0.005;
 
 /// Options of [`analyze`].
 #[derive(Clone, Debug, PartialEq)]
@@ -94,6 +90,10 @@ pub struct DeviationPoint {
     pub edf: f64,
     /// Differences in it.
     pub n: usize,
+    /// Noise that was identified there and that the degrees of freedom are of: exponent α of the rate's spectral density
+    /// f^α. 2: quantization (white phase), 1: flicker phase, 0: white, −1: flicker, −2: random walk.
+    #[serde(default)]
+    pub noise_alpha: i32,
 }
 
 /// A figure with its 95 % interval.
@@ -202,6 +202,10 @@ pub struct ChannelAnalysis {
     pub paper: Paper,
     /// What a reader has to know.
     pub warnings: Vec<String>,
+    /// Cluster time from which on the parameters describe the record, s: the sample interval, or more where the upper end of
+    /// the spectrum had to be left out. `None` where they do not: values and intervals are then no more than a description.
+    #[serde(default)]
+    pub parameters_hold_from_s: Option<f64>,
     /// Overlapping Allan deviation of the fitted parameters at the cluster times of the octave grid: `[τ in s, σ]`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fitted: Vec<[f64; 2]>,
@@ -338,6 +342,7 @@ fn analyze_channel(
             notes: Vec::new(),
         },
         warnings: sampling.warnings.clone(),
+        parameters_hold_from_s: None,
         fitted: Vec::new(),
         angle: None,
     };
@@ -361,8 +366,15 @@ fn analyze_channel(
     };
     let spectrum = (phase.samples() >= FIT_NEEDS)
         .then(|| Spectrum::with_gaps(&channel.values, &runs, &sampling.slots, tau0));
-    let fitted = spectrum.as_ref().map(fit);
     let gapped = (runs.len() > 1).then(|| Gapped::new(&channel.values, &runs, &sampling.slots));
+    let longest = gapped.as_ref().map_or(phase.longest_run(), |g| {
+        g.lengths().into_iter().max().unwrap_or(0)
+    });
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
+    let described = spectrum
+        .as_ref()
+        .map(|s| fit_described(s, longest / 5, &mut rng));
+    let fitted = described.as_ref().map(|d| d.fit.clone());
     if let Some(gapped) = &gapped {
         out.warnings.push(gaps_note(gapped, &phase, tau0));
     }
@@ -386,7 +398,7 @@ fn analyze_channel(
         };
         out.deviations.insert(*kind, points);
     }
-    let (Some(spectrum), Some(fitted)) = (spectrum, fitted) else {
+    let (Some(spectrum), Some(fitted), Some(described)) = (spectrum, fitted, described) else {
         out.warnings.push(format!(
             "inconclusive: noise parameters need {FIT_NEEDS} samples, the channel has {}",
             phase.samples()
@@ -394,6 +406,8 @@ fn analyze_channel(
         return out;
     };
     out.parameters = NoiseParameters::of(&fitted, &units);
+    out.parameters_hold_from_s = described.hold_from_m().map(|m| m as f64 * tau0);
+    out.warnings.extend(misfit_warning(&described, tau0));
     let walk = fitted.term(Term::RandomWalk);
     if walk.value.is_some() && walk.low == 0.0 && fitted.term(Term::Flicker).value.is_none() {
         out.warnings.push(
@@ -402,12 +416,10 @@ fn analyze_channel(
                 .into(),
         );
     }
-    let longest = gapped.as_ref().map_or(phase.longest_run(), |g| {
-        g.lengths().into_iter().max().unwrap_or(0)
-    });
     out.fitted = TauGrid::Octave
         .factors(longest / 2)
         .into_iter()
+        .filter(|m| *m >= described.from_m)
         .map(|m| [m as f64 * tau0, fitted.deviation(m) * units.reading.factor])
         .collect();
     if channel.quantity == Quantity::Gyro {
@@ -420,13 +432,6 @@ fn analyze_channel(
                 phase.samples() as f64 * tau0
             ));
         }
-    }
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
-    let ms = TauGrid::Octave.factors(longest / 5);
-    if let Some(found) = misfit(&spectrum, &fitted, &ms, MISFIT_REPLICATES, &mut rng)
-        && found.p_value < MISFIT_P
-    {
-        out.warnings.push(misfit_warning(&found, &fitted, tau0));
     }
     if let Some(lsb) = channel.lsb
         && let Some(n) = fitted.term(Term::White).value
@@ -450,7 +455,40 @@ fn analyze_channel(
     out
 }
 
-fn misfit_warning(found: &Misfit, fitted: &NoiseFit, tau0: f64) -> String {
+/// What a reader has to know where the terms do not describe the whole curve.
+#[must_use]
+pub fn misfit_warning(described: &Described, tau0: f64) -> Option<String> {
+    let (refused, found) = described.refused.as_ref()?;
+    let cure = if described.from_m > 1 {
+        let half_band = 1.0 / (described.from_m as f64 * tau0);
+        format!(
+            "Below {} Hz they do ({}): parameters and intervals are from there, for cluster times from {} s on",
+            short(half_band),
+            letters(&described.fit),
+            short(described.from_m as f64 * tau0)
+        )
+    } else {
+        "Parameters and intervals presume the terms".to_owned()
+    };
+    Some(format!(
+        "the fitted terms ({}) do not describe the curve: sup |z| = {:.1} at {} s, where the deviation is {:.1} % {} the \
+         fit (p = {:.3} over refitted replicates). {cure}; `imu-stand diagnose` looks for the cause",
+        letters(refused),
+        found.sup_z,
+        short(found.worst_m as f64 * tau0),
+        100.0 * (found.ratio - 1.0).abs(),
+        if found.ratio > 1.0 { "above" } else { "below" },
+        found.p_value
+    ))
+}
+
+/// Four significant digits, without zeros behind them.
+fn short(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
+/// The terms in a fit.
+fn letters(fitted: &NoiseFit) -> String {
     let names: Vec<&str> = Term::ALL
         .into_iter()
         .filter(|t| fitted.model.terms[*t as usize])
@@ -462,17 +500,7 @@ fn misfit_warning(found: &Misfit, fitted: &NoiseFit, tau0: f64) -> String {
         })
         .chain((fitted.model.ramp != Ramp::Absent).then_some("R"))
         .collect();
-    format!(
-        "the fitted terms ({}) do not describe the curve: sup |z| = {:.1} at {:.3} s, where the deviation is {:.1} % {} the \
-         fit (p = {:.3} over refitted replicates). Parameters and intervals presume the terms; `imu-stand diagnose` looks \
-         for the cause",
-        names.join(", "),
-        found.sup_z,
-        found.worst_m as f64 * tau0,
-        100.0 * (found.ratio - 1.0).abs(),
-        if found.ratio > 1.0 { "above" } else { "below" },
-        found.p_value
-    )
+    names.join(", ")
 }
 
 fn gaps_note(gapped: &Gapped, phase: &Phase, tau0: f64) -> String {
@@ -532,6 +560,7 @@ fn gapped_curve(
                 high: high * scale.factor,
                 edf,
                 n: found.estimate.n,
+                noise_alpha: noise.alpha(),
             })
         })
         .collect()
@@ -564,6 +593,7 @@ fn curve(
                 high: high * scale.factor,
                 edf,
                 n: e.n,
+                noise_alpha: noise.alpha(),
             }
         })
         .collect()

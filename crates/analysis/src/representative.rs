@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::allan::{Deviation, Phase, deviation};
-use crate::analyze::NoiseParameters;
+use crate::analyze::{NoiseParameters, misfit_warning};
 use crate::edf::{NoiseType, edf};
 use crate::error::AnalysisError;
-use crate::noise_fit::{Spectrum, Term, fit};
+use crate::noise_fit::{Spectrum, Term, fit, fit_described};
 use crate::noise_id::identify;
 use crate::pooled::{Pooled, pool};
 use crate::sampling::Sampling;
@@ -59,6 +59,10 @@ pub struct Together {
     pub runs: usize,
     /// The parameters, as `analyze` gives them.
     pub parameters: NoiseParameters,
+    /// Cluster time from which on they describe the runs, as `analyze` gives it.
+    pub parameters_hold_from_s: Option<f64>,
+    /// What a reader has to know: that the terms do not describe the runs, or only at long cluster times.
+    pub warnings: Vec<String>,
 }
 
 /// A run that does not represent the others.
@@ -166,7 +170,7 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
     }
     let is_odd = |run: usize| odd.iter().any(|o| o.run == run);
     pool_figures(&mut figures, &is_odd);
-    let together = together(records, &samplings, &names, &spectra, &is_odd);
+    let together = together(records, &samplings, &names, &spectra, &is_odd, &mut rng);
     let distance = |run: usize| figures.iter().map(|f| f.z[run].powi(2)).sum::<f64>();
     let run = (0..records.len())
         .min_by(|a, b| {
@@ -226,6 +230,7 @@ fn together(
     names: &[String],
     spectra: &[Vec<Spectrum>],
     is_odd: &dyn Fn(usize) -> bool,
+    rng: &mut impl Rng,
 ) -> Vec<Together> {
     let tau0 = samplings[0].tau0;
     if samplings
@@ -245,14 +250,17 @@ fn together(
                 .filter(|(run, _)| !is_odd(*run))
                 .map(|(_, s)| s.clone())
                 .collect();
-            let fitted = fit(&Spectrum::together(&chosen));
+            let longest = chosen.iter().map(|s| s.samples).max().unwrap_or(0);
+            let described = fit_described(&Spectrum::together(&chosen), longest / 5, rng);
             Some(Together {
                 channel: name.clone(),
                 runs: chosen.len(),
                 parameters: NoiseParameters::of(
-                    &fitted,
+                    &described.fit,
                     &Units::of(channel.quantity, &channel.unit),
                 ),
+                parameters_hold_from_s: described.hold_from_m().map(|m| m as f64 * tau0),
+                warnings: misfit_warning(&described, tau0).into_iter().collect(),
             })
         })
         .collect()

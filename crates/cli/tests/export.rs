@@ -216,6 +216,27 @@ fn gnss_ins_sim_simulates_what_was_measured() {
 }
 
 #[test]
+fn a_rate_is_written_as_a_person_would() {
+    let measured = ImuNoise {
+        rate_hz: 20.000_000_000_001_03,
+        ..imu()
+    };
+    for consumer in [
+        Consumer::Kalibr,
+        Consumer::Vins,
+        Consumer::Matlab,
+        Consumer::Gz,
+    ] {
+        let text = measured.text(consumer, measured.rate_hz);
+        assert!(
+            text.contains("20 ") || text.contains(" 20)") || text.contains(">20<"),
+            "{text}"
+        );
+        assert!(!text.contains("20.0"), "{text}");
+    }
+}
+
+#[test]
 fn what_is_not_established_is_a_limit_for_a_filter_and_nothing_for_a_simulator() {
     let mut imu = imu();
     for axis in &mut imu.gyro {

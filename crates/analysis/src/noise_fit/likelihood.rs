@@ -85,7 +85,8 @@ pub fn maximize(
         starts.push(*start);
     } else {
         // White from the upper half of the frequencies, each other term from what lies above it at its own end.
-        let upper: Vec<&Bin> = spectrum.bins.iter().filter(|b| b.w > 1.5).collect();
+        let half = 0.48 * spectrum.bins.last().map_or(0.0, |b| b.w);
+        let upper: Vec<&Bin> = spectrum.bins.iter().filter(|b| b.w > half).collect();
         let white = ratio(upper.iter().map(|b| b.cc), upper.iter().map(|b| b.count));
         let low: Vec<&Bin> = spectrum.bins.iter().take(8).collect();
         let middle: Vec<&Bin> = spectrum.bins.iter().filter(|b| b.w < 0.05).collect();

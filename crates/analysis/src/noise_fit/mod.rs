@@ -6,10 +6,12 @@
 //! record does not establish may be there all the same, and has to be allowed for. The interval of the ramp is averaged
 //! over the random walk, because the two hide each other and a plug-in interval is too narrow.
 
+mod band;
 mod likelihood;
 mod replicate;
 mod spectrum;
 
+pub use band::{Described, fit_described};
 pub use likelihood::{Maximum, Model, Ramp};
 pub use replicate::{Misfit, misfit, replicate};
 pub use spectrum::{Bin, Coefficients, Spectrum, Term, model_allan_variance};

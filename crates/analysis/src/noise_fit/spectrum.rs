@@ -181,6 +181,14 @@ impl Spectrum {
         }
     }
 
+    /// The part below the angular frequency `limit` per sample.
+    #[must_use]
+    pub fn below(&self, limit: f64) -> Self {
+        let mut out = self.clone();
+        out.bins.retain(|b| b.w < limit);
+        out
+    }
+
     /// Variance of the coefficients of a bin.
     #[inline]
     #[must_use]

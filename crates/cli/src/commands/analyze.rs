@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use analysis::AnalyzeOptions;
-use analysis::analyze::{Analysis, ChannelAnalysis, NoiseParameters};
+use analysis::allan::Deviation;
+use analysis::analyze::{Analysis, ChannelAnalysis, Interval, NoiseParameters};
 use clap::Args;
-use imu_stand::report::plot::number;
+use imu_stand::report::plot::{number, tidy};
 use imu_stand::text;
 use miette::Result;
 
@@ -60,6 +61,21 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn print(analysis: &Analysis) {
+    let input = &analysis.input;
+    let losses = match (input.gaps, input.lost_samples) {
+        (0, _) => "no gaps".to_owned(),
+        (gaps, lost) => format!("{gaps} gaps, {lost} samples lost"),
+    };
+    say!(
+        "{}: {} s at {} Hz, {} samples, {losses}",
+        input.file,
+        tidy(input.seconds, 6),
+        tidy(input.rate_hz, 6),
+        input.samples
+    );
+    say!(
+        "in brackets 95 % intervals, two-sided; `at most` is the upper end of such an interval that begins at 0"
+    );
     // Gyros first: they are what the stand is for.
     let gyros =
         |is: bool| move |(name, _): &(&String, &ChannelAnalysis)| name.starts_with("gyro") == is;
@@ -67,12 +83,19 @@ fn print(analysis: &Analysis) {
     let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
     for (name, channel) in all().filter(gyros(true)).chain(all().filter(gyros(false))) {
         say!("{name}");
-        parameters(&channel.parameters);
+        let known = channel.parameters.angle_random_walk.high.is_some();
+        parameters(
+            &channel.parameters,
+            channel.parameters_hold_from_s.is_some() || !known,
+        );
         for warning in &channel.warnings {
             say!("{}", text::item("warning: ", warning));
         }
         say!("  by the paper's procedure");
-        interval("angle random walk", &channel.paper.angle_random_walk);
+        interval(
+            walk_of_the_integral(&channel.parameters),
+            &channel.paper.angle_random_walk,
+        );
         interval(
             "in-run bias stability",
             &channel.paper.in_run_bias_stability,
@@ -97,18 +120,28 @@ fn print(analysis: &Analysis) {
             );
         }
         for (deviation, points) in &channel.deviations {
-            let name = format!("{deviation:?}").to_lowercase();
+            // A time deviation has the unit of the integral.
+            let unit = if *deviation == Deviation::Tdev {
+                channel.parameters.quantization_noise.unit.as_str()
+            } else {
+                channel.unit.as_str()
+            };
             say!(
-                "  {:<28} tau s   deviation  95 % interval",
-                format!("{name}, {}", channel.unit)
+                "  {:<16} {:>9} {:>12}   {:<26} {:>8}  noise there",
+                format!("{}, {unit}", deviation.name()),
+                "tau, s",
+                "deviation",
+                "95 % interval",
+                "edf"
             );
             for point in points {
                 say!(
-                    "    {:>29} {:>11} {:>11} .. {}",
+                    "    {:>24} {:>12}   {:<26} {:>8}  {}",
                     number(point.tau_s, 4),
                     number(point.deviation, 4),
-                    number(point.low, 4),
-                    number(point.high, 4)
+                    format!("{} .. {}", number(point.low, 4), number(point.high, 4)),
+                    number(point.edf, 3),
+                    noise(point.noise_alpha)
                 );
             }
         }
@@ -134,29 +167,71 @@ fn print(analysis: &Analysis) {
     }
 }
 
-/// N, B, K, R and Q, a line each.
-pub fn parameters(p: &NoiseParameters) {
-    interval("N angle random walk", &p.angle_random_walk);
-    interval("B bias instability", &p.bias_instability);
-    interval("K rate random walk", &p.rate_random_walk);
-    interval("R rate ramp", &p.rate_ramp);
-    interval("Q quantization noise", &p.quantization_noise);
+/// Noise by the exponent of its spectral density.
+fn noise(alpha: i32) -> &'static str {
+    match alpha {
+        2.. => "quantization",
+        1 => "flicker phase",
+        0 => "white",
+        -1 => "flicker",
+        _ => "random walk",
+    }
 }
 
-fn interval(name: &str, interval: &analysis::analyze::Interval) {
+/// What N is called: a gyro's white noise makes the angle walk, an accelerometer's the velocity.
+fn walk_of_the_integral(p: &NoiseParameters) -> &'static str {
+    if p.angle_random_walk.unit.starts_with("deg") {
+        "angle random walk"
+    } else if p.angle_random_walk.unit.starts_with("m/s") {
+        "velocity random walk"
+    } else {
+        "white noise"
+    }
+}
+
+/// N, B, K, R and Q, a line each, with a mark where the terms do not describe the record.
+pub fn parameters(p: &NoiseParameters, hold: bool) {
+    let n = walk_of_the_integral(p);
+    let (k, r) = match n {
+        "angle random walk" => ("K rate random walk", "R rate ramp"),
+        "velocity random walk" => ("K accel. random walk", "R accel. ramp"),
+        _ => ("K random walk", "R ramp"),
+    };
+    let mark = if hold { "" } else { "  ?" };
+    let line = |name: &str, of: &Interval| marked(name, of, mark);
+    line(&format!("N {n}"), &p.angle_random_walk);
+    line("B bias instability", &p.bias_instability);
+    line(k, &p.rate_random_walk);
+    line(r, &p.rate_ramp);
+    line("Q quantization noise", &p.quantization_noise);
+    if !hold {
+        say!(
+            "    ? the terms do not describe this record: no figure or limit with this mark is to be relied on"
+        );
+    }
+}
+
+fn interval(name: &str, interval: &Interval) {
+    marked(name, interval, "");
+}
+
+fn marked(name: &str, interval: &Interval, mark: &str) {
     let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| number(v, 4));
     match interval.value {
         Some(value) => say!(
-            "  {name:<24} {:>10} [{} .. {}] {}",
+            "  {name:<24} {:>10} [{} .. {}] {}{mark}",
             number(value, 4),
             shown(interval.low),
             shown(interval.high),
             interval.unit
         ),
-        None => say!(
-            "  {name:<24} not established; at most {} {}",
-            shown(interval.high),
-            interval.unit
-        ),
+        None => match interval.high {
+            Some(high) => say!(
+                "  {name:<24} not established; at most {} {}{mark}",
+                number(high, 4),
+                interval.unit
+            ),
+            None => say!("  {name:<24} nothing known"),
+        },
     }
 }

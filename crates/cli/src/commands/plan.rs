@@ -3,12 +3,15 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use analysis::noise_fit::{Spectrum, Term, fit};
+use analysis::analyze::misfit_warning;
+use analysis::noise_fit::{Spectrum, Term, fit, fit_described};
 use analysis::plan::{KnownNoise, Letter, expected, seconds_for};
 use analysis::sampling::Sampling;
 use analysis::separate::{PRESETS, TOLD_APART, separation};
 use analysis::synthetic::Truth;
 use clap::Args;
+use imu_stand::report::plot::{number, tidy};
+use imu_stand::text;
 use miette::Result;
 use model::ModelFile;
 use model::effects::{EFFECTS, effect};
@@ -67,7 +70,7 @@ struct Plan {
 }
 
 /// What is known of the noise, deg/s and s.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 struct Noise {
     from: String,
     rate_hz: f64,
@@ -77,9 +80,26 @@ struct Noise {
     q: f64,
     r: f64,
     notes: Vec<String>,
+    /// Upper limits of what is not established, in the order of [`Letter::ALL`]; 0 where there is none.
+    #[serde(skip)]
+    limits: [f64; 5],
 }
 
 impl Noise {
+    /// With one term as large as it may be, where it is not established.
+    fn at_most(&self, letter: Letter) -> Option<(Self, f64)> {
+        let limit = self.limits[letter as usize];
+        let mut noise = self.clone();
+        *match letter {
+            Letter::N => &mut noise.n,
+            Letter::B => &mut noise.b,
+            Letter::K => &mut noise.k,
+            Letter::Q => &mut noise.q,
+            Letter::R => &mut noise.r,
+        } = limit;
+        (limit > 0.0).then_some((noise, limit))
+    }
+
     fn known(&self) -> KnownNoise {
         KnownNoise {
             angle_random_walk_n: self.n,
@@ -96,6 +116,8 @@ struct Wanted {
     term: &'static str,
     within_percent: f64,
     seconds: f64,
+    /// Where the term is not established: the limit that the plan takes for its size, deg/s and s. A smaller one takes longer.
+    if_as_large_as: Option<f64>,
     /// At a quarter of the rate and at four times it.
     seconds_at: [(f64, f64); 2],
     /// Share of simulated records whose estimate is within the wanted part of the truth.
@@ -128,16 +150,23 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let noise = noise(arguments)?;
     let quiet = arguments.input.quiet;
     if !quiet {
+        let or_none = |value: f64, text: String| {
+            if value > 0.0 {
+                text
+            } else {
+                "none known".to_owned()
+            }
+        };
         say!(
-            "noise  N {:.3} deg/sqrt(h), B {:.1} deg/h, K {:.2e} deg/s/sqrt(s), {} Hz, from {}",
-            noise.n * 60.0,
-            noise.b * 3600.0,
-            noise.k,
-            noise.rate_hz,
+            "noise  N {} deg/sqrt(h), B {}, K {}, {} Hz, from {}",
+            number(noise.n * 60.0, 4),
+            or_none(noise.b, format!("{} deg/h", number(noise.b * 3600.0, 3))),
+            or_none(noise.k, format!("{:.2e} deg/s/sqrt(s)", noise.k)),
+            tidy(noise.rate_hz, 6),
             noise.from
         );
         for note in &noise.notes {
-            say!("       {note}");
+            say!("{}", text::item("", note));
         }
     }
     let mut plan = Plan {
@@ -245,6 +274,7 @@ fn noise(arguments: &Arguments) -> Result<Noise> {
         q: baseline("quantization_noise"),
         r,
         notes: Vec::new(),
+        limits: [0.0; 5],
     })
 }
 
@@ -268,13 +298,21 @@ fn of_capture(arguments: &Arguments, path: &std::path::Path) -> Result<Noise> {
         })?;
     let sampling = Sampling::of(&record, arguments.input.rate).map_err(super::explain)?;
     let runs = sampling.runs_of(&channel.values);
-    let found = fit(&Spectrum::with_gaps(
-        &channel.values,
-        &runs,
-        &sampling.slots,
-        sampling.tau0,
-    ));
+    let spectrum = Spectrum::with_gaps(&channel.values, &runs, &sampling.slots, sampling.tau0);
+    let longest = runs.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(arguments.seed);
+    let described = fit_described(&spectrum, longest / 5, &mut rng);
+    let found = &described.fit;
     let mut notes = Vec::new();
+    notes.extend(misfit_warning(&described, sampling.tau0));
+    let estimates = [
+        found.term(Term::White),
+        found.term(Term::Flicker),
+        found.term(Term::RandomWalk),
+        found.term(Term::Quantization),
+        found.rate_ramp,
+    ];
+    let limits = estimates.map(|e| if e.value.is_none() { e.high } else { 0.0 });
     let mut value = |name: &str, unit: &str, e: analysis::noise_fit::Estimated| {
         e.value.unwrap_or_else(|| {
             notes.push(format!(
@@ -298,6 +336,7 @@ fn of_capture(arguments: &Arguments, path: &std::path::Path) -> Result<Noise> {
         q,
         r,
         notes,
+        limits,
     })
 }
 
@@ -307,7 +346,19 @@ fn want(
     within_percent: f64,
     arguments: &Arguments,
 ) -> Result<Wanted> {
+    // A term that is not established is planned for as if it were as large as it may be.
+    let (noise, if_as_large_as) = match noise.at_most(letter) {
+        Some((noise, limit)) => (noise, Some(limit)),
+        None => (noise.clone(), None),
+    };
     let known = noise.known();
+    if !(0.2..=100.0).contains(&within_percent) {
+        miette::bail!(
+            help = "write for example `--want \"K within 20 %\"`",
+            "--want: {} within {within_percent} % is not to be planned for; 0.2 % to 100 % are",
+            letter.name()
+        );
+    }
     if letter.size(&known) <= 0.0 {
         miette::bail!(
             help = "plan from a longer capture, or write a model file with the size you expect and give it by --model",
@@ -324,7 +375,7 @@ fn want(
     let checked_share = match arguments.check {
         None => None,
         Some(records) => Some(check(
-            noise,
+            &noise,
             letter,
             within_percent,
             seconds,
@@ -336,6 +387,7 @@ fn want(
         term: letter.name(),
         within_percent,
         seconds,
+        if_as_large_as,
         seconds_at,
         checked_share,
     })
@@ -399,17 +451,23 @@ fn duration(seconds: f64) -> String {
 fn print_want(plan: &Plan) {
     for w in &plan.want {
         let [slower, faster] = w.seconds_at;
+        if let Some(limit) = w.if_as_large_as {
+            say!(
+                "{} is not established: were it as large as its limit, {limit:.2e} (deg, s), then",
+                w.term
+            );
+        }
         say!(
             "{} within {} % (95 %)  record {} at {} Hz ({:.0} s); {} at {} Hz, {} at {} Hz",
             w.term,
             w.within_percent,
             duration(w.seconds),
-            plan.noise.rate_hz,
+            tidy(plan.noise.rate_hz, 6),
             w.seconds.ceil(),
             duration(slower.1),
-            slower.0,
+            tidy(slower.0, 6),
             duration(faster.1),
-            faster.0
+            tidy(faster.0, 6)
         );
         if let Some(share) = w.checked_share {
             say!(

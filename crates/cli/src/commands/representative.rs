@@ -117,6 +117,12 @@ fn print(files: &[String], found: &Representative) {
             together.channel,
             together.runs
         );
-        super::analyze::parameters(&together.parameters);
+        super::analyze::parameters(
+            &together.parameters,
+            together.parameters_hold_from_s.is_some(),
+        );
+        for warning in &together.warnings {
+            say!("{}", text::item("warning: ", warning));
+        }
     }
 }

@@ -138,6 +138,7 @@ impl ImuNoise {
     /// The text that a consumer reads, for a sensor that is sampled at `rate_hz` there.
     #[must_use]
     pub fn text(&self, consumer: Consumer, rate_hz: f64) -> String {
+        let rate_hz = tidy(rate_hz);
         match consumer {
             Consumer::Kalibr => self.kalibr(rate_hz),
             Consumer::Vins => self.vins(rate_hz),
@@ -149,10 +150,10 @@ impl ImuNoise {
 
     fn origin(&self, comment: &str) -> String {
         format!(
-            "{comment} from {}: {:.0} s at {:.4} Hz, by imu-stand {}\n",
+            "{comment} from {}: {:.0} s at {} Hz, by imu-stand {}\n",
             self.file,
             self.seconds,
-            self.rate_hz,
+            tidy(self.rate_hz),
             env!("CARGO_PKG_VERSION")
         )
     }
@@ -371,6 +372,11 @@ impl ImuNoise {
     fn long(&self) -> f64 {
         (10.0 * self.seconds).max(3600.0).round()
     }
+}
+
+/// A rate as a person would write it: a sample interval that was measured or computed has a last digit of its own.
+fn tidy(rate_hz: f64) -> f64 {
+    format!("{rate_hz:.7e}").parse().unwrap_or(rate_hz)
 }
 
 /// Root mean square of those that are known; 0 where none is.

@@ -367,12 +367,26 @@ pub fn number(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
-    let exponent = value.abs().log10().floor() as i32;
+    // Of the rounded value: 0.09999996 is 0.1000, not 0.10000.
+    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
+    let exponent: i32 = scientific
+        .rsplit_once('e')
+        .and_then(|(_, e)| e.parse().ok())
+        .unwrap_or(0);
     if !(-4..6).contains(&exponent) {
-        return format!("{value:.*e}", digits.saturating_sub(1));
+        return scientific;
     }
     let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
     format!("{value:.decimals$}")
+}
+
+/// The same without zeros at the end: for what is known better than it is shown, a rate or a length.
+#[must_use]
+pub fn tidy(value: f64, digits: usize) -> String {
+    let rounded: f64 = format!("{value:.*e}", digits.saturating_sub(1))
+        .parse()
+        .unwrap_or(value);
+    format!("{rounded}")
 }
 
 /// Thins a signal to what a figure can show: the lowest and the highest of each of `columns` stretches.
@@ -407,6 +421,10 @@ mod tests {
     fn numbers_are_written_as_people_write_them() {
         assert_eq!(number(0.051_234, 3), "0.0512");
         assert_eq!(number(-1234.5, 3), "-1234");
+        assert_eq!(number(0.099_999_96, 4), "0.1000");
+        assert_eq!(number(999_999.9, 4), "1.000e6");
+        assert_eq!(tidy(20.000_000_001, 6), "20");
+        assert_eq!(tidy(599.75, 6), "599.75");
         assert_eq!(number(3.2e-7, 2), "3.2e-7");
         assert_eq!(number(0.0, 3), "0");
     }
