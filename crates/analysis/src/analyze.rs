@@ -14,6 +14,7 @@ use crate::error::AnalysisError;
 use crate::noise_fit::{Described, Estimated, NoiseFit, Ramp, Spectrum, Term, fit_described};
 use crate::noise_id::identify;
 use crate::paper::{Figure, paper_figures};
+use crate::rows;
 use crate::sampling::Sampling;
 use crate::units::{Scale, Units};
 
@@ -70,6 +71,9 @@ pub struct AnalysisInput {
     pub gaps: usize,
     /// Samples lost in them, as far as they can be counted.
     pub lost_samples: u64,
+    /// What was wrong with the rows, and what was done about it.
+    #[serde(default)]
+    pub notes: Vec<String>,
     /// Scatter of the sample times about an even grid, s rms, where times are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub jitter_s: Option<f64>,
@@ -235,6 +239,7 @@ pub struct Analysis {
 /// [`AnalysisError::NoRate`] when its sample rate is unknown, [`AnalysisError::BadOption`] for a rate that is not
 /// positive, [`AnalysisError::Inconclusive`] below 3 samples, [`AnalysisError::Constant`] when nothing in it moves.
 pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, AnalysisError> {
+    let record = &*rows::in_order(record);
     let present = || {
         record
             .channels
@@ -305,6 +310,7 @@ pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, An
             channels: present(),
             gaps: sampling.runs.len().saturating_sub(1),
             lost_samples: sampling.lost,
+            notes: record.notes.clone(),
             jitter_s: sampling.jitter_s,
         },
         attitude: attitude(record, &sampling).filter(|_| {

@@ -23,7 +23,7 @@ use crate::result::{
     Parameter, Unexplained, Verdict,
 };
 use crate::search::{Search, State};
-use crate::{beyond, dead, doubt, evidence, losses, scan, threshold};
+use crate::{beyond, dead, doubt, evidence, losses, rows, scan, threshold};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -70,9 +70,12 @@ pub(crate) struct VarianceFound {
 ///
 /// # Errors
 /// [`AnalysisError::Inconclusive`] when the record is too short, [`AnalysisError::NoChannel`] when it holds no gyro,
-/// [`AnalysisError::NoRate`] when its sample rate is unknown, [`AnalysisError::Constant`] when a gyro never changes.
+/// [`AnalysisError::NoRate`] when its sample rate is unknown, [`AnalysisError::Constant`] when a gyro never changes,
+/// [`AnalysisError::NeverNew`] when no gyro's readings are flagged as new.
 pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed, AnalysisError> {
-    let (alive, dead) = dead::left_out(record);
+    let record = &*rows::in_order(record);
+    let record = &*rows::longest_part(record);
+    let (alive, dead) = dead::left_out(record)?;
     let (mended, sticking) = sign_bit::mend(&alive);
     let record = &*mended;
     let audited = audit(record);
@@ -195,6 +198,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
                 rate_hz: grid.rate_hz,
                 samples: record.len(),
                 channels: record.channels.iter().map(|c| c.name.clone()).collect(),
+                notes: record.notes.clone(),
             },
             baseline,
             checks,

@@ -39,6 +39,16 @@ pub enum AnalysisError {
         /// Its only value.
         value: f64,
     },
+    /// The flags say that no reading of a channel is new.
+    #[error(
+        "channel {name} is never flagged as new (bit {bit} of `flags`): what it reads is old, so this is no measurement"
+    )]
+    NeverNew {
+        /// The channel.
+        name: String,
+        /// The bit that says so.
+        bit: usize,
+    },
     /// An option out of its range.
     #[error("{option} is {found}; it has to be {expected}")]
     BadOption {

@@ -34,6 +34,7 @@ pub mod plan;
 pub mod pooled;
 pub mod representative;
 pub mod result;
+pub mod rows;
 pub mod sampling;
 pub mod scale;
 pub mod scan;

@@ -1,5 +1,7 @@
 //! Which of many runs represents them, and which do not: the paper's step before the analysis proper.
 
+use std::borrow::Cow;
+
 use model::record::{Quantity, Record};
 use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,6 +16,7 @@ use crate::error::AnalysisError;
 use crate::noise_fit::{Spectrum, Term, fit, fit_described};
 use crate::noise_id::identify;
 use crate::pooled::{Pooled, pool};
+use crate::rows;
 use crate::sampling::Sampling;
 use crate::units::Units;
 
@@ -116,6 +119,7 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
             unit: "runs",
         });
     }
+    let records: Vec<Cow<'_, Record>> = records.iter().map(rows::in_order).collect();
     let common = |gyro: bool| -> Vec<String> {
         records[0]
             .channels
@@ -142,7 +146,7 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
     let mut figures = Vec::new();
     let mut spectra = Vec::new();
     for name in &names {
-        let (of_channel, of_runs) = figures_of(records, &samplings, name)?;
+        let (of_channel, of_runs) = figures_of(&records, &samplings, name)?;
         figures.extend(of_channel);
         spectra.push(of_runs);
     }
@@ -170,7 +174,7 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
     }
     let is_odd = |run: usize| odd.iter().any(|o| o.run == run);
     pool_figures(&mut figures, &is_odd);
-    let together = together(records, &samplings, &names, &spectra, &is_odd, &mut rng);
+    let together = together(&records, &samplings, &names, &spectra, &is_odd, &mut rng);
     let distance = |run: usize| figures.iter().map(|f| f.z[run].powi(2)).sum::<f64>();
     let run = (0..records.len())
         .min_by(|a, b| {
@@ -225,7 +229,7 @@ fn pool_figures(figures: &mut [RunFigure], is_odd: &dyn Fn(usize) -> bool) {
 }
 
 fn together(
-    records: &[Record],
+    records: &[Cow<'_, Record>],
     samplings: &[Sampling],
     names: &[String],
     spectra: &[Vec<Spectrum>],
@@ -270,7 +274,7 @@ fn together(
 const SAME_RATE: f64 = 1e-3;
 
 fn figures_of(
-    records: &[Record],
+    records: &[Cow<'_, Record>],
     samplings: &[Sampling],
     name: &str,
 ) -> Result<(Vec<RunFigure>, Vec<Spectrum>), AnalysisError> {

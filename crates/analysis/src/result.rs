@@ -23,6 +23,9 @@ pub struct Input {
     pub samples: usize,
     /// Channels present.
     pub channels: Vec<String>,
+    /// What was wrong with the rows, and what was done about it.
+    #[serde(default)]
+    pub notes: Vec<String>,
 }
 
 /// One omnibus check of a channel, against the model before and after it was extended.

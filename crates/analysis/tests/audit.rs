@@ -93,6 +93,7 @@ fn record(world: World, rng: &mut Xoshiro256PlusPlus) -> Record {
         ),
         flags: Some(vec![7; n]),
         channels,
+        notes: vec![],
     }
 }
 

@@ -61,6 +61,9 @@ pub fn diagnosis(d: &Diagnosis) -> String {
         "{}: {:.0} s at {:.4} Hz, {} samples",
         input.file, input.seconds, input.rate_hz, input.samples
     );
+    for note in &input.notes {
+        let _ = writeln!(out, "{}", item("note: ", note));
+    }
     let _ = writeln!(out, "verdict  {verdict}");
     for finding in &d.findings {
         write_finding(&mut out, finding);

@@ -115,6 +115,8 @@ pub struct Record {
     pub flags: Option<Vec<u16>>,
     /// The measured columns.
     pub channels: Vec<Channel>,
+    /// What a reader of the results has to know about the rows: what was put in order, left out or missing.
+    pub notes: Vec<String>,
 }
 
 impl Record {

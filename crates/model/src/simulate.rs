@@ -463,6 +463,7 @@ fn frames(
         host_time_s: Some(host),
         flags: Some(rows.iter().map(|r| s.flags[*r]).collect()),
         channels,
+        notes: vec![],
     }
 }
 

@@ -170,7 +170,9 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
         audit.untested("clock_rate", "the record is shorter than 30 s");
         return;
     }
-    let Some((gained, error)) = host_slope(device, host) else {
+    let slope =
+        host_slope(device, host).filter(|(gained, error)| gained.is_finite() && error.is_finite());
+    let Some((gained, error)) = slope else {
         audit.untested("clock_rate", "too few host times");
         return;
     };
@@ -182,8 +184,10 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
         "the device clock runs {ppm:+.1} +- {error:.1} ppm against the host's; {tolerance:.0} ppm are stated"
     );
     // The scatter of the block minima is estimated from some thirty of them.
-    let chance = if beyond <= 0.0 {
+    let chance = if beyond.is_nan() || beyond <= 0.0 {
         1.0
+    } else if beyond.is_infinite() {
+        0.0
     } else {
         statrs::distribution::StudentsT::new(0.0, 1.0, BLOCKS as f64 - 2.0).map_or_else(
             |_| tails::upper_normal(beyond),

@@ -203,6 +203,7 @@ impl RecordBuilder {
             host_time_s: Some(self.rows.iter().map(|(_, time)| *time).collect()),
             flags: Some(self.rows.iter().map(|(s, _)| s.flags).collect()),
             channels,
+            notes: Vec::new(),
         }
     }
 

@@ -184,7 +184,12 @@ fn finish(
     for (column, values) in columns.into_iter().zip(cells) {
         place(&mut record, column, values);
     }
+    if skipped > 0 {
+        let note = format!("rows that cannot be read and are left out (--skip-bad): {skipped}");
+        record.notes.push(note);
+    }
     difference_angles(&mut record)?;
+    let record = analysis::rows::in_order(&record).into_owned();
     Ok(Read { record, skipped })
 }
 
@@ -454,7 +459,7 @@ fn parse_row(
             },
         };
         let whole = match column.role {
-            Role::Seq | Role::Ticks => *value >= 0.0 && value.fract() == 0.0,
+            Role::Seq | Role::Ticks => *value >= 0.0 && *value < 9e15 && value.fract() == 0.0,
             Role::Flags => *value >= 0.0 && *value <= 65_535.0 && value.fract() == 0.0,
             Role::Measured { counts: true, .. } => {
                 value.is_nan() || (value.fract() == 0.0 && value.abs() < 1e9)
@@ -510,8 +515,8 @@ fn place(record: &mut Record, column: Column, values: Vec<f64>) {
     }
 }
 
-/// Undoes the wrapping of a counter of `modulus` steps, if it is wrapped. What goes back by less than half a turn
-/// stays where it is: a repeated or reordered row.
+/// Undoes the wrapping of a counter of `modulus` steps, if it is wrapped. What goes back by less than half a turn, over
+/// a wrap or not, stays where it is: a repeated or reordered row.
 pub(super) fn unwrap(values: impl Iterator<Item = u64>, modulus: u64) -> Vec<u64> {
     let (mut turns, mut last) = (0, 0);
     values
@@ -519,6 +524,14 @@ pub(super) fn unwrap(values: impl Iterator<Item = u64>, modulus: u64) -> Vec<u64
             // A value of `modulus` or more was unwrapped by whoever wrote it.
             if now < modulus && last < modulus && last > now && last - now > modulus / 2 {
                 turns += modulus;
+            }
+            if now < modulus
+                && last < modulus
+                && turns > 0
+                && now > last
+                && now - last > modulus / 2
+            {
+                return now + turns - modulus;
             }
             last = now;
             now + turns

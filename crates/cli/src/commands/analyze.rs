@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         deviations: deviations.collect::<Result<_>>()?,
         taus: arguments.taus.parse().map_err(super::explain)?,
         channels: arguments.channels.clone(),
-        rate_hz: arguments.input.rate,
+        rate_hz: None,
         seed: arguments.seed,
         file: super::name(&arguments.capture),
     };
@@ -80,6 +80,9 @@ fn print(analysis: &Analysis) {
     let gyros =
         |is: bool| move |(name, _): &(&String, &ChannelAnalysis)| name.starts_with("gyro") == is;
     let all = || analysis.channels.iter();
+    for note in &analysis.input.notes {
+        say!("{}", text::item("note: ", note));
+    }
     let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
     for (name, channel) in all().filter(gyros(true)).chain(all().filter(gyros(false))) {
         say!("{name}");

@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             let subject = Subject {
                 record: &read.record,
                 diagnosed: &found,
-                rate_hz: arguments.input.rate,
+                rate_hz: None,
                 command: &super::report::command(),
                 seed: arguments.seed,
                 hash: Some(&hash),

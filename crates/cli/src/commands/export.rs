@@ -113,6 +113,7 @@ fn data(arguments: &Arguments, to: To) -> Result<()> {
     }
     Outputs::beside([&arguments.file]).data("--out", Some(out))?;
     let read = arguments.input.read(&arguments.file)?;
+    super::tell(&arguments.file, &read.record);
     let table = Table::of(&read.record, arguments.raw);
     let written = match to {
         To::Npz => table.write_npz(out),
@@ -188,9 +189,10 @@ fn analysis(arguments: &Arguments) -> Result<Analysis> {
         return Ok(analysis);
     }
     let read = arguments.input.read(&arguments.file)?;
+    super::tell(&arguments.file, &read.record);
     let options = AnalyzeOptions {
         seed: arguments.seed,
-        rate_hz: arguments.input.rate,
+        rate_hz: None,
         file: super::name(&arguments.file),
         ..AnalyzeOptions::default()
     };

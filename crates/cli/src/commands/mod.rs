@@ -100,6 +100,13 @@ impl Input {
     }
 }
 
+/// Says on standard error what was wrong with the rows of a capture, for commands whose results have no place for it.
+pub fn tell(path: &Path, record: &model::record::Record) {
+    for note in &record.notes {
+        eprintln!("{}: {note}", path.display());
+    }
+}
+
 /// Where the board is; the same for every command that talks to one.
 #[derive(Args)]
 pub struct Line {
@@ -227,6 +234,9 @@ pub fn explain(error: analysis::AnalysisError) -> miette::Report {
         analysis::AnalysisError::NoRate => "add `--rate HZ`, or map a time column".to_owned(),
         analysis::AnalysisError::NoChannel { .. } => {
             "name one of the channels that are there".to_owned()
+        }
+        analysis::AnalysisError::NeverNew { .. } => {
+            "check the gyros' SPI lines; where the flags come from elsewhere, leave the column `flags` out".to_owned()
         }
         _ => "`--help` after the command lists its options, with an example".to_owned(),
     };

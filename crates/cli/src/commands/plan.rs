@@ -280,6 +280,7 @@ fn noise(arguments: &Arguments) -> Result<Noise> {
 
 fn of_capture(arguments: &Arguments, path: &std::path::Path) -> Result<Noise> {
     let record = arguments.input.read(path)?.record;
+    super::tell(path, &record);
     let channel = record
         .channels
         .iter()

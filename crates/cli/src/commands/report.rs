@@ -43,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let subject = Subject {
         record: &read.record,
         diagnosed: &diagnosed,
-        rate_hz: arguments.input.rate,
+        rate_hz: None,
         command: &command(),
         seed: arguments.seed,
         hash: Some(&hash),

@@ -42,7 +42,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let records = arguments
         .captures
         .iter()
-        .map(|path| Ok(arguments.input.read(path)?.record))
+        .map(|path| {
+            let record = arguments.input.read(path)?.record;
+            super::tell(path, &record);
+            Ok(record)
+        })
         .collect::<Result<Vec<_>>>()?;
     let found = analysis::representative(&records, arguments.seed).map_err(super::explain)?;
     let files: Vec<String> = arguments.captures.iter().map(|p| super::name(p)).collect();

@@ -20,6 +20,9 @@ pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
                 (d.input.file) " \u{b7} " (number(d.input.seconds, 3)) " s at " (format!("{:.3}", d.input.rate_hz))
                 " Hz \u{b7} " (d.input.samples) " samples"
             }
+            @for note in &d.input.notes {
+                p.warning { "Note: " (note) "." }
+            }
             h1 { span.word { (word) } " " (headline) }
             @if d.findings.is_empty() && d.unexplained.is_empty() {
                 p.lead {
