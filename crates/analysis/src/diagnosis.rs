@@ -498,12 +498,18 @@ fn effects_of<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<EffectMode
                 parameters: known(&f.parameters),
             });
         }
+        // What is the same to the last digit on several channels is one event on all of them.
+        let first = all.len();
         for (channel, p) in &f.per_channel {
-            all.push(EffectModel {
-                cause: f.cause.clone(),
-                channels: vec![channel.clone()],
-                parameters: known(p),
-            });
+            let parameters = known(p);
+            match all[first..].iter_mut().find(|e| e.parameters == parameters) {
+                Some(same) => same.channels.push(channel.clone()),
+                None => all.push(EffectModel {
+                    cause: f.cause.clone(),
+                    channels: vec![channel.clone()],
+                    parameters,
+                }),
+            }
         }
     }
     all

@@ -169,6 +169,57 @@ fn what_is_put_into_a_model_is_found_and_the_extended_model_simulates() {
 }
 
 #[test]
+fn a_cause_that_needs_excitation_comes_back_from_the_fitted_model() {
+    let folder = folder("there-and-back");
+    let text = format!(
+        "{}\n[[effect]]\ncause = \"temperature\"\nchannels = [\"gyro_y\"]\n\
+         slope = {{ value = -0.13, unit = \"deg/s/degC\" }}\n",
+        model::file::ModelFile::paper().to_toml()
+    );
+    let still = folder.join("still.toml");
+    std::fs::write(&still, &text).unwrap();
+    let warmed = folder.join("warmed.toml");
+    let excitation = "\n[excitation]\nself_heating_degc = 8.0\n\n[[channel]]";
+    std::fs::write(&warmed, text.replacen("\n[[channel]]", excitation, 1)).unwrap();
+    let simulate = |model: &Path, out: &str, seed: &str| {
+        let made = run(&[
+            "simulate",
+            "--model",
+            model.to_str().unwrap(),
+            "--seed",
+            seed,
+            "--out",
+            folder.join(out).to_str().unwrap(),
+        ]);
+        assert!(made.status.success());
+        String::from_utf8_lossy(&made.stderr).into_owned()
+    };
+    let warning = simulate(&still, "still.csv", "1");
+    assert!(warning.contains("temperature will not show"), "{warning}");
+    assert_eq!(simulate(&warmed, "first.csv", "2"), "");
+    let fitted = folder.join("fitted.toml");
+    for (capture, seed) in [("first.csv", "3"), ("second.csv", "4")] {
+        let answer = folder.join("d.json");
+        let made = run(&[
+            "diagnose",
+            folder.join(capture).to_str().unwrap(),
+            "--quiet",
+            "--json",
+            answer.to_str().unwrap(),
+            "--model-out",
+            fitted.to_str().unwrap(),
+        ]);
+        assert!(made.status.success());
+        let diagnosis = json(&answer);
+        assert_eq!(
+            diagnosis["findings"][0]["cause"], "temperature",
+            "{capture}: {diagnosis}"
+        );
+        assert_eq!(simulate(&fitted, "second.csv", seed), "");
+    }
+}
+
+#[test]
 fn a_model_file_with_an_unknown_effect_is_an_error_that_names_the_line() {
     let folder = folder("model");
     let path = folder.join("m.toml");

@@ -445,6 +445,11 @@ pub trait Effect: Send + Sync {
     fn same_event(&self, _a: &Parameters, _b: &Parameters) -> bool {
         false
     }
+    /// Settings of the excitation ([`crate::excitation::SETTINGS`]) without all of which it does not show in a
+    /// simulation; empty where it needs none.
+    fn excited_by(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// When it acts in a simulation.
     fn stage(&self) -> Stage;
     /// Act on the simulation. `channels` are the gyro axes (0..2) that the model names.

@@ -1,9 +1,16 @@
 //! What acts on a simulated stand: temperature, supply, motor, vibration. Stated in the model file, or taken from a record.
 
+mod fitted;
+
+pub use fitted::settings_like;
+
 use std::collections::BTreeMap;
 
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::effects::effect;
+use crate::file::ModelFile;
 
 /// A setting of the `[excitation]` section.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +22,9 @@ pub struct Setting {
     /// What it means.
     pub meaning: &'static str,
 }
+
+/// Settings that turn the stand, as a `base_motion` in the model does.
+const MOTION: [&str; 2] = ["turn_dps", "sway_deg"];
 
 const fn setting(key: &'static str, default: f64, meaning: &'static str) -> Setting {
     Setting {
@@ -95,6 +105,24 @@ pub fn setting_value(given: &BTreeMap<String, f64>, key: &str) -> f64 {
             .find(|s| s.key == key)
             .map_or(0.0, |s| s.default)
     })
+}
+
+/// The effects of a model that cannot show in its simulation, each with the settings of which one would let it.
+#[must_use]
+pub fn unexcited(model: &ModelFile) -> Vec<(&'static str, &'static [&'static str])> {
+    let acts = |key: &&str| setting_value(&model.excitation, key) != 0.0;
+    let moved = model.effects.iter().any(|e| e.cause == "base_motion");
+    let known = model.effects.iter().filter_map(|e| effect(&e.cause));
+    let mut missing: Vec<_> = known
+        .filter(|e| {
+            let settings = e.excited_by();
+            let by_motion = moved && settings.iter().any(|s| MOTION.contains(s));
+            !settings.is_empty() && !by_motion && !settings.iter().any(acts)
+        })
+        .map(|e| (e.id(), e.excited_by()))
+        .collect();
+    missing.dedup();
+    missing
 }
 
 /// The world of a run, one value per sample.

@@ -11,22 +11,22 @@ use crate::file::{ChannelModel, ModelFile};
 use crate::record::{Axis, Base, Channel, Header, Quantity, Record, flag};
 
 /// Unit per count of the ADIS16250's temperature, degC, and reading of the count 0.
-const TEMP_LSB_C: f64 = 0.1453;
+pub(crate) const TEMP_LSB_C: f64 = 0.1453;
 const TEMP_ZERO_C: f64 = 25.0;
 /// Unit per count of the ADIS16250's supply reading, V.
-const SUPPLY_LSB_V: f64 = 1.8315e-3;
+pub(crate) const SUPPLY_LSB_V: f64 = 1.8315e-3;
 /// Accelerometer on the 10-bit converter at 3.3 V, 800 mV/g: zero and scale in counts.
 const ACC_ZERO: f64 = 512.0;
-const ACC_PER_G: f64 = 248.24;
+pub(crate) const ACC_PER_G: f64 = 248.24;
 /// Noise of the accelerometer, g rms (data sheet: 4.7 mV at 800 mV/g).
-const ACC_NOISE_G: f64 = 4.7 / 800.0;
+pub(crate) const ACC_NOISE_G: f64 = 4.7 / 800.0;
 /// Reading noise of temperature and supply, counts.
 const SLOW_NOISE_COUNTS: f64 = 0.5;
 /// Length of a tick of the board, s, and its stated tolerance.
 const TICK_S: f64 = 4e-6;
 const TICK_TOLERANCE_PPM: f64 = 100.0;
 /// Standard gravity, m/s^2.
-const STANDARD_GRAVITY: f64 = 9.80665;
+pub(crate) const STANDARD_GRAVITY: f64 = 9.80665;
 /// Step of a channel whose model states none, deg/s: a file holds counts, and these are far below the noise of any gyro.
 const STEPLESS_DPS: f64 = 1e-6;
 /// Limits of the 14-bit word.

@@ -8,6 +8,7 @@ use clap::Args;
 use imu_stand::report::Subject;
 use imu_stand::text;
 use miette::Result;
+use model::excitation::settings_like;
 use serde::Serialize;
 
 use super::{Input, Outputs};
@@ -70,7 +71,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         };
         let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
         if let Some(path) = &arguments.model_out {
-            super::write(path, &found.extended_model.to_toml())?;
+            let mut fitted = found.extended_model.clone();
+            fitted.excitation = settings_like(&read.record, fitted.rate_hz);
+            super::write(path, &fitted.to_toml())?;
         }
         if !arguments.input.quiet {
             say!("{}", text::diagnosis(&found.diagnosis).trim_end());

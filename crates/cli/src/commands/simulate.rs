@@ -40,6 +40,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(path) => super::read_model(path)?,
     };
     let rate = arguments.rate.unwrap_or(model.rate_hz);
+    for (cause, settings) in model::excitation::unexcited(&model) {
+        eprintln!(
+            "warning: {cause} will not show: nothing excites it. help: under [excitation], set {}",
+            settings.join(" or ")
+        );
+    }
     let record = model::simulate(&model, arguments.seconds, rate, arguments.seed)
         .map_err(|error| miette::miette!(help = "see `imu-stand simulate --help`", "{error}"))?;
     if arguments.out.as_os_str() == outputs::DASH {

@@ -68,6 +68,10 @@ impl Effect for CrossAxis {
             .collect())
     }
 
+    fn excited_by(&self) -> &'static [&'static str] {
+        &["turn_dps", "sway_deg"]
+    }
+
     fn stage(&self) -> Stage {
         Stage::Rate
     }

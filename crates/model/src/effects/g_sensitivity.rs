@@ -73,6 +73,10 @@ impl Effect for GSensitivity {
         }
     }
 
+    fn excited_by(&self) -> &'static [&'static str] {
+        &["vibration_g", "sway_deg"]
+    }
+
     fn stage(&self) -> Stage {
         Stage::Rate
     }

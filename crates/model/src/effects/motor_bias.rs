@@ -95,6 +95,10 @@ impl Effect for MotorBias {
         all
     }
 
+    fn excited_by(&self) -> &'static [&'static str] {
+        &["motor_duty"]
+    }
+
     fn stage(&self) -> Stage {
         Stage::Rate
     }

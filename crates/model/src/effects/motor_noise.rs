@@ -59,6 +59,10 @@ impl Effect for MotorNoise {
         [("variance_increase_at_full_duty".to_owned(), Parameter::estimated(increase.0, increase.1, "1"))].into()
     }
 
+    fn excited_by(&self) -> &'static [&'static str] {
+        &["motor_duty"]
+    }
+
     fn stage(&self) -> Stage {
         Stage::Noise
     }

@@ -55,6 +55,10 @@ impl Effect for ScaleError {
         Ok(vec![Hypothesis::Scale])
     }
 
+    fn excited_by(&self) -> &'static [&'static str] {
+        &["turn_dps", "sway_deg"]
+    }
+
     fn stage(&self) -> Stage {
         Stage::World
     }

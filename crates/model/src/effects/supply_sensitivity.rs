@@ -62,6 +62,10 @@ impl Effect for SupplySensitivity {
         })])
     }
 
+    fn excited_by(&self) -> &'static [&'static str] {
+        &["supply_load_v", "supply_motor_v"]
+    }
+
     fn stage(&self) -> Stage {
         Stage::Rate
     }

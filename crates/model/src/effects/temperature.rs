@@ -52,6 +52,10 @@ impl Effect for Temperature {
         })])
     }
 
+    fn excited_by(&self) -> &'static [&'static str] {
+        &["heater_degc", "self_heating_degc", "drift_degc"]
+    }
+
     fn stage(&self) -> Stage {
         Stage::Rate
     }

@@ -69,6 +69,10 @@ impl Effect for TemperatureQuadratic {
         Some("temperature")
     }
 
+    fn excited_by(&self) -> &'static [&'static str] {
+        &["heater_degc", "self_heating_degc", "drift_degc"]
+    }
+
     fn stage(&self) -> Stage {
         Stage::Rate
     }

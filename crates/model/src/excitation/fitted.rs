@@ -1,0 +1,367 @@
+//! Settings that make a world like a record's: alike in size and pace, not in its course.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::World;
+use crate::record::{Axis, Base, Channel, Quantity, Record};
+use crate::simulate::{ACC_NOISE_G, ACC_PER_G, STANDARD_GRAVITY, SUPPLY_LSB_V, TEMP_LSB_C};
+
+/// Blocks in which slow histories are fitted: a second, longer where a record would have more of them.
+const MOST_BLOCKS: usize = 4000;
+/// Part of the scatter that a term has to take away before it is stated.
+const WORTH: f64 = 0.25;
+/// Time constants of the self-heating that are tried.
+const TIME_CONSTANTS: usize = 24;
+
+/// The settings of `[excitation]` under which a simulation meets temperatures, supply, motor, vibration and motion like
+/// those of the record. What the record does not have, or what does not move, is left out.
+#[must_use]
+pub fn settings_like(record: &Record, rate_hz: f64) -> BTreeMap<String, f64> {
+    let samples = record.len();
+    if samples < 2 || !(rate_hz.is_finite() && rate_hz > 0.0) {
+        return BTreeMap::new();
+    }
+    let length = (rate_hz as usize).max(samples / MOST_BLOCKS).max(1);
+    let fit = Fit {
+        record,
+        rate_hz,
+        length,
+    };
+    let mut settings = vec![];
+    fit.temperature(&mut settings);
+    fit.supply(&mut settings);
+    fit.motor(&mut settings);
+    fit.vibration(&mut settings);
+    fit.motion(&mut settings);
+    let rounded = |v: f64| format!("{v:.3e}").parse().unwrap_or(v);
+    settings
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), rounded(value)))
+        .collect()
+}
+
+type Settings = Vec<(&'static str, f64)>;
+
+struct Fit<'a> {
+    record: &'a Record,
+    rate_hz: f64,
+    /// Samples in a block.
+    length: usize,
+}
+
+impl Fit<'_> {
+    fn block_s(&self) -> f64 {
+        self.length as f64 / self.rate_hz
+    }
+
+    fn seconds(&self) -> f64 {
+        self.record.len() as f64 / self.rate_hz
+    }
+
+    /// Means of the blocks; a block without a reading repeats the one before.
+    fn blocks(&self, values: &[f64]) -> Vec<f64> {
+        let mut last = values
+            .iter()
+            .copied()
+            .find(|v| v.is_finite())
+            .unwrap_or(0.0);
+        values
+            .chunks(self.length)
+            .map(|block| {
+                let (mut sum, mut n) = (0.0, 0.0);
+                for v in block.iter().filter(|v| v.is_finite()) {
+                    sum += v;
+                    n += 1.0;
+                }
+                if n > 0.0 {
+                    last = sum / n;
+                }
+                last
+            })
+            .collect()
+    }
+
+    /// Ambient, drift, self-heating; what is left is a heater of that size and pace.
+    fn temperature(&self, settings: &mut Settings) {
+        let Some(first) = self.record.all(Quantity::Temp).next() else {
+            return;
+        };
+        let measured = self.blocks(&first.values);
+        let at = |i: usize| (i as f64 + 0.5) * self.block_s();
+        let warming = |constant: f64| -> Vec<f64> {
+            (0..measured.len())
+                .map(|i| 1.0 - (-at(i) / constant).exp())
+                .collect()
+        };
+        let straight = off_line(&measured);
+        let shapes = (0..TIME_CONSTANTS).map(|k| {
+            let share = k as f64 / (TIME_CONSTANTS - 1) as f64;
+            // From ten blocks to half the run: what is slower is a drift.
+            let (least, most) = (10.0 * self.block_s(), 0.5 * self.seconds());
+            let constant = least * (most / least).powf(share);
+            let shape = off_line(&warming(constant));
+            let size = dot(&straight, &shape) / dot(&shape, &shape);
+            (dot(&straight, &shape) * size, constant, size)
+        });
+        let best = shapes
+            .filter(|s| s.0.is_finite())
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        let mut left = measured.clone();
+        if let Some((gain, constant, size)) = best
+            && gain > WORTH * dot(&straight, &straight)
+        {
+            for (y, w) in left.iter_mut().zip(warming(constant)) {
+                *y -= size * w;
+            }
+            settings.push(("self_heating_degc", size));
+            settings.push(("self_heating_time_constant_s", constant));
+        }
+        let rest = off_line(&left);
+        if rms(&rest) > TEMP_LSB_C {
+            let period = period(&rest, self.block_s());
+            let heater: BTreeMap<String, f64> = [
+                ("heater_degc".to_owned(), 1.0),
+                ("heater_period_s".to_owned(), period),
+                ("ambient_degc".to_owned(), 0.0),
+            ]
+            .into();
+            let world = World::stated(
+                &heater,
+                left.len(),
+                1.0 / self.block_s(),
+                &mut Xoshiro256PlusPlus::seed_from_u64(0),
+            );
+            let [unit, ..] = world.temperature;
+            let swing = rms(&rest) / rms(&off_line(&unit));
+            for (y, u) in left.iter_mut().zip(unit) {
+                *y -= swing * u;
+            }
+            settings.push(("heater_degc", swing));
+            settings.push(("heater_period_s", period));
+        }
+        let (middle, slope) = line(&left);
+        let rise = slope * (left.len() - 1) as f64;
+        settings.push(("ambient_degc", middle - rise / 2.0));
+        if rise.abs() > TEMP_LSB_C {
+            settings.push(("drift_degc", rise));
+        }
+    }
+
+    /// Mean, the part that follows the motor's duty, and a load for what is left.
+    fn supply(&self, settings: &mut Settings) {
+        let Some(supply) = self.record.all(Quantity::Supply).next() else {
+            return;
+        };
+        let volts = self.blocks(&supply.values);
+        let mut left = centred(&volts);
+        let mut most = mean(&volts);
+        if let Some(duty) = self.duty() {
+            let pull = self.blocks(&duty.iter().map(|d| d.abs()).collect::<Vec<_>>());
+            let shape = centred(&pull);
+            let sag = -dot(&left, &shape) / dot(&shape, &shape);
+            if sag > 0.0 && sag * sag * dot(&shape, &shape) > WORTH * dot(&left, &left) {
+                for (y, d) in left.iter_mut().zip(&shape) {
+                    *y += sag * d;
+                }
+                most += sag * mean(&pull);
+                settings.push(("supply_motor_v", sag));
+            }
+        }
+        // A load that is on for half of its period moves the supply by half its sag to either side.
+        let load = 2.0 * rms(&left);
+        if load > SUPPLY_LSB_V {
+            most += load / 2.0;
+            settings.push(("supply_load_v", load));
+            settings.push(("supply_load_period_s", period(&left, self.block_s())));
+        }
+        settings.push(("supply_v", most));
+    }
+
+    fn duty(&self) -> Option<Vec<f64>> {
+        let pwm = self.record.all(Quantity::Pwm).next()?;
+        let duty: Vec<f64> = pwm.values.iter().map(|v| v / 255.0).collect();
+        duty.iter().any(|d| *d != 0.0).then_some(duty)
+    }
+
+    /// Largest duty, and the period of a profile that switches the motor on as often.
+    fn motor(&self, settings: &mut Settings) {
+        let Some(duty) = self.duty() else { return };
+        let largest = duty.iter().fold(0.0f64, |m, d| m.max(d.abs()));
+        let starts = duty
+            .windows(2)
+            .filter(|w| w[0].abs() < largest / 2.0 && w[1].abs() >= largest / 2.0)
+            .count();
+        settings.push(("motor_duty", largest));
+        // The profile has two starts in a period.
+        let period = 2.0 * self.seconds() / starts.max(1) as f64;
+        settings.push(("motor_period_s", period));
+    }
+
+    /// What the accelerometers see beyond their own noise and, where the base sways, beyond its slow tilt.
+    fn vibration(&self, settings: &mut Settings) {
+        let sways = self.record.header.base.is_some_and(|b| b != Base::Static);
+        let own = ACC_NOISE_G * ACC_NOISE_G + ACC_PER_G.powi(-2) / 12.0;
+        let variances: Vec<f64> = self
+            .record
+            .all(Quantity::Acc)
+            .map(|c| {
+                let g: Vec<f64> = finite(c).map(|v| v / STANDARD_GRAVITY).collect();
+                let whole = if sways {
+                    let steps: Vec<f64> = g.windows(2).map(|w| w[1] - w[0]).collect();
+                    dot(&steps, &steps) / (2 * steps.len().max(1)) as f64
+                } else {
+                    rms(&centred(&g)).powi(2)
+                };
+                (whole - own).max(0.0)
+            })
+            .collect();
+        let vibration = mean(&variances).sqrt();
+        if vibration > ACC_NOISE_G {
+            settings.push(("vibration_g", vibration));
+        }
+    }
+
+    /// The turning of a table or the sway of a base, by the gyro that sees most of it.
+    fn motion(&self, settings: &mut Settings) {
+        if !matches!(
+            self.record.header.base,
+            Some(Base::Turntable | Base::Moving)
+        ) {
+            return;
+        }
+        let seen = Axis::ALL.into_iter().filter_map(|axis| {
+            let channel = self.record.of(Quantity::Gyro, Some(axis))?;
+            let rate = centred(&self.blocks(&channel.values));
+            Some((axis, rms(&rate), period(&rate, self.block_s())))
+        });
+        let Some((axis, rms, period)) = seen.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            return;
+        };
+        let amplitude = std::f64::consts::SQRT_2 * rms;
+        if axis == Axis::Z {
+            settings.push(("turn_dps", amplitude));
+            settings.push(("turn_period_s", period));
+        } else {
+            settings.push(("sway_deg", amplitude * period / TAU));
+            settings.push(("sway_period_s", period));
+        }
+    }
+}
+
+fn finite(channel: &Channel) -> impl Iterator<Item = f64> {
+    channel.values.iter().copied().filter(|v| v.is_finite())
+}
+
+fn mean(y: &[f64]) -> f64 {
+    if y.is_empty() {
+        return 0.0;
+    }
+    y.iter().sum::<f64>() / y.len() as f64
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn rms(y: &[f64]) -> f64 {
+    (dot(y, y) / y.len().max(1) as f64).sqrt()
+}
+
+fn centred(y: &[f64]) -> Vec<f64> {
+    let mean = mean(y);
+    y.iter().map(|v| v - mean).collect()
+}
+
+/// Middle and slope of the straight line through a history.
+fn line(y: &[f64]) -> (f64, f64) {
+    let middle = (y.len() as f64 - 1.0) / 2.0;
+    let (mut xy, mut xx) = (0.0, 0.0);
+    for (i, v) in y.iter().enumerate() {
+        let x = i as f64 - middle;
+        xy += x * v;
+        xx += x * x;
+    }
+    (mean(y), if xx > 0.0 { xy / xx } else { 0.0 })
+}
+
+fn off_line(y: &[f64]) -> Vec<f64> {
+    let (level, slope) = line(y);
+    let middle = (y.len() as f64 - 1.0) / 2.0;
+    y.iter()
+        .enumerate()
+        .map(|(i, v)| v - level - slope * (i as f64 - middle))
+        .collect()
+}
+
+/// Period of a history that swings about zero, by how often it passes from well below to well above it.
+fn period(y: &[f64], step_s: f64) -> f64 {
+    let half = rms(y) / 2.0;
+    let (mut low, mut cycles) = (false, 0.0);
+    for v in y {
+        if *v < -half {
+            low = true;
+        } else if *v > half && low {
+            low = false;
+            cycles += 1.0;
+        }
+    }
+    y.len() as f64 * step_s / f64::max(cycles, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ModelFile;
+
+    /// What `settings_like` finds in a simulation of a world, and the same for a simulation of what it found.
+    fn there_and_back(
+        stated: &[(&str, f64)],
+    ) -> Result<[BTreeMap<String, f64>; 2], crate::simulate::SimulateError> {
+        let mut model = ModelFile::paper();
+        model.excitation = stated.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
+        let first = settings_like(&crate::simulate(&model, 600.0, 20.0, 3)?, 20.0);
+        model.excitation = first.clone();
+        let second = settings_like(&crate::simulate(&model, 600.0, 20.0, 4)?, 20.0);
+        Ok([first, second])
+    }
+
+    #[test]
+    fn a_world_is_found_again_in_size_and_pace() -> Result<(), Box<dyn std::error::Error>> {
+        let worlds: [&[(&str, f64)]; 5] = [
+            &[("self_heating_degc", 9.0), ("ambient_degc", 18.0)],
+            &[("heater_degc", 6.0), ("heater_period_s", 200.0)],
+            &[
+                ("motor_duty", 0.8),
+                ("motor_period_s", 75.0),
+                ("supply_motor_v", 0.1),
+            ],
+            &[("supply_load_v", 0.06), ("vibration_g", 0.1)],
+            &[("turn_dps", 12.0), ("turn_period_s", 40.0)],
+        ];
+        for stated in worlds {
+            let found = there_and_back(stated)?;
+            for (key, value) in stated {
+                for settings in &found {
+                    let got = *settings.get(*key).ok_or(format!("{key} is missing"))?;
+                    assert!(
+                        (got / value - 1.0).abs() < 0.2,
+                        "{key} is {value}, found {got} of {stated:?}"
+                    );
+                }
+            }
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn what_does_not_move_is_not_stated() -> Result<(), Box<dyn std::error::Error>> {
+        let [found, _] = there_and_back(&[])?;
+        let keys: Vec<_> = found.keys().map(String::as_str).collect();
+        assert_eq!(keys, ["ambient_degc", "supply_v"]);
+        Ok(())
+    }
+}
