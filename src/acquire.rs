@@ -51,6 +51,8 @@ pub struct Raw {
     pub adc_stalled: u8,
     /// What became of the job that was posted before this tick.
     pub done: Done,
+    /// Time of the tick, set by whoever owns the clock.
+    pub t_ticks: u32,
 }
 
 impl Raw {
@@ -65,6 +67,7 @@ impl Raw {
             spi_stalled: 0,
             adc_stalled: 0,
             done: Done::NONE,
+            t_ticks: 0,
         }
     }
 }
@@ -122,129 +125,118 @@ impl Done {
     };
 }
 
-/// One frame with one gyro.
+/// One frame with one gyro; `None` where it does not end.
 #[inline(never)]
-fn exchange<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Result<Word, Status> {
-    let Some(gyro) = sensors.gyros().get_mut(axis as usize) else {
-        return Err(Status::BadArgument);
-    };
-    gyro.exchange(command).map_err(|_| Status::NotAnswering)
+fn exchange<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Option<Word> {
+    let gyro = sensors.gyros().get_mut(axis as usize)?;
+    gyro.exchange(command).ok()
 }
 
-/// One frame with each gyro: what they answer to the command of the round before.
+/// One frame with each gyro: what they answer to the command of the round before, and a bit for each that does not.
 #[inline(never)]
-fn round<S: Sensors>(sensors: &mut S, command: Command, into: &mut [Word; 3], stalled: &mut u8) {
-    let (mut axis, mut bit) = (0, 1);
+fn round<S: Sensors>(sensors: &mut S, command: Command, into: &mut [Word; 3]) -> u8 {
+    let (mut axis, mut bit, mut stalled) = (0, 1, 0);
     for word in into {
         *word = match exchange(sensors, axis, command) {
-            Ok(reply) => reply,
-            Err(_) => {
-                *stalled |= bit;
+            Some(reply) => reply,
+            None => {
+                stalled |= bit;
                 Word(0)
             }
         };
         axis = axis.wrapping_add(1);
         bit <<= 1;
     }
+    stalled
 }
 
 /// One sample. The first thing it does is to start the ADC, the second is the first SPI frame.
 pub fn acquire<S: Sensors>(sensors: &mut S, raw: &mut Raw) {
     let mut delay = sensors.delay();
     sensors.adc_start(0);
-    (raw.spi_stalled, raw.adc_stalled) = (0, 0);
-    let stalled = &mut raw.spi_stalled;
-    round(
-        sensors,
-        Command::read(Register::GyroOut),
-        &mut raw.gyro,
-        stalled,
-    );
+    raw.adc_stalled = 0;
+    let mut stalled = round(sensors, Command::read(Register::GyroOut), &mut raw.gyro);
     sensors.sampled();
     delay.delay_us(ROUND_STALL_US);
-    round(
-        sensors,
-        Command::read(Register::TempOut),
-        &mut raw.gyro,
-        stalled,
-    );
-    raw.acc[0] = convert(sensors, &mut raw.adc_stalled, 0);
+    stalled |= round(sensors, Command::read(Register::TempOut), &mut raw.gyro);
+    convert(sensors, raw, 0);
     sensors.adc_start(1);
-    round(
-        sensors,
-        Command::read(Register::SupplyOut),
-        &mut raw.temp,
-        stalled,
-    );
+    stalled |= round(sensors, Command::read(Register::SupplyOut), &mut raw.temp);
     delay.delay_us(ROUND_STALL_US);
-    round(
-        sensors,
-        Command::read(Register::SupplyOut),
-        &mut raw.supply,
-        stalled,
-    );
-    raw.acc[1] = convert(sensors, &mut raw.adc_stalled, 1);
+    stalled |= round(sensors, Command::read(Register::SupplyOut), &mut raw.supply);
+    raw.spi_stalled = stalled;
+    convert(sensors, raw, 1);
     sensors.adc_start(2);
-    raw.acc[2] = convert(sensors, &mut raw.adc_stalled, 2);
+    convert(sensors, raw, 2);
 }
 
-fn convert<S: Sensors>(sensors: &mut S, stalled: &mut u8, channel: u8) -> u16 {
-    sensors.adc_finish().unwrap_or_else(|| {
-        *stalled |= 1 << channel;
-        0
-    })
+/// Takes the conversion of an output.
+#[inline(never)]
+fn convert<S: Sensors>(sensors: &mut S, raw: &mut Raw, channel: u8) {
+    let counts = sensors.adc_finish();
+    if counts.is_none() {
+        raw.adc_stalled |= 1 << channel;
+    }
+    if let Some(place) = raw.acc.get_mut(channel as usize) {
+        *place = counts.unwrap_or(0);
+    }
 }
 
 /// Does a job, after the sample and before the next tick.
-pub fn work<S: Sensors>(sensors: &mut S, job: Job) -> Done {
-    let mut done = Done {
-        task: job.task,
-        ..Done::NONE
-    };
-    match job.task {
-        Task::None => {}
-        Task::Configure => done.value = configure(sensors, job.value).into(),
-        Task::Read | Task::Write => match reach(sensors, job) {
-            Ok(value) => {
-                done.value = value;
-                if matches!(job.task, Task::Write) && value != job.value {
-                    done.status = Status::ReadBackWrong;
-                }
-            }
-            Err(status) => done.status = status,
+pub fn work<S: Sensors>(sensors: &mut S, job: &Job, done: &mut Done) {
+    (done.status, done.value) = match job.task {
+        Task::None => (Status::Ok, 0),
+        Task::Configure => (Status::Ok, configure(sensors, job.value).into()),
+        Task::Read => reach(sensors, job),
+        Task::Write => match reach(sensors, job) {
+            (Status::Ok, value) if value != job.value => (Status::ReadBackWrong, value),
+            reached => reached,
         },
-    }
-    done
+    };
+    done.task = job.task;
 }
 
 /// One frame with one gyro, and the pause that it wants after it.
 #[inline(never)]
-fn frame<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Result<Word, Status> {
+fn frame<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Option<Word> {
     let reply = exchange(sensors, axis, command);
     sensors.delay().delay_us(FRAME_STALL_US);
     reply
 }
 
-/// Reads the job's register, after writing it where that is asked for.
+/// Reads the job's register, after writing it where that is asked for. The value is 0 but for [`Status::Ok`].
 #[inline(never)]
-fn reach<S: Sensors>(sensors: &mut S, job: Job) -> Result<u16, Status> {
+fn reach<S: Sensors>(sensors: &mut S, job: &Job) -> (Status, u16) {
     let (axis, address) = (job.axis, job.address & !1);
+    let [low, high] = job.value.to_le_bytes();
     let read = Command::read_at(address);
-    if matches!(job.task, Task::Read) {
-        read.ok_or(Status::BadArgument)?;
-    } else {
-        let [low, high] = job.value.to_le_bytes();
-        let low = Command::write_at(address, low).ok_or(Status::BadArgument)?;
-        let high = Command::write_at(address | 1, high).ok_or(Status::BadArgument)?;
-        frame(sensors, axis, low)?;
-        frame(sensors, axis, high)?;
+    let write = Command::write_at(address, low).zip(Command::write_at(address | 1, high));
+    let is_write = job.task == Task::Write;
+    if axis > 2
+        || if is_write {
+            write.is_none()
+        } else {
+            read.is_none()
+        }
+    {
+        return (Status::BadArgument, 0);
     }
-    let Some(read) = read else {
-        return Ok(job.value);
-    };
-    frame(sensors, axis, read)?;
-    // The reply comes with any next frame; one that asks for ENDURANCE disturbs nothing.
-    frame(sensors, axis, Command::read(Register::Endurance)).map(Word::bits)
+    let value = (|| {
+        if let Some((low, high)) = write.filter(|_| is_write) {
+            frame(sensors, axis, low)?;
+            frame(sensors, axis, high)?;
+        }
+        let Some(read) = read else {
+            return Some(job.value);
+        };
+        frame(sensors, axis, read)?;
+        // The reply comes with any next frame; one that asks for ENDURANCE disturbs nothing.
+        frame(sensors, axis, Command::read(Register::Endurance)).map(Word::bits)
+    })();
+    match value {
+        Some(value) => (Status::Ok, value),
+        None => (Status::NotAnswering, 0),
+    }
 }
 
 /// GYRO_SCALE as the parts leave the factory: 1.
@@ -267,9 +259,10 @@ pub fn configure<S: Sensors>(sensors: &mut S, sens_avg: u16) -> u8 {
             address: Register::GyroScale.address(),
             ..job
         };
-        if reach(sensors, job) != Ok(sens_avg) {
+        // A gyro that does not answer has no value.
+        if reach(sensors, &job) != (Status::Ok, sens_avg) {
             wrong |= bit;
-        } else if !matches!(reach(sensors, scale), Ok(scale) if scale & 0x0fff == FACTORY_SCALE) {
+        } else if reach(sensors, &scale).1 & 0x0fff != FACTORY_SCALE {
             wrong |= bit << 3;
         }
         bit <<= 1;

@@ -1,5 +1,7 @@
 //! Bias null: the mean of each rate at rest, over N samples, with the standard error it reached.
 
+use zerocopy::little_endian::I16;
+
 use crate::math::{divide, root, scaled};
 
 /// Largest spread (max - min) of a rate at rest, counts: eight times the 5.4 counts rms that a gyro has at 20 Hz
@@ -50,75 +52,28 @@ impl BiasNull {
         self.have
     }
 
-    /// Takes a sample of one axis, counts. The caller counts the samples: [`Self::count`].
-    #[inline(never)]
-    pub fn take(&mut self, axis: u8, value: i16) -> Outcome {
+    /// Takes a sample, counts.
+    pub fn take(&mut self, rates: &[I16; 3]) -> Outcome {
         let first = self.have == 0;
-        let Some(sum) = self.axes.get_mut(axis as usize) else {
-            return Outcome::Moving;
-        };
-        if first {
-            *sum = AxisSum {
-                sum: 0,
-                steps: 0,
-                last: value,
-                low: value,
-                high: value,
-            };
-        }
-        let step = value.wrapping_sub(sum.last);
-        sum.last = value;
-        sum.sum = sum.sum.wrapping_add(i32::from(value));
-        sum.low = value.min(sum.low);
-        sum.high = value.max(sum.high);
-        if sum.high.wrapping_sub(sum.low) > SPREAD_AT_REST {
-            return Outcome::Moving;
-        }
-        // |step| <= 60: at most 3600 * 16384 < 2^26.
-        sum.steps = sum
-            .steps
-            .wrapping_add(step.wrapping_mul(step).cast_unsigned().into());
-        Outcome::Resting
-    }
-
-    /// A sample of all axes has been taken.
-    pub fn count(&mut self) {
         self.have = self.have.wrapping_add(1);
-    }
-
-    /// What [`mean`](Self::mean) says of a stand that turns; no bias is as large.
-    pub const ROTATION: i32 = i32::MIN;
-
-    /// Mean rate of an axis, Q16.16 deg/s, by a scale in Q8.24 deg/s for each count.
-    #[must_use]
-    pub fn mean(&self, axis: u8, scale: i32) -> i32 {
-        let Some(sum) = self.axes.get(axis as usize) else {
-            return Self::ROTATION;
-        };
-        // |sum| <= 16384 * 8191 < 2^27; what passes this has |sum| << 8 < 2^29.
-        let magnitude = sum.sum.unsigned_abs();
-        if divide(magnitude, self.have) >= u32::from(LARGEST_BIAS) {
-            return Self::ROTATION;
+        let mut resting = true;
+        for (axis, rate) in self.axes.iter_mut().zip(rates) {
+            resting &= axis.take(rate.get(), first);
         }
-        let mean = scaled(divide(magnitude << 8, self.have) as u16, scale);
-        if sum.sum < 0 {
-            mean.wrapping_neg()
+        if resting {
+            Outcome::Resting
         } else {
-            mean
+            Outcome::Moving
         }
     }
 
-    /// Standard error of the mean, in its unit: that of white noise whose variance is half the mean square of the steps
-    /// from sample to sample, so that a drift does not count as noise.
+    /// Mean rate of an axis, Q16.16 deg/s, by a scale in Q8.24 deg/s for each count, and its standard error in the same
+    /// unit. `None` for a stand that turns.
     #[must_use]
-    pub fn error(&self, axis: u8, scale: i32) -> i32 {
-        let Some(sum) = self.axes.get(axis as usize) else {
-            return 0;
-        };
-        // Steps squared, mean in Q6; half of it is the variance, a further division by n the mean's, in Q20.
-        let square_q6 = divide(sum.steps << 6, self.have.wrapping_sub(1));
-        let error_q10 = root(divide(square_q6 << 13, self.have));
-        scaled(error_q10, scale) >> 2
+    pub fn mean_and_error(&self, axis: u8, scale: i32) -> Option<(i32, i32)> {
+        let sum = self.axes.get(axis as usize)?;
+        let mean = sum.mean(self.have, scale)?;
+        Some((mean, sum.error(self.have, scale)))
     }
 }
 
@@ -138,6 +93,53 @@ struct AxisSum {
     high: i16,
 }
 
+// Out of line, so that the compiler reaches an axis by pointer: in line it makes an address for each field anew.
+impl AxisSum {
+    /// Takes a reading, counts; whether the spread is one at rest.
+    #[inline(never)]
+    fn take(&mut self, value: i16, first: bool) -> bool {
+        if first {
+            (self.last, self.low, self.high) = (value, value, value);
+        }
+        let step = value.wrapping_sub(self.last);
+        self.last = value;
+        self.sum = self.sum.wrapping_add(i32::from(value));
+        // |step| <= 60 at rest: at most 3600 * 16384 < 2^26.
+        self.steps = self
+            .steps
+            .wrapping_add(step.wrapping_mul(step).cast_unsigned().into());
+        self.low = value.min(self.low);
+        self.high = value.max(self.high);
+        self.high.wrapping_sub(self.low) <= SPREAD_AT_REST
+    }
+
+    /// The mean; `None` where it is a rotation.
+    #[inline(never)]
+    fn mean(&self, have: u16, scale: i32) -> Option<i32> {
+        // |sum| <= 16384 * 8191 < 2^27; what passes this has |sum| << 8 < 2^29.
+        let magnitude = self.sum.unsigned_abs();
+        if divide(magnitude, have) >= u32::from(LARGEST_BIAS) {
+            return None;
+        }
+        let mean = scaled(divide(magnitude << 8, have) as u16, scale);
+        Some(if self.sum < 0 {
+            mean.wrapping_neg()
+        } else {
+            mean
+        })
+    }
+
+    /// The mean's standard error: that of white noise whose variance is half the mean square of the steps from sample to
+    /// sample, so that a drift does not count as noise.
+    #[inline(never)]
+    fn error(&self, have: u16, scale: i32) -> i32 {
+        // Steps squared, mean in Q6; half of it is the variance, a further division by n the mean's, in Q20.
+        let square_q6 = divide(self.steps << 6, have.wrapping_sub(1));
+        let error_q10 = root(divide(square_q6 << 13, have));
+        scaled(error_q10, scale) >> 2
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,10 +149,9 @@ mod tests {
 
     fn take(null: &mut BiasNull, counts: impl IntoIterator<Item = i16>) -> Outcome {
         for value in counts {
-            if null.take(0, value) == Outcome::Moving {
+            if null.take(&[I16::new(value), I16::ZERO, I16::ZERO]) == Outcome::Moving {
                 return Outcome::Moving;
             }
-            null.count();
         }
         Outcome::Resting
     }
@@ -162,7 +163,7 @@ mod tests {
             take(&mut null, [-3, -5, -3, -5, -3, -5, -3, -5]),
             Outcome::Resting
         );
-        let (mean, error) = (null.mean(0, UNIT), null.error(0, UNIT));
+        let (mean, error) = null.mean_and_error(0, UNIT).expect("it rests");
         assert_eq!(mean, -4 << 16);
         // Steps of 2: variance 2, of the mean of eight 1/4.
         assert!((error - 32_768).abs() < 128, "{error}");
@@ -179,7 +180,7 @@ mod tests {
         let mut null = BiasNull::new();
         let counts: Vec<i16> = (0..n).map(|_| (0..4).map(|_| uniform()).sum()).collect();
         assert_eq!(take(&mut null, counts.iter().copied()), Outcome::Resting);
-        let error = null.error(0, UNIT);
+        let (_, error) = null.mean_and_error(0, UNIT).expect("it rests");
         let expected = 9.22 / f64::from(n).sqrt() * 65_536.0;
         assert!(
             (f64::from(error) / expected - 1.0).abs() < 0.05,
@@ -193,16 +194,12 @@ mod tests {
         assert_eq!(take(&mut null, [0, 0, 61]), Outcome::Moving);
         let mut steady = BiasNull::new();
         assert_eq!(take(&mut steady, [1365, 1365]), Outcome::Resting);
-        assert_eq!(
-            steady.mean(0, UNIT),
-            BiasNull::ROTATION,
-            "100 deg/s is no bias"
-        );
+        assert_eq!(steady.mean_and_error(0, UNIT), None, "100 deg/s is no bias");
         let mut full = BiasNull::new();
         assert_eq!(
             take(&mut full, (0..MAX_SAMPLES).map(|_| -8192)),
             Outcome::Resting
         );
-        assert_eq!(full.mean(0, UNIT), BiasNull::ROTATION);
+        assert_eq!(full.mean_and_error(0, UNIT), None);
     }
 }

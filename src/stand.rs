@@ -178,13 +178,9 @@ impl Stand {
         self.tell(board, HELLO);
     }
 
-    /// Counts what has been lost outside: ticks without a sample, received bytes.
-    #[inline(never)]
+    /// Counts what has been lost outside.
     pub fn count(&mut self, fault: Fault, times: u8) {
         self.health.count(fault, 0, times.into());
-        if matches!(fault, Fault::TickOverrun) {
-            self.take_seq(times);
-        }
     }
 
     #[inline(never)]
@@ -199,22 +195,27 @@ impl Stand {
         seq
     }
 
-    /// A tick's sample: scales, flags, counts and sends it.
+    /// A tick's sample, and how many ticks before it had none: scales, flags, counts and sends it.
     #[inline(never)]
-    pub fn on_sample<B: Board>(&mut self, board: &mut B, raw: &Raw, t_ticks: u32, overrun: bool) {
+    pub fn on_sample<B: Board>(&mut self, board: &mut B, raw: &Raw, missed: u8) {
         let mut sample = Sample::new_zeroed();
+        let mut seen = 0;
+        if missed != 0 {
+            self.count(Fault::TickOverrun, missed);
+            self.take_seq(missed);
+            seen = flags::TICK_OVERRUN;
+        }
         sample.seq.set(self.take_seq(1));
-        sample.t_ticks.set(t_ticks);
+        sample.t_ticks.set(raw.t_ticks);
         sample.pwm.set(self.motor.output());
-        let mut seen = if overrun { flags::TICK_OVERRUN } else { 0 };
-        let mut silent = 0;
+        let (mut silent, mut bit) = (0, 1);
         for axis in 0..3 {
-            let gyro = self.gyro(axis, raw, &mut sample);
-            seen |= gyro;
+            let gyro = self.gyro(axis, bit, raw, &mut sample);
             if gyro & flags::GYRO_NOT_ANSWERING != 0 {
-                silent |= 1 << axis;
+                silent |= bit;
             }
-            seen |= self.accelerometer(axis, raw, &mut sample);
+            seen |= gyro | self.accelerometer(axis, bit, raw, &mut sample);
+            bit <<= 1;
         }
         self.look_after_gyros(board, silent);
         if self.misconfigured & !silent != 0 {
@@ -273,15 +274,15 @@ impl Stand {
         }
     }
 
-    /// One gyro's part of the sample; its flags.
+    /// One gyro's part of the sample; its flags. `bit` is the one of the axis.
     #[inline(never)]
-    fn gyro(&mut self, axis: u8, raw: &Raw, sample: &mut Sample) -> u16 {
+    fn gyro(&mut self, axis: u8, bit: u8, raw: &Raw, sample: &mut Sample) -> u16 {
         let at = axis as usize;
         if at >= 3 {
             return 0;
         }
         let word = raw.gyro[at];
-        let stalled = raw.spi_stalled & (1 << axis) != 0;
+        let stalled = raw.spi_stalled & bit != 0;
         if stalled {
             self.record(Fault::SpiStalled, 0);
         }
@@ -299,25 +300,26 @@ impl Stand {
         sample.rate[at].set(rate.saturating_sub(bias).to_bits());
         let mut seen = 0;
         if word.is_new() {
-            seen = flags::new_data(axis);
+            seen = flags::NEW_X * u16::from(bit);
         } else {
             self.record(Fault::GyroStaleX, axis);
         }
         if word.has_error() {
-            seen |= flags::error(axis);
+            seen |= flags::ERROR_X * u16::from(bit);
             self.record(Fault::GyroErrorAlarmX, axis);
         }
         seen
     }
 
-    fn accelerometer(&mut self, axis: u8, raw: &Raw, sample: &mut Sample) -> u16 {
+    #[inline(never)]
+    fn accelerometer(&mut self, axis: u8, bit: u8, raw: &Raw, sample: &mut Sample) -> u16 {
         let at = axis as usize;
         if at >= 3 {
             return 0;
         }
         let counts = raw.acc[at];
         sample.acc[at].set(counts);
-        if raw.adc_stalled & (1 << axis) != 0 {
+        if raw.adc_stalled & bit != 0 {
             self.record(Fault::AdcStalled, 0);
             flags::ACC_NOT_CONVERTED
         } else if counts == 0 || counts >= ADC_MAX {
@@ -331,7 +333,7 @@ impl Stand {
     /// One supply for three gyros: the first that answers says what it is.
     fn supply(&mut self, silent: u8, raw: &Raw, sample: &mut Sample) -> u16 {
         let mut bit = 1;
-        for word in raw.supply {
+        for &word in &raw.supply {
             if silent & bit == 0 {
                 let counts = word.unsigned_12();
                 sample.supply.set(counts);
@@ -349,42 +351,36 @@ impl Stand {
     /// Only samples in order count: a gyro that is silent or stale would be averaged as if it were at rest.
     #[inline(never)]
     fn step_bias_null<B: Board>(&mut self, board: &mut B, in_order: bool, sample: &Sample) {
-        let mut moving = self.motor.is_on();
-        if in_order && !moving {
-            for axis in 0..3 {
-                let value = sample.gyro[axis as usize].get();
-                moving |= self.bias_null.take(axis, value) == Outcome::Moving;
-            }
-            self.bias_null.count();
-        }
+        let moving =
+            self.motor.is_on() || in_order && self.bias_null.take(&sample.gyro) == Outcome::Moving;
         if moving || self.bias_null.have() >= self.null_samples {
-            self.end_bias_null(board, moving);
+            let status = if !moving && self.take_biases() {
+                Status::Ok
+            } else {
+                self.answer.zero();
+                Status::Moving
+            };
+            let asked = core::mem::replace(&mut self.null, Pending::NONE);
+            self.reply(board, asked, status);
         }
     }
 
+    /// The means become the biases; false, and nothing changed, when the stand turns.
     #[inline(never)]
-    fn end_bias_null<B: Board>(&mut self, board: &mut B, mut moving: bool) {
+    fn take_biases(&mut self) -> bool {
         let mut largest = 0;
         for axis in 0..3 {
             let scale = self.config.set_up.scale[axis as usize].get();
-            let (mean, error) = (
-                self.bias_null.mean(axis, scale),
-                self.bias_null.error(axis, scale),
-            );
-            moving |= mean == BiasNull::ROTATION;
+            let Some((mean, error)) = self.bias_null.mean_and_error(axis, scale) else {
+                return false;
+            };
             self.answer.detail[axis as usize].set(mean);
             largest = error.max(largest);
         }
-        let asked = core::mem::replace(&mut self.null, Pending::NONE);
-        if moving {
-            self.answer.detail = Default::default();
-            self.reply(board, asked, Status::Moving);
-        } else {
-            self.answer.value.set(largest);
-            self.config.set_up.bias = self.answer.detail;
-            self.config.set_up.config_source = source::SET;
-            self.reply(board, asked, Status::Ok);
-        }
+        self.answer.value.set(largest);
+        self.config.set_up.bias = self.answer.detail;
+        self.config.set_up.config_source = source::SET;
+        true
     }
 
     /// A received byte.

@@ -19,7 +19,7 @@ static uint32_t __attribute__((noinline)) update(uint32_t crc, uint8_t byte)
             "2: dec %1\n\t"
             "brne 1b"
             : "+r"(crc), "+r"(left)
-            : "r"(0x82f63b78UL));
+            : "d"(0x82f63b78UL));
     return crc;
 }
 

@@ -1,6 +1,7 @@
 //! Faults of sensors, wires and line, each planted at a random time: flagged in the frame, counted in health, the others
 //! go on, nothing is invented, and the board comes back by itself. `IMU_STAND_SEED` replays a run.
 
+use atmega16_sim::register;
 use bench::simavr::{Answer, Probe, Simulated};
 use bench::{Scenario, uniform};
 use hil_tests::{Heard, at, generator, image, seed};
@@ -400,19 +401,18 @@ fn a_flood_at_500_kbd_overruns_the_receiver_is_counted_and_moves_no_sample() {
 
 #[test]
 fn ticks_faster_than_the_work_are_flagged_and_counted_and_none_is_told_twice() {
-    use atmega16_sim::register;
     let rng = &mut generator(seed());
     let from_s = uniform(rng, 2.0, 4.0);
     let mut meddled = 0;
     let heard = meddle(8.0, |simulated, t| {
         if t > from_s && meddled == 0 {
-            // A disturbed compare register: ticks of 800 us, less than acquisition and framing take.
+            // A disturbed compare register: ticks of 500 us, less than acquisition and framing take.
             meddled = 1;
             for (address, value) in [
                 (register::OCR1AH, 0),
-                (register::OCR1AL, 199),
+                (register::OCR1AL, 124),
                 (register::OCR1BH, 0),
-                (register::OCR1BL, 183),
+                (register::OCR1BL, 108),
             ] {
                 simulated.mcu_mut().write_register(address, value);
             }
@@ -457,4 +457,42 @@ fn ticks_faster_than_the_work_are_flagged_and_counted_and_none_is_told_twice() {
     );
     let last = samples.last().expect("samples");
     assert_eq!(last.flags, flags::IN_ORDER, "and it is over");
+}
+
+#[test]
+fn ticks_lost_behind_a_waiting_sample_are_numbered_behind_it() {
+    let rng = &mut generator(seed());
+    let from_s = uniform(rng, 2.0, 4.0);
+    let mut asked = 0;
+    let heard = meddle(8.0, |simulated, t| {
+        if t > from_s && asked == 0 {
+            // A disturbed compare register: ticks of 2 ms, which the set-up of the gyros takes longer than. It ends with a
+            // sample waiting and the guard of the next tick gone by.
+            for (address, value) in [
+                (register::OCR1AH, 1),
+                (register::OCR1AL, 243),
+                (register::OCR1BH, 1),
+                (register::OCR1BL, 227),
+            ] {
+                simulated.mcu_mut().write_register(address, value);
+            }
+        }
+        if (from_s..from_s + 1.0).contains(&t) {
+            let set = Command::SetGyro {
+                range: 4,
+                filter: 2,
+            };
+            simulated.request(&[at(t, asked, set)]);
+            asked += 1;
+        }
+    });
+    let health = heard.last_health();
+    let overruns = health.faults.get(Fault::TickOverrun);
+    println!("{asked} set-ups, {overruns} ticks without a sample");
+    assert!(overruns > 10);
+    // The clock counts 12 500 for each tick, whatever its length became: each sample bears the number of its own tick.
+    let samples: Vec<Sample> = heard.samples().map(|(_, sample)| sample).collect();
+    for sample in &samples {
+        assert_eq!(sample.t_ticks, 12_500 * (u32::from(sample.seq) + 1));
+    }
 }

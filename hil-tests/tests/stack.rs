@@ -1,9 +1,14 @@
 //! The stack never meets the statics, whatever is asked while a tick is being served.
 
+use atmega16_sim::Image;
 use bench::Scenario;
 use bench::simavr::{NoProbe, Simulated};
+use hil_tests::calls::recursion;
 use hil_tests::{Heard, at, generator, image, run, seed};
 use wire::{Axis, Command, Sensor, Shape};
+
+/// The ATmega16 has that many, reset included.
+const VECTORS: usize = 21;
 
 #[test]
 fn the_deepest_stack_leaves_room_with_every_command_at_any_phase_of_the_tick() {
@@ -101,4 +106,12 @@ fn the_deepest_stack_leaves_room_with_every_command_at_any_phase_of_the_tick() {
         said + 1 >= left && said <= left + 64,
         "the board says {said} B were left, there were {left}"
     );
+}
+
+#[test]
+fn no_function_calls_itself() {
+    // The compiler is told so (.cargo/config.toml) and leaves out what a recursion would need; and the stack has a bound.
+    let image = Image::read(&image()).expect("an image");
+    let recursion = recursion(&image.flash, VECTORS);
+    assert_eq!(recursion, Ok(None), "addresses of the functions");
 }

@@ -23,7 +23,6 @@ mod tick;
 
 use avr_device::{asm, interrupt};
 use firmware::{Stand, configure};
-use wire::Fault;
 
 /// Nothing that panics may be reachable: the symbol is defined nowhere, so an image that could get here does not link.
 #[panic_handler]
@@ -57,11 +56,8 @@ fn main() -> ! {
 
     let mut console = console::Console::new();
     loop {
-        if let Some((tick, missed)) = tick::take() {
-            if missed > 0 {
-                stand.count(Fault::TickOverrun, missed);
-            }
-            stand.on_sample(&mut board, &tick.raw, tick.t_ticks, missed > 0);
+        if let Some((raw, missed)) = tick::take() {
+            stand.on_sample(&mut board, raw, missed);
             // The watchdog is fed by the sample clock alone, and from here: a tick that stalls is a reset, a main loop that
             // hangs is one, and a reset stops the motor.
             asm::wdr();

@@ -109,8 +109,15 @@ impl SpiDevice for GyroSpi {
         })
     }
 
+    #[inline(always)]
     fn transfer_in_place(&mut self, both: &mut [u8]) -> Result<(), Stalled> {
         self.selected(|| {
+            // A gyro's frame: without a loop it stays in registers.
+            if let [high, low] = both {
+                *high = byte(*high)?;
+                *low = byte(*low)?;
+                return Ok(());
+            }
             for place in both.iter_mut() {
                 *place = byte(*place)?;
             }

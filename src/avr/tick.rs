@@ -10,7 +10,7 @@ use core::ptr::addr_of_mut;
 use avr_device::atmega16::{CPU, TC0, TC1};
 use avr_device::{asm, interrupt};
 use firmware::acquire::work;
-use firmware::{Done, Job, Raw, Task, acquire};
+use firmware::{Job, Raw, Task, acquire};
 
 use super::{sensors, serial};
 
@@ -24,18 +24,10 @@ const OCIE0: u8 = 1 << 1;
 const SLEEP_IDLE: u8 = 1 << 6;
 const AWAKE: u8 = 0;
 
-/// A sample on its way to the main loop.
-pub struct Tick {
-    /// What the sensors said.
-    pub raw: Raw,
-    /// Time of the tick.
-    pub t_ticks: u32,
-}
-
 /// All zeros at first, which costs no flash.
 struct Shared {
     /// One is written by the tick while the main loop reads the other.
-    ticks: [Tick; 2],
+    ticks: [Raw; 2],
     /// Which of them is the main loop's: 0, 1.
     reading: u8,
     /// [`Task::None`]: the slot is free.
@@ -58,12 +50,7 @@ struct Shared {
 }
 
 static mut SHARED: Shared = Shared {
-    ticks: [const {
-        Tick {
-            raw: Raw::new(),
-            t_ticks: 0,
-        }
-    }; 2],
+    ticks: [Raw::new(); 2],
     reading: 0,
     job: Job {
         task: Task::None,
@@ -166,7 +153,7 @@ pub fn ticks_since() -> u16 {
 }
 
 /// The sample that waits, if one does, and how many ticks before it are lost. It is the caller's until the next call.
-pub fn take() -> Option<(&'static Tick, u8)> {
+pub fn take() -> Option<(&'static Raw, u8)> {
     // SAFETY: a byte, which only the tick sets.
     if !unsafe { core::ptr::read_volatile(&raw const (*shared()).ready) } {
         return None;
@@ -183,7 +170,7 @@ pub fn take() -> Option<(&'static Tick, u8)> {
     })
 }
 
-fn place(which: u8) -> *mut Tick {
+fn place(which: u8) -> *mut Raw {
     // SAFETY: a static. (An index would be a multiplication.)
     unsafe {
         let [first, second] = &mut (*shared()).ticks;
@@ -255,6 +242,11 @@ pub fn unmask() {
     timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE0));
 }
 
+#[inline(never)]
+fn count_missed(shared: &mut Shared) {
+    shared.missed = shared.missed.saturating_add(1);
+}
+
 #[avr_device::interrupt(atmega16)]
 fn TIMER0_COMP() {
     // SAFETY: counted here, compared by the main loop: a byte is read at once. Should the main loop be late by 256 ms, it
@@ -283,7 +275,7 @@ fn TIMER1_COMPB() {
     if timer1().tcnt1.read().bits() <= timer1().ocr1b.read().bits() {
         // Compare A has gone by: something held this up for longer than the guard. Waiting for the next one would make
         // that late too, and so on for ever; the main loop gets the time until then.
-        shared.missed = shared.missed.saturating_add(1);
+        count_missed(shared);
         shared.skip = shared.next_every.wrapping_sub(1);
         timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
         return;
@@ -302,21 +294,21 @@ fn TIMER1_COMPB() {
         }
     }
     // SAFETY: the sensors are the tick's from its start on, the place is the one that the main loop does not read.
-    let (sensors, tick) = unsafe { (sensors::all(), &mut *free) };
-    acquire(sensors, &mut tick.raw);
-    tick.t_ticks = shared.t_ticks;
+    let (sensors, raw) = unsafe { (sensors::all(), &mut *free) };
+    acquire(sensors, raw);
+    raw.t_ticks = shared.t_ticks;
     // One that nobody took is overwritten; the end of a job stays, or it would never be answered.
     let lost = shared.ready;
     if !matches!(shared.job.task, Task::None) {
-        tick.raw.done = work(sensors, shared.job);
+        work(sensors, &shared.job, &mut raw.done);
         shared.job.task = Task::None;
     } else if !lost {
-        tick.raw.done = Done::NONE;
+        raw.done.task = Task::None;
     }
     // Until the return, so that a tick that is late already does not come in on top of this one.
     interrupt::disable();
     if lost {
-        shared.missed = shared.missed.saturating_add(1);
+        count_missed(shared);
     }
     shared.before = shared.missed;
     shared.ready = true;

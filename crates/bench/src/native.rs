@@ -70,16 +70,16 @@ pub struct Timeline {
 impl Default for Timeline {
     fn default() -> Self {
         Timeline {
-            start: 3_593_472,
-            configure: 3_544_329,
+            start: 3_588_608,
+            configure: 3_543_509,
             // Four rounds of three frames.
             spi_bytes: vec![
-                250, 351, 600, 701, 950, 1051, 1660, 1761, 2010, 2111, 2360, 2461, 2840, 2941,
-                3190, 3291, 3540, 3641, 4197, 4298, 4547, 4648, 4897, 4998,
+                150, 238, 397, 485, 644, 732, 1144, 1232, 1391, 1479, 1638, 1726, 1944, 2032, 2191,
+                2279, 2438, 2526, 2907, 2995, 3154, 3242, 3401, 3489,
             ],
-            adc: [308, 2_868, 5_428],
-            acquired: 6_200,
-            framed: 14_000,
+            adc: [284, 2_076, 3_868],
+            acquired: 5_500,
+            framed: 14_500,
             guard: 1_024,
             eeprom: 136_000,
             queue: 191,
@@ -503,7 +503,7 @@ fn life(
     }
     chip.borrow_mut().now = start;
     let mut period = chip.borrow().period;
-    let (mut tick, mut t_ticks) = (start, 0u32);
+    let mut tick = start;
     let mut raw = firmware::Raw::new();
     let mut millisecond = start + CYCLES_PER_MS;
     loop {
@@ -529,8 +529,8 @@ fn life(
             chip.ticks += 1;
             chip.job.take()
         };
-        raw.done = firmware::acquire::work(&mut sensors, job.unwrap_or_default());
-        t_ticks = t_ticks.wrapping_add(period);
+        firmware::acquire::work(&mut sensors, &job.unwrap_or_default(), &mut raw.done);
+        raw.t_ticks = raw.t_ticks.wrapping_add(period);
         period = chip.borrow().period;
         // A job may have taken the processor for longer.
         let framed = {
@@ -538,7 +538,7 @@ fn life(
             chip.now = chip.now.max(tick + timeline.acquired) + timeline.framed - timeline.acquired;
             chip.now
         };
-        stand.on_sample(board, &raw, t_ticks, false);
+        stand.on_sample(board, &raw, 0);
         work(
             chip,
             &mut stand,

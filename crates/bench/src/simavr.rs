@@ -610,7 +610,12 @@ pub fn simavr_timed(
         timeline.start = first - (second - first);
         timeline.spi_bytes.clone_from(&instants.spi_bytes);
         timeline.adc = instants.adc;
-        timeline.recorded = probe.ticks.iter().map(|(_, each)| each.clone()).collect();
+        // A period without a sample has the interrupt, and is no tick of the host's.
+        let sampled = probe.ticks.iter().map(|(_, each)| each);
+        timeline.recorded = sampled
+            .filter(|each| !each.spi_bytes.is_empty())
+            .cloned()
+            .collect();
     }
     Ok(timeline)
 }

@@ -4,58 +4,50 @@ use heapless::Vec;
 
 use crate::crc;
 
-/// Puts out a payload, stuffed as it comes; [`Writer::finish`] adds CRC and delimiter.
-pub(crate) struct Writer<P> {
-    /// Puts a byte at its place in the frame; a place behind it may have been written before.
-    put: P,
-    /// Where the next byte goes.
-    at: u8,
-    /// Where the code of the block being written goes.
-    code_at: u8,
-    register: u32,
-}
-
-impl<P: FnMut(u8, u8)> Writer<P> {
-    pub(crate) fn new(put: P, kind: u8) -> Self {
-        let mut writer = Writer {
-            put,
-            at: 1,
-            code_at: 0,
-            register: crc::INIT,
+/// Puts out a payload with CRC and delimiter, stuffed as it comes; returns the frame's length on the line. `put` gets each
+/// byte with its place in the frame: places ascend, but for the code of a block, which is known at its end.
+pub(crate) fn write(kind: u8, fields: &[u8], mut put: impl FnMut(u8, u8)) -> u8 {
+    let mut register = crc::INIT;
+    // Where the next byte goes, and where the code of the block being written goes.
+    let (mut at, mut code_at) = (1u8, 0u8);
+    // Version and kind, neither of which is ever zero.
+    let mut head = u16::from_le_bytes([crate::VERSION, kind]);
+    let mut rest = fields.iter();
+    let mut crc_left = 4u8;
+    loop {
+        let next = if head == 0 {
+            rest.next().copied()
+        } else {
+            let byte = head as u8;
+            head >>= 8;
+            Some(byte)
         };
-        writer.u8(crate::VERSION);
-        writer.u8(kind);
-        writer
-    }
-
-    pub(crate) fn u8(&mut self, byte: u8) {
-        self.register = crc::update(self.register, byte);
-        self.stuff(byte);
-    }
-
-    /// The frame's length on the line.
-    pub(crate) fn finish(mut self) -> u8 {
-        for byte in crc::finish(self.register).to_le_bytes() {
-            self.stuff(byte);
-        }
-        (self.put)(self.code_at, self.at.wrapping_sub(self.code_at));
-        (self.put)(self.at, crate::DELIMITER);
-        self.at.wrapping_add(1)
-    }
-
-    #[cfg_attr(target_arch = "avr", inline(never))]
-    fn stuff(&mut self, byte: u8) {
-        let at = self.at;
+        let byte = match next {
+            Some(byte) => {
+                register = crc::update(register, byte);
+                byte
+            }
+            None if crc_left == 0 => break,
+            None => {
+                crc_left = crc_left.wrapping_sub(1);
+                let byte = crc::finish(register) as u8;
+                register >>= 8;
+                byte
+            }
+        };
         // A zero ends the block: its code says how long it is, and the next block's takes the zero's place.
         let (place, value) = if byte == crate::DELIMITER {
-            let begun = core::mem::replace(&mut self.code_at, at);
+            let begun = core::mem::replace(&mut code_at, at);
             (begun, at.wrapping_sub(begun))
         } else {
             (at, byte)
         };
-        (self.put)(place, value);
-        self.at = at.wrapping_add(1);
+        put(place, value);
+        at = at.wrapping_add(1);
     }
+    put(code_at, at.wrapping_sub(code_at));
+    put(at, crate::DELIMITER);
+    at.wrapping_add(1)
 }
 
 /// Why a run of bytes between two delimiters is no payload.

@@ -144,11 +144,7 @@ pub const fn room_for(kind: u8, fields: usize) -> usize {
 /// As [`encode`], by a function that puts a byte at its place in the frame, counted from 0. Places come in ascending order
 /// but for the codes of the stuffing, which are written when their block ends.
 pub fn encode_by(kind: u8, fields: &[u8], put: impl FnMut(u8, u8)) -> u8 {
-    let mut writer = crate::cobs::Writer::new(put, kind);
-    for &byte in fields {
-        writer.u8(byte);
-    }
-    writer.finish()
+    crate::cobs::write(kind, fields, put)
 }
 
 impl From<&crate::Sample> for Sample {
