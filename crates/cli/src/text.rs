@@ -7,6 +7,16 @@ use analysis::result::{Diagnosis, Finding, Verdict};
 /// Columns of a terminal that text is wrapped to.
 const WIDTH: usize = 100;
 
+/// A word as a shell takes it, in quotes where it needs them.
+#[must_use]
+pub fn shell_word(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
 /// A wrapped paragraph, indented, with a lead before its first line.
 #[must_use]
 pub fn item(lead: &str, text: &str) -> String {

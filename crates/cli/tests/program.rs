@@ -27,6 +27,20 @@ fn json(path: &Path) -> serde_json::Value {
 fn wrong_usage_exits_2_and_a_missing_file_1_with_what_to_do() {
     assert_eq!(run(&["diagnose"]).status.code(), Some(2));
     assert_eq!(run(&["no-such-command"]).status.code(), Some(2));
+    for line in [
+        "analyze x.csv --taus foo",
+        "analyze x.csv --deviations foo",
+        "analyze x.csv --rate=0",
+        "analyze x.csv --rate -3",
+        "simulate --out x.csv --seconds=0",
+        "simulate --out x.csv --rate nan",
+    ] {
+        let words: Vec<&str> = line.split(' ').collect();
+        let wrong = run(&words);
+        let said = String::from_utf8_lossy(&wrong.stderr);
+        assert_eq!(wrong.status.code(), Some(2), "{line}");
+        assert!(said.contains("has to be"), "{line}: {said}");
+    }
     let missing = run(&["analyze", "no-such-file.csv"]);
     assert_eq!(missing.status.code(), Some(1));
     let said = String::from_utf8_lossy(&missing.stderr);
@@ -34,6 +48,47 @@ fn wrong_usage_exits_2_and_a_missing_file_1_with_what_to_do() {
         said.contains("no-such-file.csv") && said.contains("help"),
         "{said}"
     );
+}
+
+#[test]
+fn a_series_without_a_gyro_a_dead_channel_and_noise_that_nobody_knows_are_told_what_to_do() {
+    let folder = folder("told");
+    let write = |name: &str, text: String| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).expect("a file");
+        path.to_str().expect("a name").to_owned()
+    };
+    let noise = |k: i32| (k * 7919 + k * k * 31) % 101 - 50;
+    let series = write(
+        "one.txt",
+        (0..900).map(|k| format!("{}\n", noise(k))).collect(),
+    );
+    let dead = "# rate_hz: 20\ngyro_x\n".to_owned() + &"1\n".repeat(900);
+    let dead = write("dead.csv", dead);
+    let short = write("short.csv", "# rate_hz: 20\ngyro_x\n1\n3\n2\n".to_owned());
+    for (line, expected) in [
+        (
+            vec!["diagnose", &series, "--rate", "20"],
+            "--columns gyro_x=values --units gyro=deg/s",
+        ),
+        (
+            vec!["analyze", &dead, "--units", "gyro=deg/s"],
+            "supply and wiring",
+        ),
+        (
+            vec!["export", &short, "--units", "gyro=deg/s", "--to", "kalibr"],
+            "record for longer",
+        ),
+        (
+            vec!["export", &short, "--units", "gyro=deg/s", "--to", "matlab"],
+            "record for longer",
+        ),
+    ] {
+        let told = run(&line);
+        let said = String::from_utf8_lossy(&told.stderr);
+        assert_eq!(told.status.code(), Some(1), "{line:?}: {said}");
+        assert!(said.contains(expected), "{line:?}: {said}");
+    }
 }
 
 #[test]

@@ -87,14 +87,19 @@ fn what_cannot_be_read_is_named_with_what_there_is() {
     for (name, text, expected) in [
         ("cut.npz", "PK", "it is no NPZ"),
         ("new.mat", "MATLAB 7.3 MAT-file, and so on", "-v7"),
-        ("short.txt", "1 2\n3\n", "line 2: 1 numbers"),
-        ("none.txt", "# nothing\n", "no array of numbers"),
+        ("short.txt", "1 2\n3\n", "column_1, column_2"),
+        ("none.txt", "# nothing\n", "no row of data"),
     ] {
         let path = folder.join(name);
         std::fs::write(&path, text).unwrap();
         let error = read(&path, "", "").unwrap_err();
         assert!(error.contains(expected), "{name}: {error}");
     }
+    let error = read(&folder.join("short.txt"), "gyro_x=1", "").unwrap_err();
+    assert!(
+        error.contains("line 2") && error.contains("1 cells"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use model::record::{Channel, Quantity, Record};
 
 use super::CaptureError;
-use super::foreign::ANGLE;
+use super::units::ANGLE;
 
 /// Makes rates of the gyro channels that hold an angle: each reading the mean rate to the next row. Where that is more than
 /// one and a half intervals away, and in the last row, there is none.

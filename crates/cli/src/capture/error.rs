@@ -47,7 +47,10 @@ pub enum CaptureError {
     #[error("the header lacks the key `{key}`, which the column `{column}` needs")]
     #[diagnostic(
         code(capture::missing_key),
-        help("add a line `# {key}: VALUE` before the column names")
+        help(
+            "where the cells are counts, add a line `# {key}: VALUE` before the column names; where they are measured values, \
+             say their unit: `--units gyro=deg/s,acc=m/s2`"
+        )
     )]
     MissingKey {
         /// The key.
@@ -70,10 +73,7 @@ pub enum CaptureError {
     },
     /// No column names, or none that mean anything here.
     #[error("{why}; the columns are: {}", columns.join(", "))]
-    #[diagnostic(
-        code(capture::columns),
-        help("map them, for example: --columns {example} --units gyro=deg/s,acc=m/s2")
-    )]
+    #[diagnostic(code(capture::columns), help("map them, for example: {example}"))]
     Columns {
         /// What is wrong.
         why: String,
@@ -81,6 +81,50 @@ pub enum CaptureError {
         columns: Vec<String>,
         /// A mapping made of them.
         example: String,
+    },
+    /// Two columns of one name.
+    #[error("two columns are called `{name}`")]
+    #[diagnostic(
+        code(capture::twice),
+        help("rename one of them, or map the column by its number: `--columns {ours}={number}`")
+    )]
+    Twice {
+        /// Their name.
+        name: String,
+        /// What it is here.
+        ours: String,
+        /// The number of the first one, from 1 on.
+        number: usize,
+    },
+    /// A file that is no text.
+    #[error("{what}, no text")]
+    #[diagnostic(code(capture::no_text), help("{help}"))]
+    NoText {
+        /// What it is.
+        what: String,
+        /// What to do.
+        help: String,
+    },
+    /// Compressed data that cannot be unpacked.
+    #[error("{} is damaged: {why}", path.display())]
+    #[diagnostic(
+        code(capture::damaged),
+        help("copy it again; `zcat FILE > whole.csv` gets out what is there before the damage")
+    )]
+    Damaged {
+        /// Which file.
+        path: PathBuf,
+        /// What the unpacking says.
+        why: String,
+    },
+    /// A time column that is none.
+    #[error("{why}")]
+    #[diagnostic(code(capture::time), help("{help}"))]
+    Time {
+        /// What is wrong with it.
+        why: String,
+        /// What to do.
+        help: String,
     },
     /// An option that cannot be understood.
     #[error("{option}: {why}")]
@@ -138,7 +182,7 @@ pub enum CaptureError {
     #[diagnostic(
         code(capture::table),
         help(
-            "NPZ, NPY, Parquet, .mat (version 5 to 7), .txt and .dat are read by their endings, everything else as CSV"
+            "NPZ, NPY, Parquet, .mat (version 5 to 7.3) and HDF5 (.h5) are read by their endings, everything else as text"
         )
     )]
     Table {

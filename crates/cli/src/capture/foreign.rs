@@ -2,7 +2,11 @@
 
 use model::record::{Axis, Quantity};
 
-use super::{CaptureError, STANDARD_GRAVITY};
+use super::CaptureError;
+use super::units::What;
+
+/// What a unit can be given for.
+const QUANTITIES: [&str; 7] = ["time", "gyro", "acc", "temp", "supply", "pwm", "other"];
 
 /// `--columns` and `--units`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,20 +31,21 @@ impl ColumnMapping {
         let units = pairs(
             "--units",
             units,
-            "write `--units gyro=deg/s,acc=m/s2,temp=degC,supply=V`",
+            "write `--units time=ms,gyro=deg/s,acc=m/s2,temp=degC,supply=V`",
         )?;
         Ok(Self { columns, units })
     }
 
     /// The unit that was given for a channel: by its name, or by its quantity.
-    pub(crate) fn unit(&self, name: &str, quantity: Quantity) -> Option<&str> {
-        let of_quantity = match quantity {
-            Quantity::Gyro => "gyro",
-            Quantity::Acc => "acc",
-            Quantity::Temp => "temp",
-            Quantity::Supply => "supply",
-            Quantity::Pwm => "pwm",
-            Quantity::Other => "other",
+    pub(super) fn unit(&self, name: &str, what: What) -> Option<&str> {
+        let of_quantity = match what {
+            What::Time => "time",
+            What::Channel(Quantity::Gyro) => "gyro",
+            What::Channel(Quantity::Acc) => "acc",
+            What::Channel(Quantity::Temp) => "temp",
+            What::Channel(Quantity::Supply) => "supply",
+            What::Channel(Quantity::Pwm) => "pwm",
+            What::Channel(Quantity::Other) => "other",
         };
         let find = |key: &str| {
             self.units
@@ -50,6 +55,23 @@ impl ColumnMapping {
         };
         find(name).or_else(|| find(of_quantity))
     }
+
+    /// An error where a unit was given for what is neither a quantity nor one of the channels that are read.
+    pub(super) fn check_units<'a>(
+        &self,
+        channels: impl Iterator<Item = &'a str> + Clone,
+    ) -> Result<(), CaptureError> {
+        for (key, _) in &self.units {
+            if !QUANTITIES.contains(&key.as_str()) && !channels.clone().any(|name| name == key) {
+                return Err(CaptureError::Option {
+                    option: "--units",
+                    why: format!("`{key}` is neither a quantity nor a channel that is read"),
+                    help: format!("one of {}, or the name of a channel", QUANTITIES.join(", ")),
+                });
+            }
+        }
+        Ok(())
+    }
 }
 
 fn pairs(
@@ -57,7 +79,7 @@ fn pairs(
     text: Option<&str>,
     help: &str,
 ) -> Result<Vec<(String, String)>, CaptureError> {
-    let mut list = Vec::new();
+    let mut list: Vec<(String, String)> = Vec::new();
     for item in text
         .unwrap_or_default()
         .split(',')
@@ -65,6 +87,13 @@ fn pairs(
         .filter(|item| !item.is_empty())
     {
         match item.split_once('=') {
+            Some((ours, _)) if list.iter().any(|(known, _)| known == ours.trim()) => {
+                return Err(CaptureError::Option {
+                    option,
+                    why: format!("`{}` is given twice", ours.trim()),
+                    help: help.to_owned(),
+                });
+            }
             Some((ours, theirs)) if !ours.trim().is_empty() && !theirs.trim().is_empty() => {
                 list.push((ours.trim().to_owned(), theirs.trim().to_owned()));
             }
@@ -80,11 +109,8 @@ fn pairs(
     Ok(list)
 }
 
-/// Unit of a gyro channel that holds the angle.
-pub(crate) const ANGLE: &str = "deg";
-
 /// What a channel's name says that it is.
-pub(crate) fn meaning(name: &str) -> (Quantity, Option<Axis>) {
+pub(super) fn meaning(name: &str) -> (Quantity, Option<Axis>) {
     let (stem, axis) = match name.rsplit_once('_') {
         Some((stem, "x")) => (stem, Some(Axis::X)),
         Some((stem, "y")) => (stem, Some(Axis::Y)),
@@ -99,79 +125,4 @@ pub(crate) fn meaning(name: &str) -> (Quantity, Option<Axis>) {
         ("pwm", None) => (Quantity::Pwm, None),
         _ => (Quantity::Other, None),
     }
-}
-
-/// Our unit for a unit given, and the factor into it.
-pub(crate) fn convert(
-    quantity: Quantity,
-    given: Option<&str>,
-) -> Result<(String, f64), CaptureError> {
-    let ours = match quantity {
-        Quantity::Gyro => "deg/s",
-        Quantity::Acc => "m/s^2",
-        Quantity::Temp => "degC",
-        Quantity::Supply => "V",
-        Quantity::Pwm | Quantity::Other => "1",
-    };
-    let Some(given) = given else {
-        return Ok((ours.to_owned(), 1.0));
-    };
-    let factor = match (quantity, given) {
-        (Quantity::Gyro, "deg/s" | "dps") => 1.0,
-        (Quantity::Gyro, "rad/s") => 180.0 / std::f64::consts::PI,
-        (Quantity::Gyro, "deg/h") => 1.0 / 3600.0,
-        (Quantity::Gyro, "mdps") => 1e-3,
-        // Angles: what is read is differenced into a rate.
-        (Quantity::Gyro, "deg") => return Ok((ANGLE.to_owned(), 1.0)),
-        (Quantity::Gyro, "rad") => return Ok((ANGLE.to_owned(), 180.0 / std::f64::consts::PI)),
-        (Quantity::Gyro, "arcsec") => return Ok((ANGLE.to_owned(), 1.0 / 3600.0)),
-        (Quantity::Acc, "m/s2" | "m/s^2" | "mps2") => 1.0,
-        (Quantity::Acc, "g") => STANDARD_GRAVITY,
-        (Quantity::Acc, "mg") => STANDARD_GRAVITY * 1e-3,
-        (Quantity::Temp, "degC" | "C" | "K") => 1.0,
-        (Quantity::Supply, "V") => 1.0,
-        (Quantity::Supply, "mV") => 1e-3,
-        (Quantity::Pwm, "1") => 1.0,
-        (Quantity::Other, unit) => return Ok((unit.to_owned(), 1.0)),
-        (_, unit) => {
-            return Err(CaptureError::Option {
-                option: "--units",
-                why: format!("`{unit}` is no unit of {ours}"),
-                help: "gyro: deg/s, rad/s, deg/h, mdps, or of an angle deg, rad, arcsec; acc: m/s2, g, mg; temp: degC, K; supply: V, mV".to_owned(),
-            });
-        }
-    };
-    Ok((ours.to_owned(), factor))
-}
-
-/// A mapping made of real column names, for the error that asks for one.
-pub(crate) fn example(columns: &[String]) -> String {
-    let mut out = Vec::new();
-    let lower: Vec<String> = columns.iter().map(|c| c.to_lowercase()).collect();
-    let mut find = |ours: &str, test: &dyn Fn(&str) -> bool| {
-        if let Some(k) = lower.iter().position(|c| test(c)) {
-            out.push(format!("{ours}={}", columns[k]));
-        }
-    };
-    find("time", &|c| c.starts_with('t') && !c.starts_with("temp"));
-    for (axis, letter) in [("x", 'x'), ("y", 'y'), ("z", 'z')] {
-        find(&format!("gyro_{axis}"), &|c| {
-            c.contains(letter) && (c.contains('g') || c.contains('w')) && !c.starts_with('a')
-        });
-    }
-    for (axis, letter) in [("x", 'x'), ("y", 'y'), ("z", 'z')] {
-        find(&format!("acc_{axis}"), &|c| {
-            c.contains(letter) && c.starts_with('a')
-        });
-    }
-    find("temp", &|c| c.starts_with("temp"));
-    if out.is_empty() {
-        out = columns
-            .iter()
-            .take(2)
-            .zip(["time", "gyro_z"])
-            .map(|(c, ours)| format!("{ours}={c}"))
-            .collect();
-    }
-    out.join(",")
 }

@@ -4,6 +4,9 @@ use model::record::{Base, Header};
 
 use super::CaptureError;
 
+/// How the key begins that states the unit of a column.
+const UNIT_OF: &str = "unit of ";
+
 /// The header with where each key stands.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
@@ -11,20 +14,25 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    /// Takes a line that begins with `#`; free text is kept out.
-    pub fn take(&mut self, number: usize, line: &str) {
-        let text = line.trim_start_matches('#').trim();
-        if let Some((key, value)) = text.split_once(':') {
-            let key = key.trim();
-            let is_key = !key.is_empty()
-                && key
-                    .bytes()
-                    .all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
-            if is_key {
-                self.entries
-                    .push((number, key.to_owned(), value.trim().to_owned()));
-            }
+    /// Takes what stands after a `#`, if it is `key: value` or `unit of COLUMN: UNIT`; free text is kept out.
+    pub fn take(&mut self, number: usize, text: &str) -> bool {
+        let Some((key, value)) = text.split_once(':') else {
+            return false;
+        };
+        let key = key.trim();
+        let word = |b: u8| b.is_ascii_alphanumeric() || b == b'_' || b == b'-';
+        let is_key = !key.is_empty() && key.bytes().all(word) || key.starts_with(UNIT_OF);
+        if is_key {
+            self.entries
+                .push((number, key.to_owned(), value.trim().to_owned()));
         }
+        is_key
+    }
+
+    /// The unit that the header states for a column.
+    pub fn unit_of(&self, column: &str) -> Option<&str> {
+        self.get(&format!("{UNIT_OF}{column}"))
+            .map(|(_, unit)| unit)
     }
 
     pub fn get(&self, key: &str) -> Option<(usize, &str)> {
@@ -103,6 +111,7 @@ impl Lines {
             entries: self
                 .entries
                 .iter()
+                .filter(|(_, key, _)| !key.starts_with(UNIT_OF))
                 .map(|(_, key, value)| (key.clone(), value.clone()))
                 .collect(),
         })

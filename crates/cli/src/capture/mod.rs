@@ -2,14 +2,19 @@
 
 mod angle;
 mod build;
+mod columns;
 mod continuity;
 mod error;
 mod foreign;
 mod header;
+mod layout;
 mod live;
+mod propose;
 mod read;
 mod stream;
 mod tables;
+mod time;
+mod units;
 mod write;
 
 pub use build::{Calibration, RecordBuilder, SUPPLY_LSB_V, TEMP};

@@ -4,13 +4,17 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use model::record::{Channel, Header, Quantity, Record};
+use model::record::{Channel, Header, Record};
 
 use super::angle::difference_angles;
-use super::foreign::{convert, example, meaning};
+use super::columns::{Column, Columns, Role, Said, columns};
+use super::foreign::meaning;
 use super::header::Lines;
+use super::layout::{Cells, Layout, next_row};
+use super::stream::{TextLines, io, named, unpacked};
 use super::tables::{Table, read_table};
-use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
+use super::time::Clock;
+use super::{CaptureError, ColumnMapping};
 
 /// How to read.
 #[derive(Clone, Debug, Default)]
@@ -32,145 +36,220 @@ pub struct Read {
     pub skipped: usize,
 }
 
-/// Reads a capture, `.csv` or `.csv.gz`, or by their endings files of arrays: `.npz`, `.npy`, `.parquet`, `.mat`, and
-/// columns of text in `.txt`, `.dat`, `.tsv`. A gyro given in units of an angle is differenced into a rate.
+/// Reads a capture or any other table of numbers: by their endings files of arrays (`.npz`, `.npy`, `.parquet`, `.mat`,
+/// `.h5`), everything else as text, gzip or not, with cells between commas, semicolons, tabs or blanks. A gyro given in
+/// units of an angle is differenced into a rate.
 ///
 /// # Errors
 /// [`CaptureError`], which says what to do.
 pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureError> {
-    let io = |source| CaptureError::Io {
-        path: path.to_owned(),
-        source,
-    };
     if let Some(table) = read_table(path) {
         return from_table(table?, options);
     }
-    let file = BufReader::new(File::open(path).map_err(io)?);
-    let is_gz = path.extension().is_some_and(|e| e == "gz");
-    let read = if is_gz {
-        read_from(
-            BufReader::new(flate2::bufread::MultiGzDecoder::new(file)),
-            options,
-        )
-    } else {
-        read_from(file, options)
-    };
+    let open = || unpacked(BufReader::new(File::open(path)?));
     // An error of the stream has no path yet.
-    read.map_err(|error| match error {
-        CaptureError::Io { source, .. }
-            if is_gz && source.kind() == std::io::ErrorKind::UnexpectedEof =>
-        {
-            CaptureError::CutOff {
-                path: path.to_owned(),
-            }
-        }
-        CaptureError::Io { source, .. } => io(source),
-        other => other,
-    })
+    open()
+        .map_err(io)
+        .and_then(|text| read_from(text, options))
+        .map_err(|error| named(error, path))
 }
 
-/// A column of the file: what it is here, and how its cells become values.
-struct Column {
-    at: usize,
-    name: String,
-    role: Role,
-}
-
-enum Role {
-    Seq,
-    Ticks,
-    Time,
-    Flags,
-    /// value = (cell - zero) * scale; `lsb` where cells are counts.
-    Measured {
-        quantity: Quantity,
-        unit: String,
-        zero: f64,
-        scale: f64,
-        counts: bool,
-    },
-}
-
-/// Reads a capture from a stream.
+/// Reads a capture from a stream of text.
 ///
 /// # Errors
 /// [`CaptureError`].
-pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read, CaptureError> {
-    let io = |source| CaptureError::Io {
-        path: "input".into(),
-        source,
-    };
-    let mut lines = Lines::default();
-    let (mut number, mut names) = (0, Vec::new());
-    let mut line = String::new();
-    while names.is_empty() {
-        line.clear();
-        if input.read_line(&mut line).map_err(io)? == 0 {
-            return Err(CaptureError::Empty);
-        }
-        number += 1;
-        let text = line.trim_start_matches('\u{feff}').trim();
-        if text.starts_with('#') {
-            lines.take(number, text);
-        } else if !text.is_empty() {
-            names = text
-                .split(',')
-                .map(|name| name.trim().trim_matches('"').to_owned())
-                .collect();
-        }
-    }
-    let mut header = lines.header()?;
+pub fn read_from(input: impl BufRead, options: &ReadOptions) -> Result<Read, CaptureError> {
+    let mut text = TextLines::new(input)?;
+    let mut layout = Layout::read(&mut text)?;
+    let mut header = layout.lines.header()?;
     header.rate_hz = options.rate_hz.or(header.rate_hz);
-    let columns = if options.mapping.columns.is_empty() {
-        own_columns(&names, &lines, &options.mapping)?
-    } else {
-        mapped_columns(&names, &options.mapping)?
+    let said = Said {
+        lines: &layout.lines,
+        names: &layout.names,
+        numbered: layout.numbered,
+        units: &layout.units,
+        is_scaled: false,
     };
-    let mut rows = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(input);
-    let mut cells: Vec<Vec<f64>> = columns.iter().map(|_| Vec::new()).collect();
-    let (mut skipped, mut row) = (0, csv::StringRecord::new());
-    let mut values = vec![0.0; columns.len()];
-    loop {
-        let result = match rows.read_record(&mut row) {
-            Ok(false) => break,
-            Ok(true) => {
-                let at = row.position().map_or(0, csv::Position::line) + number as u64;
-                parse_row(&row, at, &columns, names.len(), &mut values)
-            }
-            Err(error) => {
-                let line = error.position().map_or(0, csv::Position::line) + number as u64;
-                let why = error.to_string();
-                match error.into_kind() {
-                    csv::ErrorKind::Io(source) => return Err(io(source)),
-                    _ => Err(CaptureError::BadRow {
-                        line,
-                        column: names[0].clone(),
-                        found: "?".to_owned(),
-                        expected: format!("not text: {why}"),
-                    }),
-                }
-            }
-        };
-        match result {
-            Ok(()) => cells
+    let found = columns(&said, &options.mapping)?;
+    let mut values: Vec<Vec<f64>> = found.columns.iter().map(|_| Vec::new()).collect();
+    let mut reader = RowReader::new(&found.columns, layout.names.len(), layout.cells);
+    let mut skipped = 0;
+    let mut row = layout.first.take();
+    while let Some((line, cells)) = row {
+        match reader.read(&cells, line) {
+            Ok(()) => values
                 .iter_mut()
-                .zip(&values)
+                .zip(&reader.values)
                 .for_each(|(column, &value)| column.push(value)),
             Err(_) if options.skip_bad => skipped += 1,
             Err(error) => return Err(error),
         }
+        row = next_row(&mut text)?;
     }
-    finish(header, columns, cells, skipped)
+    finish(header, found, values, skipped)
+}
+
+/// From the columns of a file of arrays. Without a mapping, names of ours are taken as they are: in the units the file
+/// states, in counts with the header's scales where it says `counts`, else in deg/s and m/s^2.
+fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError> {
+    let mut lines = Lines::default();
+    lines.entries.extend(
+        (table.about.iter().enumerate())
+            .map(|(i, (key, value))| (i + 1, key.clone(), value.clone())),
+    );
+    let mut header = lines.header()?;
+    header.rate_hz = options.rate_hz.or(header.rate_hz);
+    let stated = |name: &String| lines.unit_of(name).map(str::to_owned);
+    let units: Vec<Option<String>> = table.names.iter().map(stated).collect();
+    let said = Said {
+        lines: &lines,
+        names: &table.names,
+        numbered: false,
+        units: &units,
+        is_scaled: true,
+    };
+    let found = columns(&said, &options.mapping)?;
+    let mut cells = Vec::new();
+    for column in &found.columns {
+        let mut values = table.columns[column.at].clone();
+        if let Some(row) = values.iter().position(|v| !column.role.takes(*v)) {
+            return Err(CaptureError::BadRow {
+                line: row as u64 + 1,
+                column: column.name.clone(),
+                found: values[row].to_string(),
+                expected: "not a number of the kind that this column has".to_owned(),
+            });
+        }
+        if let Role::Time { scale } = column.role {
+            values.iter_mut().for_each(|v| *v *= scale);
+        }
+        cells.push(values);
+    }
+    finish(header, found, cells, 0)
+}
+
+impl Role {
+    /// Whether a column of this kind can have such a cell.
+    fn takes(&self, v: f64) -> bool {
+        let whole = v >= 0.0 && v.fract() == 0.0;
+        match self {
+            Role::Seq | Role::Ticks => whole && v < 9e15,
+            Role::Flags => whole && v <= 65_535.0,
+            Role::Time { .. } => v.is_finite(),
+            Role::Measured { counts: true, .. } => {
+                v.is_nan() || (v.fract() == 0.0 && v.abs() < 1e9)
+            }
+            Role::Measured { .. } => !v.is_infinite(),
+        }
+    }
+}
+
+/// Reads the rows of a text.
+struct RowReader<'a> {
+    columns: &'a [Column],
+    width: usize,
+    cells: Cells,
+    clocks: Vec<Clock>,
+    /// Of the last row.
+    values: Vec<f64>,
+}
+
+impl<'a> RowReader<'a> {
+    fn new(columns: &'a [Column], width: usize, cells: Cells) -> Self {
+        let clock = |column: &Column| match column.role {
+            Role::Time { scale } => Clock::new(scale),
+            _ => Clock::new(1.0),
+        };
+        Self {
+            columns,
+            width,
+            cells,
+            clocks: columns.iter().map(clock).collect(),
+            values: vec![0.0; columns.len()],
+        }
+    }
+
+    fn read(&mut self, text: &str, line: u64) -> Result<(), CaptureError> {
+        let bad = |column: &Column, found: &str, expected: String| CaptureError::BadRow {
+            line,
+            column: column.name.clone(),
+            found: found.to_owned(),
+            expected,
+        };
+        let row = self.cells.cut(text);
+        let ends_in_separator = row.len() == self.width + 1 && row[self.width].is_empty();
+        if row.len() != self.width
+            && !ends_in_separator
+            && let Some(column) = self.columns.first()
+        {
+            let found = format!("{} cells", row.len());
+            return Err(bad(
+                column,
+                &found,
+                format!("not a row of {} cells", self.width),
+            ));
+        }
+        for (k, column) in self.columns.iter().enumerate() {
+            let cell = row.get(column.at).map_or("", |cell| cell.as_ref());
+            let is_measured = matches!(column.role, Role::Measured { .. });
+            let read = match (cell, &column.role) {
+                ("" | "nan" | "NaN" | "NAN", _) if is_measured => Some(f64::NAN),
+                (_, Role::Time { .. }) => {
+                    let cells = &mut self.cells;
+                    self.clocks[k].seconds(cell, |cell| cells.number(cell))
+                }
+                _ => self.cells.number(cell),
+            };
+            let Some(value) = read else {
+                return Err(bad(column, cell, "not a finite number".to_owned()));
+            };
+            if !column.role.takes(value) {
+                let what = "not a whole number of the range that this column has";
+                return Err(bad(column, cell, what.to_owned()));
+            }
+            self.values[k] = value;
+        }
+        Ok(())
+    }
+}
+
+/// Longest and shortest time between rows that is taken in a unit that nobody said, s.
+const BELIEVED_S: (f64, f64) = (1e-5, 2.0);
+
+/// Sees that a time column rises, and, where nobody said its unit, that it is likely in seconds.
+fn check_time(found: &Columns, cells: &[Vec<f64>]) -> Result<(), CaptureError> {
+    let is_time = |column: &Column| matches!(column.role, Role::Time { .. });
+    let Some(at) = found.columns.iter().position(is_time) else {
+        return Ok(());
+    };
+    let mut steps: Vec<f64> = cells[at].windows(2).map(|t| t[1] - t[0]).collect();
+    let back = steps.iter().filter(|step| **step < 0.0).count();
+    // Some rows out of order, or all of them turned round, still are times.
+    if 10 * back > steps.len() && 10 * back < 9 * steps.len() {
+        let row = steps.iter().position(|step| *step < 0.0).unwrap_or(0) + 2;
+        return Err(CaptureError::Time {
+            why: format!("the time column does not rise: it goes back {back} times, first in row {row}"),
+            help: "map the column of the time, `--columns time=...`, or leave time out and say `--rate HZ`".to_owned(),
+        });
+    }
+    steps.sort_by(f64::total_cmp);
+    let Some(usual) = steps.get(steps.len() / 2).map(|step| step.abs()) else {
+        return Ok(());
+    };
+    let is_believed = usual == 0.0 || (BELIEVED_S.0..BELIEVED_S.1).contains(&usual);
+    if found.time_is_assumed && !is_believed {
+        return Err(CaptureError::Time {
+            why: format!("in seconds, rows would be {usual} s apart"),
+            help: "say the unit of the time column: `--units time=ms` (or us, ns; s, if it is so)"
+                .to_owned(),
+        });
+    }
+    Ok(())
 }
 
 fn finish(
     header: Header,
-    columns: Vec<Column>,
+    found: Columns,
     cells: Vec<Vec<f64>>,
     skipped: usize,
 ) -> Result<Read, CaptureError> {
@@ -179,9 +258,11 @@ fn finish(
     }
     let mut record = Record {
         header,
+        notes: found.notes.clone(),
         ..Record::default()
     };
-    for (column, values) in columns.into_iter().zip(cells) {
+    check_time(&found, &cells)?;
+    for (column, values) in found.columns.into_iter().zip(cells) {
         place(&mut record, column, values);
     }
     if skipped > 0 {
@@ -193,290 +274,6 @@ fn finish(
     Ok(Read { record, skipped })
 }
 
-/// From the columns of a file of arrays. Without a mapping, names of ours are taken as they are: in the units the file
-/// states, in counts with the header's scales where it says `counts`, else in deg/s and m/s^2.
-fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError> {
-    let mut lines = Lines::default();
-    lines.entries.extend(
-        table
-            .about
-            .iter()
-            .enumerate()
-            .map(|(i, (key, value))| (i + 1, key.clone(), value.clone())),
-    );
-    let mut header = lines.header()?;
-    header.rate_hz = options.rate_hz.or(header.rate_hz);
-    let unit_of = |name: &str| {
-        let key = format!("unit of {name}");
-        let found = table.about.iter().find(|(k, _)| *k == key);
-        found.map(|(_, unit)| unit.as_str())
-    };
-    let columns = if !options.mapping.columns.is_empty() {
-        mapped_columns(&table.names, &options.mapping)?
-    } else if let [name] = &table.names[..] {
-        // A single series needs no name.
-        let (quantity, _) = meaning(name);
-        let unit = options.mapping.unit(name, quantity).or(unit_of(name));
-        vec![measured(0, name, quantity, unit)?]
-    } else {
-        let has = |name: &str| table.names.iter().any(|n| n == name);
-        let (mut columns, mut counted) = (Vec::new(), Vec::new());
-        for (at, name) in table.names.iter().enumerate() {
-            let (quantity, _) = meaning(name);
-            let unit = options.mapping.unit(name, quantity).or(unit_of(name));
-            let role = match name.as_str() {
-                "seq" => Role::Seq,
-                "t_ticks" if lines.get("tick_s").is_some() => Role::Ticks,
-                "flags" => Role::Flags,
-                "host_time_s" => Role::Time,
-                "time" | "time_s" if !has("host_time_s") => Role::Time,
-                _ if quantity == Quantity::Other => continue,
-                _ if unit == Some("counts") => {
-                    counted.push((at, name.clone()));
-                    continue;
-                }
-                _ => measured(at, name, quantity, unit)?.role,
-            };
-            columns.push(Column {
-                at,
-                name: name.clone(),
-                role,
-            });
-        }
-        if !counted.is_empty() {
-            let names: Vec<String> = counted.iter().map(|(_, name)| name.clone()).collect();
-            let own = own_columns(&names, &lines, &options.mapping)?;
-            columns.extend(own.into_iter().map(|c| Column {
-                at: counted[c.at].0,
-                ..c
-            }));
-        }
-        if !columns.iter().any(|c| {
-            matches!(
-                c.role,
-                Role::Measured {
-                    quantity: Quantity::Gyro | Quantity::Acc,
-                    ..
-                }
-            )
-        }) {
-            return Err(CaptureError::Columns {
-                why: "no array has a name of the stand's captures (gyro_x, acc_x, ...)".to_owned(),
-                columns: table.names.clone(),
-                example: example(&table.names),
-            });
-        }
-        columns
-    };
-    let mut cells = Vec::new();
-    for column in &columns {
-        let values = table.columns[column.at].clone();
-        let whole = |v: f64| v >= 0.0 && v.fract() == 0.0;
-        let bad = values.iter().position(|v| match column.role {
-            Role::Seq | Role::Ticks => !whole(*v),
-            Role::Flags => !whole(*v) || *v > 65_535.0,
-            Role::Time => !v.is_finite(),
-            Role::Measured { counts, .. } => {
-                v.is_infinite() || (counts && !v.is_nan() && v.fract() != 0.0)
-            }
-        });
-        if let Some(row) = bad {
-            return Err(CaptureError::BadRow {
-                line: row as u64 + 1,
-                column: column.name.clone(),
-                found: values[row].to_string(),
-                expected: "not a number of the kind that this column has".to_owned(),
-            });
-        }
-        cells.push(values);
-    }
-    finish(header, columns, cells, 0)
-}
-
-fn measured(
-    at: usize,
-    name: &str,
-    quantity: Quantity,
-    unit: Option<&str>,
-) -> Result<Column, CaptureError> {
-    let (unit, scale) = convert(quantity, unit)?;
-    Ok(Column {
-        at,
-        name: name.to_owned(),
-        role: Role::Measured {
-            quantity,
-            unit,
-            zero: 0.0,
-            scale,
-            counts: false,
-        },
-    })
-}
-
-/// The columns of the stand's own format.
-fn own_columns(
-    names: &[String],
-    lines: &Lines,
-    mapping: &ColumnMapping,
-) -> Result<Vec<Column>, CaptureError> {
-    let mut columns = Vec::new();
-    for (at, name) in names.iter().enumerate() {
-        let (quantity, _) = meaning(name);
-        let scaled = |zero, scale, unit: &str| Role::Measured {
-            quantity,
-            unit: unit.to_owned(),
-            zero,
-            scale,
-            counts: true,
-        };
-        let role = match (name.as_str(), quantity) {
-            ("seq", _) => Role::Seq,
-            ("t_ticks", _) => {
-                lines.needed("tick_s", name)?;
-                Role::Ticks
-            }
-            ("host_time_s", _) => Role::Time,
-            ("flags", _) => Role::Flags,
-            (_, Quantity::Gyro) => scaled(0.0, lines.scale("gyro_lsb_dps", name)?, "deg/s"),
-            (_, Quantity::Temp) => {
-                let lsb = lines.scale("temp_lsb_c", name)?;
-                scaled(-lines.needed("temp_zero_c", name)? / lsb, lsb, "degC")
-            }
-            (_, Quantity::Supply) => scaled(0.0, lines.scale("supply_lsb_v", name)?, "V"),
-            (_, Quantity::Acc) => {
-                let per_g = lines.scale("acc_counts_per_g", name)?;
-                scaled(
-                    lines.needed("acc_zero_counts", name)?,
-                    STANDARD_GRAVITY / per_g,
-                    "m/s^2",
-                )
-            }
-            (_, Quantity::Pwm) => scaled(0.0, 1.0, "1"),
-            (_, Quantity::Other) => {
-                // The format may grow: what is not known is kept as it is, where the file says that it is ours.
-                if lines.get("format").is_none() {
-                    continue;
-                }
-                let unit = mapping.unit(name, quantity).unwrap_or("1").to_owned();
-                Role::Measured {
-                    quantity,
-                    unit,
-                    zero: 0.0,
-                    scale: 1.0,
-                    counts: false,
-                }
-            }
-        };
-        columns.push(Column {
-            at,
-            name: name.clone(),
-            role,
-        });
-    }
-    if columns.iter().any(|c| {
-        matches!(
-            c.role,
-            Role::Measured {
-                quantity: Quantity::Gyro | Quantity::Acc,
-                ..
-            }
-        )
-    }) {
-        return Ok(columns);
-    }
-    Err(CaptureError::Columns {
-        why: "no column has a name of the stand's captures (gyro_x, acc_x, ...)".to_owned(),
-        columns: names.to_vec(),
-        example: example(names),
-    })
-}
-
-fn mapped_columns(names: &[String], mapping: &ColumnMapping) -> Result<Vec<Column>, CaptureError> {
-    let mut columns = Vec::new();
-    for (ours, theirs) in &mapping.columns {
-        let Some(at) = names.iter().position(|name| name == theirs) else {
-            return Err(CaptureError::Columns {
-                why: format!("there is no column `{theirs}`"),
-                columns: names.to_vec(),
-                example: example(names),
-            });
-        };
-        let role = match ours.as_str() {
-            "seq" => Role::Seq,
-            "time" | "host_time_s" => Role::Time,
-            "flags" => Role::Flags,
-            name => {
-                let (quantity, _) = meaning(name);
-                let (unit, scale) = convert(quantity, mapping.unit(name, quantity))?;
-                Role::Measured {
-                    quantity,
-                    unit,
-                    zero: 0.0,
-                    scale,
-                    counts: false,
-                }
-            }
-        };
-        columns.push(Column {
-            at,
-            name: ours.clone(),
-            role,
-        });
-    }
-    Ok(columns)
-}
-
-fn parse_row(
-    row: &csv::StringRecord,
-    line: u64,
-    columns: &[Column],
-    width: usize,
-    values: &mut [f64],
-) -> Result<(), CaptureError> {
-    let bad = |column: &Column, found: &str, expected: &str| CaptureError::BadRow {
-        line,
-        column: column.name.clone(),
-        found: found.to_owned(),
-        expected: expected.to_owned(),
-    };
-    if row.len() != width
-        && let Some(column) = columns.first()
-    {
-        return Err(bad(
-            column,
-            &format!("{} cells", row.len()),
-            &format!("not a row of {width} cells"),
-        ));
-    }
-    for (column, value) in columns.iter().zip(values) {
-        let cell = row.get(column.at).unwrap_or_default();
-        let is_measured = matches!(column.role, Role::Measured { .. });
-        *value = match cell {
-            "" | "nan" | "NaN" | "NAN" if is_measured => f64::NAN,
-            text => match text.parse::<f64>() {
-                Ok(number) if number.is_finite() => number,
-                _ => return Err(bad(column, text, "not a finite number")),
-            },
-        };
-        let whole = match column.role {
-            Role::Seq | Role::Ticks => *value >= 0.0 && *value < 9e15 && value.fract() == 0.0,
-            Role::Flags => *value >= 0.0 && *value <= 65_535.0 && value.fract() == 0.0,
-            Role::Measured { counts: true, .. } => {
-                value.is_nan() || (value.fract() == 0.0 && value.abs() < 1e9)
-            }
-            _ => true,
-        };
-        if !whole {
-            return Err(bad(
-                column,
-                cell,
-                "not a whole number of the range that this column has",
-            ));
-        }
-    }
-    Ok(())
-}
-
 fn whole(values: &[f64]) -> impl Iterator<Item = u64> {
     values.iter().map(|&value| value as u64)
 }
@@ -485,7 +282,7 @@ fn place(record: &mut Record, column: Column, values: Vec<f64>) {
     match column.role {
         Role::Seq => record.seq = Some(unwrap(whole(&values), 1 << 16)),
         Role::Ticks => record.t_ticks = Some(unwrap(whole(&values), 1 << 32)),
-        Role::Time => record.host_time_s = Some(values),
+        Role::Time { .. } => record.host_time_s = Some(values),
         Role::Flags => record.flags = Some(values.iter().map(|&value| value as u16).collect()),
         Role::Measured {
             quantity,
@@ -602,6 +399,7 @@ mod tests {
             },
         )
         .unwrap();
+        assert!(read.record.notes.is_empty());
         assert!((read.record.channels[0].values[0] - 57.295_779_5).abs() < 1e-6);
     }
 }

@@ -1,9 +1,15 @@
-//! A stream, unpacked.
+//! A stream of text: unpacked, and in lines.
 
-use std::io::{BufRead, BufReader, Result};
+use std::borrow::Cow;
+use std::io::{BufRead, BufReader, Read as _, Result};
+use std::path::Path;
+
+use super::CaptureError;
 
 /// How gzip begins.
 const GZIP: &[u8] = &[0x1f, 0x8b];
+/// No row of numbers is longer.
+const LONGEST_LINE: u64 = 1 << 20;
 
 /// The text of a stream that is gzip, or of one that is not.
 ///
@@ -15,4 +21,114 @@ pub fn unpacked<'a>(mut input: impl BufRead + 'a) -> Result<Box<dyn BufRead + 'a
         return Ok(Box::new(BufReader::new(text)));
     }
     Ok(Box::new(input))
+}
+
+/// What a file is that is no text, by how it begins, and what to do.
+fn no_text(start: &[u8]) -> Option<(&'static str, &'static str)> {
+    const ENDING: &str = "give it the ending of its kind: .npz, .npy, .parquet, .mat, .h5";
+    const UNPACK: &str = "unpack it first; text and gzip are read";
+    let known: [(&[u8], _, _); 10] = [
+        (
+            b"\xff\xfe",
+            "UTF-16",
+            "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)",
+        ),
+        (
+            b"\xfe\xff",
+            "UTF-16",
+            "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)",
+        ),
+        (
+            b"PK\x03\x04",
+            "a ZIP archive, as spreadsheets and NPZ are",
+            "save the sheet as CSV; an NPZ has the ending .npz",
+        ),
+        (b"PAR1", "Parquet", ENDING),
+        (b"\x89HDF", "HDF5", ENDING),
+        (b"\x93NUMPY", "a NumPy array", ENDING),
+        (b"MATLAB", "a .mat file", ENDING),
+        (b"BZh", "bzip2", UNPACK),
+        (b"\xfd7zXZ", "xz", UNPACK),
+        (b"\x28\xb5\x2f\xfd", "Zstandard", UNPACK),
+    ];
+    if let Some((_, what, help)) = known.iter().find(|(magic, ..)| start.starts_with(magic)) {
+        return Some((what, help));
+    }
+    start.contains(&0).then_some((
+        "binary data",
+        "is it the right file? Text, gzip, NPZ, NPY, Parquet, .mat and HDF5 are read",
+    ))
+}
+
+/// Lines of a text, numbered from 1 on.
+pub(super) struct TextLines<R> {
+    input: R,
+    number: u64,
+    bytes: Vec<u8>,
+}
+
+impl<R: BufRead> TextLines<R> {
+    /// Of a stream that begins like text.
+    pub fn new(mut input: R) -> std::result::Result<Self, CaptureError> {
+        let start = input.fill_buf().map_err(io)?;
+        if let Some((what, help)) = no_text(start) {
+            return Err(CaptureError::NoText {
+                what: what.to_owned(),
+                help: help.to_owned(),
+            });
+        }
+        Ok(Self {
+            input,
+            number: 0,
+            bytes: Vec::new(),
+        })
+    }
+
+    /// The next line and its number, without what surrounds it. What is not UTF-8 is taken as Latin-1: names and units
+    /// of old programs; numbers are the same in both.
+    pub fn next_line(&mut self) -> std::result::Result<Option<(u64, String)>, CaptureError> {
+        self.bytes.clear();
+        let mut line = self.input.by_ref().take(LONGEST_LINE);
+        if line.read_until(b'\n', &mut self.bytes).map_err(io)? == 0 {
+            return Ok(None);
+        }
+        self.number += 1;
+        let text = match std::str::from_utf8(&self.bytes) {
+            Ok(text) => text.trim_start_matches('\u{feff}').into(),
+            Err(_) => Cow::from(
+                self.bytes
+                    .iter()
+                    .map(|b| char::from(*b))
+                    .collect::<String>(),
+            ),
+        };
+        // Not tabs: a cell at the end may be empty.
+        let text = text.trim_matches([' ', '\r', '\n']).to_owned();
+        Ok(Some((self.number, text)))
+    }
+}
+
+/// An error of the stream, which does not know its name.
+pub(super) fn io(source: std::io::Error) -> CaptureError {
+    CaptureError::Io {
+        path: "input".into(),
+        source,
+    }
+}
+
+/// The same with the name of the file.
+pub(super) fn named(error: CaptureError, path: &Path) -> CaptureError {
+    use std::io::ErrorKind as Kind;
+    let CaptureError::Io { source, .. } = error else {
+        return error;
+    };
+    let path = path.to_owned();
+    match source.kind() {
+        Kind::UnexpectedEof => CaptureError::CutOff { path },
+        Kind::InvalidData | Kind::InvalidInput => CaptureError::Damaged {
+            path,
+            why: source.to_string(),
+        },
+        _ => CaptureError::Io { path, source },
+    }
 }

@@ -1,8 +1,8 @@
-//! Files of others that hold arrays: NPZ and NPY, Parquet, MATLAB's .mat, HDF5, columns of text. Each becomes named columns.
+//! Files of others that hold arrays: NPZ and NPY, Parquet, MATLAB's .mat, HDF5. Each becomes named columns.
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Read as _};
+use std::io::{BufReader, Cursor, Read as _};
 use std::path::Path;
 
 use parquet::basic::{LogicalType, TimeUnit};
@@ -30,7 +30,6 @@ pub(crate) fn read_table(path: &Path) -> Option<Result<Table, CaptureError>> {
         "parquet" | "pq" => parquet_file,
         "mat" => mat,
         "h5" | "hdf5" => hdf5,
-        "txt" | "dat" | "tsv" | "asc" => text,
         _ => return None,
     };
     Some(
@@ -326,6 +325,10 @@ fn parquet_file(path: &Path) -> Result<Arrays, String> {
             cells.extend(part.map_err(bad)?);
         }
         if known {
+            if scale.is_some() {
+                let unit = (format!("unit of {}", column.name()), "s".to_owned());
+                out.about.push(unit);
+            }
             out.columns.push((column.name().to_owned(), cells));
         }
     }
@@ -362,64 +365,4 @@ fn numbers<T: DataType>(
             values.next().map_or(f64::NAN, &mut number)
         })
         .collect())
-}
-
-/// Columns of numbers between blanks, commas or semicolons, with names in the first line or without; `#` and `%` begin
-/// comments, of which `# key: value` are kept.
-fn text(path: &Path) -> Result<Arrays, String> {
-    let mut names: Vec<String> = Vec::new();
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    let mut out = Arrays::default();
-    for (number, line) in BufReader::new(open(path)?).lines().enumerate() {
-        let line = line.map_err(|error| error.to_string())?;
-        let line = line.trim_start_matches('\u{feff}').trim();
-        if let Some(comment) = line.strip_prefix(['#', '%']) {
-            if let Some((key, value)) = comment.split_once(':') {
-                let (key, value) = (key.trim(), value.trim());
-                if !key.is_empty() && !key.contains(' ') {
-                    out.about.push((key.to_owned(), value.to_owned()));
-                }
-            }
-            continue;
-        }
-        let cells: Vec<&str> = line
-            .split(|c: char| c.is_whitespace() || c == ',' || c == ';')
-            .filter(|cell| !cell.is_empty())
-            .collect();
-        if cells.is_empty() {
-            continue;
-        }
-        let parsed: Result<Vec<f64>, &str> = cells
-            .iter()
-            .map(|cell| cell.parse().map_err(|_| *cell))
-            .collect();
-        match parsed {
-            Err(_) if columns.is_empty() && names.is_empty() => {
-                names = cells.into_iter().map(str::to_owned).collect();
-            }
-            Err(cell) => return Err(format!("line {}: `{cell}` is no number", number + 1)),
-            Ok(cells) => {
-                if columns.is_empty() {
-                    columns = vec![Vec::new(); cells.len()];
-                }
-                if cells.len() != columns.len() {
-                    return Err(format!(
-                        "line {}: {} numbers, the lines before have {}",
-                        number + 1,
-                        cells.len(),
-                        columns.len()
-                    ));
-                }
-                columns.iter_mut().zip(cells).for_each(|(c, v)| c.push(v));
-            }
-        }
-    }
-    if names.len() != columns.len() {
-        names = match columns.len() {
-            1 => vec!["values".to_owned()],
-            n => (1..=n).map(|k| format!("column_{k}")).collect(),
-        };
-    }
-    out.columns = names.into_iter().zip(columns).collect();
-    Ok(out)
 }

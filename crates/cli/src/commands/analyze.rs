@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use analysis::AnalyzeOptions;
-use analysis::allan::Deviation;
+use analysis::allan::{Deviation, TauGrid};
 use analysis::analyze::{Analysis, ChannelAnalysis, Interval, NoiseParameters};
 use clap::Args;
 use imu_stand::report::plot::{number, tidy};
@@ -21,10 +21,10 @@ pub struct Arguments {
     input: Input,
     /// Deviations to compute: oadev,mdev,...
     #[arg(long, value_delimiter = ',', default_value = "oadev")]
-    deviations: Vec<String>,
+    deviations: Vec<Deviation>,
     /// Cluster times: octave, decade, all or log:N
     #[arg(long, default_value = "octave")]
-    taus: String,
+    taus: TauGrid,
     /// Only these channels: gyro_x,acc_z,...
     #[arg(long, value_delimiter = ',')]
     channels: Option<Vec<String>>,
@@ -40,13 +40,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     Outputs::beside([&arguments.capture]).result("--json", arguments.json.as_ref())?;
     let read = arguments.input.read(&arguments.capture)?;
-    let deviations = arguments
-        .deviations
-        .iter()
-        .map(|name| name.parse().map_err(super::explain));
     let options = AnalyzeOptions {
-        deviations: deviations.collect::<Result<_>>()?,
-        taus: arguments.taus.parse().map_err(super::explain)?,
+        deviations: arguments.deviations.clone(),
+        taus: arguments.taus,
         channels: arguments.channels.clone(),
         rate_hz: None,
         seed: arguments.seed,

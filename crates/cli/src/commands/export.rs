@@ -48,7 +48,7 @@ pub struct Arguments {
     #[arg(long)]
     raw: bool,
     /// Noise: the rate of the sensor where the numbers are used, Hz; the record's own without it
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = super::positive, allow_negative_numbers = true)]
     at_rate: Option<f64>,
     /// Noise: seed of the replicates behind intervals
     #[arg(long, default_value_t = 0)]
@@ -148,10 +148,11 @@ fn noise(arguments: &Arguments, consumer: Consumer) -> Result<()> {
         );
     }
     let rate = arguments.at_rate.unwrap_or(noise.rate_hz);
-    if !(rate > 0.0 && rate.is_finite()) {
+    if let Some((axis, term)) = noise.lacks(consumer) {
         miette::bail!(
-            help = "write `--at-rate 100`",
-            "--at-rate: {rate} is no sample rate"
+            help = "record for longer: `imu-stand plan` says how long; `imu-stand analyze` says what this record shows",
+            "this record of {:.3} s says nothing about the {term} of {axis}, and a 0 in its place would be believed",
+            noise.seconds
         );
     }
     let text = noise.text(consumer, rate);

@@ -23,6 +23,7 @@ use std::sync::OnceLock;
 use clap::Args;
 use imu_stand::capture::{Read, read_from, unpacked};
 use imu_stand::link::{DEFAULT_BAUD, Link};
+use imu_stand::text::shell_word;
 use imu_stand::{CaptureError, ColumnMapping, ReadOptions, read_capture};
 use miette::{IntoDiagnostic, Result, WrapErr};
 use sha2::{Digest, Sha256};
@@ -39,7 +40,7 @@ pub struct Input {
     #[arg(long, value_name = "OURS=UNIT,...")]
     units: Option<String>,
     /// Sample rate, Hz, where there is no time column
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Leave out rows that cannot be read, and count them
     #[arg(long)]
@@ -52,14 +53,6 @@ pub struct Input {
 impl Input {
     /// Reads a capture by these options; says how many rows were left out.
     pub fn read(&self, path: &Path) -> Result<Read> {
-        if let Some(rate) = self.rate
-            && !(rate > 0.0 && rate.is_finite())
-        {
-            miette::bail!(
-                help = "write `--rate 20`",
-                "--rate: {rate} is no sample rate"
-            );
-        }
         let mapping = ColumnMapping::parse(self.columns.as_deref(), self.units.as_deref())?;
         let options = ReadOptions {
             mapping,
@@ -80,7 +73,10 @@ impl Input {
         let read = read.map_err(|error| {
             let says_which = matches!(
                 error,
-                CaptureError::Io { .. } | CaptureError::CutOff { .. } | CaptureError::Table { .. }
+                CaptureError::Io { .. }
+                    | CaptureError::CutOff { .. }
+                    | CaptureError::Damaged { .. }
+                    | CaptureError::Table { .. }
             );
             let report = miette::Report::new(error);
             if says_which {
@@ -200,6 +196,14 @@ pub fn digest(path: &Path) -> Result<String> {
     Ok(format!("sha256:{:x}", hash.finalize()))
 }
 
+/// A number above 0, from an option's text.
+pub fn positive(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
+        _ => Err("it has to be a number above 0".to_owned()),
+    }
+}
+
 /// Reads a text file.
 pub fn read_text(path: &Path) -> Result<String> {
     std::fs::read_to_string(path).map_err(|error| {
@@ -232,9 +236,17 @@ pub fn explain(error: analysis::AnalysisError) -> miette::Report {
             format!("record for longer: {need} {unit} at least")
         }
         analysis::AnalysisError::NoRate => "add `--rate HZ`, or map a time column".to_owned(),
-        analysis::AnalysisError::NoChannel { .. } => {
-            "name one of the channels that are there".to_owned()
-        }
+        analysis::AnalysisError::NoChannel { name, present } => match present.first() {
+            Some(first) if name.starts_with("gyro_x,") => format!(
+                "say which column is a gyro, and in which unit: --columns {} --units gyro=deg/s",
+                shell_word(&format!("gyro_x={first}"))
+            ),
+            _ => "name one of the channels that are there".to_owned(),
+        },
+        analysis::AnalysisError::Constant { name, .. } => format!(
+            "see to the sensor's supply and wiring (`imu-stand board self-test`); to go on without {name}, name the others: \
+             `analyze --channels ...`, or `--columns` without it"
+        ),
         analysis::AnalysisError::NeverNew { .. } => {
             "check the gyros' SPI lines; where the flags come from elsewhere, leave the column `flags` out".to_owned()
         }

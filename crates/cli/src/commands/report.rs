@@ -7,6 +7,7 @@ use analysis::result::Diagnosed;
 use clap::Args;
 use imu_stand::report::standalone::figures;
 use imu_stand::report::{Subject, report};
+use imu_stand::text::shell_word;
 use miette::{IntoDiagnostic, Result, WrapErr};
 
 use super::{Input, Outputs};
@@ -90,14 +91,7 @@ pub fn write(path: &Path, subject: &Subject<'_>, quiet: bool) -> Result<()> {
 
 /// The command as it was typed; the program by its name.
 pub fn command() -> String {
-    let words = std::env::args().skip(1).map(|word| {
-        let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+".contains(c);
-        if !word.is_empty() && word.chars().all(plain) {
-            word
-        } else {
-            format!("'{}'", word.replace('\'', r"'\''"))
-        }
-    });
+    let words = std::env::args().skip(1).map(|word| shell_word(&word));
     std::iter::once("imu-stand".to_owned())
         .chain(words)
         .collect::<Vec<_>>()

@@ -16,10 +16,10 @@ pub struct Arguments {
     #[arg(long)]
     model: Option<PathBuf>,
     /// Length, s
-    #[arg(long, default_value_t = 600.0)]
+    #[arg(long, default_value_t = 600.0, value_parser = super::positive, allow_negative_numbers = true)]
     seconds: f64,
     /// Sample rate, Hz; without it the model's
-    #[arg(long)]
+    #[arg(long, value_parser = super::positive, allow_negative_numbers = true)]
     rate: Option<f64>,
     /// Seed: the same seed gives the same capture
     #[arg(long, default_value_t = 1)]
@@ -47,7 +47,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         );
     }
     let record = model::simulate(&model, arguments.seconds, rate, arguments.seed)
-        .map_err(|error| miette::miette!(help = "see `imu-stand simulate --help`", "{error}"))?;
+        .map_err(|error| {
+            let seconds = arguments.seconds;
+            let help = format!(
+                "{seconds} s at {rate} Hz are {} samples: choose `--seconds` and `--rate` accordingly",
+                (seconds * rate).round()
+            );
+            miette::miette!(help = help, "{error}")
+        })?;
     if arguments.out.as_os_str() == outputs::DASH {
         outputs::to_stdout(|mut out| write_to(&mut out, &record))?;
     } else {

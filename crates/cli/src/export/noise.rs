@@ -135,6 +135,27 @@ impl ImuNoise {
         }
     }
 
+    /// The first axis and term that a consumer needs and this record says nothing about, not even a limit: white noise
+    /// everywhere, the walk where a filter would trust a bias without one.
+    #[must_use]
+    pub fn lacks(&self, consumer: Consumer) -> Option<(&str, &'static str)> {
+        let is_filter = matches!(consumer, Consumer::Kalibr | Consumer::Vins);
+        let lacks = |axes: &[AxisNoise]| {
+            let unknown = |of: fn(&AxisNoise) -> Figure| {
+                let is_unknown = |axis: &AxisNoise| of(axis) == Figure::Unknown;
+                // A filter has one number for all axes, and it takes one of them to know it.
+                let found = axes.iter().position(is_unknown)?;
+                (!is_filter || axes.iter().all(is_unknown)).then_some(found)
+            };
+            let white = unknown(|axis| axis.white).map(|at| (at, "white noise"));
+            let walk = || unknown(|axis| axis.walk).map(|at| (at, "random walk of the bias"));
+            white.or_else(|| is_filter.then(walk).flatten())
+        };
+        [&self.gyro, &self.acc]
+            .into_iter()
+            .find_map(|axes| lacks(axes).map(|(at, term)| (axes[at].name.as_str(), term)))
+    }
+
     /// The text that a consumer reads, for a sensor that is sampled at `rate_hz` there.
     #[must_use]
     pub fn text(&self, consumer: Consumer, rate_hz: f64) -> String {

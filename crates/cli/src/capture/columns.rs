@@ -1,0 +1,387 @@
+//! Which column of a file is what: by its own names, or by a mapping.
+
+use model::record::Quantity;
+
+use super::foreign::meaning;
+use super::header::Lines;
+use super::propose::proposal;
+use super::units::{COUNTS, What, at_the_end, convert, in_brackets, usual};
+use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
+
+/// A column of the file: what it is here, and how its cells become values.
+pub(super) struct Column {
+    pub at: usize,
+    pub name: String,
+    pub role: Role,
+}
+
+pub(super) enum Role {
+    Seq,
+    Ticks,
+    /// In s, once it is scaled.
+    Time {
+        scale: f64,
+    },
+    Flags,
+    /// value = (cell - zero) * scale, in `unit`.
+    Measured {
+        quantity: Quantity,
+        unit: String,
+        zero: f64,
+        scale: f64,
+        counts: bool,
+    },
+}
+
+/// What a file says of its columns.
+pub(super) struct Said<'a> {
+    /// The header's keys.
+    pub lines: &'a Lines,
+    /// Names of the columns.
+    pub names: &'a [String],
+    /// Whether the names are made up.
+    pub numbered: bool,
+    /// Units that the file states.
+    pub units: &'a [Option<String>],
+    /// Whether cells without a unit are measured values; else they are counts, and the header scales them.
+    pub is_scaled: bool,
+}
+
+/// The columns that are read, and how they are taken.
+#[derive(Default)]
+pub(super) struct Columns {
+    pub columns: Vec<Column>,
+    /// What was assumed, for the user.
+    pub notes: Vec<String>,
+    /// Whether the time column is in a unit that nobody said.
+    pub time_is_assumed: bool,
+}
+
+/// Chooses: the mapping's columns; those of the stand's own format; or those of our names, in the units stated.
+pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
+    let found = if !mapping.columns.is_empty() {
+        mapped(said, mapping)?
+    } else if said.lines.get("format").is_some() {
+        refuse_units(said, mapping)?;
+        own(said, said.names, mapping)?
+    } else if let ([name], true) = (said.names, meaning(&said.names[0]).0 == Quantity::Other) {
+        // A single series needs no name.
+        let unit = mapping.unit(name, What::Channel(Quantity::Other));
+        let unit = unit.or(said.units[0].as_deref());
+        let column = measured(0, name, Quantity::Other, unit)?;
+        Columns {
+            columns: vec![column],
+            ..Columns::default()
+        }
+    } else {
+        by_our_names(said, mapping)?
+    };
+    let names = found.columns.iter().map(|c| c.name.as_str());
+    mapping.check_units(names)?;
+    for column in &found.columns {
+        let name = &said.names[column.at];
+        let is_by_number = mapping
+            .columns
+            .iter()
+            .any(|(_, theirs)| theirs == &(column.at + 1).to_string());
+        if !is_by_number && said.names.iter().filter(|n| *n == name).count() > 1 {
+            return Err(CaptureError::Twice {
+                name: name.clone(),
+                ours: column.name.clone(),
+                number: said.names.iter().position(|n| n == name).unwrap_or(0) + 1,
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// A capture of the stand is in counts, and its header says what they mean.
+fn refuse_units(said: &Said<'_>, mapping: &ColumnMapping) -> Result<(), CaptureError> {
+    let is_other = |key: &str| {
+        key == "other" || said.names.iter().any(|n| n == key) && meaning(key).0 == Quantity::Other
+    };
+    match mapping.units.iter().find(|(key, _)| !is_other(key)) {
+        None => Ok(()),
+        Some((key, unit)) => Err(CaptureError::Option {
+            option: "--units",
+            why: format!("{key}={unit}, but the file is a capture in counts, whose header has their scales"),
+            help: "leave it out; to read the cells as other values, map them: `--columns gyro_x=gyro_x`".to_owned(),
+        }),
+    }
+}
+
+fn unknown(said: &Said<'_>, why: String) -> CaptureError {
+    CaptureError::Columns {
+        why,
+        columns: said.names.to_vec(),
+        example: proposal(said.names, said.numbered),
+    }
+}
+
+fn is_inertial(column: &Column) -> bool {
+    matches!(
+        column.role,
+        Role::Measured {
+            quantity: Quantity::Gyro | Quantity::Acc,
+            ..
+        }
+    )
+}
+
+fn measured(
+    at: usize,
+    name: &str,
+    quantity: Quantity,
+    unit: Option<&str>,
+) -> Result<Column, CaptureError> {
+    let (unit, scale) = convert(What::Channel(quantity), unit)?;
+    Ok(Column {
+        at,
+        name: name.to_owned(),
+        role: Role::Measured {
+            quantity,
+            unit,
+            zero: 0.0,
+            scale,
+            counts: false,
+        },
+    })
+}
+
+/// Columns with names of ours: in the units that are given or stated, in counts where the file says so or says nothing.
+fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
+    let stem = |at: usize| in_brackets(&said.names[at]).0;
+    let unit = |at: usize, what: What| {
+        let given = mapping.unit(stem(at), what);
+        given.or(said.units[at].as_deref())
+    };
+    let gyro_or_acc = |at: &usize| matches!(meaning(stem(*at)).0, Quantity::Gyro | Quantity::Acc);
+    let mut inertial = (0..said.names.len()).filter(gyro_or_acc);
+    let is_scaled = said.is_scaled
+        || inertial
+            .any(|at| unit(at, What::Channel(meaning(stem(at)).0)).is_some_and(|u| u != COUNTS));
+    if !is_scaled {
+        return own(said, said.names, mapping);
+    }
+    let has = |name: &str| said.names.iter().any(|n| n == name);
+    let (mut found, mut counted) = (Columns::default(), Vec::new());
+    let mut assumed = Vec::new();
+    for at in 0..said.names.len() {
+        let name = stem(at);
+        let (quantity, _) = meaning(name);
+        let unit = unit(at, What::Channel(quantity));
+        let role = match name {
+            "seq" => Role::Seq,
+            "t_ticks" if said.lines.get("tick_s").is_some() => Role::Ticks,
+            "flags" => Role::Flags,
+            "host_time_s" => Role::Time { scale: 1.0 },
+            "t" | "time" | "time_s" | "timestamp"
+                if !has("host_time_s")
+                    && !found
+                        .columns
+                        .iter()
+                        .any(|c| matches!(c.role, Role::Time { .. })) =>
+            {
+                time(said, mapping, at, &mut found)?
+            }
+            _ if quantity == Quantity::Other => continue,
+            _ if unit == Some(COUNTS) => {
+                counted.push((at, name.to_owned()));
+                continue;
+            }
+            _ => {
+                if unit.is_none() && quantity != Quantity::Pwm {
+                    assumed.push((name.to_owned(), What::Channel(quantity)));
+                }
+                measured(at, name, quantity, unit)?.role
+            }
+        };
+        found.columns.push(Column {
+            at,
+            name: name.to_owned(),
+            role,
+        });
+    }
+    if !counted.is_empty() {
+        let names: Vec<String> = counted.iter().map(|(_, name)| name.clone()).collect();
+        let own = own(said, &names, mapping)?;
+        found
+            .columns
+            .extend(own.columns.into_iter().map(|c| Column {
+                at: counted[c.at].0,
+                ..c
+            }));
+    }
+    if !found.columns.iter().any(is_inertial) {
+        return Err(unknown(said, NONE_OF_OURS.to_owned()));
+    }
+    found.notes.extend(note(&assumed));
+    Ok(found)
+}
+
+const NONE_OF_OURS: &str = "no column has a name of the stand's captures (gyro_x, acc_x, ...)";
+
+/// The time column at a place, in the unit that is given, stated or usual.
+fn time(
+    said: &Said<'_>,
+    mapping: &ColumnMapping,
+    at: usize,
+    found: &mut Columns,
+) -> Result<Role, CaptureError> {
+    let given = mapping.unit("time", What::Time);
+    let stated = said.units[at].as_deref();
+    let unit = given
+        .or(stated)
+        .or_else(|| at_the_end(&said.names[at], What::Time));
+    found.time_is_assumed = unit.is_none();
+    let (_, scale) = convert(What::Time, unit)?;
+    if let (Some(unit), None) = (unit.filter(|_| scale != 1.0), given) {
+        let name = &said.names[at];
+        found.notes.push(format!(
+            "time is taken in {unit}, as its column `{name}` says"
+        ));
+    }
+    Ok(Role::Time { scale })
+}
+
+/// Says what was assumed.
+fn note(assumed: &[(String, What)]) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (quantity, key) in [
+        (Quantity::Gyro, "gyro=rad/s"),
+        (Quantity::Acc, "acc=g"),
+        (Quantity::Temp, "temp=K"),
+        (Quantity::Supply, "supply=mV"),
+    ] {
+        let what = What::Channel(quantity);
+        let names: Vec<&str> = (assumed.iter().filter(|(_, w)| *w == what))
+            .map(|(name, _)| name.as_str())
+            .collect();
+        if !names.is_empty() {
+            notes.push(format!(
+                "{} taken in {}, as nothing says a unit; `--units {key}` or the like does",
+                names.join(", "),
+                usual(what)
+            ));
+        }
+    }
+    notes
+}
+
+/// The columns of the stand's own format, by whose header they are scaled.
+fn own(
+    said: &Said<'_>,
+    names: &[String],
+    mapping: &ColumnMapping,
+) -> Result<Columns, CaptureError> {
+    let lines = said.lines;
+    let mut columns = Vec::new();
+    for (at, name) in names.iter().enumerate() {
+        let (quantity, _) = meaning(name);
+        let scaled = |zero, scale, unit: &str| Role::Measured {
+            quantity,
+            unit: unit.to_owned(),
+            zero,
+            scale,
+            counts: true,
+        };
+        let role = match (name.as_str(), quantity) {
+            ("seq", _) => Role::Seq,
+            ("t_ticks", _) => {
+                lines.needed("tick_s", name)?;
+                Role::Ticks
+            }
+            ("host_time_s", _) => Role::Time { scale: 1.0 },
+            ("flags", _) => Role::Flags,
+            (_, Quantity::Gyro) => scaled(0.0, lines.scale("gyro_lsb_dps", name)?, "deg/s"),
+            (_, Quantity::Temp) => {
+                let lsb = lines.scale("temp_lsb_c", name)?;
+                scaled(-lines.needed("temp_zero_c", name)? / lsb, lsb, "degC")
+            }
+            (_, Quantity::Supply) => scaled(0.0, lines.scale("supply_lsb_v", name)?, "V"),
+            (_, Quantity::Acc) => {
+                let per_g = lines.scale("acc_counts_per_g", name)?;
+                scaled(
+                    lines.needed("acc_zero_counts", name)?,
+                    STANDARD_GRAVITY / per_g,
+                    "m/s^2",
+                )
+            }
+            (_, Quantity::Pwm) => scaled(0.0, 1.0, "1"),
+            (_, Quantity::Other) => {
+                // The format may grow: what is not known is kept as it is, where the file says that it is ours.
+                if lines.get("format").is_none() {
+                    continue;
+                }
+                let unit = mapping.unit(name, What::Channel(quantity)).unwrap_or("1");
+                Role::Measured {
+                    quantity,
+                    unit: unit.to_owned(),
+                    zero: 0.0,
+                    scale: 1.0,
+                    counts: false,
+                }
+            }
+        };
+        columns.push(Column {
+            at,
+            name: name.clone(),
+            role,
+        });
+    }
+    if !columns.iter().any(is_inertial) {
+        return Err(unknown(said, NONE_OF_OURS.to_owned()));
+    }
+    Ok(Columns {
+        columns,
+        ..Columns::default()
+    })
+}
+
+/// The place of a column by its name, by its name without a unit, or by its number from 1 on.
+fn place(said: &Said<'_>, theirs: &str) -> Option<usize> {
+    let by_stem = || {
+        let stems = said.names.iter().map(|name| in_brackets(name).0);
+        let mut places = stems.enumerate().filter(|(_, stem)| *stem == theirs);
+        // Two of one stem are told apart by their units alone.
+        places.next().filter(|_| places.next().is_none())
+    };
+    let by_number = || {
+        let number: usize = theirs.parse().ok()?;
+        (1..=said.names.len()).contains(&number).then(|| number - 1)
+    };
+    (said.names.iter().position(|name| name == theirs))
+        .or_else(|| by_stem().map(|(at, _)| at))
+        .or_else(by_number)
+}
+
+fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
+    let mut found = Columns::default();
+    let mut assumed = Vec::new();
+    for (ours, theirs) in &mapping.columns {
+        let Some(at) = place(said, theirs) else {
+            return Err(unknown(said, format!("there is no column `{theirs}`")));
+        };
+        let role = match ours.as_str() {
+            "seq" => Role::Seq,
+            "time" | "host_time_s" => time(said, mapping, at, &mut found)?,
+            "flags" => Role::Flags,
+            name => {
+                let what = What::Channel(meaning(name).0);
+                let given = mapping.unit(name, what).or(said.units[at].as_deref());
+                let unit = given.or_else(|| at_the_end(&said.names[at], what));
+                if unit.is_none() {
+                    assumed.push((name.to_owned(), what));
+                }
+                measured(at, name, meaning(name).0, unit)?.role
+            }
+        };
+        found.columns.push(Column {
+            at,
+            name: ours.clone(),
+            role,
+        });
+    }
+    found.notes.extend(note(&assumed));
+    Ok(found)
+}

@@ -1,0 +1,224 @@
+//! How a text is laid out: what separates its cells, where its header is, and what that says. This is the one place that
+//! recognizes it.
+
+use std::borrow::Cow;
+use std::io::BufRead;
+
+use super::CaptureError;
+use super::header::Lines;
+use super::stream::TextLines;
+use super::time::is_date;
+use super::units::{in_brackets, known};
+
+/// What separates cells, in the order in which it is looked for; the last stands for any blanks.
+const SEPARATORS: [char; 4] = [';', '\t', ',', ' '];
+
+/// A text up to its first row.
+pub(super) struct Layout {
+    /// The `# key: value` lines.
+    pub lines: Lines,
+    /// Names of the columns.
+    pub names: Vec<String>,
+    /// Whether the names are made up, because the file has none.
+    pub numbered: bool,
+    /// Units of the columns, where brackets or a row of units say them.
+    pub units: Vec<Option<String>>,
+    /// How rows are cut into cells.
+    pub cells: Cells,
+    /// The first row, with its line; it is read already.
+    pub first: Option<(u64, String)>,
+}
+
+impl Layout {
+    /// Reads as far as the first row.
+    pub fn read(text: &mut TextLines<impl BufRead>) -> Result<Self, CaptureError> {
+        let mut lines = Lines::default();
+        let mut separator = None;
+        let mut comment = String::new();
+        let (number, line) = loop {
+            let Some((number, line)) = text.next_line()? else {
+                return Err(CaptureError::Empty);
+            };
+            if let Some(said) = line.strip_prefix(['#', '%']) {
+                let said = said.trim_start_matches(['#', '%']).trim();
+                if !lines.take(number as usize, said) && !said.is_empty() {
+                    comment = said.to_owned();
+                }
+            } else if let Some(said) = line.strip_prefix("sep=") {
+                // A spreadsheet's own line.
+                separator = said.chars().next();
+            } else if !line.trim().is_empty() {
+                break (number, line);
+            }
+        };
+        let found = SEPARATORS.into_iter().find(|s| line.contains(*s));
+        let mut cells = Cells::new(separator.or(found).unwrap_or(','));
+        if cells.is_row(&line) {
+            let width = cells.cut(&line).len();
+            // A header may stand in the last comment.
+            let named = cells.cut(&comment);
+            let is_header = named.len() == width && !cells.is_row(&comment);
+            let (names, numbered) = match width {
+                _ if is_header && width > 1 => (owned(&named), false),
+                1 => (vec!["values".to_owned()], true),
+                _ => ((1..=width).map(|k| format!("column_{k}")).collect(), true),
+            };
+            return Ok(Self::new(
+                lines,
+                names,
+                numbered,
+                cells,
+                Some((number, line)),
+            ));
+        }
+        let first = next_row(text)?;
+        let row = first.as_ref().map_or("", |(_, row)| row.as_str());
+        let (of_names, of_rows) = separators(&line, row, separator);
+        let names = owned(&Cells::new(of_names).cut(&line));
+        cells = Cells::new(of_rows);
+        let mut layout = Self::new(lines, names, false, cells, first);
+        layout.take_units(text)?;
+        Ok(layout)
+    }
+
+    fn new(
+        lines: Lines,
+        names: Vec<String>,
+        numbered: bool,
+        cells: Cells,
+        first: Option<(u64, String)>,
+    ) -> Self {
+        let unit = |name: &String| {
+            let stated = lines.unit_of(name).or(in_brackets(name).1);
+            stated.map(str::to_owned)
+        };
+        Self {
+            units: names.iter().map(unit).collect(),
+            lines,
+            names,
+            numbered,
+            cells,
+            first,
+        }
+    }
+
+    /// A row of units under the names.
+    fn take_units(&mut self, text: &mut TextLines<impl BufRead>) -> Result<(), CaptureError> {
+        let Some((_, line)) = &self.first else {
+            return Ok(());
+        };
+        let units = owned(&self.cells.cut(line));
+        let bare = |unit: &str| known(unit.trim_matches(['(', ')', '[', ']'])).map(str::to_owned);
+        let are_units = units.len() == self.names.len()
+            && units
+                .iter()
+                .all(|unit| Cells::new(';').number(unit).is_none())
+            && units.iter().any(|unit| bare(unit).is_some());
+        if are_units {
+            for (said, unit) in self.units.iter_mut().zip(&units) {
+                *said = bare(unit).or(said.take());
+            }
+            self.first = next_row(text)?;
+        }
+        Ok(())
+    }
+}
+
+/// What separates names, and what separates the cells of rows: the first pair by which both have one width.
+fn separators(names: &str, row: &str, said: Option<char>) -> (char, char) {
+    let width = |line: &str, separator| Cells::new(separator).cut(line).len();
+    let fits = |of_names, of_rows| {
+        let columns = width(names, of_names);
+        columns > 1 && columns == width(row, of_rows)
+    };
+    let mut pairs = SEPARATORS
+        .into_iter()
+        .flat_map(|a| [a].into_iter().chain(SEPARATORS).map(move |b| (a, b)));
+    let fallback = SEPARATORS[..3].iter().find(|s| names.contains(**s));
+    said.map(|s| (s, s))
+        .or_else(|| pairs.find(|(a, b)| fits(*a, *b)))
+        .unwrap_or_else(|| fallback.map_or((',', ','), |s| (*s, *s)))
+}
+
+/// The next line that is neither empty nor a comment.
+pub(super) fn next_row(
+    text: &mut TextLines<impl BufRead>,
+) -> Result<Option<(u64, String)>, CaptureError> {
+    while let Some((number, line)) = text.next_line()? {
+        if !line.trim().is_empty() && !line.starts_with(['#', '%']) {
+            return Ok(Some((number, line)));
+        }
+    }
+    Ok(None)
+}
+
+fn owned(cells: &[Cow<'_, str>]) -> Vec<String> {
+    cells.iter().map(|cell| cell.to_string()).collect()
+}
+
+/// Cuts lines into cells, and reads numbers.
+pub(super) struct Cells {
+    separator: char,
+    /// The sign before the fraction; a file has one.
+    decimal: Option<char>,
+}
+
+impl Cells {
+    pub fn new(separator: char) -> Self {
+        Self {
+            separator,
+            decimal: None,
+        }
+    }
+
+    /// The cells of a line.
+    pub fn cut<'a>(&self, line: &'a str) -> Vec<Cow<'a, str>> {
+        if line.contains('"') {
+            let mut csv = csv::ReaderBuilder::new()
+                .has_headers(false)
+                .flexible(true)
+                .delimiter(u8::try_from(self.separator).unwrap_or(b','))
+                .trim(csv::Trim::All)
+                .from_reader(line.as_bytes());
+            if let Some(Ok(record)) = csv.records().next() {
+                return record.iter().map(|cell| cell.to_owned().into()).collect();
+            }
+        }
+        if self.separator == ' ' {
+            return line.split_whitespace().map(Cow::from).collect();
+        }
+        line.split(self.separator)
+            .map(|cell| cell.trim().into())
+            .collect()
+    }
+
+    /// A number, with a point or, where commas do not separate cells, a comma before the fraction.
+    pub fn number(&mut self, cell: &str) -> Option<f64> {
+        let sign = cell
+            .bytes()
+            .find(|b| matches!(b, b'.' | b','))
+            .map(char::from);
+        if sign.is_some() && self.decimal.is_some() && sign != self.decimal {
+            return None;
+        }
+        let number: f64 = if sign == Some(',') && self.separator != ',' {
+            cell.replacen(',', ".", 1).parse().ok()?
+        } else {
+            cell.parse().ok()?
+        };
+        self.decimal = self.decimal.or(sign);
+        number.is_finite().then_some(number)
+    }
+
+    /// Whether a line is a row and no header: more than half of what is in it are numbers or dates.
+    fn is_row(&self, line: &str) -> bool {
+        let cells = self.cut(line);
+        let mut reader = Self::new(self.separator);
+        let (mut numbers, mut all) = (0, 0);
+        for cell in cells.iter().filter(|cell| !cell.is_empty()) {
+            all += 1;
+            numbers += usize::from(reader.number(cell).is_some() || is_date(cell));
+        }
+        2 * numbers > all
+    }
+}

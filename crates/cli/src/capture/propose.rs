@@ -1,0 +1,266 @@
+//! The mapping that is proposed for a file whose columns have other names than ours.
+
+use model::record::Quantity;
+
+use crate::text::shell_word;
+
+use super::units::{What, at_the_end, in_brackets, known};
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// `--columns ... --units ...` made of a file's column names, as a shell takes them. `numbered` says that the names are
+/// made up, and columns are called by their numbers.
+pub(super) fn proposal(names: &[String], numbered: bool) -> String {
+    let (mut columns, mut units) = (Vec::new(), Vec::new());
+    let mut add = |ours: &str, at: usize, what: What| {
+        let name = &names[at];
+        // What would be taken for the list's own commas goes by its number.
+        let theirs = if numbered || name.contains(',') {
+            (at + 1).to_string()
+        } else {
+            name.clone()
+        };
+        columns.push(format!("{ours}={theirs}"));
+        let key = match what {
+            What::Time => "time",
+            What::Channel(Quantity::Gyro) => "gyro",
+            What::Channel(Quantity::Acc) => "acc",
+            What::Channel(_) => return,
+        };
+        let said = in_brackets(name).1.or_else(|| at_the_end(name, what));
+        let unit = match (what, said) {
+            // Seconds go without saying; other times are guessed by nobody.
+            (What::Time, None | Some("s")) => return,
+            (What::Channel(Quantity::Gyro), None) => "deg/s",
+            (What::Channel(_), None) => "m/s2",
+            (_, Some(unit)) => unit,
+        };
+        if !units.iter().any(|(k, _)| *k == key) {
+            units.push((key, unit));
+        }
+    };
+    if numbered {
+        let gyro = What::Channel(Quantity::Gyro);
+        // As such files usually are: three gyros, three accelerometers, a time before them where the number is odd.
+        let first = usize::from(names.len() > 3 && names.len() != 6);
+        if first == 1 {
+            add("time", 0, What::Time);
+        }
+        for (k, axis) in AXES.iter().enumerate().take(names.len() - first) {
+            add(&format!("gyro_{axis}"), first + k, gyro);
+        }
+        if names.len() >= first + 6 {
+            for (k, axis) in AXES.iter().enumerate() {
+                add(
+                    &format!("acc_{axis}"),
+                    first + 3 + k,
+                    What::Channel(Quantity::Acc),
+                );
+            }
+        }
+    } else {
+        let meanings: Vec<Meaning> = names.iter().map(|name| Meaning::of(name)).collect();
+        let time = |with_unit: bool| {
+            meanings.iter().zip(names).position(|(m, name)| {
+                let says = || {
+                    in_brackets(name)
+                        .1
+                        .or_else(|| at_the_end(name, What::Time))
+                        .is_some()
+                };
+                m.kind == Kind::Time && (!with_unit || says() || m.is_seconds)
+            })
+        };
+        if let Some(at) = time(true).or_else(|| time(false)) {
+            add("time", at, What::Time);
+        }
+        let find = |kind: Kind, axis: usize| {
+            (meanings.iter()).position(|m| m.kind == kind && m.axis == Some(axis))
+        };
+        let has_gyro = (0..3).any(|axis| find(Kind::Gyro, axis).is_some());
+        let has_acc = (0..3).any(|axis| find(Kind::Acc, axis).is_some());
+        // Bare x, y, z are what the file is about, and most often a gyro here.
+        let gyro = if has_gyro || has_acc {
+            Kind::Gyro
+        } else {
+            Kind::Bare
+        };
+        for (kind, stem, quantity) in [
+            (gyro, "gyro", Quantity::Gyro),
+            (Kind::Acc, "acc", Quantity::Acc),
+        ] {
+            for (k, axis) in AXES.iter().enumerate() {
+                if let Some(at) = find(kind, k) {
+                    add(&format!("{stem}_{axis}"), at, What::Channel(quantity));
+                }
+            }
+        }
+        if let Some(at) = meanings.iter().position(|m| m.kind == Kind::Temp) {
+            add("temp", at, What::Channel(Quantity::Temp));
+        }
+        if !has_gyro && !has_acc && (0..3).all(|axis| find(Kind::Bare, axis).is_none()) {
+            // Nothing is recognized: the form of a mapping, with the first column that is no time.
+            if let Some(at) = meanings.iter().position(|m| m.kind != Kind::Time) {
+                add("gyro_x", at, What::Channel(Quantity::Gyro));
+            }
+        }
+    }
+    let columns = shell_word(&columns.join(","));
+    let units: Vec<String> = units
+        .iter()
+        .map(|(key, unit)| format!("{key}={unit}"))
+        .collect();
+    if units.is_empty() {
+        return format!("--columns {columns}");
+    }
+    format!(
+        "--columns {columns} --units {}",
+        shell_word(&units.join(","))
+    )
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Time,
+    Gyro,
+    Acc,
+    Temp,
+    /// An axis of nobody knows what.
+    Bare,
+    Unknown,
+}
+
+#[derive(Debug)]
+struct Meaning {
+    kind: Kind,
+    axis: Option<usize>,
+    is_seconds: bool,
+}
+
+impl Meaning {
+    /// What a name most probably means.
+    fn of(name: &str) -> Self {
+        let words = words(in_brackets(name).0);
+        let axis = words.iter().rev().find_map(|word| axis_of(word));
+        let is = |starts: &[&str]| (words.iter()).any(|w| starts.iter().any(|s| w.starts_with(s)));
+        let first = words.first().map_or("", String::as_str);
+        let letters = |list: &[&str]| list.contains(&first);
+        let is_seconds = known(first) == Some("s");
+        let kind = if is(&["mag", "quat", "orient", "gravity", "euler"]) {
+            Kind::Unknown
+        } else if is(&["gyr", "angular", "omega", "rotation", "rate"])
+            || letters(&["g", "w", "gx", "gy", "gz", "wx", "wy", "wz"])
+        {
+            Kind::Gyro
+        } else if is(&["acc", "linear"]) || letters(&["a", "ax", "ay", "az"]) {
+            Kind::Acc
+        } else if is(&["temp"]) {
+            Kind::Temp
+        } else if first.starts_with("time") || first == "t" || is_seconds {
+            Kind::Time
+        } else if axis.is_some() && words.len() == 1 {
+            Kind::Bare
+        } else {
+            Kind::Unknown
+        };
+        Self {
+            kind,
+            axis,
+            is_seconds,
+        }
+    }
+}
+
+/// 0, 1, 2 for a word that is or ends in an axis.
+fn axis_of(word: &str) -> Option<usize> {
+    let stem = word.trim_end_matches(['x', 'y', 'z', '0', '1', '2']);
+    let known = [
+        "", "g", "w", "a", "gyro", "gyr", "acc", "accel", "omega", "angvel",
+    ];
+    let last = word.strip_prefix(stem)?;
+    if !known.contains(&stem) {
+        return None;
+    }
+    match last {
+        "x" | "0" => Some(0),
+        "y" | "1" => Some(1),
+        "z" | "2" => Some(2),
+        _ => None,
+    }
+}
+
+/// The words of a name, in small letters: `GyroX`, `gyr[0]`, `w_RS_S_x`.
+fn words(name: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut was_small = false;
+    for c in name.chars() {
+        if !c.is_alphanumeric() || (c.is_uppercase() && was_small) {
+            words.push(String::new());
+        }
+        was_small = c.is_lowercase();
+        if let (true, Some(word)) = (c.is_alphanumeric(), words.last_mut()) {
+            word.extend(c.to_lowercase());
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_proposal_maps_each_axis_to_its_own_column_with_the_headers_units_and_quotes() {
+        let cases = [
+            (
+                "Time (s);Gyroscope x (rad/s);Gyroscope y (rad/s);Gyroscope z (rad/s)",
+                "--columns 'time=Time (s),gyro_x=Gyroscope x (rad/s),gyro_y=Gyroscope y (rad/s),gyro_z=Gyroscope z (rad/s)' \
+                 --units gyro=rad/s",
+            ),
+            (
+                "Timestamp (us);Gyroscope X (deg/s);Gyroscope Y (deg/s);Gyroscope Z (deg/s);Accelerometer X (g)",
+                "--columns 'time=Timestamp (us),gyro_x=Gyroscope X (deg/s),gyro_y=Gyroscope Y (deg/s),gyro_z=Gyroscope Z (deg/s),\
+                 acc_x=Accelerometer X (g)' --units time=us,gyro=deg/s,acc=g",
+            ),
+            (
+                "timestamp [ns];w_RS_S_x [rad s^-1];w_RS_S_y [rad s^-1];w_RS_S_z [rad s^-1];a_RS_S_z [m s^-2]",
+                "--columns 'time=timestamp [ns],gyro_x=w_RS_S_x [rad s^-1],gyro_y=w_RS_S_y [rad s^-1],\
+                 gyro_z=w_RS_S_z [rad s^-1],acc_z=a_RS_S_z [m s^-2]' --units time=ns,gyro=rad/s,acc=m/s2",
+            ),
+            (
+                "time_s;gx_dps;gy_dps;gz_dps;ax_mps2;temp_c",
+                "--columns time=time_s,gyro_x=gx_dps,gyro_y=gy_dps,gyro_z=gz_dps,acc_x=ax_mps2,temp=temp_c --units \
+                 gyro=deg/s,acc=m/s2",
+            ),
+            (
+                "time;seconds_elapsed;z;y;x",
+                "--columns time=seconds_elapsed,gyro_x=x,gyro_y=y,gyro_z=z --units gyro=deg/s",
+            ),
+            (
+                "t;GyroX;GyroY;GyroZ;AccX;MagX",
+                "--columns time=t,gyro_x=GyroX,gyro_y=GyroY,gyro_z=GyroZ,acc_x=AccX --units gyro=deg/s,acc=m/s2",
+            ),
+            (
+                "gyr[0];gyr[1];gyr[2];mag[0]",
+                "--columns 'gyro_x=gyr[0],gyro_y=gyr[1],gyro_z=gyr[2]' --units gyro=deg/s",
+            ),
+            ("y", "--columns gyro_y=y --units gyro=deg/s"),
+            ("values", "--columns gyro_x=values --units gyro=deg/s"),
+        ];
+        for (names, expected) in cases {
+            let names: Vec<String> = names.split(';').map(str::to_owned).collect();
+            assert_eq!(proposal(&names, false), expected);
+        }
+        let numbered = |n: usize| proposal(&vec![String::new(); n], true);
+        assert_eq!(numbered(1), "--columns gyro_x=1 --units gyro=deg/s");
+        assert_eq!(
+            numbered(3),
+            "--columns gyro_x=1,gyro_y=2,gyro_z=3 --units gyro=deg/s"
+        );
+        assert_eq!(
+            numbered(7),
+            "--columns time=1,gyro_x=2,gyro_y=3,gyro_z=4,acc_x=5,acc_y=6,acc_z=7 --units gyro=deg/s,acc=m/s2"
+        );
+    }
+}

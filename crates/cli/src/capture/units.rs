@@ -1,0 +1,229 @@
+//! Units: how others write them, in which of ours they end, and where a file says them.
+
+use model::record::Quantity;
+
+use super::{CaptureError, STANDARD_GRAVITY};
+
+/// Unit of a gyro channel that holds the angle.
+pub(super) const ANGLE: &str = "deg";
+/// Cells as the part delivers them.
+pub(super) const COUNTS: &str = "counts";
+
+/// One name of each unit, and the others that it has in headers and papers, in small letters.
+const SPELLINGS: [(&str, &[&str]); 23] = [
+    (
+        "deg/s",
+        &[
+            "dps",
+            "°/s",
+            "º/s",
+            "deg/sec",
+            "degrees/s",
+            "degree/s",
+            "deg s^-1",
+            "° s^-1",
+            "deg_s",
+            "degs",
+        ],
+    ),
+    (
+        "rad/s",
+        &[
+            "rad/sec",
+            "radians/s",
+            "rad s^-1",
+            "rad·s^-1",
+            "radps",
+            "rad_s",
+            "rads",
+        ],
+    ),
+    ("mrad/s", &["mrad s^-1"]),
+    ("mdps", &["mdeg/s", "m°/s"]),
+    ("deg/h", &["deg/hr", "°/h", "°/hr", "º/h", "dph"]),
+    ("deg", &["°", "º", "degrees"]),
+    ("rad", &["radians"]),
+    ("arcsec", &["\"", "as"]),
+    (
+        "m/s2",
+        &[
+            "m/s^2", "m/s²", "m/s/s", "m s^-2", "m·s^-2", "mps2", "m_s2", "ms2", "ms^-2",
+        ],
+    ),
+    ("g", &["g0", "gee"]),
+    ("mg", &[]),
+    ("degC", &["°c", "ºc", "℃", "degc", "deg c", "c", "celsius"]),
+    ("K", &["k", "kelvin"]),
+    ("V", &["v", "volt"]),
+    ("mV", &["mv"]),
+    ("s", &["sec", "secs", "second", "seconds"]),
+    ("ms", &["msec", "millis", "milliseconds"]),
+    ("us", &["µs", "μs", "usec", "micros", "microseconds"]),
+    ("ns", &["nsec", "nanos", "nanoseconds"]),
+    ("min", &["minutes"]),
+    ("h", &["hours"]),
+    (COUNTS, &["lsb", "raw", "count"]),
+    ("1", &["-"]),
+];
+
+/// Our name of a unit; `None` where it is none of those known.
+pub(super) fn known(text: &str) -> Option<&'static str> {
+    let text = text.trim().to_lowercase().replace('−', "-");
+    SPELLINGS
+        .iter()
+        .find(|(name, others)| name.to_lowercase() == text || others.contains(&text.as_str()))
+        .map(|(name, _)| *name)
+}
+
+/// What a column's name says of its unit, in brackets at its end: `Gyroscope x (rad/s)`, `timestamp [ns]`. The name
+/// without it, and the unit.
+pub(super) fn in_brackets(name: &str) -> (&str, Option<&'static str>) {
+    let split = || {
+        let open = name.rfind(['(', '[', '{'])?;
+        let inner = name
+            .get(open + 1..)?
+            .trim_end()
+            .strip_suffix([')', ']', '}'])?;
+        let stem = name[..open].trim_end();
+        (!stem.is_empty()).then_some((stem, known(inner).filter(|unit| *unit != "1")?))
+    };
+    split().map_or((name, None), |(stem, unit)| (stem, Some(unit)))
+}
+
+/// What the end of a column's name says of the unit of what it is mapped to: `gx_dps`, `t_ms`, `ax_mps2`.
+pub(super) fn at_the_end(name: &str, what: What) -> Option<&'static str> {
+    let name = name.to_lowercase();
+    let name = name.trim_end_matches(|c: char| !c.is_alphanumeric());
+    // From the longest ending on: `deg_s` before `s`.
+    name.match_indices(['_', ' ', '.'])
+        .filter_map(|(at, _)| known(&name[at + 1..]))
+        .find(|unit| scale(what, unit).is_some())
+}
+
+/// What a unit is of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum What {
+    /// Of the time column.
+    Time,
+    /// Of a channel.
+    Channel(Quantity),
+}
+
+/// The unit of ours that one of [`known`] ends in, and the factor into it; `None` where it is of another quantity.
+fn scale(what: What, unit: &str) -> Option<(&'static str, f64)> {
+    const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+    let table: &[(&str, &'static str, f64)] = match what {
+        What::Time => &[
+            ("s", "s", 1.0),
+            ("ms", "s", 1e-3),
+            ("us", "s", 1e-6),
+            ("ns", "s", 1e-9),
+            ("min", "s", 60.0),
+            ("h", "s", 3600.0),
+        ],
+        What::Channel(Quantity::Gyro) => &[
+            ("deg/s", "deg/s", 1.0),
+            ("rad/s", "deg/s", DEGREES),
+            ("mrad/s", "deg/s", DEGREES * 1e-3),
+            ("mdps", "deg/s", 1e-3),
+            ("deg/h", "deg/s", 1.0 / 3600.0),
+            // Angles: what is read is differenced into a rate.
+            ("deg", ANGLE, 1.0),
+            ("rad", ANGLE, DEGREES),
+            ("arcsec", ANGLE, 1.0 / 3600.0),
+        ],
+        What::Channel(Quantity::Acc) => &[
+            ("m/s2", "m/s^2", 1.0),
+            ("g", "m/s^2", STANDARD_GRAVITY),
+            ("mg", "m/s^2", STANDARD_GRAVITY * 1e-3),
+        ],
+        What::Channel(Quantity::Temp) => &[("degC", "degC", 1.0), ("K", "degC", 1.0)],
+        What::Channel(Quantity::Supply) => &[("V", "V", 1.0), ("mV", "V", 1e-3)],
+        What::Channel(Quantity::Pwm) => &[("1", "1", 1.0)],
+        What::Channel(Quantity::Other) => &[],
+    };
+    table
+        .iter()
+        .find(|(name, ..)| *name == unit)
+        .map(|(_, ours, factor)| (*ours, *factor))
+}
+
+/// The unit that is taken where none is said.
+pub(super) fn usual(what: What) -> &'static str {
+    match what {
+        What::Time => "s",
+        What::Channel(Quantity::Gyro) => "deg/s",
+        What::Channel(Quantity::Acc) => "m/s^2",
+        What::Channel(Quantity::Temp) => "degC",
+        What::Channel(Quantity::Supply) => "V",
+        What::Channel(Quantity::Pwm | Quantity::Other) => "1",
+    }
+}
+
+/// Our unit for a unit given, and the factor into it.
+///
+/// # Errors
+/// [`CaptureError::Option`] where it is none of this quantity.
+pub(super) fn convert(what: What, given: Option<&str>) -> Result<(String, f64), CaptureError> {
+    let Some(given) = given else {
+        return Ok((usual(what).to_owned(), 1.0));
+    };
+    if what == What::Channel(Quantity::Other) {
+        return Ok((given.to_owned(), 1.0));
+    }
+    let found = known(given).and_then(|unit| scale(what, unit));
+    let (unit, factor) = found.ok_or_else(|| CaptureError::Option {
+        option: "--units",
+        why: format!("`{given}` is no unit of {}", usual(what)),
+        help: "time: s, ms, us, ns; gyro: deg/s, rad/s, mrad/s, deg/h, mdps, or of an angle deg, rad, arcsec; acc: m/s2, g, \
+               mg; temp: degC, K; supply: V, mV"
+            .to_owned(),
+    })?;
+    Ok((unit.to_owned(), factor))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_say_their_units_in_brackets_or_at_their_ends_and_an_index_is_none() {
+        for (name, stem, unit) in [
+            ("Gyroscope x (rad/s)", "Gyroscope x", Some("rad/s")),
+            ("timestamp [ns]", "timestamp", Some("ns")),
+            ("w_RS_S_x [rad s^-1]", "w_RS_S_x", Some("rad/s")),
+            ("a_RS_S_x [m s^-2]", "a_RS_S_x", Some("m/s2")),
+            ("Gyro(°/s)", "Gyro", Some("deg/s")),
+            ("gyr[0]", "gyr[0]", None),
+            ("gyr[1]", "gyr[1]", None),
+            ("(s)", "(s)", None),
+        ] {
+            assert_eq!(in_brackets(name), (stem, unit), "{name}");
+        }
+        let gyro = What::Channel(Quantity::Gyro);
+        let acc = What::Channel(Quantity::Acc);
+        for (name, what, unit) in [
+            ("gx_dps", gyro, Some("deg/s")),
+            ("gyro_x_deg_s", gyro, Some("deg/s")),
+            ("t_ms", What::Time, Some("ms")),
+            ("ax_mps2", acc, Some("m/s2")),
+            ("acc_x_g", acc, Some("g")),
+            ("gyro_g", gyro, None),
+            ("gx", gyro, None),
+        ] {
+            assert_eq!(at_the_end(name, what), unit, "{name}");
+        }
+    }
+
+    #[test]
+    fn every_spelling_means_one_unit() {
+        for (name, others) in SPELLINGS {
+            assert_eq!(known(name), Some(name));
+            for other in others {
+                assert_eq!(known(other), Some(name), "{other}");
+            }
+        }
+        assert!(convert(What::Channel(Quantity::Gyro), Some("furlong/s")).is_err());
+        assert!(convert(What::Time, Some("deg/s")).is_err());
+    }
+}

@@ -1,0 +1,290 @@
+//! Tables of others as text: what separates their cells, where their names and units stand, and what is said where that
+//! cannot be told. All but the errors hold the same rows, 20 ms apart: gyro x rises by 0.25 deg/s a row, y is -1 deg/s.
+
+use imu_stand::capture::{Read, read_from};
+use imu_stand::{CaptureError, ColumnMapping, ReadOptions};
+use proptest::prelude::*;
+
+fn options(columns: &str, units: &str) -> Result<ReadOptions, CaptureError> {
+    let some = |text: &'static str| (!text.is_empty()).then_some(text);
+    let (columns, units) = (columns.to_owned().leak(), units.to_owned().leak());
+    Ok(ReadOptions {
+        mapping: ColumnMapping::parse(some(columns), some(units))?,
+        ..ReadOptions::default()
+    })
+}
+
+fn read(text: &[u8], columns: &str, units: &str) -> Result<Read, CaptureError> {
+    read_from(text, &options(columns, units)?)
+}
+
+/// The error as the user sees it: what is wrong, and what to do.
+fn error(text: &[u8], columns: &str, units: &str) -> String {
+    let error = read(text, columns, units).expect_err("it is wrong");
+    let help = miette::Diagnostic::help(&error).map(|help| help.to_string());
+    format!("{error}\n{}", help.unwrap_or_default())
+}
+
+/// A table: lines before the rows, what separates cells, the sign before fractions, units a second and a deg/s.
+fn table(head: &str, separator: &str, sign: &str, per_s: f64, per_dps: f64) -> String {
+    let mut text = head.to_owned();
+    for k in 0..8 {
+        let cells = [
+            0.02 * f64::from(k) * per_s,
+            0.25 * f64::from(k) * per_dps,
+            -per_dps,
+        ];
+        let cells = cells.map(|cell| format!("{cell}").replace('.', sign));
+        text += &cells.join(separator);
+        text += "\r\n";
+    }
+    text
+}
+
+const RAD: f64 = std::f64::consts::PI / 180.0;
+
+#[track_caller]
+fn is_the_table(read: &Read) {
+    let times = read.record.host_time_s.as_ref().expect("a time column");
+    let x = &read.record.channel("gyro_x").expect("gyro x");
+    let y = &read.record.channel("gyro_y").expect("gyro y");
+    assert_eq!((times.len(), x.unit.as_str()), (8, "deg/s"));
+    for k in 0..8 {
+        let at = k as f64;
+        assert!((times[k] - times[0] - 0.02 * at).abs() < 1e-6, "{times:?}");
+        assert!((x.values[k] - 0.25 * at).abs() < 1e-9, "{:?}", x.values);
+        assert!((y.values[k] + 1.0).abs() < 1e-9, "{:?}", y.values);
+    }
+}
+
+#[test]
+fn cells_between_commas_semicolons_tabs_and_blanks_and_decimal_commas_are_read() {
+    let (map, units) = ("time=t,gyro_x=gx,gyro_y=gy", "gyro=deg/s");
+    for (head, separator, sign) in [
+        ("t,gx,gy\n", ",", "."),
+        ("t, gx, gy\n", ", ", "."),
+        ("t;gx;gy\n", ";", "."),
+        ("t;gx;gy\n", ";", ","),
+        ("sep=;\nt;gx;gy\n", ";", ","),
+        ("t\tgx\tgy\n", "\t", "."),
+        ("t\tgx\tgy\n", "\t", ","),
+        ("t gx gy\n", "  ", "."),
+        ("t gx gy\n", "  ", ","),
+        ("t, gx, gy\n", "  ", "."),
+        ("\u{feff}\"t\";\"gx\";\"gy\"\n", ";", "."),
+    ] {
+        let text = table(head, separator, sign, 1.0, 1.0);
+        is_the_table(&read(text.as_bytes(), map, units).expect(head));
+    }
+    // The last cell of a row may be empty.
+    let last = read(b"t\tgx\tgy\n0\t1\t\n1\t2\t3\n", map, units).expect("tabs");
+    assert!(last.record.channel("gyro_y").expect("y").values[0].is_nan());
+    // One file has one sign.
+    let said = error(b"t;gx;gy\n0,5;1,5;2\n1.5;1.5;2\n", map, units);
+    assert!(said.contains("line 3, column `time`: `1.5`"), "{said}");
+}
+
+#[test]
+fn a_header_in_a_comment_is_one_and_a_table_without_names_goes_by_numbers() {
+    let euroc = "#timestamp [ns],w_x [rad s^-1],w_y [rad s^-1]\n";
+    let text = table(euroc, ",", ".", 1e9, RAD);
+    let by_name = "time=timestamp,gyro_x=w_x,gyro_y=w_y [rad s^-1]";
+    is_the_table(&read(text.as_bytes(), by_name, "").expect("the header's units"));
+    let none = table("# rate_hz: 50\n", ",", ".", 1.0, 1.0);
+    is_the_table(
+        &read(none.as_bytes(), "time=1,gyro_x=2,gyro_y=3", "gyro=deg/s").expect("numbers"),
+    );
+    let said = error(none.as_bytes(), "", "");
+    assert!(
+        said.contains("--columns gyro_x=1,gyro_y=2,gyro_z=3 --units gyro=deg/s"),
+        "{said}"
+    );
+    let said = error(none.as_bytes(), "gyro_x=4", "");
+    assert!(said.contains("there is no column `4`"), "{said}");
+}
+
+#[test]
+fn our_own_names_with_a_unit_from_anywhere_need_no_mapping() {
+    for (head, per_s, per_dps, units) in [
+        ("time, gyro_x, gyro_y\n", 1.0, 1.0, "gyro=deg/s"),
+        ("time,gyro_x,gyro_y\n", 1e3, RAD, "time=ms,gyro=rad/s"),
+        ("time (ms),gyro_x (rad/s),gyro_y (rad/s)\n", 1e3, RAD, ""),
+        ("time,gyro_x,gyro_y\ns,deg/s,deg/s\n", 1.0, 1.0, ""),
+        ("time,gyro_x,gyro_y\n[us],[°/s],[°/s]\n", 1e6, 1.0, ""),
+        (
+            "# unit of gyro_x: deg/s\n# unit of gyro_y: deg/s\ntime,gyro_x,gyro_y\n",
+            1.0,
+            1.0,
+            "",
+        ),
+    ] {
+        let text = table(head, ",", ".", per_s, per_dps);
+        is_the_table(&read(text.as_bytes(), "", units).expect(head));
+    }
+    // Without one the cells are counts, and a key is missing.
+    let text = table("time,gyro_x,gyro_y\n", ",", ".", 1.0, 1.0);
+    let said = error(text.as_bytes(), "", "");
+    assert!(
+        said.contains("gyro_lsb_dps") && said.contains("--units gyro=deg/s"),
+        "{said}"
+    );
+    // A capture has its scales in its header, whatever is said.
+    let own = "# format: imu-stand-capture/1\n# gyro_lsb_dps: 0.07\nseq,gyro_x\n0,1\n";
+    for unit in ["gyro=furlong/s", "gyro=rad/s"] {
+        let said = error(own.as_bytes(), "", unit);
+        assert!(
+            said.contains("--units") && said.contains("counts"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn time_is_read_in_its_unit_and_as_a_date_and_asked_for_where_seconds_make_no_sense() {
+    let map = "time=t,gyro_x=gx,gyro_y=gy";
+    for (unit, per_s) in [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)] {
+        let text = table("t,gx,gy\n", ",", ".", per_s, 1.0);
+        let units = format!("gyro=deg/s,time={unit}");
+        is_the_table(&read(text.as_bytes(), map, &units).expect(unit));
+        let head = format!("t_{unit},gx,gy\n");
+        let text = table(&head, ",", ".", per_s, 1.0);
+        let map = map.replace("time=t", &format!("time=t_{unit}"));
+        is_the_table(&read(text.as_bytes(), &map, "gyro=deg/s").expect(&head));
+    }
+    let text = table("t,gx,gy\n", ",", ".", 1e3, 1.0);
+    let said = error(text.as_bytes(), map, "gyro=deg/s");
+    assert!(
+        said.contains("20 s apart") && said.contains("time=ms"),
+        "{said}"
+    );
+    assert!(read(text.as_bytes(), map, "gyro=deg/s,time=s").is_ok());
+    let date = |k: usize| format!("2014-06-24 19:02:59.{:03}", 20 * k + 783);
+    let rows = (0..8).map(|k| format!("{},{},-1\n", date(k), 0.25 * k as f64));
+    let text: String = std::iter::once("t,gx,gy\n".to_owned())
+        .chain(rows)
+        .collect();
+    is_the_table(&read(text.as_bytes(), map, "gyro=deg/s").expect("dates"));
+    let said = error(b"t,gx,gy\n0,1,0\n2,1,0\n1,1,0\n3,1,0\n2,1,0\n", map, "");
+    assert!(said.contains("first in row 3"), "{said}");
+}
+
+#[test]
+fn what_is_assumed_is_told_and_what_contradicts_itself_is_refused() {
+    let map = "time=t,gyro_x=gx,gyro_y=gy";
+    let text = table("t,gx,gy\n", ",", ".", 1.0, 1.0);
+    let notes = read(text.as_bytes(), map, "").expect("deg/s").record.notes;
+    assert_eq!(notes.len(), 1);
+    assert!(
+        notes[0].starts_with("gyro_x, gyro_y taken in deg/s"),
+        "{notes:?}"
+    );
+    for (columns, units, expected) in [
+        (map, "gyro=deg/s,gyro=rad/s", "`gyro` is given twice"),
+        ("gyro_x=gx,gyro_x=gy", "", "`gyro_x` is given twice"),
+        (map, "gyros=deg/s", "`gyros` is neither"),
+        (map, "gyro=furlong/s", "no unit of deg/s"),
+        (map, "time=deg/s", "no unit of s"),
+        ("time=t,gyro_x=hx", "", "there is no column `hx`"),
+    ] {
+        let said = error(text.as_bytes(), columns, units);
+        assert!(said.contains(expected), "{columns} {units}: {said}");
+    }
+    let own = b"# format: imu-stand-capture/1\n# gyro_lsb_dps: 1\ngyro_x,gyro_x\n1,2\n";
+    let said = error(own, "", "");
+    assert!(said.contains("two columns are called `gyro_x`"), "{said}");
+    let twice = b"t,gx,gx\n0,1,2\n";
+    let said = error(twice, "gyro_x=gx", "gyro=deg/s");
+    assert!(said.contains("--columns gyro_x=2"), "{said}");
+    assert!(read(twice, "gyro_x=3", "gyro=deg/s").is_ok());
+}
+
+#[test]
+fn what_is_no_text_is_named() {
+    for (bytes, expected) in [
+        (&b"\xff\xfet\0,\0"[..], "UTF-16"),
+        (b"PK\x03\x04", "spreadsheet"),
+        (b"PAR1", "Parquet"),
+        (b"\x89HDF\r\n", "HDF5"),
+        (b"\xfd7zXZ\0", "unpack it first"),
+        (b"\x7fELF\0\0\0", "binary"),
+    ] {
+        let said = error(bytes, "", "");
+        assert!(said.contains(expected), "{said}");
+    }
+    // Latin-1, as old programs write degrees.
+    let head = b"t,gx (\xb0/s),gy (\xb0/s)\n";
+    let mut text = head.to_vec();
+    text.extend(table("", ",", ".", 1.0, 1.0).bytes());
+    let read = read(&text, "time=t,gyro_x=gx,gyro_y=gy", "").expect("Latin-1");
+    is_the_table(&read);
+    assert!(read.record.notes.is_empty(), "{:?}", read.record.notes);
+}
+
+/// Pieces that tables are made of, right and wrong.
+fn piece() -> impl Strategy<Value = Vec<u8>> {
+    let known = [
+        "# rate_hz: 20\n",
+        "# format: imu-stand-capture/1\n",
+        "# gyro_lsb_dps: 0.07\n",
+        "#t,x\n",
+        "sep=;\n",
+        "time",
+        "gyro_x",
+        "gyro_y (rad/s)",
+        "seq",
+        "t_ticks",
+        "flags",
+        ",",
+        ";",
+        "\t",
+        " ",
+        "\n",
+        "\r\n",
+        "1",
+        "-2.5",
+        "1e308",
+        "4294967296",
+        "99999999999999999999",
+        "-9223372036854775808",
+        "9223372036854775807",
+        "nan",
+        "inf",
+        "\"",
+        "''",
+        "[ns]",
+        "2014-06-24 19:02:59.78",
+        "s,deg/s\n",
+        "\u{feff}",
+        "°",
+        "%",
+        "(",
+        ")",
+    ];
+    prop_oneof![
+        8 => prop::sample::select(known.to_vec()).prop_map(|text| text.as_bytes().to_vec()),
+        1 => prop::collection::vec(any::<u8>(), 0..12),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn no_bytes_make_the_reader_panic(
+        pieces in prop::collection::vec(piece(), 0..60),
+        mapping in prop::sample::select(vec![
+            ("", ""), ("", "gyro=deg/s"), ("gyro_x=1", "gyro=deg"), ("time=1,gyro_x=2", "time=ns"),
+        ]),
+        skip_bad in any::<bool>(),
+    ) {
+        let bytes = pieces.concat();
+        let mut options = options(mapping.0, mapping.1).expect("a mapping");
+        options.skip_bad = skip_bad;
+        if let Ok(read) = read_from(&bytes[..], &options) {
+            let rows = read.record.len();
+            for channel in &read.record.channels {
+                prop_assert_eq!(channel.values.len(), rows);
+            }
+        }
+    }
+}
