@@ -2,8 +2,6 @@
 
 mod fitted;
 
-pub use fitted::settings_like;
-
 use std::collections::BTreeMap;
 
 use rand_distr::{Distribution, StandardNormal};

@@ -8,7 +8,6 @@ use clap::Args;
 use imu_stand::report::Subject;
 use imu_stand::text;
 use miette::Result;
-use model::excitation::settings_like;
 use serde::Serialize;
 
 use super::{Input, Outputs};
@@ -71,8 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         };
         let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
         if let Some(path) = &arguments.model_out {
-            let mut fitted = found.extended_model.clone();
-            fitted.excitation = settings_like(&read.record, fitted.rate_hz);
+            let fitted = found.extended_model.clone().excited_like(&read.record);
             super::write(path, &fitted.to_toml())?;
         }
         if !arguments.input.quiet {

@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::World;
+use super::{MOTION, World};
+use crate::file::ModelFile;
 use crate::record::{Axis, Base, Channel, Quantity, Record};
 use crate::simulate::{ACC_NOISE_G, ACC_PER_G, STANDARD_GRAVITY, SUPPLY_LSB_V, TEMP_LSB_C};
 
@@ -17,10 +18,26 @@ const WORTH: f64 = 0.25;
 /// Time constants of the self-heating that are tried.
 const TIME_CONSTANTS: usize = 24;
 
-/// The settings of `[excitation]` under which a simulation meets temperatures, supply, motor, vibration and motion like
-/// those of the record. What the record does not have, or what does not move, is left out.
-#[must_use]
-pub fn settings_like(record: &Record, rate_hz: f64) -> BTreeMap<String, f64> {
+/// Length of a block in which the motion is fitted, s.
+const MOTION_BLOCK_S: f64 = 0.5;
+
+impl ModelFile {
+    /// The model with an excitation under which its simulation meets temperatures, supply, motor, vibration and motion
+    /// like those of the record. A motion of the base becomes a part of that, so that the accelerometers see it too.
+    #[must_use]
+    pub fn excited_like(mut self, record: &Record) -> Self {
+        let named = self.effects.iter().any(|e| e.cause == "base_motion");
+        let moves = named || record.header.base.is_some_and(|b| b != Base::Static);
+        self.excitation = settings_like(record, self.rate_hz, moves);
+        if MOTION.iter().any(|k| self.excitation.contains_key(*k)) {
+            self.effects.retain(|e| e.cause != "base_motion");
+        }
+        self
+    }
+}
+
+/// The settings of such a world. What the record does not have, or what does not move, is left out.
+fn settings_like(record: &Record, rate_hz: f64, moves: bool) -> BTreeMap<String, f64> {
     let samples = record.len();
     if samples < 2 || !(rate_hz.is_finite() && rate_hz > 0.0) {
         return BTreeMap::new();
@@ -30,13 +47,16 @@ pub fn settings_like(record: &Record, rate_hz: f64) -> BTreeMap<String, f64> {
         record,
         rate_hz,
         length,
+        moves,
     };
     let mut settings = vec![];
     fit.temperature(&mut settings);
     fit.supply(&mut settings);
     fit.motor(&mut settings);
     fit.vibration(&mut settings);
-    fit.motion(&mut settings);
+    if moves {
+        fit.motion(&mut settings);
+    }
     let rounded = |v: f64| format!("{v:.3e}").parse().unwrap_or(v);
     settings
         .into_iter()
@@ -51,6 +71,8 @@ struct Fit<'a> {
     rate_hz: f64,
     /// Samples in a block.
     length: usize,
+    /// Whether the base moves.
+    moves: bool,
 }
 
 impl Fit<'_> {
@@ -203,14 +225,13 @@ impl Fit<'_> {
 
     /// What the accelerometers see beyond their own noise and, where the base sways, beyond its slow tilt.
     fn vibration(&self, settings: &mut Settings) {
-        let sways = self.record.header.base.is_some_and(|b| b != Base::Static);
         let own = ACC_NOISE_G * ACC_NOISE_G + ACC_PER_G.powi(-2) / 12.0;
         let variances: Vec<f64> = self
             .record
             .all(Quantity::Acc)
             .map(|c| {
                 let g: Vec<f64> = finite(c).map(|v| v / STANDARD_GRAVITY).collect();
-                let whole = if sways {
+                let whole = if self.moves {
                     let steps: Vec<f64> = g.windows(2).map(|w| w[1] - w[0]).collect();
                     dot(&steps, &steps) / (2 * steps.len().max(1)) as f64
                 } else {
@@ -227,16 +248,12 @@ impl Fit<'_> {
 
     /// The turning of a table or the sway of a base, by the gyro that sees most of it.
     fn motion(&self, settings: &mut Settings) {
-        if !matches!(
-            self.record.header.base,
-            Some(Base::Turntable | Base::Moving)
-        ) {
-            return;
-        }
+        let length = ((MOTION_BLOCK_S * self.rate_hz) as usize).max(1);
+        let fine = Fit { length, ..*self };
         let seen = Axis::ALL.into_iter().filter_map(|axis| {
             let channel = self.record.of(Quantity::Gyro, Some(axis))?;
-            let rate = centred(&self.blocks(&channel.values));
-            Some((axis, rms(&rate), period(&rate, self.block_s())))
+            let rate = centred(&fine.blocks(&channel.values));
+            Some((axis, rms(&rate), period(&rate, fine.block_s())))
         });
         let Some((axis, rms, period)) = seen.max_by(|a, b| a.1.total_cmp(&b.1)) else {
             return;
@@ -315,23 +332,25 @@ fn period(y: &[f64], step_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ModelFile;
 
-    /// What `settings_like` finds in a simulation of a world, and the same for a simulation of what it found.
+    /// The excitation like that of a simulation of a world, and the same for a simulation of what was found.
     fn there_and_back(
         stated: &[(&str, f64)],
     ) -> Result<[BTreeMap<String, f64>; 2], crate::simulate::SimulateError> {
         let mut model = ModelFile::paper();
         model.excitation = stated.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
-        let first = settings_like(&crate::simulate(&model, 600.0, 20.0, 3)?, 20.0);
-        model.excitation = first.clone();
-        let second = settings_like(&crate::simulate(&model, 600.0, 20.0, 4)?, 20.0);
-        Ok([first, second])
+        let first = model
+            .clone()
+            .excited_like(&crate::simulate(&model, 600.0, 20.0, 3)?);
+        let second = first
+            .clone()
+            .excited_like(&crate::simulate(&first, 600.0, 20.0, 4)?);
+        Ok([first.excitation, second.excitation])
     }
 
     #[test]
     fn a_world_is_found_again_in_size_and_pace() -> Result<(), Box<dyn std::error::Error>> {
-        let worlds: [&[(&str, f64)]; 5] = [
+        let worlds: [&[(&str, f64)]; 6] = [
             &[("self_heating_degc", 9.0), ("ambient_degc", 18.0)],
             &[("heater_degc", 6.0), ("heater_period_s", 200.0)],
             &[
@@ -341,6 +360,7 @@ mod tests {
             ],
             &[("supply_load_v", 0.06), ("vibration_g", 0.1)],
             &[("turn_dps", 12.0), ("turn_period_s", 40.0)],
+            &[("sway_deg", 5.0), ("sway_period_s", 9.0)],
         ];
         for stated in worlds {
             let found = there_and_back(stated)?;
