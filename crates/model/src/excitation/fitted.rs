@@ -7,7 +7,8 @@ use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{MOTION, World};
-use crate::file::ModelFile;
+use crate::file::{ChannelModel, EffectModel, ModelFile};
+use crate::parameter::Parameter;
 use crate::record::{Axis, Base, Channel, Quantity, Record};
 use crate::simulate::{ACC_NOISE_G, ACC_PER_G, STANDARD_GRAVITY, SUPPLY_LSB_V, TEMP_LSB_C};
 
@@ -30,9 +31,37 @@ impl ModelFile {
         let moves = named || record.header.base.is_some_and(|b| b != Base::Static);
         self.excitation = settings_like(record, self.rate_hz, moves);
         if MOTION.iter().any(|k| self.excitation.contains_key(*k)) {
-            self.effects.retain(|e| e.cause != "base_motion");
+            let moving = |e: &EffectModel| e.cause == "base_motion";
+            for channel in &mut self.channels {
+                let moves = self.effects.iter().filter(|e| moving(e));
+                let moves = moves.flat_map(|e| &e.channels).any(|c| *c == channel.name);
+                if let Some(seen) = record.channel(&channel.name).filter(|_| moves) {
+                    at_rest(channel, &seen.values, self.rate_hz);
+                }
+            }
+            self.effects.retain(|e| !moving(e));
         }
         self
+    }
+}
+
+/// The baseline of a channel that moved: the random walk fitted to it is the motion's, and no other can be seen below
+/// that; the white noise is what is left in second differences, to which a motion of seconds adds nothing.
+fn at_rest(channel: &mut ChannelModel, values: &[f64], rate_hz: f64) {
+    let bends: Vec<f64> = values
+        .windows(3)
+        .map(|w| w[0] - 2.0 * w[1] + w[2])
+        .filter(|b| b.is_finite())
+        .collect();
+    // Variances add up to 1 + 4 + 1; deg/s at one sample -> deg/sqrt(h).
+    let white = rms(&bends) / 6f64.sqrt() / rate_hz.sqrt() * 60.0;
+    for (name, value) in [("angle_random_walk", white), ("rate_random_walk", 0.0)] {
+        if let Some(p) = channel.baseline.get_mut(name) {
+            *p = Parameter::exact(value, &p.unit);
+        }
+    }
+    if let Some(bias) = channel.baseline.get_mut("bias") {
+        bias.std_error = None;
     }
 }
 
