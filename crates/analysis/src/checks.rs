@@ -2,9 +2,9 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Gamma, Normal};
 
-use crate::likelihood::Panel;
+use crate::likelihood::{Noise, Panel};
 use crate::scan::residual;
-use crate::search::State;
+use crate::search::{Form, State};
 
 /// Chance below which a check fails.
 pub const LEAST_CHANCE: f64 = 1e-5;
@@ -26,21 +26,48 @@ pub struct Outcome {
     pub what: String,
 }
 
-/// Whitened coefficients, and the same in time: independent N(0, 1) under the model.
+/// Whitened coefficients, and the same in time: independent N(0, 1) under the model. A level that is known sample by
+/// sample is taken off.
 #[must_use]
 pub fn whitened(panel: &Panel, state: &State) -> (Vec<f64>, Vec<f64>) {
+    let Some(level) = &state.level else {
+        return whitened_by_spectrum(panel, state);
+    };
+    let level = panel.dct.forward(level);
+    let mut r = residual(panel, &state.columns(), &state.solution);
+    r.iter_mut().zip(level).skip(1).for_each(|(r, l)| *r -= l);
+    let mut noise = state.noise.clone();
+    let covariances = state
+        .terms
+        .iter()
+        .filter(|t| matches!(t.form, Form::Covariance(..)));
+    let mut stated = covariances.map(|t| t.stated.is_some());
+    noise.terms.retain(|_| !stated.next().unwrap_or(false));
+    // What the process took of the random walk is the walk's again.
+    let rest = Panel::new(&panel.dct, &panel.bins, &panel.dct.inverse(&r));
+    let (noise, solution) = rest.fit(&noise, &[]);
+    by_model(panel, &r, &noise, solution.white)
+}
+
+/// The same with every process as its spectrum alone.
+#[must_use]
+pub fn whitened_by_spectrum(panel: &Panel, state: &State) -> (Vec<f64>, Vec<f64>) {
     let r = residual(panel, &state.columns(), &state.solution);
-    let g = state.noise.everywhere(&panel.bins);
+    by_model(panel, &r, &state.noise, state.solution.white)
+}
+
+fn by_model(panel: &Panel, r: &[f64], noise: &Noise, white: f64) -> (Vec<f64>, Vec<f64>) {
+    let g = noise.everywhere(&panel.bins);
     let u: Vec<f64> = r
         .iter()
         .zip(&g)
-        .map(|(r, g)| r / (state.solution.white * g).sqrt())
+        .map(|(r, g)| r / (white * g).sqrt())
         .collect();
     let e = panel.dct.inverse(&u);
     (u, e)
 }
 
-fn chi_tail(x: f64, degrees: f64) -> f64 {
+pub(crate) fn chi_tail(x: f64, degrees: f64) -> f64 {
     ChiSquared::new(degrees).map_or(f64::NAN, |c| c.sf(x))
 }
 
@@ -62,7 +89,7 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
     ]
 }
 
-fn ljung_box(e: &[f64]) -> Outcome {
+pub(crate) fn ljung_box(e: &[f64]) -> Outcome {
     let n = e.len() as f64;
     let total: f64 = e.iter().map(|v| v * v).sum();
     let mut worst = (0, 0.0f64);
@@ -113,6 +140,21 @@ pub(crate) fn all_bands(u: &[f64]) -> Vec<Band> {
             }
         })
         .collect()
+}
+
+/// Half widths about a line, in coefficients, and chance below which the energy there is not the model's. It is asked only
+/// where something is left over somewhere.
+const ABOUT: [usize; 3] = [30, 120, 480];
+const LEAST_CHANCE_ABOUT: f64 = 0.01;
+
+/// Whether something is left about a coefficient: what makes a line of a tone that is not steady lies beside it.
+pub(crate) fn stands_out(u: &[f64], at: f64) -> bool {
+    ABOUT.iter().any(|half| {
+        let from = (at as usize).saturating_sub(*half).max(1);
+        let to = (at as usize + half).min(u.len());
+        let sum: f64 = u[from..to].iter().map(|v| v * v).sum();
+        chi_tail(sum, (to - from) as f64) < LEAST_CHANCE_ABOUT
+    })
 }
 
 fn bands(u: &[f64], rate_hz: f64) -> Outcome {
@@ -287,15 +329,9 @@ fn variance_cusum(e: &[f64], rate_hz: f64) -> Outcome {
     }
 }
 
-fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
-    let n = e.len() as f64;
-    let m2 = e.iter().map(|v| v * v).sum::<f64>() / n;
-    let excess = e.iter().map(|v| v.powi(4)).sum::<f64>() / n / (m2 * m2) - 3.0;
-    let far = (0..e.len())
-        .max_by(|a, b| e[*a].abs().total_cmp(&e[*b].abs()))
-        .unwrap_or(0);
-    // Anscombe and Glynn (1983): the cube root makes the skewed statistic normal.
-    let b2 = excess + 3.0;
+/// Kurtosis of `n` values as a standard normal score. Anscombe and Glynn (1983): the cube root makes the skewed statistic
+/// normal.
+pub(crate) fn kurtosis_score(b2: f64, n: f64) -> f64 {
     let mean = 3.0 * (n - 1.0) / (n + 1.0);
     let variance = 24.0 * n * (n - 2.0) * (n - 3.0) / ((n + 1.0).powi(2) * (n + 3.0) * (n + 5.0));
     let x = (b2 - mean) / variance.sqrt();
@@ -303,13 +339,28 @@ fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
         * (6.0 * (n + 3.0) * (n + 5.0) / (n * (n - 2.0) * (n - 3.0))).sqrt();
     let a = 6.0 + 8.0 / skew * (2.0 / skew + (1.0 + 4.0 / (skew * skew)).sqrt());
     let inner = (1.0 - 2.0 / a) / (1.0 + x * (2.0 / (a - 4.0)).sqrt());
-    let z = ((1.0 - 2.0 / (9.0 * a)) - inner.cbrt()) / (2.0 / (9.0 * a)).sqrt();
+    ((1.0 - 2.0 / (9.0 * a)) - inner.cbrt()) / (2.0 / (9.0 * a)).sqrt()
+}
+
+fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
+    let n = e.len() as f64;
+    let m2 = e.iter().map(|v| v * v).sum::<f64>() / n;
+    let excess = e.iter().map(|v| v.powi(4)).sum::<f64>() / n / (m2 * m2) - 3.0;
+    let far = (0..e.len())
+        .max_by(|a, b| e[*a].abs().total_cmp(&e[*b].abs()))
+        .unwrap_or(0);
+    let z = kurtosis_score(excess + 3.0, n);
     Outcome {
         id: "kurtosis",
         statistic: excess,
         p_value: normal_tail(z),
         what: format!(
-            "excess kurtosis of the whitened residual; farthest sample {:.1} sigma at {:.2} s",
+            "excess kurtosis {excess:+.3} of the whitened residual: {}; farthest sample {:.1} sigma at {:.2} s",
+            if excess < 0.0 {
+                "tails too light"
+            } else {
+                "tails too heavy"
+            },
             e[far].abs(),
             far as f64 / rate_hz
         ),

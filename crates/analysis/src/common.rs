@@ -19,14 +19,33 @@ pub(crate) struct Shared {
     pub left: Vec<Unexplained>,
 }
 
+/// Standard error of the mean covariance of some pairs of axes that share a source of variance `shared`: estimates of
+/// two pairs with an axis in common hang together by its variance and the source.
+fn error_of_mean(pairs: &[&Pair<'_>], shared: f64, samples: f64) -> f64 {
+    let variance = |s: &Searched<'_>| s.state.solution.white;
+    let same = |a: &Searched<'_>, b: &Searched<'_>| a.target.name == b.target.name;
+    // Of jointly normal values, cov(ab, cd) = E[ac] E[bd] + E[ad] E[bc].
+    let product = |a, b| if same(a, b) { variance(a) } else { shared };
+    let mut sum = 0.0;
+    for (a, b, ..) in pairs {
+        for (c, d, ..) in pairs {
+            sum += product(a, c) * product(b, d) + product(a, d) * product(b, c);
+        }
+    }
+    (sum / samples).sqrt() / pairs.len() as f64
+}
+
+/// Two axes, the correlation of their residuals, its chance and its score.
+type Pair<'a> = (&'a Searched<'a>, &'a Searched<'a>, f64, f64, f64);
+
 /// Correlation of the whitened residuals, axis by axis.
-pub(crate) fn common(searched: &[Searched<'_>], grid: &Grid) -> Shared {
+pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
     let mut shared = Shared {
         checks: vec![],
         finding: None,
         left: vec![],
     };
-    let mut pairs = vec![];
+    let mut pairs: Vec<Pair<'_>> = vec![];
     let first = grid.n / 50;
     for (i, a) in searched.iter().enumerate() {
         for b in &searched[i + 1..] {
@@ -78,9 +97,7 @@ pub(crate) fn common(searched: &[Searched<'_>], grid: &Grid) -> Shared {
             .map(|p| p.2 * sigma(p.0) * sigma(p.1))
             .collect();
         let mean = shares.iter().sum::<f64>() / shares.len() as f64;
-        let product =
-            fails.iter().map(|p| sigma(p.0) * sigma(p.1)).sum::<f64>() / shares.len() as f64;
-        let error = product / ((grid.n * shares.len()) as f64).sqrt();
+        let error = error_of_mean(&fails, mean, (grid.n - first) as f64);
         let found = Found {
             unit: searched[0].target.unit.clone(),
             coefficients: vec![(mean.sqrt(), error / (2.0 * mean.sqrt()))],

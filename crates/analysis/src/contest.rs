@@ -3,158 +3,32 @@
 //! Both sides are weighed on the same block means: the Gaussian model by its exact likelihood, the two-level one (with
 //! white noise and a random walk of the level) by a bank of Kalman filters, one for each level, merged by moments.
 
+use std::f64::consts::TAU;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::{Covariance, Effect, Hypothesis};
 
-use crate::likelihood::{Bins, Dct, Noise, Panel};
+pub use crate::levels::two_level;
+use crate::levels::{Side, Sides, covariance_of, fitted, many_ahead, path};
+use crate::likelihood::{Bins, Dct, Noise, Panel, least_walk};
 use crate::scan::residual;
-use crate::search::{Form, Search, State, Term};
+use crate::search::{Form, Note, Search, State, Term};
+use crate::{adequacy, threshold};
 
 /// Nats by which two levels have to be better.
 const MARGIN: f64 = 4.0;
 /// Nats within which the answer stays open.
 const OPEN: f64 = 3.0;
-/// Longest block, s, and most blocks.
+/// Longest block of a short record, s, and most blocks.
 const BLOCK_S: f64 = 0.2;
 const MOST_BLOCKS: usize = 6000;
-
-/// ln of variance, ln of random-walk step over it, ln of half height over the white sigma, ln of dwell in blocks.
-type Coordinates = [f64; 4];
-
-/// Levels of the two-level process, in half heights.
-const TWO: [f64; 2] = [1.0, -1.0];
-/// Levels that stand for any: five of a normal distribution.
-const MANY: [f64; 5] = [-1.5, -0.7, 0.0, 0.7, 1.5];
-
-/// Log likelihood of block means under white noise + random walk + two levels, the mean taken out.
-#[must_use]
-pub fn two_level(y: &[f64], x: &Coordinates) -> f64 {
-    levels_likelihood(y, x, &TWO)
-}
-
-/// The same for jumps between any of `levels`, all equally likely.
-fn levels_likelihood<const K: usize>(y: &[f64], x: &Coordinates, levels: &[f64; K]) -> f64 {
-    let white = x[0].exp();
-    let walk = white * x[1].exp();
-    let half = x[2].exp() * white.sqrt();
-    let others = (K - 1) as f64;
-    // Two levels keep their share of 1/2 for ever, many theirs of 1/K.
-    let share = K as f64 / others;
-    let switch = (1.0 - (-share * (-x[3]).exp()).exp()) / share;
-    let start = 1e4 * white + half * half;
-    // State by level: weight, mean and variance of the slow level.
-    let mut states = [((K as f64).recip(), 0.0, start); K];
-    let mut sum = -0.5 * y.len() as f64 * std::f64::consts::TAU.ln();
-    for (t, v) in y.iter().enumerate() {
-        // Prediction by level: weight times 1/sqrt(s), mean, 1/s, gain, variance after the reading.
-        let predicted = states.map(|(w, m, p)| {
-            let p = p + if t > 0 { walk } else { 0.0 };
-            let inverse = 1.0 / (p + white);
-            (
-                w * inverse.sqrt(),
-                m,
-                inverse,
-                p * inverse,
-                p * white * inverse,
-            )
-        });
-        // State by level after it, with what it is off at best.
-        let mut merged = [(0.0, 0.0, 0.0, 0.0); K];
-        for (j, (level, merged)) in levels.iter().zip(&mut merged).enumerate() {
-            let off = predicted.map(|(_, m, inverse, ..)| {
-                let nu = v - m - half * level;
-                (nu, 0.5 * nu * nu * inverse)
-            });
-            let least = off.iter().map(|o| o.1).fold(f64::INFINITY, f64::min);
-            let mut parts = [(0.0, 0.0, 0.0); K];
-            let (mut all, mut mean) = (0.0, 0.0);
-            for (i, ((nu, q), (w, m, _, gain, after))) in off.iter().zip(&predicted).enumerate() {
-                let moved = if i == j {
-                    1.0 - switch
-                } else {
-                    switch / others
-                };
-                let weight = w * moved * (least - q).exp();
-                let at = m + gain * nu;
-                parts[i] = (weight, at, *after);
-                all += weight;
-                mean += weight * at;
-            }
-            mean /= all;
-            let variance = parts
-                .iter()
-                .map(|(w, at, after)| w * (after + (at - mean).powi(2)))
-                .sum::<f64>()
-                / all;
-            *merged = (all, mean, variance, least);
-        }
-        let least = merged.iter().map(|m| m.3).fold(f64::INFINITY, f64::min);
-        let weights = merged.map(|m| m.0 * (least - m.3).exp());
-        let total: f64 = weights.iter().sum();
-        sum += total.ln() - least;
-        states = std::array::from_fn(|j| (weights[j] / total, merged[j].1, merged[j].2));
-    }
-    // The diffuse start integrates the mean out. Its prior density is put back, and the factor of sqrt(count) by which
-    // that integral differs from the density of the coefficients k >= 1 of the orthonormal DCT.
-    sum + 0.5 * (std::f64::consts::TAU * start * y.len() as f64).ln()
-}
-
-/// Nats that many levels are ahead of two, from where the two are at their best.
-fn many_ahead(y: &[f64], two: &Coordinates) -> f64 {
-    let inside = |x: &[f64]| {
-        [
-            x[0],
-            x[1].clamp(-25.0, 2.0),
-            x[2].clamp(-6.0, 6.0),
-            x[3].clamp(0.7, (y.len() as f64 / 3.0).ln()),
-        ]
-    };
-    let objective = |x: &[f64]| {
-        let clamped = inside(x);
-        let outside: f64 = x.iter().zip(&clamped).map(|(a, b)| (a - b).powi(2)).sum();
-        outside - levels_likelihood(y, &clamped, &MANY)
-    };
-    let best = crate::optimise::nelder_mead(&objective, two, &[0.1, 2.0, 0.3, 0.7], 60);
-    -objective(&best) - two_level(y, two)
-}
-
-/// Covariance of the coordinates at a highest point of `l`: the inverse of its curvature, all coordinates free. One that
-/// the data do not bend, such as a random walk of nearly nothing, is held.
-fn covariance_of(l: &dyn Fn(&Coordinates) -> f64, x: &Coordinates) -> Vec<Vec<f64>> {
-    const H: f64 = 0.06;
-    let at = |moves: &[(usize, f64)]| {
-        let mut y = *x;
-        for (i, by) in moves {
-            y[*i] += by * H;
-        }
-        l(&y)
-    };
-    let middle = l(x);
-    let second = |i: usize, j: usize| {
-        if i == j {
-            return (at(&[(i, 1.0)]) - 2.0 * middle + at(&[(i, -1.0)])) / (H * H);
-        }
-        (at(&[(i, 1.0), (j, 1.0)]) - at(&[(i, 1.0), (j, -1.0)]) - at(&[(i, -1.0), (j, 1.0)])
-            + at(&[(i, -1.0), (j, -1.0)]))
-            / (4.0 * H * H)
-    };
-    let count = x.len();
-    let bends: Vec<bool> = (0..count).map(|i| second(i, i) < -0.05).collect();
-    let information: Vec<Vec<f64>> = (0..count)
-        .map(|i| {
-            (0..count)
-                .map(|j| match (i == j, bends[i] && bends[j]) {
-                    (_, true) => -second(i.min(j), i.max(j)),
-                    (true, false) => 1e12,
-                    (false, false) => 0.0,
-                })
-                .collect()
-        })
-        .collect();
-    crate::likelihood::invert(&information).0
-}
+/// Variance of the level about its most probable mean, over that of the two levels, above which it is not taken off.
+const LARGEST_DOUBT: f64 = 0.05;
+/// Blocks of a coarse look.
+const COARSE_BLOCKS: usize = 400;
+/// Most blocks of a correlation time, where a record holds more blocks than that.
+const BLOCKS_OF_A_TIME: f64 = 10.0;
 
 /// The AR(1)-like term of the library: stationary, two coordinates, no filter.
 fn stationary(search: &Search<'_>) -> Option<(usize, &'static dyn Effect, Arc<dyn Covariance>)> {
@@ -168,6 +42,39 @@ fn stationary(search: &Search<'_>) -> Option<(usize, &'static dyn Effect, Arc<dy
             }
             _ => None,
         })
+}
+
+/// Means of at most `count` blocks.
+fn means(y: &[f64], length: usize, count: usize) -> Vec<f64> {
+    let mean = |c: &[f64]| c.iter().sum::<f64>() / length as f64;
+    y.chunks_exact(length).take(count).map(mean).collect()
+}
+
+/// Whether two levels may stand behind what the search left to the random walk, by a coarse look.
+fn looks_two_level(search: &Search<'_>, state: &State) -> bool {
+    let n = search.panel.bins.n;
+    if search.view.moving || search.view.sways() {
+        return false;
+    }
+    let length = n.div_ceil(COARSE_BLOCKS);
+    let r = residual(&search.panel, &state.columns(), &state.solution);
+    let blocks = means(&search.panel.dct.inverse(&r), length, COARSE_BLOCKS);
+    let m = blocks.len();
+    if m < COARSE_BLOCKS / 2 {
+        return false;
+    }
+    let panel = Panel::new(&Dct::new(m), &Rc::new(Bins::new(m)), &blocks);
+    let (noise, walk) = panel.fit(&Noise::new(-9.0), &[]);
+    // A level that never moves does not switch.
+    if noise.log_walk <= least_walk(m) {
+        return false;
+    }
+    let variance = blocks.iter().map(|v| v * v).sum::<f64>() / m as f64;
+    let white = (state.solution.white / length as f64).min(variance);
+    let excess = (variance - white).max(0.05 * white);
+    let (two, _) = fitted(&blocks, white, excess, &[(0.9, 10.0), (0.7, 40.0)], 100);
+    let gaussian = walk.log_likelihood - 0.5 * (m - 1) as f64 * (1.0 + TAU.ln());
+    two - gaussian > MARGIN
 }
 
 /// Let two levels compete with the stationary terms and steps of a state.
@@ -195,12 +102,6 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         .terms
         .iter()
         .any(|t| contested(t) && !matches!(t.form, Form::Step(..)));
-    if !(wandering || steps >= 2) {
-        return state;
-    }
-    let Some((_, _, process)) = stationary(search) else {
-        return state;
-    };
     // The data without the terms that are not contested.
     let kept: Vec<Term> = state
         .terms
@@ -208,8 +109,15 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         .filter(|t| !contested(t))
         .cloned()
         .collect();
+    let contest = wandering || steps >= 2;
+    if !(contest || looks_two_level(search, &search.refit(kept.clone(), state.noise.log_walk))) {
+        return state;
+    }
+    let Some((_, _, process)) = stationary(search) else {
+        return state;
+    };
     let n = search.panel.bins.n;
-    let mut theirs = kept.clone();
+    let mut theirs = kept;
     let longest = 100f64.min(n as f64 / 60.0);
     theirs.push(Term {
         effect: candidate.effect,
@@ -225,20 +133,27 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
             .iter()
             .filter(|t| contested(t))
             .map(|t| t.threshold)
-            .fold(f64::INFINITY, f64::min),
+            .fold(threshold::two_level(), f64::min),
         alternatives: vec![],
         stated: None,
+        claims: vec![],
     });
     let rival = search.refit(theirs, state.noise.log_walk);
     let r = residual(&search.panel, &rival.columns(), &rival.solution);
     let rest = search.panel.dct.inverse(&r);
-    let length = ((BLOCK_S * search.view.rate_hz) as usize)
-        .max(n.div_ceil(MOST_BLOCKS))
-        .max(1);
-    let blocks: Vec<f64> = rest
-        .chunks_exact(length)
-        .map(|c| c.iter().sum::<f64>() / length as f64)
-        .collect();
+    // A process that is fast for a long record is weighed on a stretch of it, in blocks that still show it.
+    let shortest = ((BLOCK_S * search.view.rate_hz) as usize).max(1);
+    let time = rival
+        .noise
+        .terms
+        .last()
+        .map_or(0.0, |(_, theta)| theta[1].exp());
+    let length = n
+        .div_ceil(MOST_BLOCKS)
+        .min((time / BLOCKS_OF_A_TIME) as usize)
+        .max(shortest);
+    let first = n.saturating_sub(MOST_BLOCKS * length) / 2;
+    let blocks = means(&rest[first..], length, MOST_BLOCKS);
     let m = blocks.len();
     if m < 200 {
         return state;
@@ -251,9 +166,10 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
             log_walk: -9.0,
             terms: terms.to_vec(),
         };
-        let l = panel.fit(&noise, columns).1.log_likelihood;
+        let (noise, solution) = panel.fit(&noise, columns);
         let count = (m - 1) as f64;
-        l - 0.5 * count * (1.0 + std::f64::consts::TAU.ln())
+        let l = solution.log_likelihood - 0.5 * count * (1.0 + TAU.ln());
+        (l, noise, solution.white)
     };
     let own_columns: Vec<usize> = state
         .terms
@@ -262,7 +178,7 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
             Form::Step(s, _) => Some(
                 panel.add(
                     &(0..m)
-                        .map(|i| f64::from(u8::from((i * length) as f64 >= s)))
+                        .map(|i| f64::from(u8::from((first + i * length) as f64 >= s)))
                         .collect::<Vec<_>>(),
                 ),
             ),
@@ -288,36 +204,36 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
             .collect()
     };
     // Each step costs its time and its height.
-    let theirs = gaussian(&terms_of(&rival), &[])
-        .max(gaussian(&terms_of(&state), &own_columns) - steps as f64 * (m as f64).ln());
+    let like_one = gaussian(&terms_of(&rival), &[]);
+    let found = gaussian(&terms_of(&state), &own_columns);
+    let theirs = like_one.0.max(found.0 - steps as f64 * (m as f64).ln());
     let variance = blocks.iter().map(|v| v * v).sum::<f64>() / m as f64;
     let white = (state.solution.white / length as f64).min(variance);
     let excess = (variance - white).max(0.05 * white);
-    let mut best = (f64::INFINITY, vec![]);
-    for (share, dwell) in [(1.0, 15.0), (0.8, 60.0), (0.6, 200.0)] {
-        let start = [
-            white.ln(),
-            -12.0,
-            0.5 * (share * excess / white).ln(),
-            f64::ln(dwell),
-        ];
-        let objective = |x: &[f64]| {
-            let inside = [
-                x[0],
-                x[1].clamp(-25.0, 2.0),
-                x[2].clamp(-6.0, 6.0),
-                x[3].clamp(0.7, (m as f64 / 3.0).ln()),
-            ];
-            let outside: f64 = x.iter().zip(&inside).map(|(a, b)| (a - b).powi(2)).sum();
-            outside - two_level(&blocks, &inside)
-        };
-        let x = crate::optimise::nelder_mead(&objective, &start, &[0.1, 2.0, 0.3, 0.7], 160);
-        let value = objective(&x);
-        if value < best.0 {
-            best = (value, x);
+    let starts = [(1.0, 15.0), (0.8, 60.0), (0.6, 200.0)];
+    let (two, x) = fitted(&blocks, white, excess, &starts, 160);
+    let ahead = two - theirs;
+    if !contest && 2.0 * ahead < threshold::two_level() {
+        return state;
+    }
+    let (gaussian, noise, white) = if wandering { found } else { like_one };
+    let sides = Sides {
+        dct: &dct,
+        bins: &bins,
+        noise,
+        white,
+        two: x,
+    };
+    let mut state = state;
+    if ahead <= MARGIN && wandering {
+        let claim = adequacy::levels(
+            sides.cox(two - gaussian, Side::Gaussian),
+            "a Gaussian process",
+        );
+        for t in state.terms.iter_mut().filter(|t| contested(t)) {
+            t.claims.push(claim.clone());
         }
     }
-    let ahead = -best.0 - theirs;
     if ahead < -OPEN {
         return state;
     }
@@ -330,22 +246,38 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         }
         return open;
     }
-    let x: Coordinates = [best.1[0], best.1[1], best.1[2], best.1[3]];
     let errors = covariance_of(&|y| two_level(&blocks, y), &x);
     // ln of the half height is x2 + x0 / 2.
+    let least = (-2.0 * x[2]).exp() / m as f64;
     let half_error = (errors[2][2] + errors[0][2] + 0.25 * errors[0][0])
-        .max(0.0)
+        .max(least)
         .sqrt();
-    let dwell_error = errors[3][3].max(0.0).sqrt();
+    // Where the likelihood hardly bends, the switches that were seen still bound it.
+    let seen = m as f64 * (-x[3]).exp();
+    let dwell_error = errors[3][3].max(1.0 / seen.max(1.0)).sqrt();
     // A block in which the level switches reads anything between the levels: half a block's worth for each switch.
     let mixed = (0.5 * (-x[3]).exp()).min(0.3);
     let half = (x[2] + 0.5 * x[0]).exp() / (1.0 - mixed);
     let dwell = x[3].exp() * length as f64 / search.view.rate_hz;
     let mut settled = rival;
     if many_ahead(&blocks, &x) > MARGIN {
-        settled
-            .notes
-            .push("jumps between more than two levels".into());
+        settled.notes.push(Note {
+            what: "jumps between more than two levels".into(),
+            at: None,
+        });
+    }
+    // Where only a stretch was weighed, the level elsewhere is not known; and where it is much in doubt, taking it off
+    // would take noise off.
+    let levels = path(&blocks, &x);
+    let steps_at = (x[2] + 0.5 * x[0]).exp();
+    let doubt = levels
+        .iter()
+        .map(|l| 1.0 - (l / steps_at).powi(2))
+        .sum::<f64>()
+        / m as f64;
+    if first == 0 && doubt < LARGEST_DOUBT {
+        let at = |i: usize| levels[(i / length).min(m - 1)];
+        settled.level = Some(Rc::new((0..n).map(at).collect()));
     }
     if let Some(t) = settled.terms.last_mut() {
         t.stated = Some(vec![
@@ -353,6 +285,8 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
             (dwell, dwell * dwell_error),
         ]);
         t.lr = 2.0 * (ahead - MARGIN) + t.threshold;
+        let z = sides.cox(two - gaussian, Side::TwoLevels);
+        t.claims.push(adequacy::levels(z, "two levels"));
     }
     settled
 }

@@ -14,7 +14,7 @@ use crate::common::{Shared, common};
 use crate::error::AnalysisError;
 use crate::estimate;
 use crate::findings::{
-    blows, joined, motion_finding, scale_finding, term_findings, variance_finding,
+    blows, complete, joined, motion_finding, scale_finding, term_findings, variance_finding,
 };
 use crate::grid::{Grid, Target, lay_out};
 use crate::likelihood::Panel;
@@ -22,8 +22,8 @@ use crate::result::{
     Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, Input, NotTested,
     Parameter, Unexplained, Verdict,
 };
-use crate::search::{Search, State};
-use crate::{beyond, dead, doubt, evidence, losses, rows, scan, threshold};
+use crate::search::{Note, Search, State};
+use crate::{adequacy, beyond, dead, doubt, evidence, losses, rows, scan, threshold};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -127,9 +127,9 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     let shared = common(&searched, &grid);
     let mut unexplained = left_over(&checks, &shared);
     for s in &searched {
-        let note = |what: &String| Unexplained {
+        let note = |note: &Note| Unexplained {
             channel: s.target.name.clone(),
-            what: what.clone(),
+            what: note.what.clone(),
         };
         unexplained.extend(s.state.notes.iter().map(note));
     }
@@ -140,14 +140,16 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     unexplained.extend(audited.unexplained);
     // What was found on the channel may have bent the distribution; then the residual decides.
     let bent = |name: &str| {
-        let found = |s: &&Searched<'_>| !s.state.terms.is_empty() || s.variance.is_some();
+        let found = |s: &&Searched<'_>| {
+            !s.state.terms.is_empty() || s.variance.is_some() || s.target.moving
+        };
         let tails = |c: &Check| c.id == "kurtosis" && c.channel == name && c.fails_after;
         let mut own = searched.iter().filter(|s| s.target.name == name);
         own.any(|s| found(&s)) && !checks.iter().any(tails)
     };
     unexplained.extend(audited.not_normal.into_iter().filter(|u| !bent(&u.channel)));
     findings.extend(shared.finding);
-    let findings = joined(blows(findings));
+    let findings = complete(joined(blows(findings)));
     let mut not_tested = not_tested(&searched);
     not_tested.extend(scale_not_tested);
     not_tested.extend(audited.not_tested);
@@ -342,6 +344,18 @@ fn variance(s: &Searched<'_>) -> Option<VarianceFound> {
 
 fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> {
     let after = checks::all(&s.u, &s.e, s.search.view.rate_hz);
+    // Before a process was named nothing was claimed of it.
+    let claims = adequacy::of_processes(&s.search, &s.state);
+    let claims = claims.into_iter().map(|c| Check {
+        id: c.id.into(),
+        channel: s.target.name.clone(),
+        statistic: c.statistic,
+        p_value: Some(c.p_value),
+        threshold: adequacy::LEAST_CHANCE,
+        fails_before: false,
+        fails_after: c.p_value < adequacy::LEAST_CHANCE,
+        what: c.what,
+    });
     before
         .into_iter()
         .zip(after)
@@ -360,6 +374,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
                 b.what
             },
         })
+        .chain(claims)
         .collect()
 }
 
@@ -379,6 +394,7 @@ fn not_tested(searched: &[Searched<'_>]) -> Vec<NotTested> {
     let sways = searched.iter().any(|s| s.search.view.sways());
     for s in searched {
         let mut own: Vec<(&'static str, String)> = s.search.not_tested.clone();
+        let in_library = |id: &str| id != beyond::ID;
         if s.target.moving {
             let why = "the base moves about this axis: record it at rest";
             let slow = |h: &Hypothesis| {
@@ -394,7 +410,7 @@ fn not_tested(searched: &[Searched<'_>]) -> Vec<NotTested> {
                 )
             };
             for c in s.search.candidates.iter().filter(|c| slow(&c.hypothesis)) {
-                if own.iter().all(|o| o.0 != c.effect.id()) {
+                if in_library(c.effect.id()) && own.iter().all(|o| o.0 != c.effect.id()) {
                     own.push((c.effect.id(), why.to_owned()));
                 }
             }

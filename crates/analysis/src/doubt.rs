@@ -8,14 +8,21 @@
 //! size leaves e^2 of its likelihood ratio to others: a generic term beside it that holds no more than that is as likely
 //! a remainder of the shape as a cause of its own.
 
-use crate::beyond;
 use crate::checks::{self, LEAST_CHANCE};
 use crate::diagnosis::Searched;
 use crate::result::{Finding, Unexplained};
 use crate::search::{Form, Term};
+use std::f64::consts::PI;
+
+use crate::{adequacy, beyond};
 
 /// Share of a term's energy in bands that fail, from which on the failure is the term's.
 const SHARE: f64 = 0.25;
+
+/// Likelihood ratio beyond its threshold from which on a term is no makeshift for what is left elsewhere.
+const WIDE: f64 = 25.0;
+/// Share of its likelihood ratio that a law of the variance keeps, by coefficient, where nothing is left over.
+const HOLDS: f64 = 0.6;
 
 /// Share of what a shape explains that it may leave to others: it is off by a seventh of its size.
 const REMAINDER: f64 = 0.02;
@@ -75,39 +82,38 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
     let panel = &s.search.panel;
     let g = s.state.noise.over(&panel.bins);
     let n = panel.bins.n as f64;
+    let ones = vec![1.0; panel.bins.n];
     let fails: Vec<(f64, f64)> = checks::all_bands(&s.u)
         .into_iter()
         .filter(|b| b.chance < LEAST_CHANCE)
         .map(|b| (b.from as f64, b.to as f64))
         .collect();
-    let inside: Vec<bool> = panel
-        .bins
-        .at
-        .omega
-        .iter()
-        .map(|w| {
-            let k = w * n / std::f64::consts::PI;
-            fails.iter().any(|(from, to)| k >= *from && k < *to)
-        })
-        .collect();
-    let share = |energy: &[f64]| {
-        let all: f64 = energy.iter().zip(&g).map(|(e, g)| e / g).sum();
-        let hit: f64 = energy
-            .iter()
-            .zip(&g)
-            .zip(&inside)
-            .filter(|(_, i)| **i)
-            .map(|((e, g), _)| e / g)
+    let unsteady = checks::unsteady(&s.e);
+    let crowds = s.state.notes.iter().filter_map(|note| note.at);
+    let crowds: Vec<(f64, f64)> = crowds.map(|(a, b)| (a * n / PI, b * n / PI)).collect();
+    // Everything that is left and has a place in frequency, in coefficients.
+    let mut places = fails;
+    places.extend(unsteady.iter().map(|(from, to)| (from * n, to * n)));
+    places.extend(&crowds);
+    let within = |places: &[(f64, f64)], omega: f64| {
+        let k = omega * n / PI;
+        places.iter().any(|(from, to)| k >= *from && k < *to)
+    };
+    let omega = &panel.bins.at.omega;
+    let share = |information: &[f64]| {
+        let all: f64 = information.iter().sum();
+        let hit = information.iter().zip(omega);
+        let hit: f64 = hit
+            .filter(|(_, w)| within(&places, **w))
+            .map(|(i, _)| i)
             .sum();
         all > 0.0 && hit > SHARE * all
     };
-    let crowd = !s.state.notes.is_empty();
+    let crowd = s.state.notes.iter().any(|note| note.at.is_none());
     let correlated = failing("ljung_box");
-    let unsteady = checks::unsteady(&s.e);
-    let wanders = |omega: f64| {
-        let at = omega / std::f64::consts::PI;
-        unsteady.iter().any(|(from, to)| at >= *from && at < *to)
-    };
+    let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
+    // What is left without a place may be anywhere; what has one leaves a strong term elsewhere alone.
+    let misplaced = |t: &Term| !places.is_empty() && t.score() < WIDE;
     let followed = followers(s, &g);
     let remainder = |t: &Term| {
         followed
@@ -132,8 +138,23 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
         .map(|t| {
             let own = &s.state.solution.beta[at..at + t.columns.len()];
             at += t.columns.len();
-            let in_band = if t.columns.is_empty() {
-                !fails.is_empty()
+            let line = match t.form {
+                Form::Line(omega) | Form::SideBands(omega, _) => Some(omega),
+                _ => None,
+            };
+            let there = if let Some(omega) = line {
+                let at = omega * n / PI;
+                within(&crowds, omega)
+                    || unsteady.iter().any(|(a, b)| at >= a * n && at < b * n)
+                    || (correlated || !places.is_empty()) && checks::stands_out(&s.u, at)
+            } else if let Form::Covariance(process, theta) = &t.form {
+                let own = process.density(theta, &panel.bins.at);
+                let weights = panel.bins.products(&ones, &ones);
+                let information = own.iter().zip(&g).zip(weights);
+                let information = information.map(|((d, g), m)| m * (d / g).powi(2));
+                unlike
+                    || correlated && (places.is_empty() || process.filters_white())
+                    || share(&information.collect::<Vec<_>>())
             } else {
                 let mut sum = vec![0.0; panel.bins.n];
                 for (c, b) in t.columns.iter().zip(own) {
@@ -141,32 +162,58 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
                         .zip(panel.column(*c).iter())
                         .for_each(|(s, x)| *s += b * x);
                 }
-                share(&panel.bins.products(&sum, &sum))
+                let energy = panel.bins.products(&sum, &sum);
+                share(
+                    &energy
+                        .iter()
+                        .zip(&g)
+                        .map(|(e, g)| e / g)
+                        .collect::<Vec<_>>(),
+                )
             };
-            let elsewhere = match &t.form {
-                Form::Covariance(..) => correlated || !unsteady.is_empty(),
-                Form::Line(omega) | Form::SideBands(omega, _) => wanders(*omega),
-                _ => false,
-            };
-            let line = matches!(t.form, Form::Line(_) | Form::SideBands(..));
-            if line && s.state.wandering {
+            if line.is_some() && s.state.wandering.is_some() {
                 Doubt::No
-            } else if in_band || generic(t) && (crowd || elsewhere) {
+            } else if there || generic(t) && (crowd || misplaced(t)) {
                 Doubt::Checks
-            } else if let Some((id, share)) = remainder(t).filter(|_| generic(t) && !line) {
+            } else if let Some((id, share)) = remainder(t).filter(|_| generic(t) && line.is_none())
+            {
                 Doubt::Remainder(id, share)
             } else {
                 Doubt::No
             }
         })
         .collect();
-    // What is left over in the mean or the spectrum comes and goes, and its squares with it.
     let variance = failing("variance_in_time")
         || failing("kurtosis")
-        || correlated
-        || failing("time_frequency")
-        || crowd;
+        || crowd
+        || if places.is_empty() {
+            correlated || failing("time_frequency")
+        } else {
+            !everywhere(s, &|k| within(&places, k as f64 * PI / n))
+        };
     (terms, variance)
+}
+
+/// Whether the law of the variance holds in the coefficients beside those that something left over fills: a noise that
+/// changes does so at all frequencies, and what comes and goes brings its squares with it.
+fn everywhere(s: &Searched<'_>, filled: &dyn Fn(usize) -> bool) -> bool {
+    let Some(v) = &s.variance else { return true };
+    let mut kept = 0.0;
+    let u: Vec<f64> = (s.u.iter().enumerate())
+        .map(|(k, u)| {
+            let clear = f64::from(u8::from(!filled(k)));
+            kept += clear;
+            clear * u
+        })
+        .collect();
+    let e = s.search.panel.dct.inverse(&u);
+    let n = e.len() as f64;
+    let energy: f64 = e.iter().map(|e| e * e).sum();
+    let scaled: f64 = e.iter().zip(&v.law).map(|(e, v)| e * e / v).sum();
+    let logs: f64 = v.law.iter().map(|v| v.ln()).sum();
+    // A share of the coefficients holds that share of what all of them tell.
+    let lr = kept / n * (n * (energy / scaled).ln() - logs);
+    lr > HOLDS * kept / n * v.lr
 }
 
 /// Take the doubted names of a channel out of its findings, given as one for each term and then the rest; what follows a

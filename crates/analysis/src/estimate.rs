@@ -145,8 +145,10 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
                 location: vec![],
             };
             // Cramer-Rao bound of a frequency, rad per sample: 24 s^2 / (A^2 n^3).
+            // One that wanders has no place narrower than that.
             let frequency = |omega: f64, amplitude: f64| {
                 let error = (24.0 * state.solution.white * g(omega) / n.powi(3)).sqrt() / amplitude;
+                let error = error.max(state.wandering.unwrap_or(0.0));
                 let hz = rate_hz / std::f64::consts::TAU;
                 (omega * hz, error * hz)
             };

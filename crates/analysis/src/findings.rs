@@ -2,6 +2,7 @@
 
 use model::effect::{Effect, Found, Hypothesis, Parameters};
 use model::effects::effect;
+use model::parameter::Parameter;
 use model::record::Base;
 
 use crate::diagnosis::Searched;
@@ -37,6 +38,9 @@ pub(crate) fn alternatives(all: &[(&'static dyn Effect, f64)]) -> Vec<Alternativ
         .collect()
 }
 
+/// Below it a value is told with an exponent.
+const SMALL: f64 = 1e-4;
+
 /// Decimal places that show two digits of a standard error.
 fn decimals(error: f64) -> usize {
     if error > 0.0 && error.is_finite() {
@@ -52,9 +56,15 @@ pub(crate) fn sentence(title: &str, channel: &str, parameters: &Parameters) -> S
         .map(|(name, p)| {
             let unit = if p.unit == "1" { "" } else { &p.unit };
             let text = match p.std_error {
+                Some(error) if p.value.abs().max(error) < SMALL => {
+                    format!("{name} {:.2e} +- {error:.1e} {unit}", p.value)
+                }
                 Some(error) => {
                     let places = decimals(error);
                     format!("{name} {:.places$} +- {error:.places$} {unit}", p.value)
+                }
+                None if p.value != 0.0 && p.value.abs() < SMALL => {
+                    format!("{name} {:.2e} {unit}", p.value)
                 }
                 None => format!("{name} {:.4} {unit}", p.value),
             };
@@ -82,6 +92,12 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
     let scores = gain::scores(&s.target.y, grid.rate_hz, &s.state, &values);
     let misfit = evidence::allan_misfit(s, grid.rate_hz, seed);
     let n = (grid.n as f64).ln();
+    // A base that is no turntable turns a little about the other axes too.
+    let motion = s.search.candidates.iter();
+    let motion = motion
+        .filter(|_| s.search.view.sways())
+        .find(|c| matches!(c.hypothesis, Hypothesis::Motion));
+    let turning = |name: &str| grid.targets.iter().any(|t| t.moving && t.name == name);
     s.state
         .terms
         .iter()
@@ -89,7 +105,13 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
         .zip(scores)
         .map(|((term, found), score)| {
             let parameters = term.effect.describe(found);
-            let alternatives = alternatives(&term.alternatives);
+            let mut alternatives = alternatives(&term.alternatives);
+            if let Some(motion) = motion.filter(|_| term.follows.as_deref().is_some_and(turning)) {
+                alternatives.push(Alternative {
+                    cause: motion.effect.id().into(),
+                    log_odds: 0.0,
+                });
+            }
             let size = (found.coefficients.len() + found.location.len()) as f64;
             Finding {
                 cause: term.effect.id().into(),
@@ -260,6 +282,18 @@ pub(crate) fn joined(findings: Vec<Finding>) -> Vec<Finding> {
         all.push(f);
     }
     all
+}
+
+/// Parameters that every finding of a cause has and that the fit left out are 0.
+pub(crate) fn complete(mut findings: Vec<Finding>) -> Vec<Finding> {
+    for f in &mut findings {
+        let Some(of) = effect(&f.cause) else { continue };
+        for p in of.parameters().iter().filter(|p| p.required) {
+            let absent = || Parameter::exact(0.0, p.unit);
+            f.parameters.entry(p.name.to_owned()).or_insert_with(absent);
+        }
+    }
+    findings
 }
 
 /// The scale factor, where the base sways and the accelerometers see it; or why not.

@@ -20,6 +20,9 @@ pub const LEAST_SECONDS: f64 = 30.0;
 const MOTION_RMS: f64 = 0.3;
 const MOTION_BAND_HZ: (f64, f64) = (0.02, 0.6);
 
+/// Largest share of another axis' rate that a gyro sees by its own fault: a mounting off by six degrees.
+const LARGEST_SHARE: f64 = 0.1;
+
 /// A gyro on the grid.
 pub struct Target {
     /// Channel name.
@@ -67,16 +70,35 @@ pub struct Grid {
 /// Sample rate of a record: the header's, else from device or host times.
 #[must_use]
 pub fn rate_of(record: &Record) -> Option<f64> {
-    let from_times = || {
-        let t = record.host_time_s.as_ref()?;
-        let (first, last) = (t.first()?, t.last()?);
-        Some((t.len() - 1) as f64 / (last - first))
-    };
+    let from_times = || rate_of_times(record.host_time_s.as_ref()?, record.seq.as_deref());
     record
         .header
         .rate_hz
         .or_else(from_times)
         .filter(|r| r.is_finite() && *r > 0.0)
+}
+
+/// Rate of the rows that follow each other at about the usual interval: where rows are missing no time is stretched.
+/// Times that come in batches have no usual interval; then the whole length counts.
+fn rate_of_times(t: &[f64], seq: Option<&[u64]>) -> Option<f64> {
+    let (first, last) = (t.first()?, t.last()?);
+    let rows = match seq.filter(|s| s.len() == t.len()) {
+        Some(s) => return Some(s.last()?.saturating_sub(*s.first()?) as f64 / (last - first)),
+        None => (t.len() - 1) as f64,
+    };
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    if steps.is_empty() {
+        return None;
+    }
+    let middle = steps.len() / 2;
+    let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let alike = |d: &&f64| (**d - usual).abs() < 0.5 * usual;
+    let count = steps.iter().filter(alike).count();
+    if count as f64 > 0.9 * rows {
+        Some(count as f64 / steps.iter().filter(alike).sum::<f64>())
+    } else {
+        Some(rows / (last - first))
+    }
 }
 
 /// Place of every row on the grid, and the number of places.
@@ -128,12 +150,9 @@ fn interpolated(values: &[f64]) -> Vec<f64> {
 }
 
 /// White variance from first differences, robust against steps and spikes.
-fn white_by_differences(y: &[f64]) -> f64 {
-    let mut d: Vec<f64> = y
-        .windows(2)
-        .map(|w| (w[1] - w[0]).abs())
-        .filter(|d| d.is_finite())
-        .collect();
+pub(crate) fn white_by_differences(y: &[f64]) -> f64 {
+    let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
+    let mut d: Vec<f64> = known.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     if d.is_empty() {
         return 0.0;
     }
@@ -254,6 +273,15 @@ pub fn lay_out(
             white: fit.1,
         });
     }
+    let top = |y: &[f64]| {
+        let mut c = dct.forward(y);
+        c.truncate(top);
+        c
+    };
+    followers(&mut targets, &|t, strongest| {
+        let with = [drivers.as_slice(), &[top(&strongest.y)]].concat();
+        motion(&mut dct.forward(&t.y), &with, n, rate_hz, turns)
+    });
     let signals = record
         .channels
         .iter()
@@ -327,11 +355,8 @@ fn spike_limit(n: usize) -> f64 {
 }
 
 fn white_of(y: &[f64]) -> f64 {
-    let d: Vec<f64> = y
-        .windows(2)
-        .map(|w| w[1] - w[0])
-        .filter(|d| d.is_finite())
-        .collect();
+    let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
+    let d: Vec<f64> = known.windows(2).map(|w| w[1] - w[0]).collect();
     d.iter().map(|d| d * d).sum::<f64>() / (2.0 * d.len().max(1) as f64)
 }
 
@@ -352,6 +377,23 @@ fn drivers(record: &Record, places: &[usize], n: usize, dct: &Dct) -> Vec<Vec<f6
         })
         .map(|c| dct.forward(&interpolated(&spread(&c.values, places, n, &[]))))
         .collect()
+}
+
+/// An axis that only follows the one that turns most, and little of it, is not moved itself: its gyro sees a part of the
+/// other axis. `left` is the motion of an axis that does not follow another.
+fn followers(targets: &mut [Target], left: &dyn Fn(&Target, &Target) -> f64) {
+    let Some(strongest) =
+        (0..targets.len()).max_by(|a, b| targets[*a].motion_rms.total_cmp(&targets[*b].motion_rms))
+    else {
+        return;
+    };
+    let most = LARGEST_SHARE * targets[strongest].motion_rms;
+    for i in 0..targets.len() {
+        let t = &targets[i];
+        if t.moving && t.motion_rms < most && left(t, &targets[strongest]) <= MOTION_RMS {
+            targets[i].moving = false;
+        }
+    }
 }
 
 /// Half cycles of the slowest motion that is looked for where the header says that the base moves.

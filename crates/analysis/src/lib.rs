@@ -2,6 +2,7 @@
 //!
 //! Data in, values out: nothing here opens a file, reads a clock or prints.
 
+mod adequacy;
 pub mod allan;
 pub mod analyze;
 pub mod angles;
@@ -23,6 +24,7 @@ mod findings;
 pub mod gain;
 pub mod grid;
 pub mod kalman;
+mod levels;
 pub mod likelihood;
 mod losses;
 pub mod noise_fit;

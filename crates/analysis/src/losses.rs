@@ -31,6 +31,13 @@ pub(crate) fn renumbered<'a>(record: &'a Record, audit: &Audit) -> Cow<'a, Recor
 /// The audits' findings, with the far readings that only the whitened residual shows.
 pub(crate) fn findings(audit: &Audit, searched: &[Searched<'_>], grid: &Grid) -> Vec<Finding> {
     let mut all = audit.findings.clone();
+    // An axis that truly turns changes from sample to sample by more than its noise.
+    let turns = |name: &String| {
+        searched
+            .iter()
+            .any(|s| s.target.moving && s.target.name == *name)
+    };
+    all.retain(|f| f.cause != "outliers" || !f.channels.iter().all(turns));
     for s in searched {
         let name = &s.target.name;
         if s.target.spikes.is_empty() || audit.is_suppressed("outliers", name) {

@@ -1,5 +1,6 @@
 //! The scale factor of a gyro held against the tilt that the accelerometers see while the base sways.
 
+use model::effect::Signal;
 use model::record::{Axis, Quantity};
 
 use crate::grid::{Grid, Target};
@@ -24,37 +25,47 @@ pub struct Scale {
 /// # Errors
 /// Why the record does not allow it.
 pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
-    // About x the component along y tilts, about y the one along x.
-    let along =
-        match target.axis {
-            Some(Axis::X) => Axis::Y,
-            Some(Axis::Y) => Axis::X,
-            _ => return Err(
-                "a turn about the vertical tilts no accelerometer: sway about a horizontal axis"
-                    .into(),
-            ),
-        };
+    let Some(own) = target.axis else {
+        return Err("the gyro has no axis".into());
+    };
     let acc = |axis| {
         grid.signals
             .iter()
             .find(|s| s.quantity == Quantity::Acc && s.axis == Some(axis))
     };
-    let (Some(side), Some(up)) = (acc(along), acc(Axis::Z)) else {
-        return Err("acc_z and the accelerometer across the axis are needed".into());
+    // Up is the axis that carries most of gravity, whichever way it points.
+    let mean = |s: &Signal| s.values.iter().sum::<f64>() / s.values.len().max(1) as f64;
+    let axes = [Axis::X, Axis::Y, Axis::Z];
+    let weight = |a: &Axis| acc(*a).map_or(0.0, |s| mean(s).abs());
+    let upright = axes
+        .into_iter()
+        .max_by(|a, b| weight(a).total_cmp(&weight(b)));
+    let upright = upright.unwrap_or(Axis::Z);
+    if upright == own {
+        return Err(
+            "a turn about the vertical tilts no accelerometer: sway about a horizontal axis".into(),
+        );
+    }
+    // About x the component along y tilts, about y the one along x.
+    let level: Vec<Axis> = axes.into_iter().filter(|a| *a != upright).collect();
+    let pitches = own == level[1];
+    let (along, beside) = (level[usize::from(!pitches)], own);
+    let (Some(side), Some(up)) = (acc(along), acc(upright)) else {
+        return Err("the accelerometers along the vertical and across the axis are needed".into());
     };
+    let sign = mean(up).signum();
     let n = grid.n;
-    let across = acc(if along == Axis::Y { Axis::X } else { Axis::Y });
+    let across = acc(beside);
     // The roll is atan(y / z). The pitch is that of x against both others, and its rate about the body's y is smaller
     // by the cosine of the roll.
-    let pitches = along == Axis::X;
     let other = |i: usize| across.filter(|_| pitches).map_or(0.0, |a| a.values[i]);
     let tilt: Vec<f64> = (0..n)
         .map(|i| {
-            let vertical = up.values[i].hypot(other(i)).copysign(up.values[i]);
+            let vertical = up.values[i].hypot(other(i)).copysign(sign * up.values[i]);
             side.values[i].atan2(vertical).to_degrees()
         })
         .collect();
-    let leaning = |i: usize| (other(i).atan2(up.values[i])).cos();
+    let leaning = |i: usize| (other(i).atan2(sign * up.values[i])).cos();
     // Central difference of the tilt, and the rate averaged with the same weights (trapezoids).
     let tilt_rate: Vec<f64> = (0..n)
         .map(|i| {

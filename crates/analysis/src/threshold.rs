@@ -68,3 +68,9 @@ pub fn variance_law() -> f64 {
 pub fn segment() -> f64 {
     quantile(1, 2000.0)
 }
+
+/// Two levels where the search found nothing but a random walk, whose room they take: size, dwell time and the walk.
+#[must_use]
+pub fn two_level() -> f64 {
+    WIDENED * quantile(3, 1.0)
+}

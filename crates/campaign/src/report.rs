@@ -227,6 +227,7 @@ is one only by its swing, which holds depth^2 / (2 + depth^2) of its energy: d' 
 depth 1 and 21 at depth 0.5, and depths are drawn from 0.5 to 1.
 ";
 
+const NAMES: &str = include_str!("report/names.md");
 const KEPT: &str = "\
 The engine was developed with the first 14. The next eight were kept back until the campaign of 2026-11-21 with seed
 2353998398, in which 35 of 48 were unexplained and 9 got a name; since then a rule was changed by what it said to one of
@@ -506,7 +507,7 @@ fn pairs(out: &mut String, all: &[Outcome]) {
 fn foreign(out: &mut String, all: &[Outcome]) {
     let _ = writeln!(
         out,
-        "\n## Effects that the library does not have\n\n{KEPT}\n\n| effect | unexplained | given a name | names given |\n|---|---|---|---|"
+        "\n{NAMES}## Effects that the library does not have\n\n{KEPT}\n\n| effect | unexplained | given a name | names given |\n|---|---|---|---|"
     );
     for (i, label) in FOREIGN.iter().enumerate() {
         let own: Vec<&Outcome> = all

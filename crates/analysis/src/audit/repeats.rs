@@ -12,6 +12,8 @@ use crate::audit::local::{robust_sigma, width};
 
 /// Distances of the pairs that tell the chance of agreement.
 const LAGS: std::ops::RangeInclusive<usize> = 20..=25;
+/// Longest distance, in steps, that tells whether readings lie on a lattice: beyond it rounding hides that.
+const MOST_STEPS: f64 = 1000.0;
 /// Excess over the expected share, relative, that a single gyro has to show: the share itself is that well known.
 const EXCESS: f64 = 0.1;
 
@@ -82,12 +84,19 @@ fn bridged(d: &[f64], step: f64) -> Option<(f64, f64)> {
 }
 
 /// Smallest distance between two readings that is no dust of the arithmetic: the step of a channel that does not say.
+/// 0 where the other distances are no multiples of it: such readings repeat exactly or not at all.
 fn smallest_step(values: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     let dust = 1e-6 * robust_sigma(&sorted);
-    let gaps = sorted.windows(2).map(|w| w[1] - w[0]);
-    gaps.filter(|g| *g > dust).fold(f64::INFINITY, f64::min)
+    let gaps = || sorted.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > dust);
+    let step = gaps().fold(f64::INFINITY, f64::min);
+    let (mut multiples, mut all) = (0.0, 0.0);
+    for steps in gaps().map(|g| g / step).filter(|s| *s < MOST_STEPS) {
+        all += 1.0;
+        multiples += f64::from(u8::from((steps - steps.round()).abs() < 0.1));
+    }
+    if multiples > 0.8 * all { step } else { 0.0 }
 }
 
 /// Chance that a reading agrees with the one before, without a fault, and the relative error of that. Readings that
@@ -115,7 +124,7 @@ fn agreement(values: &[f64], step: f64) -> (f64, f64) {
 
 /// Whether two readings are the same.
 fn equal(a: f64, b: f64, step: f64) -> bool {
-    (a - b).abs() < 0.5 * step
+    (a - b).abs() <= 0.5 * step
 }
 
 pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {

@@ -198,7 +198,7 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
         audit.findings.push(Finding {
             cause: "clock_rate".into(),
             channels: names.to_vec(),
-            parameters: [("ppm".to_owned(), Parameter::estimated(ppm, error, "1e-6"))].into(),
+            parameters: [("ppm".to_owned(), Parameter::estimated(ppm, error, "ppm"))].into(),
             what,
             ..Finding::default()
         });

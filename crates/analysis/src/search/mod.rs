@@ -6,6 +6,7 @@ mod refine;
 mod rivals;
 mod weigh;
 
+use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::{Effect, Hypothesis, Shape, View};
@@ -13,6 +14,7 @@ use model::effects::EFFECTS;
 use model::record::Quantity;
 
 use crate::beyond;
+use crate::checks::Outcome;
 use crate::likelihood::{Noise, Panel, Solution};
 
 /// Most terms on one channel.
@@ -69,6 +71,8 @@ pub struct Term {
     pub alternatives: Vec<(&'static dyn Effect, f64)>,
     /// Coefficients found by other means than the fit.
     pub stated: Option<Vec<(f64, f64)>>,
+    /// What its name claims, where a contest has weighed that.
+    pub claims: Vec<Outcome>,
 }
 
 impl Term {
@@ -104,6 +108,15 @@ impl Candidate {
     }
 }
 
+/// Structure that was seen and that no single effect explains.
+#[derive(Clone, Debug)]
+pub struct Note {
+    /// What is seen.
+    pub what: String,
+    /// Lowest and highest angular frequency, rad per sample, where it has such a place.
+    pub at: Option<(f64, f64)>,
+}
+
 /// A model of a channel.
 #[derive(Clone)]
 pub struct State {
@@ -114,9 +127,11 @@ pub struct State {
     /// Its fit.
     pub solution: Solution,
     /// Structure that was seen and that no single effect explains.
-    pub notes: Vec<String>,
-    /// Whether its line is one of a narrow crowd: a line still, though no steady one.
-    pub wandering: bool,
+    pub notes: Vec<Note>,
+    /// Half the width of the narrow crowd that its line is one of, rad per sample: a line still, though no steady one.
+    pub wandering: Option<f64>,
+    /// The level of a process that is not Gaussian, where one was named: sample by sample.
+    pub level: Option<Rc<Vec<f64>>>,
 }
 
 impl State {
@@ -263,7 +278,8 @@ impl<'a> Search<'a> {
             noise,
             solution,
             notes: vec![],
-            wandering: false,
+            wandering: None,
+            level: None,
         };
         let mut fitted = state.noise.terms.iter();
         for t in &mut state.terms {
@@ -310,7 +326,8 @@ impl<'a> Search<'a> {
             noise,
             solution,
             notes: vec![],
-            wandering: false,
+            wandering: None,
+            level: None,
         };
         let mut state = baseline.clone();
         while state.terms.len() < MOST_TERMS {

@@ -31,6 +31,7 @@ impl Search<'_> {
             threshold,
             alternatives: vec![],
             stated: None,
+            claims: vec![],
         };
         let n = self.panel.bins.n;
         match &candidate.hypothesis {

@@ -16,7 +16,7 @@ impl Effect for ClockRate {
 
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
-            parameter("ppm", "1e-6", "device clock fast against the host, parts per million"),
+            parameter("ppm", "ppm", "device clock fast against the host, parts per million"),
         ];
         PARAMETERS
     }

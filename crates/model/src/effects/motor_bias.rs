@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::parameter::Parameter;
 use crate::record::Base;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Found, Regression, Shape, optional, value};
+use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Found, Regression, Shape, optional, parameter, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -21,7 +21,7 @@ impl Effect for MotorBias {
 
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
-            optional("at_full_duty", "deg/s", "shift at full duty, once the motor has its speed; 0 where it is left out"),
+            parameter("at_full_duty", "deg/s", "shift at full duty, once the motor has its speed"),
             optional("while_turning", "deg/s", "shift beyond that while the motor turns forward, the opposite backward: the current that friction takes"),
             optional("surge_at_full_duty", "deg/s", "shift beyond that right after a step from standstill to full duty"),
             optional("surge_time", "s", "time in which the surge falls to 1/e: the motor's mechanical time constant"),
