@@ -24,8 +24,8 @@ pub fn longest_part(record: &Record) -> Cow<'_, Record> {
         let longest = (part.len() as f64 / ROWS_TO_A_HOLE).max(1.0);
         let mut parts: Vec<Range<usize>> = vec![];
         let mut from = part.start;
-        for row in part.start + 1..part.end {
-            if steps[row] - 1.0 > longest {
+        for (row, step) in steps.iter().enumerate().take(part.end).skip(part.start + 1) {
+            if step - 1.0 > longest {
                 parts.push(from..row);
                 from = row;
             }
