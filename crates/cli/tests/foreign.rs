@@ -178,6 +178,15 @@ fn what_is_assumed_is_told_and_what_contradicts_itself_is_refused() {
         notes[0].starts_with("gyro_x, gyro_y taken in deg/s"),
         "{notes:?}"
     );
+    let head = table("t,gx (rad/s),gy (rad/s)\n", ",", ".", 1.0, 1.0);
+    let notes = read(head.as_bytes(), map, "gyro=deg/s")
+        .expect("deg/s")
+        .record
+        .notes;
+    assert!(
+        notes[0].contains("says rad/s") && notes.len() == 2,
+        "{notes:?}"
+    );
     for (columns, units, expected) in [
         (map, "gyro=deg/s,gyro=rad/s", "`gyro` is given twice"),
         ("gyro_x=gx,gyro_x=gy", "", "`gyro_x` is given twice"),

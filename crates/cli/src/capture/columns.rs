@@ -5,7 +5,7 @@ use model::record::Quantity;
 use super::foreign::meaning;
 use super::header::Lines;
 use super::propose::proposal;
-use super::units::{COUNTS, What, at_the_end, convert, in_brackets, usual};
+use super::units::{COUNTS, What, at_the_end, convert, in_brackets, known, usual};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
 
 /// A column of the file: what it is here, and how its cells become values.
@@ -230,9 +230,11 @@ fn time(
 ) -> Result<Role, CaptureError> {
     let given = mapping.unit("time", What::Time);
     let stated = said.units[at].as_deref();
-    let unit = given
-        .or(stated)
-        .or_else(|| at_the_end(&said.names[at], What::Time));
+    let stated = stated.or_else(|| at_the_end(&said.names[at], What::Time));
+    let unit = given.or(stated);
+    found
+        .notes
+        .extend(contradiction("time", &said.names[at], given, stated));
     found.time_is_assumed = unit.is_none();
     let (_, scale) = convert(What::Time, unit)?;
     if let (Some(unit), None) = (unit.filter(|_| scale != 1.0), given) {
@@ -242,6 +244,21 @@ fn time(
         ));
     }
     Ok(Role::Time { scale })
+}
+
+/// Says that a unit given is another one than the column's own.
+fn contradiction(
+    ours: &str,
+    column: &str,
+    given: Option<&str>,
+    stated: Option<&str>,
+) -> Option<String> {
+    let (given, stated) = (known(given?)?, known(stated?)?);
+    (given != stated).then(|| {
+        format!(
+            "{ours} is taken in {given}, as --units says, although its column `{column}` says {stated}"
+        )
+    })
 }
 
 /// Says what was assumed.
@@ -368,8 +385,13 @@ fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureEr
             "flags" => Role::Flags,
             name => {
                 let what = What::Channel(meaning(name).0);
-                let given = mapping.unit(name, what).or(said.units[at].as_deref());
-                let unit = given.or_else(|| at_the_end(&said.names[at], what));
+                let column = &said.names[at];
+                let stated = said.units[at].as_deref();
+                let stated = stated.or_else(|| at_the_end(column, what));
+                let given = mapping.unit(name, what);
+                let unit = given.or(stated);
+                let note = contradiction(name, column, given, stated);
+                found.notes.extend(note);
                 if unit.is_none() {
                     assumed.push((name.to_owned(), what));
                 }

@@ -4,7 +4,7 @@ use model::record::Quantity;
 
 use crate::text::shell_word;
 
-use super::units::{What, at_the_end, in_brackets, known};
+use super::units::{What, at_the_end, in_brackets, is_unit_of, known};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -146,7 +146,9 @@ impl Meaning {
         let first = words.first().map_or("", String::as_str);
         let letters = |list: &[&str]| list.contains(&first);
         let is_seconds = known(first) == Some("s");
-        let kind = if is(&["mag", "quat", "orient", "gravity", "euler"]) {
+        let unit = in_brackets(name).1;
+        let unit_is_of = |what| unit.is_some_and(|unit| is_unit_of(unit, what));
+        let kind = if is(&["mag", "quat", "orient", "gravity", "euler", "tick"]) {
             Kind::Unknown
         } else if is(&["gyr", "angular", "omega", "rotation", "rate"])
             || letters(&["g", "w", "gx", "gy", "gz", "wx", "wy", "wz"])
@@ -158,6 +160,12 @@ impl Meaning {
             Kind::Temp
         } else if first.starts_with("time") || first == "t" || is_seconds {
             Kind::Time
+        } else if unit_is_of(What::Time) {
+            Kind::Time
+        } else if unit_is_of(What::Channel(Quantity::Gyro)) {
+            Kind::Gyro
+        } else if unit_is_of(What::Channel(Quantity::Acc)) {
+            Kind::Acc
         } else if axis.is_some() && words.len() == 1 {
             Kind::Bare
         } else {
@@ -244,6 +252,10 @@ mod tests {
             (
                 "gyr[0];gyr[1];gyr[2];mag[0]",
                 "--columns 'gyro_x=gyr[0],gyro_y=gyr[1],gyro_z=gyr[2]' --units gyro=deg/s",
+            ),
+            (
+                "Zeit (s);Drehrate x (°/s);Drehrate y (°/s)",
+                "--columns 'time=Zeit (s),gyro_x=Drehrate x (°/s),gyro_y=Drehrate y (°/s)' --units gyro=deg/s",
             ),
             ("y", "--columns gyro_y=y --units gyro=deg/s"),
             ("values", "--columns gyro_x=values --units gyro=deg/s"),

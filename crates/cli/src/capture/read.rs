@@ -399,7 +399,7 @@ mod tests {
             },
         )
         .unwrap();
-        assert!(read.record.notes.is_empty());
+        assert!(read.record.notes[0].contains("says deg/s"));
         assert!((read.record.channels[0].values[0] - 57.295_779_5).abs() < 1e-6);
     }
 }

@@ -97,7 +97,7 @@ pub(super) fn at_the_end(name: &str, what: What) -> Option<&'static str> {
     // From the longest ending on: `deg_s` before `s`.
     name.match_indices(['_', ' ', '.'])
         .filter_map(|(at, _)| known(&name[at + 1..]))
-        .find(|unit| scale(what, unit).is_some())
+        .find(|unit| is_unit_of(unit, what))
 }
 
 /// What a unit is of.
@@ -146,6 +146,11 @@ fn scale(what: What, unit: &str) -> Option<(&'static str, f64)> {
         .iter()
         .find(|(name, ..)| *name == unit)
         .map(|(_, ours, factor)| (*ours, *factor))
+}
+
+/// Whether one of [`known`] is a unit of this.
+pub(super) fn is_unit_of(unit: &str, what: What) -> bool {
+    scale(what, unit).is_some()
 }
 
 /// The unit that is taken where none is said.
