@@ -9,10 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::allan::{Deviation, Gapped, Phase, TauGrid};
 use crate::angles::{Angle, Attitude, angle, attitude};
-use crate::edf::{NoiseType, chi_square_interval, edf};
+use crate::curves::{bridges, curve, gapped_curve, gaps_note};
 use crate::error::AnalysisError;
 use crate::noise_fit::{Described, Estimated, NoiseFit, Ramp, Spectrum, Term, fit_described};
-use crate::noise_id::identify;
 use crate::paper::{Figure, paper_figures};
 use crate::rows;
 use crate::sampling::Sampling;
@@ -391,7 +390,7 @@ fn analyze_channel(
             &units.reading
         };
         let points = match &gapped {
-            Some(gapped) if matches!(kind, Deviation::Oadev | Deviation::Ohdev) => gapped_curve(
+            Some(gapped) if bridges(*kind) => gapped_curve(
                 gapped,
                 *kind,
                 &phase,
@@ -507,100 +506,4 @@ fn letters(fitted: &NoiseFit) -> String {
         .chain((fitted.model.ramp != Ramp::Absent).then_some("R"))
         .collect();
     names.join(", ")
-}
-
-fn gaps_note(gapped: &Gapped, phase: &Phase, tau0: f64) -> String {
-    let longest = gapped.lengths().into_iter().max().unwrap_or(0);
-    format!(
-        "{} gaps, {:.2} % of the sample times empty: overlapping Allan and Hadamard deviations are of means over the \
-         samples that are there, up to {:.6} and {:.6} s, and their intervals count the differences that are left; other deviations end at the \
-         longest run without a gap, {:.6} s. Nothing is filled in",
-        phase.run_lengths().len() - 1,
-        100.0 * (1.0 - gapped.filled()),
-        (longest / 2) as f64 * tau0,
-        (longest / 3) as f64 * tau0,
-        phase.longest_run() as f64 * tau0
-    )
-}
-
-/// The overlapping Allan or Hadamard curve of a record with gaps. The freedom is that of the grid, less the share of differences that
-/// the gaps took.
-fn gapped_curve(
-    gapped: &Gapped,
-    kind: Deviation,
-    phase: &Phase,
-    fitted: Option<&NoiseFit>,
-    tau0: f64,
-    grid: TauGrid,
-    scale: &Scale,
-) -> Vec<DeviationPoint> {
-    let lengths = gapped.lengths();
-    let hadamard = kind == Deviation::Ohdev;
-    let longest = kind.longest(lengths.iter().copied().max().unwrap_or(0));
-    let mut noise = NoiseType::WhiteRate;
-    grid.factors(longest)
-        .into_iter()
-        .filter_map(|m| {
-            let found = if hadamard {
-                let white_share = fitted.map_or(1.0, |f| f.white_share_hadamard(m));
-                gapped.overlapping_hadamard(tau0, m, white_share)?
-            } else {
-                let white_share = fitted.map_or(1.0, |f| f.white_share(m));
-                gapped.overlapping_allan(tau0, m, white_share)?
-            };
-            // Where no run is long enough to tell, the fit does: by the slope of its curve.
-            noise = identify(phase, m)
-                .or_else(|| {
-                    let f = fitted?;
-                    let slope = (f.deviation(2 * m) / f.deviation(m)).log2();
-                    Some(NoiseType::nearest(-1.0 - 2.0 * slope))
-                })
-                .unwrap_or(noise);
-            let share = found.estimate.n as f64 / found.possible as f64;
-            let edf = (edf(kind, noise, m, &lengths) * share).max(1.0);
-            let (low, high) = chi_square_interval(found.estimate.deviation, edf, 0.95);
-            Some(DeviationPoint {
-                tau_s: found.estimate.tau_s,
-                deviation: found.estimate.deviation * scale.factor,
-                low: low * scale.factor,
-                high: high * scale.factor,
-                edf,
-                n: found.estimate.n,
-                noise_alpha: noise.alpha(),
-            })
-        })
-        .collect()
-}
-
-/// A curve with its intervals. Where too few clusters are left to identify the noise, the last type identified holds.
-fn curve(
-    phase: &Phase,
-    kind: Deviation,
-    tau0: f64,
-    grid: TauGrid,
-    scale: &Scale,
-) -> Vec<DeviationPoint> {
-    let runs = phase.run_lengths();
-    let mut noise = NoiseType::WhiteRate;
-    let factors = grid.factors(kind.longest(phase.longest_run()));
-    phase
-        .curve(kind, tau0, &factors)
-        .into_iter()
-        .map(|e| {
-            if let Some(found) = identify(phase, e.m) {
-                noise = found;
-            }
-            let edf = edf(kind, noise, e.m, &runs);
-            let (low, high) = chi_square_interval(e.deviation, edf, 0.95);
-            DeviationPoint {
-                tau_s: e.tau_s,
-                deviation: e.deviation * scale.factor,
-                low: low * scale.factor,
-                high: high * scale.factor,
-                edf,
-                n: e.n,
-                noise_alpha: noise.alpha(),
-            }
-        })
-        .collect()
 }

@@ -1,27 +1,28 @@
-//! Overlapping Allan and Hadamard deviations of a record with gaps: cluster means over the samples that are there, at their true times.
+//! Overlapping Allan and Hadamard deviations of a record with gaps: cluster means over the samples that are there, at
+//! their true times.
 
 use std::ops::Range;
 
 use super::Estimate;
 
 /// Part of a cluster's samples that have to be there, of the part that is there on the whole.
-const NEEDED_SHARE: f64 = 0.5;
+pub(super) const NEEDED_SHARE: f64 = 0.5;
 /// Below this many samples a cluster has to be complete.
-const WHOLE_BELOW: usize = 8;
+pub(super) const WHOLE_BELOW: usize = 8;
 
 /// Readings on the grid of sample times, with what is missing left out of both sums and counts.
 #[derive(Clone, Debug)]
 pub struct Gapped {
-    segments: Vec<Segment>,
+    pub(super) segments: Vec<Segment>,
     present: usize,
 }
 
 #[derive(Clone, Debug)]
-struct Segment {
+pub(super) struct Segment {
     /// Σ of the readings before each slot, less their mean.
-    sums: Vec<f64>,
+    pub(super) sums: Vec<f64>,
     /// Their number.
-    counts: Vec<u32>,
+    pub(super) counts: Vec<u32>,
 }
 
 /// A deviation of a gapped record.
@@ -169,7 +170,7 @@ impl Gapped {
     }
 
     /// Samples that a cluster of `m` slots needs.
-    fn needed(&self, m: usize) -> u32 {
+    pub(super) fn needed(&self, m: usize) -> u32 {
         if m < WHOLE_BELOW {
             m as u32
         } else {
@@ -178,7 +179,7 @@ impl Gapped {
     }
 
     #[expect(clippy::too_many_arguments, reason = "the sums of one pass")]
-    fn estimate(
+    pub(super) fn estimate(
         &self,
         squares: f64,
         inflation: f64,
@@ -206,7 +207,7 @@ impl Gapped {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::allan::{Deviation, Phase, deviation};
     use crate::edf::{NoiseType, edf};
@@ -215,7 +216,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     /// Rows left of `n` slots after each was dropped with a chance of `percent`, as values, runs and slots.
-    fn thinned(
+    pub(in crate::allan) fn thinned(
         y: &[f64],
         percent: u64,
         rng: &mut Xoshiro256PlusPlus,

@@ -3,6 +3,7 @@
 mod correlate;
 mod fast;
 mod gapped;
+mod gapped_modified;
 mod kernels;
 mod phase;
 mod streaming;

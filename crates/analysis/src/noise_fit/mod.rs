@@ -75,6 +75,23 @@ impl NoiseFit {
         (white / m as f64 / self.deviation(m).powi(2)).min(1.0)
     }
 
+    /// The same in the modified Allan variance: N²/2τ, 0.675 of the flicker's Allan variance, 33/40 of the
+    /// walk's, 3Q²/mτ² and the whole of the ramp's (NIST SP 1065, table 5, for large m).
+    #[must_use]
+    pub fn white_share_modified(&self, m: usize) -> f64 {
+        let tau = m as f64 * self.tau0;
+        let [n, b, k, q] = Term::ALL.map(|t| {
+            t.letter(self.maximum.coefficients[t as usize], self.tau0)
+                .powi(2)
+        });
+        let white = if m == 1 { n / tau } else { n / tau / 2.0 };
+        let flicker = 0.675 * b * 2.0 * std::f64::consts::LN_2 / std::f64::consts::PI;
+        let walk = 33.0 / 40.0 * k * tau / 3.0;
+        let ramp = (self.maximum.ramp * tau).powi(2) / 2.0;
+        let all = white + flicker + walk + 3.0 * q / (tau * tau * m as f64) + ramp;
+        if all > 0.0 { white / all } else { 1.0 }
+    }
+
     /// The same in the Hadamard variance: N²/τ, B²·ln(256/27)/2π, K²τ/6 and 10Q²/3τ²; no ramp.
     #[must_use]
     pub fn white_share_hadamard(&self, m: usize) -> f64 {
