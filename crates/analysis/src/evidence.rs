@@ -406,7 +406,7 @@ fn spectrum(s: &Searched<'_>, grid: &Grid, evidence: &mut Evidence) {
     };
     (evidence.log_x, evidence.log_y) = (true, true);
     evidence.x_label = "frequency, Hz".into();
-    evidence.y_label = format!("density, {}/sqrt(Hz)", s.target.unit);
+    evidence.y_label = format!("one-sided density, {}/sqrt(Hz)", s.target.unit);
     evidence.series = vec![
         series("measured", SeriesStyle::Points, middles, density),
         series(

@@ -50,6 +50,7 @@ fn imu() -> ImuNoise {
             axis("acc_y", 3.4e-3, 4.0e-4, 6.0e-5),
             axis("acc_z", 3.4e-3, 4.0e-4, 6.0e-5),
         ],
+        remarks: Vec::new(),
     }
 }
 
@@ -212,6 +213,36 @@ fn gnss_ins_sim_simulates_what_was_measured() {
             keeps: 1.0 - dt / tau,
         };
         same(step, axis, name);
+    }
+}
+
+#[test]
+fn numbers_that_do_not_describe_the_record_say_so_to_every_consumer() {
+    let folder = folder("export-remarks");
+    let path = folder.join("swing.csv");
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let mut text = String::from("time,x\n");
+    for i in 0..12_000 {
+        let t = f64::from(i) * 0.05;
+        let uniform = |_| rand_core::Rng::next_u64(&mut rng) as f64 / 2f64.powi(64);
+        let e = (0..12).map(uniform).sum::<f64>() - 6.0;
+        let swing = 0.2 * (t * std::f64::consts::TAU / 60.0).sin();
+        text.push_str(&format!("{t:.2},{}\n", swing + 0.4 * e));
+    }
+    std::fs::write(&path, text).unwrap();
+    for to in ["kalibr", "vins", "matlab", "gz", "gnss-ins-sim"] {
+        let out = run(&[
+            "export",
+            path.to_str().unwrap(),
+            "--columns",
+            "time=time,gyro_x=x",
+            "--units",
+            "gyro=deg/s",
+            "--to",
+            to,
+        ]);
+        let said = String::from_utf8_lossy(&out.stdout).into_owned();
+        assert!(said.contains("NOT TO BE RELIED ON, gyro_x"), "{to}: {said}");
     }
 }
 

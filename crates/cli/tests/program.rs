@@ -469,6 +469,17 @@ fn of_many_runs_the_one_that_is_noisier_is_not_the_representative_one() {
         "{said}"
     );
 
+    let twice = run(&[
+        "representative",
+        &paths[0],
+        &paths[1],
+        &paths[2],
+        &paths[3],
+        &paths[1],
+    ]);
+    assert_eq!(twice.status.code(), Some(1));
+    let why = String::from_utf8_lossy(&twice.stderr);
+    assert!(why.contains("have the same readings"), "{why}");
     let few = run(&["representative", &paths[0], &paths[1]]);
     assert_eq!(few.status.code(), Some(1));
     let said = String::from_utf8_lossy(&few.stderr);

@@ -7,6 +7,7 @@ use clap::Args;
 use imu_stand::report::plot::number;
 use imu_stand::text;
 use miette::Result;
+use model::record::{Quantity, Record};
 use serde::Serialize;
 
 use super::{Input, Outputs};
@@ -48,6 +49,27 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             Ok(record)
         })
         .collect::<Result<Vec<_>>>()?;
+    for (i, record) in records.iter().enumerate() {
+        // Equal to the bit: noise does not repeat itself.
+        let same = |other: &Record| {
+            record
+                .channels
+                .iter()
+                .filter(|c| matches!(c.quantity, Quantity::Gyro | Quantity::Other))
+                .any(|c| {
+                    c.values.len() > 10
+                        && other.channel(&c.name).is_some_and(|o| o.values == c.values)
+                })
+        };
+        if let Some(j) = (0..i).find(|j| same(&records[*j])) {
+            miette::bail!(
+                help = "give each run once; a channel that is copied or stuck has to be left out by --columns",
+                "{} and {} have the same readings",
+                arguments.captures[j].display(),
+                arguments.captures[i].display()
+            );
+        }
+    }
     let found = analysis::representative(&records, arguments.seed).map_err(super::explain)?;
     let files: Vec<String> = arguments.captures.iter().map(|p| super::name(p)).collect();
     if !arguments.input.quiet {

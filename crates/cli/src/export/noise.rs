@@ -104,6 +104,8 @@ pub struct ImuNoise {
     pub gyro: Vec<AxisNoise>,
     /// x, y, z, those there are, m/s^2.
     pub acc: Vec<AxisNoise>,
+    /// What a reader of the numbers has to know: where the terms do not describe an axis.
+    pub remarks: Vec<String>,
 }
 
 impl ImuNoise {
@@ -132,6 +134,7 @@ impl ImuNoise {
             rate_hz: analysis.input.rate_hz,
             gyro: of("deg/s", DEG, DEG / 3600.0),
             acc: of("m/s^2", 1.0, 1.0),
+            remarks: remarks(analysis),
         }
     }
 
@@ -170,13 +173,17 @@ impl ImuNoise {
     }
 
     fn origin(&self, comment: &str) -> String {
-        format!(
+        let mut out = format!(
             "{comment} from {}: {:.0} s at {} Hz, by imu-stand {}\n",
             self.file,
             self.seconds,
             tidy(self.rate_hz),
             env!("CARGO_PKG_VERSION")
-        )
+        );
+        for remark in &self.remarks {
+            let _ = writeln!(out, "{comment} {remark}");
+        }
+        out
     }
 
     /// Continuous time, two-sided densities, one number for all axes: their root mean square.
@@ -393,6 +400,26 @@ impl ImuNoise {
     fn long(&self) -> f64 {
         (10.0 * self.seconds).max(3600.0).round()
     }
+}
+
+/// The axes whose noise the terms do not describe, or only at long cluster times.
+fn remarks(analysis: &Analysis) -> Vec<String> {
+    let tau0 = 1.0 / analysis.input.rate_hz;
+    analysis
+        .channels
+        .iter()
+        .filter(|(_, c)| c.parameters.angle_random_walk.high.is_some())
+        .filter_map(|(name, c)| match c.parameters_hold_from_s {
+            None => Some(format!(
+                "NOT TO BE RELIED ON, {name}: white noise, flicker and random walk do not describe this record; `imu-stand diagnose`"
+            )),
+            Some(from) if from > 1.5 * tau0 => Some(format!(
+                "{name}: from the slow part of the record, for cluster times from {} s on; a filter or a line bends the rest",
+                tidy(from)
+            )),
+            Some(_) => None,
+        })
+        .collect()
 }
 
 /// A rate as a person would write it: a sample interval that was measured or computed has a last digit of its own.

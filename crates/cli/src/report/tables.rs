@@ -200,7 +200,7 @@ fn checks(subject: &Subject<'_>) -> Markup {
                     td { (check.id.replace('_', " ")) }
                     td { code { (check.channel) } }
                     td.number { (number(check.statistic, 3)) }
-                    td.number { (check.p_value.map_or_else(|| "\u{2013}".to_owned(), |p| number(p, 2))) }
+                    td.number { (check.p_value.map_or_else(|| "\u{2013}".to_owned(), chance)) }
                     td { (mark(check.fails_before)) }
                     td { (mark(check.fails_after)) }
                     td { (check.what) }
@@ -253,5 +253,14 @@ fn made(subject: &Subject<'_>) -> Markup {
                 tr { th { "program" } td { "imu-stand " (env!("CARGO_PKG_VERSION")) } }
             } }
         }
+    }
+}
+
+/// A chance; below what a double holds it is not 0.
+fn chance(p: f64) -> String {
+    if p > 0.0 {
+        number(p, 2)
+    } else {
+        "< 1e-300".to_owned()
     }
 }
