@@ -301,6 +301,35 @@ fn one_gyro_that_repeats_is_told() {
     assert!(hits >= 19, "{hits} of 20");
 }
 
+/// One gyro stops for a while, at a reading within its range.
+#[test]
+fn a_gyro_that_stands_still_is_told() {
+    let mut rng = rng(64);
+    for _ in 0..20 {
+        let mut r = record(PLAIN, &mut rng);
+        let length = 30 + rng.next_u32() as usize % 4000;
+        let start = 1 + rng.next_u32() as usize % (12_000 - length);
+        // The reading nearest to the middle of those before it.
+        let still = {
+            let mut sorted = r.channels[1].counts.clone().unwrap();
+            sorted.sort_unstable();
+            sorted[6000]
+        };
+        alter(&mut r, 1, |i, c| {
+            if (start..start + length).contains(&i) {
+                still
+            } else {
+                c[i]
+            }
+        });
+        let a = audit(&r);
+        assert_eq!(causes(&a), ["stale_samples gyro_y"], "{length} readings");
+        let count = parameter(&a, "count");
+        // A neighbour may have the same reading by chance.
+        assert!((count - length as f64).abs() <= 3.0, "{count} of {length}");
+    }
+}
+
 #[test]
 fn clipped_readings_are_told_by_the_missing_tail() {
     let mut rng = rng(64);
