@@ -78,7 +78,11 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     let (alive, dead) = dead::left_out(record)?;
     let (mended, sticking) = sign_bit::mend(&alive);
     let record = &*mended;
-    let audited = audit(record);
+    let mut audited = audit(record);
+    // Put right by the sign, but for the readings that lay beyond the bit.
+    for f in &sticking {
+        audited.converter_at_fault(&f.channels[0], &f.cause);
+    }
     let record = &*losses::renumbered(record, &audited);
     let grid = lay_out(record, &|name| audited.masked(name), options.seed)?;
     let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();

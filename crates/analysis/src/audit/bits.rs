@@ -6,16 +6,15 @@
 //! A bit that sticks moves the share of ones. With the reading normal about what its neighbours predict, L, the square
 //! wave s of period P = 2^(b+1) (+1 where bit b is 0) has the mean
 //! E s = sum over odd m of 4/(pi m) exp(-2 pi^2 sigma^2 m^2 / P^2) sin(2 pi m (L + 1/2) / P),
-//! nearly 0 for the lowest bits and far from it where P exceeds 4 sigma. That shows that the counts are not what they
-//! should be; which bit sticks is decided by the likelihood of the counts ([`super::stuck`]), for a high one moves the level
-//! and the spread that the share of a lower one is judged by.
+//! nearly 0 for the lowest bits and far from it where P exceeds 4 sigma. That shows that the counts are not what normal
+//! noise makes them; whether a bit sticks, and which, is decided by the likelihood of their histogram ([`super::stuck`]).
 
 use std::f64::consts::PI;
 
 use model::Parameter;
 
-use super::stuck::Tally;
-use super::{Audit, Gyro, LEAST_READINGS, tails};
+use super::stuck::{self, Verdict};
+use super::{Audit, Gyro, LEAST_READINGS, rounding, tails};
 use crate::audit::local::{Levels, Local};
 use crate::result::{Alternative, Finding, Unexplained};
 
@@ -153,81 +152,22 @@ fn share(ones: f64, levels: &Levels, bit: u32, sigma: f64) -> Option<Share> {
     })
 }
 
-/// Nats by which a bit that sticks has to describe the counts better than sound ones.
-const CLEARLY_STUCK: f64 = 12.0;
-
-/// Share of what any shape or any code of its own gains over sound counts that it has to gain: the level is only known
-/// to what its neighbours tell, which a hard edge between codes shows.
-const NEARLY_ALL: f64 = 0.95;
-
-/// Half width of the kernel of the smooth density, in sigma: wide against the comb that a low bit makes.
-const KERNEL: f64 = 0.5;
-
-/// Nats that the smooth density has to gain over the normal one before the counts are told not to be normal.
-const CLEARLY_NOT_NORMAL: f64 = 20.0;
-/// The same for each reading of a long record, in which the level's own error adds up; noise with an exponential tail
-/// gains 0.07.
-const BY_READING: f64 = 0.003;
-
-/// Log likelihood of the same counts when their distances from their level have one smooth density, whatever its shape:
-/// a kernel estimate of the others, its spread kept.
-fn smooth_likelihood(local: &Local, known: &[bool]) -> f64 {
-    /// A quarter of a count, or of a wide spread a sixteenth of the kernel.
-    const FINEST: f64 = 0.25;
-    const OF_KERNEL: f64 = 1.0 / 16.0;
-    let r: Vec<f64> = (0..known.len())
-        .filter(|i| known[*i])
-        .map(|i| local.residual[i])
-        .collect();
-    let n = r.len() as f64;
-    let mean = r.iter().sum::<f64>() / n;
-    let variance = r.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-    let h = KERNEL * variance.sqrt();
-    let shrink = (1.0 / (1.0 + KERNEL * KERNEL)).sqrt();
-    let h_shrunk = h * shrink;
-    let width = FINEST.max(OF_KERNEL * h);
-    let reach = (6.0 * variance.sqrt() / width).ceil() as i64;
-    let bin = |v: f64| ((v - mean) / width).round() as i64;
-    let mut tally = vec![0.0; 2 * reach as usize + 1];
-    for v in &r {
-        tally[(bin(mean + (v - mean) * shrink).clamp(-reach, reach) + reach) as usize] += 1.0;
-    }
-    let kernel = |d: f64| (-0.5 * (d / h_shrunk).powi(2)).exp() / (h_shrunk * (2.0 * PI).sqrt());
-    let density: Vec<f64> = (-reach..=reach)
-        .map(|a| {
-            tally
-                .iter()
-                .zip(-reach..)
-                .filter(|(t, _)| **t > 0.0)
-                .map(|(t, b)| t * kernel((a - b) as f64 * width))
-                .sum()
-        })
-        .collect();
-    r.iter()
-        .map(|v| {
-            let at = (bin(*v).clamp(-reach, reach) + reach) as usize;
-            let own = kernel((v - mean) * (1.0 - shrink));
-            ((density[at] - own) / (n - 1.0)).max(1e-12).ln()
-        })
-        .sum()
+/// What the histogram of the codes says of rails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shape {
+    /// It was not judged.
+    Unknown,
+    /// It is smooth.
+    Sound,
+    /// Rails explain it.
+    Rails,
+    /// Something else does, or nothing.
+    Other,
 }
 
-/// Log likelihood of the counts when every code has a share of its own, whatever it is, less what so many shares cost.
-fn code_likelihood(counts: &[i32], known: &[bool]) -> f64 {
-    /// Nats for a share: the criterion of Schwarz asks half of ln n, which is 4.7 for 12 000 readings.
-    const COST: f64 = 4.7;
-    let mut tally = std::collections::BTreeMap::<i32, f64>::new();
-    let mut n = 0.0;
-    for (c, _) in counts.iter().zip(known).filter(|(_, k)| **k) {
-        *tally.entry(*c).or_default() += 1.0;
-        n += 1.0;
-    }
-    tally.values().map(|t| t * (t / n).ln() - COST).sum()
-}
-
-pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
+pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     let Some(counts) = g.counts else {
-        return;
+        return Shape::Unknown;
     };
     let local = &g.local;
     let name = g.channel.name.as_str();
@@ -265,16 +205,16 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             }
         }
         audit.findings.push(finding);
-        audit.suppress(
-            &["stuck_bit", "stale_samples", "outliers", "kurtosis"],
-            name,
-            "coarse_lsb",
-        );
-        return;
+        audit.converter_at_fault(name, "coarse_lsb");
+        audit.suppress(&["stuck_bit", "stale_samples"], name, "coarse_lsb");
+        return Shape::Other;
     }
     let sigma = unrounded(local);
     if known.iter().filter(|k| **k).count() < LEAST_READINGS {
-        return;
+        return Shape::Unknown;
+    }
+    if rounding::explains_tails(local, &known) {
+        audit.suppress(&["kurtosis"], name, "the step of the converter");
     }
     let levels = Levels::new(&local.level, &known);
     // How often each bit is 1.
@@ -292,23 +232,22 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             "stuck_bit",
             &format!("{name}: the noise is less than a count, so the level alone decides the bits"),
         );
-        return;
+        return Shape::Unknown;
     };
     let chance = (tested.len() as f64 * tails::two_sided(worst.z)).min(1.0);
-    let told = |z: f64, what: &str| {
-        format!(
-            "bit {} of {name} reads {} more often than normal noise makes it ({z:.1} sigma){what}",
-            worst.bit, worst.value
-        )
-    };
-    if !audit.check("bit_share", name, worst.z, chance, told(worst.z.abs(), "")) {
-        return;
-    }
-    let tally = Tally::new(counts, local, &known);
-    let sound = tally.sound(sigma);
-    let smooth = smooth_likelihood(local, &known).max(code_likelihood(counts, &known));
-    match tally.best(sigma, BITS) {
-        Some(s) if s.log_likelihood - sound > CLEARLY_STUCK.max(NEARLY_ALL * (smooth - sound)) => {
+    let what = format!(
+        "bit {} of {name} reads {} more often than normal noise makes it ({:.1} sigma)",
+        worst.bit,
+        worst.value,
+        worst.z.abs()
+    );
+    let alarmed = audit.check("bit_share", name, worst.z, chance, what);
+    let own = counts.iter().zip(&known).filter(|(_, k)| **k);
+    let codes: Vec<i32> = own.map(|(c, _)| *c).collect();
+    match stuck::judge(&codes, sigma, BITS, alarmed) {
+        Verdict::Smooth => Shape::Sound,
+        Verdict::Rails => Shape::Rails,
+        Verdict::Bit(s) => {
             audit.findings.push(Finding {
                 cause: "stuck_bit".into(),
                 channels: vec![name.into()],
@@ -322,23 +261,28 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
                 ),
                 ..Finding::default()
             });
-            audit.suppress(
-                &["outliers", "kurtosis", "variance_in_time"],
-                name,
-                "stuck_bit",
-            );
+            audit.converter_at_fault(name, "stuck_bit");
+            Shape::Other
         }
-        _ if smooth - sound > CLEARLY_NOT_NORMAL.max(BY_READING * counts.len() as f64) => {
+        Verdict::Unlike { nats, nearest } => {
+            let bit = nearest.map_or("no bit that sticks makes them so".to_owned(), |s| {
+                format!(
+                    "bit {} at {} in {:.0} % of the samples comes nearest and leaves much of it",
+                    s.bit,
+                    s.value,
+                    100.0 * s.fraction
+                )
+            });
             audit.not_normal.push(Unexplained {
                 channel: name.into(),
                 what: format!(
-                    "the counts of {name} are not normally distributed about their level ({:.1} sigma at bit {}), and no bit that sticks makes them so",
+                    "the codes of {name} have shares that no smooth distribution has ({nats:.0} nats; {:.1} sigma at bit {}), and {bit}",
                     worst.z.abs(),
                     worst.bit
                 ),
             });
+            Shape::Other
         }
-        _ => {}
     }
 }
 

@@ -5,10 +5,12 @@
 //! and one audit; [`FALSE_ALARM`] is what each may spend.
 
 mod bits;
+mod codes;
 mod frames;
 pub mod local;
 mod outliers;
 mod repeats;
+mod rounding;
 mod saturation;
 pub mod sign_bit;
 mod stuck;
@@ -68,6 +70,16 @@ impl Audit {
         self.suppressed
             .iter()
             .any(|s| s.id == id && s.channel == channel)
+    }
+
+    /// A fault of the converter was found on `channel`: what it adds depends on the level, and is neither normal nor the
+    /// same throughout, so checks of the noise say nothing new.
+    pub fn converter_at_fault(&mut self, channel: &str, by: &str) {
+        self.suppress(
+            &["outliers", "kurtosis", "variance_in_time", "time_frequency"],
+            channel,
+            by,
+        );
     }
 
     /// Rows of a channel that are not to be used.
@@ -263,8 +275,8 @@ pub fn audit(record: &Record) -> Audit {
         if (0..rows).filter(|i| g.known(*i)).count() < LEAST_READINGS {
             continue;
         }
-        bits::audit(g, &mut audit);
-        saturation::audit(g, &mut audit);
+        let shape = bits::audit(g, &mut audit);
+        saturation::audit(g, shape, &mut audit);
     }
     if gyros.iter().any(|g| g.counts.is_none()) {
         for cause in ["coarse_lsb", "stuck_bit", "saturation"] {

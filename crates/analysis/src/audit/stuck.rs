@@ -1,199 +1,204 @@
-//! A bit that sticks, by the likelihood of the counts.
+//! What a converter does to the codes: nothing, a bit that sticks, or rails, by the likelihood of their histogram.
 //!
-//! Of a normal reading about the true level, the code takes, in a share f of the samples, the value v at bit b: a code
-//! with that value has the chance of its own and f times that of the code that differs in this bit alone, any other
-//! 1 - f of its own. What the neighbours tell is not the true level L but M = L + 2^b f (v - P(bit is 1 | L)): L is
-//! solved from it. f and sigma are fitted for each b and v.
+//! Each fault is fitted with the smooth law ([`super::codes`]) that suits it best. A bit that sticks is told where it
+//! describes the codes better than any smooth law and than rails do, and leaves next to nothing of what any shares
+//! of the codes could explain: a hole inside the range has no place in rails, a pile on one code none in a bit. What
+//! nothing here explains is not passed over ([`Verdict::Unlike`]).
 
-use statrs::distribution::{ContinuousCDF, Normal};
+use super::codes::{Fault, Fit, Histogram, Laws};
+use super::tails;
 
-use super::bits::Square;
-use crate::audit::local::Local;
-use crate::optimise::golden;
+/// Spreads of a reading that are tried, over what was measured: bits that stick widen it more than they narrow it.
+const SPREADS: [f64; 7] = [0.15, 0.23, 0.35, 0.5, 0.7, 0.9, 1.1];
+/// A finer step between them, once one is known.
+const FINER: f64 = 1.12;
+/// Shares of the readings that a search begins with.
+const SHARES: [f64; 2] = [0.1, 0.6];
+/// Rounds of a first fit, and of a last one.
+const FIRST: usize = 48;
+const LAST: usize = 320;
+/// Bits that are fitted to the end.
+const BEST: usize = 2;
+/// A bit beyond this many spreads is not looked at.
+const WITHIN: f64 = 24.0;
 
-/// Levels told apart in a count: rounding to them costs n / (24 (4 sigma)^2) nats, one in 12 000 readings.
-const LEVELS_PER_COUNT: f64 = 4.0;
-/// Least and largest spread against the one that was measured: a bit that sticks widens it more than it narrows it.
-const SPREADS: (f64, f64) = (0.25, 1.5);
-/// Rounds of fitting share and spread in turn.
-const ROUNDS: usize = 3;
-/// Places of each coordinate that a search begins with, and steps of its refinement.
-const PLACES: usize = 5;
-const STEPS: usize = 10;
-
-/// Chance of a code, by that of any code under the normal density.
-type Chance<'a> = &'a dyn Fn(i32, &dyn Fn(i32) -> f64) -> f64;
-
-/// Counts by their level and code.
-pub(super) struct Tally {
-    cells: Vec<(f64, Vec<(i32, f64)>)>,
-}
+/// Nats by which a bit that sticks has to describe the codes better than sound ones and than rails.
+const CLEARLY: f64 = 12.0;
+/// Cost up to which a smooth law is plain: one of many narrow levels explains almost anything.
+const PLAIN: f64 = 8.0;
+/// Spreads of a reading about its level from which on the codes' own says that the level moves far.
+const MOVES: f64 = 2.0;
+/// Nats that a bit has to gain, with the smooth law as it is, to be fitted at all.
+const WORTH_A_LOOK: f64 = 5.0;
+/// Share that it has to explain of what shares of the codes of their own would.
+const NEARLY_ALL: f64 = 0.9;
+/// Nats, and nats for each reading, that shares of their own have to gain before the codes are told to be unlike any law:
+/// converters have uneven steps by nature, and a long record shows them.
+const UNLIKE: f64 = 20.0;
+const UNLIKE_BY_READING: f64 = 1e-3;
+/// Least expected occurrences of the codes that are held against a law together.
+const LEAST_EXPECTED: f64 = 8.0;
 
 /// A fitted bit.
+#[derive(Clone, Debug)]
 pub(super) struct Stuck {
     pub bit: u32,
     pub value: u8,
     pub fraction: f64,
     /// Standard error of the fraction.
     pub error: f64,
-    /// Nats.
-    pub log_likelihood: f64,
 }
 
-/// Spread (its logarithm) and share, with the log likelihood there.
-struct Place {
-    ln: f64,
-    f: f64,
-    l: f64,
+/// What the histogram says.
+#[derive(Clone, Debug)]
+pub(super) enum Verdict {
+    /// A smooth law explains it.
+    Smooth,
+    /// Rails do, and a smooth law does not.
+    Rails,
+    /// A bit that sticks does.
+    Bit(Stuck),
+    /// Nothing here does; `nats` are left over. With the bit that comes nearest.
+    Unlike { nats: f64, nearest: Option<Stuck> },
 }
 
-/// The level that a bit which sticks moves to `seen`: bisection, as the moved level grows with the true one wherever it
-/// matters.
-fn true_level(seen: f64, square: &Square, bit: u32, value: u8, fraction: f64) -> f64 {
-    let weight = f64::from(1u32 << bit);
-    let moved = |l: f64| {
-        let one = 0.5 * (1.0 - square.at(l));
-        l + weight * fraction * (f64::from(value) - one)
+/// The best fit over spreads.
+fn best(
+    h: &Histogram,
+    fault: Fault,
+    sigma: f64,
+    rounds: usize,
+    around: Option<f64>,
+) -> Option<Fit> {
+    let spreads: Vec<f64> = match around {
+        None => SPREADS.iter().map(|s| s * sigma).collect(),
+        Some(s) => [-1, 0, 1].iter().map(|i| s * FINER.powi(*i)).collect(),
     };
-    let (mut low, mut high) = (seen - weight, seen + weight);
-    for _ in 0..24 {
-        let middle = 0.5 * (low + high);
-        if moved(middle) < seen {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
+    let never = |bit: u32, value: i32| h.iter().all(|(c, _)| (c >> bit) & 1 == value);
+    let shares: &[f64] = match fault {
+        Fault::Bit { bit, value } if never(bit, value) => &[1.0],
+        Fault::Bit { .. } => &SHARES,
+        Fault::None | Fault::Rails { .. } => &[1.0],
+    };
+    spreads
+        .iter()
+        .filter(|s| **s > LEAST_SPREAD)
+        .flat_map(|s| {
+            let laws = Laws::new(h, fault, *s);
+            shares
+                .iter()
+                .map(move |f| laws.fit(None, *f, false, rounds))
+                .collect::<Vec<_>>()
+        })
+        .max_by(|a, b| a.score().total_cmp(&b.score()))
 }
 
-impl Tally {
-    pub(super) fn new(counts: &[i32], local: &Local, known: &[bool]) -> Self {
-        let mut cells =
-            std::collections::BTreeMap::<i64, std::collections::BTreeMap<i32, f64>>::new();
-        for (i, c) in counts.iter().enumerate().filter(|(i, _)| known[*i]) {
-            let level = (local.level[i] * LEVELS_PER_COUNT).round() as i64;
-            *cells.entry(level).or_default().entry(*c).or_default() += 1.0;
+/// Least spread, counts: below it a law has edges of its own.
+const LEAST_SPREAD: f64 = 0.7;
+
+/// Whether a smooth law explains the histogram: chi-square of codes, taken together where few are expected.
+fn explains(h: &Histogram, laws: &Laws<'_>, fit: &Fit) -> bool {
+    let (mut sum, mut cells) = (0.0, 0usize);
+    let (mut seen, mut expected) = (0.0, 0.0);
+    for (t, e) in h.times.iter().zip(laws.expected(fit)) {
+        seen += t;
+        expected += e;
+        if expected >= LEAST_EXPECTED {
+            sum += (seen - expected).powi(2) / expected;
+            cells += 1;
+            (seen, expected) = (0.0, 0.0);
         }
-        let cells = cells
-            .into_iter()
-            .map(|(level, codes)| (level as f64 / LEVELS_PER_COUNT, codes.into_iter().collect()))
-            .collect();
-        Self { cells }
     }
+    // Mean, spread and the size, at least; more of them would only make it fail sooner.
+    let free = cells.saturating_sub(3).max(1) as f64;
+    tails::chi_square(sum, free) > super::FALSE_ALARM
+}
 
-    /// Sum of the log likelihood over the cells; `level_of` gives the true level, `chance` that of a code from the
-    /// chance of any code under the normal density.
-    fn sum(&self, sigma: f64, level_of: &dyn Fn(f64) -> f64, chance: Chance<'_>) -> f64 {
-        let normal = Normal::standard();
-        self.cells
-            .iter()
-            .map(|(seen, codes)| {
-                let level = level_of(*seen);
-                let mass = |c: i32| {
-                    let z = (f64::from(c) - level) / sigma;
-                    normal.cdf(z + 0.5 / sigma) - normal.cdf(z - 0.5 / sigma)
-                };
-                codes
-                    .iter()
-                    .map(|(c, times)| times * chance(*c, &mass).max(1e-12).ln())
-                    .sum::<f64>()
-            })
-            .sum()
+/// Judge codes with the spread `sigma` about their level, bits below `bits`; `alarmed` where something else has shown
+/// already that they are no law.
+pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verdict {
+    const FAR: f64 = 8.0;
+    let Some(h) = Histogram::new(codes, FAR * sigma) else {
+        return Verdict::Smooth;
+    };
+    // Where the level moves far it is the share of ones about each level that tells.
+    if !alarmed && h.spread > MOVES * sigma {
+        return Verdict::Smooth;
     }
-
-    /// Log likelihood of sound counts with the best spread near `sigma`.
-    pub(super) fn sound(&self, sigma: f64) -> f64 {
-        let l = |ln: f64| -self.sum(ln.exp(), &|seen| seen, &|c, mass| mass(c));
-        let best = golden(
-            &l,
-            (sigma * SPREADS.0).ln(),
-            (sigma * SPREADS.1).ln(),
-            STEPS,
-        );
-        -l(best)
+    let Some(first) = best(&h, Fault::None, sigma, FIRST, None) else {
+        return Verdict::Smooth;
+    };
+    let laws = Laws::new(&h, Fault::None, first.spread);
+    let every = || {
+        let near = (0..bits).filter(|b| f64::from(1u32 << b) <= WITHIN * sigma);
+        near.flat_map(|bit| [(bit, 0), (bit, 1)])
+    };
+    let looks_stuck = || {
+        every().any(|(bit, value)| laws.gain_of(&first, Fault::Bit { bit, value }) > WORTH_A_LOOK)
+    };
+    if !alarmed && first.cost < PLAIN && explains(&h, &laws, &first) && !looks_stuck() {
+        return Verdict::Smooth;
     }
-
-    fn likelihood(&self, sigma: f64, bit: u32, value: u8, fraction: f64) -> f64 {
-        let square = Square::new(sigma, 2.0 * f64::from(1u32 << bit));
-        self.sum(
-            sigma,
-            &|seen| true_level(seen, &square, bit, value, fraction),
-            &|c, mass| {
-                if (c >> bit) & 1 == i32::from(value) {
-                    mass(c) + fraction * mass(c ^ (1 << bit))
-                } else {
-                    (1.0 - fraction) * mass(c)
-                }
-            },
-        )
-    }
-
-    /// The bit below `bits` that describes the counts best; a bit beyond the reach of the noise is not looked at.
-    pub(super) fn best(&self, sigma: f64, bits: u32) -> Option<Stuck> {
-        const REACH: f64 = 4.0;
-        let (low, high) = ((sigma * SPREADS.0).ln(), (sigma * SPREADS.1).ln());
-        let places = |from: f64, to: f64| {
-            (0..PLACES).map(move |i| from + (to - from) * (i as f64 + 0.5) / PLACES as f64)
-        };
-        let apart = ((high - low) / PLACES as f64, 1.0 / PLACES as f64);
-        let mut best: Option<(u32, u8, Place)> = None;
-        for bit in (0..bits).filter(|b| f64::from(1u32 << b) <= REACH * sigma) {
-            for value in [0, 1] {
-                let l = |ln: f64, f: f64| self.likelihood(ln.exp(), bit, value, f);
-                let Some(near) = places(low, high)
-                    .flat_map(|ln| places(0.0, 1.0).map(move |f| (ln, f)))
-                    .map(|(ln, f)| Place { ln, f, l: l(ln, f) })
-                    .max_by(|a, b| a.l.total_cmp(&b.l))
-                else {
-                    continue;
-                };
-                // The peaks are narrower than the places are apart: each bit is weighed at its own.
-                let near = self.climb(bit, value, near, apart, 1);
-                if best.as_ref().is_none_or(|b| near.l > b.2.l) {
-                    best = Some((bit, value, near));
-                }
-            }
+    let sound = |spread: f64, from: Option<&Fit>| {
+        Laws::new(&h, Fault::None, spread).fit(from, 0.0, true, LAST)
+    };
+    let smooth =
+        best(&h, Fault::None, sigma, LAST, Some(first.spread)).map_or(first.score(), |f| f.score());
+    let (low, high) = (h.first, h.last());
+    let rails = [(low, i32::MAX), (i32::MIN, high), (low, high)]
+        .into_iter()
+        .filter_map(|(low, high)| best(&h, Fault::Rails { low, high }, sigma, LAST, None))
+        .map(|f| f.score())
+        .fold(f64::NEG_INFINITY, f64::max);
+    let mut all: Vec<(u32, i32, Fit)> = every()
+        .filter_map(|(bit, value)| {
+            let fit = best(&h, Fault::Bit { bit, value }, sigma, FIRST, None)?;
+            Some((bit, value, fit))
+        })
+        .collect();
+    all.sort_by(|a, b| b.2.score().total_cmp(&a.2.score()));
+    all.truncate(BEST);
+    let nearest = all
+        .into_iter()
+        .filter_map(|(bit, value, fit)| {
+            let fault = Fault::Bit { bit, value };
+            best(&h, fault, sigma, LAST, Some(fit.spread)).map(|fit| (bit, value, fit))
+        })
+        .max_by(|a, b| a.2.score().total_cmp(&b.2.score()));
+    let own = h.of_its_own();
+    let other = smooth.max(rails);
+    let left = |best: f64| own - best > UNLIKE.max(UNLIKE_BY_READING * h.n);
+    let Some((bit, value, fit)) = nearest else {
+        return without(other, rails > smooth + CLEARLY, left(other), own);
+    };
+    // At the same spread too, so that it is the edges that decide and not how many levels a law needs.
+    let gain = (fit.score() - other).min(fit.likelihood - sound(fit.spread, None).likelihood);
+    let laws = Laws::new(&h, Fault::Bit { bit, value }, fit.spread);
+    let stuck = Stuck {
+        bit,
+        value: u8::from(value == 1),
+        fraction: fit.share,
+        error: laws.share_error(&fit),
+    };
+    if gain > CLEARLY && fit.score() - smooth >= NEARLY_ALL * (own - smooth) {
+        Verdict::Bit(stuck)
+    } else if left(other) {
+        Verdict::Unlike {
+            nats: own - other,
+            nearest: (gain > CLEARLY).then_some(stuck),
         }
-        let (bit, value, near) = best?;
-        let top = self.climb(bit, value, near, apart, ROUNDS);
-        Some(self.stuck(bit, value, &top))
+    } else {
+        without(other, rails > smooth + CLEARLY, false, own)
     }
+}
 
-    /// From a place to the peak by it, spread and share in turn.
-    fn climb(&self, bit: u32, value: u8, from: Place, apart: (f64, f64), rounds: usize) -> Place {
-        let l = |ln: f64, f: f64| -self.likelihood(ln.exp(), bit, value, f.clamp(0.0, 1.0));
-        let (mut ln, mut f) = (from.ln, from.f);
-        let (mut reach_ln, mut reach_f) = apart;
-        for _ in 0..rounds {
-            ln = golden(&|ln| l(ln, f), ln - reach_ln, ln + reach_ln, STEPS);
-            let (low, high) = ((f - reach_f).max(0.0), (f + reach_f).min(1.0));
-            f = golden(&|f| l(ln, f), low, high, STEPS);
-            reach_ln *= 0.5;
-            reach_f *= 0.7;
-        }
-        let top = Place {
-            ln,
-            f,
-            l: -l(ln, f),
-        };
-        if top.l > from.l { top } else { from }
-    }
-
-    fn stuck(&self, bit: u32, value: u8, top: &Place) -> Stuck {
-        let l = |f: f64| -self.likelihood(top.ln.exp(), bit, value, f);
-        let f = top.f;
-        let best = -top.l;
-        // The curvature along the share, or at an end of it what the slope leaves.
-        let h = 0.01;
-        let (below, above) = ((f - h).max(0.0), (f + h).min(1.0));
-        let bend = (l(below) - best + l(above) - best) / ((above - below) / 2.0).powi(2);
-        Stuck {
-            bit,
-            value,
-            fraction: f,
-            error: if bend > 0.0 { bend.sqrt().recip() } else { h },
-            log_likelihood: -best,
-        }
+fn without(other: f64, rails: bool, left: bool, own: f64) -> Verdict {
+    match (left, rails) {
+        (true, _) => Verdict::Unlike {
+            nats: own - other,
+            nearest: None,
+        },
+        (false, true) => Verdict::Rails,
+        (false, false) => Verdict::Smooth,
     }
 }

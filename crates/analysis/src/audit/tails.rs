@@ -1,6 +1,6 @@
 //! Chances far out.
 
-use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, Normal, Poisson};
+use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal, Poisson};
 
 /// P(Z > z) of the standard normal.
 #[must_use]
@@ -12,6 +12,12 @@ pub fn upper_normal(z: f64) -> f64 {
 #[must_use]
 pub fn two_sided(z: f64) -> f64 {
     (2.0 * upper_normal(z.abs())).min(1.0)
+}
+
+/// P(X > x) of chi-square.
+#[must_use]
+pub fn chi_square(x: f64, degrees: f64) -> f64 {
+    ChiSquared::new(degrees).map_or(1.0, |c| c.sf(x))
 }
 
 /// P(X >= `observed`) of a Poisson variable of that mean.
