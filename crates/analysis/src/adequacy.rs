@@ -185,7 +185,8 @@ impl Process<'_> {
             let mut x: Vec<f64> = ln.iter().zip(&share).map(bend).collect();
             let before = information(&m, &x, &x).sqrt();
             let length = orthogonal(&mut x, &basis, &m);
-            if !(length > 1e-3 * before) {
+            // A shape that lies in the others' span has no length of its own; 0 of 0 is none either.
+            if length.is_nan() || length <= 1e-3 * before {
                 continue;
             }
             let power = |k| m.iter().zip(&x).map(|(m, x)| m * x.powi(k)).sum::<f64>();

@@ -7,6 +7,7 @@
 mod bits;
 mod codes;
 mod frames;
+mod frozen;
 pub mod local;
 mod outliers;
 mod repeats;
@@ -231,6 +232,8 @@ fn scaled(values: &[f64], counts: &[i32]) -> bool {
 pub fn audit(record: &Record) -> Audit {
     let rows = record.len();
     let mut audit = Audit::default();
+    let (record, still) = frozen::set_aside(record);
+    let record = record.as_ref();
     let gyros: Vec<Gyro<'_>> = record
         .all(Quantity::Gyro)
         .filter(|c| c.values.len() == rows)
@@ -269,6 +272,7 @@ pub fn audit(record: &Record) -> Audit {
         );
     }
     let at = times(record, rows);
+    frozen::audit(&still, &at, &mut audit);
     frames::audit(record, &gyros, &at, &mut audit);
     timing::audit(record, &gyros, &at, &mut audit);
     for g in &gyros {

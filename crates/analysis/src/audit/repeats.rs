@@ -17,12 +17,6 @@ const MOST_STEPS: f64 = 1000.0;
 /// Excess over the expected share, relative, that a single gyro has to show: the share itself is that well known.
 const EXCESS: f64 = 0.1;
 
-/// Largest share of agreeing neighbours with which a reading that stands still says anything.
-const MOST_AGREEING: f64 = 0.5;
-/// Shortest stretch that is called frozen, and its chance at the largest.
-const LEAST_FROZEN: usize = 20;
-const FROZEN_CHANCE: f64 = 1e-9;
-
 /// Share of agreeing pairs `lag` apart of one gyro.
 fn share(values: &[f64], lag: usize, step: f64) -> f64 {
     let (mut same, mut all) = (0.0, 0.0);
@@ -91,7 +85,7 @@ fn bridged(d: &[f64], step: f64) -> Option<(f64, f64)> {
 
 /// Smallest distance between two readings that is no dust of the arithmetic: the step of a channel that does not say.
 /// 0 where the other distances are no multiples of it: such readings repeat exactly or not at all.
-fn smallest_step(values: &[f64]) -> f64 {
+pub(super) fn smallest_step(values: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     let dust = 1e-6 * robust_sigma(&sorted);
@@ -107,7 +101,7 @@ fn smallest_step(values: &[f64]) -> f64 {
 
 /// Chance that a reading agrees with the one before, without a fault, and the relative error of that. Readings that
 /// agree as often when they lie far apart share a code, not a moment.
-fn agreement(values: &[f64], step: f64) -> (f64, f64) {
+pub(super) fn agreement(values: &[f64], step: f64) -> (f64, f64) {
     let d = differences(values, 1);
     let far: f64 = LAGS.map(|l| share(values, l, step)).sum::<f64>() / LAGS.count() as f64;
     match bridged(&d, step) {
@@ -128,43 +122,8 @@ fn agreement(values: &[f64], step: f64) -> (f64, f64) {
     }
 }
 
-/// Stretches in which one reading stands still for longer than chance lets it: places of the repeats, and the longest.
-/// A reading at an end of the range is a rail, not a sensor that stopped; where noise is below a step, nothing is told.
-fn frozen(values: &[f64], step: f64, usable: &[bool], p: f64) -> (Vec<usize>, usize) {
-    let (low, high) = values
-        .iter()
-        .filter(|v| v.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(*v), h.max(*v))
-        });
-    let long = |run: usize| {
-        p < MOST_AGREEING
-            && run >= LEAST_FROZEN
-            && run as f64 * p.ln() + (values.len() as f64).ln() < FROZEN_CHANCE.ln()
-    };
-    let (mut places, mut longest, mut start) = (vec![], 0, 0);
-    for i in 1..=values.len() {
-        let goes_on = i < values.len()
-            && usable.get(i).copied().unwrap_or(false)
-            && equal(values[i], values[start], step);
-        if goes_on {
-            continue;
-        }
-        let run = i - start - 1;
-        let inside = !equal(values[start], low, step) && !equal(values[start], high, step);
-        if inside {
-            longest = longest.max(run);
-            if long(run) {
-                places.extend(start + 1..i);
-            }
-        }
-        start = i;
-    }
-    (places, longest)
-}
-
 /// Whether two readings are the same.
-fn equal(a: f64, b: f64, step: f64) -> bool {
+pub(super) fn equal(a: f64, b: f64, step: f64) -> bool {
     (a - b).abs() <= 0.5 * step
 }
 
@@ -259,27 +218,6 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
     for (((g, values), (p, known)), step) in gyros.iter().zip(&columns).zip(&chances).zip(&steps) {
         let name = g.channel.name.as_str();
         let rest = audit.usable.get(name).cloned().unwrap_or_default();
-        let (still, longest) = frozen(values, *step, &rest, *p);
-        let what = format!(
-            "{name} repeats one reading up to {longest} times, {} readings in all",
-            still.len()
-        );
-        let chance = if still.is_empty() { 1.0 } else { FROZEN_CHANCE };
-        if audit.check(
-            "frozen_readings",
-            name,
-            longest as f64,
-            chance,
-            what.clone(),
-        ) {
-            still.iter().for_each(|i| audit.mask(name, *i));
-            let times: Vec<f64> = still.iter().map(|i| at[*i]).collect();
-            let count = still.len() as f64;
-            let named = vec![name.to_owned()];
-            let finding = counted("stale_samples", named, count, Some(0.0), &times, what);
-            audit.findings.push(finding);
-            continue;
-        }
         let own: Vec<usize> = (1..rows)
             .filter(|i| {
                 equal(values[*i], values[*i - 1], *step) && rest.get(*i).copied().unwrap_or(false)

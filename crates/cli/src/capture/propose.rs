@@ -158,9 +158,8 @@ impl Meaning {
             Kind::Acc
         } else if is(&["temp"]) {
             Kind::Temp
-        } else if first.starts_with("time") || first == "t" || is_seconds {
-            Kind::Time
-        } else if unit_is_of(What::Time) {
+        } else if first.starts_with("time") || first == "t" || is_seconds || unit_is_of(What::Time)
+        {
             Kind::Time
         } else if unit_is_of(What::Channel(Quantity::Gyro)) {
             Kind::Gyro
