@@ -173,12 +173,17 @@ impl Search<'_> {
             state.terms.retain(|t| !matches!(t.form, Form::Step(..)));
         }
         if !notes.is_empty() {
-            let (wandering, level) = (state.wandering, state.level.take());
-            *state = self.refit(std::mem::take(&mut state.terms), state.noise.log_walk);
-            (state.wandering, state.level) = (wandering, level);
-            self.reweigh(state);
+            self.settle(state);
         }
         notes
+    }
+
+    /// Estimate again after terms were changed by hand.
+    fn settle(&self, state: &mut State) {
+        let (wandering, level) = (state.wandering, state.level.take());
+        *state = self.refit(std::mem::take(&mut state.terms), state.noise.log_walk);
+        (state.wandering, state.level) = (wandering, level);
+        self.reweigh(state);
     }
 
     /// Likelihood ratio that a term cannot have because the gyro that it follows is noisy itself: a share `a` of its noise
@@ -197,7 +202,8 @@ impl Search<'_> {
         self.panel.bins.n as f64 * (noise / solution.white).ln_1p()
     }
 
-    /// Put every other effect that would do as well in the place of a term beside it.
+    /// Put every other effect that would do as well in the place of a term beside it. One that does better, for the noise
+    /// of the gyro that it follows, takes the place.
     pub(super) fn find_rivals(&self, state: &mut State) {
         for i in 0..state.terms.len() {
             if state.terms[i].stated.is_some() {
@@ -208,6 +214,7 @@ impl Search<'_> {
             let extended = state.terms[i].effect.extends();
             let score = state.terms[i].score();
             let mut alternatives = std::mem::take(&mut state.terms[i].alternatives);
+            let mut better: Option<(Term, f64)> = None;
             for offer in self.offers(&rest, &|c| {
                 c.effect.id() != own && c.effect.id() != crate::beyond::ID
             }) {
@@ -228,6 +235,16 @@ impl Search<'_> {
                     Some(a) => a.1 = a.1.max(odds),
                     None => alternatives.push((offer.effect, odds)),
                 }
+                if lost > 0.0 && odds > better.as_ref().map_or(0.0, |b| b.1) {
+                    better = Some((offer, odds));
+                }
+            }
+            if let Some((offer, by)) = better {
+                alternatives.retain(|a| a.0.id() != offer.effect.id());
+                alternatives.iter_mut().for_each(|a| a.1 -= by);
+                alternatives.push((state.terms[i].effect, -by));
+                state.terms[i] = offer;
+                self.settle(state);
             }
             alternatives.sort_by(|a, b| b.1.total_cmp(&a.1));
             state.terms[i].alternatives = alternatives;
