@@ -370,7 +370,8 @@ fn analyze_channel(
         _ => Phase::from_values(&channel.values, &runs),
     };
     let spectrum = (phase.samples() >= FIT_NEEDS)
-        .then(|| Spectrum::with_gaps(&channel.values, &runs, &sampling.slots, tau0));
+        .then(|| Spectrum::with_gaps(&channel.values, &runs, &sampling.slots, tau0))
+        .filter(|s| s.coefficients() >= FIT_NEEDS as f64 / 2.0);
     let gapped = (runs.len() > 1).then(|| Gapped::new(&channel.values, &runs, &sampling.slots));
     let longest = gapped.as_ref().map_or(phase.longest_run(), |g| {
         g.lengths().into_iter().max().unwrap_or(0)

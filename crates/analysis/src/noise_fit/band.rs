@@ -61,7 +61,7 @@ pub fn fit_described(spectrum: &Spectrum, longest: usize, rng: &mut impl Rng) ->
     let mut part = 2;
     while part <= NARROWEST {
         let narrow = spectrum.below(std::f64::consts::PI / part as f64);
-        if narrow.bins.iter().map(|b| b.count).sum::<f64>() < NEEDED {
+        if narrow.coefficients() < NEEDED {
             break;
         }
         let fit = fit(&narrow);

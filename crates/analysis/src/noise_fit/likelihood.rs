@@ -297,11 +297,14 @@ pub fn profile_interval(
         bisect(&mut below, inside, outside)
     };
     // Where the term is strongest, a thousandth of all there is.
-    let strongest = spectrum
+    let Some(strongest) = spectrum
         .bins
         .iter()
         .max_by(|a, b| a.shape[term].total_cmp(&b.shape[term]))
-        .unwrap_or(&spectrum.bins[0]);
+    else {
+        // Without a coefficient nothing is known of any term.
+        return (0.0, f64::INFINITY);
+    };
     let shape_scale = strongest.shape[term];
     let there = Spectrum::variance(strongest, &maximum.coefficients);
     let mut inside = peak;

@@ -181,6 +181,12 @@ impl Spectrum {
         }
     }
 
+    /// Coefficients that it is made of: fewer than the samples where these lie in short runs.
+    #[must_use]
+    pub fn coefficients(&self) -> f64 {
+        self.bins.iter().map(|b| b.count).sum()
+    }
+
     /// The part below the angular frequency `limit` per sample.
     #[must_use]
     pub fn below(&self, limit: f64) -> Self {
