@@ -1,35 +1,43 @@
 //! Effects that the library does not have. They act on the readings of a finished run; what they are is known here alone.
 
+use std::cell::Cell;
+
 use model::record::Record;
 
 use crate::random::Draw;
-use crate::stand::{LSB, Needs, Stand};
+use crate::stand::{GYROS, LSB, Needs, Stand};
 use crate::strength::{Meter, of_variance, size_for};
 
 mod kept_back;
+pub(crate) mod kept_back_fourth;
 mod kept_back_third;
 #[cfg(test)]
 mod library_share;
 
 /// What there is: first those that the engine was developed with or has been changed after, then those kept back.
-pub const FOREIGN: [&str; SEEN + kept_back_third::NAMES.len()] = {
-    let mut all = [""; SEEN + kept_back_third::NAMES.len()];
+pub const FOREIGN: [&str; SEEN + kept_back_fourth::NAMES.len()] = {
+    let mut all = [""; SEEN + kept_back_fourth::NAMES.len()];
     let mut i = 0;
     while i < all.len() {
         all[i] = if i < FIRST.len() {
             FIRST[i]
-        } else if i < SEEN {
+        } else if i < SECOND {
             kept_back::NAMES[i - FIRST.len()]
+        } else if i < SEEN {
+            kept_back_third::NAMES[i - SECOND]
         } else {
-            kept_back_third::NAMES[i - SEEN]
+            kept_back_fourth::NAMES[i - SEEN]
         };
         i += 1;
     }
     all
 };
 /// How many of them, from the first, are no longer unseen: the engine was made with 14 of them, and has been changed
-/// since it was graded on the next eight and on the second set kept back.
-pub const SEEN: usize = FIRST.len() + kept_back::NAMES.len();
+/// since it was graded on the next eight, and on the second and the third set kept back.
+pub const SEEN: usize = SECOND + kept_back_third::NAMES.len();
+
+/// Where the second set ends.
+const SECOND: usize = FIRST.len() + kept_back::NAMES.len();
 
 const FIRST: [&str; 22] = [
     "chirp",
@@ -59,7 +67,9 @@ const FIRST: [&str; 22] = [
 /// The environment that they need.
 #[must_use]
 pub fn needs(name: &str) -> Needs {
-    kept_back_third::needs(name).unwrap_or_else(|| kept_back::needs(name))
+    kept_back_fourth::needs(name)
+        .or_else(|| kept_back_third::needs(name))
+        .unwrap_or_else(|| kept_back::needs(name))
 }
 
 /// What it does to a channel: adds a signal, or makes new noise out of old.
@@ -83,6 +93,19 @@ enum Change {
     Noise(Vec<f64>, f64),
     /// Lower edges of the codes from the first one on, counts.
     Edges(i32, Vec<f64>),
+    /// A reading stands until the rate is this far from it, counts.
+    Holds(f64),
+    /// A share of another axis's reading, about its mean, so many frames before.
+    Late {
+        axis: usize,
+        share: f64,
+        frames: usize,
+    },
+    /// With this chance the reading is another axis's of the same frame.
+    Frames {
+        axis: usize,
+        chance: f64,
+    },
 }
 
 /// Rms of what is added, deg/s.
@@ -136,6 +159,7 @@ fn any(
 ) -> Foreign {
     kept_back::one(draw, stand, name, axis, wanted)
         .or_else(|| kept_back_third::one(draw, stand, name, axis, wanted))
+        .or_else(|| kept_back_fourth::one(draw, stand, name, axis, wanted))
         .unwrap_or_else(|| one(draw, stand, name, axis, wanted))
 }
 
@@ -449,6 +473,12 @@ fn change_readings(
     }
 }
 
+/// What an axis reads, deg/s.
+fn readings(record: &Record, axis: usize) -> Vec<f64> {
+    let own = record.channels.iter().find(|c| c.name == GYROS[axis]);
+    own.map(|c| c.values.clone()).unwrap_or_default()
+}
+
 impl Foreign {
     /// Whether it brings the white noise of its channel itself, so that the stand has to leave it out.
     #[must_use]
@@ -511,6 +541,41 @@ impl Foreign {
                     };
                     LSB * f64::from(code)
                 });
+            }
+            Change::Holds(beyond) => {
+                let stands = Cell::new(f64::NAN);
+                change_readings(record, channel, draw, |_, v| {
+                    let now = v / LSB;
+                    // The first reading is taken whatever it is.
+                    if stands.get().is_nan() || (now - stands.get()).abs() >= *beyond {
+                        stands.set(now.round());
+                    }
+                    LSB * stands.get()
+                });
+            }
+            Change::Late {
+                axis,
+                share,
+                frames,
+            } => {
+                let other = readings(record, *axis);
+                let mean = other.iter().sum::<f64>() / other.len() as f64;
+                let signal: Vec<f64> = (0..other.len())
+                    .map(|i| share * (other[i.saturating_sub(*frames)] - mean))
+                    .collect();
+                add(record, channel, &signal, draw);
+            }
+            Change::Frames { axis, chance } => {
+                let other = readings(record, *axis);
+                let taken: Vec<bool> = other.iter().map(|_| draw.chance(*chance)).collect();
+                change_readings(
+                    record,
+                    channel,
+                    draw,
+                    |i, v| {
+                        if taken[i] { other[i] } else { v }
+                    },
+                );
             }
         }
     }

@@ -15,6 +15,7 @@ use crate::random::Draw;
 use crate::stand::{LSB, Stand};
 use crate::strength::{Meter, of_variance};
 
+mod fourth;
 mod third;
 
 /// Share of the gain from which an effect of the library describes it.

@@ -8,7 +8,7 @@ use super::*;
 const HUMP: &str = "hump of noise that moves with temperature";
 
 /// Share of a signal's gain that the best two effects of the library describe together: the best, then the best beside it.
-fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> (Vec<&'static str>, f64) {
+pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> (Vec<&'static str>, f64) {
     let meter = Meter::new(stand, axis);
     let gain = |s: &[f64]| meter.of_signal(&meter.energy(s)).powi(2);
     let whole = gain(signal);
