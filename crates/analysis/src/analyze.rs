@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::allan::{Deviation, Gapped, Phase, TauGrid};
 use crate::angles::{Angle, Attitude, angle, attitude};
-use crate::curves::{bridges, curve, gapped_curve, gaps_note};
+use crate::curves::{curve, gapped_curve, gaps_note};
 use crate::error::AnalysisError;
 use crate::noise_fit::{Described, Estimated, NoiseFit, Ramp, Spectrum, Term, fit_described};
 use crate::paper::{Figure, paper_figures};
@@ -279,10 +279,11 @@ pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, An
         });
     }
     let sampling = Sampling::of(record, options.rate_hz)?;
-    let mut channels = BTreeMap::new();
+    let (mut channels, mut fits) = (BTreeMap::new(), BTreeMap::new());
     let mut constant = None;
     for channel in &chosen {
-        let result = analyze_channel(channel, &sampling, options);
+        let (result, fit) = analyze_channel(channel, &sampling, options);
+        fits.extend(fit.map(|fit| (channel.name.clone(), fit)));
         if result.deviations.is_empty() {
             constant.get_or_insert((
                 channel.name.clone(),
@@ -312,7 +313,7 @@ pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, An
             notes: record.notes.clone(),
             jitter_s: sampling.jitter_s,
         },
-        attitude: attitude(record, &sampling).filter(|_| {
+        attitude: attitude(record, &sampling, &fits).filter(|_| {
             channels
                 .keys()
                 .filter(|name| name.starts_with("gyro_"))
@@ -327,7 +328,7 @@ fn analyze_channel(
     channel: &Channel,
     sampling: &Sampling,
     options: &AnalyzeOptions,
-) -> ChannelAnalysis {
+) -> (ChannelAnalysis, Option<NoiseFit>) {
     let units = Units::of(channel.quantity, &channel.unit);
     let tau0 = sampling.tau0;
     let runs = sampling.runs_of(&channel.values);
@@ -355,13 +356,13 @@ fn analyze_channel(
     let Some(first) = readings.next() else {
         out.warnings
             .push("the channel has no finite reading".into());
-        return out;
+        return (out, None);
     };
     if readings.all(|v| v == first) {
         out.warnings.push(format!(
             "the channel reads {first} throughout: a sensor at rest has noise, so this is no measurement"
         ));
-        return out;
+        return (out, None);
     }
     let phase = match (&channel.counts, channel.lsb) {
         (Some(counts), Some(lsb)) if counts.len() == channel.values.len() => {
@@ -391,7 +392,7 @@ fn analyze_channel(
             &units.reading
         };
         let points = match &gapped {
-            Some(gapped) if bridges(*kind) => gapped_curve(
+            Some(gapped) => gapped_curve(
                 gapped,
                 *kind,
                 &phase,
@@ -400,7 +401,7 @@ fn analyze_channel(
                 options.taus,
                 scale,
             ),
-            _ => curve(&phase, *kind, tau0, options.taus, scale),
+            None => curve(&phase, *kind, tau0, options.taus, scale),
         };
         out.deviations.insert(*kind, points);
     }
@@ -409,7 +410,7 @@ fn analyze_channel(
             "inconclusive: noise parameters need {FIT_NEEDS} samples, the channel has {}",
             phase.samples()
         ));
-        return out;
+        return (out, None);
     };
     out.parameters = NoiseParameters::of(&fitted, &units);
     out.parameters_hold_from_s = described.hold_from_m().map(|m| m as f64 * tau0);
@@ -458,7 +459,7 @@ fn analyze_channel(
         ),
         notes: figures.notes,
     };
-    out
+    (out, Some(fitted))
 }
 
 /// What a reader has to know where the terms do not describe the whole curve.

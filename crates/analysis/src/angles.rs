@@ -1,11 +1,12 @@
 //! What the integrated rates of a record say: the angle of each gyro beside its prediction, and the attitude of all three.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use model::record::{Axis, Channel, Quantity, Record};
 use serde::{Deserialize, Serialize};
 
-use crate::attitude::{angle_between, angle_growth, integrate};
+use crate::attitude::{angle_between, angle_growth, integrate, predicted_sigma};
 use crate::noise_fit::NoiseFit;
 use crate::sampling::Sampling;
 use crate::units::{Scale, Units};
@@ -60,7 +61,18 @@ pub struct Orientation {
     pub quaternion: [f64; 4],
     /// Angle from the start, deg.
     pub angle_deg: f64,
+    /// Standard deviations of the rotation about x, y and z that the fitted noise predicts of a stand at rest, the error of
+    /// the biases counted, deg: those of the integrated angles. Absent beyond [`SMALL_DEG`], where the axes mix, and where a
+    /// gyro has no fit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_deg: Option<[f64; 3]>,
+    /// Angle from the start that they predict, rms, that of fitted rate ramps with them, deg.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predicted_deg: Option<f64>,
 }
+
+/// Angle up to which rotations about the axes add like numbers, deg: the cross terms are below 5 % there.
+pub const SMALL_DEG: f64 = 5.0;
 
 pub(crate) fn angle(
     channel: &Channel,
@@ -89,7 +101,11 @@ pub(crate) fn angle(
     })
 }
 
-pub(crate) fn attitude(record: &Record, sampling: &Sampling) -> Option<Attitude> {
+pub(crate) fn attitude(
+    record: &Record,
+    sampling: &Sampling,
+    fits: &BTreeMap<String, NoiseFit>,
+) -> Option<Attitude> {
     let gyro = |axis: Axis| -> Option<(&Channel, f64)> {
         let channel = record
             .channels
@@ -122,6 +138,20 @@ pub(crate) fn attitude(record: &Record, sampling: &Sampling) -> Option<Attitude>
             })
         })
         .collect();
+    let fits = gyros.map(|(c, to_si)| fits.get(&c.name).map(|fit| (fit, to_si.to_degrees())));
+    let calibration_s = calibration as f64 * sampling.tau0;
+    let predicted = |t_s: f64| -> Option<[(f64, f64); 3]> {
+        let mut out = [(0.0, 0.0); 3];
+        for (axis, fit) in out.iter_mut().zip(fits) {
+            let (fit, to_deg) = fit?;
+            let expected = fit.maximum.ramp * t_s * (t_s + calibration_s) / 2.0;
+            *axis = (
+                predicted_sigma(fit, calibration_s, t_s) * to_deg,
+                expected * to_deg,
+            );
+        }
+        Some(out)
+    };
     let start = [1.0, 0.0, 0.0, 0.0];
     let path = integrate(&rates, sampling.tau0, start);
     let mut next = 1;
@@ -129,15 +159,23 @@ pub(crate) fn attitude(record: &Record, sampling: &Sampling) -> Option<Attitude>
     for (i, quaternion) in path {
         if i > 0 && i * POINTS >= next * (rates.len() - 1) {
             next = i * POINTS / (rates.len() - 1) + 1;
+            let t_s = i as f64 * sampling.tau0;
+            let angle_deg = angle_between(start, quaternion).to_degrees();
+            let axes = predicted(t_s);
+            let squares = |a: [(f64, f64); 3]| a.iter().map(|(s, e)| s * s + e * e).sum::<f64>();
+            let predicted_deg = axes.map(|a| squares(a).sqrt());
+            let small = predicted_deg.is_some_and(|p| p.max(angle_deg) <= SMALL_DEG);
             points.push(Orientation {
-                t_s: i as f64 * sampling.tau0,
+                t_s,
                 quaternion,
-                angle_deg: angle_between(start, quaternion).to_degrees(),
+                angle_deg,
+                sigma_deg: axes.filter(|_| small).map(|a| a.map(|(sigma, _)| sigma)),
+                predicted_deg: predicted_deg.filter(|_| small),
             });
         }
     }
     Some(Attitude {
-        calibration_s: calibration as f64 * sampling.tau0,
+        calibration_s,
         points,
     })
 }

@@ -1,6 +1,6 @@
 //! Curves of a deviation with their intervals, with and without gaps.
 
-use crate::allan::{Deviation, Gapped, Phase, TauGrid};
+use crate::allan::{Deviation, Gapped, GappedEstimate, Phase, TauGrid};
 use crate::analyze::DeviationPoint;
 use crate::edf::{NoiseType, chi_square_interval, edf};
 use crate::noise_fit::NoiseFit;
@@ -10,22 +10,13 @@ use crate::units::Scale;
 pub(crate) fn gaps_note(gapped: &Gapped, phase: &Phase, tau0: f64) -> String {
     let longest = gapped.lengths().into_iter().max().unwrap_or(0);
     format!(
-        "{} gaps, {:.2} % of the sample times empty: overlapping Allan, modified Allan, time and overlapping Hadamard \
-         deviations are of means over the samples that are there (up to {:.6} s, the last three {:.6} s), and their intervals \
-         count the differences that are left; other deviations end at the longest run without a gap, {:.6} s. Nothing is filled in",
+        "{} gaps, {:.2} % of the sample times empty: deviations are of means over the samples that are there (the overlapping \
+         Allan deviation up to {:.6} s; without bridging, the longest run would end it at {:.6} s), and their intervals count the \
+         differences that are left. Nothing is filled in",
         phase.run_lengths().len() - 1,
         100.0 * (1.0 - gapped.filled()),
         (longest / 2) as f64 * tau0,
-        (longest / 3) as f64 * tau0,
-        phase.longest_run() as f64 * tau0
-    )
-}
-
-/// Whether a deviation is defined across gaps.
-pub(crate) fn bridges(kind: Deviation) -> bool {
-    matches!(
-        kind,
-        Deviation::Oadev | Deviation::Ohdev | Deviation::Mdev | Deviation::Tdev
+        (phase.longest_run() / 2) as f64 * tau0
     )
 }
 
@@ -42,20 +33,43 @@ pub(crate) fn gapped_curve(
 ) -> Vec<DeviationPoint> {
     let lengths = gapped.lengths();
     let longest = kind.longest(lengths.iter().copied().max().unwrap_or(0));
-    let mut noise = NoiseType::WhiteRate;
-    grid.factors(longest)
-        .into_iter()
-        .filter_map(|m| {
-            let share = |of: fn(&NoiseFit, usize) -> f64| fitted.map_or(1.0, |f| of(f, m));
-            let mut found = match kind {
-                Deviation::Ohdev => {
-                    gapped.overlapping_hadamard(tau0, m, share(NoiseFit::white_share_hadamard))?
-                }
-                Deviation::Mdev | Deviation::Tdev => {
-                    gapped.modified_allan(tau0, m, share(NoiseFit::white_share_modified))?
-                }
-                _ => gapped.overlapping_allan(tau0, m, share(NoiseFit::white_share))?,
+    let factors = grid.factors(longest);
+    let share = |of: fn(&NoiseFit, usize) -> f64, m: usize| fitted.map_or(1.0, |f| of(f, m));
+    let found: Vec<GappedEstimate> = if kind == Deviation::Theoh {
+        gapped.theoh_curve(tau0, &factors, |theo1, m| {
+            let of = if theo1 {
+                NoiseFit::white_share_theo1
+            } else {
+                NoiseFit::white_share
             };
+            share(of, m)
+        })
+    } else {
+        let at = |m: usize| match kind {
+            Deviation::Adev => gapped.allan(tau0, m, share(NoiseFit::white_share, m)),
+            Deviation::Hdev => gapped.hadamard(tau0, m, share(NoiseFit::white_share_hadamard, m)),
+            Deviation::Ohdev => {
+                gapped.overlapping_hadamard(tau0, m, share(NoiseFit::white_share_hadamard, m))
+            }
+            Deviation::Mdev | Deviation::Tdev => {
+                gapped.modified_allan(tau0, m, share(NoiseFit::white_share_modified, m))
+            }
+            Deviation::Totdev => gapped.total(tau0, m, share(NoiseFit::white_share, m)),
+            Deviation::Mtotdev => {
+                gapped.modified_total(tau0, m, share(NoiseFit::white_share_modified, m))
+            }
+            Deviation::Theo1 => gapped.theo1(tau0, m, share(NoiseFit::white_share_theo1, m)),
+            Deviation::Oadev | Deviation::Theoh => {
+                gapped.overlapping_allan(tau0, m, share(NoiseFit::white_share, m))
+            }
+        };
+        factors.into_iter().filter_map(at).collect()
+    };
+    let mut noise = NoiseType::WhiteRate;
+    found
+        .into_iter()
+        .map(|mut found| {
+            let m = found.estimate.m;
             if kind == Deviation::Tdev {
                 found.estimate.deviation *= found.estimate.tau_s / 3f64.sqrt();
             }
@@ -70,7 +84,7 @@ pub(crate) fn gapped_curve(
             let share = found.estimate.n as f64 / found.possible as f64;
             let edf = (edf(kind, noise, m, &lengths) * share).max(1.0);
             let (low, high) = chi_square_interval(found.estimate.deviation, edf, 0.95);
-            Some(DeviationPoint {
+            DeviationPoint {
                 tau_s: found.estimate.tau_s,
                 deviation: found.estimate.deviation * scale.factor,
                 low: low * scale.factor,
@@ -78,7 +92,7 @@ pub(crate) fn gapped_curve(
                 edf,
                 n: found.estimate.n,
                 noise_alpha: noise.alpha(),
-            })
+            }
         })
         .collect()
 }

@@ -342,6 +342,42 @@ fn the_measured_adis16405_has_the_noise_its_makers_state() {
 }
 
 #[test]
+fn the_attitude_of_a_stand_at_rest_drifts_as_the_fits_predict() {
+    // White noise of independent axes: the squared angle over its prediction is χ² of three in thirds.
+    let (mut sum, records) = (0.0, 30);
+    for seed in 0..records {
+        let mut record = white(100 + 3 * seed);
+        let of = |name: &str, axis, seed| Channel {
+            name: name.into(),
+            axis: Some(axis),
+            counts: None,
+            lsb: None,
+            ..white(seed).channels[0].clone()
+        };
+        record.channels = vec![
+            of("gyro_x", Axis::X, 100 + 3 * seed),
+            of("gyro_y", Axis::Y, 101 + 3 * seed),
+            of("gyro_z", Axis::Z, 102 + 3 * seed),
+        ];
+        for channel in &mut record.channels {
+            channel.values.iter_mut().for_each(|v| *v *= 0.2);
+        }
+        let attitude = analyze(&record, &AnalyzeOptions::default())
+            .unwrap()
+            .attitude
+            .unwrap();
+        let p = attitude.points[9];
+        let sigma = p.sigma_deg.unwrap();
+        assert!(
+            p.predicted_deg.unwrap() >= sigma.iter().map(|s| s * s).sum::<f64>().sqrt() * 0.999
+        );
+        sum += (p.angle_deg / p.predicted_deg.unwrap()).powi(2) / records as f64;
+    }
+    // χ²(90)/90: 4.5 standard deviations are 0.67; fits that see a walk by chance predict a little more.
+    assert!((0.4..1.67).contains(&sum), "{sum}");
+}
+
+#[test]
 fn the_integrated_angle_stays_within_its_prediction_and_a_turn_is_seen_by_the_attitude() {
     let z = &analyze(&white(11), &AnalyzeOptions::default()).unwrap();
     let angle = z.channels["gyro_z"].angle.as_ref().unwrap();
@@ -378,6 +414,7 @@ fn the_integrated_angle_stays_within_its_prediction_and_a_turn_is_seen_by_the_at
         .unwrap();
     let last = attitude.points.last().unwrap();
     assert!((last.angle_deg - 90.0).abs() < 0.5, "{last:?}");
+    assert_eq!(last.predicted_deg, None, "90 degrees are not small");
     assert!(
         (last.quaternion[2] - 0.5f64.sqrt()).abs() < 0.01,
         "{last:?}"

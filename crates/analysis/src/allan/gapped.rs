@@ -1,4 +1,4 @@
-//! Overlapping Allan and Hadamard deviations of a record with gaps: cluster means over the samples that are there, at
+//! Allan and Hadamard deviations of a record with gaps: cluster means over the samples that are there, at
 //! their true times.
 
 use std::ops::Range;
@@ -111,14 +111,30 @@ impl Gapped {
         m: usize,
         white_share: f64,
     ) -> Option<GappedEstimate> {
+        self.second_differences(tau0, m, 1, white_share)
+    }
+
+    /// Allan deviation at `m` of clusters side by side, by the same rules.
+    #[must_use]
+    pub fn allan(&self, tau0: f64, m: usize, white_share: f64) -> Option<GappedEstimate> {
+        self.second_differences(tau0, m, m, white_share)
+    }
+
+    fn second_differences(
+        &self,
+        tau0: f64,
+        m: usize,
+        stride: usize,
+        white_share: f64,
+    ) -> Option<GappedEstimate> {
         let needed = self.needed(m);
         let (mut squares, mut inflation, mut n, mut possible) = (0.0, 0.0, 0usize, 0usize);
         for Segment { sums, counts } in &self.segments {
             let Some(terms) = sums.len().checked_sub(2 * m).filter(|t| *t > 0 && m > 0) else {
                 continue;
             };
-            possible += terms;
-            for k in 0..terms {
+            possible += terms.div_ceil(stride);
+            for k in (0..terms).step_by(stride) {
                 let first = counts[k + m] - counts[k];
                 let second = counts[k + 2 * m] - counts[k + m];
                 if first < needed || second < needed {
@@ -144,14 +160,30 @@ impl Gapped {
         m: usize,
         white_share: f64,
     ) -> Option<GappedEstimate> {
+        self.third_differences(tau0, m, 1, white_share)
+    }
+
+    /// Hadamard deviation at `m` of clusters side by side, by the same rules.
+    #[must_use]
+    pub fn hadamard(&self, tau0: f64, m: usize, white_share: f64) -> Option<GappedEstimate> {
+        self.third_differences(tau0, m, m, white_share)
+    }
+
+    fn third_differences(
+        &self,
+        tau0: f64,
+        m: usize,
+        stride: usize,
+        white_share: f64,
+    ) -> Option<GappedEstimate> {
         let needed = self.needed(m);
         let (mut squares, mut inflation, mut n, mut possible) = (0.0, 0.0, 0usize, 0usize);
         for Segment { sums, counts } in &self.segments {
             let Some(terms) = sums.len().checked_sub(3 * m).filter(|t| *t > 0 && m > 0) else {
                 continue;
             };
-            possible += terms;
-            for k in 0..terms {
+            possible += terms.div_ceil(stride);
+            for k in (0..terms).step_by(stride) {
                 let filled: [u32; 3] =
                     std::array::from_fn(|i| counts[k + (i + 1) * m] - counts[k + i * m]);
                 if filled.iter().any(|f| *f < needed) {
@@ -174,8 +206,13 @@ impl Gapped {
         if m < WHOLE_BELOW {
             m as u32
         } else {
-            (NEEDED_SHARE * self.filled() * m as f64).ceil().max(1.0) as u32
+            self.share_needed(m)
         }
+    }
+
+    /// The same without asking short ones to be complete.
+    pub(super) fn share_needed(&self, m: usize) -> u32 {
+        (NEEDED_SHARE * self.filled() * m as f64).ceil().max(1.0) as u32
     }
 
     #[expect(clippy::too_many_arguments, reason = "the sums of one pass")]

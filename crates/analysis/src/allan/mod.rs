@@ -4,6 +4,7 @@ mod correlate;
 mod fast;
 mod gapped;
 mod gapped_modified;
+mod gapped_total;
 mod kernels;
 mod phase;
 mod streaming;

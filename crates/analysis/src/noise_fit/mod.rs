@@ -23,6 +23,9 @@ use likelihood::{maximize, profile_interval, ramp_given};
 /// Half of χ²(1) at 95 %: the fall of the log likelihood at the ends of an interval, nats.
 const DROP_95: f64 = 1.920_73;
 
+/// The same at 90 %, of the model chosen: with few misses below the interval of the full model, 5 % above are right.
+const DROP_90: f64 = 1.352_77;
+
 /// Likelihood ratio from which the random walk, always in the model, is given as a value: 2.5 % where there is none.
 const ESTABLISHES_WALK: f64 = 3.84;
 
@@ -106,6 +109,25 @@ impl NoiseFit {
         if all > 0.0 { white / all } else { 1.0 }
     }
 
+    /// The same in Theo1 with τ = 0.75·m·τ₀: N²/τ, 1/1.87 of the flicker's Allan variance, 10/27 of the walk's, 11/81·R²τ² and
+    /// 4Q²(ln(m/2) + γ)/(0.75 m²τ₀²): the sums of its definition for large m.
+    #[must_use]
+    pub fn white_share_theo1(&self, m: usize) -> f64 {
+        const EULER: f64 = 0.577_216;
+        let (mf, tau) = (m as f64, 0.75 * m as f64 * self.tau0);
+        let [n, b, k, q] = Term::ALL.map(|t| {
+            t.letter(self.maximum.coefficients[t as usize], self.tau0)
+                .powi(2)
+        });
+        let white = n / tau;
+        let flicker = b * 2.0 * std::f64::consts::LN_2 / std::f64::consts::PI / 1.87;
+        let walk = 10.0 / 27.0 * k * tau / 3.0;
+        let ramp = 11.0 / 81.0 * (self.maximum.ramp * tau).powi(2);
+        let quantized = 4.0 * q * ((mf / 2.0).ln() + EULER) / (0.75 * (mf * self.tau0).powi(2));
+        let all = white + flicker + walk + quantized + ramp;
+        if all > 0.0 { white / all } else { 1.0 }
+    }
+
     /// Allan deviation of the fitted model at `m`, U.
     #[must_use]
     pub fn deviation(&self, m: usize) -> f64 {
@@ -141,9 +163,12 @@ pub fn fit(spectrum: &Spectrum) -> NoiseFit {
             _ => model.terms[t],
         };
         if established {
-            // The model chosen lies within the likelihood of the full one, but not always within its 95 %.
+            // The value is the chosen model's, which the interval of the full one may end at or miss: other terms can only
+            // take from this one, so its upper end is where they are nothing. The chosen model's own interval is within.
             let value = term.letter(maximum.coefficients[t], tau0);
-            let (low, high) = (low.min(value), high.max(value));
+            let own = profile_interval(spectrum, model, t, &maximum, DROP_90);
+            let low = low.min(term.letter(own.0, tau0));
+            let high = high.max(term.letter(own.1, tau0));
             Estimated {
                 value: Some(value),
                 std_error: Some((high - low) / (2.0 * 1.959_964)),

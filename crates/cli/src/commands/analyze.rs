@@ -150,9 +150,13 @@ fn print(analysis: &Analysis) {
     {
         let [w, x, y, z] = last.quaternion;
         say!(
-            "attitude of the three gyros after {} s: {} deg from the start, quaternion ({w:.6}, {x:.6}, {y:.6}, {z:.6})",
+            "attitude of the three gyros after {} s: {} deg from the start{}, quaternion ({w:.6}, {x:.6}, {y:.6}, {z:.6})",
             number(last.t_s, 4),
-            number(last.angle_deg, 3)
+            number(last.angle_deg, 3),
+            last.predicted_deg.map_or_else(String::new, |p| format!(
+                " (the fits predict {} rms of a stand at rest)",
+                number(p, 3)
+            ))
         );
     }
     if !notes.is_empty() {
