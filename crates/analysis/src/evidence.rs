@@ -263,7 +263,11 @@ fn of_term(s: &Searched<'_>, grid: &Grid, term: &Term) -> Evidence {
                     (blocks(&time, count), (0..count).collect())
                 }
             };
-            let (seen, fitted) = (blocks(&seen, count), blocks(&fitted, count));
+            let (mut seen, fitted) = (blocks(&seen, count), blocks(&fitted, count));
+            // The constant is fitted beside the term: what the term does not say has no mean.
+            let left: f64 = seen.iter().zip(&fitted).map(|(y, f)| y - f).sum();
+            seen.iter_mut()
+                .for_each(|y| *y -= left / count.max(1) as f64);
             let pick = |v: &[f64]| -> Vec<f64> { order.iter().map(|i| v[*i]).collect() };
             evidence.series = vec![
                 series(
