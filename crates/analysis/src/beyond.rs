@@ -8,6 +8,10 @@ use model::effect::{
 use model::record::Quantity;
 use model::simulate::Simulation;
 
+use crate::search::Term;
+
+pub(crate) mod memory;
+
 /// Id of the stand-in that the search knows them by; no cause of the library.
 pub const ID: &str = "beyond";
 
@@ -69,11 +73,26 @@ fn played(values: &[f64], half: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Makes the values of a combination; long records hold one at a time.
-type Maker<'a> = Box<dyn Fn() -> Vec<f64> + 'a>;
+/// Makes the columns of a combination; long records hold one combination at a time.
+type Maker<'a> = Box<dyn Fn() -> Vec<Vec<f64>> + 'a>;
 
-/// The combinations that a record allows, each with its name.
-fn combinations<'a>(view: &'a View<'_>) -> Vec<(String, Maker<'a>)> {
+/// A combination: what it is, and its columns.
+struct Combination<'a> {
+    what: String,
+    columns: Maker<'a>,
+}
+
+impl<'a> Combination<'a> {
+    fn of(what: String, values: impl Fn() -> Vec<f64> + 'a) -> Self {
+        Self {
+            what,
+            columns: Box::new(move || vec![values()]),
+        }
+    }
+}
+
+/// The combinations that a record allows.
+fn combinations<'a>(view: &'a View<'_>) -> Vec<Combination<'a>> {
     let moves = |s: &&Signal, least: f64| s.range() >= least;
     let temperature = view
         .signal(Quantity::Temp)
@@ -84,80 +103,104 @@ fn combinations<'a>(view: &'a View<'_>) -> Vec<(String, Maker<'a>)> {
     let supply = view
         .signal(Quantity::Supply)
         .filter(|s| moves(s, LEAST_SUPPLY));
-    let mut all: Vec<(String, Maker<'a>)> = vec![];
+    let mut all: Vec<Combination<'a>> = vec![];
     if let Some(t) = temperature {
         let c = || centred(&t.smooth);
         let reach = ((SLOPE_S * view.rate_hz).round() as usize).max(1);
-        all.push((
-            format!("rate of change of {}", t.name),
-            Box::new(move || slope(&t.smooth, reach)),
+        let name = &t.name;
+        all.push(Combination::of(
+            format!("rate of change of {name}"),
+            move || slope(&t.smooth, reach),
         ));
-        all.push((
-            format!("{} behind a lag", t.name),
-            Box::new(|| lagged(&t.smooth, LAG_S * view.rate_hz)),
-        ));
+        all.push(Combination::of(format!("{name} behind a lag"), || {
+            lagged(&t.smooth, LAG_S * view.rate_hz)
+        }));
         for share in PLAYS {
-            let what = format!(
-                "{} with a play of {:.1} {}",
-                t.name,
-                share * t.range(),
-                t.unit
-            );
-            all.push((
-                what,
-                Box::new(move || played(&t.smooth, 0.5 * share * t.range())),
+            let play = share * t.range();
+            all.push(Combination::of(
+                format!("{name} with a play of {play:.1} {}", t.unit),
+                move || played(&t.smooth, 0.5 * play),
             ));
         }
-        all.push((
-            format!("cube of {}", t.name),
-            Box::new(move || c().iter().map(|v| v.powi(3)).collect()),
-        ));
+        all.push(Combination::of(format!("cube of {name}"), move || {
+            c().iter().map(|v| v.powi(3)).collect()
+        }));
         // The command has a zero of its own; the supply has none that means anything.
         if let Some(m) = motor {
-            all.push((
-                format!("{} times {}", m.name, t.name),
-                Box::new(move || product(&m.smooth, &c())),
+            all.push(Combination::of(
+                format!("{} times {name}", m.name),
+                move || product(&m.smooth, &c()),
             ));
         }
         if let Some(u) = supply {
-            let name = format!("{} times {}", u.name, t.name);
-            all.push((name, Box::new(move || product(&centred(&u.smooth), &c()))));
+            all.push(Combination::of(
+                format!("{} times {name}", u.name),
+                move || product(&centred(&u.smooth), &c()),
+            ));
         }
         if let Some(m) = motor {
             let size = || m.smooth.iter().map(|v| v.abs()).collect::<Vec<f64>>();
-            all.push((
-                format!("size of {} times {}", m.name, t.name),
-                Box::new(move || product(&size(), &c())),
+            all.push(Combination::of(
+                format!("size of {} times {name}", m.name),
+                move || product(&size(), &c()),
             ));
         }
     }
     if let (Some(m), Some(u)) = (motor, supply) {
-        let name = format!("{} times {}", m.name, u.name);
-        all.push((
-            name,
-            Box::new(move || product(&m.smooth, &centred(&u.smooth))),
+        all.push(Combination::of(
+            format!("{} times {}", m.name, u.name),
+            move || product(&m.smooth, &centred(&u.smooth)),
         ));
     }
-    for a in view
-        .all(Quantity::Acc)
-        .filter(|a| a.std_dev() >= LEAST_VIBRATION && !view.sways())
-    {
-        let square = || centred(&a.values).iter().map(|v| v * v).collect();
-        all.push((format!("square of {}", a.name), Box::new(square)));
+    for a in accelerations(view) {
+        all.push(Combination::of(format!("square of {}", a.name), || {
+            centred(&a.values).iter().map(|v| v * v).collect()
+        }));
     }
+    for w in turning(view) {
+        all.push(Combination::of(format!("square of {}", w.name), || {
+            w.smooth.iter().map(|v| v * v).collect()
+        }));
+    }
+    all.extend(memory::combinations(view, motor, supply));
     all
 }
 
+/// Accelerometers that feel vibration.
+fn accelerations<'a>(view: &'a View<'_>) -> impl Iterator<Item = &'a Signal> {
+    let still = !view.sways();
+    view.all(Quantity::Acc)
+        .filter(move |a| still && a.std_dev() >= LEAST_VIBRATION)
+}
+
+/// Gyros that the table turns.
+fn turning<'a>(view: &'a View<'_>) -> impl Iterator<Item = &'a Signal> {
+    let still = !view.sways() && !view.moving;
+    view.all(Quantity::Gyro)
+        .filter(move |g| still && g.moving && g.name != view.channel)
+}
+
+/// The one channel that a term without a name is made of, if it is one.
+pub(crate) fn source<'a>(view: &'a View<'_>, term: &Term) -> Option<&'a str> {
+    let what = term.follows.as_deref()?;
+    let mut parts = view.signals.iter().filter(|s| what.contains(&s.name));
+    let one = parts.next()?;
+    parts.next().is_none().then_some(one.name.as_str())
+}
+
+/// Names of its columns; they are no parameters of anything.
+const NAMES: [&str; 8] = ["c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
+
 /// Its hypotheses, each made when it is asked for.
 pub fn one_by_one<'a>(view: &'a View<'_>) -> impl ExactSizeIterator<Item = Hypothesis> + 'a {
-    combinations(view).into_iter().map(|(name, values)| {
+    combinations(view).into_iter().map(|c| {
+        let columns = (c.columns)().into_iter().zip(NAMES);
         Hypothesis::Regression(Regression {
-            columns: vec![Column {
-                parameter: "size",
-                values: values(),
-            }],
+            columns: columns
+                .map(|(values, parameter)| Column { parameter, values })
+                .collect(),
             fixed: vec![],
-            follows: Some(name),
+            follows: Some(c.what),
         })
     })
 }

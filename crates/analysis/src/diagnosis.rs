@@ -23,7 +23,7 @@ use crate::result::{
     Parameter, Unexplained, Verdict,
 };
 use crate::search::{Note, Search, State};
-use crate::{adequacy, beyond, dead, doubt, evidence, losses, rows, scan, threshold};
+use crate::{adequacy, beyond, dead, doubt, evidence, law, losses, rows, scan, threshold};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,6 +53,8 @@ pub(crate) struct Searched<'a> {
     pub variance: Option<VarianceFound>,
     /// Smallest sizes that the search would have named, whether it did or not.
     limits: Vec<DetectionLimit>,
+    /// Effects that follow a channel, and whether by the law that their name claims.
+    pub laws: Vec<(&'static str, checks::Outcome)>,
 }
 
 /// A law of the variance that was found.
@@ -258,8 +260,10 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         checks: vec![],
         variance: None,
         limits: vec![],
+        laws: vec![],
     };
     s.limits = limits(&s);
+    s.laws = law::of_followers(&s.search, &s.state);
     s.search.panel.release(&s.state.columns());
     grid.dct.keep_no_more();
     if !target.moving {
@@ -350,7 +354,8 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
     let after = checks::all(&s.u, &s.e, s.search.view.rate_hz);
     // Before a process was named nothing was claimed of it.
     let claims = adequacy::of_processes(&s.search, &s.state);
-    let claims = claims.into_iter().map(|c| Check {
+    let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
+    let claims = claims.into_iter().chain(laws).map(|c| Check {
         id: c.id.into(),
         channel: s.target.name.clone(),
         statistic: c.statistic,

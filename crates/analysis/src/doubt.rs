@@ -5,16 +5,16 @@
 //! else: they stay in the model, and the answer tells them as what is unexplained comes closest to.
 //!
 //! What follows a recorded channel does so by a shape that the library has of it. A shape that is off by a part e of its
-//! size leaves e^2 of its likelihood ratio to others: a generic term beside it that holds no more than that is as likely
-//! a remainder of the shape as a cause of its own.
+//! size leaves e^2 of its likelihood ratio to others: a generic term beside it that holds no more than that, and gives way
+//! where the shape may be late or bent, is as likely a remainder of the shape as a cause of its own.
 
-use crate::checks::{self, LEAST_CHANCE};
+use crate::checks::{self, LEAST_CHANCE, Outcome};
 use crate::diagnosis::Searched;
 use crate::result::{Finding, Unexplained};
 use crate::search::{Form, Term};
 use std::f64::consts::PI;
 
-use crate::{adequacy, beyond};
+use crate::{adequacy, beyond, law};
 
 /// Share of a term's energy in bands that fail, from which on the failure is the term's.
 const SHARE: f64 = 0.25;
@@ -121,14 +121,25 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
             .filter(|f| f.0 != t.effect.id())
             .map(|(id, all)| (*id, t.lr / all))
             .filter(|(id, share)| {
-                let most = if *id == beyond::ID {
-                    REMAINDER_BEYOND
+                if *id == beyond::ID {
+                    *share < REMAINDER_BEYOND
                 } else {
-                    REMAINDER
-                };
-                *share < most
+                    *share < REMAINDER && !law::holds_beside(&s.search, &s.state, t, id)
+                }
             })
             .min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    // What follows a channel by another law than its name claims, as the claim itself or a term without a name says.
+    let unlawful = |t: &Term| {
+        let id = t.effect.id();
+        let failed = |(of, o): &(&str, Outcome)| *of == id && o.p_value < adequacy::LEAST_CHANCE;
+        let signal = t.follows.as_deref();
+        let beside = |o: &Term| {
+            o.effect.id() == beyond::ID
+                && o.lr > law::DEPARTURE * t.lr
+                && beyond::source(&s.search.view, o) == signal
+        };
+        signal.is_some() && (s.laws.iter().any(failed) || s.state.terms.iter().any(beside))
     };
     let mut at = 0;
     let terms = s
@@ -173,7 +184,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
             };
             if line.is_some() && s.state.wandering.is_some() {
                 Doubt::No
-            } else if there || generic(t) && (crowd || misplaced(t)) {
+            } else if there || unlawful(t) || generic(t) && (crowd || misplaced(t)) {
                 Doubt::Checks
             } else if let Some((id, share)) = remainder(t).filter(|_| generic(t) && line.is_none())
             {

@@ -25,6 +25,7 @@ mod findings;
 pub mod gain;
 pub mod grid;
 pub mod kalman;
+mod law;
 mod levels;
 pub mod likelihood;
 mod losses;

@@ -85,6 +85,15 @@ impl Term {
     fn is_covariance(&self) -> bool {
         matches!(self.form, Form::Covariance(..))
     }
+
+    fn has_no_name(&self) -> bool {
+        self.effect.id() == beyond::ID
+    }
+
+    /// Whether it has the freedom to stand for several terms of the library.
+    fn may_swallow(&self) -> bool {
+        self.is_covariance() || self.has_no_name()
+    }
 }
 
 /// A hypothesis under test.
@@ -105,6 +114,12 @@ impl Candidate {
     #[must_use]
     pub fn columns(&self) -> &[usize] {
         &self.columns
+    }
+
+    /// The same, and those of a shape at every point of its grid.
+    pub(crate) fn all_columns(&self) -> impl Iterator<Item = usize> {
+        let grid = self.grid.iter().flat_map(|(_, columns)| columns);
+        self.columns.iter().chain(grid).copied()
     }
 }
 
@@ -386,21 +401,23 @@ impl<'a> Search<'a> {
         Some(plain.unwrap_or(best).clone())
     }
 
-    /// A covariance term that swallowed a regressor gives way to it.
+    /// A term that swallowed others gives way to them: a covariance to regressors, a combination to what has a name.
     fn swap(&self, state: State) -> State {
         let mut best = state;
-        let covariances: Vec<usize> = (0..best.terms.len())
-            .filter(|i| best.terms[*i].is_covariance())
-            .collect();
-        for i in covariances.into_iter().rev() {
-            if best.terms.get(i).is_none_or(|t| !t.is_covariance()) {
+        for i in (0..best.terms.len()).rev() {
+            let Some(term) = best.terms.get(i).filter(|t| t.may_swallow()) else {
                 continue;
-            }
+            };
+            let covariance = term.is_covariance();
             let mut rest = self.without(&best, i);
             // Up to three terms may share what the one took.
             for _ in 0..3 {
                 let offers = self.offers(&rest, &|c| {
-                    !matches!(c.hypothesis, Hypothesis::Covariance(_))
+                    if covariance {
+                        !matches!(c.hypothesis, Hypothesis::Covariance(_))
+                    } else {
+                        c.effect.id() != beyond::ID
+                    }
                 });
                 let Some(offer) = Self::simplest_best(offers) else {
                     break;
@@ -409,7 +426,13 @@ impl<'a> Search<'a> {
                     break;
                 }
                 rest = self.accept(&rest, offer);
-                if Self::total(&rest) > Self::total(&best) {
+                let ahead = if covariance {
+                    Self::total(&rest) - Self::total(&best)
+                } else {
+                    // Each has passed its threshold: what has a name needs to do as well, no better.
+                    2.0 * (rest.solution.log_likelihood - best.solution.log_likelihood) + RIVAL_SPAN
+                };
+                if ahead > 0.0 {
                     best = rest;
                     break;
                 }

@@ -1,0 +1,184 @@
+//! Responses with a memory: a channel that follows another one, though not at once.
+//!
+//! A linear response that starts and fades with one time constant, in any proportion to what comes at once, lies in the
+//! span of the signal and of the signal behind a lag of that time: a late response, one that is ahead and one to changes
+//! alone are points of it. Vibration has no time constant that fits a few samples; there it is any response of that
+//! many of them.
+
+use model::effect::{Signal, View};
+use model::record::Quantity;
+
+use super::{Combination, accelerations, centred, lagged, turning};
+
+/// Time constants, s, a factor of four apart: a lag half way between two of them is spanned by either to some percent.
+const SUPPLY_S: [f64; 4] = [0.5, 2.0, 8.0, 32.0];
+/// The same for the heat of a motor, which goes with the size of the command.
+const HEAT_S: [f64; 4] = [1.0, 4.0, 16.0, 64.0];
+/// The same for a command beyond the surges that the library has.
+const COMMAND_S: [f64; 2] = [12.0, 48.0];
+/// The same for a temperature.
+const TEMPERATURE_S: [f64; 3] = [10.0, 40.0, 160.0];
+/// The same for a rate that the table makes.
+const TURNING_S: [f64; 3] = [0.2, 0.8, 3.2];
+/// Samples over which a response to vibration may go on.
+const SAMPLES: usize = 6;
+
+/// A signal and what is behind it.
+fn pair(values: &[f64], tau: f64) -> Vec<Vec<f64>> {
+    let c = centred(values);
+    let behind = lagged(&c, tau);
+    vec![c, behind]
+}
+
+/// A signal and the same up to some samples later.
+fn shifted(values: &[f64]) -> Vec<Vec<f64>> {
+    let c = centred(values);
+    let at = |k: usize| (0..c.len()).map(|i| c[i.saturating_sub(k)]).collect();
+    (0..=SAMPLES).map(at).collect()
+}
+
+fn size(signal: &Signal) -> Vec<f64> {
+    signal.values.iter().map(|v| v.abs()).collect()
+}
+
+/// Those of the times that the grid resolves.
+fn resolved<'a>(view: &'a View<'_>, times: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+    let (least, most) = (1.0 / view.rate_hz, view.seconds() / 8.0);
+    let within = move |t: &f64| *t >= least && *t <= most;
+    times.iter().copied().filter(within)
+}
+
+pub(super) fn combinations<'a>(
+    view: &'a View<'_>,
+    motor: Option<&'a Signal>,
+    supply: Option<&'a Signal>,
+) -> Vec<Combination<'a>> {
+    let mut all = vec![];
+    let mut pairs = |what: String, times: &'a [f64], of: fn(&Signal) -> Vec<f64>, s: &'a Signal| {
+        for t in resolved(view, times) {
+            all.push(Combination {
+                what: format!("{what} with a memory of about {t} s"),
+                columns: Box::new(move || pair(&of(s), t * view.rate_hz)),
+            });
+        }
+    };
+    let smooth = |s: &Signal| s.smooth.to_vec();
+    if let Some(u) = supply {
+        pairs(u.name.clone(), &SUPPLY_S, smooth, u);
+    }
+    if let Some(m) = motor {
+        // A command of one direction is its own size, and the library has its surges.
+        let sign = |s: f64| m.values.iter().any(|v| *v * s > 0.0);
+        if sign(1.0) && sign(-1.0) {
+            pairs(format!("size of {}", m.name), &HEAT_S, size, m);
+        }
+        pairs(m.name.clone(), &COMMAND_S, smooth, m);
+    }
+    for w in turning(view) {
+        pairs(w.name.clone(), &TURNING_S, smooth, w);
+    }
+    for a in accelerations(view) {
+        all.push(Combination {
+            what: format!(
+                "{} over its last {:.2} s",
+                a.name,
+                SAMPLES as f64 / view.rate_hz
+            ),
+            columns: Box::new(|| shifted(&a.values)),
+        });
+    }
+    all
+}
+
+/// Everything by which a response to a signal may differ from one that is in proportion and at once: its memory, its
+/// bend, and its drift in time. Columns beside the signal itself.
+pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Vec<f64>> {
+    let vibrates = signal.quantity == Quantity::Acc;
+    let c = centred(if vibrates {
+        &signal.values
+    } else {
+        &signal.smooth
+    });
+    let n = c.len();
+    let largest = c.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-300);
+    let scaled: Vec<f64> = c.iter().map(|v| v / largest).collect();
+    let of = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
+        scaled.iter().enumerate().map(|(i, v)| f(i, *v)).collect()
+    };
+    let mut all = vec![
+        of(&|_, v| v * v),
+        of(&|_, v| v * v * v),
+        of(&|i, v| v * (2.0 * i as f64 / n as f64 - 1.0)),
+    ];
+    if vibrates {
+        all.extend(shifted(&scaled).into_iter().skip(1));
+    } else {
+        let times: &[f64] = match signal.quantity {
+            Quantity::Gyro => &TURNING_S,
+            // Surges of a motor take their part of a short memory.
+            Quantity::Pwm => &COMMAND_S,
+            Quantity::Temp => &TEMPERATURE_S,
+            _ => &SUPPLY_S,
+        };
+        all.extend(resolved(view, times).map(|t| lagged(&scaled, t * view.rate_hz)));
+    }
+    if signal.quantity == Quantity::Pwm {
+        let size = centred(&size(signal));
+        let lags = resolved(view, &HEAT_S);
+        all.extend(lags.map(|t| lagged(&size, t * view.rate_hz)));
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Share of the energy of `y` that columns explain.
+    fn spanned(columns: &[Vec<f64>], y: &[f64]) -> f64 {
+        let mut basis: Vec<Vec<f64>> = vec![];
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        for c in columns {
+            let mut c = c.clone();
+            for b in &basis {
+                let share = dot(&c, b);
+                c.iter_mut().zip(b).for_each(|(c, b)| *c -= share * b);
+            }
+            let length = dot(&c, &c).sqrt();
+            c.iter_mut().for_each(|c| *c /= length);
+            basis.push(c);
+        }
+        basis.iter().map(|b| dot(b, y).powi(2)).sum::<f64>() / dot(y, y)
+    }
+
+    #[test]
+    fn a_lag_between_two_times_is_spanned_by_one_of_them() {
+        // A load that is switched every 7 s and a response to its changes that fades in 1 s, at 20 Hz.
+        let x: Vec<f64> = (0..12_000)
+            .map(|i| if (i / 140) % 2 == 0 { 1.0 } else { -1.0 })
+            .collect();
+        let behind = lagged(&x, 20.0);
+        let y: Vec<f64> = x.iter().zip(&behind).map(|(x, b)| x - b).collect();
+        let best = SUPPLY_S
+            .iter()
+            .map(|t| spanned(&pair(&x, t * 20.0), &y))
+            .fold(0.0, f64::max);
+        assert!(best > 0.9, "{best}");
+        assert!(spanned(&[centred(&x)], &y) < 0.6);
+    }
+
+    #[test]
+    fn a_delay_of_three_samples_is_spanned_by_the_shifts() {
+        let mut state = 1u32;
+        let x: Vec<f64> = (0..4000)
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                f64::from(state >> 8) / f64::from(1u32 << 24) - 0.5
+            })
+            .collect();
+        let c = centred(&x);
+        let y: Vec<f64> = (0..c.len()).map(|i| c[i.saturating_sub(3)]).collect();
+        assert!(spanned(&shifted(&x), &y) > 0.999);
+        assert!(spanned(&[c], &y) < 0.01);
+    }
+}

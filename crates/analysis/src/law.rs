@@ -1,0 +1,110 @@
+//! What the name of an effect that follows a recorded channel claims, held against the record.
+//!
+//! The library says that the rate follows the channel in one shape: in proportion and at once, or as it states. Where the
+//! truth follows the same channel by another law (late, by its changes alone, bent, less and less), the library's shape
+//! takes the part of it that lies along it and is named for that part. Here the term is asked alone: do departures from
+//! its shape, made of the same channel, explain more? A shape that is off by a part e of its size leaves e^2 of what it
+//! explains to them.
+
+use std::collections::BTreeMap;
+
+use crate::beyond::{self, memory};
+use crate::checks::{Outcome, chi_tail};
+use crate::likelihood::Noise;
+use crate::search::{Candidate, Form, Search, State, Term};
+
+/// The claim.
+pub(crate) const CLAIM: &str = "follower_law";
+/// Share of what a shape explains that departures from it may hold: it is off by a fifth of its size. Real responses are
+/// not exactly in proportion, and a small part of a strong effect is no other cause.
+pub(crate) const DEPARTURE: f64 = 0.05;
+/// Refitting the random walk widens the likelihood ratio of slow columns (`threshold`).
+const WIDENED: f64 = 1.12;
+
+/// For each effect that follows a channel, whether its law holds.
+pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static str, Outcome)> {
+    let mut followed: BTreeMap<(&'static str, &str), f64> = BTreeMap::new();
+    for t in &state.terms {
+        let Some(name) = t.follows.as_deref().filter(|_| t.effect.id() != beyond::ID) else {
+            continue;
+        };
+        // What the terms of one effect explain together is at least what the strongest does beside the others.
+        let most = followed.entry((t.effect.id(), name)).or_default();
+        *most = most.max(t.lr);
+    }
+    // Under the noise as it was fitted: few coefficients tell the random walk, and slow departures could be traded for it.
+    let g = state.noise.over(&search.panel.bins);
+    let width = search.panel.width();
+    let mut all = vec![];
+    for ((effect, name), explained) in followed {
+        let Some(signal) = search.view.signals.iter().find(|s| s.name == name) else {
+            continue;
+        };
+        let departures = memory::departures(&search.view, signal);
+        let added: Vec<usize> = departures.iter().map(|d| search.panel.add(d)).collect();
+        // What the library has of the effect, and of one that extends it, is no departure.
+        let of_it = search.candidates.iter().filter(|c| {
+            c.effect.id() == effect || c.effect.extends() == Some(effect)
+        });
+        let mut own = state.columns();
+        own.extend(of_it.flat_map(Candidate::all_columns));
+        let null = search.panel.solve(&g, &own).log_likelihood;
+        own.extend(&added);
+        let lr = 2.0 * (search.panel.solve(&g, &own).log_likelihood - null);
+        search.panel.truncate(width);
+        let p_value = if lr < DEPARTURE * explained {
+            1.0
+        } else {
+            chi_tail(lr / WIDENED, added.len() as f64)
+        };
+        all.push((
+            effect,
+            Outcome {
+                id: CLAIM,
+                statistic: lr,
+                p_value,
+                what: format!(
+                    "told as {effect}: what is late, bent or drifts in its dependence on {name} explains {:.0} % of what it does",
+                    100.0 * lr / explained
+                ),
+            },
+        ));
+    }
+    all
+}
+
+/// Whether a term keeps most of what it explains, and enough to be named, where an effect beside it that follows a channel
+/// may depart from its shape. One that a contest weighed by other means does not say.
+pub(crate) fn holds_beside(search: &Search<'_>, state: &State, term: &Term, effect: &str) -> bool {
+    if term.stated.is_some() {
+        return false;
+    }
+    let of_it = state.terms.iter().filter(|t| t.effect.id() == effect);
+    let mut names: Vec<&str> = of_it.filter_map(|t| t.follows.as_deref()).collect();
+    names.dedup();
+    let signals = search.view.signals.iter();
+    let departures = signals
+        .filter(|s| names.contains(&s.name.as_str()))
+        .flat_map(|s| memory::departures(&search.view, s));
+    let width = search.panel.width();
+    let added: Vec<usize> = departures.map(|d| search.panel.add(&d)).collect();
+    let likelihood = |left_out: Option<&Term>| {
+        let mut noise = Noise::new(state.noise.log_walk);
+        let mut fitted = state.noise.terms.iter();
+        let mut columns = added.clone();
+        for t in &state.terms {
+            let covariance = match t.form {
+                Form::Covariance(..) => fitted.next(),
+                _ => None,
+            };
+            if !left_out.is_some_and(|l| std::ptr::eq(l, t)) {
+                noise.terms.extend(covariance.cloned());
+                columns.extend(&t.columns);
+            }
+        }
+        search.panel.fit(&noise, &columns).1.log_likelihood
+    };
+    let lr = 2.0 * (likelihood(None) - likelihood(Some(term)));
+    search.panel.truncate(width);
+    lr > term.threshold.max(0.5 * term.lr)
+}
