@@ -6,6 +6,10 @@ use crate::likelihood::{Noise, Panel};
 use crate::scan::residual;
 use crate::search::{Form, State};
 
+mod higher;
+
+pub(crate) use higher::{Repeats, repeats};
+
 /// Chance below which a check fails.
 pub const LEAST_CHANCE: f64 = 1e-5;
 /// Lags of the Ljung-Box statistic.
@@ -86,6 +90,8 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
         tiles(e, rate_hz),
         variance_cusum(e, rate_hz),
         kurtosis(e, rate_hz),
+        higher::bicovariance(e),
+        higher::period(e, rate_hz),
     ]
 }
 

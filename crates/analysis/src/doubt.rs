@@ -111,6 +111,13 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
     };
     let crowd = s.state.notes.iter().any(|note| note.at.is_none());
     let correlated = failing("ljung_box");
+    let repeats = checks::repeats(&s.e).filter(|r| r.chance < LEAST_CHANCE);
+    // A harmonic of what repeats itself, to a coefficient.
+    let harmonic = |omega: f64| {
+        let tooth = |r: &checks::Repeats| omega * r.period as f64 / (2.0 * PI);
+        let apart = |r| (tooth(r) - tooth(r).round()).abs() * 2.0 * n / r.period as f64;
+        repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
+    };
     let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
     // What is left without a place may be anywhere; what has one leaves a strong term elsewhere alone.
     let misplaced = |t: &Term| !places.is_empty() && t.score() < WIDE;
@@ -156,6 +163,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
             let there = if let Some(omega) = line {
                 let at = omega * n / PI;
                 within(&crowds, omega)
+                    || harmonic(omega)
                     || unsteady.iter().any(|(a, b)| at >= a * n && at < b * n)
                     || (correlated || !places.is_empty()) && checks::stands_out(&s.u, at)
             } else if let Form::Covariance(process, theta) = &t.form {
@@ -164,6 +172,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
                 let information = own.iter().zip(&g).zip(weights);
                 let information = information.map(|((d, g), m)| m * (d / g).powi(2));
                 unlike
+                    || repeats.is_some()
                     || correlated && (places.is_empty() || process.filters_white())
                     || share(&information.collect::<Vec<_>>())
             } else {

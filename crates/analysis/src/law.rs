@@ -43,9 +43,10 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
         let departures = memory::departures(&search.view, signal);
         let added: Vec<usize> = departures.iter().map(|d| search.panel.add(d)).collect();
         // What the library has of the effect, and of one that extends it, is no departure.
-        let of_it = search.candidates.iter().filter(|c| {
-            c.effect.id() == effect || c.effect.extends() == Some(effect)
-        });
+        let of_it = search
+            .candidates
+            .iter()
+            .filter(|c| c.effect.id() == effect || c.effect.extends() == Some(effect));
         let mut own = state.columns();
         own.extend(of_it.flat_map(Candidate::all_columns));
         let null = search.panel.solve(&g, &own).log_likelihood;

@@ -77,7 +77,13 @@ impl Audit {
     /// same throughout, so checks of the noise say nothing new.
     pub fn converter_at_fault(&mut self, channel: &str, by: &str) {
         self.suppress(
-            &["outliers", "kurtosis", "variance_in_time", "time_frequency"],
+            &[
+                "outliers",
+                "kurtosis",
+                "variance_in_time",
+                "time_frequency",
+                "bicovariance",
+            ],
             channel,
             by,
         );

@@ -32,8 +32,12 @@ const MOVES: f64 = 2.0;
 const WORTH_A_LOOK: f64 = 5.0;
 /// Share that it has to explain of what shares of the codes of their own would.
 const NEARLY_ALL: f64 = 0.9;
-/// Nats, and nats for each reading, that shares of their own have to gain before the codes are told to be unlike any law:
-/// converters have uneven steps by nature, and a long record shows them.
+/// Chance below which a law with a bit that sticks does not hold, and share of what the bit explains that may be left where
+/// a long record shows how uneven the steps of any converter are.
+const LEAST_CHANCE: f64 = 1e-3;
+const LITTLE: f64 = 0.05;
+/// Nats, and nats for each reading, that the best law without a bit that sticks has to leave before the codes are told to
+/// be unlike any: converters have uneven steps by nature, and a long record shows them.
 const UNLIKE: f64 = 20.0;
 const UNLIKE_BY_READING: f64 = 1e-3;
 /// Least expected occurrences of the codes that are held against a law together.
@@ -96,8 +100,9 @@ fn best(
 /// Least spread, counts: below it a law has edges of its own.
 const LEAST_SPREAD: f64 = 0.7;
 
-/// Whether a smooth law explains the histogram: chi-square of codes, taken together where few are expected.
-fn explains(h: &Histogram, laws: &Laws<'_>, fit: &Fit) -> bool {
+/// What a law leaves of the histogram: the excess of the chi-square of codes, taken together where few are expected, in
+/// nats, and its chance.
+fn left_by(h: &Histogram, laws: &Laws<'_>, fit: &Fit) -> (f64, f64) {
     let (mut sum, mut cells) = (0.0, 0usize);
     let (mut seen, mut expected) = (0.0, 0.0);
     for (t, e) in h.times.iter().zip(laws.expected(fit)) {
@@ -111,7 +116,7 @@ fn explains(h: &Histogram, laws: &Laws<'_>, fit: &Fit) -> bool {
     }
     // Mean, spread and the size, at least; more of them would only make it fail sooner.
     let free = cells.saturating_sub(3).max(1) as f64;
-    tails::chi_square(sum, free) > super::FALSE_ALARM
+    (0.5 * (sum - free), tails::chi_square(sum, free))
 }
 
 /// Judge codes with the spread `sigma` about their level, bits below `bits`; `alarmed` where something else has shown
@@ -136,20 +141,29 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
     let looks_stuck = || {
         every().any(|(bit, value)| laws.gain_of(&first, Fault::Bit { bit, value }) > WORTH_A_LOOK)
     };
-    if !alarmed && first.cost < PLAIN && explains(&h, &laws, &first) && !looks_stuck() {
+    if !alarmed
+        && first.cost < PLAIN
+        && left_by(&h, &laws, &first).1 > super::FALSE_ALARM
+        && !looks_stuck()
+    {
         return Verdict::Smooth;
     }
     let sound = |spread: f64, from: Option<&Fit>| {
         Laws::new(&h, Fault::None, spread).fit(from, 0.0, true, LAST)
     };
-    let smooth =
-        best(&h, Fault::None, sigma, LAST, Some(first.spread)).map_or(first.score(), |f| f.score());
+    let plain = best(&h, Fault::None, sigma, LAST, Some(first.spread)).unwrap_or(first);
+    let smooth = plain.score();
     let (low, high) = (h.first, h.last());
-    let rails = [(low, i32::MAX), (i32::MIN, high), (low, high)]
+    let railed = [(low, i32::MAX), (i32::MIN, high), (low, high)]
         .into_iter()
-        .filter_map(|(low, high)| best(&h, Fault::Rails { low, high }, sigma, LAST, None))
-        .map(|f| f.score())
-        .fold(f64::NEG_INFINITY, f64::max);
+        .filter_map(|(low, high)| {
+            let fault = Fault::Rails { low, high };
+            best(&h, fault, sigma, LAST, None).map(|fit| (fault, fit))
+        })
+        .max_by(|a, b| a.1.score().total_cmp(&b.1.score()));
+    let rails = railed
+        .as_ref()
+        .map_or(f64::NEG_INFINITY, |(_, fit)| fit.score());
     let mut all: Vec<(u32, i32, Fit)> = every()
         .filter_map(|(bit, value)| {
             let fit = best(&h, Fault::Bit { bit, value }, sigma, FIRST, None)?;
@@ -167,9 +181,25 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
         .max_by(|a, b| a.2.score().total_cmp(&b.2.score()));
     let own = h.of_its_own();
     let other = smooth.max(rails);
-    let left = |best: f64| own - best > UNLIKE.max(UNLIKE_BY_READING * h.n);
+    let (fault, sound_fit) = railed
+        .filter(|(_, fit)| fit.score() > smooth)
+        .unwrap_or((Fault::None, plain));
+    let (over, chance) = left_by(&h, &Laws::new(&h, fault, sound_fit.spread), &sound_fit);
+    let unlike = chance < super::FALSE_ALARM && over > UNLIKE.max(UNLIKE_BY_READING * h.n);
+    let without = |nearest| {
+        if unlike {
+            Verdict::Unlike {
+                nats: over,
+                nearest,
+            }
+        } else if rails > smooth + CLEARLY {
+            Verdict::Rails
+        } else {
+            Verdict::Smooth
+        }
+    };
     let Some((bit, value, fit)) = nearest else {
-        return without(other, rails > smooth + CLEARLY, left(other), own);
+        return without(None);
     };
     // At the same spread too, so that it is the edges that decide and not how many levels a law needs.
     let gain = (fit.score() - other).min(fit.likelihood - sound(fit.spread, None).likelihood);
@@ -180,25 +210,11 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
         fraction: fit.share,
         error: laws.share_error(&fit),
     };
-    if gain > CLEARLY && fit.score() - smooth >= NEARLY_ALL * (own - smooth) {
+    let (rest, chance) = left_by(&h, &laws, &fit);
+    let whole = chance > LEAST_CHANCE || rest < LITTLE * (fit.score() - smooth);
+    if gain > CLEARLY && whole && fit.score() - smooth >= NEARLY_ALL * (own - smooth) {
         Verdict::Bit(stuck)
-    } else if left(other) {
-        Verdict::Unlike {
-            nats: own - other,
-            nearest: (gain > CLEARLY).then_some(stuck),
-        }
     } else {
-        without(other, rails > smooth + CLEARLY, false, own)
-    }
-}
-
-fn without(other: f64, rails: bool, left: bool, own: f64) -> Verdict {
-    match (left, rails) {
-        (true, _) => Verdict::Unlike {
-            nats: own - other,
-            nearest: None,
-        },
-        (false, true) => Verdict::Rails,
-        (false, false) => Verdict::Smooth,
+        without((gain > CLEARLY).then_some(stuck))
     }
 }

@@ -1,0 +1,177 @@
+//! Checks of what a spectrum does not show: readings that depend on earlier ones though they do not correlate with them,
+//! and what repeats itself with the samples.
+
+use super::{Outcome, chi_tail};
+
+/// Lags, either way, of the bicovariance.
+const LAGS: usize = 20;
+
+/// Correlation of the whitened residual with its own square earlier and later, over all lags but 0. Linear, and Gaussian
+/// or of one law, it has none; what a swing leaves behind that its sign does not tell, and what rises and falls unlike, has
+/// (the third-order moments off their diagonal; Hinich 1996 tests the same sums).
+pub(super) fn bicovariance(e: &[f64]) -> Outcome {
+    let n = e.len() as f64;
+    let mean = e.iter().sum::<f64>() / n;
+    let power = e.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    let centred: Vec<f64> = e.iter().map(|v| v - mean).collect();
+    let squares: Vec<f64> = centred.iter().map(|v| v * v - power).collect();
+    let spread = squares.iter().map(|v| v * v).sum::<f64>() / n;
+    let mut worst = (0i64, 0.0f64);
+    let mut statistic = 0.0;
+    let lags = LAGS.min(e.len() / 2);
+    for lag in 1..=lags {
+        let of = |a: &[f64], b: &[f64]| -> f64 {
+            let sum: f64 = a.iter().zip(&b[lag..]).map(|(a, b)| a * b).sum();
+            sum / ((n - lag as f64) * power * spread).sqrt()
+        };
+        for (z, at) in [
+            (of(&squares, &centred), lag as i64),
+            (of(&centred, &squares), -(lag as i64)),
+        ] {
+            statistic += z * z;
+            if z.abs() > worst.1.abs() {
+                worst = (at, z);
+            }
+        }
+    }
+    let order = if worst.0 > 0 { "earlier" } else { "later" };
+    Outcome {
+        id: "bicovariance",
+        statistic,
+        p_value: chi_tail(statistic, 2.0 * lags as f64),
+        what: format!(
+            "correlation of the whitened residual with its own square over {lags} samples either way; largest {:+.3} with the square {} samples {order}",
+            worst.1 / n.sqrt(),
+            worst.0.abs()
+        ),
+    }
+}
+
+/// Longest period, samples, and fewest of them in the record.
+const LONGEST: usize = 512;
+const FEWEST: usize = 8;
+/// Samples that are looked at: so many show what repeats itself.
+const MOST: usize = 1 << 18;
+
+/// A period of the sampling with which the residual repeats itself.
+pub(crate) struct Repeats {
+    /// Samples.
+    pub period: usize,
+    /// Chi-square of the means of its places, and the chance of a larger one at any period.
+    chi_square: f64,
+    pub chance: f64,
+}
+
+/// The period at which the means of the places in it are least like those of noise.
+pub(crate) fn repeats(e: &[f64]) -> Option<Repeats> {
+    let e = &e[..e.len().min(MOST)];
+    let longest = LONGEST.min(e.len() / FEWEST);
+    let mean = e.iter().sum::<f64>() / e.len().max(1) as f64;
+    let mut sums = vec![0.0; longest];
+    (2..=longest)
+        .map(|period| {
+            let sums = &mut sums[..period];
+            sums.fill(0.0);
+            for places in e.chunks(period) {
+                sums.iter_mut()
+                    .zip(places)
+                    .for_each(|(s, v)| *s += v - mean);
+            }
+            let times = |place: usize| (e.len() - place).div_ceil(period) as f64;
+            let each = sums.iter().enumerate().map(|(i, s)| s * s / times(i));
+            let chi_square = each.sum();
+            let chance = chi_tail(chi_square, period as f64 - 1.0) * (longest - 1) as f64;
+            Repeats {
+                period,
+                chi_square,
+                chance: chance.min(1.0),
+            }
+        })
+        .min_by(|a, b| {
+            // Beyond what a chance can tell apart, the least degrees.
+            let by_chance = a.chance.total_cmp(&b.chance);
+            by_chance
+                .then((b.chi_square / b.period as f64).total_cmp(&(a.chi_square / a.period as f64)))
+        })
+}
+
+/// What repeats itself every few samples, whatever its shape: each of its harmonics may be too weak for a line.
+pub(super) fn period(e: &[f64], rate_hz: f64) -> Outcome {
+    let Some(found) = repeats(e) else {
+        return Outcome {
+            id: "period",
+            statistic: 0.0,
+            p_value: 1.0,
+            what: "too short to repeat itself".into(),
+        };
+    };
+    Outcome {
+        id: "period",
+        statistic: found.chi_square / (found.period as f64 - 1.0),
+        p_value: found.chance,
+        what: format!(
+            "means of the whitened residual by place in periods of up to {LONGEST} samples, over those of noise; {} samples ({:.4} s) stand out most",
+            found.period,
+            found.period as f64 / rate_hz
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    fn white(n: usize, seed: u64) -> Vec<f64> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
+    }
+
+    #[test]
+    fn both_fail_on_white_noise_as_often_as_their_chance_says() {
+        let runs = 500;
+        let (mut low, mut half, mut repeating) = (0, 0, 0);
+        for seed in 0..runs {
+            let e = white(3000, seed);
+            let p = bicovariance(&e).p_value;
+            low += usize::from(p < 0.01);
+            half += usize::from(p < 0.5);
+            repeating += usize::from(period(&e, 20.0).p_value < 0.01);
+        }
+        // 5 and 250 are expected; the third chance is a bound, for periods share their multiples.
+        assert!(low <= 15, "{low}");
+        assert!((200..=300).contains(&half), "{half}");
+        assert!(repeating <= 12, "{repeating}");
+    }
+
+    #[test]
+    fn a_square_that_is_left_behind_shows_though_nothing_correlates() {
+        let e = white(6000, 3);
+        let x: Vec<f64> = (1..e.len())
+            .map(|i| e[i] + 0.15 * (e[i - 1] * e[i - 1] - 1.0))
+            .collect();
+        let found = bicovariance(&x);
+        assert!(found.p_value < 1e-12, "{}", found.p_value);
+        assert!(
+            found.what.contains("the square 1 samples earlier"),
+            "{}",
+            found.what
+        );
+        assert!(super::super::ljung_box(&x).p_value > 1e-4);
+    }
+
+    #[test]
+    fn levels_that_come_again_every_63_samples_show() {
+        let mut e = white(6000, 5);
+        let levels = white(63, 6);
+        for (i, v) in e.iter_mut().enumerate() {
+            *v += 0.3 * levels[i % 63];
+        }
+        let found = repeats(&e).unwrap();
+        assert_eq!(found.period % 63, 0);
+        assert!(found.chance < 1e-12, "{}", found.chance);
+    }
+}
