@@ -91,7 +91,7 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
         variance_cusum(e, rate_hz),
         kurtosis(e, rate_hz),
         higher::bicovariance(e),
-        higher::period(e, rate_hz),
+        higher::period(u, rate_hz),
     ]
 }
 
@@ -148,19 +148,40 @@ pub(crate) fn all_bands(u: &[f64]) -> Vec<Band> {
         .collect()
 }
 
+/// Somewhere in frequency where energy is left over or lacks: shares of half the sample rate, and how far a model that
+/// knows the energies there is ahead, nats.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Place {
+    pub from: f64,
+    pub to: f64,
+    pub nats: f64,
+}
+
+/// Nats by which a model that knows the energy of `count` coefficients, over the model's, is ahead.
+fn nats(energy: f64, count: f64) -> f64 {
+    0.5 * count * (energy - 1.0 - energy.max(1e-12).ln())
+}
+
 /// Half widths about a line, in coefficients, and chance below which the energy there is not the model's. It is asked only
 /// where something is left over somewhere.
 const ABOUT: [usize; 3] = [30, 120, 480];
 const LEAST_CHANCE_ABOUT: f64 = 0.01;
 
-/// Whether something is left about a coefficient: what makes a line of a tone that is not steady lies beside it.
-pub(crate) fn stands_out(u: &[f64], at: f64) -> bool {
-    ABOUT.iter().any(|half| {
+/// What is left about a coefficient, nats; 0 where that may be chance: what makes a line of a tone that is not steady
+/// lies beside it.
+pub(crate) fn stands_out(u: &[f64], at: f64) -> f64 {
+    let left = ABOUT.iter().map(|half| {
         let from = (at as usize).saturating_sub(*half).max(1);
         let to = (at as usize + half).min(u.len());
         let sum: f64 = u[from..to].iter().map(|v| v * v).sum();
-        chi_tail(sum, (to - from) as f64) < LEAST_CHANCE_ABOUT
-    })
+        let count = (to - from) as f64;
+        if chi_tail(sum, count) < LEAST_CHANCE_ABOUT {
+            nats(sum / count, count)
+        } else {
+            0.0
+        }
+    });
+    left.fold(0.0, f64::max)
 }
 
 fn bands(u: &[f64], rate_hz: f64) -> Outcome {
@@ -245,15 +266,33 @@ impl Tiles {
     }
 }
 
-/// Frequencies, as shares of half the sample rate, at which the energy comes and goes.
-pub(crate) fn unsteady(e: &[f64]) -> Vec<(f64, f64)> {
+/// Bands that fail.
+pub(crate) fn failing_bands(u: &[f64]) -> impl Iterator<Item = Place> {
+    let n = u.len() as f64;
+    let fails = all_bands(u).into_iter().filter(|b| b.chance < LEAST_CHANCE);
+    fails.map(move |b| Place {
+        from: b.from as f64 / n,
+        to: b.to as f64 / n,
+        nats: nats(b.energy, (b.to - b.from) as f64),
+    })
+}
+
+/// Frequencies at which the energy comes and goes.
+pub(crate) fn unsteady(e: &[f64]) -> Vec<Place> {
     let mut all = vec![];
     for tiles in SEGMENTS.iter().filter_map(|s| Tiles::new(e, *s)) {
         let count = tiles.count();
+        let size = tiles.length as f64 / count as f64;
         for t in 0..count {
             let sum: f64 = tiles.of.iter().map(|s| s[t].0).sum();
             if tiles.chance(sum, tiles.of.len()) * (count as f64) < LEAST_CHANCE {
-                all.push((t as f64 / count as f64, (t + 1) as f64 / count as f64));
+                // Half a nat for each energy that is known is what noise gains too.
+                let gained = tiles.of.iter().map(|s| nats(s[t].1, size) - 0.5);
+                all.push(Place {
+                    from: t as f64 / count as f64,
+                    to: (t + 1) as f64 / count as f64,
+                    nats: gained.sum::<f64>().max(0.0),
+                });
             }
         }
     }

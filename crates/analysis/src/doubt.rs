@@ -8,7 +8,7 @@
 //! size leaves e^2 of its likelihood ratio to others: a generic term beside it that holds no more than that, and gives way
 //! where the shape may be late or bent, is as likely a remainder of the shape as a cause of its own.
 
-use crate::checks::{self, LEAST_CHANCE, Outcome};
+use crate::checks::{self, LEAST_CHANCE, Outcome, Place};
 use crate::diagnosis::Searched;
 use crate::result::{Finding, Unexplained};
 use crate::search::{Form, Term};
@@ -18,6 +18,11 @@ use crate::{adequacy, beyond, law};
 
 /// Share of a term's energy in bands that fail, from which on the failure is the term's.
 const SHARE: f64 = 0.25;
+
+/// Share of it in a place, from which on the term is touched by what is left there.
+const TOUCHED: f64 = 0.05;
+/// Part of what a term explains that may be left over where it acts: it is off by a fifth of its size, and no makeshift.
+const LEFT: f64 = 0.05;
 
 /// Likelihood ratio beyond its threshold from which on a term is no makeshift for what is left elsewhere.
 const WIDE: f64 = 25.0;
@@ -83,35 +88,50 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
     let g = s.state.noise.over(&panel.bins);
     let n = panel.bins.n as f64;
     let ones = vec![1.0; panel.bins.n];
-    let fails: Vec<(f64, f64)> = checks::all_bands(&s.u)
-        .into_iter()
-        .filter(|b| b.chance < LEAST_CHANCE)
-        .map(|b| (b.from as f64, b.to as f64))
-        .collect();
+    // Everything that is left and has a place in frequency.
     let unsteady = checks::unsteady(&s.e);
     let crowds = s.state.notes.iter().filter_map(|note| note.at);
-    let crowds: Vec<(f64, f64)> = crowds.map(|(a, b)| (a * n / PI, b * n / PI)).collect();
-    // Everything that is left and has a place in frequency, in coefficients.
-    let mut places = fails;
-    places.extend(unsteady.iter().map(|(from, to)| (from * n, to * n)));
+    let crowds: Vec<Place> = crowds
+        .map(|(from, to)| Place {
+            from: from / PI,
+            to: to / PI,
+            nats: f64::INFINITY,
+        })
+        .collect();
+    let mut places: Vec<Place> = checks::failing_bands(&s.u).collect();
+    places.extend(&unsteady);
     places.extend(&crowds);
-    let within = |places: &[(f64, f64)], omega: f64| {
-        let k = omega * n / PI;
-        places.iter().any(|(from, to)| k >= *from && k < *to)
-    };
+    let in_place = |p: &Place, omega: f64| omega / PI >= p.from && omega / PI < p.to;
+    let within = |places: &[Place], omega: f64| places.iter().any(|p| in_place(p, omega));
     let omega = &panel.bins.at.omega;
-    let share = |information: &[f64]| {
+    let counts = panel.bins.products(&ones, &ones);
+    // Whether a good part of what tells a term lies where more is left over than it leaves by being off a little. Of what
+    // is left in a place it answers for its part of the coefficients.
+    let share = |information: &[f64], lr: f64| {
         let all: f64 = information.iter().sum();
-        let hit = information.iter().zip(omega);
-        let hit: f64 = hit
-            .filter(|(_, w)| within(&places, **w))
-            .map(|(i, _)| i)
-            .sum();
-        all > 0.0 && hit > SHARE * all
+        let of = |inside: &dyn Fn(f64) -> bool| -> (f64, f64) {
+            let bins = information.iter().zip(omega).zip(&counts);
+            let hit = bins.filter(|((_, w), _)| inside(**w));
+            hit.fold((0.0, 0.0), |(sum, square), ((i, _), m)| {
+                (sum + i, square + i * i / m)
+            })
+        };
+        let left = |p: &Place| {
+            let (held, square) = of(&|w| in_place(p, w));
+            let coefficients = (p.to - p.from) * n;
+            if held > TOUCHED * all {
+                2.0 * p.nats * (held * held / square / coefficients).min(1.0)
+            } else {
+                0.0
+            }
+        };
+        all > 0.0
+            && of(&|w| within(&places, w)).0 > SHARE * all
+            && places.iter().map(left).sum::<f64>() > LEFT * lr
     };
     let crowd = s.state.notes.iter().any(|note| note.at.is_none());
     let correlated = failing("ljung_box");
-    let repeats = checks::repeats(&s.e).filter(|r| r.chance < LEAST_CHANCE);
+    let repeats = checks::repeats(&s.u).filter(|r| r.chance < LEAST_CHANCE);
     // A harmonic of what repeats itself, to a coefficient.
     let harmonic = |omega: f64| {
         let tooth = |r: &checks::Repeats| omega * r.period as f64 / (2.0 * PI);
@@ -162,19 +182,22 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
             };
             let there = if let Some(omega) = line {
                 let at = omega * n / PI;
-                within(&crowds, omega)
-                    || harmonic(omega)
-                    || unsteady.iter().any(|(a, b)| at >= a * n && at < b * n)
-                    || (correlated || !places.is_empty()) && checks::stands_out(&s.u, at)
+                let about = unsteady.iter().filter(|p| in_place(p, omega));
+                let about = about.map(|p| p.nats).fold(0.0, f64::max);
+                let beside = if correlated || !places.is_empty() {
+                    checks::stands_out(&s.u, at)
+                } else {
+                    0.0
+                };
+                within(&crowds, omega) || harmonic(omega) || 2.0 * about.max(beside) > LEFT * t.lr
             } else if let Form::Covariance(process, theta) = &t.form {
                 let own = process.density(theta, &panel.bins.at);
-                let weights = panel.bins.products(&ones, &ones);
-                let information = own.iter().zip(&g).zip(weights);
+                let information = own.iter().zip(&g).zip(&counts);
                 let information = information.map(|((d, g), m)| m * (d / g).powi(2));
                 unlike
                     || repeats.is_some()
                     || correlated && (places.is_empty() || process.filters_white())
-                    || share(&information.collect::<Vec<_>>())
+                    || share(&information.collect::<Vec<_>>(), t.lr)
             } else {
                 let mut sum = vec![0.0; panel.bins.n];
                 for (c, b) in t.columns.iter().zip(own) {
@@ -183,13 +206,8 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
                         .for_each(|(s, x)| *s += b * x);
                 }
                 let energy = panel.bins.products(&sum, &sum);
-                share(
-                    &energy
-                        .iter()
-                        .zip(&g)
-                        .map(|(e, g)| e / g)
-                        .collect::<Vec<_>>(),
-                )
+                let energy = energy.iter().zip(&g).map(|(e, g)| e / g);
+                share(&energy.collect::<Vec<_>>(), t.lr)
             };
             if line.is_some() && s.state.wandering.is_some() {
                 Doubt::No

@@ -2,6 +2,7 @@
 //! and what repeats itself with the samples.
 
 use super::{Outcome, chi_tail};
+use crate::likelihood::Dct;
 
 /// Lags, either way, of the bicovariance.
 const LAGS: usize = 20;
@@ -62,8 +63,33 @@ pub(crate) struct Repeats {
     pub chance: f64,
 }
 
-/// The period at which the means of the places in it are least like those of noise.
-pub(crate) fn repeats(e: &[f64]) -> Option<Repeats> {
+/// Half the width over which energies are taken to be even, coefficients.
+const EVEN: usize = 200;
+
+/// Whitened coefficients in time, over the energy about each: a band that is left over repeats nothing.
+fn evened(u: &[f64]) -> Vec<f64> {
+    let mut sums = Vec::with_capacity(u.len() + 1);
+    let mut sum = 0.0;
+    sums.push(sum);
+    for v in u {
+        sum += v * v;
+        sums.push(sum);
+    }
+    let even = |(k, v): (usize, &f64)| {
+        let (from, to) = (k.saturating_sub(EVEN).max(1), (k + EVEN).min(u.len()));
+        let energy = (sums[to] - sums[from]) / (to - from).max(1) as f64;
+        if energy > 0.0 { v / energy.sqrt() } else { 0.0 }
+    };
+    let even: Vec<f64> = u.iter().enumerate().map(even).collect();
+    Dct::new(u.len()).inverse(&even)
+}
+
+/// The period at which the means of the places in it are least like those of noise, by whitened coefficients.
+pub(crate) fn repeats(u: &[f64]) -> Option<Repeats> {
+    if u.len() < 2 * EVEN {
+        return None;
+    }
+    let e = evened(u);
     let e = &e[..e.len().min(MOST)];
     let longest = LONGEST.min(e.len() / FEWEST);
     let mean = e.iter().sum::<f64>() / e.len().max(1) as f64;
@@ -96,8 +122,8 @@ pub(crate) fn repeats(e: &[f64]) -> Option<Repeats> {
 }
 
 /// What repeats itself every few samples, whatever its shape: each of its harmonics may be too weak for a line.
-pub(super) fn period(e: &[f64], rate_hz: f64) -> Outcome {
-    let Some(found) = repeats(e) else {
+pub(super) fn period(u: &[f64], rate_hz: f64) -> Outcome {
+    let Some(found) = repeats(u) else {
         return Outcome {
             id: "period",
             statistic: 0.0,
@@ -139,7 +165,7 @@ mod tests {
             let p = bicovariance(&e).p_value;
             low += usize::from(p < 0.01);
             half += usize::from(p < 0.5);
-            repeating += usize::from(period(&e, 20.0).p_value < 0.01);
+            repeating += usize::from(period(&Dct::new(e.len()).forward(&e), 20.0).p_value < 0.01);
         }
         // 5 and 250 are expected; the third chance is a bound, for periods share their multiples.
         assert!(low <= 15, "{low}");
@@ -164,13 +190,26 @@ mod tests {
     }
 
     #[test]
+    fn a_band_that_is_left_over_repeats_nothing() {
+        let mut u = Dct::new(6000).forward(&white(6000, 8));
+        u[2000..2200].iter_mut().for_each(|v| *v *= 4.0);
+        let found = repeats(&u).unwrap();
+        assert!(
+            found.chance > 1e-3,
+            "{} samples, {}",
+            found.period,
+            found.chance
+        );
+    }
+
+    #[test]
     fn levels_that_come_again_every_63_samples_show() {
         let mut e = white(6000, 5);
         let levels = white(63, 6);
         for (i, v) in e.iter_mut().enumerate() {
             *v += 0.3 * levels[i % 63];
         }
-        let found = repeats(&e).unwrap();
+        let found = repeats(&Dct::new(e.len()).forward(&e)).unwrap();
         assert_eq!(found.period % 63, 0);
         assert!(found.chance < 1e-12, "{}", found.chance);
     }

@@ -11,9 +11,6 @@ use crate::grid::white_by_differences;
 /// Span of a crowd of lines over their frequency, below which they are one that wanders.
 const WANDERING: f64 = 0.02;
 
-/// Share of their likelihood ratios that the strongest of them then has.
-const MOST: f64 = 0.5;
-
 /// Part of its frequency by which a crowd of lines reaches beyond the outermost ones.
 const AROUND: f64 = 0.02;
 
@@ -115,11 +112,7 @@ impl Search<'_> {
                     (l.min(*f), h.max(*f))
                 });
             let to_omega = std::f64::consts::TAU / self.view.rate_hz;
-            // What wanders is one line still while most of it is in one place; else it is a band.
-            let (strongest, together) = lines
-                .iter()
-                .fold((0.0f64, 0.0), |(s, t), (_, lr)| (s.max(*lr), t + lr));
-            let narrow = high - low < WANDERING * high && strongest > MOST * together;
+            let narrow = high - low < WANDERING * high;
             state.wandering = narrow.then_some(0.5 * (high - low) * to_omega);
             let per_record = self.view.rate_hz / self.panel.bins.n as f64;
             let repeats = comb(&lines, per_record).filter(|_| !narrow);
@@ -142,6 +135,7 @@ impl Search<'_> {
             };
             let at = span(low, high);
             notes.push(Note { what, at });
+            let strongest = lines.iter().map(|l| l.1).fold(0.0, f64::max);
             state.terms.retain(|t| {
                 !matches!(t.form, Form::Line(_) | Form::SideBands(..)) || t.lr == strongest
             });
