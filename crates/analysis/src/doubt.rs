@@ -209,7 +209,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
                 let energy = energy.iter().zip(&g).map(|(e, g)| e / g);
                 share(&energy.collect::<Vec<_>>(), t.lr)
             };
-            if line.is_some() && s.state.wandering.is_some() {
+            if line.is_some_and(|omega| s.state.wanders(omega).is_some()) {
                 Doubt::No
             } else if there || unlawful(t) || generic(t) && (crowd || misplaced(t)) {
                 Doubt::Checks

@@ -148,7 +148,7 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
             // One that wanders has no place narrower than that.
             let frequency = |omega: f64, amplitude: f64| {
                 let error = (24.0 * state.solution.white * g(omega) / n.powi(3)).sqrt() / amplitude;
-                let error = error.max(state.wandering.unwrap_or(0.0));
+                let error = error.max(state.wanders(omega).map_or(0.0, |w| w.half));
                 let hz = rate_hz / std::f64::consts::TAU;
                 (omega * hz, error * hz)
             };

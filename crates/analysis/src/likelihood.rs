@@ -280,6 +280,12 @@ impl Panel {
         self.columns.borrow().len() - 1
     }
 
+    /// Put other coefficients in the place of the data's.
+    pub fn replace_data(&self, coefficients: Vec<f64>) {
+        self.columns.borrow_mut()[0] = Column::Whole(Rc::new(coefficients));
+        self.pairs.borrow_mut().retain(|k, _| k.0 > 0);
+    }
+
     /// Coefficients of a column.
     #[must_use]
     pub fn column(&self, i: usize) -> Rc<Vec<f64>> {

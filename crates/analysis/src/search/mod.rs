@@ -2,6 +2,7 @@
 //! walk refitted, the best one joins, covariance terms are challenged by what they may have swallowed, and what the
 //! others make superfluous is dropped. The search knows hypotheses, not effects.
 
+mod aside;
 mod refine;
 mod rivals;
 mod weigh;
@@ -132,6 +133,15 @@ pub struct Note {
     pub at: Option<(f64, f64)>,
 }
 
+/// The narrow crowd that a line is the strongest one of, rad per sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wandering {
+    /// Angular frequency of the line.
+    pub line: f64,
+    /// Half the width of the crowd.
+    pub half: f64,
+}
+
 /// A model of a channel.
 #[derive(Clone)]
 pub struct State {
@@ -143,8 +153,8 @@ pub struct State {
     pub solution: Solution,
     /// Structure that was seen and that no single effect explains.
     pub notes: Vec<Note>,
-    /// Half the width of the narrow crowd that its line is one of, rad per sample: a line still, though no steady one.
-    pub wandering: Option<f64>,
+    /// The line that wanders: a line still, though no steady one.
+    pub wandering: Option<Wandering>,
     /// The level of a process that is not Gaussian, where one was named: sample by sample.
     pub level: Option<Rc<Vec<f64>>>,
 }
@@ -157,6 +167,11 @@ impl State {
             .iter()
             .flat_map(|t| t.columns.iter().copied())
             .collect()
+    }
+
+    /// Whether a line of that angular frequency is the one that wanders.
+    pub(crate) fn wanders(&self, omega: f64) -> Option<Wandering> {
+        self.wandering.filter(|w| (w.line - omega).abs() <= w.half)
     }
 
     /// Angular frequencies of the lines, with the places of their columns.
@@ -344,7 +359,25 @@ impl<'a> Search<'a> {
             wandering: None,
             level: None,
         };
-        let mut state = baseline.clone();
+        let mut state = self.climb(baseline.clone());
+        let aside = self.set_aside(&state);
+        if let Some((rest, _, _)) = &aside {
+            state = self.climb(rest.clone());
+        }
+        state = crate::contest::hold(self, state);
+        let mut notes = std::mem::take(&mut state.notes);
+        if let Some((_, note, wandering)) = aside {
+            notes.push(note);
+            state.wandering = Some(wandering);
+        }
+        notes.extend(self.crowds(&mut state));
+        self.find_rivals(&mut state);
+        state.notes = notes;
+        (baseline, state)
+    }
+
+    /// Add terms while they pass, then drop what the others made superfluous.
+    fn climb(&self, mut state: State) -> State {
         while state.terms.len() < MOST_TERMS {
             let offers = self.offers(&state, &|_| true);
             let Some(best) = Self::simplest_best(offers) else {
@@ -365,16 +398,10 @@ impl<'a> Search<'a> {
                 .filter(|i| state.terms[*i].score() < 0.0)
                 .min_by(|a, b| state.terms[*a].score().total_cmp(&state.terms[*b].score()))
             else {
-                break;
+                return state;
             };
             state = self.without(&state, i);
         }
-        state = crate::contest::hold(self, state);
-        let mut notes = std::mem::take(&mut state.notes);
-        notes.extend(self.crowds(&mut state));
-        self.find_rivals(&mut state);
-        state.notes = notes;
-        (baseline, state)
     }
 
     /// The best offer; where it extends another that would pass too, that one: the extension has to earn its place.

@@ -2,14 +2,10 @@
 
 use std::f64::consts::PI;
 
-use model::effect::Hypothesis;
 use model::record::Quantity;
 
 use super::{Form, MOST_ALIKE, Note, RIVAL_SPAN, Search, State, Term};
 use crate::grid::white_by_differences;
-
-/// Span of a crowd of lines over their frequency, below which they are one that wanders.
-const WANDERING: f64 = 0.02;
 
 /// Part of its frequency by which a crowd of lines reaches beyond the outermost ones.
 const AROUND: f64 = 0.02;
@@ -86,9 +82,11 @@ impl Search<'_> {
             .terms
             .iter()
             .filter_map(|t| match t.form {
-                Form::Line(w) | Form::SideBands(w, _) => Some((hz(w), t.lr)),
+                Form::Line(w) | Form::SideBands(w, _) => Some((w, t.lr)),
                 _ => None,
             })
+            .filter(|(w, _)| state.wanders(*w).is_none())
+            .map(|(w, lr)| (hz(w), lr))
             .collect();
         let span = |low: f64, high: f64| {
             let to_omega = std::f64::consts::TAU / self.view.rate_hz;
@@ -111,11 +109,8 @@ impl Search<'_> {
                 .fold((f64::INFINITY, 0.0f64), |(l, h), (f, _)| {
                     (l.min(*f), h.max(*f))
                 });
-            let to_omega = std::f64::consts::TAU / self.view.rate_hz;
-            let narrow = high - low < WANDERING * high;
-            state.wandering = narrow.then_some(0.5 * (high - low) * to_omega);
             let per_record = self.view.rate_hz / self.panel.bins.n as f64;
-            let repeats = comb(&lines, per_record).filter(|_| !narrow);
+            let repeats = comb(&lines, per_record);
             let what = if let Some((fundamental, teeth)) = repeats {
                 let teeth: Vec<String> = teeth.iter().map(u32::to_string).collect();
                 format!(
@@ -123,37 +118,22 @@ impl Search<'_> {
                     teeth.join(", ")
                 )
             } else {
-                let seen = if narrow {
-                    "one line whose frequency or amplitude wanders"
-                } else {
-                    "no steady line but a band or a chirp"
-                };
                 format!(
-                    "{} lines from {low:.3} to {high:.3} Hz: {seen}",
+                    "{} lines from {low:.3} to {high:.3} Hz: no steady line but a band or a chirp",
                     lines.len()
                 )
             };
             let at = span(low, high);
             notes.push(Note { what, at });
             let strongest = lines.iter().map(|l| l.1).fold(0.0, f64::max);
-            state.terms.retain(|t| {
-                !matches!(t.form, Form::Line(_) | Form::SideBands(..)) || t.lr == strongest
-            });
-            // What wanders swings in no single time: it is a line and no more.
-            let line = self
-                .candidates
-                .iter()
-                .position(|c| matches!(c.hypothesis, Hypothesis::Line));
-            for t in &mut state.terms {
-                if let (Form::SideBands(carrier, _), Some(i)) = (&t.form, line) {
-                    t.form = Form::Line(*carrier);
-                    t.effect = self.candidates[i].effect;
-                    t.candidate = i;
-                    t.columns.truncate(2);
-                    t.names.truncate(2);
-                    t.threshold = crate::threshold::line(self.panel.bins.n);
+            let wandering = state.wandering;
+            state.terms.retain(|t| match t.form {
+                Form::Line(w) | Form::SideBands(w, _) => {
+                    t.lr == strongest || wandering.is_some_and(|of| (of.line - w).abs() <= of.half)
                 }
-            }
+                _ => true,
+            });
+            self.as_line(&mut state.terms);
         }
         let times: Vec<f64> = state
             .terms
