@@ -141,5 +141,61 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
             });
         }
     }
+    for (i, a) in searched.iter().enumerate() {
+        for b in &searched[i + 1..] {
+            let still = !(a.target.moving || b.target.moving || a.search.view.sways());
+            if still {
+                late(a, b, &mut shared);
+            }
+        }
+    }
     shared
+}
+
+/// Samples by which one axis may follow another.
+const LATE: usize = 20;
+
+/// Correlation of the residuals of two axes, one of them some samples later.
+fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
+    let power = |e: &[f64]| e.iter().map(|v| v * v).sum::<f64>() / e.len() as f64;
+    let scale = (power(&a.e) * power(&b.e)).sqrt();
+    // An axis, the one that follows it, the samples, z.
+    let mut worst = (a, b, 0, 0.0f64);
+    let mut statistic = 0.0;
+    for lag in 1..=LATE.min(a.e.len() / 2) {
+        for (first, second) in [(a, b), (b, a)] {
+            let sum: f64 = (first.e.iter().zip(&second.e[lag..]))
+                .map(|(x, y)| x * y)
+                .sum();
+            let z = sum / (scale * ((first.e.len() - lag) as f64).sqrt());
+            statistic += z * z;
+            if z.abs() > worst.3.abs() {
+                worst = (first, second, lag, z);
+            }
+        }
+    }
+    let p = checks::chi_tail(statistic, 2.0 * LATE as f64);
+    let (first, second, lag, z) = worst;
+    let r = z / (a.e.len() as f64).sqrt();
+    let what = format!(
+        "follows {} by {lag} samples ({r:+.3} of its residual)",
+        first.target.name
+    );
+    let fails = p < LEAST_CHANCE;
+    shared.checks.push(Check {
+        id: "cross_correlation_late".into(),
+        channel: format!("{}, {}", a.target.name, b.target.name),
+        statistic,
+        p_value: Some(p),
+        threshold: LEAST_CHANCE,
+        fails_before: fails,
+        fails_after: fails,
+        what: format!("correlation of the whitened residuals of two axes over {LATE} samples either way: {} {what}", second.target.name),
+    });
+    if fails {
+        shared.left.push(Unexplained {
+            channel: second.target.name.clone(),
+            what,
+        });
+    }
 }

@@ -18,6 +18,8 @@ use crate::{adequacy, threshold};
 
 /// Nats by which two levels have to be better.
 const MARGIN: f64 = 4.0;
+/// Switches that two levels make at least, where steps explain them too.
+const LEAST_SWITCHES: f64 = 3.0;
 /// Nats within which the answer stays open.
 const OPEN: f64 = 3.0;
 /// Longest block of a short record, s, and most blocks.
@@ -175,13 +177,12 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         .terms
         .iter()
         .filter_map(|t| match t.form {
-            Form::Step(s, _) => Some(
-                panel.add(
-                    &(0..m)
-                        .map(|i| f64::from(u8::from((first + i * length) as f64 >= s)))
-                        .collect::<Vec<_>>(),
-                ),
-            ),
+            Form::Step(s, _) => {
+                // The block that holds it reads a mean of both levels.
+                let after = |i: usize| (first + (i + 1) * length) as f64 - s;
+                let share = |i: usize| (after(i) / length as f64).clamp(0.0, 1.0);
+                Some(panel.add(&(0..m).map(share).collect::<Vec<_>>()))
+            }
             _ => None,
         })
         .collect();
@@ -213,6 +214,10 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     let starts = [(1.0, 15.0), (0.8, 60.0), (0.6, 200.0)];
     let (two, x) = fitted(&blocks, white, excess, &starts, 160);
     let ahead = two - theirs;
+    // A step or two are no noise that switches.
+    if steps > 0 && !wandering && (m as f64) < 1.001 * LEAST_SWITCHES * x[3].exp() {
+        return state;
+    }
     if !contest && 2.0 * ahead < threshold::two_level() {
         return state;
     }

@@ -138,6 +138,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             what: note.what.clone(),
         };
         unexplained.extend(s.state.notes.iter().map(note));
+        unexplained.extend(astray(s));
     }
     unexplained.extend(dead);
     unexplained.extend(doubts);
@@ -226,6 +227,17 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         },
     };
     Ok(diagnosed)
+}
+
+/// An axis that moves on a table that turns another one.
+fn astray(s: &Searched<'_>) -> Option<Unexplained> {
+    s.target.astray.then(|| Unexplained {
+        channel: s.target.name.clone(),
+        what: format!(
+            "moves by {:.2} deg/s rms and does not follow the axis that the table turns: it was searched for no cause; where the stand was shaken or tilted, say `base: moving`",
+            s.target.motion_rms
+        ),
+    })
 }
 
 fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {

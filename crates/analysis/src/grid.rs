@@ -43,6 +43,8 @@ pub struct Target {
     pub motion_rms: f64,
     /// Whether that is more than a bias can wander.
     pub moving: bool,
+    /// Whether it moves on a table that turns another axis, and does not follow that.
+    pub astray: bool,
     /// Baseline noise as first fitted, and its white variance.
     pub noise: Noise,
     /// White variance.
@@ -195,15 +197,17 @@ pub fn lay_out(
     }
     let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
-    let mut drivers = drivers(record, &places, n, &dct);
+    let mut known = drivers(record, &places, n, &dct);
     // Only the band of motion is asked for.
     let top = places_of(MOTION_BAND_HZ.1, n, rate_hz);
-    for d in &mut drivers {
+    for d in &mut known {
         d.truncate(top);
         d.shrink_to_fit();
     }
     let turns = matches!(record.header.base, Some(Base::Moving | Base::Turntable));
-    let motion_of = |y: &[f64]| motion(&mut dct.forward(y), &drivers, n, rate_hz, turns);
+    // Where the base moves, and where the motor turns it, they explain nothing away.
+    let drivers: &[Vec<f64>] = if turns { &[] } else { &known };
+    let motion_of = |y: &[f64]| motion(&mut dct.forward(y), drivers, n, rate_hz, turns);
     let mut targets = vec![];
     for channel in gyros {
         let (scale, unit) = match channel.unit.as_str() {
@@ -269,6 +273,7 @@ pub fn lay_out(
             spikes,
             motion_rms,
             moving: motion_rms > MOTION_RMS,
+            astray: false,
             noise: fit.0,
             white: fit.1,
         });
@@ -278,9 +283,27 @@ pub fn lay_out(
         c.truncate(top);
         c
     };
+    let turntable = record.header.base == Some(Base::Turntable);
     followers(&mut targets, &|t, strongest| {
-        let with = [drivers.as_slice(), &[top(&strongest.y)]].concat();
-        motion(&mut dct.forward(&t.y), &with, n, rate_hz, turns)
+        let axis = [top(&strongest.y)];
+        let left = |with: &[Vec<f64>], slow| motion(&mut dct.forward(&t.y), with, n, rate_hz, slow);
+        if turntable {
+            // A table turns one axis: what the others do with the motor, the supply or the temperature, and what is slow
+            // on them, is their own.
+            let (by_axis, by_known) = (left(&axis, turns), left(&known, turns));
+            let follows = (t.motion_rms.powi(2) - by_axis.powi(2)).max(0.0).sqrt();
+            Rest {
+                follows: if by_known < by_axis { 0.0 } else { follows },
+                own: left(&[known.as_slice(), &axis].concat(), false),
+                table: true,
+            }
+        } else {
+            Rest {
+                follows: t.motion_rms,
+                own: left(&[drivers, &axis].concat(), turns),
+                table: false,
+            }
+        }
     });
     let signals = record
         .channels
@@ -360,12 +383,8 @@ fn white_of(y: &[f64]) -> f64 {
     d.iter().map(|d| d * d).sum::<f64>() / (2.0 * d.len().max(1) as f64)
 }
 
-/// Coefficients of what can drive a gyro's bias on a base at rest: motor command, supply, temperatures. Where the base
-/// moves, and where the motor turns it, they explain nothing away.
+/// Coefficients of what can drive a gyro's bias: motor command, supply, temperatures.
 fn drivers(record: &Record, places: &[usize], n: usize, dct: &Dct) -> Vec<Vec<f64>> {
-    if matches!(record.header.base, Some(Base::Moving | Base::Turntable)) {
-        return vec![];
-    }
     record
         .channels
         .iter()
@@ -379,20 +398,34 @@ fn drivers(record: &Record, places: &[usize], n: usize, dct: &Dct) -> Vec<Vec<f6
         .collect()
 }
 
+/// What the motion of an axis is made of, deg/s rms.
+struct Rest {
+    /// What follows the axis that turns most; all of it, where that is not known.
+    follows: f64,
+    /// What does not.
+    own: f64,
+    /// Whether a table turns that axis, and no other.
+    table: bool,
+}
+
 /// An axis that only follows the one that turns most, and little of it, is not moved itself: its gyro sees a part of the
-/// other axis. `left` is the motion of an axis that does not follow another.
-fn followers(targets: &mut [Target], left: &dyn Fn(&Target, &Target) -> f64) {
+/// other axis.
+fn followers(targets: &mut [Target], rest: &dyn Fn(&Target, &Target) -> Rest) {
     let Some(strongest) =
         (0..targets.len()).max_by(|a, b| targets[*a].motion_rms.total_cmp(&targets[*b].motion_rms))
     else {
         return;
     };
     let most = LARGEST_SHARE * targets[strongest].motion_rms;
-    for i in 0..targets.len() {
+    for i in (0..targets.len()).filter(|i| *i != strongest) {
         let t = &targets[i];
-        if t.moving && t.motion_rms < most && left(t, &targets[strongest]) <= MOTION_RMS {
-            targets[i].moving = false;
+        if !t.moving {
+            continue;
         }
+        let rest = rest(t, &targets[strongest]);
+        let little = rest.follows < most;
+        targets[i].moving = !(little && rest.own <= MOTION_RMS);
+        targets[i].astray = rest.table && little && targets[i].moving;
     }
 }
 
