@@ -155,6 +155,8 @@ pub(crate) struct Place {
     pub from: f64,
     pub to: f64,
     pub nats: f64,
+    /// Whether energy lacks.
+    pub lacks: bool,
 }
 
 /// Nats by which a model that knows the energy of `count` coefficients, over the model's, is ahead.
@@ -274,6 +276,7 @@ pub(crate) fn failing_bands(u: &[f64]) -> impl Iterator<Item = Place> {
         from: b.from as f64 / n,
         to: b.to as f64 / n,
         nats: nats(b.energy, (b.to - b.from) as f64),
+        lacks: b.energy < 1.0,
     })
 }
 
@@ -292,6 +295,7 @@ pub(crate) fn unsteady(e: &[f64]) -> Vec<Place> {
                     from: t as f64 / count as f64,
                     to: (t + 1) as f64 / count as f64,
                     nats: gained.sum::<f64>().max(0.0),
+                    lacks: tiles.of.iter().map(|s| s[t].1 - 1.0).sum::<f64>() < 0.0,
                 });
             }
         }

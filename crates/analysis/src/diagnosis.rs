@@ -14,7 +14,7 @@ use crate::common::{Shared, common};
 use crate::error::AnalysisError;
 use crate::estimate;
 use crate::findings::{
-    blows, complete, joined, motion_finding, scale_finding, term_findings, variance_finding,
+    blows, complete, joined, loud, motion_finding, scale_finding, term_findings, variance_finding,
 };
 use crate::grid::{Grid, Target, lay_out};
 use crate::likelihood::Panel;
@@ -156,7 +156,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     };
     unexplained.extend(audited.not_normal.into_iter().filter(|u| !bent(&u.channel)));
     findings.extend(shared.finding);
-    let findings = complete(joined(blows(findings)));
+    let findings = complete(joined(loud(blows(findings))));
     let mut not_tested = not_tested(&searched);
     not_tested.extend(scale_not_tested);
     not_tested.extend(audited.not_tested);

@@ -96,10 +96,13 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
             from: from / PI,
             to: to / PI,
             nats: f64::INFINITY,
+            lacks: false,
         })
         .collect();
     let mut places: Vec<Place> = checks::failing_bands(&s.u).collect();
     places.extend(&unsteady);
+    // A level that was taken off takes some of the noise with it.
+    places.retain(|p| !(p.lacks && s.state.level.is_some()));
     places.extend(&crowds);
     let in_place = |p: &Place, omega: f64| omega / PI >= p.from && omega / PI < p.to;
     let within = |places: &[Place], omega: f64| places.iter().any(|p| in_place(p, omega));
@@ -194,7 +197,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
                 let own = process.density(theta, &panel.bins.at);
                 let information = own.iter().zip(&g).zip(&counts);
                 let information = information.map(|((d, g), m)| m * (d / g).powi(2));
-                unlike
+                unlike && !process.filters_white()
                     || repeats.is_some()
                     || correlated && (places.is_empty() || process.filters_white())
                     || share(&information.collect::<Vec<_>>(), t.lr)

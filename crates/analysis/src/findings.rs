@@ -200,7 +200,6 @@ pub(crate) fn motion_finding(s: &Searched<'_>, grid: &Grid) -> Option<Finding> {
     })
 }
 
-/// One finding for one event on several channels, and for one cause on one channel by several terms.
 /// Longest that a blow lasts that shifts a bias, s: far readings within it of the step are the blow itself.
 const BLOW_S: f64 = 1.0;
 
@@ -234,6 +233,30 @@ pub(crate) fn blows(mut findings: Vec<Finding>) -> Vec<Finding> {
     findings
 }
 
+/// Increase of the variance from which on far readings in a loud stretch are its noise: six sigma of the quiet are three of
+/// its own.
+const LOUD: f64 = 3.0;
+
+/// Far readings that lie all in a stretch of louder noise of the same channel are that noise.
+pub(crate) fn loud(mut findings: Vec<Finding>) -> Vec<Finding> {
+    let stretches: Vec<(String, f64, f64)> = (findings.iter())
+        .filter(|f| f.cause == "noise_change")
+        .filter_map(|f| {
+            let value = |name: &str| f.parameters.get(name).map(|p| p.value);
+            value("variance_increase").filter(|v| *v >= LOUD)?;
+            Some((f.channels.first()?.clone(), value("start")?, value("end")?))
+        })
+        .collect();
+    findings.retain(|f| {
+        let within = |(channel, from, to): &(String, f64, f64)| {
+            f.channels == [channel.as_str()] && f.times_s.iter().all(|t| t >= from && t <= to)
+        };
+        f.cause != "outliers" || f.times_s.is_empty() || !stretches.iter().any(within)
+    });
+    findings
+}
+
+/// One finding for one event on several channels, and for one cause on one channel by several terms.
 pub(crate) fn joined(findings: Vec<Finding>) -> Vec<Finding> {
     let mut all: Vec<Finding> = vec![];
     for f in findings {
