@@ -4,7 +4,7 @@ use model::record::Quantity;
 
 use super::foreign::meaning;
 use super::header::Lines;
-use super::propose::proposal;
+use super::propose::{nearest, proposal};
 use super::units::{COUNTS, What, at_the_end, convert, in_brackets, known, usual};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
 
@@ -394,6 +394,14 @@ fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureEr
                 found.notes.extend(note);
                 if unit.is_none() {
                     assumed.push((name.to_owned(), what));
+                }
+                if what == What::Channel(Quantity::Other)
+                    && let Some(nearest) = nearest(name)
+                {
+                    found.notes.push(format!(
+                        "`{name}` is no name of this program's, so the column is a channel of its own that explains nothing: did \
+                         you mean {nearest}? (time, gyro_x .. gyro_z, acc_x .. acc_z, temp or temp_x .. temp_z, supply, pwm)"
+                    ));
                 }
                 measured(at, name, meaning(name).0, unit)?.role
             }

@@ -119,6 +119,37 @@ pub(super) fn proposal(names: &[String], numbered: bool) -> String {
     )
 }
 
+/// The name of ours that a name which is none most probably means: `temperature`, `gyrox`, `accel_z`, `voltage`.
+pub(super) fn nearest(name: &str) -> Option<String> {
+    let found = Meaning::of(name);
+    let axis = found.axis.or_else(|| {
+        // What ends in an axis without a mark before it.
+        let word = name.to_lowercase();
+        AXES.iter().position(|axis| word.ends_with(axis))
+    });
+    let with_axis = |stem: &str| match axis {
+        Some(axis) => format!("{stem}_{}", AXES[axis]),
+        None => format!("{stem}_x"),
+    };
+    let words = words(name);
+    let is = |starts: &[&str]| (words.iter()).any(|w| starts.iter().any(|s| w.starts_with(s)));
+    match found.kind {
+        Kind::Gyro => Some(with_axis("gyro")),
+        Kind::Acc => Some(with_axis("acc")),
+        Kind::Temp => Some(
+            found
+                .axis
+                .map_or_else(|| "temp".to_owned(), |_| with_axis("temp")),
+        ),
+        Kind::Time => Some("time".to_owned()),
+        Kind::Bare | Kind::Unknown if is(&["volt", "vdd", "vcc", "supply", "batt"]) => {
+            Some("supply".to_owned())
+        }
+        Kind::Bare | Kind::Unknown if is(&["pwm", "duty", "motor"]) => Some("pwm".to_owned()),
+        Kind::Bare | Kind::Unknown => None,
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Time,
@@ -216,6 +247,26 @@ fn words(name: &str) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_that_misses_ours_by_little_is_told_and_others_are_left_alone() {
+        for (name, ours) in [
+            ("temperature", "temp"),
+            ("temperature_y", "temp_y"),
+            ("gyrox", "gyro_x"),
+            ("gyroscope_z", "gyro_z"),
+            ("accx", "acc_x"),
+            ("accel_z", "acc_z"),
+            ("timestamp", "time"),
+            ("supply_voltage", "supply"),
+            ("motor", "pwm"),
+        ] {
+            assert_eq!(nearest(name).as_deref(), Some(ours), "{name}");
+        }
+        for name in ["ocxo", "laser", "x", "pressure"] {
+            assert_eq!(nearest(name), None, "{name}");
+        }
+    }
 
     #[test]
     fn a_proposal_maps_each_axis_to_its_own_column_with_the_headers_units_and_quotes() {

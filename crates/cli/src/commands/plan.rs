@@ -27,6 +27,9 @@ use super::{Input, Outputs};
 const LONGEST_S: f64 = 36.0 * 3600.0;
 /// Most samples that `--check` simulates in all.
 const CHECK_SAMPLES: f64 = 2e8;
+/// Records that are simulated without it, of a term and of an angle, and most samples of them: some seconds.
+const RECORDS: [usize; 2] = [40, 400];
+const SAMPLES: f64 = 1e7;
 
 /// What `plan` takes.
 #[derive(Args)]
@@ -46,7 +49,8 @@ pub struct Arguments {
     /// The gyro, where there are several
     #[arg(long, value_name = "NAME")]
     channel: Option<String>,
-    /// Simulate so many records as long as planned, and count how many keep the promise of --want
+    /// Simulate so many records as long as planned, and count how many keep the promise of --want; without it 40 (400 of an
+    /// angle) where that takes seconds; 0 for none
     #[arg(long, value_name = "RECORDS")]
     check: Option<usize>,
     /// Seed of the check
@@ -67,6 +71,9 @@ struct Plan {
     want: Vec<Wanted>,
     angle: Vec<WantedAngle>,
     separate: Vec<Told>,
+    /// Whether nothing is to be simulated.
+    #[serde(skip)]
+    is_unchecked: bool,
 }
 
 /// What is known of the noise, deg/s and s.
@@ -98,6 +105,16 @@ impl Noise {
             Letter::R => &mut noise.r,
         } = limit;
         (limit > 0.0).then_some((noise, limit))
+    }
+
+    fn truth(&self) -> Truth {
+        Truth {
+            n: self.n,
+            b: self.b,
+            k: self.k,
+            q: self.q,
+            r: self.r,
+        }
     }
 
     fn known(&self) -> KnownNoise {
@@ -175,6 +192,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         want: Vec::new(),
         angle: Vec::new(),
         separate: Vec::new(),
+        is_unchecked: arguments.check == Some(0),
     };
     if let Some(text) = &arguments.want {
         for wish in wishes(text)? {
@@ -189,12 +207,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 Wish::Angle {
                     within_deg,
                     after_s,
-                } => plan.angle.push(WantedAngle::plan(
-                    &plan.noise.known(),
-                    plan.noise.rate_hz,
-                    within_deg,
-                    after_s,
-                )),
+                } => {
+                    let rate = plan.noise.rate_hz;
+                    let mut angle =
+                        WantedAngle::plan(&plan.noise.known(), rate, within_deg, after_s);
+                    let (records, most) = match arguments.check {
+                        Some(records) => (records, CHECK_SAMPLES),
+                        None => (RECORDS[1], SAMPLES),
+                    };
+                    angle.check(plan.noise.truth(), rate, records, most, arguments.seed);
+                    plan.angle.push(angle);
+                }
             }
         }
         if !quiet {
@@ -373,16 +396,19 @@ fn want(
     let rate = noise.rate_hz;
     let seconds = at(rate)?;
     let seconds_at = [(rate / 4.0, at(rate / 4.0)?), (rate * 4.0, at(rate * 4.0)?)];
-    let checked_share = match arguments.check {
-        None => None,
-        Some(records) => Some(check(
+    let records = arguments.check.unwrap_or(RECORDS[0]);
+    let is_long = seconds * rate * records as f64 > SAMPLES;
+    let checked_share = if records == 0 || (arguments.check.is_none() && is_long) {
+        None
+    } else {
+        Some(check(
             &noise,
             letter,
             within_percent,
             seconds,
             records,
             arguments,
-        )?),
+        )?)
     };
     Ok(Wanted {
         term: letter.name(),
@@ -409,13 +435,7 @@ fn check(
             "--check {records}: {records} records of {samples} samples take too long"
         );
     }
-    let truth = Truth {
-        n: noise.n,
-        b: noise.b,
-        k: noise.k,
-        q: noise.q,
-        r: noise.r,
-    };
+    let truth = noise.truth();
     let samples = samples as usize;
     let tau0 = 1.0 / noise.rate_hz;
     let size = letter.size(&noise.known());
@@ -470,11 +490,17 @@ fn print_want(plan: &Plan) {
             duration(faster.1),
             tidy(faster.0, 6)
         );
-        if let Some(share) = w.checked_share {
-            say!(
+        match w.checked_share {
+            Some(share) => say!(
                 "    checked: {:.1} % of simulated records of that length are within it",
                 100.0 * share
-            );
+            ),
+            None if plan.is_unchecked => {}
+            None => {
+                say!(
+                    "    not checked: so long a record takes its time to simulate; `--check 20` does"
+                );
+            }
         }
     }
     say!("what a record of a given length tells (half of the 95 % interval):");

@@ -1,7 +1,10 @@
 //! What `imu-stand plan --want` understands.
 
 use analysis::plan::{KnownNoise, Letter, calibration_for};
+use analysis::synthetic::Truth;
 use miette::Result;
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 /// Half of a 95 % interval in standard errors.
@@ -80,6 +83,8 @@ pub struct WantedAngle {
     /// The one that serves best, and half of the 95 % interval of the angle with it, deg.
     best_calibration_s: f64,
     best_within_deg: f64,
+    /// Share of simulated stands whose angle is within the promise: the wish, or where no calibration keeps it, the best.
+    checked_share: Option<f64>,
 }
 
 impl WantedAngle {
@@ -92,7 +97,35 @@ impl WantedAngle {
             calibration_s: plan.calibration_s,
             best_calibration_s: plan.best_calibration_s,
             best_within_deg: Z_95 * plan.best_sigma,
+            checked_share: None,
         }
+    }
+
+    /// Simulates so many stands at rest, calibrates and integrates each, and counts; nothing where that is more than
+    /// `most` samples.
+    pub fn check(&mut self, truth: Truth, rate_hz: f64, records: usize, most: f64, seed: u64) {
+        let (calibration_s, within) = match self.calibration_s {
+            Some(seconds) => (seconds, self.within_deg),
+            None => (self.best_calibration_s, self.best_within_deg),
+        };
+        let calibration = (calibration_s * rate_hz).round().max(1.0);
+        let after = (self.after_s * rate_hz).round().max(1.0);
+        if records == 0 || (calibration + after) * records as f64 > most {
+            return;
+        }
+        let (calibration, after) = (calibration as usize, after as usize);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let kept = (0..records)
+            .filter(|_| {
+                let y =
+                    Truth { r: 0.0, ..truth }.record(calibration + after, 1.0 / rate_hz, &mut rng);
+                let (still, rest) = y.split_at(calibration);
+                let bias = still.iter().sum::<f64>() / calibration as f64;
+                let angle: f64 = rest.iter().map(|v| (v - bias) / rate_hz).sum();
+                angle.abs() <= within
+            })
+            .count();
+        self.checked_share = Some(kept as f64 / records as f64);
     }
 
     /// For a person.
@@ -105,10 +138,23 @@ impl WantedAngle {
             "the best, {:.0} s, gives {:.3} deg",
             self.best_calibration_s, self.best_within_deg
         );
+        let checked = self.checked_share.map_or_else(String::new, |share| {
+            format!(
+                "\n    checked: {:.1} % of simulated angles are within {}",
+                100.0 * share,
+                if self.calibration_s.is_some() {
+                    "it"
+                } else {
+                    "the best"
+                }
+            )
+        });
         match self.calibration_s {
-            Some(seconds) => format!("{wish}  stand still for {seconds:.1} s first; {best}"),
+            Some(seconds) => {
+                format!("{wish}  stand still for {seconds:.1} s first; {best}{checked}")
+            }
             None => format!(
-                "{wish}  no calibration does it: {best}; a shorter time or less noise would"
+                "{wish}  no calibration does it: {best}; a shorter time or less noise would{checked}"
             ),
         }
     }
@@ -117,6 +163,36 @@ impl WantedAngle {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_angle_is_kept_in_as_many_simulated_stands_as_promised() {
+        // White noise, a walk and flicker: the promise is 95 %.
+        let noise = KnownNoise {
+            angle_random_walk_n: 0.088,
+            bias_instability_b: 0.01,
+            rate_random_walk_k: 0.002,
+            ..KnownNoise::default()
+        };
+        let truth = Truth {
+            n: 0.088,
+            b: 0.01,
+            k: 0.002,
+            ..Truth::default()
+        };
+        for within in [6.0, 1e-3] {
+            let mut wanted = WantedAngle::plan(&noise, 20.0, within, 60.0);
+            assert_eq!(wanted.calibration_s.is_some(), within > 1.0, "{wanted:?}");
+            wanted.check(truth, 20.0, 400, 1e9, 1);
+            // Binomial(400, 0.95): 3.7 standard deviations.
+            let share = wanted.checked_share.unwrap();
+            assert!((0.91..=0.99).contains(&share), "{within}: {share}");
+            assert!(
+                wanted.sentence().contains("checked"),
+                "{}",
+                wanted.sentence()
+            );
+        }
+    }
 
     #[test]
     fn wishes_are_read_as_people_write_them_and_nothing_else_is() {
