@@ -10,6 +10,7 @@ pub mod monitor;
 pub mod outputs;
 pub mod paper;
 pub mod plan;
+mod plan_separate;
 pub mod report;
 pub mod representative;
 pub mod run;

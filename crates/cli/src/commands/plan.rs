@@ -1,35 +1,36 @@
 //! `imu-stand plan`.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use analysis::analyze::misfit_warning;
 use analysis::noise_fit::{Spectrum, Term, fit, fit_described};
 use analysis::plan::{KnownNoise, Letter, expected, seconds_for};
 use analysis::sampling::Sampling;
-use analysis::separate::{PRESETS, TOLD_APART, separation};
 use analysis::synthetic::Truth;
 use clap::Args;
 use imu_stand::report::plot::{number, tidy};
 use imu_stand::text;
 use miette::Result;
 use model::ModelFile;
-use model::effects::{EFFECTS, effect};
 use model::record::Quantity;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
+use super::plan_separate::{Told, print_separate, separate};
 use super::wish::{WantedAngle, Wish, Z_95, wishes};
 use super::{Input, Outputs};
 
-/// Longest record that `--separate` lays out, s.
-const LONGEST_S: f64 = 36.0 * 3600.0;
 /// Most samples that `--check` simulates in all.
 const CHECK_SAMPLES: f64 = 2e8;
 /// Records that are simulated without it, of a term and of an angle, and most samples of them: some seconds.
 const RECORDS: [usize; 2] = [40, 400];
 const SAMPLES: f64 = 1e7;
+/// Share of simulated records that have to keep a promise of 95 %: fewer than 36 of 40 have a chance of 5 %.
+const KEPT: f64 = 0.9;
+/// How much longer a record is tried that does not keep it, and how often.
+const LONGER: f64 = 1.4;
+const TRIES: usize = 6;
 
 /// What `plan` takes.
 #[derive(Args)]
@@ -132,26 +133,18 @@ impl Noise {
 struct Wanted {
     term: &'static str,
     within_percent: f64,
+    /// Long enough by the Fisher information, and by the check where there is one.
     seconds: f64,
+    /// By the Fisher information alone.
+    fisher_seconds: f64,
     /// Where the term is not established: the limit that the plan takes for its size, deg/s and s. A smaller one takes longer.
     if_as_large_as: Option<f64>,
     /// At a quarter of the rate and at four times it.
     seconds_at: [(f64, f64); 2],
-    /// Share of simulated records whose estimate is within the wanted part of the truth.
+    /// Share of simulated records of `seconds` whose estimate is within the wanted part of the truth.
     checked_share: Option<f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct Told {
-    cause: String,
-    rival: String,
-    parameter: &'static str,
-    unit: &'static str,
-    excitation: &'static str,
-    /// Length in s, smallest size shown, smallest size told apart.
-    sizes: Vec<(f64, f64, f64)>,
-    /// Why there are none.
-    why: Option<String>,
+    /// The same of `fisher_seconds`.
+    fisher_share: Option<f64>,
 }
 
 /// Runs it.
@@ -236,10 +229,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             );
         };
         for (cause, rival) in [(a, b), (b, a)] {
-            plan.separate.extend(separate(&plan.noise, cause, rival)?);
+            let known = plan.noise.known();
+            plan.separate
+                .extend(separate(&known, plan.noise.rate_hz, cause, rival)?);
         }
         if !quiet {
-            print_separate(&plan);
+            print_separate(&plan.separate);
         }
     }
     super::write_json(arguments.json.as_ref(), &plan)
@@ -394,29 +389,39 @@ fn want(
     let relative = within_percent / 100.0 / Z_95;
     let at = |rate: f64| seconds_for(&known, rate, letter, relative).map_err(super::explain);
     let rate = noise.rate_hz;
-    let seconds = at(rate)?;
+    let fisher_seconds = at(rate)?;
     let seconds_at = [(rate / 4.0, at(rate / 4.0)?), (rate * 4.0, at(rate * 4.0)?)];
     let records = arguments.check.unwrap_or(RECORDS[0]);
-    let is_long = seconds * rate * records as f64 > SAMPLES;
+    let samples = |seconds: f64| seconds * rate * records as f64;
+    let is_long = samples(fisher_seconds) > SAMPLES;
+    let most = arguments.check.map_or(SAMPLES, |_| CHECK_SAMPLES);
+    let (mut seconds, mut fisher_share) = (fisher_seconds, None);
     let checked_share = if records == 0 || (arguments.check.is_none() && is_long) {
         None
     } else {
-        Some(check(
-            &noise,
-            letter,
-            within_percent,
-            seconds,
-            records,
-            arguments,
-        )?)
+        // The information is what an estimate can reach that knows which terms there are; one that has to find them out
+        // takes longer.
+        let share = |seconds| check(&noise, letter, within_percent, seconds, records, arguments);
+        let mut kept = share(seconds)?;
+        fisher_share = Some(kept);
+        for _ in 0..TRIES {
+            if kept >= KEPT || samples(LONGER * seconds) > most {
+                break;
+            }
+            seconds *= LONGER;
+            kept = share(seconds)?;
+        }
+        Some(kept)
     };
     Ok(Wanted {
         term: letter.name(),
         within_percent,
         seconds,
+        fisher_seconds,
         if_as_large_as,
         seconds_at,
         checked_share,
+        fisher_share,
     })
 }
 
@@ -457,7 +462,8 @@ fn check(
     Ok(kept as f64 / records.max(1) as f64)
 }
 
-fn duration(seconds: f64) -> String {
+/// A time for a person.
+pub(super) fn duration(seconds: f64) -> String {
     if seconds < 120.0 {
         format!("{seconds:.0} s")
     } else if seconds < 7200.0 {
@@ -479,7 +485,7 @@ fn print_want(plan: &Plan) {
             );
         }
         say!(
-            "{} within {} % (95 %)  record {} at {} Hz ({:.0} s); {} at {} Hz, {} at {} Hz",
+            "{} within {} % (95 %)  record {} at {} Hz ({:.0} s); by the information alone {} at {} Hz, {} at {} Hz",
             w.term,
             w.within_percent,
             duration(w.seconds),
@@ -492,8 +498,16 @@ fn print_want(plan: &Plan) {
         );
         match w.checked_share {
             Some(share) => say!(
-                "    checked: {:.1} % of simulated records of that length are within it",
-                100.0 * share
+                "    checked: {:.1} % of simulated records of that length are within it{}",
+                100.0 * share,
+                w.fisher_share
+                    .filter(|_| w.seconds > w.fisher_seconds)
+                    .map_or_else(String::new, |first| format!(
+                        "; of the {} that the Fisher information asks for {:.1} %, for a record has to tell which terms there \
+                         are as well",
+                        duration(w.fisher_seconds),
+                        100.0 * first
+                    ))
             ),
             None if plan.is_unchecked => {}
             None => {
@@ -521,112 +535,4 @@ fn print_want(plan: &Plan) {
         let line: String = parts.map(|part| format!("{part:<20}")).collect();
         say!("    {:>9}  {}", duration(seconds), line.trim_end());
     }
-}
-
-/// Lengths laid out by `--separate`, s.
-fn lengths() -> Vec<f64> {
-    std::iter::successors(Some(600.0), |s| Some(s * 3.0))
-        .take_while(|s| *s <= LONGEST_S)
-        .collect()
-}
-
-fn separate(noise: &Noise, cause: &str, rival: &str) -> Result<Vec<Told>> {
-    let find = |id: &str| {
-        effect(id).ok_or_else(|| {
-            let known: Vec<&str> = EFFECTS.iter().map(|e| e.id()).collect();
-            miette::miette!(
-                help = format!("the causes are {}", known.join(", ")),
-                "--separate: `{id}` is no cause"
-            )
-        })
-    };
-    let (a, b) = (find(cause)?, find(rival)?);
-    let mut out = Vec::new();
-    for preset in PRESETS {
-        let settings: BTreeMap<String, f64> = preset
-            .settings
-            .iter()
-            .map(|(key, value)| ((*key).to_owned(), *value))
-            .collect();
-        let mut told = Told {
-            cause: cause.to_owned(),
-            rival: rival.to_owned(),
-            parameter: "",
-            unit: "",
-            excitation: preset.name,
-            sizes: Vec::new(),
-            why: None,
-        };
-        for seconds in lengths() {
-            match separation(a, b, &settings, &noise.known(), noise.rate_hz, seconds) {
-                Ok(found) => {
-                    told.parameter = found.parameter;
-                    told.unit = a
-                        .parameters()
-                        .iter()
-                        .find(|p| p.name == found.parameter)
-                        .map_or("", |p| p.unit);
-                    told.sizes.push((seconds, found.shown, found.told_apart));
-                }
-                Err(why) => told.why = Some(why),
-            }
-        }
-        out.push(told);
-    }
-    Ok(out)
-}
-
-fn print_separate(plan: &Plan) {
-    for direction in plan.separate.chunk_by(|a, b| a.cause == b.cause) {
-        let (cause, rival) = (&direction[0].cause, &direction[0].rival);
-        let Some(told) = direction.iter().find(|t| !t.sizes.is_empty()) else {
-            let why = direction.iter().find_map(|t| t.why.as_deref());
-            say!(
-                "{cause} against {rival}: {}",
-                why.unwrap_or("nothing moves")
-            );
-            continue;
-        };
-        say!(
-            "{cause} against {rival}: smallest {} that shows / that is not taken for {rival}, {} (d = {TOLD_APART})",
-            told.parameter,
-            told.unit
-        );
-        let lengths: String = lengths()
-            .into_iter()
-            .map(|s| format!("{:<20}", duration(s)))
-            .collect();
-        say!("    {:<62}{}", "excitation", lengths.trim_end());
-        for told in direction {
-            if told.sizes.is_empty() {
-                let why = told.why.as_deref().unwrap_or("nothing moves");
-                say!("    {:<62}{why}", told.excitation);
-                continue;
-            }
-            let sizes: String = told
-                .sizes
-                .iter()
-                .map(|(_, shown, apart)| {
-                    let apart = if apart.is_finite() {
-                        format!("{apart:.2e}")
-                    } else {
-                        "never".to_owned()
-                    };
-                    format!("{:<20}", format!("{shown:.2e} / {apart}"))
-                })
-                .collect();
-            say!("    {:<62}{}", told.excitation, sizes.trim_end());
-        }
-        let first = |t: &&Told| t.sizes.first().map_or(f64::INFINITY, |s| s.2);
-        if let Some(best) = direction
-            .iter()
-            .min_by(|a, b| first(a).total_cmp(&first(b)))
-            .filter(|t| first(t).is_finite())
-        {
-            say!("    record: {}", best.excitation);
-        }
-    }
-    say!(
-        "least sizes that can work: a random walk refitted under each hypothesis takes a part of d"
-    );
 }
