@@ -33,6 +33,8 @@ const HOLDS: f64 = 0.6;
 const REMAINDER: f64 = 0.02;
 /// The same for a combination of channels that stands for a cause without a name: off by half.
 const REMAINDER_BEYOND: f64 = 0.25;
+/// The same where a shape is known not to hold: what is off may be as large as what it explains.
+const REMAINDER_UNLAWFUL: f64 = 1.0;
 
 /// Why a name is not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,6 +147,9 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
     // What is left without a place may be anywhere; what has one leaves a strong term elsewhere alone.
     let misplaced = |t: &Term| !places.is_empty() && t.score() < WIDE;
     let followed = followers(s, &g);
+    let unlawful_of = |id: &str, (of, o): &(&'static str, Outcome)| {
+        *of == id && o.p_value < adequacy::LEAST_CHANCE
+    };
     let remainder = |t: &Term| {
         followed
             .iter()
@@ -153,6 +158,8 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
             .filter(|(id, share)| {
                 if *id == beyond::ID {
                     *share < REMAINDER_BEYOND
+                } else if s.laws.iter().any(|l| unlawful_of(*id, l)) {
+                    *share < REMAINDER_UNLAWFUL
                 } else {
                     *share < REMAINDER && !law::holds_beside(&s.search, &s.state, t, id)
                 }
@@ -162,7 +169,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
     // What follows a channel by another law than its name claims, as the claim itself or a term without a name says.
     let unlawful = |t: &Term| {
         let id = t.effect.id();
-        let failed = |(of, o): &(&str, Outcome)| *of == id && o.p_value < adequacy::LEAST_CHANCE;
+        let failed = |l: &(&'static str, Outcome)| unlawful_of(id, l);
         let signal = t.follows.as_deref();
         let beside = |o: &Term| {
             o.effect.id() == beyond::ID

@@ -4,6 +4,7 @@
 //! the model says: every reading is held against its own neighbourhood ([`local`]). Chances are those of one channel
 //! and one audit; [`FALSE_ALARM`] is what each may spend.
 
+mod alike;
 mod bits;
 mod codes;
 mod frames;
@@ -294,6 +295,7 @@ pub fn audit(record: &Record) -> Audit {
         }
     }
     repeats::audit(record, &gyros, &at, &mut audit);
+    alike::audit(record, &gyros, &mut audit);
     for g in &gyros {
         outliers::audit(g, &at, &mut audit);
     }

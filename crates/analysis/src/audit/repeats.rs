@@ -9,11 +9,16 @@ use model::record::Record;
 
 use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted, tails};
 use crate::audit::local::{robust_sigma, width};
+use crate::result::Unexplained;
 
 /// Distances of the pairs that tell the chance of agreement.
 const LAGS: std::ops::RangeInclusive<usize> = 20..=25;
 /// Longest distance, in steps, that tells whether readings lie on a lattice: beyond it rounding hides that.
 const MOST_STEPS: f64 = 1000.0;
+/// Readings that change by one step, of those that do so when they lie far apart, below which a reading is held until it
+/// is some steps away, and the standard errors that it has to lie below that.
+const HELD: f64 = 0.85;
+const CERTAIN: f64 = 5.0;
 /// Excess over the expected share, relative, that a single gyro has to show: the share itself is that well known.
 const EXCESS: f64 = 0.1;
 
@@ -27,6 +32,25 @@ fn share(values: &[f64], lag: usize, step: f64) -> f64 {
         }
     }
     if all > 0.0 { same / all } else { 0.0 }
+}
+
+/// Readings that are one step from that `lag` before.
+fn one_step(values: &[f64], lag: usize, step: f64) -> f64 {
+    let pairs = values.iter().zip(&values[lag.min(values.len())..]);
+    let one = pairs.filter(|(a, b)| ((*b - *a).abs() / step - 1.0).abs() < 0.5);
+    one.count() as f64
+}
+
+/// How often a reading that is held until it is some steps away changes by one, and how often it would; `None` where it
+/// repeats for another reason. Of `rows` readings, `excess` repeat.
+fn held(values: &[f64], step: f64, rows: usize, excess: f64) -> Option<(f64, f64)> {
+    if step <= 0.0 {
+        return None;
+    }
+    let far = LAGS.map(|l| one_step(values, l, step)).sum::<f64>() / LAGS.count() as f64;
+    let expected = far * (1.0 - excess / rows as f64);
+    let near = one_step(values, 1, step);
+    (HELD * expected - near > CERTAIN * expected.sqrt()).then_some((near, expected))
 }
 
 fn differences(values: &[f64], lag: usize) -> Vec<f64> {
@@ -246,6 +270,13 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
             what.clone(),
         ) && chance < FALSE_ALARM
         {
+            if let Some((near, far)) = held(values, *step, rows, excess) {
+                audit.unexplained.push(Unexplained {
+                    channel: name.to_owned(),
+                    what: format!("{what}; and it changes by one step {near:.0} times, where {far:.0} are expected: a reading is held until the next one is some steps away"),
+                });
+                continue;
+            }
             // Which of them is a repeat by chance cannot be told where those are the many.
             if excess > expected {
                 own.iter().for_each(|i| audit.mask(name, *i));
