@@ -6,7 +6,7 @@
 //! its shape, made of the same channel, explain more? A shape that is off by a part e of its size leaves e^2 of what it
 //! explains to them.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use crate::beyond::{self, memory};
 use crate::checks::{Outcome, chi_tail};
@@ -23,21 +23,17 @@ const WIDENED: f64 = 1.12;
 
 /// For each effect that follows a channel, whether its law holds.
 pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static str, Outcome)> {
-    let mut followed: BTreeMap<(&'static str, &str), f64> = BTreeMap::new();
-    for t in &state.terms {
-        let Some(name) = t.follows.as_deref().filter(|_| t.effect.id() != beyond::ID) else {
-            continue;
-        };
-        // What the terms of one effect explain together is at least what the strongest does beside the others.
-        let most = followed.entry((t.effect.id(), name)).or_default();
-        *most = most.max(t.lr);
-    }
+    let of_library = |t: &&Term| t.effect.id() != beyond::ID;
+    let follows = |t: &Term| Some((t.effect.id(), t.follows.clone()?));
+    let named = state.terms.iter().filter(of_library);
+    let followed: BTreeSet<(&'static str, String)> = named.filter_map(follows).collect();
     // Under the noise as it was fitted: few coefficients tell the random walk, and slow departures could be traded for it.
     let g = state.noise.over(&search.panel.bins);
     let width = search.panel.width();
     let mut all = vec![];
-    for ((effect, name), explained) in followed {
-        let Some(signal) = search.view.signals.iter().find(|s| s.name == name) else {
+    for (effect, name) in &followed {
+        let effect = *effect;
+        let Some(signal) = search.view.signals.iter().find(|s| s.name == *name) else {
             continue;
         };
         let departures = memory::departures(&search.view, signal);
@@ -48,10 +44,15 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
             .iter()
             .filter(|c| c.effect.id() == effect || c.effect.extends() == Some(effect));
         let mut own = state.columns();
+        // What its terms explain together: of several that share it, each alone has little.
+        let without = state.terms.iter().filter(|t| t.effect.id() != effect);
+        let rest: Vec<usize> = without.flat_map(|t| t.columns.iter().copied()).collect();
+        let likelihood = |columns: &[usize]| search.panel.solve(&g, columns).log_likelihood;
+        let explained = 2.0 * (likelihood(&own) - likelihood(&rest));
         own.extend(of_it.flat_map(Candidate::all_columns));
-        let null = search.panel.solve(&g, &own).log_likelihood;
+        let null = likelihood(&own);
         own.extend(&added);
-        let lr = 2.0 * (search.panel.solve(&g, &own).log_likelihood - null);
+        let lr = 2.0 * (likelihood(&own) - null);
         search.panel.truncate(width);
         let p_value = if lr < DEPARTURE * explained {
             1.0

@@ -191,3 +191,57 @@ fn a_step_beside_a_line_that_wanders_keeps_its_name() {
         right.then_some(()).ok_or_else(|| said(&d))
     });
 }
+
+#[test]
+fn a_reading_that_is_held_until_the_next_is_far_is_no_stale_sample() {
+    graded("hysteresis of the converter", |run, rng| {
+        let mut r = record(&[], 5700 + run);
+        let counts = Uniform::new(1.5, 3.0).expect("a range").sample(rng) * 0.07326;
+        let c = r.channels.iter_mut().find(|c| c.name == "gyro_y");
+        let mut held = f64::NAN;
+        for v in &mut c.expect("a channel").values {
+            if (*v - held).abs() < counts {
+                *v = held;
+            }
+            held = *v;
+        }
+        let d = told(&r);
+        let until = |u: &analysis::result::Unexplained| {
+            u.channel == "gyro_y" && u.what.contains("held until")
+        };
+        let right = named(&d).is_empty() && d.unexplained.iter().any(until);
+        right.then_some(()).ok_or_else(|| said(&d))
+    });
+}
+
+#[test]
+fn frames_in_which_one_axis_holds_the_reading_of_another_are_told() {
+    graded("words read twice", |run, rng| {
+        let mut r = record(&[], 5800 + run);
+        let share = Uniform::new(0.1, 0.3).expect("a range").sample(rng);
+        let of = |r: &Record, name: &str| {
+            let c = r.channels.iter().position(|c| c.name == name);
+            c.expect("a channel")
+        };
+        let (x, y) = (of(&r, "gyro_x"), of(&r, "gyro_y"));
+        // Biases alike, so that a copy is no far reading.
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        let lsb = 0.07326;
+        let off = mean(&r.channels[x].values) - mean(&r.channels[y].values);
+        let off = (off / lsb).round() * lsb;
+        for i in 0..r.channels[y].values.len() {
+            r.channels[y].values[i] += off;
+            if Uniform::new(0.0, 1.0).expect("a range").sample(rng) < share {
+                r.channels[y].values[i] = r.channels[x].values[i];
+            }
+        }
+        for c in &mut r.channels[..=x.max(y)] {
+            let counts = c.values.iter().map(|v| (v / lsb).round() as i32);
+            c.counts = c.lsb.filter(|l| *l == lsb).map(|_| counts.collect());
+        }
+        let d = told(&r);
+        let holds = |u: &analysis::result::Unexplained| u.what.contains("one holds the other's");
+        let right = d.unexplained.iter().any(holds);
+        right.then_some(()).ok_or_else(|| said(&d))
+    });
+}

@@ -3,6 +3,8 @@
 //! The differences of two gyros in one frame, in counts, have a smooth distribution whatever noise they share; copies add to
 //! the difference 0 alone. What is expected there is the parabola through the differences beside it.
 
+use std::collections::BTreeMap;
+
 use model::record::Record;
 
 use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, tails};
@@ -14,6 +16,9 @@ const LEAST_SPREAD: f64 = 2.0;
 /// Room that the curve gets, relative: copies that matter are more.
 const ROOM: f64 = 0.15;
 
+/// Share of the frames from which on one gyro is the other.
+const MOST: f64 = 0.5;
+
 pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], audit: &mut Audit) {
     let rows = record.len();
     if rows < LEAST_READINGS {
@@ -24,6 +29,21 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], audit: &mut Audit) {
             pair(a, b, audit);
         }
     }
+}
+
+/// Share of the frames in which two gyros that know nothing of each other read the same.
+fn by_chance(x: &[i32], y: &[i32], rows: &[usize]) -> f64 {
+    let shares = |of: &[i32]| {
+        let mut all: BTreeMap<i32, f64> = BTreeMap::new();
+        for i in rows {
+            *all.entry(of[*i]).or_default() += 1.0 / rows.len() as f64;
+        }
+        all
+    };
+    let of_y = shares(y);
+    let both = shares(x).into_iter();
+    both.map(|(code, share)| share * of_y.get(&code).copied().unwrap_or(0.0))
+        .sum()
 }
 
 fn pair(a: &Gyro<'_>, b: &Gyro<'_>, audit: &mut Audit) {
@@ -51,7 +71,8 @@ fn pair(a: &Gyro<'_>, b: &Gyro<'_>, audit: &mut Audit) {
     }
     let times = |k: i32| d.iter().filter(|v| **v == f64::from(k)).count() as f64;
     let same = times(0);
-    let whole = same > 0.5 * d.len() as f64;
+    // Two that hardly leave one code agree without being copies.
+    let whole = same > MOST * d.len() as f64 && by_chance(x, y, &rows) < MOST;
     if !whole && robust_sigma(&d) < LEAST_SPREAD {
         return;
     }
