@@ -91,7 +91,7 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
         variance_cusum(e, rate_hz),
         kurtosis(e, rate_hz),
         higher::bicovariance(e),
-        higher::period(u, rate_hz),
+        higher::period(e, rate_hz),
     ]
 }
 

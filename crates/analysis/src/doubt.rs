@@ -136,7 +136,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
     };
     let crowd = s.state.notes.iter().any(|note| note.at.is_none());
     let correlated = failing("ljung_box");
-    let repeats = checks::repeats(&s.u).filter(|r| r.chance < LEAST_CHANCE);
+    let repeats = checks::repeats(&s.e).filter(|r| r.chance < LEAST_CHANCE);
     // A harmonic of what repeats itself, to a coefficient.
     let harmonic = |omega: f64| {
         let tooth = |r: &checks::Repeats| omega * r.period as f64 / (2.0 * PI);

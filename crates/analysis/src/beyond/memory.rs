@@ -20,8 +20,11 @@ const COMMAND_S: [f64; 2] = [12.0, 48.0];
 const TEMPERATURE_S: [f64; 3] = [10.0, 40.0, 160.0];
 /// The same for a rate that the table makes.
 const TURNING_S: [f64; 3] = [0.2, 0.8, 3.2];
-/// Samples over which a response to vibration may go on.
+/// Samples over which a response to vibration may go on, and that of a long record.
 const SAMPLES: usize = 6;
+const SAMPLES_OF_LONG: usize = 3;
+/// Samples from which on a record is long: columns then take most of the time and the memory.
+const LONG: usize = 1 << 18;
 
 /// A signal and what is behind it.
 fn pair(values: &[f64], tau: f64) -> Vec<Vec<f64>> {
@@ -34,7 +37,15 @@ fn pair(values: &[f64], tau: f64) -> Vec<Vec<f64>> {
 fn shifted(values: &[f64]) -> Vec<Vec<f64>> {
     let c = centred(values);
     let at = |k: usize| (0..c.len()).map(|i| c[i.saturating_sub(k)]).collect();
-    (0..=SAMPLES).map(at).collect()
+    (0..=shifts(c.len())).map(at).collect()
+}
+
+fn shifts(samples: usize) -> usize {
+    if samples > LONG {
+        SAMPLES_OF_LONG
+    } else {
+        SAMPLES
+    }
 }
 
 fn size(signal: &Signal) -> Vec<f64> {
@@ -82,7 +93,7 @@ pub(super) fn combinations<'a>(
             what: format!(
                 "{} over its last {:.2} s",
                 a.name,
-                SAMPLES as f64 / view.rate_hz
+                shifts(view.samples) as f64 / view.rate_hz
             ),
             columns: Box::new(|| shifted(&a.values)),
         });

@@ -66,12 +66,14 @@ pub(crate) struct Repeats {
 /// Half the width over which energies are taken to be even, coefficients.
 const EVEN: usize = 200;
 
-/// Whitened coefficients in time, over the energy about each: a band that is left over repeats nothing.
-fn evened(u: &[f64]) -> Vec<f64> {
+/// Whitened readings, each of their coefficients over the energy about it: a band that is left over repeats nothing.
+fn evened(e: &[f64]) -> Vec<f64> {
+    let dct = Dct::new(e.len());
+    let u = dct.forward(e);
     let mut sums = Vec::with_capacity(u.len() + 1);
     let mut sum = 0.0;
     sums.push(sum);
-    for v in u {
+    for v in &u {
         sum += v * v;
         sums.push(sum);
     }
@@ -81,16 +83,15 @@ fn evened(u: &[f64]) -> Vec<f64> {
         if energy > 0.0 { v / energy.sqrt() } else { 0.0 }
     };
     let even: Vec<f64> = u.iter().enumerate().map(even).collect();
-    Dct::new(u.len()).inverse(&even)
+    dct.inverse(&even)
 }
 
-/// The period at which the means of the places in it are least like those of noise, by whitened coefficients.
-pub(crate) fn repeats(u: &[f64]) -> Option<Repeats> {
-    if u.len() < 2 * EVEN {
+/// The period at which the means of the places in it are least like those of noise, by the whitened residual.
+pub(crate) fn repeats(e: &[f64]) -> Option<Repeats> {
+    if e.len() < 2 * EVEN {
         return None;
     }
-    let e = evened(u);
-    let e = &e[..e.len().min(MOST)];
+    let e = evened(&e[..e.len().min(MOST)]);
     let longest = LONGEST.min(e.len() / FEWEST);
     let mean = e.iter().sum::<f64>() / e.len().max(1) as f64;
     let mut sums = vec![0.0; longest];
@@ -122,8 +123,8 @@ pub(crate) fn repeats(u: &[f64]) -> Option<Repeats> {
 }
 
 /// What repeats itself every few samples, whatever its shape: each of its harmonics may be too weak for a line.
-pub(super) fn period(u: &[f64], rate_hz: f64) -> Outcome {
-    let Some(found) = repeats(u) else {
+pub(super) fn period(e: &[f64], rate_hz: f64) -> Outcome {
+    let Some(found) = repeats(e) else {
         return Outcome {
             id: "period",
             statistic: 0.0,
@@ -165,7 +166,7 @@ mod tests {
             let p = bicovariance(&e).p_value;
             low += usize::from(p < 0.01);
             half += usize::from(p < 0.5);
-            repeating += usize::from(period(&Dct::new(e.len()).forward(&e), 20.0).p_value < 0.01);
+            repeating += usize::from(period(&e, 20.0).p_value < 0.01);
         }
         // 5 and 250 are expected; the third chance is a bound, for periods share their multiples.
         assert!(low <= 15, "{low}");
@@ -191,9 +192,10 @@ mod tests {
 
     #[test]
     fn a_band_that_is_left_over_repeats_nothing() {
-        let mut u = Dct::new(6000).forward(&white(6000, 8));
+        let dct = Dct::new(6000);
+        let mut u = dct.forward(&white(6000, 8));
         u[2000..2200].iter_mut().for_each(|v| *v *= 4.0);
-        let found = repeats(&u).unwrap();
+        let found = repeats(&dct.inverse(&u)).unwrap();
         assert!(
             found.chance > 1e-3,
             "{} samples, {}",
@@ -209,7 +211,7 @@ mod tests {
         for (i, v) in e.iter_mut().enumerate() {
             *v += 0.3 * levels[i % 63];
         }
-        let found = repeats(&Dct::new(e.len()).forward(&e)).unwrap();
+        let found = repeats(&e).unwrap();
         assert_eq!(found.period % 63, 0);
         assert!(found.chance < 1e-12, "{}", found.chance);
     }
