@@ -8,7 +8,7 @@
 use model::effect::{Signal, View};
 use model::record::Quantity;
 
-use super::{Combination, accelerations, centred, lagged, turning};
+use super::{Combination, accelerations, centred, lagged};
 
 /// Time constants, s, a factor of four apart: a lag half way between two of them is spanned by either to some percent.
 const SUPPLY_S: [f64; 4] = [0.5, 2.0, 8.0, 32.0];
@@ -18,8 +18,9 @@ const HEAT_S: [f64; 4] = [1.0, 4.0, 16.0, 64.0];
 const COMMAND_S: [f64; 2] = [12.0, 48.0];
 /// The same for a temperature.
 const TEMPERATURE_S: [f64; 3] = [10.0, 40.0, 160.0];
-/// The same for a rate that the table makes.
-const TURNING_S: [f64; 3] = [0.2, 0.8, 3.2];
+/// The same for a rate that the table makes, which is asked of a name alone: a gyro with a memory is its noise too, and that
+/// may be shared.
+const TURNING_S: [f64; 2] = [0.8, 3.2];
 /// Samples over which a response to vibration may go on, and that of a long record.
 const SAMPLES: usize = 6;
 const SAMPLES_OF_LONG: usize = 3;
@@ -84,9 +85,6 @@ pub(super) fn combinations<'a>(
             pairs(format!("size of {}", m.name), &HEAT_S, size, m);
         }
         pairs(m.name.clone(), &COMMAND_S, smooth, m);
-    }
-    for w in turning(view) {
-        pairs(w.name.clone(), &TURNING_S, smooth, w);
     }
     for a in accelerations(view) {
         all.push(Combination {
