@@ -124,12 +124,15 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
                     delta_bic: Some(term.lr - size * n),
                     allan_misfit_before: Some(misfit[0]),
                     allan_misfit_after: Some(misfit[1]),
-                    // The filter behind the angles knows the random walk alone: of a stationary term it says nothing.
+                    // The filter behind the angles knows the random walk alone: a stationary term leaves it as it is.
                     angle_rms_deg: score
                         .angle
                         .iter()
-                        .filter(|_| !matches!(term.form, Form::Covariance(..)))
-                        .map(|(k, v)| ((*k).to_owned(), *v))
+                        .map(|(k, [before, after])| {
+                            let same = matches!(term.form, Form::Covariance(..));
+                            let after = if same { before } else { after };
+                            ((*k).to_owned(), [*before, *after])
+                        })
                         .collect(),
                     ablation_nats: Some(term.lr / 2.0),
                 }),
