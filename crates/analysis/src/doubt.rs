@@ -158,7 +158,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
             .filter(|(id, share)| {
                 if *id == beyond::ID {
                     *share < REMAINDER_BEYOND
-                } else if s.laws.iter().any(|l| unlawful_of(*id, l)) {
+                } else if s.laws.iter().any(|l| unlawful_of(id, l)) {
                     *share < REMAINDER_UNLAWFUL
                 } else {
                     *share < REMAINDER && !law::holds_beside(&s.search, &s.state, t, id)
