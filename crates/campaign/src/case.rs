@@ -263,7 +263,7 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
             if FOREIGN[i] == "backlash in temperature" {
                 allowed.extend(["temperature", "temperature_quadratic"]);
             }
-            allowed.extend(foreign::kept_back_fourth::parts(FOREIGN[i]));
+            allowed.extend(foreign::parts(FOREIGN[i]));
             let f = foreign(draw, &mut stand, FOREIGN[i], axis, wanted);
             strange = f.strength;
             unknown = Some(f);

@@ -9,35 +9,39 @@ use crate::stand::{GYROS, LSB, Needs, Stand};
 use crate::strength::{Meter, of_variance, size_for};
 
 mod kept_back;
-pub(crate) mod kept_back_fourth;
+mod kept_back_fifth;
+mod kept_back_fourth;
 mod kept_back_third;
 #[cfg(test)]
 mod library_share;
 
 /// What there is: first those that the engine was developed with or has been changed after, then those kept back.
-pub const FOREIGN: [&str; SEEN + kept_back_fourth::NAMES.len()] = {
-    let mut all = [""; SEEN + kept_back_fourth::NAMES.len()];
+pub const FOREIGN: [&str; SEEN + kept_back_fifth::NAMES.len()] = {
+    let mut all = [""; SEEN + kept_back_fifth::NAMES.len()];
     let mut i = 0;
     while i < all.len() {
         all[i] = if i < FIRST.len() {
             FIRST[i]
         } else if i < SECOND {
             kept_back::NAMES[i - FIRST.len()]
-        } else if i < SEEN {
+        } else if i < THIRD {
             kept_back_third::NAMES[i - SECOND]
+        } else if i < SEEN {
+            kept_back_fourth::NAMES[i - THIRD]
         } else {
-            kept_back_fourth::NAMES[i - SEEN]
+            kept_back_fifth::NAMES[i - SEEN]
         };
         i += 1;
     }
     all
 };
 /// How many of them, from the first, are no longer unseen: the engine was made with 14 of them, and has been changed
-/// since it was graded on the next eight, and on the second and the third set kept back.
-pub const SEEN: usize = SECOND + kept_back_third::NAMES.len();
+/// since it was graded on the next eight, and on the second, third and fourth set kept back.
+pub const SEEN: usize = THIRD + kept_back_fourth::NAMES.len();
 
-/// Where the second set ends.
+/// Where the second and the third set end.
 const SECOND: usize = FIRST.len() + kept_back::NAMES.len();
+const THIRD: usize = SECOND + kept_back_third::NAMES.len();
 
 const FIRST: [&str; 22] = [
     "chirp",
@@ -67,9 +71,16 @@ const FIRST: [&str; 22] = [
 /// The environment that they need.
 #[must_use]
 pub fn needs(name: &str) -> Needs {
-    kept_back_fourth::needs(name)
+    kept_back_fifth::needs(name)
+        .or_else(|| kept_back_fourth::needs(name))
         .or_else(|| kept_back_third::needs(name))
         .unwrap_or_else(|| kept_back::needs(name))
+}
+
+/// Causes of the library that are a true part of one.
+#[must_use]
+pub fn parts(name: &str) -> Vec<&'static str> {
+    [kept_back_fourth::parts(name), kept_back_fifth::parts(name)].concat()
 }
 
 /// What it does to a channel: adds a signal, or makes new noise out of old.
@@ -160,6 +171,7 @@ fn any(
     kept_back::one(draw, stand, name, axis, wanted)
         .or_else(|| kept_back_third::one(draw, stand, name, axis, wanted))
         .or_else(|| kept_back_fourth::one(draw, stand, name, axis, wanted))
+        .or_else(|| kept_back_fifth::one(draw, stand, name, axis, wanted))
         .unwrap_or_else(|| one(draw, stand, name, axis, wanted))
 }
 

@@ -99,7 +99,7 @@ fn one_side(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
 }
 
 /// A small heater on the board with a thermostat of short cycles: the temperatures it makes.
-fn cycles(draw: &mut Draw, stand: &mut Stand) {
+pub(super) fn cycles(draw: &mut Draw, stand: &mut Stand) {
     let (n, rate_hz) = (stand.samples(), stand.rate_hz);
     let (swing, mut on) = (draw.between(4.0, 10.0), draw.chance(0.5));
     let heater = held(draw, n, rate_hz, (8.0, 30.0), |_| {
@@ -156,7 +156,7 @@ fn drop_out(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     supply.iter().map(|u| (u - needed).min(0.0)).collect()
 }
 
-fn about_mean(values: &[f64]) -> Vec<f64> {
+pub(super) fn about_mean(values: &[f64]) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     values.iter().map(|v| v - mean).collect()
 }

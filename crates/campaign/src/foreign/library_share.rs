@@ -10,11 +10,12 @@ use model::effects::EFFECTS;
 use model::record::{Axis, Base, Quantity};
 
 use super::kept_back::{self, Mode, by_difference, by_echo, of_law, shares};
-use super::{Change, foreign};
+use super::{Change, LARGEST_RMS, foreign, rms};
 use crate::random::Draw;
 use crate::stand::{LSB, Stand};
 use crate::strength::{Meter, of_variance};
 
+mod fifth;
 mod fourth;
 mod third;
 
@@ -22,6 +23,11 @@ mod third;
 const DESCRIBED: f64 = 0.95;
 /// Draws of each effect that are looked at.
 const DRAWS: u64 = 3;
+
+/// Draws of each signal that is held against the sum of two effects as well, which takes seconds each.
+const SIGNAL_DRAWS: u64 = 1;
+/// Draws of each by which it is seen how strong it comes.
+const STRENGTHS: u64 = 8;
 
 fn stand(draw: &mut Draw, name: &str) -> Stand {
     Stand::draw(draw, 600.0, 20.0, super::needs(name))
@@ -440,11 +446,25 @@ fn no_law_of_variance_of_the_library_describes_a_changing_variance() {
 
 /// Edges between the codes of an axis 0 against bits that stick.
 fn hold_edges(name: &str, stand: &Stand, first: i32, edges: &[f64], strength: f64) {
+    let own = (stand.bias[0] / LSB, stand.white(0).sqrt() / LSB);
+    hold_edges_about(name, stand, first, edges, strength, own);
+}
+
+/// The same, against even steps of noise that has this mean and sigma, counts.
+fn hold_edges_about(
+    name: &str,
+    stand: &Stand,
+    first: i32,
+    edges: &[f64],
+    strength: f64,
+    (refitted_mean, refitted_sigma): (f64, f64),
+) {
     let (mean, sigma) = (stand.bias[0] / LSB, stand.white(0).sqrt() / LSB);
     let straight: Vec<f64> = (0..edges.len())
         .map(|i| f64::from(first) + i as f64 - 0.5)
         .collect();
-    let (even, uneven) = (shares(&straight, mean, sigma), shares(edges, mean, sigma));
+    let even = shares(&straight, refitted_mean, refitted_sigma);
+    let uneven = shares(edges, mean, sigma);
     let whole = of_law(&uneven, &even, stand.samples()).powi(2);
     assert!((whole.sqrt() - strength).abs() < 1e-6);
     let mut best = 0.0f64;
@@ -483,5 +503,58 @@ fn no_stuck_or_missing_bit_describes_uneven_steps() {
         };
         assert!(f.strength > 24.0);
         hold_edges(name, &stand, *first, edges, f.strength);
+    }
+}
+
+/// Every effect of a set, drawn as the campaign draws, is as strong as wanted, or as large as may be, and then not too
+/// weak more often than not.
+fn are_as_strong_as_wanted(names: &[&'static str], family: u64) {
+    for name in names {
+        let mut weak = 0;
+        for index in 0..STRENGTHS {
+            let draw = &mut Draw::of(20_261_121, family, index);
+            let mut stand = stand(draw, name);
+            let axis = draw.of_many(3);
+            let wanted = draw.by_ratio(25.0, 40.0);
+            let f = foreign(draw, &mut stand, name, axis, wanted);
+            if let Change::Add(signal) = &f.change {
+                assert!(signal.iter().all(|v| v.is_finite()), "{name}");
+            }
+            let large = rms(&f);
+            assert!(large <= 1.001 * LARGEST_RMS, "{name}: {large} deg/s");
+            if large > 0.999 * LARGEST_RMS {
+                weak += u64::from(f.strength < 25.0);
+            } else {
+                let kept = (f.strength / wanted - 1.0).abs() < 0.01;
+                assert!(kept, "{name}: d' {} for {wanted}", f.strength);
+            }
+        }
+        println!("{name}: {weak} of {STRENGTHS} stay below d' 25");
+        assert!(2 * weak <= STRENGTHS, "{name} is seldom as strong as asked");
+    }
+}
+
+/// Each of a set moves more than `least` of the readings of its channel, by less than 5 deg/s, and none of another's.
+fn act_on_their_channel_alone(names: &[&'static str], family: u64, least: f64) {
+    for name in names {
+        let draw = &mut Draw::of(20_261_121, family, 0);
+        let mut stand = stand(draw, name);
+        let axis = draw.of_many(3);
+        let f = foreign(draw, &mut stand, name, axis, 30.0);
+        let before = stand.record(&[], 7).expect("a stand can be simulated");
+        let mut after = before.clone();
+        let own = crate::stand::GYROS[axis];
+        f.act(&mut after, own, &stand, axis, draw);
+        for (old, new) in before.channels.iter().zip(&after.channels) {
+            let pairs = old.values.iter().zip(&new.values);
+            let moved: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).collect();
+            let share = moved.iter().filter(|d| **d > 0.0).count() as f64 / moved.len() as f64;
+            if old.name != own {
+                assert!(share == 0.0, "{name} moves {}", old.name);
+                continue;
+            }
+            let most = moved.iter().copied().fold(0.0, f64::max);
+            assert!(share > least && most < 5.0, "{name}: {share}, {most} deg/s");
+        }
     }
 }

@@ -1,7 +1,6 @@
 //! The fourth set against the library, a sum of two of its effects included.
 
 use super::super::kept_back_fourth::{NAMES, codes, noise};
-use super::super::{LARGEST_RMS, rms};
 use super::third::of_two;
 use super::*;
 
@@ -12,7 +11,7 @@ const SIGNALS: u64 = 11;
 fn no_effect_of_the_library_nor_two_describe_a_signal_of_the_fourth_set() {
     let mut signals = 0;
     for name in NAMES {
-        for index in 0..DRAWS {
+        for index in 0..SIGNAL_DRAWS {
             let draw = &mut Draw::of(20_261_121, 24, index);
             let mut stand = stand(draw, name);
             let axis = draw.of_many(3);
@@ -29,7 +28,7 @@ fn no_effect_of_the_library_nor_two_describe_a_signal_of_the_fourth_set() {
             hold(name, &names.join(" and "), share);
         }
     }
-    assert_eq!(signals, SIGNALS * DRAWS);
+    assert_eq!(signals, SIGNALS * SIGNAL_DRAWS);
 }
 
 #[test]
@@ -174,61 +173,14 @@ fn no_cross_axis_describes_frames_that_hold_another_axis() {
     }
 }
 
-/// Every effect of the set, drawn as the campaign draws: as strong as wanted, or as large as may be.
 #[test]
 fn the_fourth_set_is_as_strong_as_wanted_or_as_large_as_may_be() {
-    let mut seldom = vec![];
-    for name in NAMES {
-        let mut weak = 0;
-        for index in 0..20 {
-            let draw = &mut Draw::of(20_261_121, 30, index);
-            let mut stand = stand(draw, name);
-            let axis = draw.of_many(3);
-            let wanted = draw.by_ratio(25.0, 40.0);
-            let f = foreign(draw, &mut stand, name, axis, wanted);
-            if let Change::Add(signal) = &f.change {
-                assert!(signal.iter().all(|v| v.is_finite()), "{name}");
-            }
-            let large = rms(&f);
-            assert!(large <= 1.001 * LARGEST_RMS, "{name}: {large} deg/s");
-            if large > 0.999 * LARGEST_RMS {
-                weak += usize::from(f.strength < 25.0);
-            } else {
-                let kept = (f.strength / wanted - 1.0).abs() < 0.01;
-                assert!(kept, "{name}: d' {} for {wanted}", f.strength);
-            }
-        }
-        println!("{name}: {weak} of 20 stay below d' 25");
-        if weak > 10 {
-            seldom.push(name);
-        }
-    }
-    assert!(seldom.is_empty(), "seldom as strong as asked: {seldom:?}");
+    are_as_strong_as_wanted(&NAMES, 30);
 }
 
 #[test]
 fn each_of_the_fourth_set_acts_on_its_channel_and_leaves_the_others() {
-    for name in NAMES {
-        let draw = &mut Draw::of(20_261_121, 31, 0);
-        let mut stand = stand(draw, name);
-        let axis = draw.of_many(3);
-        let f = foreign(draw, &mut stand, name, axis, 30.0);
-        let before = stand.record(&[], 7).expect("a stand can be simulated");
-        let mut after = before.clone();
-        let own = crate::stand::GYROS[axis];
-        f.act(&mut after, own, &stand, axis, draw);
-        for (old, new) in before.channels.iter().zip(&after.channels) {
-            let pairs = old.values.iter().zip(&new.values);
-            let moved: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).collect();
-            let share = moved.iter().filter(|d| **d > 0.0).count() as f64 / moved.len() as f64;
-            if old.name != own {
-                assert!(share == 0.0, "{name} moves {}", old.name);
-                continue;
-            }
-            let most = moved.iter().copied().fold(0.0, f64::max);
-            assert!(share > 0.005 && most < 5.0, "{name}: {share}, {most} deg/s");
-        }
-    }
+    act_on_their_channel_alone(&NAMES, 31, 0.005);
 }
 
 #[test]

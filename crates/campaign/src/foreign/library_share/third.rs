@@ -1,7 +1,6 @@
 //! The third set against the library, a sum of two of its effects included.
 
 use super::super::kept_back_third::{NAMES, noise};
-use super::super::{LARGEST_RMS, rms};
 use super::*;
 
 /// Effects whose shape is not a signal that could be known: their spectrum is what is described.
@@ -64,7 +63,7 @@ pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> (Vec<&'stati
 fn no_effect_of_the_library_nor_two_describe_a_signal_of_the_third_set() {
     let mut signals = 0;
     for name in NAMES.into_iter().filter(|n| *n != HUMP) {
-        for index in 0..DRAWS {
+        for index in 0..SIGNAL_DRAWS {
             let draw = &mut Draw::of(20_261_121, 14, index);
             let mut stand = stand(draw, name);
             let axis = draw.of_many(3);
@@ -81,7 +80,7 @@ fn no_effect_of_the_library_nor_two_describe_a_signal_of_the_third_set() {
             hold(name, &names.join(" and "), share);
         }
     }
-    assert_eq!(signals, 8 * DRAWS);
+    assert_eq!(signals, 8 * SIGNAL_DRAWS);
 }
 
 #[test]
@@ -160,7 +159,7 @@ fn no_stuck_or_missing_bit_describes_two_codes_in_one() {
 fn the_third_set_is_as_strong_as_wanted_or_as_large_as_may_be() {
     for name in NAMES {
         let mut weak = 0;
-        for index in 0..20 {
+        for index in 0..STRENGTHS {
             let draw = &mut Draw::of(20_261_121, 18, index);
             let mut stand = stand(draw, name);
             let axis = draw.of_many(3);
@@ -178,31 +177,11 @@ fn the_third_set_is_as_strong_as_wanted_or_as_large_as_may_be() {
                 _ => assert!(kept, "{name}: d' {} for {wanted}", f.strength),
             }
         }
-        println!("{name}: {weak} of 20 stay below d' 25");
+        println!("{name}: {weak} of {STRENGTHS} stay below d' 25");
     }
 }
 
 #[test]
 fn each_of_the_third_set_acts_on_its_channel_and_leaves_the_others() {
-    for name in NAMES {
-        let draw = &mut Draw::of(20_261_121, 19, 0);
-        let mut stand = stand(draw, name);
-        let axis = draw.of_many(3);
-        let f = foreign(draw, &mut stand, name, axis, 30.0);
-        let before = stand.record(&[], 7).expect("a stand can be simulated");
-        let mut after = before.clone();
-        let own = crate::stand::GYROS[axis];
-        f.act(&mut after, own, &stand, axis, draw);
-        for (old, new) in before.channels.iter().zip(&after.channels) {
-            let pairs = old.values.iter().zip(&new.values);
-            let moved: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).collect();
-            let share = moved.iter().filter(|d| **d > 0.0).count() as f64 / moved.len() as f64;
-            if old.name != own {
-                assert!(share == 0.0, "{name} moves {}", old.name);
-                continue;
-            }
-            let most = moved.iter().copied().fold(0.0, f64::max);
-            assert!(share > 0.05 && most < 5.0, "{name}: {share}, {most} deg/s");
-        }
-    }
+    act_on_their_channel_alone(&NAMES, 19, 0.05);
 }

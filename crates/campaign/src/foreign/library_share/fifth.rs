@@ -1,0 +1,94 @@
+//! The fifth set against the library, a sum of two of its effects included.
+
+use super::super::kept_back_fifth::{NAMES, noise};
+use super::third::of_two;
+use super::*;
+
+/// Those whose shape is a signal that could be known.
+const SIGNALS: u64 = 7;
+
+#[test]
+fn no_effect_of_the_library_nor_two_describe_a_signal_of_the_fifth_set() {
+    let mut signals = 0;
+    for name in NAMES {
+        for index in 0..SIGNAL_DRAWS {
+            let draw = &mut Draw::of(20_261_121, 36, index);
+            let mut stand = stand(draw, name);
+            let axis = draw.of_many(3);
+            let f = foreign(draw, &mut stand, name, axis, 25.0);
+            let Change::Add(signal) = &f.change else {
+                continue;
+            };
+            signals += 1;
+            println!("{name}: d' {:.1}", f.strength);
+            for (library, share) in of_all(&stand, axis, signal) {
+                hold(name, library, share);
+            }
+            let (names, share) = of_two(&stand, axis, signal);
+            hold(name, &names.join(" and "), share);
+        }
+    }
+    assert_eq!(signals, SIGNALS * SIGNAL_DRAWS);
+}
+
+#[test]
+fn no_process_of_the_library_describes_noise_that_a_loop_holds_down() {
+    let draw = &mut Draw::of(20_261_121, 37, 0);
+    let name = "noise that a loop holds down";
+    let stand = stand(draw, name);
+    let axis = draw.of_many(3);
+    for edge_hz in [0.7, 3.0] {
+        let part = noise::HeldDown::new(edge_hz, stand.rate_hz);
+        let by = |share: f64, w: f64| share.min(1.0) * (part.density(w) - 1.0);
+        let strength = |share: f64| kept_back::shaped(&stand, axis, &|w| by(share, w));
+        let share = crate::strength::size_for(25.0, &strength).min(1.0);
+        let expected = spectrum(&stand, axis, &|w| 1.0 + by(share, w), &[]);
+        let own = saturated(&stand, &expected);
+        println!("edge {edge_hz} Hz: {share:.2} of the noise");
+        for effect in EFFECTS {
+            let share = of_process(&stand, axis, &expected, own, *effect);
+            hold(name, effect.id(), share);
+        }
+    }
+}
+
+#[test]
+fn no_law_of_variance_of_the_library_describes_the_noise_of_a_supply_near_its_end() {
+    let draw = &mut Draw::of(20_261_121, 38, 0);
+    let name = "noise of a supply near its end";
+    let mut stand = stand(draw, name);
+    let f = foreign(draw, &mut stand, name, 0, 25.0);
+    let Change::Scale(factor) = &f.change else {
+        panic!("{name} has no law of variance")
+    };
+    let law: Vec<f64> = factor.iter().map(|f| f * f).collect();
+    assert!((of_variance(&law) - f.strength).abs() < 1e-9 && (f.strength - 25.0).abs() < 0.1);
+    hold_law(name, &stand, &law);
+}
+
+#[test]
+fn no_stuck_or_missing_bit_describes_a_dead_zone() {
+    for index in 0..DRAWS {
+        let draw = &mut Draw::of(20_261_121, 39, index);
+        let name = "dead zone of a push-pull stage";
+        let mut stand = stand(draw, name);
+        let f = foreign(draw, &mut stand, name, 0, 25.0);
+        let Change::Edges(first, edges) = &f.change else {
+            panic!("{name} has no edges")
+        };
+        assert!((noise::of_edges(&stand, 0, *first, edges) - f.strength).abs() < 1e-9);
+        assert!((f.strength - 25.0).abs() < 0.1, "{}", f.strength);
+        let refitted = noise::refitted(&stand, 0, *first, edges);
+        hold_edges_about(name, &stand, *first, edges, f.strength, refitted);
+    }
+}
+
+#[test]
+fn the_fifth_set_is_as_strong_as_wanted_or_as_large_as_may_be() {
+    are_as_strong_as_wanted(&NAMES, 40);
+}
+
+#[test]
+fn each_of_the_fifth_set_acts_on_its_channel_and_leaves_the_others() {
+    act_on_their_channel_alone(&NAMES, 41, 0.005);
+}
