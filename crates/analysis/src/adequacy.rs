@@ -17,15 +17,17 @@ use std::f64::consts::PI;
 use model::effect::Hypothesis;
 
 use crate::checks::{Outcome, chi_tail, kurtosis_score, normal_tail, whitened_by_spectrum};
+use crate::law::DEPARTURE;
 use crate::likelihood::{Bins, Noise, Panel};
 use crate::search::{Form, Search, State};
 
 /// The claims.
-pub(crate) const CLAIMS: [&str; 4] = [
+pub(crate) const CLAIMS: [&str; 5] = [
     "process_spectrum",
     "process_law",
     "process_steadiness",
     "process_levels",
+    "variance_law",
 ];
 /// Chance below which a claim fails. It is weighed only where a process is named, not on every record.
 pub(crate) const LEAST_CHANCE: f64 = 1e-3;
@@ -73,6 +75,44 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<Outcome> {
         }
     }
     all
+}
+
+/// Half cycles of the cosines that a changed variance is held against.
+const COSINES: usize = 16;
+
+/// The claim of a law of the variance: divided by it, the squares of the residual `e` are even. They are held against cosines
+/// over the record; what swells, fades or follows a history is no stretch with two ends, and no law of the motor.
+/// `lr` is its likelihood ratio, of which a twentieth may be left.
+pub(crate) fn evenness(e: &[f64], named: &str, lr: f64, rate_hz: f64) -> Outcome {
+    let n = e.len() as f64;
+    let mean = e.iter().map(|v| v * v).sum::<f64>() / n;
+    let squares: Vec<f64> = e.iter().map(|v| v * v - mean).collect();
+    let spread = squares.iter().map(|s| s * s).sum::<f64>() / n;
+    let score = |k: usize| {
+        let step = PI * k as f64 / n;
+        let sum: f64 = (squares.iter().enumerate())
+            .map(|(i, s)| s * (step * (i as f64 + 0.5)).cos())
+            .sum();
+        sum / (0.5 * n * spread).sqrt()
+    };
+    let scores: Vec<f64> = (1..=COSINES).map(score).collect();
+    let statistic: f64 = scores.iter().map(|z| z * z).sum();
+    let worst = (0..COSINES)
+        .max_by(|a, b| scores[*a].abs().total_cmp(&scores[*b].abs()))
+        .unwrap_or(0);
+    Outcome {
+        id: CLAIMS[4],
+        statistic,
+        p_value: if statistic < DEPARTURE * lr {
+            1.0
+        } else {
+            chi_tail(statistic, COSINES as f64)
+        },
+        what: format!(
+            "told as {named}: divided by it, the variance still swings, most over {:.0} s",
+            2.0 * n / rate_hz / (worst + 1) as f64
+        ),
+    }
 }
 
 /// The claim of a contest of levels: `z` standard errors from what the lead of two levels is for what was named.

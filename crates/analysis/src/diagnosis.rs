@@ -372,6 +372,11 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
     // Before a process was named nothing was claimed of it.
     let claims = adequacy::of_processes(&s.search, &s.state);
     let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
+    let variance = s.variance.as_ref().map(|v| {
+        let rate_hz = s.search.view.rate_hz;
+        adequacy::evenness(&s.e, v.effect.id(), v.lr, rate_hz)
+    });
+    let laws = laws.chain(variance);
     let claims = claims.into_iter().chain(laws).map(|c| Check {
         id: c.id.into(),
         channel: s.target.name.clone(),

@@ -21,6 +21,8 @@ const TEMPERATURE_S: [f64; 3] = [10.0, 40.0, 160.0];
 /// The same for a rate that the table makes, which is asked of a name alone: a gyro with a memory is its noise too, and that
 /// may be shared.
 const TURNING_S: [f64; 2] = [0.8, 3.2];
+/// Places of bends, as shares of what a signal spans.
+const BENDS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// Samples over which a response to vibration may go on, and that of a long record.
 const SAMPLES: usize = 6;
 const SAMPLES_OF_LONG: usize = 3;
@@ -119,6 +121,13 @@ pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Vec<f64>> {
         of(&|_, v| v * v * v),
         of(&|i, v| v * (2.0 * i as f64 / n as f64 - 1.0)),
     ];
+    // A bend anywhere: what dips, saturates or has a dead zone is no parabola.
+    let low = scaled.iter().fold(f64::INFINITY, |m, v| m.min(*v));
+    let high = scaled.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
+    all.extend(BENDS.iter().map(|share| {
+        let at = low + share * (high - low);
+        of(&|_, v| (v - at).max(0.0))
+    }));
     if vibrates {
         all.extend(shifted(&scaled).into_iter().skip(1));
     } else {
