@@ -22,13 +22,14 @@ use crate::likelihood::{Bins, Noise, Panel};
 use crate::search::{Form, Search, State};
 
 /// The claims.
-pub(crate) const CLAIMS: [&str; 5] = [
+pub(crate) const CLAIMS: [&str; 4] = [
     "process_spectrum",
     "process_law",
     "process_steadiness",
     "process_levels",
-    "variance_law",
 ];
+/// The claim of a law of the variance.
+pub(crate) const VARIANCE_CLAIM: &str = "variance_law";
 /// Chance below which a claim fails. It is weighed only where a process is named, not on every record.
 pub(crate) const LEAST_CHANCE: f64 = 1e-3;
 /// Highest order of the polynomials in ln w that bend a spectrum.
@@ -101,7 +102,7 @@ pub(crate) fn evenness(e: &[f64], named: &str, lr: f64, rate_hz: f64) -> Outcome
         .max_by(|a, b| scores[*a].abs().total_cmp(&scores[*b].abs()))
         .unwrap_or(0);
     Outcome {
-        id: CLAIMS[4],
+        id: VARIANCE_CLAIM,
         statistic,
         p_value: if statistic < DEPARTURE * lr {
             1.0

@@ -33,7 +33,7 @@ pub(crate) enum Column {
 }
 
 /// Samples beyond which columns that may explain the data are kept short.
-const LONG: usize = 1 << 18;
+pub(crate) const LONG: usize = 1 << 18;
 
 impl Column {
     pub(crate) fn new(c: Vec<f64>) -> Self {

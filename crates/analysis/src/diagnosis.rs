@@ -254,17 +254,13 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         signals: &grid.signals,
     };
     let search = Search::new(panel, view);
-    let measured = search.panel.column(0);
-    let (baseline, state) = search.run(&target.noise);
-    let found = estimate::found(&search.panel, &state, &target.unit, grid.rate_hz);
+    let baseline = search.baseline(&target.noise);
     let before = {
-        // With what the search has set aside.
-        let rest = search.panel.column(0);
-        search.panel.replace_data(measured.to_vec());
         let (u, e) = checks::whitened(&search.panel, &baseline);
-        search.panel.replace_data(rest.to_vec());
         checks::all(&u, &e, grid.rate_hz)
     };
+    let state = search.run(baseline.clone());
+    let found = estimate::found(&search.panel, &state, &target.unit, grid.rate_hz);
     let (u, e) = checks::whitened(&search.panel, &state);
     let mut s = Searched {
         target,

@@ -143,8 +143,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
         let apart = |r| (tooth(r) - tooth(r).round()).abs() * 2.0 * n / r.period as f64;
         repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
     };
-    let (of_variance, of_processes) = (adequacy::CLAIMS[4], &adequacy::CLAIMS[..4]);
-    let unlike = of_processes.iter().any(|c| failing(c));
+    let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
     // What is left without a place may be anywhere; what has one leaves a strong term elsewhere alone.
     let misplaced = |t: &Term| !places.is_empty() && t.score() < WIDE;
     let followed = followers(s, &g);
@@ -233,7 +232,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
         })
         .collect();
     let variance = failing("variance_in_time")
-        || failing(of_variance)
+        || failing(adequacy::VARIANCE_CLAIM)
         || failing("kurtosis")
         || crowd
         || if places.is_empty() {

@@ -8,6 +8,8 @@
 use model::effect::{Signal, View};
 use model::record::Quantity;
 
+use crate::column::LONG;
+
 use super::{Combination, accelerations, centred, lagged};
 
 /// Time constants, s, a factor of four apart: a lag half way between two of them is spanned by either to some percent.
@@ -26,8 +28,6 @@ const BENDS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// Samples over which a response to vibration may go on, and that of a long record.
 const SAMPLES: usize = 6;
 const SAMPLES_OF_LONG: usize = 3;
-/// Samples from which on a record is long: columns then take most of the time and the memory.
-const LONG: usize = 1 << 18;
 
 /// A signal and what is behind it.
 fn pair(values: &[f64], tau: f64) -> Vec<Vec<f64>> {

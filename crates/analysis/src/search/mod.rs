@@ -347,19 +347,16 @@ impl<'a> Search<'a> {
         2.0 * state.solution.log_likelihood - state.terms.iter().map(|t| t.threshold).sum::<f64>()
     }
 
-    /// Search.
+    /// White noise and a random walk alone.
     #[must_use]
-    pub fn run(&self, start: &Noise) -> (State, State) {
-        let (noise, solution) = self.panel.fit(&Noise::new(start.log_walk), &[]);
-        let baseline = State {
-            terms: vec![],
-            noise,
-            solution,
-            notes: vec![],
-            wandering: None,
-            level: None,
-        };
-        let mut state = self.climb(baseline.clone());
+    pub fn baseline(&self, start: &Noise) -> State {
+        self.refit(vec![], start.log_walk)
+    }
+
+    /// Search from the baseline. What is set aside on the way is no longer in the data of the panel.
+    #[must_use]
+    pub fn run(&self, baseline: State) -> State {
+        let mut state = self.climb(baseline);
         let aside = self.set_aside(&state);
         if let Some((rest, _, _)) = &aside {
             state = self.climb(rest.clone());
@@ -373,7 +370,7 @@ impl<'a> Search<'a> {
         notes.extend(self.crowds(&mut state));
         self.find_rivals(&mut state);
         state.notes = notes;
-        (baseline, state)
+        state
     }
 
     /// Add terms while they pass, then drop what the others made superfluous.
