@@ -506,6 +506,45 @@ fn no_stuck_or_missing_bit_describes_uneven_steps() {
     }
 }
 
+/// Signals of a set against every effect of the library, and against the two that describe most of one together; as many
+/// signals as `expected` are among the draws.
+fn hold_signals(names: impl IntoIterator<Item = &'static str>, family: u64, expected: u64) {
+    let mut signals = 0;
+    for name in names {
+        for index in 0..SIGNAL_DRAWS {
+            let draw = &mut Draw::of(20_261_121, family, index);
+            let mut stand = stand(draw, name);
+            let axis = draw.of_many(3);
+            let f = foreign(draw, &mut stand, name, axis, 25.0);
+            let Change::Add(signal) = &f.change else {
+                continue;
+            };
+            signals += 1;
+            println!("{name} #{index}: d' {:.1}", f.strength);
+            for (library, share) in of_all(&stand, axis, signal) {
+                hold(name, library, share);
+            }
+            let (names, share) = third::of_two(&stand, axis, signal);
+            hold(name, &names.join(" and "), share);
+        }
+    }
+    assert_eq!(signals, expected * SIGNAL_DRAWS);
+}
+
+/// White noise of which a share got another density, of 25, against every process of the library.
+fn hold_noise(name: &str, stand: &Stand, axis: usize, density: &dyn Fn(f64) -> f64) {
+    let by = |share: f64, w: f64| share.min(1.0) * (density(w) - 1.0);
+    let strength = |share: f64| kept_back::shaped(stand, axis, &|w| by(share, w));
+    let share = crate::strength::size_for(25.0, &strength).min(1.0);
+    let expected = spectrum(stand, axis, &|w| 1.0 + by(share, w), &[]);
+    let own = saturated(stand, &expected);
+    println!("{name}: {share:.2} of the noise");
+    for effect in EFFECTS {
+        let share = of_process(stand, axis, &expected, own, *effect);
+        hold(name, effect.id(), share);
+    }
+}
+
 /// Every effect of a set, drawn as the campaign draws, is as strong as wanted, or as large as may be, and then not too
 /// weak more often than not.
 fn are_as_strong_as_wanted(names: &[&'static str], family: u64) {

@@ -2,9 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use analysis::likelihood::Dct;
-
-use super::super::kept_back::{of_law, shaped, shares, variance};
+use super::super::kept_back::{of_law, shares, variance};
+use super::super::kept_back_fourth::noise::of_density;
 use super::super::{Change, Foreign};
 use crate::random::Draw;
 use crate::stand::{LSB, Stand, held, wander};
@@ -76,18 +75,8 @@ fn held_down(
     axis: usize,
     wanted: f64,
 ) -> Foreign {
-    let n = stand.samples();
     let part = HeldDown::new(draw.by_ratio(0.7, 3.0), stand.rate_hz);
-    let strength = |share: f64| shaped(stand, axis, &|w| share.min(1.0) * (part.density(w) - 1.0));
-    let share = size_for(wanted, &strength).min(1.0);
-    let c: Vec<f64> = (0..n)
-        .map(|k| part.density(PI * k as f64 / n as f64).sqrt() * draw.normal())
-        .collect();
-    Foreign {
-        name,
-        strength: strength(share),
-        change: Change::Noise(Dct::new(n).inverse(&c), share),
-    }
+    of_density(draw, stand, name, axis, wanted, &|w| part.density(w))
 }
 
 /// First code and lower edges, counts, of a stage that does not answer until its input is `zone` counts off zero, and then

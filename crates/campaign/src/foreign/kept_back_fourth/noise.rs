@@ -80,16 +80,28 @@ impl Edge {
 /// A part whose own noise is cut by a filter of high order, as sigma-delta converters have it, and a stage behind that is
 /// white: the spectrum has a shoulder and then a floor.
 fn edge(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: f64) -> Foreign {
-    let n = stand.samples();
     let part = Edge::new(
         draw.between(1.5, 7.5),
         4 + draw.of_many(5) as i32,
         stand.rate_hz,
     );
-    let strength = |share: f64| shaped(stand, axis, &|w| share.min(1.0) * (part.density(w) - 1.0));
+    of_density(draw, stand, name, axis, wanted, &|w| part.density(w))
+}
+
+/// Noise of which a share has another density, of variance 1, at an angular frequency.
+pub(in super::super) fn of_density(
+    draw: &mut Draw,
+    stand: &Stand,
+    name: &'static str,
+    axis: usize,
+    wanted: f64,
+    density: &dyn Fn(f64) -> f64,
+) -> Foreign {
+    let n = stand.samples();
+    let strength = |share: f64| shaped(stand, axis, &|w| share.min(1.0) * (density(w) - 1.0));
     let share = size_for(wanted, &strength).min(1.0);
     let c: Vec<f64> = (0..n)
-        .map(|k| part.density(PI * k as f64 / n as f64).sqrt() * draw.normal())
+        .map(|k| density(PI * k as f64 / n as f64).sqrt() * draw.normal())
         .collect();
     Foreign {
         name,

@@ -1,7 +1,6 @@
 //! The fourth set against the library, a sum of two of its effects included.
 
 use super::super::kept_back_fourth::{NAMES, codes, noise};
-use super::third::of_two;
 use super::*;
 
 /// Those whose shape is a signal that could be known.
@@ -9,26 +8,7 @@ const SIGNALS: u64 = 11;
 
 #[test]
 fn no_effect_of_the_library_nor_two_describe_a_signal_of_the_fourth_set() {
-    let mut signals = 0;
-    for name in NAMES {
-        for index in 0..SIGNAL_DRAWS {
-            let draw = &mut Draw::of(20_261_121, 24, index);
-            let mut stand = stand(draw, name);
-            let axis = draw.of_many(3);
-            let f = foreign(draw, &mut stand, name, axis, 25.0);
-            let Change::Add(signal) = &f.change else {
-                continue;
-            };
-            signals += 1;
-            println!("{name} #{index}: d' {:.1}", f.strength);
-            for (library, share) in of_all(&stand, axis, signal) {
-                hold(name, library, share);
-            }
-            let (names, share) = of_two(&stand, axis, signal);
-            hold(name, &names.join(" and "), share);
-        }
-    }
-    assert_eq!(signals, SIGNALS * SIGNAL_DRAWS);
+    hold_signals(NAMES, 24, SIGNALS);
 }
 
 #[test]
@@ -40,16 +20,7 @@ fn no_process_of_the_library_describes_noise_that_ends_at_an_edge() {
         let axis = draw.of_many(3);
         for (edge_hz, order) in [(1.5, 4), (1.5, 8), (3.0, 6), (5.0, 4), (7.5, 4), (7.5, 8)] {
             let part = noise::Edge::new(edge_hz, order, stand.rate_hz);
-            let by = |share: f64, w: f64| share.min(1.0) * (part.density(w) - 1.0);
-            let strength = |share: f64| kept_back::shaped(&stand, axis, &|w| by(share, w));
-            let share = crate::strength::size_for(25.0, &strength);
-            let expected = spectrum(&stand, axis, &|w| 1.0 + by(share, w), &[]);
-            let own = saturated(&stand, &expected);
-            println!("edge {edge_hz} Hz, order {order}: {share:.2} of the noise");
-            for effect in EFFECTS {
-                let share = of_process(&stand, axis, &expected, own, *effect);
-                hold(name, effect.id(), share);
-            }
+            hold_noise(name, &stand, axis, &|w| part.density(w));
         }
     }
 }

@@ -61,26 +61,7 @@ pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> (Vec<&'stati
 
 #[test]
 fn no_effect_of_the_library_nor_two_describe_a_signal_of_the_third_set() {
-    let mut signals = 0;
-    for name in NAMES.into_iter().filter(|n| *n != HUMP) {
-        for index in 0..SIGNAL_DRAWS {
-            let draw = &mut Draw::of(20_261_121, 14, index);
-            let mut stand = stand(draw, name);
-            let axis = draw.of_many(3);
-            let f = foreign(draw, &mut stand, name, axis, 25.0);
-            let Change::Add(signal) = &f.change else {
-                continue;
-            };
-            signals += 1;
-            println!("{name} #{index}: d' {:.1}", f.strength);
-            for (library, share) in of_all(&stand, axis, signal) {
-                hold(name, library, share);
-            }
-            let (names, share) = of_two(&stand, axis, signal);
-            hold(name, &names.join(" and "), share);
-        }
-    }
-    assert_eq!(signals, 8 * SIGNAL_DRAWS);
+    hold_signals(NAMES.into_iter().filter(|n| *n != HUMP), 14, 8);
 }
 
 #[test]
