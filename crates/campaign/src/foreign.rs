@@ -11,13 +11,14 @@ use crate::strength::{Meter, of_variance, size_for};
 mod kept_back;
 mod kept_back_fifth;
 mod kept_back_fourth;
+mod kept_back_sixth;
 mod kept_back_third;
 #[cfg(test)]
 mod library_share;
 
 /// What there is: first those that the engine was developed with or has been changed after, then those kept back.
-pub const FOREIGN: [&str; SEEN + kept_back_fifth::NAMES.len()] = {
-    let mut all = [""; SEEN + kept_back_fifth::NAMES.len()];
+pub const FOREIGN: [&str; SEEN + kept_back_sixth::NAMES.len()] = {
+    let mut all = [""; SEEN + kept_back_sixth::NAMES.len()];
     let mut i = 0;
     while i < all.len() {
         all[i] = if i < FIRST.len() {
@@ -26,22 +27,25 @@ pub const FOREIGN: [&str; SEEN + kept_back_fifth::NAMES.len()] = {
             kept_back::NAMES[i - FIRST.len()]
         } else if i < THIRD {
             kept_back_third::NAMES[i - SECOND]
-        } else if i < SEEN {
+        } else if i < FOURTH {
             kept_back_fourth::NAMES[i - THIRD]
+        } else if i < SEEN {
+            kept_back_fifth::NAMES[i - FOURTH]
         } else {
-            kept_back_fifth::NAMES[i - SEEN]
+            kept_back_sixth::NAMES[i - SEEN]
         };
         i += 1;
     }
     all
 };
 /// How many of them, from the first, are no longer unseen: the engine was made with 14 of them, and has been changed
-/// since it was graded on the next eight, and on the second, third and fourth set kept back.
-pub const SEEN: usize = THIRD + kept_back_fourth::NAMES.len();
+/// since it was graded on the next eight, and on the second to the fifth set kept back.
+pub const SEEN: usize = FOURTH + kept_back_fifth::NAMES.len();
 
-/// Where the second and the third set end.
+/// Where the second, the third and the fourth set end.
 const SECOND: usize = FIRST.len() + kept_back::NAMES.len();
 const THIRD: usize = SECOND + kept_back_third::NAMES.len();
+const FOURTH: usize = THIRD + kept_back_fourth::NAMES.len();
 
 const FIRST: [&str; 22] = [
     "chirp",
@@ -71,7 +75,8 @@ const FIRST: [&str; 22] = [
 /// The environment that they need.
 #[must_use]
 pub fn needs(name: &str) -> Needs {
-    kept_back_fifth::needs(name)
+    kept_back_sixth::needs(name)
+        .or_else(|| kept_back_fifth::needs(name))
         .or_else(|| kept_back_fourth::needs(name))
         .or_else(|| kept_back_third::needs(name))
         .unwrap_or_else(|| kept_back::needs(name))
@@ -80,7 +85,12 @@ pub fn needs(name: &str) -> Needs {
 /// Causes of the library that are a true part of one.
 #[must_use]
 pub fn parts(name: &str) -> Vec<&'static str> {
-    [kept_back_fourth::parts(name), kept_back_fifth::parts(name)].concat()
+    [
+        kept_back_fourth::parts(name),
+        kept_back_fifth::parts(name),
+        kept_back_sixth::parts(name),
+    ]
+    .concat()
 }
 
 /// What it does to a channel: adds a signal, or makes new noise out of old.
@@ -117,7 +127,12 @@ enum Change {
         axis: usize,
         chance: f64,
     },
+    /// Counts of the axis, made of those of all three.
+    Made(Box<Making>),
 }
+
+/// New counts of an axis by those that the three have read.
+type Making = dyn Fn(&[Vec<i32>; 3], &mut Draw) -> Vec<i32>;
 
 /// Rms of what is added, deg/s.
 fn rms(f: &Foreign) -> f64 {
@@ -172,6 +187,7 @@ fn any(
         .or_else(|| kept_back_third::one(draw, stand, name, axis, wanted))
         .or_else(|| kept_back_fourth::one(draw, stand, name, axis, wanted))
         .or_else(|| kept_back_fifth::one(draw, stand, name, axis, wanted))
+        .or_else(|| kept_back_sixth::one(draw, stand, name, axis, wanted))
         .unwrap_or_else(|| one(draw, stand, name, axis, wanted))
 }
 
@@ -491,6 +507,14 @@ fn readings(record: &Record, axis: usize) -> Vec<f64> {
     own.map(|c| c.values.clone()).unwrap_or_default()
 }
 
+/// What the three axes read, counts.
+fn counts(record: &Record) -> [Vec<i32>; 3] {
+    GYROS.map(|name| {
+        let own = record.channels.iter().find(|c| c.name == name);
+        own.and_then(|c| c.counts.clone()).unwrap_or_default()
+    })
+}
+
 impl Foreign {
     /// Whether it brings the white noise of its channel itself, so that the stand has to leave it out.
     #[must_use]
@@ -588,6 +612,13 @@ impl Foreign {
                         if taken[i] { other[i] } else { v }
                     },
                 );
+            }
+            Change::Made(new) => {
+                let new = new(&counts(record), draw);
+                if let Some(c) = record.channels.iter_mut().find(|c| c.name == channel) {
+                    c.values = new.iter().map(|c| LSB * f64::from(*c)).collect();
+                    c.counts = Some(new);
+                }
             }
         }
     }

@@ -17,6 +17,7 @@ use crate::strength::{Meter, of_variance};
 
 mod fifth;
 mod fourth;
+mod sixth;
 mod third;
 
 /// Share of the gain from which an effect of the library describes it.
