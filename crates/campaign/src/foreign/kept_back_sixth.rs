@@ -1,7 +1,7 @@
 //! Foreign effects kept back from the engine, sixth set (2026-11-21): written from the physics and mathematics named
-//! here, by someone who had read neither how the diagnosis decides nor what it misses, nor diagnosed a run while writing.
-//! The tests of `library_share` hold that no effect of the library describes them, nor, where they are signals, a sum of
-//! two.
+//! here, by someone who had not read how the diagnosis decides beyond what `report/names.md` and `report/kept.md` tell, nor
+//! diagnosed a run while writing. The tests of `library_share` hold that no effect of the library describes them, nor,
+//! where they are signals, a sum of two.
 
 use std::f64::consts::TAU;
 
