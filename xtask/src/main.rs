@@ -129,6 +129,8 @@ fn demo(root: &Path) -> Result<(), Failure> {
             "make room or rights for it",
         )
     })?;
+    // The capture of an earlier demo, which may be of a version that did not mark it as simulated.
+    let _ = std::fs::remove_file(root.join(folder).join("capture.csv"));
     let seed = std::env::args().nth(2).unwrap_or_else(|| "2009".to_owned());
     // By cargo, which knows the target folder, wherever the user has set it.
     let build = "run --release -p imu-stand --features simavr -- run --seconds 600 --seed";

@@ -258,15 +258,23 @@ pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, An
                     })
             })
             .collect::<Result<_, _>>()?,
-        None => record
-            .channels
-            .iter()
-            .filter(|c| matches!(c.quantity, Quantity::Gyro | Quantity::Acc | Quantity::Other))
-            .collect(),
+        None => {
+            let of = |all: &[Quantity]| -> Vec<&Channel> {
+                let channels = record.channels.iter();
+                channels.filter(|c| all.contains(&c.quantity)).collect()
+            };
+            let main = of(&[Quantity::Gyro, Quantity::Acc, Quantity::Other]);
+            // Who has nothing else to show has chosen by that.
+            if main.is_empty() {
+                of(&[Quantity::Temp, Quantity::Supply])
+            } else {
+                main
+            }
+        }
     };
     if chosen.is_empty() {
         return Err(AnalysisError::NoChannel {
-            name: "gyro_* or acc_*".into(),
+            name: "gyro_*, acc_*, temp* or supply".into(),
             present: present(),
         });
     }

@@ -69,38 +69,13 @@ pub struct Grid {
     pub signals: Vec<Signal>,
 }
 
-/// Sample rate of a record: the header's, else from device or host times.
+/// Sample rate of a record: the header's, else by the times of the rows.
 #[must_use]
 pub fn rate_of(record: &Record) -> Option<f64> {
-    let from_times = || rate_of_times(record.host_time_s.as_ref()?, record.seq.as_deref());
-    record
-        .header
-        .rate_hz
-        .or_else(from_times)
+    let stated = record.header.rate_hz;
+    stated
+        .or_else(|| crate::rows::by_times(record))
         .filter(|r| r.is_finite() && *r > 0.0)
-}
-
-/// Rate of the rows that follow each other at about the usual interval: where rows are missing no time is stretched.
-/// Times that come in batches have no usual interval; then the whole length counts.
-fn rate_of_times(t: &[f64], seq: Option<&[u64]>) -> Option<f64> {
-    let (first, last) = (t.first()?, t.last()?);
-    let rows = match seq.filter(|s| s.len() == t.len()) {
-        Some(s) => return Some(s.last()?.saturating_sub(*s.first()?) as f64 / (last - first)),
-        None => (t.len() - 1) as f64,
-    };
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-    if steps.is_empty() {
-        return None;
-    }
-    let middle = steps.len() / 2;
-    let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let alike = |d: &&f64| (**d - usual).abs() < 0.5 * usual;
-    let count = steps.iter().filter(alike).count();
-    if count as f64 > 0.9 * rows {
-        Some(count as f64 / steps.iter().filter(alike).sum::<f64>())
-    } else {
-        Some(rows / (last - first))
-    }
 }
 
 /// Place of every row on the grid, and the number of places.

@@ -229,6 +229,77 @@ fn what_is_no_text_is_named() {
     assert!(read.record.notes.is_empty(), "{:?}", read.record.notes);
 }
 
+#[test]
+fn text_in_a_column_that_nobody_asked_for_is_left_alone_and_told() {
+    let head = "# format: imu-stand-capture/1\n# rate_hz: 50\n# gyro_lsb_dps: 0.25\n";
+    let rows = "seq,gyro_x,note,blank,spare\n0,0,start,,7\n1,1,\"warm, at last\",,8\n2,2,,,9\n";
+    let ours = read(format!("{head}{rows}").as_bytes(), "", "").expect("a capture with notes");
+    let names: Vec<&str> = (ours.record.channels.iter())
+        .map(|c| c.name.as_str())
+        .collect();
+    assert_eq!((names, ours.record.len()), (vec!["gyro_x", "spare"], 3));
+    let notes = ours.record.notes.join("; ");
+    for told in [
+        "`note` holds text (line 5: `start`)",
+        "`blank` holds no number",
+    ] {
+        assert!(notes.contains(told), "{notes}");
+    }
+    let mapped = read(
+        b"t,gx,note\n0,1,a\n0.02,2,b\n",
+        "time=t,gyro_x=gx",
+        "gyro=deg/s",
+    );
+    assert_eq!(mapped.expect("two columns").record.channels.len(), 1);
+    // Who asks for it is told that it cannot be had.
+    let said = error(b"t,gx,note\n0,1,a\n0.02,2,b\n", "gyro_x=gx,acc_x=note", "");
+    assert!(said.contains("line 2, column `acc_x`: `a`"), "{said}");
+}
+
+#[test]
+fn temperatures_come_by_any_spelling_and_unit_and_names_are_not_taken_twice() {
+    let text = b"time,gx,temp_f\n0,1,68\n0.02,2,86\n";
+    let all = "t=time,GyroX=gx,temperature=temp_f";
+    let read = |columns| {
+        read(text, columns, "gyro=deg/s,temp=degF")
+            .expect(columns)
+            .record
+    };
+    let record = read(all);
+    let temp = record.channel("temp").expect("by its name here");
+    assert!((temp.values[0] - 20.0).abs() < 1e-9 && (temp.values[1] - 30.0).abs() < 1e-9);
+    assert_eq!(temp.unit, "degC");
+    assert!(record.host_time_s.is_some() && record.channel("gyro_x").is_some());
+    let notes = record.notes.join("; ");
+    assert!(
+        notes.contains("`temperature` is taken as `temp`"),
+        "{notes}"
+    );
+    let both = read("gyro_x=gx,temp=temp_f,temperature=temp_f");
+    assert!(both.channel("temp").is_some() && both.channel("temperature").is_some());
+}
+
+#[test]
+fn a_file_of_another_kind_is_called_by_its_name_and_long_names_are_cut() {
+    for (start, what) in [("{\"t\":[0,1]}", "JSON"), ("<!DOCTYPE html>", "a web page")] {
+        let said = error(start.as_bytes(), "", "");
+        assert!(
+            said.contains(&format!("this is {what}")) && said.contains("as CSV"),
+            "{said}"
+        );
+    }
+    let names: Vec<String> = (0..500)
+        .map(|k| format!("{k}{}", "n".repeat(1000)))
+        .collect();
+    let text = format!("{}\n{}\n", names.join(","), vec!["1"; 500].join(","));
+    let said = error(text.as_bytes(), "", "");
+    assert!(
+        said.len() < 2000 && said.contains("and 480 more"),
+        "{}",
+        said.len()
+    );
+}
+
 /// Pieces that tables are made of, right and wrong.
 fn piece() -> impl Strategy<Value = Vec<u8>> {
     let known = [

@@ -30,7 +30,14 @@ fn folder(name: &str) -> PathBuf {
 #[test]
 fn an_output_never_goes_over_an_input_or_over_what_was_measured() {
     let folder = folder("kept");
-    for (name, text) in [("m.toml", "rate_hz = 20\n"), ("run.raw", "bytes")] {
+    let text = std::fs::read_to_string(folder.join("run.csv")).expect("the run");
+    let converted = text.replacen("# simulated: imu-stand simulate\n", "", 1);
+    assert_ne!(converted, text, "{text:.400}");
+    for (name, text) in [
+        ("m.toml", "rate_hz = 20\n"),
+        ("run.raw", "bytes"),
+        ("converted.csv", &converted),
+    ] {
         std::fs::write(folder.join(name), text).expect("a file");
     }
     #[cfg(unix)]
@@ -50,6 +57,7 @@ fn an_output_never_goes_over_an_input_or_over_what_was_measured() {
         "plan run.csv --want K --json run.csv",
         "paper --capture run.csv --json run.csv",
         "simulate --out board.csv",
+        "simulate --out converted.csv",
         "simulate --out m.toml",
         "simulate --model m.toml --out m.toml",
         "run --native --seconds 60 --out board.csv",

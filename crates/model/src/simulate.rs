@@ -38,16 +38,23 @@ const LATENCY_S: (f64, f64) = (0.018, 0.0005);
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulateError {
-    /// A length or rate that makes no record.
+    /// A rate that is none.
+    #[error("the rate is {found} Hz; it has to be above 0")]
+    BadRate {
+        /// What was given, Hz.
+        found: f64,
+    },
+    /// A length and a rate that make no record together.
     #[error(
-        "{what} is {found}; it has to be positive, and the record at most {limit} samples long"
+        "{seconds} s at {rate_hz} Hz are {:.0} samples; a simulated record has 1 to {limit}",
+        seconds * rate_hz
     )]
     BadLength {
-        /// `seconds` or `rate_hz`.
-        what: &'static str,
-        /// What was given.
-        found: f64,
-        /// Longest record.
+        /// Length, s.
+        seconds: f64,
+        /// Sample rate, Hz.
+        rate_hz: f64,
+        /// Longest record, samples.
         limit: usize,
     },
     /// A channel that is no gyro axis.
@@ -121,17 +128,16 @@ pub fn simulate(
     rate_hz: f64,
     seed: u64,
 ) -> Result<Record, SimulateError> {
-    let bad = |what, found| SimulateError::BadLength {
-        what,
-        found,
-        limit: LONGEST,
-    };
     if !(rate_hz.is_finite() && rate_hz > 0.0) {
-        return Err(bad("rate_hz", rate_hz));
+        return Err(SimulateError::BadRate { found: rate_hz });
     }
     let samples = (seconds * rate_hz).round();
     if !(samples >= 1.0 && samples <= LONGEST as f64) {
-        return Err(bad("seconds", seconds));
+        return Err(SimulateError::BadLength {
+            seconds,
+            rate_hz,
+            limit: LONGEST,
+        });
     }
     let samples = samples as usize;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -153,8 +159,8 @@ pub fn simulate_in_the_world_of(
     let samples = record.len();
     if samples == 0 {
         return Err(SimulateError::BadLength {
-            what: "seconds",
-            found: 0.0,
+            seconds: 0.0,
+            rate_hz,
             limit: LONGEST,
         });
     }

@@ -217,6 +217,7 @@ impl Keys {
             row: *row,
             seq: self.seq(*row),
             ticks: self.ticks(*row),
+            shift_s: 0.0,
         };
         left.iter().map(place).collect()
     }

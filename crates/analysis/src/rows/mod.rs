@@ -8,6 +8,7 @@
 mod keys;
 mod parts;
 mod rate;
+mod set_back;
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -17,9 +18,12 @@ use model::record::Record;
 
 use keys::Keys;
 pub use parts::longest_part;
+pub(crate) use rate::by_times;
 
 /// Latency of host times that a start of the board may seem earlier by, s.
 const LATENCY_S: f64 = 0.2;
+/// Settings of a host's clock that one record is believed to hold.
+const MOST_SETTINGS: usize = 10;
 /// Share of the rows beyond which going back cannot be boards that start anew.
 const MOST_STARTS: f64 = 0.05;
 
@@ -35,6 +39,7 @@ pub fn in_order(record: &Record) -> Cow<'_, Record> {
     }
     drop_useless(&mut out);
     rate::check(&mut out);
+    rate::take_from_times(&mut out);
     let gaps = without_readings(&out);
     note(&mut out, gaps);
     out
@@ -53,6 +58,8 @@ struct Place {
     row: usize,
     seq: Option<i64>,
     ticks: Option<i64>,
+    /// What is added to its host time, s.
+    shift_s: f64,
 }
 
 /// The rows in order, or nothing where they are.
@@ -82,6 +89,11 @@ fn mended(record: &Record, keys: &Keys) -> Option<(Vec<Place>, Vec<String>)> {
             back.len()
         ));
         return Some((keys.places(&left), notes));
+    }
+    if keys.is_host()
+        && let Some(places) = set_back(keys, &left, &back, &mut notes)
+    {
+        return Some((places, notes));
     }
     if let Some(first) = back.first() {
         notes.push(if back.len() + 1 == left.len() {
@@ -130,6 +142,7 @@ fn mended(record: &Record, keys: &Keys) -> Option<(Vec<Place>, Vec<String>)> {
                 row,
                 seq: keys.seq(row).map(|s| s + seq_offset),
                 ticks: keys.ticks(row).map(|t| t + ticks_offset),
+                shift_s: 0.0,
             });
         }
         from = end;
@@ -142,6 +155,35 @@ fn mended(record: &Record, keys: &Keys) -> Option<(Vec<Place>, Vec<String>)> {
         ));
     }
     Some((all, notes))
+}
+
+/// The rows as they come, their times going on, where the host's clock was set back at each of the places `back`.
+fn set_back(
+    keys: &Keys,
+    left: &[usize],
+    back: &[usize],
+    notes: &mut Vec<String>,
+) -> Option<Vec<Place>> {
+    if back.is_empty() || back.len() > MOST_SETTINGS {
+        return None;
+    }
+    let t: Option<Vec<f64>> = left.iter().map(|row| keys.host(*row)).collect();
+    let t = t?;
+    let shifts = set_back::shifts(&t, back)?;
+    for k in back {
+        notes.push(format!(
+            "the clock of the times was set back by {:.3} s before row {} of the file: the rows stay in the order of the file, \
+             and its times go on from there. Two recordings in one file look the same: if it is that, split it there",
+            t[k - 1] - t[*k],
+            left[*k] + 1
+        ));
+    }
+    let mut places = keys.places(left);
+    for (k, place) in places.iter_mut().enumerate() {
+        let settings = back.partition_point(|at| *at <= k);
+        place.shift_s = settings.checked_sub(1).map_or(0.0, |s| shifts[s]);
+    }
+    Some(places)
 }
 
 fn rows_are(n: usize) -> String {
@@ -262,7 +304,11 @@ fn taken(record: &Record, places: &[Place]) -> Record {
         header: record.header.clone(),
         seq: counter(&record.seq, &|p| p.seq, seq_shift),
         t_ticks: counter(&record.t_ticks, &|p| p.ticks, ticks_shift),
-        host_time_s: record.host_time_s.as_ref().map(|h| pick(h, places)),
+        host_time_s: record.host_time_s.as_ref().map(|h| {
+            (places.iter())
+                .filter_map(|p| Some(h.get(p.row)? + p.shift_s))
+                .collect()
+        }),
         flags: record.flags.as_ref().map(|f| pick(f, places)),
         channels: record
             .channels

@@ -50,6 +50,7 @@ pub fn longest_part(record: &Record) -> Cow<'_, Record> {
             row,
             seq: seq.map(|s| s[row] as i64),
             ticks: record.t_ticks.as_ref().map(|t| t[row] as i64),
+            shift_s: 0.0,
         })
         .collect();
     let mut out = taken(record, &places);

@@ -2,9 +2,10 @@
 
 use model::record::Quantity;
 
+use super::error::brief_list;
 use super::foreign::meaning;
 use super::header::Lines;
-use super::propose::{nearest, proposal};
+use super::propose::{alias, nearest, proposal};
 use super::units::{COUNTS, What, at_the_end, convert, in_brackets, known, usual};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
 
@@ -13,6 +14,8 @@ pub(super) struct Column {
     pub at: usize,
     pub name: String,
     pub role: Role,
+    /// Whether a name of ours or the mapping asks for it. What merely stands in the file may hold anything.
+    pub is_asked: bool,
 }
 
 pub(super) enum Role {
@@ -113,7 +116,7 @@ fn refuse_units(said: &Said<'_>, mapping: &ColumnMapping) -> Result<(), CaptureE
 fn unknown(said: &Said<'_>, why: String) -> CaptureError {
     CaptureError::Columns {
         why,
-        columns: said.names.to_vec(),
+        columns: brief_list(said.names),
         example: proposal(said.names, said.numbered),
     }
 }
@@ -134,17 +137,18 @@ fn measured(
     quantity: Quantity,
     unit: Option<&str>,
 ) -> Result<Column, CaptureError> {
-    let (unit, scale) = convert(What::Channel(quantity), unit)?;
+    let by = convert(What::Channel(quantity), unit)?;
     Ok(Column {
         at,
         name: name.to_owned(),
         role: Role::Measured {
             quantity,
-            unit,
-            zero: 0.0,
-            scale,
+            unit: by.unit,
+            zero: by.zero,
+            scale: by.scale,
             counts: false,
         },
+        is_asked: true,
     })
 }
 
@@ -200,6 +204,7 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
             at,
             name: name.to_owned(),
             role,
+            is_asked: true,
         });
     }
     if !counted.is_empty() {
@@ -236,7 +241,7 @@ fn time(
         .notes
         .extend(contradiction("time", &said.names[at], given, stated));
     found.time_is_assumed = unit.is_none();
-    let (_, scale) = convert(What::Time, unit)?;
+    let scale = convert(What::Time, unit)?.scale;
     if let (Some(unit), None) = (unit.filter(|_| scale != 1.0), given) {
         let name = &said.names[at];
         found.notes.push(format!(
@@ -284,6 +289,9 @@ fn note(assumed: &[(String, What)]) -> Vec<String> {
     }
     notes
 }
+
+/// Columns of the stand's own format that are no channels.
+const OF_FRAMES: [&str; 4] = ["seq", "t_ticks", "host_time_s", "flags"];
 
 /// The columns of the stand's own format, by whose header they are scaled.
 fn own(
@@ -344,6 +352,7 @@ fn own(
             at,
             name: name.clone(),
             role,
+            is_asked: quantity != Quantity::Other || OF_FRAMES.contains(&name.as_str()),
         });
     }
     if !columns.iter().any(is_inertial) {
@@ -375,10 +384,18 @@ fn place(said: &Said<'_>, theirs: &str) -> Option<usize> {
 fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
     let mut found = Columns::default();
     let mut assumed = Vec::new();
-    for (ours, theirs) in &mapping.columns {
+    for (given, theirs) in &mapping.columns {
         let Some(at) = place(said, theirs) else {
             return Err(unknown(said, format!("there is no column `{theirs}`")));
         };
+        let is_taken = |name: &str| mapping.columns.iter().any(|(other, _)| other == name);
+        let alias = alias(given).filter(|name| !is_taken(name));
+        if let Some(name) = &alias {
+            found.notes.push(format!(
+                "`{given}` is taken as `{name}`, the name that it has here"
+            ));
+        }
+        let ours = alias.unwrap_or_else(|| given.clone());
         let role = match ours.as_str() {
             "seq" => Role::Seq,
             "time" | "host_time_s" => time(said, mapping, at, &mut found)?,
@@ -408,8 +425,9 @@ fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureEr
         };
         found.columns.push(Column {
             at,
-            name: ours.clone(),
+            name: ours,
             role,
+            is_asked: true,
         });
     }
     found.notes.extend(note(&assumed));

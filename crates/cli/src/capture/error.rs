@@ -97,7 +97,7 @@ pub enum CaptureError {
         number: usize,
     },
     /// A file that is no text.
-    #[error("{what}, no text")]
+    #[error("this is {what}, and no table in plain text")]
     #[diagnostic(code(capture::no_text), help("{help}"))]
     NoText {
         /// What it is.
@@ -198,4 +198,27 @@ pub enum CaptureError {
         help("the file is empty or ends after its column names: was it copied whole?")
     )]
     Empty,
+}
+
+/// Characters of a name or a cell that a message shows.
+const SHOWN: usize = 30;
+/// Names that a message lists.
+const LISTED: usize = 20;
+
+/// As much of a text as fits into a sentence.
+pub(super) fn brief(text: &str) -> String {
+    if text.chars().count() <= SHOWN {
+        return text.to_owned();
+    }
+    let start: String = text.chars().take(SHOWN).collect();
+    format!("{start}...")
+}
+
+/// As many names as fit into a message, each in brief.
+pub(super) fn brief_list(names: &[String]) -> Vec<String> {
+    let mut list: Vec<String> = names.iter().take(LISTED).map(|name| brief(name)).collect();
+    if names.len() > LISTED {
+        list.push(format!("and {} more", names.len() - LISTED));
+    }
+    list
 }

@@ -7,6 +7,8 @@ use crate::text::shell_word;
 use super::units::{What, at_the_end, in_brackets, is_unit_of, known};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
+/// Bytes of a name beyond which its number is easier to write.
+const LONG: usize = 80;
 
 /// `--columns ... --units ...` made of a file's column names, as a shell takes them. `numbered` says that the names are
 /// made up, and columns are called by their numbers.
@@ -15,7 +17,7 @@ pub(super) fn proposal(names: &[String], numbered: bool) -> String {
     let mut add = |ours: &str, at: usize, what: What| {
         let name = &names[at];
         // What would be taken for the list's own commas goes by its number.
-        let theirs = if numbered || name.contains(',') {
+        let theirs = if numbered || name.contains(',') || name.len() > LONG {
             (at + 1).to_string()
         } else {
             name.clone()
@@ -117,6 +119,28 @@ pub(super) fn proposal(names: &[String], numbered: bool) -> String {
         "--columns {columns} --units {}",
         shell_word(&units.join(","))
     )
+}
+
+/// The name of ours that another spelling of it can only mean: `temperature`, `GyroX`, `accel_z`, `t`. `None` for names
+/// that are ours already, and for all others.
+pub(super) fn alias(name: &str) -> Option<String> {
+    const STEMS: [(&str, bool, &[&str]); 6] = [
+        ("gyro", true, &["gyr", "gyroscope"]),
+        ("acc", true, &["accel", "accelerometer"]),
+        ("temp", true, &["temperature"]),
+        ("temp", false, &["temperature"]),
+        ("supply", false, &["supplyvoltage", "vdd", "vcc"]),
+        ("time", false, &["t", "timestamp"]),
+    ];
+    let word: String = name.chars().filter(|c| c.is_alphanumeric()).collect();
+    let word = word.to_lowercase();
+    let ours = STEMS.iter().find_map(|(ours, has_axis, others)| {
+        let axis = AXES.iter().find(|axis| *has_axis && word.ends_with(**axis));
+        let stem = axis.map_or(word.as_str(), |_| &word[..word.len() - 1]);
+        let is_it = axis.is_some() == *has_axis && (stem == *ours || others.contains(&stem));
+        is_it.then(|| axis.map_or_else(|| (*ours).to_owned(), |axis| format!("{ours}_{axis}")))
+    })?;
+    (ours != name).then_some(ours)
 }
 
 /// The name of ours that a name which is none most probably means: `temperature`, `gyrox`, `accel_z`, `voltage`.
@@ -247,6 +271,33 @@ fn words(name: &str) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn another_spelling_of_a_name_of_ours_is_taken_for_it() {
+        for (name, ours) in [
+            ("temperature", "temp"),
+            ("Temperature_y", "temp_y"),
+            ("gyrox", "gyro_x"),
+            ("GyroZ", "gyro_z"),
+            ("gyroscope_y", "gyro_y"),
+            ("accel_z", "acc_z"),
+            ("t", "time"),
+            ("Supply_Voltage", "supply"),
+        ] {
+            assert_eq!(alias(name).as_deref(), Some(ours), "{name}");
+        }
+        for name in [
+            "temp",
+            "gyro_x",
+            "gyro",
+            "gyro_temp",
+            "ocxo",
+            "x",
+            "voltage",
+        ] {
+            assert_eq!(alias(name), None, "{name}");
+        }
+    }
 
     #[test]
     fn a_name_that_misses_ours_by_little_is_told_and_others_are_left_alone() {

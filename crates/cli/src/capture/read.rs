@@ -8,6 +8,7 @@ use model::record::{Channel, Header, Record};
 
 use super::angle::difference_angles;
 use super::columns::{Column, Columns, Role, Said, columns};
+use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
 use super::layout::{Cells, Layout, next_row};
@@ -86,7 +87,8 @@ pub fn read_from(input: impl BufRead, options: &ReadOptions) -> Result<Read, Cap
         }
         row = next_row(&mut text)?;
     }
-    finish(header, found, values, skipped)
+    let odd = std::mem::take(&mut reader.odd);
+    finish(header, found, values, skipped, &odd)
 }
 
 /// From the columns of a file of arrays. Without a mapping, names of ours are taken as they are: in the units the file
@@ -112,6 +114,9 @@ fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError>
     let mut cells = Vec::new();
     for column in &found.columns {
         let mut values = table.columns[column.at].clone();
+        if !column.is_asked {
+            (values.iter_mut().filter(|v| v.is_infinite())).for_each(|v| *v = f64::NAN);
+        }
         if let Some(row) = values.iter().position(|v| !column.role.takes(*v)) {
             return Err(CaptureError::BadRow {
                 line: row as u64 + 1,
@@ -125,7 +130,7 @@ fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError>
         }
         cells.push(values);
     }
-    finish(header, found, cells, 0)
+    finish(header, found, cells, 0, &[])
 }
 
 impl Role {
@@ -152,6 +157,8 @@ struct RowReader<'a> {
     clocks: Vec<Clock>,
     /// Of the last row.
     values: Vec<f64>,
+    /// Of columns that nobody asked for: line and text of the first cell that is no number.
+    odd: Vec<Option<(u64, String)>>,
 }
 
 impl<'a> RowReader<'a> {
@@ -166,14 +173,15 @@ impl<'a> RowReader<'a> {
             cells,
             clocks: columns.iter().map(clock).collect(),
             values: vec![0.0; columns.len()],
+            odd: vec![None; columns.len()],
         }
     }
 
     fn read(&mut self, text: &str, line: u64) -> Result<(), CaptureError> {
         let bad = |column: &Column, found: &str, expected: String| CaptureError::BadRow {
             line,
-            column: column.name.clone(),
-            found: found.to_owned(),
+            column: brief(&column.name),
+            found: brief(found),
             expected,
         };
         let row = self.cells.cut(text);
@@ -200,6 +208,11 @@ impl<'a> RowReader<'a> {
                 }
                 _ => self.cells.number(cell),
             };
+            if read.is_none() && !column.is_asked {
+                self.odd[k].get_or_insert_with(|| (line, cell.to_owned()));
+                self.values[k] = f64::NAN;
+                continue;
+            }
             let Some(value) = read else {
                 return Err(bad(column, cell, "not a finite number".to_owned()));
             };
@@ -232,6 +245,12 @@ fn check_time(found: &Columns, cells: &[Vec<f64>]) -> Result<(), CaptureError> {
             help: "map the column of the time, `--columns time=...`, or leave time out and say `--rate HZ`".to_owned(),
         });
     }
+    if steps.len() > 1 && steps.iter().all(|step| *step == 0.0) {
+        return Err(CaptureError::Time {
+            why: format!("the time column is {} throughout", cells[at][0]),
+            help: "map the column of the time, `--columns time=...`, or leave time out and say `--rate HZ`".to_owned(),
+        });
+    }
     steps.sort_by(f64::total_cmp);
     let Some(usual) = steps.get(steps.len() / 2).map(|step| step.abs()) else {
         return Ok(());
@@ -252,6 +271,7 @@ fn finish(
     found: Columns,
     cells: Vec<Vec<f64>>,
     skipped: usize,
+    odd: &[Option<(u64, String)>],
 ) -> Result<Read, CaptureError> {
     if cells.first().is_none_or(Vec::is_empty) {
         return Err(CaptureError::Empty);
@@ -262,8 +282,21 @@ fn finish(
         ..Record::default()
     };
     check_time(&found, &cells)?;
-    for (column, values) in found.columns.into_iter().zip(cells) {
-        place(&mut record, column, values);
+    for (k, (column, values)) in found.columns.into_iter().zip(cells).enumerate() {
+        let why = match odd.get(k).and_then(Option::as_ref) {
+            Some((line, text)) => Some(format!("holds text (line {line}: `{}`)", brief(text))),
+            None if !column.is_asked && values.iter().all(|v| v.is_nan()) => {
+                Some("holds no number".to_owned())
+            }
+            None => None,
+        };
+        match why {
+            Some(why) => record.notes.push(format!(
+                "column `{}` {why}, and nothing needs it: it is not read",
+                brief(&column.name)
+            )),
+            None => place(&mut record, column, values),
+        }
     }
     if skipped > 0 {
         let note = format!("rows that cannot be read and are left out (--skip-bad): {skipped}");

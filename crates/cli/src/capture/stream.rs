@@ -54,6 +54,19 @@ fn no_text(start: &[u8]) -> Option<(&'static str, &'static str)> {
     if let Some((_, what, help)) = known.iter().find(|(magic, ..)| start.starts_with(magic)) {
         return Some((what, help));
     }
+    const AS_CSV: &str =
+        "save the readings as CSV, a line of column names and then a row for each sample";
+    let known: [(&[u8], _); 5] = [
+        (b"{\"", "JSON"),
+        (b"[{", "JSON"),
+        (b"<?xml", "XML"),
+        (b"<!DOCTYPE", "a web page"),
+        (b"<html", "a web page"),
+    ];
+    let begins = start.trim_ascii_start();
+    if let Some((_, what)) = known.iter().find(|(how, _)| begins.starts_with(how)) {
+        return Some((what, AS_CSV));
+    }
     start.contains(&0).then_some((
         "binary data",
         "is it the right file? Text, gzip, NPZ, NPY, Parquet, .mat and HDF5 are read",

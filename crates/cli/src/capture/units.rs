@@ -10,7 +10,7 @@ pub(super) const ANGLE: &str = "deg";
 pub(super) const COUNTS: &str = "counts";
 
 /// One name of each unit, and the others that it has in headers and papers, in small letters.
-const SPELLINGS: [(&str, &[&str]); 23] = [
+const SPELLINGS: [(&str, &[&str]); 24] = [
     (
         "deg/s",
         &[
@@ -54,6 +54,7 @@ const SPELLINGS: [(&str, &[&str]); 23] = [
     ("mg", &[]),
     ("degC", &["°c", "ºc", "℃", "degc", "deg c", "c", "celsius"]),
     ("K", &["k", "kelvin"]),
+    ("degF", &["°f", "ºf", "℉", "deg f", "f", "fahrenheit"]),
     ("V", &["v", "volt"]),
     ("mV", &["mv"]),
     ("s", &["sec", "secs", "second", "seconds"]),
@@ -109,10 +110,28 @@ pub(super) enum What {
     Channel(Quantity),
 }
 
-/// The unit of ours that one of [`known`] ends in, and the factor into it; `None` where it is of another quantity.
-fn scale(what: What, unit: &str) -> Option<(&'static str, f64)> {
+/// How cells become values of ours: value = (cell - zero) * scale, in `unit`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Conversion {
+    pub unit: String,
+    pub zero: f64,
+    pub scale: f64,
+}
+
+impl Conversion {
+    fn by(unit: &str, zero: f64, scale: f64) -> Self {
+        Self {
+            unit: unit.to_owned(),
+            zero,
+            scale,
+        }
+    }
+}
+
+/// How one of [`known`] becomes the unit of ours; `None` where it is of another quantity.
+fn scale(what: What, unit: &str) -> Option<Conversion> {
     const DEGREES: f64 = 180.0 / std::f64::consts::PI;
-    let table: &[(&str, &'static str, f64)] = match what {
+    let table: &[(&str, &str, f64)] = match what {
         What::Time => &[
             ("s", "s", 1.0),
             ("ms", "s", 1e-3),
@@ -137,7 +156,14 @@ fn scale(what: What, unit: &str) -> Option<(&'static str, f64)> {
             ("g", "m/s^2", STANDARD_GRAVITY),
             ("mg", "m/s^2", STANDARD_GRAVITY * 1e-3),
         ],
-        What::Channel(Quantity::Temp) => &[("degC", "degC", 1.0), ("K", "degC", 1.0)],
+        What::Channel(Quantity::Temp) => {
+            return match unit {
+                "degC" => Some(Conversion::by("degC", 0.0, 1.0)),
+                "K" => Some(Conversion::by("degC", 273.15, 1.0)),
+                "degF" => Some(Conversion::by("degC", 32.0, 5.0 / 9.0)),
+                _ => None,
+            };
+        }
         What::Channel(Quantity::Supply) => &[("V", "V", 1.0), ("mV", "V", 1e-3)],
         What::Channel(Quantity::Pwm) => &[("1", "1", 1.0)],
         What::Channel(Quantity::Other) => &[],
@@ -145,7 +171,7 @@ fn scale(what: What, unit: &str) -> Option<(&'static str, f64)> {
     table
         .iter()
         .find(|(name, ..)| *name == unit)
-        .map(|(_, ours, factor)| (*ours, *factor))
+        .map(|(_, ours, factor)| Conversion::by(ours, 0.0, *factor))
 }
 
 /// Whether one of [`known`] is a unit of this.
@@ -165,26 +191,25 @@ pub(super) fn usual(what: What) -> &'static str {
     }
 }
 
-/// Our unit for a unit given, and the factor into it.
+/// How cells in a unit given become values of ours.
 ///
 /// # Errors
 /// [`CaptureError::Option`] where it is none of this quantity.
-pub(super) fn convert(what: What, given: Option<&str>) -> Result<(String, f64), CaptureError> {
+pub(super) fn convert(what: What, given: Option<&str>) -> Result<Conversion, CaptureError> {
     let Some(given) = given else {
-        return Ok((usual(what).to_owned(), 1.0));
+        return Ok(Conversion::by(usual(what), 0.0, 1.0));
     };
     if what == What::Channel(Quantity::Other) {
-        return Ok((given.to_owned(), 1.0));
+        return Ok(Conversion::by(given, 0.0, 1.0));
     }
     let found = known(given).and_then(|unit| scale(what, unit));
-    let (unit, factor) = found.ok_or_else(|| CaptureError::Option {
+    found.ok_or_else(|| CaptureError::Option {
         option: "--units",
         why: format!("`{given}` is no unit of {}", usual(what)),
         help: "time: s, ms, us, ns; gyro: deg/s, rad/s, mrad/s, deg/h, mdps, or of an angle deg, rad, arcsec; acc: m/s2, g, \
-               mg; temp: degC, K; supply: V, mV"
+               mg; temp: degC, K, degF; supply: V, mV"
             .to_owned(),
-    })?;
-    Ok((unit.to_owned(), factor))
+    })
 }
 
 #[cfg(test)]
@@ -227,6 +252,12 @@ mod tests {
             for other in others {
                 assert_eq!(known(other), Some(name), "{other}");
             }
+        }
+        let temp = What::Channel(Quantity::Temp);
+        for (unit, cell) in [("°C", 20.0), ("K", 293.15), ("°F", 68.0)] {
+            let by = convert(temp, Some(unit)).unwrap();
+            let value = (cell - by.zero) * by.scale;
+            assert!((value - 20.0).abs() < 1e-9, "{unit}: {value}");
         }
         assert!(convert(What::Channel(Quantity::Gyro), Some("furlong/s")).is_err());
         assert!(convert(What::Time, Some("deg/s")).is_err());

@@ -7,10 +7,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use imu_stand::capture::unpacked;
 use miette::{IntoDiagnostic, Result};
+use model::record::Record;
 use serde::Serialize;
 
 /// Stands for standard input or output in place of a file.
 pub const DASH: &str = "-";
+
+/// Key of the header that says which command simulated a capture.
+const SIMULATED: &str = "simulated";
+
+/// Marks a record as simulated: what is written of it can be had again.
+pub fn mark_simulated(record: &mut Record, command: &str) {
+    let entries = &mut record.header.entries;
+    entries.retain(|(key, _)| key != SIMULATED);
+    entries.push((SIMULATED.to_owned(), format!("imu-stand {command}")));
+}
 
 /// Whether a result goes to standard output; what is said to people then goes to standard error.
 static STDOUT_IS_TAKEN: AtomicBool = AtomicBool::new(false);
@@ -64,9 +75,9 @@ impl Outputs {
     pub fn simulated(mut self, option: &'static str, path: Option<&PathBuf>) -> Result<Self> {
         if let Some(path) = self.add(option, path)?
             && (has_header(path, "# start_unix_s:")
-                || !has_header(path, "# format: imu-stand-capture/"))
+                || !has_header(path, &format!("# {SIMULATED}:")))
         {
-            return Err(refused(option, path, "is no run of a simulated stand"));
+            return Err(refused(option, path, "does not say that it was simulated"));
         }
         Ok(self)
     }

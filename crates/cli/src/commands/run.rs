@@ -111,8 +111,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         ProgressStyle::with_template("stand {bar:40} {pos}/{len} s")
             .unwrap_or(ProgressStyle::default_bar()),
     );
-    let (record, link) = sample(&board, &plan, |time| bar.set_position(time as u64))?;
+    let (mut record, link) = sample(&board, &plan, |time| bar.set_position(time as u64))?;
     bar.finish_and_clear();
+    outputs::mark_simulated(&mut record, "run");
     write_capture(&arguments.out, &record)?;
 
     // The engine gets the capture as it was written, and nothing else.

@@ -46,15 +46,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             settings.join(" or ")
         );
     }
-    let record = model::simulate(&model, arguments.seconds, rate, arguments.seed)
-        .map_err(|error| {
-            let seconds = arguments.seconds;
-            let help = format!(
-                "{seconds} s at {rate} Hz are {} samples: choose `--seconds` and `--rate` accordingly",
-                (seconds * rate).round()
-            );
+    let mut record =
+        model::simulate(&model, arguments.seconds, rate, arguments.seed).map_err(|error| {
+            use model::simulate::SimulateError as E;
+            let help = match &error {
+                E::BadLength { .. } | E::BadRate { .. } => {
+                    "choose `--seconds` and `--rate` accordingly"
+                }
+                _ => "docs/model-file.md lists channels and effects",
+            };
             miette::miette!(help = help, "{error}")
         })?;
+    outputs::mark_simulated(&mut record, "simulate");
     if arguments.out.as_os_str() == outputs::DASH {
         outputs::to_stdout(|mut out| write_to(&mut out, &record))?;
     } else {
