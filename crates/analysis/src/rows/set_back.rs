@@ -21,7 +21,7 @@ pub(super) fn shifts(t: &[f64], back: &[usize]) -> Option<Vec<f64>> {
         .collect();
     let usual = median(&forward);
     let short = forward.iter().filter(|d| **d < 0.5 * usual).count();
-    if !(usual > 0.0) || short as f64 > MOST_SHORT * forward.len() as f64 {
+    if usual.is_nan() || usual <= 0.0 || short as f64 > MOST_SHORT * forward.len() as f64 {
         return None;
     }
     let begins: Vec<usize> = [0].into_iter().chain(back.iter().copied()).collect();
