@@ -423,6 +423,27 @@ fn analyze_channel(
     out.parameters = NoiseParameters::of(&fitted, &units);
     out.parameters_hold_from_s = described.hold_from_m().map(|m| m as f64 * tau0);
     out.warnings.extend(misfit_warning(&described, tau0));
+    let short_times = out.parameters_hold_from_s.filter(|_| described.from_m > 1);
+    let n = &out.parameters.angle_random_walk;
+    if let (Some(from), Some(high)) = (short_times, n.high)
+        && let Some((least, at)) = (out.deviations.get(&Deviation::Oadev).into_iter().flatten())
+            .filter(|p| p.tau_s < from)
+            .map(|p| {
+                let per_reading = units.angle_random_walk.factor / units.reading.factor;
+                (p.high * p.tau_s.sqrt() * per_reading, p.tau_s)
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+        && least < high
+    {
+        out.warnings.push(format!(
+            "the curve at {} s leaves room for N up to {} {} and no more, unless something filters the readings over such times: \
+             what is above is what the curve from {} s on allows by itself",
+            short(at),
+            short(least),
+            n.unit,
+            short(from)
+        ));
+    }
     let walk = fitted.term(Term::RandomWalk);
     if walk.value.is_some() && walk.low == 0.0 && fitted.term(Term::Flicker).value.is_none() {
         out.warnings.push(

@@ -32,7 +32,8 @@ const DRAWS: usize = 4000;
 pub struct RunFigure {
     /// The channel.
     pub channel: String,
-    /// `angle_random_walk`, `slow_deviation` (overlapping Allan deviation at a tenth of the shortest run) or `bias`.
+    /// `angle_random_walk` (`short_term_noise` where N holds for long cluster times alone: the white noise nearest to the
+    /// whole band), `slow_deviation` (overlapping Allan deviation at a tenth of the shortest run) or `bias`.
     pub figure: String,
     /// Unit of `values`, `pooled` and `spread`.
     pub unit: String,
@@ -172,9 +173,24 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
             }
         }
     }
-    let is_odd = |run: usize| odd.iter().any(|o| o.run == run);
+    let odd_runs: Vec<usize> = odd.iter().map(|o| o.run).collect();
+    let is_odd = |run: usize| odd_runs.contains(&run);
     pool_figures(&mut figures, &is_odd);
     let together = together(&records, &samplings, &names, &spectra, &is_odd, &mut rng);
+    // Where the terms do not describe the whole band, N is what they say below; the whole band compares runs all the same,
+    // by what it holds at its upper end, too.
+    for of in (together.iter()).filter(|t| t.parameters_hold_from_s != Some(samplings[0].tau0)) {
+        let is_white = |channel: &str, figure: &str| channel == of.channel && figure == WHITE;
+        for figure in figures
+            .iter_mut()
+            .filter(|f| is_white(&f.channel, &f.figure))
+        {
+            figure.figure = SHORT_TERM.to_owned();
+        }
+        for odd in odd.iter_mut().filter(|o| is_white(&o.channel, &o.figure)) {
+            odd.figure = SHORT_TERM.to_owned();
+        }
+    }
     let distance = |run: usize| figures.iter().map(|f| f.z[run].powi(2)).sum::<f64>();
     let run = (0..records.len())
         .min_by(|a, b| {
@@ -270,6 +286,11 @@ fn together(
         .collect()
 }
 
+/// The white noise of a run, where it is N.
+const WHITE: &str = "angle_random_walk";
+/// The same where the terms do not describe the whole band: the white noise that is nearest to all of it.
+const SHORT_TERM: &str = "short_term_noise";
+
 /// Relative difference of sample intervals up to which runs have the same.
 const SAME_RATE: f64 = 1e-3;
 
@@ -332,7 +353,7 @@ fn figures_of(
         ]);
     }
     let titles = [
-        ("angle_random_walk", units.angle_random_walk.unit, true),
+        (WHITE, units.angle_random_walk.unit, true),
         ("slow_deviation", units.reading.unit.clone(), true),
         ("bias", units.reading.unit, false),
     ];

@@ -4,6 +4,8 @@ use std::fmt::Write;
 
 use analysis::result::{Diagnosis, Finding, Verdict};
 
+use crate::report::plot::{number, tidy};
+
 /// Columns of a terminal that text is wrapped to.
 const WIDTH: usize = 100;
 
@@ -82,6 +84,13 @@ pub fn diagnosis(d: &Diagnosis) -> String {
         let _ = writeln!(out, "\nunexplained on {}", unexplained.channel);
         let _ = writeln!(out, "{}", item("", &unexplained.what));
     }
+    if let Some(walks) = slow_noise(d) {
+        let _ = writeln!(
+            out,
+            "\nslow noise, taken as a random walk\n{}",
+            item("", &walks)
+        );
+    }
     if !d.not_tested.is_empty() {
         let _ = writeln!(out, "\nnot tested");
         for not in &d.not_tested {
@@ -147,14 +156,12 @@ fn write_finding(out: &mut String, finding: &Finding) {
         finding.channels.join(", ")
     );
     for (name, parameter) in &finding.parameters {
-        let error = parameter
-            .std_error
-            .map_or_else(String::new, |e| format!(" +- {e:.2e}"));
+        let size = measured(parameter.value, parameter.std_error);
         let unit = match parameter.unit.as_str() {
             "1" => String::new(),
             unit => format!(" {unit}"),
         };
-        let _ = writeln!(out, "    {name:<24} {:.5}{error}{unit}", parameter.value);
+        let _ = writeln!(out, "    {name:<24} {size}{unit}");
     }
     if !finding.what.is_empty() {
         let _ = writeln!(out, "{}", item("", &finding.what));
@@ -182,7 +189,9 @@ fn write_finding(out: &mut String, finding: &Finding) {
     for (over, [before, after]) in &gain.angle_rms_deg {
         let _ = writeln!(
             out,
-            "    angle error over {over:<7} {before:.3} -> {after:.3} deg rms"
+            "    angle error over {over:<7} {} -> {} deg rms",
+            number(*before, 3),
+            number(*after, 3)
         );
     }
     if finding.confirmed_on_held_out_data == Some(false) {
@@ -193,8 +202,76 @@ fn write_finding(out: &mut String, finding: &Finding) {
     }
 }
 
+/// Digits of a value without an error.
+const DIGITS: usize = 6;
+
+/// A value to the second digit of its standard error, both with the same places; as it is where it has none, as counts.
+fn measured(value: f64, std_error: Option<f64>) -> String {
+    let error = match std_error {
+        Some(error) if error > 0.0 && error.is_finite() && value.is_finite() => error,
+        Some(error) => return format!("{} +- {}", tidy(value, DIGITS), tidy(error, 2)),
+        None => return tidy(value, DIGITS),
+    };
+    // Of the rounded error: 0.0996 is 0.10.
+    let exponent = |v: f64| format!("{v:.1e}").rsplit_once('e')?.1.parse::<i32>().ok();
+    let place = exponent(error).unwrap_or(0) - 1;
+    let size = exponent(value.abs().max(error)).unwrap_or(0);
+    if (-4..9).contains(&size) && place > -10 {
+        let places = (-place).max(0) as usize;
+        return format!("{value:.places$} +- {error:.places$}");
+    }
+    let digits = (size - place).max(1) as usize;
+    format!("{value:.digits$e} +- {error:.1e}")
+}
+
+/// Standard errors from which a random walk is there.
+const ESTABLISHED: f64 = 3.0;
+
+/// How the random walk of the baseline goes together with the bias instability that `analyze` may give.
+fn slow_noise(d: &Diagnosis) -> Option<String> {
+    // Where something is found, the baseline is not what the record is taken for.
+    let is_found = |channel: &String| {
+        let mut found = d.findings.iter();
+        found.any(|f| f.channels.contains(channel))
+            || d.unexplained.iter().any(|u| u.channel == *channel)
+    };
+    let walks: Vec<String> = (d.baseline.iter())
+        .filter(|(channel, _)| !is_found(channel))
+        .filter_map(|(channel, terms)| {
+            let k = terms.get("rate_random_walk")?;
+            let error = k.std_error.filter(|e| k.value > ESTABLISHED * e)?;
+            let size = measured(k.value, Some(error));
+            Some(format!("K {size} {} on {channel}", k.unit))
+        })
+        .collect();
+    (!walks.is_empty()).then(|| {
+        format!(
+            "{}. That a bias instability (flicker) describes it better is not beyond doubt in this record, so it is no finding; \
+             `imu-stand analyze` decides on lower odds, and may give the same noise as B",
+            walks.join(", ")
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn figures_end_where_their_error_does_whatever_their_size() {
+        for (value, error, shown) in [
+            (-0.130_851, Some(2.78e-3), "-0.1309 +- 0.0028"),
+            (5.32e-11, Some(6.3e-12), "5.32e-11 +- 6.3e-12"),
+            (2.1e-5, Some(1.04e-6), "2.10e-5 +- 1.0e-6"),
+            (3.299_877, Some(2.68e-5), "3.299877 +- 0.000027"),
+            (125.3, Some(34.2), "125 +- 34"),
+            (0.5, Some(0.099_6), "0.50 +- 0.10"),
+            (2.0e-7, Some(0.4), "0.00 +- 0.40"),
+            (601.0, None, "601"),
+            (4.98, Some(0.0), "4.98 +- 0"),
+        ] {
+            assert_eq!(super::measured(value, error), shown);
+        }
+    }
+
     #[test]
     fn limits_have_two_digits() {
         let shorts = [0.038_21, 0.411, 4.24, 42.4, 2.003e-4, 1234.0].map(super::short);

@@ -75,6 +75,8 @@ fn cells_between_commas_semicolons_tabs_and_blanks_and_decimal_commas_are_read()
     ] {
         let text = table(head, separator, sign, 1.0, 1.0);
         is_the_table(&read(text.as_bytes(), map, units).expect(head));
+        let old = text.replace("\r\n", "\n").replace('\n', "\r");
+        is_the_table(&read(old.as_bytes(), map, units).expect(head));
     }
     // The last cell of a row may be empty.
     let last = read(b"t\tgx\tgy\n0\t1\t\n1\t2\t3\n", map, units).expect("tabs");

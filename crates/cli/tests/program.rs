@@ -608,6 +608,30 @@ fn what_cannot_be_read_is_said_once_and_a_cut_file_by_its_name() {
     let said = String::from_utf8_lossy(&missing.stderr);
     assert_eq!(said.matches("no.csv").count(), 1, "{said}");
     assert_eq!(said.matches("No such file").count(), 1, "{said}");
+    let is_folder = run(&["analyze", folder.to_str().unwrap()]);
+    let said = String::from_utf8_lossy(&is_folder.stderr);
+    assert!(said.contains("name a file in it"), "{said}");
+    // What has nothing to read is not told to record for longer, nor planned by.
+    let (none, few) = (folder.join("none.csv"), folder.join("few.csv"));
+    std::fs::write(&none, format!("t,gx\n{}", "0,\n".repeat(700))).unwrap();
+    std::fs::write(&few, "t,gx\n0,1\n1,3\n2,2\n").unwrap();
+    let columns = ["--columns", "gyro_x=gx", "--rate", "20"];
+    for (command, path, told) in [
+        ("diagnose", &none, "map the columns"),
+        ("plan", &few, "64 samples"),
+    ] {
+        let mut line = vec![command, path.to_str().unwrap()];
+        line.extend(columns);
+        line.extend(
+            ["--want", "K within 20 %"]
+                .iter()
+                .filter(|_| command == "plan"),
+        );
+        let refused = run(&line);
+        let said = String::from_utf8_lossy(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(1), "{said}");
+        assert!(said.contains(told), "{said}");
+    }
     let (whole, cut) = (folder.join("w.csv.gz"), folder.join("cut.csv.gz"));
     let made = run(&[
         "run",

@@ -3,7 +3,7 @@
 
 use rand_core::Rng;
 
-use super::{Misfit, NoiseFit, Spectrum, fit, misfit};
+use super::{Misfit, NoiseFit, Spectrum, Term, fit, misfit};
 use crate::allan::TauGrid;
 
 /// Replicates behind the check of a fit.
@@ -39,6 +39,19 @@ impl Described {
     }
 }
 
+/// Part of the upper end of an interval that is nothing.
+const NOTHING: f64 = 1e-3;
+
+/// White noise is in every model; in the lower part of a spectrum it may be there by that alone. Where the other terms can
+/// stand for all of it, it is not established.
+fn without_unknown_white(mut fit: NoiseFit) -> NoiseFit {
+    let white = &mut fit.terms[Term::White as usize];
+    if white.low < NOTHING * white.high {
+        (white.value, white.std_error, white.low) = (None, None, 0.0);
+    }
+    fit
+}
+
 /// Fits the terms, and where they do not describe the Allan curve up to `longest` samples, fits them to the lower half, quarter,
 /// ... of the frequencies until they do, and then to half of that: what just escapes the check at the upper end of a band
 /// still pulls N by more than its interval. Dropping high frequencies takes nothing from what is known of
@@ -64,7 +77,7 @@ pub fn fit_described(spectrum: &Spectrum, longest: usize, rng: &mut impl Rng) ->
         if narrow.coefficients() < NEEDED {
             break;
         }
-        let fit = fit(&narrow);
+        let fit = without_unknown_white(fit(&narrow));
         // Of what is left of the spectrum, the short cluster times look at the upper end.
         let p = misfit(&narrow, &fit, &factors, REPLICATES, rng).map_or(0.0, |m| m.p_value);
         let before = bands.last().map_or(0.0, |(p, _)| *p);
@@ -95,4 +108,32 @@ pub fn fit_described(spectrum: &Spectrum, longest: usize, rng: &mut impl Rng) ->
         return best;
     }
     of_whole(whole.clone(), Some((whole, wrong)))
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use rand_xoshiro::rand_core::SeedableRng;
+
+    use super::*;
+    use crate::synthetic::Truth;
+
+    #[test]
+    fn white_noise_that_other_terms_can_stand_for_has_no_value_but_a_limit() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+        let white = |truth: Truth, rng: &mut Xoshiro256PlusPlus| {
+            let y = truth.record(4096, 1.0, rng);
+            let spectrum = Spectrum::of(&y, std::slice::from_ref(&(0..y.len())), 1.0);
+            without_unknown_white(fit(&spectrum)).term(Term::White)
+        };
+        let flicker = Truth {
+            b: 1.0,
+            ..Truth::default()
+        };
+        let alone = white(flicker, &mut rng);
+        assert!(alone.value.is_none() && alone.high > 0.0, "{alone:?}");
+        let both = Truth { n: 3.0, ..flicker };
+        let there = white(both, &mut rng);
+        assert!(there.low < 3.0 && there.value.is_some(), "{there:?}");
+    }
 }

@@ -114,10 +114,16 @@ fn refuse_units(said: &Said<'_>, mapping: &ColumnMapping) -> Result<(), CaptureE
 }
 
 fn unknown(said: &Said<'_>, why: String) -> CaptureError {
+    let (example, is_guessed) = proposal(said.names, said.numbered);
     CaptureError::Columns {
         why,
         columns: brief_list(said.names),
-        example: proposal(said.names, said.numbered),
+        hint: if is_guessed {
+            " and see that the units are right, which the file does not say (phones and ROS log rad/s)"
+        } else {
+            ""
+        },
+        example,
     }
 }
 

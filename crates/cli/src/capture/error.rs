@@ -73,12 +73,14 @@ pub enum CaptureError {
     },
     /// No column names, or none that mean anything here.
     #[error("{why}; the columns are: {}", columns.join(", "))]
-    #[diagnostic(code(capture::columns), help("map them, for example: {example}"))]
+    #[diagnostic(code(capture::columns), help("map them{hint}, for example: {example}"))]
     Columns {
         /// What is wrong.
         why: String,
         /// What there is.
         columns: Vec<String>,
+        /// What to see to.
+        hint: &'static str,
         /// A mapping made of them.
         example: String,
     },
@@ -207,10 +209,12 @@ const LISTED: usize = 20;
 
 /// As much of a text as fits into a sentence.
 pub(super) fn brief(text: &str) -> String {
+    // What a terminal would obey is shown as a blank.
+    let shown = |c: char| if c.is_control() { ' ' } else { c };
+    let start: String = text.chars().take(SHOWN).map(shown).collect();
     if text.chars().count() <= SHOWN {
-        return text.to_owned();
+        return start;
     }
-    let start: String = text.chars().take(SHOWN).collect();
     format!("{start}...")
 }
 

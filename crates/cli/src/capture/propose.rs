@@ -10,10 +10,13 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// Bytes of a name beyond which its number is easier to write.
 const LONG: usize = 80;
 
-/// `--columns ... --units ...` made of a file's column names, as a shell takes them. `numbered` says that the names are
-/// made up, and columns are called by their numbers.
-pub(super) fn proposal(names: &[String], numbered: bool) -> String {
+/// `--columns ... --units ...` made of a file's column names, as a shell takes them, and whether a unit in it is a guess.
+/// `numbered` says that the names are made up, and columns are called by their numbers.
+pub(super) fn proposal(names: &[String], numbered: bool) -> (String, bool) {
     let (mut columns, mut units) = (Vec::new(), Vec::new());
+    // The time column of a logger for phones, whose systems deliver rad/s.
+    let is_phone = names.iter().any(|name| name == "seconds_elapsed");
+    let mut is_guessed = false;
     let mut add = |ours: &str, at: usize, what: What| {
         let name = &names[at];
         // What would be taken for the list's own commas goes by its number.
@@ -33,10 +36,12 @@ pub(super) fn proposal(names: &[String], numbered: bool) -> String {
         let unit = match (what, said) {
             // Seconds go without saying; other times are guessed by nobody.
             (What::Time, None | Some("s")) => return,
+            (What::Channel(Quantity::Gyro), None) if is_phone => "rad/s",
             (What::Channel(Quantity::Gyro), None) => "deg/s",
             (What::Channel(_), None) => "m/s2",
             (_, Some(unit)) => unit,
         };
+        is_guessed |= said.is_none();
         if !units.iter().any(|(k, _)| *k == key) {
             units.push((key, unit));
         }
@@ -113,12 +118,10 @@ pub(super) fn proposal(names: &[String], numbered: bool) -> String {
         .map(|(key, unit)| format!("{key}={unit}"))
         .collect();
     if units.is_empty() {
-        return format!("--columns {columns}");
+        return (format!("--columns {columns}"), false);
     }
-    format!(
-        "--columns {columns} --units {}",
-        shell_word(&units.join(","))
-    )
+    let units = shell_word(&units.join(","));
+    (format!("--columns {columns} --units {units}"), is_guessed)
 }
 
 /// The name of ours that another spelling of it can only mean: `temperature`, `GyroX`, `accel_z`, `t`. `None` for names
@@ -193,8 +196,18 @@ struct Meaning {
 }
 
 impl Meaning {
-    /// What a name most probably means.
+    /// What a name most probably means; one within a group by itself, where the group tells nothing.
     fn of(name: &str) -> Self {
+        let whole = Self::of_word(name);
+        match name.rsplit_once(['.', '/']) {
+            Some((_, last)) if whole.kind == Kind::Unknown && in_brackets(name).1.is_none() => {
+                Self::of_word(last)
+            }
+            _ => whole,
+        }
+    }
+
+    fn of_word(name: &str) -> Self {
         let words = words(in_brackets(name).0);
         let axis = words.iter().rev().find_map(|word| axis_of(word));
         let is = |starts: &[&str]| (words.iter()).any(|w| starts.iter().any(|s| w.starts_with(s)));
@@ -344,7 +357,7 @@ mod tests {
             ),
             (
                 "time;seconds_elapsed;z;y;x",
-                "--columns time=seconds_elapsed,gyro_x=x,gyro_y=y,gyro_z=z --units gyro=deg/s",
+                "--columns time=seconds_elapsed,gyro_x=x,gyro_y=y,gyro_z=z --units gyro=rad/s",
             ),
             (
                 "t;GyroX;GyroY;GyroZ;AccX;MagX",
@@ -358,14 +371,24 @@ mod tests {
                 "Zeit (s);Drehrate x (°/s);Drehrate y (°/s)",
                 "--columns 'time=Zeit (s),gyro_x=Drehrate x (°/s),gyro_y=Drehrate y (°/s)' --units gyro=deg/s",
             ),
+            (
+                "imu0.time;imu0.gx;imu0.gyro.y;imu0.ax",
+                "--columns time=imu0.time,gyro_x=imu0.gx,gyro_y=imu0.gyro.y,acc_x=imu0.ax --units gyro=deg/s,acc=m/s2",
+            ),
             ("y", "--columns gyro_y=y --units gyro=deg/s"),
             ("values", "--columns gyro_x=values --units gyro=deg/s"),
         ];
         for (names, expected) in cases {
             let names: Vec<String> = names.split(';').map(str::to_owned).collect();
-            assert_eq!(proposal(&names, false), expected);
+            let (proposed, is_guessed) = proposal(&names, false);
+            assert_eq!(proposed, expected);
+            // A name that says no unit leaves it to be checked.
+            let says = ["/s", " s^", "dps"]
+                .iter()
+                .any(|unit| names[1 % names.len()].contains(unit));
+            assert_eq!(is_guessed, !says, "{names:?}");
         }
-        let numbered = |n: usize| proposal(&vec![String::new(); n], true);
+        let numbered = |n: usize| proposal(&vec![String::new(); n], true).0;
         assert_eq!(numbered(1), "--columns gyro_x=1 --units gyro=deg/s");
         assert_eq!(
             numbered(3),

@@ -78,6 +78,8 @@ pub(super) struct TextLines<R> {
     input: R,
     number: u64,
     bytes: Vec<u8>,
+    /// What lines end with: some old programs write a carriage return alone.
+    end: u8,
 }
 
 impl<R: BufRead> TextLines<R> {
@@ -90,8 +92,15 @@ impl<R: BufRead> TextLines<R> {
                 help: help.to_owned(),
             });
         }
+        let has = |byte| start.contains(&byte);
+        let end = if has(b'\r') && !has(b'\n') {
+            b'\r'
+        } else {
+            b'\n'
+        };
         Ok(Self {
             input,
+            end,
             number: 0,
             bytes: Vec::new(),
         })
@@ -102,7 +111,7 @@ impl<R: BufRead> TextLines<R> {
     pub fn next_line(&mut self) -> std::result::Result<Option<(u64, String)>, CaptureError> {
         self.bytes.clear();
         let mut line = self.input.by_ref().take(LONGEST_LINE);
-        if line.read_until(b'\n', &mut self.bytes).map_err(io)? == 0 {
+        if line.read_until(self.end, &mut self.bytes).map_err(io)? == 0 {
             return Ok(None);
         }
         self.number += 1;

@@ -203,6 +203,13 @@ fn mat(path: &Path) -> Result<Arrays, String> {
         };
         out.add(array.name(), array.size(), values, false);
     }
+    if out.columns.is_empty() {
+        return Err(
+            "it holds no array of numbers; the fields of a struct become arrays by `save(FILE, '-struct', 'NAME')`, or are read \
+             as they are from version 7.3: `save(FILE, '-v7.3')`"
+                .to_owned(),
+        );
+    }
     Ok(out)
 }
 

@@ -72,10 +72,13 @@ impl Input {
             read_capture(path, &options)
         };
         let read = read.map_err(|error| {
+            let error = match error {
+                CaptureError::Io { path, source } => return unreadable(&path, &source),
+                error => error,
+            };
             let says_which = matches!(
                 error,
-                CaptureError::Io { .. }
-                    | CaptureError::CutOff { .. }
+                CaptureError::CutOff { .. }
                     | CaptureError::Damaged { .. }
                     | CaptureError::Table { .. }
             );
@@ -83,7 +86,13 @@ impl Input {
             if says_which {
                 report
             } else {
-                report.wrap_err(format!("cannot read {}", path.display()))
+                let is_stdin = path.as_os_str() == outputs::DASH;
+                let name = if is_stdin {
+                    STDIN.into()
+                } else {
+                    path.display().to_string()
+                };
+                report.wrap_err(format!("cannot read {name}"))
             }
         })?;
         if read.skipped > 0 {
@@ -95,6 +104,18 @@ impl Input {
         }
         Ok(read)
     }
+}
+
+/// A file that cannot be opened or read, and what to do.
+fn unreadable(path: &Path, error: &std::io::Error) -> miette::Report {
+    use std::io::ErrorKind as Kind;
+    let help = match error.kind() {
+        Kind::NotFound => "is the path right, seen from the folder in which you are?",
+        Kind::IsADirectory => "it is a folder: name a file in it",
+        Kind::PermissionDenied => "change its rights, or copy it to where you may read",
+        _ => "is the disk, or the line to it, in order?",
+    };
+    miette::miette!(help = help, "cannot read {}: {error}", path.display())
 }
 
 /// Says on standard error what was wrong with the rows of a capture, for commands whose results have no place for it.
@@ -233,6 +254,9 @@ pub fn explain(error: analysis::AnalysisError) -> miette::Report {
         analysis::AnalysisError::Inconclusive {
             need, unit: "runs", ..
         } => format!("name {need} captures of the same stand at least"),
+        analysis::AnalysisError::Inconclusive { have: 0.0, .. } => {
+            "no gyro has a reading: map the columns that hold numbers, `--columns gyro_x=...`".to_owned()
+        }
         analysis::AnalysisError::Inconclusive { need, unit, .. } => {
             format!("record for longer: {need} {unit} at least")
         }

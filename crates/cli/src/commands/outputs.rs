@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use imu_stand::capture::unpacked;
+use imu_stand::capture::{CaptureError, unpacked, write_capture};
 use miette::{IntoDiagnostic, Result};
 use model::record::Record;
 use serde::Serialize;
@@ -164,6 +164,14 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
         return to_stdout(|out| out.write_all(text.as_bytes()));
     }
     std::fs::write(path, text).map_err(|error| failed(path, &error))
+}
+
+/// Writes a record as a capture.
+pub fn write_record(path: &Path, record: &Record) -> Result<()> {
+    write_capture(path, record).map_err(|error| match error {
+        CaptureError::Io { path, source } => failed(&path, &source),
+        error => miette::Report::new(error),
+    })
 }
 
 /// Writes to standard output. A reader that has had enough is no failure.

@@ -21,6 +21,8 @@ use super::plan_separate::{Told, print_separate, separate};
 use super::wish::{WantedAngle, Wish, Z_95, wishes};
 use super::{Input, Outputs};
 
+/// Samples that tell anything of the noise.
+const LEAST_SAMPLES: usize = 64;
 /// Most samples that `--check` simulates in all.
 const CHECK_SAMPLES: f64 = 2e8;
 /// Records that are simulated without it, of a term and of an angle, and most samples of them: some seconds.
@@ -318,6 +320,15 @@ fn of_capture(arguments: &Arguments, path: &std::path::Path) -> Result<Noise> {
     let sampling = Sampling::of(&record, arguments.input.rate).map_err(super::explain)?;
     let runs = sampling.runs_of(&channel.values);
     let spectrum = Spectrum::with_gaps(&channel.values, &runs, &sampling.slots, sampling.tau0);
+    let samples: usize = runs.iter().map(ExactSizeIterator::len).sum();
+    if samples < LEAST_SAMPLES {
+        return Err(super::explain(analysis::AnalysisError::Inconclusive {
+            what: format!("a plan by the noise of {}", channel.name),
+            have: samples as f64,
+            need: LEAST_SAMPLES as f64,
+            unit: "samples",
+        }));
+    }
     let longest = runs.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(arguments.seed);
     let described = fit_described(&spectrum, longest / 5, &mut rng);
@@ -335,17 +346,25 @@ fn of_capture(arguments: &Arguments, path: &std::path::Path) -> Result<Noise> {
     let mut value = |name: &str, unit: &str, e: analysis::noise_fit::Estimated| {
         e.value.unwrap_or_else(|| {
             notes.push(format!(
-                "{name} is not established in this capture: planned as absent, it is {:.2e} {unit} at the most",
-                e.high
+                "{name} is not established in this capture: planned as absent, it is {} {unit} at the most",
+                number(e.high, 3)
             ));
             0.0
         })
     };
-    let n = value("N", "deg/s*sqrt(s)", found.term(Term::White));
+    let white = found.term(Term::White);
+    // No gyro is without it: of what is not known, the worst.
+    let n = white.value.unwrap_or(white.high);
     let b = value("B", "deg/s", found.term(Term::Flicker));
     let k = value("K", "deg/s/sqrt(s)", found.term(Term::RandomWalk));
     let q = value("Q", "deg", found.term(Term::Quantization));
     let r = value("R", "deg/s/s", found.rate_ramp);
+    if white.value.is_none() {
+        notes.push(format!(
+            "N is not established in this capture: planned at its limit, {} deg/s*sqrt(s)",
+            number(n, 3)
+        ));
+    }
     Ok(Noise {
         from: format!("{}, {}", super::name(path), channel.name),
         rate_hz: 1.0 / sampling.tau0,

@@ -12,7 +12,7 @@ use clap::Args;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
 use imu_stand::stand::{Board, Hidden, Plan, Sizes, plan, plan_fitted, run_native};
-use imu_stand::{text, write_capture};
+use imu_stand::text;
 use indicatif::{ProgressBar, ProgressStyle};
 #[cfg(unix)]
 use miette::IntoDiagnostic;
@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (mut record, link) = sample(&board, &plan, |time| bar.set_position(time as u64))?;
     bar.finish_and_clear();
     outputs::mark_simulated(&mut record, "run");
-    write_capture(&arguments.out, &record)?;
+    outputs::write_record(&arguments.out, &record)?;
 
     // The engine gets the capture as it was written, and nothing else.
     let read = read_capture(&arguments.out, &ReadOptions::default())?;

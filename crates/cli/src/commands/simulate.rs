@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use imu_stand::capture::{write_capture, write_to};
+use imu_stand::capture::write_to;
 use miette::Result;
 use model::file::ModelFile;
 
@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.out.as_os_str() == outputs::DASH {
         outputs::to_stdout(|mut out| write_to(&mut out, &record))?;
     } else {
-        write_capture(&arguments.out, &record)?;
+        outputs::write_record(&arguments.out, &record)?;
     }
     if !arguments.quiet {
         say!(
