@@ -277,8 +277,11 @@ fn temperatures_come_by_any_spelling_and_unit_and_names_are_not_taken_twice() {
         notes.contains("`temperature` is taken as `temp`"),
         "{notes}"
     );
-    let both = read("gyro_x=gx,temp=temp_f,temperature=temp_f");
-    assert!(both.channel("temp").is_some() && both.channel("temperature").is_some());
+    let said = error(text, "gyro_x=gx,temp=temp_f,temperature=temp_f", "");
+    assert!(
+        said.contains("`temp_f` is given to temp and to temperature"),
+        "{said}"
+    );
 }
 
 #[test]

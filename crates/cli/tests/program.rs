@@ -578,6 +578,29 @@ fn analyze_and_diagnose_read_one_rate_from_whole_seconds_and_from_a_clock_that_w
             assert!(input["notes"].to_string().contains(told), "{input}");
         }
     }
+    let out = folder.join("stated.json");
+    let line = [
+        "--columns",
+        "time=t,gyro_x=gx",
+        "--rate",
+        "40",
+        "--quiet",
+        "--json",
+        out.to_str().unwrap(),
+    ];
+    assert!(
+        run(&[&["analyze", set_back.to_str().unwrap()], &line[..]].concat())
+            .status
+            .success()
+    );
+    let input = &json(&out)["input"];
+    assert_eq!(input["rate_hz"], 40.0);
+    assert!(
+        input["notes"]
+            .to_string()
+            .contains("by the times of the rows it is 20.0000 Hz"),
+        "{input}"
+    );
     let still = table_at(&folder, "still.csv", (0..100).map(|_| 5.0));
     let refused = run(&[
         "analyze",

@@ -113,18 +113,25 @@ fn slope(lines: &[(Vec<f64>, Vec<f64>)]) -> Option<f64> {
     (under > 0.0).then(|| over / under)
 }
 
-/// Takes the rate of a record whose header has none from the times of its rows.
+/// Takes the rate of a record whose header has none from the times of its rows; tells where they contradict the header.
 pub(super) fn take_from_times(record: &mut Cow<'_, Record>) {
-    if record
-        .header
-        .rate_hz
-        .is_some_and(|r| r.is_finite() && r > 0.0)
-    {
-        return;
-    }
     let Some(rate) = by_times(record) else {
         return;
     };
+    let stated = record.header.rate_hz;
+    if let Some(stated) = stated.filter(|r| r.is_finite() && *r > 0.0) {
+        // With ticks, the device's clock has been heard.
+        if record.t_ticks.is_none() && (stated / rate - 1.0).abs() > SIDE {
+            let told = format!(
+                "the stated rate is {stated:.4} Hz, but by the times of the rows it is {rate:.4} Hz: all times and frequencies \
+                 follow the stated one"
+            );
+            if !record.notes.contains(&told) {
+                record.to_mut().notes.push(told);
+            }
+        }
+        return;
+    }
     let t = record.host_time_s.as_deref().unwrap_or_default();
     let steps = t.len().saturating_sub(1);
     let same = t.windows(2).filter(|w| w[0] == w[1]).count();

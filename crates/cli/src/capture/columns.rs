@@ -2,7 +2,7 @@
 
 use model::record::Quantity;
 
-use super::error::brief_list;
+use super::error::{brief, brief_list};
 use super::foreign::meaning;
 use super::header::Lines;
 use super::propose::{alias, nearest, proposal};
@@ -394,6 +394,18 @@ fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureEr
         let Some(at) = place(said, theirs) else {
             return Err(unknown(said, format!("there is no column `{theirs}`")));
         };
+        if let Some(other) = found.columns.iter().find(|c: &&Column| c.at == at) {
+            return Err(CaptureError::Option {
+                option: "--columns",
+                why: format!(
+                    "the column `{}` is given to {} and to {given}",
+                    brief(&said.names[at]),
+                    other.name
+                ),
+                help: "one column is one channel: leave one of the two out, or name its own column"
+                    .to_owned(),
+            });
+        }
         let is_taken = |name: &str| mapping.columns.iter().any(|(other, _)| other == name);
         let alias = alias(given).filter(|name| !is_taken(name));
         if let Some(name) = &alias {

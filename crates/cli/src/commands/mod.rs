@@ -262,10 +262,17 @@ pub fn explain(error: analysis::AnalysisError) -> miette::Report {
         }
         analysis::AnalysisError::NoRate => "add `--rate HZ`, or map a time column".to_owned(),
         analysis::AnalysisError::NoChannel { name, present } => match present.first() {
-            Some(first) if name.starts_with("gyro_x,") => format!(
-                "say which column is a gyro, and in which unit: --columns {} --units gyro=deg/s",
-                shell_word(&format!("gyro_x={first}"))
-            ),
+            Some(_) if name.starts_with("gyro_x,") => {
+                let known = ["temp", "acc", "supply", "pwm"];
+                let is_known = |name: &&String| known.iter().any(|stem| name.starts_with(stem));
+                // What is mapped to something else already is no gyro.
+                let column = present.iter().find(|name| !is_known(name));
+                let gyro = column.map_or_else(
+                    || "gyro_x=COLUMN".to_owned(),
+                    |column| shell_word(&format!("gyro_x={column}")),
+                );
+                format!("say which column is a gyro, and in which unit: --columns {gyro} --units gyro=deg/s")
+            }
             _ => "name one of the channels that are there".to_owned(),
         },
         analysis::AnalysisError::Constant { name, .. } => format!(

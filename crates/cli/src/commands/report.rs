@@ -15,7 +15,7 @@ use super::{Input, Outputs};
 /// What `report` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// The capture, .csv or .csv.gz
+    /// The capture: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .txt
     capture: PathBuf,
     #[command(flatten)]
     input: Input,

@@ -191,7 +191,7 @@ impl ImuNoise {
         let mut out = self.origin("#");
         out.push_str(
             "# Continuous time, two-sided: discrete white noise is density * sqrt(rate), a step of the bias walk / sqrt(rate).\n\
-             # One number for all axes: their root mean square. A walk that is not established stands at its 95 % limit.\n\
+             # One number for all axes: their root mean square. What is not established stands at its 95 % limit.\n\
              # What no random walk describes (flicker, temperature, vibration) is not in these numbers: `imu-stand diagnose`.\n",
         );
         for (axes, name, unit) in [
@@ -208,18 +208,18 @@ impl ImuNoise {
             for axis in axes {
                 let figure =
                     |f: Figure| f.expected().map_or("?".to_owned(), |v| format!("{v:.6e}"));
-                let remark = axis.walk.remark();
+                let remark = |f: Figure| match f.remark() {
+                    remark if remark.is_empty() => remark,
+                    remark => format!(" ({remark})"),
+                };
                 let _ = writeln!(
                     out,
-                    "# {}: density {}, walk {}{}",
+                    "# {}: density {}{}, walk {}{}",
                     axis.name,
                     figure(axis.white),
+                    remark(axis.white),
                     figure(axis.walk),
-                    if remark.is_empty() {
-                        remark
-                    } else {
-                        format!(" ({remark})")
-                    }
+                    remark(axis.walk)
                 );
             }
             let white = rms(axes.iter().map(|axis| axis.white.expected()));
@@ -238,7 +238,7 @@ impl ImuNoise {
         let _ = writeln!(
             out,
             "# For {rate_hz} Hz and no other rate. VINS adds dt^2/2 * n^2 to a variance at each step, and dt^2 * w^2 to that of \
-             the\n# bias; so n = N sqrt(2 rate), w = K sqrt(rate). A walk that is not established stands at its 95 % limit."
+             the\n# bias; so n = N sqrt(2 rate), w = K sqrt(rate). What is not established stands at its 95 % limit."
         );
         for (axes, name, unit) in [(&self.acc, "acc", "m/s^2"), (&self.gyro, "gyr", "rad/s")] {
             if axes.is_empty() {

@@ -127,6 +127,9 @@ fn simulate(model: &ModelFile, seconds: f64, seed: u64) -> Result<Record> {
         .map_err(|error| miette::miette!(help = "try another --capture or --channel", "{error}"))
 }
 
+/// Readings that tell anything of the noise.
+const LEAST_READINGS: usize = 64;
+
 /// The record that the figures show, and the stand that its figure-1 model is simulated from.
 struct Shown {
     record: Record,
@@ -168,6 +171,15 @@ fn shown(arguments: &Arguments, stand: &PaperStand) -> Result<Shown> {
             "{} is no gyro in deg/s",
             arguments.channel
         );
+    }
+    let readings = channel.values.iter().filter(|v| v.is_finite()).count();
+    if readings < LEAST_READINGS {
+        return Err(super::explain(analysis::AnalysisError::Inconclusive {
+            what: format!("the paper's curve of {}", channel.name),
+            have: readings as f64,
+            need: LEAST_READINGS as f64,
+            unit: "samples",
+        }));
     }
     Ok(Shown {
         record,
