@@ -77,9 +77,9 @@ fn played(values: &[f64], half: f64) -> Vec<f64> {
 type Maker<'a> = Box<dyn Fn() -> Vec<Vec<f64>> + 'a>;
 
 /// A combination: what it is, and its columns.
-struct Combination<'a> {
-    what: String,
-    columns: Maker<'a>,
+pub(crate) struct Combination<'a> {
+    pub(crate) what: String,
+    pub(crate) columns: Maker<'a>,
 }
 
 impl<'a> Combination<'a> {
@@ -92,7 +92,7 @@ impl<'a> Combination<'a> {
 }
 
 /// The combinations that a record allows.
-fn combinations<'a>(view: &'a View<'_>) -> Vec<Combination<'a>> {
+pub(crate) fn combinations<'a>(view: &'a View<'_>) -> Vec<Combination<'a>> {
     let moves = |s: &&Signal, least: f64| s.range() >= least;
     let temperature = view
         .signal(Quantity::Temp)
@@ -191,18 +191,21 @@ pub(crate) fn source<'a>(view: &'a View<'_>, term: &Term) -> Option<&'a str> {
 /// Names of its columns; they are no parameters of anything.
 const NAMES: [&str; 8] = ["c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
 
-/// Its hypotheses, each made when it is asked for.
-pub fn one_by_one<'a>(view: &'a View<'_>) -> impl ExactSizeIterator<Item = Hypothesis> + 'a {
-    combinations(view).into_iter().map(|c| {
-        let columns = (c.columns)().into_iter().zip(NAMES);
+impl Combination<'_> {
+    /// Its hypothesis, with the number of columns that it turns out to have; their values are elsewhere.
+    pub(crate) fn hypothesis(self, width: usize) -> Hypothesis {
+        let names = NAMES.iter().take(width);
         Hypothesis::Regression(Regression {
-            columns: columns
-                .map(|(values, parameter)| Column { parameter, values })
+            columns: names
+                .map(|parameter| Column {
+                    parameter,
+                    values: vec![],
+                })
                 .collect(),
             fixed: vec![],
-            follows: Some(c.what),
+            follows: Some(self.what),
         })
-    })
+    }
 }
 
 impl Effect for Beyond {
@@ -229,8 +232,9 @@ impl Effect for Beyond {
         &[]
     }
 
-    fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
-        Ok(one_by_one(view).collect())
+    /// The search asks for its [`combinations`], which are made one at a time.
+    fn hypotheses(&self, _: &View<'_>) -> Result<Vec<Hypothesis>, String> {
+        Ok(vec![])
     }
 
     fn stage(&self) -> Stage {

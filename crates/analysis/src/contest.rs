@@ -3,6 +3,8 @@
 //! Both sides are weighed on the same block means: the Gaussian model by its exact likelihood, the two-level one (with
 //! white noise and a random walk of the level) by a bank of Kalman filters, one for each level, merged by moments.
 
+mod steps;
+
 use std::f64::consts::TAU;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -10,7 +12,7 @@ use std::sync::Arc;
 use model::effect::{Covariance, Effect, Hypothesis};
 
 pub use crate::levels::two_level;
-use crate::levels::{Side, Sides, covariance_of, fitted, many_ahead, path};
+use crate::levels::{Coordinates, Side, Sides, again, covariance_of, fitted, many_ahead, path};
 use crate::likelihood::{Bins, Dct, Noise, Panel, least_walk};
 use crate::scan::residual;
 use crate::search::{Form, Note, Search, State, Term};
@@ -32,6 +34,9 @@ const COARSE_BLOCKS: usize = 400;
 /// Most blocks of a correlation time, where a record holds more blocks than that.
 const BLOCKS_OF_A_TIME: f64 = 10.0;
 
+/// Stationary terms with their coordinates.
+type Processes = Vec<(Arc<dyn Covariance>, Vec<f64>)>;
+
 /// The AR(1)-like term of the library: stationary, two coordinates, no filter.
 fn stationary(search: &Search<'_>) -> Option<(usize, &'static dyn Effect, Arc<dyn Covariance>)> {
     search
@@ -50,6 +55,13 @@ fn stationary(search: &Search<'_>) -> Option<(usize, &'static dyn Effect, Arc<dy
 fn means(y: &[f64], length: usize, count: usize) -> Vec<f64> {
     let mean = |c: &[f64]| c.iter().sum::<f64>() / length as f64;
     y.chunks_exact(length).take(count).map(mean).collect()
+}
+
+/// Share of each of `count` blocks that lies behind time `at`, samples; the blocks start at `first`.
+fn after(count: usize, first: usize, length: usize, at: f64) -> Vec<f64> {
+    let behind = |i: usize| (first + (i + 1) * length) as f64 - at;
+    let share = |i: usize| (behind(i) / length as f64).clamp(0.0, 1.0);
+    (0..count).map(share).collect()
 }
 
 /// Whether two levels may stand behind what the search left to the random walk, by a coarse look.
@@ -142,20 +154,30 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     });
     let rival = search.refit(theirs, state.noise.log_walk);
     let r = residual(&search.panel, &rival.columns(), &rival.solution);
-    let rest = search.panel.dct.inverse(&r);
+    let mut rest = search.panel.dct.inverse(&r);
     // A process that is fast for a long record is weighed on a stretch of it, in blocks that still show it.
     let shortest = ((BLOCK_S * search.view.rate_hz) as usize).max(1);
-    let time = rival
-        .noise
-        .terms
-        .last()
-        .map_or(0.0, |(_, theta)| theta[1].exp());
+    // What a step beside it adds to its spectrum is none of its own.
+    let is_step = |t: &&Term| matches!(t.form, Form::Step(..));
+    let time_of = |s: &State| {
+        s.noise
+            .terms
+            .last()
+            .map_or(0.0, |(_, theta)| theta[1].exp())
+    };
+    let time = if wandering && steps > 0 {
+        let beside = state.terms.iter().filter(is_step).cloned();
+        let terms = rival.terms.iter().cloned().chain(beside).collect();
+        time_of(&search.refit(terms, state.noise.log_walk))
+    } else {
+        time_of(&rival)
+    };
     let length = n
         .div_ceil(MOST_BLOCKS)
         .min((time / BLOCKS_OF_A_TIME) as usize)
         .max(shortest);
     let first = n.saturating_sub(MOST_BLOCKS * length) / 2;
-    let blocks = means(&rest[first..], length, MOST_BLOCKS);
+    let mut blocks = means(&rest[first..], length, MOST_BLOCKS);
     let m = blocks.len();
     if m < 200 {
         return state;
@@ -163,10 +185,10 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     // Gaussian side: the better of what was found and the AR(1)-like term, steps as columns.
     let (dct, bins) = (Dct::new(m), Rc::new(Bins::new(m)));
     let panel = Panel::new(&dct, &bins, &blocks);
-    let gaussian = |terms: &[(Arc<dyn Covariance>, Vec<f64>)], columns: &[usize]| {
+    let gaussian = |panel: &Panel, terms: Processes, columns: &[usize]| {
         let noise = Noise {
             log_walk: -9.0,
-            terms: terms.to_vec(),
+            terms,
         };
         let (noise, solution) = panel.fit(&noise, columns);
         let count = (m - 1) as f64;
@@ -177,18 +199,14 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         .terms
         .iter()
         .filter_map(|t| match t.form {
-            Form::Step(s, _) => {
-                // The block that holds it reads a mean of both levels.
-                let after = |i: usize| (first + (i + 1) * length) as f64 - s;
-                let share = |i: usize| (after(i) / length as f64).clamp(0.0, 1.0);
-                Some(panel.add(&(0..m).map(share).collect::<Vec<_>>()))
-            }
+            // The block that holds it reads a mean of both levels.
+            Form::Step(s, _) => Some(panel.add(&after(m, first, length, s))),
             _ => None,
         })
         .collect();
     // Correlation times are in samples: of blocks, they are shorter by the block.
     let shorter = (length as f64).ln();
-    let terms_of = |s: &State| -> Vec<(Arc<dyn Covariance>, Vec<f64>)> {
+    let terms_of = |s: &State| -> Processes {
         s.terms
             .iter()
             .filter_map(|t| match &t.form {
@@ -205,14 +223,14 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
             .collect()
     };
     // Each step costs its time and its height.
-    let like_one = gaussian(&terms_of(&rival), &[]);
-    let found = gaussian(&terms_of(&state), &own_columns);
+    let like_one = gaussian(&panel, terms_of(&rival), &[]);
+    let found = gaussian(&panel, terms_of(&state), &own_columns);
     let theirs = like_one.0.max(found.0 - steps as f64 * (m as f64).ln());
     let variance = blocks.iter().map(|v| v * v).sum::<f64>() / m as f64;
     let white = (state.solution.white / length as f64).min(variance);
     let excess = (variance - white).max(0.05 * white);
     let starts = [(1.0, 15.0), (0.8, 60.0), (0.6, 200.0)];
-    let (two, x) = fitted(&blocks, white, excess, &starts, 160);
+    let (mut two, mut x) = fitted(&blocks, white, excess, &starts, 160);
     let ahead = two - theirs;
     // A step or two are no noise that switches.
     if steps > 0 && !wandering && (m as f64) < 1.001 * LEAST_SWITCHES * x[3].exp() {
@@ -221,20 +239,21 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     if !contest && 2.0 * ahead < threshold::two_level() {
         return state;
     }
-    let (gaussian, noise, white) = if wandering { found } else { like_one };
-    let sides = Sides {
-        dct: &dct,
-        bins: &bins,
-        noise,
-        white,
-        two: x,
+    let mut other = if wandering { found } else { like_one };
+    let cox = |two: f64, x: &Coordinates, (l, noise, white): (f64, Noise, f64), truth| {
+        let sides = Sides {
+            dct: &dct,
+            bins: &bins,
+            noise,
+            white,
+            two: *x,
+        };
+        sides.cox(two - l, truth)
     };
     let mut state = state;
     if ahead <= MARGIN && wandering {
-        let claim = adequacy::levels(
-            sides.cox(two - gaussian, Side::Gaussian),
-            "a Gaussian process",
-        );
+        let z = cox(two, &x, other.clone(), Side::Gaussian);
+        let claim = adequacy::levels(z, "a Gaussian process");
         for t in state.terms.iter_mut().filter(|t| contested(t)) {
             t.claims.push(claim.clone());
         }
@@ -251,6 +270,15 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         }
         return open;
     }
+    let mut settled = rival;
+    let without = settled.terms.len();
+    settled = steps::beside(search, settled, &mut rest, length, &x);
+    if settled.terms.len() > without {
+        blocks = means(&rest[first..], length, MOST_BLOCKS);
+        (two, x) = again(&blocks, &x);
+        let panel = Panel::new(&dct, &bins, &blocks);
+        other = gaussian(&panel, terms_of(&settled), &[]);
+    }
     let errors = covariance_of(&|y| two_level(&blocks, y), &x);
     // ln of the half height is x2 + x0 / 2.
     let least = (-2.0 * x[2]).exp() / m as f64;
@@ -264,7 +292,6 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     let mixed = (0.5 * (-x[3]).exp()).min(0.3);
     let half = (x[2] + 0.5 * x[0]).exp() / (1.0 - mixed);
     let dwell = x[3].exp() * length as f64 / search.view.rate_hz;
-    let mut settled = rival;
     if many_ahead(&blocks, &x) > MARGIN {
         settled.notes.push(Note {
             what: "jumps between more than two levels".into(),
@@ -284,13 +311,13 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         let at = |i: usize| levels[(i / length).min(m - 1)];
         settled.level = Some(Rc::new((0..n).map(at).collect()));
     }
-    if let Some(t) = settled.terms.last_mut() {
+    if let Some(t) = settled.terms.get_mut(without - 1) {
         t.stated = Some(vec![
             (half, half * half_error),
             (dwell, dwell * dwell_error),
         ]);
         t.lr = 2.0 * (ahead - MARGIN) + t.threshold;
-        let z = sides.cox(two - gaussian, Side::TwoLevels);
+        let z = cox(two, &x, other, Side::TwoLevels);
         t.claims.push(adequacy::levels(z, "two levels"));
     }
     settled

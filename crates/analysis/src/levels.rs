@@ -165,6 +165,42 @@ pub(crate) fn fitted(
         .unwrap_or((f64::NEG_INFINITY, [0.0; 4]))
 }
 
+/// The two levels fitted again, from where they were.
+pub(crate) fn again(y: &[f64], x: &Coordinates) -> (f64, Coordinates) {
+    highest(y, x, &TWO, 160)
+}
+
+/// Coefficient of a column beside the two levels, and the nats that it gains.
+pub(crate) fn with_column(y: &[f64], x: &Coordinates, column: &[f64]) -> (f64, f64) {
+    let without = highest(y, x, &TWO, 60);
+    let less = |coefficient: f64| -> Vec<f64> {
+        let parts = y.iter().zip(column);
+        parts.map(|(v, c)| v - coefficient * c).collect()
+    };
+    // What the coefficient is in doubt by at least: the levels' own height.
+    let half = (x[2] + 0.5 * x[0]).exp();
+    let mut best = (0.0, without.0);
+    for start in [-3.0, 3.0] {
+        let objective = |p: &[f64]| {
+            let clamped = inside(p, y.len());
+            let outside: f64 = p.iter().zip(&clamped).map(|(a, b)| (a - b).powi(2)).sum();
+            outside - levels_likelihood(&less(p[4] * half), &clamped, &TWO)
+        };
+        let [a, b, c, d] = without.1;
+        let at = crate::optimise::nelder_mead(
+            &objective,
+            &[a, b, c, d, start],
+            &[0.1, 2.0, 0.3, 0.7, 1.0],
+            240,
+        );
+        let l = -objective(&at);
+        if l > best.1 {
+            best = (at[4] * half, l);
+        }
+    }
+    (best.0, best.1 - without.0)
+}
+
 /// Nats that many levels are ahead of two, from where the two are at their best.
 pub(crate) fn many_ahead(y: &[f64], two: &Coordinates) -> f64 {
     highest(y, two, &MANY, 60).0 - two_level(y, two)

@@ -273,6 +273,38 @@ impl Panel {
         self.columns.borrow().len() - 1
     }
 
+    /// Add the columns that go by a name, which other channels may have in `common`: then they are made once. Returns
+    /// their numbers.
+    pub(crate) fn add_named(
+        &self,
+        name: &str,
+        common: bool,
+        make: &dyn Fn() -> Vec<Vec<f64>>,
+    ) -> Vec<usize> {
+        let made = || -> Vec<Column> {
+            let values = make();
+            let new = values.iter().map(|v| Column::new(self.dct.forward(v)));
+            new.collect()
+        };
+        let all = if common {
+            let known = self.dct.known.named.borrow().get(name).cloned();
+            known.unwrap_or_else(|| {
+                let all = made();
+                if !self.dct.known.complete.get() {
+                    let mut named = self.dct.known.named.borrow_mut();
+                    named.insert(name.to_owned(), all.clone());
+                }
+                all
+            })
+        } else {
+            made()
+        };
+        let mut columns = self.columns.borrow_mut();
+        let first = columns.len();
+        columns.extend(all);
+        (first..columns.len()).collect()
+    }
+
     /// Add a column of samples; returns its number.
     pub fn add(&self, values: &[f64]) -> usize {
         let c = self.dct.forward(values);

@@ -10,6 +10,8 @@ use rustdct::{DctPlanner, TransformType2And3};
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
+use crate::column::Column;
+
 /// Longest transform whose plan is kept for the next one who asks on the same thread, and most of them.
 const KEPT: usize = 1 << 17;
 const MOST_KEPT: usize = 64;
@@ -153,7 +155,9 @@ fn unpacked(z: &[Complex<f64>], k: usize, h: usize, turn: Complex<f64>) -> Compl
 /// Coefficients of columns that the channels of a record have in common, by a digest of their samples.
 #[derive(Default)]
 pub(crate) struct Known {
-    pub(crate) columns: RefCell<HashMap<[u64; 2], crate::column::Column>>,
+    pub(crate) columns: RefCell<HashMap<[u64; 2], Column>>,
+    /// Those that go by a name.
+    pub(crate) named: RefCell<HashMap<String, Vec<Column>>>,
     /// Whether what the channels have in common is known: those of the first are, and no later one's own are kept.
     pub(crate) complete: Cell<bool>,
 }
@@ -200,6 +204,7 @@ impl Dct {
     /// Let go of the columns that channels have in common.
     pub fn forget(&self) {
         self.known.columns.borrow_mut().clear();
+        self.known.named.borrow_mut().clear();
     }
 
     /// Coefficients of `x`.

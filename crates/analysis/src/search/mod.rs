@@ -21,7 +21,7 @@ use crate::likelihood::{Noise, Panel, Solution};
 /// Most terms on one channel.
 const MOST_TERMS: usize = 8;
 /// Most lines, and most steps, that are told as separate causes.
-const MOST_ALIKE: usize = 2;
+pub const MOST_ALIKE: usize = 2;
 /// Scores closer than this (twice 3 nats) leave the answer open.
 pub const RIVAL_SPAN: f64 = 6.0;
 /// Fewest cycles of a line in the record.
@@ -219,67 +219,75 @@ impl<'a> Search<'a> {
         let mut candidates = vec![];
         let mut not_tested = vec![];
         // What follows a thermometer of this axis is no column of another one.
-        let own = |h: &Hypothesis| match h {
-            Hypothesis::Regression(r) => view.signals.iter().any(|s| {
-                s.quantity == Quantity::Temp
-                    && s.axis.is_some()
-                    && r.follows.as_ref().is_some_and(|f| f.contains(&s.name))
-            }),
-            _ => false,
-        };
-        let mut lay_out = |effect: &'static dyn Effect,
-                           mut hypothesis: Hypothesis,
-                           siblings: usize,
-                           handicap: f64| {
-            let common = !own(&hypothesis);
-            let columns = match &mut hypothesis {
-                // The panel has them now.
-                Hypothesis::Regression(r) => r
-                    .columns
-                    .iter_mut()
-                    .map(|c| panel.add_candidate(&std::mem::take(&mut c.values), common))
-                    .collect(),
-                _ => vec![],
-            };
-            let grid = match &hypothesis {
-                Hypothesis::Shaped(s) => s
-                    .grid()
-                    .into_iter()
-                    .map(|at| {
-                        let columns = s.columns(at);
-                        let columns = columns
-                            .iter()
-                            .map(|c| panel.add_candidate(&c.values, common));
-                        (at, columns.collect())
-                    })
-                    .collect(),
-                _ => vec![],
-            };
-            candidates.push(Candidate {
-                effect,
-                hypothesis,
-                columns,
-                grid,
-                siblings,
-                handicap,
-            });
+        let own = |follows: &str| {
+            let mut thermometers = view
+                .signals
+                .iter()
+                .filter(|s| s.quantity == Quantity::Temp && s.axis.is_some());
+            thermometers.any(|s| follows.contains(&s.name))
         };
         for effect in EFFECTS {
-            match effect.hypotheses(&view) {
-                Err(why) => not_tested.push((effect.id(), why)),
-                Ok(hypotheses) => {
-                    let siblings = hypotheses.len();
-                    for hypothesis in hypotheses {
-                        lay_out(*effect, hypothesis, siblings, 0.0);
-                    }
+            let hypotheses = match effect.hypotheses(&view) {
+                Err(why) => {
+                    not_tested.push((effect.id(), why));
+                    continue;
                 }
+                Ok(hypotheses) => hypotheses,
+            };
+            let siblings = hypotheses.len();
+            for mut hypothesis in hypotheses {
+                let follows = match &hypothesis {
+                    Hypothesis::Regression(r) => r.follows.as_deref(),
+                    _ => None,
+                };
+                let common = !follows.is_some_and(own);
+                let columns = match &mut hypothesis {
+                    // The panel has them now.
+                    Hypothesis::Regression(r) => r
+                        .columns
+                        .iter_mut()
+                        .map(|c| panel.add_candidate(&std::mem::take(&mut c.values), common))
+                        .collect(),
+                    _ => vec![],
+                };
+                let grid = match &hypothesis {
+                    Hypothesis::Shaped(s) => s
+                        .grid()
+                        .into_iter()
+                        .map(|at| {
+                            let columns = s.columns(at);
+                            let columns = columns
+                                .iter()
+                                .map(|c| panel.add_candidate(&c.values, common));
+                            (at, columns.collect())
+                        })
+                        .collect(),
+                    _ => vec![],
+                };
+                candidates.push(Candidate {
+                    effect: *effect,
+                    hypothesis,
+                    columns,
+                    grid,
+                    siblings,
+                    handicap: 0.0,
+                });
             }
         }
-        // A cause of the library that does as well goes before a combination that has no name.
-        let unknown = beyond::one_by_one(&view);
+        let unknown = beyond::combinations(&view);
         let siblings = unknown.len();
-        for hypothesis in unknown {
-            lay_out(&beyond::EFFECT, hypothesis, siblings, RIVAL_SPAN);
+        for combination in unknown {
+            let common = !own(&combination.what);
+            let columns = panel.add_named(&combination.what, common, &combination.columns);
+            candidates.push(Candidate {
+                effect: &beyond::EFFECT,
+                hypothesis: combination.hypothesis(columns.len()),
+                columns,
+                grid: vec![],
+                siblings,
+                // A cause of the library that does as well goes before a combination that has no name.
+                handicap: RIVAL_SPAN,
+            });
         }
         Self {
             panel,

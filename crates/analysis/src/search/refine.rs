@@ -82,7 +82,7 @@ impl Search<'_> {
     }
 
     /// Add a term, in place of the one that it extends.
-    pub(super) fn accept(&self, state: &State, term: Term) -> State {
+    pub(crate) fn accept(&self, state: &State, term: Term) -> State {
         let mut term = self.refine(state, term);
         let mut terms = state.terms.clone();
         if term.effect.extends().is_some() && matches!(term.form, Form::Columns) {

@@ -223,7 +223,7 @@ impl Search<'_> {
     }
 
     /// What every open candidate offers, those that extend a term in its place.
-    pub(super) fn offers(&self, state: &State, allow: &dyn Fn(&Candidate) -> bool) -> Vec<Term> {
+    pub(crate) fn offers(&self, state: &State, allow: &dyn Fn(&Candidate) -> bool) -> Vec<Term> {
         let walks = self.panel.walks(&state.noise);
         (0..self.candidates.len())
             .filter(|i| allow(&self.candidates[*i]) && self.open(state, *i))
