@@ -116,6 +116,47 @@ pub(crate) fn evenness(e: &[f64], named: &str, lr: f64, rate_hz: f64) -> Outcome
     }
 }
 
+/// Samples over which what a law of the variance adds is asked whether it is white.
+const LAGS_OF_ADDED: usize = 20;
+
+/// The other claim of a law of the variance: what it adds is white. `law` is the variance over its mean, by sample, which `e`
+/// was divided by; where more of it is added, a correlation counts for more.
+pub(crate) fn added_white(e: &[f64], law: &[f64], named: &str, lr: f64) -> Outcome {
+    let least = law.iter().copied().fold(f64::INFINITY, f64::min);
+    let added: Vec<f64> = e
+        .iter()
+        .zip(law)
+        .map(|(e, v)| e * (1.0 - least / v))
+        .collect();
+    let score = |lag: usize| {
+        let (mut sum, mut square) = (0.0, 0.0);
+        for (a, b) in added.iter().zip(&added[lag..]) {
+            let p = a * b;
+            sum += p;
+            square += p * p;
+        }
+        sum / square.max(f64::MIN_POSITIVE).sqrt()
+    };
+    let scores: Vec<f64> = (1..=LAGS_OF_ADDED.min(e.len() / 2)).map(score).collect();
+    let statistic: f64 = scores.iter().map(|z| z * z).sum();
+    let worst = (0..scores.len())
+        .max_by(|a, b| scores[*a].abs().total_cmp(&scores[*b].abs()))
+        .unwrap_or(0);
+    Outcome {
+        id: VARIANCE_CLAIM,
+        statistic,
+        p_value: if statistic < DEPARTURE * lr {
+            1.0
+        } else {
+            chi_tail(statistic, scores.len() as f64)
+        },
+        what: format!(
+            "told as {named}: what it adds is not white, readings {} samples apart correlate most",
+            worst + 1
+        ),
+    }
+}
+
 /// The claim of a contest of levels: `z` standard errors from what the lead of two levels is for what was named.
 pub(crate) fn levels(z: f64, named: &str) -> Outcome {
     let more = if z > 0.0 { "more" } else { "less" };

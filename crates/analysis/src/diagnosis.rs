@@ -11,6 +11,7 @@ use model::record::Record;
 use crate::audit::{audit, sign_bit};
 use crate::checks::{self, LEAST_CHANCE};
 use crate::common::{Shared, common};
+use crate::couplings::couplings;
 use crate::error::AnalysisError;
 use crate::estimate;
 use crate::findings::{
@@ -102,8 +103,9 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     for s in &searched {
         findings.extend(motion_finding(s, &grid));
         let failing = |id: &str| {
-            let own = checks.iter().filter(|c| c.channel == s.target.name);
-            own.filter(|c| c.id == id).any(|c| c.fails_after)
+            let all = checks.iter().chain(&audited.checks);
+            let mut own = all.filter(|c| c.channel == s.target.name && c.id == id);
+            own.any(|c| c.fails_after)
         };
         if failing("kurtosis") {
             // Single far readings of a noise whose bulk is not normal are its tails.
@@ -142,6 +144,9 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     }
     unexplained.extend(dead);
     unexplained.extend(doubts);
+    let (of_others, told) = couplings(&searched, &grid);
+    unexplained.extend(told);
+    checks.extend(of_others);
     checks.extend(shared.checks);
     checks.extend(audited.checks);
     unexplained.extend(audited.unexplained);
@@ -368,9 +373,12 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
     // Before a process was named nothing was claimed of it.
     let claims = adequacy::of_processes(&s.search, &s.state);
     let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
-    let variance = s.variance.as_ref().map(|v| {
-        let rate_hz = s.search.view.rate_hz;
-        adequacy::evenness(&s.e, v.effect.id(), v.lr, rate_hz)
+    let variance = s.variance.iter().flat_map(|v| {
+        let (rate_hz, id) = (s.search.view.rate_hz, v.effect.id());
+        [
+            adequacy::evenness(&s.e, id, v.lr, rate_hz),
+            adequacy::added_white(&s.e, &v.law, id, v.lr),
+        ]
     });
     let laws = laws.chain(variance);
     let claims = claims.into_iter().chain(laws).map(|c| Check {

@@ -36,6 +36,9 @@ const REMAINDER_BEYOND: f64 = 0.25;
 /// The same where a shape is known not to hold: what is off may be as large as what it explains.
 const REMAINDER_UNLAWFUL: f64 = 1.0;
 
+/// Checks that fail where readings depend on earlier ones otherwise than in proportion.
+const BENT: [&str; 4] = ["bicovariance", "three_readings", "variance_rhythm", "slew"];
+
 /// Why a name is not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Doubt {
@@ -144,6 +147,8 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
         repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
     };
     let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
+    // A stationary process of the library is linear: its spectrum is all of it.
+    let bent = BENT.iter().any(|c| failing(c));
     // What is left without a place may be anywhere; what has one leaves a strong term elsewhere alone.
     let misplaced = |t: &Term| !places.is_empty() && t.score() < WIDE;
     let followed = followers(s, &g);
@@ -206,6 +211,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
                 let information = information.map(|((d, g), m)| m * (d / g).powi(2));
                 unlike && !process.filters_white()
                     || repeats.is_some()
+                    || bent
                     || correlated && (places.is_empty() || process.filters_white())
                     || share(&information.collect::<Vec<_>>(), t.lr)
             } else {

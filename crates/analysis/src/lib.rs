@@ -13,6 +13,7 @@ pub mod checks;
 mod column;
 mod common;
 pub mod contest;
+mod couplings;
 mod curves;
 mod dead;
 pub mod diagnosis;

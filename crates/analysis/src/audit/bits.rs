@@ -214,7 +214,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
         return Shape::Unknown;
     }
     if rounding::explains_tails(local, &known) {
-        audit.suppress(&["kurtosis"], name, "the step of the converter");
+        audit.suppress(&["kurtosis", "skewness"], name, "the step of the converter");
     }
     let levels = Levels::new(&local.level, &known);
     // How often each bit is 1.

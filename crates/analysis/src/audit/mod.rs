@@ -15,6 +15,7 @@ mod repeats;
 mod rounding;
 mod saturation;
 pub mod sign_bit;
+mod slew;
 mod stuck;
 pub mod tails;
 mod timing;
@@ -81,9 +82,12 @@ impl Audit {
             &[
                 "outliers",
                 "kurtosis",
+                "skewness",
                 "variance_in_time",
                 "time_frequency",
                 "bicovariance",
+                "three_readings",
+                "variance_rhythm",
             ],
             channel,
             by,
@@ -286,6 +290,7 @@ pub fn audit(record: &Record) -> Audit {
         if (0..rows).filter(|i| g.known(*i)).count() < LEAST_READINGS {
             continue;
         }
+        slew::audit(g, &mut audit);
         let shape = bits::audit(g, &mut audit);
         saturation::audit(g, shape, &mut audit);
     }

@@ -136,7 +136,7 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
     );
     audit.findings.push(finding);
     audit.suppress(
-        &["stuck_bit", "stale_samples", "kurtosis"],
+        &["stuck_bit", "stale_samples", "kurtosis", "skewness"],
         name,
         "saturation",
     );

@@ -48,11 +48,103 @@ pub(super) fn bicovariance(e: &[f64]) -> Outcome {
     }
 }
 
+/// Longest lag of the products of three readings.
+const LAGS_OF_THREE: usize = 10;
+
+/// Products of three readings at different times, over all pairs of lags: what a product of earlier readings leaves behind
+/// (the rest of the third-order moments).
+pub(super) fn three_readings(e: &[f64]) -> Outcome {
+    let e = &e[..e.len().min(MOST)];
+    let mean = e.iter().sum::<f64>() / e.len().max(1) as f64;
+    let centred: Vec<f64> = e.iter().map(|v| v - mean).collect();
+    let mut worst = (0, 0, 0.0f64);
+    let (mut statistic, mut pairs) = (0.0, 0.0);
+    let last = LAGS_OF_THREE.min(e.len() / 2);
+    for a in 1..last {
+        let of_two: Vec<f64> = centred
+            .iter()
+            .zip(&centred[a..])
+            .map(|(x, y)| x * y)
+            .collect();
+        for b in a + 1..=last {
+            let (mut sum, mut square) = (0.0, 0.0);
+            // The last of the three, and the two before it.
+            for (p, v) in of_two.iter().zip(&centred[b..]) {
+                let p = p * v;
+                sum += p;
+                square += p * p;
+            }
+            let z = sum / square.max(f64::MIN_POSITIVE).sqrt();
+            statistic += z * z;
+            pairs += 1.0;
+            if z.abs() > worst.2.abs() {
+                worst = (b - a, b, z);
+            }
+        }
+    }
+    Outcome {
+        id: "three_readings",
+        statistic,
+        p_value: if pairs > 0.0 {
+            chi_tail(statistic, pairs)
+        } else {
+            1.0
+        },
+        what: format!(
+            "products of the whitened residual at three times within {LAGS_OF_THREE} samples; a reading with those {} and {} before it stands out most ({:+.3})",
+            worst.0,
+            worst.1,
+            worst.2 / (e.len() as f64).sqrt()
+        ),
+    }
+}
+
+/// Lowest coefficient at which the variance is asked for a rhythm: slower changes are told by its course.
+const SLOWEST: usize = 16;
+
+/// A rhythm of the variance: the strongest line of the squares of the whitened residual.
+pub(super) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
+    let e = &e[..e.len().min(MOST)];
+    let power = e.iter().map(|v| v * v).sum::<f64>() / e.len().max(1) as f64;
+    let squares: Vec<f64> = e.iter().map(|v| v * v - power).collect();
+    let c = Dct::new(squares.len().max(1)).forward(&squares);
+    let mut sorted: Vec<f64> = c.iter().skip(SLOWEST).map(|v| v * v).collect();
+    let count = sorted.len();
+    if count < 2 * SLOWEST {
+        return Outcome {
+            id: "variance_rhythm",
+            statistic: 0.0,
+            p_value: 1.0,
+            what: "too short for a rhythm of the variance".into(),
+        };
+    }
+    let (_, median, _) = sorted.select_nth_unstable_by(count / 2, f64::total_cmp);
+    // Median of chi-square with one degree: the lines themselves do not raise it.
+    let level = *median / 0.4549;
+    let (at, most) = c
+        .iter()
+        .enumerate()
+        .skip(SLOWEST)
+        .map(|(k, v)| (k, v * v))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap_or((0, 0.0));
+    let statistic = most / level.max(f64::MIN_POSITIVE);
+    Outcome {
+        id: "variance_rhythm",
+        statistic,
+        p_value: (chi_tail(statistic, 1.0) * count as f64).min(1.0),
+        what: format!(
+            "lines in the square of the whitened residual; {:.4} Hz stands out most",
+            at as f64 / c.len() as f64 * rate_hz / 2.0
+        ),
+    }
+}
+
 /// Longest period, samples, and fewest of them in the record.
 const LONGEST: usize = 512;
 const FEWEST: usize = 8;
 /// Samples that are looked at: so many show what repeats itself.
-const MOST: usize = 1 << 18;
+pub(crate) const MOST: usize = 1 << 18;
 
 /// A period of the sampling with which the residual repeats itself.
 pub(crate) struct Repeats {
@@ -158,11 +250,14 @@ mod tests {
     }
 
     #[test]
-    fn both_fail_on_white_noise_as_often_as_their_chance_says() {
+    fn they_fail_on_white_noise_as_often_as_their_chance_says() {
         let runs = 500;
         let (mut low, mut half, mut repeating) = (0, 0, 0);
+        let (mut rhythmic, mut of_three) = (0, 0);
         for seed in 0..runs {
             let e = white(3000, seed);
+            rhythmic += usize::from(variance_rhythm(&e, 20.0).p_value < 0.01);
+            of_three += usize::from(three_readings(&e).p_value < 0.01);
             let p = bicovariance(&e).p_value;
             low += usize::from(p < 0.01);
             half += usize::from(p < 0.5);
@@ -172,6 +267,7 @@ mod tests {
         assert!(low <= 15, "{low}");
         assert!((200..=300).contains(&half), "{half}");
         assert!(repeating <= 12, "{repeating}");
+        assert!(rhythmic <= 15 && of_three <= 15, "{rhythmic} {of_three}");
     }
 
     #[test]
@@ -188,6 +284,39 @@ mod tests {
             found.what
         );
         assert!(super::super::ljung_box(&x).p_value > 1e-4);
+    }
+
+    #[test]
+    fn a_product_of_two_earlier_readings_shows() {
+        let e = white(6000, 12);
+        let x: Vec<f64> = (2..e.len())
+            .map(|i| e[i] + 0.2 * e[i - 1] * e[i - 2])
+            .collect();
+        let found = three_readings(&x);
+        assert!(found.p_value < 1e-12, "{}", found.p_value);
+        assert!(
+            found.what.contains("those 1 and 2 before it"),
+            "{}",
+            found.what
+        );
+        assert!(bicovariance(&x).p_value > 1e-4);
+    }
+
+    #[test]
+    fn a_variance_that_beats_shows_its_rhythm() {
+        let e: Vec<f64> = white(6000, 13)
+            .iter()
+            .enumerate()
+            .map(|(i, v)| v * (1.0 + 0.25 * (0.7 * i as f64).sin()))
+            .collect();
+        let found = variance_rhythm(&e, 20.0);
+        assert!(found.p_value < 1e-12, "{}", found.p_value);
+        // 0.7 rad at 20 Hz.
+        assert!(
+            found.what.contains("2.22") || found.what.contains("2.23"),
+            "{}",
+            found.what
+        );
     }
 
     #[test]
