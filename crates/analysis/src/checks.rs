@@ -394,10 +394,16 @@ pub(crate) fn kurtosis_score(b2: f64, n: f64) -> f64 {
     ((1.0 - 2.0 / (9.0 * a)) - inner.cbrt()) / (2.0 / (9.0 * a)).sqrt()
 }
 
-fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
+/// Kurtosis about 0, less the 3 of a normal distribution.
+pub(crate) fn excess_kurtosis(e: &[f64]) -> f64 {
     let n = e.len() as f64;
     let m2 = e.iter().map(|v| v * v).sum::<f64>() / n;
-    let excess = e.iter().map(|v| v.powi(4)).sum::<f64>() / n / (m2 * m2) - 3.0;
+    e.iter().map(|v| v.powi(4)).sum::<f64>() / n / (m2 * m2) - 3.0
+}
+
+fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
+    let n = e.len() as f64;
+    let excess = excess_kurtosis(e);
     let far = (0..e.len())
         .max_by(|a, b| e[*a].abs().total_cmp(&e[*b].abs()))
         .unwrap_or(0);

@@ -36,8 +36,14 @@ const REMAINDER_BEYOND: f64 = 0.25;
 /// The same where a shape is known not to hold: what is off may be as large as what it explains.
 const REMAINDER_UNLAWFUL: f64 = 1.0;
 
-/// Checks that fail where readings depend on earlier ones otherwise than in proportion.
-const BENT: [&str; 4] = ["bicovariance", "three_readings", "variance_rhythm", "slew"];
+/// Checks that fail where readings depend on earlier ones otherwise than in proportion, or lie more to one side.
+const BENT: [&str; 5] = [
+    "bicovariance",
+    "three_readings",
+    "variance_rhythm",
+    "slew",
+    "skewness",
+];
 
 /// Why a name is not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,8 +153,9 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
         repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
     };
     let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
-    // A stationary process of the library is linear: its spectrum is all of it.
-    let bent = BENT.iter().any(|c| failing(c));
+    // A stationary process of the library is linear, of normal noise; far readings beside it make heavy tails, nothing light ones.
+    let light = || checks::excess_kurtosis(&s.e) < 0.0;
+    let bent = BENT.iter().any(|c| failing(c)) || failing("kurtosis") && light();
     // What is left without a place may be anywhere; what has one leaves a strong term elsewhere alone.
     let misplaced = |t: &Term| !places.is_empty() && t.score() < WIDE;
     let followed = followers(s, &g);
