@@ -260,13 +260,16 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     };
     let search = Search::new(panel, view);
     let baseline = search.baseline(&target.noise);
-    let before = {
-        let (u, e) = checks::whitened(&search.panel, &baseline);
-        checks::all(&u, &e, grid.rate_hz)
-    };
+    let plain = checks::whitened(&search.panel, &baseline);
+    let before = checks::all(&plain.0, &plain.1, grid.rate_hz);
     let state = search.run(baseline.clone());
     let found = estimate::found(&search.panel, &state, &target.unit, grid.rate_hz);
-    let (u, e) = checks::whitened(&search.panel, &state);
+    let (u, e) = if state.terms.is_empty() {
+        plain
+    } else {
+        drop(plain);
+        checks::whitened(&search.panel, &state)
+    };
     let mut s = Searched {
         target,
         search,
@@ -369,7 +372,11 @@ fn variance(s: &Searched<'_>) -> Option<VarianceFound> {
 }
 
 fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> {
-    let after = checks::all(&s.u, &s.e, s.search.view.rate_hz);
+    let after = if s.state.terms.is_empty() && s.variance.is_none() {
+        before.clone()
+    } else {
+        checks::all(&s.u, &s.e, s.search.view.rate_hz)
+    };
     // Before a process was named nothing was claimed of it.
     let claims = adequacy::of_processes(&s.search, &s.state);
     let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());

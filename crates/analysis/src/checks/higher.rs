@@ -11,6 +11,7 @@ const LAGS: usize = 20;
 /// or of one law, it has none; what a swing leaves behind that its sign does not tell, and what rises and falls unlike, has
 /// (the third-order moments off their diagonal; Hinich 1996 tests the same sums).
 pub(super) fn bicovariance(e: &[f64]) -> Outcome {
+    let e = &e[..e.len().min(MOST)];
     let n = e.len() as f64;
     let mean = e.iter().sum::<f64>() / n;
     let power = e.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
