@@ -11,14 +11,15 @@ use crate::strength::{Meter, of_variance, size_for};
 mod kept_back;
 mod kept_back_fifth;
 mod kept_back_fourth;
+mod kept_back_seventh;
 mod kept_back_sixth;
 mod kept_back_third;
 #[cfg(test)]
 mod library_share;
 
 /// What there is: first those that the engine was developed with or has been changed after, then those kept back.
-pub const FOREIGN: [&str; SEEN + kept_back_sixth::NAMES.len()] = {
-    let mut all = [""; SEEN + kept_back_sixth::NAMES.len()];
+pub const FOREIGN: [&str; SEEN + kept_back_seventh::NAMES.len()] = {
+    let mut all = [""; SEEN + kept_back_seventh::NAMES.len()];
     let mut i = 0;
     while i < all.len() {
         all[i] = if i < FIRST.len() {
@@ -29,23 +30,26 @@ pub const FOREIGN: [&str; SEEN + kept_back_sixth::NAMES.len()] = {
             kept_back_third::NAMES[i - SECOND]
         } else if i < FOURTH {
             kept_back_fourth::NAMES[i - THIRD]
-        } else if i < SEEN {
+        } else if i < FIFTH {
             kept_back_fifth::NAMES[i - FOURTH]
+        } else if i < SEEN {
+            kept_back_sixth::NAMES[i - FIFTH]
         } else {
-            kept_back_sixth::NAMES[i - SEEN]
+            kept_back_seventh::NAMES[i - SEEN]
         };
         i += 1;
     }
     all
 };
 /// How many of them, from the first, are no longer unseen: the engine was made with 14 of them, and has been changed
-/// since it was graded on the next eight, and on the second to the fifth set kept back.
-pub const SEEN: usize = FOURTH + kept_back_fifth::NAMES.len();
+/// since it was graded on the next eight, and on the second to the sixth set kept back.
+pub const SEEN: usize = FIFTH + kept_back_sixth::NAMES.len();
 
-/// Where the second, the third and the fourth set end.
+/// Where the second to the fifth set end.
 const SECOND: usize = FIRST.len() + kept_back::NAMES.len();
 const THIRD: usize = SECOND + kept_back_third::NAMES.len();
 const FOURTH: usize = THIRD + kept_back_fourth::NAMES.len();
+const FIFTH: usize = FOURTH + kept_back_fifth::NAMES.len();
 
 const FIRST: [&str; 22] = [
     "chirp",
@@ -75,7 +79,8 @@ const FIRST: [&str; 22] = [
 /// The environment that they need.
 #[must_use]
 pub fn needs(name: &str) -> Needs {
-    kept_back_sixth::needs(name)
+    kept_back_seventh::needs(name)
+        .or_else(|| kept_back_sixth::needs(name))
         .or_else(|| kept_back_fifth::needs(name))
         .or_else(|| kept_back_fourth::needs(name))
         .or_else(|| kept_back_third::needs(name))
@@ -89,6 +94,7 @@ pub fn parts(name: &str) -> Vec<&'static str> {
         kept_back_fourth::parts(name),
         kept_back_fifth::parts(name),
         kept_back_sixth::parts(name),
+        kept_back_seventh::parts(name),
     ]
     .concat()
 }
@@ -188,6 +194,7 @@ fn any(
         .or_else(|| kept_back_fourth::one(draw, stand, name, axis, wanted))
         .or_else(|| kept_back_fifth::one(draw, stand, name, axis, wanted))
         .or_else(|| kept_back_sixth::one(draw, stand, name, axis, wanted))
+        .or_else(|| kept_back_seventh::one(draw, stand, name, axis, wanted))
         .unwrap_or_else(|| one(draw, stand, name, axis, wanted))
 }
 

@@ -17,6 +17,7 @@ use crate::strength::{Meter, of_variance};
 
 mod fifth;
 mod fourth;
+mod seventh;
 mod sixth;
 mod third;
 
