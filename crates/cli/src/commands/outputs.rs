@@ -73,11 +73,13 @@ impl Outputs {
 
     /// A simulated capture. It can be had again by its seed, and goes over another one; what a board delivered cannot.
     pub fn simulated(mut self, option: &'static str, path: Option<&PathBuf>) -> Result<Self> {
-        if let Some(path) = self.add(option, path)?
-            && (has_header(path, "# start_unix_s:")
-                || !has_header(path, &format!("# {SIMULATED}:")))
-        {
-            return Err(refused(option, path, "does not say that it was simulated"));
+        if let Some(path) = self.add(option, path)? {
+            if has_header(path, "# start_unix_s:") {
+                return Err(refused(option, path, "is a capture of a board"));
+            }
+            if !has_header(path, &format!("# {SIMULATED}:")) {
+                return Err(refused(option, path, "does not say that it was simulated"));
+            }
         }
         Ok(self)
     }
