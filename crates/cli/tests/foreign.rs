@@ -305,6 +305,35 @@ fn a_file_of_another_kind_is_called_by_its_name_and_long_names_are_cut() {
     );
 }
 
+#[test]
+fn a_boards_microseconds_go_on_when_their_32_bits_begin_again() {
+    let mut text = "micros,gx,gy\n".to_owned();
+    for k in 0..8_u64 {
+        let micros = (4_294_960_000 + 20_000 * k) % (1 << 32);
+        text += &format!("{micros},{},-1\n", 0.25 * k as f64);
+    }
+    let read = read(
+        text.as_bytes(),
+        "time=micros,gyro_x=gx,gyro_y=gy",
+        "gyro=deg/s",
+    )
+    .expect("times");
+    is_the_table(&read);
+    let notes = read.record.notes.join("; ");
+    assert!(notes.contains("begins again 1 times"), "{notes}");
+    let said = error(text.as_bytes(), "", "");
+    assert!(
+        said.contains("time=micros") && said.contains("time=us"),
+        "{said}"
+    );
+    let said = error(
+        b"t,gx\n06/07/2026 19:02:59,1\n",
+        "time=t,gyro_x=gx",
+        "gyro=deg/s",
+    );
+    assert!(said.contains("no time: a number, or a date like"), "{said}");
+}
+
 /// Pieces that tables are made of, right and wrong.
 fn piece() -> impl Strategy<Value = Vec<u8>> {
     let known = [

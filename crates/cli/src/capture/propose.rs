@@ -214,6 +214,8 @@ impl Meaning {
         let first = words.first().map_or("", String::as_str);
         let letters = |list: &[&str]| list.contains(&first);
         let is_seconds = known(first) == Some("s");
+        let is_of_time =
+            words.len() == 1 && known(first).is_some_and(|unit| is_unit_of(unit, What::Time));
         let unit = in_brackets(name).1;
         let unit_is_of = |what| unit.is_some_and(|unit| is_unit_of(unit, what));
         let kind = if is(&["mag", "quat", "orient", "gravity", "euler", "tick"]) {
@@ -226,7 +228,11 @@ impl Meaning {
             Kind::Acc
         } else if is(&["temp"]) {
             Kind::Temp
-        } else if first.starts_with("time") || first == "t" || is_seconds || unit_is_of(What::Time)
+        } else if first.starts_with("time")
+            || first == "t"
+            || is_seconds
+            || is_of_time
+            || unit_is_of(What::Time)
         {
             Kind::Time
         } else if unit_is_of(What::Channel(Quantity::Gyro)) {
@@ -374,6 +380,10 @@ mod tests {
             (
                 "imu0.time;imu0.gx;imu0.gyro.y;imu0.ax",
                 "--columns time=imu0.time,gyro_x=imu0.gx,gyro_y=imu0.gyro.y,acc_x=imu0.ax --units gyro=deg/s,acc=m/s2",
+            ),
+            (
+                "micros;gx;gy",
+                "--columns time=micros,gyro_x=gx,gyro_y=gy --units time=us,gyro=deg/s",
             ),
             ("y", "--columns gyro_y=y --units gyro=deg/s"),
             ("values", "--columns gyro_x=values --units gyro=deg/s"),

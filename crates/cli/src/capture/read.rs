@@ -214,7 +214,13 @@ impl<'a> RowReader<'a> {
                 continue;
             }
             let Some(value) = read else {
-                return Err(bad(column, cell, "not a finite number".to_owned()));
+                let what = match column.role {
+                    Role::Time { .. } => {
+                        "no time: a number, or a date like 2026-11-21 19:02:59.78 or 21.11.2026 19:02:59.78"
+                    }
+                    _ => "not a finite number",
+                };
+                return Err(bad(column, cell, what.to_owned()));
             };
             if !column.role.takes(value) {
                 let what = "not a whole number of the range that this column has";
@@ -266,15 +272,42 @@ fn check_time(found: &Columns, cells: &[Vec<f64>]) -> Result<(), CaptureError> {
     Ok(())
 }
 
+/// Undoes the wrapping of a time that a counter of 32 bits holds, as boards' microseconds do every 71 minutes: it goes back
+/// by more than half of what such a counter can hold. How often.
+fn unwrap_times(times: &mut [f64], scale: f64) -> usize {
+    let turn = scale * 4_294_967_296.0;
+    if !times.iter().all(|t| (0.0..turn).contains(t)) {
+        return 0;
+    }
+    let (mut turns, mut last) = (0, 0.0);
+    for t in times {
+        turns += usize::from(last - *t > turn / 2.0);
+        last = *t;
+        *t += turn * turns as f64;
+    }
+    turns
+}
+
 fn finish(
     header: Header,
-    found: Columns,
-    cells: Vec<Vec<f64>>,
+    mut found: Columns,
+    mut cells: Vec<Vec<f64>>,
     skipped: usize,
     odd: &[Option<(u64, String)>],
 ) -> Result<Read, CaptureError> {
     if cells.first().is_none_or(Vec::is_empty) {
         return Err(CaptureError::Empty);
+    }
+    for (column, times) in found.columns.iter().zip(&mut cells) {
+        let Role::Time { scale } = column.role else {
+            continue;
+        };
+        let turns = unwrap_times(times, scale);
+        if turns > 0 {
+            found.notes.push(format!(
+                "the time begins again {turns} times, as a counter of 32 bits does: taken to go on"
+            ));
+        }
     }
     let mut record = Record {
         header,

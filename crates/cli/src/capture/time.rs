@@ -1,6 +1,6 @@
 //! Cells of a time column.
 
-use chrono::{DateTime, NaiveDateTime};
+use chrono::{DateTime, NaiveDateTime, NaiveTime};
 
 /// Beyond this, steps of an f64 are longer than 1: 2^53.
 const EXACT: i64 = 1 << 53;
@@ -12,11 +12,17 @@ pub(super) struct Clock {
     /// Seconds a unit.
     scale: f64,
     first: Option<i64>,
+    /// The last time of day without a date, and the midnights before it.
+    of_day: Option<(i64, i64)>,
 }
 
 impl Clock {
     pub fn new(scale: f64) -> Self {
-        Self { scale, first: None }
+        Self {
+            scale,
+            first: None,
+            of_day: None,
+        }
     }
 
     /// Time of a cell, s; `number` reads one that is no date and no long whole number.
@@ -29,7 +35,17 @@ impl Clock {
         if let Some(value) = number(cell) {
             return Some(value * self.scale);
         }
-        Some(self.since(nanoseconds(cell)?) as f64 * 1e-9)
+        let since_1970 = nanoseconds(cell).or_else(|| self.since_midnight(cell))?;
+        Some(self.since(since_1970) as f64 * 1e-9)
+    }
+
+    /// A time of day without a date; past midnight the next day goes on.
+    fn since_midnight(&mut self, cell: &str) -> Option<i64> {
+        let now = of_day(cell)?;
+        let (last, mut midnights) = self.of_day.unwrap_or((now, 0));
+        midnights += i64::from(now < last - DAY_NS / 2);
+        self.of_day = Some((now, midnights));
+        Some(now + midnights * DAY_NS)
     }
 
     fn since(&mut self, whole: i64) -> i64 {
@@ -37,12 +53,22 @@ impl Clock {
     }
 }
 
-/// Whether a cell is a date with a time of day.
+/// Nanoseconds a day.
+const DAY_NS: i64 = 86_400_000_000_000;
+
+/// Whether a cell is a time of day, with a date or without.
 pub(super) fn is_date(cell: &str) -> bool {
-    nanoseconds(cell).is_some()
+    nanoseconds(cell).or_else(|| of_day(cell)).is_some()
 }
 
-/// A date and time of day by ISO 8601, since 1970; with a zone or without.
+/// A time of day, since midnight.
+fn of_day(cell: &str) -> Option<i64> {
+    let time = NaiveTime::parse_from_str(&cell.replacen(',', ".", 1), "%H:%M:%S%.f").ok()?;
+    time.signed_duration_since(NaiveTime::MIN).num_nanoseconds()
+}
+
+/// A date and time of day, since 1970: by ISO 8601, with a zone or without, or with the date as `2026/11/21` or
+/// `21.11.2026`. What begins with a month for some and with a day for others is not taken.
 fn nanoseconds(cell: &str) -> Option<i64> {
     if !cell.contains(':') {
         return None;
@@ -50,8 +76,12 @@ fn nanoseconds(cell: &str) -> Option<i64> {
     if let Ok(time) = DateTime::parse_from_rfc3339(cell) {
         return time.timestamp_nanos_opt();
     }
-    let cell = cell.replacen('T', " ", 1);
-    let time = NaiveDateTime::parse_from_str(&cell, "%Y-%m-%d %H:%M:%S%.f").ok()?;
+    let cell = cell.replacen('T', " ", 1).replacen(',', ".", 1);
+    let time = ["%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y"]
+        .iter()
+        .find_map(|date| {
+            NaiveDateTime::parse_from_str(&cell, &format!("{date} %H:%M:%S%.f")).ok()
+        })?;
     time.and_utc().timestamp_nanos_opt()
 }
 
@@ -73,9 +103,13 @@ mod tests {
             ["2014-06-24 19:02:59.783655", "2014-06-24 19:03:00.283655"],
             ["2014-06-24T19:02:59.5Z", "2014-06-24T21:03:00.0+02:00"],
             ["2014-06-30T23:59:59.5", "2014-07-01T00:00:00"],
+            ["2014/06/30 23:59:59.5", "2014/07/01 00:00:00"],
+            ["30.06.2014 23:59:59,5", "01.07.2014 00:00:00,0"],
+            ["19:02:59.5", "19:03:00"],
+            ["23:59:59.5", "00:00:00.0"],
         ] {
             assert_eq!(read(1.0, cells), [Some(0.0), Some(0.5)], "{cells:?}");
         }
-        assert_eq!(read(1.0, ["19:02:59", "x"]), [None, None]);
+        assert_eq!(read(1.0, ["06/07/2014 19:02:59", "x"]), [None, None]);
     }
 }

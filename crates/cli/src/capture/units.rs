@@ -95,6 +95,10 @@ pub(super) fn in_brackets(name: &str) -> (&str, Option<&'static str>) {
 pub(super) fn at_the_end(name: &str, what: What) -> Option<&'static str> {
     let name = name.to_lowercase();
     let name = name.trim_end_matches(|c: char| !c.is_alphanumeric());
+    // A time may be called by its unit: `millis`, `micros`.
+    if let (What::Time, Some(unit)) = (what, known(name).filter(|unit| is_unit_of(unit, what))) {
+        return Some(unit);
+    }
     // From the longest ending on: `deg_s` before `s`.
     name.match_indices(['_', ' ', '.'])
         .filter_map(|(at, _)| known(&name[at + 1..]))
@@ -236,6 +240,7 @@ mod tests {
             ("gx_dps", gyro, Some("deg/s")),
             ("gyro_x_deg_s", gyro, Some("deg/s")),
             ("t_ms", What::Time, Some("ms")),
+            ("micros", What::Time, Some("us")),
             ("ax_mps2", acc, Some("m/s2")),
             ("acc_x_g", acc, Some("g")),
             ("gyro_g", gyro, None),
