@@ -320,7 +320,7 @@ fn a_boards_microseconds_go_on_when_their_32_bits_begin_again() {
     .expect("times");
     is_the_table(&read);
     let notes = read.record.notes.join("; ");
-    assert!(notes.contains("begins again 1 times"), "{notes}");
+    assert!(notes.contains("begins again (1 x)"), "{notes}");
     let said = error(text.as_bytes(), "", "");
     assert!(
         said.contains("time=micros") && said.contains("time=us"),
@@ -332,6 +332,27 @@ fn a_boards_microseconds_go_on_when_their_32_bits_begin_again() {
         "gyro=deg/s",
     );
     assert!(said.contains("no time: a number, or a date like"), "{said}");
+}
+
+#[test]
+fn lines_before_the_table_are_passed_over_and_told() {
+    let before = "Device: XYZ 3000\nSerial;1234\n\nComment, by hand\n";
+    for head in ["t,gx,gy\n", "t,gx,gy\ns,deg/s,deg/s\n"] {
+        let text = format!("{before}{}", table(head, ",", ".", 1.0, 1.0));
+        let read = read(text.as_bytes(), "time=t,gyro_x=gx,gyro_y=gy", "gyro=deg/s").expect(head);
+        is_the_table(&read);
+        let notes = read.record.notes.join("; ");
+        assert!(
+            notes.contains("begins in line 5") && notes.contains("from line 1 on"),
+            "{notes}"
+        );
+    }
+    // Nothing is passed over where no table follows.
+    let said = error(b"remark\nanother one\n", "gyro_x=gx", "");
+    assert!(
+        said.contains("there is no column `gx`; the columns are: remark"),
+        "{said}"
+    );
 }
 
 /// Pieces that tables are made of, right and wrong.

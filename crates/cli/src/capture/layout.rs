@@ -27,6 +27,8 @@ pub(super) struct Layout {
     pub cells: Cells,
     /// The first row, with its line; it is read already.
     pub first: Option<(u64, String)>,
+    /// First and last line before the table that are none of it.
+    pub preamble: Option<(u64, u64)>,
 }
 
 impl Layout {
@@ -51,6 +53,9 @@ impl Layout {
                 break (number, line);
             }
         };
+        let begin = number;
+        let (number, line) = behind_preamble(text, (number, line), separator)?;
+        let preamble = (number > begin).then(|| (begin, number - 1));
         let found = SEPARATORS.into_iter().find(|s| line.contains(*s));
         let mut cells = Cells::new(separator.or(found).unwrap_or(','));
         if cells.is_row(&line) {
@@ -77,6 +82,7 @@ impl Layout {
         let names = owned(&Cells::new(of_names).cut(&line));
         cells = Cells::new(of_rows);
         let mut layout = Self::new(lines, names, false, cells, first);
+        layout.preamble = preamble;
         layout.take_units(text)?;
         Ok(layout)
     }
@@ -99,6 +105,7 @@ impl Layout {
             numbered,
             cells,
             first,
+            preamble: None,
         }
     }
 
@@ -108,7 +115,7 @@ impl Layout {
             return Ok(());
         };
         let units = owned(&self.cells.cut(line));
-        let bare = |unit: &str| known(unit.trim_matches(['(', ')', '[', ']'])).map(str::to_owned);
+        let bare = |unit: &str| bare_unit(unit).map(str::to_owned);
         let are_units = units.len() == self.names.len()
             && units
                 .iter()
@@ -122,6 +129,62 @@ impl Layout {
         }
         Ok(())
     }
+}
+
+/// A unit in brackets or without.
+fn bare_unit(text: &str) -> Option<&'static str> {
+    known(text.trim_matches(['(', ')', '[', ']']))
+}
+
+/// Lines before a table in which its names are looked for.
+const PREAMBLE: usize = 60;
+
+/// The line of names, where other lines stand before it: the first that has as many cells, two at least, as a row of
+/// numbers, or of units and then of numbers, below it. The line given where there is none.
+fn behind_preamble(
+    text: &mut TextLines<impl BufRead>,
+    first: (u64, String),
+    said: Option<char>,
+) -> Result<(u64, String), CaptureError> {
+    let begins = |names: &str, row: &str| {
+        let (of_names, of_rows) = separators(names, row, said);
+        let (names_cut, row_cut) = (Cells::new(of_names), Cells::new(of_rows));
+        let width = row_cut.cut(row).len();
+        width > 1
+            && names_cut.cut(names).len() == width
+            && !names_cut.is_row(names)
+            && row_cut.is_row(row)
+    };
+    let mut seen = vec![first];
+    while seen.len() < PREAMBLE + 2 {
+        let Some(line) = next_row(text)? else { break };
+        seen.push(line);
+        // As most files are.
+        if let [(_, names), (_, row)] = &seen[..]
+            && begins(names, row)
+        {
+            break;
+        }
+    }
+    let line = |k: usize| seen.get(k).map_or("", |(_, line)| line.as_str());
+    let are_units = |line: &str| {
+        let separator = SEPARATORS.into_iter().find(|s| line.contains(*s));
+        let cells = owned(&Cells::new(said.or(separator).unwrap_or(',')).cut(line));
+        cells.iter().any(|cell| bare_unit(cell).is_some())
+    };
+    let is_table = |k: &usize| {
+        begins(line(*k), line(k + 1)) || (are_units(line(k + 1)) && begins(line(*k), line(k + 2)))
+    };
+    let separator = SEPARATORS.into_iter().find(|s| line(0).contains(*s));
+    let at = if Cells::new(said.or(separator).unwrap_or(',')).is_row(line(0)) {
+        0
+    } else {
+        (0..seen.len()).find(is_table).unwrap_or(0)
+    };
+    let mut rest = seen.split_off(at).into_iter();
+    let names = rest.next();
+    text.put_back(rest);
+    names.ok_or(CaptureError::Empty)
 }
 
 /// What separates names, and what separates the cells of rows: the first pair by which both have one width.

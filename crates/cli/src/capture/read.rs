@@ -71,7 +71,13 @@ pub fn read_from(input: impl BufRead, options: &ReadOptions) -> Result<Read, Cap
         units: &layout.units,
         is_scaled: false,
     };
-    let found = columns(&said, &options.mapping)?;
+    let mut found = columns(&said, &options.mapping)?;
+    if let Some((first, last)) = layout.preamble {
+        found.notes.push(format!(
+            "the table begins in line {}: what stands before, from line {first} on, is not read",
+            last + 1
+        ));
+    }
     let mut values: Vec<Vec<f64>> = found.columns.iter().map(|_| Vec::new()).collect();
     let mut reader = RowReader::new(&found.columns, layout.names.len(), layout.cells);
     let mut skipped = 0;
@@ -305,7 +311,7 @@ fn finish(
         let turns = unwrap_times(times, scale);
         if turns > 0 {
             found.notes.push(format!(
-                "the time begins again {turns} times, as a counter of 32 bits does: taken to go on"
+                "the time begins again ({turns} x), as a counter of 32 bits does: taken to go on"
             ));
         }
     }

@@ -1,6 +1,7 @@
 //! A stream of text: unpacked, and in lines.
 
 use std::borrow::Cow;
+use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read as _, Result};
 use std::path::Path;
 
@@ -78,6 +79,8 @@ pub(super) struct TextLines<R> {
     input: R,
     number: u64,
     bytes: Vec<u8>,
+    /// Lines that were looked at already, the next one first.
+    ahead: VecDeque<(u64, String)>,
     /// What lines end with: some old programs write a carriage return alone.
     end: u8,
 }
@@ -100,6 +103,7 @@ impl<R: BufRead> TextLines<R> {
         };
         Ok(Self {
             input,
+            ahead: VecDeque::new(),
             end,
             number: 0,
             bytes: Vec::new(),
@@ -109,6 +113,9 @@ impl<R: BufRead> TextLines<R> {
     /// The next line and its number, without what surrounds it. What is not UTF-8 is taken as Latin-1: names and units
     /// of old programs; numbers are the same in both.
     pub fn next_line(&mut self) -> std::result::Result<Option<(u64, String)>, CaptureError> {
+        if let Some(line) = self.ahead.pop_front() {
+            return Ok(Some(line));
+        }
         self.bytes.clear();
         let mut line = self.input.by_ref().take(LONGEST_LINE);
         if line.read_until(self.end, &mut self.bytes).map_err(io)? == 0 {
@@ -127,6 +134,13 @@ impl<R: BufRead> TextLines<R> {
         // Not tabs: a cell at the end may be empty.
         let text = text.trim_matches([' ', '\r', '\n']).to_owned();
         Ok(Some((self.number, text)))
+    }
+}
+
+impl<R> TextLines<R> {
+    /// Gives lines back, which come again in their order.
+    pub fn put_back(&mut self, lines: impl DoubleEndedIterator<Item = (u64, String)>) {
+        lines.rev().for_each(|line| self.ahead.push_front(line));
     }
 }
 

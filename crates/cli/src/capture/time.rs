@@ -63,6 +63,9 @@ pub(super) fn is_date(cell: &str) -> bool {
 
 /// A time of day, since midnight.
 fn of_day(cell: &str) -> Option<i64> {
+    if !cell.contains(':') {
+        return None;
+    }
     let time = NaiveTime::parse_from_str(&cell.replacen(',', ".", 1), "%H:%M:%S%.f").ok()?;
     time.signed_duration_since(NaiveTime::MIN).num_nanoseconds()
 }
