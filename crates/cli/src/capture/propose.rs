@@ -228,7 +228,9 @@ impl Meaning {
             Kind::Acc
         } else if is(&["temp"]) {
             Kind::Temp
-        } else if first.starts_with("time")
+        } else if ["time", "zeit", "stamp", "epoch"]
+            .iter()
+            .any(|s| first.starts_with(s))
             || first == "t"
             || is_seconds
             || is_of_time
@@ -384,6 +386,10 @@ mod tests {
             (
                 "micros;gx;gy",
                 "--columns time=micros,gyro_x=gx,gyro_y=gy --units time=us,gyro=deg/s",
+            ),
+            (
+                "Zeit;gx",
+                "--columns time=Zeit,gyro_x=gx --units gyro=deg/s",
             ),
             ("y", "--columns gyro_y=y --units gyro=deg/s"),
             ("values", "--columns gyro_x=values --units gyro=deg/s"),

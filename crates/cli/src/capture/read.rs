@@ -220,13 +220,16 @@ impl<'a> RowReader<'a> {
                 continue;
             }
             let Some(value) = read else {
-                let what = match column.role {
-                    Role::Time { .. } => {
-                        "no time: a number, or a date like 2026-11-21 19:02:59.78 or 21.11.2026 19:02:59.78"
-                    }
-                    _ => "not a finite number",
-                };
-                return Err(bad(column, cell, what.to_owned()));
+                if matches!(column.role, Role::Time { .. }) {
+                    return Err(CaptureError::Time {
+                        why: format!("line {line}, column `{}`: `{}` is no time", brief(&column.name), brief(cell)),
+                        help: "a time is a number (`--units time=ms` says of what) or a date like 2026-11-21 19:02:59.78 or 21.11.2026 \
+                               19:02:59.78; where others stand in the file, leave time out and say `--rate HZ`; `--skip-bad` leaves \
+                               out single bad rows"
+                            .to_owned(),
+                    });
+                }
+                return Err(bad(column, cell, "not a finite number".to_owned()));
             };
             if !column.role.takes(value) {
                 let what = "not a whole number of the range that this column has";
