@@ -17,6 +17,8 @@ pub(crate) struct Shared {
     pub checks: Vec<Check>,
     pub finding: Option<Finding>,
     pub left: Vec<Unexplained>,
+    /// Channels that follow another one some samples later, and the chi-square of that.
+    pub late: Vec<(String, f64)>,
 }
 
 /// Standard error of the mean covariance of some pairs of axes that share a source of variance `shared`: estimates of
@@ -44,6 +46,7 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         checks: vec![],
         finding: None,
         left: vec![],
+        late: vec![],
     };
     let mut pairs: Vec<Pair<'_>> = vec![];
     let first = grid.n / 50;
@@ -193,6 +196,7 @@ fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
         what: format!("correlation of the whitened residuals of two axes over {LATE} samples either way: {} {what}", second.target.name),
     });
     if fails {
+        shared.late.push((second.target.name.clone(), statistic));
         shared.left.push(Unexplained {
             channel: second.target.name.clone(),
             what,

@@ -98,6 +98,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         .flat_map(|s| std::mem::take(&mut s.checks))
         .collect();
     losses::suppress(&mut checks, &audited);
+    let shared = common(&searched, &grid);
     let mut nearest = vec![];
     let mut doubts = vec![];
     for s in &searched {
@@ -117,10 +118,13 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             }));
         }
         let of_terms = term_findings(s, &grid, options.seed);
+        // What an axis takes from another one later has a spectrum, and is no process of its own.
+        let late = shared.late.iter().filter(|l| l.0 == s.target.name);
+        let late = late.map(|l| l.1).sum::<f64>();
         // A bit that sticks makes a noise of its own, which depends on the level.
         let by_counts = audited.is_suppressed("variance_in_time", &s.target.name);
         let variance = variance_finding(s).filter(|_| !by_counts);
-        let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance, &failing);
+        let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance, &failing, late);
         findings.extend(kept);
         nearest.extend(doubted);
         doubts.extend(told);
@@ -132,7 +136,6 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             }),
         }
     }
-    let shared = common(&searched, &grid);
     let mut unexplained = left_over(&checks, &shared);
     for s in &searched {
         let note = |note: &Note| Unexplained {

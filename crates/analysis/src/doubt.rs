@@ -36,14 +36,9 @@ const REMAINDER_BEYOND: f64 = 0.25;
 /// The same where a shape is known not to hold: what is off may be as large as what it explains.
 const REMAINDER_UNLAWFUL: f64 = 1.0;
 
-/// Checks that fail where readings depend on earlier ones otherwise than in proportion, or lie more to one side.
-const BENT: [&str; 5] = [
-    "bicovariance",
-    "three_readings",
-    "variance_rhythm",
-    "slew",
-    "skewness",
-];
+/// Samples of ten minutes at 20 Hz: of a longer record, whatever its size, something is always left that is no linear noise;
+/// it counts by what such a one would show.
+const RECORD: f64 = 12_000.0;
 
 /// Why a name is not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,8 +88,30 @@ fn generic(t: &Term) -> bool {
     t.follows.is_none()
 }
 
+/// Chi-square by which a channel is not of linear, normal noise. A stationary process of the library is nothing else; far
+/// readings beside it make heavy tails, but no light ones.
+fn bent(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> f64 {
+    let (e, rate_hz) = (&s.e, s.search.view.rate_hz);
+    let n = e.len() as f64;
+    // Variances of skewness and kurtosis of n normal values.
+    let skewness = || n / 6.0 * checks::skewness_of(e).powi(2);
+    let lightness = || n / 24.0 * checks::excess_kurtosis(e).min(0.0).powi(2);
+    let all: [(&str, &dyn Fn() -> f64); 6] = [
+        ("slew", &|| f64::INFINITY),
+        ("skewness", &skewness),
+        ("kurtosis", &lightness),
+        ("bicovariance", &|| checks::bicovariance(e).statistic),
+        ("three_readings", &|| checks::three_readings(e).statistic),
+        ("variance_rhythm", &|| {
+            checks::variance_rhythm(e, rate_hz).statistic
+        }),
+    ];
+    let failed = all.iter().filter(|(id, _)| failing(id));
+    failed.map(|(_, chi_square)| chi_square()).sum()
+}
+
 /// For each term of a channel, whether the checks doubt it; and whether they doubt the law of its variance.
-fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, bool) {
+fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<Doubt>, bool) {
     let panel = &s.search.panel;
     let g = s.state.noise.over(&panel.bins);
     let n = panel.bins.n as f64;
@@ -153,9 +170,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
         repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
     };
     let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
-    // A stationary process of the library is linear, of normal noise; far readings beside it make heavy tails, nothing light ones.
-    let light = || checks::excess_kurtosis(&s.e) < 0.0;
-    let bent = BENT.iter().any(|c| failing(c)) || failing("kurtosis") && light();
+    let bent = (late + bent(s, failing)) * (RECORD / n).min(1.0);
     // What is left without a place may be anywhere; what has one leaves a strong term elsewhere alone.
     let misplaced = |t: &Term| !places.is_empty() && t.score() < WIDE;
     let followed = followers(s, &g);
@@ -218,7 +233,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> (Vec<Doubt>, boo
                 let information = information.map(|((d, g), m)| m * (d / g).powi(2));
                 unlike && !process.filters_white()
                     || repeats.is_some()
-                    || bent
+                    || bent > LEFT * t.lr
                     || correlated && (places.is_empty() || process.filters_white())
                     || share(&information.collect::<Vec<_>>(), t.lr)
             } else {
@@ -279,14 +294,15 @@ fn everywhere(s: &Searched<'_>, filled: &dyn Fn(usize) -> bool) -> bool {
 }
 
 /// Take the doubted names of a channel out of its findings, given as one for each term and then the rest; what follows a
-/// combination without a name goes the same way.
+/// combination without a name goes the same way. `late` is the chi-square of what the channel takes from others later.
 pub(crate) fn withdraw(
     s: &Searched<'_>,
     of_terms: Vec<Finding>,
     of_variance: Option<Finding>,
     failing: &dyn Fn(&str) -> bool,
+    late: f64,
 ) -> (Vec<Finding>, Vec<Finding>, Vec<Unexplained>) {
-    let (terms, variance) = doubted(s, failing);
+    let (terms, variance) = doubted(s, failing, late);
     let name = s.target.name.as_str();
     let mut unexplained = vec![];
     let (mut kept, mut nearest, mut beside) = (vec![], vec![], vec![]);

@@ -10,7 +10,7 @@ const LAGS: usize = 20;
 /// Correlation of the whitened residual with its own square earlier and later, over all lags but 0. Linear, and Gaussian
 /// or of one law, it has none; what a swing leaves behind that its sign does not tell, and what rises and falls unlike, has
 /// (the third-order moments off their diagonal; Hinich 1996 tests the same sums).
-pub(super) fn bicovariance(e: &[f64]) -> Outcome {
+pub(crate) fn bicovariance(e: &[f64]) -> Outcome {
     let e = &e[..e.len().min(MOST)];
     let n = e.len() as f64;
     let mean = e.iter().sum::<f64>() / n;
@@ -54,7 +54,7 @@ const LAGS_OF_THREE: usize = 10;
 
 /// Products of three readings at different times, over all pairs of lags: what a product of earlier readings leaves behind
 /// (the rest of the third-order moments).
-pub(super) fn three_readings(e: &[f64]) -> Outcome {
+pub(crate) fn three_readings(e: &[f64]) -> Outcome {
     let e = &e[..e.len().min(MOST)];
     let mean = e.iter().sum::<f64>() / e.len().max(1) as f64;
     let centred: Vec<f64> = e.iter().map(|v| v - mean).collect();
@@ -104,7 +104,7 @@ pub(super) fn three_readings(e: &[f64]) -> Outcome {
 const SLOWEST: usize = 16;
 
 /// A rhythm of the variance: the strongest line of the squares of the whitened residual.
-pub(super) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
+pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
     let e = &e[..e.len().min(MOST)];
     let power = e.iter().map(|v| v * v).sum::<f64>() / e.len().max(1) as f64;
     let squares: Vec<f64> = e.iter().map(|v| v * v - power).collect();
