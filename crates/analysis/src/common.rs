@@ -6,8 +6,8 @@ use crate::checks::{self, LEAST_CHANCE};
 use crate::diagnosis::Searched;
 use crate::findings::sentence;
 use crate::grid::Grid;
-use crate::result::{Check, Finding, Unexplained};
-use crate::threshold;
+use crate::result::{Check, Finding, Gain, Unexplained};
+use crate::{gain, threshold};
 
 /// Correlation in sigma that each pair has to show before a source is said to be that of all axes.
 const LEAST_OF_ALL: f64 = 0.5;
@@ -107,17 +107,31 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
             ..Found::default()
         };
         let parameters = of.describe(&found);
+        let of_all: Vec<&[f64]> = searched
+            .iter()
+            .filter(|s| names.contains(&s.target.name))
+            .map(|s| s.e.as_slice())
+            .collect();
+        let (nats, std_error) = gain::of_correlation(&of_all);
+        let ratio = fails
+            .iter()
+            .map(|p| -(grid.n as f64) * (1.0 - p.2 * p.2).ln())
+            .sum::<f64>();
         shared.finding = Some(Finding {
             cause: of.id().into(),
             what: sentence(of.docs().title, &names.join(", "), &parameters),
             channels: names,
             parameters,
-            likelihood_ratio: Some(
-                fails
-                    .iter()
-                    .map(|p| -(grid.n as f64) * (1.0 - p.2 * p.2).ln())
-                    .sum(),
-            ),
+            likelihood_ratio: Some(ratio),
+            confirmed_on_held_out_data: Some(nats > 0.0),
+            gain: Some(Gain {
+                held_out_log_score_nats: Some(nats),
+                std_error: Some(std_error),
+                // One size for all of them.
+                delta_bic: Some(ratio - (grid.n as f64).ln()),
+                ablation_nats: Some(0.5 * ratio),
+                ..Gain::default()
+            }),
             ..Finding::default()
         });
     }

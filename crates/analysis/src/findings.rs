@@ -149,12 +149,17 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
 pub(crate) fn variance_finding(s: &Searched<'_>) -> Option<Finding> {
     let v = s.variance.as_ref()?;
     let alternatives = alternatives(&v.alternatives);
+    let undivided: Vec<f64> = s.e.iter().zip(&v.law).map(|(e, v)| e * v.sqrt()).collect();
+    let (nats, std_error) = gain::of_variance(&undivided, &v.law);
     Some(Finding {
         cause: v.effect.id().into(),
         channels: vec![s.target.name.clone()],
         experiment: experiment(v.effect, &alternatives),
         alternatives,
+        confirmed_on_held_out_data: Some(nats > 0.0),
         gain: Some(Gain {
+            held_out_log_score_nats: Some(nats),
+            std_error: Some(std_error),
             delta_bic: Some(v.lr - (v.parameters.len() as f64) * (s.target.y.len() as f64).ln()),
             ablation_nats: Some(v.lr / 2.0),
             ..Gain::default()
@@ -355,6 +360,11 @@ pub(crate) fn scale_finding(
         ),
         parameters,
         likelihood_ratio: Some(lr),
+        gain: Some(Gain {
+            delta_bic: Some(lr - (grid.n as f64).ln()),
+            ablation_nats: Some(lr / 2.0),
+            ..Gain::default()
+        }),
         ..Finding::default()
     }))
 }

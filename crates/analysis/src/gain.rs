@@ -112,9 +112,7 @@ fn marginal(
 #[must_use]
 pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) -> Vec<Score> {
     let n = y.len();
-    let ends: Vec<usize> = (0..=BLOCKS)
-        .map(|j| ((BEFORE + (1.0 - BEFORE) * j as f64 / BLOCKS as f64) * n as f64).round() as usize)
-        .collect();
+    let ends = ends(n);
     let moved = |column: &[f64], end: usize| variance(&column[..end]) > MOVED * variance(column);
     let moved: Vec<Vec<bool>> = ends
         .iter()
@@ -198,10 +196,7 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
                     }
                 })
                 .collect();
-            let nats: f64 = gains.iter().sum();
-            let mean = nats / BLOCKS as f64;
-            let spread =
-                gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (BLOCKS - 1) as f64;
+            let (nats, std_error) = total(&gains);
             let rms = |m: usize, w: usize| (squares[m][w].0 / squares[m][w].1.max(1) as f64).sqrt();
             let angle = windows
                 .iter()
@@ -210,11 +205,107 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
                 .collect();
             Score {
                 nats,
-                std_error: (spread * BLOCKS as f64).sqrt(),
+                std_error,
                 angle,
             }
         })
         .collect()
+}
+
+/// Ends of the blocks, the end of what lies before them first.
+fn ends(n: usize) -> Vec<usize> {
+    let share = |j: usize| BEFORE + (1.0 - BEFORE) * j as f64 / BLOCKS as f64;
+    (0..=BLOCKS)
+        .map(|j| (share(j) * n as f64).round() as usize)
+        .collect()
+}
+
+/// Sum over the blocks, with its standard error from their spread.
+fn total(gains: &[f64]) -> (f64, f64) {
+    let nats: f64 = gains.iter().sum();
+    let count = gains.len() as f64;
+    let mean = nats / count;
+    let spread = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    (nats, (spread * count).sqrt())
+}
+
+/// Least share of a record that shows a law of the variance at more than half its height, for it to have a size.
+const SHOWN: f64 = 2e-3;
+/// Largest ratio of variances that is asked, as ln.
+const MOST_RATIO: f64 = 6.0;
+
+/// What a law of the variance gains on data that its size has not seen, nats, and the standard error. `e` is the whitened
+/// residual without the law, `law` its shape in time, which is that of the whole record, as the time of a step is.
+#[must_use]
+pub fn of_variance(e: &[f64], law: &[f64]) -> (f64, f64) {
+    let low = law.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = law.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let height: Vec<f64> = law.iter().map(|v| (v - low) / (high - low)).collect();
+    let ends = ends(e.len());
+    let gains: Vec<f64> = ends
+        .windows(2)
+        .map(|w| {
+            let (seen, of) = (&e[..w[0]], &height[..w[0]]);
+            let shown = of.iter().filter(|h| **h > 0.5).count() as f64;
+            let (all, count) = (e.len() as f64, seen.len() as f64);
+            if shown < SHOWN * all || shown > count - SHOWN * all {
+                return 0.0;
+            }
+            // The larger over the smaller variance, and the smaller one by the likelihood.
+            let at = |ratio: f64, h: f64| 1.0 + ratio.exp_m1() * h;
+            let energy = |ratio: f64| -> f64 {
+                let parts = seen.iter().zip(of);
+                parts.map(|(e, h)| e * e / at(ratio, *h)).sum::<f64>() / count
+            };
+            let minus_l = |ratio: f64| {
+                let logs: f64 = of.iter().map(|h| at(ratio, *h).ln()).sum();
+                0.5 * (logs + count * energy(ratio).ln())
+            };
+            let ratio = crate::optimise::golden(&minus_l, -MOST_RATIO, MOST_RATIO, 30);
+            let (plain, least) = (energy(0.0), energy(ratio));
+            let nats = |e: f64, v: f64| -0.5 * (v.ln() + e * e / v);
+            let next = e[w[0]..w[1]].iter().zip(&height[w[0]..w[1]]);
+            next.map(|(e, h)| nats(*e, least * at(ratio, *h)) - nats(*e, plain))
+                .sum()
+        })
+        .collect();
+    total(&gains)
+}
+
+/// What knowing that channels share noise gains on data that the correlation was not taken from, nats, and the standard
+/// error: each block under the correlations of all that lies before it.
+#[must_use]
+pub fn of_correlation(channels: &[&[f64]]) -> (f64, f64) {
+    let Some(n) = channels.iter().map(|c| c.len()).min() else {
+        return (0.0, 0.0);
+    };
+    let gains: Vec<f64> = ends(n)
+        .windows(2)
+        .map(|w| {
+            let rms =
+                |c: &&[f64]| (c[..w[0]].iter().map(|v| v * v).sum::<f64>() / w[0] as f64).sqrt();
+            let scale: Vec<f64> = channels.iter().map(rms).collect();
+            let moment = |i: usize, j: usize, from: usize, to: usize| -> f64 {
+                let both = channels[i][from..to].iter().zip(&channels[j][from..to]);
+                both.map(|(a, b)| a * b).sum::<f64>() / (scale[i] * scale[j])
+            };
+            let matrix = |of: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
+                let row = |i| (0..channels.len()).map(|j| of(i, j)).collect();
+                (0..channels.len()).map(row).collect()
+            };
+            let before = matrix(&|i, j| moment(i, j, 0, w[0]) / w[0] as f64);
+            let (inverse, log_det) = crate::likelihood::invert(&before);
+            let inside = matrix(&|i, j| moment(i, j, w[0], w[1]));
+            let mut square = 0.0;
+            for (i, row) in inside.iter().enumerate() {
+                for (j, v) in row.iter().enumerate() {
+                    square += v * (inverse[i][j] - f64::from(u8::from(i == j)));
+                }
+            }
+            -0.5 * ((w[1] - w[0]) as f64 * log_det + square)
+        })
+        .collect();
+    total(&gains)
 }
 
 fn variance(x: &[f64]) -> f64 {
@@ -246,5 +337,59 @@ fn add_angles(
         let gain = p / (p + 1.0);
         level += gain * (v - level);
         p *= 1.0 - gain;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    fn white(n: usize, seed: u64) -> Vec<f64> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
+    }
+
+    #[test]
+    fn a_law_of_the_variance_gains_what_it_is_worth_and_costs_where_there_is_none() {
+        let law: Vec<f64> = (0..12_000)
+            .map(|i| if i / 600 % 2 == 0 { 1.0 } else { 2.0 })
+            .collect();
+        let e: Vec<f64> = white(12_000, 1)
+            .iter()
+            .zip(&law)
+            .map(|(e, v)| e * f64::sqrt(*v))
+            .collect();
+        // A reading tells ln(mean) - mean ln of the variances over two: (ln 1.5 - ln 2 / 2) / 2 = 0.0294 nats, of 7200.
+        let (nats, error) = of_variance(&e, &law);
+        assert!(
+            (nats - 212.0).abs() < 5.0 * error && error < 40.0,
+            "{nats} {error}"
+        );
+        let costs: f64 = (0..20)
+            .map(|s| of_variance(&white(12_000, s + 10), &law).0)
+            .sum();
+        assert!((-40.0..5.0).contains(&costs), "{costs}");
+    }
+
+    #[test]
+    fn shared_noise_gains_what_it_is_worth_and_costs_where_there_is_none() {
+        let shared = white(12_000, 2);
+        let with = |seed: u64| -> Vec<f64> {
+            let own = white(12_000, seed);
+            own.iter().zip(&shared).map(|(a, b)| a + 0.5 * b).collect()
+        };
+        let (x, y) = (with(3), with(4));
+        // Correlation 0.25 / 1.25: -ln(1 - 0.04) / 2 nats of 7200 readings.
+        let (nats, error) = of_correlation(&[&x, &y]);
+        assert!(
+            (nats - 147.0).abs() < 5.0 * error && error < 40.0,
+            "{nats} {error}"
+        );
+        let (x, y) = (white(12_000, 5), white(12_000, 6));
+        assert!(of_correlation(&[&x, &y]).0 < 3.0);
     }
 }
