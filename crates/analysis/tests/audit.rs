@@ -244,6 +244,57 @@ fn lost_frames_are_counted() {
     );
 }
 
+/// Share of frames lost without a gap of the numbers, up to one in four, at rates from 1 to 100 Hz.
+#[test]
+fn frames_lost_without_a_gap_of_the_numbers_are_told_from_the_times() {
+    let mut rng = rng(64);
+    for _ in 0..40 {
+        let rate = [1.0, 5.0, 20.0, 100.0][(rng.next_u32() % 4) as usize];
+        let each = 4 + rng.next_u32() % 96;
+        let mut r = record(
+            World {
+                samples: 4000,
+                ..PLAIN
+            },
+            &mut rng,
+        );
+        let mut at = 0u64;
+        let mut lost = 0;
+        let ticks: Vec<u64> = (0..4000)
+            .map(|_| {
+                at += 1;
+                while rng.next_u32() % each == 0 {
+                    at += 1;
+                    lost += 1;
+                }
+                (at as f64 / rate / TICK_S) as u64
+            })
+            .collect();
+        r.header.rate_hz = Some(rate);
+        r.host_time_s = Some(ticks.iter().map(|t| *t as f64 * TICK_S).collect());
+        r.t_ticks = Some(ticks);
+        let a = audit(&r);
+        let found: u64 = a.silently_lost.iter().map(|l| l.1).sum();
+        // Those before the first row and next to the last do not show.
+        assert!(
+            found.abs_diff(lost) <= 3,
+            "{found} of {lost}, one in {each}"
+        );
+        assert!(causes(&a).contains(&"dropped_samples gyro_x,gyro_y,gyro_z".to_owned()));
+    }
+}
+
+#[test]
+fn frames_that_no_gyro_has_anew_are_one_event() {
+    let mut r = record(PLAIN, &mut rng(65));
+    for i in (0..25).map(|k| 300 + 17 * k) {
+        r.flags.as_mut().unwrap()[i] &= !7;
+    }
+    let a = audit(&r);
+    assert_eq!(causes(&a), ["stale_samples gyro_x,gyro_y,gyro_z"]);
+    assert_eq!(parameter(&a, "count"), 25.0);
+}
+
 #[test]
 fn old_readings_are_told_by_their_flags() {
     let mut r = record(PLAIN, &mut rng(61));

@@ -10,6 +10,8 @@ use crate::result::Unexplained;
 const AROUND: usize = 20;
 /// Spread of the intervals, in intervals, beyond which a time column says nothing of single frames.
 const IRREGULAR: f64 = 0.3;
+/// Share of the rows of the gyro with the fewest that gyros have in common where one event concerns them all.
+const SHARED: f64 = 0.8;
 
 /// Leaps of `time` against `number` that last: row and frames lost. `time` is in intervals.
 fn leaps(time: &[f64], number: &[f64]) -> Vec<(usize, u64)> {
@@ -86,7 +88,11 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
                 .zip(number.windows(2))
                 .map(|(t, s)| t[1] - t[0] - (s[1] - s[0]))
                 .collect();
-            let spread = width(&steps, 0.02);
+            // What is missing is whole intervals; a row that comes early or by halves is another matter.
+            let odd: Vec<f64> = (steps.iter())
+                .map(|s| if *s > 0.5 { s - s.round() } else { *s })
+                .collect();
+            let spread = width(&odd, 0.02);
             if spread > IRREGULAR {
                 audit.untested(
                     "dropped_samples",
@@ -131,26 +137,18 @@ fn flags(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
     let Some(flags) = record.flags.as_ref().filter(|f| f.len() == at.len()) else {
         return;
     };
+    let bit = |first: u16, axis: Axis| first << axis.index();
+    let mut all: Vec<(&str, Vec<usize>)> = vec![];
     for g in gyros {
         let Some(axis) = g.channel.axis else { continue };
         let name = g.channel.name.as_str();
-        let bit = |first: u16, axis: Axis| first << axis.index();
         let old: Vec<usize> = (0..flags.len())
             .filter(|i| flags[*i] & bit(flag::NEW_DATA_X, axis) == 0)
             .collect();
         let what = format!("{} readings of {name} are flagged as not new", old.len());
-        if audit.limit("new_data_flag", name, old.len() as f64, 0.0, what.clone()) {
-            let times: Vec<f64> = old.iter().map(|i| at[*i]).collect();
-            audit.findings.push(counted(
-                "stale_samples",
-                vec![name.to_owned()],
-                old.len() as f64,
-                None,
-                &times,
-                what,
-            ));
-            old.iter().for_each(|i| audit.mask(name, *i));
-        }
+        audit.limit("new_data_flag", name, old.len() as f64, 0.0, what);
+        old.iter().for_each(|i| audit.mask(name, *i));
+        all.push((name, old));
         let alarms: Vec<usize> = (0..flags.len())
             .filter(|i| flags[*i] & bit(flag::ERROR_ALARM_X, axis) != 0)
             .collect();
@@ -169,11 +167,87 @@ fn flags(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
             });
         }
     }
+    for (names, rows) in together(all) {
+        let what = match names.as_slice() {
+            [name] => format!("{} readings of {name} are flagged as not new", rows.len()),
+            _ => format!(
+                "{} frames are flagged as not new for {} together",
+                rows.len(),
+                names.join(", ")
+            ),
+        };
+        let times: Vec<f64> = rows.iter().map(|i| at[*i]).collect();
+        let count = rows.len() as f64;
+        let finding = counted("stale_samples", names, count, None, &times, what);
+        audit.findings.push(finding);
+    }
+}
+
+/// Rows of each gyro as events: rows that several gyros share are one, the most gyros first.
+fn together(mut all: Vec<(&str, Vec<usize>)>) -> Vec<(Vec<String>, Vec<usize>)> {
+    let mut events = vec![];
+    let mut groups: Vec<u32> = (1..1u32 << all.len())
+        .filter(|g| g.count_ones() > 1)
+        .collect();
+    groups.sort_by_key(|g| std::cmp::Reverse(g.count_ones()));
+    for group in groups {
+        let own = |i: &usize| (group >> i) & 1 == 1;
+        let members: Vec<usize> = (0..all.len()).filter(own).collect();
+        let Some(fewest) = members.iter().map(|i| all[*i].1.len()).min() else {
+            continue;
+        };
+        let common: Vec<usize> = (all[members[0]].1.iter().copied())
+            .filter(|r| members.iter().all(|i| all[*i].1.binary_search(r).is_ok()))
+            .collect();
+        if common.is_empty() || (common.len() as f64) < SHARED * fewest as f64 {
+            continue;
+        }
+        for i in &members {
+            all[*i].1.retain(|r| common.binary_search(r).is_err());
+        }
+        let names = members.iter().map(|i| all[*i].0.to_owned()).collect();
+        events.push((names, common));
+    }
+    events.extend(
+        (all.into_iter())
+            .filter(|(_, rows)| !rows.is_empty())
+            .map(|(name, rows)| (vec![name.to_owned()], rows)),
+    );
+    events
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_that_gyros_share_are_one_event() {
+        let half: Vec<usize> = (0..100).step_by(2).collect();
+        let common = vec![4, 10, 51, 52];
+        let of = |more: &[usize]| {
+            let mut rows = [common.clone(), more.to_vec()].concat();
+            rows.sort_unstable();
+            rows.dedup();
+            rows
+        };
+        let names = |n: &[&str]| n.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
+        let (x, y, z) = (of(&half), of(&[7]), of(&[]));
+        let rest: Vec<usize> = half
+            .iter()
+            .copied()
+            .filter(|r| ![4, 10, 52].contains(r))
+            .collect();
+        assert_eq!(
+            together(vec![("x", x), ("y", y), ("z", z)]),
+            vec![
+                (names(&["x", "y", "z"]), common.clone()),
+                (names(&["x"]), rest),
+                (names(&["y"]), vec![7])
+            ]
+        );
+        let apart = vec![("x", vec![1, 5, 9]), ("y", vec![2, 5, 8]), ("z", vec![])];
+        assert_eq!(together(apart).len(), 2);
+    }
 
     #[test]
     fn a_late_frame_is_not_a_lost_one() {

@@ -106,6 +106,17 @@ fn counted(values: &[f64], places: [usize; 2], low: f64, high: f64) -> [f64; 2] 
     })
 }
 
+/// The value below which a share of the finite values lies; NaN of none.
+#[must_use]
+pub fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut v: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    if v.is_empty() {
+        return f64::NAN;
+    }
+    let place = (share * (v.len() - 1) as f64).round() as usize;
+    *v.select_nth_unstable_by(place, f64::total_cmp).1
+}
+
 /// Median of the finite values; NaN of none.
 #[must_use]
 pub fn median(values: &[f64]) -> f64 {

@@ -7,6 +7,7 @@
 mod alike;
 mod bits;
 mod codes;
+mod drift;
 mod frames;
 mod frozen;
 pub mod local;

@@ -3,9 +3,10 @@
 use model::Parameter;
 use model::record::Record;
 
+use super::drift::{self, Uneven};
 use super::{Audit, Gyro, tails};
 use crate::audit::local::{median, width};
-use crate::result::Finding;
+use crate::result::{Finding, Unexplained};
 
 /// Jitter of a sound board, rounding to ticks included, is about 36 us; beyond this it is a fault.
 const JITTER_LIMIT_S: f64 = 70e-6;
@@ -13,8 +14,6 @@ const JITTER_LIMIT_S: f64 = 70e-6;
 const SHARE: f64 = 0.01;
 /// Quantile of the standard normal at `SHARE`.
 const QUANTILE: f64 = 2.326_348;
-/// Blocks in which the earliest arrival is taken.
-const BLOCKS: usize = 32;
 /// Least length for a slope, s.
 const LEAST_SECONDS: f64 = 30.0;
 
@@ -76,80 +75,6 @@ fn jitter(record: &Record, device: &[f64], tick_s: f64, names: &[String], audit:
     }
 }
 
-/// Least squares line: slope and its standard error.
-fn slope(x: &[f64], y: &[f64]) -> (f64, f64) {
-    let n = x.len() as f64;
-    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
-    let sxx: f64 = x.iter().map(|v| (v - mx).powi(2)).sum();
-    let sxy: f64 = x.iter().zip(y).map(|(a, b)| (a - mx) * (b - my)).sum();
-    let b = sxy / sxx;
-    let rss: f64 = x
-        .iter()
-        .zip(y)
-        .map(|(a, v)| (v - my - b * (a - mx)).powi(2))
-        .sum();
-    (b, (rss / (n - 2.0).max(1.0) / sxx).sqrt())
-}
-
-/// Slope of host time against device time by the earliest arrival of each block: a message can be late, not early.
-fn host_slope(device: &[f64], host: &[f64]) -> Option<(f64, f64)> {
-    let n = device.len();
-    let late: Vec<f64> = host.iter().zip(device).map(|(h, d)| h - d).collect();
-    let pairs: Vec<(f64, f64)> = (0..n)
-        .filter(|i| late[*i].is_finite())
-        .map(|i| (device[i], late[i]))
-        .collect();
-    if pairs.len() < 4 * BLOCKS {
-        return None;
-    }
-    // Rough slope first, so that the earliest of a block is not simply its last.
-    let half = pairs.len() / 2;
-    let middle = |p: &[(f64, f64)]| {
-        (
-            median(&p.iter().map(|v| v.0).collect::<Vec<_>>()),
-            median(&p.iter().map(|v| v.1).collect::<Vec<_>>()),
-        )
-    };
-    let (a, b) = (middle(&pairs[..half]), middle(&pairs[half..]));
-    let rough = (b.1 - a.1) / (b.0 - a.0);
-    let size = pairs.len().div_ceil(BLOCKS);
-    let (x, y): (Vec<f64>, Vec<f64>) = pairs
-        .chunks(size)
-        .filter_map(|c| {
-            c.iter()
-                .map(|(d, l)| (*d, l - rough * d))
-                .min_by(|p, q| p.1.total_cmp(&q.1))
-        })
-        .unzip();
-    let (mut x, mut y) = (x, y);
-    let mut fit = slope(&x, &y);
-    // Blocks that the host slept through.
-    for _ in 0..3 {
-        let level = median(
-            &y.iter()
-                .zip(&x)
-                .map(|(v, t)| v - fit.0 * t)
-                .collect::<Vec<_>>(),
-        );
-        let r: Vec<f64> = y
-            .iter()
-            .zip(&x)
-            .map(|(v, t)| v - fit.0 * t - level)
-            .collect();
-        let spread = median(&r.iter().map(|v| v.abs()).collect::<Vec<_>>()) * 1.4826;
-        let keep: Vec<bool> = r.iter().map(|v| v.abs() <= 5.0 * spread + 1e-9).collect();
-        if keep.iter().all(|k| *k) || keep.iter().filter(|k| **k).count() < BLOCKS / 2 {
-            break;
-        }
-        let mut k = keep.iter();
-        x.retain(|_| k.next() == Some(&true));
-        let mut k = keep.iter();
-        y.retain(|_| k.next() == Some(&true));
-        fit = slope(&x, &y);
-    }
-    Some((rough + fit.0, fit.1))
-}
-
 fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
     let host = record
         .host_time_s
@@ -170,12 +95,29 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
         audit.untested("clock_rate", "the record is shorter than 30 s");
         return;
     }
-    let slope =
-        host_slope(device, host).filter(|(gained, error)| gained.is_finite() && error.is_finite());
-    let Some((gained, error)) = slope else {
+    let Some(course) = drift::of(device, host, tolerance * 1e-6) else {
         audit.untested("clock_rate", "too few host times");
         return;
     };
+    if let Some((kind, what)) = &course.uneven {
+        if *kind == Uneven::Wanders {
+            audit.untested("clock_rate", what);
+        } else {
+            audit.limit("clock_course", "record", course.told, 1.0, what.clone());
+            if let Some(c) = audit.checks.last_mut() {
+                c.fails_after = true;
+            }
+            audit.unexplained.push(Unexplained {
+                channel: "record".into(),
+                what: what.clone(),
+            });
+        }
+        // Two rates are not one.
+        if *kind == Uneven::Bend {
+            return;
+        }
+    }
+    let (gained, error) = (course.slope, course.error);
     // host = device / (1 + ppm)
     let ppm = (1.0 / (1.0 + gained) - 1.0) * 1e6;
     let error = error * 1e6;
@@ -189,7 +131,7 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
     } else if beyond.is_infinite() {
         0.0
     } else {
-        statrs::distribution::StudentsT::new(0.0, 1.0, BLOCKS as f64 - 2.0).map_or_else(
+        statrs::distribution::StudentsT::new(0.0, 1.0, drift::BLOCKS as f64 - 2.0).map_or_else(
             |_| tails::upper_normal(beyond),
             |t| statrs::distribution::ContinuousCDF::sf(&t, beyond),
         )
@@ -202,31 +144,5 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
             what,
             ..Finding::default()
         });
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn late_messages_do_not_tilt_the_clock() {
-        // 100 ppm fast, delays of 1 ms to 0.5 s by turns, longer at the end.
-        let device: Vec<f64> = (0..12_000).map(|i| f64::from(i) * 0.05).collect();
-        let host: Vec<f64> = device
-            .iter()
-            .enumerate()
-            .map(|(i, d)| {
-                let turn = (i * 7919 % 101) as f64 / 101.0;
-                d / (1.0 + 100e-6) + 0.001 + turn * (0.01 + 0.5 * d / 600.0)
-            })
-            .collect();
-        let (gained, error) = host_slope(&device, &host).unwrap();
-        let ppm = (1.0 / (1.0 + gained) - 1.0) * 1e6;
-        assert!(
-            (ppm - 100.0).abs() < 5.0 + 4.0 * error * 1e6,
-            "{ppm} +- {}",
-            error * 1e6
-        );
     }
 }
