@@ -84,7 +84,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     let mut audited = audit(record);
     // Put right by the sign, but for the readings that lay beyond the bit.
     for f in &sticking {
-        audited.converter_at_fault(&f.channels[0], &f.cause);
+        audited.put_right(f);
     }
     let record = &*losses::renumbered(record, &audited);
     let grid = lay_out(record, &|name| audited.masked(name), options.seed)?;
@@ -122,7 +122,11 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         let late = shared.late.iter().filter(|l| l.0 == s.target.name);
         let late = late.map(|l| l.1).sum::<f64>();
         // A bit that sticks makes a noise of its own, which depends on the level.
-        let by_counts = audited.is_suppressed("variance_in_time", &s.target.name);
+        let by_counts = s.variance.as_ref().is_some_and(|v| {
+            let more = v.parameters.get("variance_increase");
+            let ratio = more.map(|p| 1.0 + p.value);
+            audited.explains_variance(&s.target.name, v.lr, v.threshold, ratio)
+        });
         let variance = variance_finding(s).filter(|_| !by_counts);
         let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance, &failing, late);
         findings.extend(kept);
@@ -136,6 +140,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             }),
         }
     }
+    let notes = [record.notes.clone(), std::mem::take(&mut audited.notes)].concat();
     let mut unexplained = left_over(&checks, &shared);
     for s in &searched {
         let note = |note: &Note| Unexplained {
@@ -215,7 +220,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
                 rate_hz: grid.rate_hz,
                 samples: record.len(),
                 channels: record.channels.iter().map(|c| c.name.clone()).collect(),
-                notes: record.notes.clone(),
+                notes,
             },
             baseline,
             checks,

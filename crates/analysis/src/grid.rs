@@ -182,7 +182,19 @@ pub fn lay_out(
     let turns = matches!(record.header.base, Some(Base::Moving | Base::Turntable));
     // Where the base moves, and where the motor turns it, they explain nothing away.
     let drivers: &[Vec<f64>] = if turns { &[] } else { &known };
-    let motion_of = |y: &[f64]| motion(&mut dct.forward(y), drivers, n, rate_hz, turns);
+    // Over a gap the fill wanders as the noise does that was fitted, which a process beside it swells: only what was read
+    // tells of motion.
+    let motion_of = |y: &[f64], lost: &[usize], (noise, white): &(Noise, f64)| {
+        let all = |y: &[f64]| motion(&mut dct.forward(y), drivers, n, rate_hz, turns);
+        let whole = all(y);
+        if lost.is_empty() || whole <= MOTION_RMS {
+            return whole;
+        }
+        let mut read = y.to_vec();
+        lost.iter().for_each(|i| read[*i] = f64::NAN);
+        crate::kalman::bridge(&mut read, *white, white * noise.log_walk.exp());
+        all(&read) * (n as f64 / (n - lost.len()).max(1) as f64).sqrt()
+    };
     let mut targets = vec![];
     for channel in gyros {
         let (scale, unit) = match channel.unit.as_str() {
@@ -230,14 +242,18 @@ pub fn lay_out(
             y = given.clone();
             crate::kalman::fill(&mut y, fit.1, fit.1 * fit.0.log_walk.exp(), &mut rng);
         }
-        let moves = unit == "deg/s" && motion_of(&y) > MOTION_RMS;
+        let moves = unit == "deg/s" && motion_of(&y, &lost, &fit) > MOTION_RMS;
         let spikes = if moves {
             vec![]
         } else {
             spikes(&given, &mut y, &mut fit, &dct, &bins, &mut rng)
         };
         let lost = [lost, spikes.clone()].concat();
-        let motion_rms = if unit == "deg/s" { motion_of(&y) } else { 0.0 };
+        let motion_rms = if unit == "deg/s" {
+            motion_of(&y, &lost, &fit)
+        } else {
+            0.0
+        };
         targets.push(Target {
             name: channel.name.clone(),
             axis: channel.axis,

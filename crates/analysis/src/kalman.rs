@@ -54,6 +54,19 @@ fn smooth(y: &[f64], white: f64, step: f64) -> Vec<f64> {
     level
 }
 
+/// Fill missing samples with the level that all others tell, without noise: what moves is what was read.
+pub fn bridge(y: &mut [f64], white: f64, step: f64) {
+    if y.iter().all(|v| v.is_finite()) {
+        return;
+    }
+    let level = smooth(y, white, step);
+    for (v, l) in y.iter_mut().zip(level) {
+        if !v.is_finite() {
+            *v = l;
+        }
+    }
+}
+
 /// Fill missing samples with a draw from their distribution given all others (Durbin and Koopman).
 pub fn fill(y: &mut [f64], white: f64, step: f64, rng: &mut Xoshiro256PlusPlus) {
     if y.iter().all(|v| v.is_finite()) {

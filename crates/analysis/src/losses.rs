@@ -40,7 +40,9 @@ pub(crate) fn findings(audit: &Audit, searched: &[Searched<'_>], grid: &Grid) ->
     all.retain(|f| f.cause != "outliers" || !f.channels.iter().all(turns));
     for s in searched {
         let name = &s.target.name;
-        if s.target.spikes.is_empty() || audit.is_suppressed("outliers", name) {
+        let by_counts = ["outliers", "spikes"];
+        let told = by_counts.iter().any(|id| audit.is_suppressed(id, name));
+        if s.target.spikes.is_empty() || told {
             continue;
         }
         let mut times: Vec<f64> = s

@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 use model::Parameter;
 
 use super::stuck::{self, Verdict};
-use super::{Audit, Gyro, LEAST_READINGS, rounding, tails};
+use super::{Audit, Gyro, LEAST_READINGS, tails};
 use crate::audit::local::{Levels, Local};
 use crate::result::{Alternative, Finding, Unexplained};
 
@@ -212,9 +212,6 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     let sigma = unrounded(local);
     if known.iter().filter(|k| **k).count() < LEAST_READINGS {
         return Shape::Unknown;
-    }
-    if rounding::explains_tails(local, &known) {
-        audit.suppress(&["kurtosis", "skewness"], name, "the step of the converter");
     }
     let levels = Levels::new(&local.level, &known);
     // How often each bit is 1.

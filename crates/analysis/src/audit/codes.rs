@@ -151,6 +151,8 @@ pub(super) struct Laws<'a> {
     /// Where the fault takes each code.
     to: Vec<usize>,
     levels: Vec<f64>,
+    /// Where a fit begins, off the mean of the codes.
+    pub shift: f64,
     /// Of each level: its first code, and the chances from there on.
     chances: Vec<(usize, Vec<f64>)>,
 }
@@ -194,6 +196,7 @@ impl<'a> Laws<'a> {
             times,
             to,
             levels,
+            shift: 0.0,
             chances,
         }
     }
@@ -261,7 +264,7 @@ impl<'a> Laws<'a> {
         let bell: Vec<f64> = self
             .levels
             .iter()
-            .map(|m| (-0.5 * ((m - self.of.mean) / wide).powi(2)).exp())
+            .map(|m| (-0.5 * ((m - self.of.mean - self.shift) / wide).powi(2)).exp())
             .collect();
         let all: f64 = bell.iter().sum::<f64>().max(1e-300);
         let even = EVERYWHERE / bell.len() as f64;

@@ -242,6 +242,21 @@ impl Local {
     /// Of a channel.
     #[must_use]
     pub fn new(y: &[f64]) -> Self {
+        Self::by(y, &robust_sigma)
+    }
+
+    /// Of a channel with few codes, whose quantiles are codes: what predicts best does so by the mean square.
+    #[must_use]
+    pub fn by_squares(y: &[f64]) -> Self {
+        const FAR: f64 = 6.0;
+        Self::by(y, &|r| {
+            let near = r.iter().filter(|v| v.abs() < FAR);
+            let (sum, n) = near.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+            (sum / f64::max(n, 1.0)).sqrt()
+        })
+    }
+
+    fn by(y: &[f64], spread: &dyn Fn(&[f64]) -> f64) -> Self {
         let clean = cleaned(y);
         let sums = Sums::new(&clean);
         let residuals = |level: &[f64]| y.iter().zip(level).map(|(y, l)| y - l).collect::<Vec<_>>();
@@ -257,7 +272,7 @@ impl Local {
                 means(&clean, &sums, half)
             };
             let residual = residuals(&level);
-            let sigma = robust_sigma(&residual);
+            let sigma = spread(&residual);
             if best.as_ref().is_none_or(|b| sigma < BETTER * b.sigma) {
                 best = Some(Self {
                     level,

@@ -20,6 +20,7 @@ mod slew;
 mod stuck;
 pub mod tails;
 mod timing;
+mod wild;
 
 use std::collections::BTreeMap;
 
@@ -65,6 +66,10 @@ pub struct Audit {
     pub not_normal: Vec<Unexplained>,
     /// Rows before which frames were lost without a gap of the sequence numbers, and how many.
     pub silently_lost: Vec<(usize, u64)>,
+    /// What a reader has to know of the readings, and is no fault.
+    pub notes: Vec<String>,
+    /// Channels whose noise is hardly larger than their step.
+    rounded: BTreeMap<String, rounding::Rounded>,
 }
 
 impl Audit {
@@ -74,6 +79,24 @@ impl Audit {
         self.suppressed
             .iter()
             .any(|s| s.id == id && s.channel == channel)
+    }
+
+    /// Whether counts explain a law of the variance: its likelihood ratio, the one that it has to pass on normal noise,
+    /// and, where it is one, the ratio of the variances.
+    #[must_use]
+    pub fn explains_variance(
+        &self,
+        channel: &str,
+        lr: f64,
+        threshold: f64,
+        ratio: Option<f64>,
+    ) -> bool {
+        let by_fault = |s: &Suppression| {
+            s.id == "variance_in_time" && s.channel == channel && s.by != rounding::STEP
+        };
+        let rounded = self.rounded.get(channel);
+        self.suppressed.iter().any(by_fault)
+            || rounded.is_some_and(|r| r.explains_variance(lr, threshold, ratio))
     }
 
     /// A fault of the converter was found on `channel`: what it adds depends on the level, and is neither normal nor the
@@ -93,6 +116,25 @@ impl Audit {
             channel,
             by,
         );
+    }
+
+    /// A bit above the readings of `channel` was put right by the sign ([`sign_bit`]): readings that lay beyond it fold over
+    /// at its edges, and no rail is there.
+    pub fn put_right(&mut self, found: &Finding) {
+        let Some(bit) = found.parameters.get("bit") else {
+            return;
+        };
+        let edges = [-bit.value.exp2(), bit.value.exp2() - 1.0];
+        for channel in &found.channels {
+            self.converter_at_fault(channel, &found.cause);
+            self.findings.retain(|f| {
+                let rail = |name: &str| f.parameters.get(name).map(|p| p.value);
+                let folded = [rail("low"), rail("high")].into_iter().flatten();
+                f.cause != "saturation"
+                    || f.channels != [channel.as_str()]
+                    || !folded.clone().all(|r| edges.contains(&r))
+            });
+        }
     }
 
     /// Rows of a channel that are not to be used.
@@ -244,7 +286,9 @@ fn scaled(values: &[f64], counts: &[i32]) -> bool {
 pub fn audit(record: &Record) -> Audit {
     let rows = record.len();
     let mut audit = Audit::default();
+    let whole = record;
     let (record, still) = frozen::set_aside(record);
+    let (record, wild) = wild::set_aside(record);
     let record = record.as_ref();
     let gyros: Vec<Gyro<'_>> = record
         .all(Quantity::Gyro)
@@ -285,6 +329,7 @@ pub fn audit(record: &Record) -> Audit {
     }
     let at = times(record, rows);
     frozen::audit(&still, &at, &mut audit);
+    wild::audit(&wild, whole, &at, &mut audit);
     frames::audit(record, &gyros, &at, &mut audit);
     timing::audit(record, &gyros, &at, &mut audit);
     for g in &gyros {
@@ -294,6 +339,7 @@ pub fn audit(record: &Record) -> Audit {
         slew::audit(g, &mut audit);
         let shape = bits::audit(g, &mut audit);
         saturation::audit(g, shape, &mut audit);
+        rounding::audit(g, &mut audit);
     }
     if gyros.iter().any(|g| g.counts.is_none()) {
         for cause in ["coarse_lsb", "stuck_bit", "saturation"] {

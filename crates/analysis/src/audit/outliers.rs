@@ -5,6 +5,7 @@
 //! little farther where the base is at rest.
 
 use super::{Audit, FALSE_ALARM, Gyro, counted, tails};
+use crate::result::Finding;
 
 /// Two farther than this apart are single ones.
 const ALONE: usize = 2;
@@ -65,12 +66,16 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     }
     let times: Vec<f64> = single.iter().map(|i| at[*i]).collect();
     single.iter().for_each(|i| audit.mask(name, *i));
-    audit.findings.push(counted(
-        "outliers",
-        vec![name.to_owned()],
-        single.len() as f64,
-        None,
-        &times,
-        what,
-    ));
+    let own = |f: &Finding| f.cause == "outliers" && f.channels == [name];
+    let wild = audit.findings.iter().position(own);
+    let (mut times, mut what) = (times, what);
+    if let Some(wild) = wild.map(|i| audit.findings.remove(i)) {
+        times.extend(wild.times_s);
+        times.sort_by(f64::total_cmp);
+        what = format!("{what}; {}", wild.what);
+    }
+    let count = times.len() as f64;
+    let names = vec![name.to_owned()];
+    let finding = counted("outliers", names, count, None, &times, what);
+    audit.findings.push(finding);
 }
