@@ -4,11 +4,15 @@ use model::effect::{Effect, Found, Hypothesis, Parameters};
 use model::effects::effect;
 use model::parameter::Parameter;
 use model::record::Base;
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::diagnosis::Searched;
 use crate::grid::Grid;
 use crate::result::{Alternative, Finding, Gain};
 use crate::search::Form;
+use crate::transform::Dct;
 use crate::{evidence, gain, scale, threshold};
 
 pub(crate) fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {
@@ -171,6 +175,49 @@ pub(crate) fn variance_finding(s: &Searched<'_>) -> Option<Finding> {
     })
 }
 
+/// Coefficients over which the energy of a motion is averaged, and the energy over the noise's from which on it is there.
+const EVEN: usize = 16;
+const THERE: f64 = 4.0;
+/// Fastest motion of a base, Hz.
+const FASTEST_HZ: f64 = 3.0;
+/// Copies of a motion with other noise.
+const COPIES: usize = 12;
+
+/// Largest rate about the mean, and its standard error, of a motion in white noise: the motion is what stands out at low
+/// frequencies; what the noise that is left with it adds to the largest of many crests shows where noise is added again.
+fn peak_rate(dct: &Dct, y: &[f64], white: f64, rate_hz: f64) -> (f64, f64) {
+    let mut c = dct.forward(y);
+    c[0] = 0.0;
+    let fastest = (2.0 * FASTEST_HZ / rate_hz * c.len() as f64) as usize;
+    let fastest = fastest.clamp(1, c.len());
+    let energy = |part: &[f64]| part.iter().map(|v| v * v).sum::<f64>() / part.len() as f64;
+    let there = c[..fastest]
+        .chunks(EVEN)
+        .rposition(|part| energy(part) > THERE * white);
+    let kept = ((there.map_or(0, |i| i + 1) + 1) * EVEN).min(c.len());
+    c[kept..].fill(0.0);
+    let largest = |c: &[f64]| dct.inverse(c).iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let peak = largest(&c);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x6d6f_7469_6f6e);
+    let copies: Vec<f64> = (0..COPIES)
+        .map(|_| {
+            let with = c.iter().enumerate().map(|(k, v)| {
+                if k == 0 || k >= kept {
+                    return 0.0;
+                }
+                let e: f64 = StandardNormal.sample(&mut rng);
+                v + e * white.sqrt()
+            });
+            largest(&with.collect::<Vec<f64>>())
+        })
+        .collect();
+    let mean = copies.iter().sum::<f64>() / COPIES as f64;
+    let spread = copies.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (COPIES - 1) as f64;
+    // Of crests alike, the largest is raised by a multiple of the noise: twice its variance raises it by 2^1/2 times as much.
+    let raised = (mean - peak) / (std::f64::consts::SQRT_2 - 1.0);
+    (peak - raised, spread.sqrt().hypot(0.5 * raised))
+}
+
 pub(crate) fn motion_finding(s: &Searched<'_>, grid: &Grid) -> Option<Finding> {
     if !s.target.moving || grid.base == Some(Base::Turntable) {
         return None;
@@ -181,15 +228,7 @@ pub(crate) fn motion_finding(s: &Searched<'_>, grid: &Grid) -> Option<Finding> {
         .iter()
         .find(|c| matches!(c.hypothesis, Hypothesis::Motion))?
         .effect;
-    // The rate in blocks of 0.4 s: short enough for the band of base motion, long enough to average the noise.
-    let block = ((0.4 * grid.rate_hz).round() as usize).max(1);
-    let y = &s.target.y;
-    let mean = y.iter().sum::<f64>() / y.len() as f64;
-    let peak = y
-        .chunks_exact(block)
-        .map(|c| (c.iter().sum::<f64>() / block as f64 - mean).abs())
-        .fold(0.0, f64::max);
-    let error = (s.target.white / block as f64).sqrt();
+    let (peak, error) = peak_rate(&grid.dct, &s.target.y, s.target.white, grid.rate_hz);
     let found = Found {
         unit: s.target.unit.clone(),
         coefficients: vec![(peak, error)],
@@ -367,4 +406,37 @@ pub(crate) fn scale_finding(
         }),
         ..Finding::default()
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_rate_of_a_motion_is_that_without_its_noise() {
+        let (n, runs, sigma) = (12_000, 40, 0.2);
+        let dct = Dct::new(n);
+        let mut inside = 0;
+        let mut sum = 0.0;
+        for seed in 0..runs {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let sway = |i: usize| {
+                let t = i as f64 / 20.0;
+                3.0 * (0.7 * t).sin() + 0.5 * (1.9 * t + 0.3).sin()
+            };
+            let truth = (0..n).map(|i| sway(i).abs()).fold(0.0, f64::max);
+            let y: Vec<f64> = (0..n)
+                .map(|i| {
+                    let e: f64 = StandardNormal.sample(&mut rng);
+                    sway(i) + sigma * e
+                })
+                .collect();
+            let (peak, error) = peak_rate(&dct, &y, sigma * sigma, 20.0);
+            inside += usize::from((peak - truth).abs() < 1.96 * error);
+            sum += (peak - truth) / f64::from(runs as u32);
+        }
+        // Without the correction each would be high by some 0.05.
+        assert!(inside >= 34, "{inside} of {runs}");
+        assert!(sum.abs() < 0.03, "{sum}");
+    }
 }
