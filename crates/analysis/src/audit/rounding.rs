@@ -21,6 +21,8 @@ const COARSE: f64 = 1.0;
 const TOLD: f64 = 0.5;
 /// Noise, steps, below which what varies slowly is lost between two codes.
 const LOST: f64 = 0.35;
+/// Median change of readings, steps, from which on no noise is coarse: that of white noise of 1.1 sigma is 1.
+const WELL_ABOVE: f64 = 1.75;
 /// Standard errors within which the kurtosis is the one that rounding makes.
 const AGREES: f64 = 5.0;
 /// What the level, known to what its neighbours tell, leaves of it, as a share.
@@ -94,8 +96,22 @@ impl Table {
     }
 }
 
+/// Median change from reading to reading, steps.
+fn changes(y: &[f64]) -> f64 {
+    let pairs = y.windows(2).map(|w| (w[1] - w[0]).abs());
+    let mut all: Vec<f64> = pairs.filter(|d| d.is_finite()).collect();
+    let middle = all.len() / 2;
+    if all.is_empty() {
+        return 0.0;
+    }
+    *all.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// Of readings in steps; `None` where their noise is well above a step.
 fn of(y: &[f64]) -> Option<Rounded> {
+    if changes(y) >= WELL_ABOVE {
+        return None;
+    }
     // By mean squares: quantiles of a few codes are codes, whatever the level.
     let local = Local::by_squares(y);
     let known: Vec<bool> = y.iter().map(|v| v.is_finite()).collect();
@@ -186,7 +202,13 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     }
     let [least, largest] = rounded.variances;
     if largest - least > SWINGS {
-        let ids = ["variance_in_time", "time_frequency", "bicovariance"];
+        let ids = [
+            "variance_in_time",
+            "time_frequency",
+            "bicovariance",
+            "three_readings",
+            "variance_rhythm",
+        ];
         audit.suppress(&ids, name, STEP);
     }
     if rounded.sigma < LOST {
