@@ -533,6 +533,27 @@ fn hold_signals(names: impl IntoIterator<Item = &'static str>, family: u64, expe
     assert_eq!(signals, expected * SIGNAL_DRAWS);
 }
 
+/// In the readings: what a straight line of the other two axes has of a coupling.
+fn hold_coupling(draw: &mut Draw, name: &'static str) {
+    let mut stand = stand(draw, name);
+    let f = foreign(draw, &mut stand, name, 0, 25.0);
+    assert!((f.strength - 25.0).abs() < 0.1);
+    let before = stand.record(&[], 7).expect("a stand can be simulated");
+    let mut after = before.clone();
+    f.act(&mut after, crate::stand::GYROS[0], &stand, 0, draw);
+    let [old, one, other] = super::counts(&before);
+    let [new, ..] = super::counts(&after);
+    let of = |c: &[i32]| c.iter().map(|c| LSB * f64::from(*c)).collect::<Vec<f64>>();
+    let added: Vec<f64> = of(&new).iter().zip(of(&old)).map(|(a, b)| a - b).collect();
+    let meter = Meter::new(&stand, 0);
+    let gain = |s: &[f64]| meter.of_signal(&meter.energy(s)).powi(2);
+    // A little above d', for the converter has rounded once more.
+    let whole = gain(&added);
+    assert!((whole.sqrt() / 25.0 - 1.0).abs() < 0.25, "{name}: {whole}");
+    let left = gain(&meter.beyond(&added, &[of(&one), of(&other)]));
+    hold(name, "cross_axis", 1.0 - left / whole);
+}
+
 /// White noise of which a share got another density, of 25, against every process of the library.
 fn hold_noise(name: &str, stand: &Stand, axis: usize, density: &dyn Fn(f64) -> f64) {
     let by = |share: f64, w: f64| share.min(1.0) * (density(w) - 1.0);

@@ -99,23 +99,7 @@ fn no_cross_axis_describes_a_tail_of_another_axis() {
     for index in 0..DRAWS {
         let draw = &mut Draw::of(20_261_121, 67, index);
         let name = "tail of another axis";
-        let mut stand = stand(draw, name);
-        let f = foreign(draw, &mut stand, name, 0, 25.0);
-        assert!((f.strength - 25.0).abs() < 0.1);
-        let before = stand.record(&[], 7).expect("a stand can be simulated");
-        let mut after = before.clone();
-        f.act(&mut after, crate::stand::GYROS[0], &stand, 0, draw);
-        let [old, one, other] = super::super::counts(&before);
-        let [new, ..] = super::super::counts(&after);
-        let of = |c: &[i32]| c.iter().map(|c| LSB * f64::from(*c)).collect::<Vec<f64>>();
-        let added: Vec<f64> = of(&new).iter().zip(of(&old)).map(|(a, b)| a - b).collect();
-        let meter = Meter::new(&stand, 0);
-        let gain = |s: &[f64]| meter.of_signal(&meter.energy(s)).powi(2);
-        // A little above d', for the converter has rounded once more.
-        let whole = gain(&added);
-        assert!((whole.sqrt() / 25.0 - 1.0).abs() < 0.25, "{name}: {whole}");
-        let left = gain(&meter.beyond(&added, &[of(&one), of(&other)]));
-        hold(name, "cross_axis", 1.0 - left / whole);
+        hold_coupling(draw, name);
     }
 }
 
