@@ -16,7 +16,9 @@ use std::f64::consts::PI;
 
 use model::effect::Hypothesis;
 
-use crate::checks::{Outcome, chi_tail, kurtosis_score, normal_tail, whitened_by_spectrum};
+use crate::checks::{
+    Outcome, chi_tail, errors_of_sum, kurtosis_score, normal_tail, whitened_by_spectrum,
+};
 use crate::law::DEPARTURE;
 use crate::likelihood::{Bins, Noise, Panel};
 use crate::search::{Form, Search, State};
@@ -97,8 +99,19 @@ pub(crate) fn evenness(e: &[f64], named: &str, lr: f64, rate_hz: f64) -> Outcome
         sum / (0.5 * n * spread).sqrt()
     };
     let scores: Vec<f64> = (1..=COSINES).map(score).collect();
+    claim_of_variance(&scores, lr, |worst| {
+        let over_s = 2.0 * n / rate_hz / (worst + 1) as f64;
+        format!(
+            "told as {named}: divided by it, the variance still swings, most over {over_s:.0} s"
+        )
+    })
+}
+
+/// A claim of a law of the variance, by scores that are standard normal where it holds; a part [`DEPARTURE`] of its likelihood
+/// ratio may be left. `what` tells it by the score that stands out most.
+fn claim_of_variance(scores: &[f64], lr: f64, what: impl FnOnce(usize) -> String) -> Outcome {
     let statistic: f64 = scores.iter().map(|z| z * z).sum();
-    let worst = (0..COSINES)
+    let worst = (0..scores.len())
         .max_by(|a, b| scores[*a].abs().total_cmp(&scores[*b].abs()))
         .unwrap_or(0);
     Outcome {
@@ -107,12 +120,9 @@ pub(crate) fn evenness(e: &[f64], named: &str, lr: f64, rate_hz: f64) -> Outcome
         p_value: if statistic < DEPARTURE * lr {
             1.0
         } else {
-            chi_tail(statistic, COSINES as f64)
+            chi_tail(statistic, scores.len() as f64)
         },
-        what: format!(
-            "told as {named}: divided by it, the variance still swings, most over {:.0} s",
-            2.0 * n / rate_hz / (worst + 1) as f64
-        ),
+        what: what(worst),
     }
 }
 
@@ -128,33 +138,14 @@ pub(crate) fn added_white(e: &[f64], law: &[f64], named: &str, lr: f64) -> Outco
         .zip(law)
         .map(|(e, v)| e * (1.0 - least / v))
         .collect();
-    let score = |lag: usize| {
-        let (mut sum, mut square) = (0.0, 0.0);
-        for (a, b) in added.iter().zip(&added[lag..]) {
-            let p = a * b;
-            sum += p;
-            square += p * p;
-        }
-        sum / square.max(f64::MIN_POSITIVE).sqrt()
-    };
+    let score = |lag: usize| errors_of_sum(added.iter().zip(&added[lag..]).map(|(a, b)| a * b));
     let scores: Vec<f64> = (1..=LAGS_OF_ADDED.min(e.len() / 2)).map(score).collect();
-    let statistic: f64 = scores.iter().map(|z| z * z).sum();
-    let worst = (0..scores.len())
-        .max_by(|a, b| scores[*a].abs().total_cmp(&scores[*b].abs()))
-        .unwrap_or(0);
-    Outcome {
-        id: VARIANCE_CLAIM,
-        statistic,
-        p_value: if statistic < DEPARTURE * lr {
-            1.0
-        } else {
-            chi_tail(statistic, scores.len() as f64)
-        },
-        what: format!(
-            "told as {named}: what it adds is not white, readings {} samples apart correlate most",
-            worst + 1
-        ),
-    }
+    claim_of_variance(&scores, lr, |worst| {
+        let lag = worst + 1;
+        format!(
+            "told as {named}: what it adds is not white, readings {lag} samples apart correlate most"
+        )
+    })
 }
 
 /// The claim of a contest of levels: `z` standard errors from what the lead of two levels is for what was named.

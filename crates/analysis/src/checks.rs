@@ -10,6 +10,9 @@ mod higher;
 
 pub(crate) use higher::{MOST, Repeats, bicovariance, repeats, three_readings, variance_rhythm};
 
+/// Samples of ten minutes at 20 Hz, which the checks are calibrated on. Of a longer record of a real part, whatever its size,
+/// something is always left that is no linear, normal noise.
+pub(crate) const RECORD: f64 = 12_000.0;
 /// Chance below which a check fails.
 pub const LEAST_CHANCE: f64 = 1e-5;
 /// Lags of the Ljung-Box statistic.
@@ -79,6 +82,13 @@ pub(crate) fn chi_tail(x: f64, degrees: f64) -> f64 {
 #[must_use]
 pub fn normal_tail(z: f64) -> f64 {
     2.0 * Normal::standard().sf(z.abs())
+}
+
+/// Standard errors of a sum of products that are 0 on average and independent: exact to the second moment whatever changes
+/// the spread of their factors.
+pub(crate) fn errors_of_sum(products: impl Iterator<Item = f64>) -> f64 {
+    let (sum, square) = products.fold((0.0, 0.0), |(sum, square), p| (sum + p, square + p * p));
+    sum / f64::max(square, f64::MIN_POSITIVE).sqrt()
 }
 
 /// All checks of one channel.
@@ -436,8 +446,7 @@ fn skewness_score(skewness: f64, n: f64) -> f64 {
     (y / alpha).asinh() / (0.5 * w2.ln()).sqrt()
 }
 
-/// Skewness below which no part is told: no real one is symmetric to the last digit, and a record of ten minutes at 20 Hz, which
-/// the checks are calibrated on, would not show it.
+/// Skewness below which a longer record than [`RECORD`] is not told: that one would not show it (4.4 of its (6 / n)^1/2).
 const LEAST_SKEWNESS: f64 = 0.1;
 
 /// Third moment about the mean over the third power of the spread.
@@ -454,7 +463,7 @@ fn skewness(e: &[f64]) -> Outcome {
     Outcome {
         id: "skewness",
         statistic: skewness,
-        p_value: if n > 12_000.0 && skewness.abs() < LEAST_SKEWNESS {
+        p_value: if n > RECORD && skewness.abs() < LEAST_SKEWNESS {
             1.0
         } else {
             normal_tail(skewness_score(skewness, n))

@@ -85,15 +85,8 @@ fn of_one(s: &Searched<'_>, samples: usize) -> Vec<Source> {
     all
 }
 
-/// Standard errors of the sum of products: exact to the second moment whatever changes the spread of either side.
 fn errors(a: &[f64], b: &[f64]) -> f64 {
-    let (mut sum, mut square) = (0.0, 0.0);
-    for (a, b) in a.iter().zip(b) {
-        let p = a * b;
-        sum += p;
-        square += p * p;
-    }
-    sum / square.max(f64::MIN_POSITIVE).sqrt()
+    checks::errors_of_sum(a.iter().zip(b).map(|(a, b)| a * b))
 }
 
 /// Times over which a blow is felt, s.

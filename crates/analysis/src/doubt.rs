@@ -36,10 +36,6 @@ const REMAINDER_BEYOND: f64 = 0.25;
 /// The same where a shape is known not to hold: what is off may be as large as what it explains.
 const REMAINDER_UNLAWFUL: f64 = 1.0;
 
-/// Samples of ten minutes at 20 Hz: of a longer record, whatever its size, something is always left that is no linear noise;
-/// it counts by what such a one would show.
-const RECORD: f64 = 12_000.0;
-
 /// Why a name is not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Doubt {
@@ -170,7 +166,8 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
         repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
     };
     let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
-    let bent = (late + bent(s, failing)) * (RECORD / n).min(1.0);
+    // Of a longer record it counts by what one of that length would show.
+    let bent = (late + bent(s, failing)) * (checks::RECORD / n).min(1.0);
     // What is left without a place may be anywhere; what has one leaves a strong term elsewhere alone.
     let misplaced = |t: &Term| !places.is_empty() && t.score() < WIDE;
     let followed = followers(s, &g);

@@ -181,6 +181,17 @@ impl Audit {
         fails
     }
 
+    /// What the last check has found has no name in the library.
+    fn unexplain(&mut self, channel: &str, what: String) {
+        if let Some(check) = self.checks.last_mut() {
+            check.fails_after = true;
+        }
+        self.unexplained.push(Unexplained {
+            channel: channel.into(),
+            what,
+        });
+    }
+
     /// A check against a plain limit.
     fn limit(&mut self, id: &str, channel: &str, statistic: f64, limit: f64, what: String) -> bool {
         let fails = statistic > limit;

@@ -6,7 +6,6 @@
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 use super::{Audit, Gyro, LEAST_READINGS};
-use crate::result::Unexplained;
 
 /// Fewest changes of the largest size.
 const LEAST_PILE: usize = 20;
@@ -47,14 +46,7 @@ pub(super) fn audit(gyro: &Gyro<'_>, audit: &mut Audit) {
     );
     let fails = audit.check("slew", name, pile as f64, chance, what.clone());
     if fails && pile >= LEAST_PILE {
-        // No finding explains it.
-        if let Some(check) = audit.checks.last_mut() {
-            check.fails_after = true;
-        }
-        audit.unexplained.push(Unexplained {
-            channel: name.clone(),
-            what,
-        });
+        audit.unexplain(name, what);
     }
 }
 

@@ -6,7 +6,7 @@ use model::record::Record;
 use super::drift::{self, Uneven};
 use super::{Audit, Gyro, tails};
 use crate::audit::local::{median, width};
-use crate::result::{Finding, Unexplained};
+use crate::result::Finding;
 
 /// Jitter of a sound board, rounding to ticks included, is about 36 us; beyond this it is a fault.
 const JITTER_LIMIT_S: f64 = 70e-6;
@@ -104,13 +104,7 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
             audit.untested("clock_rate", what);
         } else {
             audit.limit("clock_course", "record", course.told, 1.0, what.clone());
-            if let Some(c) = audit.checks.last_mut() {
-                c.fails_after = true;
-            }
-            audit.unexplained.push(Unexplained {
-                channel: "record".into(),
-                what: what.clone(),
-            });
+            audit.unexplain("record", what.clone());
         }
         // Two rates are not one.
         if *kind == Uneven::Bend {

@@ -1,7 +1,7 @@
 //! Checks of what a spectrum does not show: readings that depend on earlier ones though they do not correlate with them,
 //! and what repeats itself with the samples.
 
-use super::{Outcome, chi_tail};
+use super::{Outcome, chi_tail, errors_of_sum};
 use crate::likelihood::Dct;
 
 /// Lags, either way, of the bicovariance.
@@ -68,14 +68,9 @@ pub(crate) fn three_readings(e: &[f64]) -> Outcome {
             .map(|(x, y)| x * y)
             .collect();
         for b in a + 1..=last {
-            let (mut sum, mut square) = (0.0, 0.0);
             // The last of the three, and the two before it.
-            for (p, v) in of_two.iter().zip(&centred[b..]) {
-                let p = p * v;
-                sum += p;
-                square += p * p;
-            }
-            let z = sum / square.max(f64::MIN_POSITIVE).sqrt();
+            let of_three = of_two.iter().zip(&centred[b..]);
+            let z = errors_of_sum(of_three.map(|(p, v)| p * v));
             statistic += z * z;
             pairs += 1.0;
             if z.abs() > worst.2.abs() {
