@@ -15,6 +15,7 @@ use crate::random::Draw;
 use crate::stand::{LSB, Stand};
 use crate::strength::{Meter, of_variance};
 
+mod eighth;
 mod fifth;
 mod fourth;
 mod seventh;

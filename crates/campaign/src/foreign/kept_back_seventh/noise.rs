@@ -71,7 +71,7 @@ impl Turning {
     }
 
     /// A stretch of it, from any state on.
-    pub(super) fn of(&self, draw: &mut Draw, n: usize) -> Vec<f64> {
+    pub(in super::super) fn of(&self, draw: &mut Draw, n: usize) -> Vec<f64> {
         let drive = (1.0 - self.keep * self.keep).sqrt();
         let (sin, cos) = self.turn.sin_cos();
         let (mut a, mut b) = (draw.normal(), draw.normal());

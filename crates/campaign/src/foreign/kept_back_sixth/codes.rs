@@ -345,7 +345,7 @@ fn limited(stand: &Stand, name: &'static str, axis: usize, wanted: f64) -> Forei
 }
 
 /// White readings of an axis about its bias, deg/s.
-fn white_of(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
+pub(in super::super) fn white_of(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
     let sigma = stand.white(axis).sqrt();
     (0..stand.samples())
         .map(|_| sigma * draw.normal())
@@ -353,7 +353,7 @@ fn white_of(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
 }
 
 /// What the frames of other axes add to this one, a signal of this kind giving the strength; the converter rounds again.
-fn coupled(
+pub(in super::super) fn coupled(
     stand: &Stand,
     name: &'static str,
     axis: usize,

@@ -31,7 +31,7 @@ fn no_law_of_variance_of_the_library_describes_those_of_the_seventh_set() {
 }
 
 /// A spectrum that white noise is given whole, at the size that makes it 25 strong, against every process of the library.
-fn hold_spectrum(name: &str, stand: &Stand, axis: usize, by: &dyn Fn(f64, f64) -> f64) {
+pub(super) fn hold_spectrum(name: &str, stand: &Stand, axis: usize, by: &dyn Fn(f64, f64) -> f64) {
     let strength = |size: f64| kept_back::shaped(stand, axis, &|w| by(size, w) - 1.0);
     let size = crate::strength::size_for(25.0, &strength);
     let expected = spectrum(stand, axis, &|w| by(size, w), &[]);

@@ -53,7 +53,7 @@ fn no_process_of_the_library_describes_a_zero_taken_from_blocks() {
 
 /// Correlation of neighbours is all that white noise and one pole, or any filter of the library, have of them; the longer
 /// lags of a pole follow from it.
-fn by_neighbours(r: f64, n: usize, strength: f64) -> f64 {
+pub(super) fn by_neighbours(r: f64, n: usize, strength: f64) -> f64 {
     -(n as f64) * (-r * r).ln_1p() / strength.powi(2)
 }
 
@@ -108,7 +108,7 @@ fn correlation_of_neighbours_is_a_part_of_what_filters_of_the_sixth_set_do() {
 }
 
 /// A law of codes against bits that stick and against a rail at either end, of noise with its mean and variance.
-fn hold_codes(name: &str, stand: &Stand, first: i32, read: &[f64]) {
+pub(super) fn hold_codes(name: &str, stand: &Stand, first: i32, read: &[f64]) {
     let even = codes::refitted(first, read);
     let whole = of_law(read, &even, stand.samples()).powi(2);
     let share = |law: &[f64]| 1.0 - of_law(read, law, stand.samples()).powi(2) / whole;
