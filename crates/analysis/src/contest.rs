@@ -3,6 +3,7 @@
 //! Both sides are weighed on the same block means: the Gaussian model by its exact likelihood, the two-level one (with
 //! white noise and a random walk of the level) by a bank of Kalman filters, one for each level, merged by moments.
 
+pub(crate) mod power_law;
 mod steps;
 
 use std::f64::consts::TAU;

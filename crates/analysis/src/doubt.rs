@@ -9,6 +9,7 @@
 //! where the shape may be late or bent, is as likely a remainder of the shape as a cause of its own.
 
 use crate::checks::{self, LEAST_CHANCE, Outcome, Place};
+use crate::contest::power_law::PowerLawFound;
 use crate::diagnosis::Searched;
 use crate::result::{Finding, Unexplained};
 use crate::search::{Form, Term};
@@ -166,6 +167,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
         repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
     };
     let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
+    let by_power_law = |filter: bool| s.state.power_law.is_some_and(|p| p.filter || !filter);
     // Of a longer record it counts by what one of that length would show.
     let bent = (late + bent(s, failing)) * (checks::RECORD / n).min(1.0);
     // What is left without a place may be anywhere; what has one leaves a strong term elsewhere alone.
@@ -228,10 +230,12 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
                 let own = process.density(theta, &panel.bins.at);
                 let information = own.iter().zip(&g).zip(&counts);
                 let information = information.map(|((d, g), m)| m * (d / g).powi(2));
-                unlike && !process.filters_white()
+                let filter = process.filters_white();
+                by_power_law(filter)
+                    || unlike && !filter
                     || repeats.is_some()
                     || bent > LEFT * t.lr
-                    || correlated && (places.is_empty() || process.filters_white())
+                    || correlated && (places.is_empty() || filter)
                     || share(&information.collect::<Vec<_>>(), t.lr)
             } else {
                 let mut sum = vec![0.0; panel.bins.n];
@@ -335,6 +339,14 @@ pub(crate) fn withdraw(
     match of_variance {
         Some(finding) if variance => nearest.push(finding),
         other => kept.extend(other),
+    }
+    if let Some(PowerLawFound { exponent, .. }) = s.state.power_law {
+        unexplained.push(Unexplained {
+            channel: name.into(),
+            what: format!(
+                "noise whose density falls with the frequency as f^-{exponent:.2} explains as much as the processes of the library do, and is none of them"
+            ),
+        });
     }
     if !nearest.is_empty() {
         let told: Vec<&str> = nearest.iter().map(|f| f.what.as_str()).collect();

@@ -245,3 +245,92 @@ fn frames_in_which_one_axis_holds_the_reading_of_another_are_told() {
         right.then_some(()).ok_or_else(|| said(&d))
     });
 }
+
+#[test]
+fn noise_of_another_slope_is_no_bias_that_comes_back() {
+    graded("fractional noise beside the white one", |run, rng| {
+        let mut r = record(&[], 5900 + run);
+        let order = Uniform::new(0.25, 0.35).expect("a range").sample(rng);
+        let n = r.len();
+        // (1 - B)^-order of white noise.
+        let mut weights = vec![1.0; n];
+        for k in 1..n {
+            weights[k] = weights[k - 1] * (k as f64 - 1.0 + order) / k as f64;
+        }
+        let drive: Vec<f64> = (0..n).map(|_| StandardNormal.sample(rng)).collect();
+        let noise: Vec<f64> = (0..n)
+            .map(|i| {
+                let past = weights.iter().zip(drive[..=i].iter().rev());
+                0.4 * past.map(|(w, e)| w * e).sum::<f64>()
+            })
+            .collect();
+        add(&mut r, "gyro_x", |i| noise[i]);
+        let d = told(&r);
+        let seen = (d.unexplained.iter())
+            .any(|u| u.channel == "gyro_x" && u.what.contains("falls with the frequency"));
+        // Flicker noise is its nearest relative.
+        let other = named(&d).iter().any(|n| n.0 != "flicker");
+        (seen && !other).then_some(()).ok_or_else(|| said(&d))
+    });
+}
+
+#[test]
+fn a_tone_whose_pitch_wanders_is_a_line_and_a_mode_that_noise_drives_is_none() {
+    let wide =
+        |rng: &mut Xoshiro256PlusPlus| TAU * Uniform::new(0.1, 0.4).expect("a range").sample(rng);
+    graded("a tone whose phase walks", |run, rng| {
+        let mut r = record(&[], 6000 + run);
+        let mut phase = 0.0;
+        let step = wide(rng);
+        let tone: Vec<f64> = (0..r.len())
+            .map(|_| {
+                let e: f64 = StandardNormal.sample(rng);
+                phase += step + 0.05 * e;
+                0.25 * phase.cos()
+            })
+            .collect();
+        add(&mut r, "gyro_y", |i| tone[i]);
+        let d = told(&r);
+        let right = named(&d) == [("line", "gyro_y")] && !d.unexplained.is_empty();
+        right.then_some(()).ok_or_else(|| said(&d))
+    });
+    graded("a mode that noise drives", |run, rng| {
+        let mut r = record(&[], 6100 + run);
+        let (omega, decay) = (wide(rng), 1.0 / 300.0f64);
+        let (a, b) = (2.0 * (-decay).exp() * omega.cos(), (-2.0 * decay).exp());
+        let (mut x, mut before) = (0.0, 0.0);
+        let mode: Vec<f64> = (0..r.len())
+            .map(|_| {
+                let e: f64 = StandardNormal.sample(rng);
+                (x, before) = (a * x - b * before + e, x);
+                x
+            })
+            .collect();
+        let rms = (mode.iter().map(|v| v * v).sum::<f64>() / mode.len() as f64).sqrt();
+        add(&mut r, "gyro_y", |i| 0.18 * mode[i] / rms);
+        let d = told(&r);
+        let right = named(&d).is_empty() && !d.unexplained.is_empty();
+        right.then_some(()).ok_or_else(|| said(&d))
+    });
+}
+
+#[test]
+fn readings_that_are_smoothed_while_little_happens_are_not_stale() {
+    graded("a filter that lets large changes through", |run, rng| {
+        let mut r = record(&[], 6200 + run);
+        let c = r.channels.iter_mut().find(|c| c.name == "gyro_z");
+        let c = c.expect("a channel");
+        let large = Uniform::new(0.3, 0.5).expect("a range").sample(rng);
+        let mut held = c.values[0];
+        for v in &mut c.values {
+            let change = *v - held;
+            // The larger the change, the more of it.
+            held += change * (1.0 - 0.8 * (-(change / large).powi(2)).exp());
+            *v = (held / 0.07326).round() * 0.07326;
+        }
+        c.counts = None;
+        let d = told(&r);
+        let stale = named(&d).iter().any(|n| n.0 == "stale_samples");
+        (!stale).then_some(()).ok_or_else(|| said(&d))
+    });
+}

@@ -9,6 +9,8 @@ use model::record::Record;
 
 use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted, tails};
 use crate::audit::local::{robust_sigma, width};
+use crate::checks::chi_tail;
+use crate::likelihood::invert;
 use crate::result::Unexplained;
 
 /// Distances of the pairs that tell the chance of agreement.
@@ -72,39 +74,79 @@ fn bridged(d: &[f64], step: f64) -> Option<(f64, f64)> {
             tally[k as usize] += 0.5;
         }
     }
-    // Poisson regression of ln p on (1, k^2), by Newton's method from the mean.
-    let total: f64 = tally.iter().sum();
-    if total < 20.0 {
-        return None;
-    }
-    let scale = (reach * reach) as f64;
-    let (mut a, mut c) = ((total / reach as f64).ln(), 0.0);
-    let mut variance = 1.0;
+    let reach = reach as f64;
+    let square = |k: f64| [1.0, (k / reach).powi(2), 0.0];
+    let peaked = |k: f64| [1.0, (k / reach).powi(2), k / reach];
+    let plain = poisson(&tally, square, 2)?;
+    // Differences of no normal law, as of readings that are smoothed while little happens, are peaked beside 0 as well.
+    let fit = if plain.chance < NORMAL {
+        poisson(&tally, peaked, 3)?
+    } else {
+        plain
+    };
+    // Each bin is the mean of two, and neighbours share a reading.
+    let error = (1.5 * 0.5 * fit.variance).sqrt();
+    let p = fit.first.exp() / finite;
+    (p.is_finite() && error.is_finite()).then_some((p, error))
+}
+
+/// Chance of the tallies below which the differences have no normal law.
+const NORMAL: f64 = 1e-3;
+
+/// A Poisson regression.
+struct Fitted {
+    /// Logarithm of what is expected at 0, and its variance.
+    first: f64,
+    variance: f64,
+    /// Chance of tallies as far off.
+    chance: f64,
+}
+
+/// Logarithms of the tallies from 1 on as a sum of the first `count` of `terms`, of which the first is 1 and the others
+/// are 0 at 0; by Newton's method from the mean.
+fn poisson(tally: &[f64], terms: impl Fn(f64) -> [f64; 3], count: usize) -> Option<Fitted> {
+    let bins = tally.len() - 1;
+    let total: f64 = tally[1..].iter().sum();
+    let mut x = [(total / bins as f64).ln(), 0.0, 0.0];
+    let mean = |x: &[f64; 3], t: &[f64; 3]| -> f64 {
+        let ln: f64 = x.iter().zip(t).map(|(x, t)| x * t).sum();
+        ln.exp()
+    };
+    let mut variance = f64::NAN;
     for _ in 0..30 {
-        let (mut g, mut h) = ([0.0; 2], [0.0; 3]);
+        let mut g = vec![0.0; count];
+        let mut h = vec![vec![0.0; count]; count];
         for (k, y) in tally.iter().enumerate().skip(1) {
-            let x = (k * k) as f64 / scale;
-            let mean = (a + c * x).exp();
-            g[0] += y - mean;
-            g[1] += (y - mean) * x;
-            h[0] += mean;
-            h[1] += mean * x;
-            h[2] += mean * x * x;
+            let t = terms(k as f64);
+            let m = mean(&x, &t);
+            for i in 0..count {
+                g[i] += (y - m) * t[i];
+                (0..count).for_each(|j| h[i][j] += m * t[i] * t[j]);
+            }
         }
-        let det = h[0] * h[2] - h[1] * h[1];
-        let step = (
-            (h[2] * g[0] - h[1] * g[1]) / det,
-            (h[0] * g[1] - h[1] * g[0]) / det,
-        );
-        a += step.0;
-        c += step.1;
-        // Each bin is the mean of two, and neighbours share a reading.
-        variance = 0.5 * h[2] / det;
-        if step.0.abs() < 1e-10 {
+        let (inverse, _) = invert(&h);
+        let step: Vec<f64> = inverse
+            .iter()
+            .map(|row| row.iter().zip(&g).map(|(a, b)| a * b).sum())
+            .collect();
+        x.iter_mut().zip(&step).for_each(|(x, s)| *x += s);
+        variance = inverse[0][0];
+        if step[0].abs() < 1e-10 {
             break;
         }
     }
-    (a.is_finite() && variance.is_finite()).then(|| (a.exp() / finite, (1.5 * variance).sqrt()))
+    // Each bin is the mean of two, and neighbours share a reading, as above.
+    let off = tally.iter().enumerate().skip(1).map(|(k, y)| {
+        let m = mean(&x, &terms(k as f64));
+        (y - m).powi(2) / (0.75 * m)
+    });
+    let freedom = bins.saturating_sub(count) as f64;
+    Some(Fitted {
+        first: x[0],
+        variance,
+        chance: chi_tail(off.sum(), freedom.max(1.0)),
+    })
+    .filter(|_| bins > count)
 }
 
 /// Smallest distance between two readings that is no dust of the arithmetic: the step of a channel that does not say.

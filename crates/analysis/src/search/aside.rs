@@ -3,10 +3,12 @@
 //! A mode that something drives, or a motor whose speed drifts, fills a band about its frequency. As lines it takes all
 //! terms that a channel may have, and as noise it raises the white level: steps, slopes and processes beside it are then
 //! lost or withheld. The strongest line stands for it, a note says what is left of it; there the coefficients are taken
-//! down to the energy of the noise about the band, and the search goes on.
+//! down to the energy of the noise about the band, and the search goes on. It keeps the name of a line where its size is
+//! steady (`envelope`).
 
 use std::f64::consts::{PI, TAU};
 
+use super::envelope::{STEADY, swing};
 use super::{Form, MOST_ALIKE, Note, Search, State, Term, Wandering};
 use crate::likelihood::Noise;
 use crate::scan::residual;
@@ -34,6 +36,17 @@ fn omega_of(t: &Term) -> Option<f64> {
     }
 }
 
+/// What was done to a band.
+struct Evened {
+    /// Energy that was there over that of the noise.
+    left: f64,
+    /// First coefficient, and the end.
+    from: usize,
+    to: usize,
+    /// Whether it is a tone of steady size.
+    steady: bool,
+}
+
 /// Lowest and highest of the most that lie within the span of one that wanders.
 fn narrowest(omegas: &[f64]) -> Option<(f64, f64, usize)> {
     let mut sorted = omegas.to_vec();
@@ -49,8 +62,9 @@ fn narrowest(omegas: &[f64]) -> Option<(f64, f64, usize)> {
 }
 
 impl Search<'_> {
-    /// The channel without the rest of a line that wanders, a note of it, and where it is; nothing where no line does.
-    pub(super) fn set_aside(&self, state: &State) -> Option<(State, Note, Wandering)> {
+    /// The channel without the rest of a line that wanders, a note of it, and where it is if it is a line still; nothing
+    /// where no line does.
+    pub(super) fn set_aside(&self, state: &State) -> Option<(State, Note, Option<Wandering>)> {
         let omegas: Vec<f64> = state.terms.iter().filter_map(omega_of).collect();
         let (low, high, count) = narrowest(&omegas)?;
         if count <= MOST_ALIKE || omegas.len() - count > MOST_ALIKE {
@@ -71,11 +85,21 @@ impl Search<'_> {
         let around = (AROUND * high * to_k).max(LEAST_AROUND);
         let from = (low * to_k - around).max(1.0) as usize;
         let to = ((high * to_k + around) as usize + 1).min(n);
-        let (left, from, to) = self.even_out(&rest, from, to)?;
+        let Evened {
+            left,
+            from,
+            to,
+            steady,
+        } = self.even_out(&rest, from, to)?;
+        let seen = if steady {
+            "one line whose frequency or amplitude wanders"
+        } else {
+            "a mode that noise drives, or a tone that comes and goes"
+        };
         let hz = self.view.rate_hz / TAU;
         let note = Note {
             what: format!(
-                "{count} lines from {:.3} to {:.3} Hz: one line whose frequency or amplitude wanders; beside it {left:.1} times the energy of the noise, set aside from {:.3} to {:.3} Hz",
+                "{count} lines from {:.3} to {:.3} Hz: {seen}; beside it {left:.1} times the energy of the noise, set aside from {:.3} to {:.3} Hz",
                 low * hz,
                 high * hz,
                 from as f64 / to_k * hz,
@@ -87,12 +111,13 @@ impl Search<'_> {
             line,
             half: 0.5 * (high - low),
         };
-        Some((self.refit(rest.terms, rest.noise.log_walk), note, wandering))
+        let state = self.refit(rest.terms, rest.noise.log_walk);
+        Some((state, note, steady.then_some(wandering)))
     }
 
     /// Take what a state leaves from coefficient `from` to `to`, and on either side while more than the noise is there, down
-    /// to the noise about; returns the energy that was there over it, and from where to where.
-    fn even_out(&self, state: &State, from: usize, to: usize) -> Option<(f64, usize, usize)> {
+    /// to the noise about.
+    fn even_out(&self, state: &State, from: usize, to: usize) -> Option<Evened> {
         let r = residual(&self.panel, &state.columns(), &state.solution);
         let g = Noise::everywhere(&state.noise, &self.panel.bins);
         let n = r.len();
@@ -128,11 +153,41 @@ impl Search<'_> {
             })
             .collect();
         let mut y = self.panel.column(0).to_vec();
+        // The line that stands for the band is a part of it.
+        let whole = self.with_lines(state, &r, from, to);
+        let whole = whole.iter().zip(&g[from..to]);
+        let whole: Vec<f64> = whole.map(|(c, g)| c / (g * white).sqrt()).collect();
+        let steady = swing(&whole) < STEADY;
         for (k, energy) in (from..to).zip(&energy) {
             y[k] += r[k] * (energy.max(1.0).sqrt().recip() - 1.0);
         }
         self.panel.replace_data(y);
-        Some((energy.iter().sum::<f64>() / energy.len() as f64, from, to))
+        Some(Evened {
+            left: energy.iter().sum::<f64>() / energy.len() as f64,
+            from,
+            to,
+            steady,
+        })
+    }
+
+    /// Coefficients `from` to `to` of the residual `r` with the lines of a state that lie there.
+    fn with_lines(&self, state: &State, r: &[f64], from: usize, to: usize) -> Vec<f64> {
+        let mut whole = r[from..to].to_vec();
+        let to_k = self.panel.bins.n as f64 / PI;
+        let mut at = 0;
+        for t in &state.terms {
+            let own = &state.solution.beta[at..at + t.columns.len()];
+            at += t.columns.len();
+            if omega_of(t).is_none_or(|w| w * to_k < from as f64 || w * to_k > to as f64) {
+                continue;
+            }
+            for (column, b) in t.columns.iter().zip(own) {
+                let column = self.panel.column(*column);
+                let there = whole.iter_mut().zip(&column[from..to]);
+                there.for_each(|(w, x)| *w += b * x);
+            }
+        }
+        whole
     }
 
     /// What wanders swings in no single time: it is a line and no more.

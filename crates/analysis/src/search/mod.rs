@@ -3,6 +3,7 @@
 //! others make superfluous is dropped. The search knows hypotheses, not effects.
 
 mod aside;
+mod envelope;
 mod refine;
 mod rivals;
 mod weigh;
@@ -16,6 +17,7 @@ use model::record::Quantity;
 
 use crate::beyond;
 use crate::checks::Outcome;
+use crate::contest::power_law::{self, PowerLawFound};
 use crate::likelihood::{Noise, Panel, Solution};
 
 /// Most terms on one channel.
@@ -157,6 +159,8 @@ pub struct State {
     pub wandering: Option<Wandering>,
     /// The level of a process that is not Gaussian, where one was named: sample by sample.
     pub level: Option<Rc<Vec<f64>>>,
+    /// The one power law that explains as much as the processes.
+    pub power_law: Option<PowerLawFound>,
 }
 
 impl State {
@@ -318,6 +322,7 @@ impl<'a> Search<'a> {
             notes: vec![],
             wandering: None,
             level: None,
+            power_law: None,
         };
         let mut fitted = state.noise.terms.iter();
         for t in &mut state.terms {
@@ -373,10 +378,11 @@ impl<'a> Search<'a> {
         let mut notes = std::mem::take(&mut state.notes);
         if let Some((_, note, wandering)) = aside {
             notes.push(note);
-            state.wandering = Some(wandering);
+            state.wandering = wandering;
         }
         notes.extend(self.crowds(&mut state));
         self.find_rivals(&mut state);
+        state.power_law = power_law::instead(self, &state);
         state.notes = notes;
         state
     }
