@@ -23,6 +23,18 @@ where
     eight.iter().sum::<f64>() + rest
 }
 
+/// Sum of a function of the values, in eight sums as [`dot`].
+pub(crate) fn sum_of(a: &[f64], f: impl Fn(f64) -> f64) -> f64 {
+    let (eights, rest) = a.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for eight in eights {
+        for (sum, v) in sums.iter_mut().zip(eight) {
+            *sum += f(*v);
+        }
+    }
+    sums.iter().sum::<f64>() + rest.iter().map(|v| f(*v)).sum::<f64>()
+}
+
 /// Coefficients of a column.
 #[derive(Clone)]
 pub(crate) enum Column {
@@ -41,6 +53,22 @@ impl Column {
             Self::Short(Rc::new(c.iter().map(|v| *v as f32).collect()))
         } else {
             Self::Whole(Rc::new(c))
+        }
+    }
+
+    /// Where its coefficients are in memory: columns that share them are one.
+    pub(crate) fn place(&self) -> usize {
+        match self {
+            Self::Whole(c) => Rc::as_ptr(c).addr(),
+            Self::Short(c) => Rc::as_ptr(c).addr(),
+        }
+    }
+
+    /// The first `count`.
+    pub(crate) fn first(&self, count: usize) -> Vec<f64> {
+        match self {
+            Self::Whole(c) => c.iter().take(count).copied().collect(),
+            Self::Short(c) => c.iter().take(count).map(|v| f64::from(*v)).collect(),
         }
     }
 

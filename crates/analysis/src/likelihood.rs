@@ -246,31 +246,42 @@ impl Panel {
     /// A panel on the data `y`, which becomes column 0.
     #[must_use]
     pub fn new(dct: &Dct, bins: &Rc<Bins>, y: &[f64]) -> Self {
+        Self::of(dct, bins, Rc::new(dct.forward(y)))
+    }
+
+    /// A panel on data whose coefficients are known.
+    #[must_use]
+    pub fn of(dct: &Dct, bins: &Rc<Bins>, coefficients: Rc<Vec<f64>>) -> Self {
         Self {
             dct: dct.clone(),
             bins: Rc::clone(bins),
-            columns: RefCell::new(vec![Column::Whole(Rc::new(dct.forward(y)))]),
+            columns: RefCell::new(vec![Column::Whole(coefficients)]),
             pairs: RefCell::default(),
         }
     }
 
     /// Add a column of a candidate, which other channels may have in `common`; returns its number.
     pub fn add_candidate(&self, values: &[f64], common: bool) -> usize {
-        let c = if common {
-            let key = digest(values);
-            let known = self.dct.known.columns.borrow().get(&key).cloned();
-            known.unwrap_or_else(|| {
-                let c = Column::new(self.dct.forward(values));
-                if !self.dct.known.complete.get() {
-                    self.dct.known.columns.borrow_mut().insert(key, c.clone());
-                }
-                c
-            })
-        } else {
-            Column::new(self.dct.forward(values))
-        };
+        let c = self.candidate(values, common);
         self.columns.borrow_mut().push(c);
         self.columns.borrow().len() - 1
+    }
+
+    /// The coefficients of a candidate's column, transformed once for all that have the same in `common`.
+    fn candidate(&self, values: &[f64], common: bool) -> Column {
+        let transformed = || Column::new(self.dct.forward(values));
+        if !common {
+            return transformed();
+        }
+        let key = digest(values);
+        let known = self.dct.known.columns.borrow().get(&key).cloned();
+        known.unwrap_or_else(|| {
+            let c = transformed();
+            if !self.dct.known.complete.get() {
+                self.dct.known.keep(key, &c);
+            }
+            c
+        })
     }
 
     /// Add the columns that go by a name, which other channels may have in `common`: then they are made once. Returns
@@ -283,8 +294,7 @@ impl Panel {
     ) -> Vec<usize> {
         let made = || -> Vec<Column> {
             let values = make();
-            let new = values.iter().map(|v| Column::new(self.dct.forward(v)));
-            new.collect()
+            values.iter().map(|v| self.candidate(v, common)).collect()
         };
         let all = if common {
             let known = self.dct.known.named.borrow().get(name).cloned();
@@ -324,6 +334,11 @@ impl Panel {
         self.columns.borrow()[i].whole()
     }
 
+    /// The first `count` of them.
+    pub(crate) fn first(&self, i: usize, count: usize) -> Vec<f64> {
+        self.columns.borrow()[i].first(count)
+    }
+
     /// Forget the columns from `length` on.
     pub fn truncate(&self, length: usize) {
         self.columns.borrow_mut().truncate(length);
@@ -351,7 +366,8 @@ impl Panel {
             return Rc::clone(p);
         }
         let columns = self.columns.borrow();
-        let p = Rc::new(columns[key.0].products(&columns[key.1], &self.bins));
+        let (a, b) = (&columns[key.0], &columns[key.1]);
+        let p = (self.dct.known).products(a, b, || Rc::new(a.products(b, &self.bins)));
         self.pairs.borrow_mut().insert(key, Rc::clone(&p));
         p
     }

@@ -24,10 +24,10 @@ fn first_of_residual(
     solution: &Solution,
     count: usize,
 ) -> Vec<f64> {
-    let mut r = panel.column(0)[..count].to_vec();
+    let mut r = panel.first(0, count);
     for (c, b) in columns.iter().zip(&solution.beta) {
         r.iter_mut()
-            .zip(panel.column(*c).iter())
+            .zip(panel.first(*c, count))
             .for_each(|(r, x)| *r -= b * x);
     }
     r[0] = 0.0;
@@ -96,7 +96,7 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
         let total: f64 = d.iter().sum();
         let crossed: Vec<Vec<f64>> = columns
             .iter()
-            .map(|c| sums(&panel.column(*c), &[]).0)
+            .map(|c| sums(&panel.first(*c, m), &[]).0)
             .collect();
         let count = (n - 1) as f64;
         for j in 1..m {

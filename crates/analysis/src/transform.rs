@@ -1,8 +1,8 @@
 //! Fourier and cosine transforms of real records, through complex ones of half their length.
 
 use std::cell::{Cell, OnceCell, RefCell};
-use std::collections::HashMap;
-use std::f64::consts::PI;
+use std::collections::{HashMap, HashSet};
+use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ struct Plan {
     turn: Rc<Turns>,
 }
 
-/// exp(-i pi k / (2 n)), k = 0 ..= n/2, each the product of one of few coarse and one of few fine turns: what would be a
+/// exp(-i pi k / (2 n)), k = 0 ..= n/4, each the product of one of few coarse and one of few fine turns: what would be a
 /// table as long as the record takes no memory.
 struct Turns {
     coarse: Vec<Complex<f64>>,
@@ -40,16 +40,21 @@ impl Turns {
     fn new(n: usize) -> Self {
         let turn = |k: usize| Complex::from_polar(1.0, -PI * k as f64 / (2 * n) as f64);
         Self {
-            coarse: (0..=n / 2 / Self::FINE)
+            coarse: (0..=n / 4 / Self::FINE)
                 .map(|c| turn(c * Self::FINE))
                 .collect(),
             fine: (0..Self::FINE).map(turn).collect(),
         }
     }
 
+    /// The first `count`, one after the other.
     #[inline]
-    fn at(&self, k: usize) -> Complex<f64> {
-        self.coarse[k / Self::FINE] * self.fine[k % Self::FINE]
+    fn each(&self, count: usize, mut take: impl FnMut(usize, Complex<f64>)) {
+        for (coarse, from) in self.coarse.iter().zip((0..count).step_by(Self::FINE)) {
+            for (fine, k) in self.fine.iter().zip(from..count) {
+                take(k, coarse * fine);
+            }
+        }
     }
 }
 
@@ -110,7 +115,7 @@ impl RealFft {
         }
     }
 
-    /// Transform x, of which x[2j] + i x[2j + 1] is `x(j)`, and hand F[k] of k = 0 ..= n/2 to `take`.
+    /// Transform x, of which x[2j] + i x[2j + 1] is `x(j)`, and hand F[k] of k = 0 ..= n/2 to `take`, in any order.
     pub fn run(
         &self,
         x: impl Fn(usize) -> Complex<f64>,
@@ -119,9 +124,13 @@ impl RealFft {
         let h = self.n / 2;
         let fill = |z: &mut [Complex<f64>]| z.iter_mut().enumerate().for_each(|(j, z)| *z = x(j));
         self.packed(fill, |z| {
-            for k in 0..=h {
-                take(k, unpacked(z, k, h, self.plan.turn.at(k)));
-            }
+            self.plan.turn.each(h / 2 + 1, |k, turn| {
+                let (f, g) = both(z, k, turn);
+                take(k, f);
+                if h - k > k {
+                    take(h - k, g.conj());
+                }
+            });
         });
     }
 
@@ -142,14 +151,16 @@ impl RealFft {
     }
 }
 
-/// F[k] from the transform z of the packed sequence; `turn` is exp(-i pi k / (2 n)), h is n/2.
+/// F[k], and F[h - k] conjugated, from the transform z of the packed sequence of length h, k <= h/2; `turn` is
+/// exp(-i pi k / (4 h)). What differs between the two is their signs alone.
 #[inline]
-fn unpacked(z: &[Complex<f64>], k: usize, h: usize, turn: Complex<f64>) -> Complex<f64> {
-    let a = z[if k == h { 0 } else { k }];
-    let b = z[if k == 0 { 0 } else { h - k }].conj();
-    let (even, odd) = ((a + b) * 0.5, (a - b) * Complex::new(0.0, -0.5));
+fn both(z: &[Complex<f64>], k: usize, turn: Complex<f64>) -> (Complex<f64>, Complex<f64>) {
+    let a = z[k];
+    let b = z[if k == 0 { 0 } else { z.len() - k }].conj();
+    let (even, odd) = ((a + b) * 0.5, (a - b) * 0.5);
     let square = turn * turn;
-    even + square * square * odd
+    let turned = square * square * Complex::new(odd.im, -odd.re);
+    (even + turned, even - turned)
 }
 
 /// Coefficients of columns that the channels of a record have in common, by a digest of their samples.
@@ -160,6 +171,40 @@ pub(crate) struct Known {
     pub(crate) named: RefCell<HashMap<String, Vec<Column>>>,
     /// Whether what the channels have in common is known: those of the first are, and no later one's own are kept.
     pub(crate) complete: Cell<bool>,
+    /// Sums of products of the columns, by their places in memory, where they stay while they are kept.
+    products: RefCell<HashMap<[usize; 2], Rc<Vec<f64>>>>,
+    kept: RefCell<HashSet<usize>>,
+}
+
+impl Known {
+    pub(crate) fn keep(&self, key: [u64; 2], column: &Column) {
+        self.kept.borrow_mut().insert(column.place());
+        self.columns.borrow_mut().insert(key, column.clone());
+    }
+
+    /// Sums of products of two columns, made once where both are kept.
+    pub(crate) fn products(
+        &self,
+        a: &Column,
+        b: &Column,
+        make: impl FnOnce() -> Rc<Vec<f64>>,
+    ) -> Rc<Vec<f64>> {
+        let mut places = [a.place(), b.place()];
+        places.sort_unstable();
+        let kept = self.kept.borrow();
+        if !places.iter().all(|p| kept.contains(p)) {
+            return make();
+        }
+        let mut products = self.products.borrow_mut();
+        Rc::clone(products.entry(places).or_insert_with(make))
+    }
+
+    fn forget(&self) {
+        self.products.borrow_mut().clear();
+        self.kept.borrow_mut().clear();
+        self.columns.borrow_mut().clear();
+        self.named.borrow_mut().clear();
+    }
 }
 
 /// How a cosine transform is made.
@@ -203,8 +248,7 @@ impl Dct {
 
     /// Let go of the columns that channels have in common.
     pub fn forget(&self) {
-        self.known.columns.borrow_mut().clear();
-        self.known.named.borrow_mut().clear();
+        self.known.forget();
     }
 
     /// Coefficients of `x`.
@@ -224,28 +268,29 @@ impl Dct {
                 // coefficient k in its real part and n - k in its imaginary one.
                 let mut c = vec![0.0; n];
                 let h = n / 2;
-                let sample = |i: usize| {
-                    if 2 * i < n {
-                        x[2 * i]
-                    } else {
-                        x[2 * (n - 1 - i) + 1]
-                    }
-                };
                 fft.packed(
                     |z| {
-                        for (j, z) in z.iter_mut().enumerate() {
-                            *z = Complex::new(sample(2 * j), sample(2 * j + 1));
+                        let (fours, last) = x.as_chunks::<4>();
+                        for (j, [a, b, c, d]) in fours.iter().enumerate() {
+                            z[j] = Complex::new(*a, *c);
+                            z[h - 1 - j] = Complex::new(*d, *b);
+                        }
+                        if let [a, b] = last {
+                            z[h / 2] = Complex::new(*a, *b);
                         }
                     },
                     |z| {
-                        for k in 0..=h {
-                            let turn = fft.plan.turn.at(k);
-                            let v = unpacked(z, k, h, turn) * turn * scale;
+                        fft.plan.turn.each(h / 2 + 1, |k, turn| {
+                            let (f, g) = both(z, k, turn);
+                            // The turn at h - k is this one's conjugate by an eighth of a circle.
+                            let (v, w) = (f * turn * scale, g * turn * (scale * FRAC_1_SQRT_2));
                             c[k] = v.re;
-                            if k > 0 && k < h {
+                            c[h - k] = w.re - w.im;
+                            c[h + k] = w.re + w.im;
+                            if k > 0 {
                                 c[n - k] = -v.im;
                             }
-                        }
+                        });
                     },
                 );
                 c
@@ -272,44 +317,37 @@ impl Dct {
                 x
             }
             Kind::Even(fft) => {
-                let (h, scale) = (n / 2, (0.5 * n as f64).sqrt());
-                // The spectrum of the samples in the order that `forward` brings them to.
-                let spectrum = |k: usize| {
-                    if k == 0 {
-                        return Complex::new(c[0] * 2f64.sqrt() * scale, 0.0);
-                    }
-                    Complex::new(c[k], -c[n - k]) * fft.plan.turn.at(k).conj() * scale
-                };
+                // The steps of `forward`, back, by a transform forwards of what is conjugated.
+                let h = n / 2;
+                let half = 0.5 * (0.5 * n as f64).sqrt() / h as f64;
                 let mut x = vec![0.0; n];
                 fft.packed(
                     |z| {
-                        for k in 0..=h / 2 {
-                            let (a, b) = (spectrum(k), spectrum(h - k));
-                            let turn = fft.plan.turn.at(k).conj();
-                            let square = turn * turn;
-                            let even = (a + b.conj()) * 0.5;
-                            let odd = (a - b.conj()) * 0.5 * square * square;
-                            // Conjugated, so that the forward transform goes back.
-                            let i = Complex::new(0.0, 1.0);
-                            z[k] = (even + i * odd).conj();
+                        fft.plan.turn.each(h / 2 + 1, |k, turn| {
+                            let v = match k {
+                                0 => Complex::new(SQRT_2 * c[0], 0.0),
+                                k => Complex::new(c[k], -c[n - k]),
+                            };
+                            let w = Complex::new(c[h - k] + c[h + k], c[h + k] - c[h - k]);
+                            let back = turn.conj();
+                            let (f, g) = (v * back * half, w * back * (half * FRAC_1_SQRT_2));
+                            let square = back * back;
+                            let odd = (f - g) * square * square;
+                            let (even, odd) = (f + g, Complex::new(-odd.im, odd.re));
+                            z[k] = (even + odd).conj();
                             if k > 0 {
-                                z[h - k] = even + (i * odd.conj()).conj();
+                                z[h - k] = even - odd;
                             }
-                        }
+                        });
                     },
                     |z| {
-                        let back = 1.0 / h as f64;
-                        let mut put = |i: usize, v: f64| {
-                            let to = if 2 * i < n {
-                                2 * i
-                            } else {
-                                2 * (n - 1 - i) + 1
-                            };
-                            x[to] = v * back;
-                        };
-                        for (j, z) in z.iter().enumerate() {
-                            put(2 * j, z.re);
-                            put(2 * j + 1, -z.im);
+                        let (fours, last) = x.as_chunks_mut::<4>();
+                        for (j, four) in fours.iter_mut().enumerate() {
+                            let (a, b) = (z[j], z[h - 1 - j]);
+                            *four = [a.re, -b.im, -a.im, b.re];
+                        }
+                        if let [a, b] = last {
+                            (*a, *b) = (z[h / 2].re, -z[h / 2].im);
                         }
                     },
                 );
