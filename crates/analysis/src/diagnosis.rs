@@ -254,7 +254,7 @@ fn astray(s: &Searched<'_>) -> Option<Unexplained> {
 }
 
 fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
-    let panel = Panel::new(&grid.dct, &Rc::clone(&grid.bins), &target.y);
+    let panel = Panel::of(&grid.dct, &grid.bins, Rc::clone(&target.coefficients));
     let view = View {
         channel: &target.name,
         axis: target.axis,

@@ -35,6 +35,8 @@ pub struct Target {
     pub lsb: Option<f64>,
     /// Readings, lost ones filled.
     pub y: Arc<Vec<f64>>,
+    /// Their coefficients.
+    pub coefficients: Rc<Vec<f64>>,
     /// Grid places without a reading, spikes included.
     pub lost: Vec<usize>,
     /// Places whose reading the noise cannot have made.
@@ -172,28 +174,34 @@ pub fn lay_out(
     }
     let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
-    let mut known = drivers(record, &places, n, &dct);
-    // Only the band of motion is asked for.
+    // Of the coefficients of what may drive a bias only the band of motion is asked for.
     let top = places_of(MOTION_BAND_HZ.1, n, rate_hz);
-    for d in &mut known {
-        d.truncate(top);
-        d.shrink_to_fit();
+    let mut known: Vec<Vec<f64>> = vec![];
+    let mut others = vec![];
+    for channel in record
+        .channels
+        .iter()
+        .filter(|c| c.quantity != Quantity::Gyro)
+    {
+        let (signal, driver) = other(channel, &places, n, &dct, &bins);
+        known.extend(driver.map(|c| c[..top].to_vec()));
+        others.push(signal);
     }
     let turns = matches!(record.header.base, Some(Base::Moving | Base::Turntable));
     // Where the base moves, and where the motor turns it, they explain nothing away.
     let drivers: &[Vec<f64>] = if turns { &[] } else { &known };
     // Over a gap the fill wanders as the noise does that was fitted, which a process beside it swells: only what was read
     // tells of motion.
-    let motion_of = |y: &[f64], lost: &[usize], (noise, white): &(Noise, f64)| {
-        let all = |y: &[f64]| motion(&mut dct.forward(y), drivers, n, rate_hz, turns);
-        let whole = all(y);
+    let motion_of = |y: &[f64], c: &[f64], lost: &[usize], (noise, white): &(Noise, f64)| {
+        let all = |mut c: Vec<f64>| motion(&mut c, drivers, n, rate_hz, turns);
+        let whole = all(c.to_vec());
         if lost.is_empty() || whole <= MOTION_RMS {
             return whole;
         }
         let mut read = y.to_vec();
         lost.iter().for_each(|i| read[*i] = f64::NAN);
         crate::kalman::bridge(&mut read, *white, white * noise.log_walk.exp());
-        all(&read) * (n as f64 / (n - lost.len()).max(1) as f64).sqrt()
+        all(dct.forward(&read)) * (n as f64 / (n - lost.len()).max(1) as f64).sqrt()
     };
     let mut targets = vec![];
     for channel in gyros {
@@ -232,34 +240,39 @@ pub fn lay_out(
         let given = y.clone();
         let mut fit = (Noise::new(0.0), guess.max(1e-300));
         crate::kalman::fill(&mut y, fit.1, fit.1 * 1e-4, &mut rng);
+        let mut c = Rc::default();
         for pass in 0..2 {
             let panel = Panel::new(&dct, &bins, &y);
             let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
-            fit = (noise, solution.white);
+            (fit, c) = ((noise, solution.white), panel.column(0));
             if lost.is_empty() || pass == 1 {
                 break;
             }
             y = given.clone();
             crate::kalman::fill(&mut y, fit.1, fit.1 * fit.0.log_walk.exp(), &mut rng);
         }
-        let moves = unit == "deg/s" && motion_of(&y, &lost, &fit) > MOTION_RMS;
-        let spikes = if moves {
-            vec![]
-        } else {
-            spikes(&given, &mut y, &mut fit, &dct, &bins, &mut rng)
-        };
-        let lost = [lost, spikes.clone()].concat();
-        let motion_rms = if unit == "deg/s" {
-            motion_of(&y, &lost, &fit)
+        let is_rate = unit == "deg/s";
+        let mut motion_rms = if is_rate {
+            motion_of(&y, &c, &lost, &fit)
         } else {
             0.0
         };
+        let spikes = if motion_rms > MOTION_RMS {
+            vec![]
+        } else {
+            spikes(&given, &mut y, &mut c, &mut fit, &dct, &bins, &mut rng)
+        };
+        let lost = [lost, spikes.clone()].concat();
+        if is_rate && !spikes.is_empty() {
+            motion_rms = motion_of(&y, &c, &lost, &fit);
+        }
         targets.push(Target {
             name: channel.name.clone(),
             axis: channel.axis,
             unit,
             lsb: channel.lsb.map(|l| l * scale),
             y: Arc::new(y),
+            coefficients: c,
             lost,
             spikes,
             motion_rms,
@@ -269,15 +282,11 @@ pub fn lay_out(
             white: fit.1,
         });
     }
-    let top = |y: &[f64]| {
-        let mut c = dct.forward(y);
-        c.truncate(top);
-        c
-    };
     let turntable = record.header.base == Some(Base::Turntable);
     followers(&mut targets, &|t, strongest| {
-        let axis = [top(&strongest.y)];
-        let left = |with: &[Vec<f64>], slow| motion(&mut dct.forward(&t.y), with, n, rate_hz, slow);
+        let axis = [strongest.coefficients[..top].to_vec()];
+        let left =
+            |with: &[Vec<f64>], slow| motion(&mut t.coefficients.to_vec(), with, n, rate_hz, slow);
         if turntable {
             // A table turns one axis: what the others do with the motor, the supply or the temperature, and what is slow
             // on them, is their own.
@@ -296,10 +305,12 @@ pub fn lay_out(
             }
         }
     });
-    let signals = record
-        .channels
-        .iter()
-        .map(|c| signal(c, &places, n, &dct, &bins, &targets))
+    let (mut others, mut of_gyros) = (others.into_iter(), targets.iter());
+    let signals = (record.channels.iter())
+        .filter_map(|c| match c.quantity {
+            Quantity::Gyro => of_gyros.next().map(|t| of_gyro(c, t)),
+            _ => others.next(),
+        })
         .collect();
     Ok(Grid {
         rate_hz,
@@ -317,6 +328,7 @@ pub fn lay_out(
 fn spikes(
     given: &[f64],
     y: &mut Vec<f64>,
+    coefficients: &mut Rc<Vec<f64>>,
     fit: &mut (Noise, f64),
     dct: &Dct,
     bins: &Rc<Bins>,
@@ -327,8 +339,7 @@ fn spikes(
     let mut found: Vec<usize> = vec![];
     for _ in 0..PASSES {
         let g = fit.0.everywhere(bins);
-        let c: Vec<f64> = dct
-            .forward(y)
+        let c: Vec<f64> = coefficients
             .iter()
             .zip(&g)
             .map(|(c, g)| c / (fit.1 * g).sqrt())
@@ -355,7 +366,7 @@ fn spikes(
         let panel = Panel::new(dct, bins, &rest);
         let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
         *fit = (noise, solution.white);
-        *y = rest;
+        (*y, *coefficients) = (rest, panel.column(0));
     }
     found.sort_unstable();
     found
@@ -372,21 +383,6 @@ fn white_of(y: &[f64]) -> f64 {
     let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
     let d: Vec<f64> = known.windows(2).map(|w| w[1] - w[0]).collect();
     d.iter().map(|d| d * d).sum::<f64>() / (2.0 * d.len().max(1) as f64)
-}
-
-/// Coefficients of what can drive a gyro's bias: motor command, supply, temperatures.
-fn drivers(record: &Record, places: &[usize], n: usize, dct: &Dct) -> Vec<Vec<f64>> {
-    record
-        .channels
-        .iter()
-        .filter(|c| {
-            matches!(
-                c.quantity,
-                Quantity::Pwm | Quantity::Supply | Quantity::Temp
-            )
-        })
-        .map(|c| dct.forward(&interpolated(&spread(&c.values, places, n, &[]))))
-        .collect()
 }
 
 /// What the motion of an axis is made of, deg/s rms.
@@ -468,46 +464,62 @@ fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64, turns: bo
     (excess.max(0.0) / n as f64).sqrt()
 }
 
-fn signal(
-    c: &Channel,
-    places: &[usize],
-    n: usize,
-    dct: &Dct,
-    bins: &Rc<Bins>,
-    targets: &[Target],
-) -> Signal {
-    let target = targets.iter().find(|t| t.name == c.name);
-    let values = target.map_or_else(
-        || Arc::new(interpolated(&spread(&c.values, places, n, &[]))),
-        |t| Arc::clone(&t.y),
-    );
-    let smooth = match c.quantity {
-        Quantity::Temp | Quantity::Supply => Arc::new(smoothed(&values, dct, bins)),
-        _ => Arc::clone(&values),
-    };
+/// What a gyro reads, to the effects of the others.
+fn of_gyro(c: &Channel, target: &Target) -> Signal {
     Signal {
         name: c.name.clone(),
         quantity: c.quantity,
         axis: c.axis,
         unit: c.unit.clone(),
-        values,
-        smooth,
+        values: Arc::clone(&target.y),
+        smooth: Arc::clone(&target.y),
         lsb: c.lsb,
-        moving: target.is_some_and(|t| t.moving),
+        moving: target.moving,
     }
 }
 
-/// The level of a local-level model fitted to `values`: every coefficient shrunk by the random walk's share.
-fn smoothed(values: &[f64], dct: &Dct, bins: &Rc<Bins>) -> Vec<f64> {
-    let panel = Panel::new(dct, bins, values);
-    let mut c = panel.column(0).to_vec();
-    if c[1..].iter().all(|v| v.abs() < 1e-9) {
-        return values.to_vec();
+/// A channel that is no gyro, and the coefficients of what can drive a gyro's bias: motor command, supply, temperatures.
+fn other(
+    c: &Channel,
+    places: &[usize],
+    n: usize,
+    dct: &Dct,
+    bins: &Rc<Bins>,
+) -> (Signal, Option<Rc<Vec<f64>>>) {
+    let values = Arc::new(interpolated(&spread(&c.values, places, n, &[])));
+    let (is_noisy, drives) = match c.quantity {
+        Quantity::Temp | Quantity::Supply => (true, true),
+        Quantity::Pwm => (false, true),
+        _ => (false, false),
+    };
+    let coefficients = drives.then(|| Rc::new(dct.forward(&values)));
+    let smooth = coefficients.as_ref().filter(|_| is_noisy);
+    let smooth = smooth.and_then(|c| smoothed(c, dct, bins)).map(Arc::new);
+    let signal = Signal {
+        name: c.name.clone(),
+        quantity: c.quantity,
+        axis: c.axis,
+        unit: c.unit.clone(),
+        smooth: smooth.unwrap_or_else(|| Arc::clone(&values)),
+        values,
+        lsb: c.lsb,
+        moving: false,
+    };
+    (signal, coefficients)
+}
+
+/// The level of a local-level model fitted to readings of these coefficients, every one shrunk by the random walk's share;
+/// none where the readings never change.
+fn smoothed(coefficients: &Rc<Vec<f64>>, dct: &Dct, bins: &Rc<Bins>) -> Option<Vec<f64>> {
+    if coefficients[1..].iter().all(|v| v.abs() < 1e-9) {
+        return None;
     }
+    let panel = Panel::of(dct, bins, Rc::clone(coefficients));
     let (noise, _) = panel.fit(&Noise::new(-12.0), &[]);
+    let mut c = coefficients.to_vec();
     let g = noise.everywhere(bins);
     for (v, g) in c.iter_mut().zip(g).skip(1) {
         *v *= 1.0 - 1.0 / g;
     }
-    dct.inverse(&c)
+    Some(dct.inverse(&c))
 }
