@@ -2,6 +2,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Gamma, Normal};
 
+use crate::column::{dot, sum_of};
 use crate::likelihood::{Noise, Panel};
 use crate::scan::residual;
 use crate::search::{Form, State};
@@ -110,11 +111,11 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
 
 pub(crate) fn ljung_box(e: &[f64]) -> Outcome {
     let n = e.len() as f64;
-    let total: f64 = e.iter().map(|v| v * v).sum();
+    let total = dot(e, e);
     let mut worst = (0, 0.0f64);
     let statistic = (1..=LAGS)
         .map(|lag| {
-            let r = e.iter().zip(&e[lag..]).map(|(a, b)| a * b).sum::<f64>() / total;
+            let r = dot(&e[..e.len().saturating_sub(lag)], &e[lag..]) / total;
             if r.abs() > worst.1.abs() {
                 worst = (lag, r);
             }
@@ -407,8 +408,8 @@ pub(crate) fn kurtosis_score(b2: f64, n: f64) -> f64 {
 /// Kurtosis about 0, less the 3 of a normal distribution.
 pub(crate) fn excess_kurtosis(e: &[f64]) -> f64 {
     let n = e.len() as f64;
-    let m2 = e.iter().map(|v| v * v).sum::<f64>() / n;
-    e.iter().map(|v| v.powi(4)).sum::<f64>() / n / (m2 * m2) - 3.0
+    let m2 = dot(e, e) / n;
+    sum_of(e, |v| v.powi(4)) / n / (m2 * m2) - 3.0
 }
 
 fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
@@ -452,8 +453,8 @@ const LEAST_SKEWNESS: f64 = 0.1;
 /// Third moment about the mean over the third power of the spread.
 pub(crate) fn skewness_of(e: &[f64]) -> f64 {
     let n = e.len() as f64;
-    let mean = e.iter().sum::<f64>() / n;
-    let moment = |k: i32| e.iter().map(|v| (v - mean).powi(k)).sum::<f64>() / n;
+    let mean = sum_of(e, |v| v) / n;
+    let moment = |k: i32| sum_of(e, |v| (v - mean).powi(k)) / n;
     moment(3) / moment(2).powf(1.5)
 }
 

@@ -3,6 +3,7 @@
 use model::effect::{Found, Hypothesis};
 
 use crate::checks::{self, LEAST_CHANCE};
+use crate::column::dot;
 use crate::diagnosis::Searched;
 use crate::findings::sentence;
 use crate::grid::Grid;
@@ -55,12 +56,8 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
             if a.target.moving || b.target.moving {
                 continue;
             }
-            let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
-            for (x, y) in a.u[first..].iter().zip(&b.u[first..]) {
-                ab += x * y;
-                aa += x * x;
-                bb += y * y;
-            }
+            let (x, y) = (&a.u[first..], &b.u[first..]);
+            let (ab, aa, bb) = (dot(x, y), dot(x, x), dot(y, y));
             let r = ab / (aa * bb).sqrt();
             let z = r.clamp(-0.999_999, 0.999_999).atanh() * ((grid.n - first) as f64 - 3.0).sqrt();
             let p = checks::normal_tail(z);
@@ -174,16 +171,14 @@ const LATE: usize = 20;
 
 /// Correlation of the residuals of two axes, one of them some samples later.
 fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
-    let power = |e: &[f64]| e.iter().map(|v| v * v).sum::<f64>() / e.len() as f64;
+    let power = |e: &[f64]| dot(e, e) / e.len() as f64;
     let scale = (power(&a.e) * power(&b.e)).sqrt();
     // An axis, the one that follows it, the samples, z.
     let mut worst = (a, b, 0, 0.0f64);
     let mut statistic = 0.0;
     for lag in 1..=LATE.min(a.e.len() / 2) {
         for (first, second) in [(a, b), (b, a)] {
-            let sum: f64 = (first.e.iter().zip(&second.e[lag..]))
-                .map(|(x, y)| x * y)
-                .sum();
+            let sum = dot(&first.e[..first.e.len() - lag], &second.e[lag..]);
             let z = sum / (scale * ((first.e.len() - lag) as f64).sqrt());
             statistic += z * z;
             if z.abs() > worst.3.abs() {

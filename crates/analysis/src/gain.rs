@@ -113,14 +113,11 @@ fn marginal(
 pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) -> Vec<Score> {
     let n = y.len();
     let ends = ends(n);
-    let moved = |column: &[f64], end: usize| variance(&column[..end]) > MOVED * variance(column);
-    let moved: Vec<Vec<bool>> = ends
-        .iter()
-        .map(|&end| {
-            values
-                .iter()
-                .map(|term| term.iter().all(|c| moved(c, end)))
-                .collect()
+    let moved: Vec<Vec<bool>> = (values.iter())
+        .map(|term| {
+            let columns: Vec<Vec<bool>> = term.iter().map(|c| moved(c, &ends)).collect();
+            let by_all = |j: usize| columns.iter().all(|c| c[j]);
+            (0..ends.len()).map(by_all).collect()
         })
         .collect();
     let models: Vec<Option<usize>> = (0..state.terms.len()).map(Some).chain([None]).collect();
@@ -142,7 +139,7 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
             let used: Vec<usize> = columns
                 .iter()
                 .enumerate()
-                .filter(|(i, _)| Some(*i) != *skip && moved[j][*i])
+                .filter(|(i, _)| Some(*i) != *skip && moved[*i][j])
                 .flat_map(|(_, c)| c.clone())
                 .collect();
             let prefix = marginal(&panel, state, &used, *skip, state.noise.log_walk);
@@ -153,7 +150,7 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
             let shapes: Vec<&Vec<f64>> = values
                 .iter()
                 .enumerate()
-                .filter(|(i, _)| Some(*i) != *skip && moved[j][*i])
+                .filter(|(i, _)| Some(*i) != *skip && moved[*i][j])
                 .flat_map(|(_, c)| c)
                 .collect();
             // A filter has forgotten what lies forty of its memories back; windows may reach beyond the block.
@@ -189,7 +186,7 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
             let gains: Vec<f64> = (1..=BLOCKS)
                 .map(|j| {
                     let of = |m: usize| log_m[m][j] - log_m[m][j - 1];
-                    if moved[j - 1][i] {
+                    if moved[i][j - 1] {
                         of(full) - of(i)
                     } else {
                         0.0
@@ -308,9 +305,23 @@ pub fn of_correlation(channels: &[&[f64]]) -> (f64, f64) {
     total(&gains)
 }
 
-fn variance(x: &[f64]) -> f64 {
-    let mean = x.iter().sum::<f64>() / x.len() as f64;
-    x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / x.len() as f64
+/// Whether a regressor has moved before each of the ascending `ends`.
+fn moved(column: &[f64], ends: &[usize]) -> Vec<bool> {
+    let mean = column.iter().sum::<f64>() / column.len() as f64;
+    // About one level throughout, so that sums up to one end go on to the next.
+    let (mut sum, mut square, mut from) = (0.0, 0.0, 0);
+    let mut variance = |end: usize| {
+        for v in &column[from..end] {
+            sum += v - mean;
+            square += (v - mean).powi(2);
+        }
+        from = end;
+        let n = end as f64;
+        square / n - (sum / n).powi(2)
+    };
+    let before: Vec<f64> = ends.iter().map(|end| variance(*end)).collect();
+    let whole = variance(column.len());
+    before.iter().map(|v| *v > MOVED * whole).collect()
 }
 
 /// Angle errors of windows that start in `span`, the filter's level held from their start; `rest` begins at `from`.

@@ -89,21 +89,24 @@ fn counted(values: &[f64], places: [usize; 2], low: f64, high: f64) -> [f64; 2] 
     for v in values.iter().filter(|v| v.is_finite()) {
         tally[bin(*v).min(BINS - 1)] += 1;
     }
-    places.map(|place| {
+    // Bin of each place, its place among the values there, and these.
+    let mut found = places.map(|place| {
         let (mut b, mut before) = (0, 0);
         while before + tally[b] as usize <= place {
             before += tally[b] as usize;
             b += 1;
         }
-        let mut inside: Vec<f64> = values
-            .iter()
-            .copied()
-            .filter(|v| v.is_finite() && bin(*v).min(BINS - 1) == b)
-            .collect();
-        *inside
-            .select_nth_unstable_by(place - before, f64::total_cmp)
-            .1
-    })
+        (b, place - before, Vec::with_capacity(tally[b] as usize))
+    });
+    for v in values.iter().filter(|v| v.is_finite()) {
+        let own = bin(*v).min(BINS - 1);
+        for (b, _, inside) in &mut found {
+            if own == *b {
+                inside.push(*v);
+            }
+        }
+    }
+    found.map(|(_, place, mut inside)| *inside.select_nth_unstable_by(place, f64::total_cmp).1)
 }
 
 /// The value below which a share of the finite values lies; NaN of none.
@@ -209,14 +212,24 @@ impl Sums {
 fn means(clean: &[f64], of: &Sums, half: usize) -> Vec<f64> {
     let n = clean.len();
     let Sums { base, sums } = of;
-    (0..n)
-        .map(|i| {
-            let w = half.min(i.max(n - 1 - i)).max(1);
-            let (low, high) = (i.saturating_sub(w), (i + w + 1).min(n));
-            let others = (high - low - 1).max(1) as f64;
-            base + (sums[high] - sums[low] - (clean[i] - base)) / others
-        })
-        .collect()
+    let leaning = |i: usize| {
+        let w = half.min(i.max(n - 1 - i)).max(1);
+        let (low, high) = (i.saturating_sub(w), (i + w + 1).min(n));
+        let others = (high - low - 1).max(1) as f64;
+        base + (sums[high] - sums[low] - (clean[i] - base)) / others
+    };
+    if n <= 2 * half {
+        return (0..n).map(leaning).collect();
+    }
+    // In the midst all neighbourhoods are whole, and nothing depends on the place.
+    let others = (2 * half).max(1) as f64;
+    let midst = sums[2 * half + 1..].iter().zip(sums).zip(&clean[half..]);
+    let midst = midst.map(|((high, low), v)| base + (high - low - (v - base)) / others);
+    let mut level = Vec::with_capacity(n);
+    level.extend((0..half).map(leaning));
+    level.extend(midst);
+    level.extend((n - half..n).map(leaning));
+    level
 }
 
 fn parabolas(clean: &[f64], of: &Sums, half: usize) -> Vec<f64> {

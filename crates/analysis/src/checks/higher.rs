@@ -2,6 +2,7 @@
 //! and what repeats itself with the samples.
 
 use super::{Outcome, chi_tail, errors_of_sum};
+use crate::column::dot;
 use crate::likelihood::Dct;
 
 /// Lags, either way, of the bicovariance.
@@ -23,8 +24,7 @@ pub(crate) fn bicovariance(e: &[f64]) -> Outcome {
     let lags = LAGS.min(e.len() / 2);
     for lag in 1..=lags {
         let of = |a: &[f64], b: &[f64]| -> f64 {
-            let sum: f64 = a.iter().zip(&b[lag..]).map(|(a, b)| a * b).sum();
-            sum / ((n - lag as f64) * power * spread).sqrt()
+            dot(&a[..a.len() - lag], &b[lag..]) / ((n - lag as f64) * power * spread).sqrt()
         };
         for (z, at) in [
             (of(&squares, &centred), lag as i64),
