@@ -207,9 +207,19 @@ fn separators(names: &str, row: &str, said: Option<char>) -> (char, char) {
 pub(super) fn next_row(
     text: &mut TextLines<impl BufRead>,
 ) -> Result<Option<(u64, String)>, CaptureError> {
-    while let Some((number, line)) = text.next_line()? {
+    let mut line = String::new();
+    let number = next_row_into(text, &mut line)?;
+    Ok(number.map(|number| (number, line)))
+}
+
+/// The same into a `line` that was used before, its number returned.
+pub(super) fn next_row_into(
+    text: &mut TextLines<impl BufRead>,
+    line: &mut String,
+) -> Result<Option<u64>, CaptureError> {
+    while let Some(number) = text.next_line_into(line)? {
         if !line.trim().is_empty() && !line.starts_with(['#', '%']) {
-            return Ok(Some((number, line)));
+            return Ok(Some(number));
         }
     }
     Ok(None)
@@ -217,6 +227,30 @@ pub(super) fn next_row(
 
 fn owned(cells: &[Cow<'_, str>]) -> Vec<String> {
     cells.iter().map(|cell| cell.to_string()).collect()
+}
+
+/// Cells that a row has at least room for.
+const USUAL_WIDTH: usize = 16;
+
+/// A whole number of so few digits that its value is exact on the way: what counts are, without the work that any other number
+/// takes. A zero with a sign is left to that.
+fn short_whole(cell: &str) -> Option<f64> {
+    const DIGITS: usize = 15;
+    let (is_negative, digits) = match cell.as_bytes() {
+        [b'-', digits @ ..] => (true, digits),
+        digits => (false, digits),
+    };
+    if digits.is_empty() || digits.len() > DIGITS || !digits.iter().all(u8::is_ascii_digit) {
+        return None;
+    }
+    let size = digits
+        .iter()
+        .fold(0i64, |n, d| 10 * n + i64::from(d - b'0'));
+    match (is_negative, size) {
+        (true, 0) => None,
+        (true, _) => Some(-size as f64),
+        (false, _) => Some(size as f64),
+    }
 }
 
 /// Cuts lines into cells, and reads numbers.
@@ -250,13 +284,32 @@ impl Cells {
         if self.separator == ' ' {
             return line.split_whitespace().map(Cow::from).collect();
         }
-        line.split(self.separator)
-            .map(|cell| cell.trim().into())
-            .collect()
+        let mut cells = Vec::with_capacity(USUAL_WIDTH);
+        match u8::try_from(self.separator) {
+            // A byte of ASCII is no part of another character.
+            Ok(separator) if separator.is_ascii() => {
+                let mut from = 0;
+                for (at, byte) in line.bytes().enumerate() {
+                    if byte == separator {
+                        cells.push(line[from..at].trim().into());
+                        from = at + 1;
+                    }
+                }
+                cells.push(line[from..].trim().into());
+            }
+            _ => cells.extend(
+                line.split(self.separator)
+                    .map(|cell| Cow::from(cell.trim())),
+            ),
+        }
+        cells
     }
 
     /// A number, with a point or, where commas do not separate cells, a comma before the fraction.
     pub fn number(&mut self, cell: &str) -> Option<f64> {
+        if let Some(count) = short_whole(cell) {
+            return Some(count);
+        }
         let sign = cell
             .bytes()
             .find(|b| matches!(b, b'.' | b','))

@@ -1,5 +1,6 @@
 //! Reading.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -11,7 +12,7 @@ use super::columns::{Column, Columns, Role, Said, columns};
 use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
-use super::layout::{Cells, Layout, next_row};
+use super::layout::{Cells, Layout, next_row_into};
 use super::stream::{TextLines, io, named, unpacked};
 use super::tables::{Table, read_table};
 use super::time::Clock;
@@ -81,9 +82,10 @@ pub fn read_from(input: impl BufRead, options: &ReadOptions) -> Result<Read, Cap
     let mut values: Vec<Vec<f64>> = found.columns.iter().map(|_| Vec::new()).collect();
     let mut reader = RowReader::new(&found.columns, layout.names.len(), layout.cells);
     let mut skipped = 0;
-    let mut row = layout.first.take();
-    while let Some((line, cells)) = row {
-        match reader.read(&cells, line) {
+    let (mut row, mut cells) = layout.first.take().unzip();
+    let cells = cells.get_or_insert_default();
+    while let Some(line) = row {
+        match reader.read(cells, line) {
             Ok(()) => values
                 .iter_mut()
                 .zip(&reader.values)
@@ -91,7 +93,7 @@ pub fn read_from(input: impl BufRead, options: &ReadOptions) -> Result<Read, Cap
             Err(_) if options.skip_bad => skipped += 1,
             Err(error) => return Err(error),
         }
-        row = next_row(&mut text)?;
+        row = next_row_into(&mut text, cells)?;
     }
     let odd = std::mem::take(&mut reader.odd);
     finish(header, found, values, skipped, &odd)
@@ -142,14 +144,14 @@ fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError>
 impl Role {
     /// Whether a column of this kind can have such a cell.
     fn takes(&self, v: f64) -> bool {
-        let whole = v >= 0.0 && v.fract() == 0.0;
+        // Beyond what an i64 holds none of these is taken; `fract` is a call for each cell.
+        let is_whole = v as i64 as f64 == v;
+        let whole = v >= 0.0 && is_whole;
         match self {
             Role::Seq | Role::Ticks => whole && v < 9e15,
             Role::Flags => whole && v <= 65_535.0,
             Role::Time { .. } => v.is_finite(),
-            Role::Measured { counts: true, .. } => {
-                v.is_nan() || (v.fract() == 0.0 && v.abs() < 1e9)
-            }
+            Role::Measured { counts: true, .. } => v.is_nan() || (is_whole && v.abs() < 1e9),
             Role::Measured { .. } => !v.is_infinite(),
         }
     }
@@ -266,10 +268,11 @@ fn check_time(found: &Columns, cells: &[Vec<f64>]) -> Result<(), CaptureError> {
             help: "map the column of the time, `--columns time=...`, or leave time out and say `--rate HZ`".to_owned(),
         });
     }
-    steps.sort_by(f64::total_cmp);
-    let Some(usual) = steps.get(steps.len() / 2).map(|step| step.abs()) else {
+    if steps.is_empty() {
         return Ok(());
-    };
+    }
+    let middle = steps.len() / 2;
+    let usual = steps.select_nth_unstable_by(middle, f64::total_cmp).1.abs();
     let is_believed = usual == 0.0 || (BELIEVED_S.0..BELIEVED_S.1).contains(&usual);
     if found.time_is_assumed && !is_believed {
         return Err(CaptureError::Time {
@@ -345,7 +348,11 @@ fn finish(
         record.notes.push(note);
     }
     difference_angles(&mut record)?;
-    let record = analysis::rows::in_order(&record).into_owned();
+    let mended = match analysis::rows::in_order(&record) {
+        Cow::Owned(mended) => Some(mended),
+        Cow::Borrowed(_) => None,
+    };
+    let record = mended.unwrap_or(record);
     Ok(Read { record, skipped })
 }
 
@@ -379,7 +386,11 @@ fn place(record: &mut Record, column: Column, values: Vec<f64>) {
                 quantity,
                 axis,
                 unit,
-                values: values.iter().map(|&cell| (cell - zero) * scale).collect(),
+                // In the memory of the cells.
+                values: values
+                    .into_iter()
+                    .map(|cell| (cell - zero) * scale)
+                    .collect(),
                 counts: whole,
                 lsb: counts.then_some(scale),
             });

@@ -113,8 +113,19 @@ impl<R: BufRead> TextLines<R> {
     /// The next line and its number, without what surrounds it. What is not UTF-8 is taken as Latin-1: names and units
     /// of old programs; numbers are the same in both.
     pub fn next_line(&mut self) -> std::result::Result<Option<(u64, String)>, CaptureError> {
-        if let Some(line) = self.ahead.pop_front() {
-            return Ok(Some(line));
+        let mut line = String::new();
+        let number = self.next_line_into(&mut line)?;
+        Ok(number.map(|number| (number, line)))
+    }
+
+    /// The same into a `line` that was used before, the number returned.
+    pub fn next_line_into(
+        &mut self,
+        into: &mut String,
+    ) -> std::result::Result<Option<u64>, CaptureError> {
+        if let Some((number, line)) = self.ahead.pop_front() {
+            *into = line;
+            return Ok(Some(number));
         }
         self.bytes.clear();
         let mut line = self.input.by_ref().take(LONGEST_LINE);
@@ -122,7 +133,7 @@ impl<R: BufRead> TextLines<R> {
             return Ok(None);
         }
         self.number += 1;
-        let text = match std::str::from_utf8(&self.bytes) {
+        let text: Cow<'_, str> = match std::str::from_utf8(&self.bytes) {
             Ok(text) => text.trim_start_matches('\u{feff}').into(),
             Err(_) => Cow::from(
                 self.bytes
@@ -132,8 +143,9 @@ impl<R: BufRead> TextLines<R> {
             ),
         };
         // Not tabs: a cell at the end may be empty.
-        let text = text.trim_matches([' ', '\r', '\n']).to_owned();
-        Ok(Some((self.number, text)))
+        into.clear();
+        into.push_str(text.trim_matches([' ', '\r', '\n']));
+        Ok(Some(self.number))
     }
 }
 
