@@ -85,7 +85,23 @@ enum Command {
     Flash(commands::flash::Arguments),
 }
 
+/// Lets the allocator keep what it was given back. A diagnosis makes and drops arrays as long as the record again and again;
+/// by default each one's pages go back to the system and are cleared anew.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+fn keep_memory() {
+    /// The largest that glibc takes; longer arrays are mapped one by one as before.
+    const MAPPED_FROM: libc::c_int = 32 << 20;
+    const KEPT_AT_THE_END: libc::c_int = 1 << 30;
+    // SAFETY: no other thread runs yet, and it sets two numbers of the allocator; where it refuses them they stay as they are.
+    unsafe {
+        libc::mallopt(libc::M_MMAP_THRESHOLD, MAPPED_FROM);
+        libc::mallopt(libc::M_TRIM_THRESHOLD, KEPT_AT_THE_END);
+    }
+}
+
 fn main() -> miette::Result<()> {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    keep_memory();
     // A command that a help proposes is to be copied whole: the terminal may wrap it, the text does not.
     miette::set_hook(Box::new(|_| {
         Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())
