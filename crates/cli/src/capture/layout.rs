@@ -338,3 +338,45 @@ impl Cells {
         2 * numbers > all
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_whole_number_is_what_the_slow_way_reads() {
+        let bits = |n: f64| n.to_bits();
+        for cell in [
+            "0",
+            "7",
+            "-7",
+            "007",
+            "-0",
+            "+3",
+            "65535",
+            "-123456789012345",
+            "999999999999999",
+            "1234567890123456789",
+        ] {
+            let slow: f64 = cell.parse().unwrap();
+            assert_eq!(
+                Cells::new(',').number(cell).map(bits),
+                Some(bits(slow)),
+                "{cell}"
+            );
+        }
+        for cell in ["", "-", "--1", "1-", "0x1", "1 2", "-a", "\u{661}"] {
+            assert_eq!(Cells::new(',').number(cell), None, "{cell}");
+        }
+    }
+
+    #[test]
+    fn cells_are_cut_at_every_separator_and_trimmed() {
+        assert_eq!(
+            Cells::new(',').cut(" 1 ,,\u{a0}2\u{a0}, é,"),
+            ["1", "", "2", "é", ""]
+        );
+        assert_eq!(Cells::new(';').cut(""), [""]);
+        assert_eq!(Cells::new('§').cut("1§2"), ["1", "2"]);
+    }
+}
