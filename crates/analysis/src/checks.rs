@@ -9,7 +9,9 @@ use crate::search::{Form, State};
 
 mod higher;
 
-pub(crate) use higher::{MOST, Repeats, bicovariance, repeats, three_readings, variance_rhythm};
+pub(crate) use higher::{
+    MOST, Repeats, bicovariance, neighbours, repeats, three_readings, variance_rhythm,
+};
 
 /// Samples of ten minutes at 20 Hz, which the checks are calibrated on. Of a longer record of a real part, whatever its size,
 /// something is always left that is no linear, normal noise.
@@ -104,6 +106,7 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
         skewness(e),
         higher::bicovariance(e),
         higher::three_readings(e),
+        higher::neighbours(e),
         higher::variance_rhythm(e, rate_hz),
         higher::period(e, rate_hz),
     ]

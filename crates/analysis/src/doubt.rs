@@ -93,12 +93,14 @@ fn bent(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> f64 {
     // Variances of skewness and kurtosis of n normal values.
     let skewness = || n / 6.0 * checks::skewness_of(e).powi(2);
     let lightness = || n / 24.0 * checks::excess_kurtosis(e).min(0.0).powi(2);
-    let all: [(&str, &dyn Fn() -> f64); 6] = [
+    let all: [(&str, &dyn Fn() -> f64); 8] = [
         ("slew", &|| f64::INFINITY),
+        ("repeated_readings", &|| f64::INFINITY),
         ("skewness", &skewness),
         ("kurtosis", &lightness),
         ("bicovariance", &|| checks::bicovariance(e).statistic),
         ("three_readings", &|| checks::three_readings(e).statistic),
+        ("neighbours", &|| checks::neighbours(e).statistic),
         ("variance_rhythm", &|| {
             checks::variance_rhythm(e, rate_hz).statistic
         }),

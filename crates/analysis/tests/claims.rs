@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 
 use analysis::result::Diagnosis;
 use analysis::{DiagnoseOptions, diagnose};
-use model::ModelFile;
+use model::file::EffectModel;
 use model::record::{Base, Quantity, Record};
+use model::{ModelFile, Parameter};
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -332,5 +333,28 @@ fn readings_that_are_smoothed_while_little_happens_are_not_stale() {
         let d = told(&r);
         let stale = named(&d).iter().any(|n| n.0 == "stale_samples");
         (!stale).then_some(()).ok_or_else(|| said(&d))
+    });
+}
+
+#[test]
+fn a_filter_and_a_process_beside_it_are_told_as_both() {
+    let mut model = ModelFile::paper();
+    let mut planted = |cause: &str, parameter: &str, value: f64, unit: &str| {
+        let parameter = (parameter.to_owned(), Parameter::exact(value, unit));
+        model.effects.push(EffectModel {
+            cause: cause.into(),
+            channels: vec!["gyro_y".into()],
+            parameters: [parameter].into(),
+        });
+    };
+    planted("low_pass", "lag1_correlation", 0.4, "1");
+    planted("flicker", "bias_instability", 450.0, "deg/h");
+    graded("a filter beside flicker noise", |run, _| {
+        let r = model::simulate(&model, 1200.0, 20.0, 6300 + run).expect("a run");
+        let d = told(&r);
+        let mut names = named(&d);
+        names.sort_unstable();
+        let right = names == [("flicker", "gyro_y"), ("low_pass", "gyro_y")];
+        right.then_some(()).ok_or_else(|| said(&d))
     });
 }

@@ -111,6 +111,7 @@ impl Audit {
                 "time_frequency",
                 "bicovariance",
                 "three_readings",
+                "neighbours",
                 "variance_rhythm",
             ],
             channel,

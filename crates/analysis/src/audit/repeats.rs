@@ -11,7 +11,6 @@ use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted, tails};
 use crate::audit::local::{robust_sigma, width};
 use crate::checks::chi_tail;
 use crate::likelihood::invert;
-use crate::result::Unexplained;
 
 /// Distances of the pairs that tell the chance of agreement.
 const LAGS: std::ops::RangeInclusive<usize> = 20..=25;
@@ -53,6 +52,44 @@ fn held(values: &[f64], step: f64, rows: usize, excess: f64) -> Option<(f64, f64
     let expected = far * (1.0 - excess / rows as f64);
     let near = one_step(values, 1, step);
     (HELD * expected - near > CERTAIN * expected.sqrt()).then_some((near, expected))
+}
+
+/// Readings on either side whose mean a reading is held against, beside its neighbours and what those are held with.
+const BESIDE: std::ops::RangeInclusive<usize> = 3..=8;
+/// Standard errors.
+const FAR: f64 = 4.0;
+
+/// How far, in units of variance, readings that repeat lie from those about, over what those do that a lost conversion makes
+/// repeat: these lie anywhere. Two readings that agree by what they are lie near their common mean, and the more so where
+/// a play or a filter makes them agree. `None` unless that alone is what is seen. Of `own`, the readings that repeat,
+/// `expected` do so by chance.
+fn near_only(values: &[f64], own: &[usize], expected: f64) -> Option<f64> {
+    let off = |i: usize| -> Option<f64> {
+        let mut sum = 0.0;
+        for k in BESIDE {
+            sum += values.get(i.checked_sub(k + 1)?)? + values.get(i + k)?;
+        }
+        let off = values[i] - sum / (2 * BESIDE.count()) as f64;
+        off.is_finite().then_some(off * off)
+    };
+    let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
+    let any: Vec<f64> = (0..values.len()).filter_map(off).collect();
+    let here: Vec<f64> = own.iter().filter_map(|i| off(*i)).collect();
+    if (here.len() as f64) < LEAST_READINGS as f64 {
+        return None;
+    }
+    let variance = mean(&any);
+    // Two that agree are as far off as the mean of two that correlate so.
+    let pairs = values.windows(2).map(|w| (w[1] - w[0]).powi(2));
+    let pairs: Vec<f64> = pairs.filter(|d| d.is_finite()).collect();
+    let alike = (1.0 - 0.25 * mean(&pairs) / variance).max(0.0);
+    let share = (expected / own.len() as f64).min(1.0);
+    // By chance and by a fault; by chance and by nearness.
+    let (lost, near) = (share * alike + 1.0 - share, alike);
+    let seen = mean(&here) / variance;
+    let error = seen * (2.0 / here.len() as f64).sqrt();
+    let certain = lost - seen > FAR * error && lost - seen > 0.5 * (lost - near);
+    certain.then_some(seen / lost)
 }
 
 fn differences(values: &[f64], lag: usize) -> Vec<f64> {
@@ -312,11 +349,12 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
             what.clone(),
         ) && chance < FALSE_ALARM
         {
+            if let Some(kept) = near_only(values, &own, expected) {
+                audit.unexplain(name, format!("{what}; where they do, the readings lie {kept:.2} times as far from those about as such do that are held at any time: it repeats where two in turn lie near each other, as behind a play or a filter"));
+                continue;
+            }
             if let Some((near, far)) = held(values, *step, rows, excess) {
-                audit.unexplained.push(Unexplained {
-                    channel: name.to_owned(),
-                    what: format!("{what}; and it changes by one step {near:.0} times, where {far:.0} are expected: a reading is held until the next one is some steps away"),
-                });
+                audit.unexplain(name, format!("{what}; and it changes by one step {near:.0} times, where {far:.0} are expected: a reading is held until the next one is some steps away"));
                 continue;
             }
             // Which of them is a repeat by chance cannot be told where those are the many.

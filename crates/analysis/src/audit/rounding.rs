@@ -207,6 +207,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             "time_frequency",
             "bicovariance",
             "three_readings",
+            "neighbours",
             "variance_rhythm",
         ];
         audit.suppress(&ids, name, STEP);

@@ -1,9 +1,14 @@
 //! Checks of what a spectrum does not show: readings that depend on earlier ones though they do not correlate with them,
 //! and what repeats itself with the samples.
 
-use super::{Outcome, chi_tail, errors_of_sum};
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rustfft::num_complex::Complex;
+
+use super::{Outcome, RECORD, chi_tail, errors_of_sum};
 use crate::column::dot;
-use crate::likelihood::Dct;
+use crate::transform::{Dct, RealFft};
 
 /// Lags, either way, of the bicovariance.
 const LAGS: usize = 20;
@@ -45,6 +50,95 @@ pub(crate) fn bicovariance(e: &[f64]) -> Outcome {
             "correlation of the whitened residual with its own square over {lags} samples either way; largest {:+.3} with the square {} samples {order}",
             worst.1 / n.sqrt(),
             worst.0.abs()
+        ),
+    }
+}
+
+/// Distances of the pairs of readings that are held against independence, those of pairs that they are held against, and
+/// parts of equal count that readings are sorted into.
+const LAGS_OF_PAIRS: std::ops::RangeInclusive<usize> = 1..=3;
+const LAGS_APART: std::ops::RangeInclusive<usize> = 21..=40;
+const PARTS: usize = 10;
+/// Normal values of that size, over the residual's, hide the steps of a converter: of steps of a fifth of it they leave
+/// exp(-2 pi^2 0.15^2 5^2) of the swing. Larger ones would hide what is sought.
+const DITHER: f64 = 0.15;
+/// Fewest pairs that a cell of the table is to hold.
+const LEAST_PAIRS: usize = 20;
+/// Standard deviations of its chi-square at which the chance is 1e-5.
+const CERTAIN: f64 = 4.6;
+
+/// How many pairs of readings `lag` apart lie in which two parts.
+fn pairs(part: &[usize], lag: usize) -> [f64; PARTS * PARTS] {
+    let mut table = [0.0; PARTS * PARTS];
+    for (a, b) in part.iter().zip(&part[lag..]) {
+        table[a * PARTS + b] += 1.0;
+    }
+    table
+}
+
+/// Whether readings near each other are independent, whatever their law: chi-square of where two of them lie among all,
+/// over how often two lie there that are farther apart and share no more than a level that drifts. What treats large changes otherwise than small ones leaves its mark here, though nothing correlates.
+pub(crate) fn neighbours(e: &[f64]) -> Outcome {
+    let e = &e[..e.len().min(MOST)];
+    let spread = (e.iter().map(|v| v * v).sum::<f64>() / e.len().max(1) as f64).sqrt();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x6e62_7273);
+    let e: Vec<f64> = e
+        .iter()
+        .map(|v| {
+            let dither: f64 = StandardNormal.sample(&mut rng);
+            v + DITHER * spread * dither
+        })
+        .collect();
+    let mut sorted = e.clone();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let edges: Vec<f64> = (1..PARTS)
+        .filter_map(|k| sorted.get(k * e.len() / PARTS).copied())
+        .collect();
+    let part: Vec<usize> = e
+        .iter()
+        .map(|v| edges.partition_point(|edge| edge < v))
+        .collect();
+    let (mut statistic, mut freedom) = (0.0, 0.0);
+    let mut worst = (0.0, 0, 0.0);
+    if e.len() >= LEAST_PAIRS * PARTS * PARTS {
+        let mut apart = [0.0; PARTS * PARTS];
+        for lag in LAGS_APART {
+            let all = apart.iter_mut().zip(pairs(&part, lag));
+            all.for_each(|(sum, pairs)| *sum += pairs);
+        }
+        let far: f64 = apart.iter().sum();
+        // The mean of so many tables is off by a part of what one is.
+        let spread = 1.0 + 1.0 / LAGS_APART.count() as f64;
+        for lag in LAGS_OF_PAIRS {
+            let near = pairs(&part, lag);
+            let all = (e.len() - lag) as f64;
+            freedom += ((PARTS - 1) * (PARTS - 1)) as f64;
+            for (seen, apart) in near.iter().zip(apart).filter(|(_, a)| *a > 0.0) {
+                let expected = apart * all / far;
+                let off = (seen - expected).powi(2) / (expected * spread);
+                statistic += off;
+                if off > worst.0 {
+                    worst = (off, lag, seen / expected);
+                }
+            }
+        }
+    }
+    // A longer record is told what this one would be, as with the skewness.
+    let least = CERTAIN * (2.0 * freedom).sqrt() / RECORD;
+    let small = e.len() as f64 > RECORD && (statistic - freedom) / (e.len() as f64) < least;
+    Outcome {
+        id: "neighbours",
+        statistic,
+        p_value: if small || freedom < 1.0 {
+            1.0
+        } else {
+            chi_tail(statistic, freedom)
+        },
+        what: format!(
+            "readings near each other depend on each other otherwise than by correlation: of {} parts that pairs {} samples apart lie in, one holds {:.2} times as many as of pairs far apart",
+            PARTS * PARTS,
+            worst.1,
+            worst.2
         ),
     }
 }
@@ -98,41 +192,79 @@ pub(crate) fn three_readings(e: &[f64]) -> Outcome {
 /// Lowest coefficient at which the variance is asked for a rhythm: slower changes are told by its course.
 const SLOWEST: usize = 16;
 
-/// A rhythm of the variance: the strongest line of the squares of the whitened residual.
+/// Farthest that two readings lie apart whose products are asked for a rhythm, samples, by how many there are at each place;
+/// 0: the squares.
+const SPANS: [usize; 6] = [0, 2, 4, 8, 16, 32];
+
+/// At every reading, the sum of all products of two that lie evenly about it, or about the middle to the next one, up to
+/// `span` samples apart; of span 0 its square. Of white noise the sums are white too.
+fn products_about(e: &[f64], span: usize) -> Vec<f64> {
+    if span == 0 {
+        return e.iter().map(|v| v * v).collect();
+    }
+    let reach = span / 2;
+    (reach..e.len().saturating_sub(reach))
+        .map(|m| {
+            let before = e[m - reach..m].iter().rev();
+            let about: f64 = before.zip(&e[m + 1..]).map(|(a, b)| a * b).sum();
+            let before = e[m + 1 - reach..=m].iter().rev();
+            let between: f64 = before.zip(&e[m + 1..]).map(|(a, b)| a * b).sum();
+            about + between
+        })
+        .collect()
+}
+
+/// Chi-square (two degrees) of the strongest line of a series over the level of the others, its frequency in cycles per
+/// sample, and at how many frequencies one was sought.
+fn strongest_line(series: &[f64]) -> Option<(f64, f64, usize)> {
+    let n = series.len() / 2 * 2;
+    if n < 8 * SLOWEST {
+        return None;
+    }
+    let mean = series[..n].iter().sum::<f64>() / n as f64;
+    // Twice the length: of a line between two frequencies of the record no more than a fifth is lost.
+    let pair = |j: usize| match series[..n].get(2 * j..2 * j + 2) {
+        Some([a, b]) => Complex::new(a - mean, b - mean),
+        _ => Complex::default(),
+    };
+    let mut power = vec![0.0; n + 1];
+    RealFft::new(2 * n).run(pair, |k, f| power[k] = f.norm_sqr());
+    let mut sorted = power[SLOWEST..].to_vec();
+    let count = sorted.len();
+    let (_, median, _) = sorted.select_nth_unstable_by(count / 2, f64::total_cmp);
+    // Median of chi-square with two degrees: the lines themselves do not raise it.
+    let level = (*median / (2.0 * std::f64::consts::LN_2)).max(f64::MIN_POSITIVE);
+    let lines = power.iter().enumerate().skip(SLOWEST);
+    let (at, most) = lines.max_by(|a, b| a.1.total_cmp(b.1))?;
+    Some((most / level, 0.5 * at as f64 / n as f64, count))
+}
+
+/// A rhythm of the variance, or of how neighbours depend on each other: the strongest line of the squares of the whitened
+/// residual, or of its products. What is held, switched or coded by a clock of its own has one.
 pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
     let e = &e[..e.len().min(MOST)];
-    let power = e.iter().map(|v| v * v).sum::<f64>() / e.len().max(1) as f64;
-    let squares: Vec<f64> = e.iter().map(|v| v * v - power).collect();
-    let c = Dct::new(squares.len().max(1)).forward(&squares);
-    let mut sorted: Vec<f64> = c.iter().skip(SLOWEST).map(|v| v * v).collect();
-    let count = sorted.len();
-    if count < 2 * SLOWEST {
+    let found = SPANS
+        .iter()
+        .filter_map(|span| Some((*span, strongest_line(&products_about(e, *span))?)))
+        .max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+    let Some((span, (statistic, at, count))) = found else {
         return Outcome {
             id: "variance_rhythm",
             statistic: 0.0,
             p_value: 1.0,
             what: "too short for a rhythm of the variance".into(),
         };
-    }
-    let (_, median, _) = sorted.select_nth_unstable_by(count / 2, f64::total_cmp);
-    // Median of chi-square with one degree: the lines themselves do not raise it.
-    let level = *median / 0.4549;
-    let (at, most) = c
-        .iter()
-        .enumerate()
-        .skip(SLOWEST)
-        .map(|(k, v)| (k, v * v))
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .unwrap_or((0, 0.0));
-    let statistic = most / level.max(f64::MIN_POSITIVE);
+    };
+    let of = if span == 0 {
+        "in the square of the whitened residual".to_owned()
+    } else {
+        format!("in products of the whitened residual with itself up to {span} samples later")
+    };
     Outcome {
         id: "variance_rhythm",
         statistic,
-        p_value: (chi_tail(statistic, 1.0) * count as f64).min(1.0),
-        what: format!(
-            "lines in the square of the whitened residual; {:.4} Hz stands out most",
-            at as f64 / c.len() as f64 * rate_hz / 2.0
-        ),
+        p_value: (chi_tail(statistic, 2.0) * (count * SPANS.len()) as f64).min(1.0),
+        what: format!("lines {of}; {:.4} Hz stands out most", at * rate_hz),
     }
 }
 
@@ -234,9 +366,6 @@ pub(super) fn period(e: &[f64], rate_hz: f64) -> Outcome {
 
 #[cfg(test)]
 mod tests {
-    use rand_core::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_xoshiro::Xoshiro256PlusPlus;
 
     use super::*;
 
@@ -249,11 +378,12 @@ mod tests {
     fn they_fail_on_white_noise_as_often_as_their_chance_says() {
         let runs = 500;
         let (mut low, mut half, mut repeating) = (0, 0, 0);
-        let (mut rhythmic, mut of_three) = (0, 0);
+        let (mut rhythmic, mut of_three, mut depending) = (0, 0, 0);
         for seed in 0..runs {
             let e = white(3000, seed);
             rhythmic += usize::from(variance_rhythm(&e, 20.0).p_value < 0.01);
             of_three += usize::from(three_readings(&e).p_value < 0.01);
+            depending += usize::from(neighbours(&e).p_value < 0.01);
             let p = bicovariance(&e).p_value;
             low += usize::from(p < 0.01);
             half += usize::from(p < 0.5);
@@ -263,7 +393,10 @@ mod tests {
         assert!(low <= 15, "{low}");
         assert!((200..=300).contains(&half), "{half}");
         assert!(repeating <= 12, "{repeating}");
-        assert!(rhythmic <= 15 && of_three <= 15, "{rhythmic} {of_three}");
+        assert!(
+            rhythmic <= 15 && of_three <= 15 && depending <= 15,
+            "{rhythmic} {of_three} {depending}"
+        );
     }
 
     #[test]
@@ -283,6 +416,20 @@ mod tests {
     }
 
     #[test]
+    fn what_draws_small_readings_alone_to_the_one_before_shows() {
+        let mut held = 0.0;
+        let x: Vec<f64> = (white(6000, 16).iter())
+            .map(|e| {
+                let change = e - held;
+                held += change * (1.0 - 0.5 * (-change * change).exp());
+                held
+            })
+            .collect();
+        let found = neighbours(&x);
+        assert!(found.p_value < 1e-9, "{}", found.p_value);
+    }
+
+    #[test]
     fn a_product_of_two_earlier_readings_shows() {
         let e = white(6000, 12);
         let x: Vec<f64> = (2..e.len())
@@ -296,6 +443,19 @@ mod tests {
             found.what
         );
         assert!(bicovariance(&x).p_value > 1e-4);
+    }
+
+    #[test]
+    fn what_is_held_by_a_clock_of_its_own_shows_its_rhythm() {
+        for (samples, share) in [(3, 0.6), (20, 0.6)] {
+            let held = white(6000, 15);
+            let e: Vec<f64> = (white(6000, 14).iter().enumerate())
+                .map(|(i, v)| v + share * held[i / samples])
+                .collect();
+            let found = variance_rhythm(&e, 20.0);
+            assert!(found.p_value < 1e-5, "{samples}: {}", found.p_value);
+            assert!(found.what.contains("products"), "{}", found.what);
+        }
     }
 
     #[test]

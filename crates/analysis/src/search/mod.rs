@@ -4,6 +4,7 @@
 
 mod aside;
 mod envelope;
+mod processes;
 mod refine;
 mod rivals;
 mod weigh;
@@ -374,6 +375,7 @@ impl<'a> Search<'a> {
         if let Some((rest, _, _)) = &aside {
             state = self.climb(rest.clone());
         }
+        state = self.pair_up(state);
         state = crate::contest::hold(self, state);
         let mut notes = std::mem::take(&mut state.notes);
         if let Some((_, note, wandering)) = aside {
