@@ -28,6 +28,9 @@ const OPEN: f64 = 3.0;
 /// Longest block of a short record, s, and most blocks.
 const BLOCK_S: f64 = 0.2;
 const MOST_BLOCKS: usize = 6000;
+/// How much longer a block is behind a filter of a pole up to 0.7 from sample to sample: it leaves neighbours of such
+/// blocks a correlation of a tenth.
+const BEHIND_A_FILTER: f64 = 4.0;
 /// Variance of the level about its most probable mean, over that of the two levels, above which it is not taken off.
 const LARGEST_DOUBT: f64 = 0.05;
 /// Blocks of a coarse look.
@@ -157,7 +160,14 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     let r = residual(&search.panel, &rival.columns(), &rival.solution);
     let mut rest = search.panel.dct.inverse(&r);
     // A process that is fast for a long record is weighed on a stretch of it, in blocks that still show it.
-    let shortest = ((BLOCK_S * search.view.rate_hz) as usize).max(1);
+    // What a filter makes of neighbours is to be gone from block to block.
+    let filtered = |t: &Term| matches!(&t.form, Form::Covariance(c, _) if c.filters_white());
+    let longer = if state.terms.iter().any(filtered) {
+        BEHIND_A_FILTER
+    } else {
+        1.0
+    };
+    let shortest = ((longer * BLOCK_S * search.view.rate_hz) as usize).max(1);
     // What a step beside it adds to its spectrum is none of its own.
     let is_step = |t: &&Term| matches!(t.form, Form::Step(..));
     let time_of = |s: &State| {

@@ -349,12 +349,12 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
             what.clone(),
         ) && chance < FALSE_ALARM
         {
-            if let Some(kept) = near_only(values, &own, expected) {
-                audit.unexplain(name, format!("{what}; where they do, the readings lie {kept:.2} times as far from those about as such do that are held at any time: it repeats where two in turn lie near each other, as behind a play or a filter"));
-                continue;
-            }
             if let Some((near, far)) = held(values, *step, rows, excess) {
                 audit.unexplain(name, format!("{what}; and it changes by one step {near:.0} times, where {far:.0} are expected: a reading is held until the next one is some steps away"));
+                continue;
+            }
+            if let Some(kept) = near_only(values, &own, expected) {
+                audit.unexplain(name, format!("{what}; where they do, the readings lie {kept:.2} times as far from those about as such do that are held at any time: it repeats where two in turn lie near each other, as behind a play or a filter"));
                 continue;
             }
             // Which of them is a repeat by chance cannot be told where those are the many.

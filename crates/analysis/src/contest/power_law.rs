@@ -13,7 +13,8 @@ use crate::search::{Form, Search, State, Term};
 
 /// Exponents from next to white to next to a random walk, which the noise has anyway.
 const EXPONENTS: (f64, f64) = (0.05, 1.95);
-/// That of flicker noise, and nats that another one has to be better: within them the answer stays open.
+/// That of flicker noise, and nats by which another one has to be better than it, and than what has no more freedom:
+/// within them the answer stays open, and what has a name goes first.
 const FLICKER: f64 = 1.0;
 const OPEN: f64 = 3.0;
 
@@ -71,7 +72,8 @@ pub(crate) fn instead(search: &Search<'_>, state: &State) -> Option<PowerLawFoun
     };
     const COORDINATES: usize = 2;
     // Flicker noise alone is a power law itself, whose slope its own claim asks for; two levels have their contest.
-    if coordinates(false) < COORDINATES || processes().any(|(t, _)| two_level(t)) {
+    let none = !processes().any(|(_, c)| !c.filters_white());
+    if none || processes().any(|(t, _)| two_level(t)) {
         return None;
     }
     let n = search.panel.bins.n;
@@ -91,9 +93,14 @@ pub(crate) fn instead(search: &Search<'_>, state: &State) -> Option<PowerLawFoun
         Some((best.log_likelihood, exponent))
     };
     let by = |filter: bool| {
+        if coordinates(filter) < COORDINATES {
+            return None;
+        }
         let paid = 0.5 * (coordinates(filter) - COORDINATES) as f64 * (n as f64).ln();
         let (best, exponent) = fitted(filter, EXPONENTS)?;
-        if best - state.solution.log_likelihood + paid < 0.0 {
+        // Of as much freedom as the named ones it has to be clearly better; less freedom is paid for already.
+        let asked = if paid > 0.0 { 0.0 } else { OPEN };
+        if best - state.solution.log_likelihood + paid < asked {
             return None;
         }
         let (flicker, _) = fitted(filter, (FLICKER, FLICKER))?;

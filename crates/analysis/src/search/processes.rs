@@ -63,7 +63,7 @@ impl Search<'_> {
                 c.starts(n)
             }
         };
-        let mut best: Option<State> = None;
+        let mut pairs: Vec<(usize, State)> = vec![];
         for (k, a) in all.iter().enumerate() {
             for b in &all[k + 1..] {
                 let one_effect =
@@ -71,30 +71,42 @@ impl Search<'_> {
                 if one_effect || a.1.filters_white() && b.1.filters_white() {
                     continue;
                 }
-                for of_a in starts(a.1) {
-                    for of_b in starts(b.1) {
-                        let mut terms = others.clone();
-                        terms.push(self.process(*a, of_a.clone()));
-                        terms.push(self.process(*b, of_b.clone()));
-                        let next = self.refit(terms, state.noise.log_walk);
-                        let ahead = |s: &State| Self::total(&next) > Self::total(s);
-                        if best.as_ref().is_none_or(ahead) {
-                            best = Some(next);
-                        }
-                    }
-                }
+                let from = |of_a: &Vec<f64>, of_b: Vec<f64>| {
+                    let mut terms = others.clone();
+                    terms.push(self.process(*a, of_a.clone()));
+                    terms.push(self.process(*b, of_b));
+                    self.refit(terms, state.noise.log_walk)
+                };
+                let all = starts(a.1).into_iter();
+                let all = all.flat_map(|of_a| starts(b.1).into_iter().map(move |b| from(&of_a, b)));
+                let best = all.max_by(|a, b| Self::total(a).total_cmp(&Self::total(b)));
+                let freedom = a.1.dimensions() + b.1.dimensions();
+                pairs.extend(best.map(|best| (freedom, best)));
             }
         }
-        match best {
-            Some(pair) if Self::total(&pair) > Self::total(&state) => {
-                let mut pair = self.filter_first(pair);
-                self.reweigh(&mut pair);
-                // Each has to earn its place.
-                if pair.terms.iter().all(|t| t.score() > 0.0) {
-                    pair
-                } else {
-                    state
-                }
+        let freedom = |s: &State| -> usize { s.noise.terms.iter().map(|t| t.1.len()).sum() };
+        pairs.push((freedom(&state), state));
+        // Of those that do about as well, the one with the least freedom: a pole in all of the noise is no process beside it.
+        let best = pairs.iter().map(|p| Self::total(&p.1));
+        let best = best.fold(f64::NEG_INFINITY, f64::max);
+        pairs.sort_by(|a, b| {
+            let ahead = Self::total(&b.1).total_cmp(&Self::total(&a.1));
+            a.0.cmp(&b.0).then(ahead)
+        });
+        let close = |(_, s): &(usize, State)| Self::total(s) > best - super::RIVAL_SPAN;
+        let mut open: Vec<State> = pairs.into_iter().filter(close).map(|p| p.1).collect();
+        let chosen = self.filter_first(open.swap_remove(0));
+        self.earned(chosen, open)
+    }
+
+    /// The state, weighed anew; where a term of it does not earn its place, the best of the others.
+    fn earned(&self, mut state: State, others: Vec<State>) -> State {
+        self.reweigh(&mut state);
+        let best = |a: &State, b: &State| Self::total(a).total_cmp(&Self::total(b));
+        match others.into_iter().max_by(best) {
+            Some(mut other) if state.terms.iter().any(|t| t.score() < 0.0) => {
+                self.reweigh(&mut other);
+                other
             }
             _ => state,
         }
