@@ -94,9 +94,9 @@ pub(crate) fn errors_of_sum(products: impl Iterator<Item = f64>) -> f64 {
     sum / f64::max(square, f64::MIN_POSITIVE).sqrt()
 }
 
-/// All checks of one channel.
+/// All checks of one channel, whose readings come in steps of `step` standard deviations of the residual (0: none known).
 #[must_use]
-pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
+pub fn all(u: &[f64], e: &[f64], rate_hz: f64, step: f64) -> Vec<Outcome> {
     vec![
         ljung_box(e),
         bands(u, rate_hz),
@@ -106,7 +106,7 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
         skewness(e),
         higher::bicovariance(e),
         higher::three_readings(e),
-        higher::neighbours(e),
+        higher::neighbours(e, step),
         higher::variance_rhythm(e, rate_hz),
         higher::period(e, rate_hz),
     ]

@@ -24,7 +24,7 @@ use crate::result::{
     Parameter, Unexplained, Verdict,
 };
 use crate::search::{Note, Search, State};
-use crate::{adequacy, beyond, dead, doubt, evidence, law, losses, rows, scan, threshold};
+use crate::{adequacy, beyond, dead, doubt, evidence, law, losses, refill, rows, scan, threshold};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -56,6 +56,13 @@ pub(crate) struct Searched<'a> {
     limits: Vec<DetectionLimit>,
     /// Effects that follow a channel, and whether by the law that their name claims.
     pub laws: Vec<(&'static str, checks::Outcome)>,
+}
+
+impl Searched<'_> {
+    /// Step of the readings over the standard deviation of what the model leaves.
+    pub(crate) fn step(&self) -> f64 {
+        self.target.step / self.state.solution.white.sqrt()
+    }
 }
 
 /// A law of the variance that was found.
@@ -269,8 +276,14 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     let search = Search::new(panel, view);
     let baseline = search.baseline(&target.noise);
     let plain = checks::whitened(&search.panel, &baseline);
-    let before = checks::all(&plain.0, &plain.1, grid.rate_hz);
+    let before = checks::all(
+        &plain.0,
+        &plain.1,
+        grid.rate_hz,
+        target.step / baseline.solution.white.sqrt(),
+    );
     let state = search.run(baseline.clone());
+    let state = refill::again(&search, state, target);
     let found = estimate::found(&search.panel, &state, &target.unit, grid.rate_hz);
     let (u, e) = if state.terms.is_empty() {
         plain
@@ -383,7 +396,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
     let after = if s.state.terms.is_empty() && s.variance.is_none() {
         before.clone()
     } else {
-        checks::all(&s.u, &s.e, s.search.view.rate_hz)
+        checks::all(&s.u, &s.e, s.search.view.rate_hz, s.step())
     };
     // Before a process was named nothing was claimed of it.
     let claims = adequacy::of_processes(&s.search, &s.state);

@@ -100,7 +100,7 @@ fn bent(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> f64 {
         ("kurtosis", &lightness),
         ("bicovariance", &|| checks::bicovariance(e).statistic),
         ("three_readings", &|| checks::three_readings(e).statistic),
-        ("neighbours", &|| checks::neighbours(e).statistic),
+        ("neighbours", &|| checks::neighbours(e, s.step()).statistic),
         ("variance_rhythm", &|| {
             checks::variance_rhythm(e, rate_hz).statistic
         }),

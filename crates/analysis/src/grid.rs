@@ -9,6 +9,7 @@ use model::record::{Axis, Base, Channel, Quantity, Record};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::audit::repeats::smallest_step;
 use crate::error::AnalysisError;
 use crate::likelihood::{Bins, Dct, Noise, Panel};
 
@@ -23,6 +24,11 @@ const MOTION_BAND_HZ: (f64, f64) = (0.02, 0.6);
 /// Largest share of another axis' rate that a gyro sees by its own fault: a mounting off by six degrees.
 const LARGEST_SHARE: f64 = 0.1;
 
+/// So many readings show their step.
+fn few(values: &[f64]) -> &[f64] {
+    &values[..values.len().min(crate::checks::MOST)]
+}
+
 /// A gyro on the grid.
 pub struct Target {
     /// Channel name.
@@ -33,6 +39,8 @@ pub struct Target {
     pub unit: String,
     /// Unit per count.
     pub lsb: Option<f64>,
+    /// The step in which its readings come, `lsb` or what they show themselves; 0 where there is none.
+    pub step: f64,
     /// Readings, lost ones filled.
     pub y: Arc<Vec<f64>>,
     /// Their coefficients.
@@ -271,6 +279,10 @@ pub fn lay_out(
             axis: channel.axis,
             unit,
             lsb: channel.lsb.map(|l| l * scale),
+            step: scale
+                * channel
+                    .lsb
+                    .unwrap_or_else(|| smallest_step(few(&channel.values))),
             y: Arc::new(y),
             coefficients: c,
             lost,

@@ -37,6 +37,7 @@ pub mod paper;
 pub mod paper_model;
 pub mod plan;
 pub mod pooled;
+mod refill;
 pub mod representative;
 pub mod result;
 pub mod rows;

@@ -12,7 +12,7 @@ mod frames;
 mod frozen;
 pub mod local;
 mod outliers;
-mod repeats;
+pub(crate) mod repeats;
 mod rounding;
 mod saturation;
 pub mod sign_bit;

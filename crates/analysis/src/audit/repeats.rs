@@ -188,7 +188,7 @@ fn poisson(tally: &[f64], terms: impl Fn(f64) -> [f64; 3], count: usize) -> Opti
 
 /// Smallest distance between two readings that is no dust of the arithmetic: the step of a channel that does not say.
 /// 0 where the other distances are no multiples of it: such readings repeat exactly or not at all.
-pub(super) fn smallest_step(values: &[f64]) -> f64 {
+pub(crate) fn smallest_step(values: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     let dust = 1e-6 * robust_sigma(&sorted);

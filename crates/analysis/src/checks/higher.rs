@@ -59,9 +59,8 @@ pub(crate) fn bicovariance(e: &[f64]) -> Outcome {
 const LAGS_OF_PAIRS: std::ops::RangeInclusive<usize> = 1..=3;
 const LAGS_APART: std::ops::RangeInclusive<usize> = 21..=40;
 const PARTS: usize = 10;
-/// Normal values of that size, over the residual's, hide the steps of a converter: of steps of a fifth of it they leave
-/// exp(-2 pi^2 0.15^2 5^2) of the swing. Larger ones would hide what is sought.
-const DITHER: f64 = 0.15;
+/// Normal values of that size, over the step of the converter, hide the steps: exp(-2 pi^2 0.6^2) of the swing is left.
+const DITHER: f64 = 0.6;
 /// Fewest pairs that a cell of the table is to hold.
 const LEAST_PAIRS: usize = 20;
 /// Standard deviations of its chi-square at which the chance is 1e-5.
@@ -78,7 +77,7 @@ fn pairs(part: &[usize], lag: usize) -> [f64; PARTS * PARTS] {
 
 /// Whether readings near each other are independent, whatever their law: chi-square of where two of them lie among all,
 /// over how often two lie there that are farther apart and share no more than a level that drifts. What treats large changes otherwise than small ones leaves its mark here, though nothing correlates.
-pub(crate) fn neighbours(e: &[f64]) -> Outcome {
+pub(crate) fn neighbours(e: &[f64], step: f64) -> Outcome {
     let e = &e[..e.len().min(MOST)];
     let spread = (e.iter().map(|v| v * v).sum::<f64>() / e.len().max(1) as f64).sqrt();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x6e62_7273);
@@ -86,7 +85,7 @@ pub(crate) fn neighbours(e: &[f64]) -> Outcome {
         .iter()
         .map(|v| {
             let dither: f64 = StandardNormal.sample(&mut rng);
-            v + DITHER * spread * dither
+            v + DITHER * step * spread * dither
         })
         .collect();
     let mut sorted = e.clone();
@@ -383,7 +382,7 @@ mod tests {
             let e = white(3000, seed);
             rhythmic += usize::from(variance_rhythm(&e, 20.0).p_value < 0.01);
             of_three += usize::from(three_readings(&e).p_value < 0.01);
-            depending += usize::from(neighbours(&e).p_value < 0.01);
+            depending += usize::from(neighbours(&e, 0.0).p_value < 0.01);
             let p = bicovariance(&e).p_value;
             low += usize::from(p < 0.01);
             half += usize::from(p < 0.5);
@@ -425,7 +424,7 @@ mod tests {
                 held
             })
             .collect();
-        let found = neighbours(&x);
+        let found = neighbours(&x, 0.2);
         assert!(found.p_value < 1e-9, "{}", found.p_value);
     }
 

@@ -158,11 +158,12 @@ impl Search<'_> {
         notes
     }
 
-    /// Estimate again after terms were changed by hand.
-    fn settle(&self, state: &mut State) {
-        let (wandering, level) = (state.wandering, state.level.take());
-        *state = self.refit(std::mem::take(&mut state.terms), state.noise.log_walk);
-        (state.wandering, state.level) = (wandering, level);
+    /// Estimate again after terms, or the data, were changed by hand.
+    pub(crate) fn settle(&self, state: &mut State) {
+        let terms = std::mem::take(&mut state.terms);
+        let before = std::mem::replace(state, self.refit(terms, state.noise.log_walk));
+        (state.notes, state.wandering) = (before.notes, before.wandering);
+        (state.level, state.power_law) = (before.level, before.power_law);
         self.reweigh(state);
     }
 
