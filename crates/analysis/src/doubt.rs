@@ -346,7 +346,7 @@ pub(crate) fn withdraw(
         unexplained.push(Unexplained {
             channel: name.into(),
             what: format!(
-                "noise whose density falls with the frequency as f^-{exponent:.2} explains as much as the processes of the library, with less freedom, and is none of them"
+                "noise whose density falls with the frequency as f^-{exponent:.2} explains this at least as well as the processes of the library, for its freedom, and is none of them"
             ),
         });
     }

@@ -3,7 +3,7 @@
 //! A bias that comes back has a shoulder in its spectrum, flicker noise a slope of -1. A noise whose density falls as
 //! w^-gamma with another gamma, as fractional noise and the sum of many relaxations do, has neither: over the decades
 //! of a record a shoulder and a slope together come so near it that no check of the spectrum sees what is off. Where
-//! one power law explains as much as they do, their names are no answer.
+//! one power law explains as much with less freedom, or clearly more with as much, their names are no answer.
 
 use std::sync::Arc;
 
@@ -52,9 +52,9 @@ pub struct PowerLawFound {
     pub filter: bool,
 }
 
-/// The one power law that explains a state as well as its processes do, each coordinate beyond those of the other side
-/// paid for by half the logarithm of the record's length
-/// (BIC), and clearly better than flicker noise in its place.
+/// The one power law that explains a state as well as its processes do, each coordinate that they have
+/// beyond its two paid for by half the logarithm of the record's length (BIC), and clearly better than flicker noise in its
+/// place.
 pub(crate) fn instead(search: &Search<'_>, state: &State) -> Option<PowerLawFound> {
     let processes = || {
         state.terms.iter().filter_map(|t| match &t.form {

@@ -9,8 +9,8 @@
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-/// Largest ratio of a tone whose size is steady: it swings by 0.44 of itself at most. Of a Gaussian band, fewer than
-/// 2 of 100 with 50 independent values in the record come below it (a test says so).
+/// Largest ratio of a tone whose size is steady: it swings by 0.42 of itself at most. Of Gaussian bands with some 40
+/// independent values in the record at most 4 of 100 come below it (a test holds that).
 pub(super) const STEADY: f64 = 1.3;
 
 /// Values of the envelope for each coefficient of the band.
