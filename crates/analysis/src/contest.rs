@@ -137,25 +137,15 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     let n = search.panel.bins.n;
     let mut theirs = kept;
     let longest = 100f64.min(n as f64 / 60.0);
-    theirs.push(Term {
-        effect: candidate.effect,
-        candidate: at,
-        form: Form::Covariance(process, vec![-3.0, longest.max(2.0).ln()]),
-        columns: vec![],
-        names: vec![],
-        fixed: vec![],
-        follows: None,
-        lr: 0.0,
-        threshold: state
-            .terms
-            .iter()
-            .filter(|t| contested(t))
+    let contested_limits = state.terms.iter().filter(|t| contested(t));
+    theirs.push(Term::new(
+        candidate.effect,
+        at,
+        Form::Covariance(process, vec![-3.0, longest.max(2.0).ln()]),
+        contested_limits
             .map(|t| t.threshold)
             .fold(threshold::two_level(), f64::min),
-        alternatives: vec![],
-        stated: None,
-        claims: vec![],
-    });
+    ));
     let rival = search.refit(theirs, state.noise.log_walk);
     let r = residual(&search.panel, &rival.columns(), &rival.solution);
     let mut rest = search.panel.dct.inverse(&r);

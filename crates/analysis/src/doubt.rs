@@ -51,10 +51,7 @@ enum Doubt {
 fn followers(s: &Searched<'_>, g: &[f64]) -> Vec<(&'static str, f64)> {
     let panel = &s.search.panel;
     let mut signals: Vec<(&'static str, Vec<f64>)> = vec![];
-    let mut at = 0;
-    for t in &s.state.terms {
-        let own = &s.state.solution.beta[at..at + t.columns.len()];
-        at += t.columns.len();
+    for (t, own) in s.state.parts() {
         let id = t.effect.id();
         let shaped = matches!(t.form, Form::Shaped(..)) && signals.iter().any(|x| x.0 == id);
         if t.follows.is_none() && !shaped {
@@ -64,11 +61,7 @@ fn followers(s: &Searched<'_>, g: &[f64]) -> Vec<(&'static str, f64)> {
             signals.push((id, vec![0.0; panel.bins.n]));
             signals.len() - 1
         });
-        for (c, b) in t.columns.iter().zip(own) {
-            let column = panel.column(*c);
-            let signal = signals[place].1.iter_mut();
-            signal.zip(column.iter()).for_each(|(s, x)| *s += b * x);
-        }
+        panel.add_columns(&mut signals[place].1, 0, &t.columns, own);
     }
     signals
         .into_iter()
@@ -206,14 +199,10 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
         };
         signal.is_some() && (s.laws.iter().any(failed) || s.state.terms.iter().any(beside))
     };
-    let mut at = 0;
     let terms = s
         .state
-        .terms
-        .iter()
-        .map(|t| {
-            let own = &s.state.solution.beta[at..at + t.columns.len()];
-            at += t.columns.len();
+        .parts()
+        .map(|(t, own)| {
             let line = match t.form {
                 Form::Line(omega) | Form::SideBands(omega, _) => Some(omega),
                 _ => None,
@@ -241,11 +230,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
                     || share(&information.collect::<Vec<_>>(), t.lr)
             } else {
                 let mut sum = vec![0.0; panel.bins.n];
-                for (c, b) in t.columns.iter().zip(own) {
-                    sum.iter_mut()
-                        .zip(panel.column(*c).iter())
-                        .for_each(|(s, x)| *s += b * x);
-                }
+                panel.add_columns(&mut sum, 0, &t.columns, own);
                 let energy = panel.bins.products(&sum, &sum);
                 let energy = energy.iter().zip(&g).map(|(e, g)| e / g);
                 share(&energy.collect::<Vec<_>>(), t.lr)

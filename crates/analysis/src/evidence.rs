@@ -155,19 +155,10 @@ pub(crate) fn allan_misfit(s: &Searched<'_>, _rate_hz: f64, seed: u64) -> [f64; 
 
 /// What the columns of some terms contribute, in time.
 fn modelled(panel: &Panel, state: &State, terms: &[&Term]) -> Vec<f64> {
-    let n = panel.bins.n;
-    let mut sum = vec![0.0; n];
-    let mut at = 0;
-    for t in &state.terms {
-        let own = &state.solution.beta[at..at + t.columns.len()];
-        at += t.columns.len();
-        if terms.iter().all(|o| o.columns != t.columns) {
-            continue;
-        }
-        for (c, b) in t.columns.iter().zip(own) {
-            sum.iter_mut()
-                .zip(panel.column(*c).iter())
-                .for_each(|(s, x)| *s += b * x);
+    let mut sum = vec![0.0; panel.bins.n];
+    for (t, own) in state.parts() {
+        if terms.iter().any(|o| o.columns == t.columns) {
+            panel.add_columns(&mut sum, 0, &t.columns, own);
         }
     }
     panel.dct.inverse(&sum)

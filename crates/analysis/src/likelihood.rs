@@ -339,6 +339,15 @@ impl Panel {
         self.columns.borrow()[i].first(count)
     }
 
+    /// Adds columns, each by its factor, to coefficients `from` on.
+    pub(crate) fn add_columns(&self, sum: &mut [f64], from: usize, columns: &[usize], by: &[f64]) {
+        for (c, by) in columns.iter().zip(by) {
+            let column = self.column(*c);
+            let there = sum.iter_mut().zip(&column[from..]);
+            there.for_each(|(s, x)| *s += by * x);
+        }
+    }
+
     /// Forget the columns from `length` on.
     pub fn truncate(&self, length: usize) {
         self.columns.borrow_mut().truncate(length);

@@ -9,7 +9,8 @@ use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::grid::Target;
-use crate::search::{Form, Search, State};
+use crate::scan::residual;
+use crate::search::{Form, Search, State, Term};
 
 /// Share of the readings below which what is lost makes nothing smaller that its error would show.
 const LEAST: f64 = 5e-3;
@@ -19,41 +20,34 @@ const PASSES: usize = 4;
 /// The state fitted to the data of the panel with its lost readings filled by what it explains itself.
 pub(crate) fn again(search: &Search<'_>, mut state: State, target: &Target) -> State {
     let panel = &search.panel;
-    let n = panel.bins.n;
-    let few = (target.lost.len() as f64) < LEAST * n as f64;
+    let few = (target.lost.len() as f64) < LEAST * panel.bins.n as f64;
     let columns = state.terms.iter().any(|t| !t.columns.is_empty());
     // What was found by other means than the fit is not fitted again.
     let stated = state.terms.iter().any(|t| t.stated.is_some());
     if few || !columns || stated || target.moving {
         return state;
     }
-    let mut y = target.y.to_vec();
     for _ in 0..PASSES {
-        let made = signal(search, &state);
-        let mut rest: Vec<f64> = y.iter().zip(&made).map(|(y, s)| y - s).collect();
+        let before = panel
+            .dct
+            .inverse(&residual(panel, &state.columns(), &state.solution));
+        let mut rest = before.clone();
         target.lost.iter().for_each(|i| rest[*i] = f64::NAN);
         let white = state.solution.white;
+        let step = white * state.noise.log_walk.exp();
         // The same draws every time: it is to converge.
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x7265_6669_6c6c);
-        crate::kalman::fill(
-            &mut rest,
-            white,
-            white * state.noise.log_walk.exp(),
-            &mut rng,
-        );
-        let mut change = vec![0.0; n];
-        for i in &target.lost {
-            change[*i] = rest[*i] + made[*i] - y[*i];
-            y[*i] += change[*i];
-        }
+        crate::kalman::fill(&mut rest, white, step, &mut rng);
+        // Elsewhere nothing changes.
+        rest.iter_mut().zip(before).for_each(|(r, b)| *r -= b);
+        let change = panel.dct.forward(&rest);
         let mut data = panel.column(0).to_vec();
-        let change = panel.dct.forward(&change);
         data.iter_mut().zip(change).for_each(|(d, c)| *d += c);
         panel.replace_data(data);
         search.settle(&mut state);
         // What explained the filled readings, as a step where they begin, has nothing left to explain.
         let weakest = |s: &State| {
-            let scores = s.terms.iter().map(crate::search::Term::score).enumerate();
+            let scores = s.terms.iter().map(Term::score).enumerate();
             let weak = scores.filter(|(_, score)| *score < 0.0);
             weak.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
         };
@@ -64,18 +58,6 @@ pub(crate) fn again(search: &Search<'_>, mut state: State, target: &Target) -> S
     }
     widen(search, &mut state, &target.lost);
     state
-}
-
-/// What the columns of a state explain, by sample.
-fn signal(search: &Search<'_>, state: &State) -> Vec<f64> {
-    let mut sum = vec![0.0; search.panel.bins.n];
-    for (column, b) in state.columns().iter().zip(&state.solution.beta) {
-        let column = search.panel.column(*column);
-        sum.iter_mut()
-            .zip(column.iter())
-            .for_each(|(s, c)| *s += b * c);
-    }
-    search.panel.dct.inverse(&sum)
 }
 
 /// Takes the part of each column's energy that lies in lost readings out of what is known of its coefficient. A step is

@@ -174,17 +174,10 @@ impl Search<'_> {
     fn with_lines(&self, state: &State, r: &[f64], from: usize, to: usize) -> Vec<f64> {
         let mut whole = r[from..to].to_vec();
         let to_k = self.panel.bins.n as f64 / PI;
-        let mut at = 0;
-        for t in &state.terms {
-            let own = &state.solution.beta[at..at + t.columns.len()];
-            at += t.columns.len();
-            if omega_of(t).is_none_or(|w| w * to_k < from as f64 || w * to_k > to as f64) {
-                continue;
-            }
-            for (column, b) in t.columns.iter().zip(own) {
-                let column = self.panel.column(*column);
-                let there = whole.iter_mut().zip(&column[from..to]);
-                there.for_each(|(w, x)| *w += b * x);
+        let inside = |w: f64| w * to_k >= from as f64 && w * to_k <= to as f64;
+        for (t, own) in state.parts() {
+            if omega_of(t).is_some_and(inside) {
+                self.panel.add_columns(&mut whole, from, &t.columns, own);
             }
         }
         whole

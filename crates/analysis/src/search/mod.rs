@@ -80,6 +80,29 @@ pub struct Term {
 }
 
 impl Term {
+    /// A term of candidate number `candidate`, not weighed yet.
+    pub(crate) fn new(
+        effect: &'static dyn Effect,
+        candidate: usize,
+        form: Form,
+        threshold: f64,
+    ) -> Self {
+        Self {
+            effect,
+            candidate,
+            form,
+            columns: vec![],
+            names: vec![],
+            fixed: vec![],
+            follows: None,
+            lr: 0.0,
+            threshold,
+            alternatives: vec![],
+            stated: None,
+            claims: vec![],
+        }
+    }
+
     /// Likelihood ratio beyond the threshold.
     #[must_use]
     pub fn score(&self) -> f64 {
@@ -179,6 +202,16 @@ impl State {
         self.wandering.filter(|w| (w.line - omega).abs() <= w.half)
     }
 
+    /// Every term with the coefficients of its columns.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (&Term, &[f64])> {
+        let mut rest = self.solution.beta.as_slice();
+        self.terms.iter().map(move |t| {
+            let (own, others) = rest.split_at(t.columns.len());
+            rest = others;
+            (t, own)
+        })
+    }
+
     /// Angular frequencies of the lines, with the places of their columns.
     fn lines(&self) -> Vec<(f64, usize)> {
         let mut at = 0;
@@ -194,14 +227,10 @@ impl State {
 
     /// Angular frequency of the first line, and phase p of its cos(w t + p).
     fn carrier(&self) -> Option<(f64, f64)> {
-        let mut at = 0;
-        for t in &self.terms {
-            if let (Form::Line(omega), [c, s, ..]) = (&t.form, &self.solution.beta[at..]) {
-                return Some((*omega, (-s).atan2(*c)));
-            }
-            at += t.columns.len();
-        }
-        None
+        self.parts().find_map(|(t, own)| match (&t.form, own) {
+            (Form::Line(omega), [c, s, ..]) => Some((*omega, (-s).atan2(*c))),
+            _ => None,
+        })
     }
 }
 

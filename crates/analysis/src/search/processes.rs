@@ -26,20 +26,9 @@ impl Search<'_> {
     }
 
     fn process(&self, (i, c): Process<'_>, theta: Vec<f64>) -> Term {
-        Term {
-            effect: self.candidates[i].effect,
-            candidate: i,
-            threshold: threshold::covariance(c.dimensions()),
-            form: Form::Covariance(Arc::clone(c), theta),
-            columns: vec![],
-            names: vec![],
-            fixed: vec![],
-            follows: None,
-            lr: 0.0,
-            alternatives: vec![],
-            stated: None,
-            claims: vec![],
-        }
+        let form = Form::Covariance(Arc::clone(c), theta);
+        let limit = threshold::covariance(c.dimensions());
+        Term::new(self.candidates[i].effect, i, form, limit)
     }
 
     /// The state with the pair of processes that explains most, where that is better than those that were found.

@@ -20,18 +20,10 @@ impl Search<'_> {
         let null = state.solution.log_likelihood;
         let own = state.columns();
         let term = |form, columns: Vec<usize>, names, lr, threshold| Term {
-            effect: candidate.effect,
-            candidate: i,
-            form,
             columns,
             names,
-            fixed: vec![],
-            follows: None,
             lr,
-            threshold,
-            alternatives: vec![],
-            stated: None,
-            claims: vec![],
+            ..Term::new(candidate.effect, i, form, threshold)
         };
         let n = self.panel.bins.n;
         match &candidate.hypothesis {
