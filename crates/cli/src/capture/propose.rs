@@ -66,7 +66,7 @@ pub(super) fn proposal(names: &[String], numbered: bool) -> (String, bool) {
             }
         }
     } else {
-        let meanings: Vec<Meaning> = names.iter().map(|name| Meaning::of(name)).collect();
+        let meanings = meanings(names);
         let time = |with_unit: bool| {
             meanings.iter().zip(names).position(|(m, name)| {
                 let says = || {
@@ -106,8 +106,9 @@ pub(super) fn proposal(names: &[String], numbered: bool) -> (String, bool) {
             add("temp", at, What::Channel(Quantity::Temp));
         }
         if !has_gyro && !has_acc && (0..3).all(|axis| find(Kind::Bare, axis).is_none()) {
-            // Nothing is recognized: the form of a mapping, with the first column that is no time.
-            if let Some(at) = meanings.iter().position(|m| m.kind != Kind::Time) {
+            // A gyro without an axis; or nothing is recognized: the form of a mapping, with the first column that is no time.
+            let first = |wanted: fn(Kind) -> bool| meanings.iter().position(|m| wanted(m.kind));
+            if let Some(at) = first(|k| k == Kind::Gyro).or_else(|| first(|k| k != Kind::Time)) {
                 add("gyro_x", at, What::Channel(Quantity::Gyro));
             }
         }
@@ -154,10 +155,8 @@ pub(super) fn nearest(name: &str) -> Option<String> {
         let word = name.to_lowercase();
         AXES.iter().position(|axis| word.ends_with(axis))
     });
-    let with_axis = |stem: &str| match axis {
-        Some(axis) => format!("{stem}_{}", AXES[axis]),
-        None => format!("{stem}_x"),
-    };
+    let letter = axis.and_then(|axis| AXES.get(axis)).unwrap_or(&"x");
+    let with_axis = |stem: &str| format!("{stem}_{letter}");
     let words = words(name);
     let is = |starts: &[&str]| (words.iter()).any(|w| starts.iter().any(|s| w.starts_with(s)));
     match found.kind {
@@ -195,6 +194,28 @@ struct Meaning {
     is_seconds: bool,
 }
 
+/// What the names of a file most probably mean, together: axes may be counted from 1 on, or be flight's p, q, r.
+fn meanings(names: &[String]) -> Vec<Meaning> {
+    let mut meanings: Vec<Meaning> = names.iter().map(|name| Meaning::of(name)).collect();
+    for kind in [Kind::Gyro, Kind::Acc, Kind::Bare] {
+        let has = |axis| (meanings.iter()).any(|m| m.kind == kind && m.axis == Some(axis));
+        // Only what is counted reaches 3.
+        if has(3) && !has(0) {
+            let of_kind = meanings.iter_mut().filter(|m| m.kind == kind);
+            of_kind.for_each(|m| m.axis = m.axis.map(|axis| axis - 1));
+        }
+    }
+    let at = |letter: &str| {
+        (names.iter()).position(|name| in_brackets(name).0.eq_ignore_ascii_case(letter))
+    };
+    if let [Some(p), Some(q), Some(r)] = ["p", "q", "r"].map(at) {
+        for (axis, at) in [p, q, r].into_iter().enumerate() {
+            (meanings[at].kind, meanings[at].axis) = (Kind::Gyro, Some(axis));
+        }
+    }
+    meanings
+}
+
 impl Meaning {
     /// What a name most probably means; one within a group by itself, where the group tells nothing.
     fn of(name: &str) -> Self {
@@ -220,7 +241,7 @@ impl Meaning {
         let unit_is_of = |what| unit.is_some_and(|unit| is_unit_of(unit, what));
         let kind = if is(&["mag", "quat", "orient", "gravity", "euler", "tick"]) {
             Kind::Unknown
-        } else if is(&["gyr", "angular", "omega", "rotation", "rate"])
+        } else if is(&["gyr", "angular", "omega", "rot", "rate"])
             || letters(&["g", "w", "gx", "gy", "gz", "wx", "wy", "wz"])
         {
             Kind::Gyro
@@ -241,7 +262,7 @@ impl Meaning {
             Kind::Gyro
         } else if unit_is_of(What::Channel(Quantity::Acc)) {
             Kind::Acc
-        } else if axis.is_some() && words.len() == 1 {
+        } else if axis.is_some() && words.len() == 1 && !TURNS.contains(&first) {
             Kind::Bare
         } else {
             Kind::Unknown
@@ -254,11 +275,17 @@ impl Meaning {
     }
 }
 
-/// 0, 1, 2 for a word that is or ends in an axis.
+/// The axes' names as angles: about x, y and z.
+const TURNS: [&str; 3] = ["roll", "pitch", "yaw"];
+
+/// 0, 1, 2 for a word that is or ends in an axis; its number, up to 3, where it ends in one.
 fn axis_of(word: &str) -> Option<usize> {
-    let stem = word.trim_end_matches(['x', 'y', 'z', '0', '1', '2']);
+    if let Some(axis) = TURNS.iter().position(|turn| *turn == word) {
+        return Some(axis);
+    }
+    let stem = word.trim_end_matches(['x', 'y', 'z', '0', '1', '2', '3']);
     let known = [
-        "", "g", "w", "a", "gyro", "gyr", "acc", "accel", "omega", "angvel",
+        "", "g", "w", "a", "gyro", "gyr", "acc", "accel", "omega", "angvel", "rate", "rot",
     ];
     let last = word.strip_prefix(stem)?;
     if !known.contains(&stem) {
@@ -268,8 +295,16 @@ fn axis_of(word: &str) -> Option<usize> {
         "x" | "0" => Some(0),
         "y" | "1" => Some(1),
         "z" | "2" => Some(2),
+        "3" => Some(3),
         _ => None,
     }
+}
+
+/// A word that begins with its axis, in two: `xgyro`, `rollrate`.
+fn axis_first(word: &str) -> Option<(&str, &str)> {
+    let known = ["gyro", "gyr", "acc", "accel", "rate", "speed"];
+    let split = |axis: &&str| Some(word.split_at(word.strip_prefix(*axis).map(|_| axis.len())?));
+    (AXES.iter().chain(&TURNS).filter_map(split)).find(|(_, rest)| known.contains(rest))
 }
 
 /// The words of a name, in small letters: `GyroX`, `gyr[0]`, `w_RS_S_x`.
@@ -286,7 +321,11 @@ fn words(name: &str) -> Vec<String> {
         }
     }
     words.retain(|word| !word.is_empty());
-    words
+    let split = |word: String| match axis_first(&word) {
+        Some((axis, rest)) => vec![axis.to_owned(), rest.to_owned()],
+        None => vec![word],
+    };
+    words.into_iter().flat_map(split).collect()
 }
 
 #[cfg(test)]
@@ -390,6 +429,30 @@ mod tests {
             (
                 "Zeit;gx",
                 "--columns time=Zeit,gyro_x=gx --units gyro=deg/s",
+            ),
+            (
+                "t;xgyro;ygyro;zgyro;xacc",
+                "--columns time=t,gyro_x=xgyro,gyro_y=ygyro,gyro_z=zgyro,acc_x=xacc --units gyro=deg/s,acc=m/s2",
+            ),
+            (
+                "omega1;omega2;omega3",
+                "--columns gyro_x=omega1,gyro_y=omega2,gyro_z=omega3 --units gyro=deg/s",
+            ),
+            (
+                "t;roll;rollrate;pitch_rate;yawRate",
+                "--columns time=t,gyro_x=rollrate,gyro_y=pitch_rate,gyro_z=yawRate --units gyro=deg/s",
+            ),
+            (
+                "r;q;p;throttle",
+                "--columns gyro_x=p,gyro_y=q,gyro_z=r --units gyro=deg/s",
+            ),
+            (
+                "t;rot_x;rot_y",
+                "--columns time=t,gyro_x=rot_x,gyro_y=rot_y --units gyro=deg/s",
+            ),
+            (
+                "t;acc;Gyro's rate",
+                r"--columns 'time=t,gyro_x=Gyro'\''s rate' --units gyro=deg/s",
             ),
             ("y", "--columns gyro_y=y --units gyro=deg/s"),
             ("values", "--columns gyro_x=values --units gyro=deg/s"),
