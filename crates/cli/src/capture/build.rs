@@ -4,7 +4,7 @@ use model::record::{Axis, Base, Channel, Header, Quantity, Record};
 use wire::{Sample, flags};
 
 use super::STANDARD_GRAVITY;
-use super::read::unwrap;
+use super::order::unwrap;
 
 /// What the board's counts mean; goes into the header.
 #[derive(Clone, Debug, PartialEq)]
@@ -190,16 +190,13 @@ impl RecordBuilder {
                 Some(i32::from(s.pwm))
             }),
         );
+        let counter = |of: fn(&Sample) -> u64| -> Vec<u64> {
+            self.rows.iter().map(|(sample, _)| of(sample)).collect()
+        };
         Record {
             header,
-            seq: Some(unwrap(
-                self.rows.iter().map(|(s, _)| u64::from(s.seq)),
-                1 << 16,
-            )),
-            t_ticks: Some(unwrap(
-                self.rows.iter().map(|(s, _)| u64::from(s.t_ticks)),
-                1 << 32,
-            )),
+            seq: Some(unwrap(&counter(|s| s.seq.into()), 1 << 16)),
+            t_ticks: Some(unwrap(&counter(|s| s.t_ticks.into()), 1 << 32)),
             host_time_s: Some(self.rows.iter().map(|(_, time)| *time).collect()),
             flags: Some(self.rows.iter().map(|(s, _)| s.flags).collect()),
             channels,

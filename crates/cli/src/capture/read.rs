@@ -1,6 +1,5 @@
 //! Reading.
 
-use std::borrow::Cow;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -13,6 +12,8 @@ use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
 use super::layout::{Cells, Layout, next_row_into};
+use super::order::{check_rate, check_times, check_varies, in_order, unwrap, unwrap_times};
+use super::skipped::keep_places;
 use super::stream::{TextLines, io, named, unpacked};
 use super::tables::{Table, read_table};
 use super::time::Clock;
@@ -23,9 +24,9 @@ use super::{CaptureError, ColumnMapping};
 pub struct ReadOptions {
     /// Which foreign column is what; empty for the stand's own captures.
     pub mapping: ColumnMapping,
-    /// Sample rate where the file has none, Hz. Overrides the header.
+    /// Sample rate where the rows have no times, Hz. Overrides the header; an error where times contradict it.
     pub rate_hz: Option<f64>,
-    /// Leave rows out that cannot be read, and count them.
+    /// Leave out what stands in rows that cannot be read, and count them.
     pub skip_bad: bool,
 }
 
@@ -34,7 +35,7 @@ pub struct ReadOptions {
 pub struct Read {
     /// The record.
     pub record: Record,
-    /// Rows that were left out by [`ReadOptions::skip_bad`].
+    /// Rows that were left out by [`ReadOptions::skip_bad`]; where they were is a row without readings.
     pub skipped: usize,
 }
 
@@ -81,7 +82,7 @@ pub fn read_from(input: impl BufRead, options: &ReadOptions) -> Result<Read, Cap
     }
     let mut values: Vec<Vec<f64>> = found.columns.iter().map(|_| Vec::new()).collect();
     let mut reader = RowReader::new(&found.columns, layout.names.len(), layout.cells);
-    let mut skipped = 0;
+    let mut skipped = Vec::new();
     let (mut row, mut cells) = layout.first.take().unzip();
     let cells = cells.get_or_insert_default();
     while let Some(line) = row {
@@ -90,13 +91,13 @@ pub fn read_from(input: impl BufRead, options: &ReadOptions) -> Result<Read, Cap
                 .iter_mut()
                 .zip(&reader.values)
                 .for_each(|(column, &value)| column.push(value)),
-            Err(_) if options.skip_bad => skipped += 1,
+            Err(_) if options.skip_bad => skipped.push(values.first().map_or(0, Vec::len)),
             Err(error) => return Err(error),
         }
         row = next_row_into(&mut text, cells)?;
     }
     let odd = std::mem::take(&mut reader.odd);
-    finish(header, found, values, skipped, &odd)
+    finish(header, found, values, options.rate_hz, &skipped, &odd)
 }
 
 /// From the columns of a file of arrays. Without a mapping, names of ours are taken as they are: in the units the file
@@ -138,7 +139,7 @@ fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError>
         }
         cells.push(values);
     }
-    finish(header, found, cells, 0, &[])
+    finish(header, found, cells, options.rate_hz, &[], &[])
 }
 
 impl Role {
@@ -243,68 +244,12 @@ impl<'a> RowReader<'a> {
     }
 }
 
-/// Longest and shortest time between rows that is taken in a unit that nobody said, s.
-const BELIEVED_S: (f64, f64) = (1e-5, 2.0);
-
-/// Sees that a time column rises, and, where nobody said its unit, that it is likely in seconds.
-fn check_time(found: &Columns, cells: &[Vec<f64>]) -> Result<(), CaptureError> {
-    let is_time = |column: &Column| matches!(column.role, Role::Time { .. });
-    let Some(at) = found.columns.iter().position(is_time) else {
-        return Ok(());
-    };
-    let mut steps: Vec<f64> = cells[at].windows(2).map(|t| t[1] - t[0]).collect();
-    let back = steps.iter().filter(|step| **step < 0.0).count();
-    // Some rows out of order, or all of them turned round, still are times.
-    if 10 * back > steps.len() && 10 * back < 9 * steps.len() {
-        let row = steps.iter().position(|step| *step < 0.0).unwrap_or(0) + 2;
-        return Err(CaptureError::Time {
-            why: format!("the time column does not rise: it goes back {back} times, first in row {row}"),
-            help: "map the column of the time, `--columns time=...`, or leave time out and say `--rate HZ`".to_owned(),
-        });
-    }
-    if steps.len() > 1 && steps.iter().all(|step| *step == 0.0) {
-        return Err(CaptureError::Time {
-            why: format!("the time column is {} throughout", cells[at][0]),
-            help: "map the column of the time, `--columns time=...`, or leave time out and say `--rate HZ`".to_owned(),
-        });
-    }
-    if steps.is_empty() {
-        return Ok(());
-    }
-    let middle = steps.len() / 2;
-    let usual = steps.select_nth_unstable_by(middle, f64::total_cmp).1.abs();
-    let is_believed = usual == 0.0 || (BELIEVED_S.0..BELIEVED_S.1).contains(&usual);
-    if found.time_is_assumed && !is_believed {
-        return Err(CaptureError::Time {
-            why: format!("in seconds, rows would be {usual} s apart"),
-            help: "say the unit of the time column: `--units time=ms` (or us, ns; s, if it is so)"
-                .to_owned(),
-        });
-    }
-    Ok(())
-}
-
-/// Undoes the wrapping of a time that a counter of 32 bits holds, as boards' microseconds do every 71 minutes: it goes back
-/// by more than half of what such a counter can hold. How often.
-fn unwrap_times(times: &mut [f64], scale: f64) -> usize {
-    let turn = scale * 4_294_967_296.0;
-    if !times.iter().all(|t| (0.0..turn).contains(t)) {
-        return 0;
-    }
-    let (mut turns, mut last) = (0, 0.0);
-    for t in times {
-        turns += usize::from(last - *t > turn / 2.0);
-        last = *t;
-        *t += turn * turns as f64;
-    }
-    turns
-}
-
 fn finish(
     header: Header,
     mut found: Columns,
     mut cells: Vec<Vec<f64>>,
-    skipped: usize,
+    rate_hz: Option<f64>,
+    skipped: &[usize],
     odd: &[Option<(u64, String)>],
 ) -> Result<Read, CaptureError> {
     if cells.first().is_none_or(Vec::is_empty) {
@@ -320,13 +265,13 @@ fn finish(
                 "the time begins again ({turns} x), as a counter of 32 bits does: taken to go on"
             ));
         }
+        check_varies(times)?;
     }
     let mut record = Record {
         header,
         notes: found.notes.clone(),
         ..Record::default()
     };
-    check_time(&found, &cells)?;
     for (k, (column, values)) in found.columns.into_iter().zip(cells).enumerate() {
         let why = match odd.get(k).and_then(Option::as_ref) {
             Some((line, text)) => Some(format!("holds text (line {line}: `{}`)", brief(text))),
@@ -343,27 +288,34 @@ fn finish(
             None => place(&mut record, column, values),
         }
     }
-    if skipped > 0 {
-        let note = format!("rows that cannot be read and are left out (--skip-bad): {skipped}");
+    if !skipped.is_empty() {
+        let kept = keep_places(&mut record, skipped);
+        let note = format!(
+            "rows that cannot be read and are left out (--skip-bad): {}; {kept} of them keep their places, without readings",
+            skipped.len()
+        );
         record.notes.push(note);
     }
+    let mut record = in_order(record);
+    if let Some(times) = &record.host_time_s {
+        check_times(times, found.time_is_assumed)?;
+    }
+    check_rate(&mut record, rate_hz)?;
     difference_angles(&mut record)?;
-    let mended = match analysis::rows::in_order(&record) {
-        Cow::Owned(mended) => Some(mended),
-        Cow::Borrowed(_) => None,
-    };
-    let record = mended.unwrap_or(record);
-    Ok(Read { record, skipped })
+    Ok(Read {
+        record,
+        skipped: skipped.len(),
+    })
 }
 
-fn whole(values: &[f64]) -> impl Iterator<Item = u64> {
-    values.iter().map(|&value| value as u64)
+fn whole(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|&value| value as u64).collect()
 }
 
 fn place(record: &mut Record, column: Column, values: Vec<f64>) {
     match column.role {
-        Role::Seq => record.seq = Some(unwrap(whole(&values), 1 << 16)),
-        Role::Ticks => record.t_ticks = Some(unwrap(whole(&values), 1 << 32)),
+        Role::Seq => record.seq = Some(unwrap(&whole(&values), 1 << 16)),
+        Role::Ticks => record.t_ticks = Some(unwrap(&whole(&values), 1 << 32)),
         Role::Time { .. } => record.host_time_s = Some(values),
         Role::Flags => record.flags = Some(values.iter().map(|&value| value as u16).collect()),
         Role::Measured {
@@ -396,30 +348,6 @@ fn place(record: &mut Record, column: Column, values: Vec<f64>) {
             });
         }
     }
-}
-
-/// Undoes the wrapping of a counter of `modulus` steps, if it is wrapped. What goes back by less than half a turn, over
-/// a wrap or not, stays where it is: a repeated or reordered row.
-pub(super) fn unwrap(values: impl Iterator<Item = u64>, modulus: u64) -> Vec<u64> {
-    let (mut turns, mut last) = (0, 0);
-    values
-        .map(|now| {
-            // A value of `modulus` or more was unwrapped by whoever wrote it.
-            if now < modulus && last < modulus && last > now && last - now > modulus / 2 {
-                turns += modulus;
-            }
-            if now < modulus
-                && last < modulus
-                && turns > 0
-                && now > last
-                && now - last > modulus / 2
-            {
-                return now + turns - modulus;
-            }
-            last = now;
-            now + turns
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -463,7 +391,10 @@ mod tests {
             ..ReadOptions::default()
         };
         let read = read_from(text.as_bytes(), &options).unwrap();
-        assert_eq!((read.skipped, read.record.len()), (1, 2));
+        // It came, and has its place; what it read is not known.
+        assert_eq!((read.skipped, read.record.len()), (1, 3));
+        assert_eq!(read.record.seq, Some(vec![65_534, 65_535, 65_536]));
+        assert!(read.record.channels[0].values[1].is_nan());
     }
 
     #[test]

@@ -40,10 +40,10 @@ pub struct Input {
     /// Units of a foreign file: `gyro=deg/s,acc=m/s2`
     #[arg(long, value_name = "OURS=UNIT,...")]
     units: Option<String>,
-    /// Sample rate, Hz, where there is no time column
+    /// Sample rate, Hz, where the rows have no times; refused where these say another one
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub rate: Option<f64>,
-    /// Leave out rows that cannot be read, and count them
+    /// Leave out what stands in rows that cannot be read, and count them
     #[arg(long)]
     skip_bad: bool,
     /// Print nothing but errors
