@@ -13,53 +13,59 @@ mod kept_back;
 mod kept_back_eighth;
 mod kept_back_fifth;
 mod kept_back_fourth;
+mod kept_back_ninth;
 mod kept_back_seventh;
 mod kept_back_sixth;
 mod kept_back_third;
 #[cfg(test)]
 mod library_share;
 
+/// The sets, in the order in which they were written.
+const SETS: [&[&str]; 9] = [
+    &first::NAMES,
+    &kept_back::NAMES,
+    &kept_back_third::NAMES,
+    &kept_back_fourth::NAMES,
+    &kept_back_fifth::NAMES,
+    &kept_back_sixth::NAMES,
+    &kept_back_seventh::NAMES,
+    &kept_back_eighth::NAMES,
+    &kept_back_ninth::NAMES,
+];
+
+/// How many names the first of the sets have together.
+const fn names_in(sets: usize) -> usize {
+    let (mut all, mut set) = (0, 0);
+    while set < sets {
+        all += SETS[set].len();
+        set += 1;
+    }
+    all
+}
+
 /// What there is: first those that the engine was developed with or has been changed after, then those kept back.
-pub const FOREIGN: [&str; SEEN + kept_back_eighth::NAMES.len()] = {
-    let mut all = [""; SEEN + kept_back_eighth::NAMES.len()];
-    let mut i = 0;
-    while i < all.len() {
-        all[i] = if i < first::NAMES.len() {
-            first::NAMES[i]
-        } else if i < SECOND {
-            kept_back::NAMES[i - first::NAMES.len()]
-        } else if i < THIRD {
-            kept_back_third::NAMES[i - SECOND]
-        } else if i < FOURTH {
-            kept_back_fourth::NAMES[i - THIRD]
-        } else if i < FIFTH {
-            kept_back_fifth::NAMES[i - FOURTH]
-        } else if i < SIXTH {
-            kept_back_sixth::NAMES[i - FIFTH]
-        } else if i < SEEN {
-            kept_back_seventh::NAMES[i - SIXTH]
-        } else {
-            kept_back_eighth::NAMES[i - SEEN]
-        };
-        i += 1;
+pub const FOREIGN: [&str; names_in(SETS.len())] = {
+    let mut all = [""; names_in(SETS.len())];
+    let mut set = 0;
+    while set < SETS.len() {
+        let mut i = 0;
+        while i < SETS[set].len() {
+            all[names_in(set) + i] = SETS[set][i];
+            i += 1;
+        }
+        set += 1;
     }
     all
 };
 /// How many of them, from the first, are no longer unseen: the engine was made with 14 of them, and has been changed
-/// since it was graded on the next eight, and on the second to the seventh set kept back.
-pub const SEEN: usize = SIXTH + kept_back_seventh::NAMES.len();
-
-/// Where the second to the sixth set end.
-const SECOND: usize = first::NAMES.len() + kept_back::NAMES.len();
-const THIRD: usize = SECOND + kept_back_third::NAMES.len();
-const FOURTH: usize = THIRD + kept_back_fourth::NAMES.len();
-const FIFTH: usize = FOURTH + kept_back_fifth::NAMES.len();
-const SIXTH: usize = FIFTH + kept_back_sixth::NAMES.len();
+/// since it was graded on the next eight, and on the second to the eighth set kept back.
+pub const SEEN: usize = names_in(SETS.len() - 1);
 
 /// The environment that they need.
 #[must_use]
 pub fn needs(name: &str) -> Needs {
-    kept_back_eighth::needs(name)
+    kept_back_ninth::needs(name)
+        .or_else(|| kept_back_eighth::needs(name))
         .or_else(|| kept_back_seventh::needs(name))
         .or_else(|| kept_back_sixth::needs(name))
         .or_else(|| kept_back_fifth::needs(name))
@@ -77,6 +83,7 @@ pub fn parts(name: &str) -> Vec<&'static str> {
         kept_back_sixth::parts(name),
         kept_back_seventh::parts(name),
         kept_back_eighth::parts(name),
+        kept_back_ninth::parts(name),
     ]
     .concat()
 }
@@ -178,6 +185,7 @@ fn any(
         .or_else(|| kept_back_sixth::one(draw, stand, name, axis, wanted))
         .or_else(|| kept_back_seventh::one(draw, stand, name, axis, wanted))
         .or_else(|| kept_back_eighth::one(draw, stand, name, axis, wanted))
+        .or_else(|| kept_back_ninth::one(draw, stand, name, axis, wanted))
         .unwrap_or_else(|| first::one(draw, stand, name, axis, wanted))
 }
 

@@ -285,7 +285,7 @@ fn bars(out: &mut String, all: &[Outcome]) {
             wrong,
         ),
         bar(
-            "foreign effects of d' >= 25, eighth set (2026-11-22), three changes owe something to it: told as unexplained",
+            "foreign effects of d' >= 25, ninth set (2026-11-22), unseen: told as unexplained",
             true,
             0.90,
             told(false),

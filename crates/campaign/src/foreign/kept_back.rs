@@ -384,20 +384,22 @@ pub(super) fn of_law(truth: &[f64], other: &[f64], n: usize) -> f64 {
     (2.0 * n as f64 * nats).max(0.0).sqrt()
 }
 
+/// Shares of so many equal cells either way of 0, as far as `reach`, by a density.
+pub(super) fn cells(count: i32, reach: f64, of: &dyn Fn(f64) -> f64) -> Vec<f64> {
+    let at = |i: i32| reach * f64::from(i) / f64::from(count);
+    let all: Vec<f64> = (-count..=count).map(|i| of(at(i))).collect();
+    let sum: f64 = all.iter().sum();
+    all.iter().map(|p| p / sum).collect()
+}
+
 /// Density of the sum of a uniform part, `share` of a variance of 1, and a normal rest, against the normal law.
 fn of_uniform(share: f64, n: usize) -> f64 {
-    const CELLS: i32 = 1200;
-    let at = |i: i32| 6.0 * f64::from(i) / f64::from(CELLS);
     let (half, rest) = ((3.0 * share).sqrt(), (1.0 - share).max(1e-6).sqrt());
     let below = |z: f64| 0.5 * statrs::function::erf::erfc(-z / 2f64.sqrt());
     let mixed = |x: f64| (below((x + half) / rest) - below((x - half) / rest)) / (2.0 * half);
     let normal = |x: f64| (-0.5 * x * x).exp() / TAU.sqrt();
-    let cells = |of: &dyn Fn(f64) -> f64| -> Vec<f64> {
-        let all: Vec<f64> = (-CELLS..=CELLS).map(|i| of(at(i))).collect();
-        let sum: f64 = all.iter().sum();
-        all.iter().map(|p| p / sum).collect()
-    };
-    of_law(&cells(&mixed), &cells(&normal), n)
+    let law = |of: &dyn Fn(f64) -> f64| cells(1200, 6.0, of);
+    of_law(&law(&mixed), &law(&normal), n)
 }
 
 /// A dither of even law, as converters add it, makes up a part of the noise.

@@ -15,9 +15,11 @@ use crate::random::Draw;
 use crate::stand::{LSB, Stand};
 use crate::strength::{Meter, of_variance};
 
+mod codes;
 mod eighth;
 mod fifth;
 mod fourth;
+mod ninth;
 mod seventh;
 mod sixth;
 mod third;

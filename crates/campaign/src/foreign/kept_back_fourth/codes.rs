@@ -120,7 +120,7 @@ fn threshold(stand: &Stand, name: &'static str, axis: usize, wanted: f64) -> For
 }
 
 /// One of the two others.
-fn other_than(draw: &mut Draw, axis: usize) -> usize {
+pub(in super::super) fn other_than(draw: &mut Draw, axis: usize) -> usize {
     (axis + 1 + draw.of_many(2)) % 3
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use analysis::likelihood::Dct;
 
-use super::super::kept_back::{of_law, shaped, variance};
+use super::super::kept_back::{cells, of_law, shaped, variance};
 use super::super::{Change, Foreign};
 use super::about_mean;
 use crate::random::Draw;
@@ -147,14 +147,7 @@ pub(in super::super) fn with_sine(share: f64, x: f64) -> f64 {
 /// A tone far above the samples' rate, from a switched supply or the part's own drive, whose clock is so unsteady that
 /// each sample catches it at another phase: no line is left, but values that crowd at its two crests.
 fn any_phase(draw: &mut Draw, stand: &Stand, name: &'static str, wanted: f64) -> Foreign {
-    const CELLS: i32 = 400;
-    let cells = |of: &dyn Fn(f64) -> f64| -> Vec<f64> {
-        let all: Vec<f64> = (-CELLS..=CELLS)
-            .map(|i| of(6.0 * f64::from(i) / f64::from(CELLS)))
-            .collect();
-        let sum: f64 = all.iter().sum();
-        all.iter().map(|p| p / sum).collect()
-    };
+    let cells = |of: &dyn Fn(f64) -> f64| cells(400, 6.0, of);
     let n = stand.samples();
     let normal = cells(&|x| (-0.5 * x * x).exp());
     let strength = |share: f64| of_law(&cells(&|x| with_sine(share.min(0.98), x)), &normal, n);

@@ -361,14 +361,29 @@ pub(in super::super) fn coupled(
     like: &[f64],
     of: impl Fn(&[Vec<i32>; 3], usize) -> f64 + 'static,
 ) -> Foreign {
+    coupled_series(stand, name, axis, wanted, like, move |counts| {
+        (0..counts[axis].len()).map(|i| of(counts, i)).collect()
+    })
+}
+
+/// The same of what the whole run of the other axes adds, deg/s.
+pub(in super::super) fn coupled_series(
+    stand: &Stand,
+    name: &'static str,
+    axis: usize,
+    wanted: f64,
+    like: &[f64],
+    of: impl Fn(&[Vec<i32>; 3]) -> Vec<f64> + 'static,
+) -> Foreign {
     let meter = Meter::new(stand, axis);
     let (size, strength) = meter.sized(&meter.energy(like), wanted);
     let change = move |counts: &[Vec<i32>; 3], draw: &mut Draw| {
-        let own = &counts[axis];
-        (0..own.len())
-            .map(|i| {
-                let rate = f64::from(own[i]) + draw.between(-0.5, 0.5);
-                (rate + size * of(counts, i) / LSB).round() as i32
+        counts[axis]
+            .iter()
+            .zip(of(counts))
+            .map(|(own, added)| {
+                let rate = f64::from(*own) + draw.between(-0.5, 0.5);
+                (rate + size * added / LSB).round() as i32
             })
             .collect()
     };

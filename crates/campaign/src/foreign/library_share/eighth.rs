@@ -1,11 +1,11 @@
 //! The eighth set against the library, a sum of two of its effects included.
 
 use super::super::kept_back_eighth::{NAMES, codes, noise};
-use super::super::kept_back_fourth::codes::{law, long_run, of_steps};
+use super::super::kept_back_fourth::codes::{law, long_run};
 use super::super::kept_back_seventh::noise::of_memory;
 use super::super::kept_back_third::noise::of_humps;
+use super::codes::{by_neighbours, hold_codes, hold_steps};
 use super::seventh::hold_spectrum;
-use super::sixth::{by_neighbours, hold_codes};
 use super::*;
 
 /// Those whose shape is a signal that could be known, the hump that runs among them.
@@ -140,33 +140,11 @@ fn neither_a_filter_nor_stale_samples_describe_play_in_the_reading() {
         let name = "play in the reading";
         let stand = stand(draw, name);
         let play = crate::strength::size_for(25.0, &|p| codes::of_play(&stand, 0, p.min(6.0)));
-        let (_, even) = law(&stand, 0);
+        let (first, even) = law(&stand, 0);
         let steps = codes::steps_with_play(&stand, 0, play);
         let shares = long_run(&steps, &even);
-        let mean: f64 = shares.iter().enumerate().map(|(i, p)| i as f64 * p).sum();
-        let (mut own, mut next) = (0.0, 0.0);
-        for (i, (p, row)) in shares.iter().zip(&steps).enumerate() {
-            let off = i as f64 - mean;
-            let then = |(k, q): (usize, &f64)| q * (k as f64 - mean);
-            own += p * off * off;
-            next += p * off * row.iter().enumerate().map(then).sum::<f64>();
-        }
         println!("{name}: {play:.2} counts");
-        hold(
-            name,
-            "low_pass",
-            by_neighbours(next / own, stand.samples(), 25.0),
-        );
-        let against = |stale: f64| {
-            let law = |from: usize, to: usize| {
-                stale * f64::from(u8::from(from == to)) + (1.0 - stale) * shares[to]
-            };
-            of_steps(&steps, &shares, &law, stand.samples()).powi(2)
-        };
-        let least = (1..400)
-            .map(|k| against(f64::from(k) / 1000.0))
-            .fold(f64::INFINITY, f64::min);
-        hold(name, "stale_samples", 1.0 - least / against(0.0));
+        hold_steps(name, &stand, first, &steps, &shares);
     }
 }
 

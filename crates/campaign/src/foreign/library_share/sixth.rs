@@ -2,6 +2,7 @@
 
 use super::super::kept_back_fourth::codes::{law, long_run};
 use super::super::kept_back_sixth::{NAMES, codes, noise};
+use super::codes::{by_neighbours, hold_codes, of_neighbours};
 use super::*;
 
 /// Those whose shape is a signal that could be known.
@@ -51,12 +52,6 @@ fn no_process_of_the_library_describes_a_zero_taken_from_blocks() {
     }
 }
 
-/// Correlation of neighbours is all that white noise and one pole, or any filter of the library, have of them; the longer
-/// lags of a pole follow from it.
-pub(super) fn by_neighbours(r: f64, n: usize, strength: f64) -> f64 {
-    -(n as f64) * (-r * r).ln_1p() / strength.powi(2)
-}
-
 #[test]
 fn correlation_of_neighbours_is_a_part_of_what_filters_of_the_sixth_set_do() {
     for name in [
@@ -89,62 +84,11 @@ fn correlation_of_neighbours_is_a_part_of_what_filters_of_the_sixth_set_do() {
         let (_, even) = law(&stand, 0);
         let steps = codes::steps_within(&even, most);
         let shares = long_run(&steps, &even);
-        let mean: f64 = shares.iter().enumerate().map(|(i, p)| i as f64 * p).sum();
-        let (mut own, mut next) = (0.0, 0.0);
-        for (i, (p, row)) in shares.iter().zip(&steps).enumerate() {
-            let off = i as f64 - mean;
-            let then: f64 = row
-                .iter()
-                .enumerate()
-                .map(|(k, q)| q * (k as f64 - mean))
-                .sum();
-            own += p * off * off;
-            next += p * off * then;
-        }
+        let r = of_neighbours(&steps, &shares);
         let strength = codes::of_limit(&stand, 0, most);
-        let share = by_neighbours(next / own, stand.samples(), strength);
+        let share = by_neighbours(r, stand.samples(), strength);
         hold(name, "low_pass", share);
     }
-}
-
-/// A law of codes against bits that stick and against a rail at either end, of noise with its mean and variance.
-pub(super) fn hold_codes(name: &str, stand: &Stand, first: i32, read: &[f64]) {
-    let even = codes::refitted(first, read);
-    let whole = of_law(read, &even, stand.samples()).powi(2);
-    let share = |law: &[f64]| 1.0 - of_law(read, law, stand.samples()).powi(2) / whole;
-    let mut best = f64::NEG_INFINITY;
-    for bit in 0..6 {
-        for percent in 1..=100 {
-            let chance = f64::from(percent) / 100.0;
-            for one in [false, true] {
-                let mut law: Vec<f64> = even.iter().map(|p| (1.0 - chance) * p).collect();
-                for (i, p) in even.iter().enumerate() {
-                    let code = first + i as i32;
-                    let set = if one {
-                        code | 1 << bit
-                    } else {
-                        code & !(1 << bit)
-                    };
-                    if let Some(q) = law.get_mut((set - first) as usize) {
-                        *q += chance * p;
-                    }
-                }
-                best = best.max(share(&law));
-            }
-        }
-    }
-    hold(name, "stuck_bit", best);
-    let mut best = f64::NEG_INFINITY;
-    for low in 0..even.len() / 2 {
-        for high in even.len() / 2..even.len() {
-            let mut law = vec![0.0; even.len()];
-            law[low..=high].copy_from_slice(&even[low..=high]);
-            law[low] += even[..low].iter().sum::<f64>();
-            law[high] += even[high + 1..].iter().sum::<f64>();
-            best = best.max(share(&law));
-        }
-    }
-    hold(name, "saturation", best);
 }
 
 #[test]
