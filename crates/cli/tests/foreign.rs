@@ -285,6 +285,39 @@ fn temperatures_come_by_any_spelling_and_unit_and_names_are_not_taken_twice() {
 }
 
 #[test]
+fn a_misspelt_column_is_told_with_the_name_that_was_meant_and_another_spelling_is_taken() {
+    let head = "# format: imu-stand-capture/1\n# rate_hz: 50\n# gyro_lsb_dps: 0.25\n# temp_lsb_c: 0.1\n# temp_zero_c: 25\n";
+    let rows = "seq,gyro_x,Gyro-Y,gyro_zz,temp_X,vibration_g\n0,0,4,8,10,1\n1,1,5,9,20,2\n";
+    let ours = read(format!("{head}{rows}").as_bytes(), "", "").expect("a capture");
+    let value = |name: &str| ours.record.channel(name).expect(name).values[0];
+    assert_eq!(
+        (value("gyro_y"), value("temp_x"), value("gyro_zz")),
+        (1.0, 26.0, 8.0)
+    );
+    let notes = &ours.record.notes;
+    for told in [
+        "`Gyro-Y` is taken as `gyro_y`",
+        "`temp_X` is taken as `temp_x`",
+        "`gyro_zz` is none of the format's, so it is a channel of its own that explains nothing: did you mean `gyro_z`?",
+    ] {
+        let times = notes.iter().filter(|note| note.contains(told)).count();
+        assert_eq!(times, 1, "{told}: {notes:?}");
+    }
+    assert_eq!(notes.len(), 3, "{notes:?}");
+
+    let text =
+        "Time (ms),gyro_x (rad/s),Gyro Y (rad/s),gyro_zz (rad/s),spare\n0,1,2,3,4\n20,1,2,3,4\n";
+    let theirs = read(text.as_bytes(), "", "").expect("measured values");
+    assert_eq!(theirs.record.host_time_s.as_deref(), Some(&[0.0, 0.02][..]));
+    assert_eq!(theirs.record.channels.len(), 2);
+    let notes = theirs.record.notes.join("; ");
+    assert!(
+        notes.contains("not read, as their names are none of the stand's: `gyro_zz` (did you mean `gyro_z`?), `spare`;"),
+        "{notes}"
+    );
+}
+
+#[test]
 fn a_file_of_another_kind_is_called_by_its_name_and_long_names_are_cut() {
     for (start, what) in [("{\"t\":[0,1]}", "JSON"), ("<!DOCTYPE html>", "a web page")] {
         let said = error(start.as_bytes(), "", "");

@@ -5,6 +5,7 @@ use model::record::Quantity;
 use super::error::{brief, brief_list};
 use super::foreign::meaning;
 use super::header::Lines;
+use super::names::{TIMES, meant, not_read, respelt};
 use super::propose::{alias, nearest, proposal};
 use super::units::{COUNTS, What, at_the_end, convert, in_brackets, known, usual};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
@@ -160,7 +161,11 @@ fn measured(
 
 /// Columns with names of ours: in the units that are given or stated, in counts where the file says so or says nothing.
 fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
-    let stem = |at: usize| in_brackets(&said.names[at]).0;
+    let stems: Vec<String> = (said.names.iter())
+        .map(|name| in_brackets(name).0.to_owned())
+        .collect();
+    let (names, notes) = respelt(&stems, &TIMES, false);
+    let stem = |at: usize| names[at].as_str();
     let unit = |at: usize, what: What| {
         let given = mapping.unit(stem(at), what);
         given.or(said.units[at].as_deref())
@@ -173,10 +178,13 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
     if !is_scaled {
         return own(said, said.names, mapping);
     }
-    let has = |name: &str| said.names.iter().any(|n| n == name);
-    let (mut found, mut counted) = (Columns::default(), Vec::new());
-    let mut assumed = Vec::new();
-    for at in 0..said.names.len() {
+    let has = |name: &str| names.iter().any(|n| n == name);
+    let mut found = Columns {
+        notes,
+        ..Columns::default()
+    };
+    let (mut counted, mut assumed, mut unread) = (Vec::new(), Vec::new(), Vec::new());
+    for (at, theirs) in stems.iter().enumerate() {
         let name = stem(at);
         let (quantity, _) = meaning(name);
         let unit = unit(at, What::Channel(quantity));
@@ -185,16 +193,19 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
             "t_ticks" if said.lines.get("tick_s").is_some() => Role::Ticks,
             "flags" => Role::Flags,
             "host_time_s" => Role::Time { scale: 1.0 },
-            "t" | "time" | "time_s" | "timestamp"
-                if !has("host_time_s")
-                    && !found
-                        .columns
-                        .iter()
-                        .any(|c| matches!(c.role, Role::Time { .. })) =>
+            name if TIMES.contains(&name)
+                && !has("host_time_s")
+                && !found
+                    .columns
+                    .iter()
+                    .any(|c| matches!(c.role, Role::Time { .. })) =>
             {
                 time(said, mapping, at, &mut found)?
             }
-            _ if quantity == Quantity::Other => continue,
+            _ if quantity == Quantity::Other => {
+                unread.push(theirs);
+                continue;
+            }
             _ if unit == Some(COUNTS) => {
                 counted.push((at, name.to_owned()));
                 continue;
@@ -216,6 +227,7 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
     if !counted.is_empty() {
         let names: Vec<String> = counted.iter().map(|(_, name)| name.clone()).collect();
         let own = own(said, &names, mapping)?;
+        found.notes.extend(own.notes);
         found
             .columns
             .extend(own.columns.into_iter().map(|c| Column {
@@ -227,6 +239,7 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
         return Err(unknown(said, NONE_OF_OURS.to_owned()));
     }
     found.notes.extend(note(&assumed));
+    found.notes.extend(not_read(&unread, &names));
     Ok(found)
 }
 
@@ -306,7 +319,10 @@ fn own(
     mapping: &ColumnMapping,
 ) -> Result<Columns, CaptureError> {
     let lines = said.lines;
-    let mut columns = Vec::new();
+    let is_capture = lines.get("format").is_some();
+    let theirs = names;
+    let (names, mut notes) = respelt(theirs, &[], is_capture);
+    let (mut columns, mut unread) = (Vec::new(), Vec::new());
     for (at, name) in names.iter().enumerate() {
         let (quantity, _) = meaning(name);
         let scaled = |zero, scale, unit: &str| Role::Measured {
@@ -341,8 +357,16 @@ fn own(
             (_, Quantity::Pwm) => scaled(0.0, 1.0, "1"),
             (_, Quantity::Other) => {
                 // The format may grow: what is not known is kept as it is, where the file says that it is ours.
-                if lines.get("format").is_none() {
+                if !is_capture {
+                    unread.push(&theirs[at]);
                     continue;
+                }
+                if let Some(ours) = meant(name, &names) {
+                    notes.push(format!(
+                        "column `{}` is none of the format's, so it is a channel of its own that explains nothing: did you \
+                         mean `{ours}`? Then rename it in the line of the names",
+                        brief(name)
+                    ));
                 }
                 let unit = mapping.unit(name, What::Channel(quantity)).unwrap_or("1");
                 Role::Measured {
@@ -364,8 +388,10 @@ fn own(
     if !columns.iter().any(is_inertial) {
         return Err(unknown(said, NONE_OF_OURS.to_owned()));
     }
+    notes.extend(not_read(&unread, &names));
     Ok(Columns {
         columns,
+        notes,
         ..Columns::default()
     })
 }

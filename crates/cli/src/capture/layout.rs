@@ -286,7 +286,8 @@ impl Cells {
         }
         let mut cells = Vec::with_capacity(USUAL_WIDTH);
         match u8::try_from(self.separator) {
-            // A byte of ASCII is no part of another character.
+            // A byte of ASCII is no part of another character. `str::split` takes 1.5 to 1.9 times as long over the short
+            // cells of a capture, and the reading of its rows 1.3 to 1.8 times.
             Ok(separator) if separator.is_ascii() => {
                 let mut from = 0;
                 for (at, byte) in line.bytes().enumerate() {

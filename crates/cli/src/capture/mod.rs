@@ -9,6 +9,7 @@ mod foreign;
 mod header;
 mod layout;
 mod live;
+mod names;
 mod order;
 mod propose;
 mod read;

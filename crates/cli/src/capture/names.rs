@@ -1,0 +1,189 @@
+//! Column names that are ours but for their spelling: those that differ in case and punctuation alone are taken for ours, the
+//! nearest is told of others.
+
+use model::record::Quantity;
+
+use super::error::brief;
+use super::foreign::meaning;
+use super::propose::alias;
+
+/// The names of the format.
+const OURS: [&str; 16] = [
+    "seq",
+    "t_ticks",
+    "host_time_s",
+    "gyro_x",
+    "gyro_y",
+    "gyro_z",
+    "temp_x",
+    "temp_y",
+    "temp_z",
+    "temp",
+    "supply",
+    "acc_x",
+    "acc_y",
+    "acc_z",
+    "pwm",
+    "flags",
+];
+/// Those of a time in tables of others.
+pub(super) const TIMES: [&str; 4] = ["time", "time_s", "timestamp", "t"];
+
+/// Letters and digits of a name, small.
+fn plain(name: &str) -> String {
+    let letters = name.chars().filter(|c| c.is_alphanumeric());
+    letters.flat_map(char::to_lowercase).collect()
+}
+
+/// The columns' names with those of ours, and `more`, where case and punctuation are all that differs, and notes of them.
+/// Nothing is guessed: not where ours is there too, or two columns may be it; nor where no gyro or accelerometer has a name
+/// of ours and the file does not say that it is a capture of the stand.
+pub(super) fn respelt(
+    names: &[String],
+    more: &[&'static str],
+    is_capture: bool,
+) -> (Vec<String>, Vec<String>) {
+    let is_inertial = |n: &String| matches!(meaning(n).0, Quantity::Gyro | Quantity::Acc);
+    if !is_capture && !names.iter().any(is_inertial) {
+        return (names.to_vec(), Vec::new());
+    }
+    let plains: Vec<String> = names.iter().map(|name| plain(name)).collect();
+    let mut notes = Vec::new();
+    let ours = |(name, own): (&String, &String)| {
+        let is_only = plains.iter().filter(|other| *other == own).count() == 1;
+        // A letter of its own may be anything.
+        let mut all = OURS.iter().chain(more).filter(|ours| ours.len() > 1);
+        let found = all.find(|ours| plain(ours) == *own && is_only)?;
+        if *found != name {
+            notes.push(format!(
+                "column `{}` is taken as `{found}`, the name that it has here",
+                brief(name)
+            ));
+        }
+        Some((*found).to_owned())
+    };
+    let found: Vec<Option<String>> = names.iter().zip(&plains).map(ours).collect();
+    let names = found.into_iter().zip(names);
+    let names = names.map(|(ours, name)| ours.unwrap_or_else(|| name.clone()));
+    (names.collect(), notes)
+}
+
+/// The name of ours that a column was probably meant to have; none where several are as near. `names` are those that are
+/// there: they are not missing.
+pub(super) fn meant(name: &str, names: &[String]) -> Option<String> {
+    let own = plain(name);
+    let is_there = |ours: &str| names.iter().any(|name| name == ours);
+    let mut near: Vec<(usize, &str)> = (OURS.iter().filter(|ours| !is_there(ours)))
+        .map(|ours| (distance(&plain(ours), &own), *ours))
+        .filter(|(distance, ours)| *distance <= if plain(ours).len() > SHORT { 2 } else { 1 })
+        .collect();
+    near.sort_unstable();
+    match near[..] {
+        [] => alias(name).filter(|ours| OURS.contains(&ours.as_str()) && !is_there(ours)),
+        [(first, _), (second, _), ..] if first == second => None,
+        [(_, ours), ..] => Some(ours.to_owned()),
+    }
+}
+
+/// Letters of a name up to which one wrong one is all that it stands.
+const SHORT: usize = 4;
+
+/// Letters that are wrong, missing, too many, or changed with their neighbour.
+fn distance(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let mut rows: Vec<Vec<usize>> = vec![(0..=b.len()).collect()];
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let is_other = usize::from(a[i - 1] != b[j - 1]);
+            let mut least = (rows[i - 1][j - 1] + is_other)
+                .min(rows[i - 1][j] + 1)
+                .min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                least = least.min(rows[i - 2][j - 2] + 1);
+            }
+            row.push(least);
+        }
+        rows.push(row);
+    }
+    rows[a.len()][b.len()]
+}
+
+/// Names that a note lists.
+const LISTED: usize = 20;
+
+/// Says which columns are not read because of their names.
+pub(super) fn not_read(unread: &[&String], names: &[String]) -> Option<String> {
+    let say = |name: &&String| match meant(name, names) {
+        Some(ours) => format!("`{}` (did you mean `{ours}`?)", brief(name)),
+        None => format!("`{}`", brief(name)),
+    };
+    let mut list: Vec<String> = unread.iter().take(LISTED).map(say).collect();
+    if unread.len() > LISTED {
+        list.push(format!("and {} more", unread.len() - LISTED));
+    }
+    (!unread.is_empty()).then(|| {
+        format!(
+            "not read, as their names are none of the stand's: {}; `--columns` maps them, or rename them",
+            list.join(", ")
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn list(names: &str) -> Vec<String> {
+        names.split(',').map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn case_and_punctuation_make_no_other_name_and_nothing_is_guessed() {
+        for (names, is_capture, taken) in [
+            (
+                "gyro_x,Gyro_Y,gyro-z,ACC X,Time",
+                false,
+                "gyro_x,gyro_y,gyro_z,acc_x,time",
+            ),
+            ("SEQ,GyroX,Temp", true, "seq,gyro_x,temp"),
+            // Ours is there too; two may be it; the file is not known to be ours.
+            ("gyro_x,Gyro_X", true, "gyro_x,Gyro_X"),
+            ("gyro_y,Gyro-X,gyro x", true, "gyro_y,Gyro-X,gyro x"),
+            ("Gyro_X,Gyro_Y", false, "Gyro_X,Gyro_Y"),
+            ("gyro_x,T", false, "gyro_x,T"),
+        ] {
+            let (found, notes) = respelt(&list(names), &TIMES, is_capture);
+            assert_eq!(found, list(taken));
+            let other = list(names)
+                .iter()
+                .zip(&found)
+                .filter(|(a, b)| a != b)
+                .count();
+            assert_eq!(notes.len(), other, "{notes:?}");
+        }
+    }
+
+    #[test]
+    fn the_name_that_was_meant_is_told_where_it_is_one_and_missing() {
+        let names = list("seq,gyro_x,gyro_y,acc_x");
+        for (name, ours) in [
+            ("gyro_zz", Some("gyro_z")),
+            ("gyor_z", Some("gyro_z")),
+            ("suply", Some("supply")),
+            ("tick", Some("t_ticks")),
+            ("t_tick", Some("t_ticks")),
+            ("flag", Some("flags")),
+            ("pmw", Some("pwm")),
+            ("accel_z", Some("acc_z")),
+            ("temperature_y", Some("temp_y")),
+            // As near to y as to z; there already; nothing like ours.
+            ("acc_w", None),
+            ("gyro_xx", Some("gyro_z")),
+            ("vibration_g", None),
+            ("heater_degc", None),
+        ] {
+            assert_eq!(meant(name, &names).as_deref(), ours, "{name}");
+        }
+    }
+}
