@@ -1,13 +1,14 @@
 //! What the axes share: correlation of their whitened residuals.
 
-use model::effect::{Found, Hypothesis};
+use model::effect::{Effect, Found, Hypothesis};
 
 use crate::checks::{self, LEAST_CHANCE};
 use crate::column::dot;
 use crate::diagnosis::Searched;
 use crate::findings::sentence;
 use crate::grid::Grid;
-use crate::result::{Check, Finding, Gain, Unexplained};
+use crate::limits::{ONE_SIDED, limit};
+use crate::result::{Check, DetectionLimit, Finding, Gain, Unexplained};
 use crate::{gain, threshold};
 
 /// Correlation in sigma that each pair has to show before a source is said to be that of all axes.
@@ -18,6 +19,8 @@ pub(crate) struct Shared {
     pub checks: Vec<Check>,
     pub finding: Option<Finding>,
     pub left: Vec<Unexplained>,
+    /// Smallest source that would have been found, by channel.
+    pub limits: Vec<DetectionLimit>,
     /// Channels that follow another one some samples later, and the chi-square of that.
     pub late: Vec<(String, f64)>,
 }
@@ -47,6 +50,7 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         checks: vec![],
         finding: None,
         left: vec![],
+        limits: vec![],
         late: vec![],
     };
     let mut pairs: Vec<Pair<'_>> = vec![];
@@ -79,6 +83,9 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         .flat_map(|s| &s.search.candidates)
         .find(|c| matches!(c.hypothesis, Hypothesis::Common))
         .map(|c| c.effect);
+    if let Some(of) = of.filter(|_| !pairs.is_empty()) {
+        shared.limits = smallest(&pairs, of, (grid.n - first) as f64);
+    }
     // A shared source correlates positively; where more than one pair shows it, all of its pairs are counted.
     let positive = !fails.is_empty() && fails.iter().all(|p| p.2 > 0.0);
     if let (Some(of), true) = (of, positive) {
@@ -164,6 +171,36 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         }
     }
     shared
+}
+
+/// The size from which on a source that all axes share is found 95 times in 100.
+fn smallest(pairs: &[Pair<'_>], of: &dyn Effect, samples: f64) -> Vec<DetectionLimit> {
+    // z of each pair by the variance of the source.
+    let z = |p: &Pair<'_>| (samples / (p.0.state.solution.white * p.1.state.solution.white)).sqrt();
+    let count = pairs.len() as f64;
+    let joint = pairs.iter().map(z).sum::<f64>() / count.sqrt();
+    let weakest = pairs.iter().map(z).fold(f64::INFINITY, f64::min);
+    let reach = |chance: f64| crate::audit::tails::farthest(1, chance) + ONE_SIDED;
+    let variance = if pairs.len() > 1 {
+        (reach(2.0 * threshold::FALSE_ALARM) / joint).max((LEAST_OF_ALL + ONE_SIDED) / weakest)
+    } else {
+        reach(LEAST_CHANCE) / joint
+    };
+    let mut names: Vec<&str> = vec![];
+    for s in pairs.iter().flat_map(|p| [p.0, p.1]) {
+        if !names.contains(&s.target.name.as_str()) {
+            names.push(&s.target.name);
+        }
+    }
+    let found = Found {
+        unit: pairs[0].0.target.unit.clone(),
+        coefficients: vec![(variance.sqrt(), f64::NAN)],
+        ..Found::default()
+    };
+    let described = of.describe(&found);
+    let each = names.iter();
+    each.filter_map(|name| limit(of.id(), name, &described, "sigma", &[]))
+        .collect()
 }
 
 /// Samples by which one axis may follow another.

@@ -24,7 +24,9 @@ use crate::result::{
     Parameter, Unexplained, Verdict,
 };
 use crate::search::{Note, Search, State};
-use crate::{adequacy, beyond, dead, doubt, evidence, law, losses, refill, rows, scan, threshold};
+use crate::{
+    adequacy, beyond, dead, doubt, evidence, law, limits, losses, refill, rows, scan, threshold,
+};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -100,6 +102,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     let mut findings = sticking;
     findings.extend(losses::findings(&audited, &searched, &grid));
     let mut scale_not_tested = vec![];
+    let mut smallest = std::mem::take(&mut audited.limits);
     let mut checks: Vec<Check> = searched
         .iter_mut()
         .flat_map(|s| std::mem::take(&mut s.checks))
@@ -140,7 +143,10 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         nearest.extend(doubted);
         doubts.extend(told);
         match scale_finding(s, &grid) {
-            Ok(found) => findings.extend(found),
+            Ok(scaled) => {
+                findings.extend(scaled.finding);
+                smallest.extend(scaled.limit);
+            }
             Err((cause, why)) => scale_not_tested.push(NotTested {
                 cause: cause.into(),
                 why: format!("{}: {why}", s.target.name),
@@ -176,6 +182,8 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     };
     unexplained.extend(audited.not_normal.into_iter().filter(|u| !bent(&u.channel)));
     findings.extend(shared.finding);
+    smallest.extend(searched.iter().flat_map(|s| s.limits.iter().cloned()));
+    smallest.extend(shared.limits);
     let findings = complete(joined(loud(blows(findings))));
     let mut not_tested = not_tested(&searched);
     not_tested.extend(scale_not_tested);
@@ -231,15 +239,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             },
             baseline,
             checks,
-            detection_limits: searched
-                .iter()
-                .flat_map(|s| s.limits.iter().cloned())
-                .filter(|l| {
-                    !findings
-                        .iter()
-                        .any(|f| f.cause == l.cause && f.channels.contains(&l.channel))
-                })
-                .collect(),
+            detection_limits: limits::of_not_found(smallest, &findings),
             findings,
             unexplained,
             not_tested,
@@ -304,7 +304,7 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         limits: vec![],
         laws: vec![],
     };
-    s.limits = limits(&s);
+    s.limits = limits::of_channel(&s);
     s.laws = law::of_followers(&s.search, &s.state);
     s.search.panel.release(&s.state.columns());
     grid.dct.keep_no_more();
@@ -590,62 +590,6 @@ fn effects_of<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<EffectMode
                 }),
             }
         }
-    }
-    all
-}
-
-/// Smallest size of each regression that was looked for: at d' = 6.3 of its own standard error with the
-/// random walk averaged, which the search names 95 times in 100.
-fn limits(s: &Searched<'_>) -> Vec<DetectionLimit> {
-    const D_PRIME: f64 = 6.3;
-    if s.target.moving {
-        return vec![];
-    }
-    let own = s.state.columns();
-    let g = s.state.noise.over(&s.search.panel.bins);
-    let mut all = vec![];
-    for c in &s.search.candidates {
-        let id = c.effect.id();
-        // Of several shapes that estimate one parameter, the first is the effect's own.
-        let listed = |name: &str| {
-            all.iter()
-                .any(|l: &DetectionLimit| l.cause == id && l.parameter == name)
-        };
-        if id == beyond::ID {
-            continue;
-        }
-        let (Hypothesis::Regression(r), [column, ..]) = (&c.hypothesis, c.columns()) else {
-            continue;
-        };
-        if r.columns.len() > 1 || listed(r.columns[0].parameter) {
-            continue;
-        }
-        let solution = s
-            .search
-            .panel
-            .solve(&g, &[own.clone(), vec![*column]].concat());
-        let Some(variance) = solution.inverse.last().and_then(|row| row.last()) else {
-            continue;
-        };
-        let name = r.columns[0].parameter;
-        let spec = c
-            .effect
-            .parameters()
-            .iter()
-            .find(|p| p.name == name)
-            .map_or("1", |p| p.unit);
-        let unit = if s.target.unit == "deg/s" {
-            spec.to_owned()
-        } else {
-            model::effect::unit_on(spec, &s.target.unit)
-        };
-        all.push(DetectionLimit {
-            cause: id.into(),
-            channel: s.target.name.clone(),
-            parameter: name.into(),
-            value: D_PRIME * (solution.white * variance).sqrt(),
-            unit,
-        });
     }
     all
 }

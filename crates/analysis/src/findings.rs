@@ -10,10 +10,10 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::diagnosis::Searched;
 use crate::grid::Grid;
-use crate::result::{Alternative, Finding, Gain};
+use crate::result::{Alternative, DetectionLimit, Finding, Gain};
 use crate::search::Form;
 use crate::transform::Dct;
-use crate::{evidence, gain, scale, threshold};
+use crate::{evidence, gain, limits, scale, threshold};
 
 pub(crate) fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {
     let first = alternatives.first()?;
@@ -366,31 +366,47 @@ pub(crate) fn complete(mut findings: Vec<Finding>) -> Vec<Finding> {
     findings
 }
 
+/// What a scale held against the tilt is found to be: wrong, or right to this limit.
+#[derive(Default)]
+pub(crate) struct Scaled {
+    pub finding: Option<Finding>,
+    pub limit: Option<DetectionLimit>,
+}
+
 /// The scale factor, where the base sways and the accelerometers see it; or why not.
 pub(crate) fn scale_finding(
     s: &Searched<'_>,
     grid: &Grid,
-) -> Result<Option<Finding>, (&'static str, String)> {
+) -> Result<Scaled, (&'static str, String)> {
     let of = s
         .search
         .candidates
         .iter()
         .find(|c| matches!(c.hypothesis, Hypothesis::Scale))
         .map(|c| c.effect);
-    let Some(of) = of else { return Ok(None) };
-    let found = scale::against_tilt(grid, s.target).map_err(|why| (of.id(), why))?;
-    let lr = (found.relative / found.std_error).powi(2);
-    if lr < threshold::regression(1, 1) {
-        return Ok(None);
-    }
-    let estimate = Found {
-        unit: s.target.unit.clone(),
-        names: vec!["relative"],
-        coefficients: vec![(found.relative, found.std_error)],
-        ..Found::default()
+    let Some(of) = of else {
+        return Ok(Scaled::default());
     };
-    let parameters = of.describe(&estimate);
-    Ok(Some(Finding {
+    let found = scale::against_tilt(grid, s.target).map_err(|why| (of.id(), why))?;
+    let describe = |relative: f64| {
+        of.describe(&Found {
+            unit: s.target.unit.clone(),
+            names: vec!["relative"],
+            coefficients: vec![(relative, found.std_error)],
+            ..Found::default()
+        })
+    };
+    let lr = (found.relative / found.std_error).powi(2);
+    let least = threshold::regression(1, 1);
+    if lr < least {
+        let smallest = describe(limits::strength_for(least) * found.std_error);
+        return Ok(Scaled {
+            limit: limits::limit(of.id(), &s.target.name, &smallest, "relative", &[]),
+            finding: None,
+        });
+    }
+    let parameters = describe(found.relative);
+    let finding = Finding {
         cause: of.id().into(),
         channels: vec![s.target.name.clone()],
         what: format!(
@@ -405,7 +421,11 @@ pub(crate) fn scale_finding(
             ..Gain::default()
         }),
         ..Finding::default()
-    }))
+    };
+    Ok(Scaled {
+        finding: Some(finding),
+        limit: None,
+    })
 }
 
 #[cfg(test)]

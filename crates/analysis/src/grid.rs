@@ -18,7 +18,7 @@ pub const LEAST_SAMPLES: usize = 600;
 /// Least length, s.
 pub const LEAST_SECONDS: f64 = 30.0;
 /// Rate between [`MOTION_BAND_HZ`] beyond what a bias can wander, deg/s rms.
-const MOTION_RMS: f64 = 0.3;
+pub(crate) const MOTION_RMS: f64 = 0.3;
 const MOTION_BAND_HZ: (f64, f64) = (0.02, 0.6);
 
 /// Largest share of another axis' rate that a gyro sees by its own fault: a mounting off by six degrees.

@@ -29,6 +29,7 @@ pub mod kalman;
 mod law;
 mod levels;
 pub mod likelihood;
+mod limits;
 mod losses;
 pub mod noise_fit;
 pub mod noise_id;

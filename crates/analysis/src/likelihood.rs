@@ -102,6 +102,14 @@ impl Bins {
             .get_or_init(|| self.angles().map(walk_shape).collect())
     }
 
+    /// Coefficients in each bin.
+    pub(crate) fn counts(&self) -> Vec<f64> {
+        self.start
+            .windows(2)
+            .map(|w| (w[1] - w[0]) as f64)
+            .collect()
+    }
+
     /// Sums of a[k] b[k] over each bin.
     #[must_use]
     pub fn products(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
@@ -379,6 +387,39 @@ impl Panel {
         let p = (self.dct.known).products(a, b, || Rc::new(a.products(b, &self.bins)));
         self.pairs.borrow_mut().insert(key, Rc::clone(&p));
         p
+    }
+
+    /// Energy in each bin of what is left of a column when the best multiples of others are taken off.
+    pub(crate) fn energy_beyond(&self, g: &[f64], others: &[usize], column: usize) -> Vec<f64> {
+        let over = |i, j| -> f64 { self.pair(i, j).iter().zip(g).map(|(p, g)| p / g).sum() };
+        let normal: Vec<Vec<f64>> = others
+            .iter()
+            .map(|a| others.iter().map(|b| over(*a, *b)).collect())
+            .collect();
+        let right: Vec<f64> = others.iter().map(|o| over(*o, column)).collect();
+        let (inverse, _) = invert(&normal);
+        let shares = inverse
+            .iter()
+            .map(|row| -row.iter().zip(&right).map(|(a, b)| a * b).sum::<f64>());
+        let all: Vec<(usize, f64)> = others
+            .iter()
+            .copied()
+            .zip(shares)
+            .chain([(column, 1.0)])
+            .collect();
+        let mut energy = vec![0.0; g.len()];
+        for (i, a) in &all {
+            for (j, b) in &all {
+                let pair = self.pair(*i, *j);
+                energy
+                    .iter_mut()
+                    .zip(pair.iter())
+                    .for_each(|(e, p)| *e += a * b * p);
+            }
+        }
+        // What rounding leaves of nothing.
+        energy.iter_mut().for_each(|e| *e = e.max(0.0));
+        energy
     }
 
     /// Least squares of the data on `columns` under the shape `g` over the bins.

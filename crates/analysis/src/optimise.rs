@@ -42,6 +42,48 @@ pub fn peak(points: &[(f64, f64)]) -> f64 {
     best.1 + (-slope * slope / (4.0 * curvature)).min(0.5 * (best.1 - l.1).max(best.1 - r.1))
 }
 
+/// The size at which a strength, growing with size, reaches `wanted`: halving until it is enclosed, then, as a strength is
+/// nearly a straight line on logarithmic scales, by the secant of the enclosing pair (Illinois). Far from what is wanted,
+/// where a strength may vanish or overflow, nothing is asked.
+#[must_use]
+pub fn size_for(wanted: f64, strength: &dyn Fn(f64) -> f64) -> f64 {
+    const ENOUGH: f64 = 1e-9;
+    let (mut low, mut high) = (-18.0f64, 8.0f64);
+    // How far off, as a logarithm, the ends are that were asked.
+    let (mut below, mut above): (Option<f64>, Option<f64>) = (None, None);
+    let mut last = 0i8;
+    for step in 0..60 {
+        // Where the line is bent the secant creeps: every fourth step halves.
+        let x = match (below, above) {
+            (Some(b), Some(a)) if step % 4 != 3 => (low * a - high * b) / (a - b),
+            _ => 0.5 * (low + high),
+        };
+        let d = strength(x.exp());
+        let off = if d.is_nan() {
+            50.0
+        } else {
+            (d / wanted).ln().clamp(-50.0, 50.0)
+        };
+        if off.abs() < ENOUGH || high - low < ENOUGH {
+            return x.exp();
+        }
+        if d < wanted {
+            (low, below) = (x, Some(off));
+            if last == -1 {
+                above = above.map(|a| 0.5 * a);
+            }
+            last = -1;
+        } else {
+            (high, above) = (x, Some(off));
+            if last == 1 {
+                below = below.map(|b| 0.5 * b);
+            }
+            last = 1;
+        }
+    }
+    (0.5 * (low + high)).exp()
+}
+
 /// Nelder-Mead search for the lowest point of `f`, at most `evaluations` evaluations or until the simplex is flat.
 pub fn nelder_mead(
     f: &dyn Fn(&[f64]) -> f64,
@@ -104,4 +146,26 @@ pub fn nelder_mead(
     }
     simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
     simplex.swap_remove(0).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_size_is_found_whatever_the_strength_does_far_from_it() {
+        let near =
+            |found: f64, size: f64| assert!((found / size - 1.0).abs() < 1e-6, "{found} {size}");
+        near(size_for(8.0, &|x| 3.0 * x), 8.0 / 3.0);
+        near(
+            size_for(8.0, &|x| if x < 0.1 { 0.0 } else { x * x }),
+            8f64.sqrt(),
+        );
+        for beyond in [0.0, f64::NAN, f64::INFINITY] {
+            let overflows = |x: f64| if x > 200.0 { beyond } else { 4.0 * x };
+            near(size_for(8.0, &overflows), 2.0);
+        }
+        // Saturates below what is wanted: the largest.
+        near(size_for(8.0, &|x| x.min(2.0)), 8f64.exp());
+    }
 }

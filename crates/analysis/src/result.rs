@@ -129,7 +129,7 @@ pub struct NotTested {
 }
 
 /// The smallest size that this record would have shown, for a cause that was looked for and not found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DetectionLimit {
     /// Cause id.
     pub cause: String,
@@ -141,6 +141,9 @@ pub struct DetectionLimit {
     pub value: f64,
     /// Unit of `value`.
     pub unit: String,
+    /// The other parameters, where the cause has some: the limit holds there.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub at: BTreeMap<String, Parameter>,
 }
 
 /// The verdict on the baseline model.

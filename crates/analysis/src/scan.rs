@@ -416,12 +416,14 @@ pub fn ends(u: &[f64], start: usize, end: usize, increase: f64) -> ((f64, f64), 
     (first, last)
 }
 
-/// Likelihood of variance 1 + gamma x shape, its scale profiled: (LR, gamma, standard error).
-#[must_use]
-pub fn variance_law(u: &[f64], shape: &[f64]) -> (f64, f64, f64) {
-    let top = shape.iter().copied().fold(1e-9, f64::max);
-    let n = u.len() as f64;
-    // Samples of nearly the same shape have nearly the same variance: their count, mean shape and squares stand for them.
+fn top_of(shape: &[f64]) -> f64 {
+    shape.iter().copied().fold(1e-9, f64::max)
+}
+
+/// Samples of nearly the same shape have nearly the same variance: their count, and the sums of their shapes and squares,
+/// stand for them.
+pub(crate) fn levels(u: &[f64], shape: &[f64]) -> Vec<(f64, f64, f64)> {
+    let top = top_of(shape);
     let bottom = shape.iter().copied().fold(top, f64::min);
     let per_level = (LEVELS - 1) as f64 / (top - bottom).max(f64::MIN_POSITIVE);
     let mut levels = vec![(0.0, 0.0, 0.0); LEVELS];
@@ -432,6 +434,15 @@ pub fn variance_law(u: &[f64], shape: &[f64]) -> (f64, f64, f64) {
         *squares += u * u;
     }
     levels.retain(|l| l.0 > 0.0);
+    levels
+}
+
+/// Likelihood of variance 1 + gamma x shape, its scale profiled: (LR, gamma, standard error).
+#[must_use]
+pub fn variance_law(u: &[f64], shape: &[f64]) -> (f64, f64, f64) {
+    let top = top_of(shape);
+    let n = u.len() as f64;
+    let levels = levels(u, shape);
     let minus_l = |x: f64| {
         let gamma = (x.exp() - 1.0) / top;
         let (mut scaled, mut logs) = (0.0, 0.0);

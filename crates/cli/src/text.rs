@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use analysis::result::{Diagnosis, Finding, Verdict};
+use analysis::result::{DetectionLimit, Diagnosis, Finding, Verdict};
 
 use crate::report::plot::{number, tidy};
 
@@ -101,19 +101,26 @@ pub fn diagnosis(d: &Diagnosis) -> String {
     out
 }
 
+/// One row of the detection limits: what it is of, where it holds, and the sizes by channel.
+type LimitRow<'a> = (String, String, Vec<(&'a str, f64)>);
+
 /// Detection limits: a line for each cause, a column for each channel.
 fn write_limits(out: &mut String, d: &Diagnosis) {
     let mut channels: Vec<&str> = Vec::new();
-    let mut rows: Vec<(String, Vec<(&str, f64)>)> = Vec::new();
+    let mut rows: Vec<LimitRow<'_>> = Vec::new();
     for limit in &d.detection_limits {
         if !channels.contains(&limit.channel.as_str()) {
             channels.push(&limit.channel);
         }
-        let what = format!("{} {}, {}", limit.cause, limit.parameter, limit.unit);
+        let unit = Some(limit.unit.as_str()).filter(|unit| *unit != "1");
+        let unit = unit.map_or_else(String::new, |unit| format!(", {unit}"));
+        let what = format!("{} {}{unit}", limit.cause, limit.parameter);
+        let at = held_at(limit);
         let cell = (limit.channel.as_str(), limit.value);
-        match rows.iter_mut().find(|(row, _)| *row == what) {
-            Some((_, cells)) => cells.push(cell),
-            None => rows.push((what, vec![cell])),
+        let same = |row: &&mut LimitRow<'_>| row.0 == what && row.1 == at;
+        match rows.iter_mut().find(same) {
+            Some((.., cells)) => cells.push(cell),
+            None => rows.push((what, at, vec![cell])),
         }
     }
     if rows.is_empty() {
@@ -121,26 +128,40 @@ fn write_limits(out: &mut String, d: &Diagnosis) {
     }
     channels.sort_unstable();
     let title = "smallest size that this run would have found";
-    let _ = write!(out, "\n{title:<48}");
+    let _ = write!(out, "\n{title:<52}");
     for channel in &channels {
-        let _ = write!(out, " {channel:>11}");
+        let _ = write!(out, " {channel:>8}");
     }
     let _ = writeln!(out);
-    for (what, cells) in rows {
-        let mut line = format!("    {what:<44}");
+    for (what, at, cells) in rows {
+        let mut line = format!("    {what:<48}");
         for channel in &channels {
             let cell = cells.iter().find(|(name, _)| name == channel);
             let text = cell.map_or_else(|| "-".to_owned(), |(_, value)| short(*value));
-            let _ = write!(line, " {text:>11}");
+            let _ = write!(line, " {text:>8}");
         }
-        let _ = writeln!(out, "{line}");
+        let _ = writeln!(out, "{line}{at}");
     }
+}
+
+/// The other parameters at which a limit holds, as `  at frequency 5.0 Hz`; nothing where there are none.
+pub fn held_at(limit: &DetectionLimit) -> String {
+    let each = limit.at.iter().map(|(name, p)| {
+        let unit = Some(p.unit.as_str()).filter(|unit| *unit != "1");
+        let unit = unit.map_or_else(String::new, |unit| format!(" {unit}"));
+        format!("{} {}{unit}", name.replace('_', " "), short(p.value))
+    });
+    let all: Vec<String> = each.collect();
+    if all.is_empty() {
+        return String::new();
+    }
+    format!("  at {}", all.join(", "))
 }
 
 /// Two digits: a limit is no measurement.
 fn short(value: f64) -> String {
     match value.abs() {
-        0.01..100.0 => {
+        0.01..10_000.0 => {
             let digits = (1.0 - value.abs().log10().floor()).max(0.0) as usize;
             format!("{value:.digits$}")
         }

@@ -16,6 +16,7 @@ use model::Parameter;
 use super::stuck::{self, Verdict};
 use super::{Audit, Gyro, LEAST_READINGS, tails};
 use crate::audit::local::{Levels, Local};
+use crate::limits::ONE_SIDED;
 use crate::result::{Alternative, Finding, Unexplained};
 
 /// Most low bits that are looked at.
@@ -171,6 +172,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     };
     let local = &g.local;
     let name = g.channel.name.as_str();
+    audit.smallest("coarse_lsb", name, "missing_bits", 1.0, "1");
     let known: Vec<bool> = (0..counts.len()).map(|i| g.known(i)).collect();
     if let Some(c) = coarse(counts, &known) {
         let chance = 0.5f64.powi(c.changes.min(900) as i32);
@@ -231,6 +233,10 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
         );
         return Shape::Unknown;
     };
+    // A bit that changes the readings by one count leaves nothing but its share of ones.
+    let readings = levels.iter().map(|l| l.1).sum::<f64>();
+    let reach = (2.0 * stuck::CLEARLY).sqrt() + ONE_SIDED;
+    audit.smallest("stuck_bit", name, "fraction", reach / readings.sqrt(), "1");
     let chance = (tested.len() as f64 * tails::two_sided(worst.z)).min(1.0);
     let what = format!(
         "bit {} of {name} reads {} more often than normal noise makes it ({:.1} sigma)",

@@ -117,6 +117,7 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         "{lost} frames are missing: {with_gaps} by the sequence numbers, {} by the time between numbers",
         lost - with_gaps
     );
+    audit.smallest("dropped_samples", "record", "count", 1.0, "1");
     let fails = audit.limit("dropped_samples", "record", lost as f64, 0.0, what.clone());
     if fails && !names.is_empty() {
         events.sort_unstable();

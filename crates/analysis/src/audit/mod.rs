@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 
 use model::record::{Channel, Quantity, Record};
 
-use crate::result::{Check, Finding, NotTested, Parameter, Unexplained};
+use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter, Unexplained};
 use local::Local;
 
 /// Chance of a false alarm of one audit on one channel.
@@ -66,6 +66,8 @@ pub struct Audit {
     pub not_normal: Vec<Unexplained>,
     /// Rows before which frames were lost without a gap of the sequence numbers, and how many.
     pub silently_lost: Vec<(usize, u64)>,
+    /// Smallest faults that would have been found.
+    pub limits: Vec<DetectionLimit>,
     /// What a reader has to know of the readings, and is no fault.
     pub notes: Vec<String>,
     /// Channels whose noise is hardly larger than their step.
@@ -207,6 +209,18 @@ impl Audit {
             what,
         });
         fails
+    }
+
+    /// The smallest size of a fault on a channel that would have been found.
+    fn smallest(&mut self, cause: &str, channel: &str, parameter: &str, size: f64, unit: &str) {
+        self.limits.push(DetectionLimit {
+            cause: cause.into(),
+            channel: channel.into(),
+            parameter: parameter.into(),
+            value: size,
+            unit: unit.into(),
+            ..DetectionLimit::default()
+        });
     }
 
     fn untested(&mut self, cause: &str, why: &str) {

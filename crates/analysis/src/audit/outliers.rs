@@ -5,6 +5,7 @@
 //! little farther where the base is at rest.
 
 use super::{Audit, FALSE_ALARM, Gyro, counted, tails};
+use crate::limits::ONE_SIDED;
 use crate::result::Finding;
 
 /// Two farther than this apart are single ones.
@@ -27,6 +28,12 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
         return;
     }
     let limit = tails::farthest(n, FALSE_ALARM) * if local.bent { MOVING } else { 1.0 };
+    let unit = g
+        .of_readings
+        .as_ref()
+        .map_or_else(|| g.channel.lsb.unwrap_or(1.0), |_| 1.0);
+    let farthest = (limit + ONE_SIDED) * local.sigma.max(0.3 * step) + 0.5 * step;
+    audit.smallest("outliers", name, "size", unit * farthest, &g.channel.unit);
     // Where the noise is within a count, a residual of one or two counts is rounding.
     let z: Vec<f64> = local
         .residual

@@ -11,6 +11,7 @@ use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted, tails};
 use crate::audit::local::{robust_sigma, width};
 use crate::checks::chi_tail;
 use crate::likelihood::invert;
+use crate::limits::ONE_SIDED;
 
 /// Distances of the pairs that tell the chance of agreement.
 const LAGS: std::ops::RangeInclusive<usize> = 20..=25;
@@ -288,6 +289,17 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         1.0
     };
     let names: Vec<String> = gyros.iter().map(|g| g.channel.name.clone()).collect();
+    if columns.len() > 1 {
+        let mean = expected * (1.0 + 3.0 * doubt);
+        let mut counts = mean as u64..rows as u64;
+        if let Some(enough) = counts.find(|k| tails::at_least(*k, mean) < FALSE_ALARM) {
+            let by_chance = (expected - ONE_SIDED * expected.sqrt()).max(0.0);
+            let planted = (enough as f64 - by_chance).ceil();
+            for name in &names {
+                audit.smallest("stale_samples", name, "count", planted, "1");
+            }
+        }
+    }
     let what = format!(
         "{observed} frames repeat all of {} from the frame before, {expected:.2} are expected",
         names.join(", ")
@@ -339,6 +351,11 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
             own.len()
         );
         let excess = own.len() as f64 - expected;
+        if columns.len() == 1 {
+            let reach = tails::farthest(1, 2.0 * FALSE_ALARM) + ONE_SIDED;
+            let planted = (reach * error.max(1.0)).max(EXCESS * expected).ceil();
+            audit.smallest("stale_samples", name, "count", planted, "1");
+        }
         let told = audit.is_suppressed("stale_samples", name);
         let relative = excess > EXCESS * expected;
         if audit.check(

@@ -53,6 +53,11 @@ fn swing(values: impl Iterator<Item = (f64, f64)>) -> f64 {
     at(1.0 - RARE) - at(RARE)
 }
 
+/// Readings that have to be missing beyond one of both ends: the chance of so many is exp(-them).
+fn least_beyond() -> f64 {
+    (2.0 / FALSE_ALARM).ln()
+}
+
 /// One end.
 struct End {
     code: i32,
@@ -65,12 +70,8 @@ struct End {
 }
 
 impl End {
-    fn chance(&self) -> f64 {
-        (-self.beyond).exp()
-    }
-
     fn clips(&self) -> bool {
-        self.chance() < FALSE_ALARM / 2.0 && tails::at_least(self.pile, self.expected) < PILE
+        self.beyond > least_beyond() && tails::at_least(self.pile, self.expected) < PILE
     }
 }
 
@@ -124,6 +125,7 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
     let both = low.beyond + high.beyond;
     let chance = (1.0 + both) * (-both).exp();
     let piled = low.clips() || high.clips();
+    audit.smallest("saturation", name, "clipped", least_beyond().ceil(), "1");
     let what = format!(
         "{:.0} readings of {name} are missing above {} counts and {:.0} below {}; {} and {} lie on these codes, where {:.1} and {:.1} are expected",
         high.beyond,

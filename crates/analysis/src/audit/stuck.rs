@@ -23,7 +23,7 @@ const BEST: usize = 2;
 const WITHIN: f64 = 24.0;
 
 /// Nats by which a bit that sticks has to describe the codes better than sound ones and than rails.
-const CLEARLY: f64 = 12.0;
+pub(super) const CLEARLY: f64 = 12.0;
 /// Cost up to which a smooth law is plain: one of many narrow levels explains almost anything.
 const PLAIN: f64 = 8.0;
 /// Spreads of a reading about its level from which on the codes' own says that the level moves far.

@@ -2,10 +2,12 @@
 
 use model::Parameter;
 use model::record::Record;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::drift::{self, Uneven};
 use super::{Audit, Gyro, tails};
 use crate::audit::local::{median, width};
+use crate::limits::ONE_SIDED;
 use crate::result::Finding;
 
 /// Jitter of a sound board, rounding to ticks included, is about 36 us; beyond this it is a fault.
@@ -63,8 +65,11 @@ fn jitter(record: &Record, device: &[f64], tick_s: f64, names: &[String], audit:
         1e6 * tick_s,
         1e6 * limit
     );
+    let relative = (1.5 / single.len() as f64).sqrt();
+    let seen = limit * (1.0 + ONE_SIDED * relative);
+    audit.smallest("timestamp_jitter", "record", "sigma", seen, "s");
     if audit.limit("timestamp_jitter", "record", sigma, limit, what.clone()) {
-        let error = sigma * (1.5 / single.len() as f64).sqrt();
+        let error = sigma * relative;
         audit.findings.push(Finding {
             cause: "timestamp_jitter".into(),
             channels: names.to_vec(),
@@ -120,16 +125,27 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
         "the device clock runs {ppm:+.1} +- {error:.1} ppm against the host's; {tolerance:.0} ppm are stated"
     );
     // The scatter of the block minima is estimated from some thirty of them.
+    let law = StudentsT::new(0.0, 1.0, drift::BLOCKS as f64 - 2.0).ok();
     let chance = if beyond.is_nan() || beyond <= 0.0 {
         1.0
     } else if beyond.is_infinite() {
         0.0
     } else {
-        statrs::distribution::StudentsT::new(0.0, 1.0, drift::BLOCKS as f64 - 2.0).map_or_else(
-            |_| tails::upper_normal(beyond),
-            |t| statrs::distribution::ContinuousCDF::sf(&t, beyond),
-        )
+        law.map_or_else(|| tails::upper_normal(beyond), |t| t.sf(beyond))
     };
+    if let Some(law) = law {
+        // The scatter itself is known to 1.17 / sqrt(blocks) of it, here and in the run that would show the fault.
+        let scatter = 1.17 * (2.0 / drift::BLOCKS as f64).sqrt();
+        let limit = law.inverse_cdf(1.0 - super::FALSE_ALARM);
+        let reach = limit * (1.0 + ONE_SIDED * scatter) + ONE_SIDED;
+        audit.smallest(
+            "clock_rate",
+            "record",
+            "ppm",
+            tolerance + reach * error,
+            "ppm",
+        );
+    }
     if audit.check("clock_rate", "record", ppm, chance, what.clone()) {
         audit.findings.push(Finding {
             cause: "clock_rate".into(),

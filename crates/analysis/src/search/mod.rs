@@ -143,6 +143,16 @@ impl Candidate {
         &self.columns
     }
 
+    /// A shape's coordinates that are tried first, with the columns there.
+    pub(crate) fn grid(&self) -> &[(f64, Vec<usize>)] {
+        &self.grid
+    }
+
+    /// How many hypotheses its effect offers.
+    pub(crate) fn siblings(&self) -> usize {
+        self.siblings
+    }
+
     /// The same, and those of a shape at every point of its grid.
     pub(crate) fn all_columns(&self) -> impl Iterator<Item = usize> {
         let grid = self.grid.iter().flat_map(|(_, columns)| columns);

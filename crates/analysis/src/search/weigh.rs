@@ -124,7 +124,7 @@ impl Search<'_> {
                     carrier,
                     phase,
                 );
-                let widest = (2.0 * FASTEST_BEAT_HZ / self.view.rate_hz * n as f64) as usize;
+                let widest = self.widest_beat();
                 let bin = std::f64::consts::PI / n as f64;
                 let d = ((2.0 * LEAST_BEATS) as usize..=widest.min(n - 1))
                     .filter(|d| carrier > bin * (d + 1) as f64)
@@ -161,6 +161,11 @@ impl Search<'_> {
             }
             _ => None,
         }
+    }
+
+    /// Fastest swing of a line that is sought, half cycles in the record.
+    pub(crate) fn widest_beat(&self) -> usize {
+        (2.0 * FASTEST_BEAT_HZ / self.view.rate_hz * self.panel.bins.n as f64) as usize
     }
 
     /// Highest log likelihood of a shape near the point `at` of its grid.

@@ -222,7 +222,7 @@ fn limits(subject: &Subject<'_>) -> Markup {
                     tbody { @for limit in &d.detection_limits { tr {
                         td { (limit.cause.replace('_', " ")) }
                         td { code { (limit.channel) } }
-                        td { (limit.parameter.replace('_', " ")) }
+                        td { (limit.parameter.replace('_', " ")) (crate::text::held_at(limit)) }
                         td.number { (number(limit.value, 2)) " " @if limit.unit != "1" { (limit.unit) } }
                     } } }
                 } }
