@@ -10,6 +10,7 @@
 //! * Law: third and fourth Hermite moments of the smoothed process (coefficients c_k f_k) and of what drives it (u_k f_k),
 //!   whose variances over a Gaussian process of correlation r are 6 and 24 times the sum of r^3 and r^4.
 //! * Levels: Cox's test of how far two levels are ahead or behind (`contest`).
+//! * Dwells: Bartlett's test of whether two levels switch at random (`contest::dwells`).
 //! * Steadiness: energies of what drives it in stretches of the record, whose variance follows from the sum of r^2.
 
 use std::f64::consts::PI;
@@ -24,11 +25,12 @@ use crate::likelihood::{Bins, Noise, Panel};
 use crate::search::{Form, Search, State};
 
 /// The claims.
-pub(crate) const CLAIMS: [&str; 4] = [
+pub(crate) const CLAIMS: [&str; 5] = [
     "process_spectrum",
     "process_law",
     "process_steadiness",
     "process_levels",
+    "process_dwells",
 ];
 /// The claim of a law of the variance.
 pub(crate) const VARIANCE_CLAIM: &str = "variance_law";

@@ -3,6 +3,7 @@
 //! Both sides are weighed on the same block means: the Gaussian model by its exact likelihood, the two-level one (with
 //! white noise and a random walk of the level) by a bank of Kalman filters, one for each level, merged by moments.
 
+mod dwells;
 pub(crate) mod power_law;
 mod steps;
 
@@ -273,10 +274,20 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     }
     let mut settled = rival;
     let without = settled.terms.len();
-    settled = steps::beside(search, settled, &mut rest, length, &x);
+    let block_s = length as f64 / search.view.rate_hz;
+    let at_random = |blocks: &[f64], x: &Coordinates| dwells::at_random(blocks, x, block_s);
+    let mut switches = at_random(&blocks, &x);
+    // What switches by a clock has no steps beside it: its own are surprises to levels that switch at random.
+    if !switches
+        .as_ref()
+        .is_some_and(|s| s.p_value < adequacy::LEAST_CHANCE)
+    {
+        settled = steps::beside(search, settled, &mut rest, length, &x);
+    }
     if settled.terms.len() > without {
         blocks = means(&rest[first..], length, MOST_BLOCKS);
         (two, x) = again(&blocks, &x);
+        switches = at_random(&blocks, &x);
         let panel = Panel::new(&dct, &bins, &blocks);
         other = gaussian(&panel, terms_of(&settled), &[]);
     }
@@ -292,7 +303,7 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     // A block in which the level switches reads anything between the levels: half a block's worth for each switch.
     let mixed = (0.5 * (-x[3]).exp()).min(0.3);
     let half = (x[2] + 0.5 * x[0]).exp() / (1.0 - mixed);
-    let dwell = x[3].exp() * length as f64 / search.view.rate_hz;
+    let dwell = x[3].exp() * block_s;
     if many_ahead(&blocks, &x) > MARGIN {
         settled.notes.push(Note {
             what: "jumps between more than two levels".into(),
@@ -320,6 +331,7 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         t.lr = 2.0 * (ahead - MARGIN) + t.threshold;
         let z = cox(two, &x, other, Side::TwoLevels);
         t.claims.push(adequacy::levels(z, "two levels"));
+        t.claims.extend(switches);
     }
     settled
 }

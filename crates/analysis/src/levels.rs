@@ -33,7 +33,7 @@ pub(crate) fn path(y: &[f64], x: &Coordinates) -> Vec<f64> {
     filter(y.iter(), x, &TWO, |upper| before.push(upper));
     filter(y.iter().rev(), x, &TWO, |upper| after.push(upper));
     after.reverse();
-    let switch = 0.5 * (1.0 - (-2.0 * (-x[3]).exp()).exp());
+    let switch = switch_of(x);
     let known = |upper: f64| upper * (1.0 - switch) + (1.0 - upper) * switch;
     (0..y.len())
         .map(|t| {
@@ -43,6 +43,36 @@ pub(crate) fn path(y: &[f64], x: &Coordinates) -> Vec<f64> {
             half * (upper - lower) / (upper + lower).max(f64::MIN_POSITIVE)
         })
         .collect()
+}
+
+/// Chance that two levels have switched from block to block.
+fn switch_of(x: &Coordinates) -> f64 {
+    0.5 * (1.0 - (-2.0 * (-x[3]).exp()).exp())
+}
+
+/// Whether each block lies on the upper level: from a filter's last block back, the more probable one before the next. A
+/// filter learns by the first switch which level it started from, so each half is decoded by the one that comes from the other
+/// end.
+pub(crate) fn decoded(y: &[f64], x: &Coordinates) -> Vec<bool> {
+    let switch = switch_of(x);
+    let back = |upper: Vec<f64>| {
+        let next = upper.into_iter().rev().scan(None, move |next, u| {
+            let upper = match next {
+                None => u > 0.5,
+                Some(true) => u > switch,
+                Some(false) => u > 1.0 - switch,
+            };
+            *next = Some(upper);
+            *next
+        });
+        next.take(y.len().div_ceil(2)).collect::<Vec<bool>>()
+    };
+    let (mut before, mut after) = (vec![], vec![]);
+    filter(y.iter(), x, &TWO, |upper| before.push(upper));
+    filter(y.iter().rev(), x, &TWO, |upper| after.push(upper));
+    let (mut first, second) = (back(after), back(before));
+    first.extend(second.into_iter().take(y.len() / 2).rev());
+    first
 }
 
 /// The filter behind the likelihood; `seen` is told the chance of the first level after each block.
@@ -117,6 +147,35 @@ fn filter<'a, const K: usize>(
     // The diffuse start integrates the mean out. Its prior density is put back, and the factor of sqrt(count) by which
     // that integral differs from the density of the coefficients k >= 1 of the orthonormal DCT.
     sum + 0.5 * (std::f64::consts::TAU * start * count as f64).ln()
+}
+
+/// Block means of two levels as they were fitted.
+pub(crate) fn replicate(m: usize, x: &Coordinates, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+    let [log_white, log_walk, log_half, log_dwell] = *x;
+    let sigma = (0.5 * log_white).exp();
+    let (walk, half) = (sigma * (0.5 * log_walk).exp(), sigma * log_half.exp());
+    let wait = |rng: &mut _| log_dwell.exp() * Distribution::<f64>::sample(&Exp1, rng);
+    let (mut level, mut drift, mut left) = (half, 0.0, wait(rng));
+    let mut y: Vec<f64> = (0..m)
+        .map(|_| {
+            // A block in which the level switches reads the mean.
+            let (mut rest, mut mean) = (1.0, 0.0);
+            while left < rest {
+                mean += level * left;
+                rest -= left;
+                level = -level;
+                left = wait(rng);
+            }
+            mean += level * rest;
+            left -= rest;
+            let e: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(rng));
+            drift += walk * e[0];
+            mean + drift + sigma * e[1]
+        })
+        .collect();
+    let middle = y.iter().sum::<f64>() / m as f64;
+    y.iter_mut().for_each(|v| *v -= middle);
+    y
 }
 
 /// The coordinates within their bounds on `m` blocks.
@@ -291,35 +350,6 @@ impl Sides<'_> {
         self.dct.inverse(&c)
     }
 
-    /// Block means of the two levels.
-    fn two_levels(&self, m: usize, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
-        let [log_white, log_walk, log_half, log_dwell] = self.two;
-        let sigma = (0.5 * log_white).exp();
-        let (walk, half) = (sigma * (0.5 * log_walk).exp(), sigma * log_half.exp());
-        let wait = |rng: &mut _| log_dwell.exp() * Distribution::<f64>::sample(&Exp1, rng);
-        let (mut level, mut drift, mut left) = (half, 0.0, wait(rng));
-        let mut y: Vec<f64> = (0..m)
-            .map(|_| {
-                // A block in which the level switches reads the mean.
-                let (mut rest, mut mean) = (1.0, 0.0);
-                while left < rest {
-                    mean += level * left;
-                    rest -= left;
-                    level = -level;
-                    left = wait(rng);
-                }
-                mean += level * rest;
-                left -= rest;
-                let e: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(rng));
-                drift += walk * e[0];
-                mean + drift + sigma * e[1]
-            })
-            .collect();
-        let middle = y.iter().sum::<f64>() / m as f64;
-        y.iter_mut().for_each(|v| *v -= middle);
-        y
-    }
-
     /// Cox's test of separate families: standard errors between `ahead`, the nats by which two levels are better, and
     /// what it is where `truth` holds. Replicates are weighed with both sides as they were fitted; what the fits add is
     /// half a chi-square of the fitted coordinates.
@@ -330,7 +360,7 @@ impl Sides<'_> {
             .map(|_| {
                 let y = match truth {
                     Side::Gaussian => self.gaussian(&g, &mut rng),
-                    Side::TwoLevels => self.two_levels(g.len(), &mut rng),
+                    Side::TwoLevels => replicate(g.len(), &self.two, &mut rng),
                 };
                 self.ahead(&y, &g)
             })
@@ -399,7 +429,7 @@ mod tests {
             let [gaussian, two] = scores(&sides.gaussian(&g, &mut rng));
             assert!(gaussian.abs() < 3.5, "{gaussian}");
             as_two += two / f64::from(runs);
-            let [gaussian, two] = scores(&sides.two_levels(m, &mut rng));
+            let [gaussian, two] = scores(&replicate(m, &sides.two, &mut rng));
             assert!(two.abs() < 3.5, "{two}");
             as_gaussian += gaussian / f64::from(runs);
         }

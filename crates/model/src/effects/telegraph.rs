@@ -30,7 +30,7 @@ impl Effect for Telegraph {
             title: "Telegraph noise",
             physics: "b(t) = +-half_height, switching at random with the mean dwell time on either level: a single charge trap, a loose contact, popcorn noise.",
             excitation: "Nothing; many switches within the record.",
-            test: "Likelihood of a two-level hidden Markov chain against Gauss-Markov and steps.",
+            test: "Likelihood of a two-level hidden Markov chain against Gauss-Markov and steps; Bartlett's test of the dwell times, which are exponential where it switches at random.",
             figure: "Rate in time blocks with the most probable level.",
             example: Example::new(Plot::RateInTime { block_s: 2.0 }, &[("half_height", 0.3), ("dwell_time", 40.0)]),
         }
