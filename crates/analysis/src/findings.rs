@@ -1,6 +1,6 @@
 //! Findings out of what was estimated: one for each cause, with its rivals, its experiment and its gain.
 
-use model::effect::{Effect, Found, Hypothesis, Parameters};
+use model::effect::{Effect, Found, Hypothesis, Parameters, VarianceLaw};
 use model::effects::effect;
 use model::parameter::Parameter;
 use model::record::Base;
@@ -8,12 +8,12 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::diagnosis::Searched;
+use crate::diagnosis::{Searched, VarianceFound};
 use crate::grid::Grid;
 use crate::result::{Alternative, DetectionLimit, Finding, Gain};
 use crate::search::Form;
 use crate::transform::Dct;
-use crate::{evidence, gain, limits, scale, threshold};
+use crate::{evidence, gain, limits, scale, scan, threshold};
 
 pub(crate) fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {
     let first = alternatives.first()?;
@@ -150,11 +150,47 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
         .collect()
 }
 
+/// Nats by which one law of an effect's variance has to be ahead of its others; within them the record does not tell which it
+/// is, and the effect's own is the first.
+const OPEN: f64 = 3.0;
+
+/// Parameters of a law of the variance of the residual `e`: of the effect's laws, the one that the record tells.
+fn variance_parameters(s: &Searched<'_>, v: &VarianceFound, e: &[f64]) -> Parameters {
+    let own = s.search.candidates.iter();
+    let own = own.filter(|c| c.effect.id() == v.effect.id());
+    let laws: Vec<_> = own
+        .filter_map(|c| match &c.hypothesis {
+            Hypothesis::Variance(VarianceLaw::Shape { shape, fixed, .. }) => {
+                Some((scan::variance_law(e, shape), fixed))
+            }
+            _ => None,
+        })
+        .collect();
+    let best = laws.iter().map(|((lr, ..), _)| *lr).fold(0.0, f64::max);
+    let near: Vec<_> = laws
+        .iter()
+        .filter(|((lr, ..), _)| best - lr < 2.0 * OPEN)
+        .collect();
+    let ((_, increase, error), fixed) = match (near.as_slice(), laws.first()) {
+        ([told], _) => (told.0, told.1.clone()),
+        (_, Some(first)) => (first.0, vec![]),
+        _ => return v.parameters.clone(),
+    };
+    v.effect.describe(&Found {
+        unit: s.target.unit.clone(),
+        rate_hz: s.search.view.rate_hz,
+        coefficients: vec![(increase, error)],
+        fixed,
+        ..Found::default()
+    })
+}
+
 pub(crate) fn variance_finding(s: &Searched<'_>) -> Option<Finding> {
     let v = s.variance.as_ref()?;
     let alternatives = alternatives(&v.alternatives);
     let undivided: Vec<f64> = s.e.iter().zip(&v.law).map(|(e, v)| e * v.sqrt()).collect();
     let (nats, std_error) = gain::of_variance(&undivided, &v.law);
+    let parameters = variance_parameters(s, v, &undivided);
     Some(Finding {
         cause: v.effect.id().into(),
         channels: vec![s.target.name.clone()],
@@ -168,8 +204,8 @@ pub(crate) fn variance_finding(s: &Searched<'_>) -> Option<Finding> {
             ablation_nats: Some(v.lr / 2.0),
             ..Gain::default()
         }),
-        what: sentence(v.effect.docs().title, &s.target.name, &v.parameters),
-        parameters: v.parameters.clone(),
+        what: sentence(v.effect.docs().title, &s.target.name, &parameters),
+        parameters,
         likelihood_ratio: Some(v.lr),
         ..Finding::default()
     })

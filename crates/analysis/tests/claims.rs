@@ -48,7 +48,7 @@ fn named(d: &Diagnosis) -> Vec<(&str, &str)> {
         .collect()
 }
 
-fn graded(what: &str, right: impl Fn(u64, &mut Xoshiro256PlusPlus) -> Result<(), String>) {
+fn graded(what: &str, mut right: impl FnMut(u64, &mut Xoshiro256PlusPlus) -> Result<(), String>) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xc1a1);
     let misses: Vec<String> = (0..RUNS)
         .filter_map(|run| right(run, &mut rng).err())
@@ -442,4 +442,53 @@ fn two_levels_that_switch_by_a_clock_are_no_telegraph_noise() {
         let right = named(&d) == [("telegraph", "gyro_x")] && d.unexplained.is_empty();
         right.then_some(()).ok_or_else(|| said(&d))
     });
+}
+
+/// A motor that is driven at many duties: its noise follows their magnitude in every other run, else their square.
+#[test]
+fn the_law_of_the_motors_noise_is_told_where_the_record_tells_it() {
+    let mut undecided = 0;
+    graded("noise by |duty| and by duty^2", |run, rng| {
+        let mut r = record(&[("motor_duty", 0.9)], 6700 + run);
+        let by_magnitude = (run % 2) as f64;
+        let increase = Uniform::new(2.0, 4.0).expect("a range").sample(rng);
+        // Another duty every 12 s.
+        let duty: Vec<f64> = (0..r.len() / 240 + 1)
+            .map(|_| Uniform::new(-1.0, 1.0).expect("a range").sample(rng))
+            .collect();
+        let pwm = r.channels.iter_mut().find(|c| c.quantity == Quantity::Pwm);
+        let pwm = pwm.expect("a channel");
+        pwm.counts = None;
+        for (i, v) in pwm.values.iter_mut().enumerate() {
+            *v = (255.0 * duty[i / 240]).round();
+        }
+        let white = {
+            let y = values(&r, Quantity::Gyro);
+            let squares = y.windows(2).map(|w| (w[1] - w[0]).powi(2));
+            (squares.sum::<f64>() / 2.0 / (y.len() - 1) as f64).sqrt()
+        };
+        let more: Vec<f64> = (0..r.len())
+            .map(|i| {
+                let d = duty[i / 240].abs();
+                let law = if by_magnitude > 0.0 { d } else { d * d };
+                let e: f64 = StandardNormal.sample(rng);
+                white * (increase * law).sqrt() * e
+            })
+            .collect();
+        let first = r.channels.iter().find(|c| c.quantity == Quantity::Gyro);
+        let first = first.expect("a channel").name.clone();
+        add(&mut r, &first, |i| more[i]);
+        let d = told(&r);
+        let found = d.findings.iter().find(|f| f.cause == "motor_noise");
+        let parameters = &found.ok_or_else(|| said(&d))?.parameters;
+        let size = &parameters["variance_increase_at_full_duty"];
+        let off = (size.value - increase) / size.std_error.unwrap_or(f64::NAN);
+        let law = parameters.get("by_magnitude").map(|p| p.value);
+        undecided += u64::from(law.is_none());
+        // Where the law is open, the size is the square's.
+        let right = law.is_none() || law == Some(by_magnitude) && off.abs() < 4.0;
+        let told = format!("{by_magnitude} {increase}: {law:?} {off}");
+        right.then_some(()).ok_or(told)
+    });
+    assert!(undecided <= 1, "{undecided}");
 }

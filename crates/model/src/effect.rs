@@ -363,6 +363,8 @@ pub enum VarianceLaw {
     Shape {
         /// One value per sample, 0..1.
         shape: Vec<f64>,
+        /// Parameters that say which of the effect's shapes it is.
+        fixed: Vec<(&'static str, f64, &'static str)>,
         /// The channel that it is made of.
         follows: String,
     },
