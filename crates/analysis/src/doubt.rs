@@ -8,6 +8,9 @@
 //! size leaves e^2 of its likelihood ratio to others: a generic term beside it that holds no more than that, and gives way
 //! where the shape may be late or bent, is as likely a remainder of the shape as a cause of its own.
 
+use model::effect::Signal;
+use model::record::Quantity;
+
 use crate::checks::{self, LEAST_CHANCE, Outcome, Place};
 use crate::contest::power_law::PowerLawFound;
 use crate::diagnosis::Searched;
@@ -37,12 +40,20 @@ const REMAINDER_BEYOND: f64 = 0.25;
 /// The same where a shape is known not to hold: what is off may be as large as what it explains.
 const REMAINDER_UNLAWFUL: f64 = 1.0;
 
+/// Share of the energy of a slow channel from which on a line at its place swings as the channel does: a line elsewhere
+/// meets so much of it at a handful of thousands of frequencies.
+const SWINGS: f64 = 0.02;
+/// Half cycles in the record by which they may lie apart.
+const SAME_SWING: f64 = 1.5;
+
 /// Why a name is not given.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 enum Doubt {
     No,
     /// A check fails where the term acts.
     Checks,
+    /// It swings at the frequency of the channel of this name, or is a shape of time beside what does: that follows late.
+    Beside(String),
     /// It holds this share of what the effect explains that follows a channel beside it.
     Remainder(&'static str, f64),
 }
@@ -100,6 +111,32 @@ fn bent(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> f64 {
     ];
     let failed = all.iter().filter(|(id, _)| failing(id));
     failed.map(|(_, chi_square)| chi_square()).sum()
+}
+
+/// The recorded temperature, supply or motor command that swings at the frequency of a line.
+fn swings_as(s: &Searched<'_>, t: &Term) -> Option<String> {
+    let (Form::Line(omega) | Form::SideBands(omega, _)) = t.form else {
+        return None;
+    };
+    let panel = &s.search.panel;
+    let at = omega * panel.bins.n as f64 / PI;
+    let (from, to) = (
+        (at - SAME_SWING).ceil() as usize,
+        (at + SAME_SWING) as usize,
+    );
+    let slow = [Quantity::Temp, Quantity::Supply, Quantity::Pwm];
+    let mut signals = s
+        .search
+        .view
+        .signals
+        .iter()
+        .filter(|o| slow.contains(&o.quantity));
+    let swings = |o: &&Signal| {
+        let c = panel.dct.forward(&o.smooth);
+        let energy = |c: &[f64]| c.iter().map(|c| c * c).sum::<f64>();
+        energy(&c[from.max(1)..(to + 1).min(c.len())]) > SWINGS * energy(&c[1..])
+    };
+    signals.find(swings).map(|o| o.name.clone())
 }
 
 /// For each term of a channel, whether the checks doubt it; and whether they doubt the law of its variance.
@@ -199,6 +236,12 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
         };
         signal.is_some() && (s.laws.iter().any(failed) || s.state.terms.iter().any(beside))
     };
+    let swing = s.state.terms.iter().find_map(|t| swings_as(s, t));
+    // What follows late begins with a transient, too.
+    let beside_swing = |t: &Term| match t.form {
+        Form::Shaped(..) | Form::Columns | Form::Step(..) if generic(t) => swing.clone(),
+        _ => swings_as(s, t),
+    };
     let terms = s
         .state
         .parts()
@@ -237,6 +280,8 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
             };
             if line.is_some_and(|omega| s.state.wanders(omega).is_some()) {
                 Doubt::No
+            } else if let Some(name) = beside_swing(t) {
+                Doubt::Beside(name)
             } else if there || unlawful(t) || generic(t) && (crowd || misplaced(t)) {
                 Doubt::Checks
             } else if let Some((id, share)) = remainder(t).filter(|_| generic(t) && line.is_none())
@@ -308,6 +353,16 @@ pub(crate) fn withdraw(
             match doubt {
                 Doubt::No => kept.push(finding),
                 Doubt::Checks => nearest.push(finding),
+                Doubt::Beside(of) => {
+                    unexplained.push(Unexplained {
+                        channel: name.into(),
+                        what: format!(
+                            "follows {of}, at whose frequency it swings, late or bent as no effect of the library does: {}",
+                            finding.what
+                        ),
+                    });
+                    beside.push(finding);
+                }
                 Doubt::Remainder(of, share) => {
                     let of = if of == beyond::ID { "that" } else { of };
                     unexplained.push(Unexplained {

@@ -103,6 +103,35 @@ fn a_response_to_changes_of_the_supply_alone_gets_no_name() {
 }
 
 #[test]
+fn a_bias_late_behind_its_thermometer_is_no_line() {
+    graded("a bias behind its thermometer", |run, rng| {
+        let period = Uniform::new(50.0, 150.0).expect("a range").sample(rng);
+        let mut r = record(
+            &[("heater_degc", 6.0), ("heater_period_s", period)],
+            5250 + run,
+        );
+        let warmth = values(&r, Quantity::Temp);
+        let late = Uniform::new(0.1, 0.3).expect("a range").sample(rng) * period * 20.0;
+        let mut followed = warmth[0];
+        let behind: Vec<f64> = warmth
+            .iter()
+            .map(|t| {
+                followed += (t - followed) / late;
+                followed
+            })
+            .collect();
+        let slope = Uniform::new(0.2, 0.5).expect("a range").sample(rng);
+        add(&mut r, "gyro_x", |i| slope * behind[i]);
+        let d = told(&r);
+        let line = named(&d).contains(&("line", "gyro_x"));
+        let seen = !named(&d).is_empty() || !d.unexplained.is_empty();
+        (seen && !line)
+            .then_some(())
+            .ok_or_else(|| format!("{period} s, {late}: {}", said(&d)))
+    });
+}
+
+#[test]
 fn an_axis_that_another_leaks_into_a_frame_later_is_told() {
     graded("a leak by one frame", |run, rng| {
         let mut r = record(&[], 5300 + run);
