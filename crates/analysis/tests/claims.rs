@@ -132,6 +132,30 @@ fn a_bias_late_behind_its_thermometer_is_no_line() {
 }
 
 #[test]
+fn noise_below_half_a_step_whose_level_drifts_is_no_effect() {
+    graded("three axes of coarse readings", |run, rng| {
+        let mut model = ModelFile::paper();
+        let share = Uniform::new(0.28, 0.45).expect("a range").sample(rng);
+        for c in &mut model.channels {
+            let step = c.lsb.expect("a step");
+            let walk = Uniform::new(0.2, 1.0).expect("a range").sample(rng) * step;
+            for (name, value) in [
+                ("angle_random_walk", share * step * 60.0 / 20f64.sqrt()),
+                ("rate_random_walk", walk / 600f64.sqrt()),
+            ] {
+                c.baseline.get_mut(name).expect("a parameter").value = value;
+            }
+        }
+        let r = model::simulate(&model, 600.0, 20.0, 5260 + run).expect("a run");
+        let d = told(&r);
+        let clean = named(&d).is_empty() && d.unexplained.is_empty();
+        clean
+            .then_some(())
+            .ok_or_else(|| format!("{share} steps: {}", said(&d)))
+    });
+}
+
+#[test]
 fn an_axis_that_another_leaks_into_a_frame_later_is_told() {
     graded("a leak by one frame", |run, rng| {
         let mut r = record(&[], 5300 + run);

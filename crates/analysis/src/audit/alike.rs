@@ -71,8 +71,11 @@ fn pair(a: &Gyro<'_>, b: &Gyro<'_>, audit: &mut Audit) {
     }
     let times = |k: i32| d.iter().filter(|v| **v == f64::from(k)).count() as f64;
     let same = times(0);
-    // Two that hardly leave one code agree without being copies.
-    let whole = same > MOST * d.len() as f64 && by_chance(x, y, &rows) < MOST;
+    // Two that hardly leave one code agree without being copies: nearer to all frames than to those of chance.
+    let whole = same > MOST * d.len() as f64 && {
+        let chance = by_chance(x, y, &rows);
+        chance < MOST && same > 0.5 * (1.0 + chance) * d.len() as f64
+    };
     if !whole && robust_sigma(&d) < LEAST_SPREAD {
         return;
     }

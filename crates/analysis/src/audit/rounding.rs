@@ -11,6 +11,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::repeats::smallest_step;
 use super::{Audit, Gyro, LEAST_READINGS};
+use crate::adequacy::VARIANCE_CLAIM;
 use crate::audit::local::{Levels, Local};
 
 /// What explains the checks that rounding makes fail.
@@ -20,7 +21,7 @@ const COARSE: f64 = 1.0;
 /// Noise, steps, below which the step is told.
 const TOLD: f64 = 0.5;
 /// Noise, steps, below which what varies slowly is lost between two codes.
-const LOST: f64 = 0.35;
+const LOST: f64 = 0.4;
 /// Median change of readings, steps, from which on no noise is coarse: that of white noise of 1.1 sigma is 1.
 const WELL_ABOVE: f64 = 1.75;
 /// Standard errors within which the kurtosis is the one that rounding makes.
@@ -39,7 +40,7 @@ const PLACES: usize = 64;
 pub(super) struct Rounded {
     /// Spread before rounding, steps.
     sigma: f64,
-    /// Fourth moment over the square of the variance.
+    /// Largest fourth moment over the square of the variance, about the levels of the record.
     kurtosis: f64,
     /// Variances about the levels of the record, over their mean: the least and the largest.
     variances: [f64; 2],
@@ -140,14 +141,15 @@ fn of(y: &[f64]) -> Option<Rounded> {
     let (seen, made) = (fourth / (second * second), f / (s * s));
     // The variance of a sample's fourth moment grows with the eighth.
     let error = (24.0 / n).sqrt() * (made / 3.0).max(1.0).powi(2);
-    let (mut least, mut largest) = (f64::INFINITY, 0.0f64);
+    let (mut least, mut largest, mut tails) = (f64::INFINITY, 0.0f64, 0.0f64);
     for (level, _) in levels.iter() {
-        let v = table.at(level)[0] / s;
-        (least, largest) = (least.min(v), largest.max(v));
+        let [second, fourth] = table.at(level);
+        (least, largest) = (least.min(second / s), largest.max(second / s));
+        tails = tails.max(fourth / (second * second));
     }
     Some(Rounded {
         sigma,
-        kurtosis: made,
+        kurtosis: tails,
         variances: [least, largest],
         explains_tails: (seen - made).abs() < AGREES * error + OF_LEVEL * (made - 3.0).abs(),
     })
@@ -209,11 +211,13 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             "three_readings",
             "neighbours",
             "variance_rhythm",
+            "variance_follows",
+            VARIANCE_CLAIM,
         ];
         audit.suppress(&ids, name, STEP);
     }
     if rounded.sigma < LOST {
-        audit.suppress(&["ljung_box", "band_energy"], name, STEP);
+        audit.suppress(&["ljung_box", "band_energy", VARIANCE_CLAIM], name, STEP);
     }
     if rounded.sigma < TOLD {
         // The far readings of a residual are single codes.
@@ -221,7 +225,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         let lost = if rounded.sigma < LOST {
             audit.untested(
                 "noise_change",
-                &format!("{name}: the noise is below a third of a step, so its size hangs on the level: choose a finer range"),
+                &format!("{name}: the noise is below {LOST} steps, so its size hangs on the level: choose a finer range"),
             );
             ", and what changes by less than a step is lost or bent"
         } else {
@@ -276,9 +280,8 @@ mod tests {
 
     #[test]
     fn a_variance_that_the_level_makes_is_no_law() {
-        let own = rounded(0.35, 1.0, 1).expect("it is coarse");
-        assert!(own.sigma > LOST - 0.03, "{own:?}");
-        let own = Rounded { sigma: 0.36, ..own };
+        let own = rounded(1.05 * LOST, 1.0, 1).expect("it is coarse");
+        assert!(own.sigma > LOST, "{own:?}");
         assert!(own.explains_variance(500.0, 30.0, Some(1.0)));
         assert!(own.explains_variance(31.0, 30.0, Some(9.0)));
         assert!(!own.explains_variance(500.0, 30.0, Some(9.0)));
