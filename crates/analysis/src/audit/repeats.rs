@@ -59,6 +59,9 @@ fn held(values: &[f64], step: f64, rows: usize, excess: f64) -> Option<(f64, f64
 const BESIDE: std::ops::RangeInclusive<usize> = 3..=8;
 /// Standard errors.
 const FAR: f64 = 4.0;
+/// Repeats of repeats beyond those of chance, over all beyond chance: where a fault holds readings for three frames and more
+/// they are half and more of them.
+const IN_RUNS: f64 = 0.4;
 
 /// How far, in units of variance, readings that repeat lie from those about, over what those do that a lost conversion makes
 /// repeat: these lie anywhere. Two readings that agree by what they are lie near their common mean, and the more so where
@@ -79,6 +82,12 @@ fn near_only(values: &[f64], own: &[usize], expected: f64) -> Option<f64> {
     if (here.len() as f64) < LEAST_READINGS as f64 {
         return None;
     }
+    // A reading that is held for several frames is what those about are held with: it repeats repeats.
+    let repeats = own.len() as f64;
+    let again = own.windows(2).filter(|w| w[1] == w[0] + 1).count() as f64;
+    if again - repeats * repeats / values.len() as f64 > IN_RUNS * (repeats - expected) {
+        return None;
+    }
     let variance = mean(&any);
     // Two that agree are as far off as the mean of two that correlate so.
     let pairs = values.windows(2).map(|w| (w[1] - w[0]).powi(2));
@@ -95,6 +104,17 @@ fn near_only(values: &[f64], own: &[usize], expected: f64) -> Option<f64> {
 
 fn differences(values: &[f64], lag: usize) -> Vec<f64> {
     values.windows(lag + 1).map(|w| w[lag] - w[0]).collect()
+}
+
+/// Beyond this many standard deviations a difference is no matter of noise.
+const WILD: f64 = 5.0;
+
+/// Standard deviation of differences, wild ones left out.
+fn spread(d: &[f64], step: f64) -> f64 {
+    let limit = WILD * robust_sigma(d).max(step);
+    let near = d.iter().filter(|v| v.abs() < limit);
+    let (sum, count) = near.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+    (sum / f64::max(count, 1.0)).sqrt()
 }
 
 /// Share of differences 0 that the others predict, with its relative error; `None` where the noise is below a step.
@@ -212,10 +232,9 @@ pub(super) fn agreement(values: &[f64], step: f64) -> (f64, f64) {
         Some((p, error)) if p >= far => (p, error),
         Some((_, error)) => (far, error.max(0.02)),
         None => {
-            let (near, wide) = (
-                robust_sigma(&d),
-                robust_sigma(&differences(values, *LAGS.start())),
-            );
+            // Quantiles of a few steps are steps: by mean squares, which add what rounding does to both.
+            let near = spread(&d, step);
+            let wide = spread(&differences(values, *LAGS.start()), step);
             let raised = if near > 0.0 {
                 (wide / near).max(1.0)
             } else {
@@ -374,10 +393,13 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
                 audit.unexplain(name, format!("{what}; where they do, the readings lie {kept:.2} times as far from those about as such do that are held at any time: it repeats where two in turn lie near each other, as behind a play or a filter"));
                 continue;
             }
-            // Which of them is a repeat by chance cannot be told where those are the many.
-            if excess > expected {
-                own.iter().for_each(|i| audit.mask(name, *i));
-            }
+            // Which of them is a repeat by chance cannot be told where those are the many, but of a reading that comes
+            // three times and more.
+            let held = |i: &&usize| {
+                let next = |j: usize| own.binary_search(&j).is_ok();
+                excess > expected || next(**i + 1) || next(i.saturating_sub(1))
+            };
+            own.iter().filter(held).for_each(|i| audit.mask(name, *i));
             let times: Vec<f64> = own.iter().map(|i| at[*i]).collect();
             let times = if excess > expected { times } else { vec![] };
             audit.findings.push(counted(
