@@ -161,9 +161,11 @@ pub fn held_at(limit: &DetectionLimit) -> String {
 /// Two digits: a limit is no measurement.
 fn short(value: f64) -> String {
     match value.abs() {
-        0.01..10_000.0 => {
-            let digits = (1.0 - value.abs().log10().floor()).max(0.0) as usize;
-            format!("{value:.digits$}")
+        size @ 0.01..1000.0 => {
+            let last = size.log10().floor() as i32 - 1;
+            let digits = usize::try_from(-last).unwrap_or(0);
+            let unit = 10f64.powi(last);
+            format!("{:.digits$}", (value / unit).round() * unit)
         }
         _ => format!("{value:.1e}"),
     }
@@ -295,8 +297,11 @@ mod tests {
 
     #[test]
     fn limits_have_two_digits() {
-        let shorts = [0.038_21, 0.411, 4.24, 42.4, 2.003e-4, 1234.0].map(super::short);
-        assert_eq!(shorts, ["0.038", "0.41", "4.2", "42", "2.0e-4", "1.2e3"]);
+        let shorts = [0.038_21, 0.411, 4.24, 42.4, 284.0, 2.003e-4, 1234.0].map(super::short);
+        assert_eq!(
+            shorts,
+            ["0.038", "0.41", "4.2", "42", "280", "2.0e-4", "1.2e3"]
+        );
     }
 
     #[test]
