@@ -24,8 +24,8 @@ pub(super) fn keep_places(record: &mut Record, skipped: &[usize]) -> usize {
             None => return Some(f64::INFINITY),
         };
         // Rows out of order have others between them.
-        let others = sorted.partition_point(|p| *p < to) - sorted.partition_point(|p| *p <= from);
-        (to > from && others == 0).then(|| (to - from).round() - 1.0)
+        let next = sorted.partition_point(|p| *p <= from);
+        (to > from && sorted.get(next) == Some(&to)).then(|| (to - from).round() - 1.0)
     };
     let gaps: Vec<Gap> = (skipped.chunk_by(|a, b| a == b))
         .filter(|same| (1..record.len()).contains(&same[0]))
