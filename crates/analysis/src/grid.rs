@@ -12,6 +12,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::audit::repeats::smallest_step;
 use crate::error::AnalysisError;
 use crate::likelihood::{Bins, Dct, Noise, Panel};
+use crate::staircase;
 
 /// Least number of samples of a gyro.
 pub const LEAST_SAMPLES: usize = 600;
@@ -498,15 +499,19 @@ fn other(
     dct: &Dct,
     bins: &Rc<Bins>,
 ) -> (Signal, Option<Rc<Vec<f64>>>) {
-    let values = Arc::new(interpolated(&spread(&c.values, places, n, &[])));
+    let read = spread(&c.values, places, n, &[]);
+    let values = Arc::new(interpolated(&read));
     let (is_noisy, drives) = match c.quantity {
         Quantity::Temp | Quantity::Supply => (true, true),
         Quantity::Pwm => (false, true),
         _ => (false, false),
     };
     let coefficients = drives.then(|| Rc::new(dct.forward(&values)));
+    let step = || c.lsb.unwrap_or_else(|| smallest_step(few(&c.values)));
     let smooth = coefficients.as_ref().filter(|_| is_noisy);
-    let smooth = smooth.and_then(|c| smoothed(c, dct, bins)).map(Arc::new);
+    let smooth = smooth
+        .and_then(|c| staircase::smoothed(&read, step()).or_else(|| smoothed(c, dct, bins)))
+        .map(Arc::new);
     let signal = Signal {
         name: c.name.clone(),
         quantity: c.quantity,

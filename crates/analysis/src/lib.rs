@@ -47,6 +47,7 @@ pub mod scale;
 pub mod scan;
 pub mod search;
 pub mod separate;
+mod staircase;
 pub mod synthetic;
 pub mod threshold;
 pub mod transform;
