@@ -291,7 +291,7 @@ fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smalle
                 _ => None,
             });
             let omega = line.map_or(TAU * LINE, |l| l.0);
-            let wanted = strength_for(threshold::side_bands(s.search.widest_beat()));
+            let wanted = strength_for(threshold::side_bands(s.search.slow_beats()));
             // The swing holds n/4 of the square of amplitude times depth.
             let variance = meter.white * s.state.noise.at(omega);
             let swing = wanted * (4.0 * variance / n as f64).sqrt();

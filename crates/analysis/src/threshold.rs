@@ -44,10 +44,10 @@ pub fn line(n: usize) -> f64 {
 }
 
 /// A swing of a line with any of `places` frequencies, two unknowns each. It is sought only where a line is certain, so
-/// that its chance is one for each line, not for each channel.
+/// that its chance is one for each line, not for each channel; slow and fast swings have half of it each.
 #[must_use]
 pub fn side_bands(places: usize) -> f64 {
-    const BY_LINE: f64 = 1e-3;
+    const BY_LINE: f64 = 0.5e-3;
     2.0 * (2.0 * places.max(1) as f64 / BY_LINE).ln()
 }
 

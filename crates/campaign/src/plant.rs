@@ -298,9 +298,10 @@ pub fn plant(
             truth(p, d, Some(s))
         }
         "am_line" => {
+            let frequency = draw.between(0.05, 0.45) * stand.rate_hz;
             let shape = [
-                ("frequency", draw.between(0.05, 0.45) * stand.rate_hz),
-                ("modulation_frequency", draw.by_ratio(0.02, 0.5)),
+                ("frequency", frequency),
+                ("modulation_frequency", draw.by_ratio(0.02, 0.2 * frequency)),
                 ("depth", draw.between(0.5, 1.0)),
                 ("phase", draw.between(-3.1, 3.1)),
                 ("modulation_phase", draw.between(-3.1, 3.1)),

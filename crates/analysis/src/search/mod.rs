@@ -29,8 +29,10 @@ pub const MOST_ALIKE: usize = 2;
 pub const RIVAL_SPAN: f64 = 6.0;
 /// Fewest cycles of a line in the record.
 const LEAST_CYCLES: f64 = 3.0;
-/// Longest beat that side bands are sought at, Hz, and fewest beats in the record.
-const FASTEST_BEAT_HZ: f64 = 0.6;
+/// A swing of a line is slow up to here, Hz; faster ones are sought up to this share of the line's own frequency, beyond
+/// which side bands are lines like others; and fewest swings in the record.
+const SLOW_BEAT_HZ: f64 = 0.6;
+const FASTEST_BEAT: f64 = 0.25;
 const LEAST_BEATS: f64 = 3.0;
 
 /// What an accepted or weighed term is made of.

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use model::effect::{Hypothesis, Shape};
 
-use super::{Candidate, FASTEST_BEAT_HZ, Form, LEAST_BEATS, LEAST_CYCLES, Search, State, Term};
+use super::{
+    Candidate, FASTEST_BEAT, Form, LEAST_BEATS, LEAST_CYCLES, SLOW_BEAT_HZ, Search, State, Term,
+};
 use crate::likelihood::Noise;
 use crate::{scan, threshold};
 
@@ -124,18 +126,21 @@ impl Search<'_> {
                     carrier,
                     phase,
                 );
-                let widest = self.widest_beat();
+                let slow = self.slow_beats();
                 let bin = std::f64::consts::PI / n as f64;
-                let d = ((2.0 * LEAST_BEATS) as usize..=widest.min(n - 1))
+                let fastest = (FASTEST_BEAT * carrier / bin) as usize;
+                let limit = |d: usize| threshold::side_bands(if d <= slow { slow } else { n });
+                let margin = |d: usize| lr[d] - limit(d);
+                let d = ((2.0 * LEAST_BEATS) as usize..=slow.max(fastest).min(n - 1))
                     .filter(|d| carrier > bin * (d + 1) as f64)
                     .filter(|d| carrier + bin * (d + 1) as f64 <= std::f64::consts::PI)
-                    .max_by(|a, b| lr[*a].total_cmp(&lr[*b]))?;
+                    .max_by(|a, b| margin(*a).total_cmp(&margin(*b)))?;
                 Some(term(
                     Form::SideBands(carrier, d as f64 * bin),
                     vec![],
                     vec!["cosine", "sine", "in_phase", "quadrature"],
                     lr[d],
-                    threshold::side_bands(widest),
+                    limit(d),
                 ))
             }
             Hypothesis::Covariance(c) => {
@@ -163,9 +168,9 @@ impl Search<'_> {
         }
     }
 
-    /// Fastest swing of a line that is sought, half cycles in the record.
-    pub(crate) fn widest_beat(&self) -> usize {
-        (2.0 * FASTEST_BEAT_HZ / self.view.rate_hz * self.panel.bins.n as f64) as usize
+    /// Fastest slow swing of a line, half cycles in the record.
+    pub(crate) fn slow_beats(&self) -> usize {
+        (2.0 * SLOW_BEAT_HZ / self.view.rate_hz * self.panel.bins.n as f64) as usize
     }
 
     /// Highest log likelihood of a shape near the point `at` of its grid.
