@@ -1,6 +1,9 @@
 //! What acts on a simulated stand: temperature, supply, motor, vibration. Stated in the model file, or taken from a record.
 
 mod fitted;
+mod moved;
+
+pub(crate) use moved::{moved_like, slow};
 
 use std::collections::BTreeMap;
 

@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::effect::Stage;
 use crate::effects::effect;
-use crate::excitation::World;
+use crate::excitation::{World, moved_like, slow};
 use crate::file::{ChannelModel, ModelFile};
 use crate::record::{Axis, Base, Channel, Header, Quantity, Record, flag};
 
@@ -142,7 +142,7 @@ pub fn simulate(
     let samples = samples as usize;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let world = World::stated(&model.excitation, samples, rate_hz, &mut rng);
-    run(model, world, rate_hz, rng)
+    run(model, world, &Default::default(), rate_hz, rng)
 }
 
 /// Simulate the model in the world that a record saw: its temperatures, supply, motor command and accelerations.
@@ -165,20 +165,14 @@ pub fn simulate_in_the_world_of(
         });
     }
     let mut world = World::stated(&model.excitation, samples, rate_hz, &mut rng);
-    let held = |values: &[f64], scale: f64| -> Option<Vec<f64>> {
-        let mut last = *values.iter().find(|v| v.is_finite())?;
-        Some(
-            values
-                .iter()
-                .map(|v| {
-                    if v.is_finite() {
-                        last = *v
-                    }
-                    last * scale
-                })
-                .collect(),
-        )
-    };
+    let (model, read) = &moved_like(model, record, rate_hz);
+    // What the other axes take of a motion.
+    for (motion, read) in world.motion.iter_mut().zip(read) {
+        if let Some(read) = read {
+            let mean = read.iter().sum::<f64>() / samples as f64;
+            *motion = read.iter().map(|v| v - mean).collect();
+        }
+    }
     for axis in Axis::ALL {
         let own = record
             .of(Quantity::Temp, Some(axis))
@@ -207,7 +201,19 @@ pub fn simulate_in_the_world_of(
     {
         world.duty = d;
     }
-    run(model, world, rate_hz, rng)
+    run(model, world, read, rate_hz, rng)
+}
+
+/// The values, those that are missing as the ones before them, times a scale; none where none is known.
+pub(crate) fn held(values: &[f64], scale: f64) -> Option<Vec<f64>> {
+    let mut last = *values.iter().find(|v| v.is_finite())?;
+    let each = values.iter().map(|v| {
+        if v.is_finite() {
+            last = *v;
+        }
+        last * scale
+    });
+    Some(each.collect())
 }
 
 fn axis_of(channel: &ChannelModel) -> Result<usize, SimulateError> {
@@ -223,9 +229,11 @@ fn axis_of(channel: &ChannelModel) -> Result<usize, SimulateError> {
     }
 }
 
+/// A run in a world; of the axes whose slow part was `read`, deg/s, that is the run's.
 fn run(
     model: &ModelFile,
     world: World,
+    read: &[Option<Vec<f64>>; 3],
     rate_hz: f64,
     rng: Xoshiro256PlusPlus,
 ) -> Result<Record, SimulateError> {
@@ -297,9 +305,17 @@ fn run(
     stage(Stage::Output, &mut s);
     for (axis, own) in lsb.iter().enumerate() {
         let unit = own.unwrap_or(STEPLESS_DPS);
-        s.counts[axis] = (0..samples)
-            .map(|i| {
-                let w = s.scale[axis] * s.motion[axis][i] + s.rate[axis][i] + s.white[axis][i];
+        let mut rate: Vec<f64> = (0..samples)
+            .map(|i| s.scale[axis] * s.motion[axis][i] + s.rate[axis][i] + s.white[axis][i])
+            .collect();
+        if let Some(read) = &read[axis] {
+            let own = slow(&rate, rate_hz);
+            let moved = rate.iter_mut().zip(own.iter().zip(read));
+            moved.for_each(|(w, (own, read))| *w += read - own);
+        }
+        s.counts[axis] = rate
+            .iter()
+            .map(|w| {
                 let limit = if own.is_some() {
                     COUNT_LIMIT
                 } else {

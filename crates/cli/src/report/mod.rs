@@ -89,6 +89,10 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
                         "command and accelerations. " b.before { "Before" } " is white noise, a random walk and a "
                         "constant bias; " b.after { "after" } " adds the causes found. Bands hold 95 % of "
                         (REPLICATES) " replicates, with every parameter at its estimate."
+                        @if subject.diagnosed.diagnosis.findings.iter().any(|f| f.cause == "base_motion") {
+                            " A motion of the base is an input too: of an axis that moved, " b.after { "after" }
+                            " repeats what was read below 1 Hz, and only what is faster is simulated."
+                        }
                     }
                     @for channel in &channels { (channel) }
                 }

@@ -6,8 +6,9 @@ use std::f64::consts::TAU;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::moved::{BLOCK_S, MOVED, at_rest, moved_channels};
 use super::{MOTION, World};
-use crate::file::{ChannelModel, EffectModel, ModelFile};
+use crate::file::{EffectModel, ModelFile};
 use crate::parameter::Parameter;
 use crate::record::{Axis, Base, Channel, Quantity, Record};
 use crate::simulate::{ACC_NOISE_G, ACC_PER_G, STANDARD_GRAVITY, SUPPLY_LSB_V, TEMP_LSB_C};
@@ -19,49 +20,47 @@ const WORTH: f64 = 0.25;
 /// Time constants of the self-heating that are tried.
 const TIME_CONSTANTS: usize = 24;
 
-/// Length of a block in which the motion is fitted, s.
-const MOTION_BLOCK_S: f64 = 0.5;
-
 impl ModelFile {
     /// The model with an excitation under which its simulation meets temperatures, supply, motor, vibration and motion
-    /// like those of the record. A motion of the base becomes a part of that, so that the accelerometers see it too.
+    /// like those of the record. A motion of the base that the accelerometers saw becomes a part of that; else each axis
+    /// swings by itself.
     #[must_use]
     pub fn excited_like(mut self, record: &Record) -> Self {
-        let named = self.effects.iter().any(|e| e.cause == "base_motion");
-        let moves = named || record.header.base.is_some_and(|b| b != Base::Static);
+        let named = moved_channels(&self);
+        let moves = !named.is_empty() || record.header.base.is_some_and(|b| b != Base::Static);
         self.excitation = settings_like(record, self.rate_hz, moves);
-        if MOTION.iter().any(|k| self.excitation.contains_key(*k)) {
-            let moving = |e: &EffectModel| e.cause == "base_motion";
-            for channel in &mut self.channels {
-                let moves = self.effects.iter().filter(|e| moving(e));
-                let moves = moves.flat_map(|e| &e.channels).any(|c| *c == channel.name);
-                if let Some(seen) = record.channel(&channel.name).filter(|_| moves) {
-                    at_rest(channel, &seen.values, self.rate_hz);
-                }
+        // What of the motion the settings do not make, each axis makes by itself: alike in size and pace too.
+        let acts = |key: &&str| self.excitation.contains_key(*key);
+        let by_settings: &[&str] = match MOTION.iter().find(|k| acts(k)) {
+            Some(&"sway_deg") => &["gyro_x", "gyro_y"],
+            Some(_) => &["gyro_z"],
+            None => &[],
+        };
+        let fit = Fit::fine(record, self.rate_hz);
+        self.effects.retain(|e| e.cause != MOVED);
+        for channel in &mut self.channels {
+            let Some(seen) = record
+                .channel(&channel.name)
+                .filter(|_| named.contains(&channel.name))
+            else {
+                continue;
+            };
+            at_rest(channel, &seen.values, self.rate_hz);
+            if by_settings.contains(&channel.name.as_str()) {
+                continue;
             }
-            self.effects.retain(|e| !moving(e));
+            let (amplitude, period) = fit.swing(&seen.values);
+            let parameters = [
+                ("peak".to_owned(), Parameter::exact(amplitude, "deg/s")),
+                ("frequency".to_owned(), Parameter::exact(1.0 / period, "Hz")),
+            ];
+            self.effects.push(EffectModel {
+                cause: MOVED.into(),
+                channels: vec![channel.name.clone()],
+                parameters: parameters.into(),
+            });
         }
         self
-    }
-}
-
-/// The baseline of a channel that moved: the random walk fitted to it is the motion's, and no other can be seen below
-/// that; the white noise is what is left in second differences, to which a motion of seconds adds nothing.
-fn at_rest(channel: &mut ChannelModel, values: &[f64], rate_hz: f64) {
-    let bends: Vec<f64> = values
-        .windows(3)
-        .map(|w| w[0] - 2.0 * w[1] + w[2])
-        .filter(|b| b.is_finite())
-        .collect();
-    // Variances add up to 1 + 4 + 1; deg/s at one sample -> deg/sqrt(h).
-    let white = rms(&bends) / 6f64.sqrt() / rate_hz.sqrt() * 60.0;
-    for (name, value) in [("angle_random_walk", white), ("rate_random_walk", 0.0)] {
-        if let Some(p) = channel.baseline.get_mut(name) {
-            *p = Parameter::exact(value, &p.unit);
-        }
-    }
-    if let Some(bias) = channel.baseline.get_mut("bias") {
-        bias.std_error = None;
     }
 }
 
@@ -275,24 +274,48 @@ impl Fit<'_> {
         }
     }
 
-    /// The turning of a table or the sway of a base, by the gyro that sees most of it.
+    /// Blocks as short as motion is fast.
+    fn fine(record: &Record, rate_hz: f64) -> Fit<'_> {
+        Fit {
+            record,
+            rate_hz,
+            length: ((BLOCK_S * rate_hz) as usize).max(1),
+            moves: true,
+        }
+    }
+
+    /// Amplitude and period, s, of a swing that is as large and as frequent.
+    fn swing(&self, values: &[f64]) -> (f64, f64) {
+        let rate = centred(&self.blocks(values));
+        let amplitude = std::f64::consts::SQRT_2 * rms(&rate);
+        (amplitude, period(&rate, self.block_s()))
+    }
+
+    /// The turning of a table or the sway of a base, by the gyro that sees most of it. A sway tilts the accelerometers: what
+    /// they do not see is none, as a shove.
     fn motion(&self, settings: &mut Settings) {
-        let length = ((MOTION_BLOCK_S * self.rate_hz) as usize).max(1);
-        let fine = Fit { length, ..*self };
+        let fine = Self::fine(self.record, self.rate_hz);
         let seen = Axis::ALL.into_iter().filter_map(|axis| {
             let channel = self.record.of(Quantity::Gyro, Some(axis))?;
-            let rate = centred(&fine.blocks(&channel.values));
-            Some((axis, rms(&rate), period(&rate, fine.block_s())))
+            let (amplitude, period) = fine.swing(&channel.values);
+            Some((axis, amplitude, period))
         });
-        let Some((axis, rms, period)) = seen.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        let Some((axis, amplitude, period)) = seen.max_by(|a, b| a.1.total_cmp(&b.1)) else {
             return;
         };
-        let amplitude = std::f64::consts::SQRT_2 * rms;
         if axis == Axis::Z {
             settings.push(("turn_dps", amplitude));
             settings.push(("turn_period_s", period));
-        } else {
-            settings.push(("sway_deg", amplitude * period / TAU));
+            return;
+        }
+        let sway = amplitude * period / TAU;
+        let tilts = self
+            .record
+            .all(Quantity::Acc)
+            .map(|c| fine.swing(&c.values).0);
+        let tilt = tilts.fold(0.0, f64::max) / STANDARD_GRAVITY;
+        if tilt > 0.5 * sway.to_radians().sin() {
+            settings.push(("sway_deg", sway));
             settings.push(("sway_period_s", period));
         }
     }
@@ -313,7 +336,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-fn rms(y: &[f64]) -> f64 {
+pub(super) fn rms(y: &[f64]) -> f64 {
     (dot(y, y) / y.len().max(1) as f64).sqrt()
 }
 

@@ -1,0 +1,173 @@
+//! A base that moved: no error of a sensor, but an input of the run.
+
+use super::fitted::rms;
+use crate::file::{ChannelModel, ModelFile};
+use crate::parameter::Parameter;
+use crate::record::Record;
+use crate::simulate::held;
+
+/// The cause that is a motion of the base.
+pub(super) const MOVED: &str = "base_motion";
+/// Length of a block that motion is hardly faster than, s.
+pub(super) const BLOCK_S: f64 = 0.5;
+const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
+
+/// The channels that moved.
+pub(super) fn moved_channels(model: &ModelFile) -> Vec<String> {
+    let moves = model.effects.iter().filter(|e| e.cause == MOVED);
+    moves.flat_map(|e| e.channels.iter().cloned()).collect()
+}
+
+/// The baseline of a channel that moved: the random walk fitted to it is the motion's, and no other can be seen below
+/// that; the white noise is what is left in second differences, to which a motion of seconds adds nothing.
+pub(super) fn at_rest(channel: &mut ChannelModel, values: &[f64], rate_hz: f64) {
+    let bends: Vec<f64> = values
+        .windows(3)
+        .map(|w| w[0] - 2.0 * w[1] + w[2])
+        .filter(|b| b.is_finite())
+        .collect();
+    // Variances add up to 1 + 4 + 1; deg/s at one sample -> deg/sqrt(h).
+    let white = rms(&bends) / 6f64.sqrt() / rate_hz.sqrt() * 60.0;
+    for (name, value) in [("angle_random_walk", white), ("rate_random_walk", 0.0)] {
+        if let Some(p) = channel.baseline.get_mut(name) {
+            *p = Parameter::exact(value, &p.unit);
+        }
+    }
+    if let Some(bias) = channel.baseline.get_mut("bias") {
+        bias.std_error = None;
+    }
+}
+
+/// The model as it is simulated in the world of a record, and the slow part of each axis that moved there, deg/s: the motion
+/// is the one that was read.
+pub(crate) fn moved_like(
+    model: &ModelFile,
+    record: &Record,
+    rate_hz: f64,
+) -> (ModelFile, [Option<Vec<f64>>; 3]) {
+    let named = moved_channels(model);
+    let mut model = model.clone();
+    let read = GYROS.map(|name| {
+        let moved = named.iter().any(|n| n == name);
+        let seen = record.channel(name).filter(|_| moved)?;
+        let own = model.channels.iter_mut().find(|c| c.name == name)?;
+        let values = held(&seen.values, 1.0)?;
+        at_rest(own, &seen.values, rate_hz);
+        Some(slow(&values, rate_hz))
+    });
+    let replayed = |c: &String| GYROS.iter().zip(&read).any(|(n, r)| n == c && r.is_some());
+    model.effects.retain_mut(|e| {
+        let by_name = e.cause == MOVED && !e.channels.is_empty();
+        if by_name {
+            e.channels.retain(|c| !replayed(c));
+        }
+        !(by_name && e.channels.is_empty())
+    });
+    (model, read)
+}
+
+/// What of a record is slower than about 1 Hz: 2 B - B^2, where B is the mean over a third of a second taken twice, which
+/// turns no frequency round. The band of motion, to 0.6 Hz, passes to 2 %.
+pub(crate) fn slow(values: &[f64], rate_hz: f64) -> Vec<f64> {
+    let half = (BLOCK_S * rate_hz / 3.0) as usize;
+    let smooth = |x: &[f64]| means(&means(x, half), half);
+    let once = smooth(values);
+    let twice = smooth(&once);
+    once.iter().zip(twice).map(|(a, b)| 2.0 * a - b).collect()
+}
+
+/// Means over `half` samples to either side, fewer at the ends.
+fn means(values: &[f64], half: usize) -> Vec<f64> {
+    let mut sum = 0.0;
+    let sums: Vec<f64> = std::iter::once(0.0)
+        .chain(values.iter().map(|v| {
+            sum += v;
+            sum
+        }))
+        .collect();
+    (0..values.len())
+        .map(|i| {
+            let (from, to) = (i.saturating_sub(half), (i + half + 1).min(values.len()));
+            (sums[to] - sums[from]) / (to - from) as f64
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::file::EffectModel;
+
+    type Tested = Result<(), Box<dyn std::error::Error>>;
+
+    /// A run in which one axis is shoved to and fro three times for four seconds, and its model.
+    fn shoved() -> Result<(Record, ModelFile), crate::simulate::SimulateError> {
+        let mut record = crate::simulate(&ModelFile::paper(), 600.0, 20.0, 6)?;
+        let shove = |t: f64| {
+            let since = (t - 100.0).rem_euclid(200.0);
+            let rate = 6.0 * (std::f64::consts::TAU * since / 4.0).sin();
+            if since < 4.0 { rate } else { 0.0 }
+        };
+        for c in record.channels.iter_mut().filter(|c| c.name == "gyro_x") {
+            for (i, v) in c.values.iter_mut().enumerate() {
+                *v += shove(i as f64 / 20.0);
+            }
+        }
+        let mut model = ModelFile::paper();
+        model.effects = vec![EffectModel {
+            cause: MOVED.into(),
+            channels: vec!["gyro_x".into()],
+            parameters: [("peak".to_owned(), Parameter::exact(6.0, "deg/s"))].into(),
+        }];
+        Ok((record, model))
+    }
+
+    /// The readings of a channel, centred: their slow part and the rest.
+    fn parts(record: &Record, name: &str) -> [Vec<f64>; 2] {
+        let values = record.channel(name).map(|c| c.values.as_slice());
+        let values = values.unwrap_or_default();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let slow: Vec<f64> = slow(values, 20.0).iter().map(|v| v - mean).collect();
+        let fast = values
+            .iter()
+            .zip(&slow)
+            .map(|(v, s)| v - mean - s)
+            .collect();
+        [slow, fast]
+    }
+
+    #[test]
+    fn a_shove_of_one_axis_moves_that_axis_alone() -> Tested {
+        let (record, model) = shoved()?;
+        let again = crate::simulate(&model.excited_like(&record), 600.0, 20.0, 7)?;
+        for name in ["gyro_x", "gyro_y", "gyro_z", "acc_x", "acc_y"] {
+            let [read, made] = [&record, &again].map(|r| rms(&parts(r, name)[0]));
+            assert!((made / read - 1.0).abs() < 0.2, "{name}: {read} {made}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn in_the_world_of_a_record_the_base_moves_as_it_did_and_only_the_rest_is_new() -> Tested {
+        let (record, model) = shoved()?;
+        let again = crate::simulate_in_the_world_of(&model, &record, 20.0, 8)?;
+        let [slow_read, fast_read] = parts(&record, "gyro_x");
+        let [slow_made, fast_made] = parts(&again, "gyro_x");
+        // Over two seconds nothing of what is new is left.
+        let [read, made] = [&slow_read, &slow_made].map(|s| means(s, 20));
+        let off: Vec<f64> = read.iter().zip(&made).map(|(a, b)| a - b).collect();
+        assert!(
+            rms(&off) < 0.05 * rms(&read),
+            "{} {}",
+            rms(&off),
+            rms(&read)
+        );
+        let ratio = rms(&fast_made) / rms(&fast_read);
+        assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+        // Where one part passes into the other, and there alone, some of what was read stays.
+        let product: f64 = fast_read.iter().zip(&fast_made).map(|(a, b)| a * b).sum();
+        let shared = product / 12_000.0 / rms(&fast_read) / rms(&fast_made);
+        assert!(shared.abs() < 0.15, "{shared}");
+        Ok(())
+    }
+}
