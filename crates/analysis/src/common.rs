@@ -55,15 +55,17 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
     };
     let mut pairs: Vec<Pair<'_>> = vec![];
     let first = grid.n / 50;
+    let read = searched.iter().map(|s| s.told().1).fold(1.0, f64::min);
+    let free = read * (grid.n - first) as f64;
     for (i, a) in searched.iter().enumerate() {
         for b in &searched[i + 1..] {
             if a.target.moving || b.target.moving {
                 continue;
             }
-            let (x, y) = (&a.u[first..], &b.u[first..]);
+            let (x, y) = (&a.told().0[first..], &b.told().0[first..]);
             let (ab, aa, bb) = (dot(x, y), dot(x, x), dot(y, y));
             let r = ab / (aa * bb).sqrt();
-            let z = r.clamp(-0.999_999, 0.999_999).atanh() * ((grid.n - first) as f64 - 3.0).sqrt();
+            let z = r.clamp(-0.999_999, 0.999_999).atanh() * (free - 3.0).sqrt();
             let p = checks::normal_tail(z);
             pairs.push((a, b, r, p, z));
         }
@@ -84,7 +86,7 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         .find(|c| matches!(c.hypothesis, Hypothesis::Common))
         .map(|c| c.effect);
     if let Some(of) = of.filter(|_| !pairs.is_empty()) {
-        shared.limits = smallest(&pairs, of, (grid.n - first) as f64);
+        shared.limits = smallest(&pairs, of, free);
     }
     // A shared source correlates positively; where more than one pair shows it, all of its pairs are counted.
     let positive = !fails.is_empty() && fails.iter().all(|p| p.2 > 0.0);
@@ -104,7 +106,7 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
             .map(|p| p.2 * sigma(p.0) * sigma(p.1))
             .collect();
         let mean = shares.iter().sum::<f64>() / shares.len() as f64;
-        let error = error_of_mean(&fails, mean, (grid.n - first) as f64);
+        let error = error_of_mean(&fails, mean, free);
         let found = Found {
             unit: searched[0].target.unit.clone(),
             coefficients: vec![(mean.sqrt(), error / (2.0 * mean.sqrt()))],
@@ -119,7 +121,7 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         let (nats, std_error) = gain::of_correlation(&of_all);
         let ratio = fails
             .iter()
-            .map(|p| -(grid.n as f64) * (1.0 - p.2 * p.2).ln())
+            .map(|p| -(read * grid.n as f64) * (1.0 - p.2 * p.2).ln())
             .sum::<f64>();
         shared.finding = Some(Finding {
             cause: of.id().into(),

@@ -50,6 +50,8 @@ pub(crate) struct Searched<'a> {
     pub e: Vec<f64>,
     /// Whitened coefficients.
     pub u: Vec<f64>,
+    /// The same of what was read alone, where readings are lost.
+    told: Option<Vec<f64>>,
     /// Omnibus checks, before and after.
     checks: Vec<Check>,
     /// The law of the variance, where one was found.
@@ -61,6 +63,14 @@ pub(crate) struct Searched<'a> {
 }
 
 impl Searched<'_> {
+    /// Whitened coefficients of what was read, and the part of them that are free.
+    pub(crate) fn told(&self) -> (&[f64], f64) {
+        match &self.told {
+            Some(told) => (told, self.search.read),
+            None => (&self.u, 1.0),
+        }
+    }
+
     /// Step of the readings over the standard deviation of what the model leaves.
     pub(crate) fn step(&self) -> f64 {
         self.target.step / self.state.solution.white.sqrt()
@@ -273,17 +283,25 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         moving: target.moving,
         signals: &grid.signals,
     };
-    let search = Search::new(panel, view);
+    let mut search = Search::new(panel, view);
+    search.read = 1.0 - target.lost.len() as f64 / grid.n as f64;
     let baseline = search.baseline(&target.noise);
-    let plain = checks::whitened(&search.panel, &baseline);
-    let before = checks::all(
-        &plain.0,
-        &plain.1,
-        grid.rate_hz,
-        target.step / baseline.solution.white.sqrt(),
-    );
-    let state = search.run(baseline.clone());
-    let state = refill::again(&search, state, target);
+    let mut plain = checks::whitened(&search.panel, &baseline);
+    let plain_checks = |(u, e): &(Vec<f64>, Vec<f64>)| {
+        let step = target.step / baseline.solution.white.sqrt();
+        checks::all(u, e, grid.rate_hz, step)
+    };
+    let mut before = plain_checks(&plain);
+    let mut state = search.run(baseline.clone());
+    let refilled = refill::again(&search, &state, target);
+    if let Some(refilled) = refilled.clone() {
+        state = refilled;
+        if state.terms.is_empty() {
+            plain = checks::whitened(&search.panel, &state);
+            before = plain_checks(&plain);
+        }
+    }
+    let told = refilled.map(|s| refill::told(&search, &s, &target.lost));
     let found = estimate::found(&search.panel, &state, &target.unit, grid.rate_hz);
     let (u, e) = if state.terms.is_empty() {
         plain
@@ -299,6 +317,7 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         found,
         e,
         u,
+        told,
         checks: vec![],
         variance: None,
         limits: vec![],
@@ -548,7 +567,7 @@ fn baseline_of(s: &Searched<'_>, state: &State, grid: &Grid) -> Parameters {
         "angle_random_walk".into(),
         Parameter::estimated(
             white * density,
-            white * density / (2.0 * n).sqrt(),
+            white * density / (2.0 * n).sqrt() * state.wider.first().unwrap_or(&1.0),
             &density_unit,
         ),
     );

@@ -113,7 +113,7 @@ pub fn noise_errors(panel: &Panel, state: &State) -> Vec<f64> {
     (0..m)
         .map(|i| {
             if inverse[i][i] > 0.0 {
-                inverse[i][i].sqrt()
+                inverse[i][i].sqrt() * state.wider.get(i + 1).unwrap_or(&1.0)
             } else {
                 f64::NAN
             }

@@ -272,6 +272,9 @@ pub fn lay_out(
             spikes(&given, &mut y, &mut c, &mut fit, &dct, &bins, &mut rng)
         };
         let lost = [lost, spikes.clone()].concat();
+        if motion_rms <= MOTION_RMS {
+            c = crate::refill::first(&channel.name, &dct, &bins, &mut y, &lost, &mut fit);
+        }
         if is_rate && !spikes.is_empty() {
             motion_rms = motion_of(&y, &c, &lost, &fit);
         }

@@ -12,6 +12,7 @@ pub mod beyond;
 pub mod checks;
 mod column;
 mod common;
+mod conditional;
 pub mod contest;
 mod couplings;
 mod curves;

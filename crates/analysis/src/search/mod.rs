@@ -197,6 +197,9 @@ pub struct State {
     pub level: Option<Rc<Vec<f64>>>,
     /// The one power law that explains as much as the processes.
     pub power_law: Option<PowerLawFound>,
+    /// How much wider lost readings make the errors of the noise: of the white variance, the random walk, the coordinates of
+    /// the terms; none where they are few.
+    pub wider: Vec<f64>,
 }
 
 impl State {
@@ -256,6 +259,8 @@ pub struct Search<'a> {
     pub candidates: Vec<Candidate>,
     /// What cannot be tested, with the reason.
     pub not_tested: Vec<(&'static str, String)>,
+    /// Part of the readings that was read.
+    pub read: f64,
 }
 
 impl<'a> Search<'a> {
@@ -340,6 +345,7 @@ impl<'a> Search<'a> {
             view,
             candidates,
             not_tested,
+            read: 1.0,
         }
     }
 
@@ -365,6 +371,7 @@ impl<'a> Search<'a> {
             wandering: None,
             level: None,
             power_law: None,
+            wider: vec![],
         };
         let mut fitted = state.noise.terms.iter();
         for t in &mut state.terms {
@@ -375,6 +382,12 @@ impl<'a> Search<'a> {
             }
         }
         state
+    }
+
+    /// What of a likelihood ratio of the spectrum the readings have earned that there are: those that were filled by the
+    /// spectrum repeat what it has by chance, which makes each departure larger by the part that was lost.
+    fn of_read(&self) -> f64 {
+        self.read * self.read
     }
 
     fn without(&self, state: &State, i: usize) -> State {
@@ -392,7 +405,7 @@ impl<'a> Search<'a> {
                 2.0 * (state.solution.log_likelihood - rest.solution.log_likelihood);
             // A refit that starts well may beat one that starts badly; never report less than nothing.
             if covariance {
-                state.terms[i].lr = state.terms[i].lr.max(0.0);
+                state.terms[i].lr = (self.of_read() * state.terms[i].lr).max(0.0);
             }
         }
     }

@@ -153,7 +153,7 @@ impl Search<'_> {
                         self.panel.fit(&noise, &own)
                     })
                     .max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;
-                let lr = 2.0 * (best.1.log_likelihood - null);
+                let lr = self.of_read() * 2.0 * (best.1.log_likelihood - null);
                 let theta = best.0.terms.last().map(|t| t.1.clone())?;
                 let limit = threshold::covariance(c.dimensions());
                 Some(term(
