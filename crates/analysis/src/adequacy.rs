@@ -20,6 +20,7 @@ use model::effect::Hypothesis;
 use crate::checks::{
     Outcome, chi_tail, errors_of_sum, kurtosis_score, normal_tail, whitened_by_spectrum,
 };
+use crate::diagnosis::{Searched, VarianceFound};
 use crate::law::DEPARTURE;
 use crate::likelihood::{Bins, Noise, Panel};
 use crate::search::{Form, Search, State};
@@ -148,6 +149,36 @@ pub(crate) fn added_white(e: &[f64], law: &[f64], named: &str, lr: f64) -> Outco
             "told as {named}: what it adds is not white, readings {lag} samples apart correlate most"
         )
     })
+}
+
+/// The third claim of a law of the variance, where it follows a channel of both signs: what it adds is as large under either.
+pub(crate) fn either_sign(s: &Searched<'_>, found: &VarianceFound) -> Option<Outcome> {
+    let channel = found.follows.as_ref()?;
+    let follows = &s
+        .search
+        .view
+        .signals
+        .iter()
+        .find(|c| c.name == *channel)?
+        .values;
+    let has = |sign: f64| follows.iter().any(|x| sign * x > 0.0);
+    if !(has(1.0) && has(-1.0)) {
+        return None;
+    }
+    let (e, n) = (&s.e, s.e.len() as f64);
+    let least = found.law.iter().copied().fold(f64::INFINITY, f64::min);
+    // What moves ln of the variance where one sign has more of it and the other less.
+    let odd: Vec<f64> = (found.law.iter().zip(follows.iter()))
+        .map(|(v, x)| (1.0 - least / v) * if *x == 0.0 { 0.0 } else { x.signum() })
+        .collect();
+    let middle = odd.iter().sum::<f64>() / n;
+    let mean = e.iter().map(|v| v * v).sum::<f64>() / n;
+    let score = errors_of_sum((e.iter().zip(&odd)).map(|(e, o)| (e * e - mean) * (o - middle)));
+    Some(claim_of_variance(&[score], found.lr, |_| {
+        let more = if score > 0.0 { "above" } else { "below" };
+        let id = found.effect.id();
+        format!("told as {id}: it adds more while {channel} is {more} 0 than at the other sign")
+    }))
 }
 
 /// The claim of a contest of levels: `z` standard errors from what the lead of two levels is for what was named.

@@ -25,7 +25,8 @@ use crate::result::{
 };
 use crate::search::{Note, Search, State};
 use crate::{
-    adequacy, beyond, dead, doubt, evidence, law, limits, losses, refill, rows, scan, threshold,
+    adequacy, beyond, dead, doubt, evidence, law, limits, losses, refill, rows, scan, slow,
+    threshold,
 };
 
 /// Options of [`diagnose`].
@@ -86,6 +87,8 @@ pub(crate) struct VarianceFound {
     pub alternatives: Vec<(&'static dyn Effect, f64)>,
     /// Variance over its mean, by sample.
     pub law: Vec<f64>,
+    /// The channel that it follows.
+    pub follows: Option<String>,
 }
 
 /// Diagnose a record.
@@ -354,6 +357,10 @@ fn variance(s: &Searched<'_>) -> Option<VarianceFound> {
                 rate_hz,
                 ..Found::default()
             };
+            let follows = match law {
+                VarianceLaw::Shape { follows, .. } => Some(follows.clone()),
+                VarianceLaw::Segment => None,
+            };
             let (lr, limit, law) = match law {
                 VarianceLaw::Shape { shape, .. } => {
                     let (lr, gamma, error) = scan::variance_law(e, shape);
@@ -393,6 +400,7 @@ fn variance(s: &Searched<'_>) -> Option<VarianceFound> {
                 threshold: limit,
                 alternatives: vec![],
                 law,
+                follows,
             })
         })
         .filter(|v| v.lr > v.threshold)
@@ -426,6 +434,8 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
             adequacy::evenness(&s.e, id, v.lr, rate_hz),
             adequacy::added_white(&s.e, &v.law, id, v.lr),
         ]
+        .into_iter()
+        .chain(adequacy::either_sign(s, v))
     });
     let laws = laws.chain(variance);
     let claims = claims.into_iter().chain(laws).map(|c| Check {
@@ -457,6 +467,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
             },
         })
         .chain(claims)
+        .chain(slow::check(s))
         .collect()
 }
 

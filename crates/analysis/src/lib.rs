@@ -48,6 +48,7 @@ pub mod scale;
 pub mod scan;
 pub mod search;
 pub mod separate;
+mod slow;
 mod staircase;
 pub mod synthetic;
 pub mod threshold;
