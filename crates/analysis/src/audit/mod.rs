@@ -8,8 +8,10 @@ mod alike;
 mod bits;
 mod codes;
 mod drift;
+mod foretold;
 mod frames;
 mod frozen;
+mod joint;
 pub mod local;
 mod outliers;
 pub(crate) mod repeats;
@@ -146,6 +148,13 @@ impl Audit {
         self.usable
             .get(channel)
             .map_or(vec![], |u| (0..u.len()).filter(|i| !u[*i]).collect())
+    }
+
+    /// Whether one of some causes was found on a channel.
+    fn found(&self, causes: &[&str], channel: &str) -> bool {
+        let here = |f: &Finding| f.channels.iter().any(|c| c == channel);
+        let mut all = self.findings.iter();
+        all.any(|f| causes.contains(&f.cause.as_str()) && here(f))
     }
 
     fn mask(&mut self, channel: &str, row: usize) {
@@ -374,7 +383,9 @@ pub fn audit(record: &Record) -> Audit {
     }
     repeats::audit(record, &gyros, &at, &mut audit);
     alike::audit(record, &gyros, &mut audit);
+    joint::audit(&gyros, &mut audit);
     for g in &gyros {
+        foretold::audit(g, &mut audit);
         outliers::audit(g, &at, &mut audit);
     }
     audit

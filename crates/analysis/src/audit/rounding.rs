@@ -171,7 +171,7 @@ impl Rounded {
 }
 
 /// Readings of a channel in steps, and the step.
-fn in_steps(g: &Gyro<'_>) -> Option<(Vec<f64>, f64)> {
+pub(super) fn in_steps(g: &Gyro<'_>) -> Option<(Vec<f64>, f64)> {
     let Channel { values, lsb, .. } = g.channel;
     let step = match (g.counts, lsb) {
         (Some(_), Some(lsb)) => *lsb,

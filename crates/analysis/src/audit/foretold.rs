@@ -1,0 +1,344 @@
+//! Readings that their neighbours foretell: gaps that were bridged by a line, a parabola or a spline, or held.
+//!
+//! Where a curve of degree k - 1 stands in for readings, their k-th differences are rounding alone. Differences d of a
+//! window of L are jointly normal with the covariance C that the record itself shows, whatever its spectrum, so
+//! d' C^-1 d over its mean is a ratio of chi-squares, and how small it may be is known. Windows that are too small are
+//! counted, none twice, against a Poisson law. What a law that is not normal adds shows as well where every few readings alone
+//! are taken, which nothing bridges; an even noise of a code's width is added first, since what is rounded would
+//! else be exactly 0 more often than its spread says.
+
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, Uniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::rounding::in_steps;
+use super::{Audit, Gyro, LEAST_READINGS, tails};
+
+/// Orders of the differences: a line leaves no second one, a cubic no fourth one.
+const ORDERS: [usize; 2] = [2, 4];
+/// Differences of a window.
+const LENGTHS: [usize; 3] = [3, 5, 9];
+/// Windows on either side that tell how large differences are there; the smaller one counts, so that a stretch is not held
+/// against a louder one beside it.
+const ABOUT: usize = 60;
+/// Expected windows at which they are counted.
+const EXPECTED: [f64; 7] = [3.0, 1.0, 0.3, 0.1, 0.01, 1e-3, 1e-5];
+/// Readings apart that are held against those in turn, longer than most windows; and standard errors of what they show.
+const APART: [usize; 2] = [7, 11];
+const ROOM: f64 = 3.0;
+/// Least noise, steps: what is bridged is hardly told from less.
+const LEAST_SIGMA: f64 = 1.0;
+
+/// Differences of order `order`: each from that many readings before it on; NaN where one is lost.
+fn differences(y: &[f64], order: usize) -> Vec<f64> {
+    let mut d = y.to_vec();
+    for _ in 0..order {
+        d = d.windows(2).map(|w| w[1] - w[0]).collect();
+    }
+    d
+}
+
+/// The lower triangle whose product with its transpose is the matrix of `covariance` by lag, row by row.
+fn cholesky(covariance: &[f64]) -> Option<Vec<Vec<f64>>> {
+    let mut rows: Vec<Vec<f64>> = vec![];
+    for i in 0..covariance.len() {
+        let mut row = Vec::with_capacity(i + 1);
+        for j in 0..=i {
+            let above: &[f64] = if j < i { &rows[j] } else { &row };
+            let dot: f64 = row[..j].iter().zip(above).map(|(a, b)| a * b).sum();
+            let rest = covariance[i - j] - dot;
+            row.push(if j < i {
+                rest / rows[j][j]
+            } else {
+                Some(rest.sqrt()).filter(|r| *r > 0.0)?
+            });
+        }
+        rows.push(row);
+    }
+    Some(rows)
+}
+
+/// Sum of squares of independent normal values that make up `d`.
+fn independent(rows: &[Vec<f64>], d: &[f64], z: &mut Vec<f64>) -> f64 {
+    z.clear();
+    for (row, d) in rows.iter().zip(d) {
+        let known: f64 = row.iter().zip(z.iter()).map(|(r, z)| r * z).sum();
+        z.push((d - known) / row[z.len()]);
+    }
+    z.iter().map(|z| z * z).sum()
+}
+
+/// Differences of one order.
+struct Differences {
+    order: usize,
+    d: Vec<f64>,
+    /// Mean square about each, by the quieter side.
+    power: Vec<f64>,
+    /// By lag, over the variance.
+    correlation: Vec<f64>,
+}
+
+impl Differences {
+    fn new(y: &[f64], order: usize) -> Self {
+        let d = differences(y, order);
+        let (mut sums, mut sum, mut known) = (vec![(0.0, 0.0)], 0.0, 0.0);
+        for v in &d {
+            if v.is_finite() {
+                (sum, known) = (sum + v * v, known + 1.0);
+            }
+            sums.push((sum, known));
+        }
+        let mean = |from: usize, to: usize| {
+            let (a, b) = (sums[from], sums[to]);
+            if b.1 - a.1 < 0.5 * ABOUT as f64 {
+                f64::INFINITY
+            } else {
+                (b.0 - a.0) / (b.1 - a.1)
+            }
+        };
+        let n = d.len();
+        let power = (0..n)
+            .map(|i| mean(i.saturating_sub(ABOUT), i).min(mean(i, (i + ABOUT).min(n))))
+            .collect();
+        let longest = LENGTHS[LENGTHS.len() - 1];
+        let product = |lag: usize| {
+            let pairs = d.iter().zip(&d[lag.min(n)..]).map(|(a, b)| a * b);
+            let (sum, n) = pairs
+                .filter(|p| p.is_finite())
+                .fold((0.0, 0.0), |(s, n), p| (s + p, n + 1.0));
+            sum / f64::max(n, 1.0)
+        };
+        let variance = product(0);
+        let correlation = (0..longest).map(|lag| product(lag) / variance).collect();
+        Self {
+            order,
+            d,
+            power,
+            correlation,
+        }
+    }
+
+    /// Windows of `length` that are too small: first difference, and the chance of each, below `least`.
+    fn windows(&self, length: usize, least: f64) -> Vec<(usize, f64)> {
+        let Some(rows) = cholesky(&self.correlation[..length]) else {
+            return vec![];
+        };
+        // Of correlated values so many are independent.
+        let alike: f64 = self.correlation.iter().skip(1).map(|r| 2.0 * r * r).sum();
+        let Ok(law) = FisherSnedecor::new(length as f64, ABOUT as f64 / (1.0 + alike)) else {
+            return vec![];
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if law.cdf(middle) > least {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        // None of a small window is farther off than the window as a whole.
+        let most = high * length as f64;
+        let (mut found, mut run, mut z) = (vec![], 0, vec![]);
+        for (i, (d, power)) in self.d.iter().zip(&self.power).enumerate() {
+            run = if d * d < most * power { run + 1 } else { 0 };
+            if run < length {
+                continue;
+            }
+            let first = i + 1 - length;
+            let ratio = independent(&rows, &self.d[first..=i], &mut z)
+                / length as f64
+                / self.power[first].min(*power);
+            if ratio < high {
+                found.push((first, law.cdf(ratio)));
+            }
+        }
+        found
+    }
+}
+
+/// How many windows there are whose chance is below that of each number in [`EXPECTED`], none of them twice, by order and
+/// length.
+fn counts(y: &[f64]) -> Vec<[u64; EXPECTED.len()]> {
+    let mut all = vec![];
+    for of in ORDERS.map(|order| Differences::new(y, order)) {
+        let n = of.d.iter().filter(|d| d.is_finite()).count() as f64;
+        for length in LENGTHS {
+            let windows = of.windows(length, EXPECTED[0] / n);
+            all.push(EXPECTED.map(|expected| {
+                let mut free = 0;
+                let mut apart = |(first, p): &&(usize, f64)| {
+                    let counts = *p < expected / n && *first >= free;
+                    if counts {
+                        free = first + length + of.order;
+                    }
+                    counts
+                };
+                windows.iter().filter(|w| apart(w)).count() as u64
+            }));
+        }
+    }
+    all
+}
+
+/// Every `apart`-th reading, from the first on, then from the second on, and so on.
+fn taken(y: &[f64], apart: usize) -> Vec<f64> {
+    let from = |first| y.iter().skip(first).step_by(apart).copied();
+    (0..apart).flat_map(from).collect()
+}
+
+/// Windows that are too small together, expected and counted.
+struct Foretold {
+    chance: f64,
+    expected: f64,
+    counted: u64,
+    order: usize,
+    length: usize,
+}
+
+fn foretold(y: &[f64]) -> Option<Foretold> {
+    let in_turn = counts(y);
+    let others = APART.map(|apart| counts(&taken(y, apart)));
+    let looks = (in_turn.len() * EXPECTED.len()) as f64;
+    let places = ORDERS.iter().flat_map(|o| LENGTHS.map(|l| (*o, l)));
+    let mut all = vec![];
+    for (i, (order, length)) in places.enumerate() {
+        for (k, expected) in EXPECTED.iter().enumerate() {
+            let sum: u64 = others.iter().map(|o| o[i][k]).sum();
+            let mean = sum as f64 / APART.len() as f64;
+            let by_law = mean + ROOM * (mean / APART.len() as f64).sqrt();
+            let (expected, counted) = (expected.max(by_law), in_turn[i][k]);
+            all.push(Foretold {
+                chance: (looks * tails::at_least(counted, expected)).min(1.0),
+                expected,
+                counted,
+                order,
+                length,
+            });
+        }
+    }
+    all.into_iter().min_by(|a, b| a.chance.total_cmp(&b.chance))
+}
+
+pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
+    let name = g.channel.name.as_str();
+    // These make the step wider than it is said to be.
+    if audit.found(&["coarse_lsb", "stuck_bit"], name) {
+        return;
+    }
+    let Some(usable) = audit.usable.get(name) else {
+        return;
+    };
+    let unit = if g.counts.is_some() {
+        g.channel.lsb.unwrap_or(1.0)
+    } else {
+        1.0
+    };
+    let (y, sigma) = match in_steps(g) {
+        Some((steps, step)) => (steps, g.local.sigma * unit / step),
+        None => (g.channel.values.clone(), f64::INFINITY),
+    };
+    if y.len() < LEAST_READINGS || sigma < LEAST_SIGMA {
+        return;
+    }
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x666f_7265);
+    let width = if sigma.is_finite() { 0.5 } else { 0.0 };
+    let within = Uniform::new_inclusive(-width, width);
+    let y: Vec<f64> = (y.iter().zip(usable))
+        .map(|(v, usable)| {
+            let dither = within.map_or(0.0, |w| w.sample(&mut rng));
+            if *usable { v + dither } else { f64::NAN }
+        })
+        .collect();
+    let Some(found) = foretold(&y) else {
+        return;
+    };
+    let what = format!(
+        "in {} stretches of {} readings {name} follows a {} closer than its noise lets it, {:.2} are expected",
+        found.counted,
+        found.length + found.order,
+        if found.order == 2 {
+            "straight line"
+        } else {
+            "smooth curve"
+        },
+        found.expected,
+    );
+    let fails = audit.check(
+        "foretold",
+        name,
+        found.counted as f64,
+        found.chance,
+        what.clone(),
+    );
+    if fails {
+        audit.unexplain(name, what);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::StandardNormal;
+
+    use super::*;
+
+    /// Codes of white noise behind a one-pole filter, with a cubic over `readings` at some places, even noise added.
+    fn codes(sigma: f64, keep: f64, gaps: usize, readings: usize, seed: u64) -> Vec<f64> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut held = 0.0;
+        let mut y: Vec<f64> = (0..6000)
+            .map(|_| {
+                let z: f64 = StandardNormal.sample(&mut rng);
+                held = keep * held + (1.0 - keep * keep).sqrt() * z;
+                (sigma * held).round()
+            })
+            .collect();
+        for gap in 0..gaps {
+            let from = 50 + gap * 200;
+            let (a, b) = (y[from], y[from + readings + 1]);
+            for k in 1..=readings {
+                let t = k as f64 / (readings + 1) as f64;
+                y[from + k] = (a + (b - a) * t * t * (3.0 - 2.0 * t)).round();
+            }
+        }
+        let even = Uniform::new(-0.5, 0.5).unwrap();
+        y.iter().map(|v| v + even.sample(&mut rng)).collect()
+    }
+
+    #[test]
+    fn noise_of_any_colour_foretells_nothing_more_often_than_chance_says() {
+        let settings = [(1.2, 0.0), (5.0, 0.0), (5.0, 0.8), (40.0, -0.5)];
+        let runs = 40;
+        let low: Vec<f64> = (0..runs)
+            .flat_map(|seed| settings.map(|(s, keep)| codes(s, keep, 0, 0, seed)))
+            .filter_map(|y| foretold(&y).map(|f| f.chance))
+            .filter(|p| *p < 0.02)
+            .collect();
+        // At most 3.2 of 160 are expected; 10 come once in 400 times.
+        assert!(low.len() <= 10, "{low:?}");
+    }
+
+    #[test]
+    fn two_levels_foretell_nothing() {
+        for seed in 0..10 {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(100 + seed);
+            let y: Vec<f64> = (codes(3.0, 0.0, 0, 0, seed).iter())
+                .map(|v| {
+                    let z: f64 = StandardNormal.sample(&mut rng);
+                    if z > 0.8 { v + 20.0 } else { *v }
+                })
+                .collect();
+            let p = foretold(&y).unwrap().chance;
+            assert!(p > 1e-3, "{seed}: {p}");
+        }
+    }
+
+    #[test]
+    fn gaps_that_a_curve_bridges_are_told() {
+        for seed in 0..10 {
+            let found = foretold(&codes(5.0, 0.0, 12, 11, seed)).unwrap();
+            assert!(found.chance < 1e-6, "{seed}: {}", found.chance);
+        }
+    }
+}
