@@ -10,6 +10,9 @@ use super::tails;
 
 /// Spreads of a reading that are tried, over what was measured: bits that stick widen it more than they narrow it.
 const SPREADS: [f64; 7] = [0.15, 0.23, 0.35, 0.5, 0.7, 0.9, 1.1];
+/// Spread, over what noise without the fault has, below which a law has edges of its own: one that narrow is made to hold a
+/// code that is never read, or read too often, and no converter's noise.
+const NATURAL: f64 = 0.35;
 /// A finer step between them, once one is known.
 const FINER: f64 = 1.12;
 /// Shares of the readings that a search begins with.
@@ -200,6 +203,15 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
     let (fault, sound_fit) = railed
         .filter(|(_, fit)| fit.score() > smooth)
         .unwrap_or((Fault::None, plain));
+    // What only a law with edges of its own explains is not explained.
+    let (fault, sound_fit) = if sound_fit.spread < NATURAL * sigma {
+        let anew = |spread: &f64| (Fault::None, sound(spread * sigma, None));
+        let wide = SPREADS.iter().filter(|s| **s >= NATURAL).map(anew);
+        wide.max_by(|a, b| a.1.score().total_cmp(&b.1.score()))
+            .unwrap_or((fault, sound_fit))
+    } else {
+        (fault, sound_fit)
+    };
     let (over, chance) = left_by(&h, &Laws::new(&h, fault, sound_fit.spread), &sound_fit);
     let unlike = chance < super::FALSE_ALARM && over > UNLIKE.max(UNLIKE_BY_READING * h.n);
     let without = |nearest| {
@@ -227,8 +239,11 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
         error: laws.share_error(&fit),
     };
     let (rest, chance) = left_by(&h, &laws, &fit);
+    // A bit adds at most a quarter of its square to the variance.
+    let without_bit = (sigma * sigma - 0.25 * f64::from(1u32 << bit).powi(2)).max(0.0);
+    let natural = fit.spread >= NATURAL * without_bit.sqrt();
     let whole = chance > LEAST_CHANCE || rest < LITTLE * (fit.score() - smooth);
-    if gain > CLEARLY && whole && fit.score() - smooth >= NEARLY_ALL * (own - smooth) {
+    if gain > CLEARLY && natural && whole && fit.score() - smooth >= NEARLY_ALL * (own - smooth) {
         Verdict::Bit(stuck)
     } else {
         without((gain > CLEARLY).then_some(stuck))
