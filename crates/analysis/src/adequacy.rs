@@ -20,6 +20,7 @@ use model::effect::Hypothesis;
 use crate::checks::{
     Outcome, chi_tail, errors_of_sum, kurtosis_score, normal_tail, whitened_by_spectrum,
 };
+use crate::column::dot;
 use crate::diagnosis::{Searched, VarianceFound};
 use crate::law::DEPARTURE;
 use crate::likelihood::{Bins, Noise, Panel};
@@ -179,6 +180,49 @@ pub(crate) fn either_sign(s: &Searched<'_>, found: &VarianceFound) -> Option<Out
         let id = found.effect.id();
         format!("told as {id}: it adds more while {channel} is {more} 0 than at the other sign")
     }))
+}
+
+/// The claim of noise that axes share.
+pub(crate) const COMMON_CLAIM: &str = "common_noise_law";
+
+/// Square and cube of a series, each without what the powers below it have of it.
+fn bends(e: &[f64]) -> [Vec<f64>; 2] {
+    let mean = e.iter().sum::<f64>() / e.len().max(1) as f64;
+    let centred: Vec<f64> = e.iter().map(|v| v - mean).collect();
+    let mut lower = vec![vec![1.0; e.len()], centred.clone()];
+    for power in [2, 3] {
+        let mut own: Vec<f64> = centred.iter().map(|v| v.powi(power)).collect();
+        for below in &lower {
+            let share = dot(&own, below) / dot(below, below).max(f64::MIN_POSITIVE);
+            own.iter_mut().zip(below).for_each(|(o, b)| *o -= share * b);
+        }
+        lower.push(own);
+    }
+    let cube = lower.pop().unwrap_or_default();
+    [lower.pop().unwrap_or_default(), cube]
+}
+
+/// The claim of noise that two axes share: each follows the other in a straight line, the same way up and down. What comes
+/// over on one side alone, or beyond a threshold, follows the square or the cube as well. `lr` is the likelihood ratio of
+/// their correlation, of which a twentieth may be left, and `pairs` the number of pairs that are asked.
+pub(crate) fn straight(a: &[f64], b: &[f64], lr: f64, pairs: usize) -> Outcome {
+    let score = |e: &[f64], bend: &[f64]| errors_of_sum(e.iter().zip(bend).map(|(e, b)| e * b));
+    let scores = [(a, bends(b)), (b, bends(a))].map(|(e, of)| of.map(|bend| score(e, &bend)));
+    let scores = scores.as_flattened();
+    let statistic: f64 = scores.iter().map(|z| z * z).sum();
+    let bent = scores.iter().map(|z| z.abs()).fold(0.0, f64::max);
+    Outcome {
+        id: COMMON_CLAIM,
+        statistic,
+        p_value: if statistic < DEPARTURE * lr {
+            1.0
+        } else {
+            (pairs as f64 * chi_tail(statistic, scores.len() as f64)).min(1.0)
+        },
+        what: format!(
+            "told as common_noise: one follows the square or the cube of the other by {bent:.1} standard errors, what they share would do so in a straight line"
+        ),
+    }
 }
 
 /// The claim of a contest of levels: `z` standard errors from what the lead of two levels is for what was named.
@@ -483,5 +527,36 @@ mod tests {
         f.values[3000..].iter_mut().for_each(|v| *v *= 0.3);
         assert!(f.steadiness().unwrap().1 < 1e-9);
         assert!(f.moments()[1].1 > 4.0);
+    }
+
+    /// Two series, the second with a part of a shared one, and the first with what `comes_over` makes of the second.
+    fn coupled(comes_over: impl Fn(f64, f64) -> f64, shared: f64, seed: u64) -> Outcome {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        let (a, b): (Vec<f64>, Vec<f64>) = (0..6000)
+            .map(|_| {
+                let common = shared * draw();
+                let (own, other) = (common + draw(), common + draw());
+                (own + comes_over(own, other), other)
+            })
+            .unzip();
+        let r = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
+        straight(&a, &b, -6000.0 * (1.0 - r * r).ln(), 1)
+    }
+
+    #[test]
+    fn what_two_axes_share_is_straight_and_what_comes_over_on_one_side_is_not() {
+        let runs = 300;
+        let low = (0..runs).filter(|s| coupled(|_, _| 0.0, 0.5, *s).statistic > 13.28);
+        let low = low.count();
+        // Chi-square of four degrees is beyond 13.28 once in 100: 3 are expected.
+        assert!(low <= 10, "{low}");
+        for seed in 0..10 {
+            let diode = coupled(|own, other| 0.4 * (other - own - 0.5).max(0.0), 0.0, seed);
+            assert!(diode.p_value < 1e-6, "{seed}: {}", diode.p_value);
+            let beyond = |_: f64, other: f64| 0.9 * (other - other.clamp(-1.5, 1.5));
+            let beyond = coupled(beyond, 0.0, seed);
+            assert!(beyond.p_value < 1e-5, "{seed}: {}", beyond.p_value);
+        }
     }
 }

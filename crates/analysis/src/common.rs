@@ -9,7 +9,7 @@ use crate::findings::sentence;
 use crate::grid::Grid;
 use crate::limits::{ONE_SIDED, limit};
 use crate::result::{Check, DetectionLimit, Finding, Gain, Unexplained};
-use crate::{gain, threshold};
+use crate::{adequacy, gain, threshold};
 
 /// Correlation in sigma that each pair has to show before a source is said to be that of all axes.
 const LEAST_OF_ALL: f64 = 0.5;
@@ -90,7 +90,31 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
     }
     // A shared source correlates positively; where more than one pair shows it, all of its pairs are counted.
     let positive = !fails.is_empty() && fails.iter().all(|p| p.2 > 0.0);
-    if let (Some(of), true) = (of, positive) {
+    let mut straight = true;
+    for (a, b, r, ..) in fails.iter().filter(|_| positive) {
+        let samples = (grid.n - first) as f64;
+        let claim = adequacy::straight(&a.e, &b.e, -samples * (1.0 - r * r).ln(), fails.len());
+        let channel = format!("{}, {}", a.target.name, b.target.name);
+        let doubted = claim.p_value < adequacy::LEAST_CHANCE;
+        straight &= !doubted;
+        shared.checks.push(Check {
+            id: claim.id.into(),
+            channel,
+            statistic: claim.statistic,
+            p_value: Some(claim.p_value),
+            threshold: adequacy::LEAST_CHANCE,
+            fails_before: false,
+            fails_after: doubted,
+            what: claim.what.clone(),
+        });
+        if doubted {
+            shared.left.push(Unexplained {
+                channel: a.target.name.clone(),
+                what: format!("with {}, {}", b.target.name, claim.what),
+            });
+        }
+    }
+    if let (Some(of), true) = (of, positive && straight) {
         let names: Vec<String> = searched
             .iter()
             .map(|s| s.target.name.clone())
