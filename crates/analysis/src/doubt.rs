@@ -11,6 +11,7 @@
 use model::effect::Signal;
 use model::record::Quantity;
 
+use crate::audit::repeats;
 use crate::checks::{self, LEAST_CHANCE, Outcome, Place};
 use crate::contest::power_law::PowerLawFound;
 use crate::diagnosis::Searched;
@@ -45,6 +46,22 @@ const REMAINDER_UNLAWFUL: f64 = 1.0;
 const SWINGS: f64 = 0.02;
 /// Half cycles in the record by which they may lie apart.
 const SAME_SWING: f64 = 1.5;
+
+/// Standard errors beyond which readings come again more often than by chance, and within which a correlation is none.
+const COMES_AGAIN: f64 = 5.0;
+const NO_FILTER: f64 = 3.3;
+
+/// Whether readings that are those before, more than there are by chance, make neighbours correlate: a share of them does by
+/// that share, and what is left is not told from nothing.
+fn by_repeats(s: &Searched<'_>) -> bool {
+    let (y, step) = (&s.target.y, s.target.step);
+    let n = y.len() as f64;
+    let same = y.windows(2).filter(|w| repeats::equal(w[1], w[0], step));
+    let (by_chance, relative) = repeats::agreement(y, step);
+    let more = same.count() as f64 / n - by_chance;
+    let error = (by_chance / n).sqrt().hypot(by_chance * relative);
+    more > COMES_AGAIN * error && repeats::correlation(y) - more < NO_FILTER / n.sqrt()
+}
 
 /// Why a name is not given.
 #[derive(Clone, Debug, PartialEq)]
@@ -198,6 +215,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
         let apart = |r| (tooth(r) - tooth(r).round()).abs() * 2.0 * n / r.period as f64;
         repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
     };
+    let miscoded = failing("fine_codes") || failing("foretold");
     let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
     let by_power_law = |filter: bool| s.state.power_law.is_some_and(|p| p.filter || !filter);
     // Of a longer record it counts by what one of that length would show.
@@ -270,6 +288,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
                     || repeats.is_some()
                     || bent > LEFT * t.lr
                     || correlated && (places.is_empty() || filter)
+                    || filter && (miscoded || by_repeats(s))
                     || share(&information.collect::<Vec<_>>(), t.lr)
             } else {
                 let mut sum = vec![0.0; panel.bins.n];

@@ -225,7 +225,7 @@ pub(crate) fn smallest_step(values: &[f64]) -> f64 {
 
 /// Chance that a reading agrees with the one before, without a fault, and the relative error of that. Readings that
 /// agree as often when they lie far apart share a code, not a moment.
-pub(super) fn agreement(values: &[f64], step: f64) -> (f64, f64) {
+pub(crate) fn agreement(values: &[f64], step: f64) -> (f64, f64) {
     let d = differences(values, 1);
     let far: f64 = LAGS.map(|l| share(values, l, step)).sum::<f64>() / LAGS.count() as f64;
     match bridged(&d, step) {
@@ -245,8 +245,17 @@ pub(super) fn agreement(values: &[f64], step: f64) -> (f64, f64) {
     }
 }
 
+/// Correlation of neighbours, by how much less they differ than readings far apart.
+pub(crate) fn correlation(values: &[f64]) -> f64 {
+    let square = |lag: usize| {
+        let d = differences(values, lag);
+        d.iter().map(|d| d * d).sum::<f64>() / d.len().max(1) as f64
+    };
+    1.0 - square(1) / square(*LAGS.start())
+}
+
 /// Whether two readings are the same.
-pub(super) fn equal(a: f64, b: f64, step: f64) -> bool {
+pub(crate) fn equal(a: f64, b: f64, step: f64) -> bool {
     (a - b).abs() <= 0.5 * step
 }
 
