@@ -6,6 +6,7 @@ use rand_distr::{Distribution, Exp1, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::likelihood::{Bins, Dct, Noise};
+use crate::logs::LogProduct;
 
 /// ln of variance, ln of random-walk step over it, ln of half height over the white sigma, ln of dwell in blocks.
 pub(crate) type Coordinates = [f64; 4];
@@ -94,6 +95,7 @@ fn filter<'a, const K: usize>(
     // State by level: weight, mean and variance of the slow level.
     let mut states = [((K as f64).recip(), 0.0, start); K];
     let mut sum = -0.5 * count as f64 * std::f64::consts::TAU.ln();
+    let mut product = LogProduct::new();
     for (t, v) in y.enumerate() {
         // Prediction by level: weight times 1/sqrt(s), mean, 1/s, gain, variance after the reading.
         let predicted = states.map(|(w, m, p)| {
@@ -140,13 +142,14 @@ fn filter<'a, const K: usize>(
         let least = merged.iter().map(|m| m.3).fold(f64::INFINITY, f64::min);
         let weights = merged.map(|m| m.0 * (least - m.3).exp());
         let total: f64 = weights.iter().sum();
-        sum += total.ln() - least;
+        product.multiply(total);
+        sum -= least;
         states = std::array::from_fn(|j| (weights[j] / total, merged[j].1, merged[j].2));
         seen(states[0].0);
     }
     // The diffuse start integrates the mean out. Its prior density is put back, and the factor of sqrt(count) by which
     // that integral differs from the density of the coefficients k >= 1 of the orthonormal DCT.
-    sum + 0.5 * (std::f64::consts::TAU * start * count as f64).ln()
+    sum + product.ln() + 0.5 * (std::f64::consts::TAU * start * count as f64).ln()
 }
 
 /// Block means of two levels as they were fitted.

@@ -31,6 +31,7 @@ mod law;
 mod levels;
 pub mod likelihood;
 mod limits;
+mod logs;
 mod losses;
 pub mod noise_fit;
 pub mod noise_id;

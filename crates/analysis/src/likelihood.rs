@@ -13,6 +13,7 @@ use std::sync::Arc;
 use model::effect::{Covariance, Frequencies};
 
 use crate::column::{Column, dot};
+use crate::logs::sum_of_logs;
 pub use crate::transform::Dct;
 
 /// Bins of single coefficients at the low end.
@@ -40,6 +41,7 @@ pub struct Bins {
     pub n: usize,
     /// First coefficient of each bin, and the end.
     start: Vec<usize>,
+    counts: Vec<f64>,
     /// Middle of each bin.
     pub at: Frequencies,
     /// Random-walk shape 1 / (2 - 2 cos w).
@@ -75,9 +77,11 @@ impl Bins {
             .collect();
         let cosine = omega.iter().map(|w| w.cos()).collect();
         let walk = omega.iter().map(|w| walk_shape(*w)).collect();
+        let counts = start.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
         Self {
             n,
             start,
+            counts,
             at: Frequencies { omega, cosine },
             walk,
             fine: OnceCell::new(),
@@ -103,11 +107,13 @@ impl Bins {
     }
 
     /// Coefficients in each bin.
-    pub(crate) fn counts(&self) -> Vec<f64> {
-        self.start
-            .windows(2)
-            .map(|w| (w[1] - w[0]) as f64)
-            .collect()
+    pub(crate) fn counts(&self) -> &[f64] {
+        &self.counts
+    }
+
+    /// Sum of ln g over the coefficients, of g over the bins.
+    pub(crate) fn log_det(&self, g: &[f64]) -> f64 {
+        sum_of_logs(&self.counts, g)
     }
 
     /// Sums of a[k] b[k] over each bin.
@@ -426,14 +432,7 @@ impl Panel {
     #[must_use]
     pub fn solve(&self, g: &[f64], columns: &[usize]) -> Solution {
         let weight: Vec<f64> = g.iter().map(|g| 1.0 / g).collect();
-        let log_det_noise = self
-            .bins
-            .start
-            .windows(2)
-            .zip(g)
-            .map(|(w, g)| (w[1] - w[0]) as f64 * g.ln())
-            .sum();
-        self.solve_weighted(&weight, log_det_noise, columns)
+        self.solve_weighted(&weight, self.bins.log_det(g), columns)
     }
 
     /// As [`Panel::solve`], with 1/g and the sum of ln g at hand.
@@ -444,22 +443,22 @@ impl Panel {
         log_det_noise: f64,
         columns: &[usize],
     ) -> Solution {
-        let dot = |i, j| -> f64 { self.pair(i, j).iter().zip(weight).map(|(p, w)| p * w).sum() };
+        let over = |i, j| dot(&self.pair(i, j), weight);
         let m = columns.len();
         let mut normal = vec![vec![0.0; m]; m];
         for a in 0..m {
             for b in a..m {
-                normal[a][b] = dot(columns[a], columns[b]);
+                normal[a][b] = over(columns[a], columns[b]);
                 normal[b][a] = normal[a][b];
             }
         }
-        let right: Vec<f64> = columns.iter().map(|c| dot(0, *c)).collect();
+        let right: Vec<f64> = columns.iter().map(|c| over(0, *c)).collect();
         let (inverse, log_det_normal) = invert(&normal);
         let beta: Vec<f64> = inverse
             .iter()
             .map(|row| row.iter().zip(&right).map(|(a, b)| a * b).sum())
             .collect();
-        let total = dot(0, 0);
+        let total = over(0, 0);
         let explained: f64 = beta.iter().zip(&right).map(|(a, b)| a * b).sum();
         let rss = (total - explained).max(total * 1e-12);
         let n = (self.bins.n - 1) as f64;
@@ -583,13 +582,7 @@ impl Panel {
                     terms: noise.terms.clone(),
                 };
                 let g = trial.over(&self.bins);
-                let log_det = self
-                    .bins
-                    .start
-                    .windows(2)
-                    .zip(&g)
-                    .map(|(w, g)| (w[1] - w[0]) as f64 * g.ln())
-                    .sum();
+                let log_det = self.bins.log_det(&g);
                 (trial, g.iter().map(|g| 1.0 / g).collect(), log_det)
             })
             .collect()

@@ -15,6 +15,7 @@ use model::effects::EFFECTS;
 use crate::diagnosis::Searched;
 use crate::grid::MOTION_RMS;
 use crate::likelihood::{Noise, Panel, least_walk};
+use crate::logs::sum_of_logs;
 use crate::optimise::{peak, size_for};
 use crate::result::{DetectionLimit, Finding, Parameter};
 use crate::search::{Candidate, Form};
@@ -58,7 +59,7 @@ struct Meter<'a> {
     panel: &'a Panel,
     white: f64,
     /// Coefficients in each bin, and all.
-    count: Vec<f64>,
+    count: &'a [f64],
     n: f64,
     /// Shape of the noise as it was fitted.
     g: Vec<f64>,
@@ -74,11 +75,10 @@ impl<'a> Meter<'a> {
             let log_walk = low + (MOST_WALK - low) * i as f64 / (WALKS - 1) as f64;
             let terms = noise.terms.clone();
             let tried = Noise { log_walk, terms }.over(&panel.bins);
-            let each = || tried.iter().zip(&count);
             Walk {
                 log: log_walk,
-                logs: each().map(|(g, m)| m * g.ln()).sum(),
-                clean: each()
+                logs: sum_of_logs(count, &tried),
+                clean: (tried.iter().zip(count))
                     .zip(&g)
                     .map(|((tried, m), g)| m * white * g / tried)
                     .sum(),
@@ -98,8 +98,7 @@ impl<'a> Meter<'a> {
     /// d' of what is expected to have these sums of energies over the g of each random walk, where the truth has these
     /// variances over white.
     fn strength(&self, sums: impl Iterator<Item = f64>, truth: &[f64]) -> f64 {
-        let logs: f64 = truth.iter().zip(&self.count).map(|(g, m)| m * g.ln()).sum();
-        let truth = self.n * self.white.ln() + logs;
+        let truth = self.n * self.white.ln() + sum_of_logs(self.count, truth);
         let without = self.walks.iter().zip(sums).map(|(walk, sum)| {
             let minus_two_l = self.n * (sum / self.n).ln() + walk.logs;
             (walk.log, -minus_two_l)
@@ -144,7 +143,7 @@ impl<'a> Meter<'a> {
             let truth = at(x);
             let energy: Vec<f64> = truth
                 .iter()
-                .zip(&self.count)
+                .zip(self.count)
                 .map(|(g, m)| self.white * g * m)
                 .collect();
             let sum = |w: &Walk| energy.iter().zip(&w.weight).map(|(e, w)| e * w).sum();

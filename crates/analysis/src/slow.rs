@@ -112,7 +112,7 @@ pub(crate) fn check(s: &Searched<'_>) -> Option<Check> {
         .zip(rest.into_iter().zip(walk))
         .map(|((energy, count), (rest, walk))| Bin {
             energy,
-            count,
+            count: *count,
             rest,
             // Beside white noise of 1.
             walk: walk - 1.0,
@@ -164,7 +164,8 @@ mod tests {
         let walk = Noise::new(0.0).over(&bins);
         let mut rest = signal[1..].iter();
         bins.counts()
-            .into_iter()
+            .iter()
+            .copied()
             .zip(walk)
             .map(|(count, walk)| {
                 let mut bin = Bin {
