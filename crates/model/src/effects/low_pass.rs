@@ -151,10 +151,12 @@ impl Covariance for Triangle {
     fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
         let unit = inverse_spline(logistic(theta[0]));
         let taps: Vec<f64> = (1..).map(|l| spline(f64::from(l) * unit)).take_while(|r| *r > 0.0).collect();
-        at.omega
+        at.cosine
             .iter()
-            .map(|w| {
-                let tail: f64 = taps.iter().zip(1..).map(|(r, l)| 2.0 * r * (f64::from(l) * w).cos()).sum();
+            .map(|c| {
+                // Sum of taps times cosines of multiples of the frequency, by Clenshaw's recurrence.
+                let (first, second) = taps.iter().rev().fold((0.0, 0.0), |(b, next), r| (r + 2.0 * c * b - next, b));
+                let tail = 2.0 * (c * first - second);
                 // Quantization and the electronics behind the filter keep the density off zero.
                 (1.0 + tail).max(0.0) + 2e-3
             })
