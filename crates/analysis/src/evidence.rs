@@ -4,6 +4,7 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::column::dot;
 use crate::diagnosis::Searched;
 use crate::grid::Grid;
 use crate::likelihood::{Dct, Panel};
@@ -17,11 +18,10 @@ const BLOCKS: usize = 60;
 
 /// ln of the overlapping Allan deviation at `m` samples, from the cumulated sum.
 fn log_allan(sum: &[f64], m: usize) -> f64 {
-    let count = sum.len() - 2 * m;
-    let total: f64 = (0..count)
-        .map(|i| (sum[i + 2 * m] - 2.0 * sum[i + m] + sum[i]).powi(2))
-        .sum();
-    0.5 * (total / count as f64 / (2.0 * (m * m) as f64)).ln()
+    let apart = sum[2 * m..].iter().zip(&sum[m..]).zip(sum);
+    let second: Vec<f64> = apart.map(|((c, b), a)| c - 2.0 * b + a).collect();
+    let total = dot(&second, &second);
+    0.5 * (total / second.len() as f64 / (2.0 * (m * m) as f64)).ln()
 }
 
 fn cumulated(y: &[f64]) -> Vec<f64> {

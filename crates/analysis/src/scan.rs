@@ -46,7 +46,9 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
         .map(|w| 1.0 / w.sqrt())
         .collect();
     let scale = -(2.0 / n as f64).sqrt();
-    let mut best = vec![f64::NEG_INFINITY; m];
+    let count = (n - 1) as f64;
+    // The likelihood falls with the residual sum of squares times the geometric mean of the noise: the least of the walks.
+    let mut least = vec![f64::INFINITY; m];
     for noise in walks {
         let g = noise.first(&panel.bins, m);
         let solution = panel.solve(&noise.over(&panel.bins), columns);
@@ -98,7 +100,7 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
             .iter()
             .map(|c| sums(&panel.first(*c, m), &[]).0)
             .collect();
-        let count = (n - 1) as f64;
+        let mean = (solution.log_det_noise / count).exp();
         for j in 1..m {
             let mut b = (total - cosines[j]) / n as f64;
             let whole = b;
@@ -111,16 +113,17 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
                 continue;
             }
             let rss = (solution.rss - a[j] * a[j] / b).max(solution.rss * 1e-9);
-            let l = -0.5 * (count * (rss / count).ln() + solution.log_det_noise);
-            best[j] = best[j].max(2.0 * (l - null));
+            least[j] = least[j].min(rss * mean);
         }
     }
     let places = n as f64 / m as f64;
+    let lr = |least: f64| -count * (least / count).ln() - 2.0 * null;
     // A step next to an end is a spike or an offset of a few samples: half a second is left out by the caller.
-    best.into_iter()
+    least
+        .into_iter()
         .enumerate()
         .skip(1)
-        .map(|(j, lr)| (j as f64 * places, lr))
+        .map(|(j, least)| (j as f64 * places, lr(least)))
         .collect()
 }
 
@@ -131,9 +134,8 @@ pub fn lines(panel: &Panel, noise: &Noise, columns: &[usize], solution: &Solutio
     let g = noise.everywhere(&panel.bins);
     let mut weighted = residual(panel, columns, solution);
     weighted.iter_mut().zip(&g).for_each(|(r, g)| *r /= g);
-    let z = panel.dct.inverse(&weighted);
+    let energy = panel.dct.energies(&weighted, &panel.dct.inverse(&weighted));
     drop(weighted);
-    let energy = panel.dct.energies(&z);
     let count = (n - 1) as f64;
     (0..n)
         .map(|k| {
@@ -320,7 +322,7 @@ pub fn beats(
         .zip(turning(n, carrier, phase))
         .map(|(v, line)| v * line.re)
         .collect();
-    let seen = panel.dct.energies(&moved);
+    let seen = panel.dct.energies(&panel.dct.forward(&moved), &moved);
     let centre = carrier / std::f64::consts::PI * n as f64;
     let at = |k: f64| 1.0 / g[(k.round().max(1.0) as usize).min(n - 1)];
     let count = (n - 1) as f64;

@@ -1,6 +1,6 @@
 //! Fourier and cosine transforms of real records, through complex ones of half their length.
 
-use std::cell::{Cell, OnceCell, RefCell};
+use std::cell::{Cell, RefCell};
 use std::collections::{HashMap, HashSet};
 use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 use std::rc::Rc;
@@ -103,15 +103,11 @@ impl RealFft {
     /// When `n` is odd or 0.
     #[must_use]
     pub fn new(n: usize) -> Self {
-        Self::within(n, Rc::default())
-    }
-
-    fn within(n: usize, space: Rc<RefCell<Space>>) -> Self {
         assert!(n > 0 && n.is_multiple_of(2), "{n} is no even length");
         Self {
             n,
             plan: Plan::new(n),
-            space,
+            space: Rc::default(),
         }
     }
 
@@ -219,8 +215,6 @@ enum Kind {
 pub struct Dct {
     n: usize,
     kind: Kind,
-    /// The Fourier transform of twice the length, once it is asked for.
-    padded: Rc<OnceCell<RealFft>>,
     pub(crate) known: Rc<Known>,
 }
 
@@ -236,7 +230,6 @@ impl Dct {
         Self {
             n,
             kind,
-            padded: Rc::default(),
             known: Rc::default(),
         }
     }
@@ -356,27 +349,22 @@ impl Dct {
         }
     }
 
-    /// Energy of the Fourier transform at twice its frequencies: |sum of z[j] exp(-i pi j k / n)|^2, k = 0..n.
+    /// Energy of the Fourier transform at twice its frequencies: |sum of z[j] exp(-i pi j k / n)|^2, k = 0..n, of samples z
+    /// whose coefficients are c. Cosines about half a sample are these; sines are those of z with every second sign turned,
+    /// backwards.
     #[must_use]
-    pub fn energies(&self, z: &[f64]) -> Vec<f64> {
-        let n = self.n;
-        let fft = self.padded.get_or_init(|| {
-            let space = match &self.kind {
-                Kind::Even(fft) => Rc::clone(&fft.space),
-                Kind::Odd(_) => Rc::default(),
-            };
-            RealFft::within(2 * n, space)
-        });
-        let mut all = vec![0.0; n];
-        let at = |j: usize| z.get(j).copied().unwrap_or(0.0);
-        fft.run(
-            |j| Complex::new(at(2 * j), at(2 * j + 1)),
-            |k, f| {
-                if let Some(e) = all.get_mut(k) {
-                    *e = f.norm_sqr();
-                }
-            },
-        );
+    pub fn energies(&self, c: &[f64], z: &[f64]) -> Vec<f64> {
+        let turned: Vec<f64> = z
+            .iter()
+            .enumerate()
+            .map(|(j, v)| if j % 2 == 0 { *v } else { -v })
+            .collect();
+        let sines = self.forward(&turned);
+        let half = 0.5 * self.n as f64;
+        let mut all: Vec<f64> = (c.iter().skip(1).zip(sines.iter().skip(1).rev()))
+            .map(|(c, s)| half * (c * c + s * s))
+            .collect();
+        all.insert(0, 2.0 * half * c[0] * c[0]);
         all
     }
 }
@@ -409,10 +397,11 @@ mod tests {
     }
 
     #[test]
-    fn energies_are_those_of_the_padded_transform() {
+    fn energies_are_those_of_the_fourier_transform() {
         for n in [5, 8, 30] {
             let x = record(n);
-            for (k, found) in Dct::new(n).energies(&x).iter().enumerate() {
+            let dct = Dct::new(n);
+            for (k, found) in dct.energies(&dct.forward(&x), &x).iter().enumerate() {
                 let sum: Complex<f64> = x
                     .iter()
                     .enumerate()
