@@ -76,6 +76,19 @@ pub(crate) fn decoded(y: &[f64], x: &Coordinates) -> Vec<bool> {
     first
 }
 
+/// The least of some exponents, and exp(least - exponent) of each.
+#[inline]
+fn below_least<const K: usize>(exponents: [f64; K]) -> (f64, [f64; K]) {
+    // Of two, one is 1: half the exponentials of what most of the time goes into.
+    if let [a, b] = exponents[..] {
+        let mut falls = [1.0; K];
+        falls[usize::from(b > a)] = (-(a - b).abs()).exp();
+        return (a.min(b), falls);
+    }
+    let least = exponents.iter().copied().fold(f64::INFINITY, f64::min);
+    (least, exponents.map(|x| (least - x).exp()))
+}
+
 /// The filter behind the likelihood; `seen` is told the chance of the first level after each block.
 fn filter<'a, const K: usize>(
     y: impl ExactSizeIterator<Item = &'a f64>,
@@ -112,20 +125,19 @@ fn filter<'a, const K: usize>(
         // State by level after it, with what it is off at best.
         let mut merged = [(0.0, 0.0, 0.0, 0.0); K];
         for (j, (level, merged)) in levels.iter().zip(&mut merged).enumerate() {
-            let off = predicted.map(|(_, m, inverse, ..)| {
-                let nu = v - m - half * level;
-                (nu, 0.5 * nu * nu * inverse)
-            });
-            let least = off.iter().map(|o| o.1).fold(f64::INFINITY, f64::min);
+            let off = predicted.map(|(_, m, ..)| v - m - half * level);
+            let exponents: [f64; K] =
+                std::array::from_fn(|i| 0.5 * off[i] * off[i] * predicted[i].2);
+            let (least, falls) = below_least(exponents);
             let mut parts = [(0.0, 0.0, 0.0); K];
             let (mut all, mut mean) = (0.0, 0.0);
-            for (i, ((nu, q), (w, m, _, gain, after))) in off.iter().zip(&predicted).enumerate() {
+            for (i, (nu, (w, m, _, gain, after))) in off.iter().zip(&predicted).enumerate() {
                 let moved = if i == j {
                     1.0 - switch
                 } else {
                     switch / others
                 };
-                let weight = w * moved * (least - q).exp();
+                let weight = w * moved * falls[i];
                 let at = m + gain * nu;
                 parts[i] = (weight, at, *after);
                 all += weight;
@@ -139,8 +151,8 @@ fn filter<'a, const K: usize>(
                 / all;
             *merged = (all, mean, variance, least);
         }
-        let least = merged.iter().map(|m| m.3).fold(f64::INFINITY, f64::min);
-        let weights = merged.map(|m| m.0 * (least - m.3).exp());
+        let (least, falls) = below_least(merged.map(|m| m.3));
+        let weights: [f64; K] = std::array::from_fn(|j| merged[j].0 * falls[j]);
         let total: f64 = weights.iter().sum();
         product.multiply(total);
         sum -= least;
