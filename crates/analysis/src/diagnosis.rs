@@ -15,7 +15,8 @@ use crate::couplings::couplings;
 use crate::error::AnalysisError;
 use crate::estimate;
 use crate::findings::{
-    blows, complete, joined, loud, motion_finding, scale_finding, term_findings, variance_finding,
+    blows, complete, joined, loud, motion_findings, scale_finding, term_findings, turning,
+    variance_finding,
 };
 use crate::grid::{Grid, Target, lay_out};
 use crate::likelihood::Panel;
@@ -125,7 +126,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     let mut nearest = vec![];
     let mut doubts = vec![];
     for s in &searched {
-        findings.extend(motion_finding(s, &grid));
+        findings.extend(motion_findings(s, &grid));
         let failing = |id: &str| {
             let all = checks.iter().chain(&audited.checks);
             let mut own = all.filter(|c| c.channel == s.target.name && c.id == id);
@@ -197,7 +198,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     findings.extend(shared.finding);
     smallest.extend(searched.iter().flat_map(|s| s.limits.iter().cloned()));
     smallest.extend(shared.limits);
-    let findings = complete(joined(loud(blows(findings))));
+    let findings = complete(joined(loud(blows(turning(findings, &grid)))));
     let mut not_tested = not_tested(&searched);
     not_tested.extend(scale_not_tested);
     not_tested.extend(audited.not_tested);

@@ -254,33 +254,56 @@ fn peak_rate(dct: &Dct, y: &[f64], white: f64, rate_hz: f64) -> (f64, f64) {
     (peak - raised, spread.sqrt().hypot(0.5 * raised))
 }
 
-pub(crate) fn motion_finding(s: &Searched<'_>, grid: &Grid) -> Option<Finding> {
-    if !s.target.moving || grid.base == Some(Base::Turntable) {
-        return None;
-    }
-    let of = s
-        .search
-        .candidates
-        .iter()
-        .find(|c| matches!(c.hypothesis, Hypothesis::Motion))?
-        .effect;
-    let (peak, error) = peak_rate(&grid.dct, &s.target.y, s.target.white, grid.rate_hz);
-    let found = Found {
-        unit: s.target.unit.clone(),
-        coefficients: vec![(peak, error)],
-        ..Found::default()
+pub(crate) fn motion_findings(s: &Searched<'_>, grid: &Grid) -> Vec<Finding> {
+    let candidates = &mut s.search.candidates.iter();
+    let of = candidates.find(|c| matches!(c.hypothesis, Hypothesis::Motion));
+    let Some(of) = of.map(|c| c.effect) else {
+        return vec![];
     };
-    let parameters = of.describe(&found);
-    Some(Finding {
+    let name = &s.target.name;
+    let finding = |peak: (f64, f64), location: Vec<(f64, f64)>, what: String| Finding {
         cause: of.id().into(),
-        channels: vec![s.target.name.clone()],
-        what: format!(
-            "The base moves about {}: {:.2} deg/s rms between 0.02 and 0.6 Hz. No error of the sensor",
-            s.target.name, s.target.motion_rms
-        ),
-        parameters,
+        channels: vec![name.clone()],
+        what: format!("The base {what}. No error of the sensor"),
+        parameters: of.describe(&Found {
+            unit: s.target.unit.clone(),
+            coefficients: vec![peak],
+            location,
+            ..Found::default()
+        }),
         ..Finding::default()
-    })
+    };
+    let turned = s.target.excursions.iter().map(|e| {
+        let [from, to] = [e.samples.start, e.samples.end].map(|i| i as f64 / grid.rate_hz);
+        let what = format!(
+            "turns about {name} from {from:.1} to {to:.1} s, by up to {:.2} deg/s, and is back at rest",
+            e.peak.0
+        );
+        finding(e.peak, [from, to].map(|t| (t, e.end_error / grid.rate_hz)).to_vec(), what)
+    });
+    let mut all: Vec<Finding> = turned.collect();
+    if s.target.moving && grid.base != Some(Base::Turntable) {
+        let peak = peak_rate(&grid.dct, &s.target.y, s.target.white, grid.rate_hz);
+        let rms = s.target.motion_rms;
+        let what = format!("moves about {name}: {rms:.2} deg/s rms between 0.02 and 0.6 Hz");
+        all.push(finding(peak, vec![], what));
+    }
+    all
+}
+
+/// Far readings while the base turns are its motion.
+pub(crate) fn turning(mut findings: Vec<Finding>, grid: &Grid) -> Vec<Finding> {
+    let n = grid.n;
+    let turns: Vec<_> = (grid.targets.iter())
+        .flat_map(|t| t.excursions.iter().map(|e| e.with_margin(n)))
+        .collect();
+    let within = |t: &f64| {
+        let i = (t * grid.rate_hz) as usize;
+        turns.iter().any(|turn| turn.contains(&i))
+    };
+    findings
+        .retain(|f| f.cause != "outliers" || f.times_s.is_empty() || !f.times_s.iter().all(within));
+    findings
 }
 
 /// Longest that a blow lasts that shifts a bias, s: far readings within it of the step are the blow itself.

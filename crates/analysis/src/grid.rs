@@ -1,6 +1,7 @@
 //! From a record to an even grid: gaps found by the sequence numbers, lost samples filled so that the likelihood cannot
 //! tell, slow channels smoothed, motion of the base noticed.
 
+use std::ops::Range;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -11,6 +12,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::audit::repeats::smallest_step;
 use crate::error::AnalysisError;
+use crate::excursions::{Excursion, excursions, largest_rate};
 use crate::likelihood::{Bins, Dct, Noise, Panel};
 use crate::staircase;
 
@@ -50,6 +52,8 @@ pub struct Target {
     pub lost: Vec<usize>,
     /// Places whose reading the noise cannot have made.
     pub spikes: Vec<usize>,
+    /// Turns of the base that it felt, taken out of `y` as lost readings are.
+    pub excursions: Vec<Excursion>,
     /// Excess rms in the band of base motion, deg/s.
     pub motion_rms: f64,
     /// Whether that is more than a bias can wander.
@@ -212,14 +216,22 @@ pub fn lay_out(
         crate::kalman::bridge(&mut read, *white, white * noise.log_walk.exp());
         all(dct.forward(&read)) * (n as f64 / (n - lost.len()).max(1) as f64).sqrt()
     };
-    let mut targets = vec![];
-    for channel in gyros {
-        let (scale, unit) = match channel.unit.as_str() {
-            "rad/s" => (180.0 / std::f64::consts::PI, "deg/s".to_owned()),
-            other => (1.0, other.to_owned()),
-        };
+    let read = |channel: &Channel| {
         let mut y = spread(&channel.values, &places, n, &masked(&channel.name));
+        let (scale, _) = unit_of(channel);
         y.iter_mut().for_each(|v| *v *= scale);
+        y
+    };
+    // Where the base is known to move, a turn of seconds is part of that.
+    let felt = |channel: &Channel| match unit_of(channel).1.as_str() {
+        "deg/s" if !turns => felt(&interpolated(&read(channel)), &others, rate_hz, &dct),
+        _ => vec![],
+    };
+    let felt: Vec<Vec<Excursion>> = gyros.iter().map(|g| felt(g)).collect();
+    let mut targets = vec![];
+    for (channel, own) in gyros.into_iter().zip(&felt) {
+        let (scale, unit) = unit_of(channel);
+        let mut y = read(channel);
         let lost: Vec<usize> = (0..n).filter(|i| !y[*i].is_finite()).collect();
         if n - lost.len() < LEAST_SAMPLES {
             return Err(short(
@@ -228,6 +240,11 @@ pub fn lay_out(
                 "samples",
             ));
         }
+        // While the base turns, no axis of it is at rest.
+        for e in felt.iter().flatten() {
+            y[e.with_margin(n)].fill(f64::NAN);
+        }
+        let lost: Vec<usize> = (0..n).filter(|i| !y[*i].is_finite()).collect();
         let guess =
             white_by_differences(&y).max(channel.lsb.map_or(0.0, |l| (l * scale).powi(2) / 12.0));
         let constant = y
@@ -291,6 +308,7 @@ pub fn lay_out(
             coefficients: c,
             lost,
             spikes,
+            excursions: own.clone(),
             motion_rms,
             moving: motion_rms > MOTION_RMS,
             astray: false,
@@ -337,6 +355,30 @@ pub fn lay_out(
         targets,
         signals,
     })
+}
+
+/// Factor to the unit in which a gyro is searched, and that unit.
+fn unit_of(channel: &Channel) -> (f64, String) {
+    match channel.unit.as_str() {
+        "rad/s" => (180.0 / std::f64::consts::PI, "deg/s".to_owned()),
+        other => (1.0, other.to_owned()),
+    }
+}
+
+/// Turns of a base at rest that a gyro felt, without those of which what drives its bias makes up most.
+fn felt(y: &[f64], others: &[Signal], rate_hz: f64, dct: &Dct) -> Vec<Excursion> {
+    let mut found = excursions(y, rate_hz);
+    let drivers = others.iter().filter(|s| drives(s.quantity));
+    if found.is_empty() || drivers.clone().next().is_none() {
+        return found;
+    }
+    let drivers: Vec<Vec<f64>> = drivers.map(|s| dct.forward(&s.smooth)).collect();
+    let mut c = dct.forward(y);
+    let [low, high] = [MOTION_BAND_HZ.0, MOTION_BAND_HZ.1].map(|f| places_of(f, y.len(), rate_hz));
+    take_off(&mut c, &drivers, low..high);
+    let beyond = dct.inverse(&c);
+    found.retain(|e| largest_rate(&beyond, &e.samples) > 0.5 * largest_rate(y, &e.samples));
+    found
 }
 
 /// Take out single samples that the noise cannot have made, and fill their places; largest first, since each one
@@ -456,15 +498,28 @@ fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64, turns: bo
     } else {
         *above.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.4549
     };
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let band = &mut c[low..high];
+    take_off(c, drivers, low..high);
+    let band = &c[low..high];
+    let excess: f64 = band.iter().map(|v| v * v - white).sum();
+    (excess.max(0.0) / n as f64).sqrt()
+}
+
+/// Takes off coefficients what follows the drivers, by what is in the band.
+fn take_off(c: &mut [f64], drivers: &[Vec<f64>], band: Range<usize>) {
+    let dot = |a: &[f64], b: &[f64]| {
+        let pairs = a[band.clone()].iter().zip(&b[band.clone()]);
+        pairs.map(|(a, b)| a * b).sum::<f64>()
+    };
+    let less = |c: &mut [f64], share: f64, o: &[f64]| {
+        c.iter_mut().zip(o).for_each(|(c, o)| *c -= share * o);
+    };
     let mut orthogonal: Vec<Vec<f64>> = vec![];
     for driver in drivers {
-        let mut x = driver[low..high].to_vec();
+        let mut x = driver.clone();
         let before = dot(&x, &x);
         for o in &orthogonal {
             let share = dot(&x, o);
-            x.iter_mut().zip(o).for_each(|(x, o)| *x -= share * o);
+            less(&mut x, share, o);
         }
         let length = dot(&x, &x);
         // What is left of a driver that the others make up is rounding.
@@ -472,12 +527,15 @@ fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64, turns: bo
             continue;
         }
         x.iter_mut().for_each(|x| *x /= length.sqrt());
-        let share = dot(band, &x);
-        band.iter_mut().zip(&x).for_each(|(c, x)| *c -= share * x);
+        let share = dot(c, &x);
+        less(c, share, &x);
         orthogonal.push(x);
     }
-    let excess: f64 = band.iter().map(|v| v * v - white).sum();
-    (excess.max(0.0) / n as f64).sqrt()
+}
+
+/// Whether a quantity can drive a gyro's bias.
+fn drives(quantity: Quantity) -> bool {
+    matches!(quantity, Quantity::Temp | Quantity::Supply | Quantity::Pwm)
 }
 
 /// What a gyro reads, to the effects of the others.
@@ -504,12 +562,8 @@ fn other(
 ) -> (Signal, Option<Rc<Vec<f64>>>) {
     let read = spread(&c.values, places, n, &[]);
     let values = Arc::new(interpolated(&read));
-    let (is_noisy, drives) = match c.quantity {
-        Quantity::Temp | Quantity::Supply => (true, true),
-        Quantity::Pwm => (false, true),
-        _ => (false, false),
-    };
-    let coefficients = drives.then(|| Rc::new(dct.forward(&values)));
+    let is_noisy = matches!(c.quantity, Quantity::Temp | Quantity::Supply);
+    let coefficients = drives(c.quantity).then(|| Rc::new(dct.forward(&values)));
     let step = || c.lsb.unwrap_or_else(|| smallest_step(few(&c.values)));
     let smooth = coefficients.as_ref().filter(|_| is_noisy);
     let smooth = smooth

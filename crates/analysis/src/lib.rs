@@ -23,6 +23,7 @@ pub mod edf;
 pub mod error;
 pub mod estimate;
 mod evidence;
+mod excursions;
 mod findings;
 pub mod gain;
 pub mod grid;

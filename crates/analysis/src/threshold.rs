@@ -12,7 +12,12 @@ pub const FALSE_ALARM: f64 = 7e-5;
 const WIDENED: f64 = 1.12;
 
 fn quantile(degrees: usize, places: f64) -> f64 {
-    let p = (FALSE_ALARM / places).max(1e-300);
+    tail(degrees, FALSE_ALARM / places)
+}
+
+/// Where the tail of chi-square falls below a chance.
+pub(crate) fn tail(degrees: usize, chance: f64) -> f64 {
+    let p = chance.max(1e-300);
     // inverse of the survival function: for small p the inverse cdf of 1 - p is accurate to 1e-4 here.
     ChiSquared::new(degrees as f64).map_or(f64::INFINITY, |c| c.inverse_cdf(1.0 - p))
 }

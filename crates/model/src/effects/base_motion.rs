@@ -1,5 +1,7 @@
 //! The base moves.
 
+use std::ops::Range;
+
 use crate::parameter::Parameter;
 use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, optional, value};
 use crate::record::Quantity;
@@ -19,6 +21,8 @@ impl Effect for BaseMotion {
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
             parameter("peak", "deg/s", "largest rate of the motion"),
+            optional("start", "s", "start of one turn out and back, where it is no sway"),
+            optional("end", "s", "its end"),
             optional("frequency", "Hz", "frequency of the sway in a simulation; 0.1 where it is left out"),
         ];
         PARAMETERS
@@ -27,9 +31,9 @@ impl Effect for BaseMotion {
     fn docs(&self) -> Docs {
         Docs {
             title: "The base moves",
-            physics: "True rotation of the base: no error of the sensor. It is reported as an input, and slow causes of that axis are not tested.",
+            physics: "True rotation of the base: no error of the sensor. It is reported as an input, and slow causes of that axis are not tested; a turn of seconds is left out on all axes, and the rest is searched.",
             excitation: "Motion.",
-            test: "Excess rms between 0.02 and 0.6 Hz above 0.3 deg/s, more than any bias of this class of part can wander.",
+            test: "Excess rms between 0.02 and 0.6 Hz above 0.3 deg/s, more than any bias of this class of part can wander; or, in a record at rest, rates of more than 1 deg/s that come smoothly and are gone within 30 s.",
             figure: "The rate in time blocks.",
             example: Example::new(Plot::RateInTime { block_s: 2.0 }, &[("peak", 3.0), ("frequency", 0.02)]),
         }
@@ -52,11 +56,18 @@ impl Effect for BaseMotion {
 
     fn describe(&self, found: &Found) -> Parameters {
         let peak = found.coefficients.first().map_or((0.0, 0.0), |c| *c);
-        [("peak".to_owned(), Parameter::estimated(peak.0, peak.1, &found.unit))].into()
+        let mut all = Parameters::from([("peak".to_owned(), Parameter::estimated(peak.0, peak.1, &found.unit))]);
+        for (name, at) in ["start", "end"].iter().zip(&found.location) {
+            all.insert((*name).into(), Parameter::estimated(at.0, at.1, "s"));
+        }
+        all
     }
 
-    fn same_event(&self, _a: &Parameters, _b: &Parameters) -> bool {
-        true
+    fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
+        match (stretch(a), stretch(b)) {
+            (Some(a), Some(b)) => a.start < b.end && b.start < a.end,
+            (a, b) => a.is_none() && b.is_none(),
+        }
     }
 
     fn stage(&self) -> Stage {
@@ -66,10 +77,22 @@ impl Effect for BaseMotion {
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let peak = value(parameters, "peak");
         let frequency = parameters.get("frequency").map_or(0.1, |p| p.value);
+        let turn = stretch(parameters);
+        // In a turn there and back, or since the start.
+        let cycles = |t: f64| match &turn {
+            Some(turn) if turn.contains(&t) => (t - turn.start) / (turn.end - turn.start),
+            Some(_) => 0.0,
+            None => frequency * t,
+        };
         for &axis in channels {
             for (i, w) in simulation.motion[axis].iter_mut().enumerate() {
-                *w += peak * (std::f64::consts::TAU * frequency * i as f64 / simulation.rate_hz).sin();
+                *w += peak * (std::f64::consts::TAU * cycles(i as f64 / simulation.rate_hz)).sin();
             }
         }
     }
+}
+
+/// When a turn begins and ends, s, where it is one.
+fn stretch(parameters: &Parameters) -> Option<Range<f64>> {
+    Some(parameters.get("start")?.value..parameters.get("end")?.value)
 }

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::moved::{BLOCK_S, MOVED, at_rest, moved_channels};
+use super::moved::{BLOCK_S, MOVED, at_rest, moved_channels, moves_throughout};
 use super::{MOTION, World};
 use crate::file::{EffectModel, ModelFile};
 use crate::parameter::Parameter;
@@ -37,7 +37,7 @@ impl ModelFile {
             None => &[],
         };
         let fit = Fit::fine(record, self.rate_hz);
-        self.effects.retain(|e| e.cause != MOVED);
+        self.effects.retain(|e| !moves_throughout(e));
         for channel in &mut self.channels {
             let Some(seen) = record
                 .channel(&channel.name)

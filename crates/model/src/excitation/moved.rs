@@ -1,7 +1,7 @@
 //! A base that moved: no error of a sensor, but an input of the run.
 
 use super::fitted::rms;
-use crate::file::{ChannelModel, ModelFile};
+use crate::file::{ChannelModel, EffectModel, ModelFile};
 use crate::parameter::Parameter;
 use crate::record::Record;
 use crate::simulate::held;
@@ -12,9 +12,14 @@ pub(super) const MOVED: &str = "base_motion";
 pub(super) const BLOCK_S: f64 = 0.5;
 const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 
+/// Whether an effect is a motion of the base, and no turn of seconds, which is simulated as what it is.
+pub(super) fn moves_throughout(e: &EffectModel) -> bool {
+    e.cause == MOVED && !e.parameters.contains_key("start")
+}
+
 /// The channels that moved.
 pub(super) fn moved_channels(model: &ModelFile) -> Vec<String> {
-    let moves = model.effects.iter().filter(|e| e.cause == MOVED);
+    let moves = model.effects.iter().filter(|e| moves_throughout(e));
     moves.flat_map(|e| e.channels.iter().cloned()).collect()
 }
 
@@ -57,7 +62,7 @@ pub(crate) fn moved_like(
     });
     let replayed = |c: &String| GYROS.iter().zip(&read).any(|(n, r)| n == c && r.is_some());
     model.effects.retain_mut(|e| {
-        let by_name = e.cause == MOVED && !e.channels.is_empty();
+        let by_name = moves_throughout(e) && !e.channels.is_empty();
         if by_name {
             e.channels.retain(|c| !replayed(c));
         }
@@ -96,7 +101,6 @@ fn means(values: &[f64], half: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::EffectModel;
 
     type Tested = Result<(), Box<dyn std::error::Error>>;
 
