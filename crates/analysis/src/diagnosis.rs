@@ -198,6 +198,12 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     findings.extend(shared.finding);
     smallest.extend(searched.iter().flat_map(|s| s.limits.iter().cloned()));
     smallest.extend(shared.limits);
+    // What the audit could not ask a channel for has no smallest size there.
+    smallest.retain(|l| {
+        let here = format!("{}: ", l.channel);
+        let of = |n: &NotTested| n.cause == l.cause && n.why.starts_with(&here);
+        !audited.not_tested.iter().any(of)
+    });
     let findings = complete(joined(loud(blows(turning(findings, &grid)))));
     let mut not_tested = not_tested(&searched);
     not_tested.extend(scale_not_tested);

@@ -207,7 +207,8 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
             }
         }
         audit.findings.push(finding);
-        audit.converter_at_fault(name, "coarse_lsb");
+        let step = f64::from(1u32 << c.bits);
+        audit.lacks_a_bit(name, "coarse_lsb", step, unrounded(local));
         audit.suppress(&["stuck_bit", "stale_samples"], name, "coarse_lsb");
         return Shape::Other;
     }
@@ -264,7 +265,8 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
                 ),
                 ..Finding::default()
             });
-            audit.converter_at_fault(name, "stuck_bit");
+            let step = f64::from(1u32 << (s.bit + 1));
+            audit.lacks_a_bit(name, "stuck_bit", step, sigma);
             Shape::Other
         }
         Verdict::Unlike { nats, nearest } => {

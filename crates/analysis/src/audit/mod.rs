@@ -33,6 +33,10 @@ use local::Local;
 
 /// Chance of a false alarm of one audit on one channel.
 pub const FALSE_ALARM: f64 = 2e-5;
+
+/// Steps of a converter that lacks a bit, over the noise, up to which the variance of readings is the same at any level: to
+/// 5e-4 at this width, by the first harmonic of a rounded normal variable.
+const WIDE: f64 = 1.5;
 /// Least readings of a channel that an audit of its distribution takes.
 pub const LEAST_READINGS: usize = 200;
 /// Most times that a finding lists.
@@ -72,6 +76,8 @@ pub struct Audit {
     pub limits: Vec<DetectionLimit>,
     /// What a reader has to know of the readings, and is no fault.
     pub notes: Vec<String>,
+    /// Steps, counts, of channels whose converter lacks a bit.
+    steps: BTreeMap<String, f64>,
     /// Channels whose noise is hardly larger than their step.
     rounded: BTreeMap<String, rounding::Rounded>,
 }
@@ -105,10 +111,9 @@ impl Audit {
 
     /// A fault of the converter was found on `channel`: what it adds depends on the level, and is neither normal nor the
     /// same throughout, so checks of the noise say nothing new.
-    pub fn converter_at_fault(&mut self, channel: &str, by: &str) {
+    fn converter_at_fault(&mut self, channel: &str, by: &str) {
         self.suppress(
             &[
-                "outliers",
                 "kurtosis",
                 "skewness",
                 "variance_in_time",
@@ -123,6 +128,31 @@ impl Audit {
         );
     }
 
+    /// A converter of `channel` that lacks a bit was found, so that it steps by `step` counts where the noise has `sigma`. Law
+    /// and independence of the readings are no longer the noise's; beyond some width its size is not, either.
+    fn lacks_a_bit(&mut self, channel: &str, by: &str, step: f64, sigma: f64) {
+        self.steps.insert(channel.into(), step);
+        if step <= WIDE * sigma {
+            let ids = [
+                "kurtosis",
+                "skewness",
+                "bicovariance",
+                "three_readings",
+                "neighbours",
+            ];
+            self.suppress(&ids, channel, by);
+            return;
+        }
+        self.converter_at_fault(channel, by);
+        self.suppress(&["spikes"], channel, by);
+        for cause in ["noise_change", "motor_noise"] {
+            self.untested(
+                cause,
+                &format!("{channel}: with the bit that is missing it steps by {:.1} sigma, so the size of its noise hangs on the level: mend the converter first", step / sigma),
+            );
+        }
+    }
+
     /// A bit above the readings of `channel` was put right by the sign ([`sign_bit`]): readings that lay beyond it fold over
     /// at its edges, and no rail is there.
     pub fn put_right(&mut self, found: &Finding) {
@@ -132,6 +162,7 @@ impl Audit {
         let edges = [-bit.value.exp2(), bit.value.exp2() - 1.0];
         for channel in &found.channels {
             self.converter_at_fault(channel, &found.cause);
+            self.suppress(&["outliers"], channel, &found.cause);
             self.findings.retain(|f| {
                 let rail = |name: &str| f.parameters.get(name).map(|p| p.value);
                 let folded = [rail("low"), rail("high")].into_iter().flatten();

@@ -23,6 +23,8 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
             g.channel.lsb.unwrap_or(0.0),
         ),
     };
+    // A bit that is missing moves a reading by half of what its lack makes a step of.
+    let step = step * audit.steps.get(name).copied().unwrap_or(1.0);
     let n = local.residual.len();
     if n < super::LEAST_READINGS || local.sigma <= 0.0 {
         return;

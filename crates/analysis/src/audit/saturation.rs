@@ -195,7 +195,11 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
     if swing(kept()) > SWINGS {
         // The noise that is left depends on the level, so it changes with it, and the level itself is bent.
         audit.converter_at_fault(name, "saturation");
-        audit.suppress(&["process_law", "process_levels"], name, "saturation");
+        audit.suppress(
+            &["outliers", "process_law", "process_levels"],
+            name,
+            "saturation",
+        );
     }
 }
 
