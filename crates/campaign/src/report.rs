@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::case::{Estimate, Family, Hit, Outcome};
-use crate::foreign::{FOREIGN, SEEN};
+use crate::foreign::{FOREIGN, SEEN, has_twin};
 use crate::plant::{BY_COUNT, BY_STRENGTH, asked_from, asked_ratio};
 use crate::tally::{ORACLE, Rate, d95, oracle};
 
@@ -257,6 +257,7 @@ fn bars(out: &mut String, all: &[Outcome]) {
         })
     };
     let told = |seen| Rate::of(strange(seen).map(|o| !o.unexplained.is_empty()));
+    let alone_of_its_kind = || strange(false).filter(|o| !has_twin(o.family.label()));
     let misnamed = |seen| Rate::of(strange(seen).map(|o| !o.wrong.is_empty()));
     let fit: Vec<_> = estimates(all).into_values().flatten().collect();
     let covered = Rate::of(
@@ -285,12 +286,24 @@ fn bars(out: &mut String, all: &[Outcome]) {
             wrong,
         ),
         bar(
-            "foreign effects of d' >= 25, ninth set (2026-11-22), unseen: told as unexplained",
+            "foreign effects of d' >= 25, tenth set (2026-11-22), unseen: told as unexplained",
             true,
             0.90,
             told(false),
         ),
         bar("the same: given a name", false, 0.05, misnamed(false)),
+        bar(
+            "those of them without a near twin in an earlier set: told as unexplained",
+            true,
+            0.90,
+            Rate::of(alone_of_its_kind().map(|o| !o.unexplained.is_empty())),
+        ),
+        bar(
+            "the same: given a name",
+            false,
+            0.05,
+            Rate::of(alone_of_its_kind().map(|o| !o.wrong.is_empty())),
+        ),
         bar(
             "foreign effects of d' >= 25 that the engine was developed with or changed after: told as unexplained",
             true,

@@ -270,7 +270,11 @@ fn behind_diode(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 }
 
 /// What a series does to a mode of this pitch and half width, Hz, from the sample after on.
-fn resonating(series: &[f64], (pitch, half_width): (f64, f64), rate_hz: f64) -> Vec<f64> {
+pub(super) fn resonating(
+    series: &[f64],
+    (pitch, half_width): (f64, f64),
+    rate_hz: f64,
+) -> Vec<f64> {
     let keep = (-TAU * half_width / rate_hz).exp();
     let (sin, cos) = (TAU * pitch / rate_hz).sin_cos();
     let (mut push, mut moves) = (0.0, 0.0);

@@ -98,7 +98,7 @@ pub(super) fn one(
     Some(of_signal(stand, name, axis, &unit, wanted))
 }
 
-fn in_steps(command: f64) -> f64 {
+pub(super) fn in_steps(command: f64) -> f64 {
     (command * 255.0).round() / 255.0
 }
 

@@ -22,6 +22,7 @@ mod fourth;
 mod ninth;
 mod seventh;
 mod sixth;
+mod tenth;
 mod third;
 
 /// Share of the gain from which an effect of the library describes it.
