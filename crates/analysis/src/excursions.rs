@@ -437,7 +437,8 @@ mod tests {
 
     #[test]
     fn jumps_that_jump_back_steps_and_decays_are_none() {
-        let shapes: [(&str, f64, fn(f64) -> f64); 5] = [
+        type Shape = fn(f64) -> f64;
+        let shapes: [(&str, f64, Shape); 5] = [
             ("a jump there and back", 8.0, |_| 2.0),
             ("two jumps", 6.0, |x| if x < 0.5 { 2.0 } else { -2.0 }),
             ("a step", 300.0, |_| 3.0),
