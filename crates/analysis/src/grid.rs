@@ -492,11 +492,10 @@ fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64, turns: bo
     }
     let mut above: Vec<f64> = c[high..].iter().map(|v| v * v).collect();
     let middle = above.len() / 2;
-    // Median of chi-square(1) is 0.4549.
     let white = if above.is_empty() {
         0.0
     } else {
-        *above.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.4549
+        *above.select_nth_unstable_by(middle, f64::total_cmp).1 / crate::threshold::MEDIAN
     };
     take_off(c, drivers, low..high);
     let band = &c[low..high];

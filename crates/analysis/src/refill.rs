@@ -13,9 +13,10 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::conditional;
 use crate::grid::Target;
-use crate::likelihood::{Dct, Noise, Panel, invert};
+use crate::likelihood::{Bins, Dct, Noise, Panel, invert};
 use crate::scan::residual;
 use crate::search::{Form, Search, State, Term};
+use crate::threshold;
 
 /// Share of the readings below which what is lost makes nothing smaller that its error would show.
 const LEAST: f64 = 5e-3;
@@ -26,8 +27,6 @@ const SPECTRUM_PASSES: usize = 8;
 /// Fewest coefficients of a band of the spectrum, and its width over its frequency.
 const LEAST_BAND: usize = 32;
 const BAND_WIDTH: f64 = 0.2;
-/// Median of chi-square(1).
-const MEDIAN: f64 = 0.4549;
 
 /// Whether so many are lost of `n` that they are filled again.
 pub(crate) fn many(lost: &[usize], n: usize) -> bool {
@@ -55,7 +54,7 @@ fn by_spectrum(panel: &Panel, noise: &Noise, white: f64) -> Vec<f64> {
         let mut ratios: Vec<f64> = (start..end).map(|k| c[k] * c[k] / (white * g[k])).collect();
         let middle = ratios.len() / 2;
         let (_, median, _) = ratios.select_nth_unstable_by(middle, f64::total_cmp);
-        let ratio = (*median / MEDIAN).max(f64::MIN_POSITIVE);
+        let ratio = (*median / threshold::MEDIAN).max(f64::MIN_POSITIVE);
         bands.push(((0.5 * (start + end) as f64).ln(), ratio.ln()));
         start = end;
     }
@@ -77,7 +76,7 @@ fn by_spectrum(panel: &Panel, noise: &Noise, white: f64) -> Vec<f64> {
 pub(crate) fn first(
     channel: &str,
     dct: &Dct,
-    bins: &Rc<crate::likelihood::Bins>,
+    bins: &Rc<Bins>,
     y: &mut [f64],
     lost: &[usize],
     fit: &mut (Noise, f64),

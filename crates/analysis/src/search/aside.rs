@@ -26,8 +26,6 @@ const SMOOTH: usize = 8;
 const STRETCH: usize = 60;
 const SKIRT: f64 = 1.7;
 const FARTHEST: f64 = 0.1;
-/// Median of a chi-square of one degree.
-const MEDIAN: f64 = 0.4549;
 
 fn omega_of(t: &Term) -> Option<f64> {
     match t.form {
@@ -132,7 +130,7 @@ impl Search<'_> {
             return None;
         }
         let middle = about.len() / 2;
-        let white = *about.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN;
+        let white = *about.select_nth_unstable_by(middle, f64::total_cmp).1 / threshold::MEDIAN;
         let mean = |a: usize, b: usize| (a..b).map(scaled).sum::<f64>() / (b - a) as f64 / white;
         let (mut from, mut to) = (from, to);
         let farthest = (FARTHEST * to as f64) as usize;
