@@ -67,8 +67,8 @@ fn capture_and_board_work_on_the_pseudo_terminal_in_real_time() {
     );
     let text = std::fs::read_to_string(&out).expect("a capture");
     let rows = text.lines().filter(|line| !line.starts_with('#')).count() - 1;
-    // 3 s at 20 Hz, less what it takes to begin.
-    assert!((40..=62).contains(&rows), "{rows} samples in 3 s");
+    // 3 s at 20 Hz, less what it takes to begin, longer on a busy computer.
+    assert!((20..=62).contains(&rows), "{rows} samples in 3 s");
 
     let info = program()
         .args(["board", "--port", &port, "info"])

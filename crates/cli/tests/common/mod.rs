@@ -5,7 +5,7 @@ use std::io::{Read as _, Write as _};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -104,6 +104,8 @@ pub struct Board {
     ends: Ends,
     /// Bytes that the board is sent by somebody else.
     aside: Arc<Mutex<Vec<u8>>>,
+    /// Samples that were sent while nothing was plugged in.
+    unheard: Arc<AtomicU64>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -124,13 +126,15 @@ impl Board {
             path: Path::new(env!("CARGO_TARGET_TMPDIR")).join(name),
             ends: Arc::default(),
             aside: Arc::default(),
+            unheard: Arc::default(),
             stop: Arc::clone(&stop),
             thread: None,
         };
         board.plug();
         let (ends, aside) = (Arc::clone(&board.ends), Arc::clone(&board.aside));
+        let unheard = Arc::clone(&board.unheard);
         board.thread = Some(std::thread::spawn(move || {
-            serve(&ends, &aside, scenario, swallow, &stop);
+            serve(&ends, &aside, &unheard, scenario, swallow, &stop);
         }));
         board
     }
@@ -150,6 +154,11 @@ impl Board {
     pub fn unplug(&self) {
         let _ = std::fs::remove_file(&self.path);
         *self.ends.lock().unwrap() = None;
+    }
+
+    /// Samples that it sent while the cable was out.
+    pub fn unheard(&self) -> u64 {
+        self.unheard.load(Ordering::Relaxed)
     }
 
     /// Sends the board a command without the program's knowledge.
@@ -191,6 +200,7 @@ fn taken(list: &mut Vec<u8>, code: u8) -> bool {
 fn serve(
     ends: &Ends,
     aside: &Mutex<Vec<u8>>,
+    unheard: &AtomicU64,
     scenario: Scenario,
     swallow: Swallow,
     stop: &AtomicBool,
@@ -237,9 +247,15 @@ fn serve(
                 Some(Ok(Frame::Sample(sample))) => swallow.samples.contains(&sample.seq),
                 _ => false,
             };
-            if let (false, Some((master, _))) = (lost, &mut *ends.lock().unwrap()) {
+            match (lost, &mut *ends.lock().unwrap()) {
                 // A line that nobody reads overflows.
-                let _ = master.write_all(&frame);
+                (false, Some((master, _))) => {
+                    let _ = master.write_all(&frame);
+                }
+                (false, None) if matches!(decoded, Some(Ok(Frame::Sample(_)))) => {
+                    unheard.fetch_add(1, Ordering::Relaxed);
+                }
+                _ => {}
             }
             frame.clear();
         }
