@@ -236,7 +236,7 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         _ => Needs::default(),
     };
     let mut stand = Stand::draw(draw, seconds, rate_hz, needed);
-    let axis = draw.of_many(3);
+    let mut axis = draw.of_many(3);
     let mut unknown = None;
     match family {
         Family::Clean | Family::Elsewhere => {}
@@ -256,6 +256,7 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         Family::Pair => pair(draw, &mut stand, &mut truths),
         Family::Foreign(i) => {
             let wanted = draw.by_ratio(25.0, 40.0);
+            axis = foreign::on_axis(FOREIGN[i], axis);
             if FOREIGN[i] == "line that comes and goes" {
                 allowed.push("line");
             }

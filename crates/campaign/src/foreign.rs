@@ -11,6 +11,7 @@ use crate::strength::Meter;
 mod first;
 mod kept_back;
 mod kept_back_eighth;
+mod kept_back_eleventh;
 mod kept_back_fifth;
 mod kept_back_fourth;
 mod kept_back_ninth;
@@ -22,7 +23,7 @@ mod kept_back_third;
 mod library_share;
 
 /// The sets, in the order in which they were written.
-const SETS: [&[&str]; 10] = [
+const SETS: [&[&str]; 11] = [
     &first::NAMES,
     &kept_back::NAMES,
     &kept_back_third::NAMES,
@@ -33,6 +34,7 @@ const SETS: [&[&str]; 10] = [
     &kept_back_eighth::NAMES,
     &kept_back_ninth::NAMES,
     &kept_back_tenth::NAMES,
+    &kept_back_eleventh::NAMES,
 ];
 
 /// How many names the first of the sets have together.
@@ -60,19 +62,23 @@ pub const FOREIGN: [&str; names_in(SETS.len())] = {
     all
 };
 /// How many of them, from the first, are no longer unseen: the engine was made with 14 of them, and has been changed
-/// since it was graded on the next eight, and on the second to the ninth set kept back.
+/// since it was graded on the next eight, and on the second to the tenth set kept back.
 pub const SEEN: usize = names_in(SETS.len() - 1);
 
-/// Whether one of those that are unseen has a near twin in an earlier set.
+/// Whether one has a near twin in an earlier set, as its own set says: the two last ones do.
 #[must_use]
 pub fn has_twin(name: &str) -> bool {
-    kept_back_tenth::TWINS.iter().any(|(own, _)| *own == name)
+    kept_back_eleventh::TWINS
+        .iter()
+        .chain(&kept_back_tenth::TWINS)
+        .any(|(own, _)| *own == name)
 }
 
 /// The environment that they need.
 #[must_use]
 pub fn needs(name: &str) -> Needs {
-    kept_back_tenth::needs(name)
+    kept_back_eleventh::needs(name)
+        .or_else(|| kept_back_tenth::needs(name))
         .or_else(|| kept_back_ninth::needs(name))
         .or_else(|| kept_back_eighth::needs(name))
         .or_else(|| kept_back_seventh::needs(name))
@@ -81,6 +87,12 @@ pub fn needs(name: &str) -> Needs {
         .or_else(|| kept_back_fourth::needs(name))
         .or_else(|| kept_back_third::needs(name))
         .unwrap_or_else(|| kept_back::needs(name))
+}
+
+/// The axis that one acts on, where it cannot be any.
+#[must_use]
+pub fn on_axis(name: &str, axis: usize) -> usize {
+    kept_back_eleventh::on_axis(name, axis)
 }
 
 /// Causes of the library that are a true part of one.
@@ -94,6 +106,7 @@ pub fn parts(name: &str) -> Vec<&'static str> {
         kept_back_eighth::parts(name),
         kept_back_ninth::parts(name),
         kept_back_tenth::parts(name),
+        kept_back_eleventh::parts(name),
     ]
     .concat()
 }
@@ -197,6 +210,7 @@ fn any(
         .or_else(|| kept_back_eighth::one(draw, stand, name, axis, wanted))
         .or_else(|| kept_back_ninth::one(draw, stand, name, axis, wanted))
         .or_else(|| kept_back_tenth::one(draw, stand, name, axis, wanted))
+        .or_else(|| kept_back_eleventh::one(draw, stand, name, axis, wanted))
         .unwrap_or_else(|| first::one(draw, stand, name, axis, wanted))
 }
 

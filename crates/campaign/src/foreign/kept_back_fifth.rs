@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use super::kept_back_fourth::{about_mean, cycles};
-use super::{Foreign, extremes, of_signal};
+use super::{Foreign, extremes, of_signal, swing};
 use crate::random::Draw;
 use crate::stand::{Needs, Stand, held, wander};
 
@@ -101,15 +101,16 @@ fn dips(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
 /// A gyro's sensitivity to acceleration is trimmed away at one temperature, near the middle of its range; what the springs
 /// lose in stiffness by a degree brings it back, with one sign above and the other below.
 fn weighed(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
-    let temperature = about_mean(&stand.world.temperature[axis]);
-    let (low, high) = extremes(&temperature);
-    let trimmed = draw.between(-0.1, 0.1) * (high - low);
+    let temperature = from_trim(draw, stand, axis);
     let force = about_mean(&stand.world.acc[draw.of_many(3)]);
-    temperature
-        .iter()
-        .zip(force)
-        .map(|(t, a)| (t - trimmed) * a)
-        .collect()
+    temperature.iter().zip(force).map(|(t, a)| t * a).collect()
+}
+
+/// An axis's temperature from that at which something of it was trimmed, near the middle of its range.
+pub(super) fn from_trim(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
+    let temperature = about_mean(&stand.world.temperature[axis]);
+    let trimmed = draw.between(-0.1, 0.1) * swing(&temperature);
+    temperature.iter().map(|t| t - trimmed).collect()
 }
 
 /// A converter that steps its input up or down to one voltage has the least ripple where both are equal, and more the

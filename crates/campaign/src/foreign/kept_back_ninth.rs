@@ -94,7 +94,7 @@ pub(super) fn one(
 }
 
 /// A signal of time, s.
-fn in_time(stand: &Stand, of: impl Fn(f64) -> f64) -> Vec<f64> {
+pub(super) fn in_time(stand: &Stand, of: impl Fn(f64) -> f64) -> Vec<f64> {
     (0..stand.samples())
         .map(|i| of(i as f64 / stand.rate_hz))
         .collect()

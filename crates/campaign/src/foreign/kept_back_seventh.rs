@@ -95,18 +95,9 @@ fn slips(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         stand.rate_hz,
     );
     let force: Vec<f64> = sway.of(draw, n).iter().map(|s| rms * s).collect();
-    let mut contacts: [(f64, f64, f64); CONTACTS] =
-        std::array::from_fn(|_| (rms * draw.between(0.3, 1.5), draw.between(0.5, 1.5), 0.0));
-    let y: Vec<f64> = force
-        .iter()
-        .map(|a| {
-            let follow = |(play, weight, held): &mut (f64, f64, f64)| {
-                *held = held.clamp(a - *play, a + *play);
-                *weight * *held
-            };
-            contacts.iter_mut().map(follow).sum()
-        })
-        .collect();
+    let contacts: [(f64, f64); CONTACTS] =
+        std::array::from_fn(|_| (rms * draw.between(0.3, 1.5), draw.between(0.5, 1.5)));
+    let y = behind_plays(&force, &contacts);
     let still = if along == 2 { 1.0 } else { 0.0 };
     for (acc, a) in stand.world.acc[along].iter_mut().zip(&force) {
         *acc = still + a + 0.005 * draw.normal();
@@ -114,8 +105,23 @@ fn slips(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     without_line(&y, &force)
 }
 
+/// What follows a series, from 0, by many contacts, each after its own play and with its own weight.
+pub(super) fn behind_plays(series: &[f64], contacts: &[(f64, f64)]) -> Vec<f64> {
+    let mut held = vec![0.0f64; contacts.len()];
+    series
+        .iter()
+        .map(|a| {
+            let follow = |((play, weight), held): (&(f64, f64), &mut f64)| {
+                *held = held.clamp(a - play, a + play);
+                weight * *held
+            };
+            contacts.iter().zip(&mut held).map(follow).sum()
+        })
+        .collect()
+}
+
 /// What is left of a series when the straight line in another is taken off.
-fn without_line(y: &[f64], x: &[f64]) -> Vec<f64> {
+pub(super) fn without_line(y: &[f64], x: &[f64]) -> Vec<f64> {
     let n = y.len() as f64;
     let (my, mx) = (y.iter().sum::<f64>() / n, x.iter().sum::<f64>() / n);
     let (mut xy, mut xx) = (0.0, 0.0);
@@ -128,9 +134,8 @@ fn without_line(y: &[f64], x: &[f64]) -> Vec<f64> {
     y.iter().zip(x).map(rest).collect()
 }
 
-/// The near side of the part has the temperature at once and the far side later, and what they differ by bends it. A lamp
-/// close by is switched on and off within seconds, for what bends slowly is hidden by a random walk.
-fn gradient(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
+/// The temperatures that a lamp close by makes, which is switched on and off within seconds.
+pub(super) fn lamp(draw: &mut Draw, stand: &mut Stand) {
     let (n, rate_hz) = (stand.samples(), stand.rate_hz);
     let (room, top) = (draw.between(20.0, 30.0), draw.between(3.0, 10.0));
     let mut on = draw.chance(0.5);
@@ -144,8 +149,14 @@ fn gradient(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
         let off = draw.between(-0.5, 0.5);
         heat.iter().map(|t| t + off).collect()
     });
+}
+
+/// The near side of the part has the temperature at once and the far side later, and what they differ by bends it: by the
+/// lamp, for what bends slowly is hidden by a random walk.
+fn gradient(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
+    lamp(draw, stand);
     let near = &stand.world.temperature[axis];
-    let far = lagged(near, draw.by_ratio(0.5, 3.0), rate_hz);
+    let far = lagged(near, draw.by_ratio(0.5, 3.0), stand.rate_hz);
     near.iter().zip(far).map(|(t, f)| t - f).collect()
 }
 

@@ -152,7 +152,7 @@ pub(super) fn one(
 
 /// Commands of a rate table's programme, which the stand gets: levels held for so long, s, slow ones more often than fast
 /// ones, in either sense, and a rest now and then.
-fn programme(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64)) {
+pub(super) fn programme(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64)) {
     const RESTS: f64 = 0.25;
     stand.world.duty = held(draw, stand.samples(), stand.rate_hz, dwell_s, |d| {
         if d.chance(RESTS) {
@@ -164,15 +164,15 @@ fn programme(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64)) {
 }
 
 /// How long a programme of rates stays at one, s.
-const DWELL: (f64, f64) = (3.0, 12.0);
+pub(super) const DWELL: (f64, f64) = (3.0, 12.0);
 
 /// The table's rate over that at full duty: behind the command by the time that the motor takes to spin up.
-fn rate_of_table(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+pub(super) fn rate_of_table(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     lagged(&stand.world.duty, draw.by_ratio(0.3, 1.5), stand.rate_hz)
 }
 
 /// The angle that the table has turned by, rad, where its rate at full duty is so many turns per second.
-fn angle_of_table(rate: &[f64], full: f64, rate_hz: f64) -> Vec<f64> {
+pub(super) fn angle_of_table(rate: &[f64], full: f64, rate_hz: f64) -> Vec<f64> {
     let mut angle = 0.0;
     rate.iter()
         .map(|r| {
@@ -190,8 +190,8 @@ fn squared_rate(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     about_mean(&rate.iter().map(|r| sign * r * r).collect::<Vec<f64>>())
 }
 
-/// Rectification (g^2 of IEEE Std 528): the square of the acceleration along a level axis, whose vibration swells and fades.
-fn squared_acceleration(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+/// Vibration along a level axis, told, that swells and fades.
+pub(super) fn swelling(draw: &mut Draw, stand: &mut Stand) -> usize {
     const RAIL_G: f64 = 1.9;
     let (usual, tau) = (draw.by_ratio(0.1, 0.4), draw.by_ratio(10.0, 60.0));
     let swell = wander(draw, stand.samples(), stand.rate_hz, 0.5, tau);
@@ -200,6 +200,12 @@ fn squared_acceleration(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         .iter()
         .map(|s| (usual * s.exp() * draw.normal()).clamp(-RAIL_G, RAIL_G))
         .collect();
+    level
+}
+
+/// Rectification (g^2 of IEEE Std 528): the square of the acceleration along a level axis, whose vibration swells and fades.
+fn squared_acceleration(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let level = swelling(draw, stand);
     let square: Vec<f64> = stand.world.acc[level].iter().map(|a| a * a).collect();
     let sign = draw.sign();
     about_mean(&square).iter().map(|s| sign * s).collect()
@@ -363,7 +369,7 @@ fn wobble(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     pub(super) fn stand(index: u64) -> (Draw, Stand) {
@@ -377,7 +383,7 @@ mod tests {
     }
 
     /// Largest change from one sample to the next.
-    pub(super) fn largest_change(y: &[f64]) -> f64 {
+    pub(in super::super) fn largest_change(y: &[f64]) -> f64 {
         y.windows(2)
             .map(|w| (w[1] - w[0]).abs())
             .fold(0.0, f64::max)

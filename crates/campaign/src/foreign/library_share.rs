@@ -17,6 +17,7 @@ use crate::strength::{Meter, of_variance};
 
 mod codes;
 mod eighth;
+mod eleventh;
 mod fifth;
 mod fourth;
 mod ninth;

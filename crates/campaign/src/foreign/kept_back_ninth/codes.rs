@@ -207,7 +207,7 @@ pub(in super::super) fn of_next(stand: &Stand, axis: usize, chance: f64, next: &
 }
 
 /// Readings that with some chance are what `next` makes of the reading before and the code.
-fn by_chance(
+pub(in super::super) fn by_chance(
     stand: &Stand,
     name: &'static str,
     axis: usize,

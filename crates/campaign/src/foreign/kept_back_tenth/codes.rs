@@ -23,28 +23,39 @@ pub(super) fn one(
         "slew limit of the output stage" => return Some(slew(stand, name, axis, wanted)),
         _ => return None,
     };
+    Some(by_stage(stand, name, axis, wanted, &stage))
+}
+
+/// A stage of the size that is as strong as wanted.
+pub(in super::super) fn by_stage(
+    stand: &Stand,
+    name: &'static str,
+    axis: usize,
+    wanted: f64,
+    stage: &dyn Fn(f64) -> Stage,
+) -> Foreign {
     let strength = |size: f64| stage(size).strength(stand, axis);
     let size = size_for(wanted, &strength);
-    Some(Foreign {
+    Foreign {
         name,
         strength: strength(size),
         change: stage(size).change(axis),
-    })
+    }
 }
 
 /// A stage whose output is a straight line of its input on each side of two thresholds and between them, counts.
 #[derive(Clone, Copy, Debug)]
 pub(in super::super) struct Stage {
     /// Zero rate.
-    zero: f64,
+    pub(in super::super) zero: f64,
     /// The thresholds are this far from it.
-    threshold: f64,
+    pub(in super::super) threshold: f64,
     /// Gain between them.
-    inside: f64,
+    pub(in super::super) inside: f64,
     /// Gain beyond.
-    beyond: f64,
+    pub(in super::super) beyond: f64,
     /// What comes out just beyond them, from zero.
-    from: f64,
+    pub(in super::super) from: f64,
 }
 
 impl Stage {
@@ -109,7 +120,7 @@ impl Stage {
 }
 
 /// Zero rate of a stage, counts: not quite that of the part.
-fn zero_of(draw: &mut Draw, stand: &Stand, axis: usize) -> f64 {
+pub(in super::super) fn zero_of(draw: &mut Draw, stand: &Stand, axis: usize) -> f64 {
     let sigma = stand.white(axis).sqrt();
     (stand.bias[axis] + sigma * draw.between(-0.7, 0.7)) / LSB
 }

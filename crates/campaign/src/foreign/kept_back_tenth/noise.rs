@@ -72,7 +72,7 @@ fn quantised(
 }
 
 /// Noise whose variance is 1 at rest, and more by a shape.
-fn by_law(name: &'static str, shape: &[f64], wanted: f64) -> Foreign {
+pub(in super::super) fn by_law(name: &'static str, shape: &[f64], wanted: f64) -> Foreign {
     let law = |size: f64| -> Vec<f64> { shape.iter().map(|s| 1.0 + size * s).collect() };
     let size = size_for(wanted, &|size| of_variance(&law(size)));
     let law = law(size);

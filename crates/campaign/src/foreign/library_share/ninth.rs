@@ -1,9 +1,8 @@
 //! The ninth set against the library, a sum of two of its effects included.
 
 use super::super::kept_back_fourth::about_mean;
-use super::super::kept_back_fourth::codes::{law, long_run};
 use super::super::kept_back_ninth::{NAMES, codes, noise};
-use super::codes::{by_neighbours, hold_codes, hold_steps};
+use super::codes::{by_neighbours, hold_codes, hold_next};
 use super::*;
 
 /// Those whose shape is a signal that could be known.
@@ -74,7 +73,6 @@ fn neither_a_filter_nor_stale_samples_describe_the_codes_of_the_ninth_set() {
     for index in 0..DRAWS {
         let draw = &mut Draw::of(20_261_122, 96, index);
         let stand = stand(draw, NAMES[0]);
-        let (first, even) = law(&stand, 0);
         let fault = codes::repeated(codes::fault_of(draw, &stand, 0));
         let all: [(&str, &codes::Next); 4] = [
             ("low bits that a latch keeps", &codes::latched(1)),
@@ -83,13 +81,7 @@ fn neither_a_filter_nor_stale_samples_describe_the_codes_of_the_ninth_set() {
             ("code taken for a fault", &fault),
         ];
         for (name, next) in all {
-            let of = |chance: f64| codes::of_next(&stand, 0, chance.min(1.0), next);
-            let chance = crate::strength::size_for(25.0, &of);
-            println!("{name}: chance {chance:.2}");
-            assert!(chance < 1.0, "{name}");
-            let steps = codes::steps_of(&stand, 0, chance, next);
-            let shares = long_run(&steps, &even);
-            hold_steps(name, &stand, first, &steps, &shares);
+            let (first, _, shares) = hold_next(name, &stand, next);
             if name == "code taken for a fault" {
                 hold_codes(name, &stand, first, &shares);
             }

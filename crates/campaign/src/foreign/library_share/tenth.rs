@@ -2,11 +2,9 @@
 
 use super::super::kept_back::shaped;
 use super::super::kept_back_fourth::codes::{law, long_run};
-use super::super::kept_back_tenth::codes::{
-    Stage, dead_zone, limit_of, of_limit, ranges, steps_of_limit,
-};
+use super::super::kept_back_tenth::codes::{dead_zone, limit_of, of_limit, ranges, steps_of_limit};
 use super::super::kept_back_tenth::{NAMES, noise};
-use super::codes::{hold_codes, hold_steps};
+use super::codes::{hold_stage, hold_steps};
 use super::*;
 
 /// Those whose shape is a signal that could be known, the narrow band's as it came out included.
@@ -39,6 +37,23 @@ fn no_law_of_variance_of_the_library_describes_those_of_the_tenth_set() {
     }
 }
 
+/// A process of this density beside the noise of an axis 0, of 25, against every process of the library.
+pub(super) fn hold_beside(name: &str, stand: &Stand, density: &dyn Fn(f64) -> f64) {
+    let meter = Meter::new(stand, 0);
+    let of = |variance: f64| -> Vec<f64> {
+        let one = |w: &f64| variance * density(*w);
+        meter.omega().iter().map(one).collect()
+    };
+    let variance = crate::strength::size_for(25.0, &|v| meter.of_density(&of(v)));
+    let beside = |w: f64| 1.0 + variance * density(w) / stand.white(0);
+    let expected = spectrum(stand, 0, &beside, &[]);
+    let own = saturated(stand, &expected);
+    for effect in EFFECTS {
+        let share = of_process(stand, 0, &expected, own, *effect);
+        hold(name, effect.id(), share);
+    }
+}
+
 #[test]
 fn no_process_of_the_library_describes_the_noise_of_the_tenth_set() {
     for index in 0..DRAWS {
@@ -48,20 +63,7 @@ fn no_process_of_the_library_describes_the_noise_of_the_tenth_set() {
         hold_noise(name, &stand, 0, &|w| 1.0 + noise::by_difference(1.0, w));
         let name = "narrow band that a fan drives";
         let mode = (draw.by_ratio(0.8, 8.5), draw.by_ratio(0.05, 0.4));
-        let meter = Meter::new(&stand, 0);
-        let of = |variance: f64| -> Vec<f64> {
-            let density = |w: &f64| variance * noise::of_mode(mode, stand.rate_hz, *w);
-            meter.omega().iter().map(density).collect()
-        };
-        let variance = crate::strength::size_for(25.0, &|v| meter.of_density(&of(v)));
-        let white = stand.white(0);
-        let beside = |w: f64| 1.0 + variance * noise::of_mode(mode, stand.rate_hz, w) / white;
-        let expected = spectrum(&stand, 0, &beside, &[]);
-        let own = saturated(&stand, &expected);
-        for effect in EFFECTS {
-            let share = of_process(&stand, 0, &expected, own, *effect);
-            hold(name, effect.id(), share);
-        }
+        hold_beside(name, &stand, &|w| noise::of_mode(mode, stand.rate_hz, w));
     }
 }
 
@@ -97,18 +99,10 @@ fn no_bit_rail_filter_or_stale_sample_describes_the_readings_of_the_tenth_set() 
     for index in 0..DRAWS {
         let draw = &mut Draw::of(20_261_122, 105, index);
         let stand = stand(draw, NAMES[0]);
-        let hold_stage = |name: &str, stage: &dyn Fn(f64) -> Stage| {
-            let of = |size: f64| stage(size).strength(&stand, 0);
-            let size = crate::strength::size_for(25.0, &of);
-            println!("{name}: {:?}", stage(size));
-            let (first, read) = stage(size).law(&stand, 0);
-            hold_codes(name, &stand, first, &read);
-        };
-        hold_stage("dead zone about zero rate", &dead_zone(draw, &stand, 0));
-        hold_stage(
-            "other gain and offset beyond a rate",
-            &ranges(draw, &stand, 0),
-        );
+        let dead = dead_zone(draw, &stand, 0);
+        hold_stage("dead zone about zero rate", &stand, &dead);
+        let beyond = ranges(draw, &stand, 0);
+        hold_stage("other gain and offset beyond a rate", &stand, &beyond);
         let name = "slew limit of the output stage";
         let of = |steep: f64| of_limit(&stand, 0, limit_of(steep));
         let limit = limit_of(crate::strength::size_for(25.0, &of));
