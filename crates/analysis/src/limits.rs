@@ -252,9 +252,11 @@ fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smalle
         Hypothesis::Shaped(shape) => {
             let (place, columns) = c.grid().get(c.grid().len() / 2)?;
             let parameter = shape.columns(*place).first()?.parameter;
-            let wanted = strength_for(threshold::shaped(1));
+            let (first, rest) = columns.split_first()?;
+            let wanted = strength_for(threshold::shaped(columns.len()));
+            let size = meter.column(&[own.as_slice(), rest].concat(), *first, wanted)?;
             Some(Smallest {
-                coefficients: vec![meter.column(&own, *columns.first()?, wanted)?],
+                coefficients: vec![size],
                 location: vec![*place],
                 names: vec![parameter],
                 parameter,

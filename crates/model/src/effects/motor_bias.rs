@@ -24,6 +24,7 @@ impl Effect for MotorBias {
             parameter("at_full_duty", "deg/s", "shift at full duty, once the motor has its speed"),
             optional("while_turning", "deg/s", "shift beyond that while the motor turns forward, the opposite backward: the current that friction takes"),
             optional("surge_at_full_duty", "deg/s", "shift beyond that right after a step from standstill to full duty"),
+            optional("surge_at_start", "deg/s", "shift at the start beyond that: the motor did not have its speed yet"),
             optional("surge_time", "s", "time in which the surge falls to 1/e: the motor's mechanical time constant"),
             optional("by_magnitude", "1", "1 where the shift follows |duty|, else it follows the sign too"),
         ];
@@ -33,7 +34,7 @@ impl Effect for MotorBias {
     fn docs(&self) -> Docs {
         Docs {
             title: "Motor shifts the bias",
-            physics: "b(t) = at_full_duty x duty, or x |duty| where both directions are driven and the magnitude fits better: magnetic field or ground shift of the motor current. Current surges until the motor has spun up: with w' = (duty - w) / surge_time, surge_at_full_duty x (duty - w) is added. Dry friction takes the same current at any speed: while_turning x sign(duty).",
+            physics: "b(t) = at_full_duty x duty, or x |duty| where both directions are driven and the magnitude fits better: magnetic field or ground shift of the motor current. Current surges until the motor has spun up: with w' = (duty - w) / surge_time, surge_at_full_duty x (duty - w) is added, and surge_at_start x exp(-t / surge_time) where the record begins while it does. Dry friction takes the same current at any speed: while_turning x sign(duty).",
             excitation: "A motor command that changes, while the axis itself does not turn.",
             test: "Least squares on the command, and on the surge over a grid of times, refined; random walk refitted.",
             figure: "Rate in time blocks against duty.",
@@ -106,13 +107,16 @@ impl Effect for MotorBias {
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let full = value(parameters, "at_full_duty");
         let (surge, time) = (value(parameters, "surge_at_full_duty"), value(parameters, "surge_time"));
+        let start = value(parameters, "surge_at_start");
         let by_size = value(parameters, "by_magnitude") != 0.0;
         let extra = (surge != 0.0 && time > 0.0).then(|| lagging(&simulation.duty, time * simulation.rate_hz));
+        let first = (start != 0.0 && time > 0.0).then(|| settling(simulation.duty.len(), time * simulation.rate_hz));
         for &axis in channels {
             for (i, (rate, d)) in simulation.rate[axis].iter_mut().zip(&simulation.duty).enumerate() {
                 *rate += full * if by_size { d.abs() } else { *d };
                 *rate += value(parameters, "while_turning") * direction(*d);
                 *rate += surge * extra.as_ref().map_or(0.0, |e| e[i]);
+                *rate += start * first.as_ref().map_or(0.0, |f| f[i]);
             }
         }
     }
@@ -154,6 +158,13 @@ fn lagging(duty: &[f64], tau: f64) -> Vec<f64> {
         .collect()
 }
 
+/// What is left of a surge of 1 at the first sample's beginning, averaged over each sample.
+fn settling(samples: usize, tau: f64) -> Vec<f64> {
+    let keep = (-1.0 / tau).exp();
+    let first = tau * (1.0 - keep);
+    std::iter::successors(Some(first), |s| Some(s * keep)).take(samples).collect()
+}
+
 /// The surge, by its time.
 struct Surge {
     duty: Vec<f64>,
@@ -172,7 +183,13 @@ impl Shape for Surge {
     }
 
     fn columns(&self, at: f64) -> Vec<Column> {
-        vec![Column { parameter: "surge_at_full_duty", values: lagging(&self.duty, at * self.rate_hz) }]
+        let tau = at * self.rate_hz;
+        let mut all = vec![Column { parameter: "surge_at_full_duty", values: lagging(&self.duty, tau) }];
+        // A motor that is driven from the first sample on may have been switched on just before.
+        if self.duty.first().is_some_and(|d| *d != 0.0) {
+            all.push(Column { parameter: "surge_at_start", values: settling(self.duty.len(), tau) });
+        }
+        all
     }
 }
 
