@@ -26,7 +26,7 @@ use crate::result::{
 };
 use crate::search::{Note, Search, State};
 use crate::{
-    adequacy, beyond, dead, doubt, evidence, law, limits, losses, refill, rows, scan, slow,
+    adequacy, beyond, dead, doubt, events, evidence, law, limits, losses, refill, rows, scan, slow,
     threshold,
 };
 
@@ -115,6 +115,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     grid.dct.forget();
     let mut findings = sticking;
     findings.extend(losses::findings(&audited, &searched, &grid));
+    let mut findings = turning(findings, &grid);
     let mut scale_not_tested = vec![];
     let mut smallest = std::mem::take(&mut audited.limits);
     let mut checks: Vec<Check> = searched
@@ -126,21 +127,14 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     let mut nearest = vec![];
     let mut doubts = vec![];
     for s in &searched {
-        findings.extend(motion_findings(s, &grid));
         let failing = |id: &str| {
             let all = checks.iter().chain(&audited.checks);
             let mut own = all.filter(|c| c.channel == s.target.name && c.id == id);
             own.any(|c| c.fails_after)
         };
-        if failing("kurtosis") {
-            // Single far readings of a noise whose bulk is not normal are its tails.
-            let tails =
-                |f: &Finding| f.cause == "outliers" && f.channels == [s.target.name.as_str()];
-            doubts.extend(findings.extract_if(.., |f| tails(f)).map(|f| Unexplained {
-                channel: s.target.name.clone(),
-                what: format!("noise with tails: {}", f.what),
-            }));
-        }
+        let (moved, told) = motion_findings(s, &grid, &failing);
+        findings.extend(moved);
+        doubts.extend(told);
         let of_terms = term_findings(s, &grid, options.seed);
         // What an axis takes from another one later has a spectrum, and is no process of its own.
         let late = shared.late.iter().filter(|l| l.0 == s.target.name);
@@ -153,6 +147,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         });
         let variance = variance_finding(s).filter(|_| !by_counts);
         let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance, &failing, late);
+        doubts.extend(events::hold_outliers(s, &kept, &mut findings, &failing));
         findings.extend(kept);
         nearest.extend(doubted);
         doubts.extend(told);
@@ -204,7 +199,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         let of = |n: &NotTested| n.cause == l.cause && n.why.starts_with(&here);
         !audited.not_tested.iter().any(of)
     });
-    let findings = complete(joined(loud(blows(turning(findings, &grid)))));
+    let findings = complete(joined(loud(blows(findings))));
     let mut not_tested = not_tested(&searched);
     not_tested.extend(scale_not_tested);
     not_tested.extend(audited.not_tested);

@@ -217,6 +217,8 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
     };
     let miscoded = failing("fine_codes") || failing("foretold");
     let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
+    // Beside a wander that is not the process it was told as, a step is as likely a piece of that.
+    let unlike_step = |t: &Term| unlike && matches!(t.form, Form::Step(..));
     let by_power_law = |filter: bool| s.state.power_law.is_some_and(|p| p.filter || !filter);
     // Of a longer record it counts by what one of that length would show.
     let bent = (late + bent(s, failing)) * (checks::RECORD / n).min(1.0);
@@ -301,7 +303,11 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
                 Doubt::No
             } else if let Some(name) = beside_swing(t) {
                 Doubt::Beside(name)
-            } else if there || unlawful(t) || generic(t) && (crowd || misplaced(t)) {
+            } else if there
+                || unlawful(t)
+                || unlike_step(t)
+                || generic(t) && (crowd || misplaced(t))
+            {
                 Doubt::Checks
             } else if let Some((id, share)) = remainder(t).filter(|_| generic(t) && line.is_none())
             {

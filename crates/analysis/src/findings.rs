@@ -10,10 +10,10 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::diagnosis::{Searched, VarianceFound};
 use crate::grid::Grid;
-use crate::result::{Alternative, DetectionLimit, Finding, Gain};
+use crate::result::{Alternative, DetectionLimit, Finding, Gain, Unexplained};
 use crate::search::Form;
 use crate::transform::Dct;
-use crate::{evidence, gain, limits, scale, scan, threshold};
+use crate::{events, evidence, gain, limits, scale, scan, threshold};
 
 pub(crate) fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {
     let first = alternatives.first()?;
@@ -254,11 +254,16 @@ fn peak_rate(dct: &Dct, y: &[f64], white: f64, rate_hz: f64) -> (f64, f64) {
     (peak - raised, spread.sqrt().hypot(0.5 * raised))
 }
 
-pub(crate) fn motion_findings(s: &Searched<'_>, grid: &Grid) -> Vec<Finding> {
+/// What the base did, and what is no turn of it after all.
+pub(crate) fn motion_findings(
+    s: &Searched<'_>,
+    grid: &Grid,
+    failing: &dyn Fn(&str) -> bool,
+) -> (Vec<Finding>, Vec<Unexplained>) {
     let candidates = &mut s.search.candidates.iter();
     let of = candidates.find(|c| matches!(c.hypothesis, Hypothesis::Motion));
     let Some(of) = of.map(|c| c.effect) else {
-        return vec![];
+        return (vec![], vec![]);
     };
     let name = &s.target.name;
     let finding = |peak: (f64, f64), location: Vec<(f64, f64)>, what: String| Finding {
@@ -273,22 +278,31 @@ pub(crate) fn motion_findings(s: &Searched<'_>, grid: &Grid) -> Vec<Finding> {
         }),
         ..Finding::default()
     };
-    let turned = s.target.excursions.iter().map(|e| {
+    let (mut all, mut told) = (vec![], vec![]);
+    for e in &s.target.excursions {
         let [from, to] = [e.samples.start, e.samples.end].map(|i| i as f64 / grid.rate_hz);
-        let what = format!(
-            "turns about {name} from {from:.1} to {to:.1} s, by up to {:.2} deg/s, and is back at rest",
+        let seen = format!(
+            "from {from:.1} to {to:.1} s, by up to {:.2} deg/s",
             e.peak.0
         );
-        finding(e.peak, [from, to].map(|t| (t, e.end_error / grid.rate_hz)).to_vec(), what)
-    });
-    let mut all: Vec<Finding> = turned.collect();
+        let Some(why) = events::no_turn(s, e, failing) else {
+            let what = format!("turns about {name} {seen}, and is back at rest");
+            let ends = [from, to].map(|t| (t, e.end_error / grid.rate_hz));
+            all.push(finding(e.peak, ends.to_vec(), what));
+            continue;
+        };
+        told.push(Unexplained {
+            channel: name.clone(),
+            what: format!("goes out and comes back {seen}: no turn of the base, for {why}"),
+        });
+    }
     if s.target.moving && grid.base != Some(Base::Turntable) {
         let peak = peak_rate(&grid.dct, &s.target.y, s.target.white, grid.rate_hz);
         let rms = s.target.motion_rms;
         let what = format!("moves about {name}: {rms:.2} deg/s rms between 0.02 and 0.6 Hz");
         all.push(finding(peak, vec![], what));
     }
-    all
+    (all, told)
 }
 
 /// Far readings while the base turns are its motion.
@@ -301,33 +315,48 @@ pub(crate) fn turning(mut findings: Vec<Finding>, grid: &Grid) -> Vec<Finding> {
         let i = (t * grid.rate_hz) as usize;
         turns.iter().any(|turn| turn.contains(&i))
     };
-    findings
-        .retain(|f| f.cause != "outliers" || f.times_s.is_empty() || !f.times_s.iter().all(within));
+    findings.retain_mut(|f| {
+        let before = f.times_s.len();
+        if f.cause != "outliers" || before == 0 {
+            return true;
+        }
+        f.times_s.retain(|t| !within(t));
+        let lost = before - f.times_s.len();
+        if let Some(count) = f.parameters.get_mut("count") {
+            count.value -= lost as f64;
+        }
+        !f.times_s.is_empty()
+    });
     findings
 }
 
 /// Longest that a blow lasts that shifts a bias, s: far readings within it of the step are the blow itself.
 const BLOW_S: f64 = 1.0;
 
+/// When a bias steps, s, where a finding says so.
+pub(crate) fn step_at(f: &Finding) -> Option<f64> {
+    let time = f.parameters.get("time").map(|p| p.value);
+    time.filter(|_| f.cause == "bias_step")
+}
+
+/// Whether the far readings of a finding lie all at a step at that time, s.
+pub(crate) fn blow_of(f: &Finding, at: f64) -> bool {
+    !f.times_s.is_empty() && f.times_s.iter().all(|t| (t - at).abs() < BLOW_S)
+}
+
 /// Far readings that lie all at a step of the same channel are told with the step, not as a cause of their own.
 pub(crate) fn blows(mut findings: Vec<Finding>) -> Vec<Finding> {
-    let step = |f: &Finding| f.parameters.get("time").map(|p| p.value);
-    let steps: Vec<(String, f64)> = findings
-        .iter()
-        .filter(|f| f.cause == "bias_step")
-        .filter_map(|f| Some((f.channels.first()?.clone(), step(f)?)))
+    let steps: Vec<(String, f64)> = (findings.iter())
+        .filter_map(|f| Some((f.channels.first()?.clone(), step_at(f)?)))
         .collect();
     for (channel, at) in steps {
         let of_it = |f: &mut Finding| {
-            f.cause == "outliers"
-                && f.channels == [channel.as_str()]
-                && !f.times_s.is_empty()
-                && f.times_s.iter().all(|t| (t - at).abs() < BLOW_S)
+            f.cause == "outliers" && f.channels == [channel.as_str()] && blow_of(f, at)
         };
         let blow: Vec<Finding> = findings.extract_if(.., of_it).collect();
         let own = findings
             .iter_mut()
-            .find(|f| f.cause == "bias_step" && f.channels[0] == channel && step(f) == Some(at));
+            .find(|f| f.channels[0] == channel && step_at(f) == Some(at));
         if let Some(f) = own.filter(|_| !blow.is_empty()) {
             let count: usize = blow.iter().map(|b| b.times_s.len()).sum();
             f.what = format!(

@@ -52,6 +52,8 @@ pub struct Target {
     pub lost: Vec<usize>,
     /// Places whose reading the noise cannot have made.
     pub spikes: Vec<usize>,
+    /// Places whose reading is not believed, and what was read there.
+    pub aside: Vec<(usize, f64)>,
     /// Turns of the base that it felt, taken out of `y` as lost readings are.
     pub excursions: Vec<Excursion>,
     /// Excess rms in the band of base motion, deg/s.
@@ -288,6 +290,14 @@ pub fn lay_out(
         } else {
             spikes(&given, &mut y, &mut c, &mut fit, &dct, &bins, &mut rng)
         };
+        let of_audit = masked(&channel.name).into_iter();
+        let of_audit = of_audit.filter_map(|row| {
+            let given = channel.values.get(row).filter(|v| v.is_finite())?;
+            Some((*places.get(row)?, given * scale))
+        });
+        let aside = of_audit
+            .chain(spikes.iter().map(|i| (*i, given[*i])))
+            .collect();
         let lost = [lost, spikes.clone()].concat();
         if motion_rms <= MOTION_RMS {
             c = crate::refill::first(&channel.name, &dct, &bins, &mut y, &lost, &mut fit);
@@ -308,6 +318,7 @@ pub fn lay_out(
             coefficients: c,
             lost,
             spikes,
+            aside,
             excursions: own.clone(),
             motion_rms,
             moving: motion_rms > MOTION_RMS,
@@ -431,7 +442,7 @@ fn spikes(
 }
 
 /// Distance in sigma that one of `n` samples reaches once in 10^5 records.
-fn spike_limit(n: usize) -> f64 {
+pub(crate) fn spike_limit(n: usize) -> f64 {
     let tail =
         |z: f64| (n as f64 * crate::checks::normal_tail(z)).ln() - crate::checks::LEAST_CHANCE.ln();
     crate::optimise::golden(&|z| tail(z).abs(), 4.0, 12.0, 40)

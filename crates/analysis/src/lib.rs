@@ -22,6 +22,7 @@ mod doubt;
 pub mod edf;
 pub mod error;
 pub mod estimate;
+mod events;
 mod evidence;
 mod excursions;
 mod findings;
