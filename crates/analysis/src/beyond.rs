@@ -28,9 +28,9 @@ const LAG_S: f64 = 40.0;
 /// Plays of a hysteresis, as shares of the swing.
 const PLAYS: [f64; 2] = [0.3, 0.7];
 /// Smallest changes that a combination is made of: degC, counts of the motor command, V, m/s^2 rms.
-const LEAST_TEMPERATURE: f64 = 0.5;
-const LEAST_COMMAND: f64 = 8.0;
-const LEAST_SUPPLY: f64 = 5e-3;
+pub(crate) const LEAST_TEMPERATURE: f64 = 0.5;
+pub(crate) const LEAST_COMMAND: f64 = 8.0;
+pub(crate) const LEAST_SUPPLY: f64 = 5e-3;
 const LEAST_VIBRATION: f64 = 0.15;
 
 fn centred(values: &[f64]) -> Vec<f64> {
@@ -49,7 +49,8 @@ fn slope(values: &[f64], reach: usize) -> Vec<f64> {
         .collect()
 }
 
-fn lagged(values: &[f64], tau: f64) -> Vec<f64> {
+/// A signal behind a lag of `tau` samples.
+pub(crate) fn lagged(values: &[f64], tau: f64) -> Vec<f64> {
     let gain = 1.0 - (-1.0 / tau).exp();
     let mut y = values.first().copied().unwrap_or(0.0);
     values

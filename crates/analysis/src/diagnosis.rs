@@ -26,8 +26,8 @@ use crate::result::{
 };
 use crate::search::{Note, Search, State};
 use crate::{
-    adequacy, beyond, dead, doubt, events, evidence, law, limits, losses, refill, rows, scan, slow,
-    threshold,
+    adequacy, beyond, dead, doubt, events, evidence, law, limits, losses, refill, rows, scan,
+    short_time, slow, threshold,
 };
 
 /// Options of [`diagnose`].
@@ -469,6 +469,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
             },
         })
         .chain(claims)
+        .chain(short_time::checks(s))
         .chain(slow::check(s))
         .collect()
 }

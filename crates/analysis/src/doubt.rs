@@ -19,7 +19,7 @@ use crate::result::{Finding, Unexplained};
 use crate::search::{Form, Term};
 use std::f64::consts::PI;
 
-use crate::{adequacy, beyond, law};
+use crate::{adequacy, beyond, law, short_time};
 
 /// Share of a term's energy in bands that fail, from which on the failure is the term's.
 const SHARE: f64 = 0.25;
@@ -216,6 +216,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
         repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
     };
     let miscoded = failing("fine_codes") || failing("foretold");
+    let followed_by_noise = short_time::IDS.iter().any(|id| failing(id));
     let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
     // Beside a wander that is not the process it was told as, a step is as likely a piece of that.
     let unlike_step = |t: &Term| unlike && matches!(t.form, Form::Step(..));
@@ -279,13 +280,17 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
                 } else {
                     0.0
                 };
-                within(&crowds, omega) || harmonic(omega) || 2.0 * about.max(beside) > LEFT * t.lr
+                within(&crowds, omega)
+                    || harmonic(omega)
+                    || failing(short_time::ORDER)
+                    || 2.0 * about.max(beside) > LEFT * t.lr
             } else if let Form::Covariance(process, theta) = &t.form {
                 let own = process.density(theta, &panel.bins.at);
                 let information = own.iter().zip(&g).zip(&counts);
                 let information = information.map(|((d, g), m)| m * (d / g).powi(2));
                 let filter = process.filters_white();
                 by_power_law(filter)
+                    || followed_by_noise
                     || unlike && !filter
                     || repeats.is_some()
                     || bent > LEFT * t.lr
@@ -319,6 +324,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
         .collect();
     let variance = failing("variance_in_time")
         || failing(adequacy::VARIANCE_CLAIM)
+        || followed_by_noise
         || failing("kurtosis")
         || crowd
         || if places.is_empty() {

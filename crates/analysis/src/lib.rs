@@ -51,6 +51,7 @@ pub mod scale;
 pub mod scan;
 pub mod search;
 pub mod separate;
+mod short_time;
 mod slow;
 mod staircase;
 pub mod synthetic;

@@ -29,6 +29,7 @@ use std::collections::BTreeMap;
 use model::record::{Channel, Quantity, Record};
 
 use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter, Unexplained};
+use crate::short_time;
 use local::Local;
 
 /// Chance of a false alarm of one audit on one channel.
@@ -122,6 +123,8 @@ impl Audit {
                 "three_readings",
                 "neighbours",
                 "variance_rhythm",
+                short_time::COLOUR,
+                short_time::LEANING,
             ],
             channel,
             by,
@@ -139,6 +142,7 @@ impl Audit {
                 "bicovariance",
                 "three_readings",
                 "neighbours",
+                short_time::LEANING,
             ];
             self.suppress(&ids, channel, by);
             return;

@@ -13,6 +13,7 @@ use super::repeats::smallest_step;
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::adequacy::VARIANCE_CLAIM;
 use crate::audit::local::{Levels, Local};
+use crate::short_time;
 
 /// What explains the checks that rounding makes fail.
 pub(super) const STEP: &str = "the step of the converter";
@@ -200,7 +201,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         return;
     };
     if rounded.explains_tails {
-        audit.suppress(&["kurtosis", "skewness"], name, STEP);
+        audit.suppress(&["kurtosis", "skewness", short_time::LEANING], name, STEP);
     }
     let [least, largest] = rounded.variances;
     if largest - least > SWINGS {
@@ -212,6 +213,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             "neighbours",
             "variance_rhythm",
             "variance_follows",
+            short_time::COLOUR,
             VARIANCE_CLAIM,
         ];
         audit.suppress(&ids, name, STEP);

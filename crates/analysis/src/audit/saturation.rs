@@ -12,6 +12,7 @@ use super::bits::Shape;
 use super::{Audit, FALSE_ALARM, Gyro, tails};
 use crate::audit::local::Levels;
 use crate::result::Finding;
+use crate::short_time;
 
 /// Chance of the pile on the last code that light tails may have.
 const PILE: f64 = 1e-2;
@@ -182,7 +183,14 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
     finding.what.push_str(unknown);
     audit.findings.push(finding);
     audit.suppress(
-        &["stuck_bit", "stale_samples", "kurtosis", "skewness"],
+        &[
+            "stuck_bit",
+            "stale_samples",
+            "kurtosis",
+            "skewness",
+            short_time::COLOUR,
+            short_time::LEANING,
+        ],
         name,
         "saturation",
     );
