@@ -18,13 +18,14 @@ use std::f64::consts::PI;
 use model::effect::Hypothesis;
 
 use crate::checks::{
-    Outcome, chi_tail, errors_of_sum, kurtosis_score, normal_tail, whitened_by_spectrum,
+    Outcome, chi_tail, errors_of_sum, kurtosis_score, normal_tail, variance_rhythm,
+    whitened_by_spectrum,
 };
 use crate::column::dot;
 use crate::diagnosis::{Searched, VarianceFound};
 use crate::law::DEPARTURE;
 use crate::likelihood::{Bins, Noise, Panel};
-use crate::search::{Form, Search, State};
+use crate::search::{Form, Search, State, Term};
 
 /// The claims.
 pub(crate) const CLAIMS: [&str; 5] = [
@@ -34,6 +35,9 @@ pub(crate) const CLAIMS: [&str; 5] = [
     "process_levels",
     "process_dwells",
 ];
+/// The claim of every stationary process, filters among them: neither its variance nor how its neighbours depend on each other
+/// has a rhythm, as what is held, bridged or switched by a clock of its own has.
+pub(crate) const STATIONARY_CLAIM: &str = "process_rhythm";
 /// The claim of a law of the variance.
 pub(crate) const VARIANCE_CLAIM: &str = "variance_law";
 /// Chance below which a claim fails. It is weighed only where a process is named, not on every record.
@@ -82,6 +86,21 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<Outcome> {
         }
     }
     all
+}
+
+/// Whether a channel that was told as a stationary, Gaussian process is stationary from reading to reading.
+pub(crate) fn stationary(s: &Searched<'_>) -> Option<Outcome> {
+    let is_one = |t: &Term| {
+        let hypothesis = &s.search.candidates[t.candidate].hypothesis;
+        matches!(t.form, Form::Covariance(..)) && matches!(hypothesis, Hypothesis::Covariance(_))
+    };
+    let term = s.state.terms.iter().find(|t| is_one(t))?;
+    let rhythm = variance_rhythm(&s.e, s.search.view.rate_hz);
+    Some(Outcome {
+        id: STATIONARY_CLAIM,
+        what: format!("told as {}: {}", term.effect.id(), rhythm.what),
+        ..rhythm
+    })
 }
 
 /// Half cycles of the cosines that a changed variance is held against.

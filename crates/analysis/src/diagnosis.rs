@@ -429,6 +429,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
     };
     // Before a process was named nothing was claimed of it.
     let claims = adequacy::of_processes(&s.search, &s.state);
+    let claims = claims.into_iter().chain(adequacy::stationary(s));
     let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
     let variance = s.variance.iter().flat_map(|v| {
         let (rate_hz, id) = (s.search.view.rate_hz, v.effect.id());
@@ -440,7 +441,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
         .chain(adequacy::either_sign(s, v))
     });
     let laws = laws.chain(variance);
-    let claims = claims.into_iter().chain(laws).map(|c| Check {
+    let claims = claims.chain(laws).map(|c| Check {
         id: c.id.into(),
         channel: s.target.name.clone(),
         statistic: c.statistic,

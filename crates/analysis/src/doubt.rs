@@ -291,6 +291,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
                 let filter = process.filters_white();
                 by_power_law(filter)
                     || followed_by_noise
+                    || failing(adequacy::STATIONARY_CLAIM)
                     || unlike && !filter
                     || repeats.is_some()
                     || bent > LEFT * t.lr
