@@ -138,7 +138,13 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         let of_terms = term_findings(s, &grid, options.seed);
         // What an axis takes from another one later has a spectrum, and is no process of its own.
         let late = shared.late.iter().filter(|l| l.0 == s.target.name);
-        let late = late.map(|l| l.1).sum::<f64>();
+        let mut colours = checks
+            .iter()
+            .filter(|c| c.channel == s.target.name && c.id == short_time::COLOUR && c.fails_after);
+        let left = doubt::Left {
+            late: late.map(|l| l.1).sum(),
+            colour: colours.next().map_or(0.0, |c| c.statistic),
+        };
         // A bit that sticks makes a noise of its own, which depends on the level.
         let by_counts = s.variance.as_ref().is_some_and(|v| {
             let more = v.parameters.get("variance_increase");
@@ -146,7 +152,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             audited.explains_variance(&s.target.name, v.lr, v.threshold, ratio)
         });
         let variance = variance_finding(s).filter(|_| !by_counts);
-        let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance, &failing, late);
+        let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance, &failing, left);
         doubts.extend(events::hold_outliers(s, &kept, &mut findings, &failing));
         findings.extend(kept);
         nearest.extend(doubted);

@@ -157,7 +157,7 @@ fn swings_as(s: &Searched<'_>, t: &Term) -> Option<String> {
 }
 
 /// For each term of a channel, whether the checks doubt it; and whether they doubt the law of its variance.
-fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<Doubt>, bool) {
+fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: Left) -> (Vec<Doubt>, bool) {
     let panel = &s.search.panel;
     let g = s.state.noise.over(&panel.bins);
     let n = panel.bins.n as f64;
@@ -217,12 +217,19 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
     };
     let miscoded = failing("fine_codes") || failing("foretold");
     let followed_by_noise = short_time::IDS.iter().any(|id| failing(id));
+    // Of a longer record what is left counts by what one of that length would show.
+    let shown = (checks::RECORD / n).min(1.0);
+    // Where the energy of a band follows what moves, a process may still hold that makes far more than that.
+    let knows = |t: &Term| {
+        failing(short_time::ORDER)
+            || failing(short_time::LEANING)
+            || left.colour * shown > REMAINDER * t.lr
+    };
     let unlike = adequacy::CLAIMS.iter().any(|c| failing(c));
     // Beside a wander that is not the process it was told as, a step is as likely a piece of that.
     let unlike_step = |t: &Term| unlike && matches!(t.form, Form::Step(..));
     let by_power_law = |filter: bool| s.state.power_law.is_some_and(|p| p.filter || !filter);
-    // Of a longer record it counts by what one of that length would show.
-    let bent = (late + bent(s, failing)) * (checks::RECORD / n).min(1.0);
+    let bent = (left.late + bent(s, failing)) * shown;
     // What is left without a place may be anywhere; what has one leaves a strong term elsewhere alone.
     let misplaced = |t: &Term| !places.is_empty() && t.score() < WIDE;
     let followed = followers(s, &g);
@@ -290,7 +297,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, late: f64) -> (Vec<
                 let information = information.map(|((d, g), m)| m * (d / g).powi(2));
                 let filter = process.filters_white();
                 by_power_law(filter)
-                    || followed_by_noise
+                    || knows(t)
                     || failing(adequacy::STATIONARY_CLAIM)
                     || unlike && !filter
                     || repeats.is_some()
@@ -358,16 +365,25 @@ fn everywhere(s: &Searched<'_>, filled: &dyn Fn(usize) -> bool) -> bool {
     lr > HOLDS * kept / n * v.lr
 }
 
+/// Chi-square of what is left on a channel.
+#[derive(Clone, Copy)]
+pub(crate) struct Left {
+    /// Of what it takes from others later.
+    pub late: f64,
+    /// Of the energies that follow something recorded, where they do.
+    pub colour: f64,
+}
+
 /// Take the doubted names of a channel out of its findings, given as one for each term and then the rest; what follows a
-/// combination without a name goes the same way. `late` is the chi-square of what the channel takes from others later.
+/// combination without a name goes the same way.
 pub(crate) fn withdraw(
     s: &Searched<'_>,
     of_terms: Vec<Finding>,
     of_variance: Option<Finding>,
     failing: &dyn Fn(&str) -> bool,
-    late: f64,
+    left: Left,
 ) -> (Vec<Finding>, Vec<Finding>, Vec<Unexplained>) {
-    let (terms, variance) = doubted(s, failing, late);
+    let (terms, variance) = doubted(s, failing, left);
     let name = s.target.name.as_str();
     let mut unexplained = vec![];
     let (mut kept, mut nearest, mut beside) = (vec![], vec![], vec![]);
