@@ -194,7 +194,7 @@ fn vibration_level(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 }
 
 /// What follows a command no faster than so much a second.
-fn ramped(command: &[f64], most_per_s: f64, rate_hz: f64) -> Vec<f64> {
+pub(super) fn ramped(command: &[f64], most_per_s: f64, rate_hz: f64) -> Vec<f64> {
     let most = most_per_s / rate_hz;
     let mut follows = command.first().copied().unwrap_or(0.0);
     command
@@ -216,7 +216,7 @@ fn late(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 }
 
 /// Change since the sample before.
-fn changes(series: &[f64]) -> Vec<f64> {
+pub(super) fn changes(series: &[f64]) -> Vec<f64> {
     let mut last = series.first().copied().unwrap_or(0.0);
     let change = |v: &f64| v - std::mem::replace(&mut last, *v);
     series.iter().map(change).collect()

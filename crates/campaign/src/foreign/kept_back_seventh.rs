@@ -136,14 +136,19 @@ pub(super) fn without_line(y: &[f64], x: &[f64]) -> Vec<f64> {
 
 /// The temperatures that a lamp close by makes, which is switched on and off within seconds.
 pub(super) fn lamp(draw: &mut Draw, stand: &mut Stand) {
+    lit(draw, stand, (2.0, 14.0), (2.0, 6.0));
+}
+
+/// Those of one that is switched after so long and warms within so long, s.
+pub(super) fn lit(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64), lag_s: (f64, f64)) {
     let (n, rate_hz) = (stand.samples(), stand.rate_hz);
     let (room, top) = (draw.between(20.0, 30.0), draw.between(3.0, 10.0));
     let mut on = draw.chance(0.5);
-    let lamp = held(draw, n, rate_hz, (2.0, 14.0), |d| {
+    let lamp = held(draw, n, rate_hz, dwell_s, |d| {
         on = !on;
         room + if on { top * d.between(0.5, 1.0) } else { 0.0 }
     });
-    let heat = lagged(&lamp, draw.by_ratio(2.0, 6.0), rate_hz);
+    let heat = lagged(&lamp, draw.by_ratio(lag_s.0, lag_s.1), rate_hz);
     // Three parts on one board: nearly the same temperature.
     stand.world.temperature = std::array::from_fn(|_| {
         let off = draw.between(-0.5, 0.5);

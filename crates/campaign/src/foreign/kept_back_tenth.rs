@@ -17,7 +17,7 @@ use crate::random::Draw;
 use crate::stand::{Needs, Stand, held, lagged, wander};
 
 pub(super) mod codes;
-mod events;
+pub(super) mod events;
 pub(super) mod noise;
 
 /// Their names, in the order in which they were listed.

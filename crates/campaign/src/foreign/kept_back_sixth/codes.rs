@@ -34,7 +34,7 @@ pub(super) fn one(
     })
 }
 
-fn mean_and_sigma(stand: &Stand, axis: usize) -> (f64, f64) {
+pub(in super::super) fn mean_and_sigma(stand: &Stand, axis: usize) -> (f64, f64) {
     (stand.bias[axis] / LSB, stand.white(axis).sqrt() / LSB)
 }
 
@@ -180,7 +180,7 @@ pub(in super::super) fn of_map(
 }
 
 /// The effect of such a reading.
-fn mapped(
+pub(in super::super) fn mapped(
     name: &'static str,
     axis: usize,
     chance: f64,

@@ -7,7 +7,7 @@ use crate::random::Draw;
 use crate::stand::Stand;
 
 /// Events of a record, s: `count` of them, the first after a tenth of it, and no two within a twentieth.
-fn events(draw: &mut Draw, stand: &Stand, count: usize) -> Vec<f64> {
+pub(in super::super) fn events(draw: &mut Draw, stand: &Stand, count: usize) -> Vec<f64> {
     let mut all: Vec<f64> = vec![];
     while all.len() < count {
         let at = stand.seconds * draw.between(0.1, 0.9);
@@ -19,13 +19,17 @@ fn events(draw: &mut Draw, stand: &Stand, count: usize) -> Vec<f64> {
 }
 
 /// How large each of them is, of either sign.
-fn sizes(draw: &mut Draw, events: &[f64]) -> Vec<f64> {
+pub(in super::super) fn sizes(draw: &mut Draw, events: &[f64]) -> Vec<f64> {
     let size = |_: &f64| draw.sign() * draw.between(0.5, 1.5);
     events.iter().map(size).collect()
 }
 
 /// What events add, by the time since each of them, s.
-fn since(stand: &Stand, events: &[f64], of: impl Fn(usize, f64) -> f64) -> Vec<f64> {
+pub(in super::super) fn since(
+    stand: &Stand,
+    events: &[f64],
+    of: impl Fn(usize, f64) -> f64,
+) -> Vec<f64> {
     (0..stand.samples())
         .map(|i| {
             let t = i as f64 / stand.rate_hz;
