@@ -9,7 +9,7 @@
 use std::collections::BTreeSet;
 
 use crate::beyond::{self, memory};
-use crate::checks::{Outcome, chi_tail};
+use crate::checks::{Outcome, chi_tail, normal_tail};
 use crate::likelihood::Noise;
 use crate::search::{Candidate, Form, Search, State, Term};
 
@@ -72,7 +72,52 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
             },
         ));
     }
+    all.extend(state.terms.iter().filter_map(|t| in_proportion(state, t)));
     all
+}
+
+/// Whether the coefficients of a term of which the library says that they are parts of others are no more than that.
+fn in_proportion(state: &State, term: &Term) -> Option<(&'static str, Outcome)> {
+    let id = term.effect.id();
+    let filtered = |t: &Term| matches!(&t.form, Form::Covariance(c, _) if c.filters_white());
+    if state.terms.iter().any(filtered) {
+        return None;
+    }
+    let columns = state.terms.iter().flat_map(|t| {
+        let name = move |i| t.names.get(i).filter(|_| t.effect.id() == id);
+        (0..t.columns.len()).map(name)
+    });
+    let columns: Vec<Option<&&str>> = columns.collect();
+    let place = |name: &str| columns.iter().position(|c| c.is_some_and(|c| *c == name));
+    let s = &state.solution;
+    let beyond = |name: &str| {
+        let (whole, part) = term.effect.at_most(name)?;
+        let own = place(name)?;
+        let error = |variance: f64| (s.white * variance).sqrt();
+        Some(match place(whole) {
+            Some(of) => {
+                let part = part * (s.beta[own] * s.beta[of]).signum();
+                let covariance = s.inverse[own][own] - 2.0 * part * s.inverse[own][of]
+                    + part * part * s.inverse[of][of];
+                (s.beta[own] - part * s.beta[of]) * s.beta[own].signum() / error(covariance)
+            }
+            None => s.beta[own].abs() / error(s.inverse[own][own]),
+        })
+    };
+    let asked = term.names.iter().filter_map(|n| Some((*n, beyond(n)?)));
+    let (name, most) = asked.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let chance = term.names.len() as f64 * normal_tail(most.max(0.0));
+    Some((
+        id,
+        Outcome {
+            id: CLAIM,
+            statistic: most,
+            p_value: chance.min(1.0),
+            what: format!(
+                "told as {id}: {name} is larger than it can be by {most:.1} standard errors"
+            ),
+        },
+    ))
 }
 
 /// Whether a term keeps most of what it explains, and enough to be named, where an effect beside it that follows a channel

@@ -602,3 +602,33 @@ fn the_law_of_the_motors_noise_is_told_where_the_record_tells_it() {
     });
     assert!(undecided <= 1, "{undecided}");
 }
+
+#[test]
+fn acceleration_that_is_felt_a_little_late_is_felt_and_what_comes_a_sample_later_is_another_thing()
+{
+    for late in [(0.15, 0.4), (0.9, 1.0)] {
+        graded("vibration that is felt late", |run, rng| {
+            let mut between = |low, high| Uniform::new(low, high).expect("a range").sample(rng);
+            let r = record(&[("vibration_g", between(0.08, 0.15))], 8400 + run);
+            let (mut r, felt) = (r.clone(), values(&r, Quantity::Acc));
+            // Of a sensitivity in deg/s/g, this part acts in the next sample.
+            let (k, part) = (between(1.5, 3.0), between(late.0, late.1));
+            let mean = felt.iter().sum::<f64>() / felt.len() as f64;
+            let g = |i: usize| (felt[i] - mean) / 9.80665;
+            add(&mut r, "gyro_y", |i| {
+                k * ((1.0 - part) * g(i) + part * g(i.saturating_sub(1)))
+            });
+            let d = told(&r);
+            let right = if part > 0.5 {
+                named(&d).is_empty() && !d.unexplained.is_empty()
+            } else {
+                let whole = d.findings.first().and_then(|f| f.parameters.get("acc_x"));
+                let hit = |p: &Parameter| (p.value - k).abs() < 4.0 * p.std_error.unwrap_or(0.0);
+                named(&d) == [("g_sensitivity", "gyro_y")] && whole.is_some_and(hit)
+            };
+            right
+                .then_some(())
+                .ok_or_else(|| format!("{part:.2} of {k:.2} late: {}", said(&d)))
+        });
+    }
+}

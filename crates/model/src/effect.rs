@@ -443,6 +443,10 @@ pub trait Effect: Send + Sync {
     fn extends(&self) -> Option<&'static str> {
         None
     }
+    /// The parameter that this one is at most a part of, either way, and the part, where the channel's noise is not filtered.
+    fn at_most(&self, _parameter: &str) -> Option<(&'static str, f64)> {
+        None
+    }
     /// Whether the same cause on two channels is one event.
     fn same_event(&self, _a: &Parameters, _b: &Parameters) -> bool {
         false

@@ -16,10 +16,12 @@ use model::effect::{Effect, Hypothesis, Shape, View};
 use model::effects::EFFECTS;
 use model::record::Quantity;
 
+use crate::adequacy::LEAST_CHANCE;
 use crate::beyond;
 use crate::checks::Outcome;
 use crate::contest::power_law::{self, PowerLawFound};
 use crate::likelihood::{Noise, Panel, Solution};
+use crate::threshold;
 
 /// Most terms on one channel.
 const MOST_TERMS: usize = 8;
@@ -523,8 +525,15 @@ impl<'a> Search<'a> {
                 let ahead = if covariance {
                     Self::total(&rest) - Self::total(&best)
                 } else {
-                    // Each has passed its threshold: what has a name needs to do as well, no better.
-                    2.0 * (rest.solution.log_likelihood - best.solution.log_likelihood) + RIVAL_SPAN
+                    // Each has passed its threshold: what has a name needs to do as well, no better, but for what the
+                    // other gains by chance with more columns.
+                    let by_chance = match best.columns().len().saturating_sub(rest.columns().len())
+                    {
+                        0 => 0.0,
+                        more => threshold::tail(more, LEAST_CHANCE),
+                    };
+                    2.0 * (rest.solution.log_likelihood - best.solution.log_likelihood)
+                        + RIVAL_SPAN.max(by_chance)
                 };
                 if ahead > 0.0 {
                     best = rest;

@@ -20,6 +20,9 @@ impl Effect for GSensitivity {
             optional("acc_x", "deg/s/g", "shift per g along x"),
             optional("acc_y", "deg/s/g", "shift per g along y"),
             optional("acc_z", "deg/s/g", "shift per g along z"),
+            optional("late_x", "deg/s/g", "part of the shift along x that comes a sample late"),
+            optional("late_y", "deg/s/g", "part of the shift along y that comes a sample late"),
+            optional("late_z", "deg/s/g", "part of the shift along z that comes a sample late"),
         ];
         PARAMETERS
     }
@@ -27,9 +30,9 @@ impl Effect for GSensitivity {
     fn docs(&self) -> Docs {
         Docs {
             title: "Sensitivity to acceleration",
-            physics: "b(t) = sum over axes of k a(t) / g: the proof mass of a vibrating gyro is also an accelerometer; the ADIS16250 data sheet gives 0.2 deg/s/g.",
+            physics: "b(t) = sum over axes of k a(t) / g: the proof mass of a vibrating gyro is also an accelerometer; the ADIS16250 data sheet gives 0.2 deg/s/g. The gyro's own filter, and its pole, delay what it feels, and not what the accelerometer shows: a part of fast vibration comes in the sample after, late (a(t - 1) - a(t)) / g.",
             excitation: "Acceleration that changes by more than 0.015 g rms: shaking, tilting, a six-position test.",
-            test: "Least squares on each accelerometer axis, random walk refitted.",
+            test: "Least squares on each accelerometer axis, and on its change since the sample before where the base is still; random walk refitted. More than half of it late is no filter of the gyro, unless its noise went through one.",
             figure: "Rate in blocks of acceleration against acceleration.",
             example: Example::new(Plot::RateByValue("acc_x"), &[("acc_x", 0.6)]).in_a_world(&[("vibration_g", 0.15)]),
         }
@@ -47,6 +50,8 @@ impl Effect for GSensitivity {
     fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
         let mut any = false;
         let mut all = vec![];
+        let mut changes = vec![];
+        let mut followed = vec![];
         for signal in view.all(Quantity::Acc) {
             any = true;
             let Some(axis) = signal.axis else { continue };
@@ -55,13 +60,23 @@ impl Effect for GSensitivity {
                 continue;
             }
             let mean = in_g.iter().sum::<f64>() / in_g.len() as f64;
+            changes.push(Column { parameter: LATE[axis.index()], values: late(&in_g).collect() });
+            followed.push(signal.name.as_str());
             all.push(Hypothesis::Regression(Regression {
                 columns: vec![Column {
-                    parameter: ["acc_x", "acc_y", "acc_z"][axis.index()],
+                    parameter: AT_ONCE[axis.index()],
                     values: in_g.iter().map(|a| a - mean).collect(),
                 }],
                 fixed: vec![],
                 follows: Some(signal.name.clone()),
+            }));
+        }
+        // What is late is so along every axis. The change of a tilt is a true rate.
+        if !changes.is_empty() && !view.sways() {
+            all.push(Hypothesis::Regression(Regression {
+                columns: changes,
+                fixed: vec![],
+                follows: Some(followed.join(", ")),
             }));
         }
         match (any, all.is_empty()) {
@@ -77,21 +92,40 @@ impl Effect for GSensitivity {
         &["vibration_g", "sway_deg"]
     }
 
+    fn at_most(&self, parameter: &str) -> Option<(&'static str, f64)> {
+        let axis = LATE.iter().position(|l| *l == parameter)?;
+        Some((AT_ONCE[axis], MOST_LATE))
+    }
+
     fn stage(&self) -> Stage {
         Stage::Rate
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        for (source, name) in ["acc_x", "acc_y", "acc_z"].iter().enumerate() {
-            let k = value(parameters, name);
+        for (source, acc) in simulation.acc.iter().enumerate() {
+            let mean = acc.iter().sum::<f64>() / simulation.samples.max(1) as f64;
+            let (k, k_late) = (value(parameters, AT_ONCE[source]), value(parameters, LATE[source]));
             for &axis in channels {
-                let mean = simulation.acc[source].iter().sum::<f64>() / simulation.samples.max(1) as f64;
-                for (rate, a) in simulation.rate[axis].iter_mut().zip(&simulation.acc[source]) {
-                    *rate += k * (a - mean);
+                for ((rate, a), change) in simulation.rate[axis].iter_mut().zip(acc).zip(late(acc)) {
+                    *rate += k * (a - mean) + k_late * change;
                 }
             }
         }
     }
+}
+
+/// Parameters of what comes at once and in all, by axis of the acceleration.
+const AT_ONCE: [&str; 3] = ["acc_x", "acc_y", "acc_z"];
+/// Parameters of the part of it that comes a sample late.
+const LATE: [&str; 3] = ["late_x", "late_y", "late_z"];
+/// A window that covers more than one sample interval, and so delays by more than half of it, gives neighbouring samples
+/// noise in common: a filter that would be seen.
+const MOST_LATE: f64 = 0.5;
+
+/// What a shift of 1 that comes a sample late adds to one that comes at once.
+fn late(acc: &[f64]) -> impl Iterator<Item = f64> {
+    let before = acc.iter().take(1).chain(acc);
+    before.zip(acc).map(|(before, a)| before - a)
 }
 
 /// Standard gravity, m/s^2.
