@@ -18,8 +18,7 @@ use std::f64::consts::PI;
 use model::effect::Hypothesis;
 
 use crate::checks::{
-    Outcome, chi_tail, errors_of_sum, kurtosis_score, normal_tail, variance_rhythm,
-    whitened_by_spectrum,
+    Outcome, chi_tail, errors_of_sum, kurtosis_score, normal_tail, whitened_by_spectrum,
 };
 use crate::column::dot;
 use crate::diagnosis::{Searched, VarianceFound};
@@ -88,18 +87,18 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<Outcome> {
     all
 }
 
-/// Whether a channel that was told as a stationary, Gaussian process is stationary from reading to reading.
-pub(crate) fn stationary(s: &Searched<'_>) -> Option<Outcome> {
+/// Whether a channel that was told as a stationary, Gaussian process is stationary from reading to reading, by the `rhythm` of
+/// its variance.
+pub(crate) fn stationary(s: &Searched<'_>, rhythm: &Outcome) -> Option<Outcome> {
     let is_one = |t: &Term| {
         let hypothesis = &s.search.candidates[t.candidate].hypothesis;
         matches!(t.form, Form::Covariance(..)) && matches!(hypothesis, Hypothesis::Covariance(_))
     };
     let term = s.state.terms.iter().find(|t| is_one(t))?;
-    let rhythm = variance_rhythm(&s.e, s.search.view.rate_hz);
     Some(Outcome {
         id: STATIONARY_CLAIM,
         what: format!("told as {}: {}", term.effect.id(), rhythm.what),
-        ..rhythm
+        ..*rhythm
     })
 }
 

@@ -10,7 +10,7 @@ use crate::search::{Form, State};
 mod higher;
 
 pub(crate) use higher::{
-    MOST, Repeats, bicovariance, neighbours, repeats, three_readings, variance_rhythm,
+    MOST, RHYTHM, Repeats, bicovariance, neighbours, repeats, three_readings, variance_rhythm,
 };
 
 /// Samples of ten minutes at 20 Hz, which the checks are calibrated on. Of a longer record of a real part, whatever its size,

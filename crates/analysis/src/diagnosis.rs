@@ -435,7 +435,9 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
     };
     // Before a process was named nothing was claimed of it.
     let claims = adequacy::of_processes(&s.search, &s.state);
-    let claims = claims.into_iter().chain(adequacy::stationary(s));
+    let mut rhythms = after.iter().filter(|c| c.id == checks::RHYTHM);
+    let stationary = rhythms.next().and_then(|r| adequacy::stationary(s, r));
+    let claims = claims.into_iter().chain(stationary);
     let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
     let variance = s.variance.iter().flat_map(|v| {
         let (rate_hz, id) = (s.search.view.rate_hz, v.effect.id());

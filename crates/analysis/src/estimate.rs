@@ -219,11 +219,8 @@ fn shaped(
         if x < low - 0.7 || x > high + 0.7 {
             continue;
         }
-        let added: Vec<usize> = shape
-            .columns(x.exp())
-            .iter()
-            .map(|c| panel.add(&c.values))
-            .collect();
+        let values = shape.columns(x.exp()).into_iter().map(|c| c.values);
+        let added = panel.add_all(&values.collect::<Vec<_>>());
         let columns = [added, others.clone()].concat();
         for (weight, s) in weighted(panel, &state.noise, &columns) {
             all.push((x, weight, s));

@@ -11,7 +11,7 @@ use crate::likelihood::{Dct, Panel};
 use crate::result::{Evidence, Series, SeriesStyle};
 use crate::search::{Form, State, Term};
 
-/// Replicates of the Allan misfit.
+/// Replicates of the Allan misfit, made in pairs.
 const REPLICATES: usize = 32;
 /// Points of a figure of blocks.
 const BLOCKS: usize = 60;
@@ -129,17 +129,20 @@ pub(crate) fn allan_misfit(s: &Searched<'_>, _rate_hz: f64, seed: u64) -> [f64; 
         }
         let target = allan(&measured, first);
         let (mut sum, mut square) = (vec![0.0; target.len()], vec![0.0; target.len()]);
-        for _ in 0..REPLICATES {
-            let c: Vec<f64> = v
-                .iter()
-                .map(|v| {
-                    let e: f64 = StandardNormal.sample(&mut rng);
-                    v.sqrt() * e
-                })
-                .collect();
-            for (i, v) in allan(&dct.inverse(&c), first).into_iter().enumerate() {
-                sum[i] += v;
-                square[i] += v * v;
+        v.iter_mut().for_each(|v| *v = v.sqrt());
+        let mut replicate = || -> Vec<f64> {
+            let of = v.iter().map(|v| {
+                let e: f64 = StandardNormal.sample(&mut rng);
+                v * e
+            });
+            of.collect()
+        };
+        for _ in 0..REPLICATES / 2 {
+            for y in dct.inverse_all(&[replicate(), replicate()]) {
+                for (i, v) in allan(&y, first).into_iter().enumerate() {
+                    sum[i] += v;
+                    square[i] += v * v;
+                }
             }
         }
         let count = REPLICATES as f64;

@@ -130,10 +130,16 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
     let mut squares = vec![vec![(0.0, 0usize); windows.len()]; models.len()];
     for (j, end) in ends.iter().enumerate() {
         let (dct, bins) = (Dct::new(*end), Rc::new(Bins::new(*end)));
-        let panel = Panel::new(&dct, &bins, &y[..*end]);
+        let shapes = values.iter().flatten().map(Vec::as_slice);
+        let beginnings: Vec<&[f64]> = std::iter::once(y)
+            .chain(shapes)
+            .map(|c| &c[..*end])
+            .collect();
+        let panel = Panel::of_all(&dct, &bins, &beginnings);
+        let mut numbers = 1..;
         let columns: Vec<Vec<usize>> = values
             .iter()
-            .map(|term| term.iter().map(|c| panel.add(&c[..*end])).collect())
+            .map(|term| numbers.by_ref().take(term.len()).collect())
             .collect();
         for (m, skip) in models.iter().enumerate() {
             let used: Vec<usize> = columns

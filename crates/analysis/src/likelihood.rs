@@ -263,6 +263,14 @@ impl Panel {
         Self::of(dct, bins, Rc::new(dct.forward(y)))
     }
 
+    /// A panel on the first of these sequences, which the others may explain; they are columns 0, 1 and so on.
+    pub(crate) fn of_all(dct: &Dct, bins: &Rc<Bins>, all: &[&[f64]]) -> Self {
+        let panel = Self::of(dct, bins, Rc::default());
+        panel.columns.borrow_mut().clear();
+        panel.add_all(all);
+        panel
+    }
+
     /// A panel on data whose coefficients are known.
     #[must_use]
     pub fn of(dct: &Dct, bins: &Rc<Bins>, coefficients: Rc<Vec<f64>>) -> Self {
@@ -274,28 +282,37 @@ impl Panel {
         }
     }
 
-    /// Add a column of a candidate, which other channels may have in `common`; returns its number.
-    pub fn add_candidate(&self, values: &[f64], common: bool) -> usize {
-        let c = self.candidate(values, common);
-        self.columns.borrow_mut().push(c);
-        self.columns.borrow().len() - 1
+    /// Add columns of a candidate, which other channels may have in `common`; returns their numbers.
+    pub fn add_candidate(&self, values: &[Vec<f64>], common: bool) -> Vec<usize> {
+        self.push(self.candidate(values, common))
     }
 
-    /// The coefficients of a candidate's column, transformed once for all that have the same in `common`.
-    fn candidate(&self, values: &[f64], common: bool) -> Column {
-        let transformed = || Column::new(self.dct.forward(values));
+    /// The coefficients of a candidate's columns, transformed once for all that have the same in `common`.
+    fn candidate(&self, values: &[Vec<f64>], common: bool) -> Vec<Column> {
         if !common {
-            return transformed();
+            let all = self.dct.forward_all(values);
+            return all.into_iter().map(Column::new).collect();
         }
-        let key = digest(values);
-        let known = self.dct.known.columns.borrow().get(&key).cloned();
-        known.unwrap_or_else(|| {
-            let c = transformed();
+        let keys: Vec<[u64; 2]> = values.iter().map(|v| digest(v)).collect();
+        let known = |key: &[u64; 2]| self.dct.known.columns.borrow().get(key).cloned();
+        let mut all: Vec<Option<Column>> = keys.iter().map(known).collect();
+        let missing: Vec<usize> = (0..all.len()).filter(|i| all[*i].is_none()).collect();
+        let new: Vec<&Vec<f64>> = missing.iter().map(|i| &values[*i]).collect();
+        for (i, c) in missing.into_iter().zip(self.dct.forward_all(&new)) {
+            let c = Column::new(c);
             if !self.dct.known.complete.get() {
-                self.dct.known.keep(key, &c);
+                self.dct.known.keep(keys[i], &c);
             }
-            c
-        })
+            all[i] = Some(c);
+        }
+        all.into_iter().flatten().collect()
+    }
+
+    fn push(&self, new: Vec<Column>) -> Vec<usize> {
+        let mut columns = self.columns.borrow_mut();
+        let first = columns.len();
+        columns.extend(new);
+        (first..columns.len()).collect()
     }
 
     /// Add the columns that go by a name, which other channels may have in `common`: then they are made once. Returns
@@ -306,10 +323,7 @@ impl Panel {
         common: bool,
         make: &dyn Fn() -> Vec<Vec<f64>>,
     ) -> Vec<usize> {
-        let made = || -> Vec<Column> {
-            let values = make();
-            values.iter().map(|v| self.candidate(v, common)).collect()
-        };
+        let made = || self.candidate(&make(), common);
         let all = if common {
             let known = self.dct.known.named.borrow().get(name).cloned();
             known.unwrap_or_else(|| {
@@ -323,10 +337,7 @@ impl Panel {
         } else {
             made()
         };
-        let mut columns = self.columns.borrow_mut();
-        let first = columns.len();
-        columns.extend(all);
-        (first..columns.len()).collect()
+        self.push(all)
     }
 
     /// Add a column of samples; returns its number.
@@ -334,6 +345,12 @@ impl Panel {
         let c = self.dct.forward(values);
         self.columns.borrow_mut().push(Column::Whole(Rc::new(c)));
         self.columns.borrow().len() - 1
+    }
+
+    /// Add columns of samples; returns their numbers.
+    pub(crate) fn add_all<X: AsRef<[f64]>>(&self, values: &[X]) -> Vec<usize> {
+        let all = self.dct.forward_all(values).into_iter();
+        self.push(all.map(|c| Column::Whole(Rc::new(c))).collect())
     }
 
     /// Put other coefficients in the place of the data's.

@@ -1,8 +1,10 @@
 //! Scans: a step at all times at once, a line at all frequencies at once, side bands, stretches of larger variance.
 
+use std::rc::Rc;
+
 use rustfft::num_complex::Complex;
 
-use crate::likelihood::{Noise, Panel, Solution};
+use crate::likelihood::{Bins, Dct, Noise, Panel, Solution};
 use crate::transform::RealFft;
 
 /// Longest grid of step times; beyond it the scan is as fine as this many places.
@@ -34,76 +36,101 @@ fn first_of_residual(
     r
 }
 
+/// Energy over white noise + random walk of a step at each of n times, beside its mean, by the walk's shape
+/// 1 / (lambda + 4 sin^2(w / 2)): with lambda = 4 sinh^2(kappa / 2) the sum over all coefficients is that of a ring of twice
+/// the length.
+fn energies_beside_walk(n: usize, log_walk: f64) -> Vec<f64> {
+    let kappa = 2.0 * (0.5 * (0.5 * log_walk).exp()).asinh();
+    let kept = (-2.0 * kappa).exp();
+    let lost = -(-2.0 * kappa).exp_m1();
+    // 1 - exp(-2 kappa j), which loses no digits where kappa is next to nothing.
+    let gone: Vec<f64> = std::iter::successors(Some(0.0), |gone| Some(kept * gone + lost))
+        .take(n + 1)
+        .collect();
+    let scale = 1.0 / (gone[n] * 2.0 * kappa.sinh());
+    let ends = gone.iter().zip(gone.iter().rev());
+    ends.take(n).map(|(a, b)| a * b * scale).collect()
+}
+
+/// The same of any noise g, from the first coefficients of it and of the walk's shape.
+fn energies_beside(g: &[f64], walks: &[f64], n: usize) -> Vec<f64> {
+    let m = g.len();
+    // Sums of cosines of even multiples: between the places of an odd length stands nothing.
+    let apart = 1 + m % 2;
+    let mut d = vec![0.0; apart * m];
+    for (k, (w, g)) in walks.iter().zip(g).enumerate().skip(1) {
+        d[apart * k] = w / g;
+    }
+    let total: f64 = d.iter().sum();
+    let pair = |j: usize| Complex::new(d[2 * j], d[2 * j + 1]);
+    let mut energies = vec![0.0; m];
+    RealFft::new(apart * m).run(pair, |j, f| {
+        if j > 0 && 2 * j <= m {
+            let energy = (total - f.re) / n as f64;
+            (energies[j], energies[m - j]) = (energy, energy);
+        }
+    });
+    energies
+}
+
 /// Likelihood ratio of a step at each of the grid's times, the random walk profiled; times in samples.
 #[must_use]
 pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Vec<(f64, f64)> {
     let n = panel.bins.n;
     let m = n.min(LONGEST_STEP_GRID);
-    let fft = RealFft::new(2 * m);
-    // 2 sin(w / 2).
-    let half: Vec<f64> = panel.bins.walks()[..m]
-        .iter()
-        .map(|w| 1.0 / w.sqrt())
-        .collect();
-    let scale = -(2.0 / n as f64).sqrt();
+    let (dct, coarse) = if m < n {
+        (Dct::new(m), Rc::new(Bins::new(m)))
+    } else {
+        (panel.dct.clone(), Rc::clone(&panel.bins))
+    };
+    let walk_shapes = &panel.bins.walks()[..m];
+    // A step on the grid has these parts of the coefficients of one in the record: 1 where the grid is the record.
+    let parts: &[f64] = &(walk_shapes.iter().zip(coarse.walks()))
+        .map(|(fine, coarse)| (fine / coarse * m as f64 / n as f64).sqrt())
+        .collect::<Vec<f64>>();
     let count = (n - 1) as f64;
+    let fits: Vec<(Vec<f64>, Solution)> = walks
+        .iter()
+        .map(|noise| {
+            let solution = panel.solve(&noise.over(&panel.bins), columns);
+            (noise.first(&panel.bins, m), solution)
+        })
+        .collect();
+    // <step at t, x> under a noise, for all t: the sum of x over it, in time, from t on.
+    let weighted = fits.iter().flat_map(|(g, solution)| {
+        let left = first_of_residual(panel, columns, solution, m);
+        let own = columns.iter().map(|c| panel.first(*c, m));
+        let all = std::iter::once(left).chain(own);
+        all.map(move |mut x| {
+            let by = parts.iter().zip(g);
+            x.iter_mut()
+                .zip(by)
+                .for_each(|(x, (part, g))| *x *= part / g);
+            x
+        })
+    });
+    let mut sums = dct.inverse_all(&weighted.collect::<Vec<_>>());
+    for x in &mut sums {
+        let mut sum = 0.0;
+        for v in x.iter_mut().rev() {
+            sum += *v;
+            *v = sum;
+        }
+    }
     // The likelihood falls with the residual sum of squares times the geometric mean of the noise: the least of the walks.
     let mut least = vec![f64::INFINITY; m];
-    for noise in walks {
-        let g = noise.first(&panel.bins, m);
-        let solution = panel.solve(&noise.over(&panel.bins), columns);
-        // <step at t, x> under this noise, for all t: sums of sines, those of an odd sequence of twice the length; an even
-        // one that comes with it gives sums of the cosines of twice the frequencies.
-        let sums = |x: &[f64], even: &[f64]| -> (Vec<f64>, Vec<f64>) {
-            let b: Vec<f64> = (0..m)
-                .map(|k| {
-                    if k == 0 {
-                        0.0
-                    } else {
-                        scale * x[k] / (g[k] * half[k])
-                    }
-                })
-                .collect();
-            let odd = |i: usize| match i {
-                i if i < m => b[i],
-                i if i == m => 0.0,
-                i => -b[2 * m - i],
-            };
-            let mirrored = |j: usize| match (j, even) {
-                (_, []) | (0, _) => 0.0,
-                (j, e) => 0.5 * (e[j] + e[m - j]),
-            };
-            let (mut sines, mut cosines) = (vec![0.0; m], vec![0.0; m]);
-            fft.run(
-                |j| Complex::new(odd(2 * j) + mirrored(j), odd(2 * j + 1)),
-                |j, f| {
-                    if j < m {
-                        sines[j] = -0.5 * f.im;
-                        cosines[j] = f.re;
-                    }
-                },
-            );
-            (sines, cosines)
+    let sums = sums.chunks(1 + columns.len());
+    for ((noise, (g, solution)), sums) in walks.iter().zip(&fits).zip(sums) {
+        let (a, crossed) = (&sums[0], &sums[1..]);
+        let energies = if noise.terms.is_empty() && m == n {
+            energies_beside_walk(n, noise.log_walk)
+        } else {
+            energies_beside(g, walk_shapes, n)
         };
-        let d: Vec<f64> = (0..m)
-            .map(|k| {
-                if k == 0 {
-                    0.0
-                } else {
-                    1.0 / (half[k] * half[k] * g[k])
-                }
-            })
-            .collect();
-        let (a, cosines) = sums(&first_of_residual(panel, columns, &solution, m), &d);
-        let total: f64 = d.iter().sum();
-        let crossed: Vec<Vec<f64>> = columns
-            .iter()
-            .map(|c| sums(&panel.first(*c, m), &[]).0)
-            .collect();
         let mean = (solution.log_det_noise / count).exp();
         for j in 1..m {
-            let mut b = (total - cosines[j]) / n as f64;
-            let whole = b;
+            let whole = energies[j];
+            let mut b = whole;
             for (p, x) in crossed.iter().enumerate() {
                 for (q, y) in crossed.iter().enumerate() {
                     b -= x[j] * solution.inverse[p][q] * y[j];

@@ -430,7 +430,8 @@ fn outcomes(s: &Searched<'_>) -> Vec<Outcome> {
         lengths.into_iter().map(|l| Spectra::new(e, l)).collect()
     };
     let courses = courses(view, e.len());
-    let mut all: Vec<Outcome> = order(view, &e, &of(&e)).into_iter().collect();
+    let mut spectra = of(&e);
+    let mut all: Vec<Outcome> = order(view, &e, &spectra).into_iter().collect();
     // What is rounded leans by where its level lies between the codes.
     if s.step() < WIDEST_STEP {
         all.push(leaning(&e, &courses));
@@ -438,8 +439,8 @@ fn outcomes(s: &Searched<'_>) -> Vec<Outcome> {
     // The law of the variance holds for the white noise alone.
     if let Some(v) = &s.variance {
         e.iter_mut().zip(&v.law).for_each(|(e, v)| *e *= v.sqrt());
+        spectra = of(&e);
     }
-    let spectra = of(&e);
     let steady: Vec<Vec<f64>> = spectra.iter().map(|x| steady(s, x)).collect();
     let law = s.variance.as_ref().map(|v| v.law.as_slice());
     all.push(colour(view.rate_hz, law, &courses, &spectra, &steady));

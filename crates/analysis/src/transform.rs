@@ -1,4 +1,5 @@
-//! Fourier and cosine transforms of real records, through complex ones of half their length.
+//! Fourier and cosine transforms of real records: of an even length through complex ones of half of it, of an odd one two at
+//! a time.
 
 use std::cell::{Cell, RefCell};
 use std::collections::{HashMap, HashSet};
@@ -6,7 +7,6 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use rustdct::{DctPlanner, TransformType2And3};
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
@@ -20,14 +20,15 @@ thread_local! {
     static PLANS: RefCell<HashMap<usize, Plan>> = RefCell::default();
 }
 
-/// What a real transform of one even length needs.
+/// What real transforms of one length need.
 #[derive(Clone)]
 struct Plan {
-    half: Arc<dyn Fft<f64>>,
+    /// Of half an even length, of the whole of an odd one.
+    complex: Arc<dyn Fft<f64>>,
     turn: Rc<Turns>,
 }
 
-/// exp(-i pi k / (2 n)), k = 0 ..= n/4, each the product of one of few coarse and one of few fine turns: what would be a
+/// exp(-i pi k / (2 n)) of the first k, each the product of one of few coarse and one of few fine turns: what would be a
 /// table as long as the record takes no memory.
 struct Turns {
     coarse: Vec<Complex<f64>>,
@@ -37,10 +38,11 @@ struct Turns {
 impl Turns {
     const FINE: usize = 1 << 9;
 
-    fn new(n: usize) -> Self {
+    /// Up to k = `last`.
+    fn new(n: usize, last: usize) -> Self {
         let turn = |k: usize| Complex::from_polar(1.0, -PI * k as f64 / (2 * n) as f64);
         Self {
-            coarse: (0..=n / 4 / Self::FINE)
+            coarse: (0..=last / Self::FINE)
                 .map(|c| turn(c * Self::FINE))
                 .collect(),
             fine: (0..Self::FINE).map(turn).collect(),
@@ -64,9 +66,14 @@ impl Plan {
         if let Some(known) = known {
             return known;
         }
+        let (length, last) = if n.is_multiple_of(2) {
+            (n / 2, n / 4)
+        } else {
+            (n, n / 2)
+        };
         let new = Self {
-            half: FftPlanner::new().plan_fft_forward(n / 2),
-            turn: Rc::new(Turns::new(n)),
+            complex: FftPlanner::new().plan_fft_forward(length),
+            turn: Rc::new(Turns::new(n, last)),
         };
         if n <= KEPT {
             PLANS.with(|k| {
@@ -88,12 +95,46 @@ struct Space {
     scratch: Vec<Complex<f64>>,
 }
 
+/// The complex transform that real ones are made by.
+#[derive(Clone)]
+struct Packed {
+    plan: Plan,
+    space: Rc<RefCell<Space>>,
+}
+
+impl Packed {
+    fn new(n: usize) -> Self {
+        Self {
+            plan: Plan::new(n),
+            space: Rc::default(),
+        }
+    }
+
+    /// Transform in the work space.
+    fn run(
+        &self,
+        fill: impl FnOnce(&mut [Complex<f64>]),
+        take: impl FnOnce(&[Complex<f64>], &Turns),
+    ) {
+        let Plan { complex, turn } = &self.plan;
+        let Space { packed, scratch } = &mut *self.space.borrow_mut();
+        let zero = Complex::new(0.0, 0.0);
+        packed.resize(complex.len(), zero);
+        fill(packed);
+        let need = complex.get_inplace_scratch_len();
+        if scratch.len() < need {
+            scratch.resize(need, zero);
+        }
+        complex.process_with_scratch(packed, &mut scratch[..need]);
+        take(packed, turn);
+    }
+}
+
 /// The discrete Fourier transform of real sequences of one even length n: F[k] = sum of x[j] exp(-2 pi i j k / n).
 #[derive(Clone)]
 pub struct RealFft {
     n: usize,
-    plan: Plan,
-    space: Rc<RefCell<Space>>,
+    packed: Packed,
 }
 
 impl RealFft {
@@ -104,11 +145,8 @@ impl RealFft {
     #[must_use]
     pub fn new(n: usize) -> Self {
         assert!(n > 0 && n.is_multiple_of(2), "{n} is no even length");
-        Self {
-            n,
-            plan: Plan::new(n),
-            space: Rc::default(),
-        }
+        let packed = Packed::new(n);
+        Self { n, packed }
     }
 
     /// Transform x, of which x[2j] + i x[2j + 1] is `x(j)`, and hand F[k] of k = 0 ..= n/2 to `take`, in any order.
@@ -119,8 +157,8 @@ impl RealFft {
     ) {
         let h = self.n / 2;
         let fill = |z: &mut [Complex<f64>]| z.iter_mut().enumerate().for_each(|(j, z)| *z = x(j));
-        self.packed(fill, |z| {
-            self.plan.turn.each(h / 2 + 1, |k, turn| {
+        self.packed.run(fill, |z, turns| {
+            turns.each(h / 2 + 1, |k, turn| {
                 let (f, g) = both(z, k, turn);
                 take(k, f);
                 if h - k > k {
@@ -128,22 +166,6 @@ impl RealFft {
                 }
             });
         });
-    }
-
-    /// The complex transform of half the length, in the work space.
-    fn packed(&self, fill: impl FnOnce(&mut [Complex<f64>]), take: impl FnOnce(&[Complex<f64>])) {
-        let Space { packed, scratch } = &mut *self.space.borrow_mut();
-        let zero = Complex::new(0.0, 0.0);
-        packed.resize(self.n / 2, zero);
-        fill(packed);
-        let need = self.plan.half.get_inplace_scratch_len();
-        if scratch.len() < need {
-            scratch.resize(need, zero);
-        }
-        self.plan
-            .half
-            .process_with_scratch(packed, &mut scratch[..need]);
-        take(packed);
     }
 }
 
@@ -203,11 +225,86 @@ impl Known {
     }
 }
 
+/// The orthonormal DCT-II of two sequences of one odd length, or of the first alone where the second is empty.
+fn forward_of_two(packed: &Packed, a: &[f64], b: &[f64]) -> [Vec<f64>; 2] {
+    let [mut c, mut d] = [a, b].map(|x| vec![0.0; x.len()]);
+    let x = |i: usize| Complex::new(a[i], b.get(i).copied().unwrap_or(0.0));
+    packed.run(
+        // Even samples forwards, then odd ones backwards.
+        |z| {
+            let (even, odd) = z.split_at_mut(a.len().div_ceil(2));
+            let even = even.iter_mut().zip((0..).step_by(2));
+            even.for_each(|(z, i)| *z = x(i));
+            let odd = odd.iter_mut().rev().zip((1..).step_by(2));
+            odd.for_each(|(z, i)| *z = x(i));
+        },
+        |z, turns| {
+            let n = z.len();
+            let scale = (0.5 / n as f64).sqrt();
+            let mut put = |k: usize, v: f64, w: f64| {
+                c[k] = v;
+                d.get_mut(k).into_iter().for_each(|d| *d = w);
+            };
+            turns.each(n.div_ceil(2), |k, turn| {
+                let turn = turn * scale;
+                if k == 0 {
+                    put(0, SQRT_2 * turn.re * z[0].re, SQRT_2 * turn.re * z[0].im);
+                    return;
+                }
+                let mirrored = z[n - k].conj();
+                let (sum, off) = (z[k] + mirrored, z[k] - mirrored);
+                let (v, w) = (sum * turn, Complex::new(off.im, -off.re) * turn);
+                put(k, v.re, w.re);
+                put(n - k, -v.im, -w.im);
+            });
+        },
+    );
+    [c, d]
+}
+
+/// The steps of [`forward_of_two`], back, by a transform forwards of what is conjugated.
+fn inverse_of_two(packed: &Packed, c: &[f64], d: &[f64]) -> [Vec<f64>; 2] {
+    let [mut a, mut b] = [c, d].map(|x| vec![0.0; x.len()]);
+    let second = |k: usize| d.get(k).copied().unwrap_or(0.0);
+    packed.run(
+        |z| {
+            let n = z.len();
+            let scale = (0.5 / n as f64).sqrt();
+            packed.plan.turn.each(n.div_ceil(2), |k, turn| {
+                let back = turn.conj() * scale;
+                if k == 0 {
+                    z[0] = Complex::new(c[0], -second(0)) * (SQRT_2 * back.re);
+                    return;
+                }
+                let v = Complex::new(c[k], -c[n - k]) * back;
+                let w = Complex::new(second(k), -second(n - k)) * back;
+                z[k] = Complex::new(v.re - w.im, -v.im - w.re);
+                z[n - k] = Complex::new(v.re + w.im, v.im - w.re);
+            });
+        },
+        |z, _| {
+            let mut put = |i: usize, z: &Complex<f64>| {
+                a[i] = z.re;
+                b.get_mut(i).into_iter().for_each(|b| *b = -z.im);
+            };
+            let (even, odd) = z.split_at(z.len().div_ceil(2));
+            let even = even.iter().zip((0..).step_by(2));
+            even.for_each(|(z, i)| put(i, z));
+            let odd = odd.iter().rev().zip((1..).step_by(2));
+            odd.for_each(|(z, i)| put(i, z));
+        },
+    );
+    [a, b]
+}
+
+/// Two real transforms by a complex one.
+type OfTwo = fn(&Packed, &[f64], &[f64]) -> [Vec<f64>; 2];
+
 /// How a cosine transform is made.
 #[derive(Clone)]
 enum Kind {
     Even(RealFft),
-    Odd(Arc<dyn TransformType2And3<f64>>),
+    Odd(Packed),
 }
 
 /// The orthonormal DCT-II of one length.
@@ -225,7 +322,7 @@ impl Dct {
         let kind = if n > 0 && n.is_multiple_of(2) {
             Kind::Even(RealFft::new(n))
         } else {
-            Kind::Odd(DctPlanner::new().plan_dct2(n))
+            Kind::Odd(Packed::new(n))
         };
         Self {
             n,
@@ -248,20 +345,18 @@ impl Dct {
     #[must_use]
     pub fn forward(&self, x: &[f64]) -> Vec<f64> {
         let n = self.n;
-        let scale = (2.0 / n as f64).sqrt();
-        let mut c = match &self.kind {
-            Kind::Odd(plan) => {
-                let mut c = x.to_vec();
-                plan.process_dct2(&mut c);
-                c.iter_mut().for_each(|v| *v *= scale);
+        match &self.kind {
+            Kind::Odd(packed) => {
+                let [c, _] = forward_of_two(packed, x, &[]);
                 c
             }
             Kind::Even(fft) => {
+                let mut c = vec![0.0; n];
                 // Even samples forwards, then odd ones backwards: their spectrum, turned by k/4 of a sample, holds
                 // coefficient k in its real part and n - k in its imaginary one.
-                let mut c = vec![0.0; n];
+                let scale = (2.0 / n as f64).sqrt();
                 let h = n / 2;
-                fft.packed(
+                fft.packed.run(
                     |z| {
                         let (fours, last) = x.as_chunks::<4>();
                         for (j, [a, b, c, d]) in fours.iter().enumerate() {
@@ -272,8 +367,8 @@ impl Dct {
                             z[h / 2] = Complex::new(*a, *b);
                         }
                     },
-                    |z| {
-                        fft.plan.turn.each(h / 2 + 1, |k, turn| {
+                    |z, turns| {
+                        turns.each(h / 2 + 1, |k, turn| {
                             let (f, g) = both(z, k, turn);
                             // The turn at h - k is this one's conjugate by an eighth of a circle.
                             let (v, w) = (f * turn * scale, g * turn * (scale * FRAC_1_SQRT_2));
@@ -286,13 +381,38 @@ impl Dct {
                         });
                     },
                 );
+                c[0] *= FRAC_1_SQRT_2;
                 c
             }
-        };
-        if let Some(first) = c.first_mut() {
-            *first /= 2f64.sqrt();
         }
-        c
+    }
+
+    /// Coefficients of several, of an odd length at half the time of each alone.
+    #[must_use]
+    pub fn forward_all<X: AsRef<[f64]>>(&self, all: &[X]) -> Vec<Vec<f64>> {
+        self.in_pairs(all, forward_of_two, Self::forward)
+    }
+
+    /// Samples of several, as [`Dct::forward_all`].
+    #[must_use]
+    pub fn inverse_all<X: AsRef<[f64]>>(&self, all: &[X]) -> Vec<Vec<f64>> {
+        self.in_pairs(all, inverse_of_two, Self::inverse)
+    }
+
+    fn in_pairs<X: AsRef<[f64]>>(
+        &self,
+        all: &[X],
+        of_two: OfTwo,
+        of_one: fn(&Self, &[f64]) -> Vec<f64>,
+    ) -> Vec<Vec<f64>> {
+        let pairs = all.chunks(2).flat_map(|pair| match (pair, &self.kind) {
+            ([a, b], Kind::Odd(packed)) => of_two(packed, a.as_ref(), b.as_ref()).into(),
+            _ => pair
+                .iter()
+                .map(|x| of_one(self, x.as_ref()))
+                .collect::<Vec<_>>(),
+        });
+        pairs.collect()
     }
 
     /// Samples from coefficients.
@@ -300,13 +420,8 @@ impl Dct {
     pub fn inverse(&self, c: &[f64]) -> Vec<f64> {
         let n = self.n;
         match &self.kind {
-            Kind::Odd(plan) => {
-                let scale = (2.0 / n as f64).sqrt();
-                let mut x: Vec<f64> = c.iter().map(|v| v * scale).collect();
-                if let Some(first) = x.first_mut() {
-                    *first *= 2f64.sqrt();
-                }
-                plan.process_dct3(&mut x);
+            Kind::Odd(packed) => {
+                let [x, _] = inverse_of_two(packed, c, &[]);
                 x
             }
             Kind::Even(fft) => {
@@ -314,9 +429,9 @@ impl Dct {
                 let h = n / 2;
                 let half = 0.5 * (0.5 * n as f64).sqrt() / h as f64;
                 let mut x = vec![0.0; n];
-                fft.packed(
+                fft.packed.run(
                     |z| {
-                        fft.plan.turn.each(h / 2 + 1, |k, turn| {
+                        fft.packed.plan.turn.each(h / 2 + 1, |k, turn| {
                             let v = match k {
                                 0 => Complex::new(SQRT_2 * c[0], 0.0),
                                 k => Complex::new(c[k], -c[n - k]),
@@ -333,7 +448,7 @@ impl Dct {
                             }
                         });
                     },
-                    |z| {
+                    |z, _| {
                         let (fours, last) = x.as_chunks_mut::<4>();
                         for (j, four) in fours.iter_mut().enumerate() {
                             let (a, b) = (z[j], z[h - 1 - j]);
@@ -392,6 +507,26 @@ mod tests {
             }
             for (a, b) in dct.inverse(&c).iter().zip(&x) {
                 assert!((a - b).abs() < 1e-12, "{n}");
+            }
+        }
+    }
+
+    #[test]
+    fn several_at_once_are_what_each_is_alone() {
+        for n in [1, 3, 4, 10, 27, 101] {
+            let dct = Dct::new(n);
+            let all: Vec<Vec<f64>> = (0..3).map(|i| record(n + i)[i..].to_vec()).collect();
+            let close = |a: &[f64], b: &[f64]| {
+                let mut pairs = a.iter().zip(b);
+                assert!(
+                    a.len() == n && pairs.all(|(a, b)| (a - b).abs() < 1e-12),
+                    "{n}"
+                );
+            };
+            let c = dct.forward_all(&all);
+            for ((c, back), x) in c.iter().zip(dct.inverse_all(&c)).zip(&all) {
+                close(c, &dct.forward(x));
+                close(&back, x);
             }
         }
     }

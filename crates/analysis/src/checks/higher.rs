@@ -1,6 +1,8 @@
 //! Checks of what a spectrum does not show: readings that depend on earlier ones though they do not correlate with them,
 //! and what repeats itself with the samples.
 
+use std::f64::consts::PI;
+
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -238,6 +240,9 @@ fn strongest_line(series: &[f64]) -> Option<(f64, f64, usize)> {
     Some((most / level, 0.5 * at as f64 / n as f64, count))
 }
 
+/// Name of the check for a rhythm of the variance.
+pub(crate) const RHYTHM: &str = "variance_rhythm";
+
 /// A rhythm of the variance, or of how neighbours depend on each other: the strongest line of the squares of the whitened
 /// residual, or of its products. What is held, switched or coded by a clock of its own has one.
 pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
@@ -248,7 +253,7 @@ pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
         .max_by(|a, b| a.1.0.total_cmp(&b.1.0));
     let Some((span, (statistic, at, count))) = found else {
         return Outcome {
-            id: "variance_rhythm",
+            id: RHYTHM,
             statistic: 0.0,
             p_value: 1.0,
             what: "too short for a rhythm of the variance".into(),
@@ -260,7 +265,7 @@ pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
         format!("in products of the whitened residual with itself up to {span} samples later")
     };
     Outcome {
-        id: "variance_rhythm",
+        id: RHYTHM,
         statistic,
         p_value: (chi_tail(statistic, 2.0) * (count * SPANS.len()) as f64).min(1.0),
         what: format!("lines {of}; {:.4} Hz stands out most", at * rate_hz),
@@ -305,32 +310,63 @@ fn evened(e: &[f64]) -> Vec<f64> {
     dct.inverse(&even)
 }
 
+/// Chi-square of the means of the places in each period from 2 to `longest` samples, by period; of values whose mean is 0.
+fn by_period(e: &[f64], longest: usize) -> Vec<f64> {
+    let mut all = vec![0.0; longest + 1];
+    let mut sums = vec![0.0; longest];
+    for twice in longest / 2 + 1..=longest {
+        sums[..twice].fill(0.0);
+        for places in e.chunks(twice) {
+            sums.iter_mut().zip(places).for_each(|(s, v)| *s += v);
+        }
+        let mut period = twice;
+        loop {
+            let (times, more) = (e.len() / period, e.len() % period);
+            let energy = |sums: &[f64]| sums.iter().map(|s| s * s).sum::<f64>();
+            all[period] = energy(&sums[..more]) / (times + 1) as f64
+                + energy(&sums[more..period]) / times as f64;
+            if period % 2 == 1 || period < 4 {
+                break;
+            }
+            // Half a period has two places for one.
+            period /= 2;
+            let (first, second) = sums.split_at_mut(period);
+            first.iter_mut().zip(second).for_each(|(a, b)| *a += *b);
+        }
+    }
+    all
+}
+
 /// The period at which the means of the places in it are least like those of noise, by the whitened residual.
 pub(crate) fn repeats(e: &[f64]) -> Option<Repeats> {
     if e.len() < 2 * EVEN {
         return None;
     }
-    let e = evened(&e[..e.len().min(MOST)]);
+    let mut e = evened(&e[..e.len().min(MOST)]);
     let longest = LONGEST.min(e.len() / FEWEST);
     let mean = e.iter().sum::<f64>() / e.len().max(1) as f64;
-    let mut sums = vec![0.0; longest];
-    (2..=longest)
-        .map(|period| {
-            let sums = &mut sums[..period];
-            sums.fill(0.0);
-            for places in e.chunks(period) {
-                sums.iter_mut()
-                    .zip(places)
-                    .for_each(|(s, v)| *s += v - mean);
-            }
-            let times = |place: usize| (e.len() - place).div_ceil(period) as f64;
-            let each = sums.iter().enumerate().map(|(i, s)| s * s / times(i));
-            let chi_square = each.sum();
-            let chance = chi_tail(chi_square, period as f64 - 1.0) * (longest - 1) as f64;
+    e.iter_mut().for_each(|v| *v -= mean);
+    let periods = (longest - 1) as f64;
+    // ln of the gamma function of half the degrees, of even ones and of odd ones.
+    let mut log_gammas = [0.0, 0.5 * PI.ln()];
+    (by_period(&e, longest).into_iter().enumerate().skip(2))
+        .map(|(period, chi_square)| {
+            let degrees = period - 1;
+            let (half, shape) = (0.5 * chi_square, 0.5 * degrees as f64);
+            let log_gamma = &mut log_gammas[degrees % 2];
+            // Of two degrees and more the tail is larger than half^(shape - 1) exp(-half) / gamma(shape): where that is
+            // enough for one in all periods, as in most, no more is asked.
+            let least = (shape - 1.0) * half.ln() - half - *log_gamma;
+            *log_gamma += shape.ln();
+            let chance = if degrees > 1 && least > -periods.ln() {
+                1.0
+            } else {
+                (chi_tail(chi_square, degrees as f64) * periods).min(1.0)
+            };
             Repeats {
                 period,
                 chi_square,
-                chance: chance.min(1.0),
+                chance,
             }
         })
         .min_by(|a, b| {

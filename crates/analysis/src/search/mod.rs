@@ -296,11 +296,11 @@ impl<'a> Search<'a> {
                 let common = !follows.is_some_and(own);
                 let columns = match &mut hypothesis {
                     // The panel has them now.
-                    Hypothesis::Regression(r) => r
-                        .columns
-                        .iter_mut()
-                        .map(|c| panel.add_candidate(&std::mem::take(&mut c.values), common))
-                        .collect(),
+                    Hypothesis::Regression(r) => {
+                        let columns = r.columns.iter_mut();
+                        let values = columns.map(|c| std::mem::take(&mut c.values));
+                        panel.add_candidate(&values.collect::<Vec<_>>(), common)
+                    }
                     _ => vec![],
                 };
                 let grid = match &hypothesis {
@@ -308,11 +308,9 @@ impl<'a> Search<'a> {
                         .grid()
                         .into_iter()
                         .map(|at| {
-                            let columns = s.columns(at);
-                            let columns = columns
-                                .iter()
-                                .map(|c| panel.add_candidate(&c.values, common));
-                            (at, columns.collect())
+                            let columns = s.columns(at).into_iter().map(|c| c.values);
+                            let columns: Vec<Vec<f64>> = columns.collect();
+                            (at, panel.add_candidate(&columns, common))
                         })
                         .collect(),
                     _ => vec![],

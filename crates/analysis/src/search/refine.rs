@@ -17,7 +17,7 @@ impl Search<'_> {
         let g = state.noise.over(&self.panel.bins);
         let width = self.panel.width();
         let with = |columns: &[Vec<f64>]| {
-            let added: Vec<usize> = columns.iter().map(|c| self.panel.add(c)).collect();
+            let added = self.panel.add_all(columns);
             let l = self
                 .panel
                 .solve(&g, &[own.clone(), added].concat())
@@ -77,7 +77,7 @@ impl Search<'_> {
                 [scan::sinusoid(n, *carrier).to_vec(), bands(d)].concat()
             }
         };
-        term.columns = values.iter().map(|v| self.panel.add(v)).collect();
+        term.columns = self.panel.add_all(&values);
         term
     }
 

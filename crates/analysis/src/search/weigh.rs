@@ -184,11 +184,8 @@ impl Search<'_> {
         const STEPS: usize = 6;
         let width = self.panel.width();
         let minus_l = |x: f64| {
-            let added: Vec<usize> = shape
-                .columns(x.exp())
-                .iter()
-                .map(|c| self.panel.add(&c.values))
-                .collect();
+            let columns = shape.columns(x.exp()).into_iter().map(|c| c.values);
+            let added = self.panel.add_all(&columns.collect::<Vec<_>>());
             let l = self.panel.profile(walks, &[own, &added].concat());
             self.panel.truncate(width);
             -l
