@@ -39,6 +39,8 @@ pub struct DiagnoseOptions {
     pub file: String,
     /// Digest of the file, for the model file.
     pub hash: Option<String>,
+    /// Whether [`Diagnosed::evidence`], which a report alone shows, is left out.
+    pub no_evidence: bool,
 }
 
 /// One gyro, searched.
@@ -244,8 +246,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             &|s| baseline_of(s, &s.state, &grid),
             effects_of(findings.iter().chain(&nearest)),
         ),
-        evidence: searched
-            .iter()
+        evidence: (searched.iter().filter(|_| !options.no_evidence))
             .flat_map(|s| evidence::of_channel(s, &grid))
             .collect(),
         diagnosis: Diagnosis {

@@ -47,13 +47,12 @@ struct Prefix {
     log_walk: f64,
 }
 
-fn marginal(
-    panel: &Panel,
-    state: &State,
-    columns: &[usize],
-    skip: Option<usize>,
-    walk: f64,
-) -> Prefix {
+/// A noise of the mixture: its random walk, 1/g and the sum of ln g.
+type Mixed = (f64, Vec<f64>, f64);
+
+/// The mixture for a state without its term `skip`.
+fn mixture(panel: &Panel, state: &State, skip: Option<usize>) -> Vec<Mixed> {
+    let walk = state.noise.log_walk;
     // Sizes of stationary terms are averaged over a factor of e^2 either way of the fitted one.
     let sizes: &[f64] = if state
         .terms
@@ -65,11 +64,9 @@ fn marginal(
     } else {
         &[0.0]
     };
-    let n = panel.bins.n as f64;
     let low = least_walk(panel.bins.n).min(walk - 4.0);
     let step = (MOST_WALK.max(walk + 3.0) - low) / f64::from(WALKS);
     let mut all = vec![];
-    let mut best = (f64::NEG_INFINITY, vec![], walk);
     for size in sizes {
         let terms: Vec<_> = state
             .terms
@@ -91,15 +88,27 @@ fn marginal(
                 log_walk: low + step * f64::from(i),
                 terms: terms.clone(),
             };
-            let s = panel.solve(&noise.over(&panel.bins), columns);
-            let free = (n - 1.0 - columns.len() as f64) / 2.0;
-            let log_m =
-                ln_gamma(free) - free * s.rss.ln() - 0.5 * (s.log_det_noise + s.log_det_normal);
-            if log_m > best.0 {
-                best = (log_m, s.beta, noise.log_walk);
-            }
-            all.push(log_m);
+            let mut weight = noise.over(&panel.bins);
+            let log_det = panel.bins.log_det(&weight);
+            weight.iter_mut().for_each(|g| *g = g.recip());
+            all.push((noise.log_walk, weight, log_det));
         }
+    }
+    all
+}
+
+fn marginal(panel: &Panel, mixture: &[Mixed], columns: &[usize], walk: f64) -> Prefix {
+    let free = ((panel.bins.n - 1) as f64 - columns.len() as f64) / 2.0;
+    let constant = ln_gamma(free);
+    let mut all = vec![];
+    let mut best = (f64::NEG_INFINITY, vec![], walk);
+    for (log_walk, weight, log_det) in mixture {
+        let s = panel.solve_weighted(weight, *log_det, columns);
+        let log_m = constant - free * s.rss.ln() - 0.5 * (s.log_det_noise + s.log_det_normal);
+        if log_m > best.0 {
+            best = (log_m, s.beta, *log_walk);
+        }
+        all.push(log_m);
     }
     Prefix {
         log_m: log_sum(&all) - (all.len() as f64).ln(),
@@ -141,6 +150,8 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
             .iter()
             .map(|term| numbers.by_ref().take(term.len()).collect())
             .collect();
+        // Without a term that is no noise the mixture is that of the whole.
+        let whole = mixture(&panel, state, None);
         for (m, skip) in models.iter().enumerate() {
             let used: Vec<usize> = columns
                 .iter()
@@ -148,7 +159,11 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
                 .filter(|(i, _)| Some(*i) != *skip && moved[*i][j])
                 .flat_map(|(_, c)| c.clone())
                 .collect();
-            let prefix = marginal(&panel, state, &used, *skip, state.noise.log_walk);
+            let own = skip
+                .filter(|i| state.terms[*i].is_covariance())
+                .map(|i| mixture(&panel, state, Some(i)));
+            let mixture = own.as_ref().unwrap_or(&whole);
+            let prefix = marginal(&panel, mixture, &used, state.noise.log_walk);
             log_m[m].push(prefix.log_m);
             let Some(next) = ends.get(j + 1) else {
                 continue;

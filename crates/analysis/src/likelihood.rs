@@ -5,7 +5,7 @@
 //! g_k = h(w_k) + lambda / (2 - 2 cos w_k) + further densities, w_k = pi k / N. What a fit needs of the data are sums
 //! of products of coefficients over bins in which g hardly changes: singly at low frequency, then 1 % wide.
 
-use std::cell::{OnceCell, RefCell};
+use std::cell::{Cell, OnceCell, RefCell};
 use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -127,10 +127,12 @@ impl Bins {
         A: Copy + Into<f64>,
         B: Copy + Into<f64>,
     {
-        self.start
-            .windows(2)
-            .map(|w| dot(&a[w[0]..w[1]], &b[w[0]..w[1]]))
-            .collect()
+        let single = self.counts.iter().take_while(|c| **c == 1.0).count();
+        let alone = a.iter().zip(b).skip(1).take(single);
+        let alone = alone.map(|(a, b)| (*a).into() * (*b).into());
+        let bins = self.start.windows(2).skip(single);
+        let wide = bins.map(|w| dot(&a[w[0]..w[1]], &b[w[0]..w[1]]));
+        alone.chain(wide).collect()
     }
 }
 
@@ -235,6 +237,7 @@ pub struct Panel {
     pub bins: Rc<Bins>,
     columns: RefCell<Vec<Column>>,
     pairs: RefCell<Pairs>,
+    revision: Cell<usize>,
 }
 
 /// Weighted least squares under one noise shape.
@@ -279,6 +282,7 @@ impl Panel {
             bins: Rc::clone(bins),
             columns: RefCell::new(vec![Column::Whole(coefficients)]),
             pairs: RefCell::default(),
+            revision: Cell::default(),
         }
     }
 
@@ -290,8 +294,7 @@ impl Panel {
     /// The coefficients of a candidate's columns, transformed once for all that have the same in `common`.
     fn candidate(&self, values: &[Vec<f64>], common: bool) -> Vec<Column> {
         if !common {
-            let all = self.dct.forward_all(values);
-            return all.into_iter().map(Column::new).collect();
+            return self.dct.forward_all(values).map(Column::new).collect();
         }
         let keys: Vec<[u64; 2]> = values.iter().map(|v| digest(v)).collect();
         let known = |key: &[u64; 2]| self.dct.known.columns.borrow().get(key).cloned();
@@ -349,14 +352,20 @@ impl Panel {
 
     /// Add columns of samples; returns their numbers.
     pub(crate) fn add_all<X: AsRef<[f64]>>(&self, values: &[X]) -> Vec<usize> {
-        let all = self.dct.forward_all(values).into_iter();
+        let all = self.dct.forward_all(values);
         self.push(all.map(|c| Column::Whole(Rc::new(c))).collect())
     }
 
     /// Put other coefficients in the place of the data's.
     pub fn replace_data(&self, coefficients: Vec<f64>) {
+        self.revision.set(self.revision.get() + 1);
         self.columns.borrow_mut()[0] = Column::Whole(Rc::new(coefficients));
         self.pairs.borrow_mut().retain(|k, _| k.0 > 0);
+    }
+
+    /// How often the data were replaced.
+    pub(crate) fn revision(&self) -> usize {
+        self.revision.get()
     }
 
     /// Coefficients of a column.

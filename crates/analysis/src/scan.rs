@@ -10,6 +10,9 @@ use crate::transform::RealFft;
 /// Longest grid of step times; beyond it the scan is as fine as this many places.
 const LONGEST_STEP_GRID: usize = 1 << 16;
 
+/// Places that are worked on at a time: a few columns of so many fit the nearest cache.
+const AT_HAND: usize = 512;
+
 /// Levels that the shape of a variance is divided into.
 const LEVELS: usize = 4096;
 
@@ -73,6 +76,25 @@ fn energies_beside(g: &[f64], walks: &[f64], n: usize) -> Vec<f64> {
     energies
 }
 
+/// What columns leave of energies, from the products of these with the columns and the columns' inverse; some places at a
+/// time, which stay at hand for all pairs of columns.
+fn energies_left(energies: &[f64], crossed: &[Vec<f64>], inverse: &[Vec<f64>]) -> Vec<f64> {
+    let mut all = energies.to_vec();
+    for (i, left) in all.chunks_mut(AT_HAND).enumerate() {
+        let from = i * AT_HAND;
+        for (p, x) in crossed.iter().enumerate() {
+            for (q, y) in crossed.iter().enumerate().skip(p) {
+                let times = if p == q { 1.0 } else { 2.0 };
+                let v = times * inverse[p][q];
+                let both = x[from..].iter().zip(&y[from..]);
+                let both = left.iter_mut().zip(both);
+                both.for_each(|(left, (x, y))| *left -= v * x * y);
+            }
+        }
+    }
+    all
+}
+
 /// Likelihood ratio of a step at each of the grid's times, the random walk profiled; times in samples.
 #[must_use]
 pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Vec<(f64, f64)> {
@@ -89,58 +111,53 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
         .map(|(fine, coarse)| (fine / coarse * m as f64 / n as f64).sqrt())
         .collect::<Vec<f64>>();
     let count = (n - 1) as f64;
-    let fits: Vec<(Vec<f64>, Solution)> = walks
-        .iter()
-        .map(|noise| {
-            let solution = panel.solve(&noise.over(&panel.bins), columns);
-            (noise.first(&panel.bins, m), solution)
-        })
-        .collect();
-    // <step at t, x> under a noise, for all t: the sum of x over it, in time, from t on.
-    let weighted = fits.iter().flat_map(|(g, solution)| {
-        let left = first_of_residual(panel, columns, solution, m);
-        let own = columns.iter().map(|c| panel.first(*c, m));
-        let all = std::iter::once(left).chain(own);
-        all.map(move |mut x| {
-            let by = parts.iter().zip(g);
-            x.iter_mut()
-                .zip(by)
-                .for_each(|(x, (part, g))| *x *= part / g);
-            x
-        })
-    });
-    let mut sums = dct.inverse_all(&weighted.collect::<Vec<_>>());
-    for x in &mut sums {
-        let mut sum = 0.0;
-        for v in x.iter_mut().rev() {
-            sum += *v;
-            *v = sum;
-        }
-    }
     // The likelihood falls with the residual sum of squares times the geometric mean of the noise: the least of the walks.
     let mut least = vec![f64::INFINITY; m];
-    let sums = sums.chunks(1 + columns.len());
-    for ((noise, (g, solution)), sums) in walks.iter().zip(&fits).zip(sums) {
-        let (a, crossed) = (&sums[0], &sums[1..]);
-        let energies = if noise.terms.is_empty() && m == n {
-            energies_beside_walk(n, noise.log_walk)
-        } else {
-            energies_beside(g, walk_shapes, n)
-        };
-        let mean = (solution.log_det_noise / count).exp();
-        for j in 1..m {
-            let whole = energies[j];
-            let mut b = whole;
-            for (p, x) in crossed.iter().enumerate() {
-                for (q, y) in crossed.iter().enumerate() {
-                    b -= x[j] * solution.inverse[p][q] * y[j];
+    // Two at a time, as their transforms are made.
+    for walks in walks.chunks(2) {
+        let fits: Vec<(Vec<f64>, Solution)> = walks
+            .iter()
+            .map(|noise| {
+                let solution = panel.solve(&noise.over(&panel.bins), columns);
+                (noise.first(&panel.bins, m), solution)
+            })
+            .collect();
+        // <step at t, x> under a noise, for all t: the sum of x over it, in time, from t on.
+        let weighted = fits.iter().flat_map(|(g, solution)| {
+            let left = first_of_residual(panel, columns, solution, m);
+            let own = columns.iter().map(|c| panel.first(*c, m));
+            let all = std::iter::once(left).chain(own);
+            all.map(move |mut x| {
+                let by = parts.iter().zip(g).map(|(part, g)| part / g);
+                x.iter_mut().zip(by).for_each(|(x, by)| *x *= by);
+                x
+            })
+        });
+        let weighted: Vec<Vec<f64>> = weighted.collect();
+        let mut sums: Vec<Vec<f64>> = dct.inverse_all(&weighted).collect();
+        for x in &mut sums {
+            let mut sum = 0.0;
+            for v in x.iter_mut().rev() {
+                sum += *v;
+                *v = sum;
+            }
+        }
+        let sums = sums.chunks(1 + columns.len());
+        for ((noise, (g, solution)), sums) in walks.iter().zip(&fits).zip(sums) {
+            let energies = if noise.terms.is_empty() && m == n {
+                energies_beside_walk(n, noise.log_walk)
+            } else {
+                energies_beside(g, walk_shapes, n)
+            };
+            let mean = (solution.log_det_noise / count).exp();
+            let left = energies_left(&energies, &sums[1..], &solution.inverse);
+            for (j, a) in sums[0].iter().enumerate().skip(1) {
+                if left[j] < 1e-6 * energies[j] {
+                    continue;
                 }
+                let rss = (solution.rss - a * a / left[j]).max(solution.rss * 1e-9);
+                least[j] = least[j].min(rss * mean);
             }
-            if b < 1e-6 * whole {
-                continue;
-            }
-            let rss = (solution.rss - a[j] * a[j] / b).max(solution.rss * 1e-9);
-            least[j] = least[j].min(rss * mean);
         }
     }
     let places = n as f64 / m as f64;
@@ -491,4 +508,31 @@ pub fn variance_law(u: &[f64], shape: &[f64]) -> (f64, f64, f64) {
         gamma,
         x.exp() / top / curvature.max(1e-12).sqrt(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::likelihood::least_walk;
+
+    #[test]
+    fn a_step_has_the_energy_of_its_coefficients_over_the_noise() {
+        for n in [600, 601] {
+            let (dct, bins) = (Dct::new(n), Bins::new(n));
+            for log_walk in [least_walk(n), -9.0, 1.0] {
+                let g = Noise::new(log_walk).everywhere(&bins);
+                let closed = energies_beside_walk(n, log_walk);
+                let summed = energies_beside(&g, bins.walks(), n);
+                for t in [1, 7, n / 2, n - 1] {
+                    let step = (0..n).map(|i| f64::from(u8::from(i >= t)));
+                    let c = dct.forward(&step.collect::<Vec<_>>());
+                    let parts = c.iter().zip(&g).skip(1);
+                    let energy: f64 = parts.map(|(c, g)| c * c / g).sum();
+                    for found in [closed[t], summed[t]] {
+                        assert!((found / energy - 1.0).abs() < 1e-9, "{n} {log_walk} {t}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -303,8 +303,9 @@ fn colour(
 
 /// Where a pitch of so many coefficients lies once it is folded into the band.
 fn folded(pitch: f64, length: usize) -> usize {
-    let around = pitch % (2 * length) as f64;
-    around.min((2 * length) as f64 - around).round() as usize
+    let twice = (2 * length) as f64;
+    let around = pitch - (pitch * twice.recip()) as usize as f64 * twice;
+    (around.min(twice - around) + 0.5) as usize
 }
 
 /// A ridge: energy of its coefficients, their number, the pitch at full speed, Hz, and how late it is, s.
@@ -331,8 +332,19 @@ fn order(view: &View<'_>, e: &[f64], all: &[Spectra]) -> Option<Outcome> {
     let mut worst = Ridge::default();
     let mut asked = 0usize;
     for spectra in all {
-        let evened = spectra.evened();
         let length = spectra.length;
+        // Energy and number of the coefficients about each; none about the first two, and beyond the band.
+        let about = |w: &Vec<f64>| -> Vec<(f64, f64)> {
+            let ridge = |at: usize| {
+                let (from, to) = (at.saturating_sub(BESIDE), (at + BESIDE + 1).min(length));
+                if from == 0 || from >= to {
+                    return (0.0, 0.0);
+                }
+                (w[from..to].iter().sum(), (to - from) as f64)
+            };
+            (0..=length).map(ridge).collect()
+        };
+        let evened: Vec<Vec<(f64, f64)>> = spectra.evened().iter().map(about).collect();
         for lag in LAGS_S {
             let speeds = spectra.means(&lagged(&size, lag * view.rate_hz));
             for highest in 2..FOLDS * length {
@@ -343,12 +355,9 @@ fn order(view: &View<'_>, e: &[f64], all: &[Spectra]) -> Option<Outcome> {
                     ..Ridge::default()
                 };
                 for (w, speed) in evened.iter().zip(&speeds) {
-                    let at = folded(highest as f64 * speed / top, length);
-                    let (from, to) = (at.saturating_sub(BESIDE), (at + BESIDE + 1).min(length));
-                    if from > 0 && from < to {
-                        ridge.energy += w[from..to].iter().sum::<f64>();
-                        ridge.count += (to - from) as f64;
-                    }
+                    let (energy, count) = w[folded(highest as f64 * speed / top, length)];
+                    ridge.energy += energy;
+                    ridge.count += count;
                 }
                 asked += 1;
                 if ridge.score() > worst.score() {

@@ -387,32 +387,34 @@ impl Dct {
         }
     }
 
-    /// Coefficients of several, of an odd length at half the time of each alone.
-    #[must_use]
-    pub fn forward_all<X: AsRef<[f64]>>(&self, all: &[X]) -> Vec<Vec<f64>> {
-        self.in_pairs(all, forward_of_two, Self::forward)
+    /// Coefficients of several, one after the other; of an odd length at half the time of each alone.
+    pub fn forward_all<X: AsRef<[f64]>>(&self, all: &[X]) -> impl Iterator<Item = Vec<f64>> {
+        self.each(all, forward_of_two, Self::forward)
     }
 
     /// Samples of several, as [`Dct::forward_all`].
-    #[must_use]
-    pub fn inverse_all<X: AsRef<[f64]>>(&self, all: &[X]) -> Vec<Vec<f64>> {
-        self.in_pairs(all, inverse_of_two, Self::inverse)
+    pub fn inverse_all<X: AsRef<[f64]>>(&self, all: &[X]) -> impl Iterator<Item = Vec<f64>> {
+        self.each(all, inverse_of_two, Self::inverse)
     }
 
-    fn in_pairs<X: AsRef<[f64]>>(
+    fn each<X: AsRef<[f64]>>(
         &self,
         all: &[X],
         of_two: OfTwo,
         of_one: fn(&Self, &[f64]) -> Vec<f64>,
-    ) -> Vec<Vec<f64>> {
-        let pairs = all.chunks(2).flat_map(|pair| match (pair, &self.kind) {
-            ([a, b], Kind::Odd(packed)) => of_two(packed, a.as_ref(), b.as_ref()).into(),
-            _ => pair
-                .iter()
-                .map(|x| of_one(self, x.as_ref()))
-                .collect::<Vec<_>>(),
-        });
-        pairs.collect()
+    ) -> impl Iterator<Item = Vec<f64>> {
+        let at_once = match self.kind {
+            Kind::Even(_) => 1,
+            Kind::Odd(_) => 2,
+        };
+        all.chunks(at_once)
+            .flat_map(move |some| match (some, &self.kind) {
+                ([a, b], Kind::Odd(packed)) => of_two(packed, a.as_ref(), b.as_ref()).into(),
+                _ => some
+                    .iter()
+                    .map(|x| of_one(self, x.as_ref()))
+                    .collect::<Vec<_>>(),
+            })
     }
 
     /// Samples from coefficients.
@@ -523,7 +525,7 @@ mod tests {
                     "{n}"
                 );
             };
-            let c = dct.forward_all(&all);
+            let c: Vec<Vec<f64>> = dct.forward_all(&all).collect();
             for ((c, back), x) in c.iter().zip(dct.inverse_all(&c)).zip(&all) {
                 close(c, &dct.forward(x));
                 close(&back, x);

@@ -10,6 +10,8 @@
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use crate::column::dot;
+
 /// Levels in a spread.
 const BY_SPREAD: f64 = 2.0;
 /// Spreads beyond which a level has no codes.
@@ -322,7 +324,7 @@ impl<'a> Laws<'a> {
                     *w = 0.0;
                     continue;
                 }
-                let gain: f64 = back[*at..].iter().zip(chances).map(|(b, c)| b * c).sum();
+                let gain = dot(&back[*at..][..chances.len()], chances);
                 *w *= (gain / self.of.n).powf(step);
                 all += *w;
             }

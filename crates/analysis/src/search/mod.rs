@@ -9,6 +9,8 @@ mod refine;
 mod rivals;
 mod weigh;
 
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -113,7 +115,7 @@ impl Term {
         self.lr - self.threshold
     }
 
-    fn is_covariance(&self) -> bool {
+    pub(crate) fn is_covariance(&self) -> bool {
         matches!(self.form, Form::Covariance(..))
     }
 
@@ -263,7 +265,12 @@ pub struct Search<'a> {
     pub not_tested: Vec<(&'static str, String)>,
     /// Part of the readings that was read.
     pub read: f64,
+    /// What candidates offered to states without processes.
+    offered: RefCell<HashMap<Place, HashMap<usize, Option<Term>>>>,
 }
+
+/// What a state without processes is known by: the data's revision, its random walk, its terms with their columns.
+type Place = (usize, u64, Vec<(usize, Vec<usize>)>);
 
 impl<'a> Search<'a> {
     /// Lay out all hypotheses for a channel.
@@ -346,6 +353,7 @@ impl<'a> Search<'a> {
             candidates,
             not_tested,
             read: 1.0,
+            offered: RefCell::default(),
         }
     }
 

@@ -1,5 +1,6 @@
 //! What each hypothesis offers to a model: its best place, its likelihood ratio, its threshold.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use model::effect::{Hypothesis, Shape};
@@ -226,8 +227,27 @@ impl Search<'_> {
         let walks = self.panel.walks(&state.noise);
         (0..self.candidates.len())
             .filter(|i| allow(&self.candidates[*i]) && self.open(state, *i))
-            .filter_map(|i| self.weigh(state, &walks, i))
+            .filter_map(|i| self.offer(state, &walks, i))
             .filter(|t| t.lr.is_finite())
             .collect()
+    }
+
+    /// As [`Search::weigh`]; the search comes back to states without processes, term by term, and is told what it was.
+    fn offer(&self, state: &State, walks: &[(Noise, Vec<f64>, f64)], i: usize) -> Option<Term> {
+        if !state.noise.terms.is_empty() {
+            return self.weigh(state, walks, i);
+        }
+        let terms = state.terms.iter().map(|t| (t.candidate, t.columns.clone()));
+        let (data, walk) = (self.panel.revision(), state.noise.log_walk.to_bits());
+        let place = (data, walk, terms.collect());
+        let known =
+            |all: &HashMap<_, HashMap<usize, Option<Term>>>| all.get(&place)?.get(&i).cloned();
+        let known = known(&self.offered.borrow());
+        known.unwrap_or_else(|| {
+            let new = self.weigh(state, walks, i);
+            let mut all = self.offered.borrow_mut();
+            all.entry(place).or_default().insert(i, new.clone());
+            new
+        })
     }
 }

@@ -67,6 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             seed: arguments.seed,
             file: super::name(path),
             hash: Some(hash.clone()),
+            no_evidence: arguments.report.is_none(),
         };
         let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
         if let Some(path) = &arguments.model_out {

@@ -39,6 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         seed: arguments.seed,
         file: super::name(&arguments.capture),
         hash: Some(hash.clone()),
+        no_evidence: false,
     };
     let diagnosed = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
     let subject = Subject {

@@ -131,6 +131,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         seed: arguments.seed,
         file,
         hash: Some(hash.clone()),
+        no_evidence: arguments.report.is_none(),
     };
     let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
     super::write_json(arguments.json.as_ref(), &found.diagnosis)?;

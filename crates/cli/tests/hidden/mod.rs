@@ -126,6 +126,7 @@ pub fn diagnosed(record: &Record, seed: u64) -> Diagnosis {
         seed,
         file: "hidden.csv".into(),
         hash: None,
+        no_evidence: true,
     };
     analysis::diagnose(&read.record, &options)
         .expect("600 s are enough")
