@@ -138,7 +138,7 @@ pub(crate) fn allan_misfit(s: &Searched<'_>, _rate_hz: f64, seed: u64) -> [f64; 
             of.collect()
         };
         for _ in 0..REPLICATES / 2 {
-            for y in dct.inverse_all(&[replicate(), replicate()]) {
+            for y in dct.inverse_all([replicate(), replicate()]) {
                 for (i, v) in allan(&y, first).into_iter().enumerate() {
                     sum[i] += v;
                     square[i] += v * v;

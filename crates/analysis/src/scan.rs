@@ -133,8 +133,7 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
                 x
             })
         });
-        let weighted: Vec<Vec<f64>> = weighted.collect();
-        let mut sums: Vec<Vec<f64>> = dct.inverse_all(&weighted).collect();
+        let mut sums: Vec<Vec<f64>> = dct.inverse_all(weighted).collect();
         for x in &mut sums {
             let mut sum = 0.0;
             for v in x.iter_mut().rev() {

@@ -388,33 +388,45 @@ impl Dct {
     }
 
     /// Coefficients of several, one after the other; of an odd length at half the time of each alone.
-    pub fn forward_all<X: AsRef<[f64]>>(&self, all: &[X]) -> impl Iterator<Item = Vec<f64>> {
+    pub fn forward_all<X: AsRef<[f64]>>(
+        &self,
+        all: impl IntoIterator<Item = X>,
+    ) -> impl Iterator<Item = Vec<f64>> {
         self.each(all, forward_of_two, Self::forward)
     }
 
     /// Samples of several, as [`Dct::forward_all`].
-    pub fn inverse_all<X: AsRef<[f64]>>(&self, all: &[X]) -> impl Iterator<Item = Vec<f64>> {
+    pub fn inverse_all<X: AsRef<[f64]>>(
+        &self,
+        all: impl IntoIterator<Item = X>,
+    ) -> impl Iterator<Item = Vec<f64>> {
         self.each(all, inverse_of_two, Self::inverse)
     }
 
+    /// No more are held than are made at once.
     fn each<X: AsRef<[f64]>>(
         &self,
-        all: &[X],
+        all: impl IntoIterator<Item = X>,
         of_two: OfTwo,
         of_one: fn(&Self, &[f64]) -> Vec<f64>,
     ) -> impl Iterator<Item = Vec<f64>> {
-        let at_once = match self.kind {
-            Kind::Even(_) => 1,
-            Kind::Odd(_) => 2,
-        };
-        all.chunks(at_once)
-            .flat_map(move |some| match (some, &self.kind) {
-                ([a, b], Kind::Odd(packed)) => of_two(packed, a.as_ref(), b.as_ref()).into(),
-                _ => some
-                    .iter()
-                    .map(|x| of_one(self, x.as_ref()))
-                    .collect::<Vec<_>>(),
-            })
+        let mut all = all.into_iter();
+        let mut second = None;
+        std::iter::from_fn(move || {
+            if second.is_some() {
+                return second.take();
+            }
+            let a = all.next()?;
+            let Kind::Odd(packed) = &self.kind else {
+                return Some(of_one(self, a.as_ref()));
+            };
+            let Some(b) = all.next() else {
+                return Some(of_one(self, a.as_ref()));
+            };
+            let [first, other] = of_two(packed, a.as_ref(), b.as_ref());
+            second = Some(other);
+            Some(first)
+        })
     }
 
     /// Samples from coefficients.
