@@ -12,10 +12,12 @@
 //! * Levels: Cox's test of how far two levels are ahead or behind (`contest`).
 //! * Dwells: Bartlett's test of whether two levels switch at random (`contest::dwells`).
 //! * Steadiness: energies of what drives it in stretches of the record, whose variance follows from the sum of r^2.
+//! * Size: the same energy against temperature, supply and command and their squares, which it knows nothing of.
 
 use std::f64::consts::PI;
 
-use model::effect::Hypothesis;
+use model::effect::{Hypothesis, View};
+use model::record::Quantity;
 
 use crate::checks::{
     Outcome, chi_tail, errors_of_sum, kurtosis_score, normal_tail, whitened_by_spectrum,
@@ -27,12 +29,13 @@ use crate::likelihood::{Bins, Noise, Panel};
 use crate::search::{Form, Search, State, Term};
 
 /// The claims.
-pub(crate) const CLAIMS: [&str; 5] = [
+pub(crate) const CLAIMS: [&str; 6] = [
     "process_spectrum",
     "process_law",
     "process_steadiness",
     "process_levels",
     "process_dwells",
+    "process_size",
 ];
 /// The claim of every stationary process, filters among them: neither its variance nor how its neighbours depend on each other
 /// has a rhythm, as what is held, bridged or switched by a clock of its own has.
@@ -47,6 +50,12 @@ const BENDS: usize = 6;
 const LEAST: f64 = 24.0;
 /// Stretches of the record.
 const STRETCHES: usize = 12;
+/// The same for a course over the whole record.
+const LEAST_OF_COURSE: f64 = 4.0 * LEAST;
+/// Part of its energy, rms, that may follow what else was recorded: its size is then off by a tenth.
+const DEPTH: f64 = 0.2;
+/// Energy of a column over that of what it was made of, below which it is rounding.
+const ROUNDING: f64 = 1e-9;
 /// Step of a numerical derivative.
 const STEP: f64 = 1e-3;
 
@@ -71,11 +80,11 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<Outcome> {
             state,
             u: &u,
             id: term.effect.id(),
+            view: &search.view,
             alone: Noise {
                 log_walk: f64::NEG_INFINITY,
                 terms: vec![state.noise.terms[i].clone()],
             },
-            rate_hz: search.view.rate_hz,
         };
         all.extend(process.shape());
         // Two levels have the spectrum of a process that is Gaussian, and are not.
@@ -203,21 +212,22 @@ pub(crate) fn either_sign(s: &Searched<'_>, found: &VarianceFound) -> Option<Out
 /// The claim of noise that axes share.
 pub(crate) const COMMON_CLAIM: &str = "common_noise_law";
 
-/// Square and cube of a series, each without what the powers below it have of it.
-fn bends(e: &[f64]) -> [Vec<f64>; 2] {
+/// A series and its square and cube, each without its mean and what the powers below it have of it.
+fn powers(e: &[f64]) -> [Vec<f64>; 3] {
     let mean = e.iter().sum::<f64>() / e.len().max(1) as f64;
     let centred: Vec<f64> = e.iter().map(|v| v - mean).collect();
-    let mut lower = vec![vec![1.0; e.len()], centred.clone()];
-    for power in [2, 3] {
-        let mut own: Vec<f64> = centred.iter().map(|v| v.powi(power)).collect();
-        for below in &lower {
-            let share = dot(&own, below) / dot(below, below).max(f64::MIN_POSITIVE);
-            own.iter_mut().zip(below).for_each(|(o, b)| *o -= share * b);
+    let ones = vec![1.0; e.len()];
+    let without = |mut own: Vec<f64>, below: &[&[f64]]| {
+        for b in below {
+            let share = dot(&own, b) / dot(b, b).max(f64::MIN_POSITIVE);
+            own.iter_mut().zip(*b).for_each(|(o, b)| *o -= share * b);
         }
-        lower.push(own);
-    }
-    let cube = lower.pop().unwrap_or_default();
-    [lower.pop().unwrap_or_default(), cube]
+        own
+    };
+    let power = |k| centred.iter().map(|v| v.powi(k)).collect();
+    let square = without(power(2), &[&ones, &centred]);
+    let cube = without(power(3), &[&ones, &centred, &square]);
+    [centred, square, cube]
 }
 
 /// The claim of noise that two axes share: each follows the other in a straight line, the same way up and down. What comes
@@ -225,7 +235,8 @@ fn bends(e: &[f64]) -> [Vec<f64>; 2] {
 /// their correlation, of which a twentieth may be left, and `pairs` the number of pairs that are asked.
 pub(crate) fn straight(a: &[f64], b: &[f64], lr: f64, pairs: usize) -> Outcome {
     let score = |e: &[f64], bend: &[f64]| errors_of_sum(e.iter().zip(bend).map(|(e, b)| e * b));
-    let scores = [(a, bends(b)), (b, bends(a))].map(|(e, of)| of.map(|bend| score(e, &bend)));
+    let scores = [(a, powers(b)), (b, powers(a))]
+        .map(|(e, [_, square, cube])| [square, cube].map(|bend| score(e, &bend)));
     let scores = scores.as_flattened();
     let statistic: f64 = scores.iter().map(|z| z * z).sum();
     let bent = scores.iter().map(|z| z.abs()).fold(0.0, f64::max);
@@ -263,9 +274,9 @@ struct Process<'a> {
     /// Whitened coefficients of the residual.
     u: &'a [f64],
     id: &'static str,
+    view: &'a View<'a>,
     /// Its noise beside a white one of variance 1.
     alone: Noise,
-    rate_hz: f64,
 }
 
 /// Sum of m a b / 2: the information that deviations a and b of ln variance share.
@@ -384,7 +395,7 @@ impl Process<'_> {
             let weigh = |b: usize| bent(b).abs() * weight[b].sqrt();
             weigh(*a).total_cmp(&weigh(*b))
         })?;
-        let hz = bins.at.omega[heaviest] / (2.0 * PI) * self.rate_hz;
+        let hz = bins.at.omega[heaviest] / (2.0 * PI) * self.view.rate_hz;
         let what = format!(
             "its spectrum is bent otherwise; all noise is {:.2} of the model's about {hz:.3} Hz",
             bent(heaviest).exp()
@@ -425,7 +436,7 @@ impl Process<'_> {
             )
         });
         let steadiness = drive.steadiness().map(|(statistic, p, j, energy)| {
-            let length = self.u.len() as f64 / self.rate_hz / STRETCHES as f64;
+            let length = self.u.len() as f64 / self.view.rate_hz / STRETCHES as f64;
             let what = format!(
                 "it is not there all the time alike; {energy:.2} of its mean from {:.0} to {:.0} s",
                 j as f64 * length,
@@ -433,7 +444,25 @@ impl Process<'_> {
             );
             self.outcome(CLAIMS[2], statistic, p, what)
         });
-        law.into_iter().chain(steadiness).collect()
+        let size = self.size(&drive);
+        law.into_iter().chain(steadiness).chain(size).collect()
+    }
+
+    /// Whether its size follows what else was recorded.
+    fn size(&self, drive: &Filtered) -> Option<Outcome> {
+        let quantities = [Quantity::Temp, Quantity::Supply, Quantity::Pwm];
+        let recorded = quantities.iter().filter_map(|q| self.view.signal(*q));
+        let asked: Vec<(&str, f64, f64)> = recorded
+            .filter_map(|s| {
+                let (statistic, depth) = drive.follows(&s.smooth)?;
+                Some((s.name.as_str(), statistic, depth))
+            })
+            .collect();
+        let (name, statistic, depth) = asked.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let chance = (asked.len() as f64 * chi_tail(*statistic, 2.0)).min(1.0);
+        let p = if *depth < DEPTH { 1.0 } else { chance };
+        let what = format!("its energy follows {name}, by {:.0} % rms", 100.0 * depth);
+        Some(self.outcome(CLAIMS[5], *statistic, p, what))
     }
 }
 
@@ -498,6 +527,29 @@ impl Filtered {
         let chance = chi_tail(statistic, STRETCHES as f64 - 1.0);
         Some((statistic, chance, worst, energies[worst] / mean))
     }
+
+    /// Chi-square of two degrees of the energy against a course and its square, and the part of the energy, rms, that
+    /// follows them. `None` where too few independent values stand behind.
+    fn follows(&self, course: &[f64]) -> Option<(f64, f64)> {
+        let n = self.values.len() as f64;
+        if n < LEAST_OF_COURSE * self.sums[0] {
+            return None;
+        }
+        let energy = self.values.iter().map(|v| v * v).sum::<f64>() / n;
+        let [first, square, _] = powers(course);
+        // What is left of a course that rests, or of the square of one of two levels, is rounding.
+        let score = |c: &[f64], of: &[f64], power: i32| {
+            let raw: f64 = of.iter().map(|v| v.powi(2 * power)).sum();
+            if dot(c, c) < ROUNDING * raw {
+                return 0.0;
+            }
+            let more = self.values.iter().map(|v| v * v / energy - 1.0);
+            more.zip(c).map(|(m, c)| m * c).sum::<f64>() / dot(c, c).sqrt()
+        };
+        let scores = score(&first, course, 1).powi(2) + score(&square, &first, 2).powi(2);
+        let follows = (scores / (2.0 * self.sums[0]), (scores / n).sqrt());
+        Some(follows)
+    }
 }
 
 #[cfg(test)]
@@ -537,6 +589,30 @@ mod tests {
         let unsteady = unsteady.count();
         // 4 are expected.
         assert!(unsteady <= 12, "{unsteady}");
+    }
+
+    #[test]
+    fn a_size_that_follows_a_thermometer_is_told_and_one_that_does_not_is_not() {
+        let warm = |i: usize| (i as f64 / 450.0).sin() + 0.4;
+        let course: Vec<f64> = (0..6000).map(warm).collect();
+        let chance_of = |f: &Filtered, c: &[f64]| chi_tail(f.follows(c).unwrap().0, 2.0);
+        let runs = 400;
+        let low = (0..runs).filter(|s| chance_of(&filtered(*s), &course) < 0.01);
+        let low = low.count();
+        // 4 are expected.
+        assert!(low <= 12, "{low}");
+        for seed in 0..10 {
+            let mut f = filtered(seed);
+            f.values.iter_mut().zip(&course).for_each(|(v, c)| *v *= c);
+            let (statistic, depth) = f.follows(&course).unwrap();
+            assert!(chi_tail(statistic, 2.0) < 1e-6 && depth > DEPTH, "{depth}");
+        }
+        // What rests, and what has two levels, whose square is the same course.
+        assert!(filtered(1).follows(&[25.29; 6000]).unwrap().0 < 1e-6);
+        let levels: Vec<f64> = (0..6000)
+            .map(|i| if i % 700 < 90 { 0.3 } else { 0.7 })
+            .collect();
+        assert!(chance_of(&filtered(1), &levels) > 1e-3);
     }
 
     #[test]
