@@ -256,7 +256,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: Left) -> (Vec
     let unlawful = |t: &Term| {
         let id = t.effect.id();
         let failed = |l: &(&'static str, Outcome)| unlawful_of(id, l);
-        let signal = t.follows.as_deref();
+        let signal = s.search.followed(t);
         let beside = |o: &Term| {
             o.effect.id() == beyond::ID
                 && o.lr > law::DEPARTURE * t.lr

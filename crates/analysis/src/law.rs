@@ -24,7 +24,7 @@ const WIDENED: f64 = 1.12;
 /// For each effect that follows a channel, whether its law holds.
 pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static str, Outcome)> {
     let of_library = |t: &&Term| t.effect.id() != beyond::ID;
-    let follows = |t: &Term| Some((t.effect.id(), t.follows.clone()?));
+    let follows = |t: &Term| Some((t.effect.id(), search.followed(t)?.to_owned()));
     let named = state.terms.iter().filter(of_library);
     let followed: BTreeSet<(&'static str, String)> = named.filter_map(follows).collect();
     // Under the noise as it was fitted: few coefficients tell the random walk, and slow departures could be traded for it.

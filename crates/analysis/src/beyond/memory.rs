@@ -141,12 +141,62 @@ pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Vec<f64>> {
         all.extend(resolved(view, times).map(|t| lagged(&scaled, t * view.rate_hz)));
     }
     if signal.quantity == Quantity::Pwm {
-        let size = centred(&size(signal));
+        let size = size(signal);
         let lags = resolved(view, &HEAT_S);
-        all.extend(lags.map(|t| lagged(&size, t * view.rate_hz)));
+        let heat = centred(&size);
+        all.extend(lags.map(|t| lagged(&heat, t * view.rate_hz)));
+        all.extend(after_changes(&scaled));
+        all.extend(after_changes(&size));
     }
     all
 }
+
+/// Stretches of samples after a change, of any shape within them: first one and end. What rings swings within some samples,
+/// what relaxes does so in octaves.
+const AFTER: [(usize, usize); 12] = [
+    (0, 1),
+    (1, 2),
+    (2, 3),
+    (3, 4),
+    (4, 5),
+    (5, 6),
+    (6, 8),
+    (8, 10),
+    (10, 13),
+    (13, 16),
+    (16, 24),
+    (24, 48),
+];
+
+/// What follows each change of a series in proportion, in each stretch after it. A series that changes more often than in one
+/// of sixteen samples has no stretches of its own.
+fn after_changes(values: &[f64]) -> Vec<Vec<f64>> {
+    let steps = values
+        .windows(2)
+        .enumerate()
+        .map(|(i, w)| (i + 1, w[1] - w[0]));
+    let largest = steps.clone().map(|(_, d)| d.abs()).fold(0.0, f64::max);
+    let events: Vec<(usize, f64)> = steps
+        .filter(|(_, d)| d.abs() > LEAST_STEP * largest)
+        .collect();
+    if events.is_empty() || events.len() > values.len() / 16 {
+        return vec![];
+    }
+    let stretch = |(from, to): &(usize, usize)| {
+        let mut column = vec![0.0; values.len()];
+        for (at, change) in &events {
+            let range = (at + from).min(values.len())..(at + to).min(values.len());
+            column[range]
+                .iter_mut()
+                .for_each(|v| *v += change / largest);
+        }
+        column
+    };
+    AFTER.iter().map(stretch).collect()
+}
+
+/// Smallest change that counts, over the largest.
+const LEAST_STEP: f64 = 0.05;
 
 #[cfg(test)]
 mod tests {

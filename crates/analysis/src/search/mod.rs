@@ -357,6 +357,23 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// The channel that a term follows; what has a shape of its own follows what else of its effect does.
+    pub(crate) fn followed<'b>(&'b self, term: &'b Term) -> Option<&'b str> {
+        let of_effect = || {
+            let own = |c: &&Candidate| c.effect.id() == term.effect.id();
+            self.candidates
+                .iter()
+                .filter(own)
+                .find_map(|c| match &c.hypothesis {
+                    Hypothesis::Regression(r) => r.follows.as_deref(),
+                    _ => None,
+                })
+        };
+        let shaped = matches!(term.form, Form::Shaped(..));
+        let of_shape = || of_effect().filter(|_| shaped);
+        term.follows.as_deref().or_else(of_shape)
+    }
+
     /// The state with these terms, fitted from a starting noise.
     #[must_use]
     pub fn refit(&self, terms: Vec<Term>, start: f64) -> State {
