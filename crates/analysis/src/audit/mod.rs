@@ -417,7 +417,7 @@ pub fn audit(record: &Record) -> Audit {
         }
     }
     repeats::audit(record, &gyros, &at, &mut audit);
-    alike::audit(record, &gyros, &mut audit);
+    alike::audit(record, &gyros, &at, &mut audit);
     joint::audit(&gyros, &mut audit);
     for g in &gyros {
         foretold::audit(g, &mut audit);
