@@ -5,6 +5,8 @@
 //! and however alike neighbours are. Where the noise is below a count, pairs farther apart tell the share instead. Three
 //! gyros agree with the product of theirs: (1 / (2 sqrt(pi) sigma))^3 for white noise of sigma counts.
 
+use std::f64::consts::SQRT_2;
+
 use model::record::Record;
 
 use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted, tails};
@@ -59,23 +61,37 @@ fn held(values: &[f64], step: f64, rows: usize, excess: f64) -> Option<(f64, f64
 const BESIDE: std::ops::RangeInclusive<usize> = 3..=8;
 /// Standard errors.
 const FAR: f64 = 4.0;
+/// Standard errors of two findings together at which readings that repeat are none that are held at any time: 1e-4.
+const NOT_HELD: f64 = 3.72;
 /// Repeats of repeats beyond those of chance, over all beyond chance: where a fault holds readings for three frames and more
 /// they are half and more of them.
 const IN_RUNS: f64 = 0.4;
 
+/// How far readings that repeat lie from those about.
+struct Near {
+    /// Over what those do that a lost conversion makes repeat, variances.
+    part: f64,
+    /// Standard errors below that.
+    z: f64,
+    /// Whether nearness alone is what is seen.
+    alone: bool,
+}
+
+/// How far a reading lies from those about that it is not held with.
+fn off(values: &[f64], i: usize) -> Option<f64> {
+    let mut sum = 0.0;
+    for k in BESIDE {
+        sum += values.get(i.checked_sub(k + 1)?)? + values.get(i + k)?;
+    }
+    let off = values[i] - sum / (2 * BESIDE.count()) as f64;
+    off.is_finite().then_some(off)
+}
+
 /// How far, in units of variance, readings that repeat lie from those about, over what those do that a lost conversion makes
 /// repeat: these lie anywhere. Two readings that agree by what they are lie near their common mean, and the more so where
-/// a play or a filter makes them agree. `None` unless that alone is what is seen. Of `own`, the readings that repeat,
-/// `expected` do so by chance.
-fn near_only(values: &[f64], own: &[usize], expected: f64) -> Option<f64> {
-    let off = |i: usize| -> Option<f64> {
-        let mut sum = 0.0;
-        for k in BESIDE {
-            sum += values.get(i.checked_sub(k + 1)?)? + values.get(i + k)?;
-        }
-        let off = values[i] - sum / (2 * BESIDE.count()) as f64;
-        off.is_finite().then_some(off * off)
-    };
+/// a play or a filter makes them agree. Of `own`, the readings that repeat, `expected` do so by chance.
+fn near(values: &[f64], own: &[usize], expected: f64) -> Option<Near> {
+    let off = |i: usize| off(values, i).map(|o| o * o);
     let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
     let any: Vec<f64> = (0..values.len()).filter_map(off).collect();
     let here: Vec<f64> = own.iter().filter_map(|i| off(*i)).collect();
@@ -98,8 +114,49 @@ fn near_only(values: &[f64], own: &[usize], expected: f64) -> Option<f64> {
     let (lost, near) = (share * alike + 1.0 - share, alike);
     let seen = mean(&here) / variance;
     let error = seen * (2.0 / here.len() as f64).sqrt();
-    let certain = lost - seen > FAR * error && lost - seen > 0.5 * (lost - near);
-    certain.then_some(seen / lost)
+    Some(Near {
+        part: seen / lost,
+        z: (lost - seen) / error,
+        alone: lost - seen > FAR * error && lost - seen > 0.5 * (lost - near),
+    })
+}
+
+/// Standard errors by which readings that repeat, `own`, go with those before and after both more than such do that a lost
+/// conversion makes repeat. That holds a reading whatever comes next, which goes with it as any two readings do that are one
+/// and two apart; so do, where neighbours are jointly normal, two that agree by chance: with v = y1 = y2,
+/// E v^2 = (1 + r1) / 2 and E v y0 = (r1 + r2) / (1 + r1) E v^2. A median holds a reading that lies between others, and one
+/// far out only beside one farther out. Of `own`, `expected` repeat by chance.
+fn beside(values: &[f64], own: &[usize], expected: f64) -> Option<f64> {
+    let offs: Vec<Option<f64>> = (0..values.len()).map(|i| off(values, i)).collect();
+    let at = |i: usize| offs.get(i).copied().flatten();
+    let apart = |lag: usize| {
+        let pairs = offs.iter().zip(offs.iter().skip(lag));
+        let all: Vec<f64> = pairs.filter_map(|(a, b)| Some((*a)? * (*b)?)).collect();
+        mean_with_error(&all).0
+    };
+    let next = |i: usize| own.binary_search(&i).is_ok();
+    let alone = own.iter().filter(|i| !next(**i - 1) && !next(**i + 1));
+    let here = alone.filter_map(|i| {
+        let about = at(i.checked_sub(2)?)? + at(i + 1)?;
+        Some(0.25 * (at(i - 1)? + at(*i)?) * about)
+    });
+    let here: Vec<f64> = here.collect();
+    if here.len() < LEAST_READINGS {
+        return None;
+    }
+    let (seen, error) = mean_with_error(&here);
+    // Readings that are held make neighbours alike by their share.
+    let holds = (own.len() as f64 - expected) / values.len() as f64;
+    let lost = 0.5 * (apart(1) - holds * apart(0) + apart(2));
+    Some((seen - lost) / error)
+}
+
+/// Mean of independent values, and its standard error.
+fn mean_with_error(all: &[f64]) -> (f64, f64) {
+    let n = all.len() as f64;
+    let mean = all.iter().sum::<f64>() / n;
+    let squares = all.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+    (mean, squares.sqrt() / n)
 }
 
 fn differences(values: &[f64], lag: usize) -> Vec<f64> {
@@ -398,9 +455,20 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
                 audit.unexplain(name, format!("{what}; and it changes by one step {near:.0} times, where {far:.0} are expected: a reading is held until the next one is some steps away"));
                 continue;
             }
-            if let Some(kept) = near_only(values, &own, expected) {
-                audit.unexplain(name, format!("{what}; where they do, the readings lie {kept:.2} times as far from those about as such do that are held at any time: it repeats where two in turn lie near each other, as behind a play or a filter"));
-                continue;
+            if let Some(near) = near(values, &own, expected) {
+                let part = near.part;
+                let least = format!(
+                    "where they do, the readings lie {part:.2} times as far from those about as such do that are held at any time"
+                );
+                if near.alone {
+                    audit.unexplain(name, format!("{what}; {least}: it repeats where two in turn lie near each other, as behind a play or a filter"));
+                    continue;
+                }
+                let beside = beside(values, &own, expected);
+                if let Some(z) = beside.filter(|z| z + near.z > NOT_HELD * SQRT_2) {
+                    audit.unexplain(name, format!("{what}; {least}, and go with those beside them by {z:.1} standard errors more: it repeats readings that lie between others, as a median does"));
+                    continue;
+                }
             }
             // Which of them is a repeat by chance cannot be told where those are the many, but of a reading that comes
             // three times and more.
