@@ -22,6 +22,8 @@ const MOST: f64 = 0.5;
 
 /// Readings of a run below which it is not looked at.
 const LEAST_RUN: usize = 10;
+/// Longest runs that are weighed by more than the chance of a reading on its own.
+const MOST_RUNS: usize = 3;
 /// Rows that one gyro may lie behind another whose readings it holds.
 const BEHIND: [(usize, usize); 3] = [(0, 0), (1, 0), (0, 1)];
 /// What is new in a reading spreads this many times less than the narrowest of the differences, at most.
@@ -73,18 +75,38 @@ fn counts<'a>(
     (a.channel.lsb == b.channel.lsb).then(|| (x, y, rows.collect()))
 }
 
+/// How many of some numbers the most frequent of them is.
+fn most_alike(all: &[Vec<i32>]) -> usize {
+    let numbers = || all.iter().flatten().copied();
+    let (Some(low), Some(high)) = (numbers().min(), numbers().max()) else {
+        return 0;
+    };
+    let places = (i64::from(high) - i64::from(low)) as usize + 1;
+    // What is spread wider than there are numbers is better sorted.
+    if places > numbers().count() {
+        let mut sorted: Vec<i32> = numbers().collect();
+        sorted.sort_unstable();
+        return sorted
+            .chunk_by(|a, b| a == b)
+            .map(<[i32]>::len)
+            .max()
+            .unwrap_or(0);
+    }
+    let mut counts = vec![0; places];
+    numbers().for_each(|v| counts[(v - low) as usize] += 1);
+    counts.into_iter().max().unwrap_or(0)
+}
+
 /// Largest share that one number has of those of some stretches, of their first or of their second differences: no reading
 /// is known from those before with a larger chance, but for [`NARROWER`].
 fn largest_share(stretches: &[&[i32]]) -> f64 {
     let mut stretches: Vec<Vec<i32>> = stretches.iter().map(|s| s.to_vec()).collect();
     let mut largest = 0.0f64;
     for _ in 0..3 {
-        let mut all: Vec<i32> = stretches.concat();
-        all.sort_unstable();
-        let most = all.chunk_by(|a, b| a == b).map(<[i32]>::len).max();
-        largest = largest.max(most.map_or(1.0, |m| m as f64 / all.len() as f64));
+        let count: usize = stretches.iter().map(Vec::len).sum();
+        largest = largest.max(most_alike(&stretches) as f64 / count.max(1) as f64);
         for s in &mut stretches {
-            *s = s.windows(2).map(|w| w[1] - w[0]).collect();
+            *s = s.windows(2).map(|w| w[1].wrapping_sub(w[0])).collect();
         }
     }
     largest
@@ -103,25 +125,32 @@ struct Run {
 /// the run, where both may be held, at a rail or quiet, and in the difference elsewhere, which what they share leaves alone.
 fn longest(x: &[i32], y: &[i32]) -> Option<Run> {
     let d: Vec<i32> = x.iter().zip(y).map(|(x, y)| x - y).collect();
-    let own = largest_share(&[x]).max(largest_share(&[y]));
     let (mut first, mut runs) = (0, vec![]);
     for part in d.chunk_by(|a, b| (*a == 0) == (*b == 0)) {
         // Where most is the same there is no elsewhere.
         if part[0] == 0 && part.len() >= LEAST_RUN && 2 * part.len() < d.len() {
-            let end = first + part.len();
-            let inside = largest_share(&[&x[first..end]]);
-            let elsewhere = largest_share(&[&d[..first], &d[end..]]);
-            let each = NARROWER * own.max(inside).max(elsewhere);
-            runs.push(Run {
-                first,
-                length: part.len(),
-                ln_chance: part.len() as f64 * each.min(1.0).ln(),
-            });
+            runs.push((part.len(), first));
         }
         first += part.len();
     }
-    runs.into_iter()
-        .min_by(|a, b| a.ln_chance.total_cmp(&b.ln_chance))
+    runs.sort_unstable_by(|a, b| b.cmp(a));
+    let most = runs.first()?.0;
+    let ln_chance = |length: usize, share: f64| length as f64 * (NARROWER * share).min(1.0).ln();
+    let own = largest_share(&[x]).max(largest_share(&[y]));
+    if ln_chance(most, own) > (FALSE_ALARM / d.len() as f64).ln() {
+        return None;
+    }
+    let weighed = runs.into_iter().take(MOST_RUNS).map(|(length, first)| {
+        let end = first + length;
+        let inside = largest_share(&[&x[first..end]]);
+        let elsewhere = largest_share(&[&d[..first], &d[end..]]);
+        Run {
+            first,
+            length,
+            ln_chance: ln_chance(length, own.max(inside).max(elsewhere)),
+        }
+    });
+    weighed.min_by(|a, b| a.ln_chance.total_cmp(&b.ln_chance))
 }
 
 /// Logarithm of the likelihood of readings of a run, normal as those about it.
