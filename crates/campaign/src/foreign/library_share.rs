@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use analysis::likelihood::Dct;
 use analysis::optimise::nelder_mead;
-use model::effect::{Effect, Hypothesis, Signal, VarianceLaw, View};
+use model::effect::{Column, Effect, Hypothesis, Signal, VarianceLaw, View};
 use model::effects::EFFECTS;
 use model::record::{Axis, Base, Quantity};
 
@@ -93,13 +93,40 @@ fn hypotheses(effect: &dyn Effect, stand: &Stand, axis: usize) -> Vec<Hypothesis
     effect.hypotheses(&view).unwrap_or_default()
 }
 
+/// Columns of an effect's regressions. What is at most a part of another comes with it, nothing of it or all that it may be
+/// either way.
+fn within_bounds(effect: &dyn Effect, all: &[Column]) -> Vec<Vec<Vec<f64>>> {
+    let (parts, whole): (Vec<&Column>, Vec<&Column>) = all
+        .iter()
+        .partition(|c| effect.at_most(c.parameter).is_some());
+    let signs: &[f64] = if parts.is_empty() {
+        &[0.0]
+    } else {
+        &[-1.0, 0.0, 1.0]
+    };
+    let with = |c: &Column, sign: f64| {
+        let mut values = c.values.clone();
+        for p in &parts {
+            if let Some((_, most)) = effect.at_most(p.parameter).filter(|a| a.0 == c.parameter) {
+                values
+                    .iter_mut()
+                    .zip(&p.values)
+                    .for_each(|(v, p)| *v += sign * most * p);
+            }
+        }
+        values
+    };
+    let set = |sign: &f64| whole.iter().map(|c| with(c, *sign)).collect();
+    signs.iter().map(set).collect()
+}
+
 /// Sets of columns by which an effect could describe a signal: all its regressions together, each with each value of a
 /// shape, and every step.
 fn columns(effect: &dyn Effect, stand: &Stand, axis: usize) -> Vec<Vec<Vec<f64>>> {
-    let (mut fixed, mut shaped, mut sets) = (vec![], vec![], vec![]);
+    let (mut regressions, mut shaped, mut sets) = (vec![], vec![], vec![]);
     for h in hypotheses(effect, stand, axis) {
         match h {
-            Hypothesis::Regression(r) => fixed.extend(r.columns.into_iter().map(|c| c.values)),
+            Hypothesis::Regression(r) => regressions.extend(r.columns),
             Hypothesis::Shaped(s) => {
                 let at = |x: f64| {
                     s.columns(x)
@@ -118,9 +145,15 @@ fn columns(effect: &dyn Effect, stand: &Stand, axis: usize) -> Vec<Vec<Vec<f64>>
             _ => {}
         }
     }
-    sets.extend(shaped.into_iter().map(|s| [fixed.clone(), s].concat()));
-    if !fixed.is_empty() {
-        sets.push(fixed);
+    for fixed in within_bounds(effect, &regressions) {
+        sets.extend(
+            shaped
+                .iter()
+                .map(|s: &Vec<_>| [fixed.clone(), s.clone()].concat()),
+        );
+        if !fixed.is_empty() {
+            sets.push(fixed);
+        }
     }
     sets
 }

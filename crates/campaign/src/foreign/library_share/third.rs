@@ -19,6 +19,11 @@ pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> (Vec<&'stati
                 .map(|set| (e.id(), set))
         })
         .collect();
+    // Of an effect with bounds one set is all that it can be: two of them would be beyond these.
+    let bounded = |id: &str| {
+        let of = EFFECTS.iter().find(|e| e.id() == id);
+        of.is_some_and(|e| e.parameters().iter().any(|p| e.at_most(p.name).is_some()))
+    };
     let (mut taken, mut names) = (vec![], vec![]);
     let mut rest = signal.to_vec();
     for _ in 0..2 {
@@ -34,6 +39,7 @@ pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> (Vec<&'stati
         let (id, best) = sets
             .iter()
             .chain([&own[0], &own[2]])
+            .filter(|(id, _)| !(names.contains(id) && bounded(id)))
             .min_by(|a, b| gain(&with(&a.1)).total_cmp(&gain(&with(&b.1))))
             .expect("the library has regressions");
         rest = with(best);
