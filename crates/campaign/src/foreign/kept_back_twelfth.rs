@@ -232,7 +232,7 @@ fn structure(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 }
 
 /// How often each reading passes one of so many places of a turn, which lie at equal angles.
-fn passes(angle: &[f64], per_turn: f64, first: f64) -> Vec<f64> {
+pub(super) fn passes(angle: &[f64], per_turn: f64, first: f64) -> Vec<f64> {
     let places: Vec<f64> = angle
         .iter()
         .map(|a| (a / TAU * per_turn + first).floor())
@@ -341,7 +341,7 @@ fn die(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::foreign::kept_back_tenth::tests::largest_change;
     use crate::foreign::swing;
@@ -353,7 +353,7 @@ mod tests {
     }
 
     /// Correlation of two series.
-    fn alike(a: &[f64], b: &[f64]) -> f64 {
+    pub(in super::super) fn alike(a: &[f64], b: &[f64]) -> f64 {
         let (a, b) = (about_mean(a), about_mean(b));
         let of = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
         of(&a, &b) / (of(&a, &a) * of(&b, &b)).sqrt()

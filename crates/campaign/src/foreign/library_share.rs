@@ -25,6 +25,7 @@ mod seventh;
 mod sixth;
 mod tenth;
 mod third;
+mod thirteenth;
 mod twelfth;
 
 /// Share of the gain from which an effect of the library describes it.
