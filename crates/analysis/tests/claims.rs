@@ -1,65 +1,18 @@
 //! What a name has to hold, and what is told where none does: effects that no cause of the library makes are hidden in
-//! simulated runs, and causes where they were lost before. Graded by rate, as in `closed_loop`.
+//! simulated runs, and causes where they were lost before.
+
+mod graded;
 
 use std::f64::consts::TAU;
 
-use analysis::result::{Diagnosis, Finding};
-use analysis::{DiagnoseOptions, diagnose};
+use analysis::result::Finding;
+use graded::{LEAST, RUNS, add, graded, named, record, said, told, values};
 use model::file::EffectModel;
 use model::record::{Base, Quantity, Record};
 use model::{ModelFile, Parameter};
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
-
-const RUNS: u64 = 8;
-const LEAST: u64 = 7;
-
-fn record(excitation: &[(&str, f64)], seed: u64) -> Record {
-    let mut model = ModelFile::paper();
-    let moves = excitation.iter().map(|(k, v)| ((*k).to_owned(), *v));
-    model.excitation.extend(moves);
-    model::simulate(&model, 600.0, 20.0, seed).expect("a run")
-}
-
-fn add(record: &mut Record, name: &str, of: impl Fn(usize) -> f64) {
-    let c = record.channels.iter_mut().find(|c| c.name == name);
-    let values = &mut c.expect("a channel").values;
-    let lsb = 0.07326;
-    for (i, v) in values.iter_mut().enumerate() {
-        *v = ((*v + of(i)) / lsb).round() * lsb;
-    }
-}
-
-fn values(record: &Record, quantity: Quantity) -> Vec<f64> {
-    let c = record.channels.iter().find(|c| c.quantity == quantity);
-    c.expect("a channel").values.clone()
-}
-
-fn told(record: &Record) -> Diagnosis {
-    diagnose(record, &DiagnoseOptions::default())
-        .expect("a diagnosis")
-        .diagnosis
-}
-
-fn named(d: &Diagnosis) -> Vec<(&str, &str)> {
-    (d.findings.iter())
-        .flat_map(|f| f.channels.iter().map(|c| (f.cause.as_str(), c.as_str())))
-        .collect()
-}
-
-fn graded(what: &str, mut right: impl FnMut(u64, &mut Xoshiro256PlusPlus) -> Result<(), String>) {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xc1a1);
-    let misses: Vec<String> = (0..RUNS)
-        .filter_map(|run| right(run, &mut rng).err())
-        .collect();
-    let hits = RUNS - misses.len() as u64;
-    assert!(hits >= LEAST, "{what}: {hits} of {RUNS}; {misses:#?}");
-}
-
-fn said(d: &Diagnosis) -> String {
-    format!("{:?} | {:?}", named(d), d.unexplained)
-}
 
 #[test]
 fn a_large_step_is_a_step_wherever_it_lies() {
