@@ -7,7 +7,7 @@ use model::record::Quantity;
 use crate::checks::{self, LEAST_CHANCE, MOST};
 use crate::diagnosis::Searched;
 use crate::grid::Grid;
-use crate::result::{Check, Unexplained};
+use crate::result::Check;
 
 /// Bits of a code that are looked at.
 const BITS: u32 = 14;
@@ -125,14 +125,14 @@ fn most<'a>(e: &[f64], sources: impl Iterator<Item = &'a Source>) -> Option<(f64
 }
 
 /// Each axis at rest against what the others are made of, and its variance against what the accelerometers felt.
-pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> (Vec<Check>, Vec<Unexplained>) {
+pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
     let still: Vec<&Searched<'_>> = searched
         .iter()
         .filter(|s| !s.target.moving && !s.search.view.sways())
         .collect();
-    let (mut found, mut left) = (vec![], vec![]);
+    let mut found = vec![];
     let Some(samples) = still.iter().map(|s| s.e.len().min(MOST)).min() else {
-        return (found, left);
+        return found;
     };
     let sources: Vec<Vec<Source>> = still.iter().map(|s| of_one(s, samples)).collect();
     let felt = felt(grid, samples);
@@ -149,14 +149,12 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> (Vec<Check>, 
             threshold: LEAST_CHANCE,
             fails_before: fails,
             fails_after: fails,
-            what: format!("most of all, {what}"),
+            what: if fails {
+                what
+            } else {
+                format!("most of all, {what}")
+            },
         });
-        if fails {
-            left.push(Unexplained {
-                channel: channel.into(),
-                what: format!("{id}: {what}"),
-            });
-        }
     };
     for (i, a) in still.iter().enumerate() {
         let e = &a.e[..samples];
@@ -188,7 +186,7 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> (Vec<Check>, 
             most(&square, felt.iter()),
         );
     }
-    (found, left)
+    found
 }
 
 #[cfg(test)]

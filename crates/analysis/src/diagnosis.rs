@@ -126,26 +126,26 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         .collect();
     losses::suppress(&mut checks, &audited);
     let shared = common(&searched, &grid);
+    checks.extend(couplings(&searched, &grid));
     let mut nearest = vec![];
     let mut doubts = vec![];
     for s in &searched {
-        let failing = |id: &str| {
+        let fails = || {
             let all = checks.iter().chain(&audited.checks);
-            let mut own = all.filter(|c| c.channel == s.target.name && c.id == id);
-            own.any(|c| c.fails_after)
+            all.filter(|c| c.channel == s.target.name && c.fails_after)
         };
+        let failing = |id: &str| fails().any(|c| c.id == id);
         let (moved, told) = motion_findings(s, &grid, &failing);
         findings.extend(moved);
         doubts.extend(told);
         let of_terms = term_findings(s, &grid, options.seed);
         // What an axis takes from another one later has a spectrum, and is no process of its own.
         let late = shared.late.iter().filter(|l| l.0 == s.target.name);
-        let mut colours = checks
-            .iter()
-            .filter(|c| c.channel == s.target.name && c.id == short_time::COLOUR && c.fails_after);
+        let mut colours = fails().filter(|c| c.id == short_time::COLOUR);
         let left = doubt::Left {
             late: late.map(|l| l.1).sum(),
             colour: colours.next().map_or(0.0, |c| c.statistic),
+            said: fails().map(|c| c.what.clone()).collect(),
         };
         // A bit that sticks makes a noise of its own, which depends on the level.
         let by_counts = s.variance.as_ref().is_some_and(|v| {
@@ -154,7 +154,8 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             audited.explains_variance(&s.target.name, v.lr, v.threshold, ratio)
         });
         let variance = variance_finding(s).filter(|_| !by_counts);
-        let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance, &failing, left);
+        let (kept, doubted, told) = doubt::withdraw(s, of_terms, variance, &failing, &left);
+        doubts.extend(doubt::kin::stale(s, &mut findings, &failing));
         doubts.extend(events::hold_outliers(s, &kept, &mut findings, &failing));
         findings.extend(kept);
         nearest.extend(doubted);
@@ -182,9 +183,6 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
     }
     unexplained.extend(dead);
     unexplained.extend(doubts);
-    let (of_others, told) = couplings(&searched, &grid);
-    unexplained.extend(told);
-    checks.extend(of_others);
     checks.extend(shared.checks);
     checks.extend(audited.checks);
     unexplained.extend(audited.unexplained);
@@ -198,7 +196,14 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         own.any(|s| found(&s)) && !checks.iter().any(tails)
     };
     unexplained.extend(audited.not_normal.into_iter().filter(|u| !bent(&u.channel)));
-    findings.extend(shared.finding);
+    if let Some(finding) = shared.finding {
+        if doubt::kin::shared_falls(&finding, &checks) {
+            unexplained.push(doubt::nearest_of(&finding.channels[0], &finding.what));
+            nearest.push(finding);
+        } else {
+            findings.push(finding);
+        }
+    }
     smallest.extend(searched.iter().flat_map(|s| s.limits.iter().cloned()));
     smallest.extend(shared.limits);
     // What the audit could not ask a channel for has no smallest size there.

@@ -11,6 +11,8 @@
 use model::effect::Signal;
 use model::record::Quantity;
 
+pub(crate) mod kin;
+
 use crate::audit::repeats;
 use crate::checks::{self, LEAST_CHANCE, Outcome, Place};
 use crate::contest::power_law::PowerLawFound;
@@ -20,6 +22,7 @@ use crate::search::{Form, Term};
 use std::f64::consts::PI;
 
 use crate::{adequacy, beyond, law, short_time};
+use kin::Kin;
 
 /// Share of a term's energy in bands that fail, from which on the failure is the term's.
 const SHARE: f64 = 0.25;
@@ -157,7 +160,7 @@ fn swings_as(s: &Searched<'_>, t: &Term) -> Option<String> {
 }
 
 /// For each term of a channel, whether the checks doubt it; and whether they doubt the law of its variance.
-fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: Left) -> (Vec<Doubt>, bool) {
+fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Vec<Doubt>, bool) {
     let panel = &s.search.panel;
     let g = s.state.noise.over(&panel.bins);
     let n = panel.bins.n as f64;
@@ -270,7 +273,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: Left) -> (Vec
         Form::Shaped(..) | Form::Columns | Form::Step(..) if generic(t) => swing.clone(),
         _ => swings_as(s, t),
     };
-    let terms = s
+    let mut terms: Vec<Doubt> = s
         .state
         .parts()
         .map(|(t, own)| {
@@ -330,7 +333,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: Left) -> (Vec
             }
         })
         .collect();
-    let variance = failing("variance_in_time")
+    let mut variance = failing("variance_in_time")
         || failing(adequacy::VARIANCE_CLAIM)
         || followed_by_noise
         || failing("kurtosis")
@@ -340,6 +343,18 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: Left) -> (Vec
         } else {
             !everywhere(s, &|k| within(&places, k as f64 * PI / n))
         };
+    let kin = Kin {
+        s,
+        g: &g,
+        counts: &counts,
+        said: &left.said,
+        variance: (failing(adequacy::VARIANCE_CLAIM), variance),
+        felt: failing("variance_follows"),
+        bent,
+        again: repeats.is_some(),
+    };
+    kin.fall(&mut terms);
+    variance |= kin.variance_falls(&terms);
     (terms, variance)
 }
 
@@ -365,13 +380,22 @@ fn everywhere(s: &Searched<'_>, filled: &dyn Fn(usize) -> bool) -> bool {
     lr > HOLDS * kept / n * v.lr
 }
 
-/// Chi-square of what is left on a channel.
-#[derive(Clone, Copy)]
+/// What is left on a channel.
 pub(crate) struct Left {
-    /// Of what it takes from others later.
+    /// Chi-square of what it takes from others later.
     pub late: f64,
-    /// Of the energies that follow something recorded, where they do.
+    /// The same of the energies that follow something recorded, where they do.
     pub colour: f64,
+    /// What the checks say that fail.
+    pub said: Vec<String>,
+}
+
+/// What the library comes nearest to a channel with.
+pub(crate) fn nearest_of(channel: &str, what: &str) -> Unexplained {
+    Unexplained {
+        channel: channel.into(),
+        what: format!("nearest in the library, though checks fail on it: {what}"),
+    }
 }
 
 /// Take the doubted names of a channel out of its findings, given as one for each term and then the rest; what follows a
@@ -381,7 +405,7 @@ pub(crate) fn withdraw(
     of_terms: Vec<Finding>,
     of_variance: Option<Finding>,
     failing: &dyn Fn(&str) -> bool,
-    left: Left,
+    left: &Left,
 ) -> (Vec<Finding>, Vec<Finding>, Vec<Unexplained>) {
     let (terms, variance) = doubted(s, failing, left);
     let name = s.target.name.as_str();
@@ -440,13 +464,7 @@ pub(crate) fn withdraw(
     }
     if !nearest.is_empty() {
         let told: Vec<&str> = nearest.iter().map(|f| f.what.as_str()).collect();
-        unexplained.push(Unexplained {
-            channel: name.into(),
-            what: format!(
-                "nearest in the library, though checks fail on it: {}",
-                told.join("; ")
-            ),
-        });
+        unexplained.push(nearest_of(name, &told.join("; ")));
     }
     nearest.extend(beside);
     (kept, nearest, unexplained)
