@@ -28,6 +28,9 @@ const WALKS: usize = 64;
 const MOST_WALK: f64 = 4.0;
 /// Share of a strength that is near enough: between the random walks that are tried it is interpolated.
 const NEARLY: f64 = 0.98;
+/// Share of the energy of a column beyond others below which they span it: the normal equations lose as many digits, and a
+/// limit a thousand times as large is no size of anything.
+const SPANNED: f64 = 1e-6;
 /// Of a line: its frequency over the sample rate. The limit is that of white noise wherever that is white.
 const LINE: f64 = 0.25;
 /// Of two levels: stays in the record.
@@ -124,9 +127,12 @@ impl<'a> Meter<'a> {
         (least.is_finite() && strength(ratio) > NEARLY * wanted).then_some(ratio * least)
     }
 
-    /// What is left of a column beyond others: its size.
+    /// What is left of a column beyond others: its size; none where they span it.
     fn column(&self, others: &[usize], column: usize, wanted: f64) -> Option<f64> {
-        self.signal(&self.panel.energy_beyond(&self.g, others, column), wanted)
+        let beyond = |others: &[usize]| self.panel.energy_beyond(&self.g, others, column);
+        let all = |energy: &[f64]| energy.iter().sum::<f64>();
+        let left = beyond(others);
+        (all(&left) > SPANNED * all(&beyond(&[]))).then(|| self.signal(&left, wanted))?
     }
 
     /// The same for values that are no column yet.

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use analysis::result::{DetectionLimit, Diagnosis};
 use analysis::{DiagnoseOptions, diagnose};
 use model::file::EffectModel;
+use model::record::Record;
 use model::{ModelFile, Parameter};
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Uniform};
@@ -125,4 +126,40 @@ fn a_cause_at_its_limit_is_found() {
         shares.len() > 20 && chance > 1e-4,
         "{found} of {tried}: {shares:?}"
     );
+}
+
+/// Where the supply goes with the temperature, what one of them explains the other would too: neither has a size beside it.
+#[test]
+fn a_cause_that_another_spans_has_no_limit() {
+    let mut model = ModelFile::paper();
+    let world = [("heater_degc", 6.0), ("heater_period_s", 200.0)];
+    let world = world.map(|(k, v)| (k.to_owned(), v));
+    model.excitation.extend(world);
+    let mut record = model::simulate(&model, 600.0, 20.0, 5).expect("a run");
+    let of = |record: &Record, name: &str| {
+        let mut all = record.channels.iter();
+        all.position(|c| c.name == name).expect("a channel")
+    };
+    let warm = record.channels[of(&record, "temp_x")].values.clone();
+    let supply = of(&record, "supply");
+    record.channels[supply].counts = None;
+    record.channels[supply].values = warm.iter().map(|t| 5.0 + 0.02 * (t - warm[0])).collect();
+    let gyro = of(&record, "gyro_x");
+    record.channels[gyro].counts = None;
+    let rates = record.channels[gyro].values.iter_mut().zip(&warm);
+    rates.for_each(|(y, t)| *y += 0.3 * (t - warm[0]));
+    let d = diagnose(&record, &DiagnoseOptions::default());
+    let d = d.expect("a diagnosis").diagnosis;
+    let either = ["temperature", "supply_sensitivity"];
+    let here = |channel: &str| channel == "gyro_x";
+    let mut found = d.findings.iter().filter(|f| here(&f.channels[0]));
+    assert!(
+        found.any(|f| either.contains(&f.cause.as_str())),
+        "{:?}",
+        d.findings
+    );
+    let limits: Vec<&DetectionLimit> = (d.detection_limits.iter())
+        .filter(|l| here(&l.channel) && either.contains(&l.cause.as_str()))
+        .collect();
+    assert!(limits.is_empty(), "{limits:?}");
 }
