@@ -23,7 +23,7 @@ use crate::checks::{
     Outcome, chi_tail, errors_of_sum, kurtosis_score, normal_tail, whitened_by_spectrum,
 };
 use crate::column::dot;
-use crate::diagnosis::{Searched, VarianceFound};
+use crate::diagnosis::Searched;
 use crate::law::DEPARTURE;
 use crate::likelihood::{Bins, Noise, Panel};
 use crate::search::{Form, Search, State, Term};
@@ -40,8 +40,6 @@ pub(crate) const CLAIMS: [&str; 6] = [
 /// The claim of every stationary process, filters among them: neither its variance nor how its neighbours depend on each other
 /// has a rhythm, as what is held, bridged or switched by a clock of its own has.
 pub(crate) const STATIONARY_CLAIM: &str = "process_rhythm";
-/// The claim of a law of the variance.
-pub(crate) const VARIANCE_CLAIM: &str = "variance_law";
 /// Chance below which a claim fails. It is weighed only where a process is named, not on every record.
 pub(crate) const LEAST_CHANCE: f64 = 1e-3;
 /// Highest order of the polynomials in ln w that bend a spectrum.
@@ -109,104 +107,6 @@ pub(crate) fn stationary(s: &Searched<'_>, rhythm: &Outcome) -> Option<Outcome> 
         what: format!("told as {}: {}", term.effect.id(), rhythm.what),
         ..*rhythm
     })
-}
-
-/// Half cycles of the cosines that a changed variance is held against.
-const COSINES: usize = 16;
-
-/// The claim of a law of the variance: divided by it, the squares of the residual `e` are even. They are held against cosines
-/// over the record; what swells, fades or follows a history is no stretch with two ends, and no law of the motor.
-/// `lr` is its likelihood ratio, of which a twentieth may be left.
-pub(crate) fn evenness(e: &[f64], named: &str, lr: f64, rate_hz: f64) -> Outcome {
-    let n = e.len() as f64;
-    let mean = e.iter().map(|v| v * v).sum::<f64>() / n;
-    let squares: Vec<f64> = e.iter().map(|v| v * v - mean).collect();
-    let spread = squares.iter().map(|s| s * s).sum::<f64>() / n;
-    let score = |k: usize| {
-        let step = PI * k as f64 / n;
-        let sum: f64 = (squares.iter().enumerate())
-            .map(|(i, s)| s * (step * (i as f64 + 0.5)).cos())
-            .sum();
-        sum / (0.5 * n * spread).sqrt()
-    };
-    let scores: Vec<f64> = (1..=COSINES).map(score).collect();
-    claim_of_variance(&scores, lr, |worst| {
-        let over_s = 2.0 * n / rate_hz / (worst + 1) as f64;
-        format!(
-            "told as {named}: divided by it, the variance still swings, most over {over_s:.0} s"
-        )
-    })
-}
-
-/// A claim of a law of the variance, by scores that are standard normal where it holds; a part [`DEPARTURE`] of its likelihood
-/// ratio may be left. `what` tells it by the score that stands out most.
-fn claim_of_variance(scores: &[f64], lr: f64, what: impl FnOnce(usize) -> String) -> Outcome {
-    let statistic: f64 = scores.iter().map(|z| z * z).sum();
-    let worst = (0..scores.len())
-        .max_by(|a, b| scores[*a].abs().total_cmp(&scores[*b].abs()))
-        .unwrap_or(0);
-    Outcome {
-        id: VARIANCE_CLAIM,
-        statistic,
-        p_value: if statistic < DEPARTURE * lr {
-            1.0
-        } else {
-            chi_tail(statistic, scores.len() as f64)
-        },
-        what: what(worst),
-    }
-}
-
-/// Samples over which what a law of the variance adds is asked whether it is white.
-const LAGS_OF_ADDED: usize = 20;
-
-/// The other claim of a law of the variance: what it adds is white. `law` is the variance over its mean, by sample, which `e`
-/// was divided by; where more of it is added, a correlation counts for more.
-pub(crate) fn added_white(e: &[f64], law: &[f64], named: &str, lr: f64) -> Outcome {
-    let least = law.iter().copied().fold(f64::INFINITY, f64::min);
-    let added: Vec<f64> = e
-        .iter()
-        .zip(law)
-        .map(|(e, v)| e * (1.0 - least / v))
-        .collect();
-    let score = |lag: usize| errors_of_sum(added.iter().zip(&added[lag..]).map(|(a, b)| a * b));
-    let scores: Vec<f64> = (1..=LAGS_OF_ADDED.min(e.len() / 2)).map(score).collect();
-    claim_of_variance(&scores, lr, |worst| {
-        let lag = worst + 1;
-        format!(
-            "told as {named}: what it adds is not white, readings {lag} samples apart correlate most"
-        )
-    })
-}
-
-/// The third claim of a law of the variance, where it follows a channel of both signs: what it adds is as large under either.
-pub(crate) fn either_sign(s: &Searched<'_>, found: &VarianceFound) -> Option<Outcome> {
-    let channel = found.follows.as_ref()?;
-    let follows = &s
-        .search
-        .view
-        .signals
-        .iter()
-        .find(|c| c.name == *channel)?
-        .values;
-    let has = |sign: f64| follows.iter().any(|x| sign * x > 0.0);
-    if !(has(1.0) && has(-1.0)) {
-        return None;
-    }
-    let (e, n) = (&s.e, s.e.len() as f64);
-    let least = found.law.iter().copied().fold(f64::INFINITY, f64::min);
-    // What moves ln of the variance where one sign has more of it and the other less.
-    let odd: Vec<f64> = (found.law.iter().zip(follows.iter()))
-        .map(|(v, x)| (1.0 - least / v) * if *x == 0.0 { 0.0 } else { x.signum() })
-        .collect();
-    let middle = odd.iter().sum::<f64>() / n;
-    let mean = e.iter().map(|v| v * v).sum::<f64>() / n;
-    let score = errors_of_sum((e.iter().zip(&odd)).map(|(e, o)| (e * e - mean) * (o - middle)));
-    Some(claim_of_variance(&[score], found.lr, |_| {
-        let more = if score > 0.0 { "above" } else { "below" };
-        let id = found.effect.id();
-        format!("told as {id}: it adds more while {channel} is {more} 0 than at the other sign")
-    }))
 }
 
 /// The claim of noise that axes share.

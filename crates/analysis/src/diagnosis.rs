@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use model::effect::{Effect, Found, Hypothesis, Parameters, VarianceLaw, View};
+use model::effect::{Found, Hypothesis, Parameters, View};
 use model::effects::{EFFECTS, effect};
 use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
 use model::record::Record;
@@ -26,8 +26,8 @@ use crate::result::{
 };
 use crate::search::{Note, Search, State};
 use crate::{
-    adequacy, beyond, dead, doubt, events, evidence, law, limits, losses, refill, rows, scan,
-    short_time, slow, threshold,
+    adequacy, beyond, dead, doubt, events, evidence, law, limits, losses, refill, rows, short_time,
+    slow, variance,
 };
 
 /// Options of [`diagnose`].
@@ -59,7 +59,7 @@ pub(crate) struct Searched<'a> {
     /// Omnibus checks, before and after.
     checks: Vec<Check>,
     /// The law of the variance, where one was found.
-    pub variance: Option<VarianceFound>,
+    pub variance: Option<variance::VarianceFound>,
     /// Smallest sizes that the search would have named, whether it did or not.
     limits: Vec<DetectionLimit>,
     /// Effects that follow a channel, and whether by the law that their name claims.
@@ -79,19 +79,6 @@ impl Searched<'_> {
     pub(crate) fn step(&self) -> f64 {
         self.target.step / self.state.solution.white.sqrt()
     }
-}
-
-/// A law of the variance that was found.
-pub(crate) struct VarianceFound {
-    pub effect: &'static dyn Effect,
-    pub parameters: Parameters,
-    pub lr: f64,
-    threshold: f64,
-    pub alternatives: Vec<(&'static dyn Effect, f64)>,
-    /// Variance over its mean, by sample.
-    pub law: Vec<f64>,
-    /// The channel that it follows.
-    pub follows: Option<String>,
 }
 
 /// Diagnose a record.
@@ -345,92 +332,13 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     s.search.panel.release(&s.state.columns());
     grid.dct.keep_no_more();
     if !target.moving {
-        s.variance = variance(&s);
+        s.variance = variance::best(&s);
     }
     if let Some(v) = &s.variance {
         s.e.iter_mut().zip(&v.law).for_each(|(e, v)| *e /= v.sqrt());
     }
     s.checks = channel_checks(&s, before);
     s
-}
-
-/// The best law of the variance, if one passes its threshold.
-fn variance(s: &Searched<'_>) -> Option<VarianceFound> {
-    let e = &s.e;
-    let mut all: Vec<VarianceFound> = s
-        .search
-        .candidates
-        .iter()
-        .filter_map(|c| {
-            let Hypothesis::Variance(law) = &c.hypothesis else {
-                return None;
-            };
-            let rate_hz = s.search.view.rate_hz;
-            let mut found = Found {
-                unit: s.target.unit.clone(),
-                rate_hz,
-                ..Found::default()
-            };
-            let follows = match law {
-                VarianceLaw::Shape { follows, .. } => Some(follows.clone()),
-                VarianceLaw::Segment => None,
-            };
-            let (lr, limit, law) = match law {
-                VarianceLaw::Shape { shape, .. } => {
-                    let (lr, gamma, error) = scan::variance_law(e, shape);
-                    found.coefficients = vec![(gamma, error)];
-                    (
-                        lr,
-                        threshold::variance_law(),
-                        shape.iter().map(|d| 1.0 + gamma * d).collect::<Vec<f64>>(),
-                    )
-                }
-                VarianceLaw::Segment => {
-                    let (lr, start, end, increase) = scan::segment(e);
-                    let (n, inside) = (e.len() as f64, (end - start) as f64);
-                    let error = (1.0 + increase)
-                        * (2.0 / inside.max(1.0) + 2.0 / (n - inside).max(1.0)).sqrt();
-                    found.coefficients = vec![(increase, error)];
-                    let (first, last) = scan::ends(e, start, end, increase);
-                    found.location = [first, last]
-                        .map(|(at, error)| (at / rate_hz, error / rate_hz))
-                        .to_vec();
-                    let law = (0..e.len())
-                        .map(|i| {
-                            if i >= start && i < end {
-                                1.0 + increase
-                            } else {
-                                1.0
-                            }
-                        })
-                        .collect();
-                    (lr, threshold::segment(), law)
-                }
-            };
-            Some(VarianceFound {
-                effect: c.effect,
-                parameters: c.effect.describe(&found),
-                lr,
-                threshold: limit,
-                alternatives: vec![],
-                law,
-                follows,
-            })
-        })
-        .filter(|v| v.lr > v.threshold)
-        .collect();
-    let score = |v: &VarianceFound| v.lr - v.threshold;
-    all.sort_by(|a, b| score(b).total_cmp(&score(a)));
-    let (best, rest) = all.split_first_mut()?;
-    for other in rest.iter().filter(|o| o.effect.id() != best.effect.id()) {
-        if score(best) - score(other) < crate::search::RIVAL_SPAN {
-            best.alternatives
-                .push((other.effect, (score(other) - score(best)) / 2.0));
-        }
-    }
-    let mean = best.law.iter().sum::<f64>() / best.law.len() as f64;
-    best.law.iter_mut().for_each(|v| *v /= mean);
-    Some(all.swap_remove(0))
 }
 
 fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> {
@@ -445,16 +353,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<checks::Outcome>) -> Vec<Check> 
     let stationary = rhythms.next().and_then(|r| adequacy::stationary(s, r));
     let claims = claims.into_iter().chain(stationary);
     let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
-    let variance = s.variance.iter().flat_map(|v| {
-        let (rate_hz, id) = (s.search.view.rate_hz, v.effect.id());
-        [
-            adequacy::evenness(&s.e, id, v.lr, rate_hz),
-            adequacy::added_white(&s.e, &v.law, id, v.lr),
-        ]
-        .into_iter()
-        .chain(adequacy::either_sign(s, v))
-    });
-    let laws = laws.chain(variance);
+    let laws = laws.chain(variance::claims(s));
     let claims = claims.chain(laws).map(|c| Check {
         id: c.id.into(),
         channel: s.target.name.clone(),

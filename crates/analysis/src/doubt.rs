@@ -21,7 +21,7 @@ use crate::result::{Finding, Unexplained};
 use crate::search::{Form, Term};
 use std::f64::consts::PI;
 
-use crate::{adequacy, beyond, law, short_time};
+use crate::{adequacy, beyond, law, short_time, variance};
 use kin::Kin;
 
 /// Share of a term's energy in bands that fail, from which on the failure is the term's.
@@ -334,7 +334,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
         })
         .collect();
     let mut variance = failing("variance_in_time")
-        || failing(adequacy::VARIANCE_CLAIM)
+        || failing(variance::CLAIM)
         || followed_by_noise
         || failing("kurtosis")
         || crowd
@@ -348,7 +348,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
         g: &g,
         counts: &counts,
         said: &left.said,
-        variance: (failing(adequacy::VARIANCE_CLAIM), variance),
+        variance: (failing(variance::CLAIM), variance),
         felt: failing("variance_follows"),
         bent,
         again: repeats.is_some(),

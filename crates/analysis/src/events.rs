@@ -14,7 +14,6 @@ use std::f64::consts::PI;
 use model::effect::Signal;
 use model::record::Quantity;
 
-use crate::adequacy;
 use crate::audit::{MOST_TIMES, tails};
 use crate::checks;
 use crate::diagnosis::Searched;
@@ -22,6 +21,7 @@ use crate::excursions::Excursion;
 use crate::findings::{blow_of, step_at};
 use crate::result::{Finding, Parameter, Unexplained};
 use crate::search::Form;
+use crate::variance;
 
 /// Chance below which a claim fails, over everything that it is asked for. It is asked only where an event is named.
 const LEAST_CHANCE: f64 = 1e-3;
@@ -49,7 +49,7 @@ const LAWS: [&str; 8] = [
     "variance_rhythm",
     "variance_in_time",
     "time_frequency",
-    adequacy::VARIANCE_CLAIM,
+    variance::CLAIM,
 ];
 /// Half cycles of the fastest part of a turn of the base: twice as many as its shape has.
 const FASTEST: f64 = 6.0;

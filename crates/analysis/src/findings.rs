@@ -8,11 +8,12 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::diagnosis::{Searched, VarianceFound};
+use crate::diagnosis::Searched;
 use crate::grid::Grid;
 use crate::result::{Alternative, DetectionLimit, Finding, Gain, Unexplained};
 use crate::search::Form;
 use crate::transform::Dct;
+use crate::variance::VarianceFound;
 use crate::{events, evidence, gain, limits, scale, scan, threshold};
 
 pub(crate) fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {

@@ -9,6 +9,7 @@ pub mod angles;
 pub mod attitude;
 pub mod audit;
 pub mod beyond;
+mod bins;
 pub mod checks;
 mod column;
 mod common;
@@ -58,6 +59,7 @@ pub mod synthetic;
 pub mod threshold;
 pub mod transform;
 pub mod units;
+mod variance;
 
 pub use analyze::{Analysis, AnalyzeOptions, analyze};
 pub use diagnosis::{DiagnoseOptions, diagnose};

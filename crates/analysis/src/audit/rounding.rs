@@ -11,9 +11,9 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::repeats::smallest_step;
 use super::{Audit, Gyro, LEAST_READINGS};
-use crate::adequacy::VARIANCE_CLAIM;
 use crate::audit::local::{Levels, Local};
 use crate::short_time;
+use crate::variance;
 
 /// What explains the checks that rounding makes fail.
 pub(super) const STEP: &str = "the step of the converter";
@@ -214,12 +214,12 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             "variance_rhythm",
             "variance_follows",
             short_time::COLOUR,
-            VARIANCE_CLAIM,
+            variance::CLAIM,
         ];
         audit.suppress(&ids, name, STEP);
     }
     if rounded.sigma < LOST {
-        audit.suppress(&["ljung_box", "band_energy", VARIANCE_CLAIM], name, STEP);
+        audit.suppress(&["ljung_box", "band_energy", variance::CLAIM], name, STEP);
     }
     if rounded.sigma < TOLD {
         // The far readings of a residual are single codes.
