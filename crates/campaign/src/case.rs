@@ -257,13 +257,6 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         Family::Foreign(i) => {
             let wanted = draw.by_ratio(25.0, 40.0);
             axis = foreign::on_axis(FOREIGN[i], axis);
-            if FOREIGN[i] == "line that comes and goes" {
-                allowed.push("line");
-            }
-            // What follows the temperature along a loop follows it along a line as well.
-            if FOREIGN[i] == "backlash in temperature" {
-                allowed.extend(["temperature", "temperature_quadratic"]);
-            }
             allowed.extend(foreign::parts(FOREIGN[i]));
             let f = foreign(draw, &mut stand, FOREIGN[i], axis, wanted);
             strange = f.strength;

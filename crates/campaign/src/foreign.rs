@@ -24,28 +24,64 @@ mod kept_back_twelfth;
 #[cfg(test)]
 mod library_share;
 
+/// A set of them: each file gives one.
+struct Set {
+    names: &'static [&'static str],
+    /// Those that have a near twin in an earlier set, with the one that is nearest.
+    twins: &'static [(&'static str, &'static str)],
+    /// Beyond what every foreign effect gets.
+    needs: fn(&str) -> Needs,
+    /// Causes of the library that are a true part of one.
+    parts: fn(&str) -> &'static [&'static str],
+    /// The axis that one acts on, where it cannot be any.
+    on_axis: fn(&str, usize) -> usize,
+    /// One of them; `None` for a name of another set. The world of the stand may gain what drives it.
+    one: fn(&mut Draw, &mut Stand, &'static str, usize, f64) -> Option<Foreign>,
+}
+
+/// What a set is where it does not say.
+const PLAIN: Set = Set {
+    names: &[],
+    twins: &[],
+    needs: |_| Needs {
+        temperature: false,
+        supply: false,
+        motor: false,
+        vibration: false,
+    },
+    parts: |_| &[],
+    on_axis: |_, axis| axis,
+    one: |_, _, _, _, _| None,
+};
+
 /// The sets, in the order in which they were written.
-const SETS: [&[&str]; 13] = [
-    &first::NAMES,
-    &kept_back::NAMES,
-    &kept_back_third::NAMES,
-    &kept_back_fourth::NAMES,
-    &kept_back_fifth::NAMES,
-    &kept_back_sixth::NAMES,
-    &kept_back_seventh::NAMES,
-    &kept_back_eighth::NAMES,
-    &kept_back_ninth::NAMES,
-    &kept_back_tenth::NAMES,
-    &kept_back_eleventh::NAMES,
-    &kept_back_twelfth::NAMES,
-    &kept_back_thirteenth::NAMES,
+const SETS: &[Set] = &[
+    first::SET,
+    kept_back::SET,
+    kept_back_third::SET,
+    kept_back_fourth::SET,
+    kept_back_fifth::SET,
+    kept_back_sixth::SET,
+    kept_back_seventh::SET,
+    kept_back_eighth::SET,
+    kept_back_ninth::SET,
+    kept_back_tenth::SET,
+    kept_back_eleventh::SET,
+    kept_back_twelfth::SET,
+    kept_back_thirteenth::SET,
 ];
+
+/// The set that a name is of; the first for a name of none.
+fn set_of(name: &str) -> &'static Set {
+    let own = SETS.iter().find(|set| set.names.contains(&name));
+    own.unwrap_or(&SETS[0])
+}
 
 /// How many names the first of the sets have together.
 const fn names_in(sets: usize) -> usize {
     let (mut all, mut set) = (0, 0);
     while set < sets {
-        all += SETS[set].len();
+        all += SETS[set].names.len();
         set += 1;
     }
     all
@@ -57,8 +93,8 @@ pub const FOREIGN: [&str; names_in(SETS.len())] = {
     let mut set = 0;
     while set < SETS.len() {
         let mut i = 0;
-        while i < SETS[set].len() {
-            all[names_in(set) + i] = SETS[set][i];
+        while i < SETS[set].names.len() {
+            all[names_in(set) + i] = SETS[set].names[i];
             i += 1;
         }
         set += 1;
@@ -69,56 +105,28 @@ pub const FOREIGN: [&str; names_in(SETS.len())] = {
 /// since it was graded on the next eight, and on the second to the twelfth set kept back.
 pub const SEEN: usize = names_in(SETS.len() - 1);
 
-/// Whether one has a near twin in an earlier set, as its own set says: the four last ones do.
+/// Whether one has a near twin in an earlier set, as its own set says: those from the tenth on do.
 #[must_use]
 pub fn has_twin(name: &str) -> bool {
-    kept_back_thirteenth::TWINS
-        .iter()
-        .chain(&kept_back_twelfth::TWINS)
-        .chain(&kept_back_eleventh::TWINS)
-        .chain(&kept_back_tenth::TWINS)
-        .any(|(own, _)| *own == name)
+    set_of(name).twins.iter().any(|(own, _)| *own == name)
 }
 
 /// The environment that they need.
 #[must_use]
 pub fn needs(name: &str) -> Needs {
-    kept_back_thirteenth::needs(name)
-        .or_else(|| kept_back_twelfth::needs(name))
-        .or_else(|| kept_back_eleventh::needs(name))
-        .or_else(|| kept_back_tenth::needs(name))
-        .or_else(|| kept_back_ninth::needs(name))
-        .or_else(|| kept_back_eighth::needs(name))
-        .or_else(|| kept_back_seventh::needs(name))
-        .or_else(|| kept_back_sixth::needs(name))
-        .or_else(|| kept_back_fifth::needs(name))
-        .or_else(|| kept_back_fourth::needs(name))
-        .or_else(|| kept_back_third::needs(name))
-        .unwrap_or_else(|| kept_back::needs(name))
+    (set_of(name).needs)(name)
 }
 
 /// The axis that one acts on, where it cannot be any.
 #[must_use]
 pub fn on_axis(name: &str, axis: usize) -> usize {
-    kept_back_eleventh::on_axis(name, kept_back_twelfth::on_axis(name, axis))
+    (set_of(name).on_axis)(name, axis)
 }
 
 /// Causes of the library that are a true part of one.
 #[must_use]
-pub fn parts(name: &str) -> Vec<&'static str> {
-    [
-        kept_back_fourth::parts(name),
-        kept_back_fifth::parts(name),
-        kept_back_sixth::parts(name),
-        kept_back_seventh::parts(name),
-        kept_back_eighth::parts(name),
-        kept_back_ninth::parts(name),
-        kept_back_tenth::parts(name),
-        kept_back_eleventh::parts(name),
-        kept_back_twelfth::parts(name),
-        kept_back_thirteenth::parts(name),
-    ]
-    .concat()
+pub fn parts(name: &str) -> &'static [&'static str] {
+    (set_of(name).parts)(name)
 }
 
 /// What it does to a channel: adds a signal, or makes new noise out of old.
@@ -211,19 +219,7 @@ fn any(
     axis: usize,
     wanted: f64,
 ) -> Foreign {
-    kept_back::one(draw, stand, name, axis, wanted)
-        .or_else(|| kept_back_third::one(draw, stand, name, axis, wanted))
-        .or_else(|| kept_back_fourth::one(draw, stand, name, axis, wanted))
-        .or_else(|| kept_back_fifth::one(draw, stand, name, axis, wanted))
-        .or_else(|| kept_back_sixth::one(draw, stand, name, axis, wanted))
-        .or_else(|| kept_back_seventh::one(draw, stand, name, axis, wanted))
-        .or_else(|| kept_back_eighth::one(draw, stand, name, axis, wanted))
-        .or_else(|| kept_back_ninth::one(draw, stand, name, axis, wanted))
-        .or_else(|| kept_back_tenth::one(draw, stand, name, axis, wanted))
-        .or_else(|| kept_back_eleventh::one(draw, stand, name, axis, wanted))
-        .or_else(|| kept_back_twelfth::one(draw, stand, name, axis, wanted))
-        .or_else(|| kept_back_thirteenth::one(draw, stand, name, axis, wanted))
-        .unwrap_or_else(|| first::one(draw, stand, name, axis, wanted))
+    (set_of(name).one)(draw, stand, name, axis, wanted).expect("a set makes what it names")
 }
 
 /// A signal of this shape, at the size that gives the strength.

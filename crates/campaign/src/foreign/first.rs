@@ -1,8 +1,8 @@
 //! The first foreign effects: 14 that the engine was developed with, then eight that were kept back until 2026-11-21.
 
-use super::{Change, Foreign, extremes, of_signal, swing};
+use super::{Change, Foreign, PLAIN, Set, extremes, of_signal, swing};
 use crate::random::Draw;
-use crate::stand::Stand;
+use crate::stand::{Needs, Stand};
 use crate::strength::{of_variance, size_for};
 
 /// Their names.
@@ -31,14 +31,30 @@ pub const NAMES: [&str; 22] = [
     "random walk for a while",
 ];
 
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    needs: |_| Needs {
+        temperature: true,
+        motor: true,
+        ..Needs::default()
+    },
+    parts,
+    one: |draw, stand, name, axis, wanted| Some(one(draw, stand, name, axis, wanted)),
+    ..PLAIN
+};
+
+/// Causes of the library that are a true part of it: a line where there is one, and the straight line through a loop.
+fn parts(name: &str) -> &'static [&'static str] {
+    match name {
+        "line that comes and goes" => &["line"],
+        "backlash in temperature" => &["temperature", "temperature_quadratic"],
+        _ => &[],
+    }
+}
+
 /// One of them, by its name.
-pub(super) fn one(
-    draw: &mut Draw,
-    stand: &Stand,
-    name: &'static str,
-    axis: usize,
-    wanted: f64,
-) -> Foreign {
+fn one(draw: &mut Draw, stand: &Stand, name: &'static str, axis: usize, wanted: f64) -> Foreign {
     let n = stand.samples();
     let t = |i: usize| i as f64 / stand.rate_hz;
     let tau = std::f64::consts::TAU;

@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Change, Foreign, extremes, of_signal};
+use super::{Change, Foreign, PLAIN, Set, extremes, of_signal};
 use crate::random::Draw;
 use crate::stand::{LSB, Needs, Stand};
 use crate::strength::{Meter, of_variance, size_for};
@@ -27,8 +27,16 @@ pub const NAMES: [&str; 14] = [
     "uneven steps of the converter",
 ];
 
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    needs,
+    one,
+    ..PLAIN
+};
+
 /// Beyond what every foreign effect gets.
-pub(super) fn needs(name: &str) -> Needs {
+fn needs(name: &str) -> Needs {
     Needs {
         temperature: true,
         motor: true,
@@ -37,8 +45,8 @@ pub(super) fn needs(name: &str) -> Needs {
     }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain a vibration.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain a vibration.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,

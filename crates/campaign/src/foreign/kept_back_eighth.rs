@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use super::kept_back_fourth::{about_mean, cycles};
 use super::kept_back_seventh::noise::Turning;
-use super::{Foreign, extremes, of_signal};
+use super::{Foreign, PLAIN, Set, extremes, of_signal};
 use crate::random::Draw;
 use crate::stand::{Needs, Stand, held, wander};
 
@@ -40,19 +40,21 @@ pub const NAMES: [&str; 20] = [
     "play in the reading",
 ];
 
-/// Beyond what every foreign effect gets; `None` for a name of another set.
-pub(super) fn needs(name: &str) -> Option<Needs> {
-    NAMES.contains(&name).then_some(Needs {
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    needs: |_| Needs {
         temperature: true,
         motor: true,
-        supply: false,
-        vibration: false,
-    })
-}
+        ..Needs::default()
+    },
+    parts,
+    one,
+    ..PLAIN
+};
 
 /// Causes of the library that are a true part of it: the straight line through a law that saturates or ages.
-#[must_use]
-pub fn parts(name: &str) -> &'static [&'static str] {
+fn parts(name: &str) -> &'static [&'static str] {
     match name {
         "temperature that saturates" => &["temperature"],
         "acceleration that saturates" => &["g_sensitivity"],
@@ -61,8 +63,8 @@ pub fn parts(name: &str) -> &'static [&'static str] {
     }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain what drives it.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain what drives it.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,
@@ -247,7 +249,7 @@ mod tests {
 
     fn stand() -> (Draw, Stand) {
         let mut draw = Draw::of(20_261_122, 71, 0);
-        let needed = needs(NAMES[0]).expect("a name of this set");
+        let needed = (SET.needs)(NAMES[0]);
         let stand = Stand::draw(&mut draw, 600.0, 20.0, needed);
         (draw, stand)
     }

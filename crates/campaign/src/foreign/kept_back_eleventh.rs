@@ -16,7 +16,7 @@ use super::kept_back_fourth::{about_mean, cycles};
 use super::kept_back_ninth::resonating;
 use super::kept_back_seventh::{behind_plays, lamp, without_line};
 use super::kept_back_tenth::{DWELL, programme, rate_of_table, swelling};
-use super::{Foreign, of_signal, swing};
+use super::{Foreign, Set, of_signal, swing};
 use crate::motor::current;
 use crate::random::Draw;
 use crate::stand::{Needs, Stand, lagged};
@@ -112,9 +112,19 @@ pub const TWINS: [(&str, &str); 19] = [
     ("self-test at a fixed period", "one short pulse each period"),
 ];
 
-/// Beyond what every foreign effect gets; `None` for a name of another set.
-pub(super) fn needs(name: &str) -> Option<Needs> {
-    NAMES.contains(&name).then(|| Needs {
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    twins: &TWINS,
+    needs,
+    parts,
+    on_axis,
+    one,
+};
+
+/// Beyond what every foreign effect gets.
+fn needs(name: &str) -> Needs {
+    Needs {
         temperature: matches!(
             name,
             "scale factor that follows temperature" | "noise that grows with the warmth"
@@ -122,11 +132,11 @@ pub(super) fn needs(name: &str) -> Option<Needs> {
         motor: false,
         supply: false,
         vibration: name == "rest of an accelerometer's last sample",
-    })
+    }
 }
 
 /// The axis it acts on where another cannot be: a part is misaligned to a table that turns about z.
-pub(super) fn on_axis(name: &str, axis: usize) -> usize {
+fn on_axis(name: &str, axis: usize) -> usize {
     if name == "misalignment that grows with temperature" {
         axis.min(1)
     } else {
@@ -137,8 +147,7 @@ pub(super) fn on_axis(name: &str, axis: usize) -> usize {
 /// Causes of the library that are a true part of it: the straight line through a bent law, or what is left of a product at
 /// a temperature that is not the run's mean; the surge that a change of the rate resembles; ground that really sways;
 /// words that are disturbed.
-#[must_use]
-pub fn parts(name: &str) -> &'static [&'static str] {
+fn parts(name: &str) -> &'static [&'static str] {
     match name {
         "lorries that sway the ground" => &["base_motion"],
         "high byte of the reading before" => &["outliers"],
@@ -152,8 +161,8 @@ pub fn parts(name: &str) -> &'static [&'static str] {
     }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain what drives it.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain what drives it.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,

@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use super::kept_back_fourth::{about_mean, cycles};
-use super::{Foreign, extremes, of_signal, swing};
+use super::{Foreign, PLAIN, Set, extremes, of_signal, swing};
 use crate::random::Draw;
 use crate::stand::{Needs, Stand, held, wander};
 
@@ -26,20 +26,28 @@ pub const NAMES: [&str; 10] = [
     "dead zone of a push-pull stage",
 ];
 
-/// Beyond what every foreign effect gets; `None` for a name of another set.
-pub(super) fn needs(name: &str) -> Option<Needs> {
-    NAMES.contains(&name).then(|| Needs {
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    needs,
+    parts,
+    one,
+    ..PLAIN
+};
+
+/// Beyond what every foreign effect gets.
+fn needs(name: &str) -> Needs {
+    Needs {
         temperature: true,
         motor: true,
         supply: false,
         vibration: name.contains("acceleration"),
-    })
+    }
 }
 
 /// Causes of the library that are a true part of it: the straight line through a bent law, and what is left of an
 /// acceleration at a temperature that is not the run's mean.
-#[must_use]
-pub fn parts(name: &str) -> &'static [&'static str] {
+fn parts(name: &str) -> &'static [&'static str] {
     match name {
         "acceleration weighed by temperature" => &["g_sensitivity"],
         "ripple of a converter that steps up or down" => &["supply_sensitivity"],
@@ -48,8 +56,8 @@ pub fn parts(name: &str) -> &'static [&'static str] {
     }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain what drives it.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain what drives it.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Foreign, extremes, of_signal};
+use super::{Foreign, PLAIN, Set, extremes, of_signal};
 use crate::random::Draw;
 use crate::stand::{Needs, Stand, held, lagged, wander};
 
@@ -35,19 +35,27 @@ pub const NAMES: [&str; 18] = [
     "frames that hold another axis",
 ];
 
-/// Beyond what every foreign effect gets; `None` for a name of another set.
-pub(super) fn needs(name: &str) -> Option<Needs> {
-    NAMES.contains(&name).then(|| Needs {
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    needs,
+    parts,
+    one,
+    ..PLAIN
+};
+
+/// Beyond what every foreign effect gets.
+fn needs(name: &str) -> Needs {
+    Needs {
         temperature: true,
         motor: true,
         supply: false,
         vibration: name.contains("acceleration"),
-    })
+    }
 }
 
 /// Causes of the library that are a true part of it: the straight line of what has a dead zone.
-#[must_use]
-pub fn parts(name: &str) -> &'static [&'static str] {
+fn parts(name: &str) -> &'static [&'static str] {
     match name {
         "regulator that drops out" => &["supply_sensitivity"],
         "play of a mount under acceleration" => &["g_sensitivity"],
@@ -55,8 +63,8 @@ pub fn parts(name: &str) -> &'static [&'static str] {
     }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain what drives it.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain what drives it.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,

@@ -8,7 +8,7 @@
 use std::f64::consts::TAU;
 
 use super::kept_back_fourth::{about_mean, cycles};
-use super::{Foreign, extremes, of_signal};
+use super::{Foreign, PLAIN, Set, extremes, of_signal};
 use crate::random::Draw;
 use crate::stand::{Needs, Stand, held, wander};
 
@@ -40,20 +40,28 @@ pub const NAMES: [&str; 20] = [
     "gaps bridged by straight lines",
 ];
 
-/// Beyond what every foreign effect gets; `None` for a name of another set.
-pub(super) fn needs(name: &str) -> Option<Needs> {
-    NAMES.contains(&name).then_some(Needs {
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    needs,
+    parts,
+    one,
+    ..PLAIN
+};
+
+/// Beyond what every foreign effect gets.
+fn needs(name: &str) -> Needs {
+    Needs {
         temperature: true,
         motor: true,
         supply: false,
         vibration: name.contains("acceleration"),
-    })
+    }
 }
 
 /// Causes of the library that are a true part of it: the straight line through a threshold or a diode, the
 /// far readings of a law with a tail, and the reading before in place of a code.
-#[must_use]
-pub fn parts(name: &str) -> &'static [&'static str] {
+fn parts(name: &str) -> &'static [&'static str] {
     match name {
         "motor that sticks until it is pushed enough" => &["motor_bias"],
         "supply behind a diode" => &["supply_sensitivity"],
@@ -65,8 +73,8 @@ pub fn parts(name: &str) -> &'static [&'static str] {
     }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain what drives it.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain what drives it.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,
@@ -334,7 +342,7 @@ mod tests {
 
     fn stand(name: &str) -> (Draw, Stand) {
         let mut draw = Draw::of(20_261_122, 87, 0);
-        let needed = needs(name).expect("a name of this set");
+        let needed = needs(name);
         let stand = Stand::draw(&mut draw, 600.0, 20.0, needed);
         (draw, stand)
     }

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Foreign, of_signal};
+use super::{Foreign, PLAIN, Set, of_signal};
 use crate::random::Draw;
 use crate::stand::{Needs, Stand, held, lagged};
 
@@ -37,20 +37,22 @@ pub const NAMES: [&str; 20] = [
     "dead band at zero",
 ];
 
-/// Beyond what every foreign effect gets; `None` for a name of another set.
-pub(super) fn needs(name: &str) -> Option<Needs> {
-    NAMES.contains(&name).then_some(Needs {
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    needs: |_| Needs {
         temperature: true,
         motor: true,
-        supply: false,
-        vibration: false,
-    })
-}
+        ..Needs::default()
+    },
+    parts,
+    one,
+    ..PLAIN
+};
 
 /// Causes of the library that are a true part of it: what follows the acceleration along a loop follows it along a line as
 /// well, tails as heavy as those have samples that Gaussian noise cannot make, and a memory without end is a kin of flicker.
-#[must_use]
-pub fn parts(name: &str) -> &'static [&'static str] {
+fn parts(name: &str) -> &'static [&'static str] {
     match name {
         "mount that slips in many places" => &["g_sensitivity"],
         "noise of a double-exponential law" => &["outliers"],
@@ -59,8 +61,8 @@ pub fn parts(name: &str) -> &'static [&'static str] {
     }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain what drives it.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain what drives it.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,
@@ -334,7 +336,7 @@ mod tests {
 
     fn stand() -> (Draw, Stand) {
         let mut draw = Draw::of(20_261_121, 60, 0);
-        let needed = needs(NAMES[0]).expect("a name of this set");
+        let needed = (SET.needs)(NAMES[0]);
         let stand = Stand::draw(&mut draw, 600.0, 20.0, needed);
         (draw, stand)
     }

@@ -12,9 +12,9 @@ use std::f64::consts::TAU;
 
 use super::kept_back_fourth::about_mean;
 use super::kept_back_sixth::in_steps;
-use super::{Foreign, of_signal};
+use super::{Foreign, PLAIN, Set, of_signal};
 use crate::random::Draw;
-use crate::stand::{Needs, Stand, held, lagged, wander};
+use crate::stand::{Stand, held, lagged, wander};
 
 pub(super) mod codes;
 pub(super) mod events;
@@ -96,21 +96,19 @@ pub const TWINS: [(&str, &str); 17] = [
     ("narrow band that a fan drives", "noise with a resonance"),
 ];
 
-/// Beyond what every foreign effect gets; `None` for a name of another set.
-pub(super) fn needs(name: &str) -> Option<Needs> {
-    NAMES.contains(&name).then_some(Needs {
-        temperature: false,
-        motor: false,
-        supply: false,
-        vibration: false,
-    })
-}
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    twins: &TWINS,
+    parts,
+    one,
+    ..PLAIN
+};
 
 /// Causes of the library that are a true part of it: the straight line by the command through its square and through what
 /// remembers it, the steps that stay after a shock or a zero, a variance by the command where the rate lags behind, and the
 /// filter that straight lines between samples are.
-#[must_use]
-pub fn parts(name: &str) -> &'static [&'static str] {
+fn parts(name: &str) -> &'static [&'static str] {
     match name {
         "error by the square of the table's rate" => &["motor_bias"],
         "dielectric that remembers strong rates" => &["motor_bias"],
@@ -121,8 +119,8 @@ pub fn parts(name: &str) -> &'static [&'static str] {
     }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain what drives it.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain what drives it.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,
@@ -371,6 +369,7 @@ fn wobble(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::stand::Needs;
 
     pub(super) fn stand(index: u64) -> (Draw, Stand) {
         let mut draw = Draw::of(20_261_122, 108, index);

@@ -4,7 +4,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Foreign, extremes, of_signal};
+use super::{Foreign, PLAIN, Set, extremes, of_signal};
 use crate::motor::current;
 use crate::random::Draw;
 use crate::stand::{Needs, Stand, held, lagged, wander};
@@ -29,18 +29,26 @@ pub const NAMES: [&str; 14] = [
     "two codes of the part in one",
 ];
 
-/// Beyond what every foreign effect gets; `None` for a name of another set.
-pub(super) fn needs(name: &str) -> Option<Needs> {
-    NAMES.contains(&name).then(|| Needs {
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    needs,
+    one,
+    ..PLAIN
+};
+
+/// Beyond what every foreign effect gets.
+fn needs(name: &str) -> Needs {
+    Needs {
         temperature: true,
         motor: true,
         supply: name == "supply by its changes alone",
         vibration: name == "acceleration that comes late",
-    })
+    }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain spells of its motor.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain spells of its motor.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,

@@ -16,9 +16,9 @@ use super::kept_back_ninth::resonating;
 use super::kept_back_sixth::in_steps;
 use super::kept_back_tenth::{DWELL, angle_of_table, programme, rate_of_table, swelling};
 use super::kept_back_twelfth::passes;
-use super::{Foreign, of_signal};
+use super::{Foreign, PLAIN, Set, of_signal};
 use crate::random::Draw;
-use crate::stand::{Needs, Stand, held, lagged, wander};
+use crate::stand::{Stand, held, lagged, wander};
 
 pub(super) mod codes;
 pub(super) mod noise;
@@ -130,21 +130,19 @@ pub const TWINS: [(&str, &str); 20] = [
     ),
 ];
 
-/// Beyond what every foreign effect gets; `None` for a name of another set.
-pub(super) fn needs(name: &str) -> Option<Needs> {
-    NAMES.contains(&name).then_some(Needs {
-        temperature: false,
-        motor: false,
-        supply: false,
-        vibration: false,
-    })
-}
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    twins: &TWINS,
+    parts,
+    one,
+    ..PLAIN
+};
 
 /// Causes of the library that are a true part of it: the surge by which a belt is twisted while the table takes its speed;
 /// the mean push of links that are laid down faster or slower, and the mean filling of traps, by the command; the line by
 /// temperature through a size that follows it.
-#[must_use]
-pub fn parts(name: &str) -> &'static [&'static str] {
+fn parts(name: &str) -> &'static [&'static str] {
     match name {
         "belt that rings by its teeth"
         | "cable chain that lays down its links"
@@ -154,8 +152,8 @@ pub fn parts(name: &str) -> &'static [&'static str] {
     }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain what drives it.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain what drives it.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,

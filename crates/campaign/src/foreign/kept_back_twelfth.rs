@@ -16,9 +16,9 @@ use super::kept_back_ninth::resonating;
 use super::kept_back_seventh::{lamp, lit, without_line};
 use super::kept_back_sixth::in_steps;
 use super::kept_back_tenth::{DWELL, angle_of_table, programme, rate_of_table};
-use super::{Foreign, extremes, of_signal};
+use super::{Foreign, PLAIN, Set, extremes, of_signal};
 use crate::random::Draw;
-use crate::stand::{Needs, Stand, lagged, wander};
+use crate::stand::{Stand, lagged, wander};
 
 pub(super) mod codes;
 pub(super) mod noise;
@@ -119,26 +119,25 @@ pub const TWINS: [(&str, &str); 20] = [
     ),
 ];
 
-/// Beyond what every foreign effect gets; `None` for a name of another set.
-pub(super) fn needs(name: &str) -> Option<Needs> {
-    NAMES.contains(&name).then_some(Needs {
-        temperature: false,
-        motor: false,
-        supply: false,
-        vibration: false,
-    })
-}
+/// The set.
+pub(super) const SET: Set = Set {
+    names: &NAMES,
+    twins: &TWINS,
+    parts,
+    on_axis,
+    one,
+    ..PLAIN
+};
 
 /// The axis it acts on where another cannot be: a table that turns about z takes the level axes through the headings.
-pub(super) fn on_axis(name: &str, axis: usize) -> usize {
+fn on_axis(name: &str, axis: usize) -> usize {
     if name == NAMES[0] { axis.min(1) } else { axis }
 }
 
 /// Causes of the library that are a true part of it: the straight line through a bent or stepped law of temperature,
 /// through a late one, and through a product whose other factor is not exactly 0 in the mean; the surge that a change of the
 /// rate resembles; another axis's size of noise while it is read; the correlation of neighbours that a median leaves.
-#[must_use]
-pub fn parts(name: &str) -> &'static [&'static str] {
+fn parts(name: &str) -> &'static [&'static str] {
     match name {
         "quadrature that leaks as the demodulator warms"
         | "compensation table whose entries are off"
@@ -151,8 +150,8 @@ pub fn parts(name: &str) -> &'static [&'static str] {
     }
 }
 
-/// One of them; `None` for a name of another set. The world of the stand may gain what drives it.
-pub(super) fn one(
+/// One of them; `None` for another name. The world of the stand may gain what drives it.
+fn one(
     draw: &mut Draw,
     stand: &mut Stand,
     name: &'static str,
@@ -345,6 +344,7 @@ pub(super) mod tests {
     use super::*;
     use crate::foreign::kept_back_tenth::tests::largest_change;
     use crate::foreign::swing;
+    use crate::stand::Needs;
 
     pub(super) fn stand(index: u64) -> (Draw, Stand) {
         let mut draw = Draw::of(20_261_122, 130, index);

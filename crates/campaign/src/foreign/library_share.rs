@@ -9,7 +9,7 @@ use model::effect::{Column, Effect, Hypothesis, Signal, VarianceLaw, View};
 use model::effects::EFFECTS;
 use model::record::{Axis, Base, Quantity};
 
-use super::kept_back::{self, Mode, by_difference, by_echo, of_law, shares};
+use super::kept_back::{self, of_law, shares};
 use super::{Change, LARGEST_RMS, foreign, rms};
 use crate::random::Draw;
 use crate::stand::{LSB, Stand};
@@ -21,6 +21,7 @@ mod eleventh;
 mod fifth;
 mod fourth;
 mod ninth;
+mod second;
 mod seventh;
 mod sixth;
 mod tenth;
@@ -308,25 +309,6 @@ fn hold(what: &str, library: &str, share: f64) {
     );
 }
 
-#[test]
-fn no_regression_line_or_process_of_the_library_describes_a_signal() {
-    for name in kept_back::NAMES {
-        for index in 0..DRAWS {
-            let draw = &mut Draw::of(20_261_121, 7, index);
-            let mut stand = stand(draw, name);
-            let axis = draw.of_many(3);
-            let f = foreign(draw, &mut stand, name, axis, 25.0);
-            let (Change::Add(signal), true) = (&f.change, name != "noise with a resonance") else {
-                continue;
-            };
-            println!("{name} #{index}: d' {:.1}", f.strength);
-            for (library, share) in of_all(&stand, axis, signal) {
-                hold(name, library, share);
-            }
-        }
-    }
-}
-
 /// What the share is worth: an effect of the library is described by itself.
 #[test]
 fn a_line_a_swinging_line_a_temperature_term_and_a_step_describe_themselves() {
@@ -361,57 +343,6 @@ fn a_line_a_swinging_line_a_temperature_term_and_a_step_describe_themselves() {
         share > DESCRIBED,
         "gauss_markov describes {share:.3} of itself"
     );
-}
-
-#[test]
-fn no_process_of_the_library_describes_a_shaped_noise() {
-    for index in 0..DRAWS {
-        let draw = &mut Draw::of(20_261_121, 8, index);
-        let stand = stand(draw, "");
-        let axis = draw.of_many(3);
-        let meter = Meter::new(&stand, axis);
-        let hold_all = |what: &str, expected: &[f64]| {
-            let own = saturated(&stand, expected);
-            for effect in EFFECTS {
-                hold(
-                    what,
-                    effect.id(),
-                    of_process(&stand, axis, expected, own, *effect),
-                );
-            }
-        };
-        let share = 0.3;
-        hold_all(
-            "noise of a differenced angle",
-            &spectrum(&stand, axis, &|w| 1.0 + by_difference(share, w), &[]),
-        );
-        for (g, after) in [(0.24, 3), (-0.24, 3), (0.24, 9), (-0.24, 25)] {
-            hold_all(
-                "echo of earlier samples",
-                &spectrum(&stand, axis, &|w| 1.0 + by_echo(g, after, w), &[]),
-            );
-        }
-        for (f, half_width) in [(0.6, 0.03), (0.6, 0.15), (3.0, 0.1), (8.0, 0.3)] {
-            let mode = Mode::new(f, half_width, stand.rate_hz);
-            let with = |size: f64| -> Vec<f64> {
-                meter
-                    .omega()
-                    .iter()
-                    .map(|w| size * mode.density(*w))
-                    .collect()
-            };
-            let size = crate::strength::size_for(25.0, &|x| meter.of_density(&with(x)));
-            hold_all(
-                "noise with a resonance",
-                &spectrum(
-                    &stand,
-                    axis,
-                    &|w| 1.0 + size * mode.density(w) / stand.white(axis),
-                    &[],
-                ),
-            );
-        }
-    }
 }
 
 /// A law of variance of an axis 0, known in full, against what the library has for it.
@@ -467,25 +398,6 @@ fn hold_law(name: &str, stand: &Stand, law: &[f64]) {
     }
 }
 
-#[test]
-fn no_law_of_variance_of_the_library_describes_a_changing_variance() {
-    for name in ["noise whose size wanders", "every few samples noisier"] {
-        for index in 0..DRAWS {
-            let draw = &mut Draw::of(20_261_121, 9, index);
-            let mut stand = stand(draw, name);
-            let f = foreign(draw, &mut stand, name, 0, 25.0);
-            let Change::Scale(factor) = &f.change else {
-                panic!("{name} has no law of variance")
-            };
-            let law: Vec<f64> = factor.iter().map(|f| f * f).collect();
-            assert!(
-                (of_variance(&law) - f.strength).abs() < 1e-9 && (f.strength - 25.0).abs() < 0.1
-            );
-            hold_law(name, &stand, &law);
-        }
-    }
-}
-
 /// Edges between the codes of an axis 0 against bits that stick.
 fn hold_edges(name: &str, stand: &Stand, first: i32, edges: &[f64], strength: f64) {
     let own = (stand.bias[0] / LSB, stand.white(0).sqrt() / LSB);
@@ -531,21 +443,6 @@ fn hold_edges_about(
         }
     }
     hold(name, "stuck_bit", best);
-}
-
-#[test]
-fn no_stuck_or_missing_bit_describes_uneven_steps() {
-    for index in 0..DRAWS {
-        let draw = &mut Draw::of(20_261_121, 10, index);
-        let mut stand = stand(draw, "");
-        let name = "uneven steps of the converter";
-        let f = foreign(draw, &mut stand, name, 0, 25.0);
-        let Change::Edges(first, edges) = &f.change else {
-            panic!("no edges")
-        };
-        assert!(f.strength > 24.0);
-        hold_edges(name, &stand, *first, edges, f.strength);
-    }
 }
 
 /// Signals of a set against every effect of the library, and against the two that describe most of one together; as many

@@ -99,7 +99,7 @@ mod tests {
 
     fn noise_of(name: &'static str) -> (Vec<f64>, f64, Stand) {
         let draw = &mut Draw::of(20_261_122, 88, 0);
-        let needed = super::super::needs(name).expect("a name of this set");
+        let needed = super::super::needs(name);
         let mut stand = Stand::draw(draw, 3000.0, 20.0, needed);
         let f = one(draw, &mut stand, name, 50.0).expect("a name of this set");
         assert!((f.strength - 50.0).abs() < 0.1, "{name}: {}", f.strength);

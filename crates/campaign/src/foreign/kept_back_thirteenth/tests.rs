@@ -1,6 +1,7 @@
 use super::*;
 use crate::foreign::extremes;
 use crate::foreign::kept_back_twelfth::tests::alike;
+use crate::stand::Needs;
 
 pub(super) fn stand(index: u64) -> (Draw, Stand) {
     let mut draw = Draw::of(20_261_122, 140, index);
