@@ -286,7 +286,7 @@ fn bars(out: &mut String, all: &[Outcome]) {
             wrong,
         ),
         bar(
-            "foreign effects of d' >= 25, thirteenth set (2026-11-22), unseen: told as unexplained",
+            "foreign effects of d' >= 25, fourteenth set (2026-11-22), unseen: told as unexplained",
             true,
             0.90,
             told(false),

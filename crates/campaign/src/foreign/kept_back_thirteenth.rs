@@ -50,7 +50,7 @@ pub const NAMES: [&str; 20] = [
 
 /// Those of them that have a near twin in an earlier set, with the one that is nearest, by the rule of the twelfth set: what
 /// is in doubt counts as one, and all do.
-pub const TWINS: [(&str, &str); 20] = [
+const TWINS: [(&str, &str); 20] = [
     (
         "clock that drifts from the encoder's and is set",
         "axis that is converted late",

@@ -19,6 +19,7 @@ mod codes;
 mod eighth;
 mod eleventh;
 mod fifth;
+mod fourteenth;
 mod fourth;
 mod ninth;
 mod second;

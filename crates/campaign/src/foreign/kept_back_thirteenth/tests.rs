@@ -195,12 +195,3 @@ fn a_sample_droops_the_more_the_warmer_it_is() {
     let (cold, warm) = (of(&|t| t < cold + third), of(&|t| t > warm - third));
     assert!(warm > 1.1 * cold, "{cold} {warm}");
 }
-
-#[test]
-fn a_twin_is_of_this_set_and_the_other_of_an_earlier_one() {
-    for (own, other) in TWINS {
-        let at = |name| super::super::FOREIGN.iter().position(|n| *n == name);
-        assert!(NAMES.contains(&own), "{own}");
-        assert!(at(other).is_some_and(|i| i < super::super::SEEN), "{other}");
-    }
-}
