@@ -12,7 +12,10 @@
 //! * Levels: Cox's test of how far two levels are ahead or behind (`contest`).
 //! * Dwells: Bartlett's test of whether two levels switch at random (`contest::dwells`).
 //! * Steadiness: energies of what drives it in stretches of the record, whose variance follows from the sum of r^2.
+//! * Source: what it knows nothing of, by its mean (`source`).
 //! * Size: the same energy against temperature, supply and command and their squares, which it knows nothing of.
+
+pub(crate) mod source;
 
 use std::f64::consts::PI;
 
@@ -29,13 +32,14 @@ use crate::likelihood::{Bins, Noise, Panel};
 use crate::search::{Form, Search, State, Term};
 
 /// The claims.
-pub(crate) const CLAIMS: [&str; 6] = [
+pub(crate) const CLAIMS: [&str; 7] = [
     "process_spectrum",
     "process_law",
     "process_steadiness",
     "process_levels",
     "process_dwells",
     "process_size",
+    "process_source",
 ];
 /// The claim of every stationary process, filters among them: neither its variance nor how its neighbours depend on each other
 /// has a rhythm, as what is held, bridged or switched by a clock of its own has.

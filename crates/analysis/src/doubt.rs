@@ -41,6 +41,8 @@ const HOLDS: f64 = 0.6;
 const REMAINDER: f64 = 0.02;
 /// The same for a combination of channels that stands for a cause without a name: off by half.
 const REMAINDER_BEYOND: f64 = 0.25;
+/// The same of what may have gone to a process: noise takes up what is off in any shape, a step or a line does in few.
+const REMAINDER_PROCESS: f64 = 0.25;
 /// The same where a shape is known not to hold: what is off may be as large as what it explains.
 const REMAINDER_UNLAWFUL: f64 = 1.0;
 
@@ -84,8 +86,7 @@ fn followers(s: &Searched<'_>, g: &[f64]) -> Vec<(&'static str, f64)> {
     let mut signals: Vec<(&'static str, Vec<f64>)> = vec![];
     for (t, own) in s.state.parts() {
         let id = t.effect.id();
-        let shaped = matches!(t.form, Form::Shaped(..)) && signals.iter().any(|x| x.0 == id);
-        if t.follows.is_none() && !shaped {
+        if s.search.followed(t).is_none() {
             continue;
         }
         let place = signals.iter().position(|x| x.0 == id).unwrap_or_else(|| {
@@ -240,6 +241,11 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
         *of == id && o.p_value < adequacy::LEAST_CHANCE
     };
     let remainder = |t: &Term| {
+        let most = if t.is_covariance() {
+            REMAINDER_PROCESS
+        } else {
+            REMAINDER
+        };
         followed
             .iter()
             .filter(|f| f.0 != t.effect.id())
@@ -250,7 +256,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
                 } else if s.laws.iter().any(|l| unlawful_of(id, l)) {
                     *share < REMAINDER_UNLAWFUL
                 } else {
-                    *share < REMAINDER && !law::holds_beside(&s.search, &s.state, t, id)
+                    *share < most && !law::holds_beside(&s.search, &s.state, t, id)
                 }
             })
             .min_by(|a, b| a.1.total_cmp(&b.1))

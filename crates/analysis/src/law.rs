@@ -8,6 +8,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::adequacy::source;
 use crate::beyond::{self, memory};
 use crate::checks::{Outcome, chi_tail, normal_tail};
 use crate::likelihood::Noise;
@@ -19,7 +20,7 @@ pub(crate) const CLAIM: &str = "follower_law";
 /// not exactly in proportion, and a small part of a strong effect is no other cause.
 pub(crate) const DEPARTURE: f64 = 0.05;
 /// Refitting the random walk widens the likelihood ratio of slow columns (`threshold`).
-const WIDENED: f64 = 1.12;
+pub(crate) const WIDENED: f64 = 1.12;
 
 /// For each effect that follows a channel, whether its law holds.
 pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static str, Outcome)> {
@@ -37,7 +38,8 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
             continue;
         };
         let departures = memory::departures(&search.view, signal);
-        let added: Vec<usize> = departures.iter().map(|d| search.panel.add(d)).collect();
+        let departures = departures.iter().flatten();
+        let added: Vec<usize> = departures.map(|d| search.panel.add(d)).collect();
         // What the library has of the effect, and of one that extends it, is no departure.
         let of_it = search
             .candidates
@@ -73,6 +75,7 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
         ));
     }
     all.extend(state.terms.iter().filter_map(|t| in_proportion(state, t)));
+    all.extend(source::of_processes(search, state));
     all
 }
 
@@ -127,12 +130,12 @@ pub(crate) fn holds_beside(search: &Search<'_>, state: &State, term: &Term, effe
         return false;
     }
     let of_it = state.terms.iter().filter(|t| t.effect.id() == effect);
-    let mut names: Vec<&str> = of_it.filter_map(|t| t.follows.as_deref()).collect();
+    let mut names: Vec<&str> = of_it.filter_map(|t| search.followed(t)).collect();
     names.dedup();
     let signals = search.view.signals.iter();
     let departures = signals
         .filter(|s| names.contains(&s.name.as_str()))
-        .flat_map(|s| memory::departures(&search.view, s));
+        .flat_map(|s| memory::departures(&search.view, s).concat());
     let width = search.panel.width();
     let added: Vec<usize> = departures.map(|d| search.panel.add(&d)).collect();
     let likelihood = |left_out: Option<&Term>| {

@@ -75,6 +75,78 @@ fn a_motor_that_shifts_the_bias_and_adds_noise_is_told_as_both() {
     });
 }
 
+/// Counts of the motor command at full duty.
+const FULL: f64 = 255.0;
+
+/// Gives a record another programme of its motor: levels at random either way, held for some seconds.
+fn programme(record: &mut Record, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+    let motor = (record.channels.iter_mut()).find(|c| c.quantity == Quantity::Pwm);
+    let command = &mut motor.expect("a motor").values;
+    let mut from = 0;
+    while from < command.len() {
+        let to = command.len().min(from + between(rng, 20.0, 100.0) as usize);
+        command[from..to].fill((FULL * between(rng, -1.0, 1.0)).round());
+        from = to;
+    }
+    command.clone()
+}
+
+/// Firmware that takes a slow turn of the table for its bias and lets its zero follow it, and in fast ones leaves the zero where
+/// it is: a wander that is made of the command's past, by no law of the library, and no process.
+#[test]
+fn a_zero_that_follows_slow_turns_is_no_process() {
+    graded("a zero that follows slow turns", |run, rng| {
+        let mut r = record(&[("motor_duty", 0.9)], 7500 + run);
+        let pwm = programme(&mut r, rng);
+        let (slow, takes) = (between(rng, 0.35, 0.5), between(rng, 0.4, 1.0));
+        let size = between(rng, 1.0, 1.4);
+        let (mut rate, mut zero) = (0.0, 0.0);
+        let zeros: Vec<f64> = (pwm.iter())
+            .map(|p| {
+                rate += (p / FULL - rate) / (20.0 * 0.3);
+                if rate.abs() < slow {
+                    zero += (rate - zero) / (20.0 * takes);
+                }
+                size * zero
+            })
+            .collect();
+        add(&mut r, "gyro_z", |i| -zeros[i]);
+        let d = told(&r);
+        let right = named(&d).is_empty() && !d.unexplained.is_empty();
+        right
+            .then_some(())
+            .ok_or_else(|| format!("{slow} {takes} {size}: {}", said(&d)))
+    });
+}
+
+/// A wander of its own beside a motor that shifts the bias: the process knows nothing of the motor, and both keep their names.
+#[test]
+fn a_process_beside_a_motor_keeps_its_name() {
+    graded("a process beside a motor", |run, rng| {
+        let mut r = record(&[("motor_duty", 0.7)], 7600 + run);
+        let pwm = values(&r, Quantity::Pwm);
+        let full = pwm.iter().fold(1.0, |m: f64, v| m.max(v.abs()));
+        let (shift, sigma) = (between(rng, 0.15, 0.3), between(rng, 0.12, 0.2));
+        let correlated = (-1.0 / (20.0 * between(rng, 0.5, 3.0))).exp();
+        let mut level = 0.0;
+        let more: Vec<f64> = (pwm.iter())
+            .map(|p| {
+                let drive = sigma * (1.0f64 - correlated * correlated).sqrt();
+                level = correlated * level + drive * normal(rng);
+                shift * p / full + level
+            })
+            .collect();
+        add(&mut r, "gyro_z", |i| more[i]);
+        let d = told(&r);
+        let mut names = named(&d);
+        names.sort_unstable();
+        let right = names == [("gauss_markov", "gyro_z"), ("motor_bias", "gyro_z")];
+        right
+            .then_some(())
+            .ok_or_else(|| format!("{shift} {sigma} {correlated}: {}", said(&d)))
+    });
+}
+
 /// A room whose thermostat lets it warm and cool between two edges, no two spells of it alike: a wander whose middle pitch
 /// stands out. It is neither a process of the library nor a line in the band of one.
 #[test]

@@ -23,6 +23,10 @@ const TEMPERATURE_S: [f64; 3] = [10.0, 40.0, 160.0];
 /// The same for a rate that the table makes, which is asked of a name alone: a gyro with a memory is its noise too, and that
 /// may be shared.
 const TURNING_S: [f64; 2] = [0.8, 3.2];
+/// Shares of the largest command from which on its sense alone counts, and memories of it, s: at once, and a factor of four
+/// apart.
+const GATES: [f64; 3] = [0.02, 0.25, 0.5];
+const SENSE_S: [f64; 4] = [0.05, 0.5, 2.0, 8.0];
 /// Places of bends, as shares of what a signal spans.
 const BENDS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// Samples over which a response to vibration may go on, and that of a long record.
@@ -101,9 +105,10 @@ pub(super) fn combinations<'a>(
     all
 }
 
-/// Everything by which a response to a signal may differ from one that is in proportion and at once: its memory, its
-/// bend, and its drift in time. Columns beside the signal itself.
-pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Vec<f64>> {
+/// Everything by which a response to a signal may differ from one that is in proportion and at once, by kind: its bend and
+/// its drift in time, its memory, and of a motor the memory of its heat, what follows its changes, and what knows no more
+/// than its sense. Columns beside the signal itself.
+pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Vec<Vec<f64>>> {
     let vibrates = signal.quantity == Quantity::Acc;
     let c = centred(if vibrates {
         &signal.values
@@ -116,7 +121,7 @@ pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Vec<f64>> {
     let of = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
         scaled.iter().enumerate().map(|(i, v)| f(i, *v)).collect()
     };
-    let mut all = vec![
+    let mut bent = vec![
         of(&|_, v| v * v),
         of(&|_, v| v * v * v),
         of(&|i, v| v * (2.0 * i as f64 / n as f64 - 1.0)),
@@ -124,12 +129,16 @@ pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Vec<f64>> {
     // A bend anywhere: what dips, saturates or has a dead zone is no parabola.
     let low = scaled.iter().fold(f64::INFINITY, |m, v| m.min(*v));
     let high = scaled.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
-    all.extend(BENDS.iter().map(|share| {
+    bent.extend(BENDS.iter().map(|share| {
         let at = low + share * (high - low);
         of(&|_, v| (v - at).max(0.0))
     }));
-    if vibrates {
-        all.extend(shifted(&scaled).into_iter().skip(1));
+    let behind = |values: &[f64], times: &[f64]| -> Vec<Vec<f64>> {
+        let times = resolved(view, times);
+        times.map(|t| lagged(values, t * view.rate_hz)).collect()
+    };
+    let late = if vibrates {
+        shifted(&scaled).split_off(1)
     } else {
         let times: &[f64] = match signal.quantity {
             Quantity::Gyro => &TURNING_S,
@@ -138,17 +147,31 @@ pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Vec<f64>> {
             Quantity::Temp => &TEMPERATURE_S,
             _ => &SUPPLY_S,
         };
-        all.extend(resolved(view, times).map(|t| lagged(&scaled, t * view.rate_hz)));
-    }
+        behind(&scaled, times)
+    };
+    let mut all = vec![bent, late];
     if signal.quantity == Quantity::Pwm {
         let size = size(signal);
-        let lags = resolved(view, &HEAT_S);
-        let heat = centred(&size);
-        all.extend(lags.map(|t| lagged(&heat, t * view.rate_hz)));
-        all.extend(after_changes(&scaled));
-        all.extend(after_changes(&size));
+        all.push(behind(&centred(&size), &HEAT_S));
+        all.push(after_changes(&scaled));
+        all.push(after_changes(&size));
+        let gates = GATES.iter().map(|g| sense(&signal.smooth, *g));
+        all.push(gates.flat_map(|s| behind(&s, &SENSE_S)).collect());
     }
     all
+}
+
+/// The sense of a command that is beyond a share of its largest, and 0 below it.
+fn sense(command: &[f64], gate: f64) -> Vec<f64> {
+    let largest = command.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let sense = |v: &f64| {
+        if v.abs() > gate * largest {
+            v.signum()
+        } else {
+            0.0
+        }
+    };
+    command.iter().map(sense).collect()
 }
 
 /// Stretches of samples after a change, of any shape within them: first one and end. What rings swings within some samples,
