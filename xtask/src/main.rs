@@ -29,7 +29,10 @@ const USAGE: &str = "usage: cargo xtask COMMAND
 
 fn main() -> ExitCode {
     let command = std::env::args().nth(1);
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
+    // Where it runs, not where it was built: checkouts may share a target folder.
+    let own = std::env::var_os("CARGO_MANIFEST_DIR");
+    let root = own.map_or_else(|| env!("CARGO_MANIFEST_DIR").into(), PathBuf::from);
+    let root = root.join("..");
     let done = match command.as_deref() {
         Some("test") => test(&root),
         Some("demo") => demo(&root),

@@ -83,7 +83,7 @@ fn what_cannot_be_read_is_named_with_what_there_is() {
     assert!(error.contains("stamp, gx, gy, temp"), "{error}");
     let error = read(&data("imu.npz"), "gyro_x=gyr", "").unwrap_err();
     assert!(error.contains("gyr[0]"), "{error}");
-    let folder = tempfile();
+    let folder = folder_of("what_cannot_be_read_is_named_with_what_there_is");
     for (name, text, expected) in [
         ("cut.npz", "PK", "it is no NPZ"),
         ("new.mat", "MATLAB 7.3 MAT-file, and so on", "-v7"),
@@ -104,7 +104,7 @@ fn what_cannot_be_read_is_named_with_what_there_is() {
 
 #[test]
 fn columns_of_text_and_angles_become_rates() {
-    let folder = tempfile();
+    let folder = folder_of("columns_of_text_and_angles_become_rates");
     // One series without a name, as clock tools write it.
     let path = folder.join("frequency.txt");
     std::fs::write(&path, "# rate_hz: 2\n1.5e-3\n2.5e-3\n\n-1e-3\n").unwrap();
@@ -124,12 +124,9 @@ fn columns_of_text_and_angles_become_rates() {
     assert!(error.contains("time between its rows"), "{error}");
 }
 
-fn tempfile() -> PathBuf {
-    let folder = std::env::temp_dir().join(format!(
-        "imu-stand-tables-{}-{:?}",
-        std::process::id(),
-        std::thread::current().id()
-    ));
+/// A folder of each test's own, below `target`.
+fn folder_of(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
     std::fs::create_dir_all(&folder).unwrap();
     folder
 }
@@ -142,7 +139,7 @@ fn what_our_own_export_writes_is_read_back_scaled_and_raw() {
         ("heater_degc".to_owned(), 3.0),
     ]);
     let record = model::simulate(&model, 20.0, 20.0, 4).unwrap();
-    let folder = tempfile();
+    let folder = folder_of("what_our_own_export_writes_is_read_back_scaled_and_raw");
     for raw in [false, true] {
         let table = imu_stand::export::data::Table::of(&record, raw);
         let (npz, parquet) = (folder.join("own.npz"), folder.join("own.parquet"));
