@@ -12,6 +12,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use crate::checks::LEAST_CHANCE;
+use crate::column::dot;
 use crate::grid::{MOTION_RMS, white_by_differences};
 use crate::threshold;
 
@@ -380,10 +381,6 @@ fn steps(points: &[f64], variance: f64) -> f64 {
 fn means(y: &[f64], by: usize) -> Vec<f64> {
     let mean = |part: &[f64]| part.iter().sum::<f64>() / by as f64;
     y.chunks_exact(by).map(mean).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! set aside before anything else is asked: it is no step of the bias, no quiet noise and no code that comes too often.
 
 use std::borrow::Cow;
+use std::cell::LazyCell;
 
 use model::record::{Channel, Quantity, Record, flag};
 
@@ -35,8 +36,9 @@ fn of(record: &Record, channel: &Channel) -> Still {
     let new = |i: usize| flags.zip(bit).is_none_or(|(f, bit)| f[i] & bit != 0);
     let lsb = channel.lsb.filter(|_| channel.counts.is_some());
     let step = lsb.unwrap_or_else(|| smallest_step(values));
-    let (p, _) = agreement(values, step);
-    let chance = |run: usize| run as f64 * p.ln() + (rows as f64).ln();
+    // Asked for where something stands still at all.
+    let agreeing = LazyCell::new(|| agreement(values, step).0);
+    let chance = |run: usize| run as f64 * agreeing.ln() + (rows as f64).ln();
     let (low, high) = values
         .iter()
         .filter(|v| v.is_finite())
@@ -58,7 +60,7 @@ fn of(record: &Record, channel: &Channel) -> Still {
         let inside = ![low, high].iter().any(|v| equal(values[start], *v, step));
         if inside {
             still.longest = still.longest.max(run);
-            if p < MOST_AGREEING && run >= LEAST && chance(run) < CHANCE.ln() {
+            if run >= LEAST && *agreeing < MOST_AGREEING && chance(run) < CHANCE.ln() {
                 still.rows.extend(start + 1..i);
             }
         }

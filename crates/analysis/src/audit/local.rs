@@ -47,10 +47,7 @@ pub fn robust_sigma(values: &[f64]) -> f64 {
 /// Width between the `share` and `1 - share` points of the finite values; 0 of none.
 #[must_use]
 pub fn width(values: &[f64], share: f64) -> f64 {
-    let (mut low, mut high, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0usize);
-    for v in values.iter().filter(|v| v.is_finite()) {
-        (low, high, count) = (low.min(*v), high.max(*v), count + 1);
-    }
+    let (low, high, count) = span(values);
     if count == 0 {
         return 0.0;
     }
@@ -72,6 +69,29 @@ pub fn width(values: &[f64], share: f64) -> f64 {
     above - below
 }
 
+/// Least and greatest finite value, and how many are finite.
+fn span(values: &[f64]) -> (f64, f64, usize) {
+    const ABREAST: usize = 8;
+    let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY].map(|v| [v; ABREAST]);
+    let mut counts = [0u64; ABREAST];
+    let mut see = |i: usize, v: f64| {
+        let finite = v.is_finite();
+        low[i] = if finite & (v < low[i]) { v } else { low[i] };
+        high[i] = if finite & (v > high[i]) { v } else { high[i] };
+        counts[i] += u64::from(finite);
+    };
+    let (many, rest) = values.as_chunks::<ABREAST>();
+    for few in many {
+        for (i, v) in few.iter().enumerate() {
+            see(i, *v);
+        }
+    }
+    rest.iter().for_each(|v| see(0, *v));
+    let low = low.into_iter().fold(f64::INFINITY, f64::min);
+    let high = high.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    (low, high, counts.iter().sum::<u64>() as usize)
+}
+
 /// Values beyond which order statistics are found by counting first.
 const COUNTED: usize = 2048;
 
@@ -79,16 +99,26 @@ const COUNTED: usize = 2048;
 /// the bin of the place alone.
 fn counted(values: &[f64], places: [usize; 2], low: f64, high: f64) -> [f64; 2] {
     const BINS: usize = 2048;
+    /// Values whose bins are made at once.
+    const ABREAST: usize = 8;
+    /// 2^52: added to a number, its whole part stands in the last bits.
+    const WHOLE: f64 = 4_503_599_627_370_496.0;
     let scale = if high > low {
         (BINS - 1) as f64 / (high - low)
     } else {
         0.0
     };
-    let bin = |v: f64| ((v - low) * scale) as usize;
-    let mut tally = [0u32; BINS];
-    for v in values.iter().filter(|v| v.is_finite()) {
-        tally[bin(*v).min(BINS - 1)] += 1;
-    }
+    // What is not finite has the bin behind all others.
+    let bin = |v: f64| {
+        let whole = ((v - low) * scale + WHOLE).to_bits() - WHOLE.to_bits();
+        if v.is_finite() { whole } else { BINS as u64 }
+    };
+    let bins = |few: &[f64; ABREAST]| few.map(bin);
+    let (many, rest) = values.as_chunks::<ABREAST>();
+    let mut tally = [0u32; BINS + 1];
+    let mut count = |b: u64| tally[(b as usize).min(BINS)] += 1;
+    many.iter().flat_map(bins).for_each(&mut count);
+    rest.iter().map(|v| bin(*v)).for_each(&mut count);
     // Bin of each place, its place among the values there, and these.
     let mut found = places.map(|place| {
         let (mut b, mut before) = (0, 0);
@@ -96,16 +126,26 @@ fn counted(values: &[f64], places: [usize; 2], low: f64, high: f64) -> [f64; 2] 
             before += tally[b] as usize;
             b += 1;
         }
-        (b, place - before, Vec::with_capacity(tally[b] as usize))
+        (
+            b as u64,
+            place - before,
+            Vec::with_capacity(tally[b] as usize),
+        )
     });
-    for v in values.iter().filter(|v| v.is_finite()) {
-        let own = bin(*v).min(BINS - 1);
+    let [first, second] = [found[0].0, found[1].0];
+    let mut take = |v: f64| {
         for (b, _, inside) in &mut found {
-            if own == *b {
-                inside.push(*v);
+            if bin(v) == *b {
+                inside.push(v);
             }
         }
+    };
+    for few in many {
+        if bins(few).iter().any(|b| (*b == first) | (*b == second)) {
+            few.iter().for_each(|v| take(*v));
+        }
     }
+    rest.iter().for_each(|v| take(*v));
     found.map(|(_, place, mut inside)| *inside.select_nth_unstable_by(place, f64::total_cmp).1)
 }
 
