@@ -5,6 +5,7 @@ use std::rc::Rc;
 use crate::likelihood::Bins;
 
 /// Sum of products, in eight sums that a processor makes at once.
+#[inline(always)]
 pub(crate) fn dot<A, B>(a: &[A], b: &[B]) -> f64
 where
     A: Copy + Into<f64>,
@@ -24,6 +25,7 @@ where
 }
 
 /// Halves, quarters and eighths on each other, as they lie side by side in a processor.
+#[inline(always)]
 fn sum_of_eight([a, b, c, d, e, f, g, h]: [f64; 8]) -> f64 {
     ((a + e) + (c + g)) + ((b + f) + (d + h))
 }

@@ -44,6 +44,7 @@ pub mod paper_model;
 pub mod plan;
 pub mod pooled;
 mod refill;
+mod powers;
 pub mod representative;
 pub mod result;
 pub mod rows;

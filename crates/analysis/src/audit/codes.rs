@@ -8,9 +8,14 @@
 //! of the readings from x to a(x): q(c) = (1 - f) p(c) + f sum over a(x) = c of p(x). Weights and share are fitted by
 //! expectation and maximization; the likelihood is that of the histogram.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::column::dot;
+use crate::powers::{logarithms, powers};
 
 /// Levels in a spread.
 const BY_SPREAD: f64 = 2.0;
@@ -70,6 +75,40 @@ pub(super) struct Histogram {
     pub mean: f64,
     /// Standard deviation.
     pub spread: f64,
+    /// Levels that were made, by first code, codes and spread: faults that move codes as far have the same.
+    known: RefCell<HashMap<(i32, usize, u64), Rc<Levels>>>,
+}
+
+/// Levels of one spread.
+#[derive(Debug)]
+struct Levels {
+    at: Vec<f64>,
+    /// Of each: its first code, and the chances from there on.
+    chances: Vec<(usize, Vec<f64>)>,
+}
+
+impl Levels {
+    fn new(first: i32, codes: usize, spread: f64) -> Self {
+        let normal = Normal::standard();
+        let step = spread / BY_SPREAD;
+        let levels: Vec<f64> = (0..=((codes - 1) as f64 / step) as usize)
+            .map(|k| f64::from(first) + k as f64 * step)
+            .collect();
+        let chances = levels
+            .iter()
+            .map(|m| {
+                let at = |x: f64| (x - f64::from(first)).clamp(0.0, (codes - 1) as f64) as usize;
+                let (a, b) = (at(m - REACH * spread), at(m + REACH * spread));
+                let edge = |i: usize| normal.cdf((f64::from(first) + i as f64 - 0.5 - m) / spread);
+                let edges: Vec<f64> = (a..=b + 1).map(edge).collect();
+                (a, edges.windows(2).map(|w| w[1] - w[0]).collect())
+            })
+            .collect();
+        Self {
+            at: levels,
+            chances,
+        }
+    }
 }
 
 impl Histogram {
@@ -100,6 +139,7 @@ impl Histogram {
             n,
             mean,
             spread: variance.sqrt(),
+            known: RefCell::default(),
         })
     }
 
@@ -152,11 +192,9 @@ pub(super) struct Laws<'a> {
     times: Vec<f64>,
     /// Where the fault takes each code.
     to: Vec<usize>,
-    levels: Vec<f64>,
+    levels: Rc<Levels>,
     /// Where a fit begins, off the mean of the codes.
     pub shift: f64,
-    /// Of each level: its first code, and the chances from there on.
-    chances: Vec<(usize, Vec<f64>)>,
 }
 
 impl<'a> Laws<'a> {
@@ -175,21 +213,10 @@ impl<'a> Laws<'a> {
         let to = (first..=last)
             .map(|x| (fault.of(x).clamp(first, last) - first) as usize)
             .collect();
-        let normal = Normal::standard();
-        let step = spread / BY_SPREAD;
-        let levels: Vec<f64> = (0..=((codes - 1) as f64 / step) as usize)
-            .map(|k| f64::from(first) + k as f64 * step)
-            .collect();
-        let chances = levels
-            .iter()
-            .map(|m| {
-                let at = |x: f64| (x - f64::from(first)).clamp(0.0, (codes - 1) as f64) as usize;
-                let (a, b) = (at(m - REACH * spread), at(m + REACH * spread));
-                let edge = |i: usize| normal.cdf((f64::from(first) + i as f64 - 0.5 - m) / spread);
-                let edges: Vec<f64> = (a..=b + 1).map(edge).collect();
-                (a, edges.windows(2).map(|w| w[1] - w[0]).collect())
-            })
-            .collect();
+        let key = (first, codes, spread.to_bits());
+        let mut known = of.known.borrow_mut();
+        let levels = known.entry(key);
+        let levels = levels.or_insert_with(|| Rc::new(Levels::new(first, codes, spread)));
         Self {
             of,
             fault,
@@ -197,15 +224,19 @@ impl<'a> Laws<'a> {
             first,
             times,
             to,
-            levels,
+            levels: Rc::clone(levels),
             shift: 0.0,
-            chances,
         }
     }
 
+    #[inline(always)]
     fn sound(&self, weights: &[f64]) -> Vec<f64> {
         let mut p = vec![LEAST; self.times.len()];
-        for (w, (at, chances)) in weights.iter().zip(&self.chances).filter(|(w, _)| **w > 0.0) {
+        for (w, (at, chances)) in weights
+            .iter()
+            .zip(&self.levels.chances)
+            .filter(|(w, _)| **w > 0.0)
+        {
             p[*at..]
                 .iter_mut()
                 .zip(chances)
@@ -215,6 +246,7 @@ impl<'a> Laws<'a> {
     }
 
     /// Where the fault takes the codes.
+    #[inline(always)]
     fn taken(&self, p: &[f64]) -> Vec<f64> {
         let mut taken = vec![0.0; p.len()];
         self.to.iter().zip(p).for_each(|(to, p)| taken[*to] += p);
@@ -222,14 +254,17 @@ impl<'a> Laws<'a> {
     }
 
     /// Log likelihood under (1 - f) p + f taken.
+    #[inline(always)]
     fn likelihood(&self, p: &[f64], taken: &[f64], share: f64) -> f64 {
-        let all = self.times.iter().zip(p.iter().zip(taken));
-        all.filter(|(t, _)| **t > 0.0)
-            .map(|(t, (p, a))| t * ((1.0 - share) * p + share * a).max(LEAST).ln())
-            .sum()
+        let mut logs: Vec<f64> = (p.iter().zip(taken))
+            .map(|(p, a)| ((1.0 - share) * p + share * a).max(LEAST))
+            .collect();
+        logarithms(&mut logs);
+        dot(&self.times, &logs)
     }
 
     /// The best share for given chances: the likelihood is concave in it.
+    #[inline(always)]
     fn best_share(&self, p: &[f64], taken: &[f64], mut share: f64) -> f64 {
         for _ in 0..2 {
             let (mut slope, mut bend) = (0.0, 0.0);
@@ -265,6 +300,7 @@ impl<'a> Laws<'a> {
             .sqrt();
         let bell: Vec<f64> = self
             .levels
+            .at
             .iter()
             .map(|m| (-0.5 * ((m - self.of.mean - self.shift) / wide).powi(2)).exp())
             .collect();
@@ -277,7 +313,30 @@ impl<'a> Laws<'a> {
 
     /// Fit from a start; `held` keeps the share as it is.
     pub(super) fn fit(&self, from: Option<&Fit>, share: f64, held: bool, rounds: usize) -> Fit {
-        let mut weights = match from.filter(|f| f.weights.len() == self.levels.len()) {
+        // The same sums by wider registers: nothing is rounded otherwise.
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "avx2")]
+            fn with_avx2(
+                laws: &Laws<'_>,
+                from: Option<&Fit>,
+                share: f64,
+                held: bool,
+                rounds: usize,
+            ) -> Fit {
+                laws.fitted(from, share, held, rounds)
+            }
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has it.
+                return unsafe { with_avx2(self, from, share, held, rounds) };
+            }
+        }
+        self.fitted(from, share, held, rounds)
+    }
+
+    #[inline(always)]
+    fn fitted(&self, from: Option<&Fit>, share: f64, held: bool, rounds: usize) -> Fit {
+        let mut weights = match from.filter(|f| f.weights.len() == self.levels.at.len()) {
             Some(f) => f.weights.clone(),
             None => self.start(),
         };
@@ -290,6 +349,7 @@ impl<'a> Laws<'a> {
         let mut before = f64::NEG_INFINITY;
         let mut step = STEP;
         let mut likelihood = before;
+        let mut gains = vec![0.0; weights.len()];
         for round in 0..=rounds {
             let p = self.sound(&weights);
             let taken = self.taken(&p);
@@ -318,14 +378,18 @@ impl<'a> Laws<'a> {
                 .zip(&self.to)
                 .map(|(r, to)| (1.0 - share) * r + share * ratio[*to])
                 .collect();
-            let mut all = 0.0;
-            for (w, (at, chances)) in weights.iter_mut().zip(&self.chances) {
-                if *w < 1e-12 {
-                    *w = 0.0;
-                    continue;
+            for ((gain, w), (at, chances)) in
+                gains.iter_mut().zip(&weights).zip(&self.levels.chances)
+            {
+                *gain = 0.0;
+                if *w >= 1e-12 {
+                    *gain = dot(&back[*at..][..chances.len()], chances) / self.of.n;
                 }
-                let gain = dot(&back[*at..][..chances.len()], chances);
-                *w *= (gain / self.of.n).powf(step);
+            }
+            powers(&mut gains, step);
+            let mut all = 0.0;
+            for (w, gain) in weights.iter_mut().zip(&gains) {
+                *w = if *w < 1e-12 { 0.0 } else { *w * gain };
                 all += *w;
             }
             weights.iter_mut().for_each(|w| *w /= all);
@@ -344,7 +408,7 @@ impl<'a> Laws<'a> {
         let about = |f: &dyn Fn(f64) -> f64| -> f64 {
             weights
                 .iter()
-                .zip(&self.levels)
+                .zip(&self.levels.at)
                 .map(|(w, m)| w * f(*m))
                 .sum()
         };
