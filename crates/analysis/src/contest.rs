@@ -291,7 +291,7 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         let panel = Panel::new(&dct, &bins, &blocks);
         other = gaussian(&panel, terms_of(&settled), &[]);
     }
-    let errors = covariance_of(&|y| two_level(&blocks, y), &x);
+    let errors = covariance_of(&blocks, &x);
     // ln of the half height is x2 + x0 / 2.
     let least = (-2.0 * x[2]).exp() / m as f64;
     let half_error = (errors[2][2] + errors[0][2] + 0.25 * errors[0][0])

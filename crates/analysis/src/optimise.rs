@@ -84,6 +84,132 @@ pub fn size_for(wanted: f64, strength: &dyn Fn(f64) -> f64) -> f64 {
     (0.5 * (low + high)).exp()
 }
 
+/// A Nelder-Mead search that says where it has to know its function next, so that several can go on side by side.
+struct Simplex {
+    corners: Vec<(f64, Vec<f64>)>,
+    /// Evaluations so far, and at most.
+    used: usize,
+    evaluations: usize,
+    /// Mean of all corners but the worst.
+    centre: Vec<f64>,
+    stage: Stage,
+}
+
+/// What a simplex waits for.
+enum Stage {
+    /// The corners from this one on.
+    Corners(usize),
+    /// The worst corner, reflected.
+    Reflected,
+    /// The worst corner moved this many times as far, beside the reflected one's value.
+    Moved(f64, f64),
+    Ended,
+}
+
+/// How far the worst corner may be moved: reflected, farther, outside and inside; times its way to the centre.
+const WAYS: [f64; 4] = [1.0, 2.0, 0.5, -0.5];
+
+impl Simplex {
+    fn new(start: &[f64], steps: &[f64], evaluations: usize) -> Self {
+        let mut corners = vec![(0.0, start.to_vec()); start.len() + 1];
+        for (i, by) in steps.iter().enumerate() {
+            corners[i + 1].1[i] += by;
+        }
+        Self {
+            corners,
+            used: 0,
+            evaluations,
+            centre: vec![],
+            stage: Stage::Corners(0),
+        }
+    }
+
+    /// The worst corner moved through the centre.
+    fn along(&self, t: f64) -> Vec<f64> {
+        let worst = &self.corners[self.corners.len() - 1].1;
+        let parts = self.centre.iter().zip(worst);
+        parts.map(|(c, w)| c + t * (c - w)).collect()
+    }
+
+    /// Where the function has to be known next; `ahead`, with all that the same step may ask for.
+    fn wanted(&self, ahead: bool) -> Vec<Vec<f64>> {
+        match self.stage {
+            Stage::Corners(from) => self.corners[from..].iter().map(|c| c.1.clone()).collect(),
+            Stage::Reflected if ahead => WAYS.iter().map(|t| self.along(*t)).collect(),
+            Stage::Reflected => vec![self.along(1.0)],
+            Stage::Moved(t, _) => vec![self.along(t)],
+            Stage::Ended => vec![],
+        }
+    }
+
+    /// The values there.
+    fn told(&mut self, values: &[f64]) {
+        let n = self.corners.len() - 1;
+        match self.stage {
+            Stage::Corners(from) => {
+                let corners = self.corners[from..].iter_mut().zip(values);
+                corners.for_each(|(c, v)| c.0 = *v);
+                self.used += values.len();
+                self.turn();
+            }
+            Stage::Reflected => {
+                self.used += 1;
+                let fr = values[0];
+                let way = if fr < self.corners[0].0 {
+                    1
+                } else if fr < self.corners[n - 1].0 {
+                    self.corners[n] = (fr, self.along(1.0));
+                    return self.turn();
+                } else if fr < self.corners[n].0 {
+                    2
+                } else {
+                    3
+                };
+                self.stage = Stage::Moved(WAYS[way], fr);
+                if let Some(value) = values.get(way) {
+                    self.told(&[*value]);
+                }
+            }
+            Stage::Moved(t, fr) => {
+                self.used += 1;
+                let moved = (values[0], self.along(t));
+                if t > 1.0 {
+                    let reflected = (fr, self.along(1.0));
+                    self.corners[n] = if moved.0 < fr { moved } else { reflected };
+                } else if moved.0 < self.corners[n].0.min(fr) {
+                    self.corners[n] = moved;
+                } else {
+                    let (best, others) = self.corners.split_at_mut(1);
+                    for (x, b) in others
+                        .iter_mut()
+                        .flat_map(|s| s.1.iter_mut().zip(&best[0].1))
+                    {
+                        *x = b + 0.5 * (*x - b);
+                    }
+                    self.stage = Stage::Corners(1);
+                    return;
+                }
+                self.turn();
+            }
+            Stage::Ended => {}
+        }
+    }
+
+    /// Begin a further step, unless it was the last one.
+    fn turn(&mut self) {
+        self.corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let n = self.corners.len() - 1;
+        let flat = (self.corners[n].0 - self.corners[0].0).abs() < 1e-4;
+        if flat || self.used >= self.evaluations {
+            self.stage = Stage::Ended;
+            return;
+        }
+        let mean = |j: usize| self.corners[..n].iter().map(|s| s.1[j]).sum::<f64>() / n as f64;
+        self.centre = (0..n).map(mean).collect();
+        self.stage = Stage::Reflected;
+    }
+}
+
 /// Nelder-Mead search for the lowest point of `f`, at most `evaluations` evaluations or until the simplex is flat.
 pub fn nelder_mead(
     f: &dyn Fn(&[f64]) -> f64,
@@ -91,66 +217,63 @@ pub fn nelder_mead(
     steps: &[f64],
     evaluations: usize,
 ) -> Vec<f64> {
-    let n = start.len();
-    let mut simplex: Vec<(f64, Vec<f64>)> = vec![(f(start), start.to_vec())];
-    for i in 0..n {
-        let mut x = start.to_vec();
-        x[i] += steps[i];
-        simplex.push((f(&x), x));
+    let mut simplex = Simplex::new(start, steps, evaluations);
+    while !matches!(simplex.stage, Stage::Ended) {
+        let values: Vec<f64> = simplex.wanted(false).iter().map(|x| f(x)).collect();
+        simplex.told(&values);
     }
-    let mut used = n + 1;
-    while used < evaluations {
-        simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
-        if (simplex[n].0 - simplex[0].0).abs() < 1e-4 {
+    simplex.corners.swap_remove(0).1
+}
+
+/// The same from several starts, with the lowest values, of an `f` that takes several points in little more time than one: each
+/// search asks what it asks for alone, and the last one what it may ask for too.
+pub(crate) fn side_by_side<X: AsRef<[f64]>>(
+    f: &dyn Fn(&[Vec<f64>]) -> Vec<f64>,
+    starts: &[X],
+    steps: &[f64],
+    evaluations: usize,
+) -> Vec<(f64, Vec<f64>)> {
+    let new = |start: &X| Simplex::new(start.as_ref(), steps, evaluations);
+    let mut all: Vec<Simplex> = starts.iter().map(new).collect();
+    loop {
+        let going = |s: &&Simplex| !matches!(s.stage, Stage::Ended);
+        let alone = all.iter().filter(going).count() == 1;
+        let wanted: Vec<Vec<Vec<f64>>> = all.iter().map(|s| s.wanted(alone)).collect();
+        let values = f(&wanted.concat());
+        if values.is_empty() {
             break;
         }
-        let centre: Vec<f64> = (0..n)
-            .map(|j| simplex[..n].iter().map(|s| s.1[j]).sum::<f64>() / n as f64)
-            .collect();
-        let along = |t: f64| -> Vec<f64> {
-            (0..n)
-                .map(|j| centre[j] + t * (centre[j] - simplex[n].1[j]))
-                .collect()
-        };
-        let reflected = along(1.0);
-        let fr = f(&reflected);
-        used += 1;
-        if fr < simplex[0].0 {
-            let far = along(2.0);
-            let ff = f(&far);
-            used += 1;
-            simplex[n] = if ff < fr { (ff, far) } else { (fr, reflected) };
-        } else if fr < simplex[n - 1].0 {
-            simplex[n] = (fr, reflected);
-        } else {
-            let near = if fr < simplex[n].0 {
-                along(0.5)
-            } else {
-                along(-0.5)
-            };
-            let fn_ = f(&near);
-            used += 1;
-            if fn_ < simplex[n].0.min(fr) {
-                simplex[n] = (fn_, near);
-            } else {
-                let best = simplex[0].1.clone();
-                for s in simplex.iter_mut().skip(1) {
-                    s.1.iter_mut()
-                        .zip(&best)
-                        .for_each(|(x, b)| *x = b + 0.5 * (*x - b));
-                    s.0 = f(&s.1);
-                    used += 1;
-                }
-            }
+        let mut rest = &values[..];
+        for (simplex, wanted) in all.iter_mut().zip(&wanted) {
+            let (own, others) = rest.split_at(wanted.len());
+            simplex.told(own);
+            rest = others;
         }
     }
-    simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
-    simplex.swap_remove(0).1
+    let best = |mut s: Simplex| s.corners.swap_remove(0);
+    all.into_iter().map(best).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn searches_side_by_side_find_what_each_finds_alone() {
+        let f = |x: &[f64]| (x[0] - 1.0).powi(4) + (x[1] + x[0] * x[0]).powi(2) + x[2].abs();
+        let all = |points: &[Vec<f64>]| points.iter().map(|x| f(x)).collect();
+        let starts = [[3.0, 1.0, 2.0], [-2.0, 0.5, -1.0], [0.0, 0.0, 9.0]];
+        for evaluations in [3, 40, 41, 42, 43, 400] {
+            let found = side_by_side(&all, &starts, &[0.5; 3], evaluations);
+            let ahead = starts.map(|s| side_by_side(&all, &[s], &[0.5; 3], evaluations).remove(0));
+            for (start, (a, b)) in starts.iter().zip(found.into_iter().zip(ahead)) {
+                let alone = nelder_mead(&f, start, &[0.5; 3], evaluations);
+                assert_eq!((f(&alone), alone), a);
+                assert_eq!(a, b);
+            }
+        }
+        assert!(side_by_side(&all, &[[3.0, 1.0, 2.0]], &[0.5; 3], 400)[0].0 < 1e-3);
+    }
 
     #[test]
     fn a_size_is_found_whatever_the_strength_does_far_from_it() {
