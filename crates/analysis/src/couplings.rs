@@ -5,6 +5,7 @@ use model::effect::Signal;
 use model::record::Quantity;
 
 use crate::checks::{self, LEAST_CHANCE, MOST};
+use crate::column::{dot, sum_of};
 use crate::diagnosis::Searched;
 use crate::grid::Grid;
 use crate::result::Check;
@@ -21,7 +22,7 @@ struct Source {
 }
 
 fn without_mean(mut values: Vec<f64>) -> Vec<f64> {
-    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let mean = sum_of(&values, |v| v) / values.len().max(1) as f64;
     values.iter_mut().for_each(|v| *v -= mean);
     values
 }
@@ -29,12 +30,7 @@ fn without_mean(mut values: Vec<f64>) -> Vec<f64> {
 /// What `of` has beyond a share of `e`.
 fn beyond(of: Vec<f64>, e: &[f64]) -> Vec<f64> {
     let of = without_mean(of);
-    let (mut both, mut own) = (0.0, 0.0);
-    for (a, b) in of.iter().zip(e) {
-        both += a * b;
-        own += b * b;
-    }
-    let share = both / own.max(f64::MIN_POSITIVE);
+    let share = dot(&of, e) / dot(e, e).max(f64::MIN_POSITIVE);
     of.iter().zip(e).map(|(a, b)| a - share * b).collect()
 }
 
@@ -85,8 +81,10 @@ fn of_one(s: &Searched<'_>, samples: usize) -> Vec<Source> {
     all
 }
 
+/// As [`checks::errors_of_sum`], of many.
 fn errors(a: &[f64], b: &[f64]) -> f64 {
-    checks::errors_of_sum(a.iter().zip(b).map(|(a, b)| a * b))
+    let products: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * b).collect();
+    sum_of(&products, |p| p) / dot(&products, &products).max(f64::MIN_POSITIVE).sqrt()
 }
 
 /// Times over which a blow is felt, s.

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use model::effect::{Found, Hypothesis, Parameters, VarianceLaw};
 use model::effects::EFFECTS;
 
+use crate::column::dot;
 use crate::diagnosis::Searched;
 use crate::grid::MOTION_RMS;
 use crate::likelihood::{Noise, Panel, least_walk};
@@ -112,7 +113,7 @@ impl<'a> Meter<'a> {
 
     /// Size of a signal with these energies at size 1.
     fn signal(&self, energy: &[f64], wanted: f64) -> Option<f64> {
-        let over = |weight: &[f64]| -> f64 { energy.iter().zip(weight).map(|(e, w)| e * w).sum() };
+        let over = |weight: &[f64]| dot(energy, weight);
         let of_signal: Vec<f64> = self.walks.iter().map(|w| over(&w.weight)).collect();
         let inverse: Vec<f64> = self.g.iter().map(|g| 1.0 / g).collect();
         // With the random walk as it is: less is never enough.
@@ -152,8 +153,8 @@ impl<'a> Meter<'a> {
                 .zip(self.count)
                 .map(|(g, m)| self.white * g * m)
                 .collect();
-            let sum = |w: &Walk| energy.iter().zip(&w.weight).map(|(e, w)| e * w).sum();
-            self.strength(self.walks.iter().map(sum), &truth)
+            let sums = self.walks.iter().map(|w| dot(&energy, &w.weight));
+            self.strength(sums, &truth)
         };
         let (mut low, mut high) = bounds;
         if strength(high) < wanted {
