@@ -107,11 +107,7 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     else {
         return state;
     };
-    let contested = |t: &Term| match &t.form {
-        Form::Covariance(c, _) => !c.filters_white(),
-        Form::Step(..) => true,
-        _ => false,
-    };
+    let contested = |t: &Term| t.is_process() || matches!(t.form, Form::Step(..));
     let steps = state
         .terms
         .iter()
@@ -152,8 +148,7 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     let mut rest = search.panel.dct.inverse(&r);
     // A process that is fast for a long record is weighed on a stretch of it, in blocks that still show it.
     // What a filter makes of neighbours is to be gone from block to block.
-    let filtered = |t: &Term| matches!(&t.form, Form::Covariance(c, _) if c.filters_white());
-    let longer = if state.terms.iter().any(filtered) {
+    let longer = if state.terms.iter().any(Term::is_filter) {
         BEHIND_A_FILTER
     } else {
         1.0

@@ -20,7 +20,7 @@ use crate::diagnosis::Searched;
 use crate::excursions::Excursion;
 use crate::findings::{blow_of, step_at};
 use crate::result::{Finding, Parameter, Unexplained};
-use crate::search::Form;
+use crate::search::{Form, Term};
 use crate::variance;
 
 /// Chance below which a claim fails, over everything that it is asked for. It is asked only where an event is named.
@@ -336,8 +336,7 @@ fn unlike(
     if wild.is_empty() {
         return (vec![], None);
     }
-    let filter = |f: &Form| matches!(f, Form::Covariance(c, _) if c.filters_white());
-    let filtered = s.state.terms.iter().any(|t| filter(&t.form));
+    let filtered = s.state.terms.iter().any(Term::is_filter);
     let residual = Residual::new(s, e, if filtered { FILTERED } else { 0 });
     let scores: Vec<Vec<Score>> = wild.iter().map(|w| residual.scores(w.at)).collect();
     let own = |i: &usize| {

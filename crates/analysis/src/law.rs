@@ -38,7 +38,7 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
             continue;
         };
         let departures = memory::departures(&search.view, signal);
-        let departures = departures.iter().flatten();
+        let departures = departures.iter().flat_map(|d| &d.1);
         let added: Vec<usize> = departures.map(|d| search.panel.add(d)).collect();
         // What the library has of the effect, and of one that extends it, is no departure.
         let of_it = search
@@ -82,8 +82,7 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
 /// Whether the coefficients of a term of which the library says that they are parts of others are no more than that.
 fn in_proportion(state: &State, term: &Term) -> Option<(&'static str, Outcome)> {
     let id = term.effect.id();
-    let filtered = |t: &Term| matches!(&t.form, Form::Covariance(c, _) if c.filters_white());
-    if state.terms.iter().any(filtered) {
+    if state.terms.iter().any(Term::is_filter) {
         return None;
     }
     let columns = state.terms.iter().flat_map(|t| {
@@ -135,7 +134,8 @@ pub(crate) fn holds_beside(search: &Search<'_>, state: &State, term: &Term, effe
     let signals = search.view.signals.iter();
     let departures = signals
         .filter(|s| names.contains(&s.name.as_str()))
-        .flat_map(|s| memory::departures(&search.view, s).concat());
+        .flat_map(|s| memory::departures(&search.view, s))
+        .flat_map(|d| d.1);
     let width = search.panel.width();
     let added: Vec<usize> = departures.map(|d| search.panel.add(&d)).collect();
     let likelihood = |left_out: Option<&Term>| {

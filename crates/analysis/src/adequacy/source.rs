@@ -9,20 +9,19 @@ use model::effect::{Hypothesis, Signal};
 use model::record::Quantity;
 
 use super::CLAIMS;
-use crate::beyond::{self, memory};
+use crate::beyond;
+use crate::beyond::memory::{self, Departure};
 use crate::checks::{Outcome, chi_tail};
 use crate::law::WIDENED;
 use crate::search::{Candidate, Search, State, Term};
 
-/// Kinds of columns, as `memory::departures` gives them.
-const KINDS: [&str; 6] = [
-    "by a bend or a drift",
-    "late",
-    "behind the heat of its size",
-    "after each of its changes",
-    "after each change of its size",
-    "by its sense alone",
-];
+/// What columns of one kind explain beside all that the library has of a channel.
+struct Asked {
+    how: String,
+    chi_square: f64,
+    degrees: usize,
+    chance: f64,
+}
 
 /// The slow channels of a record that move enough.
 fn recorded<'a>(search: &'a Search<'_>) -> impl Iterator<Item = &'a Signal> {
@@ -37,48 +36,34 @@ fn recorded<'a>(search: &'a Search<'_>) -> impl Iterator<Item = &'a Signal> {
 
 /// For each process among the terms, whether it is independent of what was recorded.
 pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<(&'static str, Outcome)> {
-    let processes = state.terms.iter().filter(|t| is_process(t));
-    let names: Vec<&'static str> = processes.map(|t| t.effect.id()).collect();
-    if names.is_empty() {
+    let processes = || state.terms.iter().filter(|t| t.is_process());
+    if processes().next().is_none() {
         return vec![];
     }
-    let asked: Vec<(String, f64, f64, usize)> = recorded(search)
+    let asked: Vec<Asked> = recorded(search)
         .flat_map(|signal| of_channel(search, state, signal))
         .collect();
-    let chance = |(_, lr, p, _): &(String, f64, f64, usize)| (*lr, *p);
-    let Some(least) = asked
-        .iter()
-        .min_by(|a, b| chance(a).1.total_cmp(&chance(b).1))
-    else {
+    let Some(most) = asked.iter().min_by(|a, b| a.chance.total_cmp(&b.chance)) else {
         return vec![];
     };
-    let (how, lr, p, width) = least;
-    let outcome = |id: &'static str| {
-        let what = format!(
-            "told as {id}, which knows nothing of what was recorded: follows {how}, {lr:.0} of chi-square in {width}"
-        );
+    let outcome = |t: &Term| {
+        let id = t.effect.id();
         let outcome = Outcome {
             id: CLAIMS[6],
-            statistic: *lr,
-            p_value: (p * asked.len() as f64).min(1.0),
-            what,
+            statistic: most.chi_square,
+            p_value: (most.chance * asked.len() as f64).min(1.0),
+            what: format!(
+                "told as {id}, which knows nothing of what was recorded: follows {}, {:.0} of chi-square in {}",
+                most.how, most.chi_square, most.degrees
+            ),
         };
         (id, outcome)
     };
-    names.into_iter().map(outcome).collect()
+    processes().map(outcome).collect()
 }
 
-fn is_process(t: &Term) -> bool {
-    use crate::search::Form;
-    matches!(&t.form, Form::Covariance(c, _) if !c.filters_white())
-}
-
-/// What columns of each kind explain beside all that the library has of a channel: how, chi-square, its chance and degrees.
-fn of_channel(
-    search: &Search<'_>,
-    state: &State,
-    signal: &Signal,
-) -> Vec<(String, f64, f64, usize)> {
+/// The kinds of columns of a channel, asked under the noise as it was fitted.
+fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked> {
     let panel = &search.panel;
     let g = state.noise.over(&panel.bins);
     let width = panel.width();
@@ -86,12 +71,8 @@ fn of_channel(
         Hypothesis::Regression(r) => r.follows.as_deref() == Some(signal.name.as_str()),
         _ => false,
     };
-    let library = || {
-        search
-            .candidates
-            .iter()
-            .filter(|c| c.effect.id() != beyond::ID)
-    };
+    let candidates = || search.candidates.iter();
+    let library = || candidates().filter(|c| c.effect.id() != beyond::ID);
     let ids: Vec<&str> = library().filter(follows).map(|c| c.effect.id()).collect();
     let mut own = state.columns();
     let of_it = library().filter(|c| ids.contains(&c.effect.id()));
@@ -101,18 +82,18 @@ fn of_channel(
     let likelihood = |columns: &[usize]| panel.solve(&g, columns).log_likelihood;
     let null = likelihood(&own);
     let kinds = memory::departures(&search.view, signal);
-    let asked = kinds
-        .iter()
-        .zip(KINDS)
-        .filter(|(columns, _)| !columns.is_empty());
+    let asked = kinds.iter().filter(|d| !d.1.is_empty());
     let all = asked
-        .map(|(columns, kind)| {
+        .map(|Departure(kind, columns)| {
             let mut whole = own.clone();
             whole.extend(columns.iter().map(|d| panel.add(d)));
-            let lr = 2.0 * (likelihood(&whole) - null);
-            let degrees = columns.len();
-            let p = chi_tail(lr / WIDENED, degrees as f64);
-            (format!("{} {kind}", signal.name), lr, p, degrees)
+            let chi_square = 2.0 * (likelihood(&whole) - null);
+            Asked {
+                how: format!("{} {kind}", signal.name),
+                chi_square,
+                degrees: columns.len(),
+                chance: chi_tail(chi_square / WIDENED, columns.len() as f64),
+            }
         })
         .collect();
     panel.truncate(width);

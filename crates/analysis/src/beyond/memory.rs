@@ -105,10 +105,13 @@ pub(super) fn combinations<'a>(
     all
 }
 
+/// One kind of what a response may differ by: how it follows the signal then, and the columns.
+pub(crate) struct Departure(pub(crate) &'static str, pub(crate) Vec<Vec<f64>>);
+
 /// Everything by which a response to a signal may differ from one that is in proportion and at once, by kind: its bend and
 /// its drift in time, its memory, and of a motor the memory of its heat, what follows its changes, and what knows no more
 /// than its sense. Columns beside the signal itself.
-pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Vec<Vec<f64>>> {
+pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Departure> {
     let vibrates = signal.quantity == Quantity::Acc;
     let c = centred(if vibrates {
         &signal.values
@@ -149,14 +152,21 @@ pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Vec<Vec<f64>>>
         };
         behind(&scaled, times)
     };
-    let mut all = vec![bent, late];
+    let mut all = vec![
+        Departure("by a bend or a drift", bent),
+        Departure("late", late),
+    ];
     if signal.quantity == Quantity::Pwm {
         let size = size(signal);
-        all.push(behind(&centred(&size), &HEAT_S));
-        all.push(after_changes(&scaled));
-        all.push(after_changes(&size));
+        let heat = behind(&centred(&size), &HEAT_S);
         let gates = GATES.iter().map(|g| sense(&signal.smooth, *g));
-        all.push(gates.flat_map(|s| behind(&s, &SENSE_S)).collect());
+        let senses = gates.flat_map(|s| behind(&s, &SENSE_S)).collect();
+        all.extend([
+            Departure("behind the heat of its size", heat),
+            Departure("after each of its changes", after_changes(&scaled)),
+            Departure("after each change of its size", after_changes(&size)),
+            Departure("by its sense alone", senses),
+        ]);
     }
     all
 }

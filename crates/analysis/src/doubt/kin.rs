@@ -129,13 +129,11 @@ impl Kin<'_> {
                 };
                 // A line that wanders is told as such, and set aside.
                 let aside = line.is_some_and(|omega| self.s.state.wanders(omega).is_some());
-                let filter =
-                    matches!(&t.form, Form::Covariance(process, _) if process.filters_white());
                 let of_kind = self.in_its_band(t, own, &fallen)
                     || self.of_its_source(t, doubts)
                     || self.beside_larger(t, doubts)
                     || line.is_some() && self.again
-                    || filter && self.variance.0;
+                    || t.is_filter() && self.variance.0;
                 *doubt == Doubt::No && !aside && of_kind
             })
             .collect();

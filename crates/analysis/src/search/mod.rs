@@ -115,6 +115,16 @@ impl Term {
         self.lr - self.threshold
     }
 
+    /// Whether it is a process that is added.
+    pub(crate) fn is_process(&self) -> bool {
+        matches!(&self.form, Form::Covariance(c, _) if !c.filters_white())
+    }
+
+    /// Whether it is a filter that the white noise goes through.
+    pub(crate) fn is_filter(&self) -> bool {
+        self.is_covariance() && !self.is_process()
+    }
+
     pub(crate) fn is_covariance(&self) -> bool {
         matches!(self.form, Form::Covariance(..))
     }

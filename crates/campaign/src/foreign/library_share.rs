@@ -346,6 +346,20 @@ fn a_line_a_swinging_line_a_temperature_term_and_a_step_describe_themselves() {
     );
 }
 
+/// An effect that gives an axis 0 a changing variance, drawn as strong as asked, against what the library has for it; the stand
+/// that it was drawn for.
+fn hold_variance(draw: &mut Draw, name: &'static str) -> Stand {
+    let mut stand = stand(draw, name);
+    let f = foreign(draw, &mut stand, name, 0, 25.0);
+    let Change::Scale(factor) = &f.change else {
+        panic!("{name} has no law of variance")
+    };
+    let law: Vec<f64> = factor.iter().map(|f| f * f).collect();
+    assert!((of_variance(&law) - f.strength).abs() < 1e-9 && (f.strength - 25.0).abs() < 0.1);
+    hold_law(name, &stand, &law);
+    stand
+}
+
 /// A law of variance of an axis 0, known in full, against what the library has for it.
 fn hold_law(name: &str, stand: &Stand, law: &[f64]) {
     let whole = of_variance(law).powi(2);

@@ -27,14 +27,7 @@ fn no_process_of_the_library_describes_noise_that_a_loop_holds_down() {
 fn no_law_of_variance_of_the_library_describes_the_noise_of_a_supply_near_its_end() {
     let draw = &mut Draw::of(20_261_121, 38, 0);
     let name = "noise of a supply near its end";
-    let mut stand = stand(draw, name);
-    let f = foreign(draw, &mut stand, name, 0, 25.0);
-    let Change::Scale(factor) = &f.change else {
-        panic!("{name} has no law of variance")
-    };
-    let law: Vec<f64> = factor.iter().map(|f| f * f).collect();
-    assert!((of_variance(&law) - f.strength).abs() < 1e-9 && (f.strength - 25.0).abs() < 0.1);
-    hold_law(name, &stand, &law);
+    hold_variance(draw, name);
 }
 
 #[test]
