@@ -253,6 +253,36 @@ fn short_whole(cell: &str) -> Option<f64> {
     }
 }
 
+/// 10^k, which an f64 holds.
+const TENS: [f64; 16] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+];
+
+/// The number that a text begins with, its length, and whether it has a point. Of so few digits whole number and power of ten
+/// are exact, and their ratio is rounded once: the nearest number, as it is read in any other way.
+fn short_decimal(text: &[u8]) -> Option<(f64, usize, bool)> {
+    const DIGITS: usize = 15;
+    let from = usize::from(text.first() == Some(&b'-'));
+    let (mut whole, mut point) = (0i64, None);
+    let mut at = from;
+    while let Some(byte) = text.get(at) {
+        match byte {
+            b'0'..=b'9' => whole = whole.wrapping_mul(10) + i64::from(byte - b'0'),
+            b'.' if point.is_none() => point = Some(at),
+            _ => break,
+        }
+        at += 1;
+    }
+    let digits = at - from - usize::from(point.is_some());
+    if digits == 0 || digits > DIGITS {
+        return None;
+    }
+    let size = whole as f64;
+    let size = point.map_or(size, |point| size / TENS[at - point - 1]);
+    let number = if from == 1 { -size } else { size };
+    Some((number, at, point.is_some()))
+}
+
 /// Cuts lines into cells, and reads numbers.
 pub(super) struct Cells {
     separator: char,
@@ -304,6 +334,27 @@ impl Cells {
             ),
         }
         cells
+    }
+
+    /// The numbers of a row as programs write them, in digits, signs and points alone and with no cell empty; nothing where
+    /// any cell is something else. The same as by [`Cells::cut`] and [`Cells::number`], which take four times as long.
+    pub fn plain(&self, line: &str, numbers: &mut Vec<f64>) -> Option<()> {
+        let separator = u8::try_from(self.separator).ok().filter(u8::is_ascii)?;
+        numbers.clear();
+        let mut rest = line.as_bytes();
+        loop {
+            let (number, length, has_point) = short_decimal(rest)?;
+            // The sign of the fraction is the file's once a number has shown it.
+            if has_point && self.decimal != Some('.') {
+                return None;
+            }
+            numbers.push(number);
+            match rest.get(length) {
+                None => return Some(()),
+                Some(end) if *end == separator => rest = &rest[length + 1..],
+                Some(_) => return None,
+            }
+        }
     }
 
     /// A number, with a point or, where commas do not separate cells, a comma before the fraction.
@@ -368,6 +419,41 @@ mod tests {
         }
         for cell in ["", "-", "--1", "1-", "0x1", "1 2", "-a", "\u{661}"] {
             assert_eq!(Cells::new(',').number(cell), None, "{cell}");
+        }
+    }
+
+    #[test]
+    fn a_plain_row_is_what_the_slow_way_reads() {
+        let row = "0,-0,7,-12,0.018028,-1.5,.5,3.,123456789012345,0.00000000000001,-98765.4321";
+        let mut cells = Cells::new(',');
+        let cut: Vec<String> = cells.cut(row).iter().map(ToString::to_string).collect();
+        let mut numbers = vec![];
+        // The point is not yet the file's.
+        assert_eq!(cells.plain(row, &mut numbers), None);
+        let slow: Vec<u64> = (cut.iter().filter_map(|cell| cells.number(cell)))
+            .map(f64::to_bits)
+            .collect();
+        assert_eq!(cells.plain(row, &mut numbers), Some(()));
+        let plain: Vec<u64> = numbers.iter().map(|n| n.to_bits()).collect();
+        assert_eq!(plain, slow);
+        for row in [
+            "",
+            "1,",
+            ",1",
+            "1,,2",
+            "1, 2",
+            "+1",
+            "-",
+            ".",
+            "1.2.3",
+            "1e3",
+            "--1",
+            "nan",
+            "1;2",
+            "1234567890123456",
+            "\u{661}",
+        ] {
+            assert_eq!(cells.plain(row, &mut numbers), None, "{row}");
         }
     }
 

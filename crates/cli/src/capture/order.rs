@@ -133,14 +133,14 @@ pub(super) fn check_times(times: &[f64], is_assumed: bool) -> Result<(), Capture
             help: format!("{NO_TIME}; if it is the time of sampling, sort the rows by it"),
         });
     }
-    let mut steps: Vec<f64> = steps(times).collect();
-    if steps.is_empty() {
+    if !is_assumed || times.len() < 2 {
         return Ok(());
     }
+    let mut steps: Vec<f64> = steps(times).collect();
     let middle = steps.len() / 2;
     let usual = steps.select_nth_unstable_by(middle, f64::total_cmp).1.abs();
     let is_believed = usual == 0.0 || (BELIEVED_S.0..BELIEVED_S.1).contains(&usual);
-    if is_assumed && !is_believed {
+    if !is_believed {
         return Err(CaptureError::Time {
             why: format!("in seconds, rows would be {usual} s apart"),
             help: "say the unit of the time column: `--units time=ms` (or us, ns; s, if it is so)"

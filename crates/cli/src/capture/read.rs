@@ -39,6 +39,9 @@ pub struct Read {
     pub skipped: usize,
 }
 
+/// Bytes of a file that are read at once.
+const READ_AT_ONCE: usize = 1 << 16;
+
 /// Reads a capture or any other table of numbers: by their endings files of arrays (`.npz`, `.npy`, `.parquet`, `.mat`,
 /// `.h5`), everything else as text, gzip or not, with cells between commas, semicolons, tabs or blanks. A gyro given in
 /// units of an angle is differenced into a rate.
@@ -49,7 +52,7 @@ pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureE
     if let Some(table) = read_table(path) {
         return from_table(table?, options);
     }
-    let open = || unpacked(BufReader::new(File::open(path)?));
+    let open = || unpacked(BufReader::with_capacity(READ_AT_ONCE, File::open(path)?));
     // An error of the stream has no path yet.
     open()
         .map_err(io)
@@ -166,6 +169,8 @@ struct RowReader<'a> {
     clocks: Vec<Clock>,
     /// Of the last row.
     values: Vec<f64>,
+    /// All numbers of a plain row.
+    numbers: Vec<f64>,
     /// Of columns that nobody asked for: line and text of the first cell that is no number.
     odd: Vec<Option<(u64, String)>>,
 }
@@ -182,11 +187,35 @@ impl<'a> RowReader<'a> {
             cells,
             clocks: columns.iter().map(clock).collect(),
             values: vec![0.0; columns.len()],
+            numbers: Vec::new(),
             odd: vec![None; columns.len()],
         }
     }
 
+    /// Reads a row of plain numbers, as most are; nothing where it is anything else.
+    fn plain(&mut self, text: &str) -> Option<()> {
+        self.cells.plain(text, &mut self.numbers)?;
+        if self.numbers.len() != self.width {
+            return None;
+        }
+        for (k, column) in self.columns.iter().enumerate() {
+            let number = *self.numbers.get(column.at)?;
+            let value = match column.role {
+                Role::Time { .. } => self.clocks[k].plain(number)?,
+                _ => number,
+            };
+            if !column.role.takes(value) {
+                return None;
+            }
+            self.values[k] = value;
+        }
+        Some(())
+    }
+
     fn read(&mut self, text: &str, line: u64) -> Result<(), CaptureError> {
+        if self.plain(text).is_some() {
+            return Ok(());
+        }
         let bad = |column: &Column, found: &str, expected: String| CaptureError::BadRow {
             line,
             column: brief(&column.name),

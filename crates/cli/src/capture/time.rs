@@ -39,6 +39,11 @@ impl Clock {
         Some(self.since(since_1970) as f64 * 1e-9)
     }
 
+    /// Time of a cell that is a plain number of few digits, s; nothing where times count from the first row on.
+    pub fn plain(&self, number: f64) -> Option<f64> {
+        self.first.is_none().then_some(number * self.scale)
+    }
+
     /// A time of day without a date; past midnight the next day goes on.
     fn since_midnight(&mut self, cell: &str) -> Option<i64> {
         let now = of_day(cell)?;
