@@ -23,16 +23,21 @@ pub(super) fn median(v: &[f64]) -> f64 {
 
 /// Steps of `a` to a step of `b`, by the steps that are about as usual; in whatever order the rows are.
 pub(super) fn ratio(a: &[i64], b: &[i64]) -> Option<f64> {
-    let steps: Vec<(f64, f64)> = a
-        .windows(2)
-        .zip(b.windows(2))
-        .map(|(a, b)| ((a[1] - a[0]) as f64, (b[1] - b[0]) as f64))
-        .filter(|(a, b)| a / b > 0.0 && (a / b).is_finite())
-        .collect();
-    let usual = median(&steps.iter().map(|(a, b)| a / b).collect::<Vec<_>>());
-    let alike = steps
-        .iter()
-        .filter(|(a, b)| (a / b - usual).abs() < 0.5 * usual);
+    let steps = || {
+        (a.windows(2).zip(b.windows(2)))
+            .map(|(a, b)| ((a[1] - a[0]) as f64, (b[1] - b[0]) as f64))
+            .filter(|(a, b)| a / b > 0.0 && (a / b).is_finite())
+    };
+    let (low, high) = steps().fold((f64::INFINITY, 0.0f64), |s, (a, b)| {
+        (s.0.min(a / b), s.1.max(a / b))
+    });
+    // Which of them is usual does not matter where all are alike.
+    let usual = if high - low < 0.49 * low {
+        low
+    } else {
+        median(&steps().map(|(a, b)| a / b).collect::<Vec<_>>())
+    };
+    let alike = steps().filter(|(a, b)| (a / b - usual).abs() < 0.5 * usual);
     let (over, under) = alike.fold((0.0, 0.0), |s, (a, b)| (s.0 + a.abs(), s.1 + b.abs()));
     (under > 0.0 && over > 0.0).then(|| over / under)
 }
@@ -115,13 +120,17 @@ fn slope(lines: &[(Vec<f64>, Vec<f64>)]) -> Option<f64> {
 
 /// Takes the rate of a record whose header has none from the times of its rows; tells where they contradict the header.
 pub(super) fn take_from_times(record: &mut Cow<'_, Record>) {
+    let stated = record.header.rate_hz;
+    let stated = stated.filter(|r| r.is_finite() && *r > 0.0);
+    // With ticks, the device's clock has been heard.
+    if stated.is_some() && record.t_ticks.is_some() {
+        return;
+    }
     let Some(rate) = by_times(record) else {
         return;
     };
-    let stated = record.header.rate_hz;
-    if let Some(stated) = stated.filter(|r| r.is_finite() && *r > 0.0) {
-        // With ticks, the device's clock has been heard.
-        if record.t_ticks.is_none() && (stated / rate - 1.0).abs() > SIDE {
+    if let Some(stated) = stated {
+        if (stated / rate - 1.0).abs() > SIDE {
             let told = format!(
                 "the stated rate is {stated:.4} Hz, but by the times of the rows it is {rate:.4} Hz: all times and frequencies \
                  follow the stated one"
