@@ -1,5 +1,6 @@
 //! What the simulation of a sensor gets wrong, and why.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -8,7 +9,7 @@ use model::effects::{EFFECTS, effect};
 use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
 use model::record::Record;
 
-use crate::audit::{audit, sign_bit};
+use crate::audit::{Audit, audit, sign_bit};
 use crate::checks::{self, LEAST_CHANCE};
 use crate::common::{Shared, common};
 use crate::couplings::couplings;
@@ -88,7 +89,39 @@ impl Searched<'_> {
 /// [`AnalysisError::NoRate`] when its sample rate is unknown, [`AnalysisError::Constant`] when a gyro never changes,
 /// [`AnalysisError::NeverNew`] when no gyro's readings are flagged as new.
 pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed, AnalysisError> {
-    let record = &*rows::in_order(record);
+    Ok(diagnosed(
+        prepared(Cow::Borrowed(record), options.seed)?,
+        options,
+    ))
+}
+
+/// As [`diagnose`], of a record that nobody needs any longer: the search has its memory.
+///
+/// # Errors
+/// Those of [`diagnose`].
+pub fn diagnose_owned(
+    record: Record,
+    options: &DiagnoseOptions,
+) -> Result<Diagnosed, AnalysisError> {
+    Ok(diagnosed(
+        prepared(Cow::Owned(record), options.seed)?,
+        options,
+    ))
+}
+
+/// What the search needs of a record, and what was seen of it before.
+struct Prepared {
+    grid: Grid,
+    audited: Audit,
+    sticking: Vec<Finding>,
+    dead: Vec<Unexplained>,
+    samples: usize,
+    channels: Vec<String>,
+    notes: Vec<String>,
+}
+
+fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisError> {
+    let record = &*rows::in_order(&record);
     let record = &*rows::longest_part(record);
     let (alive, dead) = dead::left_out(record)?;
     let (mended, sticking) = sign_bit::mend(&alive);
@@ -99,7 +132,28 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
         audited.put_right(f);
     }
     let record = &*losses::renumbered(record, &audited);
-    let grid = lay_out(record, &|name| audited.masked(name), options.seed)?;
+    let grid = lay_out(record, &|name| audited.masked(name), seed)?;
+    Ok(Prepared {
+        grid,
+        audited,
+        sticking,
+        dead,
+        samples: record.len(),
+        channels: record.channels.iter().map(|c| c.name.clone()).collect(),
+        notes: record.notes.clone(),
+    })
+}
+
+fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
+    let Prepared {
+        grid,
+        mut audited,
+        sticking,
+        dead,
+        samples,
+        channels,
+        notes,
+    } = of;
     let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();
     grid.dct.forget();
     let mut findings = sticking;
@@ -158,7 +212,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             }),
         }
     }
-    let notes = [record.notes.clone(), std::mem::take(&mut audited.notes)].concat();
+    let notes = [notes, std::mem::take(&mut audited.notes)].concat();
     let mut unexplained = left_over(&checks, &shared);
     for s in &searched {
         let note = |note: &Note| Unexplained {
@@ -232,7 +286,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             .collect(),
         effects,
     };
-    let diagnosed = Diagnosed {
+    Diagnosed {
         baseline_model: model(&|s| baseline_of(s, &s.baseline, &grid), vec![]),
         extended_model: model(
             &|s| baseline_of(s, &s.state, &grid),
@@ -247,8 +301,8 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
                 file: options.file.clone(),
                 seconds: grid.n as f64 / grid.rate_hz,
                 rate_hz: grid.rate_hz,
-                samples: record.len(),
-                channels: record.channels.iter().map(|c| c.name.clone()).collect(),
+                samples,
+                channels,
                 notes,
             },
             baseline,
@@ -259,8 +313,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed,
             not_tested,
             verdict,
         },
-    };
-    Ok(diagnosed)
+    }
 }
 
 /// An axis that moves on a table that turns another one.

@@ -64,6 +64,6 @@ pub mod units;
 mod variance;
 
 pub use analyze::{Analysis, AnalyzeOptions, analyze};
-pub use diagnosis::{DiagnoseOptions, diagnose};
+pub use diagnosis::{DiagnoseOptions, diagnose, diagnose_owned};
 pub use error::AnalysisError;
 pub use representative::{Representative, representative};

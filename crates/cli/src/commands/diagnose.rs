@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .result("--report", arguments.report.as_ref())?;
     let mut runs = Vec::new();
     for path in &arguments.captures {
-        let read = arguments.input.read(path)?;
+        let mut read = arguments.input.read(path)?;
         let hash = super::digest(path)?;
         let options = DiagnoseOptions {
             seed: arguments.seed,
@@ -69,7 +69,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             hash: Some(hash.clone()),
             no_evidence: arguments.report.is_none(),
         };
-        let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
+        let is_needed = arguments.model_out.is_some() || arguments.report.is_some();
+        let found = if is_needed {
+            analysis::diagnose(&read.record, &options)
+        } else {
+            analysis::diagnose_owned(std::mem::take(&mut read.record), &options)
+        };
+        let found = found.map_err(super::explain)?;
         if let Some(path) = &arguments.model_out {
             let fitted = found.extended_model.clone().excited_like(&read.record);
             super::write(path, &fitted.to_toml())?;
