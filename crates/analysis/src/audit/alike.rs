@@ -67,12 +67,19 @@ fn counts<'a>(
     audit: &Audit,
 ) -> Option<(&'a [i32], &'a [i32], Vec<usize>)> {
     let (x, y) = (a.counts?, b.counts?);
-    let usable = |g: &Gyro<'_>, i: usize| {
-        let own = audit.usable.get(&g.channel.name);
-        g.known(i) && own.and_then(|u| u.get(i)) == Some(&true)
+    if a.channel.lsb != b.channel.lsb {
+        return None;
+    }
+    let usable = |g: &'a Gyro<'_>| {
+        let own = audit.usable.get(&g.channel.name).map(Vec::as_slice);
+        let known = g.channel.values.iter().map(|v| v.is_finite());
+        known
+            .zip(own.unwrap_or_default())
+            .map(|(known, own)| known && *own)
     };
-    let rows = (0..x.len().min(y.len())).filter(|i| usable(a, *i) && usable(b, *i));
-    (a.channel.lsb == b.channel.lsb).then(|| (x, y, rows.collect()))
+    let both = usable(a).zip(usable(b)).enumerate();
+    let rows = both.filter(|(_, (a, b))| *a && *b).map(|(i, _)| i);
+    Some((x, y, rows.collect()))
 }
 
 /// How many of some numbers the most frequent of them is.

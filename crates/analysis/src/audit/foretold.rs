@@ -30,13 +30,15 @@ const ROOM: f64 = 3.0;
 /// Least noise, steps: what is bridged is hardly told from less.
 const LEAST_SIGMA: f64 = 1.0;
 
-/// Differences of order `order`: each from that many readings before it on; NaN where one is lost.
+/// Differences of order `order`, 2 or 4: each from that many readings before it on; NaN where one is lost.
 fn differences(y: &[f64], order: usize) -> Vec<f64> {
-    let mut d = y.to_vec();
-    for _ in 0..order {
-        d = d.windows(2).map(|w| w[1] - w[0]).collect();
+    let second = |w: &[f64]| (w[2] - w[1]) - (w[1] - w[0]);
+    let fourth = |w: &[f64]| second(&[second(&w[..3]), second(&w[1..4]), second(&w[2..5])]);
+    if order == 2 {
+        y.windows(3).map(second).collect()
+    } else {
+        y.windows(5).map(fourth).collect()
     }
-    d
 }
 
 /// The lower triangle whose product with its transpose is `covariance`, of which rows up to the diagonal are given, row by row.
@@ -107,28 +109,41 @@ struct Differences {
 impl Differences {
     fn new(y: &[f64], order: usize) -> Self {
         let d = differences(y, order);
-        let (mut sums, mut sum, mut known) = (vec![(0.0, 0.0)], 0.0, 0.0);
-        for v in &d {
-            if v.is_finite() {
-                (sum, known) = (sum + v * v, known + 1.0);
-            }
-            sums.push((sum, known));
+        let n = d.len();
+        // Of all before each, and how many are known.
+        let (mut sums, mut counts) = (vec![0.0; n + 1], vec![0u32; n + 1]);
+        let (mut sum, mut known) = (0.0, 0);
+        for (v, (s, k)) in d.iter().zip(sums.iter_mut().zip(&mut counts).skip(1)) {
+            let finite = v.is_finite();
+            sum += if finite { v * v } else { 0.0 };
+            known += u32::from(finite);
+            (*s, *k) = (sum, known);
         }
-        let mean = |from: usize, to: usize| {
-            let (a, b) = (sums[from], sums[to]);
-            if b.1 - a.1 < 0.5 * ABOUT as f64 {
+        let mean = |sum: f64, known: u32| {
+            if known < ABOUT as u32 / 2 {
                 f64::INFINITY
             } else {
-                (b.0 - a.0) / (b.1 - a.1)
+                sum / f64::from(known)
             }
         };
-        let n = d.len();
-        let power = (0..n)
-            .map(|i| {
-                let quieter = mean(i.saturating_sub(ABOUT), i).min(mean(i, (i + ABOUT).min(n)));
-                if quieter.is_finite() { quieter } else { 0.0 }
-            })
-            .collect();
+        // Before each place, and the one behind the last.
+        let many = ABOUT.min(n + 1);
+        let first = sums.iter().zip(&counts).take(many);
+        let mut power: Vec<f64> = first.map(|(s, k)| mean(*s, *k)).collect();
+        power.reserve_exact(n + 1 - many);
+        let pairs = sums.iter().zip(&sums[many..]);
+        let known = counts.iter().zip(&counts[many..]);
+        power.extend((pairs.zip(known)).map(|((a, b), (k, l))| mean(b - a, l - k)));
+        // What lies before a place lies behind another one.
+        for i in 0..n {
+            let behind = match power.get(i + ABOUT) {
+                Some(mean) => *mean,
+                None => mean(sums[n] - sums[i], counts[n] - counts[i]),
+            };
+            let quieter = power[i].min(behind);
+            power[i] = if quieter.is_finite() { quieter } else { 0.0 };
+        }
+        power.truncate(n);
         let covariance = covariance(&d);
         Self {
             order,
@@ -205,8 +220,13 @@ fn counts(y: &[f64]) -> Vec<[u64; EXPECTED.len()]> {
 
 /// Every `apart`-th reading, from the first on, then from the second on, and so on.
 fn taken(y: &[f64], apart: usize) -> Vec<f64> {
-    let from = |first| y.iter().skip(first).step_by(apart).copied();
-    (0..apart).flat_map(from).collect()
+    let mut all = vec![0.0; y.len()];
+    let from = |first: usize| (0..first).map(|f| (y.len() - f).div_ceil(apart)).sum();
+    let places: Vec<usize> = (0..apart.min(y.len())).map(from).collect();
+    for (i, few) in y.chunks(apart).enumerate() {
+        (few.iter().zip(&places)).for_each(|(v, place)| all[place + i] = *v);
+    }
+    all
 }
 
 /// Windows that are too small together, expected and counted.

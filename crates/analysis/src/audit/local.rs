@@ -38,10 +38,23 @@ pub struct Local {
     pub edge: usize,
 }
 
+/// The 90 % point of the standard normal.
+const TENTH: f64 = 1.281_552;
+
 /// Half the width between the 10 % and 90 % points over that of the standard normal.
 #[must_use]
 pub fn robust_sigma(values: &[f64]) -> f64 {
-    width(values, 0.1) / (2.0 * 1.281_552)
+    width(values, 0.1) / (2.0 * TENTH)
+}
+
+/// Whether the 10 % and 90 % points of values, all of them finite, lie within `near` of 0; false where that is not plain.
+fn holds_most(values: &[f64], near: f64) -> bool {
+    let beyond = |past: &dyn Fn(f64) -> bool| values.iter().filter(|v| past(**v)).count();
+    let last = values.len().saturating_sub(1) as f64;
+    let place = |p: f64| (p * last).round() as usize;
+    values.iter().all(|v| v.is_finite())
+        && beyond(&|v| v < -near) <= place(0.1)
+        && beyond(&|v| v > near) < values.len() - place(0.9)
 }
 
 /// Width between the `share` and `1 - share` points of the finite values; 0 of none.
@@ -163,6 +176,11 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
 /// Median of the finite values; NaN of none.
 #[must_use]
 pub fn median(values: &[f64]) -> f64 {
+    let (low, high, count) = span(values);
+    if count > COUNTED && high - low < f64::MAX {
+        let middle = count / 2;
+        return counted(values, [middle, middle], low, high)[0];
+    }
     let mut v: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     if v.is_empty() {
         return f64::NAN;
@@ -281,12 +299,16 @@ fn parabolas(clean: &[f64], of: &Sums, half: usize) -> Vec<f64> {
     let s4: f64 = (1..=half).map(|j| 2.0 * (j * j * j * j) as f64).sum();
     let d = s0 * s4 - s2 * s2;
     let weights: Vec<f64> = (1..=half).map(|j| (s4 - s2 * (j * j) as f64) / d).collect();
-    for i in half..n.saturating_sub(half) {
-        level[i] = weights
-            .iter()
-            .enumerate()
-            .map(|(j, g)| g * (clean[i - j - 1] + clean[i + j + 1]))
-            .sum();
+    // Weight by weight over a stretch, so that several places are summed at once.
+    const STRETCH: usize = 512;
+    let midst = half..n.saturating_sub(half).max(half);
+    for from in midst.clone().step_by(STRETCH) {
+        let sums = &mut level[from..(from + STRETCH).min(midst.end)];
+        sums.fill(0.0);
+        for (j, g) in (1..).zip(&weights) {
+            let beside = clean[from - j..].iter().zip(&clean[from + j..]);
+            (sums.iter_mut().zip(beside)).for_each(|(s, (a, b))| *s += g * (a + b));
+        }
     }
     level
 }
@@ -352,15 +374,20 @@ impl Local {
         let mut spread = vec![self.sigma; n];
         let mut at = 0;
         let step = SPREAD / 4;
+        // Where no more lies beyond it than beyond the points of the spread, the spread is clearly no more.
+        let near = (1.0 - 1e-9) * CLEARLY * self.sigma * TENTH;
         while at < n {
             let end = (at + step).min(n);
             let (low, high) = (
                 (at + step / 2).saturating_sub(SPREAD / 2),
                 (at + step / 2 + SPREAD / 2).min(n),
             );
-            let s = robust_sigma(&self.residual[low..high]);
-            if s > CLEARLY * self.sigma {
-                spread[at..end].fill(s);
+            let there = &self.residual[low..high];
+            if !holds_most(there, near) {
+                let s = robust_sigma(there);
+                if s > CLEARLY * self.sigma {
+                    spread[at..end].fill(s);
+                }
             }
             at = end;
         }

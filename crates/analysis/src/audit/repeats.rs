@@ -28,14 +28,18 @@ const EXCESS: f64 = 0.1;
 
 /// Share of agreeing pairs `lag` apart of one gyro.
 fn share(values: &[f64], lag: usize, step: f64) -> f64 {
-    let (mut same, mut all) = (0.0, 0.0);
+    // Without a branch, so that several are counted at once.
+    let (mut same, mut all) = (0u64, 0u64);
     for (a, b) in values.iter().zip(&values[lag.min(values.len())..]) {
-        if a.is_finite() && b.is_finite() {
-            all += 1.0;
-            same += f64::from(u8::from(equal(*a, *b, step)));
-        }
+        let known = a.is_finite() & b.is_finite();
+        all += u64::from(known);
+        same += u64::from(known & equal(*a, *b, step));
     }
-    if all > 0.0 { same / all } else { 0.0 }
+    if all > 0 {
+        same as f64 / all as f64
+    } else {
+        0.0
+    }
 }
 
 /// Readings that are one step from that `lag` before.

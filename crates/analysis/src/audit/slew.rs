@@ -17,18 +17,29 @@ const LEAST_CHANGE: u32 = 4;
 /// Largest sizes that the pile is sought in: a limit that lies between two of them is met by either.
 const LARGEST: usize = 3;
 
+/// Changes below which each size has a place of its own among the counts.
+const SMALL: usize = 1 << 10;
+
 pub(super) fn audit(gyro: &Gyro<'_>, audit: &mut Audit) {
     let (Some(counts), name) = (gyro.counts, &gyro.channel.name) else {
         return;
     };
     let known = |i: usize| gyro.known(i);
-    let mut times: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut small = [0; SMALL];
+    let mut large: BTreeMap<u32, usize> = BTreeMap::new();
     for i in (1..counts.len()).filter(|i| known(*i) && known(i - 1)) {
-        *times.entry(counts[i].abs_diff(counts[i - 1])).or_default() += 1;
+        let size = counts[i].abs_diff(counts[i - 1]);
+        match small.get_mut(size as usize) {
+            Some(times) => *times += 1,
+            None => *large.entry(size).or_default() += 1,
+        }
     }
-    let changes: usize = times.values().sum();
+    let changes = large.values().chain(&small).sum::<usize>();
     // The largest first.
-    let sizes: Vec<(u32, usize)> = times.into_iter().rev().take(LARGEST + 1).collect();
+    let small = (0..SMALL as u32).zip(small).rev().filter(|s| s.1 > 0);
+    let sizes: Vec<(u32, usize)> = (large.into_iter().rev().chain(small))
+        .take(LARGEST + 1)
+        .collect();
     let Some((most, _)) = sizes.first().copied() else {
         return;
     };
