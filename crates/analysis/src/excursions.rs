@@ -162,12 +162,11 @@ fn places(y: &[f64], white: f64, rate_hz: f64) -> (Vec<Place>, f64) {
     let mut places = vec![];
     for block in blocks {
         let means = means(y, block);
-        let energies: Vec<f64> = (means.windows(WINDOW))
-            .map(|w| basis[1..].iter().map(|b| dot(b, w).powi(2)).sum())
-            .collect();
-        if energies.is_empty() {
+        let energy = |w: &[f64]| basis[1..].iter().map(|b| dot(b, w).powi(2)).sum();
+        if !largest_reach(&means, least, &energy) {
             continue;
         }
+        let energies: Vec<f64> = means.windows(WINDOW).map(energy).collect();
         let mut sorted = energies.clone();
         let middle = sorted.len() / 2;
         let usual = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN;
@@ -182,6 +181,23 @@ fn places(y: &[f64], white: f64, rate_hz: f64) -> (Vec<Place>, f64) {
     }
     places.sort_by(|a, b| b.energy.total_cmp(&a.energy));
     (places, limit)
+}
+
+/// Whether the energy of the series is more than `least` in any window. It is asked only where the sum of squares, of which
+/// it is a part, is.
+fn largest_reach(means: &[f64], least: f64, energy: &dyn Fn(&[f64]) -> f64) -> bool {
+    let level = means.iter().sum::<f64>() / means.len().max(1) as f64;
+    let square = |v: f64| (v - level) * (v - level);
+    let mut sum = 0.0;
+    means.windows(WINDOW).enumerate().any(|(i, w)| {
+        // Anew now and then: what is added and taken off again leaves its rounding.
+        sum = if i % WINDOW == 0 {
+            w.iter().map(|v| square(*v)).sum()
+        } else {
+            sum + square(w[WINDOW - 1]) - square(means[i - 1])
+        };
+        sum > 0.99 * least && energy(w) > least
+    })
 }
 
 /// Samples of a block for each length that is looked for, 2^1/2 apart.

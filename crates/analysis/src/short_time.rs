@@ -347,18 +347,21 @@ fn order(view: &View<'_>, e: &[f64], all: &[Spectra]) -> Option<Outcome> {
         let evened: Vec<Vec<(f64, f64)>> = spectra.evened().iter().map(about).collect();
         for lag in LAGS_S {
             let speeds = spectra.means(&lagged(&size, lag * view.rate_hz));
-            for highest in 2..FOLDS * length {
-                let hz = highest as f64 / length as f64 * view.rate_hz / 2.0;
-                let mut ridge = Ridge {
-                    hz,
-                    lag,
-                    ..Ridge::default()
-                };
-                for (w, speed) in evened.iter().zip(&speeds) {
+            let mut ridges: Vec<(f64, f64)> = vec![(0.0, 0.0); FOLDS * length];
+            // Window by window: each is at hand for all pitches.
+            for (w, speed) in evened.iter().zip(&speeds) {
+                for (highest, ridge) in ridges.iter_mut().enumerate().skip(2) {
                     let (energy, count) = w[folded(highest as f64 * speed / top, length)];
-                    ridge.energy += energy;
-                    ridge.count += count;
+                    *ridge = (ridge.0 + energy, ridge.1 + count);
                 }
+            }
+            for (highest, (energy, count)) in ridges.into_iter().enumerate().skip(2) {
+                let ridge = Ridge {
+                    energy,
+                    count,
+                    hz: highest as f64 / length as f64 * view.rate_hz / 2.0,
+                    lag,
+                };
                 asked += 1;
                 if ridge.score() > worst.score() {
                     worst = ridge;

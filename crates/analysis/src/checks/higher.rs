@@ -68,6 +68,25 @@ const LEAST_PAIRS: usize = 20;
 /// Standard deviations of its chi-square at which the chance is 1e-5.
 const CERTAIN: f64 = 4.6;
 
+/// Where values are cut into parts of equal count, ascending.
+fn edges(mut values: Vec<f64>) -> Vec<f64> {
+    let n = values.len();
+    let mut all = vec![];
+    let mut rest = values.as_mut_slice();
+    for k in (1..PARTS).rev() {
+        let place = k * n / PARTS;
+        if place < rest.len() {
+            let (below, edge, _) = rest.select_nth_unstable_by(place, f64::total_cmp);
+            all.push(*edge);
+            rest = below;
+        } else {
+            all.extend(all.last().copied());
+        }
+    }
+    all.reverse();
+    all
+}
+
 /// How many pairs of readings `lag` apart lie in which two parts.
 fn pairs(part: &[usize], lag: usize) -> [f64; PARTS * PARTS] {
     let mut table = [0.0; PARTS * PARTS];
@@ -90,11 +109,7 @@ pub(crate) fn neighbours(e: &[f64], step: f64) -> Outcome {
             v + DITHER * step * spread * dither
         })
         .collect();
-    let mut sorted = e.clone();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let edges: Vec<f64> = (1..PARTS)
-        .filter_map(|k| sorted.get(k * e.len() / PARTS).copied())
-        .collect();
+    let edges = edges(e.clone());
     let part: Vec<usize> = e
         .iter()
         .map(|v| edges.partition_point(|edge| edge < v))
