@@ -159,6 +159,9 @@ pub(crate) fn allan_misfit(s: &Searched<'_>, _rate_hz: f64, seed: u64) -> [f64; 
 /// What the columns of some terms contribute, in time.
 fn modelled(panel: &Panel, state: &State, terms: &[&Term]) -> Vec<f64> {
     let mut sum = vec![0.0; panel.bins.n];
+    if terms.iter().all(|t| t.columns.is_empty()) {
+        return sum;
+    }
     for (t, own) in state.parts() {
         if terms.iter().any(|o| o.columns == t.columns) {
             panel.add_columns(&mut sum, 0, &t.columns, own);
