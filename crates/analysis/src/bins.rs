@@ -96,6 +96,15 @@ impl Bins {
         sum_of_logs(&self.counts, g)
     }
 
+    /// Numbers over the bins, each at every coefficient of its bin, and 0 at k = 0.
+    pub(crate) fn spread(&self, over: &[f64]) -> Vec<f64> {
+        let mut at = vec![0.0; self.n];
+        for (bin, v) in self.start.windows(2).zip(over) {
+            at[bin[0]..bin[1]].fill(*v);
+        }
+        at
+    }
+
     /// Sums of a[k] b[k] over each bin.
     #[must_use]
     pub fn products(&self, a: &[f64], b: &[f64]) -> Vec<f64> {

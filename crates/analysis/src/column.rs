@@ -1,5 +1,6 @@
 //! Coefficients of the columns that may explain the data.
 
+use std::ops::Range;
 use std::rc::Rc;
 
 use crate::likelihood::Bins;
@@ -83,6 +84,14 @@ impl Column {
         match self {
             Self::Whole(c) => Rc::clone(c),
             Self::Short(c) => Rc::new(c.iter().map(|v| f64::from(*v)).collect()),
+        }
+    }
+
+    /// Sum of products of some coefficients with numbers.
+    pub(crate) fn along(&self, part: Range<usize>, by: &[f64]) -> f64 {
+        match self {
+            Self::Whole(c) => dot(&c[part], by),
+            Self::Short(c) => dot(&c[part], by),
         }
     }
 

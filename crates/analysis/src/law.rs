@@ -9,6 +9,7 @@
 use std::collections::BTreeSet;
 
 use crate::adequacy::source;
+use crate::beside::Beside;
 use crate::beyond::{self, memory};
 use crate::checks::{Outcome, chi_tail, normal_tail};
 use crate::likelihood::Noise;
@@ -30,7 +31,6 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
     let followed: BTreeSet<(&'static str, String)> = named.filter_map(follows).collect();
     // Under the noise as it was fitted: few coefficients tell the random walk, and slow departures could be traded for it.
     let g = state.noise.over(&search.panel.bins);
-    let width = search.panel.width();
     let mut all = vec![];
     for (effect, name) in &followed {
         let effect = *effect;
@@ -38,8 +38,7 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
             continue;
         };
         let departures = memory::departures(&search.view, signal);
-        let departures = departures.iter().flat_map(|d| &d.1);
-        let added: Vec<usize> = departures.map(|d| search.panel.add(d)).collect();
+        let departures: Vec<Vec<f64>> = departures.flat_map(|d| d.columns).collect();
         // What the library has of the effect, and of one that extends it, is no departure.
         let of_it = search
             .candidates
@@ -52,14 +51,11 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
         let likelihood = |columns: &[usize]| search.panel.solve(&g, columns).log_likelihood;
         let explained = 2.0 * (likelihood(&own) - likelihood(&rest));
         own.extend(of_it.flat_map(Candidate::all_columns));
-        let null = likelihood(&own);
-        own.extend(&added);
-        let lr = 2.0 * (likelihood(&own) - null);
-        search.panel.truncate(width);
+        let lr = Beside::new(&search.panel, &g, &own).gain_of(&departures);
         let p_value = if lr < DEPARTURE * explained {
             1.0
         } else {
-            chi_tail(lr / WIDENED, added.len() as f64)
+            chi_tail(lr / WIDENED, departures.len() as f64)
         };
         all.push((
             effect,
@@ -135,9 +131,9 @@ pub(crate) fn holds_beside(search: &Search<'_>, state: &State, term: &Term, effe
     let departures = signals
         .filter(|s| names.contains(&s.name.as_str()))
         .flat_map(|s| memory::departures(&search.view, s))
-        .flat_map(|d| d.1);
+        .flat_map(|d| d.columns);
     let width = search.panel.width();
-    let added: Vec<usize> = departures.map(|d| search.panel.add(&d)).collect();
+    let added = search.panel.add_all(&departures.collect::<Vec<_>>());
     let likelihood = |left_out: Option<&Term>| {
         let mut noise = Noise::new(state.noise.log_walk);
         let mut fitted = state.noise.terms.iter();

@@ -9,6 +9,7 @@ pub mod angles;
 pub mod attitude;
 pub mod audit;
 mod bank;
+mod beside;
 pub mod beyond;
 mod bins;
 pub mod checks;

@@ -175,6 +175,13 @@ impl Panel {
         self.columns.borrow()[i].whole()
     }
 
+    /// The data and some columns.
+    pub(crate) fn data_and(&self, columns: &[usize]) -> Vec<Column> {
+        let all = self.columns.borrow();
+        let data = std::iter::once(&0);
+        data.chain(columns).map(|c| all[*c].clone()).collect()
+    }
+
     /// The first `count` of them.
     pub(crate) fn first(&self, i: usize, count: usize) -> Vec<f64> {
         self.columns.borrow()[i].first(count)
@@ -270,35 +277,27 @@ impl Panel {
         log_det_noise: f64,
         columns: &[usize],
     ) -> Solution {
+        let n = (self.bins.n - 1) as f64;
+        self.normal(weight, columns).solved(n, log_det_noise)
+    }
+
+    /// Sums of products under weights over the bins.
+    pub(crate) fn normal(&self, weight: &[f64], columns: &[usize]) -> Normal {
         let over = |i, j| dot(&self.pair(i, j), weight);
         let m = columns.len();
-        let mut normal = vec![vec![0.0; m]; m];
+        let mut matrix = vec![vec![0.0; m]; m];
         for a in 0..m {
             for b in a..m {
-                normal[a][b] = over(columns[a], columns[b]);
-                normal[b][a] = normal[a][b];
+                matrix[a][b] = over(columns[a], columns[b]);
+                matrix[b][a] = matrix[a][b];
             }
         }
-        let right: Vec<f64> = columns.iter().map(|c| over(0, *c)).collect();
-        let (inverse, log_det_normal) = invert(&normal);
-        let beta: Vec<f64> = inverse
-            .iter()
-            .map(|row| row.iter().zip(&right).map(|(a, b)| a * b).sum())
-            .collect();
+        let right = columns.iter().map(|c| over(0, *c)).collect();
         let total = over(0, 0);
-        let explained: f64 = beta.iter().zip(&right).map(|(a, b)| a * b).sum();
-        let rss = (total - explained).max(total * 1e-12);
-        let n = (self.bins.n - 1) as f64;
-        let white = rss / n;
-        let log_likelihood = -0.5 * (n * white.ln() + log_det_noise);
-        Solution {
-            log_likelihood,
-            white,
-            rss,
-            beta,
-            inverse,
-            log_det_normal,
-            log_det_noise,
+        Normal {
+            matrix,
+            right,
+            total,
         }
     }
 
@@ -429,6 +428,39 @@ impl Panel {
             })
             .collect();
         crate::optimise::peak(&points)
+    }
+}
+
+/// Sums of products over g that least squares need: of columns with each other, of the data with them and with themselves.
+#[derive(Clone, Debug)]
+pub(crate) struct Normal {
+    pub(crate) matrix: Vec<Vec<f64>>,
+    pub(crate) right: Vec<f64>,
+    pub(crate) total: f64,
+}
+
+impl Normal {
+    /// Least squares of `n` coefficients.
+    pub(crate) fn solved(&self, n: f64, log_det_noise: f64) -> Solution {
+        let Self { right, total, .. } = self;
+        let (inverse, log_det_normal) = invert(&self.matrix);
+        let beta: Vec<f64> = inverse
+            .iter()
+            .map(|row| row.iter().zip(right).map(|(a, b)| a * b).sum())
+            .collect();
+        let explained: f64 = beta.iter().zip(right).map(|(a, b)| a * b).sum();
+        let rss = (total - explained).max(total * 1e-12);
+        let white = rss / n;
+        let log_likelihood = -0.5 * (n * white.ln() + log_det_noise);
+        Solution {
+            log_likelihood,
+            white,
+            rss,
+            beta,
+            inverse,
+            log_det_normal,
+            log_det_noise,
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use model::effect::{Hypothesis, Signal};
 use model::record::Quantity;
 
 use super::CLAIMS;
+use crate::beside::Beside;
 use crate::beyond;
 use crate::beyond::memory::{self, Departure};
 use crate::checks::{Outcome, chi_tail};
@@ -66,7 +67,6 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<(&'static 
 fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked> {
     let panel = &search.panel;
     let g = state.noise.over(&panel.bins);
-    let width = panel.width();
     let follows = |c: &&Candidate| match &c.hypothesis {
         Hypothesis::Regression(r) => r.follows.as_deref() == Some(signal.name.as_str()),
         _ => false,
@@ -79,23 +79,16 @@ fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked>
     own.extend(of_it.flat_map(Candidate::all_columns));
     own.sort_unstable();
     own.dedup();
-    let likelihood = |columns: &[usize]| panel.solve(&g, columns).log_likelihood;
-    let null = likelihood(&own);
-    let kinds = memory::departures(&search.view, signal);
-    let asked = kinds.iter().filter(|d| !d.1.is_empty());
-    let all = asked
-        .map(|Departure(kind, columns)| {
-            let mut whole = own.clone();
-            whole.extend(columns.iter().map(|d| panel.add(d)));
-            let chi_square = 2.0 * (likelihood(&whole) - null);
-            Asked {
-                how: format!("{} {kind}", signal.name),
-                chi_square,
-                degrees: columns.len(),
-                chance: chi_tail(chi_square / WIDENED, columns.len() as f64),
-            }
-        })
-        .collect();
-    panel.truncate(width);
-    all
+    let beside = Beside::new(panel, &g, &own);
+    let asked = memory::departures(&search.view, signal).filter(|d| !d.columns.is_empty());
+    let asked = asked.map(|Departure { how, columns }| {
+        let chi_square = beside.gain_of(&columns);
+        Asked {
+            how: format!("{} {how}", signal.name),
+            chi_square,
+            degrees: columns.len(),
+            chance: chi_tail(chi_square / WIDENED, columns.len() as f64),
+        }
+    });
+    asked.collect()
 }

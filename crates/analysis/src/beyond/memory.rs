@@ -106,69 +106,121 @@ pub(super) fn combinations<'a>(
 }
 
 /// One kind of what a response may differ by: how it follows the signal then, and the columns.
-pub(crate) struct Departure(pub(crate) &'static str, pub(crate) Vec<Vec<f64>>);
+pub(crate) struct Departure {
+    pub(crate) how: &'static str,
+    pub(crate) columns: Vec<Vec<f64>>,
+}
+
+type Columns = fn(&Followed<'_>) -> Vec<Vec<f64>>;
+
+/// The kinds that any signal has.
+const OF_ANY: [(&str, Columns); 2] = [
+    ("by a bend or a drift", |f| f.bent()),
+    ("late", |f| f.late()),
+];
+/// Those that a motor's command has beside them.
+const OF_A_MOTOR: [(&str, Columns); 4] = [
+    ("behind the heat of its size", |f| f.behind_heat()),
+    ("after each of its changes", |f| after_changes(&f.scaled)),
+    ("after each change of its size", |f| {
+        after_changes(&size(f.signal))
+    }),
+    ("by its sense alone", |f| f.by_sense()),
+];
 
 /// Everything by which a response to a signal may differ from one that is in proportion and at once, by kind: its bend and
 /// its drift in time, its memory, and of a motor the memory of its heat, what follows its changes, and what knows no more
-/// than its sense. Columns beside the signal itself.
-pub(crate) fn departures(view: &View<'_>, signal: &Signal) -> Vec<Departure> {
-    let vibrates = signal.quantity == Quantity::Acc;
-    let c = centred(if vibrates {
-        &signal.values
-    } else {
-        &signal.smooth
-    });
-    let n = c.len();
-    let largest = c.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-300);
-    let scaled: Vec<f64> = c.iter().map(|v| v / largest).collect();
-    let of = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
-        scaled.iter().enumerate().map(|(i, v)| f(i, *v)).collect()
+/// than its sense. Columns beside the signal itself, made when their kind is asked for.
+pub(crate) fn departures<'a>(
+    view: &'a View<'_>,
+    signal: &'a Signal,
+) -> impl Iterator<Item = Departure> + 'a {
+    let motor: &[_] = match signal.quantity {
+        Quantity::Pwm => &OF_A_MOTOR,
+        _ => &[],
     };
-    let mut bent = vec![
-        of(&|_, v| v * v),
-        of(&|_, v| v * v * v),
-        of(&|i, v| v * (2.0 * i as f64 / n as f64 - 1.0)),
-    ];
-    // A bend anywhere: what dips, saturates or has a dead zone is no parabola.
-    let low = scaled.iter().fold(f64::INFINITY, |m, v| m.min(*v));
-    let high = scaled.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
-    bent.extend(BENDS.iter().map(|share| {
-        let at = low + share * (high - low);
-        of(&|_, v| (v - at).max(0.0))
-    }));
-    let behind = |values: &[f64], times: &[f64]| -> Vec<Vec<f64>> {
-        let times = resolved(view, times);
-        times.map(|t| lagged(values, t * view.rate_hz)).collect()
+    let followed = Followed::new(view, signal);
+    let columns = move |(how, columns): &(&'static str, Columns)| Departure {
+        how,
+        columns: columns(&followed),
     };
-    let late = if vibrates {
-        shifted(&scaled).split_off(1)
-    } else {
-        let times: &[f64] = match signal.quantity {
+    OF_ANY.iter().chain(motor).map(columns)
+}
+
+/// A signal that is followed.
+struct Followed<'a> {
+    view: &'a View<'a>,
+    signal: &'a Signal,
+    /// About its middle, over the largest of it.
+    scaled: Vec<f64>,
+}
+
+impl<'a> Followed<'a> {
+    fn new(view: &'a View<'_>, signal: &'a Signal) -> Self {
+        let mut scaled = centred(if signal.quantity == Quantity::Acc {
+            &signal.values
+        } else {
+            &signal.smooth
+        });
+        let largest = scaled.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let largest = largest.max(1e-300);
+        scaled.iter_mut().for_each(|v| *v /= largest);
+        Self {
+            view,
+            signal,
+            scaled,
+        }
+    }
+
+    fn behind(&self, values: &[f64], times: &[f64]) -> Vec<Vec<f64>> {
+        let times = resolved(self.view, times);
+        times
+            .map(|t| lagged(values, t * self.view.rate_hz))
+            .collect()
+    }
+
+    fn bent(&self) -> Vec<Vec<f64>> {
+        let n = self.scaled.len();
+        let of = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
+            let all = self.scaled.iter().enumerate();
+            all.map(|(i, v)| f(i, *v)).collect()
+        };
+        let mut bent = vec![
+            of(&|_, v| v * v),
+            of(&|_, v| v * v * v),
+            of(&|i, v| v * (2.0 * i as f64 / n as f64 - 1.0)),
+        ];
+        // A bend anywhere: what dips, saturates or has a dead zone is no parabola.
+        let all = || self.scaled.iter();
+        let low = all().fold(f64::INFINITY, |m, v| m.min(*v));
+        let high = all().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
+        bent.extend(BENDS.iter().map(|share| {
+            let at = low + share * (high - low);
+            of(&|_, v| (v - at).max(0.0))
+        }));
+        bent
+    }
+
+    fn late(&self) -> Vec<Vec<f64>> {
+        let times: &[f64] = match self.signal.quantity {
+            Quantity::Acc => return shifted(&self.scaled).split_off(1),
             Quantity::Gyro => &TURNING_S,
             // Surges of a motor take their part of a short memory.
             Quantity::Pwm => &COMMAND_S,
             Quantity::Temp => &TEMPERATURE_S,
             _ => &SUPPLY_S,
         };
-        behind(&scaled, times)
-    };
-    let mut all = vec![
-        Departure("by a bend or a drift", bent),
-        Departure("late", late),
-    ];
-    if signal.quantity == Quantity::Pwm {
-        let size = size(signal);
-        let heat = behind(&centred(&size), &HEAT_S);
-        let gates = GATES.iter().map(|g| sense(&signal.smooth, *g));
-        let senses = gates.flat_map(|s| behind(&s, &SENSE_S)).collect();
-        all.extend([
-            Departure("behind the heat of its size", heat),
-            Departure("after each of its changes", after_changes(&scaled)),
-            Departure("after each change of its size", after_changes(&size)),
-            Departure("by its sense alone", senses),
-        ]);
+        self.behind(&self.scaled, times)
     }
-    all
+
+    fn behind_heat(&self) -> Vec<Vec<f64>> {
+        self.behind(&centred(&size(self.signal)), &HEAT_S)
+    }
+
+    fn by_sense(&self) -> Vec<Vec<f64>> {
+        let gates = GATES.iter().map(|g| sense(&self.signal.smooth, *g));
+        gates.flat_map(|s| self.behind(&s, &SENSE_S)).collect()
+    }
 }
 
 /// The sense of a command that is beyond a share of its largest, and 0 below it.

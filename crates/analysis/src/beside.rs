@@ -1,0 +1,114 @@
+//! What sequences explain beside columns under noise as it was fitted. None of them is kept: a name is asked by many.
+
+use std::rc::Rc;
+
+use crate::column::Column;
+use crate::likelihood::{Normal, Panel};
+
+/// Coefficients that a processor has at hand, of all columns at once.
+const AT_HAND: usize = 1 << 11;
+
+/// Columns of a panel under one noise.
+pub(crate) struct Beside<'a> {
+    panel: &'a Panel,
+    data_and_columns: Vec<Column>,
+    /// 1/g at every coefficient.
+    weight: Vec<f64>,
+    normal: Normal,
+    /// Log likelihood of the columns alone.
+    alone: f64,
+}
+
+impl<'a> Beside<'a> {
+    /// Columns under the shape `g` over the bins.
+    pub(crate) fn new(panel: &'a Panel, g: &[f64], columns: &[usize]) -> Self {
+        let weight: Vec<f64> = g.iter().map(|g| 1.0 / g).collect();
+        let normal = panel.normal(&weight, columns);
+        Self {
+            alone: likelihood(panel, &normal),
+            panel,
+            data_and_columns: panel.data_and(columns),
+            weight: panel.bins.spread(&weight),
+            normal,
+        }
+    }
+
+    /// Likelihood ratio that sequences of samples gain.
+    pub(crate) fn gain_of(&self, further: &[Vec<f64>]) -> f64 {
+        let further = self.panel.dct.forward_all(further);
+        let further: Vec<Rc<Vec<f64>>> = further.map(Rc::new).collect();
+        let new = further.iter().map(|c| Column::Whole(Rc::clone(c)));
+        let all: Vec<Column> = self.data_and_columns.iter().cloned().chain(new).collect();
+        let sums = self.products(&further, &all);
+        let mut normal = self.normal.clone();
+        // Each row holds the data first.
+        for (i, own) in normal.matrix.iter_mut().enumerate() {
+            own.extend(sums.iter().map(|row| row[1 + i]));
+        }
+        for row in sums {
+            normal.right.push(row[0]);
+            normal.matrix.push(row[1..].to_vec());
+        }
+        2.0 * (likelihood(self.panel, &normal) - self.alone)
+    }
+
+    /// Sums of products over g of sequences with columns.
+    fn products(&self, of: &[Rc<Vec<f64>>], with: &[Column]) -> Vec<Vec<f64>> {
+        let mut sums = vec![vec![0.0; with.len()]; of.len()];
+        let mut weighted = vec![];
+        for (at, weight) in self.weight.chunks(AT_HAND).enumerate() {
+            let part = at * AT_HAND..at * AT_HAND + weight.len();
+            for (sums, c) in sums.iter_mut().zip(of) {
+                let c = c[part.clone()].iter().zip(weight);
+                weighted.clear();
+                weighted.extend(c.map(|(c, w)| c * w));
+                for (sum, other) in sums.iter_mut().zip(with) {
+                    *sum += other.along(part.clone(), &weighted);
+                }
+            }
+        }
+        sums
+    }
+}
+
+/// Log likelihood but for the part of the noise, which is the same.
+fn likelihood(panel: &Panel, normal: &Normal) -> f64 {
+    let n = (panel.bins.n - 1) as f64;
+    normal.solved(n, 0.0).log_likelihood
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::likelihood::{Bins, Dct};
+
+    #[test]
+    fn what_is_gained_beside_columns_is_what_a_panel_with_all_of_them_gains() {
+        let n = 5000;
+        let mut state = 9u32;
+        let mut column = || -> Vec<f64> {
+            let next = |_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                f64::from(state >> 8) / f64::from(1u32 << 24) - 0.5
+            };
+            (0..n).map(next).collect()
+        };
+        let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
+        let panel = Panel::new(&dct, &bins, &column());
+        let own: Vec<usize> = (0..4).map(|_| panel.add(&column())).collect();
+        let mut further: Vec<Vec<f64>> = (0..3).map(|_| column()).collect();
+        // One that the others span.
+        let sum = further[0].iter().zip(&further[1]).map(|(a, b)| a + b);
+        further.push(sum.collect());
+        let g: Vec<f64> = bins.at.omega.iter().map(|w| 1.0 + 0.1 / w).collect();
+        let gain = Beside::new(&panel, &g, &own).gain_of(&further);
+        let alone = panel.solve(&g, &own).log_likelihood;
+        let all = [own, panel.add_all(&further)].concat();
+        let whole = panel.solve(&g, &all).log_likelihood;
+        let expected = 2.0 * (whole - alone);
+        assert!(
+            (gain - expected).abs() < 1e-8 * expected,
+            "{gain} {expected}"
+        );
+    }
+}
