@@ -141,8 +141,9 @@ fn run<const K: usize>(
                     middle[l] += parts[i][l] * at[i][l];
                 }
             }
+            let once = sum.map(f64::recip);
             for l in 0..ABREAST {
-                middle[l] /= sum[l];
+                middle[l] *= once[l];
             }
             for i in 0..K {
                 for l in 0..ABREAST {
@@ -152,7 +153,7 @@ fn run<const K: usize>(
             }
             (all[j], mean[j]) = (sum, middle);
             for l in 0..ABREAST {
-                variance[j][l] = spread[l] / sum[l];
+                variance[j][l] = spread[l] * once[l];
             }
         }
         let least = below_least(&mut leasts);
@@ -163,9 +164,10 @@ fn run<const K: usize>(
                 total[l] += weight[j][l];
             }
         }
+        let once = total.map(f64::recip);
         for w in &mut weight {
             for l in 0..ABREAST {
-                w[l] /= total[l];
+                w[l] *= once[l];
             }
         }
         for l in 0..ABREAST {

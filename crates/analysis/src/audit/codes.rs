@@ -31,6 +31,10 @@ const EVERYWHERE: f64 = 0.03;
 const STEP: f64 = 1.7;
 /// Nats in eight steps at which a fit has ended.
 const ENDED: f64 = 0.02;
+/// Rounds after which fits from several starts are compared, and the difference of shares and weights at which they have met:
+/// from there they would go the same way.
+const MEET: [usize; 3] = [1, 8, 24];
+const MET: f64 = 1e-9;
 /// Nats that a law wider than the spread of a reading has to gain for each e-fold of it: levels that are only there to
 /// bend the law are as many parameters.
 const COST: f64 = 50.0;
@@ -182,6 +186,31 @@ impl Fit {
     }
 }
 
+/// A fit on its way, before the round that is next.
+pub(super) struct Course {
+    weights: Vec<f64>,
+    share: f64,
+    held: bool,
+    step: f64,
+    round: usize,
+    /// Log likelihood of the round before, and of the last eighth one.
+    likelihood: f64,
+    before: f64,
+    /// The fit, where further rounds would not change it.
+    ended: Option<Fit>,
+}
+
+impl Course {
+    /// Whether two of one round are at the same place.
+    fn has_met(&self, other: &Self) -> bool {
+        let near = |a: f64, b: f64| (a - b).abs() <= MET;
+        let mut weights = self.weights.iter().zip(&other.weights);
+        self.round == other.round
+            && near(self.share, other.share)
+            && weights.all(|(a, b)| near(*a, *b))
+    }
+}
+
 /// Codes and levels of the laws of one spread.
 pub(super) struct Laws<'a> {
     of: &'a Histogram,
@@ -311,62 +340,109 @@ impl<'a> Laws<'a> {
             .collect()
     }
 
-    /// Fit from a start; `held` keeps the share as it is.
+    /// A fit that begins with a share, from weights of its own or those of another fit; `held` keeps the share as it is.
+    pub(super) fn begin(&self, from: Option<&Fit>, share: f64, held: bool) -> Course {
+        let known = from.filter(|f| f.weights.len() == self.levels.at.len());
+        Course {
+            weights: known.map_or_else(|| self.start(), |f| f.weights.clone()),
+            share: if self.fault == Fault::None {
+                0.0
+            } else {
+                share
+            },
+            held: held || !matches!(self.fault, Fault::Bit { .. }),
+            step: STEP,
+            round: 0,
+            likelihood: f64::NEG_INFINITY,
+            before: f64::NEG_INFINITY,
+            ended: None,
+        }
+    }
+
+    /// Fit of at most so many rounds from a start.
     pub(super) fn fit(&self, from: Option<&Fit>, share: f64, held: bool, rounds: usize) -> Fit {
+        self.go_on(&mut self.begin(from, share, held), rounds)
+    }
+
+    /// Fits of at most so many rounds, those behind them included. Of those that meet on their way one goes on.
+    pub(super) fn go_on_together(&self, courses: &mut Vec<Course>, rounds: usize) -> Vec<Fit> {
+        for stop in MEET.into_iter().filter(|stop| *stop < rounds) {
+            for i in (1..courses.len()).rev() {
+                let (one, others) = courses.split_at_mut(i);
+                let (one, other) = (&mut one[0], &mut others[0]);
+                if one.round.max(other.round) <= stop {
+                    self.go_on(one, stop);
+                    self.go_on(other, stop);
+                    if one.has_met(other) {
+                        courses.remove(i);
+                    }
+                }
+            }
+        }
+        let all = courses.iter_mut();
+        all.map(|c| self.go_on(c, rounds)).collect()
+    }
+
+    /// Go on with a fit, up to so many rounds in all.
+    fn go_on(&self, course: &mut Course, rounds: usize) -> Fit {
         // The same sums by wider registers: nothing is rounded otherwise.
         #[cfg(target_arch = "x86_64")]
         {
             #[target_feature(enable = "avx2")]
-            fn with_avx2(
-                laws: &Laws<'_>,
-                from: Option<&Fit>,
-                share: f64,
-                held: bool,
-                rounds: usize,
-            ) -> Fit {
-                laws.fitted(from, share, held, rounds)
+            fn with_avx2(laws: &Laws<'_>, course: &mut Course, rounds: usize) -> Fit {
+                laws.fitted(course, rounds)
             }
             if std::arch::is_x86_feature_detected!("avx2") {
                 // SAFETY: the processor has it.
-                return unsafe { with_avx2(self, from, share, held, rounds) };
+                return unsafe { with_avx2(self, course, rounds) };
             }
         }
-        self.fitted(from, share, held, rounds)
+        self.fitted(course, rounds)
     }
 
     #[inline(always)]
-    fn fitted(&self, from: Option<&Fit>, share: f64, held: bool, rounds: usize) -> Fit {
-        let mut weights = match from.filter(|f| f.weights.len() == self.levels.at.len()) {
-            Some(f) => f.weights.clone(),
-            None => self.start(),
-        };
-        let mut share = if self.fault == Fault::None {
-            0.0
-        } else {
-            share
-        };
-        let held = held || !matches!(self.fault, Fault::Bit { .. });
-        let mut before = f64::NEG_INFINITY;
-        let mut step = STEP;
-        let mut likelihood = before;
-        let mut gains = vec![0.0; weights.len()];
-        for round in 0..=rounds {
-            let p = self.sound(&weights);
+    fn fitted(&self, course: &mut Course, rounds: usize) -> Fit {
+        if let Some(fit) = &course.ended {
+            return fit.clone();
+        }
+        let mut gains = vec![0.0; course.weights.len()];
+        loop {
+            let Course {
+                weights,
+                round,
+                before,
+                ..
+            } = course;
+            let p = self.sound(weights);
             let taken = self.taken(&p);
-            if !held {
-                share = self.best_share(&p, &taken, share);
-            }
+            let share = if course.held {
+                course.share
+            } else {
+                self.best_share(&p, &taken, course.share)
+            };
             let l = self.likelihood(&p, &taken, share);
-            if l < likelihood {
-                step = 1.0;
+            let eighth = *round % 8 == 7;
+            let ended = eighth && l - *before < ENDED;
+            if *round >= rounds || ended {
+                let fit = Fit {
+                    spread: self.spread,
+                    share,
+                    likelihood: l,
+                    cost: self.cost(weights),
+                    weights: weights.clone(),
+                };
+                course.ended = ended.then(|| fit.clone());
+                return fit;
             }
-            likelihood = l;
-            if round == rounds || round % 8 == 7 && l - before < ENDED {
-                break;
+            if eighth {
+                *before = l;
             }
-            if round % 8 == 7 {
-                before = l;
+            if l < course.likelihood {
+                course.step = 1.0;
             }
+            course.likelihood = l;
+            course.share = share;
+            *round += 1;
             let ratio: Vec<f64> = self
                 .times
                 .iter()
@@ -378,28 +454,23 @@ impl<'a> Laws<'a> {
                 .zip(&self.to)
                 .map(|(r, to)| (1.0 - share) * r + share * ratio[*to])
                 .collect();
-            for ((gain, w), (at, chances)) in
-                gains.iter_mut().zip(&weights).zip(&self.levels.chances)
+            for ((gain, w), (at, chances)) in gains
+                .iter_mut()
+                .zip(weights.iter())
+                .zip(&self.levels.chances)
             {
                 *gain = 0.0;
                 if *w >= 1e-12 {
                     *gain = dot(&back[*at..][..chances.len()], chances) / self.of.n;
                 }
             }
-            powers(&mut gains, step);
+            powers(&mut gains, course.step);
             let mut all = 0.0;
             for (w, gain) in weights.iter_mut().zip(&gains) {
                 *w = if *w < 1e-12 { 0.0 } else { *w * gain };
                 all += *w;
             }
             weights.iter_mut().for_each(|w| *w /= all);
-        }
-        Fit {
-            spread: self.spread,
-            share,
-            likelihood,
-            cost: self.cost(&weights),
-            weights,
         }
     }
 

@@ -5,7 +5,7 @@
 //! of the codes could explain: a hole inside the range has no place in rails, a pile on one code none in a bit. What
 //! nothing here explains is not passed over ([`Verdict::Unlike`]).
 
-use super::codes::{Fault, Fit, Histogram, Laws};
+use super::codes::{Course, Fault, Fit, Histogram, Laws};
 use super::tails;
 
 /// Spreads of a reading that are tried, over what was measured: bits that stick widen it more than they narrow it.
@@ -69,45 +69,67 @@ pub(super) enum Verdict {
     Unlike { nats: f64, nearest: Option<Stuck> },
 }
 
-/// The best fit over spreads.
-fn best(
-    h: &Histogram,
+/// Fits of one fault on their way, at several spreads and from several starts.
+struct Tries<'a> {
+    of: &'a Histogram,
     fault: Fault,
-    sigma: f64,
-    rounds: usize,
-    around: Option<f64>,
-) -> Option<Fit> {
-    let spreads: Vec<f64> = match around {
-        None => SPREADS.iter().map(|s| s * sigma).collect(),
-        Some(s) => [-1, 0, 1].iter().map(|i| s * FINER.powi(*i)).collect(),
-    };
-    let never = |bit: u32, value: i32| h.iter().all(|(c, _)| (c >> bit) & 1 == value);
-    let shares: &[f64] = match fault {
-        Fault::Bit { bit, value } if never(bit, value) => &[1.0],
-        Fault::Bit { .. } => &SHARES,
-        Fault::None | Fault::Rails { .. } => &[1.0],
-    };
-    // What a bit that never changes has taken may be most of the readings: then a fit begins where they came from.
-    let shifts: &[f64] = match fault {
-        Fault::Bit { bit, value } if never(bit, value) => {
-            let weight = f64::from(1u32 << bit);
-            &[0.0, if value == 1 { -weight } else { weight }]
+    by_spread: Vec<(Laws<'a>, Vec<Course>)>,
+}
+
+impl<'a> Tries<'a> {
+    /// Over the spreads that noise of `sigma` may have.
+    fn new(of: &'a Histogram, fault: Fault, sigma: f64) -> Self {
+        let mut new = Self::none(of, fault);
+        SPREADS.iter().for_each(|s| new.also(s * sigma));
+        new
+    }
+
+    fn none(of: &'a Histogram, fault: Fault) -> Self {
+        let by_spread = vec![];
+        Self {
+            of,
+            fault,
+            by_spread,
         }
-        _ => &[0.0],
-    };
-    spreads
-        .iter()
-        .filter(|s| **s > LEAST_SPREAD)
-        .flat_map(|s| {
-            let mut laws = Laws::new(h, fault, *s);
-            let mut fits = vec![];
-            for shift in shifts {
-                laws.shift = *shift;
-                fits.extend(shares.iter().map(|f| laws.fit(None, *f, false, rounds)));
+    }
+
+    /// Those at another spread too.
+    fn also(&mut self, spread: f64) {
+        if spread <= LEAST_SPREAD {
+            return;
+        }
+        let mut laws = Laws::new(self.of, self.fault, spread);
+        let never = |bit: u32, value: i32| self.of.iter().all(|(c, _)| (c >> bit) & 1 == value);
+        let courses = match self.fault {
+            // What a bit that never changes has taken may be most of the readings: then a fit begins where they came from.
+            Fault::Bit { bit, value } if never(bit, value) => {
+                let weight = f64::from(1u32 << bit);
+                let away = if value == 1 { -weight } else { weight };
+                let from = |shift| {
+                    laws.shift = shift;
+                    laws.begin(None, 1.0, false)
+                };
+                [0.0, away].map(from).into()
             }
-            fits
-        })
-        .max_by(|a, b| a.score().total_cmp(&b.score()))
+            Fault::Bit { .. } => SHARES.map(|share| laws.begin(None, share, false)).into(),
+            Fault::None | Fault::Rails { .. } => vec![laws.begin(None, 1.0, false)],
+        };
+        self.by_spread.push((laws, courses));
+    }
+
+    /// Those about a spread, that one included.
+    fn around(&mut self, spread: f64) {
+        [-1, 0, 1]
+            .iter()
+            .for_each(|i| self.also(spread * FINER.powi(*i)));
+    }
+
+    /// The best of them after so many rounds.
+    fn best(&mut self, rounds: usize) -> Option<Fit> {
+        let all = self.by_spread.iter_mut();
+        all.flat_map(|(laws, courses)| laws.go_on_together(courses, rounds))
+            .max_by(|a, b| a.score().total_cmp(&b.score()))
+    }
 }
 
 /// Least spread, counts: below it a law has edges of its own.
@@ -143,7 +165,7 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
     if !alarmed && h.spread > MOVES * sigma {
         return Verdict::Smooth;
     }
-    let Some(first) = best(&h, Fault::None, sigma, FIRST, None) else {
+    let Some(first) = Tries::new(&h, Fault::None, sigma).best(FIRST) else {
         return Verdict::Smooth;
     };
     let laws = Laws::new(&h, Fault::None, first.spread);
@@ -164,38 +186,37 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
     let sound = |spread: f64, from: Option<&Fit>| {
         Laws::new(&h, Fault::None, spread).fit(from, 0.0, true, LAST)
     };
-    let plain = best(&h, Fault::None, sigma, LAST, Some(first.spread)).unwrap_or(first);
+    let mut finer = Tries::none(&h, Fault::None);
+    finer.around(first.spread);
+    let plain = finer.best(LAST).unwrap_or(first);
     let smooth = plain.score();
     let (low, high) = (h.first, h.last());
     let railed = [(low, i32::MAX), (i32::MIN, high), (low, high)]
         .into_iter()
         .filter_map(|(low, high)| {
             let fault = Fault::Rails { low, high };
-            best(&h, fault, sigma, LAST, None).map(|fit| (fault, fit))
+            let fit = Tries::new(&h, fault, sigma).best(LAST)?;
+            Some((fault, fit))
         })
         .max_by(|a, b| a.1.score().total_cmp(&b.1.score()));
     let rails = railed
         .as_ref()
         .map_or(f64::NEG_INFINITY, |(_, fit)| fit.score());
-    let mut all: Vec<(u32, i32, Fit)> = every()
+    let mut all: Vec<(u32, i32, Fit, Tries<'_>)> = every()
         .filter_map(|(bit, value)| {
-            let fit = best(&h, Fault::Bit { bit, value }, sigma, FIRST, None)?;
-            Some((bit, value, fit))
+            let mut tries = Tries::new(&h, Fault::Bit { bit, value }, sigma);
+            Some((bit, value, tries.best(FIRST)?, tries))
         })
         .collect();
     all.sort_by(|a, b| b.2.score().total_cmp(&a.2.score()));
     all.truncate(BEST);
     let nearest = all
         .into_iter()
-        .filter_map(|(bit, value, fit)| {
-            let fault = Fault::Bit { bit, value };
+        .filter_map(|(bit, value, fit, mut tries)| {
             // A bit that folds most of the readings over is far from where a fit begins: with few rounds another spread
-            // may look best than with many.
-            let around = best(&h, fault, sigma, LAST, Some(fit.spread));
-            let anew = best(&h, fault, sigma, LAST, None);
-            let fits = around.into_iter().chain(anew);
-            let fit = fits.max_by(|a, b| a.score().total_cmp(&b.score()))?;
-            Some((bit, value, fit))
+            // may look best than with many, and all go on.
+            tries.around(fit.spread);
+            Some((bit, value, tries.best(LAST)?))
         })
         .max_by(|a, b| a.2.score().total_cmp(&b.2.score()));
     let own = h.of_its_own();
