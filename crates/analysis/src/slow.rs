@@ -11,6 +11,7 @@ use model::record::Quantity;
 use crate::checks::{LEAST_CHANCE, chi_tail};
 use crate::diagnosis::Searched;
 use crate::likelihood::{Noise, least_walk};
+use crate::logs::LogProduct;
 use crate::optimise::golden;
 use crate::result::Check;
 use crate::scan::residual;
@@ -36,24 +37,45 @@ impl Bin {
     }
 }
 
-/// -2 ln L under a white variance.
-fn at(bins: &[Bin], white: f64, log_walk: f64) -> f64 {
-    bins.iter()
-        .map(|b| {
-            let v = white * b.shape(log_walk);
-            b.count * v.ln() + b.energy / v
-        })
-        .sum()
+/// What bins say of one walk, whatever the white variance.
+struct Under {
+    /// Sum of ln of the shape over the coefficients.
+    logs: f64,
+    /// Sum of the energies over the shape.
+    energy: f64,
+    count: f64,
 }
 
-/// The white variance that fits best beside a walk.
-fn white(bins: &[Bin], log_walk: f64) -> f64 {
-    let (mut energy, mut count) = (0.0, 0.0);
-    for b in bins {
-        energy += b.energy / b.shape(log_walk);
-        count += b.count;
+impl Under {
+    fn new(bins: &[Bin], log_walk: f64) -> Self {
+        let walk = log_walk.exp();
+        let [mut logs, mut energy, mut count] = [0.0; 3];
+        for same in bins.chunk_by(|a, b| a.count == b.count) {
+            let mut product = LogProduct::new();
+            for b in same {
+                let shape = b.rest + walk * b.walk;
+                energy += b.energy / shape;
+                product.multiply(shape);
+            }
+            logs += same[0].count * product.ln();
+            count += same[0].count * same.len() as f64;
+        }
+        Self {
+            logs,
+            energy,
+            count,
+        }
     }
-    energy / count
+
+    /// The white variance that fits best.
+    fn white(&self) -> f64 {
+        self.energy / self.count
+    }
+
+    /// -2 ln L under a white variance.
+    fn at(&self, white: f64) -> f64 {
+        self.logs + self.count * white.ln() + self.energy / white
+    }
 }
 
 /// The walk that fits best, from a coarse row of them.
@@ -61,9 +83,11 @@ fn best(low: f64, high: f64, f: &dyn Fn(f64) -> f64) -> f64 {
     const ROW: u32 = 10;
     let step = (high - low) / f64::from(ROW);
     let row = (0..=ROW).map(|i| low + step * f64::from(i));
-    let first = row.min_by(|a, b| f(*a).total_cmp(&f(*b))).unwrap_or(low);
+    let row = row.map(|x| (f(x), x));
+    let first = row.min_by(|a, b| a.0.total_cmp(&b.0));
+    let (least, first) = first.unwrap_or((f64::INFINITY, low));
     let x = golden(f, (first - step).max(low), (first + step).min(high), STEPS);
-    if f(x) < f(first) { x } else { first }
+    if f(x) < least { x } else { first }
 }
 
 /// Two walks against one: likelihood ratio, the last coefficient of the slow one, ln of the other one's step variance over
@@ -71,18 +95,23 @@ fn best(low: f64, high: f64, f: &dyn Fn(f64) -> f64) -> f64 {
 fn two_walks(bins: &[Bin], samples: usize, start: f64) -> Option<(f64, usize, f64, f64)> {
     let low = least_walk(samples);
     let (from, to) = ((start - WIDE).max(low), (start + WIDE).min(6.0));
+    // The walk, the white variance and -2 ln L.
     let free = |bins: &[Bin]| {
-        let walk = best(from, to, &|x| at(bins, white(bins, x), x));
-        (walk, white(bins, walk))
+        let with = |x: f64| {
+            let under = Under::new(bins, x);
+            let white = under.white();
+            (x, white, under.at(white))
+        };
+        with(best(from, to, &|x| with(x).2))
     };
-    let (one, of_one) = free(bins);
-    let null = at(bins, of_one, one);
+    let (_, _, null) = free(bins);
     LAST.filter(|m| 4 * m < bins.len())
         .map(|m| {
             let (slow, fast) = bins.split_at(m);
-            let (walk, white) = free(fast);
-            let larger = best(walk, walk + WIDE, &|x| at(slow, white, x));
-            let lr = null - at(slow, white, larger) - at(fast, white, walk);
+            let (walk, white, of_fast) = free(fast);
+            let of_slow = |x: f64| Under::new(slow, x).at(white);
+            let larger = best(walk, walk + WIDE, &of_slow);
+            let lr = null - of_slow(larger) - of_fast;
             (lr, m, walk, white)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
