@@ -4,13 +4,15 @@
 //! four likelihoods are made side by side, of other readings or other parameters.
 
 use crate::logs::LogProduct;
-use crate::powers::exp;
+use crate::powers::{exponentials, product_and};
 
 /// ln of variance, ln of random-walk step over it, ln of half height over the white sigma, ln of dwell in blocks.
 pub(crate) type Coordinates = [f64; 4];
 
 /// Likelihoods that are made side by side.
 pub(crate) const ABREAST: usize = 4;
+/// Readings whose factors are multiplied before their size is looked at: each is some 1e-4 at least, the chance of a switch.
+const FEW: usize = 4;
 /// A number of each.
 type Each = [f64; ABREAST];
 
@@ -21,19 +23,20 @@ fn each(f: impl Fn(usize) -> f64) -> Each {
 /// The least of some exponents, which become exp(least - exponent).
 #[inline(always)]
 #[allow(clippy::needless_range_loop)] // one number after the other of several arrays, side by side
-fn below_least<const K: usize>(of: &mut [Each; K]) -> Each {
+fn below_least<const K: usize, const AT_ONCE: bool>(of: &mut [Each; K]) -> Each {
     // Of two, one is 1: half the exponentials.
     if K == 2 {
         let [mut least, mut off, mut fall] = [[0.0; ABREAST]; 3];
         for l in 0..ABREAST {
+            least[l] = of[0][l].min(of[1][l]);
             off[l] = of[0][l] - of[1][l];
-            least[l] = if off[l] > 0.0 { of[1][l] } else { of[0][l] };
+            fall[l] = -off[l].abs();
         }
-        for l in 0..ABREAST {
-            fall[l] = exp(-off[l].abs());
-        }
+        exponentials::<ABREAST, AT_ONCE>(&mut fall);
         for l in 0..ABREAST {
             of[0][l] = if off[l] > 0.0 { fall[l] } else { 1.0 };
+        }
+        for l in 0..ABREAST {
             of[1][l] = if off[l] > 0.0 { 1.0 } else { fall[l] };
         }
         return least;
@@ -46,8 +49,9 @@ fn below_least<const K: usize>(of: &mut [Each; K]) -> Each {
     }
     for e in of {
         for l in 0..ABREAST {
-            e[l] = exp(least[l] - e[l]);
+            e[l] = least[l] - e[l];
         }
+        exponentials::<ABREAST, AT_ONCE>(e);
     }
     least
 }
@@ -60,35 +64,37 @@ pub(crate) fn filter<const K: usize>(
     levels: &[f64; K],
     seen: impl FnMut(&Each),
 ) -> Each {
-    // The same sums by wider registers: nothing is rounded otherwise.
+    // By wider registers, products and sums at once.
     #[cfg(target_arch = "x86_64")]
     {
-        #[target_feature(enable = "avx2")]
+        #[target_feature(enable = "avx2,fma")]
         fn with_avx2<const K: usize>(
             y: [&[f64]; ABREAST],
             x: &[Coordinates; ABREAST],
             levels: &[f64; K],
             seen: impl FnMut(&Each),
         ) -> Each {
-            run(y, x, levels, seen)
+            run::<K, true>(y, x, levels, seen)
         }
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has it.
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
+        {
+            // SAFETY: the processor has both.
             return unsafe { with_avx2(y, x, levels, seen) };
         }
     }
-    run(y, x, levels, seen)
+    run::<K, false>(y, x, levels, seen)
 }
 
 /// The filter. Its inner loops are over the likelihoods alone, so that each becomes an instruction or two.
 #[inline(always)]
 #[allow(clippy::needless_range_loop)]
-fn run<const K: usize>(
+fn run<const K: usize, const AT_ONCE: bool>(
     y: [&[f64]; ABREAST],
     x: &[Coordinates; ABREAST],
     levels: &[f64; K],
     mut seen: impl FnMut(&Each),
 ) -> Each {
+    let of = product_and::<AT_ONCE>;
     let count = y[0].len();
     let y = y.map(|y| &y[..count]);
     let white = x.map(|x| x[0].exp());
@@ -106,19 +112,23 @@ fn run<const K: usize>(
     let mut variance = [start; K];
     let mut sums = [-0.5 * count as f64 * std::f64::consts::TAU.ln(); ABREAST];
     let mut products: [LogProduct; ABREAST] = std::array::from_fn(|_| LogProduct::new());
+    let mut product = [1.0; ABREAST];
+    // None before the first reading.
+    let mut step = [0.0; ABREAST];
     for t in 0..count {
         let v = y.map(|y| y[t]);
         // Prediction by level: weight times 1/sqrt(s), 1/s, gain, variance after the reading.
         let [mut inverse, mut gain, mut after] = [[[0.0; ABREAST]; K]; 3];
         for i in 0..K {
             for l in 0..ABREAST {
-                let p = variance[i][l] + if t > 0 { walk[l] } else { 0.0 };
+                let p = variance[i][l] + step[l];
                 inverse[i][l] = 1.0 / (p + white[l]);
                 gain[i][l] = p * inverse[i][l];
                 after[i][l] = gain[i][l] * white[l];
                 weight[i][l] *= inverse[i][l].sqrt();
             }
         }
+        step = walk;
         // State by level after it, with what it is off at best.
         let before = mean;
         let [mut all, mut leasts] = [[[0.0; ABREAST]; K]; 2];
@@ -126,19 +136,19 @@ fn run<const K: usize>(
             let [mut parts, mut at] = [[[0.0; ABREAST]; K]; 2];
             for i in 0..K {
                 for l in 0..ABREAST {
-                    let off = v[l] - before[i][l] - half[l] * levels[j];
-                    at[i][l] = before[i][l] + gain[i][l] * off;
+                    let off = of(-half[l], levels[j], v[l] - before[i][l]);
+                    at[i][l] = of(gain[i][l], off, before[i][l]);
                     parts[i][l] = 0.5 * off * off * inverse[i][l];
                 }
             }
-            leasts[j] = below_least(&mut parts);
+            leasts[j] = below_least::<K, AT_ONCE>(&mut parts);
             let [mut sum, mut middle, mut spread] = [[0.0; ABREAST]; 3];
             for i in 0..K {
                 let moved = if i == j { stays } else { comes };
                 for l in 0..ABREAST {
                     parts[i][l] *= weight[i][l] * moved[l];
                     sum[l] += parts[i][l];
-                    middle[l] += parts[i][l] * at[i][l];
+                    middle[l] = of(parts[i][l], at[i][l], middle[l]);
                 }
             }
             let once = sum.map(f64::recip);
@@ -148,7 +158,7 @@ fn run<const K: usize>(
             for i in 0..K {
                 for l in 0..ABREAST {
                     let away = at[i][l] - middle[l];
-                    spread[l] += parts[i][l] * (after[i][l] + away * away);
+                    spread[l] = of(parts[i][l], of(away, away, after[i][l]), spread[l]);
                 }
             }
             (all[j], mean[j]) = (sum, middle);
@@ -156,7 +166,7 @@ fn run<const K: usize>(
                 variance[j][l] = spread[l] * once[l];
             }
         }
-        let least = below_least(&mut leasts);
+        let least = below_least::<K, AT_ONCE>(&mut leasts);
         let mut total = [0.0; ABREAST];
         for j in 0..K {
             for l in 0..ABREAST {
@@ -173,14 +183,22 @@ fn run<const K: usize>(
         for l in 0..ABREAST {
             sums[l] -= least[l];
         }
-        for (product, total) in products.iter_mut().zip(total) {
-            product.multiply(total);
+        for l in 0..ABREAST {
+            product[l] *= total[l];
+        }
+        if t % FEW == FEW - 1 {
+            let all = products.iter_mut().zip(product);
+            all.for_each(|(all, few)| all.multiply(few));
+            product = [1.0; ABREAST];
         }
         seen(&weight[0]);
     }
     // The diffuse start integrates the mean out. Its prior density is put back, and the factor of sqrt(count) by which
     // that integral differs from the density of the coefficients k >= 1 of the orthonormal DCT.
     each(|l| {
-        sums[l] + products[l].ln() + 0.5 * (std::f64::consts::TAU * start[l] * count as f64).ln()
+        sums[l]
+            + products[l].ln()
+            + product[l].ln()
+            + 0.5 * (std::f64::consts::TAU * start[l] * count as f64).ln()
     })
 }

@@ -21,23 +21,50 @@ const TAYLOR: [f64; 14] = {
     all
 };
 
+/// a b + c; `at_once` on a processor that makes it so, rounded once.
+#[inline(always)]
+pub(crate) fn product_and<const AT_ONCE: bool>(a: f64, b: f64, c: f64) -> f64 {
+    if AT_ONCE { a.mul_add(b, c) } else { a * b + c }
+}
+
 /// e to the power of `x`, within some 4e-16 of itself.
 #[inline(always)]
-pub(crate) fn exp(x: f64) -> f64 {
-    let x = if x < -FARTHEST { -FARTHEST } else { x };
-    let x = if x > FARTHEST { FARTHEST } else { x };
-    let shifted = x * LOG2_E + WHOLE;
-    let whole = shifted - WHOLE;
-    let r = (x - whole * LN_2_HIGH) - whole * LN_2_LOW;
-    let c = &TAYLOR;
-    // Pairs, fours and eights: no long chain of sums.
-    let (two, four) = (r * r, (r * r) * (r * r));
-    let low = (c[0] + c[1] * r) + (c[2] + c[3] * r) * two;
-    let middle = (c[4] + c[5] * r) + (c[6] + c[7] * r) * two;
-    let high = (c[8] + c[9] * r) + (c[10] + c[11] * r) * two;
-    let last = c[12] + c[13] * r;
-    let sum = low + (middle + (high + last * four) * four) * four;
-    sum * f64::from_bits((shifted.to_bits() << 52).wrapping_add(1f64.to_bits()))
+pub(crate) fn exp<const AT_ONCE: bool>(x: f64) -> f64 {
+    let mut one = [x];
+    exponentials::<1, AT_ONCE>(&mut one);
+    one[0]
+}
+
+/// Of each, e to its power, step by step beside the others.
+#[inline(always)]
+#[allow(clippy::needless_range_loop)]
+pub(crate) fn exponentials<const N: usize, const AT_ONCE: bool>(all: &mut [f64; N]) {
+    let of = product_and::<AT_ONCE>;
+    let [mut r, mut power, mut sum] = [[0.0; N]; 3];
+    for l in 0..N {
+        let x = all[l];
+        let x = if x < -FARTHEST { -FARTHEST } else { x };
+        let x = if x > FARTHEST { FARTHEST } else { x };
+        let shifted = of(x, LOG2_E, WHOLE);
+        let whole = shifted - WHOLE;
+        r[l] = of(-whole, LN_2_LOW, of(-whole, LN_2_HIGH, x));
+        power[l] = f64::from_bits((shifted.to_bits() << 52).wrapping_add(1f64.to_bits()));
+    }
+    for l in 0..N {
+        let (r, c) = (r[l], &TAYLOR);
+        // Pairs, fours and eights: no long chain of sums.
+        let (two, four) = (r * r, (r * r) * (r * r));
+        let pair = |k: usize| of(c[k + 1], r, c[k]);
+        let fours = |k: usize| of(pair(k + 2), two, pair(k));
+        sum[l] = of(
+            of(of(pair(12), four, fours(8)), four, fours(4)),
+            four,
+            fours(0),
+        );
+    }
+    for l in 0..N {
+        all[l] = sum[l] * power[l];
+    }
 }
 
 /// Natural logarithm of a positive `x`, within some 4e-16 of itself or of ln 2; of 0 and the numbers next to it, some -700.
@@ -64,16 +91,22 @@ pub(crate) fn ln(x: f64) -> f64 {
     (2.0 * s + 2.0 * s * (z * sum)) + (power * LN_2_LOW + power * LN_2_HIGH)
 }
 
+// Loops and no closures: those would be made without the instructions of the function around them.
+
 /// Each its natural logarithm.
 #[inline(always)]
 pub(crate) fn logarithms(all: &mut [f64]) {
-    all.iter_mut().for_each(|x| *x = ln(*x));
+    for x in all {
+        *x = ln(*x);
+    }
 }
 
 /// Each, none of them negative, to a `power`.
 #[inline(always)]
 pub(crate) fn powers(all: &mut [f64], power: f64) {
-    all.iter_mut().for_each(|x| *x = exp(power * ln(*x)));
+    for x in all {
+        *x = exp::<false>(power * ln(*x));
+    }
 }
 
 #[cfg(test)]
@@ -84,8 +117,10 @@ mod tests {
     fn they_are_those_of_the_library() {
         for i in -69_000..69_000 {
             let x = 0.01 * f64::from(i) + 0.003;
-            let e = exp(x);
-            assert!((e / x.exp() - 1.0).abs() < 6e-16, "exp {x}");
+            let e = exp::<false>(x);
+            for e in [e, exp::<true>(x)] {
+                assert!((e / x.exp() - 1.0).abs() < 6e-16, "exp {x}");
+            }
             let near = 3e-16 * x.abs().max(1.0);
             assert!((ln(e) - e.ln()).abs() <= near, "ln {e}");
         }
@@ -97,8 +132,8 @@ mod tests {
 
     #[test]
     fn beyond_the_numbers_they_stand_still() {
-        assert_eq!((exp(0.0), ln(1.0)), (1.0, 0.0));
-        assert!(exp(f64::NEG_INFINITY) < 1e-300 && exp(f64::INFINITY) > 1e300);
-        assert!(ln(0.0) < -700.0 && exp(f64::NAN).is_nan());
+        assert_eq!((exp::<false>(0.0), ln(1.0)), (1.0, 0.0));
+        assert!(exp::<false>(f64::NEG_INFINITY) < 1e-300 && exp::<false>(f64::INFINITY) > 1e300);
+        assert!(ln(0.0) < -700.0 && exp::<false>(f64::NAN).is_nan());
     }
 }

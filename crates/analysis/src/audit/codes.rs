@@ -266,10 +266,10 @@ impl<'a> Laws<'a> {
             .zip(&self.levels.chances)
             .filter(|(w, _)| **w > 0.0)
         {
-            p[*at..]
-                .iter_mut()
-                .zip(chances)
-                .for_each(|(p, c)| *p += w * c);
+            // A closure would be made without the instructions of the function around it.
+            for (p, c) in p[*at..].iter_mut().zip(chances) {
+                *p += w * c;
+            }
         }
         p
     }
