@@ -169,6 +169,21 @@ impl Noise {
         self.shape(&bins.at, &bins.walk)
     }
 
+    /// g over the bins with any random walk in the place of its own, by ln of the step variance over the white one: what else
+    /// there is of it is made once.
+    pub(crate) fn with_walks<'a>(&self, bins: &'a Bins) -> impl Fn(f64) -> Vec<f64> + 'a {
+        let still = Self {
+            log_walk: f64::NEG_INFINITY,
+            terms: self.terms.clone(),
+        };
+        let still = still.over(bins);
+        move |log_walk| {
+            let lambda = log_walk.exp();
+            let all = still.iter().zip(&bins.walk);
+            all.map(|(g, walk)| g + lambda * walk).collect()
+        }
+    }
+
     /// g at every coefficient k = 0..n; that of k = 0, which no likelihood uses, is infinite.
     #[must_use]
     pub fn everywhere(&self, bins: &Bins) -> Vec<f64> {

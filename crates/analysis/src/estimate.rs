@@ -18,14 +18,11 @@ fn weighted(
     let high = (noise.log_walk + 4.0).max(least_walk(panel.bins.n) + 14.0);
     let low = least_walk(panel.bins.n);
     let step = (high - low) / f64::from(WALKS);
+    let with = noise.with_walks(&panel.bins);
     (0..=WALKS)
         .map(|i| {
             let log_walk = low + step * f64::from(i);
-            let trial = Noise {
-                log_walk,
-                terms: noise.terms.clone(),
-            };
-            let s = panel.solve(&trial.over(&panel.bins), columns);
+            let s = panel.solve(&with(log_walk), columns);
             let free = n - columns.len() as f64;
             let restricted =
                 -0.5 * (free * s.rss.ln() + s.log_det_noise + s.log_det_normal) + 0.5 * log_walk;

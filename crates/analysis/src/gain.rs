@@ -83,15 +83,17 @@ fn mixture(panel: &Panel, state: &State, skip: Option<usize>) -> Vec<Mixed> {
                 _ => None,
             })
             .collect();
+        let noise = Noise {
+            log_walk: walk,
+            terms,
+        };
+        let with = noise.with_walks(&panel.bins);
         for i in 0..=WALKS {
-            let noise = Noise {
-                log_walk: low + step * f64::from(i),
-                terms: terms.clone(),
-            };
-            let mut weight = noise.over(&panel.bins);
+            let log_walk = low + step * f64::from(i);
+            let mut weight = with(log_walk);
             let log_det = panel.bins.log_det(&weight);
             weight.iter_mut().for_each(|g| *g = g.recip());
-            all.push((noise.log_walk, weight, log_det));
+            all.push((log_walk, weight, log_det));
         }
     }
     all

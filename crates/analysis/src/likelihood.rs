@@ -265,8 +265,13 @@ impl Panel {
     /// Least squares of the data on `columns` under the shape `g` over the bins.
     #[must_use]
     pub fn solve(&self, g: &[f64], columns: &[usize]) -> Solution {
+        self.solve_by(&self.sums(columns), g)
+    }
+
+    /// The same by sums that are known.
+    fn solve_by(&self, sums: &Sums, g: &[f64]) -> Solution {
         let weight: Vec<f64> = g.iter().map(|g| 1.0 / g).collect();
-        self.solve_weighted(&weight, self.bins.log_det(g), columns)
+        self.solved(&sums.under(&weight), self.bins.log_det(g))
     }
 
     /// As [`Panel::solve`], with 1/g and the sum of ln g at hand.
@@ -277,27 +282,28 @@ impl Panel {
         log_det_noise: f64,
         columns: &[usize],
     ) -> Solution {
-        let n = (self.bins.n - 1) as f64;
-        self.normal(weight, columns).solved(n, log_det_noise)
+        self.solved(&self.normal(weight, columns), log_det_noise)
+    }
+
+    fn solved(&self, normal: &Normal, log_det_noise: f64) -> Solution {
+        normal.solved((self.bins.n - 1) as f64, log_det_noise)
     }
 
     /// Sums of products under weights over the bins.
     pub(crate) fn normal(&self, weight: &[f64], columns: &[usize]) -> Normal {
-        let over = |i, j| dot(&self.pair(i, j), weight);
-        let m = columns.len();
-        let mut matrix = vec![vec![0.0; m]; m];
-        for a in 0..m {
-            for b in a..m {
-                matrix[a][b] = over(columns[a], columns[b]);
-                matrix[b][a] = matrix[a][b];
-            }
-        }
-        let right = columns.iter().map(|c| over(0, *c)).collect();
-        let total = over(0, 0);
-        Normal {
-            matrix,
-            right,
-            total,
+        self.sums(columns).under(weight)
+    }
+
+    /// Sums of products over the bins that least squares on columns need.
+    fn sums(&self, columns: &[usize]) -> Sums {
+        let data_and = || std::iter::once(&0).chain(columns);
+        let from = |(i, a): (usize, &usize)| {
+            let a = *a;
+            data_and().skip(i).map(move |b| self.pair(a, *b))
+        };
+        Sums {
+            columns: columns.len(),
+            pairs: data_and().enumerate().flat_map(from).collect(),
         }
     }
 
@@ -334,6 +340,7 @@ impl Panel {
                 terms,
             }
         };
+        let sums = self.sums(columns);
         let objective = |x: &[f64]| {
             let inside: Vec<f64> = x
                 .iter()
@@ -341,10 +348,8 @@ impl Panel {
                 .map(|(v, b)| v.clamp(b.0, b.1))
                 .collect();
             let outside: f64 = x.iter().zip(&inside).map(|(a, b)| (a - b).powi(2)).sum();
-            outside
-                - self
-                    .solve(&unpack(&inside).over(&self.bins), columns)
-                    .log_likelihood
+            let g = unpack(&inside).over(&self.bins);
+            outside - self.solve_by(&sums, &g).log_likelihood
         };
         let best = crate::optimise::nelder_mead(&objective, &start, &steps, 120 + 60 * start.len());
         let inside: Vec<f64> = best
@@ -353,20 +358,15 @@ impl Panel {
             .map(|(v, b)| v.clamp(b.0, b.1))
             .collect();
         let fitted = unpack(&inside);
-        let solution = self.solve(&fitted.over(&self.bins), columns);
+        let solution = self.solve_by(&sums, &fitted.over(&self.bins));
         (fitted, solution)
     }
 
     /// The best random walk with the terms held.
     fn best_walk(&self, noise: &Noise, columns: &[usize]) -> Noise {
         let (low, high) = (least_walk(self.bins.n), 6.0);
-        let at = |x: f64| {
-            let trial = Noise {
-                log_walk: x,
-                terms: noise.terms.clone(),
-            };
-            self.solve(&trial.over(&self.bins), columns).log_likelihood
-        };
+        let (with, sums) = (noise.with_walks(&self.bins), self.sums(columns));
+        let at = |x: f64| self.solve_by(&sums, &with(x)).log_likelihood;
         let count = 24;
         let step = (high - low) / f64::from(count);
         let best = (0..=count)
@@ -401,13 +401,14 @@ impl Panel {
         at.push(low);
         at.sort_by(f64::total_cmp);
         at.dedup();
+        let with = noise.with_walks(&self.bins);
         at.into_iter()
             .map(|log_walk| {
+                let g = with(log_walk);
                 let trial = Noise {
                     log_walk,
                     terms: noise.terms.clone(),
                 };
-                let g = trial.over(&self.bins);
                 let log_det = self.bins.log_det(&g);
                 (trial, g.iter().map(|g| 1.0 / g).collect(), log_det)
             })
@@ -429,6 +430,54 @@ impl Panel {
             .collect();
         crate::optimise::peak(&points)
     }
+}
+
+/// Sums of products over the bins: of the data and the columns, each with itself and those behind it.
+struct Sums {
+    columns: usize,
+    pairs: Vec<Rc<Vec<f64>>>,
+}
+
+impl Sums {
+    /// Under weights over the bins.
+    fn under(&self, weight: &[f64]) -> Normal {
+        let mut all = dots(&self.pairs, weight).into_iter();
+        let mut next = |count: usize| -> Vec<f64> { all.by_ref().take(count).collect() };
+        let (total, right) = (next(1)[0], next(self.columns));
+        let mut matrix = vec![vec![0.0; self.columns]; self.columns];
+        for a in 0..self.columns {
+            for (b, v) in (a..).zip(next(self.columns - a)) {
+                matrix[a][b] = v;
+                matrix[b][a] = v;
+            }
+        }
+        Normal {
+            matrix,
+            right,
+            total,
+        }
+    }
+}
+
+/// Sums of products with weights.
+fn dots(all: &[Rc<Vec<f64>>], weight: &[f64]) -> Vec<f64> {
+    // The same sums by wider registers: nothing is rounded otherwise.
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn with_avx2(all: &[Rc<Vec<f64>>], weight: &[f64]) -> Vec<f64> {
+            let mut sums = Vec::with_capacity(all.len());
+            for of in all {
+                sums.push(dot(of, weight));
+            }
+            sums
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has it.
+            return unsafe { with_avx2(all, weight) };
+        }
+    }
+    all.iter().map(|of| dot(of, weight)).collect()
 }
 
 /// Sums of products over g that least squares need: of columns with each other, of the data with them and with themselves.

@@ -75,10 +75,10 @@ impl<'a> Meter<'a> {
         let count = panel.bins.counts();
         let g = noise.over(&panel.bins);
         let low = least_walk(panel.bins.n);
+        let with = noise.with_walks(&panel.bins);
         let walk = |i: usize| {
             let log_walk = low + (MOST_WALK - low) * i as f64 / (WALKS - 1) as f64;
-            let terms = noise.terms.clone();
-            let tried = Noise { log_walk, terms }.over(&panel.bins);
+            let tried = with(log_walk);
             Walk {
                 log: log_walk,
                 logs: sum_of_logs(count, &tried),
