@@ -446,10 +446,11 @@ impl Sums {
         let (total, right) = (next(1)[0], next(self.columns));
         let mut matrix = vec![vec![0.0; self.columns]; self.columns];
         for a in 0..self.columns {
-            for (b, v) in (a..).zip(next(self.columns - a)) {
-                matrix[a][b] = v;
-                matrix[b][a] = v;
+            let beyond = next(self.columns - a);
+            for (own, v) in matrix[a..].iter_mut().zip(&beyond) {
+                own[a] = *v;
             }
+            matrix[a][a..].copy_from_slice(&beyond);
         }
         Normal {
             matrix,
