@@ -1,7 +1,5 @@
 //! What sequences explain beside columns under noise as it was fitted. None of them is kept: a name is asked by many.
 
-use std::rc::Rc;
-
 use crate::column::Column;
 use crate::likelihood::{Normal, Panel};
 
@@ -33,13 +31,12 @@ impl<'a> Beside<'a> {
         }
     }
 
-    /// Likelihood ratio that sequences of samples gain.
-    pub(crate) fn gain_of(&self, further: &[Vec<f64>]) -> f64 {
-        let further = self.panel.dct.forward_all(further);
-        let further: Vec<Rc<Vec<f64>>> = further.map(Rc::new).collect();
-        let new = further.iter().map(|c| Column::Whole(Rc::clone(c)));
-        let all: Vec<Column> = self.data_and_columns.iter().cloned().chain(new).collect();
-        let sums = self.products(&further, &all);
+    /// Likelihood ratio that sequences of samples gain, each let go of once it is transformed.
+    pub(crate) fn gain_of(&self, further: Vec<Vec<f64>>) -> f64 {
+        let new = self.panel.dct.forward_all(further).map(Column::new);
+        let known = self.data_and_columns.iter().cloned();
+        let all: Vec<Column> = known.chain(new).collect();
+        let sums = self.products(&all[self.data_and_columns.len()..], &all);
         let mut normal = self.normal.clone();
         // Each row holds the data first.
         for (i, own) in normal.matrix.iter_mut().enumerate() {
@@ -52,16 +49,14 @@ impl<'a> Beside<'a> {
         2.0 * (likelihood(self.panel, &normal) - self.alone)
     }
 
-    /// Sums of products over g of sequences with columns.
-    fn products(&self, of: &[Rc<Vec<f64>>], with: &[Column]) -> Vec<Vec<f64>> {
+    /// Sums of products over g of columns with others.
+    fn products(&self, of: &[Column], with: &[Column]) -> Vec<Vec<f64>> {
         let mut sums = vec![vec![0.0; with.len()]; of.len()];
         let mut weighted = vec![];
         for (at, weight) in self.weight.chunks(AT_HAND).enumerate() {
             let part = at * AT_HAND..at * AT_HAND + weight.len();
             for (sums, c) in sums.iter_mut().zip(of) {
-                let c = c[part.clone()].iter().zip(weight);
-                weighted.clear();
-                weighted.extend(c.map(|(c, w)| c * w));
+                c.times(part.clone(), weight, &mut weighted);
                 for (sum, other) in sums.iter_mut().zip(with) {
                     *sum += other.along(part.clone(), &weighted);
                 }
@@ -79,6 +74,8 @@ fn likelihood(panel: &Panel, normal: &Normal) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::rc::Rc;
+
     use super::*;
     use crate::likelihood::{Bins, Dct};
 
@@ -101,7 +98,7 @@ mod tests {
         let sum = further[0].iter().zip(&further[1]).map(|(a, b)| a + b);
         further.push(sum.collect());
         let g: Vec<f64> = bins.at.omega.iter().map(|w| 1.0 + 0.1 / w).collect();
-        let gain = Beside::new(&panel, &g, &own).gain_of(&further);
+        let gain = Beside::new(&panel, &g, &own).gain_of(further.clone());
         let alone = panel.solve(&g, &own).log_likelihood;
         let all = [own, panel.add_all(&further)].concat();
         let whole = panel.solve(&g, &all).log_likelihood;

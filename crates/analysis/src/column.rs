@@ -95,6 +95,15 @@ impl Column {
         }
     }
 
+    /// Some coefficients, each times a number.
+    pub(crate) fn times(&self, part: Range<usize>, by: &[f64], into: &mut Vec<f64>) {
+        into.clear();
+        match self {
+            Self::Whole(c) => into.extend(c[part].iter().zip(by).map(|(c, by)| c * by)),
+            Self::Short(c) => into.extend(c[part].iter().zip(by).map(|(c, by)| f64::from(*c) * by)),
+        }
+    }
+
     pub(crate) fn products(&self, other: &Self, bins: &Bins) -> Vec<f64> {
         match (self, other) {
             (Self::Whole(a), Self::Whole(b)) => bins.sums(a, b),

@@ -11,6 +11,7 @@ use std::rc::Rc;
 use statrs::function::gamma::ln_gamma;
 
 use crate::likelihood::{Bins, Dct, Noise, Panel, least_walk};
+use crate::logs::LogProduct;
 use crate::search::{Form, State};
 
 /// Blocks, and the part of the record before the first.
@@ -272,20 +273,24 @@ pub fn of_variance(e: &[f64], law: &[f64]) -> (f64, f64) {
                 return 0.0;
             }
             // The larger over the smaller variance, and the smaller one by the likelihood.
-            let at = |ratio: f64, h: f64| 1.0 + ratio.exp_m1() * h;
+            let at = |ratio: f64| {
+                let rise = ratio.exp_m1();
+                move |h: f64| 1.0 + rise * h
+            };
             let energy = |ratio: f64| -> f64 {
-                let parts = seen.iter().zip(of);
-                parts.map(|(e, h)| e * e / at(ratio, *h)).sum::<f64>() / count
+                let (parts, at) = (seen.iter().zip(of), at(ratio));
+                parts.map(|(e, h)| e * e / at(*h)).sum::<f64>() / count
             };
             let minus_l = |ratio: f64| {
-                let logs: f64 = of.iter().map(|h| at(ratio, *h).ln()).sum();
-                0.5 * (logs + count * energy(ratio).ln())
+                let (mut product, at) = (LogProduct::new(), at(ratio));
+                of.iter().for_each(|h| product.multiply(at(*h)));
+                0.5 * (product.ln() + count * energy(ratio).ln())
             };
             let ratio = crate::optimise::golden(&minus_l, -MOST_RATIO, MOST_RATIO, 30);
-            let (plain, least) = (energy(0.0), energy(ratio));
+            let (plain, least, at) = (energy(0.0), energy(ratio), at(ratio));
             let nats = |e: f64, v: f64| -0.5 * (v.ln() + e * e / v);
             let next = e[w[0]..w[1]].iter().zip(&height[w[0]..w[1]]);
-            next.map(|(e, h)| nats(*e, least * at(ratio, *h)) - nats(*e, plain))
+            next.map(|(e, h)| nats(*e, least * at(*h)) - nats(*e, plain))
                 .sum()
         })
         .collect();

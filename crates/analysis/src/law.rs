@@ -39,6 +39,7 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
         };
         let departures = memory::departures(&search.view, signal);
         let departures: Vec<Vec<f64>> = departures.flat_map(|d| d.columns).collect();
+        let degrees = departures.len() as f64;
         // What the library has of the effect, and of one that extends it, is no departure.
         let of_it = search
             .candidates
@@ -51,11 +52,11 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
         let likelihood = |columns: &[usize]| search.panel.solve(&g, columns).log_likelihood;
         let explained = 2.0 * (likelihood(&own) - likelihood(&rest));
         own.extend(of_it.flat_map(Candidate::all_columns));
-        let lr = Beside::new(&search.panel, &g, &own).gain_of(&departures);
+        let lr = Beside::new(&search.panel, &g, &own).gain_of(departures);
         let p_value = if lr < DEPARTURE * explained {
             1.0
         } else {
-            chi_tail(lr / WIDENED, departures.len() as f64)
+            chi_tail(lr / WIDENED, degrees)
         };
         all.push((
             effect,

@@ -82,12 +82,13 @@ fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked>
     let beside = Beside::new(panel, &g, &own);
     let asked = memory::departures(&search.view, signal).filter(|d| !d.columns.is_empty());
     let asked = asked.map(|Departure { how, columns }| {
-        let chi_square = beside.gain_of(&columns);
+        let degrees = columns.len();
+        let chi_square = beside.gain_of(columns);
         Asked {
             how: format!("{} {how}", signal.name),
             chi_square,
-            degrees: columns.len(),
-            chance: chi_tail(chi_square / WIDENED, columns.len() as f64),
+            degrees,
+            chance: chi_tail(chi_square / WIDENED, degrees as f64),
         }
     });
     asked.collect()
