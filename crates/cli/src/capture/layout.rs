@@ -267,7 +267,8 @@ fn short_decimal(text: &[u8]) -> Option<(f64, usize, bool)> {
     let mut at = from;
     while let Some(byte) = text.get(at) {
         match byte {
-            b'0'..=b'9' => whole = whole.wrapping_mul(10) + i64::from(byte - b'0'),
+            // Too many digits for an i64 are too many for what follows.
+            b'0'..=b'9' => whole = whole.wrapping_mul(10).wrapping_add(i64::from(byte - b'0')),
             b'.' if point.is_none() => point = Some(at),
             _ => break,
         }
@@ -451,6 +452,8 @@ mod tests {
             "nan",
             "1;2",
             "1234567890123456",
+            "99999999999999999999999999999999999999",
+            "0.99999999999999999999999999999999999999",
             "\u{661}",
         ] {
             assert_eq!(cells.plain(row, &mut numbers), None, "{row}");
