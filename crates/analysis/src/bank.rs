@@ -202,3 +202,30 @@ fn run<const K: usize, const AT_ONCE: bool>(
             + 0.5 * (std::f64::consts::TAU * start[l] * count as f64).ln()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_processor_finds_the_same() {
+        let y: Vec<f64> = (0..2001)
+            .map(|i| f64::from(i * 7919 % 997) / 300.0 - 1.6 + f64::from(i / 100 % 2))
+            .collect();
+        let x: [Coordinates; ABREAST] =
+            std::array::from_fn(|l| [0.1 * l as f64, -9.0, -0.5 + 0.3 * l as f64, 4.0]);
+        let (two, many) = ([1.0, -1.0], [-1.5, -0.7, 0.0, 0.7, 1.5]);
+        let here = [
+            filter([&y; ABREAST], &x, &two, |_| {}),
+            filter([&y; ABREAST], &x, &many, |_| {}),
+        ];
+        let plain = [
+            run::<2, false>([&y; ABREAST], &x, &two, |_| {}),
+            run::<5, false>([&y; ABREAST], &x, &many, |_| {}),
+        ];
+        for (a, b) in here.iter().flatten().zip(plain.iter().flatten()) {
+            assert!((a / b - 1.0).abs() < 1e-10, "{a} {b}");
+        }
+        assert!(here[0][0] != here[0][1]);
+    }
+}

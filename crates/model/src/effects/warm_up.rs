@@ -92,7 +92,7 @@ impl Shape for Exponentials {
     }
 
     fn columns(&self, at: f64) -> Vec<Column> {
-        // Each the product of one of few coarse and one of few fine steps: an exponential for every sample takes ten times as long.
+        // Each the product of one of few coarse and one of few fine steps, and no exponential for every sample.
         const FINE: usize = 1 << 9;
         let exp = |i: usize| (-(i as f64) / self.rate_hz / at).exp();
         let fine: Vec<f64> = (0..FINE.min(self.samples)).map(exp).collect();
