@@ -5,6 +5,7 @@
 
 use crate::logs::LogProduct;
 use crate::powers::{exponentials, product_and};
+use crate::wide::wide;
 
 /// ln of variance, ln of random-walk step over it, ln of half height over the white sigma, ln of dwell in blocks.
 pub(crate) type Coordinates = [f64; 4];
@@ -56,33 +57,15 @@ fn below_least<const K: usize, const AT_ONCE: bool>(of: &mut [Each; K]) -> Each 
     least
 }
 
-/// Log likelihoods of readings of one length, the mean taken out, under jumps between any of `levels`, all equally likely;
-/// `seen` is told the chances of the first level after each reading.
-pub(crate) fn filter<const K: usize>(
-    y: [&[f64]; ABREAST],
-    x: &[Coordinates; ABREAST],
-    levels: &[f64; K],
-    seen: impl FnMut(&Each),
-) -> Each {
-    // By wider registers, products and sums at once.
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2,fma")]
-        fn with_avx2<const K: usize>(
-            y: [&[f64]; ABREAST],
-            x: &[Coordinates; ABREAST],
-            levels: &[f64; K],
-            seen: impl FnMut(&Each),
-        ) -> Each {
-            run::<K, true>(y, x, levels, seen)
-        }
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
-        {
-            // SAFETY: the processor has both.
-            return unsafe { with_avx2(y, x, levels, seen) };
-        }
-    }
-    run::<K, false>(y, x, levels, seen)
+wide! {
+    /// Log likelihoods of readings of one length, the mean taken out, under jumps between any of `levels`, all equally
+    /// likely; `seen` is told the chances of the first level after each reading.
+    pub(crate) fn filter[const K: usize](
+        y: [&[f64]; ABREAST],
+        x: &[Coordinates; ABREAST],
+        levels: &[f64; K],
+        seen: impl FnMut(&Each),
+    ) -> Each = run::<K, true>, else run::<K, false>
 }
 
 /// The filter. Its inner loops are over the likelihoods alone, so that each becomes an instruction or two.

@@ -2,6 +2,7 @@
 
 use crate::column::Column;
 use crate::likelihood::{Normal, Panel};
+use crate::wide::wide;
 
 /// Coefficients that a processor has at hand, of all columns at once.
 const AT_HAND: usize = 1 << 11;
@@ -33,10 +34,9 @@ impl<'a> Beside<'a> {
 
     /// Likelihood ratio that sequences of samples gain, each let go of once it is transformed.
     pub(crate) fn gain_of(&self, further: Vec<Vec<f64>>) -> f64 {
-        let new = self.panel.dct.forward_all(further).map(Column::new);
-        let known = self.data_and_columns.iter().cloned();
-        let all: Vec<Column> = known.chain(new).collect();
-        let sums = self.products(&all[self.data_and_columns.len()..], &all);
+        let new = self.panel.dct.columns(further);
+        let all = [&self.data_and_columns[..], &new].concat();
+        let sums = products(&new, &all, &self.weight);
         let mut normal = self.normal.clone();
         // Each row holds the data first.
         for (i, own) in normal.matrix.iter_mut().enumerate() {
@@ -48,22 +48,27 @@ impl<'a> Beside<'a> {
         }
         2.0 * (likelihood(self.panel, &normal) - self.alone)
     }
+}
 
-    /// Sums of products over g of columns with others.
-    fn products(&self, of: &[Column], with: &[Column]) -> Vec<Vec<f64>> {
-        let mut sums = vec![vec![0.0; with.len()]; of.len()];
-        let mut weighted = vec![];
-        for (at, weight) in self.weight.chunks(AT_HAND).enumerate() {
-            let part = at * AT_HAND..at * AT_HAND + weight.len();
-            for (sums, c) in sums.iter_mut().zip(of) {
-                c.times(part.clone(), weight, &mut weighted);
-                for (sum, other) in sums.iter_mut().zip(with) {
-                    *sum += other.along(part.clone(), &weighted);
-                }
+wide! {
+    /// Sums of products of columns with others under weights at every coefficient.
+    fn products[](of: &[Column], with: &[Column], weight: &[f64]) -> Vec<Vec<f64>> = products_of
+}
+
+#[inline(always)]
+fn products_of(of: &[Column], with: &[Column], weight: &[f64]) -> Vec<Vec<f64>> {
+    let mut sums = vec![vec![0.0; with.len()]; of.len()];
+    let mut weighted = vec![];
+    for (at, weight) in weight.chunks(AT_HAND).enumerate() {
+        let part = at * AT_HAND..at * AT_HAND + weight.len();
+        for (sums, c) in sums.iter_mut().zip(of) {
+            c.times(part.clone(), weight, &mut weighted);
+            for (sum, other) in sums.iter_mut().zip(with) {
+                *sum += other.along(part.clone(), &weighted);
             }
         }
-        sums
     }
+    sums
 }
 
 /// Log likelihood but for the part of the noise, which is the same.

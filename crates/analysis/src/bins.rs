@@ -8,6 +8,7 @@ use model::effect::{Covariance, Frequencies};
 
 use crate::column::dot;
 use crate::logs::sum_of_logs;
+use crate::wide::wide;
 
 /// Bins of single coefficients at the low end.
 const SINGLE: usize = 256;
@@ -116,13 +117,30 @@ impl Bins {
         A: Copy + Into<f64>,
         B: Copy + Into<f64>,
     {
-        let single = self.counts.iter().take_while(|c| **c == 1.0).count();
-        let alone = a.iter().zip(b).skip(1).take(single);
-        let alone = alone.map(|(a, b)| (*a).into() * (*b).into());
-        let bins = self.start.windows(2).skip(single);
-        let wide = bins.map(|w| dot(&a[w[0]..w[1]], &b[w[0]..w[1]]));
-        alone.chain(wide).collect()
+        sums_over(self, a, b)
     }
+}
+
+wide! {
+    fn sums_over[A: Copy + Into<f64>, B: Copy + Into<f64>](bins: &Bins, a: &[A], b: &[B]) -> Vec<f64>
+    = sums
+}
+
+#[inline(always)]
+fn sums<A, B>(bins: &Bins, a: &[A], b: &[B]) -> Vec<f64>
+where
+    A: Copy + Into<f64>,
+    B: Copy + Into<f64>,
+{
+    let mut sums = Vec::with_capacity(bins.counts.len());
+    for (w, count) in bins.start.windows(2).zip(&bins.counts) {
+        sums.push(if *count == 1.0 {
+            a[w[0]].into() * b[w[0]].into()
+        } else {
+            dot(&a[w[0]..w[1]], &b[w[0]..w[1]])
+        });
+    }
+    sums
 }
 
 /// The shape of the noise: everything but its white variance.

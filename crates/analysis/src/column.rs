@@ -48,7 +48,7 @@ pub(crate) fn sum_of(a: &[f64], f: impl Fn(f64) -> f64) -> f64 {
 pub(crate) enum Column {
     /// As computed.
     Whole(Rc<Vec<f64>>),
-    /// Of a long record, where what may explain the data fills memory: rounded by parts in 10^7, each by itself.
+    /// Of a long record, where what may explain the data fills memory.
     Short(Rc<Vec<f32>>),
 }
 
@@ -56,14 +56,6 @@ pub(crate) enum Column {
 pub(crate) const LONG: usize = 1 << 18;
 
 impl Column {
-    pub(crate) fn new(c: Vec<f64>) -> Self {
-        if c.len() > LONG {
-            Self::Short(Rc::new(c.iter().map(|v| *v as f32).collect()))
-        } else {
-            Self::Whole(Rc::new(c))
-        }
-    }
-
     /// Where its coefficients are in memory: columns that share them are one.
     pub(crate) fn place(&self) -> usize {
         match self {
@@ -88,6 +80,7 @@ impl Column {
     }
 
     /// Sum of products of some coefficients with numbers.
+    #[inline(always)]
     pub(crate) fn along(&self, part: Range<usize>, by: &[f64]) -> f64 {
         match self {
             Self::Whole(c) => dot(&c[part], by),
@@ -96,6 +89,7 @@ impl Column {
     }
 
     /// Some coefficients, each times a number.
+    #[inline(always)]
     pub(crate) fn times(&self, part: Range<usize>, by: &[f64], into: &mut Vec<f64>) {
         into.clear();
         match self {

@@ -63,6 +63,7 @@ pub mod threshold;
 pub mod transform;
 pub mod units;
 mod variance;
+mod wide;
 
 pub use analyze::{Analysis, AnalyzeOptions, analyze};
 pub use diagnosis::{DiagnoseOptions, diagnose, diagnose_owned};

@@ -13,6 +13,7 @@ use std::sync::Arc;
 pub use crate::bins::{Bins, Noise, least_walk};
 use crate::column::{Column, dot};
 pub use crate::transform::Dct;
+use crate::wide::wide;
 
 /// Two sums over the samples' bits and places: columns that agree in both are the same.
 fn digest(x: &[f64]) -> [u64; 2] {
@@ -69,9 +70,9 @@ impl Panel {
 
     /// A panel on the first of these sequences, which the others may explain; they are columns 0, 1 and so on.
     pub(crate) fn of_all(dct: &Dct, bins: &Rc<Bins>, all: &[&[f64]]) -> Self {
-        let panel = Self::of(dct, bins, Rc::default());
-        panel.columns.borrow_mut().clear();
-        panel.add_all(all);
+        let (data, others) = all.split_at(1);
+        let panel = Self::new(dct, bins, data[0]);
+        panel.push(dct.columns(others));
         panel
     }
 
@@ -95,15 +96,14 @@ impl Panel {
     /// The coefficients of a candidate's columns, transformed once for all that have the same in `common`.
     fn candidate(&self, values: &[Vec<f64>], common: bool) -> Vec<Column> {
         if !common {
-            return self.dct.forward_all(values).map(Column::new).collect();
+            return self.dct.columns(values);
         }
         let keys: Vec<[u64; 2]> = values.iter().map(|v| digest(v)).collect();
         let known = |key: &[u64; 2]| self.dct.known.columns.borrow().get(key).cloned();
         let mut all: Vec<Option<Column>> = keys.iter().map(known).collect();
         let missing: Vec<usize> = (0..all.len()).filter(|i| all[*i].is_none()).collect();
         let new: Vec<&Vec<f64>> = missing.iter().map(|i| &values[*i]).collect();
-        for (i, c) in missing.into_iter().zip(self.dct.forward_all(&new)) {
-            let c = Column::new(c);
+        for (i, c) in missing.into_iter().zip(self.dct.columns(new)) {
             if !self.dct.known.complete.get() {
                 self.dct.known.keep(keys[i], &c);
             }
@@ -460,25 +460,18 @@ impl Sums {
     }
 }
 
-/// Sums of products with weights.
-fn dots(all: &[Rc<Vec<f64>>], weight: &[f64]) -> Vec<f64> {
-    // The same sums by wider registers: nothing is rounded otherwise.
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2")]
-        fn with_avx2(all: &[Rc<Vec<f64>>], weight: &[f64]) -> Vec<f64> {
-            let mut sums = Vec::with_capacity(all.len());
-            for of in all {
-                sums.push(dot(of, weight));
-            }
-            sums
-        }
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has it.
-            return unsafe { with_avx2(all, weight) };
-        }
+wide! {
+    /// Sums of products with weights.
+    fn dots[](all: &[Rc<Vec<f64>>], weight: &[f64]) -> Vec<f64> = dots_of
+}
+
+#[inline(always)]
+fn dots_of(all: &[Rc<Vec<f64>>], weight: &[f64]) -> Vec<f64> {
+    let mut sums = Vec::with_capacity(all.len());
+    for of in all {
+        sums.push(dot(of, weight));
     }
-    all.iter().map(|of| dot(of, weight)).collect()
+    sums
 }
 
 /// Sums of products over g that least squares need: of columns with each other, of the data with them and with themselves.

@@ -16,6 +16,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::column::dot;
 use crate::powers::{logarithms, powers};
+use crate::wide::wide;
 
 /// Levels in a spread.
 const BY_SPREAD: f64 = 2.0;
@@ -226,6 +227,10 @@ pub(super) struct Laws<'a> {
     pub shift: f64,
 }
 
+wide! {
+    fn fitted[](laws: &Laws<'_>, course: &mut Course, rounds: usize) -> Fit = Laws::fitted
+}
+
 impl<'a> Laws<'a> {
     pub(super) fn new(of: &'a Histogram, fault: Fault, spread: f64) -> Self {
         let beyond = match fault {
@@ -385,19 +390,7 @@ impl<'a> Laws<'a> {
 
     /// Go on with a fit, up to so many rounds in all.
     fn go_on(&self, course: &mut Course, rounds: usize) -> Fit {
-        // The same sums by wider registers: nothing is rounded otherwise.
-        #[cfg(target_arch = "x86_64")]
-        {
-            #[target_feature(enable = "avx2")]
-            fn with_avx2(laws: &Laws<'_>, course: &mut Course, rounds: usize) -> Fit {
-                laws.fitted(course, rounds)
-            }
-            if std::arch::is_x86_feature_detected!("avx2") {
-                // SAFETY: the processor has it.
-                return unsafe { with_avx2(self, course, rounds) };
-            }
-        }
-        self.fitted(course, rounds)
+        fitted(self, course, rounds)
     }
 
     #[inline(always)]
