@@ -32,8 +32,8 @@ impl<'a> Beside<'a> {
         }
     }
 
-    /// Likelihood ratio that sequences of samples gain, each let go of once it is transformed.
-    pub(crate) fn gain_of(&self, further: Vec<Vec<f64>>) -> f64 {
+    /// Likelihood ratio that sequences of samples gain, each let go of once it is transformed, and how many they are.
+    pub(crate) fn gain_of(&self, further: impl IntoIterator<Item = Vec<f64>>) -> (f64, usize) {
         let new = self.panel.dct.columns(further);
         let all = [&self.data_and_columns[..], &new].concat();
         let sums = products(&new, &all, &self.weight);
@@ -46,7 +46,8 @@ impl<'a> Beside<'a> {
             normal.right.push(row[0]);
             normal.matrix.push(row[1..].to_vec());
         }
-        2.0 * (likelihood(self.panel, &normal) - self.alone)
+        let gain = 2.0 * (likelihood(self.panel, &normal) - self.alone);
+        (gain, new.len())
     }
 }
 
@@ -58,13 +59,25 @@ wide! {
 #[inline(always)]
 fn products_of(of: &[Column], with: &[Column], weight: &[f64]) -> Vec<Vec<f64>> {
     let mut sums = vec![vec![0.0; with.len()]; of.len()];
-    let mut weighted = vec![];
+    let mut weighted = [vec![], vec![]];
     for (at, weight) in weight.chunks(AT_HAND).enumerate() {
         let part = at * AT_HAND..at * AT_HAND + weight.len();
-        for (sums, c) in sums.iter_mut().zip(of) {
-            c.times(part.clone(), weight, &mut weighted);
-            for (sum, other) in sums.iter_mut().zip(with) {
-                *sum += other.along(part.clone(), &weighted);
+        for (sums, two) in sums.chunks_mut(2).zip(of.chunks(2)) {
+            for (c, weighted) in two.iter().zip(&mut weighted) {
+                c.times(part.clone(), weight, weighted);
+            }
+            let [a, b] = weighted.each_ref().map(Vec::as_slice);
+            for (i, other) in with.iter().enumerate() {
+                match &mut *sums {
+                    [first, second] => {
+                        let [p, q] = other.along_two(part.clone(), [a, b]);
+                        first[i] += p;
+                        second[i] += q;
+                    }
+                    rest => rest
+                        .iter_mut()
+                        .for_each(|s| s[i] += other.along(part.clone(), a)),
+                }
             }
         }
     }
@@ -103,7 +116,8 @@ mod tests {
         let sum = further[0].iter().zip(&further[1]).map(|(a, b)| a + b);
         further.push(sum.collect());
         let g: Vec<f64> = bins.at.omega.iter().map(|w| 1.0 + 0.1 / w).collect();
-        let gain = Beside::new(&panel, &g, &own).gain_of(further.clone());
+        let (gain, count) = Beside::new(&panel, &g, &own).gain_of(further.clone());
+        assert_eq!(count, 4);
         let alone = panel.solve(&g, &own).log_likelihood;
         let all = [own, panel.add_all(&further)].concat();
         let whole = panel.solve(&g, &all).log_likelihood;

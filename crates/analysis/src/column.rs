@@ -25,6 +25,27 @@ where
     sum_of_eight(eight) + rest
 }
 
+/// Sums of products with two, as [`dot`] makes each: a processor that adds to one need not wait for the other.
+#[inline(always)]
+fn dot_two<A: Copy + Into<f64>>(a: &[A], [b, c]: [&[f64]; 2]) -> [f64; 2] {
+    let ([mut first, mut second], mut rest) = ([[0.0; 8]; 2], [0.0; 2]);
+    let (x, y, z) = (a.chunks_exact(8), b.chunks_exact(8), c.chunks_exact(8));
+    for ((p, q), r) in x.remainder().iter().zip(y.remainder()).zip(z.remainder()) {
+        rest[0] += (*p).into() * q;
+        rest[1] += (*p).into() * r;
+    }
+    for ((p, q), r) in x.zip(y).zip(z) {
+        for i in 0..8 {
+            first[i] += p[i].into() * q[i];
+            second[i] += p[i].into() * r[i];
+        }
+    }
+    [
+        sum_of_eight(first) + rest[0],
+        sum_of_eight(second) + rest[1],
+    ]
+}
+
 /// Halves, quarters and eighths on each other, as they lie side by side in a processor.
 #[inline(always)]
 fn sum_of_eight([a, b, c, d, e, f, g, h]: [f64; 8]) -> f64 {
@@ -85,6 +106,15 @@ impl Column {
         match self {
             Self::Whole(c) => dot(&c[part], by),
             Self::Short(c) => dot(&c[part], by),
+        }
+    }
+
+    /// The same with two sets of numbers.
+    #[inline(always)]
+    pub(crate) fn along_two(&self, part: Range<usize>, by: [&[f64]; 2]) -> [f64; 2] {
+        match self {
+            Self::Whole(c) => dot_two(&c[part], by),
+            Self::Short(c) => dot_two(&c[part], by),
         }
     }
 

@@ -217,7 +217,7 @@ fn shaped(
             continue;
         }
         let values = shape.columns(x.exp()).into_iter().map(|c| c.values);
-        let added = panel.add_all(&values.collect::<Vec<_>>());
+        let added = panel.add_all(values);
         let columns = [added, others.clone()].concat();
         for (weight, s) in weighted(panel, &state.noise, &columns) {
             all.push((x, weight, s));

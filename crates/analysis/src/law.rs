@@ -38,8 +38,6 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
             continue;
         };
         let departures = memory::departures(&search.view, signal);
-        let departures: Vec<Vec<f64>> = departures.flat_map(|d| d.columns).collect();
-        let degrees = departures.len() as f64;
         // What the library has of the effect, and of one that extends it, is no departure.
         let of_it = search
             .candidates
@@ -52,11 +50,12 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
         let likelihood = |columns: &[usize]| search.panel.solve(&g, columns).log_likelihood;
         let explained = 2.0 * (likelihood(&own) - likelihood(&rest));
         own.extend(of_it.flat_map(Candidate::all_columns));
-        let lr = Beside::new(&search.panel, &g, &own).gain_of(departures);
+        let beside = Beside::new(&search.panel, &g, &own);
+        let (lr, degrees) = beside.gain_of(departures.flat_map(|d| d.columns));
         let p_value = if lr < DEPARTURE * explained {
             1.0
         } else {
-            chi_tail(lr / WIDENED, degrees)
+            chi_tail(lr / WIDENED, degrees as f64)
         };
         all.push((
             effect,
@@ -134,7 +133,7 @@ pub(crate) fn holds_beside(search: &Search<'_>, state: &State, term: &Term, effe
         .flat_map(|s| memory::departures(&search.view, s))
         .flat_map(|d| d.columns);
     let width = search.panel.width();
-    let added = search.panel.add_all(&departures.collect::<Vec<_>>());
+    let added = search.panel.add_all(departures);
     let likelihood = |left_out: Option<&Term>| {
         let mut noise = Noise::new(state.noise.log_walk);
         let mut fitted = state.noise.terms.iter();

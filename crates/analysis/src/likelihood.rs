@@ -152,7 +152,10 @@ impl Panel {
     }
 
     /// Add columns of samples; returns their numbers.
-    pub(crate) fn add_all<X: AsRef<[f64]>>(&self, values: &[X]) -> Vec<usize> {
+    pub(crate) fn add_all<X: AsRef<[f64]>>(
+        &self,
+        values: impl IntoIterator<Item = X>,
+    ) -> Vec<usize> {
         let all = self.dct.forward_all(values);
         self.push(all.map(|c| Column::Whole(Rc::new(c))).collect())
     }

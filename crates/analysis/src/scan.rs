@@ -177,18 +177,15 @@ pub fn lines(panel: &Panel, noise: &Noise, columns: &[usize], solution: &Solutio
     let g = noise.everywhere(&panel.bins);
     let mut weighted = residual(panel, columns, solution);
     weighted.iter_mut().zip(&g).for_each(|(r, g)| *r /= g);
-    let energy = panel.dct.energies(&weighted, &panel.dct.inverse(&weighted));
+    let mut energy = (panel.dct).energies(&weighted, panel.dct.inverse(&weighted));
     drop(weighted);
     let count = (n - 1) as f64;
-    (0..n)
-        .map(|k| {
-            if k == 0 {
-                return 0.0;
-            }
-            let drop = energy[k] * 2.0 * g[k] / n as f64;
-            -count * (1.0 - (drop / solution.rss).min(0.999)).ln()
-        })
-        .collect()
+    energy[0] = 0.0;
+    for (energy, g) in energy.iter_mut().zip(&g).skip(1) {
+        let drop = *energy * 2.0 * g / n as f64;
+        *energy = -count * (1.0 - (drop / solution.rss).min(0.999)).ln();
+    }
+    energy
 }
 
 /// exp(i (omega t + phase)) for t = 0..n, turned on from sample to sample and set anew now and then.
@@ -365,7 +362,7 @@ pub fn beats(
         .zip(turning(n, carrier, phase))
         .map(|(v, line)| v * line.re)
         .collect();
-    let seen = panel.dct.energies(&panel.dct.forward(&moved), &moved);
+    let seen = panel.dct.energies(&panel.dct.forward(&moved), moved);
     let centre = carrier / std::f64::consts::PI * n as f64;
     let at = |k: f64| 1.0 / g[(k.round().max(1.0) as usize).min(n - 1)];
     let count = (n - 1) as f64;

@@ -80,10 +80,9 @@ fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked>
     own.sort_unstable();
     own.dedup();
     let beside = Beside::new(panel, &g, &own);
-    let asked = memory::departures(&search.view, signal).filter(|d| !d.columns.is_empty());
+    let asked = memory::departures(&search.view, signal);
     let asked = asked.map(|Departure { how, columns }| {
-        let degrees = columns.len();
-        let chi_square = beside.gain_of(columns);
+        let (chi_square, degrees) = beside.gain_of(columns);
         Asked {
             how: format!("{} {how}", signal.name),
             chi_square,
@@ -91,5 +90,5 @@ fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked>
             chance: chi_tail(chi_square / WIDENED, degrees as f64),
         }
     });
-    asked.collect()
+    asked.filter(|a| a.degrees > 0).collect()
 }

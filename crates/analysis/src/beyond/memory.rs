@@ -5,6 +5,8 @@
 //! alone are points of it. Vibration has no time constant that fits a few samples; there it is any response of that
 //! many of them.
 
+use std::rc::Rc;
+
 use model::effect::{Signal, View};
 use model::record::Quantity;
 
@@ -41,10 +43,16 @@ fn pair(values: &[f64], tau: f64) -> Vec<Vec<f64>> {
 }
 
 /// A signal and the same up to some samples later.
-fn shifted(values: &[f64]) -> Vec<Vec<f64>> {
+fn shifted(values: &[f64]) -> impl Iterator<Item = Vec<f64>> + use<> {
     let c = centred(values);
-    let at = |k: usize| (0..c.len()).map(|i| c[i.saturating_sub(k)]).collect();
-    (0..=shifts(c.len())).map(at).collect()
+    let shifts = shifts(c.len());
+    (0..=shifts).map(move |k| {
+        let before = std::iter::repeat_n(c.first().copied().unwrap_or(0.0), k.min(c.len()));
+        let mut column = Vec::with_capacity(c.len());
+        column.extend(before);
+        column.extend(&c[..c.len().saturating_sub(k)]);
+        column
+    })
 }
 
 fn shifts(samples: usize) -> usize {
@@ -99,34 +107,20 @@ pub(super) fn combinations<'a>(
                 a.name,
                 shifts(view.samples) as f64 / view.rate_hz
             ),
-            columns: Box::new(|| shifted(&a.values)),
+            columns: Box::new(|| shifted(&a.values).collect()),
         });
     }
     all
 }
 
-/// One kind of what a response may differ by: how it follows the signal then, and the columns.
-pub(crate) struct Departure {
+/// One kind of what a response may differ by: how it follows the signal then, and the columns, each made as it is asked for.
+pub(crate) struct Departure<'a> {
     pub(crate) how: &'static str,
-    pub(crate) columns: Vec<Vec<f64>>,
+    pub(crate) columns: Columns<'a>,
 }
 
-type Columns = fn(&Followed<'_>) -> Vec<Vec<f64>>;
-
-/// The kinds that any signal has.
-const OF_ANY: [(&str, Columns); 2] = [
-    ("by a bend or a drift", |f| f.bent()),
-    ("late", |f| f.late()),
-];
-/// Those that a motor's command has beside them.
-const OF_A_MOTOR: [(&str, Columns); 4] = [
-    ("behind the heat of its size", |f| f.behind_heat()),
-    ("after each of its changes", |f| after_changes(&f.scaled)),
-    ("after each change of its size", |f| {
-        after_changes(&size(f.signal))
-    }),
-    ("by its sense alone", |f| f.by_sense()),
-];
+type Columns<'a> = Box<dyn Iterator<Item = Vec<f64>> + 'a>;
+type Kind<'a> = (&'static str, fn(Rc<Followed<'a>>) -> Columns<'a>);
 
 /// Everything by which a response to a signal may differ from one that is in proportion and at once, by kind: its bend and
 /// its drift in time, its memory, and of a motor the memory of its heat, what follows its changes, and what knows no more
@@ -134,17 +128,25 @@ const OF_A_MOTOR: [(&str, Columns); 4] = [
 pub(crate) fn departures<'a>(
     view: &'a View<'_>,
     signal: &'a Signal,
-) -> impl Iterator<Item = Departure> + 'a {
-    let motor: &[_] = match signal.quantity {
-        Quantity::Pwm => &OF_A_MOTOR,
-        _ => &[],
-    };
-    let followed = Followed::new(view, signal);
-    let columns = move |(how, columns): &(&'static str, Columns)| Departure {
-        how,
-        columns: columns(&followed),
-    };
-    OF_ANY.iter().chain(motor).map(columns)
+) -> impl Iterator<Item = Departure<'a>> {
+    let of_any: [Kind<'a>; 2] = [("by a bend or a drift", bent), ("late", late)];
+    let of_a_motor: [Kind<'a>; 4] = [
+        ("behind the heat of its size", behind_heat),
+        ("after each of its changes", |f| {
+            Box::new(after_changes(&f.scaled))
+        }),
+        ("after each change of its size", |f| {
+            Box::new(after_changes(&size(f.signal)))
+        }),
+        ("by its sense alone", by_sense),
+    ];
+    let is_motor = signal.quantity == Quantity::Pwm;
+    let beside = of_a_motor.into_iter().filter(move |_| is_motor);
+    let followed = Rc::new(Followed::new(view, signal));
+    of_any.into_iter().chain(beside).map(move |(how, columns)| {
+        let columns = columns(Rc::clone(&followed));
+        Departure { how, columns }
+    })
 }
 
 /// A signal that is followed.
@@ -172,55 +174,56 @@ impl<'a> Followed<'a> {
         }
     }
 
-    fn behind(&self, values: &[f64], times: &[f64]) -> Vec<Vec<f64>> {
-        let times = resolved(self.view, times);
-        times
-            .map(|t| lagged(values, t * self.view.rate_hz))
-            .collect()
+    fn behind(
+        &self,
+        values: Vec<f64>,
+        times: &'a [f64],
+    ) -> impl Iterator<Item = Vec<f64>> + use<'a> {
+        let view = self.view;
+        resolved(view, times).map(move |t| lagged(&values, t * view.rate_hz))
     }
+}
 
-    fn bent(&self) -> Vec<Vec<f64>> {
-        let n = self.scaled.len();
-        let of = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
-            let all = self.scaled.iter().enumerate();
-            all.map(|(i, v)| f(i, *v)).collect()
-        };
-        let mut bent = vec![
-            of(&|_, v| v * v),
-            of(&|_, v| v * v * v),
-            of(&|i, v| v * (2.0 * i as f64 / n as f64 - 1.0)),
-        ];
-        // A bend anywhere: what dips, saturates or has a dead zone is no parabola.
-        let all = || self.scaled.iter();
-        let low = all().fold(f64::INFINITY, |m, v| m.min(*v));
-        let high = all().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
-        bent.extend(BENDS.iter().map(|share| {
-            let at = low + share * (high - low);
-            of(&|_, v| (v - at).max(0.0))
-        }));
-        bent
-    }
+fn bent<'a>(f: Rc<Followed<'a>>) -> Columns<'a> {
+    let n = f.scaled.len() as f64;
+    let all = || f.scaled.iter();
+    let low = all().fold(f64::INFINITY, |m, v| m.min(*v));
+    let high = all().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
+    let powers = [|v: f64| v * v, |v: f64| v * v * v].into_iter();
+    let of = Rc::clone(&f);
+    let powers = powers.map(move |power| of.scaled.iter().map(|v| power(*v)).collect());
+    let of = Rc::clone(&f);
+    let drift = std::iter::once_with(move || {
+        let all = of.scaled.iter().enumerate();
+        all.map(|(i, v)| v * (2.0 * i as f64 / n - 1.0)).collect()
+    });
+    // A bend anywhere: what dips, saturates or has a dead zone is no parabola.
+    let bends = BENDS.iter().map(move |share| {
+        let at = low + share * (high - low);
+        f.scaled.iter().map(|v| (v - at).max(0.0)).collect()
+    });
+    Box::new(powers.chain(drift).chain(bends))
+}
 
-    fn late(&self) -> Vec<Vec<f64>> {
-        let times: &[f64] = match self.signal.quantity {
-            Quantity::Acc => return shifted(&self.scaled).split_off(1),
-            Quantity::Gyro => &TURNING_S,
-            // Surges of a motor take their part of a short memory.
-            Quantity::Pwm => &COMMAND_S,
-            Quantity::Temp => &TEMPERATURE_S,
-            _ => &SUPPLY_S,
-        };
-        self.behind(&self.scaled, times)
-    }
+fn late<'a>(f: Rc<Followed<'a>>) -> Columns<'a> {
+    let times: &[f64] = match f.signal.quantity {
+        Quantity::Acc => return Box::new(shifted(&f.scaled).skip(1)),
+        Quantity::Gyro => &TURNING_S,
+        // Surges of a motor take their part of a short memory.
+        Quantity::Pwm => &COMMAND_S,
+        Quantity::Temp => &TEMPERATURE_S,
+        _ => &SUPPLY_S,
+    };
+    Box::new(f.behind(f.scaled.clone(), times))
+}
 
-    fn behind_heat(&self) -> Vec<Vec<f64>> {
-        self.behind(&centred(&size(self.signal)), &HEAT_S)
-    }
+fn behind_heat<'a>(f: Rc<Followed<'a>>) -> Columns<'a> {
+    Box::new(f.behind(centred(&size(f.signal)), &HEAT_S))
+}
 
-    fn by_sense(&self) -> Vec<Vec<f64>> {
-        let gates = GATES.iter().map(|g| sense(&self.signal.smooth, *g));
-        gates.flat_map(|s| self.behind(&s, &SENSE_S)).collect()
-    }
+fn by_sense<'a>(f: Rc<Followed<'a>>) -> Columns<'a> {
+    let of_gate = move |g| f.behind(sense(&f.signal.smooth, g), &SENSE_S);
+    Box::new(GATES.into_iter().flat_map(of_gate))
 }
 
 /// The sense of a command that is beyond a share of its largest, and 0 below it.
@@ -255,7 +258,8 @@ const AFTER: [(usize, usize); 12] = [
 
 /// What follows each change of a series in proportion, in each stretch after it. A series that changes more often than in one
 /// of sixteen samples has no stretches of its own.
-fn after_changes(values: &[f64]) -> Vec<Vec<f64>> {
+fn after_changes(values: &[f64]) -> impl Iterator<Item = Vec<f64>> + use<> {
+    let n = values.len();
     let steps = values
         .windows(2)
         .enumerate()
@@ -264,20 +268,18 @@ fn after_changes(values: &[f64]) -> Vec<Vec<f64>> {
     let events: Vec<(usize, f64)> = steps
         .filter(|(_, d)| d.abs() > LEAST_STEP * largest)
         .collect();
-    if events.is_empty() || events.len() > values.len() / 16 {
-        return vec![];
-    }
-    let stretch = |(from, to): &(usize, usize)| {
-        let mut column = vec![0.0; values.len()];
+    let seldom = !events.is_empty() && events.len() <= n / 16;
+    let asked = AFTER.iter().filter(move |_| seldom);
+    asked.map(move |(from, to)| {
+        let mut column = vec![0.0; n];
         for (at, change) in &events {
-            let range = (at + from).min(values.len())..(at + to).min(values.len());
+            let range = (at + from).min(n)..(at + to).min(n);
             column[range]
                 .iter_mut()
                 .for_each(|v| *v += change / largest);
         }
         column
-    };
-    AFTER.iter().map(stretch).collect()
+    })
 }
 
 /// Smallest change that counts, over the largest.
@@ -331,7 +333,7 @@ mod tests {
             .collect();
         let c = centred(&x);
         let y: Vec<f64> = (0..c.len()).map(|i| c[i.saturating_sub(3)]).collect();
-        assert!(spanned(&shifted(&x), &y) > 0.999);
+        assert!(spanned(&shifted(&x).collect::<Vec<_>>(), &y) > 0.999);
         assert!(spanned(&[c], &y) < 0.01);
     }
 }

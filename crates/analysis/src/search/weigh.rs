@@ -186,7 +186,7 @@ impl Search<'_> {
         let width = self.panel.width();
         let minus_l = |x: f64| {
             let columns = shape.columns(x.exp()).into_iter().map(|c| c.values);
-            let added = self.panel.add_all(&columns.collect::<Vec<_>>());
+            let added = self.panel.add_all(columns);
             let l = self.panel.profile(walks, &[own, &added].concat());
             self.panel.truncate(width);
             -l
