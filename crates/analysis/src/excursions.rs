@@ -15,6 +15,7 @@ use crate::checks::LEAST_CHANCE;
 use crate::column::dot;
 use crate::grid::{MOTION_RMS, white_by_differences};
 use crate::threshold;
+use crate::wide::wide;
 
 /// Shortest and longest turn, s: a blow rings for less; what takes longer is drift to a gyro that warms up.
 const SHORTEST_S: f64 = 0.8;
@@ -162,11 +163,10 @@ fn places(y: &[f64], white: f64, rate_hz: f64) -> (Vec<Place>, f64) {
     let mut places = vec![];
     for block in blocks {
         let means = means(y, block);
-        let energy = |w: &[f64]| basis[1..].iter().map(|b| dot(b, w).powi(2)).sum();
-        if !largest_reach(&means, least, &energy) {
+        if !largest_reach(&means, least, &basis[1..]) {
             continue;
         }
-        let energies: Vec<f64> = means.windows(WINDOW).map(energy).collect();
+        let energies: Vec<f64> = (means.windows(WINDOW).map(|w| energy(w, &basis[1..]))).collect();
         let mut sorted = energies.clone();
         let middle = sorted.len() / 2;
         let usual = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN;
@@ -183,21 +183,35 @@ fn places(y: &[f64], white: f64, rate_hz: f64) -> (Vec<Place>, f64) {
     (places, limit)
 }
 
-/// Whether the energy of the series is more than `least` in any window. It is asked only where the sum of squares, of which
-/// it is a part, is.
-fn largest_reach(means: &[f64], least: f64, energy: &dyn Fn(&[f64]) -> f64) -> bool {
+/// Energy of the series in a window.
+#[inline(always)]
+fn energy(window: &[f64], basis: &[Vec<f64>]) -> f64 {
+    basis.iter().map(|b| dot(b, window).powi(2)).sum()
+}
+
+wide! {
+    /// Whether the energy of the series is more than `least` in any window.
+    fn largest_reach[](means: &[f64], least: f64, basis: &[Vec<f64>]) -> bool = any_reaches
+}
+
+/// The energy is asked only where the sum of squares, of which it is a part, is.
+#[inline(always)]
+fn any_reaches(means: &[f64], least: f64, basis: &[Vec<f64>]) -> bool {
     let level = means.iter().sum::<f64>() / means.len().max(1) as f64;
     let square = |v: f64| (v - level) * (v - level);
     let mut sum = 0.0;
-    means.windows(WINDOW).enumerate().any(|(i, w)| {
+    for (i, w) in means.windows(WINDOW).enumerate() {
         // Anew now and then: what is added and taken off again leaves its rounding.
         sum = if i % WINDOW == 0 {
             w.iter().map(|v| square(*v)).sum()
         } else {
             sum + square(w[WINDOW - 1]) - square(means[i - 1])
         };
-        sum > 0.99 * least && energy(w) > least
-    })
+        if sum > 0.99 * least && energy(w, basis) > least {
+            return true;
+        }
+    }
+    false
 }
 
 /// Samples of a block for each length that is looked for, 2^1/2 apart.

@@ -17,15 +17,21 @@ use crate::wide::wide;
 
 /// Two sums over the samples' bits and places: columns that agree in both are the same.
 fn digest(x: &[f64]) -> [u64; 2] {
+    const BY: [u64; 2] = [0x9e37_79b9_7f4a_7c15, 0xc2b2_ae3d_27d4_eb4f];
     let step = |h: u64, v: u64, by: u64| (h ^ v).wrapping_mul(by).rotate_left(29);
-    x.iter()
-        .fold([0x243f_6a88_85a3_08d3, x.len() as u64], |[a, b], v| {
-            let bits = v.to_bits();
-            [
-                step(a, bits, 0x9e37_79b9_7f4a_7c15),
-                step(b, bits, 0xc2b2_ae3d_27d4_eb4f),
-            ]
-        })
+    let both = |sums: [u64; 2], v: u64| [step(sums[0], v, BY[0]), step(sums[1], v, BY[1])];
+    // Every fourth sample in sums of its own: none waits for the one before.
+    let (fours, rest) = x.as_chunks::<4>();
+    let mut sums = [[0x243f_6a88_85a3_08d3, x.len() as u64]; 4];
+    for four in fours {
+        for (sums, v) in sums.iter_mut().zip(four) {
+            *sums = both(*sums, v.to_bits());
+        }
+    }
+    let start = rest.iter().fold([0; 2], |all, v| both(all, v.to_bits()));
+    sums.into_iter().fold(start, |all, sums| {
+        [step(all[0], sums[0], BY[0]), step(all[1], sums[1], BY[1])]
+    })
 }
 
 /// Sums over bins by pair of columns.
@@ -70,9 +76,9 @@ impl Panel {
 
     /// A panel on the first of these sequences, which the others may explain; they are columns 0, 1 and so on.
     pub(crate) fn of_all(dct: &Dct, bins: &Rc<Bins>, all: &[&[f64]]) -> Self {
-        let (data, others) = all.split_at(1);
-        let panel = Self::new(dct, bins, data[0]);
-        panel.push(dct.columns(others));
+        let panel = Self::of(dct, bins, Rc::default());
+        panel.columns.borrow_mut().clear();
+        panel.add_all(all);
         panel
     }
 

@@ -160,6 +160,12 @@ impl RealFft {
         Self { n, packed }
     }
 
+    /// Samples.
+    #[must_use]
+    pub fn length(&self) -> usize {
+        self.n
+    }
+
     /// Transform x, of which x[2j] + i x[2j + 1] is `x(j)`, and hand F[k] of k = 0 ..= n/2 to `take`, in any order.
     pub fn run(
         &self,
@@ -426,31 +432,77 @@ fn inverse_of_two(packed: &Packed<f64>, c: &[f64], d: &[f64]) -> [Vec<f64>; 2] {
     [a, b]
 }
 
+wide! {
+    /// The spectrum, conjugated, of the packed sequence that has these coefficients.
+    fn spectrum[](c: &[f64], turns: &Turns<f64>, half: [f64; 2], z: &mut [Complex<f64>]) -> ()
+    = spectrum_of
+}
+
+#[inline(always)]
+fn spectrum_of(c: &[f64], turns: &Turns<f64>, half: [f64; 2], z: &mut [Complex<f64>]) {
+    let (h, n) = (z.len(), c.len());
+    let one = |k: usize, turn: Complex<f64>, z: &mut [Complex<f64>]| {
+        let v = match k {
+            0 => Complex::new(SQRT_2 * c[0], 0.0),
+            k => Complex::new(c[k], -c[n - k]),
+        };
+        let w = Complex::new(c[h - k] + c[h + k], c[h + k] - c[h - k]);
+        let (low, high) = returned(v, w, turn, half);
+        z[k] = low;
+        if k > 0 {
+            z[h - k] = high;
+        }
+    };
+    let coarse = turns
+        .coarse
+        .iter()
+        .zip((0..=h / 2).step_by(Turns::<f64>::FINE));
+    for (coarse, from) in coarse {
+        let fine = turns.fine.as_chunks::<ABREAST>().0.iter();
+        for (fine, k) in fine.zip((from..=h / 2).step_by(ABREAST)) {
+            let last = k + ABREAST - 1;
+            if k == 0 || last >= h / 2 {
+                let alone = fine.iter().zip(k..=h / 2);
+                alone.for_each(|(fine, k)| one(k, coarse * fine, z));
+                continue;
+            }
+            let (low, high) = (&c[k..=last], &c[n - last..=n - k]);
+            let (below, above) = (&c[h - last..=h - k], &c[h + k..=h + last]);
+            let v = Abreast::of(|i| Complex::new(low[i], -high[ABREAST - 1 - i]));
+            let w = Abreast::of(|i| {
+                let below = below[ABREAST - 1 - i];
+                Complex::new(below + above[i], above[i] - below)
+            });
+            let turn = Abreast::of(|_| *coarse) * Abreast::of(|i| fine[i]);
+            let (low, high) = returned(v, w, turn, half);
+            for i in 0..ABREAST {
+                z[k + i] = Complex::new(low.re[i], low.im[i]);
+                z[h - k - i] = Complex::new(high.re[i], high.im[i]);
+            }
+        }
+    }
+}
+
+/// The steps of [`turned`], back.
+#[inline(always)]
+fn returned<Z: Plane>(v: Z, w: Z, turn: Z, half: [Z::Real; 2]) -> (Z, Z) {
+    let back = turn.conjugate();
+    let (f, g) = ((v * back).by(half[0]), (w * back).by(half[1]));
+    let square = back * back;
+    let odd = ((f - g) * square * square).quarter_back();
+    let even = f + g;
+    ((even - odd).conjugate(), even + odd)
+}
+
 /// The steps of [`forward_of_one`], back, by a transform forwards of what is conjugated.
 fn inverse_of_one(packed: &Packed<f64>, c: &[f64]) -> Vec<f64> {
     let n = c.len();
     let h = n / 2;
     let half = 0.5 * (0.5 * n as f64).sqrt() / h as f64;
     let mut x = vec![0.0; n];
+    let half = [half, half * FRAC_1_SQRT_2];
     packed.run(
-        |z| {
-            packed.plan.turn.each(h / 2 + 1, |k, turn| {
-                let v = match k {
-                    0 => Complex::new(SQRT_2 * c[0], 0.0),
-                    k => Complex::new(c[k], -c[n - k]),
-                };
-                let w = Complex::new(c[h - k] + c[h + k], c[h + k] - c[h - k]);
-                let back = turn.conj();
-                let (f, g) = (v * back * half, w * back * (half * FRAC_1_SQRT_2));
-                let square = back * back;
-                let odd = (f - g) * square * square;
-                let (even, odd) = (f + g, Complex::new(-odd.im, odd.re));
-                z[k] = (even + odd).conj();
-                if k > 0 {
-                    z[h - k] = even - odd;
-                }
-            });
-        },
+        |z| spectrum(c, &packed.plan.turn, half, z),
         |z, _| {
             let (fours, last) = x.as_chunks_mut::<4>();
             for (j, four) in fours.iter_mut().enumerate() {

@@ -231,8 +231,8 @@ fn products_about(e: &[f64], span: usize) -> Vec<f64> {
 }
 
 /// Chi-square (two degrees) of the strongest line of a series over the level of the others, its frequency in cycles per
-/// sample, and at how many frequencies one was sought.
-fn strongest_line(series: &[f64]) -> Option<(f64, f64, usize)> {
+/// sample, and at how many frequencies one was sought. The transform is kept for a series of the same length.
+fn strongest_line(series: &[f64], fft: &mut Option<RealFft>) -> Option<(f64, f64, usize)> {
     let n = series.len() / 2 * 2;
     if n < 8 * SLOWEST {
         return None;
@@ -244,7 +244,9 @@ fn strongest_line(series: &[f64]) -> Option<(f64, f64, usize)> {
         _ => Complex::default(),
     };
     let mut power = vec![0.0; n + 1];
-    RealFft::new(2 * n).run(pair, |k, f| power[k] = f.norm_sqr());
+    let known = fft.take().filter(|f| f.length() == 2 * n);
+    let fft = fft.insert(known.unwrap_or_else(|| RealFft::new(2 * n)));
+    fft.run(pair, |k, f| power[k] = f.norm_sqr());
     let mut sorted = power[SLOWEST..].to_vec();
     let count = sorted.len();
     let (_, median, _) = sorted.select_nth_unstable_by(count / 2, f64::total_cmp);
@@ -261,10 +263,14 @@ pub(crate) const RHYTHM: &str = "variance_rhythm";
 /// A rhythm of the variance, or of how neighbours depend on each other: the strongest line of the squares of the whitened
 /// residual, or of its products. What is held, switched or coded by a clock of its own has one.
 pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
-    let e = &e[..e.len().min(MOST)];
+    let mut fft = None;
     let found = SPANS
         .iter()
-        .filter_map(|span| Some((*span, strongest_line(&products_about(e, *span))?)))
+        .filter_map(|span| {
+            // Of a long record as many products of every span.
+            let e = &e[..e.len().min(MOST + span)];
+            Some((*span, strongest_line(&products_about(e, *span), &mut fft)?))
+        })
         .max_by(|a, b| a.1.0.total_cmp(&b.1.0));
     let Some((span, (statistic, at, count))) = found else {
         return Outcome {
