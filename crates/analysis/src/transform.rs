@@ -3,7 +3,7 @@
 
 use std::cell::{Cell, OnceCell, RefCell};
 use std::collections::{HashMap, HashSet};
-use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
+use std::f64::consts::PI;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -11,10 +11,13 @@ use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
 use crate::column::{Column, LONG, sum_of};
-use crate::wide::wide;
-use abreast::{ABREAST, Abreast, Number, Plane, each};
+use abreast::{Number, Plane};
+use even::{forward_of_one, inverse_of_one};
+use odd::{forward_of_two, inverse_of_two};
 
 mod abreast;
+mod even;
+mod odd;
 
 /// Longest transform whose plan is kept for the next one who asks on the same thread, and most of them.
 const KEPT: usize = 1 << 17;
@@ -264,257 +267,6 @@ impl About<'_> {
     fn number<T: Number>(self, v: f64) -> T {
         T::of(v - self.level)
     }
-}
-
-wide! {
-    /// Even samples forwards, then odd ones backwards, two a complex number.
-    fn laid_out[T: Number](x: About, z: &mut [Complex<T>]) -> () = laid_out_in
-}
-
-#[inline(always)]
-fn laid_out_in<T: Number>(x: About, z: &mut [Complex<T>]) {
-    let (fours, last) = x.samples.as_chunks::<4>();
-    let (first, second) = z.split_at_mut(fours.len());
-    for ((four, z), mirrored) in fours.iter().zip(first).zip(second.iter_mut().rev()) {
-        let [a, b, c, d] = four.map(|v| x.number(v));
-        *z = Complex::new(a, c);
-        *mirrored = Complex::new(d, b);
-    }
-    if let [a, b] = last {
-        second[0] = Complex::new(x.number(*a), x.number(*b));
-    }
-}
-
-wide! {
-    /// Coefficients from the transform z of a packed sequence, by the scales of all and of those an eighth of a circle on.
-    fn coefficients[T: Number](z: &[Complex<T>], turns: &Turns<T>, scale: [T; 2], c: &mut [T]) -> ()
-    = coefficients_of
-}
-
-#[inline(always)]
-fn coefficients_of<T: Number>(z: &[Complex<T>], turns: &Turns<T>, scale: [T; 2], c: &mut [T]) {
-    let (h, n) = (z.len(), c.len());
-    let coarse = turns
-        .coarse
-        .iter()
-        .zip((0..=h / 2).step_by(Turns::<T>::FINE));
-    for (coarse, from) in coarse {
-        let fine = turns.fine.as_chunks::<ABREAST>().0.iter();
-        for (fine, k) in fine.zip((from..=h / 2).step_by(ABREAST)) {
-            let last = k + ABREAST - 1;
-            if k == 0 || last >= h / 2 {
-                for (fine, k) in fine.iter().zip(k..=h / 2) {
-                    let mirrored = z[if k == 0 { 0 } else { h - k }];
-                    let [v, w] = turned(z[k], mirrored, *coarse * *fine, scale);
-                    (c[k], c[h - k], c[h + k]) = (v.re, w.re - w.im, w.re + w.im);
-                    if k > 0 {
-                        c[n - k] = -v.im;
-                    }
-                }
-                continue;
-            }
-            let (a, b) = (&z[k..=last], &z[h - last..=h - k]);
-            let a = Abreast::of(|i| a[i]);
-            let b = Abreast::of(|i| b[ABREAST - 1 - i]);
-            let turn = Abreast::of(|_| *coarse) * Abreast::of(|i| fine[i]);
-            let [v, w] = turned(a, b, turn, scale);
-            let mut below = each(w.re, w.im, |a, b| a - b);
-            let mut high = each(v.im, v.im, |a, _| -a);
-            below.reverse();
-            high.reverse();
-            c[k..=last].copy_from_slice(&v.re);
-            c[h - last..=h - k].copy_from_slice(&below);
-            c[h + k..=h + last].copy_from_slice(&each(w.re, w.im, |a, b| a + b));
-            c[n - last..=n - k].copy_from_slice(&high);
-        }
-    }
-}
-
-/// Coefficients k and n - k in the parts of the first, those about h in the second: the turn at h - k is that at k
-/// conjugated, by an eighth of a circle.
-#[inline(always)]
-fn turned<Z: Plane>(a: Z, b: Z, turn: Z, scale: [Z::Real; 2]) -> [Z; 2] {
-    let (f, g) = both(a, b, turn);
-    [(f * turn).by(scale[0]), (g * turn).by(scale[1])]
-}
-
-/// The orthonormal DCT-II of a sequence of even length.
-fn forward_of_one<T: Number>(packed: &Packed<T>, x: About) -> Vec<T> {
-    let n = x.samples.len();
-    let mut c = vec![T::zero(); n];
-    // The spectrum of what is laid out, turned by k/4 of a sample, holds coefficient k in its
-    // real part and n - k in its imaginary one.
-    let scale = T::of((2.0 / n as f64).sqrt());
-    let of_eighth = T::of((2.0 / n as f64).sqrt() * FRAC_1_SQRT_2);
-    packed.run(
-        |z| laid_out(x, z),
-        |z, turns| coefficients(z, turns, [scale, of_eighth], &mut c),
-    );
-    c[0] = c[0] * T::of(FRAC_1_SQRT_2) + T::of(x.level * (n as f64).sqrt());
-    c
-}
-
-/// The orthonormal DCT-II of two sequences of one odd length, or of the first alone where the second is empty.
-fn forward_of_two<T: Number>(packed: &Packed<T>, a: About, b: About) -> [Vec<T>; 2] {
-    let [mut c, mut d] = [a, b].map(|x| vec![T::zero(); x.samples.len()]);
-    let x = |i: usize| {
-        let second = b.samples.get(i).map_or(T::zero(), |v| b.number(*v));
-        Complex::new(a.number(a.samples[i]), second)
-    };
-    packed.run(
-        // Even samples forwards, then odd ones backwards.
-        |z| {
-            let (even, odd) = z.split_at_mut(a.samples.len().div_ceil(2));
-            let even = even.iter_mut().zip((0..).step_by(2));
-            even.for_each(|(z, i)| *z = x(i));
-            let odd = odd.iter_mut().rev().zip((1..).step_by(2));
-            odd.for_each(|(z, i)| *z = x(i));
-        },
-        |z, turns| {
-            let n = z.len();
-            let scale = T::of((0.5 / n as f64).sqrt());
-            let (root, level) = (T::of(SQRT_2), (n as f64).sqrt());
-            let mut put = |k: usize, v: T, w: T| {
-                c[k] = v;
-                d.get_mut(k).into_iter().for_each(|d| *d = w);
-            };
-            turns.each(n.div_ceil(2), |k, turn| {
-                let turn = turn * scale;
-                if k == 0 {
-                    let [v, w] = [(z[0].re, a), (z[0].im, b)]
-                        .map(|(z, x)| root * turn.re * z + T::of(x.level * level));
-                    put(0, v, w);
-                    return;
-                }
-                let mirrored = z[n - k].conj();
-                let (sum, off) = (z[k] + mirrored, z[k] - mirrored);
-                let (v, w) = (sum * turn, Complex::new(off.im, -off.re) * turn);
-                put(k, v.re, w.re);
-                put(n - k, -v.im, -w.im);
-            });
-        },
-    );
-    [c, d]
-}
-
-/// The steps of [`forward_of_two`], back, by a transform forwards of what is conjugated.
-fn inverse_of_two(packed: &Packed<f64>, c: &[f64], d: &[f64]) -> [Vec<f64>; 2] {
-    let [mut a, mut b] = [c, d].map(|x| vec![0.0; x.len()]);
-    let second = |k: usize| d.get(k).copied().unwrap_or(0.0);
-    packed.run(
-        |z| {
-            let n = z.len();
-            let scale = (0.5 / n as f64).sqrt();
-            packed.plan.turn.each(n.div_ceil(2), |k, turn| {
-                let back = turn.conj() * scale;
-                if k == 0 {
-                    z[0] = Complex::new(c[0], -second(0)) * (SQRT_2 * back.re);
-                    return;
-                }
-                let v = Complex::new(c[k], -c[n - k]) * back;
-                let w = Complex::new(second(k), -second(n - k)) * back;
-                z[k] = Complex::new(v.re - w.im, -v.im - w.re);
-                z[n - k] = Complex::new(v.re + w.im, v.im - w.re);
-            });
-        },
-        |z, _| {
-            let mut put = |i: usize, z: &Complex<f64>| {
-                a[i] = z.re;
-                b.get_mut(i).into_iter().for_each(|b| *b = -z.im);
-            };
-            let (even, odd) = z.split_at(z.len().div_ceil(2));
-            let even = even.iter().zip((0..).step_by(2));
-            even.for_each(|(z, i)| put(i, z));
-            let odd = odd.iter().rev().zip((1..).step_by(2));
-            odd.for_each(|(z, i)| put(i, z));
-        },
-    );
-    [a, b]
-}
-
-wide! {
-    /// The spectrum, conjugated, of the packed sequence that has these coefficients.
-    fn spectrum[](c: &[f64], turns: &Turns<f64>, half: [f64; 2], z: &mut [Complex<f64>]) -> ()
-    = spectrum_of
-}
-
-#[inline(always)]
-fn spectrum_of(c: &[f64], turns: &Turns<f64>, half: [f64; 2], z: &mut [Complex<f64>]) {
-    let (h, n) = (z.len(), c.len());
-    let one = |k: usize, turn: Complex<f64>, z: &mut [Complex<f64>]| {
-        let v = match k {
-            0 => Complex::new(SQRT_2 * c[0], 0.0),
-            k => Complex::new(c[k], -c[n - k]),
-        };
-        let w = Complex::new(c[h - k] + c[h + k], c[h + k] - c[h - k]);
-        let (low, high) = returned(v, w, turn, half);
-        z[k] = low;
-        if k > 0 {
-            z[h - k] = high;
-        }
-    };
-    let coarse = turns
-        .coarse
-        .iter()
-        .zip((0..=h / 2).step_by(Turns::<f64>::FINE));
-    for (coarse, from) in coarse {
-        let fine = turns.fine.as_chunks::<ABREAST>().0.iter();
-        for (fine, k) in fine.zip((from..=h / 2).step_by(ABREAST)) {
-            let last = k + ABREAST - 1;
-            if k == 0 || last >= h / 2 {
-                let alone = fine.iter().zip(k..=h / 2);
-                alone.for_each(|(fine, k)| one(k, coarse * fine, z));
-                continue;
-            }
-            let (low, high) = (&c[k..=last], &c[n - last..=n - k]);
-            let (below, above) = (&c[h - last..=h - k], &c[h + k..=h + last]);
-            let v = Abreast::of(|i| Complex::new(low[i], -high[ABREAST - 1 - i]));
-            let w = Abreast::of(|i| {
-                let below = below[ABREAST - 1 - i];
-                Complex::new(below + above[i], above[i] - below)
-            });
-            let turn = Abreast::of(|_| *coarse) * Abreast::of(|i| fine[i]);
-            let (low, high) = returned(v, w, turn, half);
-            for i in 0..ABREAST {
-                z[k + i] = Complex::new(low.re[i], low.im[i]);
-                z[h - k - i] = Complex::new(high.re[i], high.im[i]);
-            }
-        }
-    }
-}
-
-/// The steps of [`turned`], back.
-#[inline(always)]
-fn returned<Z: Plane>(v: Z, w: Z, turn: Z, half: [Z::Real; 2]) -> (Z, Z) {
-    let back = turn.conjugate();
-    let (f, g) = ((v * back).by(half[0]), (w * back).by(half[1]));
-    let square = back * back;
-    let odd = ((f - g) * square * square).quarter_back();
-    let even = f + g;
-    ((even - odd).conjugate(), even + odd)
-}
-
-/// The steps of [`forward_of_one`], back, by a transform forwards of what is conjugated.
-fn inverse_of_one(packed: &Packed<f64>, c: &[f64]) -> Vec<f64> {
-    let n = c.len();
-    let h = n / 2;
-    let half = 0.5 * (0.5 * n as f64).sqrt() / h as f64;
-    let mut x = vec![0.0; n];
-    let half = [half, half * FRAC_1_SQRT_2];
-    packed.run(
-        |z| spectrum(c, &packed.plan.turn, half, z),
-        |z, _| {
-            let (fours, last) = x.as_chunks_mut::<4>();
-            for (j, four) in fours.iter_mut().enumerate() {
-                let (a, b) = (z[j], z[h - 1 - j]);
-                *four = [a.re, -b.im, -a.im, b.re];
-            }
-            if let [a, b] = last {
-                (*a, *b) = (z[h / 2].re, -z[h / 2].im);
-            }
-        },
-    );
-    x
 }
 
 /// How a cosine transform is made.
