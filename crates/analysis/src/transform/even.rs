@@ -27,6 +27,32 @@ fn laid_out_in<T: Number>(x: About, z: &mut [Complex<T>]) {
     }
 }
 
+impl<T: Number> Turns<T> {
+    /// Work on those of k = 0 ..= h/2, side by side where neither end is among them.
+    #[inline(always)]
+    fn to_half<O>(
+        &self,
+        h: usize,
+        out: &mut [O],
+        one: impl Fn(usize, Complex<T>, &mut [O]),
+        some: impl Fn(usize, Abreast<T>, &mut [O]),
+    ) {
+        let coarse = self.coarse.iter().zip((0..=h / 2).step_by(Self::FINE));
+        for (coarse, from) in coarse {
+            let fine = self.fine.as_chunks::<ABREAST>().0.iter();
+            for (fine, k) in fine.zip((from..=h / 2).step_by(ABREAST)) {
+                if k == 0 || k + ABREAST > h / 2 {
+                    let alone = fine.iter().zip(k..=h / 2);
+                    alone.for_each(|(fine, k)| one(k, coarse * fine, out));
+                } else {
+                    let turn = Abreast::of(|_| *coarse) * Abreast::of(|i| fine[i]);
+                    some(k, turn, out);
+                }
+            }
+        }
+    }
+}
+
 wide! {
     /// Coefficients from the transform z of a packed sequence, by the scales of all and of those an eighth of a circle on.
     fn coefficients[T: Number](z: &[Complex<T>], turns: &Turns<T>, scale: [T; 2], c: &mut [T]) -> ()
@@ -36,40 +62,30 @@ wide! {
 #[inline(always)]
 fn coefficients_of<T: Number>(z: &[Complex<T>], turns: &Turns<T>, scale: [T; 2], c: &mut [T]) {
     let (h, n) = (z.len(), c.len());
-    let coarse = turns
-        .coarse
-        .iter()
-        .zip((0..=h / 2).step_by(Turns::<T>::FINE));
-    for (coarse, from) in coarse {
-        let fine = turns.fine.as_chunks::<ABREAST>().0.iter();
-        for (fine, k) in fine.zip((from..=h / 2).step_by(ABREAST)) {
-            let last = k + ABREAST - 1;
-            if k == 0 || last >= h / 2 {
-                for (fine, k) in fine.iter().zip(k..=h / 2) {
-                    let mirrored = z[if k == 0 { 0 } else { h - k }];
-                    let [v, w] = turned(z[k], mirrored, *coarse * *fine, scale);
-                    (c[k], c[h - k], c[h + k]) = (v.re, w.re - w.im, w.re + w.im);
-                    if k > 0 {
-                        c[n - k] = -v.im;
-                    }
-                }
-                continue;
-            }
-            let (a, b) = (&z[k..=last], &z[h - last..=h - k]);
-            let a = Abreast::of(|i| a[i]);
-            let b = Abreast::of(|i| b[ABREAST - 1 - i]);
-            let turn = Abreast::of(|_| *coarse) * Abreast::of(|i| fine[i]);
-            let [v, w] = turned(a, b, turn, scale);
-            let mut below = each(w.re, w.im, |a, b| a - b);
-            let mut high = each(v.im, v.im, |a, _| -a);
-            below.reverse();
-            high.reverse();
-            c[k..=last].copy_from_slice(&v.re);
-            c[h - last..=h - k].copy_from_slice(&below);
-            c[h + k..=h + last].copy_from_slice(&each(w.re, w.im, |a, b| a + b));
-            c[n - last..=n - k].copy_from_slice(&high);
+    let one = |k: usize, turn: Complex<T>, c: &mut [T]| {
+        let mirrored = z[if k == 0 { 0 } else { h - k }];
+        let [v, w] = turned(z[k], mirrored, turn, scale);
+        (c[k], c[h - k], c[h + k]) = (v.re, w.re - w.im, w.re + w.im);
+        if k > 0 {
+            c[n - k] = -v.im;
         }
-    }
+    };
+    let some = |k: usize, turn: Abreast<T>, c: &mut [T]| {
+        let last = k + ABREAST - 1;
+        let (a, b) = (&z[k..=last], &z[h - last..=h - k]);
+        let a = Abreast::of(|i| a[i]);
+        let b = Abreast::of(|i| b[ABREAST - 1 - i]);
+        let [v, w] = turned(a, b, turn, scale);
+        let mut below = each(w.re, w.im, |a, b| a - b);
+        let mut high = each(v.im, v.im, |a, _| -a);
+        below.reverse();
+        high.reverse();
+        c[k..=last].copy_from_slice(&v.re);
+        c[h - last..=h - k].copy_from_slice(&below);
+        c[h + k..=h + last].copy_from_slice(&each(w.re, w.im, |a, b| a + b));
+        c[n - last..=n - k].copy_from_slice(&high);
+    };
+    turns.to_half(h, c, one, some);
 }
 
 /// Coefficients k and n - k in the parts of the first, those about h in the second: the turn at h - k is that at k
@@ -84,8 +100,8 @@ fn turned<Z: Plane>(a: Z, b: Z, turn: Z, scale: [Z::Real; 2]) -> [Z; 2] {
 pub(super) fn forward_of_one<T: Number>(packed: &Packed<T>, x: About) -> Vec<T> {
     let n = x.samples.len();
     let mut c = vec![T::zero(); n];
-    // The spectrum of what is laid out, turned by k/4 of a sample, holds coefficient k in its
-    // real part and n - k in its imaginary one.
+    // The spectrum of what is laid out, turned by k/4 of a sample, holds coefficient k in its real part and n - k in its
+    // imaginary one.
     let scale = T::of((2.0 / n as f64).sqrt());
     let of_eighth = T::of((2.0 / n as f64).sqrt() * FRAC_1_SQRT_2);
     packed.run(
@@ -117,34 +133,22 @@ fn spectrum_of(c: &[f64], turns: &Turns<f64>, half: [f64; 2], z: &mut [Complex<f
             z[h - k] = high;
         }
     };
-    let coarse = turns
-        .coarse
-        .iter()
-        .zip((0..=h / 2).step_by(Turns::<f64>::FINE));
-    for (coarse, from) in coarse {
-        let fine = turns.fine.as_chunks::<ABREAST>().0.iter();
-        for (fine, k) in fine.zip((from..=h / 2).step_by(ABREAST)) {
-            let last = k + ABREAST - 1;
-            if k == 0 || last >= h / 2 {
-                let alone = fine.iter().zip(k..=h / 2);
-                alone.for_each(|(fine, k)| one(k, coarse * fine, z));
-                continue;
-            }
-            let (low, high) = (&c[k..=last], &c[n - last..=n - k]);
-            let (below, above) = (&c[h - last..=h - k], &c[h + k..=h + last]);
-            let v = Abreast::of(|i| Complex::new(low[i], -high[ABREAST - 1 - i]));
-            let w = Abreast::of(|i| {
-                let below = below[ABREAST - 1 - i];
-                Complex::new(below + above[i], above[i] - below)
-            });
-            let turn = Abreast::of(|_| *coarse) * Abreast::of(|i| fine[i]);
-            let (low, high) = returned(v, w, turn, half);
-            for i in 0..ABREAST {
-                z[k + i] = Complex::new(low.re[i], low.im[i]);
-                z[h - k - i] = Complex::new(high.re[i], high.im[i]);
-            }
+    let some = |k: usize, turn: Abreast<f64>, z: &mut [Complex<f64>]| {
+        let last = k + ABREAST - 1;
+        let (low, high) = (&c[k..=last], &c[n - last..=n - k]);
+        let (below, above) = (&c[h - last..=h - k], &c[h + k..=h + last]);
+        let v = Abreast::of(|i| Complex::new(low[i], -high[ABREAST - 1 - i]));
+        let w = Abreast::of(|i| {
+            let below = below[ABREAST - 1 - i];
+            Complex::new(below + above[i], above[i] - below)
+        });
+        let (low, high) = returned(v, w, turn, half);
+        for i in 0..ABREAST {
+            z[k + i] = Complex::new(low.re[i], low.im[i]);
+            z[h - k - i] = Complex::new(high.re[i], high.im[i]);
         }
-    }
+    };
+    turns.to_half(h, z, one, some);
 }
 
 /// The steps of [`turned`], back.
