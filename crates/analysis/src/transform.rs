@@ -257,9 +257,14 @@ impl About<'_> {
         About { samples, level }
     }
 
-    /// Short numbers would spend their digits on the level.
-    fn mean(samples: &[f64]) -> About<'_> {
-        let level = sum_of(samples, |v| v) / samples.len().max(1) as f64;
+    /// Short numbers would spend their digits on the level: about as much of it as some stretches tell.
+    fn level(samples: &[f64]) -> About<'_> {
+        const STRETCH: usize = 64;
+        const EVERY: usize = 16;
+        let some = || samples.chunks(STRETCH).step_by(EVERY);
+        let sum: f64 = some().map(|few| sum_of(few, |v| v)).sum();
+        let count: usize = some().map(<[f64]>::len).sum();
+        let level = sum / count.max(1) as f64;
         About { samples, level }
     }
 
@@ -398,7 +403,7 @@ impl Dct {
         all: impl IntoIterator<Item = X>,
     ) -> impl Iterator<Item = Vec<f32>> {
         let new = || Kind::new(self.n, Plan::new(self.n));
-        self.short.get_or_init(new).forward_all(all, About::mean)
+        self.short.get_or_init(new).forward_all(all, About::level)
     }
 
     /// Samples of several, as [`Dct::forward_all`].
