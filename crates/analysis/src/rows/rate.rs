@@ -28,17 +28,19 @@ pub(super) fn ratio(a: &[i64], b: &[i64]) -> Option<f64> {
             .map(|(a, b)| ((a[1] - a[0]) as f64, (b[1] - b[0]) as f64))
             .filter(|(a, b)| a / b > 0.0 && (a / b).is_finite())
     };
-    let (low, high) = steps().fold((f64::INFINITY, 0.0f64), |s, (a, b)| {
-        (s.0.min(a / b), s.1.max(a / b))
-    });
-    // Which of them is usual does not matter where all are alike.
-    let usual = if high - low < 0.49 * low {
-        low
-    } else {
-        median(&steps().map(|(a, b)| a / b).collect::<Vec<_>>())
-    };
-    let alike = steps().filter(|(a, b)| (a / b - usual).abs() < 0.5 * usual);
-    let (over, under) = alike.fold((0.0, 0.0), |s, (a, b)| (s.0 + a.abs(), s.1 + b.abs()));
+    let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+    let (mut over, mut under) = (0.0, 0.0);
+    for (a, b) in steps() {
+        let step = a / b;
+        (low, high) = (low.min(step), high.max(step));
+        (over, under) = (over + a.abs(), under + b.abs());
+    }
+    // Which of them is usual matters where not all are alike.
+    if high - low >= 0.49 * low {
+        let usual = median(&steps().map(|(a, b)| a / b).collect::<Vec<_>>());
+        let alike = steps().filter(|(a, b)| (a / b - usual).abs() < 0.5 * usual);
+        (over, under) = alike.fold((0.0, 0.0), |s, (a, b)| (s.0 + a.abs(), s.1 + b.abs()));
+    }
     (under > 0.0 && over > 0.0).then(|| over / under)
 }
 
