@@ -96,11 +96,51 @@ fn independent(rows: &[Vec<f64>], d: &[f64], z: &mut Vec<f64>) -> f64 {
     z.iter().map(|z| z * z).sum()
 }
 
+/// Mean square of differences about each, by the quieter side; 0, so that nothing is small, where neither has enough readings.
+fn powers(d: &[f64]) -> Vec<f64> {
+    // Sums of a stretch and what lies about it stay at hand.
+    const STRETCH: usize = 1 << 12;
+    let n = d.len();
+    let mean = |low: &[f64; 2], high: &[f64; 2]| {
+        let [sum, known] = [high[0] - low[0], high[1] - low[1]];
+        if known < (ABOUT / 2) as f64 {
+            f64::INFINITY
+        } else {
+            sum / known
+        }
+    };
+    let mut power = Vec::with_capacity(n);
+    let mut sums = vec![];
+    for from in (0..n).step_by(STRETCH) {
+        let to = (from + STRETCH).min(n);
+        // What lies beyond either end is not known.
+        let about = from.saturating_sub(ABOUT)..(to + ABOUT).min(n);
+        let before = std::iter::repeat_n(&f64::NAN, ABOUT - (from - about.start));
+        let behind = std::iter::repeat_n(&f64::NAN, ABOUT - (about.end - to));
+        // Of all before each, and how many are known.
+        let [mut sum, mut known] = [0.0; 2];
+        sums.clear();
+        sums.push([sum, known]);
+        sums.extend(before.chain(&d[about]).chain(behind).map(|v| {
+            let finite = v.is_finite();
+            sum += if finite { v * v } else { 0.0 };
+            known += f64::from(u8::from(finite));
+            [sum, known]
+        }));
+        let sides = sums.iter().zip(&sums[ABOUT..]).zip(&sums[2 * ABOUT..]);
+        power.extend(sides.take(to - from).map(|((low, at), high)| {
+            let quieter = mean(low, at).min(mean(at, high));
+            if quieter.is_finite() { quieter } else { 0.0 }
+        }));
+    }
+    power
+}
+
 /// Differences of one order.
 struct Differences {
     order: usize,
     d: Vec<f64>,
-    /// Mean square about each, by the quieter side; 0, so that nothing is small, where neither has enough readings.
+    /// Mean square about each.
     power: Vec<f64>,
     /// Covariance of the differences of a window over their variance, rows up to the diagonal; none where few are whole.
     covariance: Vec<Vec<f64>>,
@@ -109,41 +149,7 @@ struct Differences {
 impl Differences {
     fn new(y: &[f64], order: usize) -> Self {
         let d = differences(y, order);
-        let n = d.len();
-        // Of all before each, and how many are known.
-        let (mut sums, mut counts) = (vec![0.0; n + 1], vec![0u32; n + 1]);
-        let (mut sum, mut known) = (0.0, 0);
-        for (v, (s, k)) in d.iter().zip(sums.iter_mut().zip(&mut counts).skip(1)) {
-            let finite = v.is_finite();
-            sum += if finite { v * v } else { 0.0 };
-            known += u32::from(finite);
-            (*s, *k) = (sum, known);
-        }
-        let mean = |sum: f64, known: u32| {
-            if known < ABOUT as u32 / 2 {
-                f64::INFINITY
-            } else {
-                sum / f64::from(known)
-            }
-        };
-        // Before each place, and the one behind the last.
-        let many = ABOUT.min(n + 1);
-        let first = sums.iter().zip(&counts).take(many);
-        let mut power: Vec<f64> = first.map(|(s, k)| mean(*s, *k)).collect();
-        power.reserve_exact(n + 1 - many);
-        let pairs = sums.iter().zip(&sums[many..]);
-        let known = counts.iter().zip(&counts[many..]);
-        power.extend((pairs.zip(known)).map(|((a, b), (k, l))| mean(b - a, l - k)));
-        // What lies before a place lies behind another one.
-        for i in 0..n {
-            let behind = match power.get(i + ABOUT) {
-                Some(mean) => *mean,
-                None => mean(sums[n] - sums[i], counts[n] - counts[i]),
-            };
-            let quieter = power[i].min(behind);
-            power[i] = if quieter.is_finite() { quieter } else { 0.0 };
-        }
-        power.truncate(n);
+        let power = powers(&d);
         let covariance = covariance(&d);
         Self {
             order,
@@ -176,19 +182,25 @@ impl Differences {
         }
         // None of a small window is farther off than the window as a whole.
         let most = high * length as f64;
-        let (mut found, mut run, mut z) = (vec![], 0, vec![]);
-        for (i, (d, power)) in self.d.iter().zip(&self.power).enumerate() {
-            run = if d * d < most * power { run + 1 } else { 0 };
-            if run < length {
+        let small = |i: usize| self.d[i] * self.d[i] < most * self.power[i];
+        let (mut found, mut z) = (vec![], vec![]);
+        // From the last of each on, so that one that is not small rules out all windows that it is in; those before `sure` are.
+        let (mut first, mut sure) = (0, 0);
+        while first + length <= self.d.len() {
+            let end = first + length;
+            let not = (sure..end).rev().find(|i| !small(*i));
+            sure = end;
+            if let Some(not) = not {
+                first = not + 1;
                 continue;
             }
-            let first = i + 1 - length;
-            let ratio = independent(&rows, &self.d[first..=i], &mut z)
+            let ratio = independent(&rows, &self.d[first..end], &mut z)
                 / length as f64
-                / self.power[first].min(*power);
+                / self.power[first].min(self.power[end - 1]);
             if ratio < high {
                 found.push((first, law.cdf(ratio)));
             }
+            first += 1;
         }
         found
     }

@@ -5,6 +5,8 @@
 //! sum (S4 - S2 j^2) y_j / (S0 S4 - S2^2), S_k = sum j^k. The prediction errs by the noise of the reading and that of
 //! its neighbours together, and `sigma` is the robust spread of just that.
 
+use std::ops::Range;
+
 /// Half widths of the means, in samples, widest first: where the level stands still, the noise of a narrow mean would
 /// be counted twice, in the level and in the spread about it.
 const MEANS: &[usize] = &[400, 100, 40, 20, 10];
@@ -266,8 +268,8 @@ impl Sums {
     }
 }
 
-/// Mean of the neighbours within `half`, without the reading itself.
-fn means(clean: &[f64], of: &Sums, half: usize) -> Vec<f64> {
+/// Mean of the neighbours within `half` of each reading of a part, without the reading itself.
+fn means(clean: &[f64], of: &Sums, half: usize, part: Range<usize>) -> Vec<f64> {
     let n = clean.len();
     let Sums { base, sums } = of;
     let leaning = |i: usize| {
@@ -276,23 +278,26 @@ fn means(clean: &[f64], of: &Sums, half: usize) -> Vec<f64> {
         let others = (high - low - 1).max(1) as f64;
         base + (sums[high] - sums[low] - (clean[i] - base)) / others
     };
-    if n <= 2 * half {
-        return (0..n).map(leaning).collect();
-    }
     // In the midst all neighbourhoods are whole, and nothing depends on the place.
+    let midst =
+        half.clamp(part.start, part.end)..n.saturating_sub(half).clamp(part.start, part.end);
+    if midst.is_empty() {
+        return part.map(leaning).collect();
+    }
     let others = (2 * half).max(1) as f64;
-    let midst = sums[2 * half + 1..].iter().zip(sums).zip(&clean[half..]);
-    let midst = midst.map(|((high, low), v)| base + (high - low - (v - base)) / others);
-    let mut level = Vec::with_capacity(n);
-    level.extend((0..half).map(leaning));
-    level.extend(midst);
-    level.extend((n - half..n).map(leaning));
+    let above = &sums[midst.start + half + 1..];
+    let sides = above.iter().zip(&sums[midst.start - half..]);
+    let mean = |((high, low), v): ((&f64, &f64), &f64)| base + (high - low - (v - base)) / others;
+    let mut level = Vec::with_capacity(part.len());
+    level.extend((part.start..midst.start).map(leaning));
+    level.extend(sides.zip(&clean[midst.clone()]).map(mean));
+    level.extend((midst.end..part.end).map(leaning));
     level
 }
 
-fn parabolas(clean: &[f64], of: &Sums, half: usize) -> Vec<f64> {
+fn parabolas(clean: &[f64], of: &Sums, half: usize, part: Range<usize>) -> Vec<f64> {
     let n = clean.len();
-    let mut level = means(clean, of, half);
+    let mut level = means(clean, of, half, part.clone());
     let w = half as f64;
     let s0 = 2.0 * w;
     let s2: f64 = (1..=half).map(|j| 2.0 * (j * j) as f64).sum();
@@ -301,9 +306,10 @@ fn parabolas(clean: &[f64], of: &Sums, half: usize) -> Vec<f64> {
     let weights: Vec<f64> = (1..=half).map(|j| (s4 - s2 * (j * j) as f64) / d).collect();
     // Weight by weight over a stretch, so that several places are summed at once.
     const STRETCH: usize = 512;
-    let midst = half..n.saturating_sub(half).max(half);
+    let midst = half.max(part.start)..n.saturating_sub(half).min(part.end);
     for from in midst.clone().step_by(STRETCH) {
-        let sums = &mut level[from..(from + STRETCH).min(midst.end)];
+        let to = (from + STRETCH).min(midst.end);
+        let sums = &mut level[from - part.start..to - part.start];
         sums.fill(0.0);
         for (j, g) in (1..).zip(&weights) {
             let beside = clean[from - j..].iter().zip(&clean[from + j..]);
@@ -311,6 +317,41 @@ fn parabolas(clean: &[f64], of: &Sums, half: usize) -> Vec<f64> {
         }
     }
     level
+}
+
+/// Readings beyond which some of them tell which neighbourhoods predict best, and one of how many they are.
+const MANY: usize = 1 << 18;
+const ONE_OF: usize = 8;
+/// Readings that lie side by side where not all are asked.
+const SIDE_BY_SIDE: usize = 1 << 12;
+
+/// Parts of `n` readings that tell which neighbourhoods predict best: the whole, or some all over it.
+fn telling(n: usize) -> Vec<Range<usize>> {
+    let (every, side_by_side) = if n > MANY {
+        (ONE_OF * SIDE_BY_SIDE, SIDE_BY_SIDE)
+    } else {
+        (n.max(1), n)
+    };
+    let part = |from: usize| from..(from + side_by_side).min(n);
+    (0..n).step_by(every).map(part).collect()
+}
+
+/// Neighbourhoods of one width.
+#[derive(Clone, Copy)]
+struct Neighbours {
+    half: usize,
+    bent: bool,
+}
+
+impl Neighbours {
+    /// What they predict of a part.
+    fn level(self, clean: &[f64], sums: &Sums, part: Range<usize>) -> Vec<f64> {
+        if self.bent {
+            parabolas(clean, sums, self.half, part)
+        } else {
+            means(clean, sums, self.half, part)
+        }
+    }
 }
 
 impl Local {
@@ -334,31 +375,40 @@ impl Local {
     fn by(y: &[f64], spread: &dyn Fn(&[f64]) -> f64) -> Self {
         let clean = cleaned(y);
         let sums = Sums::new(&clean);
-        let residuals = |level: &[f64]| y.iter().zip(level).map(|(y, l)| y - l).collect::<Vec<_>>();
-        let all = MEANS
-            .iter()
-            .map(|w| (*w, false))
-            .chain(PARABOLAS.iter().map(|w| (*w, true)));
-        let mut best: Option<Self> = None;
-        for (half, bent) in all {
-            let level = if bent {
-                parabolas(&clean, &sums, half)
-            } else {
-                means(&clean, &sums, half)
-            };
-            let residual = residuals(&level);
+        let of = |neighbours: Neighbours, parts: &[Range<usize>]| {
+            let Neighbours { half, bent } = neighbours;
+            let (mut level, mut residual) = (vec![], vec![]);
+            for part in parts {
+                let there = neighbours.level(&clean, &sums, part.clone());
+                residual.extend(y[part.clone()].iter().zip(&there).map(|(y, l)| y - l));
+                level.extend(there);
+            }
             let sigma = spread(&residual);
-            if best.as_ref().is_none_or(|b| sigma < BETTER * b.sigma) {
-                best = Some(Self {
-                    level,
-                    residual,
-                    sigma,
-                    bent,
-                    edge: if half <= NARROW { half } else { 0 },
-                });
+            let edge = if half <= NARROW { half } else { 0 };
+            Self {
+                level,
+                residual,
+                sigma,
+                bent,
+                edge,
+            }
+        };
+        let neighbours = |half: &usize, bent| Neighbours { half: *half, bent };
+        let all = (MEANS.iter().map(|w| neighbours(w, false)))
+            .chain(PARABOLAS.iter().map(|w| neighbours(w, true)));
+        let parts = telling(y.len());
+        let mut best: Option<(Neighbours, Self)> = None;
+        for neighbours in all {
+            let told = of(neighbours, &parts);
+            if (best.as_ref()).is_none_or(|(_, b)| told.sigma < BETTER * b.sigma) {
+                best = Some((neighbours, told));
             }
         }
-        best.unwrap_or_default()
+        match best {
+            Some((_, told)) if told.level.len() == y.len() => told,
+            Some((neighbours, _)) => of(neighbours, std::slice::from_ref(&(0..y.len()))),
+            None => Self::default(),
+        }
     }
 
     /// Standard deviation of the readings before they were rounded to whole counts.
@@ -488,7 +538,7 @@ mod tests {
             .map(|i| 0.01 * f64::from(i * i) - f64::from(i))
             .collect();
         for half in [5, 10] {
-            let level = parabolas(&y, &Sums::new(&y), half);
+            let level = parabolas(&y, &Sums::new(&y), half, 0..y.len());
             assert!((10..90).all(|i| (level[i] - y[i]).abs() < 1e-9));
         }
     }
@@ -497,8 +547,8 @@ mod tests {
     fn a_reading_does_not_predict_itself() {
         let mut y = vec![0.0; 100];
         y[50] = 1.0;
-        assert!(means(&y, &Sums::new(&y), 20)[50].abs() < 1e-12);
-        assert!(parabolas(&y, &Sums::new(&y), 10)[50].abs() < 1e-12);
+        assert!(means(&y, &Sums::new(&y), 20, 0..y.len())[50].abs() < 1e-12);
+        assert!(parabolas(&y, &Sums::new(&y), 10, 0..y.len())[50].abs() < 1e-12);
     }
 
     #[test]
