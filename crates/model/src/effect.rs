@@ -211,10 +211,11 @@ impl Signal {
         // Eight at once; the least of them is the same in any order.
         const ABREAST: usize = 8;
         let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY].map(|v| [v; ABREAST]);
-        for some in self.smooth.chunks(ABREAST) {
+        let (many, rest) = self.smooth.as_chunks::<ABREAST>();
+        for some in many.iter().map(<[f64; ABREAST]>::as_slice).chain([rest]) {
             for ((l, h), v) in low.iter_mut().zip(&mut high).zip(some) {
-                *l = l.min(*v);
-                *h = h.max(*v);
+                *l = if v < l { *v } else { *l };
+                *h = if v > h { *v } else { *h };
             }
         }
         let low = low.into_iter().fold(f64::INFINITY, f64::min);
