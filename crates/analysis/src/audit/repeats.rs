@@ -10,7 +10,7 @@ use std::f64::consts::SQRT_2;
 use model::record::Record;
 
 use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted, tails};
-use crate::audit::local::{robust_sigma, width};
+use crate::audit::local::robust_sigma;
 use crate::checks::chi_tail;
 use crate::likelihood::invert;
 use crate::limits::ONE_SIDED;
@@ -325,7 +325,11 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
     if gyros.is_empty() || rows < LEAST_READINGS.max(4 * LAGS.end()) {
         return;
     }
-    let varies = |g: &Gyro<'_>| width(&g.channel.values, 0.0) > 0.0;
+    let varies = |g: &Gyro<'_>| {
+        let mut known = g.channel.values.iter().filter(|v| v.is_finite());
+        let first = known.next();
+        known.any(|v| Some(v) != first)
+    };
     let gyros: Vec<&Gyro<'_>> = gyros.iter().filter(|g| varies(g)).collect();
     let columns: Vec<&[f64]> = gyros.iter().map(|g| g.channel.values.as_slice()).collect();
     if columns.is_empty() {
