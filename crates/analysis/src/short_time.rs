@@ -17,6 +17,7 @@ use crate::diagnosis::Searched;
 use crate::likelihood::{Dct, Noise};
 use crate::result::Check;
 use crate::search::Form;
+use crate::wide::wide;
 
 /// The checks.
 pub(crate) const COLOUR: &str = "colour_follows";
@@ -301,11 +302,21 @@ fn colour(
     }
 }
 
-/// Where a pitch of so many coefficients lies once it is folded into the band.
-fn folded(pitch: f64, length: usize) -> usize {
+wide! {
+    /// Where pitches of 0, 1, 2 and so on coefficients at full speed lie at a `speed` of `top` once they are folded into the
+    /// band.
+    fn folded[](speed: f64, top: f64, length: usize, at: &mut [i32]) -> () = folded_of
+}
+
+#[inline(always)]
+fn folded_of(speed: f64, top: f64, length: usize, at: &mut [i32]) {
     let twice = (2 * length) as f64;
-    let around = pitch - (pitch * twice.recip()) as usize as f64 * twice;
-    (around.min(twice - around) + 0.5) as usize
+    let over = twice.recip();
+    for (highest, at) in (0i32..).zip(at) {
+        let pitch = f64::from(highest) * speed / top;
+        let around = pitch - f64::from((pitch * over) as i32) * twice;
+        *at = ((around.min(twice - around) + 0.5) as i32).max(0);
+    }
 }
 
 /// A ridge: energy of its coefficients, their number, the pitch at full speed, Hz, and how late it is, s.
@@ -348,10 +359,12 @@ fn order(view: &View<'_>, e: &[f64], all: &[Spectra]) -> Option<Outcome> {
         for lag in LAGS_S {
             let speeds = spectra.means(&lagged(&size, lag * view.rate_hz));
             let mut ridges: Vec<(f64, f64)> = vec![(0.0, 0.0); FOLDS * length];
+            let mut places = vec![0; ridges.len()];
             // Window by window: each is at hand for all pitches.
             for (w, speed) in evened.iter().zip(&speeds) {
-                for (highest, ridge) in ridges.iter_mut().enumerate().skip(2) {
-                    let (energy, count) = w[folded(highest as f64 * speed / top, length)];
+                folded(*speed, top, length, &mut places);
+                for (ridge, at) in ridges.iter_mut().zip(&places).skip(2) {
+                    let (energy, count) = w[*at as usize];
                     *ridge = (ridge.0 + energy, ridge.1 + count);
                 }
             }
