@@ -38,13 +38,16 @@ impl<'a> Beside<'a> {
         let all = [&self.data_and_columns[..], &new].concat();
         let sums = products(&new, &all, &self.weight);
         let mut normal = self.normal.clone();
-        // Each row holds the data first.
+        // Each row holds the data first, and ends with its own square.
         for (i, own) in normal.matrix.iter_mut().enumerate() {
             own.extend(sums.iter().map(|row| row[1 + i]));
         }
-        for row in sums {
+        let own = self.data_and_columns.len();
+        for (i, row) in sums.iter().enumerate() {
             normal.right.push(row[0]);
-            normal.matrix.push(row[1..].to_vec());
+            let behind = sums[i + 1..].iter().map(|other| other[own + i]);
+            let row = row[1..].iter().copied().chain(behind);
+            normal.matrix.push(row.collect());
         }
         let gain = 2.0 * (likelihood(self.panel, &normal) - self.alone);
         (gain, new.len())
@@ -52,31 +55,40 @@ impl<'a> Beside<'a> {
 }
 
 wide! {
-    /// Sums of products of columns with others under weights at every coefficient.
-    fn products[](of: &[Column], with: &[Column], weight: &[f64]) -> Vec<Vec<f64>> = products_of
+    /// Sums of products of the last of some columns with all of them up to themselves, under weights at every coefficient.
+    fn products[](last: &[Column], all: &[Column], weight: &[f64]) -> Vec<Vec<f64>> = products_of
 }
 
 #[inline(always)]
-fn products_of(of: &[Column], with: &[Column], weight: &[f64]) -> Vec<Vec<f64>> {
-    let mut sums = vec![vec![0.0; with.len()]; of.len()];
+fn products_of(last: &[Column], all: &[Column], weight: &[f64]) -> Vec<Vec<f64>> {
+    let first = all.len() - last.len();
+    let mut sums: Vec<Vec<f64>> = (0..last.len()).map(|i| vec![0.0; first + i + 1]).collect();
     let mut weighted = [vec![], vec![]];
     for (at, weight) in weight.chunks(AT_HAND).enumerate() {
         let part = at * AT_HAND..at * AT_HAND + weight.len();
-        for (sums, two) in sums.chunks_mut(2).zip(of.chunks(2)) {
+        for (sums, two) in sums.chunks_mut(2).zip(last.chunks(2)) {
             for (c, weighted) in two.iter().zip(&mut weighted) {
                 c.times(part.clone(), weight, weighted);
             }
             let [a, b] = weighted.each_ref().map(Vec::as_slice);
-            for (i, other) in with.iter().enumerate() {
-                match &mut *sums {
-                    [first, second] => {
-                        let [p, q] = other.along_two(part.clone(), [a, b]);
-                        first[i] += p;
-                        second[i] += q;
+            let with = all.iter().map(|c| (c, part.clone()));
+            match sums {
+                [one, two] => {
+                    let shared = one.len();
+                    let (both, beyond) = two.split_at_mut(shared);
+                    for (((c, part), p), q) in with.clone().zip(one).zip(both) {
+                        let more = c.along_two(part, [a, b]);
+                        *p += more[0];
+                        *q += more[1];
                     }
-                    rest => rest
-                        .iter_mut()
-                        .for_each(|s| s[i] += other.along(part.clone(), a)),
+                    for ((c, part), q) in with.skip(shared).zip(beyond) {
+                        *q += c.along(part, b);
+                    }
+                }
+                one => {
+                    for ((c, part), p) in with.zip(one.iter_mut().flatten()) {
+                        *p += c.along(part, a);
+                    }
                 }
             }
         }

@@ -6,12 +6,14 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Frequencies};
 
-use crate::column::dot;
+use crate::column::{Column, dot};
 use crate::logs::sum_of_logs;
 use crate::wide::wide;
 
 /// Bins of single coefficients at the low end.
 const SINGLE: usize = 256;
+/// Coefficients of each column that a processor has at hand while several are multiplied.
+const AT_HAND: usize = 1 << 13;
 /// Width of the other bins over their frequency.
 const WIDTH: f64 = 0.01;
 
@@ -109,38 +111,52 @@ impl Bins {
     /// Sums of a[k] b[k] over each bin.
     #[must_use]
     pub fn products(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
-        self.sums(a, b)
+        let mut sums = Vec::with_capacity(self.counts.len());
+        add_sums(&self.start, a, b, &mut sums);
+        sums
     }
 
-    pub(crate) fn sums<A, B>(&self, a: &[A], b: &[B]) -> Vec<f64>
-    where
-        A: Copy + Into<f64>,
-        B: Copy + Into<f64>,
-    {
-        sums_over(self, a, b)
+    /// The same of pairs of columns. A column of several pairs is read once.
+    pub(crate) fn products_of(&self, pairs: &[[&Column; 2]]) -> Vec<Vec<f64>> {
+        let mut all: Vec<Vec<f64>> = (pairs.iter())
+            .map(|_| Vec::with_capacity(self.counts.len()))
+            .collect();
+        let mut rest = self.start.as_slice();
+        while rest.len() > 1 {
+            let at_hand = |k: &&usize| **k <= rest[0] + AT_HAND;
+            let bins = rest[1..].iter().take_while(at_hand).count().max(1);
+            for ([a, b], sums) in pairs.iter().zip(&mut all) {
+                a.add_sums(b, &rest[..=bins], sums);
+            }
+            rest = &rest[bins..];
+        }
+        all
     }
 }
 
 wide! {
-    fn sums_over[A: Copy + Into<f64>, B: Copy + Into<f64>](bins: &Bins, a: &[A], b: &[B]) -> Vec<f64>
-    = sums
+    /// Adds sums of a[k] b[k] over bins, which begin at the places in `start` and end at its last, to others.
+    pub(crate) fn add_sums[A: Copy + Into<f64>, B: Copy + Into<f64>](
+        start: &[usize],
+        a: &[A],
+        b: &[B],
+        sums: &mut Vec<f64>,
+    ) -> () = add_sums_of
 }
 
 #[inline(always)]
-fn sums<A, B>(bins: &Bins, a: &[A], b: &[B]) -> Vec<f64>
+fn add_sums_of<A, B>(start: &[usize], a: &[A], b: &[B], sums: &mut Vec<f64>)
 where
     A: Copy + Into<f64>,
     B: Copy + Into<f64>,
 {
-    let mut sums = Vec::with_capacity(bins.counts.len());
-    for (w, count) in bins.start.windows(2).zip(&bins.counts) {
-        sums.push(if *count == 1.0 {
+    for w in start.windows(2) {
+        sums.push(if w[1] - w[0] == 1 {
             a[w[0]].into() * b[w[0]].into()
         } else {
             dot(&a[w[0]..w[1]], &b[w[0]..w[1]])
         });
     }
-    sums
 }
 
 /// The shape of the noise: everything but its white variance.

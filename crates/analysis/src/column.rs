@@ -3,7 +3,8 @@
 use std::ops::Range;
 use std::rc::Rc;
 
-use crate::likelihood::Bins;
+use crate::bins::add_sums;
+use crate::wide::wide;
 
 /// Sum of products, in eight sums that a processor makes at once.
 #[inline(always)]
@@ -50,6 +51,42 @@ fn dot_two<A: Copy + Into<f64>>(a: &[A], [b, c]: [&[f64]; 2]) -> [f64; 2] {
 #[inline(always)]
 fn sum_of_eight([a, b, c, d, e, f, g, h]: [f64; 8]) -> f64 {
     ((a + e) + (c + g)) + ((b + f) + (d + h))
+}
+
+wide! {
+    /// [`dot`] of each value but the last ones with that 1, 2 and so on up to `lags` behind it: a stretch after the other,
+    /// which stays at hand for all.
+    pub(crate) fn dots_behind[](a: &[f64], b: &[f64], lags: usize) -> Vec<f64> = dots_behind_of
+}
+
+#[inline(always)]
+fn dots_behind_of(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
+    const STRETCH: usize = 1 << 10;
+    let mut sums = vec![[0.0; 8]; lags];
+    let pairs = |lag: usize| (&a[..a.len() - lag], &b[lag..]);
+    for from in (0..a.len()).step_by(STRETCH) {
+        for (lag, eight) in (1..).zip(&mut sums) {
+            let (x, y) = pairs(lag);
+            let whole = x.len() - x.len() % 8;
+            let part = from.min(whole)..(from + STRETCH).min(whole);
+            let (x, y) = (x[part.clone()].chunks_exact(8), y[part].chunks_exact(8));
+            for (p, q) in x.zip(y) {
+                for (sum, (p, q)) in eight.iter_mut().zip(p.iter().zip(q)) {
+                    *sum += p * q;
+                }
+            }
+        }
+    }
+    let of = |(lag, eight): (usize, [f64; 8])| {
+        let (x, y) = pairs(lag);
+        let rest = x.len() - x.len() % 8;
+        sum_of_eight(eight)
+            + x[rest..]
+                .iter()
+                .zip(&y[rest..])
+                .fold(0.0, |s, (p, q)| s + p * q)
+    };
+    (1..).zip(sums).map(of).collect()
 }
 
 /// Sum of a function of the values, in eight sums as [`dot`].
@@ -100,6 +137,19 @@ impl Column {
         }
     }
 
+    /// Adds coefficients `from` on, each times a number, to others.
+    pub(crate) fn add_to(&self, sum: &mut [f64], from: usize, by: f64) {
+        match self {
+            Self::Whole(c) => sum
+                .iter_mut()
+                .zip(&c[from..])
+                .for_each(|(s, x)| *s += by * x),
+            Self::Short(c) => {
+                (sum.iter_mut().zip(&c[from..])).for_each(|(s, x)| *s += by * f64::from(*x))
+            }
+        }
+    }
+
     /// Sum of products of some coefficients with numbers.
     #[inline(always)]
     pub(crate) fn along(&self, part: Range<usize>, by: &[f64]) -> f64 {
@@ -128,11 +178,28 @@ impl Column {
         }
     }
 
-    pub(crate) fn products(&self, other: &Self, bins: &Bins) -> Vec<f64> {
+    /// Adds sums of products with another over bins, as [`add_sums`].
+    pub(crate) fn add_sums(&self, other: &Self, start: &[usize], sums: &mut Vec<f64>) {
         match (self, other) {
-            (Self::Whole(a), Self::Whole(b)) => bins.sums(a, b),
-            (Self::Whole(a), Self::Short(b)) | (Self::Short(b), Self::Whole(a)) => bins.sums(a, b),
-            (Self::Short(a), Self::Short(b)) => bins.sums(a, b),
+            (Self::Whole(a), Self::Whole(b)) => add_sums(start, a, b, sums),
+            (Self::Whole(a), Self::Short(b)) | (Self::Short(b), Self::Whole(a)) => {
+                add_sums(start, a, b, sums);
+            }
+            (Self::Short(a), Self::Short(b)) => add_sums(start, a, b, sums),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_behind_are_those_of_the_shifted_values() {
+        let wave = |by: f64| -> Vec<f64> { (0..5003).map(|i| (f64::from(i) * by).sin()).collect() };
+        let (a, b) = (wave(0.7), wave(1.3));
+        for (lag, sum) in (1..).zip(dots_behind(&a, &b, 20)) {
+            assert_eq!(sum, dot(&a[..a.len() - lag], &b[lag..]), "{lag}");
         }
     }
 }

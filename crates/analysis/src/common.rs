@@ -3,7 +3,7 @@
 use model::effect::{Effect, Found, Hypothesis};
 
 use crate::checks::{self, LEAST_CHANCE};
-use crate::column::dot;
+use crate::column::{dot, dots_behind};
 use crate::diagnosis::Searched;
 use crate::findings::sentence;
 use crate::grid::Grid;
@@ -239,9 +239,11 @@ fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
     // An axis, the one that follows it, the samples, z.
     let mut worst = (a, b, 0, 0.0f64);
     let mut statistic = 0.0;
-    for lag in 1..=LATE.min(a.e.len() / 2) {
-        for (first, second) in [(a, b), (b, a)] {
-            let sum = dot(&first.e[..first.e.len() - lag], &second.e[lag..]);
+    let lags = LATE.min(a.e.len() / 2);
+    let sums = [(a, b), (b, a)].map(|(first, second)| dots_behind(&first.e, &second.e, lags));
+    for lag in 1..=lags {
+        for ((first, second), sums) in [(a, b), (b, a)].into_iter().zip(&sums) {
+            let sum = sums[lag - 1];
             let z = sum / (scale * ((first.e.len() - lag) as f64).sqrt());
             statistic += z * z;
             if z.abs() > worst.3.abs() {

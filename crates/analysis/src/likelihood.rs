@@ -15,23 +15,33 @@ use crate::column::{Column, dot};
 pub use crate::transform::Dct;
 use crate::wide::wide;
 
-/// Two sums over the samples' bits and places: columns that agree in both are the same.
+/// Two numbers of the samples' bits and places: columns that agree in both are the same. Products of two words, their halves
+/// laid on each other.
 fn digest(x: &[f64]) -> [u64; 2] {
-    const BY: [u64; 2] = [0x9e37_79b9_7f4a_7c15, 0xc2b2_ae3d_27d4_eb4f];
-    let step = |h: u64, v: u64, by: u64| (h ^ v).wrapping_mul(by).rotate_left(29);
-    let both = |sums: [u64; 2], v: u64| [step(sums[0], v, BY[0]), step(sums[1], v, BY[1])];
-    // Every fourth sample in sums of its own: none waits for the one before.
-    let (fours, rest) = x.as_chunks::<4>();
-    let mut sums = [[0x243f_6a88_85a3_08d3, x.len() as u64]; 4];
-    for four in fours {
-        for (sums, v) in sums.iter_mut().zip(four) {
-            *sums = both(*sums, v.to_bits());
+    const BY: [u64; 4] = [
+        0x9e37_79b9_7f4a_7c15,
+        0xc2b2_ae3d_27d4_eb4f,
+        0x243f_6a88_85a3_08d3,
+        0x1319_8a2e_0370_7344,
+    ];
+    let fold = |a: u64, b: u64| {
+        let product = u128::from(a) * u128::from(b);
+        product as u64 ^ (product >> 64) as u64
+    };
+    // Every fourth pair of samples in a number of its own: none waits for the one before.
+    let (eights, rest) = x.as_chunks::<8>();
+    let mut all = BY;
+    for eight in eights {
+        for (own, (pair, by)) in all.iter_mut().zip(eight.as_chunks::<2>().0.iter().zip(BY)) {
+            *own = fold(pair[0].to_bits() ^ by, pair[1].to_bits() ^ *own);
         }
     }
-    let start = rest.iter().fold([0; 2], |all, v| both(all, v.to_bits()));
-    sums.into_iter().fold(start, |all, sums| {
-        [step(all[0], sums[0], BY[0]), step(all[1], sums[1], BY[1])]
-    })
+    for (i, v) in rest.iter().enumerate() {
+        let i = i % all.len();
+        all[i] = fold(v.to_bits() ^ BY[i], all[i]);
+    }
+    let length = x.len() as u64;
+    [fold(all[0] ^ length, all[1]), fold(all[2] ^ length, all[3])]
 }
 
 /// Sums over bins by pair of columns.
@@ -74,11 +84,11 @@ impl Panel {
         Self::of(dct, bins, Rc::new(dct.forward(y)))
     }
 
-    /// A panel on the first of these sequences, which the others may explain; they are columns 0, 1 and so on.
+    /// A panel on the first of these sequences, which the others may explain; they are columns 0, 1 and so on, those of a long
+    /// record in short numbers.
     pub(crate) fn of_all(dct: &Dct, bins: &Rc<Bins>, all: &[&[f64]]) -> Self {
         let panel = Self::of(dct, bins, Rc::default());
-        panel.columns.borrow_mut().clear();
-        panel.add_all(all);
+        *panel.columns.borrow_mut() = dct.columns(all);
         panel
     }
 
@@ -198,10 +208,9 @@ impl Panel {
 
     /// Adds columns, each by its factor, to coefficients `from` on.
     pub(crate) fn add_columns(&self, sum: &mut [f64], from: usize, columns: &[usize], by: &[f64]) {
+        let all = self.columns.borrow();
         for (c, by) in columns.iter().zip(by) {
-            let column = self.column(*c);
-            let there = sum.iter_mut().zip(&column[from..]);
-            there.for_each(|(s, x)| *s += by * x);
+            all[*c].add_to(sum, from, *by);
         }
     }
 
@@ -227,15 +236,39 @@ impl Panel {
     }
 
     fn pair(&self, i: usize, j: usize) -> Rc<Vec<f64>> {
-        let key = (i.min(j), i.max(j));
-        if let Some(p) = self.pairs.borrow().get(&key) {
-            return Rc::clone(p);
+        self.pairs([(i, j)]).swap_remove(0)
+    }
+
+    /// Sums of products of pairs of columns over the bins: those that are not known yet are made together.
+    fn pairs(&self, all: impl IntoIterator<Item = (usize, usize)>) -> Vec<Rc<Vec<f64>>> {
+        let in_order = |(i, j): (usize, usize)| (i.min(j), i.max(j));
+        let keys: Vec<_> = all.into_iter().map(in_order).collect();
+        let mut pairs = self.pairs.borrow_mut();
+        let asked = |pairs: &Pairs| -> Option<Vec<_>> {
+            keys.iter().map(|key| pairs.get(key).cloned()).collect()
+        };
+        if let Some(all) = asked(&pairs) {
+            return all;
         }
-        let columns = self.columns.borrow();
-        let (a, b) = (&columns[key.0], &columns[key.1]);
-        let p = (self.dct.known).products(a, b, || Rc::new(a.products(b, &self.bins)));
-        self.pairs.borrow_mut().insert(key, Rc::clone(&p));
-        p
+        let (columns, known) = (self.columns.borrow(), &self.dct.known);
+        let two = |key: &(usize, usize)| [&columns[key.0], &columns[key.1]];
+        let mut missing = vec![];
+        for key in &keys {
+            if pairs.contains_key(key) || missing.contains(key) {
+                continue;
+            }
+            match known.products(two(key)) {
+                Some(p) => drop(pairs.insert(*key, p)),
+                None => missing.push(*key),
+            }
+        }
+        let of: Vec<_> = missing.iter().map(two).collect();
+        for ((key, two), made) in missing.iter().zip(&of).zip(self.bins.products_of(&of)) {
+            let made = Rc::new(made);
+            known.keep_products(*two, &made);
+            pairs.insert(*key, made);
+        }
+        asked(&pairs).unwrap_or_default()
     }
 
     /// Energy in each bin of what is left of a column when the best multiples of others are taken off.
@@ -308,11 +341,11 @@ impl Panel {
         let data_and = || std::iter::once(&0).chain(columns);
         let from = |(i, a): (usize, &usize)| {
             let a = *a;
-            data_and().skip(i).map(move |b| self.pair(a, *b))
+            data_and().skip(i).map(move |b| (a, *b))
         };
         Sums {
             columns: columns.len(),
-            pairs: data_and().enumerate().flat_map(from).collect(),
+            pairs: self.pairs(data_and().enumerate().flat_map(from)),
         }
     }
 

@@ -30,11 +30,8 @@ fn first_of_residual(
     count: usize,
 ) -> Vec<f64> {
     let mut r = panel.first(0, count);
-    for (c, b) in columns.iter().zip(&solution.beta) {
-        r.iter_mut()
-            .zip(panel.first(*c, count))
-            .for_each(|(r, x)| *r -= b * x);
-    }
+    let minus: Vec<f64> = solution.beta.iter().map(|b| -b).collect();
+    panel.add_columns(&mut r, 0, columns, &minus);
     r[0] = 0.0;
     r
 }
@@ -170,22 +167,27 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
         .collect()
 }
 
-/// Amplitudes of the whitened residual at twice the Fourier frequencies: likelihood ratio of a line at k pi / n.
+/// The line at k pi / n, k from `least` on, that explains most, and its likelihood ratio: by the amplitude of the whitened
+/// residual at twice the Fourier frequencies.
 #[must_use]
-pub fn lines(panel: &Panel, noise: &Noise, columns: &[usize], solution: &Solution) -> Vec<f64> {
+pub fn best_line(
+    panel: &Panel,
+    noise: &Noise,
+    columns: &[usize],
+    solution: &Solution,
+    least: usize,
+) -> Option<(usize, f64)> {
     let n = panel.bins.n;
     let g = noise.everywhere(&panel.bins);
     let mut weighted = residual(panel, columns, solution);
     weighted.iter_mut().zip(&g).for_each(|(r, g)| *r /= g);
-    let mut energy = (panel.dct).energies(&weighted, panel.dct.inverse(&weighted));
-    drop(weighted);
+    let energies = panel.dct.energies(&weighted);
+    let drops =
+        (energies.iter().zip(&g).enumerate()).map(|(k, (e, g))| (k, e * 2.0 * g / n as f64));
+    let all = drops.take(n - 1).skip(least.max(1));
+    let (k, drop) = all.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let count = (n - 1) as f64;
-    energy[0] = 0.0;
-    for (energy, g) in energy.iter_mut().zip(&g).skip(1) {
-        let drop = *energy * 2.0 * g / n as f64;
-        *energy = -count * (1.0 - (drop / solution.rss).min(0.999)).ln();
-    }
-    energy
+    Some((k, -count * (1.0 - (drop / solution.rss).min(0.999)).ln()))
 }
 
 /// exp(i (omega t + phase)) for t = 0..n, turned on from sample to sample and set anew now and then.
@@ -362,7 +364,7 @@ pub fn beats(
         .zip(turning(n, carrier, phase))
         .map(|(v, line)| v * line.re)
         .collect();
-    let seen = panel.dct.energies(&panel.dct.forward(&moved), moved);
+    let seen = panel.dct.energies_of(moved);
     let centre = carrier / std::f64::consts::PI * n as f64;
     let at = |k: f64| 1.0 / g[(k.round().max(1.0) as usize).min(n - 1)];
     let count = (n - 1) as f64;

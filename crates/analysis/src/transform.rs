@@ -219,21 +219,24 @@ impl Known {
         self.columns.borrow_mut().insert(key, column.clone());
     }
 
-    /// Sums of products of two columns, made once where both are kept.
-    pub(crate) fn products(
-        &self,
-        a: &Column,
-        b: &Column,
-        make: impl FnOnce() -> Rc<Vec<f64>>,
-    ) -> Rc<Vec<f64>> {
-        let mut places = [a.place(), b.place()];
-        places.sort_unstable();
-        let kept = self.kept.borrow();
-        if !places.iter().all(|p| kept.contains(p)) {
-            return make();
+    /// Sums of products of two columns, where they are known.
+    pub(crate) fn products(&self, two: [&Column; 2]) -> Option<Rc<Vec<f64>>> {
+        self.products.borrow().get(&Self::places(two)).cloned()
+    }
+
+    /// Keeps them for the next who asks, where both columns are kept.
+    pub(crate) fn keep_products(&self, two: [&Column; 2], products: &Rc<Vec<f64>>) {
+        let (places, kept) = (Self::places(two), self.kept.borrow());
+        if places.iter().all(|p| kept.contains(p)) {
+            let mut all = self.products.borrow_mut();
+            all.insert(places, Rc::clone(products));
         }
-        let mut products = self.products.borrow_mut();
-        Rc::clone(products.entry(places).or_insert_with(make))
+    }
+
+    fn places(two: [&Column; 2]) -> [usize; 2] {
+        let mut places = two.map(Column::place);
+        places.sort_unstable();
+        places
     }
 
     fn forget(&self) {
@@ -301,6 +304,16 @@ impl<T: Number> Kind<T> {
         }
     }
 
+    fn inverse(&self, c: &[f64]) -> Vec<f64> {
+        match self {
+            Self::Even(packed) => inverse_of_one(packed, c),
+            Self::Odd(packed) => {
+                let [x, _] = inverse_of_two(packed, c, &[]);
+                x
+            }
+        }
+    }
+
     /// Of several, one after the other; two of an odd length are made at once. No more are held than that.
     fn each<X, Y>(
         &self,
@@ -344,7 +357,8 @@ impl<T: Number> Kind<T> {
 #[derive(Clone)]
 pub struct Dct {
     n: usize,
-    kind: Kind<f64>,
+    /// Each made for the first who asks.
+    whole: Rc<OnceCell<Kind<f64>>>,
     /// In short numbers, for the columns of long records.
     short: Rc<OnceCell<Kind<f32>>>,
     pub(crate) known: Rc<Known>,
@@ -356,7 +370,7 @@ impl Dct {
     pub fn new(n: usize) -> Self {
         Self {
             n,
-            kind: Kind::new(n, Plan::known(n)),
+            whole: Rc::default(),
             short: Rc::default(),
             known: Rc::default(),
         }
@@ -375,7 +389,7 @@ impl Dct {
     /// Coefficients of `x`.
     #[must_use]
     pub fn forward(&self, x: &[f64]) -> Vec<f64> {
-        self.kind.forward(About::nothing(x))
+        self.in_whole().forward(About::nothing(x))
     }
 
     /// Coefficients of several, one after the other; of an odd length at half the time of each alone.
@@ -383,7 +397,7 @@ impl Dct {
         &self,
         all: impl IntoIterator<Item = X>,
     ) -> impl Iterator<Item = Vec<f64>> {
-        self.kind.forward_all(all, About::nothing)
+        self.in_whole().forward_all(all, About::nothing)
     }
 
     /// Columns of several that may explain the data, those of a long record in short numbers.
@@ -402,8 +416,17 @@ impl Dct {
         &self,
         all: impl IntoIterator<Item = X>,
     ) -> impl Iterator<Item = Vec<f32>> {
+        self.in_short().forward_all(all, About::level)
+    }
+
+    fn in_whole(&self) -> &Kind<f64> {
+        let known = || Kind::new(self.n, Plan::known(self.n));
+        self.whole.get_or_init(known)
+    }
+
+    fn in_short(&self) -> &Kind<f32> {
         let new = || Kind::new(self.n, Plan::new(self.n));
-        self.short.get_or_init(new).forward_all(all, About::level)
+        self.short.get_or_init(new)
     }
 
     /// Samples of several, as [`Dct::forward_all`].
@@ -411,7 +434,7 @@ impl Dct {
         &self,
         all: impl IntoIterator<Item = X>,
     ) -> impl Iterator<Item = Vec<f64>> {
-        self.kind.each(
+        self.in_whole().each(
             all,
             |c| self.inverse(c.as_ref()),
             |packed, c, d| inverse_of_two(packed, c.as_ref(), d.as_ref()),
@@ -421,33 +444,46 @@ impl Dct {
     /// Samples from coefficients.
     #[must_use]
     pub fn inverse(&self, c: &[f64]) -> Vec<f64> {
-        match &self.kind {
-            Kind::Odd(packed) => {
-                let [x, _] = inverse_of_two(packed, c, &[]);
-                x
-            }
-            Kind::Even(packed) => inverse_of_one(packed, c),
-        }
+        self.in_whole().inverse(c)
     }
 
     /// Energy of the Fourier transform at twice its frequencies: |sum of z[j] exp(-i pi j k / n)|^2, k = 0..n, of samples z
-    /// whose coefficients are c. Cosines about half a sample are these; sines are those of z with every second sign turned,
-    /// backwards.
+    /// whose coefficients are c. Of a long record it is made in short numbers.
     #[must_use]
-    pub fn energies(&self, c: &[f64], mut z: Vec<f64>) -> Vec<f64> {
-        z.iter_mut().skip(1).step_by(2).for_each(|v| *v = -*v);
-        let mut all = self.forward(&z);
-        drop(z);
-        let half = 0.5 * self.n as f64;
-        let energy = |c: f64, s: f64| half * (c * c + s * s);
-        all[0] = 2.0 * half * c[0] * c[0];
-        for k in 1..=self.n / 2 {
-            let mirrored = self.n - k;
-            let (low, high) = (all[k], all[mirrored]);
-            (all[k], all[mirrored]) = (energy(c[k], high), energy(c[mirrored], low));
+    pub fn energies(&self, c: &[f64]) -> Vec<f64> {
+        if self.n > LONG {
+            energies(self.in_short(), c, self.in_short().inverse(c))
+        } else {
+            energies(self.in_whole(), c, self.inverse(c))
         }
-        all
     }
+
+    /// The same of the samples.
+    #[must_use]
+    pub fn energies_of(&self, z: Vec<f64>) -> Vec<f64> {
+        if self.n > LONG {
+            let c = self.in_short().forward(About::nothing(&z));
+            energies(self.in_short(), &c, z)
+        } else {
+            energies(self.in_whole(), &self.forward(&z), z)
+        }
+    }
+}
+
+/// Cosines about half a sample are the coefficients c; sines are those of the samples z with every second sign turned,
+/// backwards.
+fn energies<T: Number>(kind: &Kind<T>, c: &[impl Copy + Into<f64>], mut z: Vec<f64>) -> Vec<f64> {
+    z.iter_mut().skip(1).step_by(2).for_each(|v| *v = -*v);
+    let sines = kind.forward(About::nothing(&z));
+    let mut energies = z;
+    let half = 0.5 * c.len() as f64;
+    let level: f64 = c[0].into();
+    energies[0] = 2.0 * half * level * level;
+    for ((energy, c), s) in energies.iter_mut().zip(c).skip(1).zip(sines.iter().rev()) {
+        let (c, s): (f64, f64) = ((*c).into(), (*s).into());
+        *energy = half * (c * c + s * s);
+    }
+    energies
 }
 
 #[cfg(test)]
@@ -527,13 +563,30 @@ mod tests {
         for n in [5, 8, 30] {
             let x = record(n);
             let dct = Dct::new(n);
-            for (k, found) in dct.energies(&dct.forward(&x), x.clone()).iter().enumerate() {
+            let of_both = [dct.energies(&dct.forward(&x)), dct.energies_of(x.clone())];
+            for (k, found) in of_both.iter().flat_map(|e| e.iter().enumerate()) {
                 let sum: Complex<f64> = x
                     .iter()
                     .enumerate()
                     .map(|(j, v)| Complex::from_polar(*v, -PI * (j * k) as f64 / n as f64))
                     .sum();
                 assert!((found - sum.norm_sqr()).abs() < 1e-9, "{n} {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn energies_of_a_long_record_are_those_of_whole_numbers() {
+        for n in [LONG + 6, LONG + 7] {
+            let x = record(n);
+            let dct = Dct::new(n);
+            let c = dct.forward(&x);
+            let whole = energies(dct.in_whole(), &c, x.clone());
+            let mean = whole.iter().sum::<f64>() / n as f64;
+            for short in [dct.energies(&c), dct.energies_of(x)] {
+                let off = |(a, b): (&f64, &f64)| (a - b).abs() / (mean + b);
+                let most = short.iter().zip(&whole).map(off).fold(0.0, f64::max);
+                assert!(most < 1e-3, "{n} {most}");
             }
         }
     }

@@ -105,15 +105,15 @@ impl Search<'_> {
                 ))
             }
             Hypothesis::Line => {
-                let lr = scan::lines(&self.panel, &state.noise, &own, &state.solution);
                 let least = (2.0 * LEAST_CYCLES) as usize;
-                let k = (least..n - 1).max_by(|a, b| lr[*a].total_cmp(&lr[*b]))?;
+                let (k, lr) =
+                    scan::best_line(&self.panel, &state.noise, &own, &state.solution, least)?;
                 let omega = std::f64::consts::PI * k as f64 / n as f64;
                 Some(term(
                     Form::Line(omega),
                     vec![],
                     vec!["cosine", "sine"],
-                    lr[k],
+                    lr,
                     threshold::line(n),
                 ))
             }

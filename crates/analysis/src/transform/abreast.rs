@@ -6,7 +6,7 @@ use rustfft::FftNum;
 use rustfft::num_complex::Complex;
 
 /// Numbers that a transform is made in.
-pub(super) trait Number: FftNum {
+pub(super) trait Number: FftNum + Into<f64> {
     fn of(v: f64) -> Self;
 }
 

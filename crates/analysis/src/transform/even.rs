@@ -27,26 +27,28 @@ fn laid_out_in<T: Number>(x: About, z: &mut [Complex<T>]) {
     }
 }
 
+/// Work on what lies at k and at its mirror images, by the turn there.
+trait AtTurns<T> {
+    fn one(&mut self, k: usize, turn: Complex<T>);
+    /// From k on, side by side.
+    fn some(&mut self, k: usize, turn: Abreast<T>);
+}
+
 impl<T: Number> Turns<T> {
-    /// Work on those of k = 0 ..= h/2, side by side where neither end is among them.
+    /// Work at k = 0 ..= h/2, side by side where neither end is among them.
     #[inline(always)]
-    fn to_half<O>(
-        &self,
-        h: usize,
-        out: &mut [O],
-        one: impl Fn(usize, Complex<T>, &mut [O]),
-        some: impl Fn(usize, Abreast<T>, &mut [O]),
-    ) {
+    fn to_half(&self, h: usize, mut work: impl AtTurns<T>) {
         let coarse = self.coarse.iter().zip((0..=h / 2).step_by(Self::FINE));
         for (coarse, from) in coarse {
             let fine = self.fine.as_chunks::<ABREAST>().0.iter();
             for (fine, k) in fine.zip((from..=h / 2).step_by(ABREAST)) {
                 if k == 0 || k + ABREAST > h / 2 {
-                    let alone = fine.iter().zip(k..=h / 2);
-                    alone.for_each(|(fine, k)| one(k, coarse * fine, out));
+                    for (fine, k) in fine.iter().zip(k..=h / 2) {
+                        work.one(k, coarse * fine);
+                    }
                 } else {
                     let turn = Abreast::of(|_| *coarse) * Abreast::of(|i| fine[i]);
-                    some(k, turn, out);
+                    work.some(k, turn);
                 }
             }
         }
@@ -61,21 +63,36 @@ wide! {
 
 #[inline(always)]
 fn coefficients_of<T: Number>(z: &[Complex<T>], turns: &Turns<T>, scale: [T; 2], c: &mut [T]) {
-    let (h, n) = (z.len(), c.len());
-    let one = |k: usize, turn: Complex<T>, c: &mut [T]| {
+    turns.to_half(z.len(), Coefficients { z, scale, c });
+}
+
+struct Coefficients<'a, T> {
+    z: &'a [Complex<T>],
+    scale: [T; 2],
+    c: &'a mut [T],
+}
+
+impl<T: Number> AtTurns<T> for Coefficients<'_, T> {
+    #[inline(always)]
+    fn one(&mut self, k: usize, turn: Complex<T>) {
+        let Self { z, scale, c } = self;
+        let (h, n) = (z.len(), c.len());
         let mirrored = z[if k == 0 { 0 } else { h - k }];
-        let [v, w] = turned(z[k], mirrored, turn, scale);
+        let [v, w] = turned(z[k], mirrored, turn, *scale);
         (c[k], c[h - k], c[h + k]) = (v.re, w.re - w.im, w.re + w.im);
         if k > 0 {
             c[n - k] = -v.im;
         }
-    };
-    let some = |k: usize, turn: Abreast<T>, c: &mut [T]| {
-        let last = k + ABREAST - 1;
+    }
+
+    #[inline(always)]
+    fn some(&mut self, k: usize, turn: Abreast<T>) {
+        let Self { z, scale, c } = self;
+        let (h, n, last) = (z.len(), c.len(), k + ABREAST - 1);
         let (a, b) = (&z[k..=last], &z[h - last..=h - k]);
         let a = Abreast::of(|i| a[i]);
         let b = Abreast::of(|i| b[ABREAST - 1 - i]);
-        let [v, w] = turned(a, b, turn, scale);
+        let [v, w] = turned(a, b, turn, *scale);
         let mut below = each(w.re, w.im, |a, b| a - b);
         let mut high = each(v.im, v.im, |a, _| -a);
         below.reverse();
@@ -84,8 +101,7 @@ fn coefficients_of<T: Number>(z: &[Complex<T>], turns: &Turns<T>, scale: [T; 2],
         c[h - last..=h - k].copy_from_slice(&below);
         c[h + k..=h + last].copy_from_slice(&each(w.re, w.im, |a, b| a + b));
         c[n - last..=n - k].copy_from_slice(&high);
-    };
-    turns.to_half(h, c, one, some);
+    }
 }
 
 /// Coefficients k and n - k in the parts of the first, those about h in the second: the turn at h - k is that at k
@@ -114,41 +130,60 @@ pub(super) fn forward_of_one<T: Number>(packed: &Packed<T>, x: About) -> Vec<T> 
 
 wide! {
     /// The spectrum, conjugated, of the packed sequence that has these coefficients.
-    fn spectrum[](c: &[f64], turns: &Turns<f64>, half: [f64; 2], z: &mut [Complex<f64>]) -> ()
+    fn spectrum[T: Number](c: &[f64], turns: &Turns<T>, half: [T; 2], z: &mut [Complex<T>]) -> ()
     = spectrum_of
 }
 
 #[inline(always)]
-fn spectrum_of(c: &[f64], turns: &Turns<f64>, half: [f64; 2], z: &mut [Complex<f64>]) {
-    let (h, n) = (z.len(), c.len());
-    let one = |k: usize, turn: Complex<f64>, z: &mut [Complex<f64>]| {
+fn spectrum_of<T: Number>(c: &[f64], turns: &Turns<T>, half: [T; 2], z: &mut [Complex<T>]) {
+    turns.to_half(z.len(), Spectrum { c, half, z });
+}
+
+struct Spectrum<'a, T> {
+    c: &'a [f64],
+    half: [T; 2],
+    z: &'a mut [Complex<T>],
+}
+
+#[inline(always)]
+fn number<T: Number>(re: f64, im: f64) -> Complex<T> {
+    Complex::new(T::of(re), T::of(im))
+}
+
+impl<T: Number> AtTurns<T> for Spectrum<'_, T> {
+    #[inline(always)]
+    fn one(&mut self, k: usize, turn: Complex<T>) {
+        let Self { c, half, z } = self;
+        let (h, n) = (z.len(), c.len());
         let v = match k {
-            0 => Complex::new(SQRT_2 * c[0], 0.0),
-            k => Complex::new(c[k], -c[n - k]),
+            0 => number(SQRT_2 * c[0], 0.0),
+            k => number(c[k], -c[n - k]),
         };
-        let w = Complex::new(c[h - k] + c[h + k], c[h + k] - c[h - k]);
-        let (low, high) = returned(v, w, turn, half);
+        let w = number(c[h - k] + c[h + k], c[h + k] - c[h - k]);
+        let (low, high) = returned(v, w, turn, *half);
         z[k] = low;
         if k > 0 {
             z[h - k] = high;
         }
-    };
-    let some = |k: usize, turn: Abreast<f64>, z: &mut [Complex<f64>]| {
-        let last = k + ABREAST - 1;
+    }
+
+    #[inline(always)]
+    fn some(&mut self, k: usize, turn: Abreast<T>) {
+        let Self { c, half, z } = self;
+        let (h, n, last) = (z.len(), c.len(), k + ABREAST - 1);
         let (low, high) = (&c[k..=last], &c[n - last..=n - k]);
         let (below, above) = (&c[h - last..=h - k], &c[h + k..=h + last]);
-        let v = Abreast::of(|i| Complex::new(low[i], -high[ABREAST - 1 - i]));
+        let v = Abreast::of(|i| number(low[i], -high[ABREAST - 1 - i]));
         let w = Abreast::of(|i| {
             let below = below[ABREAST - 1 - i];
-            Complex::new(below + above[i], above[i] - below)
+            number(below + above[i], above[i] - below)
         });
-        let (low, high) = returned(v, w, turn, half);
+        let (low, high) = returned(v, w, turn, *half);
         for i in 0..ABREAST {
             z[k + i] = Complex::new(low.re[i], low.im[i]);
             z[h - k - i] = Complex::new(high.re[i], high.im[i]);
         }
-    };
-    turns.to_half(h, z, one, some);
+    }
 }
 
 /// The steps of [`turned`], back.
@@ -163,22 +198,22 @@ fn returned<Z: Plane>(v: Z, w: Z, turn: Z, half: [Z::Real; 2]) -> (Z, Z) {
 }
 
 /// The steps of [`forward_of_one`], back, by a transform forwards of what is conjugated.
-pub(super) fn inverse_of_one(packed: &Packed<f64>, c: &[f64]) -> Vec<f64> {
+pub(super) fn inverse_of_one<T: Number>(packed: &Packed<T>, c: &[f64]) -> Vec<f64> {
     let n = c.len();
     let h = n / 2;
     let half = 0.5 * (0.5 * n as f64).sqrt() / h as f64;
     let mut x = vec![0.0; n];
-    let half = [half, half * FRAC_1_SQRT_2];
+    let half = [half, half * FRAC_1_SQRT_2].map(T::of);
     packed.run(
         |z| spectrum(c, &packed.plan.turn, half, z),
         |z, _| {
             let (fours, last) = x.as_chunks_mut::<4>();
             for (j, four) in fours.iter_mut().enumerate() {
                 let (a, b) = (z[j], z[h - 1 - j]);
-                *four = [a.re, -b.im, -a.im, b.re];
+                *four = [a.re, -b.im, -a.im, b.re].map(T::into);
             }
             if let [a, b] = last {
-                (*a, *b) = (z[h / 2].re, -z[h / 2].im);
+                (*a, *b) = (z[h / 2].re.into(), (-z[h / 2].im).into());
             }
         },
     );

@@ -51,29 +51,30 @@ pub(super) fn forward_of_two<T: Number>(packed: &Packed<T>, a: About, b: About) 
 }
 
 /// The steps of [`forward_of_two`], back, by a transform forwards of what is conjugated.
-pub(super) fn inverse_of_two(packed: &Packed<f64>, c: &[f64], d: &[f64]) -> [Vec<f64>; 2] {
+pub(super) fn inverse_of_two<T: Number>(packed: &Packed<T>, c: &[f64], d: &[f64]) -> [Vec<f64>; 2] {
     let [mut a, mut b] = [c, d].map(|x| vec![0.0; x.len()]);
     let second = |k: usize| d.get(k).copied().unwrap_or(0.0);
+    let number = |re: f64, im: f64| Complex::new(T::of(re), T::of(im));
     packed.run(
         |z| {
             let n = z.len();
-            let scale = (0.5 / n as f64).sqrt();
+            let (scale, root) = (T::of((0.5 / n as f64).sqrt()), T::of(SQRT_2));
             packed.plan.turn.each(n.div_ceil(2), |k, turn| {
                 let back = turn.conj() * scale;
                 if k == 0 {
-                    z[0] = Complex::new(c[0], -second(0)) * (SQRT_2 * back.re);
+                    z[0] = number(c[0], -second(0)) * (root * back.re);
                     return;
                 }
-                let v = Complex::new(c[k], -c[n - k]) * back;
-                let w = Complex::new(second(k), -second(n - k)) * back;
+                let v = number(c[k], -c[n - k]) * back;
+                let w = number(second(k), -second(n - k)) * back;
                 z[k] = Complex::new(v.re - w.im, -v.im - w.re);
                 z[n - k] = Complex::new(v.re + w.im, v.im - w.re);
             });
         },
         |z, _| {
-            let mut put = |i: usize, z: &Complex<f64>| {
-                a[i] = z.re;
-                b.get_mut(i).into_iter().for_each(|b| *b = -z.im);
+            let mut put = |i: usize, z: &Complex<T>| {
+                a[i] = z.re.into();
+                b.get_mut(i).into_iter().for_each(|b| *b = (-z.im).into());
             };
             let (even, odd) = z.split_at(z.len().div_ceil(2));
             let even = even.iter().zip((0..).step_by(2));
