@@ -4,6 +4,7 @@ use std::rc::Rc;
 
 use rustfft::num_complex::Complex;
 
+use crate::column::extremes;
 use crate::likelihood::{Bins, Dct, Noise, Panel, Solution};
 use crate::transform::RealFft;
 
@@ -429,7 +430,8 @@ pub fn ends(u: &[f64], start: usize, end: usize, increase: f64) -> ((f64, f64), 
     let weigh = |places: std::ops::Range<usize>, logs: &[f64]| {
         let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let (mut sum, mut mean, mut square) = (0.0, 0.0, 0.0);
-        for (i, l) in places.zip(logs) {
+        // Less than that has no weight in any number.
+        for (i, l) in places.zip(logs).filter(|(_, l)| **l - top > -746.0) {
             let w = (l - top).exp();
             sum += w;
             mean += w * i as f64;
@@ -461,22 +463,31 @@ pub fn ends(u: &[f64], start: usize, end: usize, increase: f64) -> ((f64, f64), 
 }
 
 fn top_of(shape: &[f64]) -> f64 {
-    shape.iter().copied().fold(1e-9, f64::max)
+    extremes(shape)[1].max(1e-9)
 }
 
 /// Samples of nearly the same shape have nearly the same variance: their count, and the sums of their shapes and squares,
 /// stand for them.
 pub(crate) fn levels(u: &[f64], shape: &[f64]) -> Vec<(f64, f64, f64)> {
-    let top = top_of(shape);
-    let bottom = shape.iter().copied().fold(top, f64::min);
+    let [low, high] = extremes(shape);
+    let top = high.max(1e-9);
+    let bottom = low.min(top);
     let per_level = (LEVELS - 1) as f64 / (top - bottom).max(f64::MIN_POSITIVE);
     let mut levels = vec![(0.0, 0.0, 0.0); LEVELS];
+    // Most shapes stay at a level for a while: its sums are put away when they leave it.
+    let mut here = (0, levels[0]);
     for (u, d) in u.iter().zip(shape) {
-        let (count, sum, squares) = &mut levels[((d - bottom) * per_level) as usize];
+        let at = ((d - bottom) * per_level) as usize;
+        if at != here.0 {
+            levels[here.0] = here.1;
+            here = (at, levels[at]);
+        }
+        let (count, sum, squares) = &mut here.1;
         *count += 1.0;
         *sum += d;
         *squares += u * u;
     }
+    levels[here.0] = here.1;
     levels.retain(|l| l.0 > 0.0);
     levels
 }
