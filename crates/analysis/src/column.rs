@@ -89,6 +89,31 @@ fn dots_behind_of(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
     (1..).zip(sums).map(of).collect()
 }
 
+wide! {
+    /// Sum of products, and that of their squares, as [`sum_of`] and [`dot`] make them of the products.
+    pub(crate) fn sums_of_products[](a: &[f64], b: &[f64]) -> [f64; 2] = sums_of_products_of
+}
+
+#[inline(always)]
+fn sums_of_products_of(a: &[f64], b: &[f64]) -> [f64; 2] {
+    let [mut sums, mut squares] = [[0.0; 8]; 2];
+    let (x, y) = (a.chunks_exact(8), b.chunks_exact(8));
+    let (mut sum, mut square) = (0.0, 0.0);
+    for (p, q) in x.remainder().iter().zip(y.remainder()) {
+        let product = p * q;
+        sum += product;
+        square += product * product;
+    }
+    for (p, q) in x.zip(y) {
+        for i in 0..8 {
+            let product = p[i] * q[i];
+            sums[i] += product;
+            squares[i] += product * product;
+        }
+    }
+    [sum_of_eight(sums) + sum, sum_of_eight(squares) + square]
+}
+
 /// Sum of a function of the values, in eight sums as [`dot`].
 pub(crate) fn sum_of(a: &[f64], f: impl Fn(f64) -> f64) -> f64 {
     let (eights, rest) = a.as_chunks::<8>();
@@ -208,9 +233,20 @@ impl Column {
 mod tests {
     use super::*;
 
+    fn wave(by: f64) -> Vec<f64> {
+        (0..5003).map(|i| (f64::from(i) * by).sin()).collect()
+    }
+
+    #[test]
+    fn sums_of_products_are_those_of_the_products() {
+        let (a, b) = (wave(0.7), wave(1.3));
+        let products: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a * b).collect();
+        let direct = [sum_of(&products, |p| p), dot(&products, &products)];
+        assert_eq!(sums_of_products(&a, &b), direct);
+    }
+
     #[test]
     fn products_behind_are_those_of_the_shifted_values() {
-        let wave = |by: f64| -> Vec<f64> { (0..5003).map(|i| (f64::from(i) * by).sin()).collect() };
         let (a, b) = (wave(0.7), wave(1.3));
         for (lag, sum) in (1..).zip(dots_behind(&a, &b, 20)) {
             assert_eq!(sum, dot(&a[..a.len() - lag], &b[lag..]), "{lag}");

@@ -5,7 +5,7 @@ use model::effect::Signal;
 use model::record::Quantity;
 
 use crate::checks::{self, LEAST_CHANCE, MOST};
-use crate::column::{dot, sum_of};
+use crate::column::{dot, sum_of, sums_of_products};
 use crate::diagnosis::Searched;
 use crate::grid::Grid;
 use crate::result::Check;
@@ -83,8 +83,8 @@ fn of_one(s: &Searched<'_>, samples: usize) -> Vec<Source> {
 
 /// As [`checks::errors_of_sum`], of many.
 fn errors(a: &[f64], b: &[f64]) -> f64 {
-    let products: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * b).collect();
-    sum_of(&products, |p| p) / dot(&products, &products).max(f64::MIN_POSITIVE).sqrt()
+    let [sum, square] = sums_of_products(a, b);
+    sum / square.max(f64::MIN_POSITIVE).sqrt()
 }
 
 /// Times over which a blow is felt, s.
