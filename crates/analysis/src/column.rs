@@ -126,20 +126,6 @@ pub(crate) fn sum_of(a: &[f64], f: impl Fn(f64) -> f64) -> f64 {
     sum_of_eight(sums) + rest.iter().map(|v| f(*v)).sum::<f64>()
 }
 
-/// The least and the greatest of some values, eight at a time: they are the same in any order.
-pub(crate) fn extremes(a: &[f64]) -> [f64; 2] {
-    let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY].map(|v| [v; 8]);
-    let (eights, rest) = a.as_chunks::<8>();
-    for some in eights.iter().map(<[f64; 8]>::as_slice).chain([rest]) {
-        for ((low, high), v) in low.iter_mut().zip(&mut high).zip(some) {
-            *low = if v < low { *v } else { *low };
-            *high = if v > high { *v } else { *high };
-        }
-    }
-    let low = low.into_iter().fold(f64::INFINITY, f64::min);
-    [low, high.into_iter().fold(f64::NEG_INFINITY, f64::max)]
-}
-
 /// Coefficients of a column.
 #[derive(Clone)]
 pub(crate) enum Column {

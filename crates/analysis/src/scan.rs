@@ -2,9 +2,9 @@
 
 use std::rc::Rc;
 
+use model::effect::extremes;
 use rustfft::num_complex::Complex;
 
-use crate::column::extremes;
 use crate::likelihood::{Bins, Dct, Noise, Panel, Solution};
 use crate::transform::RealFft;
 

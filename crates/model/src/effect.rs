@@ -204,22 +204,27 @@ pub struct Signal {
     pub moving: bool,
 }
 
+/// The least and the greatest of some values, eight at a time: they are the same in any order. Infinite, the least above
+/// the greatest, of none.
+#[must_use]
+pub fn extremes(values: &[f64]) -> [f64; 2] {
+    let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY].map(|v| [v; 8]);
+    let (eights, rest) = values.as_chunks::<8>();
+    for some in eights.iter().map(<[f64; 8]>::as_slice).chain([rest]) {
+        for ((low, high), v) in low.iter_mut().zip(&mut high).zip(some) {
+            *low = if v < low { *v } else { *low };
+            *high = if v > high { *v } else { *high };
+        }
+    }
+    let low = low.into_iter().fold(f64::INFINITY, f64::min);
+    [low, high.into_iter().fold(f64::NEG_INFINITY, f64::max)]
+}
+
 impl Signal {
     /// Highest minus lowest value of the smoothed signal.
     #[must_use]
     pub fn range(&self) -> f64 {
-        // Eight at once; the least of them is the same in any order.
-        const ABREAST: usize = 8;
-        let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY].map(|v| [v; ABREAST]);
-        let (many, rest) = self.smooth.as_chunks::<ABREAST>();
-        for some in many.iter().map(<[f64; ABREAST]>::as_slice).chain([rest]) {
-            for ((l, h), v) in low.iter_mut().zip(&mut high).zip(some) {
-                *l = if v < l { *v } else { *l };
-                *h = if v > h { *v } else { *h };
-            }
-        }
-        let low = low.into_iter().fold(f64::INFINITY, f64::min);
-        let high = high.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let [low, high] = extremes(&self.smooth);
         high - low
     }
 

@@ -399,6 +399,13 @@ struct Neighbours {
 }
 
 impl Neighbours {
+    /// In the order in which they are tried.
+    fn all() -> impl Iterator<Item = Self> {
+        let of = |half: &usize, bent| Self { half: *half, bent };
+        let means = MEANS.iter().map(move |w| of(w, false));
+        means.chain(PARABOLAS.iter().map(move |w| of(w, true)))
+    }
+
     /// What they predict of a part.
     fn level(self, clean: &[f64], sums: &Sums, part: Range<usize>) -> Vec<f64> {
         if self.bent {
@@ -448,12 +455,9 @@ impl Local {
                 edge,
             }
         };
-        let neighbours = |half: &usize, bent| Neighbours { half: *half, bent };
-        let all = (MEANS.iter().map(|w| neighbours(w, false)))
-            .chain(PARABOLAS.iter().map(|w| neighbours(w, true)));
         let parts = telling(y.len());
         let mut best: Option<(Neighbours, Self)> = None;
-        for neighbours in all {
+        for neighbours in Neighbours::all() {
             let told = of(neighbours, &parts);
             if (best.as_ref()).is_none_or(|(_, b)| told.sigma < BETTER * b.sigma) {
                 best = Some((neighbours, told));
@@ -618,10 +622,7 @@ mod tests {
                 })
                 .collect();
             let sums = Sums::new(&y);
-            let of = |half: &usize, bent| Neighbours { half: *half, bent };
-            let all =
-                (MEANS.iter().map(|w| of(w, false))).chain(PARABOLAS.iter().map(|w| of(w, true)));
-            let least = all
+            let least = Neighbours::all()
                 .map(|n| {
                     let level = n.level(&y, &sums, 0..y.len());
                     let residual = y.iter().zip(&level).map(|(y, l)| y - l);
