@@ -1,5 +1,6 @@
 //! Toolchain, image, tests: what a newcomer types.
 
+mod answers;
 mod campaign;
 mod effects;
 mod image;
@@ -21,6 +22,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
            analyzes and diagnoses; a number after it is the seed
   campaign measures by rates what the diagnosis can tell, and writes docs/power.md: up to an hour on two cores;
            --quick for minutes, --full for hours, --seed N for a run that was made before, --help for the rest
+  answers  --write [DIR] keeps what the engine says of some 400 records of every kind; --compare [DIR] names by record and
+           path what has moved since: before and after a change of the engine's code that is to move nothing
   effects  writes docs/effects.md and its figures from the files of the effects; --check tells whether they are current
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}
   size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt
@@ -38,6 +41,7 @@ fn main() -> ExitCode {
         Some("demo") => demo(&root),
         Some("image") => build_image(&root),
         Some("campaign") => campaign::measure(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("answers") => answers::freeze(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("effects") => effects::page(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("size") => size::report(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("compare-peers") => peers::compare(&root, std::env::args().any(|a| a == "--long")),
