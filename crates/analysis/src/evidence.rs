@@ -95,7 +95,7 @@ fn of_blocks(v: &[f64], walks: &[f64], length: usize, blocks: usize) -> Vec<f64>
 }
 
 /// sup |z| of ln ADEV against replicates of the model, before and after.
-pub(crate) fn allan_misfit(s: &Searched<'_>, _rate_hz: f64, seed: u64) -> [f64; 2] {
+pub(crate) fn allan_misfit(s: &Searched<'_>, seed: u64) -> [f64; 2] {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x616c_6c61_6e21);
     let y = &s.target.y;
     let panel = &s.search.panel;

@@ -95,7 +95,7 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
         })
         .collect();
     let scores = gain::scores(&s.target.y, grid.rate_hz, &s.state, &values);
-    let misfit = evidence::allan_misfit(s, grid.rate_hz, seed);
+    let misfit = evidence::allan_misfit(s, seed);
     let n = (grid.n as f64).ln();
     // A base that is no turntable turns a little about the other axes too.
     let motion = s.search.candidates.iter();

@@ -31,7 +31,7 @@ pub struct Input {
 /// One omnibus check of a channel, against the model before and after it was extended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Check {
-    /// `ljung_box`, `band_energy`, `variance_cusum`, ...
+    /// `ljung_box`, `band_energy`, `variance_in_time`, ...
     pub id: String,
     /// The channel, or `record` where it concerns all.
     pub channel: String,

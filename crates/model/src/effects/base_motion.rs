@@ -2,8 +2,11 @@
 
 use std::ops::Range;
 
+use crate::effect::{
+    Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    optional, parameter, value,
+};
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, optional, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -21,9 +24,17 @@ impl Effect for BaseMotion {
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
             parameter("peak", "deg/s", "largest rate of the motion"),
-            optional("start", "s", "start of one turn out and back, where it is no sway"),
+            optional(
+                "start",
+                "s",
+                "start of one turn out and back, where it is no sway",
+            ),
             optional("end", "s", "its end"),
-            optional("frequency", "Hz", "frequency of the sway in a simulation; 0.1 where it is left out"),
+            optional(
+                "frequency",
+                "Hz",
+                "frequency of the sway in a simulation; 0.1 where it is left out",
+            ),
         ];
         PARAMETERS
     }
@@ -35,14 +46,23 @@ impl Effect for BaseMotion {
             excitation: "Motion.",
             test: "Excess rms between 0.02 and 0.6 Hz above 0.3 deg/s, more than any bias of this class of part can wander; or, in a record at rest, rates of more than 1 deg/s that come smoothly and are gone within 30 s.",
             figure: "The rate in time blocks.",
-            example: Example::new(Plot::RateInTime { block_s: 2.0 }, &[("peak", 3.0), ("frequency", 0.02)]),
+            example: Example::new(
+                Plot::RateInTime { block_s: 2.0 },
+                &[("peak", 3.0), ("frequency", 0.02)],
+            ),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "line", experiment: "decouple the base from the bench" },
-            Rival { cause: "g_sensitivity", experiment: "shake along the axis without turning" }
+            Rival {
+                cause: "line",
+                experiment: "decouple the base from the bench",
+            },
+            Rival {
+                cause: "g_sensitivity",
+                experiment: "shake along the axis without turning",
+            },
         ];
         RIVALS
     }
@@ -56,7 +76,10 @@ impl Effect for BaseMotion {
 
     fn describe(&self, found: &Found) -> Parameters {
         let peak = found.coefficients.first().map_or((0.0, 0.0), |c| *c);
-        let mut all = Parameters::from([("peak".to_owned(), Parameter::estimated(peak.0, peak.1, &found.unit))]);
+        let mut all = Parameters::from([(
+            "peak".to_owned(),
+            Parameter::estimated(peak.0, peak.1, &found.unit),
+        )]);
         for (name, at) in ["start", "end"].iter().zip(&found.location) {
             all.insert((*name).into(), Parameter::estimated(at.0, at.1, "s"));
         }

@@ -1,7 +1,10 @@
 //! The bias jumps once.
 
+use crate::effect::{
+    Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    parameter, value,
+};
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -30,18 +33,39 @@ impl Effect for BiasStep {
             excitation: "Nothing.",
             test: "Likelihood ratio at all times at once, random walk refitted; largest one taken.",
             figure: "Rate in time blocks with the two levels.",
-            example: Example::new(Plot::RateInTime { block_s: 5.0 }, &[("time", 240.0), ("height", 0.4)]),
+            example: Example::new(
+                Plot::RateInTime { block_s: 5.0 },
+                &[("time", 240.0), ("height", 0.4)],
+            ),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "rate_ramp", experiment: "a record ten times longer: a ramp goes on, a step stays" },
-            Rival { cause: "telegraph", experiment: "a longer record: telegraph noise comes back" },
-            Rival { cause: "temperature", experiment: "repeat the run: a step does not come back at the same temperature" },
-            Rival { cause: "supply_sensitivity", experiment: "switch the load several times" },
-            Rival { cause: "motor_bias", experiment: "switch the motor several times" },
-            Rival { cause: "warm_up", experiment: "a second cold start" }
+            Rival {
+                cause: "rate_ramp",
+                experiment: "a record ten times longer: a ramp goes on, a step stays",
+            },
+            Rival {
+                cause: "telegraph",
+                experiment: "a longer record: telegraph noise comes back",
+            },
+            Rival {
+                cause: "temperature",
+                experiment: "repeat the run: a step does not come back at the same temperature",
+            },
+            Rival {
+                cause: "supply_sensitivity",
+                experiment: "switch the load several times",
+            },
+            Rival {
+                cause: "motor_bias",
+                experiment: "switch the motor several times",
+            },
+            Rival {
+                cause: "warm_up",
+                experiment: "a second cold start",
+            },
         ];
         RIVALS
     }
@@ -56,14 +80,19 @@ impl Effect for BiasStep {
     fn describe(&self, found: &Found) -> Parameters {
         let mut all = Parameters::new();
         if let (Some(height), Some(time)) = (found.coefficients.first(), found.location.first()) {
-            all.insert("height".into(), Parameter::estimated(height.0, height.1, &found.unit));
+            all.insert(
+                "height".into(),
+                Parameter::estimated(height.0, height.1, &found.unit),
+            );
             all.insert("time".into(), Parameter::estimated(time.0, time.1, "s"));
         }
         all
     }
 
     fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
-        let (Some(a), Some(b)) = (a.get("time"), b.get("time")) else { return false };
+        let (Some(a), Some(b)) = (a.get("time"), b.get("time")) else {
+            return false;
+        };
         let error = a.std_error.unwrap_or(0.0).hypot(b.std_error.unwrap_or(0.0));
         (a.value - b.value).abs() <= 3.0 * error + 0.1
     }

@@ -1,6 +1,9 @@
 //! The board clock is off.
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
+use crate::effect::{
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    parameter, value,
+};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -15,9 +18,11 @@ impl Effect for ClockRate {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("ppm", "ppm", "device clock fast against the host, parts per million"),
-        ];
+        const PARAMETERS: &[ParameterSpec] = &[parameter(
+            "ppm",
+            "ppm",
+            "device clock fast against the host, parts per million",
+        )];
         PARAMETERS
     }
 
@@ -33,9 +38,10 @@ impl Effect for ClockRate {
     }
 
     fn rivals(&self) -> &'static [Rival] {
-        const RIVALS: &[Rival] = &[
-            Rival { cause: "dropped_samples", experiment: "the sequence numbers" }
-        ];
+        const RIVALS: &[Rival] = &[Rival {
+            cause: "dropped_samples",
+            experiment: "the sequence numbers",
+        }];
         RIVALS
     }
 

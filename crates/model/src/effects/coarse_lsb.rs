@@ -1,6 +1,9 @@
 //! Low bits are missing.
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
+use crate::effect::{
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    parameter, value,
+};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -15,9 +18,8 @@ impl Effect for CoarseLsb {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("missing_bits", "1", "low bits that are always 0"),
-        ];
+        const PARAMETERS: &[ParameterSpec] =
+            &[parameter("missing_bits", "1", "low bits that are always 0")];
         PARAMETERS
     }
 
@@ -33,9 +35,10 @@ impl Effect for CoarseLsb {
     }
 
     fn rivals(&self) -> &'static [Rival] {
-        const RIVALS: &[Rival] = &[
-            Rival { cause: "stuck_bit", experiment: "look at the counts: one bit or all below it" }
-        ];
+        const RIVALS: &[Rival] = &[Rival {
+            cause: "stuck_bit",
+            experiment: "look at the counts: one bit or all below it",
+        }];
         RIVALS
     }
 

@@ -2,8 +2,11 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::effect::{
+    Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    parameter, value,
+};
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -19,9 +22,11 @@ impl Effect for CommonNoise {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("sigma", "deg/s", "standard deviation of the shared part"),
-        ];
+        const PARAMETERS: &[ParameterSpec] = &[parameter(
+            "sigma",
+            "deg/s",
+            "standard deviation of the shared part",
+        )];
         PARAMETERS
     }
 
@@ -38,8 +43,14 @@ impl Effect for CommonNoise {
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "base_motion", experiment: "decouple the base from the bench" },
-            Rival { cause: "supply_sensitivity", experiment: "a battery in place of the supply" }
+            Rival {
+                cause: "base_motion",
+                experiment: "decouple the base from the bench",
+            },
+            Rival {
+                cause: "supply_sensitivity",
+                experiment: "a battery in place of the supply",
+            },
         ];
         RIVALS
     }
@@ -53,7 +64,11 @@ impl Effect for CommonNoise {
 
     fn describe(&self, found: &Found) -> Parameters {
         let sigma = found.coefficients.first().map_or((0.0, 0.0), |c| *c);
-        [("sigma".to_owned(), Parameter::estimated(sigma.0, sigma.1, &found.unit))].into()
+        [(
+            "sigma".to_owned(),
+            Parameter::estimated(sigma.0, sigma.1, &found.unit),
+        )]
+        .into()
     }
 
     fn same_event(&self, _a: &Parameters, _b: &Parameters) -> bool {

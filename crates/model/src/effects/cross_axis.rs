@@ -1,6 +1,9 @@
 //! The gyro feels the rotation about another axis.
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, optional, value};
+use crate::effect::{
+    Column, Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Regression, Rival,
+    Stage, View, optional, value,
+};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -31,14 +34,21 @@ impl Effect for CrossAxis {
             excitation: "Rotation about another axis, while this one is at rest.",
             test: "Least squares on the other gyros that turn, random walk refitted.",
             figure: "Rate in blocks of the other rate against that rate.",
-            example: Example::new(Plot::RateByValue("gyro_z"), &[("from_gyro_z", 0.03)]).in_a_world(&[("turn_dps", 20.0)]),
+            example: Example::new(Plot::RateByValue("gyro_z"), &[("from_gyro_z", 0.03)])
+                .in_a_world(&[("turn_dps", 20.0)]),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "base_motion", experiment: "a rate table with a stiff axis" },
-            Rival { cause: "g_sensitivity", experiment: "a six-position test at rest" }
+            Rival {
+                cause: "base_motion",
+                experiment: "a rate table with a stiff axis",
+            },
+            Rival {
+                cause: "g_sensitivity",
+                experiment: "a six-position test at rest",
+            },
         ];
         RIVALS
     }
@@ -77,10 +87,16 @@ impl Effect for CrossAxis {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        for (source, name) in ["from_gyro_x", "from_gyro_y", "from_gyro_z"].iter().enumerate() {
+        for (source, name) in ["from_gyro_x", "from_gyro_y", "from_gyro_z"]
+            .iter()
+            .enumerate()
+        {
             let share = value(parameters, name);
             for &axis in channels {
-                for (rate, w) in simulation.rate[axis].iter_mut().zip(&simulation.motion[source]) {
+                for (rate, w) in simulation.rate[axis]
+                    .iter_mut()
+                    .zip(&simulation.motion[source])
+                {
                     *rate += share * w;
                 }
             }

@@ -2,7 +2,10 @@
 
 use rand_distr::{Distribution, Uniform};
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
+use crate::effect::{
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    parameter, value,
+};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -17,9 +20,7 @@ impl Effect for DroppedSamples {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("count", "1", "frames lost"),
-        ];
+        const PARAMETERS: &[ParameterSpec] = &[parameter("count", "1", "frames lost")];
         PARAMETERS
     }
 
@@ -36,8 +37,14 @@ impl Effect for DroppedSamples {
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "stale_samples", experiment: "the new-data flags" },
-            Rival { cause: "clock_rate", experiment: "the sequence numbers" }
+            Rival {
+                cause: "stale_samples",
+                experiment: "the new-data flags",
+            },
+            Rival {
+                cause: "clock_rate",
+                experiment: "the sequence numbers",
+            },
         ];
         RIVALS
     }
@@ -52,7 +59,9 @@ impl Effect for DroppedSamples {
 
     fn simulate(&self, parameters: &Parameters, _channels: &[usize], simulation: &mut Simulation) {
         let count = value(parameters, "count").round().max(0.0) as usize;
-        let Ok(at) = Uniform::new(1, simulation.samples.max(2)) else { return };
+        let Ok(at) = Uniform::new(1, simulation.samples.max(2)) else {
+            return;
+        };
         for _ in 0..count {
             let i = at.sample(&mut simulation.rng).min(simulation.samples - 1);
             simulation.keep[i] = false;

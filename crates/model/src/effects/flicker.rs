@@ -4,8 +4,11 @@ use std::sync::Arc;
 
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::effect::{
+    Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
+    Plot, Rival, Stage, View, parameter, value,
+};
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -20,9 +23,11 @@ impl Effect for Flicker {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("bias_instability", "deg/h", "B of IEEE Std 952; the flat part of the Allan curve lies at 0.664 B"),
-        ];
+        const PARAMETERS: &[ParameterSpec] = &[parameter(
+            "bias_instability",
+            "deg/h",
+            "B of IEEE Std 952; the flat part of the Allan curve lies at 0.664 B",
+        )];
         PARAMETERS
     }
 
@@ -39,9 +44,18 @@ impl Effect for Flicker {
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "gauss_markov", experiment: "a longer record: flicker goes on rising to lower frequencies" },
-            Rival { cause: "telegraph", experiment: "a longer record: look at the histogram for two levels" },
-            Rival { cause: "low_pass", experiment: "change the filter taps" }
+            Rival {
+                cause: "gauss_markov",
+                experiment: "a longer record: flicker goes on rising to lower frequencies",
+            },
+            Rival {
+                cause: "telegraph",
+                experiment: "a longer record: look at the histogram for two levels",
+            },
+            Rival {
+                cause: "low_pass",
+                experiment: "change the filter taps",
+            },
         ];
         RIVALS
     }
@@ -54,10 +68,20 @@ impl Effect for Flicker {
     }
 
     fn describe(&self, found: &Found) -> Parameters {
-        let Some((kb, error)) = found.coefficients.first() else { return Parameters::new() };
+        let Some((kb, error)) = found.coefficients.first() else {
+            return Parameters::new();
+        };
         let b = found.white_sigma * (kb / 2.0).exp();
-        let (b, unit) = if found.unit == "deg/s" { (b * 3600.0, "deg/h") } else { (b, found.unit.as_str()) };
-        [("bias_instability".to_owned(), Parameter::estimated(b, b * error / 2.0, unit))].into()
+        let (b, unit) = if found.unit == "deg/s" {
+            (b * 3600.0, "deg/h")
+        } else {
+            (b, found.unit.as_str())
+        };
+        [(
+            "bias_instability".to_owned(),
+            Parameter::estimated(b, b * error / 2.0, unit),
+        )]
+        .into()
     }
 
     fn stage(&self) -> Stage {

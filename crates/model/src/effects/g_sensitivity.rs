@@ -1,6 +1,9 @@
 //! The gyro feels acceleration.
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, optional, value};
+use crate::effect::{
+    Column, Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Regression, Rival,
+    Stage, View, optional, value,
+};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -20,9 +23,21 @@ impl Effect for GSensitivity {
             optional("acc_x", "deg/s/g", "shift per g along x"),
             optional("acc_y", "deg/s/g", "shift per g along y"),
             optional("acc_z", "deg/s/g", "shift per g along z"),
-            optional("late_x", "deg/s/g", "part of the shift along x that comes a sample late"),
-            optional("late_y", "deg/s/g", "part of the shift along y that comes a sample late"),
-            optional("late_z", "deg/s/g", "part of the shift along z that comes a sample late"),
+            optional(
+                "late_x",
+                "deg/s/g",
+                "part of the shift along x that comes a sample late",
+            ),
+            optional(
+                "late_y",
+                "deg/s/g",
+                "part of the shift along y that comes a sample late",
+            ),
+            optional(
+                "late_z",
+                "deg/s/g",
+                "part of the shift along z that comes a sample late",
+            ),
         ];
         PARAMETERS
     }
@@ -34,15 +49,25 @@ impl Effect for GSensitivity {
             excitation: "Acceleration that changes by more than 0.015 g rms: shaking, tilting, a six-position test.",
             test: "Least squares on each accelerometer axis, and on its change since the sample before where the base is still; random walk refitted. More than half of it late is no filter of the gyro, unless its noise went through one.",
             figure: "Rate in blocks of acceleration against acceleration.",
-            example: Example::new(Plot::RateByValue("acc_x"), &[("acc_x", 0.6)]).in_a_world(&[("vibration_g", 0.15)]),
+            example: Example::new(Plot::RateByValue("acc_x"), &[("acc_x", 0.6)])
+                .in_a_world(&[("vibration_g", 0.15)]),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "base_motion", experiment: "shake along the axis without turning (a shaker), or a six-position test" },
-            Rival { cause: "cross_axis", experiment: "a six-position test at rest" },
-            Rival { cause: "line", experiment: "a shaker run at another frequency" }
+            Rival {
+                cause: "base_motion",
+                experiment: "shake along the axis without turning (a shaker), or a six-position test",
+            },
+            Rival {
+                cause: "cross_axis",
+                experiment: "a six-position test at rest",
+            },
+            Rival {
+                cause: "line",
+                experiment: "a shaker run at another frequency",
+            },
         ];
         RIVALS
     }
@@ -60,7 +85,10 @@ impl Effect for GSensitivity {
                 continue;
             }
             let mean = in_g.iter().sum::<f64>() / in_g.len() as f64;
-            changes.push(Column { parameter: LATE[axis.index()], values: late(&in_g).collect() });
+            changes.push(Column {
+                parameter: LATE[axis.index()],
+                values: late(&in_g).collect(),
+            });
             followed.push(signal.name.as_str());
             all.push(Hypothesis::Regression(Regression {
                 columns: vec![Column {
@@ -104,9 +132,13 @@ impl Effect for GSensitivity {
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         for (source, acc) in simulation.acc.iter().enumerate() {
             let mean = acc.iter().sum::<f64>() / simulation.samples.max(1) as f64;
-            let (k, k_late) = (value(parameters, AT_ONCE[source]), value(parameters, LATE[source]));
+            let (k, k_late) = (
+                value(parameters, AT_ONCE[source]),
+                value(parameters, LATE[source]),
+            );
             for &axis in channels {
-                for ((rate, a), change) in simulation.rate[axis].iter_mut().zip(acc).zip(late(acc)) {
+                for ((rate, a), change) in simulation.rate[axis].iter_mut().zip(acc).zip(late(acc))
+                {
                     *rate += k * (a - mean) + k_late * change;
                 }
             }

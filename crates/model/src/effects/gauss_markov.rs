@@ -4,8 +4,11 @@ use std::sync::Arc;
 
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::effect::{
+    Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
+    Plot, Rival, Stage, View, parameter, value,
+};
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -22,7 +25,11 @@ impl Effect for GaussMarkov {
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
             parameter("sigma", "deg/s", "standard deviation"),
-            parameter("correlation_time", "s", "time in which the correlation falls to 1/e"),
+            parameter(
+                "correlation_time",
+                "s",
+                "time in which the correlation falls to 1/e",
+            ),
         ];
         PARAMETERS
     }
@@ -40,10 +47,22 @@ impl Effect for GaussMarkov {
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "flicker", experiment: "a longer record: flicker goes on rising to lower frequencies" },
-            Rival { cause: "low_pass", experiment: "change the filter taps" },
-            Rival { cause: "telegraph", experiment: "a longer record: look at the histogram for two levels" },
-            Rival { cause: "bias_step", experiment: "a longer record" }
+            Rival {
+                cause: "flicker",
+                experiment: "a longer record: flicker goes on rising to lower frequencies",
+            },
+            Rival {
+                cause: "low_pass",
+                experiment: "change the filter taps",
+            },
+            Rival {
+                cause: "telegraph",
+                experiment: "a longer record: look at the histogram for two levels",
+            },
+            Rival {
+                cause: "bias_step",
+                experiment: "a longer record",
+            },
         ];
         RIVALS
     }
@@ -56,12 +75,20 @@ impl Effect for GaussMarkov {
     }
 
     fn describe(&self, found: &Found) -> Parameters {
-        let [(a, a_error), (t, t_error), ..] = found.coefficients[..] else { return Parameters::new() };
+        let [(a, a_error), (t, t_error), ..] = found.coefficients[..] else {
+            return Parameters::new();
+        };
         let sigma = found.white_sigma * (a / 2.0).exp();
         let tau = t.exp() / found.rate_hz;
         [
-            ("sigma".to_owned(), Parameter::estimated(sigma, sigma * a_error / 2.0, &found.unit)),
-            ("correlation_time".to_owned(), Parameter::estimated(tau, tau * t_error, "s")),
+            (
+                "sigma".to_owned(),
+                Parameter::estimated(sigma, sigma * a_error / 2.0, &found.unit),
+            ),
+            (
+                "correlation_time".to_owned(),
+                Parameter::estimated(tau, tau * t_error, "s"),
+            ),
         ]
         .into()
     }
@@ -71,8 +98,15 @@ impl Effect for GaussMarkov {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        let (sigma, tau) = (value(parameters, "sigma"), value(parameters, "correlation_time"));
-        let p = if tau > 0.0 { (-1.0 / (tau * simulation.rate_hz)).exp() } else { 0.0 };
+        let (sigma, tau) = (
+            value(parameters, "sigma"),
+            value(parameters, "correlation_time"),
+        );
+        let p = if tau > 0.0 {
+            (-1.0 / (tau * simulation.rate_hz)).exp()
+        } else {
+            0.0
+        };
         for &axis in channels {
             let normal = |s: &mut Simulation| -> f64 { StandardNormal.sample(&mut s.rng) };
             let mut x = sigma * normal(simulation);

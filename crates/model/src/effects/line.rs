@@ -1,7 +1,10 @@
 //! A sinusoid in the rate.
 
+use crate::effect::{
+    Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    optional, parameter, value,
+};
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, optional, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -17,7 +20,11 @@ impl Effect for Line {
 
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
-            parameter("frequency", "Hz", "frequency as sampled; the true one may be an alias"),
+            parameter(
+                "frequency",
+                "Hz",
+                "frequency as sampled; the true one may be an alias",
+            ),
             parameter("amplitude", "deg/s", "amplitude"),
             optional("phase", "rad", "phase of the cosine at the start"),
         ];
@@ -31,15 +38,30 @@ impl Effect for Line {
             excitation: "Nothing; more than three cycles.",
             test: "Periodogram of the whitened residual at twice the Fourier frequencies, then the exact likelihood of the refined frequency.",
             figure: "Amplitude spectrum of the rate around it, other terms taken out: one peak.",
-            example: Example::new(Plot::Lines { from_hz: 2.0, to_hz: 2.8 }, &[("frequency", 2.37), ("amplitude", 0.08)]),
+            example: Example::new(
+                Plot::Lines {
+                    from_hz: 2.0,
+                    to_hz: 2.8,
+                },
+                &[("frequency", 2.37), ("amplitude", 0.08)],
+            ),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "am_line", experiment: "a longer record: side bands grow apart from the carrier" },
-            Rival { cause: "motor_bias", experiment: "spin the motor without load, or disconnect it" },
-            Rival { cause: "base_motion", experiment: "decouple the base from the bench" }
+            Rival {
+                cause: "am_line",
+                experiment: "a longer record: side bands grow apart from the carrier",
+            },
+            Rival {
+                cause: "motor_bias",
+                experiment: "spin the motor without load, or disconnect it",
+            },
+            Rival {
+                cause: "base_motion",
+                experiment: "decouple the base from the bench",
+            },
         ];
         RIVALS
     }
@@ -53,18 +75,31 @@ impl Effect for Line {
 
     fn describe(&self, found: &Found) -> Parameters {
         let mut all = Parameters::new();
-        let [(c, c_error), (s, s_error), ..] = found.coefficients[..] else { return all };
+        let [(c, c_error), (s, s_error), ..] = found.coefficients[..] else {
+            return all;
+        };
         let amplitude = c.hypot(s);
-        all.insert("amplitude".into(), Parameter::estimated(amplitude, (c_error * s_error).sqrt(), &found.unit));
-        all.insert("phase".into(), Parameter::estimated((-s).atan2(c), (c_error * s_error).sqrt() / amplitude, "rad"));
+        all.insert(
+            "amplitude".into(),
+            Parameter::estimated(amplitude, (c_error * s_error).sqrt(), &found.unit),
+        );
+        all.insert(
+            "phase".into(),
+            Parameter::estimated((-s).atan2(c), (c_error * s_error).sqrt() / amplitude, "rad"),
+        );
         if let Some((frequency, error)) = found.location.first() {
-            all.insert("frequency".into(), Parameter::estimated(*frequency, *error, "Hz"));
+            all.insert(
+                "frequency".into(),
+                Parameter::estimated(*frequency, *error, "Hz"),
+            );
         }
         all
     }
 
     fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
-        let (Some(a), Some(b)) = (a.get("frequency"), b.get("frequency")) else { return false };
+        let (Some(a), Some(b)) = (a.get("frequency"), b.get("frequency")) else {
+            return false;
+        };
         let error = a.std_error.unwrap_or(0.0).hypot(b.std_error.unwrap_or(0.0));
         (a.value - b.value).abs() <= 4.0 * error
     }
@@ -74,7 +109,10 @@ impl Effect for Line {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        let (frequency, amplitude) = (value(parameters, "frequency"), value(parameters, "amplitude"));
+        let (frequency, amplitude) = (
+            value(parameters, "frequency"),
+            value(parameters, "amplitude"),
+        );
         let phase = value(parameters, "phase");
         for &axis in channels {
             for (i, rate) in simulation.rate[axis].iter_mut().enumerate() {

@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
+use crate::effect::{
+    Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
+    Plot, Rival, Stage, View, parameter, value,
+};
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Covariance, Found, Frequencies, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -18,9 +21,11 @@ impl Effect for LowPass {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("lag1_correlation", "1", "correlation of neighbouring samples of the white part"),
-        ];
+        const PARAMETERS: &[ParameterSpec] = &[parameter(
+            "lag1_correlation",
+            "1",
+            "correlation of neighbouring samples of the white part",
+        )];
         PARAMETERS
     }
 
@@ -37,8 +42,14 @@ impl Effect for LowPass {
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "gauss_markov", experiment: "change the filter taps" },
-            Rival { cause: "flicker", experiment: "change the filter taps" }
+            Rival {
+                cause: "gauss_markov",
+                experiment: "change the filter taps",
+            },
+            Rival {
+                cause: "flicker",
+                experiment: "change the filter taps",
+            },
         ];
         RIVALS
     }
@@ -47,13 +58,22 @@ impl Effect for LowPass {
         if view.samples < 256 {
             return Err("fewer than 256 samples".into());
         }
-        Ok(vec![Hypothesis::Covariance(Arc::new(Pole)), Hypothesis::Covariance(Arc::new(Triangle))])
+        Ok(vec![
+            Hypothesis::Covariance(Arc::new(Pole)),
+            Hypothesis::Covariance(Arc::new(Triangle)),
+        ])
     }
 
     fn describe(&self, found: &Found) -> Parameters {
-        let Some(&(theta, error)) = found.coefficients.first() else { return Parameters::new() };
+        let Some(&(theta, error)) = found.coefficients.first() else {
+            return Parameters::new();
+        };
         let rho = logistic(theta);
-        [("lag1_correlation".to_owned(), Parameter::estimated(rho, error * rho * (1.0 - rho), "1"))].into()
+        [(
+            "lag1_correlation".to_owned(),
+            Parameter::estimated(rho, error * rho * (1.0 - rho), "1"),
+        )]
+        .into()
     }
 
     fn stage(&self) -> Stage {
@@ -66,7 +86,11 @@ impl Effect for LowPass {
         for &axis in channels {
             let noise = &mut simulation.white[axis];
             if rho <= 0.3 {
-                let w = if rho > 0.0 { (1.0 - (1.0 - 4.0 * rho * rho).sqrt()) / (2.0 * rho) } else { 0.0 };
+                let w = if rho > 0.0 {
+                    (1.0 - (1.0 - 4.0 * rho * rho).sqrt()) / (2.0 * rho)
+                } else {
+                    0.0
+                };
                 let norm = (1.0 + w * w).sqrt();
                 let mut before = noise.first().copied().unwrap_or(0.0);
                 for v in noise.iter_mut() {
@@ -134,7 +158,11 @@ fn inverse_spline(r: f64) -> f64 {
     let (mut low, mut high) = (0.0, 2.0);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        if spline(middle) > r { low = middle } else { high = middle }
+        if spline(middle) > r {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }
@@ -150,12 +178,18 @@ impl Covariance for Triangle {
 
     fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
         let unit = inverse_spline(logistic(theta[0]));
-        let taps: Vec<f64> = (1..).map(|l| spline(f64::from(l) * unit)).take_while(|r| *r > 0.0).collect();
+        let taps: Vec<f64> = (1..)
+            .map(|l| spline(f64::from(l) * unit))
+            .take_while(|r| *r > 0.0)
+            .collect();
         at.cosine
             .iter()
             .map(|c| {
                 // Sum of taps times cosines of multiples of the frequency, by Clenshaw's recurrence.
-                let (first, second) = taps.iter().rev().fold((0.0, 0.0), |(b, next), r| (r + 2.0 * c * b - next, b));
+                let (first, second) = taps
+                    .iter()
+                    .rev()
+                    .fold((0.0, 0.0), |(b, next), r| (r + 2.0 * c * b - next, b));
                 let tail = 2.0 * (c * first - second);
                 // Quantization and the electronics behind the filter keep the density off zero.
                 (1.0 + tail).max(0.0) + 2e-3

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
+use crate::effect::{
+    Column, Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Regression,
+    Rival, Shape, Stage, View, optional, parameter, value,
+};
 use crate::parameter::Parameter;
 use crate::record::Base;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Found, Regression, Shape, optional, parameter, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -21,12 +24,36 @@ impl Effect for MotorBias {
 
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
-            parameter("at_full_duty", "deg/s", "shift at full duty, once the motor has its speed"),
-            optional("while_turning", "deg/s", "shift beyond that while the motor turns forward, the opposite backward: the current that friction takes"),
-            optional("surge_at_full_duty", "deg/s", "shift beyond that right after a step from standstill to full duty"),
-            optional("surge_at_start", "deg/s", "shift at the start beyond that: the motor did not have its speed yet"),
-            optional("surge_time", "s", "time in which the surge falls to 1/e: the motor's mechanical time constant"),
-            optional("by_magnitude", "1", "1 where the shift follows |duty|, else it follows the sign too"),
+            parameter(
+                "at_full_duty",
+                "deg/s",
+                "shift at full duty, once the motor has its speed",
+            ),
+            optional(
+                "while_turning",
+                "deg/s",
+                "shift beyond that while the motor turns forward, the opposite backward: the current that friction takes",
+            ),
+            optional(
+                "surge_at_full_duty",
+                "deg/s",
+                "shift beyond that right after a step from standstill to full duty",
+            ),
+            optional(
+                "surge_at_start",
+                "deg/s",
+                "shift at the start beyond that: the motor did not have its speed yet",
+            ),
+            optional(
+                "surge_time",
+                "s",
+                "time in which the surge falls to 1/e: the motor's mechanical time constant",
+            ),
+            optional(
+                "by_magnitude",
+                "1",
+                "1 where the shift follows |duty|, else it follows the sign too",
+            ),
         ];
         PARAMETERS
     }
@@ -38,39 +65,65 @@ impl Effect for MotorBias {
             excitation: "A motor command that changes, while the axis itself does not turn.",
             test: "Least squares on the command, and on the surge over a grid of times, refined; random walk refitted.",
             figure: "Rate in time blocks against duty.",
-            example: Example::new(Plot::RateAgainst("pwm"), &[("at_full_duty", 0.4)]).in_a_world(&[("motor_duty", 0.8)]),
+            example: Example::new(Plot::RateAgainst("pwm"), &[("at_full_duty", 0.4)])
+                .in_a_world(&[("motor_duty", 0.8)]),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "supply_sensitivity", experiment: "switch a dummy load with the motor off" },
-            Rival { cause: "line", experiment: "spin the motor without load" },
-            Rival { cause: "bias_step", experiment: "switch the motor several times" }
+            Rival {
+                cause: "supply_sensitivity",
+                experiment: "switch a dummy load with the motor off",
+            },
+            Rival {
+                cause: "line",
+                experiment: "spin the motor without load",
+            },
+            Rival {
+                cause: "bias_step",
+                experiment: "switch the motor several times",
+            },
         ];
         RIVALS
     }
 
     fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
-        let signal = view.signal(Quantity::Pwm).ok_or("no motor channel: record the motor command")?;
+        let signal = view
+            .signal(Quantity::Pwm)
+            .ok_or("no motor channel: record the motor command")?;
         if view.base == Some(Base::Turntable) && view.moving {
             return Err("the motor turns this axis: its true rate follows the command; disconnect the rotor or test an axis at rest".into());
         }
         let values = || signal.values.iter();
-        let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+        let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {
+            (l.min(v), h.max(v))
+        });
         let duty: Vec<f64> = values().map(|v| v / FULL_DUTY).collect();
         let size: Vec<f64> = duty.iter().map(|d| d.abs()).collect();
         let regression = |values, by_magnitude| {
             Hypothesis::Regression(Regression {
-                columns: vec![Column { parameter: "at_full_duty", values }],
-                fixed: if by_magnitude { vec![("by_magnitude", 1.0, "1")] } else { vec![] },
+                columns: vec![Column {
+                    parameter: "at_full_duty",
+                    values,
+                }],
+                fixed: if by_magnitude {
+                    vec![("by_magnitude", 1.0, "1")]
+                } else {
+                    vec![]
+                },
                 follows: Some(signal.name.clone()),
             })
         };
         if high - low < LEAST_CHANGE {
-            return Err("the motor command does not change: switch the motor during the record".into());
+            return Err(
+                "the motor command does not change: switch the motor during the record".into(),
+            );
         }
-        let surge = Hypothesis::Shaped(Arc::new(Surge { duty: duty.clone(), rate_hz: view.rate_hz }));
+        let surge = Hypothesis::Shaped(Arc::new(Surge {
+            duty: duty.clone(),
+            rate_hz: view.rate_hz,
+        }));
         let mut all = vec![regression(duty.clone(), false)];
         if low < 0.0 && high > 0.0 {
             all.push(regression(size, true));
@@ -79,7 +132,10 @@ impl Effect for MotorBias {
         // A command of two levels cannot tell them apart.
         if likeness(&turning, &duty) < MOST_ALIKE {
             all.push(Hypothesis::Regression(Regression {
-                columns: vec![Column { parameter: "while_turning", values: turning }],
+                columns: vec![Column {
+                    parameter: "while_turning",
+                    values: turning,
+                }],
                 fixed: vec![],
                 follows: Some(signal.name.clone()),
             }));
@@ -91,7 +147,10 @@ impl Effect for MotorBias {
     fn describe(&self, found: &Found) -> Parameters {
         let mut all = crate::effect::columns_as_parameters(self.parameters(), found);
         if let Some((time, error)) = found.location.first() {
-            all.insert("surge_time".into(), Parameter::estimated(*time, *error, "s"));
+            all.insert(
+                "surge_time".into(),
+                Parameter::estimated(*time, *error, "s"),
+            );
         }
         all
     }
@@ -106,13 +165,22 @@ impl Effect for MotorBias {
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let full = value(parameters, "at_full_duty");
-        let (surge, time) = (value(parameters, "surge_at_full_duty"), value(parameters, "surge_time"));
+        let (surge, time) = (
+            value(parameters, "surge_at_full_duty"),
+            value(parameters, "surge_time"),
+        );
         let start = value(parameters, "surge_at_start");
         let by_size = value(parameters, "by_magnitude") != 0.0;
-        let extra = (surge != 0.0 && time > 0.0).then(|| lagging(&simulation.duty, time * simulation.rate_hz));
-        let first = (start != 0.0 && time > 0.0).then(|| settling(simulation.duty.len(), time * simulation.rate_hz));
+        let extra = (surge != 0.0 && time > 0.0)
+            .then(|| lagging(&simulation.duty, time * simulation.rate_hz));
+        let first = (start != 0.0 && time > 0.0)
+            .then(|| settling(simulation.duty.len(), time * simulation.rate_hz));
         for &axis in channels {
-            for (i, (rate, d)) in simulation.rate[axis].iter_mut().zip(&simulation.duty).enumerate() {
+            for (i, (rate, d)) in simulation.rate[axis]
+                .iter_mut()
+                .zip(&simulation.duty)
+                .enumerate()
+            {
                 *rate += full * if by_size { d.abs() } else { *d };
                 *rate += value(parameters, "while_turning") * direction(*d);
                 *rate += surge * extra.as_ref().map_or(0.0, |e| e[i]);
@@ -137,7 +205,11 @@ fn likeness(a: &[f64], b: &[f64]) -> f64 {
         aa += (x - ma).powi(2);
         bb += (y - mb).powi(2);
     }
-    if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 1.0 }
+    if aa > 0.0 && bb > 0.0 {
+        ab / (aa * bb).sqrt()
+    } else {
+        1.0
+    }
 }
 
 /// Correlation of direction and command, above which one stands for both.
@@ -162,7 +234,9 @@ fn lagging(duty: &[f64], tau: f64) -> Vec<f64> {
 fn settling(samples: usize, tau: f64) -> Vec<f64> {
     let keep = (-1.0 / tau).exp();
     let first = tau * (1.0 - keep);
-    std::iter::successors(Some(first), |s| Some(s * keep)).take(samples).collect()
+    std::iter::successors(Some(first), |s| Some(s * keep))
+        .take(samples)
+        .collect()
 }
 
 /// The surge, by its time.
@@ -179,15 +253,25 @@ impl Shape for Surge {
     /// From half a sample to a few seconds, which no small motor needs.
     fn grid(&self) -> Vec<f64> {
         let least = (0.5 / self.rate_hz).max(0.03);
-        [1.0, 3.0, 9.0, 27.0, 81.0].iter().map(|k| k * least).filter(|t| *t < 4.0).collect()
+        [1.0, 3.0, 9.0, 27.0, 81.0]
+            .iter()
+            .map(|k| k * least)
+            .filter(|t| *t < 4.0)
+            .collect()
     }
 
     fn columns(&self, at: f64) -> Vec<Column> {
         let tau = at * self.rate_hz;
-        let mut all = vec![Column { parameter: "surge_at_full_duty", values: lagging(&self.duty, tau) }];
+        let mut all = vec![Column {
+            parameter: "surge_at_full_duty",
+            values: lagging(&self.duty, tau),
+        }];
         // A motor that is driven from the first sample on may have been switched on just before.
         if self.duty.first().is_some_and(|d| *d != 0.0) {
-            all.push(Column { parameter: "surge_at_start", values: settling(self.duty.len(), tau) });
+            all.push(Column {
+                parameter: "surge_at_start",
+                values: settling(self.duty.len(), tau),
+            });
         }
         all
     }

@@ -1,6 +1,9 @@
 //! The motor makes the rate noisier.
 
-use crate::effect::{Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, VarianceLaw, optional, parameter, value};
+use crate::effect::{
+    Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage,
+    VarianceLaw, View, optional, parameter, value,
+};
 use crate::parameter::Parameter;
 use crate::record::Quantity;
 use crate::simulate::Simulation;
@@ -18,8 +21,16 @@ impl Effect for MotorNoise {
 
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
-            parameter("variance_increase_at_full_duty", "1", "white variance at full duty over that at rest, minus 1"),
-            optional("by_magnitude", "1", "1 where the variance follows the magnitude of duty, 0 where its square, which is meant where this is left out because a record does not tell"),
+            parameter(
+                "variance_increase_at_full_duty",
+                "1",
+                "white variance at full duty over that at rest, minus 1",
+            ),
+            optional(
+                "by_magnitude",
+                "1",
+                "1 where the variance follows the magnitude of duty, 0 where its square, which is meant where this is left out because a record does not tell",
+            ),
         ];
         PARAMETERS
     }
@@ -31,37 +42,68 @@ impl Effect for MotorNoise {
             excitation: "A motor command that changes.",
             test: "Likelihood of the whitened residual with a variance that follows the square of duty, or |duty| where that is clearly better.",
             figure: "Mean square of the whitened residual in time blocks against duty.",
-            example: Example::new(Plot::PowerAgainst("pwm"), &[("variance_increase_at_full_duty", 1.5)]).in_a_world(&[("motor_duty", 0.8)]),
+            example: Example::new(
+                Plot::PowerAgainst("pwm"),
+                &[("variance_increase_at_full_duty", 1.5)],
+            )
+            .in_a_world(&[("motor_duty", 0.8)]),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "noise_change", experiment: "switch the motor several times: the noise follows it or does not" },
-            Rival { cause: "line", experiment: "a longer record at constant duty" }
+            Rival {
+                cause: "noise_change",
+                experiment: "switch the motor several times: the noise follows it or does not",
+            },
+            Rival {
+                cause: "line",
+                experiment: "a longer record at constant duty",
+            },
         ];
         RIVALS
     }
 
     fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
-        let signal = view.signal(Quantity::Pwm).ok_or("no motor channel: record the motor command")?;
-        let size: Vec<f64> = signal.values.iter().map(|v| (v / super::motor_bias::FULL_DUTY).abs()).collect();
-        let (low, high) = size.iter().fold((f64::INFINITY, 0.0f64), |(l, h), &v| (l.min(v), h.max(v)));
+        let signal = view
+            .signal(Quantity::Pwm)
+            .ok_or("no motor channel: record the motor command")?;
+        let size: Vec<f64> = signal
+            .values
+            .iter()
+            .map(|v| (v / super::motor_bias::FULL_DUTY).abs())
+            .collect();
+        let (low, high) = size
+            .iter()
+            .fold((f64::INFINITY, 0.0f64), |(l, h), &v| (l.min(v), h.max(v)));
         if (high - low) * super::motor_bias::FULL_DUTY < super::motor_bias::LEAST_CHANGE {
-            return Err("the motor command does not change in size: switch the motor during the record".into());
+            return Err(
+                "the motor command does not change in size: switch the motor during the record"
+                    .into(),
+            );
         }
         let square = size.iter().map(|d| d * d).collect();
         let law = |shape, by_magnitude| {
             let fixed = vec![("by_magnitude", by_magnitude, "1")];
-            Hypothesis::Variance(VarianceLaw::Shape { shape, fixed, follows: signal.name.clone() })
+            Hypothesis::Variance(VarianceLaw::Shape {
+                shape,
+                fixed,
+                follows: signal.name.clone(),
+            })
         };
         Ok(vec![law(square, 0.0), law(size, 1.0)])
     }
 
     fn describe(&self, found: &Found) -> Parameters {
         let increase = found.coefficients.first().map_or((0.0, 0.0), |c| *c);
-        let fixed = found.fixed.iter().map(|(name, value, unit)| ((*name).to_owned(), Parameter::exact(*value, unit)));
-        let size = ("variance_increase_at_full_duty".to_owned(), Parameter::estimated(increase.0, increase.1, "1"));
+        let fixed = found
+            .fixed
+            .iter()
+            .map(|(name, value, unit)| ((*name).to_owned(), Parameter::exact(*value, unit)));
+        let size = (
+            "variance_increase_at_full_duty".to_owned(),
+            Parameter::estimated(increase.0, increase.1, "1"),
+        );
         fixed.chain([size]).collect()
     }
 
@@ -97,13 +139,25 @@ mod tests {
             let mut model = ModelFile::paper();
             model.excitation.insert("motor_duty".into(), 0.5);
             let told = by_magnitude.map(|v| ("by_magnitude".into(), Parameter::exact(v, "1")));
-            let size = ("variance_increase_at_full_duty".into(), Parameter::exact(increase, "1"));
+            let size = (
+                "variance_increase_at_full_duty".into(),
+                Parameter::exact(increase, "1"),
+            );
             let parameters = told.into_iter().chain([size]).collect();
-            model.effects.push(EffectModel { cause: "motor_noise".into(), channels: vec!["gyro_x".into()], parameters });
+            model.effects.push(EffectModel {
+                cause: "motor_noise".into(),
+                channels: vec!["gyro_x".into()],
+                parameters,
+            });
             let model = ModelFile::parse(&model.to_toml()).expect("a model");
-            crate::simulate(&model, 200.0, 20.0, 1).expect("a run").channels
+            crate::simulate(&model, 200.0, 20.0, 1)
+                .expect("a run")
+                .channels
         };
-        assert!(run(duty, Some(1.0)) == run(1.0, Some(0.0)), "increase x |duty|");
+        assert!(
+            run(duty, Some(1.0)) == run(1.0, Some(0.0)),
+            "increase x |duty|"
+        );
         assert!(run(1.0, Some(0.0)) == run(1.0, None), "the square");
         assert!(run(1.0, Some(1.0)) != run(1.0, None), "two laws");
     }

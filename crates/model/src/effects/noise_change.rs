@@ -1,7 +1,10 @@
 //! The noise is larger for a while.
 
+use crate::effect::{
+    Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage,
+    VarianceLaw, View, parameter, value,
+};
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, VarianceLaw, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -19,7 +22,11 @@ impl Effect for NoiseChange {
         const PARAMETERS: &[ParameterSpec] = &[
             parameter("start", "s", "start of the stretch"),
             parameter("end", "s", "end of the stretch"),
-            parameter("variance_increase", "1", "white variance in the stretch over that outside, minus 1"),
+            parameter(
+                "variance_increase",
+                "1",
+                "white variance in the stretch over that outside, minus 1",
+            ),
         ];
         PARAMETERS
     }
@@ -31,14 +38,18 @@ impl Effect for NoiseChange {
             excitation: "Nothing.",
             test: "Likelihood of all stretches of the whitened residual.",
             figure: "Mean square of the whitened residual in time blocks.",
-            example: Example::new(Plot::PowerInTime, &[("start", 200.0), ("end", 320.0), ("variance_increase", 1.5)]),
+            example: Example::new(
+                Plot::PowerInTime,
+                &[("start", 200.0), ("end", 320.0), ("variance_increase", 1.5)],
+            ),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
-        const RIVALS: &[Rival] = &[
-            Rival { cause: "motor_noise", experiment: "switch the motor several times: the noise follows it or does not" }
-        ];
+        const RIVALS: &[Rival] = &[Rival {
+            cause: "motor_noise",
+            experiment: "switch the motor several times: the noise follows it or does not",
+        }];
         RIVALS
     }
 
@@ -52,7 +63,10 @@ impl Effect for NoiseChange {
     fn describe(&self, found: &Found) -> Parameters {
         let mut all = Parameters::new();
         if let Some(increase) = found.coefficients.first() {
-            all.insert("variance_increase".into(), Parameter::estimated(increase.0, increase.1, "1"));
+            all.insert(
+                "variance_increase".into(),
+                Parameter::estimated(increase.0, increase.1, "1"),
+            );
         }
         for (name, at) in ["start", "end"].iter().zip(&found.location) {
             all.insert((*name).into(), Parameter::estimated(at.0, at.1, "s"));

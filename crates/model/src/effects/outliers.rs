@@ -2,7 +2,10 @@
 
 use rand_distr::{Distribution, Uniform};
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, optional, value};
+use crate::effect::{
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    optional, parameter, value,
+};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -19,7 +22,11 @@ impl Effect for Outliers {
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
             parameter("count", "1", "samples far off"),
-            optional("size", "deg/s", "distance from the truth in a simulation; 10 white sigma where it is left out"),
+            optional(
+                "size",
+                "deg/s",
+                "distance from the truth in a simulation; 10 white sigma where it is left out",
+            ),
         ];
         PARAMETERS
     }
@@ -37,8 +44,14 @@ impl Effect for Outliers {
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "telegraph", experiment: "a longer record" },
-            Rival { cause: "stuck_bit", experiment: "look at the counts: a stuck bit is off by one power of two" }
+            Rival {
+                cause: "telegraph",
+                experiment: "a longer record",
+            },
+            Rival {
+                cause: "stuck_bit",
+                experiment: "look at the counts: a stuck bit is off by one power of two",
+            },
         ];
         RIVALS
     }
@@ -53,9 +66,13 @@ impl Effect for Outliers {
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let count = value(parameters, "count").round().max(0.0) as usize;
-        let Ok(at) = Uniform::new(0, simulation.samples.max(1)) else { return };
+        let Ok(at) = Uniform::new(0, simulation.samples.max(1)) else {
+            return;
+        };
         for &axis in channels {
-            let size = parameters.get("size").map_or(10.0 * simulation.white_sigma[axis], |p| p.value);
+            let size = parameters
+                .get("size")
+                .map_or(10.0 * simulation.white_sigma[axis], |p| p.value);
             for k in 0..count {
                 let i = at.sample(&mut simulation.rng);
                 simulation.white[axis][i] += if k % 2 == 0 { size } else { -size };

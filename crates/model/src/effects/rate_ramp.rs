@@ -1,6 +1,9 @@
 //! The bias runs away at a constant rate.
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, parameter, value};
+use crate::effect::{
+    Column, Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Regression, Rival,
+    Stage, View, parameter, value,
+};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -15,9 +18,11 @@ impl Effect for RateRamp {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("slope", "deg/s^2", "change of the bias per second"),
-        ];
+        const PARAMETERS: &[ParameterSpec] = &[parameter(
+            "slope",
+            "deg/s^2",
+            "change of the bias per second",
+        )];
         PARAMETERS
     }
 
@@ -34,10 +39,22 @@ impl Effect for RateRamp {
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "temperature", experiment: "a record ten times longer with a heater cycle: a ramp goes on, a temperature term follows the heater" },
-            Rival { cause: "temperature_quadratic", experiment: "a record ten times longer with a heater cycle" },
-            Rival { cause: "warm_up", experiment: "a record ten times longer: a ramp goes on, a warm-up ends" },
-            Rival { cause: "bias_step", experiment: "a record ten times longer: a ramp goes on, a step stays" }
+            Rival {
+                cause: "temperature",
+                experiment: "a record ten times longer with a heater cycle: a ramp goes on, a temperature term follows the heater",
+            },
+            Rival {
+                cause: "temperature_quadratic",
+                experiment: "a record ten times longer with a heater cycle",
+            },
+            Rival {
+                cause: "warm_up",
+                experiment: "a record ten times longer: a ramp goes on, a warm-up ends",
+            },
+            Rival {
+                cause: "bias_step",
+                experiment: "a record ten times longer: a ramp goes on, a step stays",
+            },
         ];
         RIVALS
     }
@@ -46,7 +63,10 @@ impl Effect for RateRamp {
         let centre = view.seconds() / 2.0;
         let values = (0..view.samples).map(|i| view.time(i) - centre).collect();
         Ok(vec![Hypothesis::Regression(Regression {
-            columns: vec![Column { parameter: "slope", values }],
+            columns: vec![Column {
+                parameter: "slope",
+                values,
+            }],
             fixed: vec![],
             follows: None,
         })])

@@ -1,6 +1,9 @@
 //! Readings end at a rail.
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, optional};
+use crate::effect::{
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    optional,
+};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -35,9 +38,10 @@ impl Effect for Saturation {
     }
 
     fn rivals(&self) -> &'static [Rival] {
-        const RIVALS: &[Rival] = &[
-            Rival { cause: "outliers", experiment: "a larger range" }
-        ];
+        const RIVALS: &[Rival] = &[Rival {
+            cause: "outliers",
+            experiment: "a larger range",
+        }];
         RIVALS
     }
 
@@ -51,7 +55,10 @@ impl Effect for Saturation {
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let limit = |name: &str| parameters.get(name).map(|p| p.value.round() as i32);
-        let (low, high) = (limit("low").unwrap_or(i32::MIN), limit("high").unwrap_or(i32::MAX));
+        let (low, high) = (
+            limit("low").unwrap_or(i32::MIN),
+            limit("high").unwrap_or(i32::MAX),
+        );
         for &axis in channels {
             for c in &mut simulation.counts[axis] {
                 *c = (*c).clamp(low.min(high), high);

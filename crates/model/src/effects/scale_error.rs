@@ -1,7 +1,10 @@
 //! The scale factor is wrong.
 
+use crate::effect::{
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    parameter, value,
+};
 use crate::record::Base;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -17,9 +20,11 @@ impl Effect for ScaleError {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("relative", "1", "true scale over the stated one, minus 1"),
-        ];
+        const PARAMETERS: &[ParameterSpec] = &[parameter(
+            "relative",
+            "1",
+            "true scale over the stated one, minus 1",
+        )];
         PARAMETERS
     }
 
@@ -30,14 +35,21 @@ impl Effect for ScaleError {
             excitation: "A slow sway of the base whose tilt the accelerometers see.",
             test: "The tilt of the accelerometers regressed on the integrated rate, in a band around the sway.",
             figure: "Tilt from the accelerometers against tilt from the rate.",
-            example: Example::new(Plot::Tilt, &[("relative", 0.15)]).in_a_world(&[("sway_deg", 5.0)]),
+            example: Example::new(Plot::Tilt, &[("relative", 0.15)])
+                .in_a_world(&[("sway_deg", 5.0)]),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "cross_axis", experiment: "a rate-table run about one axis" },
-            Rival { cause: "g_sensitivity", experiment: "a six-position test at rest" }
+            Rival {
+                cause: "cross_axis",
+                experiment: "a rate-table run about one axis",
+            },
+            Rival {
+                cause: "g_sensitivity",
+                experiment: "a six-position test at rest",
+            },
         ];
         RIVALS
     }
@@ -47,10 +59,15 @@ impl Effect for ScaleError {
             return Err("no accelerometer channels: nothing to hold the rate against".into());
         }
         if view.base == Some(Base::Turntable) {
-            return Err("a turntable does not tilt: sway the base by some degrees about a horizontal axis".into());
+            return Err(
+                "a turntable does not tilt: sway the base by some degrees about a horizontal axis"
+                    .into(),
+            );
         }
         if !view.moving {
-            return Err("the axis does not turn: sway the base by some degrees, or use a rate table".into());
+            return Err(
+                "the axis does not turn: sway the base by some degrees, or use a rate table".into(),
+            );
         }
         Ok(vec![Hypothesis::Scale])
     }

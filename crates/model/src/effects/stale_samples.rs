@@ -2,7 +2,10 @@
 
 use rand_distr::{Distribution, Uniform};
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, optional, value};
+use crate::effect::{
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    optional, parameter, value,
+};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -36,9 +39,10 @@ impl Effect for StaleSamples {
     }
 
     fn rivals(&self) -> &'static [Rival] {
-        const RIVALS: &[Rival] = &[
-            Rival { cause: "dropped_samples", experiment: "the sequence numbers" }
-        ];
+        const RIVALS: &[Rival] = &[Rival {
+            cause: "dropped_samples",
+            experiment: "the sequence numbers",
+        }];
         RIVALS
     }
 
@@ -53,7 +57,9 @@ impl Effect for StaleSamples {
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let count = value(parameters, "count").round().max(0.0) as usize;
         let silent = value(parameters, "silent") != 0.0;
-        let Ok(at) = Uniform::new(1, simulation.samples.max(2)) else { return };
+        let Ok(at) = Uniform::new(1, simulation.samples.max(2)) else {
+            return;
+        };
         for _ in 0..count {
             let i = at.sample(&mut simulation.rng).min(simulation.samples - 1);
             for &axis in channels {

@@ -2,7 +2,10 @@
 
 use rand_distr::{Bernoulli, Distribution};
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
+use crate::effect::{
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    parameter, value,
+};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -32,14 +35,23 @@ impl Effect for StuckBit {
             excitation: "Nothing.",
             test: "Audit: share of ones in each low bit against the share that the noise makes.",
             figure: "Share of ones by bit.",
-            example: Example::new(Plot::Bits, &[("bit", 2.0), ("value", 1.0), ("fraction", 0.6)]),
+            example: Example::new(
+                Plot::Bits,
+                &[("bit", 2.0), ("value", 1.0), ("fraction", 0.6)],
+            ),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "coarse_lsb", experiment: "look at the counts: one bit or all below it" },
-            Rival { cause: "outliers", experiment: "look at the counts: a stuck bit is off by one power of two" }
+            Rival {
+                cause: "coarse_lsb",
+                experiment: "look at the counts: one bit or all below it",
+            },
+            Rival {
+                cause: "outliers",
+                experiment: "look at the counts: a stuck bit is off by one power of two",
+            },
         ];
         RIVALS
     }
@@ -55,12 +67,18 @@ impl Effect for StuckBit {
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let bit = value(parameters, "bit").round().clamp(0.0, 13.0) as u32;
         let one = value(parameters, "value") != 0.0;
-        let Ok(sticks) = Bernoulli::new(value(parameters, "fraction").clamp(0.0, 1.0)) else { return };
+        let Ok(sticks) = Bernoulli::new(value(parameters, "fraction").clamp(0.0, 1.0)) else {
+            return;
+        };
         for &axis in channels {
             for i in 0..simulation.samples {
                 if sticks.sample(&mut simulation.rng) {
                     let c = &mut simulation.counts[axis][i];
-                    *c = if one { *c | (1 << bit) } else { *c & !(1 << bit) };
+                    *c = if one {
+                        *c | (1 << bit)
+                    } else {
+                        *c & !(1 << bit)
+                    };
                 }
             }
         }

@@ -1,6 +1,9 @@
 //! The bias follows the supply.
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, parameter, value};
+use crate::effect::{
+    Column, Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Regression, Rival,
+    Stage, View, parameter, value,
+};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -16,9 +19,8 @@ impl Effect for SupplySensitivity {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("slope", "deg/s/V", "change of the bias per volt"),
-        ];
+        const PARAMETERS: &[ParameterSpec] =
+            &[parameter("slope", "deg/s/V", "change of the bias per volt")];
         PARAMETERS
     }
 
@@ -29,22 +31,37 @@ impl Effect for SupplySensitivity {
             excitation: "A supply that moves by more than 5 mV.",
             test: "Least squares on the supply channel, random walk refitted.",
             figure: "Rate in time blocks against supply.",
-            example: Example::new(Plot::RateAgainst("supply"), &[("slope", 5.0)]).in_a_world(&[("supply_load_v", 0.06)]),
+            example: Example::new(Plot::RateAgainst("supply"), &[("slope", 5.0)])
+                .in_a_world(&[("supply_load_v", 0.06)]),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "motor_bias", experiment: "switch a dummy load with the motor off" },
-            Rival { cause: "temperature", experiment: "switch a load for less than a thermal time constant" },
-            Rival { cause: "bias_step", experiment: "switch the load several times" },
-            Rival { cause: "rate_ramp", experiment: "switch a load: the bias follows it or does not" }
+            Rival {
+                cause: "motor_bias",
+                experiment: "switch a dummy load with the motor off",
+            },
+            Rival {
+                cause: "temperature",
+                experiment: "switch a load for less than a thermal time constant",
+            },
+            Rival {
+                cause: "bias_step",
+                experiment: "switch the load several times",
+            },
+            Rival {
+                cause: "rate_ramp",
+                experiment: "switch a load: the bias follows it or does not",
+            },
         ];
         RIVALS
     }
 
     fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
-        let signal = view.signal(Quantity::Supply).ok_or("no supply channel: record the supply voltage")?;
+        let signal = view
+            .signal(Quantity::Supply)
+            .ok_or("no supply channel: record the supply voltage")?;
         let swing = signal.range();
         if swing < LEAST_SWING {
             return Err(format!(
@@ -56,7 +73,10 @@ impl Effect for SupplySensitivity {
         }
         let mean = signal.smooth.iter().sum::<f64>() / signal.smooth.len() as f64;
         Ok(vec![Hypothesis::Regression(Regression {
-            columns: vec![Column { parameter: "slope", values: signal.smooth.iter().map(|u| u - mean).collect() }],
+            columns: vec![Column {
+                parameter: "slope",
+                values: signal.smooth.iter().map(|u| u - mean).collect(),
+            }],
             fixed: vec![],
             follows: Some(signal.name.clone()),
         })])

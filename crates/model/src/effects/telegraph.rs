@@ -2,8 +2,11 @@
 
 use rand_distr::{Distribution, Exp1};
 
+use crate::effect::{
+    Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    parameter, value,
+};
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Found, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -32,15 +35,27 @@ impl Effect for Telegraph {
             excitation: "Nothing; many switches within the record.",
             test: "Likelihood of a two-level hidden Markov chain against Gauss-Markov and steps; Bartlett's test of the dwell times, which are exponential where it switches at random.",
             figure: "Rate in time blocks with the most probable level.",
-            example: Example::new(Plot::RateInTime { block_s: 2.0 }, &[("half_height", 0.3), ("dwell_time", 40.0)]),
+            example: Example::new(
+                Plot::RateInTime { block_s: 2.0 },
+                &[("half_height", 0.3), ("dwell_time", 40.0)],
+            ),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "gauss_markov", experiment: "a longer record: look at the histogram for two levels" },
-            Rival { cause: "flicker", experiment: "a longer record: look at the histogram for two levels" },
-            Rival { cause: "bias_step", experiment: "a longer record: telegraph noise comes back" }
+            Rival {
+                cause: "gauss_markov",
+                experiment: "a longer record: look at the histogram for two levels",
+            },
+            Rival {
+                cause: "flicker",
+                experiment: "a longer record: look at the histogram for two levels",
+            },
+            Rival {
+                cause: "bias_step",
+                experiment: "a longer record: telegraph noise comes back",
+            },
         ];
         RIVALS
     }
@@ -54,10 +69,18 @@ impl Effect for Telegraph {
 
     /// Coefficients: half the distance of the levels, and the dwell time in s.
     fn describe(&self, found: &Found) -> Parameters {
-        let [half, dwell, ..] = found.coefficients[..] else { return Parameters::new() };
+        let [half, dwell, ..] = found.coefficients[..] else {
+            return Parameters::new();
+        };
         [
-            ("half_height".to_owned(), Parameter::estimated(half.0, half.1, &found.unit)),
-            ("dwell_time".to_owned(), Parameter::estimated(dwell.0, dwell.1, "s")),
+            (
+                "half_height".to_owned(),
+                Parameter::estimated(half.0, half.1, &found.unit),
+            ),
+            (
+                "dwell_time".to_owned(),
+                Parameter::estimated(dwell.0, dwell.1, "s"),
+            ),
         ]
         .into()
     }
@@ -67,7 +90,10 @@ impl Effect for Telegraph {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        let (half, dwell) = (value(parameters, "half_height"), value(parameters, "dwell_time"));
+        let (half, dwell) = (
+            value(parameters, "half_height"),
+            value(parameters, "dwell_time"),
+        );
         if dwell <= 0.0 {
             return;
         }

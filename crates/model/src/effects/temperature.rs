@@ -1,6 +1,9 @@
 //! The bias follows the temperature of the die.
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, parameter, value};
+use crate::effect::{
+    Column, Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Regression, Rival,
+    Stage, View, parameter, value,
+};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -16,9 +19,11 @@ impl Effect for Temperature {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("slope", "deg/s/degC", "change of the bias per degree"),
-        ];
+        const PARAMETERS: &[ParameterSpec] = &[parameter(
+            "slope",
+            "deg/s/degC",
+            "change of the bias per degree",
+        )];
         PARAMETERS
     }
 
@@ -29,24 +34,43 @@ impl Effect for Temperature {
             excitation: "A temperature that moves by at least half a degree, best up and down again (a heater cycle).",
             test: "Least squares on the smoothed temperature channel, random walk refitted.",
             figure: "Rate in time blocks, the other terms taken out, against temperature: a straight line.",
-            example: Example::new(Plot::RateAgainst("temp_x"), &[("slope", 0.08)]).in_a_world(&[("heater_degc", 6.0)]),
+            example: Example::new(Plot::RateAgainst("temp_x"), &[("slope", 0.08)])
+                .in_a_world(&[("heater_degc", 6.0)]),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "warm_up", experiment: "a heater cycle of two periods: a temperature term repeats, a warm-up does not" },
-            Rival { cause: "rate_ramp", experiment: "a record ten times longer with a heater cycle: a ramp goes on, a temperature term follows the heater" },
-            Rival { cause: "temperature_quadratic", experiment: "a heater cycle of twice the swing" },
-            Rival { cause: "bias_step", experiment: "repeat the run: a step does not come back at the same temperature" },
-            Rival { cause: "supply_sensitivity", experiment: "a heater cycle at constant supply" }
+            Rival {
+                cause: "warm_up",
+                experiment: "a heater cycle of two periods: a temperature term repeats, a warm-up does not",
+            },
+            Rival {
+                cause: "rate_ramp",
+                experiment: "a record ten times longer with a heater cycle: a ramp goes on, a temperature term follows the heater",
+            },
+            Rival {
+                cause: "temperature_quadratic",
+                experiment: "a heater cycle of twice the swing",
+            },
+            Rival {
+                cause: "bias_step",
+                experiment: "repeat the run: a step does not come back at the same temperature",
+            },
+            Rival {
+                cause: "supply_sensitivity",
+                experiment: "a heater cycle at constant supply",
+            },
         ];
         RIVALS
     }
 
     fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
         Ok(vec![Hypothesis::Regression(Regression {
-            columns: vec![Column { parameter: "slope", values: centred(view)?.0 }],
+            columns: vec![Column {
+                parameter: "slope",
+                values: centred(view)?.0,
+            }],
             fixed: vec![],
             follows: Some(centred(view)?.1),
         })])
@@ -63,8 +87,12 @@ impl Effect for Temperature {
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let slope = value(parameters, "slope");
         for &axis in channels {
-            let mean = simulation.temperature[axis].iter().sum::<f64>() / simulation.samples.max(1) as f64;
-            for (rate, t) in simulation.rate[axis].iter_mut().zip(&simulation.temperature[axis]) {
+            let mean =
+                simulation.temperature[axis].iter().sum::<f64>() / simulation.samples.max(1) as f64;
+            for (rate, t) in simulation.rate[axis]
+                .iter_mut()
+                .zip(&simulation.temperature[axis])
+            {
                 *rate += slope * (t - mean);
             }
         }
@@ -76,7 +104,9 @@ pub(super) const LEAST_SWING: f64 = 0.5;
 
 /// The temperature minus its mean, and the name of its channel.
 fn centred(view: &View<'_>) -> Result<(Vec<f64>, String), String> {
-    let signal = view.signal(Quantity::Temp).ok_or("no temperature channel: record the gyro's temperature")?;
+    let signal = view
+        .signal(Quantity::Temp)
+        .ok_or("no temperature channel: record the gyro's temperature")?;
     let swing = signal.range();
     if swing < LEAST_SWING {
         return Err(format!(
@@ -85,5 +115,8 @@ fn centred(view: &View<'_>) -> Result<(Vec<f64>, String), String> {
         ));
     }
     let mean = signal.smooth.iter().sum::<f64>() / signal.smooth.len() as f64;
-    Ok((signal.smooth.iter().map(|t| t - mean).collect(), signal.name.clone()))
+    Ok((
+        signal.smooth.iter().map(|t| t - mean).collect(),
+        signal.name.clone(),
+    ))
 }

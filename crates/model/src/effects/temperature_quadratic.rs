@@ -1,6 +1,9 @@
 //! The bias follows the temperature of the die along a parabola.
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Regression, parameter, optional, value};
+use crate::effect::{
+    Column, Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Regression, Rival,
+    Stage, View, optional, parameter, value,
+};
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -17,9 +20,17 @@ impl Effect for TemperatureQuadratic {
 
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
-            parameter("slope", "deg/s/degC", "change of the bias per degree at the reference"),
+            parameter(
+                "slope",
+                "deg/s/degC",
+                "change of the bias per degree at the reference",
+            ),
             parameter("curvature", "deg/s/degC^2", "coefficient of the square"),
-            optional("reference", "degC", "temperature that both refer to; 25 where it is left out"),
+            optional(
+                "reference",
+                "degC",
+                "temperature that both refer to; 25 where it is left out",
+            ),
         ];
         PARAMETERS
     }
@@ -31,21 +42,36 @@ impl Effect for TemperatureQuadratic {
             excitation: "A temperature swing of a few degrees; the power grows with the square of the swing.",
             test: "Least squares on T and T^2 of the smoothed temperature channel; against a linear term already found, the square alone.",
             figure: "Rate in time blocks, the other terms taken out, against temperature: a parabola.",
-            example: Example::new(Plot::RateAgainst("temp_x"), &[("slope", 0.02), ("curvature", 0.04)]).in_a_world(&[("ambient_degc", 22.0), ("heater_degc", 6.5)]),
+            example: Example::new(
+                Plot::RateAgainst("temp_x"),
+                &[("slope", 0.02), ("curvature", 0.04)],
+            )
+            .in_a_world(&[("ambient_degc", 22.0), ("heater_degc", 6.5)]),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "temperature", experiment: "a heater cycle of twice the swing" },
-            Rival { cause: "warm_up", experiment: "a heater cycle of two periods: a temperature term repeats, a warm-up does not" },
-            Rival { cause: "rate_ramp", experiment: "a record ten times longer with a heater cycle" }
+            Rival {
+                cause: "temperature",
+                experiment: "a heater cycle of twice the swing",
+            },
+            Rival {
+                cause: "warm_up",
+                experiment: "a heater cycle of two periods: a temperature term repeats, a warm-up does not",
+            },
+            Rival {
+                cause: "rate_ramp",
+                experiment: "a record ten times longer with a heater cycle",
+            },
         ];
         RIVALS
     }
 
     fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
-        let signal = view.signal(Quantity::Temp).ok_or("no temperature channel: record the gyro's temperature")?;
+        let signal = view
+            .signal(Quantity::Temp)
+            .ok_or("no temperature channel: record the gyro's temperature")?;
         let swing = signal.range();
         if swing < 2.0 * super::temperature::LEAST_SWING {
             return Err(format!(
@@ -54,11 +80,23 @@ impl Effect for TemperatureQuadratic {
                 2.0 * super::temperature::LEAST_SWING
             ));
         }
-        let power = |n: i32| signal.smooth.iter().map(|t| (t - REFERENCE).powi(n)).collect();
+        let power = |n: i32| {
+            signal
+                .smooth
+                .iter()
+                .map(|t| (t - REFERENCE).powi(n))
+                .collect()
+        };
         Ok(vec![Hypothesis::Regression(Regression {
             columns: vec![
-                Column { parameter: "slope", values: power(1) },
-                Column { parameter: "curvature", values: power(2) },
+                Column {
+                    parameter: "slope",
+                    values: power(1),
+                },
+                Column {
+                    parameter: "curvature",
+                    values: power(2),
+                },
             ],
             fixed: vec![("reference", REFERENCE, "degC")],
             follows: Some(signal.name.clone()),
@@ -81,7 +119,10 @@ impl Effect for TemperatureQuadratic {
         let (slope, curvature) = (value(parameters, "slope"), value(parameters, "curvature"));
         let reference = parameters.get("reference").map_or(REFERENCE, |p| p.value);
         for &axis in channels {
-            for (rate, t) in simulation.rate[axis].iter_mut().zip(&simulation.temperature[axis]) {
+            for (rate, t) in simulation.rate[axis]
+                .iter_mut()
+                .zip(&simulation.temperature[axis])
+            {
                 let d = t - reference;
                 *rate += slope * d + curvature * d * d;
             }

@@ -2,7 +2,10 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, parameter, value};
+use crate::effect::{
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
+    parameter, value,
+};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -17,9 +20,11 @@ impl Effect for TimestampJitter {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
-            parameter("sigma", "s", "standard deviation of the sampling instant"),
-        ];
+        const PARAMETERS: &[ParameterSpec] = &[parameter(
+            "sigma",
+            "s",
+            "standard deviation of the sampling instant",
+        )];
         PARAMETERS
     }
 
@@ -35,9 +40,10 @@ impl Effect for TimestampJitter {
     }
 
     fn rivals(&self) -> &'static [Rival] {
-        const RIVALS: &[Rival] = &[
-            Rival { cause: "dropped_samples", experiment: "the sequence numbers" }
-        ];
+        const RIVALS: &[Rival] = &[Rival {
+            cause: "dropped_samples",
+            experiment: "the sequence numbers",
+        }];
         RIVALS
     }
 

@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
+use crate::effect::{
+    Column, Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival,
+    Shape, Stage, View, parameter, value,
+};
 use crate::parameter::Parameter;
-use crate::effect::{Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, Column, Found, Shape, parameter, value};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -19,7 +22,11 @@ impl Effect for WarmUp {
 
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
-            parameter("amplitude", "deg/s", "bias at the start of the record, minus the final one"),
+            parameter(
+                "amplitude",
+                "deg/s",
+                "bias at the start of the record, minus the final one",
+            ),
             parameter("time_constant", "s", "time in which it falls to 1/e"),
         ];
         PARAMETERS
@@ -32,28 +39,49 @@ impl Effect for WarmUp {
             excitation: "A record that starts at power-up and lasts several time constants.",
             test: "Least squares on exponentials over a grid of time constants, refined; random walk refitted.",
             figure: "Rate in time blocks with the exponential.",
-            example: Example::new(Plot::RateInTime { block_s: 5.0 }, &[("amplitude", 0.5), ("time_constant", 90.0)]),
+            example: Example::new(
+                Plot::RateInTime { block_s: 5.0 },
+                &[("amplitude", 0.5), ("time_constant", 90.0)],
+            ),
         }
     }
 
     fn rivals(&self) -> &'static [Rival] {
         const RIVALS: &[Rival] = &[
-            Rival { cause: "temperature", experiment: "a heater cycle of two periods, or a restart while warm: a temperature term repeats, a warm-up does not" },
-            Rival { cause: "temperature_quadratic", experiment: "two cold starts at different ambient temperatures" },
-            Rival { cause: "rate_ramp", experiment: "a record ten times longer: a ramp goes on, a warm-up ends" },
-            Rival { cause: "bias_step", experiment: "a second cold start: a warm-up comes back, a step does not" }
+            Rival {
+                cause: "temperature",
+                experiment: "a heater cycle of two periods, or a restart while warm: a temperature term repeats, a warm-up does not",
+            },
+            Rival {
+                cause: "temperature_quadratic",
+                experiment: "two cold starts at different ambient temperatures",
+            },
+            Rival {
+                cause: "rate_ramp",
+                experiment: "a record ten times longer: a ramp goes on, a warm-up ends",
+            },
+            Rival {
+                cause: "bias_step",
+                experiment: "a second cold start: a warm-up comes back, a step does not",
+            },
         ];
         RIVALS
     }
 
     fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
-        Ok(vec![Hypothesis::Shaped(Arc::new(Exponentials { samples: view.samples, rate_hz: view.rate_hz }))])
+        Ok(vec![Hypothesis::Shaped(Arc::new(Exponentials {
+            samples: view.samples,
+            rate_hz: view.rate_hz,
+        }))])
     }
 
     fn describe(&self, found: &Found) -> Parameters {
         let mut all = crate::effect::columns_as_parameters(self.parameters(), found);
         if let Some((tau, error)) = found.location.first() {
-            all.insert("time_constant".into(), Parameter::estimated(*tau, *error, "s"));
+            all.insert(
+                "time_constant".into(),
+                Parameter::estimated(*tau, *error, "s"),
+            );
         }
         all
     }
@@ -63,7 +91,10 @@ impl Effect for WarmUp {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        let (amplitude, tau) = (value(parameters, "amplitude"), value(parameters, "time_constant"));
+        let (amplitude, tau) = (
+            value(parameters, "amplitude"),
+            value(parameters, "time_constant"),
+        );
         if tau <= 0.0 {
             return;
         }
@@ -88,7 +119,10 @@ impl Shape for Exponentials {
 
     fn grid(&self) -> Vec<f64> {
         let seconds = self.samples as f64 / self.rate_hz;
-        [50.0, 24.0, 12.0, 6.0, 3.0].iter().map(|part| seconds / part).collect()
+        [50.0, 24.0, 12.0, 6.0, 3.0]
+            .iter()
+            .map(|part| seconds / part)
+            .collect()
     }
 
     fn columns(&self, at: f64) -> Vec<Column> {
@@ -100,6 +134,9 @@ impl Shape for Exponentials {
         let mut values = Vec::with_capacity(self.samples + FINE);
         coarse.for_each(|c| values.extend(fine.iter().map(|f| c * f)));
         values.truncate(self.samples);
-        vec![Column { parameter: "amplitude", values }]
+        vec![Column {
+            parameter: "amplitude",
+            values,
+        }]
     }
 }
