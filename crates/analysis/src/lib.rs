@@ -1,71 +1,43 @@
 //! Allan family, fits, checks and diagnosis of inertial sensor records.
 //!
-//! Data in, values out: nothing here opens a file, reads a clock or prints.
+//! Data in, values out: nothing here opens a file, reads a clock or prints. The modules are layers, each of which may use
+//! what stands before it: `cargo test -p xtask` reads their `use` lines.
 
-mod adequacy;
-pub mod allan;
-pub mod analyze;
-pub mod angles;
-pub mod attitude;
-pub mod audit;
-mod bank;
-mod beside;
-pub mod beyond;
-mod bins;
-pub mod checks;
-mod column;
-mod common;
-mod conditional;
-pub mod contest;
-mod couplings;
-mod curves;
-mod dead;
-pub mod diagnosis;
-mod doubt;
-pub mod edf;
-pub mod error;
-pub mod estimate;
-mod events;
-mod evidence;
-mod excursions;
-mod findings;
-pub mod gain;
-pub mod grid;
-pub mod kalman;
-mod law;
-mod levels;
-pub mod likelihood;
-mod limits;
-mod logs;
-mod losses;
-pub mod noise_fit;
-pub mod noise_id;
-pub mod optimise;
-pub mod paper;
-pub mod paper_model;
-pub mod plan;
-pub mod pooled;
-mod powers;
-mod refill;
-pub mod representative;
+pub mod numerics;
+pub mod records;
+
+pub mod noise;
+
 pub mod result;
-pub mod rows;
-pub mod sampling;
-pub mod scale;
-pub mod scan;
-pub mod search;
-pub mod separate;
-mod short_time;
-mod slow;
-mod staircase;
-pub mod synthetic;
-pub mod threshold;
-pub mod transform;
-pub mod units;
-mod variance;
-mod wide;
 
-pub use analyze::{Analysis, AnalyzeOptions, analyze};
-pub use diagnosis::{DiagnoseOptions, diagnose, diagnose_owned};
+mod fit;
+mod ingest;
+
+pub mod audit;
+
+mod features;
+mod search;
+
+mod two_level;
+
+mod criticise;
+
+mod attribute;
+mod report;
+
+mod pipeline;
+
+pub use fit::{likelihood, scan};
+pub use ingest::kalman;
+pub use noise::{
+    allan, analyze, attitude, discriminate as separate, edf, fit as noise_fit, paper_model, plan,
+    synthetic,
+};
+pub use numerics::minimise as optimise;
+pub use records::{error, rows, sampling};
+pub use two_level::compare as contest;
+
 pub use error::AnalysisError;
-pub use representative::{Representative, representative};
+pub use noise::analyze::{Analysis, AnalyzeOptions, analyze};
+pub use noise::representative::{self, Representative, representative};
+pub use pipeline::{DiagnoseOptions, diagnose, diagnose_owned};

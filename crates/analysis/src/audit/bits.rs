@@ -14,9 +14,10 @@ use std::f64::consts::PI;
 use model::Parameter;
 
 use super::stuck::{self, Verdict};
-use super::{Audit, Gyro, LEAST_READINGS, tails};
+use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};
-use crate::limits::ONE_SIDED;
+use crate::numerics::tails;
+use crate::report::detection_limits::ONE_SIDED;
 use crate::result::{Alternative, Finding, Unexplained};
 
 /// Most low bits that are looked at.

@@ -14,9 +14,9 @@ use std::rc::Rc;
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use crate::column::dot;
-use crate::powers::{logarithms, powers};
-use crate::wide::wide;
+use crate::numerics::column::dot;
+use crate::numerics::exp_ln::{logarithms, powers};
+use crate::numerics::simd::wide;
 
 /// Levels in a spread.
 const BY_SPREAD: f64 = 2.0;

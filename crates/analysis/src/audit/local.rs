@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use crate::wide::wide;
+use crate::numerics::simd::wide;
 
 /// Half widths of the means, in samples, widest first: where the level stands still, the noise of a narrow mean would
 /// be counted twice, in the level and in the spread about it.

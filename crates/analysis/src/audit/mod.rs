@@ -4,32 +4,31 @@
 //! the model says: every reading is held against its own neighbourhood ([`local`]). Chances are those of one channel
 //! and one audit; [`FALSE_ALARM`] is what each may spend.
 
-mod alike;
 mod bits;
+mod code_dependence;
 mod codes;
+mod constant_run;
 mod drift;
-mod foretold;
+mod duplicated;
 mod frames;
-mod frozen;
-mod joint;
+mod gross_outliers;
+mod interpolated;
 pub mod local;
 mod outliers;
+mod rate_limit;
 pub(crate) mod repeats;
 mod rounding;
 mod saturation;
 pub mod sign_bit;
-mod slew;
 mod stuck;
-pub mod tails;
 mod timing;
-mod wild;
 
 use std::collections::BTreeMap;
 
 use model::record::{Channel, Quantity, Record};
 
+use crate::criticise::short_time;
 use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter, Unexplained};
-use crate::short_time;
 use local::Local;
 
 /// Chance of a false alarm of one audit on one channel.
@@ -304,7 +303,7 @@ fn times(record: &Record, rows: usize) -> Vec<f64> {
             .map(|v| (v.saturating_sub(t[0])) as f64 * tick)
             .collect();
     }
-    let rate = crate::grid::rate_of(record).unwrap_or(1.0);
+    let rate = crate::ingest::grid::rate_of(record).unwrap_or(1.0);
     match record.seq.as_ref().filter(|s| s.len() == rows && rows > 0) {
         Some(s) => s
             .iter()
@@ -357,8 +356,8 @@ pub fn audit(record: &Record) -> Audit {
     let rows = record.len();
     let mut audit = Audit::default();
     let whole = record;
-    let (record, still) = frozen::set_aside(record);
-    let (record, wild) = wild::set_aside(record);
+    let (record, still) = constant_run::set_aside(record);
+    let (record, wild) = gross_outliers::set_aside(record);
     let record = record.as_ref();
     let gyros: Vec<Gyro<'_>> = record
         .all(Quantity::Gyro)
@@ -398,15 +397,15 @@ pub fn audit(record: &Record) -> Audit {
         );
     }
     let at = times(record, rows);
-    frozen::audit(&still, &at, &mut audit);
-    wild::audit(&wild, whole, &at, &mut audit);
+    constant_run::audit(&still, &at, &mut audit);
+    gross_outliers::audit(&wild, whole, &at, &mut audit);
     frames::audit(record, &gyros, &at, &mut audit);
     timing::audit(record, &gyros, &at, &mut audit);
     for g in &gyros {
         if (0..rows).filter(|i| g.known(*i)).count() < LEAST_READINGS {
             continue;
         }
-        slew::audit(g, &mut audit);
+        rate_limit::audit(g, &mut audit);
         let shape = bits::audit(g, &mut audit);
         saturation::audit(g, shape, &mut audit);
         rounding::audit(g, &mut audit);
@@ -417,10 +416,10 @@ pub fn audit(record: &Record) -> Audit {
         }
     }
     repeats::audit(record, &gyros, &at, &mut audit);
-    alike::audit(record, &gyros, &at, &mut audit);
-    joint::audit(&gyros, &mut audit);
+    duplicated::audit(record, &gyros, &at, &mut audit);
+    code_dependence::audit(&gyros, &mut audit);
     for g in &gyros {
-        foretold::audit(g, &mut audit);
+        interpolated::audit(g, &mut audit);
         outliers::audit(g, &at, &mut audit);
     }
     audit

@@ -4,8 +4,9 @@
 //! with the chance of a false alarm. It does not need to know the noise; the whitened residual of the search sees a
 //! little farther where the base is at rest.
 
-use super::{Audit, FALSE_ALARM, Gyro, counted, tails};
-use crate::limits::ONE_SIDED;
+use super::{Audit, FALSE_ALARM, Gyro, counted};
+use crate::numerics::tails;
+use crate::report::detection_limits::ONE_SIDED;
 use crate::result::Finding;
 
 /// Two farther than this apart are single ones.

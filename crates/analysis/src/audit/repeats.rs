@@ -9,11 +9,12 @@ use std::f64::consts::SQRT_2;
 
 use model::record::Record;
 
-use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted, tails};
+use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted};
 use crate::audit::local::robust_sigma;
-use crate::checks::chi_tail;
-use crate::likelihood::invert;
-use crate::limits::ONE_SIDED;
+use crate::criticise::residual::chi_tail;
+use crate::fit::likelihood::invert;
+use crate::numerics::tails;
+use crate::report::detection_limits::ONE_SIDED;
 
 /// Distances of the pairs that tell the chance of agreement.
 const LAGS: std::ops::RangeInclusive<usize> = 20..=25;

@@ -12,8 +12,8 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use super::repeats::smallest_step;
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};
-use crate::short_time;
-use crate::variance;
+use crate::criticise::short_time;
+use crate::criticise::variance_law;
 
 /// What explains the checks that rounding makes fail.
 pub(super) const STEP: &str = "the step of the converter";
@@ -214,12 +214,16 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             "variance_rhythm",
             "variance_follows",
             short_time::COLOUR,
-            variance::CLAIM,
+            variance_law::CLAIM,
         ];
         audit.suppress(&ids, name, STEP);
     }
     if rounded.sigma < LOST {
-        audit.suppress(&["ljung_box", "band_energy", variance::CLAIM], name, STEP);
+        audit.suppress(
+            &["ljung_box", "band_energy", variance_law::CLAIM],
+            name,
+            STEP,
+        );
     }
     if rounded.sigma < TOLD {
         // The far readings of a residual are single codes.

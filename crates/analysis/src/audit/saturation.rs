@@ -9,10 +9,11 @@ use model::Parameter;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::bits::Shape;
-use super::{Audit, FALSE_ALARM, Gyro, tails};
+use super::{Audit, FALSE_ALARM, Gyro};
 use crate::audit::local::Levels;
+use crate::criticise::short_time;
+use crate::numerics::tails;
 use crate::result::Finding;
-use crate::short_time;
 
 /// Chance of the pile on the last code that light tails may have.
 const PILE: f64 = 1e-2;

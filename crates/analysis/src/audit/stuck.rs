@@ -6,7 +6,7 @@
 //! nothing here explains is not passed over ([`Verdict::Unlike`]).
 
 use super::codes::{Course, Fault, Fit, Histogram, Laws};
-use super::tails;
+use crate::numerics::tails;
 
 /// Spreads of a reading that are tried, over what was measured: bits that stick widen it more than they narrow it.
 const SPREADS: [f64; 7] = [0.15, 0.23, 0.35, 0.5, 0.7, 0.9, 1.1];

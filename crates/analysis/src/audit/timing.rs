@@ -5,9 +5,10 @@ use model::record::Record;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::drift::{self, Uneven};
-use super::{Audit, Gyro, tails};
+use super::{Audit, Gyro};
 use crate::audit::local::{median, width};
-use crate::limits::ONE_SIDED;
+use crate::numerics::tails;
+use crate::report::detection_limits::ONE_SIDED;
 use crate::result::Finding;
 
 /// Jitter of a sound board, rounding to ticks included, is about 36 us; beyond this it is a fault.

@@ -49,7 +49,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     use super::*;
-    use crate::transform::Dct;
+    use crate::numerics::transform::Dct;
 
     const N: usize = 12_000;
 

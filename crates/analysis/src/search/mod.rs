@@ -2,12 +2,14 @@
 //! walk refitted, the best one joins, covariance terms are challenged by what they may have swallowed, and what the
 //! others make superfluous is dropped. The search knows hypotheses, not effects.
 
-mod aside;
 mod envelope;
-mod processes;
+mod excise;
+pub(crate) mod impute;
+pub(crate) mod power_law;
+mod process_pairs;
 mod refine;
 mod rivals;
-mod weigh;
+mod score;
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -18,12 +20,12 @@ use model::effect::{Effect, Hypothesis, Shape, View};
 use model::effects::EFFECTS;
 use model::record::Quantity;
 
-use crate::adequacy::LEAST_CHANCE;
-use crate::beyond;
-use crate::checks::Outcome;
-use crate::contest::power_law::{self, PowerLawFound};
-use crate::likelihood::{Noise, Panel, Solution};
-use crate::threshold;
+use crate::criticise::process::LEAST_CHANCE;
+use crate::criticise::residual::Outcome;
+use crate::features;
+use crate::fit::likelihood::{Noise, Panel, Solution};
+use crate::fit::threshold;
+use power_law::PowerLawFound;
 
 /// Most terms on one channel.
 const MOST_TERMS: usize = 8;
@@ -130,7 +132,7 @@ impl Term {
     }
 
     fn has_no_name(&self) -> bool {
-        self.effect.id() == beyond::ID
+        self.effect.id() == features::ID
     }
 
     /// Whether it has the freedom to stand for several terms of the library.
@@ -342,13 +344,13 @@ impl<'a> Search<'a> {
                 });
             }
         }
-        let unknown = beyond::combinations(&view);
+        let unknown = features::combinations(&view);
         let siblings = unknown.len();
         for combination in unknown {
             let common = !own(&combination.what);
             let columns = panel.add_named(&combination.what, common, &combination.columns);
             candidates.push(Candidate {
-                effect: &beyond::EFFECT,
+                effect: &features::EFFECT,
                 hypothesis: combination.hypothesis(columns.len()),
                 columns,
                 grid: vec![],
@@ -465,7 +467,7 @@ impl<'a> Search<'a> {
             state = self.climb(rest.clone());
         }
         state = self.pair_up(state);
-        state = crate::contest::hold(self, state);
+        state = crate::two_level::compare::hold(self, state);
         let mut notes = std::mem::take(&mut state.notes);
         if let Some((_, note, wandering)) = aside {
             notes.push(note);
@@ -545,7 +547,7 @@ impl<'a> Search<'a> {
                     if covariance {
                         !matches!(c.hypothesis, Hypothesis::Covariance(_))
                     } else {
-                        c.effect.id() != beyond::ID
+                        c.effect.id() != features::ID
                     }
                 });
                 let Some(offer) = Self::simplest_best(offers) else {

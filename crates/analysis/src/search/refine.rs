@@ -1,7 +1,8 @@
 //! A term that was found on a grid gets its exact place, and joins the model.
 
 use super::{Form, Search, State, Term};
-use crate::{scan, threshold};
+use crate::fit::scan;
+use crate::fit::threshold;
 
 /// The points of a grid beside one of it.
 pub(super) fn neighbours(grid: &[f64], at: f64) -> (f64, f64) {
@@ -42,7 +43,9 @@ impl Search<'_> {
                         .map(|c| c.values)
                         .collect()
                 };
-                *at = crate::optimise::golden(&|x| with(&make(x)), low.ln(), high.ln(), 8).exp();
+                *at =
+                    crate::numerics::minimise::golden(&|x| with(&make(x)), low.ln(), high.ln(), 8)
+                        .exp();
                 make(at.ln())
             }
             Form::Line(omega) => {
@@ -55,7 +58,7 @@ impl Search<'_> {
                     *omega,
                 );
                 *omega = place.unwrap_or_else(|| {
-                    crate::optimise::golden(
+                    crate::numerics::minimise::golden(
                         &|w| with(&scan::sinusoid(n, w)),
                         *omega - bin,
                         *omega + bin,
@@ -67,7 +70,7 @@ impl Search<'_> {
             Form::SideBands(carrier, distance) => {
                 let phase = state.carrier().map_or(0.0, |c| c.1);
                 let bands = |d: f64| scan::swings(n, *carrier, phase, d).to_vec();
-                *distance = crate::optimise::golden(
+                *distance = crate::numerics::minimise::golden(
                     &|d| with(&bands(d)),
                     *distance - bin,
                     *distance + bin,

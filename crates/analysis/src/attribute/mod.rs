@@ -1,0 +1,5 @@
+//! Which names the record bears out, and what belongs together.
+
+pub mod events;
+pub mod masking;
+pub mod withdraw;

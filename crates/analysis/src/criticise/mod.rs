@@ -1,0 +1,11 @@
+//! Tests of what the model of a channel leaves, and of what each name claims.
+
+pub mod common_noise;
+pub mod cross_axis;
+pub mod follower_shape;
+pub mod process;
+pub mod random_walk;
+pub mod residual;
+pub mod scale;
+pub mod short_time;
+pub mod variance_law;

@@ -1,0 +1,111 @@
+//! The scale factor of a gyro held against the tilt that the accelerometers see while the base sways.
+
+use model::effect::Signal;
+use model::record::{Axis, Quantity};
+
+use crate::fit::likelihood::Dct;
+use crate::ingest::grid::{Grid, Target};
+
+/// Band in which a sway is sought, Hz.
+const BAND_HZ: (f64, f64) = (0.02, 2.0);
+/// Least correlation of tilt rate and rate in the band of the sway.
+const LEAST_CORRELATION: f64 = 0.9;
+
+/// Scale over the stated one, minus 1, with its standard error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// True scale over the stated one, minus 1.
+    pub relative: f64,
+    /// Standard error.
+    pub std_error: f64,
+}
+
+/// Regress the tilt rate on the rate, in a band around the sway.
+///
+/// # Errors
+/// Why the record does not allow it.
+pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
+    let Some(own) = target.axis else {
+        return Err("the gyro has no axis".into());
+    };
+    let acc = |axis| {
+        grid.signals
+            .iter()
+            .find(|s| s.quantity == Quantity::Acc && s.axis == Some(axis))
+    };
+    // Up is the axis that carries most of gravity, whichever way it points.
+    let mean = |s: &Signal| s.values.iter().sum::<f64>() / s.values.len().max(1) as f64;
+    let axes = [Axis::X, Axis::Y, Axis::Z];
+    let weight = |a: &Axis| acc(*a).map_or(0.0, |s| mean(s).abs());
+    let upright = axes
+        .into_iter()
+        .max_by(|a, b| weight(a).total_cmp(&weight(b)));
+    let upright = upright.unwrap_or(Axis::Z);
+    if upright == own {
+        return Err(
+            "a turn about the vertical tilts no accelerometer: sway about a horizontal axis".into(),
+        );
+    }
+    // About x the component along y tilts, about y the one along x.
+    let level: Vec<Axis> = axes.into_iter().filter(|a| *a != upright).collect();
+    let pitches = own == level[1];
+    let (along, beside) = (level[usize::from(!pitches)], own);
+    let (Some(side), Some(up)) = (acc(along), acc(upright)) else {
+        return Err("the accelerometers along the vertical and across the axis are needed".into());
+    };
+    let sign = mean(up).signum();
+    let n = grid.n;
+    let across = acc(beside);
+    // The roll is atan(y / z). The pitch is that of x against both others, and its rate about the body's y is smaller
+    // by the cosine of the roll.
+    let other = |i: usize| across.filter(|_| pitches).map_or(0.0, |a| a.values[i]);
+    let tilt: Vec<f64> = (0..n)
+        .map(|i| {
+            let vertical = up.values[i].hypot(other(i)).copysign(sign * up.values[i]);
+            side.values[i].atan2(vertical).to_degrees()
+        })
+        .collect();
+    let leaning = |i: usize| (other(i).atan2(sign * up.values[i])).cos();
+    // Central difference of the tilt, and the rate averaged with the same weights (trapezoids).
+    let tilt_rate: Vec<f64> = (0..n)
+        .map(|i| {
+            let change = tilt[(i + 1).min(n - 1)] - tilt[i.saturating_sub(1)];
+            change * leaning(i).abs() * grid.rate_hz / 2.0
+        })
+        .collect();
+    let y = &target.y;
+    let rate: Vec<f64> = (0..n)
+        .map(|i| (y[i.saturating_sub(1)] + 2.0 * y[i] + y[(i + 1).min(n - 1)]) / 4.0)
+        .collect();
+    let dct = Dct::new(n);
+    let (t, w) = (dct.forward(&tilt_rate), dct.forward(&rate));
+    let k_of = |hz: f64| ((2.0 * hz / grid.rate_hz * n as f64) as usize).clamp(1, n - 1);
+    let (low, high) = (k_of(BAND_HZ.0), k_of(BAND_HZ.1));
+    let Some(peak) = (low..high).max_by(|a, b| w[*a].abs().total_cmp(&w[*b].abs())) else {
+        return Err("the record is too short for a sway".into());
+    };
+    let band = (peak / 2).max(low)..(2 * peak).min(high);
+    let (mut tw, mut ww, mut tt) = (0.0, 0.0, 0.0);
+    for k in band.clone() {
+        tw += t[k] * w[k];
+        ww += w[k] * w[k];
+        tt += t[k] * t[k];
+    }
+    let correlation = tw / (ww * tt).sqrt();
+    if !correlation.is_finite() || correlation.abs() < LEAST_CORRELATION {
+        return Err(format!(
+            "tilt and rate correlate by {:.2} only: sway the base slowly by some degrees about a horizontal axis",
+            correlation.abs()
+        ));
+    }
+    // The white noise of the rate, which the weights let through at these low frequencies, does not tilt.
+    let signal = ww - target.white * band.len() as f64;
+    let slope = tw / signal;
+    let rest = (tt - tw * tw / ww).max(0.0) / band.len().max(2) as f64;
+    let error = (rest / signal).sqrt();
+    // The rate carries the scale: tilt rate = rate / (1 + relative).
+    Ok(Scale {
+        relative: 1.0 / slope.abs() - 1.0,
+        std_error: error / (slope * slope),
+    })
+}

@@ -1,0 +1,247 @@
+//! Combinations of the recorded channels that no effect of the library is made of. A channel that follows one of them
+//! has a cause without a name: the search weighs them beside the effects, and the answer is "unexplained, but follows".
+
+use model::effect::{
+    Column, Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Regression, Rival,
+    Signal, Stage, View,
+};
+use model::record::Quantity;
+use model::simulate::Simulation;
+
+use crate::search::Term;
+
+pub(crate) mod lagged;
+
+/// Id of the stand-in that the search knows them by; no cause of the library.
+pub const ID: &str = "beyond";
+
+/// The stand-in.
+pub struct Beyond;
+
+/// Its one instance.
+pub static EFFECT: Beyond = Beyond;
+
+/// Half the time over which the rate of a temperature is taken, s.
+const SLOPE_S: f64 = 2.0;
+/// Lag of a thermometer that sits elsewhere, s.
+const LAG_S: f64 = 40.0;
+/// Plays of a hysteresis, as shares of the swing.
+const PLAYS: [f64; 2] = [0.3, 0.7];
+/// Smallest changes that a combination is made of: degC, counts of the motor command, V, m/s^2 rms.
+pub(crate) const LEAST_TEMPERATURE: f64 = 0.5;
+pub(crate) const LEAST_COMMAND: f64 = 8.0;
+pub(crate) const LEAST_SUPPLY: f64 = 5e-3;
+const LEAST_VIBRATION: f64 = 0.15;
+
+fn centred(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    values.iter().map(|v| v - mean).collect()
+}
+
+fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a * b).collect()
+}
+
+fn slope(values: &[f64], reach: usize) -> Vec<f64> {
+    let last = values.len().saturating_sub(1);
+    (0..values.len())
+        .map(|i| values[(i + reach).min(last)] - values[i.saturating_sub(reach)])
+        .collect()
+}
+
+/// A signal behind a lag of `tau` samples.
+pub(crate) fn lagged(values: &[f64], tau: f64) -> Vec<f64> {
+    let gain = 1.0 - (-1.0 / tau).exp();
+    let mut y = values.first().copied().unwrap_or(0.0);
+    values
+        .iter()
+        .map(|v| {
+            y += gain * (v - y);
+            y
+        })
+        .collect()
+}
+
+/// What follows a signal only once it has moved through a play of twice `half`.
+fn played(values: &[f64], half: f64) -> Vec<f64> {
+    let mut held = values.first().copied().unwrap_or(0.0);
+    values
+        .iter()
+        .map(|v| {
+            held = held.clamp(v - half, v + half);
+            held
+        })
+        .collect()
+}
+
+/// Makes the columns of a combination; long records hold one combination at a time.
+type Maker<'a> = Box<dyn Fn() -> Vec<Vec<f64>> + 'a>;
+
+/// A combination: what it is, and its columns.
+pub(crate) struct Combination<'a> {
+    pub(crate) what: String,
+    pub(crate) columns: Maker<'a>,
+}
+
+impl<'a> Combination<'a> {
+    fn of(what: String, values: impl Fn() -> Vec<f64> + 'a) -> Self {
+        Self {
+            what,
+            columns: Box::new(move || vec![values()]),
+        }
+    }
+}
+
+/// The combinations that a record allows.
+pub(crate) fn combinations<'a>(view: &'a View<'_>) -> Vec<Combination<'a>> {
+    let moves = |s: &&Signal, least: f64| s.range() >= least;
+    let temperature = view
+        .signal(Quantity::Temp)
+        .filter(|s| moves(s, LEAST_TEMPERATURE));
+    let motor = view
+        .signal(Quantity::Pwm)
+        .filter(|s| moves(s, LEAST_COMMAND));
+    let supply = view
+        .signal(Quantity::Supply)
+        .filter(|s| moves(s, LEAST_SUPPLY));
+    let mut all: Vec<Combination<'a>> = vec![];
+    if let Some(t) = temperature {
+        let c = || centred(&t.smooth);
+        let reach = ((SLOPE_S * view.rate_hz).round() as usize).max(1);
+        let name = &t.name;
+        all.push(Combination::of(
+            format!("rate of change of {name}"),
+            move || slope(&t.smooth, reach),
+        ));
+        all.push(Combination::of(format!("{name} behind a lag"), || {
+            lagged(&t.smooth, LAG_S * view.rate_hz)
+        }));
+        for share in PLAYS {
+            let play = share * t.range();
+            all.push(Combination::of(
+                format!("{name} with a play of {play:.1} {}", t.unit),
+                move || played(&t.smooth, 0.5 * play),
+            ));
+        }
+        all.push(Combination::of(format!("cube of {name}"), move || {
+            c().iter().map(|v| v.powi(3)).collect()
+        }));
+        // The command has a zero of its own; the supply has none that means anything.
+        if let Some(m) = motor {
+            all.push(Combination::of(
+                format!("{} times {name}", m.name),
+                move || product(&m.smooth, &c()),
+            ));
+        }
+        if let Some(u) = supply {
+            all.push(Combination::of(
+                format!("{} times {name}", u.name),
+                move || product(&centred(&u.smooth), &c()),
+            ));
+        }
+        if let Some(m) = motor {
+            let size = || m.smooth.iter().map(|v| v.abs()).collect::<Vec<f64>>();
+            all.push(Combination::of(
+                format!("size of {} times {name}", m.name),
+                move || product(&size(), &c()),
+            ));
+        }
+    }
+    if let (Some(m), Some(u)) = (motor, supply) {
+        all.push(Combination::of(
+            format!("{} times {}", m.name, u.name),
+            move || product(&m.smooth, &centred(&u.smooth)),
+        ));
+    }
+    for a in accelerations(view) {
+        all.push(Combination::of(format!("square of {}", a.name), || {
+            centred(&a.values).iter().map(|v| v * v).collect()
+        }));
+    }
+    for w in turning(view) {
+        all.push(Combination::of(format!("square of {}", w.name), || {
+            w.smooth.iter().map(|v| v * v).collect()
+        }));
+    }
+    all.extend(lagged::combinations(view, motor, supply));
+    all
+}
+
+/// Accelerometers that feel vibration.
+fn accelerations<'a>(view: &'a View<'_>) -> impl Iterator<Item = &'a Signal> {
+    let still = !view.sways();
+    view.all(Quantity::Acc)
+        .filter(move |a| still && a.std_dev() >= LEAST_VIBRATION)
+}
+
+/// Gyros that the table turns.
+fn turning<'a>(view: &'a View<'_>) -> impl Iterator<Item = &'a Signal> {
+    let still = !view.sways() && !view.moving;
+    view.all(Quantity::Gyro)
+        .filter(move |g| still && g.moving && g.name != view.channel)
+}
+
+/// The one channel that a term without a name is made of, if it is one.
+pub(crate) fn source<'a>(view: &'a View<'_>, term: &Term) -> Option<&'a str> {
+    let what = term.follows.as_deref()?;
+    let mut parts = view.signals.iter().filter(|s| what.contains(&s.name));
+    let one = parts.next()?;
+    parts.next().is_none().then_some(one.name.as_str())
+}
+
+/// Names of its columns; they are no parameters of anything.
+const NAMES: [&str; 8] = ["c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
+
+impl Combination<'_> {
+    /// Its hypothesis, with the number of columns that it turns out to have; their values are elsewhere.
+    pub(crate) fn hypothesis(self, width: usize) -> Hypothesis {
+        let names = NAMES.iter().take(width);
+        Hypothesis::Regression(Regression {
+            columns: names
+                .map(|parameter| Column {
+                    parameter,
+                    values: vec![],
+                })
+                .collect(),
+            fixed: vec![],
+            follows: Some(self.what),
+        })
+    }
+}
+
+impl Effect for Beyond {
+    fn id(&self) -> &'static str {
+        ID
+    }
+
+    fn parameters(&self) -> &'static [ParameterSpec] {
+        &[]
+    }
+
+    fn docs(&self) -> Docs {
+        Docs {
+            title: "No effect of the library",
+            physics: "",
+            excitation: "",
+            test: "",
+            figure: "",
+            example: Example::new(Plot::Spectrum, &[]),
+        }
+    }
+
+    fn rivals(&self) -> &'static [Rival] {
+        &[]
+    }
+
+    /// The search asks for its [`combinations`], which are made one at a time.
+    fn hypotheses(&self, _: &View<'_>) -> Result<Vec<Hypothesis>, String> {
+        Ok(vec![])
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Rate
+    }
+
+    /// It has no physics that could be simulated.
+    fn simulate(&self, _: &Parameters, _: &[usize], _: &mut Simulation) {}
+}

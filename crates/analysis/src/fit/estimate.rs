@@ -1,0 +1,246 @@
+//! Estimates with honest errors: coefficients averaged over the random walk, noise parameters from the curvature.
+
+use model::effect::Found;
+
+use crate::fit::likelihood::{Noise, Panel, invert, least_walk};
+use crate::search::{Form, State};
+
+/// Points of the random walk that coefficients are averaged over.
+const WALKS: u32 = 28;
+
+/// Random walks with the logarithms of their posterior weights (flat in the random walk's size, restricted likelihood).
+fn weighted(
+    panel: &Panel,
+    noise: &Noise,
+    columns: &[usize],
+) -> Vec<(f64, crate::fit::likelihood::Solution)> {
+    let n = (panel.bins.n - 1) as f64;
+    let high = (noise.log_walk + 4.0).max(least_walk(panel.bins.n) + 14.0);
+    let low = least_walk(panel.bins.n);
+    let step = (high - low) / f64::from(WALKS);
+    let with = noise.with_walks(&panel.bins);
+    (0..=WALKS)
+        .map(|i| {
+            let log_walk = low + step * f64::from(i);
+            let s = panel.solve(&with(log_walk), columns);
+            let free = n - columns.len() as f64;
+            let restricted =
+                -0.5 * (free * s.rss.ln() + s.log_det_noise + s.log_det_normal) + 0.5 * log_walk;
+            (restricted, s)
+        })
+        .collect()
+}
+
+/// Random walks with their posterior weights.
+#[must_use]
+pub fn mixture(
+    panel: &Panel,
+    noise: &Noise,
+    columns: &[usize],
+) -> Vec<(f64, crate::fit::likelihood::Solution)> {
+    let points = weighted(panel, noise, columns);
+    let top = points.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
+    let sum: f64 = points.iter().map(|p| (p.0 - top).exp()).sum();
+    points
+        .into_iter()
+        .map(|(r, s)| ((r - top).exp() / sum, s))
+        .collect()
+}
+
+/// Coefficients of all columns with standard errors, averaged over the random walk.
+#[must_use]
+pub fn coefficients(panel: &Panel, state: &State) -> Vec<(f64, f64)> {
+    let columns = state.columns();
+    let mixed = mixture(panel, &state.noise, &columns);
+    (0..columns.len())
+        .map(|i| {
+            let mean: f64 = mixed.iter().map(|(w, s)| w * s.beta[i]).sum();
+            let variance: f64 = mixed
+                .iter()
+                .map(|(w, s)| w * (s.white * s.inverse[i][i] + (s.beta[i] - mean).powi(2)))
+                .sum();
+            (mean, variance.sqrt())
+        })
+        .collect()
+}
+
+/// Coordinates of the noise shape (random walk first) with standard errors from the curvature of the likelihood.
+#[must_use]
+pub fn noise_errors(panel: &Panel, state: &State) -> Vec<f64> {
+    let columns = state.columns();
+    let mut x = vec![state.noise.log_walk];
+    x.extend(state.noise.terms.iter().flat_map(|t| t.1.iter().copied()));
+    let at = |x: &[f64]| {
+        let mut rest = &x[1..];
+        let terms = state
+            .noise
+            .terms
+            .iter()
+            .map(|(c, theta)| {
+                let (own, tail) = rest.split_at(theta.len());
+                rest = tail;
+                (c.clone(), own.to_vec())
+            })
+            .collect();
+        let noise = Noise {
+            log_walk: x[0],
+            terms,
+        };
+        panel
+            .solve(&noise.over(&panel.bins), &columns)
+            .log_likelihood
+    };
+    let h = 0.1;
+    let m = x.len();
+    let shifted = |i: usize, a: f64, j: usize, b: f64| {
+        let mut y = x.clone();
+        y[i] += a * h;
+        y[j] += b * h;
+        at(&y)
+    };
+    let second = |i: usize, j: usize| {
+        (shifted(i, 1.0, j, 1.0) - shifted(i, 1.0, j, -1.0) - shifted(i, -1.0, j, 1.0)
+            + shifted(i, -1.0, j, -1.0))
+            / (4.0 * h * h)
+    };
+    let information: Vec<Vec<f64>> = (0..m)
+        .map(|i| (0..m).map(|j| -second(i.min(j), i.max(j))).collect())
+        .collect();
+    let (inverse, _) = invert(&information);
+    (0..m)
+        .map(|i| {
+            if inverse[i][i] > 0.0 {
+                inverse[i][i].sqrt() * state.wider.get(i + 1).unwrap_or(&1.0)
+            } else {
+                f64::NAN
+            }
+        })
+        .collect()
+}
+
+/// What was found for each term of a state.
+#[must_use]
+pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Found> {
+    let beta = coefficients(panel, state);
+    let errors = noise_errors(panel, state);
+    let n = panel.bins.n as f64;
+    let (mut column, mut coordinate) = (0, 1);
+    let g = |omega: f64| state.noise.at(omega);
+    state
+        .terms
+        .iter()
+        .map(|t| {
+            let own = &beta[column..column + t.columns.len()];
+            column += t.columns.len();
+            let mut found = Found {
+                unit: unit.to_owned(),
+                rate_hz,
+                white_sigma: state.solution.white.sqrt(),
+                names: t.names.clone(),
+                coefficients: own.to_vec(),
+                fixed: t.fixed.clone(),
+                location: vec![],
+            };
+            // Cramer-Rao bound of a frequency, rad per sample: 24 s^2 / (A^2 n^3).
+            // One that wanders has no place narrower than that.
+            let frequency = |omega: f64, amplitude: f64| {
+                let error = (24.0 * state.solution.white * g(omega) / n.powi(3)).sqrt() / amplitude;
+                let error = error.max(state.wanders(omega).map_or(0.0, |w| w.half));
+                let hz = rate_hz / std::f64::consts::TAU;
+                (omega * hz, error * hz)
+            };
+            match &t.form {
+                Form::Columns => {}
+                Form::Step(at, error) => found.location.push((at / rate_hz, error / rate_hz)),
+                Form::Line(omega) => found
+                    .location
+                    .push(frequency(*omega, own[0].0.hypot(own[1].0))),
+                Form::SideBands(carrier, distance) => {
+                    found
+                        .location
+                        .push(frequency(*carrier, own[0].0.hypot(own[1].0)));
+                    // Two side bands of half its size tell the frequency of the swing.
+                    let bands = own[2].0.hypot(own[3].0) / 2f64.sqrt();
+                    let (_, error) = frequency(*carrier, bands);
+                    found
+                        .location
+                        .push((distance * rate_hz / std::f64::consts::TAU, error));
+                }
+                Form::Shaped(shape, at) => {
+                    let (place, coefficients) = shaped(panel, state, t, shape.as_ref(), *at);
+                    found.location.push(place);
+                    found.coefficients = coefficients;
+                }
+                Form::Covariance(_, theta) => {
+                    let own = theta
+                        .iter()
+                        .zip(&errors[coordinate..])
+                        .map(|(v, e)| (*v, *e));
+                    found.coefficients = own.collect();
+                    coordinate += theta.len();
+                }
+            }
+            if let Some(stated) = &t.stated {
+                found.coefficients.clone_from(stated);
+            }
+            found
+        })
+        .collect()
+}
+
+/// Values of a shape's coordinate that it is averaged over, and how far they reach in its logarithm.
+const SHAPES: i32 = 12;
+const REACH: f64 = 1.2;
+
+/// A shape's coordinate and the coefficients of its columns, averaged over both the coordinate (flat in its logarithm,
+/// within `bounds`) and the random walk: where a slow shape and a slow walk take each other's part, errors at fixed
+/// values of either are too small.
+fn shaped(
+    panel: &Panel,
+    state: &State,
+    term: &crate::search::Term,
+    shape: &dyn model::effect::Shape,
+    at: f64,
+) -> ((f64, f64), Vec<(f64, f64)>) {
+    let others: Vec<usize> = state
+        .columns()
+        .into_iter()
+        .filter(|c| !term.columns.contains(c))
+        .collect();
+    let width = panel.width();
+    let grid = shape.grid();
+    let (low, high) = (grid[0].ln(), grid[grid.len() - 1].ln());
+    let mut all: Vec<(f64, f64, crate::fit::likelihood::Solution)> = vec![];
+    for i in -SHAPES..=SHAPES {
+        let x = at.ln() + REACH * f64::from(i) / f64::from(SHAPES);
+        if x < low - 0.7 || x > high + 0.7 {
+            continue;
+        }
+        let values = shape.columns(x.exp()).into_iter().map(|c| c.values);
+        let added = panel.add_all(values);
+        let columns = [added, others.clone()].concat();
+        for (weight, s) in weighted(panel, &state.noise, &columns) {
+            all.push((x, weight, s));
+        }
+        panel.truncate(width);
+    }
+    let top = all.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = all.iter().map(|p| (p.1 - top).exp()).collect();
+    let sum: f64 = weights.iter().sum();
+    let mean_of = |f: &dyn Fn(usize) -> f64| -> f64 {
+        (0..all.len()).map(|i| weights[i] * f(i)).sum::<f64>() / sum
+    };
+    let x = mean_of(&|i| all[i].0);
+    let spread = mean_of(&|i| (all[i].0 - x).powi(2)).sqrt();
+    let coefficients = (0..term.columns.len())
+        .map(|c| {
+            let mean = mean_of(&|i| all[i].2.beta[c]);
+            let variance = mean_of(&|i| {
+                let s = &all[i].2;
+                s.white * s.inverse[c][c] + (s.beta[c] - mean).powi(2)
+            });
+            (mean, variance.sqrt())
+        })
+        .collect();
+    ((x.exp(), x.exp() * spread), coefficients)
+}

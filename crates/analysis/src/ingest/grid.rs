@@ -1,0 +1,611 @@
+//! From a record to an even grid: gaps found by the sequence numbers, lost samples filled so that the likelihood cannot
+//! tell, slow channels smoothed, motion of the base noticed.
+
+use std::ops::Range;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use model::effect::Signal;
+use model::record::{Axis, Base, Channel, Quantity, Record};
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::audit::repeats::smallest_step;
+use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
+use crate::ingest::base_turns::{Excursion, excursions, largest_rate};
+use crate::ingest::dequantise;
+use crate::records::error::AnalysisError;
+
+/// Least number of samples of a gyro.
+pub const LEAST_SAMPLES: usize = 600;
+/// Least length, s.
+pub const LEAST_SECONDS: f64 = 30.0;
+/// Rate between [`MOTION_BAND_HZ`] beyond what a bias can wander, deg/s rms.
+pub(crate) const MOTION_RMS: f64 = 0.3;
+const MOTION_BAND_HZ: (f64, f64) = (0.02, 0.6);
+
+/// Largest share of another axis' rate that a gyro sees by its own fault: a mounting off by six degrees.
+const LARGEST_SHARE: f64 = 0.1;
+
+/// So many readings show their step.
+fn few(values: &[f64]) -> &[f64] {
+    &values[..values.len().min(crate::criticise::residual::MOST)]
+}
+
+/// A gyro on the grid.
+pub struct Target {
+    /// Channel name.
+    pub name: String,
+    /// Axis.
+    pub axis: Option<Axis>,
+    /// Unit of `y`.
+    pub unit: String,
+    /// Unit per count.
+    pub lsb: Option<f64>,
+    /// The step in which its readings come, `lsb` or what they show themselves; 0 where there is none.
+    pub step: f64,
+    /// Readings, lost ones filled.
+    pub y: Arc<Vec<f64>>,
+    /// Their coefficients.
+    pub coefficients: Rc<Vec<f64>>,
+    /// Grid places without a reading, spikes included.
+    pub lost: Vec<usize>,
+    /// Places whose reading the noise cannot have made.
+    pub spikes: Vec<usize>,
+    /// Places whose reading is not believed, and what was read there.
+    pub aside: Vec<(usize, f64)>,
+    /// Turns of the base that it felt, taken out of `y` as lost readings are.
+    pub excursions: Vec<Excursion>,
+    /// Excess rms in the band of base motion, deg/s.
+    pub motion_rms: f64,
+    /// Whether that is more than a bias can wander.
+    pub moving: bool,
+    /// Whether it moves on a table that turns another axis, and does not follow that.
+    pub astray: bool,
+    /// Baseline noise as first fitted, and its white variance.
+    pub noise: Noise,
+    /// White variance.
+    pub white: f64,
+}
+
+/// A record on its grid.
+pub struct Grid {
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Places.
+    pub n: usize,
+    /// Transform of that length.
+    pub dct: Dct,
+    /// Its bins.
+    pub bins: Rc<Bins>,
+    /// What the base did.
+    pub base: Option<Base>,
+    /// The gyros.
+    pub targets: Vec<Target>,
+    /// All channels, gyros included.
+    pub signals: Vec<Signal>,
+}
+
+/// Sample rate of a record: the header's, else by the times of the rows.
+#[must_use]
+pub fn rate_of(record: &Record) -> Option<f64> {
+    let stated = record.header.rate_hz;
+    stated
+        .or_else(|| crate::records::rows::by_times(record))
+        .filter(|r| r.is_finite() && *r > 0.0)
+}
+
+/// Place of every row on the grid, and the number of places.
+fn places(record: &Record) -> (Vec<usize>, usize) {
+    let rows = record.len();
+    let even = || ((0..rows).collect(), rows);
+    let Some(seq) = record.seq.as_ref().filter(|s| s.len() == rows && rows > 0) else {
+        return even();
+    };
+    let ascending = seq.windows(2).all(|w| w[1] > w[0]);
+    let span = seq[rows - 1].saturating_sub(seq[0]) as usize + 1;
+    // A sequence that leaps by more than the record is no count of samples.
+    if !ascending || span > 4 * rows {
+        return even();
+    }
+    (seq.iter().map(|s| (s - seq[0]) as usize).collect(), span)
+}
+
+fn spread(values: &[f64], places: &[usize], n: usize, masked: &[usize]) -> Vec<f64> {
+    let mut grid = vec![f64::NAN; n];
+    for (v, p) in values.iter().zip(places) {
+        grid[*p] = *v;
+    }
+    for row in masked {
+        if let Some(p) = places.get(*row) {
+            grid[*p] = f64::NAN;
+        }
+    }
+    grid
+}
+
+fn interpolated(values: &[f64]) -> Vec<f64> {
+    let known: Vec<usize> = (0..values.len())
+        .filter(|i| values[*i].is_finite())
+        .collect();
+    let mut out = values.to_vec();
+    let (Some(first), Some(last)) = (known.first(), known.last()) else {
+        return vec![0.0; values.len()];
+    };
+    out[..*first].fill(values[*first]);
+    out[*last..].fill(values[*last]);
+    for pair in known.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        for (step, v) in out[a + 1..b].iter_mut().enumerate() {
+            *v = values[a] + (values[b] - values[a]) * (step + 1) as f64 / (b - a) as f64;
+        }
+    }
+    out
+}
+
+/// White variance from first differences, robust against steps and spikes.
+pub(crate) fn white_by_differences(y: &[f64]) -> f64 {
+    let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
+    let mut d: Vec<f64> = known.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    if d.is_empty() {
+        return 0.0;
+    }
+    let middle = d.len() / 2;
+    let (_, median, _) = d.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median / 0.6745).powi(2) / 2.0
+}
+
+/// Put a record on its grid. `masked(name)` gives the rows of a channel that are not to be believed.
+///
+/// # Errors
+/// As [`crate::diagnose`].
+pub fn lay_out(
+    record: &Record,
+    masked: &dyn Fn(&str) -> Vec<usize>,
+    seed: u64,
+) -> Result<Grid, AnalysisError> {
+    let rate_hz = rate_of(record).ok_or(AnalysisError::NoRate)?;
+    let gyros: Vec<&Channel> = record.all(Quantity::Gyro).collect();
+    if gyros.is_empty() {
+        let present = record.channels.iter().map(|c| c.name.clone()).collect();
+        return Err(AnalysisError::NoChannel {
+            name: "gyro_x, gyro_y or gyro_z".into(),
+            present,
+        });
+    }
+    let (places, n) = places(record);
+    let seconds = n as f64 / rate_hz;
+    let short = |have: f64, need: f64, unit| AnalysisError::Inconclusive {
+        what: "a diagnosis".into(),
+        have,
+        need,
+        unit,
+    };
+    if n < LEAST_SAMPLES {
+        return Err(short(n as f64, LEAST_SAMPLES as f64, "samples"));
+    }
+    if seconds < LEAST_SECONDS {
+        return Err(short(seconds, LEAST_SECONDS, "s"));
+    }
+    let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
+    // Of the coefficients of what may drive a bias only the band of motion is asked for.
+    let top = places_of(MOTION_BAND_HZ.1, n, rate_hz);
+    let mut known: Vec<Vec<f64>> = vec![];
+    let mut others = vec![];
+    for channel in record
+        .channels
+        .iter()
+        .filter(|c| c.quantity != Quantity::Gyro)
+    {
+        let (signal, driver) = other(channel, &places, n, &dct, &bins);
+        known.extend(driver.map(|c| c[..top].to_vec()));
+        others.push(signal);
+    }
+    let turns = matches!(record.header.base, Some(Base::Moving | Base::Turntable));
+    // Where the base moves, and where the motor turns it, they explain nothing away.
+    let drivers: &[Vec<f64>] = if turns { &[] } else { &known };
+    // Over a gap the fill wanders as the noise does that was fitted, which a process beside it swells: only what was read
+    // tells of motion.
+    let motion_of = |y: &[f64], c: &[f64], lost: &[usize], (noise, white): &(Noise, f64)| {
+        let all = |mut c: Vec<f64>| motion(&mut c, drivers, n, rate_hz, turns);
+        let whole = all(c.to_vec());
+        if lost.is_empty() || whole <= MOTION_RMS {
+            return whole;
+        }
+        let mut read = y.to_vec();
+        lost.iter().for_each(|i| read[*i] = f64::NAN);
+        crate::ingest::kalman::bridge(&mut read, *white, white * noise.log_walk.exp());
+        all(dct.forward(&read)) * (n as f64 / (n - lost.len()).max(1) as f64).sqrt()
+    };
+    let read = |channel: &Channel| {
+        let mut y = spread(&channel.values, &places, n, &masked(&channel.name));
+        let (scale, _) = unit_of(channel);
+        y.iter_mut().for_each(|v| *v *= scale);
+        y
+    };
+    // Where the base is known to move, a turn of seconds is part of that.
+    let felt = |channel: &Channel| match unit_of(channel).1.as_str() {
+        "deg/s" if !turns => felt(&interpolated(&read(channel)), &others, rate_hz, &dct),
+        _ => vec![],
+    };
+    let felt: Vec<Vec<Excursion>> = gyros.iter().map(|g| felt(g)).collect();
+    let mut targets = vec![];
+    for (channel, own) in gyros.into_iter().zip(&felt) {
+        let (scale, unit) = unit_of(channel);
+        let mut y = read(channel);
+        let lost: Vec<usize> = (0..n).filter(|i| !y[*i].is_finite()).collect();
+        if n - lost.len() < LEAST_SAMPLES {
+            return Err(short(
+                (n - lost.len()) as f64,
+                LEAST_SAMPLES as f64,
+                "samples",
+            ));
+        }
+        // While the base turns, no axis of it is at rest.
+        for e in felt.iter().flatten() {
+            y[e.with_margin(n)].fill(f64::NAN);
+        }
+        let lost: Vec<usize> = (0..n).filter(|i| !y[*i].is_finite()).collect();
+        let guess =
+            white_by_differences(&y).max(channel.lsb.map_or(0.0, |l| (l * scale).powi(2) / 12.0));
+        let constant = y
+            .iter()
+            .filter(|v| v.is_finite())
+            .all(|v| Some(v) == y.iter().find(|v| v.is_finite()));
+        if constant || guess <= 0.0 && white_of(&y) <= 0.0 {
+            let value = channel
+                .values
+                .iter()
+                .copied()
+                .find(|v| v.is_finite())
+                .unwrap_or(f64::NAN);
+            return Err(AnalysisError::Constant {
+                name: channel.name.clone(),
+                value,
+            });
+        }
+        let given = y.clone();
+        let mut fit = (Noise::new(0.0), guess.max(1e-300));
+        crate::ingest::kalman::fill(&mut y, fit.1, fit.1 * 1e-4, &mut rng);
+        let mut c = Rc::default();
+        for pass in 0..2 {
+            let panel = Panel::new(&dct, &bins, &y);
+            let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
+            (fit, c) = ((noise, solution.white), panel.column(0));
+            if lost.is_empty() || pass == 1 {
+                break;
+            }
+            y = given.clone();
+            crate::ingest::kalman::fill(&mut y, fit.1, fit.1 * fit.0.log_walk.exp(), &mut rng);
+        }
+        let is_rate = unit == "deg/s";
+        let mut motion_rms = if is_rate {
+            motion_of(&y, &c, &lost, &fit)
+        } else {
+            0.0
+        };
+        let spikes = if motion_rms > MOTION_RMS {
+            vec![]
+        } else {
+            spikes(&given, &mut y, &mut c, &mut fit, &dct, &bins, &mut rng)
+        };
+        let of_audit = masked(&channel.name).into_iter();
+        let of_audit = of_audit.filter_map(|row| {
+            let given = channel.values.get(row).filter(|v| v.is_finite())?;
+            Some((*places.get(row)?, given * scale))
+        });
+        let aside = of_audit
+            .chain(spikes.iter().map(|i| (*i, given[*i])))
+            .collect();
+        let lost = [lost, spikes.clone()].concat();
+        if motion_rms <= MOTION_RMS {
+            c = crate::search::impute::first(&channel.name, &dct, &bins, &mut y, &lost, &mut fit);
+        }
+        if is_rate && !spikes.is_empty() {
+            motion_rms = motion_of(&y, &c, &lost, &fit);
+        }
+        targets.push(Target {
+            name: channel.name.clone(),
+            axis: channel.axis,
+            unit,
+            lsb: channel.lsb.map(|l| l * scale),
+            step: scale
+                * channel
+                    .lsb
+                    .unwrap_or_else(|| smallest_step(few(&channel.values))),
+            y: Arc::new(y),
+            coefficients: c,
+            lost,
+            spikes,
+            aside,
+            excursions: own.clone(),
+            motion_rms,
+            moving: motion_rms > MOTION_RMS,
+            astray: false,
+            noise: fit.0,
+            white: fit.1,
+        });
+    }
+    let turntable = record.header.base == Some(Base::Turntable);
+    followers(&mut targets, &|t, strongest| {
+        let axis = [strongest.coefficients[..top].to_vec()];
+        let left =
+            |with: &[Vec<f64>], slow| motion(&mut t.coefficients.to_vec(), with, n, rate_hz, slow);
+        if turntable {
+            // A table turns one axis: what the others do with the motor, the supply or the temperature, and what is slow
+            // on them, is their own.
+            let (by_axis, by_known) = (left(&axis, turns), left(&known, turns));
+            let follows = (t.motion_rms.powi(2) - by_axis.powi(2)).max(0.0).sqrt();
+            Rest {
+                follows: if by_known < by_axis { 0.0 } else { follows },
+                own: left(&[known.as_slice(), &axis].concat(), false),
+                table: true,
+            }
+        } else {
+            Rest {
+                follows: t.motion_rms,
+                own: left(&[drivers, &axis].concat(), turns),
+                table: false,
+            }
+        }
+    });
+    let (mut others, mut of_gyros) = (others.into_iter(), targets.iter());
+    let signals = (record.channels.iter())
+        .filter_map(|c| match c.quantity {
+            Quantity::Gyro => of_gyros.next().map(|t| of_gyro(c, t)),
+            _ => others.next(),
+        })
+        .collect();
+    Ok(Grid {
+        rate_hz,
+        n,
+        dct,
+        bins,
+        base: record.header.base,
+        targets,
+        signals,
+    })
+}
+
+/// Factor to the unit in which a gyro is searched, and that unit.
+fn unit_of(channel: &Channel) -> (f64, String) {
+    match channel.unit.as_str() {
+        "rad/s" => (180.0 / std::f64::consts::PI, "deg/s".to_owned()),
+        other => (1.0, other.to_owned()),
+    }
+}
+
+/// Turns of a base at rest that a gyro felt, without those of which what drives its bias makes up most.
+fn felt(y: &[f64], others: &[Signal], rate_hz: f64, dct: &Dct) -> Vec<Excursion> {
+    let mut found = excursions(y, rate_hz);
+    let drivers = others.iter().filter(|s| drives(s.quantity));
+    if found.is_empty() || drivers.clone().next().is_none() {
+        return found;
+    }
+    let drivers: Vec<Vec<f64>> = drivers.map(|s| dct.forward(&s.smooth)).collect();
+    let mut c = dct.forward(y);
+    let [low, high] = [MOTION_BAND_HZ.0, MOTION_BAND_HZ.1].map(|f| places_of(f, y.len(), rate_hz));
+    take_off(&mut c, &drivers, low..high);
+    let beyond = dct.inverse(&c);
+    found.retain(|e| largest_rate(&beyond, &e.samples) > 0.5 * largest_rate(y, &e.samples));
+    found
+}
+
+/// Take out single samples that the noise cannot have made, and fill their places; largest first, since each one
+/// widens the noise that the others are held against.
+fn spikes(
+    given: &[f64],
+    y: &mut Vec<f64>,
+    coefficients: &mut Rc<Vec<f64>>,
+    fit: &mut (Noise, f64),
+    dct: &Dct,
+    bins: &Rc<Bins>,
+    rng: &mut Xoshiro256PlusPlus,
+) -> Vec<usize> {
+    const PASSES: usize = 8;
+    let n = y.len();
+    let mut found: Vec<usize> = vec![];
+    for _ in 0..PASSES {
+        let g = fit.0.everywhere(bins);
+        let c: Vec<f64> = coefficients
+            .iter()
+            .zip(&g)
+            .map(|(c, g)| c / (fit.1 * g).sqrt())
+            .collect();
+        let e = dct.inverse(&c);
+        let beyond = |limit: f64| {
+            (0..n)
+                .filter(|i| e[*i].abs() > limit && given[*i].is_finite())
+                .collect::<Vec<_>>()
+        };
+        let fresh: Vec<usize> = beyond(spike_limit(n))
+            .into_iter()
+            .filter(|i| !found.contains(i))
+            .collect();
+        if fresh.is_empty() {
+            break;
+        }
+        found.extend(fresh);
+        let mut rest = given.to_vec();
+        for i in &found {
+            rest[*i] = f64::NAN;
+        }
+        crate::ingest::kalman::fill(&mut rest, fit.1, fit.1 * fit.0.log_walk.exp(), rng);
+        let panel = Panel::new(dct, bins, &rest);
+        let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
+        *fit = (noise, solution.white);
+        (*y, *coefficients) = (rest, panel.column(0));
+    }
+    found.sort_unstable();
+    found
+}
+
+/// Distance in sigma that one of `n` samples reaches once in 10^5 records.
+pub(crate) fn spike_limit(n: usize) -> f64 {
+    let tail = |z: f64| {
+        (n as f64 * crate::criticise::residual::normal_tail(z)).ln()
+            - crate::criticise::residual::LEAST_CHANCE.ln()
+    };
+    crate::numerics::minimise::golden(&|z| tail(z).abs(), 4.0, 12.0, 40)
+}
+
+fn white_of(y: &[f64]) -> f64 {
+    let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
+    let d: Vec<f64> = known.windows(2).map(|w| w[1] - w[0]).collect();
+    d.iter().map(|d| d * d).sum::<f64>() / (2.0 * d.len().max(1) as f64)
+}
+
+/// What the motion of an axis is made of, deg/s rms.
+struct Rest {
+    /// What follows the axis that turns most; all of it, where that is not known.
+    follows: f64,
+    /// What does not.
+    own: f64,
+    /// Whether a table turns that axis, and no other.
+    table: bool,
+}
+
+/// An axis that only follows the one that turns most, and little of it, is not moved itself: its gyro sees a part of the
+/// other axis.
+fn followers(targets: &mut [Target], rest: &dyn Fn(&Target, &Target) -> Rest) {
+    let Some(strongest) =
+        (0..targets.len()).max_by(|a, b| targets[*a].motion_rms.total_cmp(&targets[*b].motion_rms))
+    else {
+        return;
+    };
+    let most = LARGEST_SHARE * targets[strongest].motion_rms;
+    for i in (0..targets.len()).filter(|i| *i != strongest) {
+        let t = &targets[i];
+        if !t.moving {
+            continue;
+        }
+        let rest = rest(t, &targets[strongest]);
+        let little = rest.follows < most;
+        targets[i].moving = !(little && rest.own <= MOTION_RMS);
+        targets[i].astray = rest.table && little && targets[i].moving;
+    }
+}
+
+/// Half cycles of the slowest motion that is looked for where the header says that the base moves.
+const SLOWEST_MOTION: usize = 3;
+
+/// Place of a frequency among `n` coefficients.
+fn places_of(hz: f64, n: usize, rate_hz: f64) -> usize {
+    ((2.0 * hz / rate_hz * n as f64) as usize).clamp(1, n - 1)
+}
+
+/// Excess rms in the band of base motion, white noise and what follows the `drivers` taken off. Where the base is known to
+/// move (`turns`), slower motion counts too; else that is drift.
+fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64, turns: bool) -> f64 {
+    let k_of = |f: f64| places_of(f, n, rate_hz);
+    let (mut low, high) = (k_of(MOTION_BAND_HZ.0), k_of(MOTION_BAND_HZ.1));
+    if turns {
+        low = low.min(SLOWEST_MOTION);
+    }
+    let mut above: Vec<f64> = c[high..].iter().map(|v| v * v).collect();
+    let middle = above.len() / 2;
+    let white = if above.is_empty() {
+        0.0
+    } else {
+        *above.select_nth_unstable_by(middle, f64::total_cmp).1 / crate::fit::threshold::MEDIAN
+    };
+    take_off(c, drivers, low..high);
+    let band = &c[low..high];
+    let excess: f64 = band.iter().map(|v| v * v - white).sum();
+    (excess.max(0.0) / n as f64).sqrt()
+}
+
+/// Takes off coefficients what follows the drivers, by what is in the band.
+fn take_off(c: &mut [f64], drivers: &[Vec<f64>], band: Range<usize>) {
+    let dot = |a: &[f64], b: &[f64]| {
+        let pairs = a[band.clone()].iter().zip(&b[band.clone()]);
+        pairs.map(|(a, b)| a * b).sum::<f64>()
+    };
+    let less = |c: &mut [f64], share: f64, o: &[f64]| {
+        c.iter_mut().zip(o).for_each(|(c, o)| *c -= share * o);
+    };
+    let mut orthogonal: Vec<Vec<f64>> = vec![];
+    for driver in drivers {
+        let mut x = driver.clone();
+        let before = dot(&x, &x);
+        for o in &orthogonal {
+            let share = dot(&x, o);
+            less(&mut x, share, o);
+        }
+        let length = dot(&x, &x);
+        // What is left of a driver that the others make up is rounding.
+        if length <= 1e-9 * before.max(f64::MIN_POSITIVE) {
+            continue;
+        }
+        x.iter_mut().for_each(|x| *x /= length.sqrt());
+        let share = dot(c, &x);
+        less(c, share, &x);
+        orthogonal.push(x);
+    }
+}
+
+/// Whether a quantity can drive a gyro's bias.
+fn drives(quantity: Quantity) -> bool {
+    matches!(quantity, Quantity::Temp | Quantity::Supply | Quantity::Pwm)
+}
+
+/// What a gyro reads, to the effects of the others.
+fn of_gyro(c: &Channel, target: &Target) -> Signal {
+    Signal {
+        name: c.name.clone(),
+        quantity: c.quantity,
+        axis: c.axis,
+        unit: c.unit.clone(),
+        values: Arc::clone(&target.y),
+        smooth: Arc::clone(&target.y),
+        lsb: c.lsb,
+        moving: target.moving,
+    }
+}
+
+/// A channel that is no gyro, and the coefficients of what can drive a gyro's bias: motor command, supply, temperatures.
+fn other(
+    c: &Channel,
+    places: &[usize],
+    n: usize,
+    dct: &Dct,
+    bins: &Rc<Bins>,
+) -> (Signal, Option<Rc<Vec<f64>>>) {
+    let read = spread(&c.values, places, n, &[]);
+    let values = Arc::new(interpolated(&read));
+    let is_noisy = matches!(c.quantity, Quantity::Temp | Quantity::Supply);
+    let coefficients = drives(c.quantity).then(|| Rc::new(dct.forward(&values)));
+    let step = || c.lsb.unwrap_or_else(|| smallest_step(few(&c.values)));
+    let smooth = coefficients.as_ref().filter(|_| is_noisy);
+    let smooth = smooth
+        .and_then(|c| dequantise::smoothed(&read, step()).or_else(|| smoothed(c, dct, bins)))
+        .map(Arc::new);
+    let signal = Signal {
+        name: c.name.clone(),
+        quantity: c.quantity,
+        axis: c.axis,
+        unit: c.unit.clone(),
+        smooth: smooth.unwrap_or_else(|| Arc::clone(&values)),
+        values,
+        lsb: c.lsb,
+        moving: false,
+    };
+    (signal, coefficients)
+}
+
+/// The level of a local-level model fitted to readings of these coefficients, every one shrunk by the random walk's share;
+/// none where the readings never change.
+fn smoothed(coefficients: &Rc<Vec<f64>>, dct: &Dct, bins: &Rc<Bins>) -> Option<Vec<f64>> {
+    if coefficients[1..].iter().all(|v| v.abs() < 1e-9) {
+        return None;
+    }
+    let panel = Panel::of(dct, bins, Rc::clone(coefficients));
+    let (noise, _) = panel.fit(&Noise::new(-12.0), &[]);
+    let mut c = coefficients.to_vec();
+    let g = noise.everywhere(bins);
+    for (v, g) in c.iter_mut().zip(g).skip(1) {
+        *v *= 1.0 - 1.0 / g;
+    }
+    Some(dct.inverse(&c))
+}

@@ -1,0 +1,8 @@
+//! From a record to an even grid of readings that are believed.
+
+pub mod base_turns;
+pub mod conditional_draw;
+pub mod dead;
+pub mod dequantise;
+pub mod grid;
+pub mod kalman;

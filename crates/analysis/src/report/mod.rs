@@ -1,0 +1,5 @@
+//! Findings, detection limits and figures.
+
+pub mod detection_limits;
+pub mod figures;
+pub mod findings;

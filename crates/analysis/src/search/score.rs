@@ -1,0 +1,254 @@
+//! What each hypothesis offers to a model: its best place, its likelihood ratio, its threshold.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use model::effect::{Hypothesis, Shape};
+
+use super::{
+    Candidate, FASTEST_BEAT, Form, LEAST_BEATS, LEAST_CYCLES, SLOW_BEAT_HZ, Search, State, Term,
+};
+use crate::fit::likelihood::Noise;
+use crate::fit::scan;
+use crate::fit::threshold;
+
+impl Search<'_> {
+    /// Best term that candidate `i` offers to `state`; `quick` leaves out refinements.
+    pub(super) fn weigh(
+        &self,
+        state: &State,
+        walks: &[(Noise, Vec<f64>, f64)],
+        i: usize,
+    ) -> Option<Term> {
+        let candidate = &self.candidates[i];
+        let null = state.solution.log_likelihood;
+        let own = state.columns();
+        let term = |form, columns: Vec<usize>, names, lr, threshold| Term {
+            columns,
+            names,
+            lr,
+            ..Term::new(candidate.effect, i, form, threshold)
+        };
+        let n = self.panel.bins.n;
+        match &candidate.hypothesis {
+            Hypothesis::Regression(r) => {
+                let columns = [own, candidate.columns.clone()].concat();
+                let lr = 2.0 * (self.panel.profile(walks, &columns) - null);
+                let names = r.columns.iter().map(|c| c.parameter).collect();
+                // In the place of a narrower term, only the columns beyond it are new.
+                let held: usize = state
+                    .terms
+                    .iter()
+                    .filter(|t| candidate.effect.extends() == Some(t.effect.id()))
+                    .map(|t| t.columns.len())
+                    .sum();
+                let new = r.columns.len().saturating_sub(held).max(1);
+                let limit = threshold::regression(new, candidate.siblings) + candidate.handicap;
+                let mut t = term(Form::Columns, candidate.columns.clone(), names, lr, limit);
+                t.fixed.clone_from(&r.fixed);
+                t.follows.clone_from(&r.follows);
+                Some(t)
+            }
+            Hypothesis::Shaped(shape) => {
+                let (at, columns, lr) = candidate
+                    .grid
+                    .iter()
+                    .map(|(at, c)| {
+                        (
+                            *at,
+                            c,
+                            2.0 * (self
+                                .panel
+                                .profile(walks, &[own.clone(), c.clone()].concat())
+                                - null),
+                        )
+                    })
+                    .max_by(|a, b| a.2.total_cmp(&b.2))?;
+                let names: Vec<_> = shape.columns(at).iter().map(|c| c.parameter).collect();
+                let limit = threshold::shaped(names.len());
+                // Between the points of the grid it may be much better: what is a rival is weighed at its best.
+                let lr = if lr > limit {
+                    lr.max(2.0 * (self.between(walks, &own, shape.as_ref(), at) - null))
+                } else {
+                    lr
+                };
+                Some(term(
+                    Form::Shaped(Arc::clone(shape), at),
+                    columns.clone(),
+                    names,
+                    lr,
+                    limit,
+                ))
+            }
+            Hypothesis::Step => {
+                let margin = (0.5 * self.view.rate_hz).max(4.0);
+                let noises: Vec<Noise> = walks.iter().step_by(2).map(|w| w.0.clone()).collect();
+                let curve = scan::steps(&self.panel, &noises, &own, null);
+                let inside: Vec<_> = curve
+                    .into_iter()
+                    .filter(|(t, _)| *t >= margin && *t <= n as f64 - margin)
+                    .collect();
+                let (at, lr) = inside.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
+                let weight = |l: f64| ((l - lr) / 2.0).exp();
+                let near = |t: f64| (t - at).abs() < 0.1 * n as f64;
+                let (mut sum, mut square) = (0.0, 0.0);
+                for (t, l) in inside.iter().filter(|(t, _)| near(*t)) {
+                    sum += weight(*l);
+                    square += weight(*l) * (t - at).powi(2);
+                }
+                let error = (square / sum).sqrt().max(0.5);
+                Some(term(
+                    Form::Step(at, error),
+                    vec![],
+                    vec!["height"],
+                    lr,
+                    threshold::step(n),
+                ))
+            }
+            Hypothesis::Line => {
+                let least = (2.0 * LEAST_CYCLES) as usize;
+                let (k, lr) =
+                    scan::best_line(&self.panel, &state.noise, &own, &state.solution, least)?;
+                let omega = std::f64::consts::PI * k as f64 / n as f64;
+                Some(term(
+                    Form::Line(omega),
+                    vec![],
+                    vec!["cosine", "sine"],
+                    lr,
+                    threshold::line(n),
+                ))
+            }
+            Hypothesis::SideBands => {
+                let (carrier, phase) = state.carrier()?;
+                let lr = scan::beats(
+                    &self.panel,
+                    &state.noise,
+                    &own,
+                    &state.solution,
+                    carrier,
+                    phase,
+                );
+                let slow = self.slow_beats();
+                let bin = std::f64::consts::PI / n as f64;
+                let fastest = (FASTEST_BEAT * carrier / bin) as usize;
+                let limit = |d: usize| threshold::side_bands(if d <= slow { slow } else { n });
+                let margin = |d: usize| lr[d] - limit(d);
+                let d = ((2.0 * LEAST_BEATS) as usize..=slow.max(fastest).min(n - 1))
+                    .filter(|d| carrier > bin * (d + 1) as f64)
+                    .filter(|d| carrier + bin * (d + 1) as f64 <= std::f64::consts::PI)
+                    .max_by(|a, b| margin(*a).total_cmp(&margin(*b)))?;
+                Some(term(
+                    Form::SideBands(carrier, d as f64 * bin),
+                    vec![],
+                    vec!["cosine", "sine", "in_phase", "quadrature"],
+                    lr[d],
+                    limit(d),
+                ))
+            }
+            Hypothesis::Covariance(c) => {
+                let best = c
+                    .starts(n)
+                    .into_iter()
+                    .map(|theta| {
+                        let mut noise = state.noise.clone();
+                        noise.terms.push((Arc::clone(c), theta));
+                        self.panel.fit(&noise, &own)
+                    })
+                    .max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;
+                let lr = self.of_read() * 2.0 * (best.1.log_likelihood - null);
+                let theta = best.0.terms.last().map(|t| t.1.clone())?;
+                let limit = threshold::covariance(c.dimensions());
+                Some(term(
+                    Form::Covariance(Arc::clone(c), theta),
+                    vec![],
+                    vec![],
+                    lr,
+                    limit,
+                ))
+            }
+            _ => None,
+        }
+    }
+
+    /// Fastest slow swing of a line, half cycles in the record.
+    pub(crate) fn slow_beats(&self) -> usize {
+        (2.0 * SLOW_BEAT_HZ / self.view.rate_hz * self.panel.bins.n as f64) as usize
+    }
+
+    /// Highest log likelihood of a shape near the point `at` of its grid.
+    fn between(
+        &self,
+        walks: &[(Noise, Vec<f64>, f64)],
+        own: &[usize],
+        shape: &dyn Shape,
+        at: f64,
+    ) -> f64 {
+        const STEPS: usize = 6;
+        let width = self.panel.width();
+        let minus_l = |x: f64| {
+            let columns = shape.columns(x.exp()).into_iter().map(|c| c.values);
+            let added = self.panel.add_all(columns);
+            let l = self.panel.profile(walks, &[own, &added].concat());
+            self.panel.truncate(width);
+            -l
+        };
+        let (low, high) = super::refine::neighbours(&shape.grid(), at);
+        let best = crate::numerics::minimise::golden(&minus_l, low.ln(), high.ln(), STEPS);
+        -minus_l(best)
+    }
+
+    /// Whether a candidate may still join.
+    pub(super) fn open(&self, state: &State, i: usize) -> bool {
+        let c = &self.candidates[i];
+        match &c.hypothesis {
+            Hypothesis::Step => !self.view.moving,
+            Hypothesis::Line => !self.view.moving && !self.view.sways(),
+            Hypothesis::SideBands => state.terms.iter().all(|t| t.candidate != i),
+            Hypothesis::Covariance(_) => {
+                !self.view.moving
+                    && !self.view.sways()
+                    && state.terms.iter().all(|t| t.effect.id() != c.effect.id())
+            }
+            Hypothesis::Regression(r) => {
+                let other = |t: &Term| r.columns.iter().all(|c| !t.names.contains(&c.parameter));
+                !self.view.moving
+                    && state.terms.iter().all(|t| {
+                        t.effect.id() != c.effect.id() || t.follows != r.follows || other(t)
+                    })
+            }
+            Hypothesis::Shaped(_) => {
+                !self.view.moving && state.terms.iter().all(|t| t.candidate != i)
+            }
+            _ => false,
+        }
+    }
+
+    /// What every open candidate offers, those that extend a term in its place.
+    pub(crate) fn offers(&self, state: &State, allow: &dyn Fn(&Candidate) -> bool) -> Vec<Term> {
+        let walks = self.panel.walks(&state.noise);
+        (0..self.candidates.len())
+            .filter(|i| allow(&self.candidates[*i]) && self.open(state, *i))
+            .filter_map(|i| self.offer(state, &walks, i))
+            .filter(|t| t.lr.is_finite())
+            .collect()
+    }
+
+    /// As [`Search::weigh`]; the search comes back to states without processes, term by term, and is told what it was.
+    fn offer(&self, state: &State, walks: &[(Noise, Vec<f64>, f64)], i: usize) -> Option<Term> {
+        if !state.noise.terms.is_empty() {
+            return self.weigh(state, walks, i);
+        }
+        let terms = state.terms.iter().map(|t| (t.candidate, t.columns.clone()));
+        let (data, walk) = (self.panel.revision(), state.noise.log_walk.to_bits());
+        let place = (data, walk, terms.collect());
+        let known =
+            |all: &HashMap<_, HashMap<usize, Option<Term>>>| all.get(&place)?.get(&i).cloned();
+        let known = known(&self.offered.borrow());
+        known.unwrap_or_else(|| {
+            let new = self.weigh(state, walks, i);
+            let mut all = self.offered.borrow_mut();
+            all.entry(place).or_default().insert(i, new.clone());
+            new
+        })
+    }
+}

@@ -1,0 +1,5 @@
+//! Two levels against a Gaussian process.
+
+pub mod compare;
+pub mod filter_bank;
+pub mod fit;
