@@ -10,7 +10,7 @@
 #define SELECTS (_BV(PB2) | _BV(PB3) | _BV(PB4))
 /* Master, mode 3; with SPI2X clock / 8 = 2 MHz, below the part's 2.5 MHz. */
 #define SPCR_MASTER (_BV(SPE) | _BV(MSTR) | _BV(CPOL) | _BV(CPHA) | _BV(SPR0))
-/* Polls: a byte takes 64 cycles, a conversion 1664, the first 3200. */
+/* Polls: a byte takes 64 cycles, a conversion 1664, the first of a tick 3200. */
 #define SPI_BUDGET 60
 #define ADC_BUDGET 1000
 /* Clock / 128 = 125 kHz. */
@@ -30,7 +30,6 @@ void sensors_start(void)
     /* g-select is driven low or left to the pull-up to 3.3 V, never driven high: 5 V would harm the part. */
     PORTC = 0;
     DDRC = _BV(PC0) | _BV(PC1);
-    ADCSRA = ADC_ON | _BV(ADSC);
     _delay_ms(SENSOR_START_MS);
 }
 
@@ -117,4 +116,6 @@ void sensors_acquire(struct raw *raw, void (*sampled)(void))
     adc_finish(raw, 1);
     adc_start(2);
     adc_finish(raw, 2);
+    /* Off: idle sleep starts conversions by itself while it is on. */
+    ADCSRA = 0;
 }

@@ -1,5 +1,6 @@
 //! `memcpy` and `memset` as byte loops: a tenth of the flash of the general ones, whose symbols are weak.
 
+use core::ffi::{c_int, c_void};
 use core::ptr::{read_volatile, write_volatile};
 
 /// Copies `n` bytes. Volatile, so that the compiler does not see a `memcpy` in it and calls itself.
@@ -7,8 +8,8 @@ use core::ptr::{read_volatile, write_volatile};
 /// # Safety
 /// As C has it.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn memcpy(to: *mut u8, from: *const u8, n: usize) -> *mut u8 {
-    let (mut at, mut source, mut left) = (to, from, n);
+pub unsafe extern "C" fn memcpy(to: *mut c_void, from: *const c_void, n: usize) -> *mut c_void {
+    let (mut at, mut source, mut left) = (to.cast::<u8>(), from.cast::<u8>(), n);
     while left != 0 {
         // SAFETY: the caller's.
         unsafe { write_volatile(at, read_volatile(source)) };
@@ -26,8 +27,8 @@ pub unsafe extern "C" fn memcpy(to: *mut u8, from: *const u8, n: usize) -> *mut 
 /// # Safety
 /// As C has it.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn memset(to: *mut u8, byte: core::ffi::c_int, n: usize) -> *mut u8 {
-    let (mut at, mut left) = (to, n);
+pub unsafe extern "C" fn memset(to: *mut c_void, byte: c_int, n: usize) -> *mut c_void {
+    let (mut at, mut left) = (to.cast::<u8>(), n);
     while left != 0 {
         // SAFETY: the caller's.
         unsafe { write_volatile(at, byte as u8) };

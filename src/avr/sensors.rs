@@ -21,7 +21,7 @@ const SPI_BUDGET: u8 = 60;
 /// ADEN, clock / 128 = 125 kHz: the only setting at 16 MHz inside the 50..200 kHz that 10 bits need.
 const ADC_ON: u8 = 1 << 7 | 7;
 const ADSC: u8 = 1 << 6;
-/// Polls for the end of a conversion: it takes 1664 cycles, the first 3200; a poll about 6.
+/// Polls for the end of a conversion: it takes 1664 cycles, the first of a tick 3200; a poll about 6.
 const ADC_BUDGET: u16 = 1_000;
 
 /// The end of a byte did not come: SS was pulled low, or the clock has stopped.
@@ -204,7 +204,6 @@ pub unsafe fn start() -> &'static mut AvrSensors {
         (*PORTC::ptr()).portc.write(|w| bits!(w, 0));
         (*PORTC::ptr()).ddrc.write(|w| bits!(w, 0b11));
     }
-    adc().adcsra.write(|w| bits!(w, ADC_ON | ADSC));
     Delay.delay_ms(u32::from(firmware::SENSOR_START_MS));
     // SAFETY: the caller's.
     unsafe { all() }
@@ -213,6 +212,12 @@ pub unsafe fn start() -> &'static mut AvrSensors {
 fn adc() -> &'static avr_device::atmega16::adc::RegisterBlock {
     // SAFETY: the ADC is used by the sensors alone.
     unsafe { &*ADC::ptr() }
+}
+
+/// Switches the ADC off until the next conversion is asked for. Idle sleep starts one by itself while it is on (2466T, idle
+/// mode): the tick would meet it running, `ADSC` would do nothing, and the result would be the input's before.
+pub fn adc_off() {
+    adc().adcsra.write(|w| bits!(w, 0));
 }
 
 impl Sensors for AvrSensors {

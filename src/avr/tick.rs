@@ -296,6 +296,7 @@ fn TIMER1_COMPB() {
     // SAFETY: the sensors are the tick's from its start on, the place is the one that the main loop does not read.
     let (sensors, raw) = unsafe { (sensors::all(), &mut *free) };
     acquire(sensors, raw);
+    sensors::adc_off();
     raw.t_ticks = shared.t_ticks;
     // One that nobody took is overwritten; the end of a job stays, or it would never be answered.
     let lost = shared.ready;

@@ -277,11 +277,11 @@ impl Chip {
             }
             r::ADMUX => self.adc.write_mux(value),
             r::ADCL | r::ADCH => {}
-            r::UBRRL => self.usart.write_ubrrl(value),
+            r::UBRRL => self.usart.write_ubrrl(value, now),
             r::UCSRB => self.usart.write_b(value, now)?,
             r::UCSRA => self.usart.write_a(value),
             r::UDR => self.usart.write_data(value, now),
-            r::UCSRC => self.usart.write_shared(value)?,
+            r::UCSRC => self.usart.write_shared(value, now)?,
             r::SPCR => {
                 let low = self.select_is_low();
                 self.spi.write_control(value, low);
@@ -405,8 +405,12 @@ impl Chip {
         Ok(LOOK)
     }
 
-    /// Whether `sleep` puts the processor to sleep.
-    pub fn may_sleep(&self) -> bool {
-        self.mcucr & SLEEP_ENABLE != 0
+    /// `sleep`: whether it puts the processor to sleep, and what that sets going.
+    pub fn sleep(&mut self, now: u64) -> bool {
+        let sleeps = self.mcucr & SLEEP_ENABLE != 0;
+        if sleeps && let Err(what) = self.adc.enter_idle(now) {
+            self.unmodelled.get_or_insert(what);
+        }
+        sleeps
     }
 }

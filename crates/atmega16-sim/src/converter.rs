@@ -95,14 +95,31 @@ impl Converter {
             self.enabled_at = now;
             self.first = true;
         }
-        if value & ADSC != 0 && self.running.is_none() {
-            // It starts with the next edge of its clock; half clocks: 1.5 (13.5) to the sample, 13 (25) to the end.
-            let clock = self.divider();
-            let start = self.enabled_at + ((now - self.enabled_at) / clock + 1) * clock;
-            let (sample, end) = if self.first { (27, 50) } else { (3, 26) };
-            self.start(start, sample, end)?;
+        if value & ADSC != 0 {
+            self.start_at_next_clock(now)?;
         }
         Ok(())
+    }
+
+    /// Idle mode is entered: "if the ADC is enabled, a conversion starts automatically when this mode is entered" (2466T,
+    /// idle mode).
+    pub fn enter_idle(&mut self, now: u64) -> Result<(), Unmodelled> {
+        if self.control & ADEN == 0 {
+            return Ok(());
+        }
+        self.start_at_next_clock(now)
+    }
+
+    /// A conversion, unless one runs: its input stays the one that it was started with.
+    fn start_at_next_clock(&mut self, now: u64) -> Result<(), Unmodelled> {
+        if self.running.is_some() {
+            return Ok(());
+        }
+        // It starts with the next edge of its clock; half clocks: 1.5 (13.5) to the sample, 13 (25) to the end.
+        let clock = self.divider();
+        let start = self.enabled_at + ((now - self.enabled_at) / clock + 1) * clock;
+        let (sample, end) = if self.first { (27, 50) } else { (3, 26) };
+        self.start(start, sample, end)
     }
 
     /// A conversion that samples and ends so many half clocks after `start`.

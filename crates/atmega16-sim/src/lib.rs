@@ -359,7 +359,10 @@ impl Mcu {
             match self.core.run(cycles) {
                 Ran::On => {}
                 Ran::Enabled => self.shielded = true,
-                Ran::Sleep => self.asleep = self.chip().may_sleep(),
+                Ran::Sleep => {
+                    let now = self.core.cycle();
+                    self.asleep = self.core.chip_mut().sleep(now);
+                }
                 Ran::Crash => {
                     let at = self.core.program_counter();
                     return Stop::Crashed { at };

@@ -220,14 +220,45 @@ impl Usart {
         Ok(())
     }
 
-    pub fn write_ubrrl(&mut self, value: u8) {
-        self.ubrr = self.ubrr & 0xf00 | u16::from(value);
+    pub fn write_ubrrl(&mut self, value: u8, now: u64) {
+        self.set_divisor(self.ubrr & 0xf00 | u16::from(value), now);
+    }
+
+    /// "Ongoing transmissions by the transmitter and receiver will be corrupted if the baud rate is changed" (2466T, UBRR):
+    /// the bits that have not gone out yet are as long as the new speed has them, and whoever listens at the old one takes
+    /// what is on the line in the middle of each of its own bits. (The receiver samples a character at one speed, the
+    /// present one.)
+    fn set_divisor(&mut self, divisor: u16, now: u64) {
+        let old = self.bit();
+        self.ubrr = divisor;
+        let new = self.bit();
+        let Some((byte, end)) = self.shift.filter(|_| new != old) else {
+            return;
+        };
+        // Start bit, eight data bits, stop bits; past their end the line is high.
+        let bits = u64::from(byte) << 1 | !0 << 9;
+        let start = end.saturating_sub(self.frame() / new * old);
+        let gone = now.saturating_sub(start);
+        let (whole, part) = (gone / old, gone % old);
+        // The bit that is going out keeps its share of time.
+        let rest = (old - part) * new / old;
+        let on_line = |at: u64| match at.checked_sub(gone) {
+            None => bits >> (at / old) & 1,
+            Some(since) if since < rest => bits >> whole & 1,
+            Some(since) => bits >> (whole + 1 + (since - rest) / new).min(63) & 1,
+        };
+        let heard = (0..8).fold(0, |heard, n| {
+            heard | (on_line(old * (n + 1) + old / 2) as u8) << n
+        });
+        let frame_bits = self.frame() / new;
+        let left = frame_bits.saturating_sub(whole + 1);
+        self.shift = Some((heard, now + rest + left * new));
     }
 
     /// UCSRC with URSEL set, else UBRRH.
-    pub fn write_shared(&mut self, value: u8) -> Result<(), Unmodelled> {
+    pub fn write_shared(&mut self, value: u8, now: u64) -> Result<(), Unmodelled> {
         if value & URSEL == 0 {
-            self.ubrr = self.ubrr & 0xff | u16::from(value & 0x0f) << 8;
+            self.set_divisor(self.ubrr & 0xff | u16::from(value & 0x0f) << 8, now);
             return Ok(());
         }
         self.c = value;

@@ -52,6 +52,28 @@ fn the_result_is_1024_v_over_the_reference() {
     assert_eq!(word(&mcu, "gap"), (1.22f64 / 3.3 * 1024.0) as u16);
 }
 
+/// Asked for input 0 after a sleep, MUX 2 before it: what is read, and the inputs held from the sleep on.
+fn after_idle_sleep(flags: &[&str]) -> (u8, u16, Vec<u8>) {
+    let mut all = vec!["-DPRESCALE=7", "-DIDLE"];
+    all.extend(flags);
+    let (mcu, board) = converted(&all);
+    let held = board.adc.iter().skip(1).map(|&(_, channel)| channel);
+    (byte(&mcu, "running"), word(&mcu, "counts"), held.collect())
+}
+
+#[test]
+fn idle_sleep_starts_a_conversion_while_the_adc_is_on() {
+    // Input 0 is at 0 V, input 2 at 1 V. What is asked for while it runs is not converted.
+    let of_2 = (1.0f64 / 3.3 * 1024.0) as u16;
+    assert_eq!(after_idle_sleep(&[]), (1 << 6, of_2, vec![2]));
+    // Switched off after the sleep the conversion is gone, before it there is none; the next one takes its own input.
+    assert_eq!(
+        after_idle_sleep(&["-DOFF_AFTER_SLEEP"]),
+        (1 << 6, 0, vec![2, 0])
+    );
+    assert_eq!(after_idle_sleep(&["-DOFF_BEFORE_SLEEP"]), (0, 0, vec![0]));
+}
+
 #[test]
 fn free_running_it_takes_13_clocks_each() {
     let (_, board) = converted(&["-DPRESCALE=7", "-DFREE_RUNNING"]);

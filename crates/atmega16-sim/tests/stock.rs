@@ -168,6 +168,29 @@ fn rows() -> Vec<(&'static str, String, String, String)> {
         &common::byte(&mcu, "taken"),
     );
 
+    let flags = ["-DPRESCALE=7", "-DIDLE"];
+    let mut stock = Stock::new("adc.c", &flags);
+    stock.run(400_000);
+    let (mcu, _) = ours("adc.c", &flags, 400_000);
+    row(
+        "ADC that is on: ADSC after an idle sleep",
+        &64,
+        &stock.byte("running"),
+        &common::byte(&mcu, "running"),
+    );
+
+    let flags = ["-DDIVISOR=25", "-DDOUBLE=0", "-DBYTES=2", "-DFASTER"];
+    let mut stock = Stock::new("serial.c", &flags);
+    stock.run(400_000);
+    let (_, board) = ours("serial.c", &flags, 400_000);
+    let first = |uart: &[(u64, u8)]| format!("{:#04x}", uart[0].1);
+    row(
+        "USART: 0x55 heard at 38400 baud, UBRR set to 3 after three and a half bits",
+        &"0xfd",
+        &first(&stock.heard.bytes.borrow()),
+        &first(&board.uart),
+    );
+
     let mut stock = Stock::new("spi.c", &[]);
     stock.run(100_000);
     let (mcu, _) = ours("spi.c", &[], 100_000);

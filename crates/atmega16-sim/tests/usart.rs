@@ -62,6 +62,20 @@ fn two_bytes_are_taken_at_once_and_txc_comes_when_all_is_out() {
     assert!(end.0 > last && end.0 - last < 30, "TXC once, at the end");
 }
 
+/// 0x55 on the line: 0 1010 1010 1. The speed changes after three and a half bits of 416 cycles; from there on bits last 64.
+/// The listener, whose bits last 416, still finds start, 1, 0 and, in the middle of the fourth, 1; then the stop bit.
+#[test]
+fn a_byte_whose_speed_changes_on_its_way_is_corrupted() {
+    let (board, _) = send(25, 0, &["-DFASTER"]);
+    assert_eq!(board.uart[0].1, 0b1111_1101);
+    let (byte, apart) = (board.uart[1].1, board.uart[2].0 - board.uart[1].0);
+    assert_eq!(
+        (byte, apart),
+        (0, 640),
+        "what is begun at one speed is whole"
+    );
+}
+
 fn receive(delay_ms: u32, feed: impl Fn(&mut atmega16_sim::Mcu)) -> (Vec<u8>, Vec<u8>) {
     let mut mcu = load("receive.c", &[&format!("-DDELAY={delay_ms}")]);
     let mut board = Recorder::new();
