@@ -1,4 +1,5 @@
-//! The motor: off unless the PC is there, never faster than its limits, never a jump.
+//! The motor's command: never faster than its limits, never a jump. That it is off unless the PC is there is the board's
+//! part (see [`Board::keep_alive`](crate::Board::keep_alive)).
 
 use crate::math::divide;
 
@@ -28,7 +29,6 @@ pub struct Motor {
     max_duty: i16,
     /// Q6 steps a millisecond.
     ramp_q6: i16,
-    alive_ms: u8,
     shape: u8,
     /// Periods left; 0 for as long as the PC is there.
     cycles: u8,
@@ -49,7 +49,6 @@ impl Motor {
             output: 0,
             max_duty: 0,
             ramp_q6: 0,
-            alive_ms: 0,
             shape: shape::STOP,
             cycles: 0,
             amplitude: 0,
@@ -66,17 +65,6 @@ impl Motor {
         self.max_duty = max_duty.into();
         // steps/s -> Q6 steps/ms: * 64 / 1000, which is 4194 / 2^16 to 8e-5; at least the smallest there is.
         self.ramp_q6 = (u32::from(ramp_per_s).wrapping_mul(4_194) >> 16).max(1) as i16;
-    }
-
-    /// A word from the PC.
-    pub fn keep_alive(&mut self) {
-        self.alive_ms = KEEP_ALIVE_MS;
-    }
-
-    /// Whether the PC was heard in time.
-    #[must_use]
-    pub fn is_alive(&self) -> bool {
-        self.alive_ms > 0
     }
 
     /// New command, which ends a profile; what is beyond the limit is cut to it. Returns the command that holds.
@@ -178,23 +166,14 @@ impl Motor {
         self.target = 0;
         self.output_q6 = 0;
         self.output = 0;
-        self.alive_ms = 0;
         self.shape = shape::STOP;
     }
 
-    /// A millisecond has passed. True when the motor was cut because the PC fell silent.
+    /// A millisecond has passed.
     #[inline(always)]
-    pub fn on_millisecond(&mut self) -> bool {
-        let alive = self.alive_ms > 0;
-        if alive {
-            self.alive_ms = self.alive_ms.wrapping_sub(1);
-        }
+    pub fn on_millisecond(&mut self) {
         if !self.turns() {
-            return false;
-        }
-        if !alive {
-            self.cut();
-            return true;
+            return;
         }
         if self.shape != shape::STOP {
             self.step_profile();
@@ -207,7 +186,6 @@ impl Motor {
         // Towards zero, as a division rounds.
         let round = if self.output_q6 < 0 { 63 } else { 0 };
         self.output = self.output_q6.wrapping_add(round) >> 6;
-        false
     }
 }
 
@@ -244,19 +222,22 @@ mod tests {
     }
 
     #[test]
-    fn it_is_cut_200_ms_after_the_last_word() {
+    fn what_was_cut_stays_off() {
         for profile in [false, true] {
             let mut motor = motor(255, DEFAULT_RAMP_PER_S);
-            motor.keep_alive();
             if profile {
                 assert!(motor.profile(shape::SINE, 100, 0, 1000, 0));
             } else {
                 motor.command(255);
             }
-            let cut_at = (1..=400).find(|_| motor.on_millisecond());
-            assert_eq!(cut_at, Some(i32::from(KEEP_ALIVE_MS) + 1));
-            assert_eq!(motor.output(), 0);
-            assert!(!(0..400).any(|_| motor.on_millisecond()), "counted once");
+            (0..100).for_each(|_| motor.on_millisecond());
+            assert_ne!(motor.output(), 0);
+            motor.cut();
+            (0..400).for_each(|_| {
+                motor.on_millisecond();
+                assert_eq!(motor.output(), 0);
+            });
+            assert!(!motor.is_on());
         }
     }
 
@@ -266,7 +247,6 @@ mod tests {
         motor.command(255);
         let (mut before, mut highest) = (0, 0);
         for _ in 0..1000 {
-            motor.keep_alive();
             motor.on_millisecond();
             assert!(motor.output() - before <= 1);
             before = motor.output();
@@ -278,7 +258,6 @@ mod tests {
     #[test]
     fn a_motor_without_limits_set_does_not_turn() {
         let mut motor = Motor::new();
-        motor.keep_alive();
         assert_eq!(motor.command(255), 0);
         motor.on_millisecond();
         assert_eq!(motor.output(), 0);
@@ -290,7 +269,6 @@ mod tests {
         assert!(motor.profile(shape, amplitude, offset, period_ms, cycles));
         (0..2 * u32::from(period_ms))
             .map(|_| {
-                motor.keep_alive();
                 motor.on_millisecond();
                 motor.target
             })

@@ -18,8 +18,15 @@ pub trait Board {
     /// Queues a frame of these fields for the line (see [`wire::fields`]); false, and nothing queued, when there is less room
     /// than [`wire::fields::room_for`] says.
     fn send(&mut self, kind: u8, fields: &[u8]) -> bool;
-    /// Puts out the motor command, -255..=255.
+    /// Bytes that the transmit queue still takes.
+    fn room(&self) -> u8;
+    /// Puts out the motor command, -255..=255; anything but 0 while [`host_is_there`](Self::host_is_there) only.
     fn set_motor(&mut self, duty: i16);
+    /// The host is there: from now on the motor may turn for [`crate::motor::KEEP_ALIVE_MS`]. The board cuts it by itself
+    /// when they are over, whatever its main loop is busy with.
+    fn keep_alive(&mut self);
+    /// Whether they are not over yet.
+    fn host_is_there(&self) -> bool;
     /// Sets the period of the sample timer, and that every n-th period has a sample.
     fn set_period(&mut self, ticks: u16, every: u8);
     /// Sets the USART's UBRR once what is queued has gone out.
@@ -63,6 +70,15 @@ const HEALTH: u8 = 2;
 const CLEAR: u8 = 4;
 /// SUPPLY_OUT of 4.75 V and 5.25 V at 1.8315 mV a count: the part's operating range (data sheet).
 const SUPPLY_COUNTS: core::ops::RangeInclusive<u16> = 2_594..=2_866;
+/// Lengths on the line.
+const SAMPLE_LEN: u8 = wire::Sample::FRAME_LEN as u8;
+const REPLY_LEN: u8 = wire::Reply::FRAME_LEN as u8;
+const HELLO_LEN: u8 = wire::Hello::FRAME_LEN as u8;
+const HEALTH_LEN: u8 = wire::Health::FRAME_LEN as u8;
+/// Samples from one reply to the next, and from one hello or health frame to the next, where the queue has no room for a
+/// sample beside it: 16 samples, 4 replies and a health frame are 1002 bytes, so that samples have four fifths of any line.
+const SAMPLES_PER_REPLY: u8 = 4;
+const SAMPLES_PER_REPORT: u8 = 16;
 /// Codes at which the accelerometer's output is at the converter's end.
 const ADC_MAX: u16 = 1_023;
 
@@ -102,6 +118,9 @@ pub struct Stand {
     owed: u8,
     /// What has been owed since a sample ago: it goes before samples, or a line too slow for the rate would carry nothing else.
     late: u8,
+    /// Samples sent since the last reply, and since the last hello or health frame; they saturate.
+    since_reply: u8,
+    since_report: u8,
     motor: Motor,
     config: Config,
     /// What the next reply will say beside its status; zero after each.
@@ -128,6 +147,8 @@ impl Stand {
             millisecond: 0,
             owed: 0,
             late: 0,
+            since_reply: 0,
+            since_report: 0,
             motor: Motor::new(),
             config: Config::new(),
             answer: Reply {
@@ -228,11 +249,17 @@ impl Stand {
             self.step_bias_null(board, in_order, &sample);
         }
         sample.flags.set(seen);
-        self.late &= self.owed;
         if self.late != 0 || !board.send(kind::SAMPLE, sample.as_bytes()) {
             self.record(Fault::FrameDropped, 0);
+        } else {
+            self.since_reply = self.since_reply.saturating_add(1);
+            self.since_report = self.since_report.saturating_add(1);
         }
-        self.late = self.owed;
+        self.late = if self.since_report >= SAMPLES_PER_REPORT {
+            self.owed
+        } else {
+            0
+        };
         if !matches!(raw.done.task, Task::None) {
             self.job_done(board, raw.done);
         }
@@ -383,6 +410,20 @@ impl Stand {
         true
     }
 
+    /// Whether there is room for the reply that the next received byte may bring. Until then the bytes wait: no request,
+    /// however many there are, takes the room of a sample, or of a report that is late.
+    #[inline(never)]
+    pub fn listens<B: Board>(&self, board: &B) -> bool {
+        let beside = if self.late != 0 {
+            HEALTH_LEN + REPLY_LEN
+        } else if self.since_reply >= SAMPLES_PER_REPLY {
+            0
+        } else {
+            SAMPLE_LEN + REPLY_LEN
+        };
+        board.room() >= beside.wrapping_add(REPLY_LEN)
+    }
+
     /// A received byte.
     #[inline(never)]
     pub fn on_byte<B: Board>(&mut self, board: &mut B, byte: u8) {
@@ -396,9 +437,8 @@ impl Stand {
     /// A millisecond has passed: motor, EEPROM, self-test, health.
     #[inline(never)]
     pub fn on_millisecond<B: Board>(&mut self, board: &mut B) {
-        if self.motor.on_millisecond() {
-            self.record(Fault::MotorTimeout, 0);
-        }
+        self.miss_host(board);
+        self.motor.on_millisecond();
         board.set_motor(self.motor.output());
         if !self.store.is_idle() {
             self.step_store(board);
@@ -421,6 +461,15 @@ impl Stand {
         }
     }
 
+    /// Where the host fell silent the board has cut the motor: its command ends with it.
+    #[inline(never)]
+    fn miss_host<B: Board>(&mut self, board: &B) {
+        if self.motor.is_on() && !board.host_is_there() {
+            self.motor.cut();
+            self.record(Fault::MotorTimeout, 0);
+        }
+    }
+
     /// The one reply to a request, with what [`answer`](Self::answer) says.
     #[inline(never)]
     fn reply<B: Board>(&mut self, board: &mut B, asked: Pending, status: Status) {
@@ -430,14 +479,27 @@ impl Stand {
         if !board.send(kind::REPLY, self.answer.as_bytes()) {
             self.record(Fault::ReportDropped, 0);
         }
+        self.since_reply = 0;
         self.answer.zero();
+    }
+
+    /// Whether a hello or health frame of this length has its turn: soon after another one there has to be room for a sample
+    /// beside it.
+    #[inline(never)]
+    fn may_report<B: Board>(&self, board: &B, len: u8) -> bool {
+        let beside = if self.since_report >= SAMPLES_PER_REPORT {
+            REPLY_LEN
+        } else {
+            REPLY_LEN + SAMPLE_LEN
+        };
+        board.room() >= beside.wrapping_add(len)
     }
 
     /// Sends what is owed, and `more`, as far as there is room.
     #[inline(never)]
     fn tell<B: Board>(&mut self, board: &mut B, more: u8) {
         self.owed |= more;
-        if self.owed & HELLO != 0 {
+        if self.owed & HELLO != 0 && self.may_report(board, HELLO_LEN) {
             let hello = wire::fields::Hello {
                 firmware: crate::VERSION,
                 board_id: self.config.board_id,
@@ -449,17 +511,24 @@ impl Stand {
             };
             if board.send(kind::HELLO, hello.as_bytes()) {
                 self.owed &= !HELLO;
+                self.reported();
             }
         }
-        if self.owed & HEALTH != 0 {
+        if self.owed & HEALTH != 0 && self.may_report(board, HEALTH_LEN) {
             self.health.stack_free.set(board.stack_free());
             if board.send(kind::HEALTH, self.health.as_bytes()) {
                 if self.owed & CLEAR != 0 {
                     self.health.faults.zero();
                 }
                 self.owed &= !(HEALTH | CLEAR);
+                self.reported();
             }
         }
+    }
+
+    /// A hello or health frame has been sent.
+    fn reported(&mut self) {
+        (self.since_report, self.late) = (0, 0);
     }
 
     #[inline(never)]

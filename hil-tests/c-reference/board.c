@@ -3,6 +3,7 @@
 #include <avr/io.h>
 #include <avr/wdt.h>
 #include <stdlib.h>
+#include <util/atomic.h>
 
 #include "serial.h"
 #include "tick.h"
@@ -62,7 +63,11 @@ void board_set_motor(int16_t duty)
     else
         PORTD &= (uint8_t)~_BV(PD6);
     OCR2 = (uint8_t)abs(duty);
-    TCCR2 = _BV(WGM21) | _BV(WGM20) | _BV(COM21) | _BV(CS21); /* fast PWM, clock / 8: 7.8 kHz */
+    ATOMIC_BLOCK(ATOMIC_FORCEON) /* not behind the interrupt that cuts it */
+    {
+        if (tick_host_is_there())
+            TCCR2 = _BV(WGM21) | _BV(WGM20) | _BV(COM21) | _BV(CS21); /* fast PWM, clock / 8: 7.8 kHz */
+    }
 }
 
 void board_reboot(void)

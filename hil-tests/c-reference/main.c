@@ -10,8 +10,34 @@
 #include "store.h"
 #include "tick.h"
 
+/* Received bytes that are looked at before the next sample and millisecond have their turn. */
+#define BYTES_PER_PASS 32
+
+static void take_bytes(void)
+{
+    for (uint8_t left = BYTES_PER_PASS; left && stand_listens(); left--) {
+        int16_t byte = serial_receive();
+        if (byte < 0)
+            return;
+        if (console_takes((uint8_t)byte))
+            continue;
+        switch (frame_receive((uint8_t)byte)) {
+        case RECEIVED_REQUEST:
+            stand_on_request(&frame_incoming.request);
+            break;
+        case RECEIVED_DAMAGED:
+            stand_count(FAULT_RX_BAD_FRAME, 1);
+            break;
+        case RECEIVED_NOTHING:
+            break;
+        }
+    }
+}
+
 int main(void)
 {
+    /* Which of the two clocks have moved since the watchdog was fed. */
+    bool ticked = false, passed = false;
     board_start();
     serial_start();
     sensors_start();
@@ -24,30 +50,23 @@ int main(void)
         const struct raw *raw = tick_take(&missed);
         if (raw) {
             stand_on_sample(raw, missed);
-            /* Fed by the sample clock alone, and from here: a tick that stalls is a reset, a main loop that hangs is one,
-             * and a reset stops the motor. */
-            wdt_reset();
+            ticked = true;
         } else if (tick_take_passed()) {
-            wdt_reset();
+            ticked = true;
         }
-        for (int16_t byte; (byte = serial_receive()) >= 0;) {
-            if (console_takes((uint8_t)byte))
-                continue;
-            switch (frame_receive((uint8_t)byte)) {
-            case RECEIVED_REQUEST:
-                stand_on_request(&frame_incoming.request);
-                break;
-            case RECEIVED_DAMAGED:
-                stand_count(FAULT_RX_BAD_FRAME, 1);
-                break;
-            case RECEIVED_NOTHING:
-                break;
-            }
-        }
+        take_bytes();
         serial_count_losses();
-        if (tick_take_millisecond())
+        if (tick_take_millisecond()) {
             stand_on_millisecond();
+            passed = true;
+        }
+        /* Fed by both clocks, and from here alone: one that stalls is a reset, a main loop that hangs is one, and a reset
+         * stops the motor. */
+        if (ticked && passed) {
+            wdt_reset();
+            ticked = passed = false;
+        }
         serial_work();
-        tick_sleep_until_work();
+        tick_sleep_until_work(stand_listens());
     }
 }

@@ -2,11 +2,9 @@
 
 #include <stdlib.h>
 
-#define KEEP_ALIVE_MS 200
-
 static int16_t target, output_q6, output, max_duty, ramp_q6, amplitude, offset;
 static uint32_t phase, phase_per_ms; /* of a period, in 2^-32 */
-static uint8_t alive_ms, shape, cycles;
+static uint8_t shape, cycles;
 
 void motor_limit(uint8_t limit, uint16_t ramp_per_s)
 {
@@ -16,16 +14,6 @@ void motor_limit(uint8_t limit, uint16_t ramp_per_s)
     ramp_q6 = (int16_t)((uint32_t)ramp_per_s * 4194 >> 16);
     if (ramp_q6 == 0)
         ramp_q6 = 1;
-}
-
-void motor_keep_alive(void)
-{
-    alive_ms = KEEP_ALIVE_MS;
-}
-
-bool motor_is_alive(void)
-{
-    return alive_ms != 0;
 }
 
 static int16_t clamp(int16_t value, int16_t limit)
@@ -107,24 +95,15 @@ bool motor_is_on(void)
 void motor_cut(void)
 {
     target = output_q6 = output = 0;
-    alive_ms = 0;
     shape = SHAPE_STOP;
 }
 
-bool motor_on_millisecond(void)
+void motor_on_millisecond(void)
 {
-    bool alive = alive_ms;
-    if (alive)
-        alive_ms--;
     if (!motor_is_on())
-        return false;
-    if (!alive) {
-        motor_cut();
-        return true;
-    }
+        return;
     if (shape != SHAPE_STOP)
         step_profile();
     output_q6 = (int16_t)(output_q6 + clamp((int16_t)(target * 64 - output_q6), ramp_q6));
     output = output_q6 / 64;
-    return false;
 }

@@ -1,4 +1,4 @@
-/* The motor: off unless the PC is there, never faster than its limits, never a jump. */
+/* The motor's command: never faster than its limits, never a jump. That it is off unless the PC is there is tick.c's part. */
 #pragma once
 
 #include <stdbool.h>
@@ -11,8 +11,6 @@ enum shape { SHAPE_STOP, SHAPE_STEPS, SHAPE_TRIANGLE, SHAPE_SINE };
 
 /* Brings it to rest at once and sets its limits. */
 void motor_limit(uint8_t max_duty, uint16_t ramp_per_s);
-void motor_keep_alive(void);
-bool motor_is_alive(void);
 /* A new command, which ends a profile; returns the one that holds after the limits. */
 int16_t motor_command(int16_t duty);
 /* A new profile; false, and nothing changed, when an argument is out of range. */
@@ -21,5 +19,5 @@ bool motor_profile(uint8_t shape, int16_t amplitude, int16_t offset, uint16_t pe
 int16_t motor_output(void);
 bool motor_is_on(void);
 void motor_cut(void);
-/* A millisecond has passed; true when the motor was cut for lack of keep-alive. */
-bool motor_on_millisecond(void);
+/* A millisecond has passed. */
+void motor_on_millisecond(void);

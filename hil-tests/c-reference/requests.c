@@ -114,7 +114,8 @@ static uint8_t carry_out(const struct request *request)
         stand_tell(OWED_HELLO);
         return STATUS_OK;
     case CODE_KEEP_ALIVE:
-        motor_keep_alive();
+        stand_miss_host();
+        tick_keep_alive();
         return STATUS_OK;
     case CODE_COUNTERS:
         stand_tell(OWED_HEALTH);
@@ -180,12 +181,12 @@ static uint8_t carry_out(const struct request *request)
     case CODE_MOTOR_DUTY:
         if (request->i16 < -MOTOR_FULL || request->i16 > MOTOR_FULL)
             return STATUS_BAD_ARGUMENT;
-        if (request->i16 && !motor_is_alive())
+        if (request->i16 && !tick_host_is_there())
             return STATUS_NO_KEEP_ALIVE;
         stand_answer.value = motor_command(request->i16);
         return STATUS_OK;
     case CODE_MOTOR_PROFILE:
-        if (request->profile.shape != SHAPE_STOP && !motor_is_alive())
+        if (request->profile.shape != SHAPE_STOP && !tick_host_is_there())
             return STATUS_NO_KEEP_ALIVE;
         return motor_profile(request->profile.shape, request->profile.amplitude, request->profile.offset,
                              request->profile.period_ms, request->profile.cycles)

@@ -18,6 +18,11 @@
 #define SUPPLY_LOWEST 2594
 #define SUPPLY_HIGHEST 2866
 #define ADC_MAX 1023
+/* Samples from reply to reply and from hello or health frame to the next, where the queue has no room for a sample beside it:
+ * then samples have four fifths of any line. */
+#define SAMPLES_PER_REPLY 4
+#define SAMPLES_PER_REPORT 16
+#define ON_LINE(fields) (sizeof(fields) + 6)
 
 struct pending stand_job, stand_null;
 uint16_t stand_null_samples;
@@ -27,6 +32,7 @@ static struct health health;
 static uint8_t silent; /* bit per axis: not answering at the last sample */
 static uint8_t owed;   /* to the host, as soon as there is room */
 static uint8_t late;   /* of it, what has been owed since a sample ago */
+static uint8_t since_reply, since_report; /* samples sent since then; they saturate */
 static bool unset;     /* the gyros have to be set up (anew) */
 
 void stand_count(uint8_t fault, uint8_t times)
@@ -44,10 +50,28 @@ void stand_count_each(uint8_t fault, uint8_t axes)
     }
 }
 
+bool stand_listens(void)
+{
+    uint8_t room = ON_LINE(struct reply);
+    if (late)
+        room += ON_LINE(struct health) + ON_LINE(struct reply);
+    else if (since_reply < SAMPLES_PER_REPLY)
+        room += ON_LINE(struct sample) + ON_LINE(struct reply);
+    return serial_room() >= room;
+}
+
+static bool may_report(uint8_t length)
+{
+    length += ON_LINE(struct reply);
+    if (since_report < SAMPLES_PER_REPORT)
+        length += ON_LINE(struct sample);
+    return serial_room() >= length;
+}
+
 void stand_tell(uint8_t more)
 {
     owed |= more;
-    if (owed & OWED_HELLO) {
+    if (owed & OWED_HELLO && may_report(ON_LINE(struct hello))) {
         struct hello hello = {
             .firmware = {FIRMWARE_VERSION},
             .board_id = config.board_id,
@@ -57,15 +81,18 @@ void stand_tell(uint8_t more)
             .tick_ns = TICK_NS,
             .set_up = config.set_up,
         };
-        if (frame_send(KIND_HELLO, &hello, sizeof hello))
+        if (frame_send(KIND_HELLO, &hello, sizeof hello)) {
             owed &= (uint8_t)~OWED_HELLO;
+            since_report = late = 0;
+        }
     }
-    if (owed & OWED_HEALTH) {
+    if (owed & OWED_HEALTH && may_report(ON_LINE(struct health))) {
         health.stack_free = board_stack_free();
         if (frame_send(KIND_HEALTH, &health, sizeof health)) {
             if (owed & OWED_CLEAR)
                 memset(health.faults, 0, sizeof health.faults);
             owed &= (uint8_t)~(OWED_HEALTH | OWED_CLEAR);
+            since_report = late = 0;
         }
     }
 }
@@ -77,6 +104,7 @@ void stand_reply(uint8_t code, uint16_t number, uint8_t status)
     stand_answer.status = status;
     if (!frame_send(KIND_REPLY, &stand_answer, sizeof stand_answer))
         stand_count(FAULT_REPORT_DROPPED, 1);
+    since_reply = 0;
     memset(&stand_answer, 0, sizeof stand_answer);
 }
 
@@ -94,6 +122,14 @@ void stand_note_configured(uint8_t wrong)
     stand_misconfigured = now;
     stand_count_each(FAULT_GYRO_REGISTER_MISMATCH_X, wrong & 7);
     stand_count_each(FAULT_GYRO_SCALE_IMPOSSIBLE_X, wrong >> 3);
+}
+
+void stand_miss_host(void)
+{
+    if (motor_is_on() && !tick_host_is_there()) {
+        motor_cut();
+        stand_count(FAULT_MOTOR_TIMEOUT, 1);
+    }
 }
 
 void stand_apply(void)
@@ -275,9 +311,15 @@ void stand_on_sample(const struct raw *raw, uint8_t missed)
     }
     sample.flags = flags;
     /* What has been owed since a sample ago goes before samples. */
-    if ((late & owed) || !frame_send(KIND_SAMPLE, &sample, sizeof sample))
+    if (late || !frame_send(KIND_SAMPLE, &sample, sizeof sample)) {
         stand_count(FAULT_FRAME_DROPPED, 1);
-    late = owed;
+    } else {
+        if (since_reply != UINT8_MAX)
+            since_reply++;
+        if (since_report != UINT8_MAX)
+            since_report++;
+    }
+    late = since_report >= SAMPLES_PER_REPORT ? owed : 0;
     requests_on_sample();
     uint16_t busy = tick_since();
     if (busy > health.tick_busy_max)
@@ -287,8 +329,8 @@ void stand_on_sample(const struct raw *raw, uint8_t missed)
 void stand_on_millisecond(void)
 {
     static uint16_t millisecond;
-    if (motor_on_millisecond())
-        stand_count(FAULT_MOTOR_TIMEOUT, 1);
+    stand_miss_host();
+    motor_on_millisecond();
     board_set_motor(motor_output());
     requests_on_millisecond();
     if (++millisecond >= HEALTH_MS) {

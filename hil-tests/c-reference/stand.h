@@ -14,6 +14,9 @@ void stand_started(uint8_t misconfigured);
 void stand_on_sample(const struct raw *raw, uint8_t missed);
 void stand_on_millisecond(void);
 void stand_on_request(const struct request *request);
+/* Whether there is room for the reply that the next received byte may bring: until then the bytes wait, so that no request
+ * takes the room of a sample, or of a report that is late. */
+bool stand_listens(void);
 /* Counts a fault so many times more. */
 void stand_count(uint8_t fault, uint8_t times);
 /* Counts a fault for each axis that has its bit set; fault is that of x. */
@@ -39,6 +42,8 @@ extern uint8_t stand_misconfigured;
 /* Sends what is owed, and more, as far as there is room; counters are cleared once they have been told. */
 void stand_tell(uint8_t more);
 enum { OWED_HELLO = 1, OWED_HEALTH = 2, OWED_CLEAR = 4 };
+/* Where the host fell silent the motor has been cut: its command ends with it. */
+void stand_miss_host(void);
 /* Applies the set-up to motor, clock, line and sensors. */
 void stand_apply(void);
 void stand_note_configured(uint8_t wrong);

@@ -28,6 +28,10 @@ static uint16_t period, next_period;
 static uint8_t skip, next_every;
 static uint8_t masked_ucsrb;
 
+/* Milliseconds that the motor may still turn without a word from the host. */
+#define KEEP_ALIVE_MS 200
+static volatile uint8_t alive_ms;
+
 enum slot { FREE, POSTED, DONE };
 static volatile uint8_t slot;
 static struct gyro_job job;
@@ -39,14 +43,20 @@ static void set_compare(uint16_t ticks)
     OCR1B = last - GUARD_TICKS;
 }
 
+/* Timer 0: CTC, clock / 64: 1 kHz. Said again before each tick: the motor's keep-alive is counted by it. */
+static inline void run_milliseconds(void)
+{
+    OCR0 = 249;
+    TCCR0 = _BV(WGM01) | _BV(CS01) | _BV(CS00);
+}
+
 void tick_start(void)
 {
     period = next_period;
     skip = next_every - 1;
     set_compare(period);
     wdt_enable(WDTO_1S); /* longer than the slowest tick */
-    OCR0 = 249; /* CTC, clock / 64: 1 kHz */
-    TCCR0 = _BV(WGM01) | _BV(CS01) | _BV(CS00);
+    run_milliseconds();
     TCNT1 = 0;
     TCCR1B = _BV(WGM12) | _BV(CS11) | _BV(CS10);
     TIMSK = TIMSK_ALL;
@@ -139,11 +149,11 @@ static inline void sleep_now(void)
 }
 
 /* A transmitted byte wakes the processor, and is no work. */
-void tick_sleep_until_work(void)
+void tick_sleep_until_work(bool listens)
 {
     for (;;) {
         cli();
-        if (ready || milliseconds != counted || serial_has_received()) {
+        if (ready || milliseconds != counted || (listens && serial_has_received())) {
             sei();
             return;
         }
@@ -157,9 +167,26 @@ static void unmask(void)
     TIMSK = _BV(OCIE1A) | _BV(OCIE0);
 }
 
+void tick_keep_alive(void)
+{
+    alive_ms = KEEP_ALIVE_MS + 1; /* a millisecond is under way */
+}
+
+bool tick_host_is_there(void)
+{
+    return alive_ms != 0;
+}
+
 ISR(TIMER0_COMP_vect)
 {
     milliseconds++;
+    /* The motor is cut here, whatever the main loop is busy with. */
+    uint8_t left = alive_ms;
+    if (left) {
+        alive_ms = --left;
+        if (left == 0)
+            TCCR2 = 0;
+    }
 }
 
 ISR(TIMER1_COMPA_vect)
@@ -170,6 +197,7 @@ ISR(TIMER1_COMPA_vect)
 ISR(TIMER1_COMPB_vect)
 {
     TIMSK = _BV(OCIE1A);
+    run_milliseconds();
     t_ticks += period;
     if (skip) {
         skip--;

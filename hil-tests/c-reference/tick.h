@@ -24,5 +24,8 @@ uint16_t tick_since(void);
 bool tick_post(uint8_t what, uint8_t axis, uint8_t address, uint16_t value);
 /* The work that is done, or NULL; fetched once. */
 const struct gyro_job *tick_fetch_done(void);
-/* Sleeps until the next interrupt, unless something waits already. */
-void tick_sleep_until_work(void);
+/* Sleeps until the next interrupt, unless something waits already; received bytes count where somebody listens. */
+void tick_sleep_until_work(bool listens);
+/* The host is there: the motor may turn for 200 ms, then the millisecond's interrupt cuts it. */
+void tick_keep_alive(void);
+bool tick_host_is_there(void);

@@ -177,6 +177,61 @@ fn a_tick_that_stalls_ends_in_a_watchdog_reset_with_the_motor_off_though_the_hos
     );
 }
 
+/// At full duty, the host silent from 2.9 s on; `meddle` is called each half millisecond from 2.8 s on.
+fn left_alone(mut meddle: impl FnMut(&mut Simulated<Shaft>, f64)) -> Board {
+    let mut board = turning(255, 3.0, 2.8);
+    let mut t = 2.8;
+    while t < 7.0 {
+        meddle(&mut board.simulated, t);
+        t += 0.000_5;
+        board.run(t);
+    }
+    board
+}
+
+#[test]
+fn a_millisecond_clock_that_was_stopped_runs_again_with_the_next_tick_and_the_motor_is_cut_in_time()
+{
+    for registers in [
+        [(register::TCCR0, 0), (register::OCR0, 249)],
+        [(register::TCCR0, 0x0d), (register::OCR0, 255)],
+        [(register::TIMSK, 1 << 3), (register::OCR0, 249)],
+    ] {
+        let mut meddled = false;
+        let board = left_alone(|simulated, t| {
+            if t > 2.95 && !meddled {
+                meddled = true;
+                for (address, value) in registers {
+                    simulated.mcu_mut().write_register(address, value);
+                }
+            }
+        });
+        let stopped = board.last_change();
+        // It stood for a tick at the most.
+        assert!(
+            (3.1..=3.16).contains(&stopped),
+            "{registers:?}: {stopped} s"
+        );
+        assert_eq!(board.simulated.duty(), 0.0);
+        let health = board.heard.last_health();
+        assert_eq!(health.faults.get(Fault::WatchdogReset), 0);
+    }
+}
+
+#[test]
+fn a_millisecond_clock_that_never_moves_ends_in_a_watchdog_reset_with_the_motor_off() {
+    let board = left_alone(|simulated, _| {
+        // It counts, and never gets to the end.
+        simulated.mcu_mut().write_register(register::TCNT0, 0);
+    });
+    let stopped = board.last_change();
+    println!("stopped at {stopped} s");
+    assert_eq!(board.simulated.duty(), 0.0);
+    assert!(!board.turned_since(stopped + 1e-6));
+    // The watchdog's second.
+    assert!(stopped < 2.8 + 1.2, "stopped at {stopped} s");
+}
+
 #[test]
 fn with_any_eeprom_it_is_off_until_asked_and_the_board_samples() {
     let rng = &mut generator(seed());

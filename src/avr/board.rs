@@ -50,6 +50,13 @@ pub fn paint_stack() {
     }
 }
 
+/// Takes the motor's pulses off the pin, which is low then: fast PWM would leave a spike at 0.
+#[inline(always)]
+pub fn cut_motor() {
+    // SAFETY: timer 2 is the motor's; a single byte is written.
+    unsafe { (*TC2::ptr()).tccr2.write(|w| bits!(w, 0)) };
+}
+
 /// The board but for its sensors. What it keeps is in statics: as fields they would be handed from function to function, in
 /// registers that each of them has to save.
 pub struct AvrBoard(());
@@ -100,8 +107,7 @@ impl Board for AvrBoard {
         // SAFETY: timer 2 and port D's upper pins are the motor's.
         let (timer, port) = unsafe { (&*TC2::ptr(), &*PORTD::ptr()) };
         if duty == 0 {
-            // Disconnected, so that the pin is low: fast PWM would leave a spike at 0.
-            timer.tccr2.write(|w| bits!(w, 0));
+            cut_motor();
             return;
         }
         if duty < 0 {
@@ -114,7 +120,24 @@ impl Board for AvrBoard {
         timer
             .ocr2
             .write(|w| bits!(w, duty.unsigned_abs().min(255) as u8));
-        timer.tccr2.write(|w| bits!(w, FAST_PWM | PWM_TO_PIN));
+        // Not behind the interrupt that cuts it.
+        interrupt::free(|_| {
+            if tick::host_is_there() {
+                timer.tccr2.write(|w| bits!(w, FAST_PWM | PWM_TO_PIN));
+            }
+        });
+    }
+
+    fn keep_alive(&mut self) {
+        tick::keep_alive();
+    }
+
+    fn host_is_there(&self) -> bool {
+        tick::host_is_there()
+    }
+
+    fn room(&self) -> u8 {
+        serial::room()
     }
 
     fn set_period(&mut self, ticks: u16, every: u8) {

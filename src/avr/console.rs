@@ -31,7 +31,7 @@ impl Console {
 /// Version, reset cause, stack, each as `letter number`: every string would be copied to the SRAM, letters are not.
 #[inline(never)]
 fn answer(board: &mut AvrBoard) {
-    if !serial::has_room(LONGEST) {
+    if serial::room() < LONGEST {
         return;
     }
     let [major, minor, patch] = VERSION;

@@ -34,6 +34,10 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     unsafe { firmware_contains_a_reachable_panic() }
 }
 
+/// Received bytes that are looked at before the next sample and millisecond have their turn: a request and a half, which
+/// take less than a millisecond.
+const BYTES_PER_PASS: u8 = 32;
+
 /// All zeros: in .bss, which costs no flash.
 static mut STAND: Stand = Stand::new();
 
@@ -55,16 +59,22 @@ fn main() -> ! {
     unsafe { interrupt::enable() };
 
     let mut console = console::Console::new();
+    // Which of the two clocks have moved since the watchdog was fed.
+    let (mut ticked, mut passed) = (false, false);
     loop {
         if let Some((raw, missed)) = tick::take() {
             stand.on_sample(&mut board, raw, missed);
-            // The watchdog is fed by the sample clock alone, and from here: a tick that stalls is a reset, a main loop that
-            // hangs is one, and a reset stops the motor.
-            asm::wdr();
+            ticked = true;
         } else if tick::take_passed() {
-            asm::wdr();
+            ticked = true;
         }
-        while let Some(byte) = serial::received() {
+        for _ in 0..BYTES_PER_PASS {
+            if !stand.listens(&board) {
+                break;
+            }
+            let Some(byte) = serial::received() else {
+                break;
+            };
             if !console.takes(&mut board, byte) {
                 stand.on_byte(&mut board, byte);
             }
@@ -72,8 +82,15 @@ fn main() -> ! {
         serial::count_losses(stand);
         if tick::take_millisecond() {
             stand.on_millisecond(&mut board);
+            passed = true;
+        }
+        // Fed by both clocks, and from here alone: one that stalls is a reset, a main loop that hangs is one, and a reset
+        // stops the motor.
+        if ticked && passed {
+            asm::wdr();
+            (ticked, passed) = (false, false);
         }
         board.work();
-        tick::sleep_until_work();
+        tick::sleep_until_work(stand.listens(&board));
     }
 }

@@ -70,7 +70,7 @@ pub fn has_received() -> bool {
 /// Queues a frame, or nothing where there is less room than [`room_for`] says. It is framed where it lies in the ring.
 #[inline(never)]
 pub fn send(kind: u8, fields: &[u8]) -> bool {
-    if (TX.room() as usize) < room_for(kind, fields.len()) {
+    if usize::from(room()) < room_for(kind, fields.len()) {
         return false;
     }
     let len = encode_by(kind, fields, |at, byte| TX.put(at, byte));
@@ -79,9 +79,10 @@ pub fn send(kind: u8, fields: &[u8]) -> bool {
     true
 }
 
-/// Whether so many plain bytes fit.
-pub fn has_room(bytes: u8) -> bool {
-    TX.room() >= bytes
+/// Bytes that the transmit queue still takes.
+#[inline(never)]
+pub fn room() -> u8 {
+    TX.room()
 }
 
 /// Queues a plain byte, for which there is room.

@@ -10,9 +10,10 @@ use core::ptr::addr_of_mut;
 use avr_device::atmega16::{CPU, TC0, TC1};
 use avr_device::{asm, interrupt};
 use firmware::acquire::work;
+use firmware::motor::KEEP_ALIVE_MS;
 use firmware::{Job, Raw, Task, acquire};
 
-use super::{sensors, serial};
+use super::{board, sensors, serial};
 
 /// Compare B comes this many ticks of 4 us before compare A: 1024 cycles, more than the longest section with
 /// interrupts off and the longest interrupt together (hil-tests/tests/timing.rs measures the jitter).
@@ -74,6 +75,8 @@ static mut SHARED: Shared = Shared {
 /// Milliseconds that have passed, and those that the main loop has taken; both wrap.
 static mut MILLISECONDS: u8 = 0;
 static mut TAKEN: u8 = 0;
+/// Milliseconds that the motor may still turn without a word from the host.
+static mut ALIVE: u8 = 0;
 
 fn shared() -> *mut Shared {
     addr_of_mut!(SHARED)
@@ -104,13 +107,18 @@ pub unsafe fn start() {
         asm::wdr();
         watchdog.wdtcr.write(|w| bits!(w, 1 << 3 | 6));
     }
-    // Timer 0: CTC, clock / 64, 250 counts: 1 kHz.
-    timer0().ocr0.write(|w| bits!(w, 249));
-    timer0().tccr0.write(|w| bits!(w, 1 << 3 | 3));
+    run_milliseconds();
     // Timer 1: CTC with OCR1A (mode 4), clock / 64: 4 us.
     timer1().tcnt1.write(|w| bits!(w, 0));
     timer1().tccr1b.write(|w| bits!(w, 1 << 3 | 3));
     timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
+}
+
+/// Timer 0: CTC, clock / 64, 250 counts: 1 kHz. Said again before each tick: the motor's keep-alive is counted by it.
+#[inline(always)]
+fn run_milliseconds() {
+    timer0().ocr0.write(|w| bits!(w, 249));
+    timer0().tccr0.write(|w| bits!(w, 1 << 3 | 3));
 }
 
 #[inline(never)]
@@ -208,13 +216,26 @@ fn milliseconds_wait() -> bool {
     unsafe { core::ptr::read_volatile(&raw const MILLISECONDS) != TAKEN }
 }
 
-/// Sleeps until there is work: a transmitted byte wakes the processor, and is none.
-pub fn sleep_until_work() {
+/// The host is there: the motor may turn for [`KEEP_ALIVE_MS`].
+pub fn keep_alive() {
+    // SAFETY: a byte. A millisecond is under way: one more makes it whole.
+    unsafe { core::ptr::write_volatile(&raw mut ALIVE, KEEP_ALIVE_MS.wrapping_add(1)) };
+}
+
+/// Whether the host was heard in time.
+pub fn host_is_there() -> bool {
+    // SAFETY: a byte.
+    unsafe { core::ptr::read_volatile(&raw const ALIVE) != 0 }
+}
+
+/// Sleeps until there is work: a transmitted byte wakes the processor, and is none; nor are received bytes while nobody
+/// `listens`.
+pub fn sleep_until_work(listens: bool) {
     loop {
         interrupt::disable();
         // SAFETY: interrupts are off.
         let sampled = unsafe { core::ptr::read_volatile(&raw const (*shared()).ready) };
-        if sampled || milliseconds_wait() || serial::has_received() {
+        if sampled || milliseconds_wait() || listens && serial::has_received() {
             // SAFETY: they were on.
             unsafe { interrupt::enable() };
             return;
@@ -251,7 +272,16 @@ fn count_missed(shared: &mut Shared) {
 fn TIMER0_COMP() {
     // SAFETY: counted here, compared by the main loop: a byte is read at once. Should the main loop be late by 256 ms, it
     // loses them; by a second, the watchdog has it.
-    unsafe { MILLISECONDS = MILLISECONDS.wrapping_add(1) };
+    unsafe {
+        MILLISECONDS = MILLISECONDS.wrapping_add(1);
+        // The motor is cut here, whatever the main loop is busy with.
+        if ALIVE != 0 {
+            ALIVE = ALIVE.wrapping_sub(1);
+            if ALIVE == 0 {
+                board::cut_motor();
+            }
+        }
+    }
 }
 
 #[avr_device::interrupt(atmega16)]
@@ -263,6 +293,7 @@ fn TIMER1_COMPA() {
 #[avr_device::interrupt(atmega16)]
 fn TIMER1_COMPB() {
     timer1().timsk.write(|w| bits!(w, OCIE1A));
+    run_milliseconds();
     // SAFETY: this interrupt is off until it ends, so it never meets itself; the main loop looks with interrupts off.
     let shared = unsafe { &mut *shared() };
     shared.t_ticks = shared.t_ticks.wrapping_add(u32::from(shared.period));

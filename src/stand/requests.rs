@@ -72,7 +72,8 @@ impl Stand {
                 Status::Ok
             }
             code::KEEP_ALIVE => {
-                self.motor.keep_alive();
+                self.miss_host(board);
+                board.keep_alive();
                 Status::Ok
             }
             code::COUNTERS | code::CLEAR_COUNTERS => {
@@ -121,7 +122,7 @@ impl Stand {
                 let duty = asked.i16::<0>();
                 if !(-FULL..=FULL).contains(&duty) {
                     Status::BadArgument
-                } else if duty != 0 && !self.motor.is_alive() {
+                } else if duty != 0 && !board.host_is_there() {
                     Status::NoKeepAlive
                 } else {
                     let holds = self.motor.command(duty);
@@ -131,7 +132,7 @@ impl Stand {
             }
             code::MOTOR_PROFILE => {
                 let shape = asked.u8::<0>();
-                if shape != 0 && !self.motor.is_alive() {
+                if shape != 0 && !board.host_is_there() {
                     Status::NoKeepAlive
                 } else {
                     done(self.motor.profile(

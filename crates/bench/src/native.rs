@@ -106,6 +106,8 @@ struct Chip {
     eeprom_until: u64,
     divisor: Option<u16>,
     next_divisor: Option<u16>,
+    /// Milliseconds that the motor may still turn without a word from the host.
+    alive: u8,
     period: u32,
     /// Ends of the bytes that are queued or on their way.
     line: VecDeque<u64>,
@@ -152,6 +154,29 @@ impl Chip {
             self.holding = None;
             let t = self.seconds(at);
             self.conversion = Some(self.stand.acc_counts(axis, t));
+        }
+    }
+
+    /// Bytes that the transmit queue still takes.
+    fn room(&mut self) -> usize {
+        let now = self.now;
+        let byte = byte_cycles(self.divisor.unwrap_or(25));
+        // A byte leaves the queue for the transmitter's buffer when the one before it begins to shift.
+        while self.line.front().is_some_and(|&end| end < now + 2 * byte) {
+            self.line.pop_front();
+        }
+        self.timeline.queue.saturating_sub(self.line.len())
+    }
+
+    /// The interrupt of the millisecond at a cycle: it cuts the motor, whatever the main loop is busy with.
+    fn millisecond(&mut self, at: u64) {
+        self.alive = match self.alive {
+            0 => return,
+            left => left - 1,
+        };
+        if self.alive == 0 {
+            let t = self.seconds(at);
+            self.stand.set_motor(0.0, t);
         }
     }
 
@@ -249,17 +274,10 @@ impl Board for HostBoard {
         let len = wire::fields::encode(kind, fields, &mut frame);
         let frame = &frame[..len];
         let chip = &mut *self.0.borrow_mut();
-        let now = chip.now;
-        let byte = byte_cycles(chip.divisor.unwrap_or(25));
-        // A byte leaves the queue for the transmitter's buffer when the one before it begins to shift.
-        while chip.line.front().is_some_and(|&end| end < now + 2 * byte) {
-            chip.line.pop_front();
-        }
-        if chip.timeline.queue.saturating_sub(chip.line.len())
-            < wire::fields::room_for(kind, fields.len())
-        {
+        if chip.room() < wire::fields::room_for(kind, fields.len()) {
             return false;
         }
+        let (now, byte) = (chip.now, byte_cycles(chip.divisor.unwrap_or(25)));
         for &out in frame {
             chip.line_free = chip.line_free.max(now) + byte;
             chip.line.push_back(chip.line_free);
@@ -268,8 +286,24 @@ impl Board for HostBoard {
         true
     }
 
+    fn room(&self) -> u8 {
+        self.0.borrow_mut().room().try_into().unwrap_or(u8::MAX)
+    }
+
+    fn keep_alive(&mut self) {
+        // A millisecond is under way: one more makes it whole.
+        self.0.borrow_mut().alive = firmware::motor::KEEP_ALIVE_MS + 1;
+    }
+
+    fn host_is_there(&self) -> bool {
+        self.0.borrow().alive != 0
+    }
+
     fn set_motor(&mut self, duty: i16) {
         let chip = &mut *self.0.borrow_mut();
+        if duty != 0 && chip.alive == 0 {
+            return;
+        }
         let t = chip.seconds(chip.now);
         // Fast PWM is high for OCR2 + 1 of 256 counts; at 0 the output is disconnected.
         let magnitude = if duty == 0 {
@@ -408,6 +442,7 @@ pub fn native_live(
         eeprom_until: 0,
         divisor: None,
         next_divisor: None,
+        alive: 0,
         period: 12_500,
         line: VecDeque::new(),
         line_free: 0,
@@ -453,6 +488,7 @@ pub fn native_live(
         board.reboot = false;
         board.now += WATCHDOG_CYCLES;
         (board.job, board.divisor, board.next_divisor, board.period) = (None, None, None, 12_500);
+        board.alive = 0;
         board.cause = reset_cause::WATCHDOG;
         board.restarts = board.restarts.saturating_add(1);
         // What had not left the transmitter is lost with the reset.
@@ -565,15 +601,25 @@ fn work(
     let board = &mut HostBoard(Rc::clone(chip));
     loop {
         let byte = (received.queue.front().copied()).filter(|&(at, _)| at <= until);
+        // Where there is no room for a reply the bytes wait for the next millisecond, and so on.
+        let byte = byte.filter(|&(at, _)| {
+            let now = chip.borrow().now;
+            chip.borrow_mut().now = late.unwrap_or(at).max(now);
+            let listens = stand.listens(board);
+            chip.borrow_mut().now = now;
+            listens
+        });
         let byte_first = byte.is_some_and(|(at, _)| late.is_some() || at <= *millisecond);
         if let Some((at, byte)) = byte.filter(|_| byte_first) {
             received.queue.pop_front();
-            chip.borrow_mut().now = late.unwrap_or(at);
+            let now = chip.borrow().now;
+            chip.borrow_mut().now = late.unwrap_or(at).max(now);
             stand.on_byte(board, byte);
         } else if *millisecond <= until {
             let t = chip.borrow().seconds(*millisecond);
             let bytes = (received.listen)(t);
             (received.queue).extend(bytes.into_iter().map(|byte| (*millisecond, byte)));
+            chip.borrow_mut().millisecond(*millisecond);
             chip.borrow_mut().now = late.unwrap_or(*millisecond);
             *millisecond += CYCLES_PER_MS;
             stand.on_millisecond(board);
