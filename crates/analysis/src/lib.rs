@@ -9,6 +9,7 @@ pub mod records;
 pub mod noise;
 
 pub mod result;
+pub mod test_level;
 
 mod fit;
 mod ingest;

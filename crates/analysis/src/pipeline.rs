@@ -4,42 +4,37 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use model::effect::{Found, Hypothesis, Parameters, View};
+use model::effect::{Hypothesis, Parameters, View};
 use model::effects::{EFFECTS, effect};
 use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
 use model::record::Record;
 
-use crate::attribute::events;
-use crate::attribute::masking;
-use crate::attribute::withdraw;
+use crate::attribute::{events, masking, withdraw};
 use crate::audit::{Audit, audit, sign_bit};
 use crate::criticise::common_noise::{Shared, common};
 use crate::criticise::cross_axis::couplings;
-use crate::criticise::follower_shape;
-use crate::criticise::process;
-use crate::criticise::random_walk;
-use crate::criticise::residual::{self, LEAST_CHANCE};
-use crate::criticise::short_time;
-use crate::criticise::variance_law;
-use crate::features;
-use crate::fit::estimate;
+use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
+use crate::fit::channel::{Note, State};
 use crate::fit::likelihood::Panel;
+use crate::fit::{channel, estimate};
 use crate::ingest::dead;
 use crate::ingest::grid::{Grid, Target, lay_out};
 use crate::records::error::AnalysisError;
 use crate::records::rows;
-use crate::report::detection_limits;
-use crate::report::figures;
 use crate::report::findings::{
     blows, complete, joined, loud, motion_findings, scale_finding, term_findings, turning,
     variance_finding,
 };
+use crate::report::{detection_limits, figures};
 use crate::result::{
-    Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, Input, NotTested,
-    Parameter, Unexplained, Verdict,
+    Check, DIAGNOSIS_FORMAT, Diagnosed, Diagnosis, Finding, Input, NotTested, Parameter,
+    Unexplained, Verdict,
 };
-use crate::search::impute;
-use crate::search::{Note, Search, State};
+use crate::search::searched::Searched;
+use crate::search::{Search, impute};
+use crate::test_level;
+use crate::test_level::OMNIBUS_LEVEL;
+use crate::two_level::compare;
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,44 +47,6 @@ pub struct DiagnoseOptions {
     pub hash: Option<String>,
     /// Whether [`Diagnosed::evidence`], which a report alone shows, is left out.
     pub no_evidence: bool,
-}
-
-/// One gyro, searched.
-pub(crate) struct Searched<'a> {
-    pub target: &'a Target,
-    pub search: Search<'a>,
-    pub baseline: State,
-    pub state: State,
-    pub found: Vec<Found>,
-    /// Whitened residual in time.
-    pub e: Vec<f64>,
-    /// Whitened coefficients.
-    pub u: Vec<f64>,
-    /// The same of what was read alone, where readings are lost.
-    told: Option<Vec<f64>>,
-    /// Omnibus checks, before and after.
-    checks: Vec<Check>,
-    /// The law of the variance, where one was found.
-    pub variance: Option<variance_law::VarianceFound>,
-    /// Smallest sizes that the search would have named, whether it did or not.
-    limits: Vec<DetectionLimit>,
-    /// Effects that follow a channel, and whether by the law that their name claims.
-    pub laws: Vec<(&'static str, residual::Outcome)>,
-}
-
-impl Searched<'_> {
-    /// Whitened coefficients of what was read, and the part of them that are free.
-    pub(crate) fn told(&self) -> (&[f64], f64) {
-        match &self.told {
-            Some(told) => (told, self.search.read),
-            None => (&self.u, 1.0),
-        }
-    }
-
-    /// Step of the readings over the standard deviation of what the model leaves.
-    pub(crate) fn step(&self) -> f64 {
-        self.target.step / self.state.solution.white.sqrt()
-    }
 }
 
 /// Diagnose a record.
@@ -192,7 +149,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         let of_terms = term_findings(s, &grid, options.seed);
         // What an axis takes from another one later has a spectrum, and is no process of its own.
         let late = shared.late.iter().filter(|l| l.0 == s.target.name);
-        let mut colours = fails().filter(|c| c.id == short_time::COLOUR);
+        let mut colours = fails().filter(|c| c.id == test_level::COLOUR);
         let left = withdraw::Left {
             late: late.map(|l| l.1).sum(),
             colour: colours.next().map_or(0.0, |c| c.statistic),
@@ -353,18 +310,19 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     let mut search = Search::new(panel, view);
     search.read = 1.0 - target.lost.len() as f64 / grid.n as f64;
     let baseline = search.baseline(&target.noise);
-    let mut plain = residual::whitened(&search.panel, &baseline);
+    let mut plain = channel::whitened(&search.panel, &baseline);
     let plain_checks = |(u, e): &(Vec<f64>, Vec<f64>)| {
         let step = target.step / baseline.solution.white.sqrt();
         residual::all(u, e, grid.rate_hz, step)
     };
     let mut before = plain_checks(&plain);
-    let mut state = search.run(baseline.clone());
+    let (ascended, aside) = search.ascend(baseline.clone());
+    let mut state = search.conclude(compare::hold(&search, ascended), aside);
     let refilled = impute::again(&search, &state, target);
     if let Some(refilled) = refilled.clone() {
         state = refilled;
         if state.terms.is_empty() {
-            plain = residual::whitened(&search.panel, &state);
+            plain = channel::whitened(&search.panel, &state);
             before = plain_checks(&plain);
         }
     }
@@ -374,7 +332,7 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         plain
     } else {
         drop(plain);
-        residual::whitened(&search.panel, &state)
+        channel::whitened(&search.panel, &state)
     };
     let mut s = Searched {
         target,
@@ -404,7 +362,7 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     s
 }
 
-fn channel_checks(s: &Searched<'_>, before: Vec<residual::Outcome>) -> Vec<Check> {
+fn channel_checks(s: &Searched<'_>, before: Vec<test_level::Outcome>) -> Vec<Check> {
     let after = if s.state.terms.is_empty() && s.variance.is_none() {
         before.clone()
     } else {
@@ -412,7 +370,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<residual::Outcome>) -> Vec<Check
     };
     // Before a process was named nothing was claimed of it.
     let claims = process::of_processes(&s.search, &s.state);
-    let mut rhythms = after.iter().filter(|c| c.id == residual::RHYTHM);
+    let mut rhythms = after.iter().filter(|c| c.id == test_level::RHYTHM);
     let stationary = rhythms.next().and_then(|r| process::stationary(s, r));
     let claims = claims.into_iter().chain(stationary);
     let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
@@ -422,9 +380,9 @@ fn channel_checks(s: &Searched<'_>, before: Vec<residual::Outcome>) -> Vec<Check
         channel: s.target.name.clone(),
         statistic: c.statistic,
         p_value: Some(c.p_value),
-        threshold: process::LEAST_CHANCE,
+        threshold: test_level::CLAIM_LEVEL,
         fails_before: false,
-        fails_after: c.p_value < process::LEAST_CHANCE,
+        fails_after: c.p_value < test_level::CLAIM_LEVEL,
         what: c.what,
     });
     before
@@ -435,11 +393,11 @@ fn channel_checks(s: &Searched<'_>, before: Vec<residual::Outcome>) -> Vec<Check
             channel: s.target.name.clone(),
             statistic: b.statistic,
             p_value: Some(b.p_value),
-            threshold: LEAST_CHANCE,
-            fails_before: b.p_value < LEAST_CHANCE,
+            threshold: OMNIBUS_LEVEL,
+            fails_before: b.p_value < OMNIBUS_LEVEL,
             // A base that moves is told as an input; what it leaves in the residual is no riddle.
-            fails_after: a.p_value < LEAST_CHANCE && !s.target.moving && !s.search.view.sways(),
-            what: if a.p_value < LEAST_CHANCE {
+            fails_after: a.p_value < OMNIBUS_LEVEL && !s.target.moving && !s.search.view.sways(),
+            what: if a.p_value < OMNIBUS_LEVEL {
                 a.what
             } else {
                 b.what
@@ -467,7 +425,7 @@ fn not_tested(searched: &[Searched<'_>]) -> Vec<NotTested> {
     let sways = searched.iter().any(|s| s.search.view.sways());
     for s in searched {
         let mut own: Vec<(&'static str, String)> = s.search.not_tested.clone();
-        let in_library = |id: &str| id != features::ID;
+        let in_library = |id: &str| id != channel::ID;
         if s.target.moving {
             let why = "the base moves about this axis: record it at rest";
             let slow = |h: &Hypothesis| {

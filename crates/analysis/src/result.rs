@@ -1,5 +1,6 @@
 //! The diagnosis as it leaves the program: `imu-stand-diagnosis/1`.
 
+use model::effect::Parameters;
 use std::collections::BTreeMap;
 
 use model::file::ModelFile;
@@ -240,4 +241,61 @@ pub struct Diagnosed {
     pub extended_model: ModelFile,
     /// Figures.
     pub evidence: Vec<Evidence>,
+}
+
+/// Below it a value is told with an exponent.
+pub(crate) const SMALL: f64 = 1e-4;
+
+/// Decimal places that show two digits of a standard error.
+pub(crate) fn decimals(error: f64) -> usize {
+    if error > 0.0 && error.is_finite() {
+        (1.0 - error.log10().floor()).clamp(0.0, 9.0) as usize
+    } else {
+        4
+    }
+}
+
+pub(crate) fn sentence(title: &str, channel: &str, parameters: &Parameters) -> String {
+    let values: Vec<String> = parameters
+        .iter()
+        .map(|(name, p)| {
+            let unit = if p.unit == "1" { "" } else { &p.unit };
+            let text = match p.std_error {
+                Some(error) if p.value.abs().max(error) < SMALL => {
+                    format!("{name} {:.2e} +- {error:.1e} {unit}", p.value)
+                }
+                Some(error) => {
+                    let places = decimals(error);
+                    format!("{name} {:.places$} +- {error:.places$} {unit}", p.value)
+                }
+                None if p.value != 0.0 && p.value.abs() < SMALL => {
+                    format!("{name} {:.2e} {unit}", p.value)
+                }
+                None => format!("{name} {:.4} {unit}", p.value),
+            };
+            text.trim_end().to_owned()
+        })
+        .collect();
+    format!("{title} on {channel}: {}", values.join(", "))
+}
+
+/// The limit of one parameter of an effect that is described, the others named in `at`.
+pub(crate) fn limit(
+    cause: &str,
+    channel: &str,
+    described: &Parameters,
+    parameter: &str,
+    at: &[&str],
+) -> Option<DetectionLimit> {
+    let size = described.get(parameter)?;
+    let exact = |p: &Parameter| Parameter::exact(p.value, &p.unit);
+    let others = at.iter().filter_map(|name| described.get_key_value(*name));
+    Some(DetectionLimit {
+        cause: cause.into(),
+        channel: channel.into(),
+        parameter: parameter.into(),
+        value: size.value,
+        unit: size.unit.clone(),
+        at: others.map(|(name, p)| (name.clone(), exact(p))).collect(),
+    })
 }

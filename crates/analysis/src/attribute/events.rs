@@ -16,13 +16,12 @@ use model::record::Quantity;
 
 use crate::audit::MOST_TIMES;
 use crate::criticise::residual;
-use crate::criticise::variance_law;
+use crate::fit::channel::{Form, Term};
 use crate::ingest::base_turns::Excursion;
 use crate::numerics::tails;
-use crate::pipeline::Searched;
-use crate::report::findings::{blow_of, step_at};
 use crate::result::{Finding, Parameter, Unexplained};
-use crate::search::{Form, Term};
+use crate::search::searched::Searched;
+use crate::test_level;
 
 /// Chance below which a claim fails, over everything that it is asked for. It is asked only where an event is named.
 const LEAST_CHANCE: f64 = 1e-3;
@@ -50,7 +49,7 @@ const LAWS: [&str; 8] = [
     "variance_rhythm",
     "variance_in_time",
     "time_frequency",
-    variance_law::CLAIM,
+    test_level::VARIANCE_CLAIM,
 ];
 /// Half cycles of the fastest part of a turn of the base: twice as many as its shape has.
 const FASTEST: f64 = 6.0;
@@ -130,7 +129,7 @@ impl<'a> Residual<'a> {
             }
         }
         let chances = sums.iter().filter(|s| s.1 > 0.0);
-        let least = chances.map(|(sum, degrees)| residual::chi_tail(*sum, *degrees));
+        let least = chances.map(|(sum, degrees)| tails::chi_tail(*sum, *degrees));
         least.fold(1.0, f64::min) * sums.len() as f64
     }
 }
@@ -176,7 +175,7 @@ fn follows(wild: &[Wild], signals: &[Signal]) -> Option<(f64, String)> {
     let others = signals.iter().filter(|s| s.quantity != Quantity::Gyro);
     let measures: Vec<(String, Vec<f64>)> = others
         .flat_map(|s| {
-            let middle = crate::audit::local::median(&s.values);
+            let middle = crate::numerics::order_statistics::median(&s.values);
             let size = s.values.iter().map(|v| (v - middle).abs()).collect();
             let change = s.values.windows(2).map(|w| (w[1] - w[0]).abs());
             let change = std::iter::once(0.0).chain(change).collect();
@@ -197,7 +196,7 @@ fn follows(wild: &[Wild], signals: &[Signal]) -> Option<(f64, String)> {
             ((n - below as f64) / n).ln()
         };
         let sum: f64 = wild.iter().map(rank).sum();
-        let p = residual::chi_tail(-2.0 * sum, 2.0 * wild.len() as f64);
+        let p = tails::chi_tail(-2.0 * sum, 2.0 * wild.len() as f64);
         (p * count, what)
     });
     scored.min_by(|a, b| a.0.total_cmp(&b.0))
@@ -403,4 +402,18 @@ pub(crate) fn no_turn(
     let has_its_like =
         notes || wandering.iter().any(|id| failing(id)) || left.any(|p| p.from < fastest);
     has_its_like.then_some("it has its like in what is left")
+}
+
+/// Longest that a blow lasts that shifts a bias, s: far readings within it of the step are the blow itself.
+pub(crate) const BLOW_S: f64 = 1.0;
+
+/// When a bias steps, s, where a finding says so.
+pub(crate) fn step_at(f: &Finding) -> Option<f64> {
+    let time = f.parameters.get("time").map(|p| p.value);
+    time.filter(|_| f.cause == "bias_step")
+}
+
+/// Whether the far readings of a finding lie all at a step at that time, s.
+pub(crate) fn blow_of(f: &Finding, at: f64) -> bool {
+    !f.times_s.is_empty() && f.times_s.iter().all(|t| (t - at).abs() < BLOW_S)
 }

@@ -7,8 +7,8 @@ use model::record::Record;
 
 use crate::audit::{Audit, MOST_TIMES};
 use crate::ingest::grid::Grid;
-use crate::pipeline::Searched;
 use crate::result::{Check, Finding, Parameter};
+use crate::search::searched::Searched;
 
 /// The record with sequence numbers that count the silently lost frames too.
 pub(crate) fn renumbered<'a>(record: &'a Record, audit: &Audit) -> Cow<'a, Record> {

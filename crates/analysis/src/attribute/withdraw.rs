@@ -14,18 +14,16 @@ use model::record::Quantity;
 pub(crate) mod propagate;
 
 use crate::audit::repeats;
-use crate::criticise::residual::{self, LEAST_CHANCE, Outcome, Place};
-use crate::pipeline::Searched;
+use crate::criticise::follower_shape;
+use crate::criticise::residual::{self, Place};
+use crate::fit::channel;
+use crate::fit::channel::{Form, PowerLawFound, Term};
 use crate::result::{Finding, Unexplained};
-use crate::search::power_law::PowerLawFound;
-use crate::search::{Form, Term};
+use crate::search::searched::Searched;
+use crate::test_level::{OMNIBUS_LEVEL, Outcome};
+use crate::{features, test_level};
 use std::f64::consts::PI;
 
-use crate::criticise::follower_shape;
-use crate::criticise::process;
-use crate::criticise::short_time;
-use crate::criticise::variance_law;
-use crate::features;
 use propagate::Kin;
 
 /// Share of a term's energy in bands that fail, from which on the failure is the term's.
@@ -218,7 +216,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
     };
     let crowd = s.state.notes.iter().any(|note| note.at.is_none());
     let correlated = failing("ljung_box");
-    let repeats = residual::repeats(&s.e).filter(|r| r.chance < LEAST_CHANCE);
+    let repeats = residual::repeats(&s.e).filter(|r| r.chance < OMNIBUS_LEVEL);
     // A harmonic of what repeats itself, to a coefficient.
     let harmonic = |omega: f64| {
         let tooth = |r: &residual::Repeats| omega * r.period as f64 / (2.0 * PI);
@@ -226,16 +224,16 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
         repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
     };
     let miscoded = failing("fine_codes") || failing("foretold");
-    let followed_by_noise = short_time::IDS.iter().any(|id| failing(id));
+    let followed_by_noise = test_level::IDS.iter().any(|id| failing(id));
     // Of a longer record what is left counts by what one of that length would show.
-    let shown = (residual::RECORD / n).min(1.0);
+    let shown = (test_level::RECORD / n).min(1.0);
     // Where the energy of a band follows what moves, a process may still hold that makes far more than that.
     let knows = |t: &Term| {
-        failing(short_time::ORDER)
-            || failing(short_time::LEANING)
+        failing(test_level::ORDER)
+            || failing(test_level::LEANING)
             || left.colour * shown > REMAINDER * t.lr
     };
-    let unlike = process::CLAIMS.iter().any(|c| failing(c));
+    let unlike = test_level::CLAIMS.iter().any(|c| failing(c));
     // Beside a wander that is not the process it was told as, a step is as likely a piece of that.
     let unlike_step = |t: &Term| unlike && matches!(t.form, Form::Step(..));
     let by_power_law = |filter: bool| s.state.power_law.is_some_and(|p| p.filter || !filter);
@@ -244,7 +242,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
     let misplaced = |t: &Term| !places.is_empty() && t.score() < WIDE;
     let followed = followers(s, &g);
     let unlawful_of = |id: &str, (of, o): &(&'static str, Outcome)| {
-        *of == id && o.p_value < process::LEAST_CHANCE
+        *of == id && o.p_value < test_level::CLAIM_LEVEL
     };
     let remainder = |t: &Term| {
         let most = if t.is_covariance() {
@@ -257,7 +255,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
             .filter(|f| f.0 != t.effect.id())
             .map(|(id, all)| (*id, t.lr / all))
             .filter(|(id, share)| {
-                if *id == features::ID {
+                if *id == channel::ID {
                     *share < REMAINDER_BEYOND
                 } else if s.laws.iter().any(|l| unlawful_of(id, l)) {
                     *share < REMAINDER_UNLAWFUL
@@ -273,8 +271,8 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
         let failed = |l: &(&'static str, Outcome)| unlawful_of(id, l);
         let signal = s.search.followed(t);
         let beside = |o: &Term| {
-            o.effect.id() == features::ID
-                && o.lr > follower_shape::DEPARTURE * t.lr
+            o.effect.id() == channel::ID
+                && o.lr > test_level::DEPARTURE * t.lr
                 && features::source(&s.search.view, o) == signal
         };
         signal.is_some() && (s.laws.iter().any(failed) || s.state.terms.iter().any(beside))
@@ -304,7 +302,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
                 };
                 within(&crowds, omega)
                     || harmonic(omega)
-                    || failing(short_time::ORDER)
+                    || failing(test_level::ORDER)
                     || 2.0 * about.max(beside) > LEFT * t.lr
             } else if let Form::Covariance(process, theta) = &t.form {
                 let own = process.density(theta, &panel.bins.at);
@@ -313,7 +311,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
                 let filter = process.filters_white();
                 by_power_law(filter)
                     || knows(t)
-                    || failing(process::STATIONARY_CLAIM)
+                    || failing(test_level::STATIONARY_CLAIM)
                     || unlike && !filter
                     || repeats.is_some()
                     || bent > LEFT * t.lr
@@ -346,7 +344,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
         })
         .collect();
     let mut variance = failing("variance_in_time")
-        || failing(variance_law::CLAIM)
+        || failing(test_level::VARIANCE_CLAIM)
         || followed_by_noise
         || failing("kurtosis")
         || crowd
@@ -360,7 +358,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
         g: &g,
         counts: &counts,
         said: &left.said,
-        variance: (failing(variance_law::CLAIM), variance),
+        variance: (failing(test_level::VARIANCE_CLAIM), variance),
         felt: failing("variance_follows"),
         bent,
         again: repeats.is_some(),
@@ -424,7 +422,7 @@ pub(crate) fn withdraw(
     let mut unexplained = vec![];
     let (mut kept, mut nearest, mut beside) = (vec![], vec![], vec![]);
     for ((finding, doubt), term) in of_terms.into_iter().zip(terms).zip(&s.state.terms) {
-        if term.effect.id() == features::ID {
+        if term.effect.id() == channel::ID {
             unexplained.push(Unexplained {
                 channel: name.into(),
                 what: format!(
@@ -448,7 +446,7 @@ pub(crate) fn withdraw(
                     beside.push(finding);
                 }
                 Doubt::Remainder(of, share) => {
-                    let of = if of == features::ID { "that" } else { of };
+                    let of = if of == channel::ID { "that" } else { of };
                     unexplained.push(Unexplained {
                         channel: name.into(),
                         what: format!(

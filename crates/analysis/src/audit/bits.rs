@@ -17,7 +17,7 @@ use super::stuck::{self, Verdict};
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};
 use crate::numerics::tails;
-use crate::report::detection_limits::ONE_SIDED;
+use crate::numerics::tails::ONE_SIDED;
 use crate::result::{Alternative, Finding, Unexplained};
 
 /// Most low bits that are looked at.

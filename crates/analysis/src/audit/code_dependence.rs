@@ -14,8 +14,8 @@ use rustfft::{Fft, FftPlanner};
 
 use super::rounding::in_steps;
 use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS};
-use crate::criticise::residual::{MOST, RECORD};
 use crate::numerics::tails;
+use crate::test_level::{MOST, RECORD};
 
 /// Residues of a code that are told apart.
 const CODES: usize = 32;

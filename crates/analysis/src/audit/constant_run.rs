@@ -8,8 +8,9 @@ use std::cell::LazyCell;
 
 use model::record::{Channel, Quantity, Record, flag};
 
-use super::repeats::{agreement, equal, smallest_step};
+use super::repeats::{agreement, equal};
 use super::{Audit, LEAST_READINGS, counted};
+use crate::numerics::series::smallest_step;
 
 /// Largest share of agreeing neighbours with which a reading that stands still says anything.
 const MOST_AGREEING: f64 = 0.5;

@@ -6,7 +6,7 @@
 //! slept through do not bend. Lines that meet at the break are a change of the rate; lines that do not, a jump.
 //! What neither describes wanders.
 
-use crate::audit::local::median;
+use crate::numerics::order_statistics::median;
 
 /// Blocks in which the earliest arrival is taken.
 pub(super) const BLOCKS: usize = 32;
@@ -144,7 +144,7 @@ pub(super) fn of(device: &[f64], host: &[f64], tolerance: f64) -> Option<Course>
     let (one, two) = (cost(&whole, s), cost(&rest, s));
     let n = x.len() as f64;
     let sizes: Vec<f64> = whole.iter().map(|r| r.abs()).collect();
-    let far = crate::audit::local::quantile(&sizes, 0.9);
+    let far = crate::numerics::order_statistics::quantile(&sizes, 0.9);
     // What the line is off by may tilt it.
     let tilt = TILT_OF_BEND * far / length;
     if one < two + BETTER || two > DESCRIBES * n {

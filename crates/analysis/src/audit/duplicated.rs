@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use model::record::Record;
 
 use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS};
-use crate::audit::local::robust_sigma;
+use crate::numerics::order_statistics::robust_sigma;
 use crate::numerics::tails;
 use crate::result::Unexplained;
 

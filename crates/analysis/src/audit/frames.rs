@@ -3,7 +3,7 @@
 use model::record::{Axis, Record, flag};
 
 use super::{Audit, Gyro, counted};
-use crate::audit::local::{median, width};
+use crate::numerics::order_statistics::{median, width};
 use crate::result::Unexplained;
 
 /// Frames before and after a leap of the time that say whether it lasts.

@@ -7,8 +7,8 @@ use std::borrow::Cow;
 
 use model::record::{Channel, Quantity, Record};
 
-use super::local::{median, width};
 use super::{Audit, LEAST_READINGS, counted};
+use crate::numerics::order_statistics::{median, width};
 
 /// Share of the readings on either side that such readings are at most.
 const SHARE: f64 = 0.002;

@@ -27,8 +27,8 @@ use std::collections::BTreeMap;
 
 use model::record::{Channel, Quantity, Record};
 
-use crate::criticise::short_time;
 use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter, Unexplained};
+use crate::test_level;
 use local::Local;
 
 /// Chance of a false alarm of one audit on one channel.
@@ -122,8 +122,8 @@ impl Audit {
                 "three_readings",
                 "neighbours",
                 "variance_rhythm",
-                short_time::COLOUR,
-                short_time::LEANING,
+                test_level::COLOUR,
+                test_level::LEANING,
             ],
             channel,
             by,
@@ -141,7 +141,7 @@ impl Audit {
                 "bicovariance",
                 "three_readings",
                 "neighbours",
-                short_time::LEANING,
+                test_level::LEANING,
             ];
             self.suppress(&ids, channel, by);
             return;

@@ -6,7 +6,7 @@
 
 use super::{Audit, FALSE_ALARM, Gyro, counted};
 use crate::numerics::tails;
-use crate::report::detection_limits::ONE_SIDED;
+use crate::numerics::tails::ONE_SIDED;
 use crate::result::Finding;
 
 /// Two farther than this apart are single ones.

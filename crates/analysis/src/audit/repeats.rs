@@ -10,16 +10,14 @@ use std::f64::consts::SQRT_2;
 use model::record::Record;
 
 use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted};
-use crate::audit::local::robust_sigma;
-use crate::criticise::residual::chi_tail;
 use crate::fit::likelihood::invert;
+use crate::numerics::order_statistics::robust_sigma;
+use crate::numerics::series::smallest_step;
 use crate::numerics::tails;
-use crate::report::detection_limits::ONE_SIDED;
+use crate::numerics::tails::{ONE_SIDED, chi_tail};
 
 /// Distances of the pairs that tell the chance of agreement.
 const LAGS: std::ops::RangeInclusive<usize> = 20..=25;
-/// Longest distance, in steps, that tells whether readings lie on a lattice: beyond it rounding hides that.
-const MOST_STEPS: f64 = 1000.0;
 /// Readings that change by one step, of those that do so when they lie far apart, below which a reading is held until it
 /// is some steps away, and the standard errors that it has to lie below that.
 const HELD: f64 = 0.85;
@@ -267,22 +265,6 @@ fn poisson(tally: &[f64], terms: impl Fn(f64) -> [f64; 3], count: usize) -> Opti
         chance: chi_tail(off.sum(), freedom.max(1.0)),
     })
     .filter(|_| bins > count)
-}
-
-/// Smallest distance between two readings that is no dust of the arithmetic: the step of a channel that does not say.
-/// 0 where the other distances are no multiples of it: such readings repeat exactly or not at all.
-pub(crate) fn smallest_step(values: &[f64]) -> f64 {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let dust = 1e-6 * robust_sigma(&sorted);
-    let gaps = || sorted.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > dust);
-    let step = gaps().fold(f64::INFINITY, f64::min);
-    let (mut multiples, mut all) = (0.0, 0.0);
-    for steps in gaps().map(|g| g / step).filter(|s| *s < MOST_STEPS) {
-        all += 1.0;
-        multiples += f64::from(u8::from((steps - steps.round()).abs() < 0.1));
-    }
-    if multiples > 0.8 * all { step } else { 0.0 }
 }
 
 /// Chance that a reading agrees with the one before, without a fault, and the relative error of that. Readings that

@@ -9,11 +9,10 @@
 use model::record::Channel;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::repeats::smallest_step;
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};
-use crate::criticise::short_time;
-use crate::criticise::variance_law;
+use crate::numerics::series::smallest_step;
+use crate::test_level;
 
 /// What explains the checks that rounding makes fail.
 pub(super) const STEP: &str = "the step of the converter";
@@ -201,7 +200,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         return;
     };
     if rounded.explains_tails {
-        audit.suppress(&["kurtosis", "skewness", short_time::LEANING], name, STEP);
+        audit.suppress(&["kurtosis", "skewness", test_level::LEANING], name, STEP);
     }
     let [least, largest] = rounded.variances;
     if largest - least > SWINGS {
@@ -213,14 +212,14 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             "neighbours",
             "variance_rhythm",
             "variance_follows",
-            short_time::COLOUR,
-            variance_law::CLAIM,
+            test_level::COLOUR,
+            test_level::VARIANCE_CLAIM,
         ];
         audit.suppress(&ids, name, STEP);
     }
     if rounded.sigma < LOST {
         audit.suppress(
-            &["ljung_box", "band_energy", variance_law::CLAIM],
+            &["ljung_box", "band_energy", test_level::VARIANCE_CLAIM],
             name,
             STEP,
         );

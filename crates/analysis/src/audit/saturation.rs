@@ -11,9 +11,9 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use super::bits::Shape;
 use super::{Audit, FALSE_ALARM, Gyro};
 use crate::audit::local::Levels;
-use crate::criticise::short_time;
 use crate::numerics::tails;
 use crate::result::Finding;
+use crate::test_level;
 
 /// Chance of the pile on the last code that light tails may have.
 const PILE: f64 = 1e-2;
@@ -189,8 +189,8 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
             "stale_samples",
             "kurtosis",
             "skewness",
-            short_time::COLOUR,
-            short_time::LEANING,
+            test_level::COLOUR,
+            test_level::LEANING,
         ],
         name,
         "saturation",

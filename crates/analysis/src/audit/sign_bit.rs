@@ -10,6 +10,7 @@ use model::Parameter;
 use model::record::{Quantity, Record};
 
 use super::LEAST_READINGS;
+use crate::numerics::order_statistics::median;
 use crate::result::Finding;
 
 /// Bits of the gyros' words; the last one is the sign.
@@ -70,8 +71,7 @@ fn joins(counts: &[i32], right: &[i32], known: &[bool], sign: u32) -> bool {
             within.push(step);
         }
     }
-    across.len() >= LEAST_OF_A_SIGN
-        && super::local::median(&across) <= LIKE * super::local::median(&within) + LIKE
+    across.len() >= LEAST_OF_A_SIGN && median(&across) <= LIKE * median(&within) + LIKE
 }
 
 /// The record with the readings of such bits put right, and the findings.

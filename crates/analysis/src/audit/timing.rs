@@ -6,9 +6,9 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::drift::{self, Uneven};
 use super::{Audit, Gyro};
-use crate::audit::local::{median, width};
+use crate::numerics::order_statistics::{median, width};
 use crate::numerics::tails;
-use crate::report::detection_limits::ONE_SIDED;
+use crate::numerics::tails::ONE_SIDED;
 use crate::result::Finding;
 
 /// Jitter of a sound board, rounding to ticks included, is about 36 us; beyond this it is a fault.

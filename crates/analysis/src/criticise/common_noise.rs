@@ -3,15 +3,15 @@
 use model::effect::{Effect, Found, Hypothesis};
 
 use crate::criticise::process;
-use crate::criticise::residual::{self, LEAST_CHANCE};
-use crate::fit::prequential;
-use crate::fit::threshold;
+use crate::fit::{prequential, threshold};
 use crate::ingest::grid::Grid;
 use crate::numerics::column::{dot, dots_behind};
-use crate::pipeline::Searched;
-use crate::report::detection_limits::{ONE_SIDED, limit};
-use crate::report::findings::sentence;
-use crate::result::{Check, DetectionLimit, Finding, Gain, Unexplained};
+use crate::numerics::tails;
+use crate::numerics::tails::ONE_SIDED;
+use crate::result::{Check, DetectionLimit, Finding, Gain, Unexplained, limit, sentence};
+use crate::search::searched::Searched;
+use crate::test_level;
+use crate::test_level::OMNIBUS_LEVEL;
 
 /// Correlation in sigma that each pair has to show before a source is said to be that of all axes.
 const LEAST_OF_ALL: f64 = 0.5;
@@ -68,19 +68,19 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
             let (ab, aa, bb) = (dot(x, y), dot(x, x), dot(y, y));
             let r = ab / (aa * bb).sqrt();
             let z = r.clamp(-0.999_999, 0.999_999).atanh() * (free - 3.0).sqrt();
-            let p = residual::normal_tail(z);
+            let p = tails::normal_tail(z);
             pairs.push((a, b, r, p, z));
         }
     }
     // A source that all axes share shows in all pairs: their sum tells it from d' 1.7 times smaller on than any one pair.
     let joint = pairs.iter().map(|p| p.4).sum::<f64>() / (pairs.len().max(1) as f64).sqrt();
     let together = pairs.len() > 1
-        && residual::normal_tail(joint) < 2.0 * threshold::FALSE_ALARM
+        && tails::normal_tail(joint) < 2.0 * threshold::FALSE_ALARM
         && joint > 0.0
         && pairs.iter().all(|p| p.4 > LEAST_OF_ALL);
     let fails: Vec<_> = pairs
         .iter()
-        .filter(|p| together || p.3 < LEAST_CHANCE)
+        .filter(|p| together || p.3 < OMNIBUS_LEVEL)
         .collect();
     let of = searched
         .iter()
@@ -97,14 +97,14 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         let samples = (grid.n - first) as f64;
         let claim = process::straight(&a.e, &b.e, -samples * (1.0 - r * r).ln(), fails.len());
         let channel = format!("{}, {}", a.target.name, b.target.name);
-        let doubted = claim.p_value < process::LEAST_CHANCE;
+        let doubted = claim.p_value < test_level::CLAIM_LEVEL;
         straight &= !doubted;
         shared.checks.push(Check {
             id: claim.id.into(),
             channel,
             statistic: claim.statistic,
             p_value: Some(claim.p_value),
-            threshold: process::LEAST_CHANCE,
+            threshold: test_level::CLAIM_LEVEL,
             fails_before: false,
             fails_after: doubted,
             what: claim.what.clone(),
@@ -168,14 +168,14 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         });
     }
     for (a, b, r, p, _) in &pairs {
-        let fails = *p < LEAST_CHANCE;
+        let fails = *p < OMNIBUS_LEVEL;
         let explained = shared.finding.is_some();
         shared.checks.push(Check {
             id: "cross_correlation".into(),
             channel: format!("{}, {}", a.target.name, b.target.name),
             statistic: *r,
             p_value: Some(*p),
-            threshold: LEAST_CHANCE,
+            threshold: OMNIBUS_LEVEL,
             fails_before: fails,
             fails_after: fails && !explained,
             what: "correlation of the whitened residuals of two axes".into(),
@@ -212,7 +212,7 @@ fn smallest(pairs: &[Pair<'_>], of: &dyn Effect, samples: f64) -> Vec<DetectionL
     let variance = if pairs.len() > 1 {
         (reach(2.0 * threshold::FALSE_ALARM) / joint).max((LEAST_OF_ALL + ONE_SIDED) / weakest)
     } else {
-        reach(LEAST_CHANCE) / joint
+        reach(OMNIBUS_LEVEL) / joint
     };
     let mut names: Vec<&str> = vec![];
     for s in pairs.iter().flat_map(|p| [p.0, p.1]) {
@@ -253,20 +253,20 @@ fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
             }
         }
     }
-    let p = residual::chi_tail(statistic, 2.0 * LATE as f64);
+    let p = tails::chi_tail(statistic, 2.0 * LATE as f64);
     let (first, second, lag, z) = worst;
     let r = z / (a.e.len() as f64).sqrt();
     let what = format!(
         "follows {} by {lag} samples ({r:+.3} of its residual)",
         first.target.name
     );
-    let fails = p < LEAST_CHANCE;
+    let fails = p < OMNIBUS_LEVEL;
     shared.checks.push(Check {
         id: "cross_correlation_late".into(),
         channel: format!("{}, {}", a.target.name, b.target.name),
         statistic,
         p_value: Some(p),
-        threshold: LEAST_CHANCE,
+        threshold: OMNIBUS_LEVEL,
         fails_before: fails,
         fails_after: fails,
         what: format!("correlation of the whitened residuals of two axes over {LATE} samples either way: {} {what}", second.target.name),

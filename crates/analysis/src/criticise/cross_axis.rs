@@ -4,11 +4,12 @@
 use model::effect::Signal;
 use model::record::Quantity;
 
-use crate::criticise::residual::{self, LEAST_CHANCE, MOST};
 use crate::ingest::grid::Grid;
 use crate::numerics::column::{dot, sum_of, sums_of_products};
-use crate::pipeline::Searched;
+use crate::numerics::tails;
 use crate::result::Check;
+use crate::search::searched::Searched;
+use crate::test_level::{MOST, OMNIBUS_LEVEL};
 
 /// Bits of a code that are looked at.
 const BITS: u32 = 14;
@@ -81,7 +82,7 @@ fn of_one(s: &Searched<'_>, samples: usize) -> Vec<Source> {
     all
 }
 
-/// As [`residual::errors_of_sum`], of many.
+/// As [`tails::errors_of_sum`], of many.
 fn errors(a: &[f64], b: &[f64]) -> f64 {
     let [sum, square] = sums_of_products(a, b);
     sum / square.max(f64::MIN_POSITIVE).sqrt()
@@ -118,7 +119,7 @@ fn most<'a>(e: &[f64], sources: impl Iterator<Item = &'a Source>) -> Option<(f64
     let (z, what) = scored
         .iter()
         .max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
-    let p = (residual::normal_tail(*z) * scored.len() as f64).min(1.0);
+    let p = (tails::normal_tail(*z) * scored.len() as f64).min(1.0);
     Some((*z, *what, p))
 }
 
@@ -137,14 +138,14 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
     let mut tell = |id: &str, channel: &str, what: &str, most: Option<(f64, &str, f64)>| {
         let Some((z, of, p)) = most else { return };
         let share = z / (samples as f64).sqrt();
-        let fails = p < LEAST_CHANCE;
+        let fails = p < OMNIBUS_LEVEL;
         let what = format!("{what} {of} ({share:+.3} of it)");
         found.push(Check {
             id: id.into(),
             channel: channel.into(),
             statistic: z,
             p_value: Some(p),
-            threshold: LEAST_CHANCE,
+            threshold: OMNIBUS_LEVEL,
             fails_before: fails,
             fails_after: fails,
             what: if fails {

@@ -9,23 +9,19 @@
 use std::collections::BTreeSet;
 
 use crate::criticise::process::independence;
-use crate::criticise::residual::{Outcome, chi_tail, normal_tail};
-use crate::features::{self, lagged};
+use crate::features::lagged;
+use crate::fit::channel;
+use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::Noise;
 use crate::fit::score_test::Beside;
-use crate::search::{Candidate, Form, Search, State, Term};
-
-/// The claim.
-pub(crate) const CLAIM: &str = "follower_law";
-/// Share of what a shape explains that departures from it may hold: it is off by a fifth of its size. Real responses are
-/// not exactly in proportion, and a small part of a strong effect is no other cause.
-pub(crate) const DEPARTURE: f64 = 0.05;
-/// Refitting the random walk widens the likelihood ratio of slow columns (`threshold`).
-pub(crate) const WIDENED: f64 = 1.12;
+use crate::fit::threshold::WIDENED;
+use crate::numerics::tails::{chi_tail, normal_tail};
+use crate::search::{Candidate, Search};
+use crate::test_level::{DEPARTURE, FOLLOWER_CLAIM, Outcome};
 
 /// For each effect that follows a channel, whether its law holds.
 pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static str, Outcome)> {
-    let of_library = |t: &&Term| t.effect.id() != features::ID;
+    let of_library = |t: &&Term| t.effect.id() != channel::ID;
     let follows = |t: &Term| Some((t.effect.id(), search.followed(t)?.to_owned()));
     let named = state.terms.iter().filter(of_library);
     let followed: BTreeSet<(&'static str, String)> = named.filter_map(follows).collect();
@@ -60,7 +56,7 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
         all.push((
             effect,
             Outcome {
-                id: CLAIM,
+                id: FOLLOWER_CLAIM,
                 statistic: lr,
                 p_value,
                 what: format!(
@@ -108,7 +104,7 @@ fn in_proportion(state: &State, term: &Term) -> Option<(&'static str, Outcome)> 
     Some((
         id,
         Outcome {
-            id: CLAIM,
+            id: FOLLOWER_CLAIM,
             statistic: most,
             p_value: chance.min(1.0),
             what: format!(

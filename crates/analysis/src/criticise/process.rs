@@ -22,30 +22,14 @@ use std::f64::consts::PI;
 use model::effect::{Hypothesis, View};
 use model::record::Quantity;
 
-use crate::criticise::follower_shape::DEPARTURE;
-use crate::criticise::residual::{
-    Outcome, chi_tail, errors_of_sum, kurtosis_score, normal_tail, whitened_by_spectrum,
-};
+use crate::fit::channel::{Form, State, Term, whitened_by_spectrum};
 use crate::fit::likelihood::{Bins, Noise, Panel};
 use crate::numerics::column::dot;
-use crate::pipeline::Searched;
-use crate::search::{Form, Search, State, Term};
+use crate::numerics::tails::{chi_tail, errors_of_sum, kurtosis_score, normal_tail};
+use crate::search::Search;
+use crate::search::searched::Searched;
+use crate::test_level::{CLAIMS, DEPARTURE, Outcome, STATIONARY_CLAIM};
 
-/// The claims.
-pub(crate) const CLAIMS: [&str; 7] = [
-    "process_spectrum",
-    "process_law",
-    "process_steadiness",
-    "process_levels",
-    "process_dwells",
-    "process_size",
-    "process_source",
-];
-/// The claim of every stationary process, filters among them: neither its variance nor how its neighbours depend on each other
-/// has a rhythm, as what is held, bridged or switched by a clock of its own has.
-pub(crate) const STATIONARY_CLAIM: &str = "process_rhythm";
-/// Chance below which a claim fails. It is weighed only where a process is named, not on every record.
-pub(crate) const LEAST_CHANCE: f64 = 1e-3;
 /// Highest order of the polynomials in ln w that bend a spectrum.
 const BENDS: usize = 6;
 /// Fewest independent values that a bend or a moment may rest on.
@@ -154,19 +138,6 @@ pub(crate) fn straight(a: &[f64], b: &[f64], lr: f64, pairs: usize) -> Outcome {
         },
         what: format!(
             "told as common_noise: one follows the square or the cube of the other by {bent:.1} standard errors, what they share would do so in a straight line"
-        ),
-    }
-}
-
-/// The claim of a contest of levels: `z` standard errors from what the lead of two levels is for what was named.
-pub(crate) fn levels(z: f64, named: &str) -> Outcome {
-    let more = if z > 0.0 { "more" } else { "less" };
-    Outcome {
-        id: CLAIMS[3],
-        statistic: z,
-        p_value: normal_tail(z),
-        what: format!(
-            "told as {named}, it lies {more} about two levels than one does, in standard errors"
         ),
     }
 }

@@ -8,13 +8,14 @@
 
 use model::record::Quantity;
 
-use crate::criticise::residual::{LEAST_CHANCE, chi_tail};
 use crate::fit::likelihood::{Noise, least_walk};
 use crate::fit::scan::residual;
 use crate::numerics::log_product::LogProduct;
 use crate::numerics::minimise::golden;
-use crate::pipeline::Searched;
+use crate::numerics::tails::chi_tail;
 use crate::result::Check;
+use crate::search::searched::Searched;
+use crate::test_level::OMNIBUS_LEVEL;
 
 /// Last half cycles of the slow part that are tried: from one cycle and a half on, fewer are a trend, to eight.
 const LAST: std::ops::RangeInclusive<usize> = 3..=16;
@@ -162,13 +163,13 @@ pub(crate) fn check(s: &Searched<'_>) -> Option<Check> {
         "; no temperature was recorded, and one that goes up and down moves a bias like that"
     };
     let p_value = chance(lr);
-    let fails = p_value < LEAST_CHANCE;
+    let fails = p_value < OMNIBUS_LEVEL;
     Some(Check {
         id: "slow_cycles".into(),
         channel: target.name.clone(),
         statistic: lr,
         p_value: Some(p_value),
-        threshold: LEAST_CHANCE,
+        threshold: OMNIBUS_LEVEL,
         fails_before: fails,
         fails_after: fails,
         what: format!(
@@ -243,7 +244,7 @@ mod tests {
                 .collect();
             let bins = record(-18.0, &Dct::new(N).forward(&cycles), &mut rng);
             let (lr, last, ..) = two_walks(&bins, N, -9.0).expect("bins");
-            assert!(chance(lr) < LEAST_CHANCE, "{swing}: {lr} up to {last}");
+            assert!(chance(lr) < OMNIBUS_LEVEL, "{swing}: {lr} up to {last}");
         }
     }
 }

@@ -1,98 +1,21 @@
 //! Omnibus checks of whitened residuals: they show that something is left, the search says what.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Gamma, Normal};
+use statrs::distribution::{ContinuousCDF, Gamma};
 
-use crate::fit::likelihood::{Noise, Panel};
-use crate::fit::scan::residual;
 use crate::numerics::column::{dot, sum_of};
-use crate::search::{Form, State};
+use crate::numerics::tails::{chi_tail, kurtosis_score, normal_tail};
+use crate::test_level::{OMNIBUS_LEVEL, Outcome, RECORD};
 
 mod dependence;
 
 pub(crate) use dependence::{
-    MOST, RHYTHM, Repeats, bicovariance, neighbours, repeats, three_readings, variance_rhythm,
+    Repeats, bicovariance, neighbours, repeats, three_readings, variance_rhythm,
 };
 
-/// Samples of ten minutes at 20 Hz, which the checks are calibrated on. Of a longer record of a real part, whatever its size,
-/// something is always left that is no linear, normal noise.
-pub(crate) const RECORD: f64 = 12_000.0;
-/// Chance below which a check fails.
-pub const LEAST_CHANCE: f64 = 1e-5;
 /// Lags of the Ljung-Box statistic.
 const LAGS: usize = 20;
 /// Bands.
 const BANDS: usize = 19;
-
-/// One statistic with its chance, and what was seen where.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
-    /// Name of the check.
-    pub id: &'static str,
-    /// Statistic.
-    pub statistic: f64,
-    /// Chance of a larger one under the model.
-    pub p_value: f64,
-    /// What it sees.
-    pub what: String,
-}
-
-/// Whitened coefficients, and the same in time: independent N(0, 1) under the model. A level that is known sample by
-/// sample is taken off.
-#[must_use]
-pub fn whitened(panel: &Panel, state: &State) -> (Vec<f64>, Vec<f64>) {
-    let Some(level) = &state.level else {
-        return whitened_by_spectrum(panel, state);
-    };
-    let level = panel.dct.forward(level);
-    let mut r = residual(panel, &state.columns(), &state.solution);
-    r.iter_mut().zip(level).skip(1).for_each(|(r, l)| *r -= l);
-    let mut noise = state.noise.clone();
-    let covariances = state
-        .terms
-        .iter()
-        .filter(|t| matches!(t.form, Form::Covariance(..)));
-    let mut stated = covariances.map(|t| t.stated.is_some());
-    noise.terms.retain(|_| !stated.next().unwrap_or(false));
-    // What the process took of the random walk is the walk's again.
-    let rest = Panel::new(&panel.dct, &panel.bins, &panel.dct.inverse(&r));
-    let (noise, solution) = rest.fit(&noise, &[]);
-    by_model(panel, &r, &noise, solution.white)
-}
-
-/// The same with every process as its spectrum alone.
-#[must_use]
-pub fn whitened_by_spectrum(panel: &Panel, state: &State) -> (Vec<f64>, Vec<f64>) {
-    let r = residual(panel, &state.columns(), &state.solution);
-    by_model(panel, &r, &state.noise, state.solution.white)
-}
-
-fn by_model(panel: &Panel, r: &[f64], noise: &Noise, white: f64) -> (Vec<f64>, Vec<f64>) {
-    let g = noise.everywhere(&panel.bins);
-    let u: Vec<f64> = r
-        .iter()
-        .zip(&g)
-        .map(|(r, g)| r / (white * g).sqrt())
-        .collect();
-    let e = panel.dct.inverse(&u);
-    (u, e)
-}
-
-pub(crate) fn chi_tail(x: f64, degrees: f64) -> f64 {
-    ChiSquared::new(degrees).map_or(f64::NAN, |c| c.sf(x))
-}
-
-/// Two-sided tail of the standard normal.
-#[must_use]
-pub fn normal_tail(z: f64) -> f64 {
-    2.0 * Normal::standard().sf(z.abs())
-}
-
-/// Standard errors of a sum of products that are 0 on average and independent: exact to the second moment whatever changes
-/// the spread of their factors.
-pub(crate) fn errors_of_sum(products: impl Iterator<Item = f64>) -> f64 {
-    let (sum, square) = products.fold((0.0, 0.0), |(sum, square), p| (sum + p, square + p * p));
-    sum / f64::max(square, f64::MIN_POSITIVE).sqrt()
-}
 
 /// All checks of one channel, whose readings come in steps of `step` standard deviations of the residual (0: none known).
 #[must_use]
@@ -288,7 +211,9 @@ impl Tiles {
 /// Bands that fail.
 pub(crate) fn failing_bands(u: &[f64]) -> impl Iterator<Item = Place> {
     let n = u.len() as f64;
-    let fails = all_bands(u).into_iter().filter(|b| b.chance < LEAST_CHANCE);
+    let fails = all_bands(u)
+        .into_iter()
+        .filter(|b| b.chance < OMNIBUS_LEVEL);
     fails.map(move |b| Place {
         from: b.from as f64 / n,
         to: b.to as f64 / n,
@@ -305,7 +230,7 @@ pub(crate) fn unsteady(e: &[f64]) -> Vec<Place> {
         let size = tiles.length as f64 / count as f64;
         for t in 0..count {
             let sum: f64 = tiles.of.iter().map(|s| s[t].0).sum();
-            if tiles.chance(sum, tiles.of.len()) * (count as f64) < LEAST_CHANCE {
+            if tiles.chance(sum, tiles.of.len()) * (count as f64) < OMNIBUS_LEVEL {
                 // Half a nat for each energy that is known is what noise gains too.
                 let gained = tiles.of.iter().map(|s| nats(s[t].1, size) - 0.5);
                 all.push(Place {
@@ -393,19 +318,6 @@ fn variance_cusum(e: &[f64], rate_hz: f64) -> Outcome {
             "range of the cumulated squares of the whitened residual; it is {size} from {from:.1} to {to:.1} s"
         ),
     }
-}
-
-/// Kurtosis of `n` values as a standard normal score. Anscombe and Glynn (1983): the cube root makes the skewed statistic
-/// normal.
-pub(crate) fn kurtosis_score(b2: f64, n: f64) -> f64 {
-    let mean = 3.0 * (n - 1.0) / (n + 1.0);
-    let variance = 24.0 * n * (n - 2.0) * (n - 3.0) / ((n + 1.0).powi(2) * (n + 3.0) * (n + 5.0));
-    let x = (b2 - mean) / variance.sqrt();
-    let skew = 6.0 * (n * n - 5.0 * n + 2.0) / ((n + 7.0) * (n + 9.0))
-        * (6.0 * (n + 3.0) * (n + 5.0) / (n * (n - 2.0) * (n - 3.0))).sqrt();
-    let a = 6.0 + 8.0 / skew * (2.0 / skew + (1.0 + 4.0 / (skew * skew)).sqrt());
-    let inner = (1.0 - 2.0 / a) / (1.0 + x * (2.0 / (a - 4.0)).sqrt());
-    ((1.0 - 2.0 / (9.0 * a)) - inner.cbrt()) / (2.0 / (9.0 * a)).sqrt()
 }
 
 /// Kurtosis about 0, less the 3 of a normal distribution.

@@ -10,22 +10,15 @@ use std::f64::consts::PI;
 use model::effect::{Signal, View};
 use model::record::Quantity;
 
-use crate::criticise::process;
-use crate::criticise::residual::{
-    LEAST_CHANCE, MOST, Outcome, chi_tail, errors_of_sum, normal_tail,
-};
 use crate::features::{LEAST_COMMAND, LEAST_SUPPLY, LEAST_TEMPERATURE, lagged};
+use crate::fit::channel::Form;
 use crate::fit::likelihood::{Dct, Noise};
 use crate::numerics::simd::wide;
-use crate::pipeline::Searched;
+use crate::numerics::tails::{chi_tail, errors_of_sum, normal_tail};
 use crate::result::Check;
-use crate::search::Form;
-
-/// The checks.
-pub(crate) const COLOUR: &str = "colour_follows";
-pub(crate) const ORDER: &str = "order";
-pub(crate) const LEANING: &str = "leaning";
-pub(crate) const IDS: [&str; 3] = [COLOUR, ORDER, LEANING];
+use crate::search::searched::Searched;
+use crate::test_level;
+use crate::test_level::{COLOUR, LEANING, MOST, OMNIBUS_LEVEL, ORDER, Outcome};
 
 /// Lengths of the windows, s: what a motor holds a speed for, and the time in which a slow pitch comes round.
 const WINDOWS_S: [f64; 2] = [3.2, 12.8];
@@ -482,9 +475,9 @@ pub(crate) fn checks(s: &Searched<'_>) -> impl Iterator<Item = Check> {
         .iter()
         .any(|t| matches!(t.form, Form::Covariance(..)));
     let threshold = if process || s.variance.is_some() {
-        process::LEAST_CHANCE
+        test_level::CLAIM_LEVEL
     } else {
-        LEAST_CHANCE
+        OMNIBUS_LEVEL
     };
     let channel = s.target.name.clone();
     outcomes(s).into_iter().map(move |o| {
@@ -591,7 +584,7 @@ mod tests {
             });
             let e: Vec<f64> = e.collect();
             let order = chances(&e, &v)[1];
-            assert!(order < LEAST_CHANCE, "{pitch} Hz: {order}");
+            assert!(order < OMNIBUS_LEVEL, "{pitch} Hz: {order}");
         }
     }
 
@@ -603,7 +596,7 @@ mod tests {
             .map(|((e, h), v)| e + 1.2 * h * f64::from(u8::from(*v > 0.0)))
             .collect();
         let colour = chances(&e, &v)[0];
-        assert!(colour < LEAST_CHANCE, "{colour}");
+        assert!(colour < OMNIBUS_LEVEL, "{colour}");
     }
 
     #[test]
@@ -619,6 +612,6 @@ mod tests {
             }
         }
         let leaning = chances(&e, &v)[2];
-        assert!(leaning < LEAST_CHANCE, "{leaning}");
+        assert!(leaning < OMNIBUS_LEVEL, "{leaning}");
     }
 }

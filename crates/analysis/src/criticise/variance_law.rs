@@ -2,28 +2,13 @@
 
 use std::f64::consts::PI;
 
-use model::effect::{Effect, Found, Hypothesis, Parameters, VarianceLaw};
+use model::effect::{Found, Hypothesis, VarianceLaw};
 
-use crate::criticise::follower_shape::DEPARTURE;
-use crate::criticise::residual::{Outcome, chi_tail, errors_of_sum};
-use crate::fit::scan;
-use crate::fit::threshold;
-use crate::pipeline::Searched;
-
-/// The claim of a law of the variance.
-pub(crate) const CLAIM: &str = "variance_law";
-/// A law of the variance that was found.
-pub(crate) struct VarianceFound {
-    pub effect: &'static dyn Effect,
-    pub parameters: Parameters,
-    pub lr: f64,
-    pub threshold: f64,
-    pub alternatives: Vec<(&'static dyn Effect, f64)>,
-    /// Variance over its mean, by sample.
-    pub law: Vec<f64>,
-    /// The channel that it follows.
-    pub follows: Option<String>,
-}
+use crate::fit::channel::VarianceFound;
+use crate::fit::{scan, threshold};
+use crate::numerics::tails::{chi_tail, errors_of_sum};
+use crate::search::searched::Searched;
+use crate::test_level::{DEPARTURE, Outcome, VARIANCE_CLAIM};
 
 /// The best law of the variance, if one passes its threshold.
 pub(crate) fn best(s: &Searched<'_>) -> Option<VarianceFound> {
@@ -94,7 +79,7 @@ pub(crate) fn best(s: &Searched<'_>) -> Option<VarianceFound> {
     all.sort_by(|a, b| score(b).total_cmp(&score(a)));
     let (best, rest) = all.split_first_mut()?;
     for other in rest.iter().filter(|o| o.effect.id() != best.effect.id()) {
-        if score(best) - score(other) < crate::search::RIVAL_SPAN {
+        if score(best) - score(other) < crate::fit::channel::RIVAL_SPAN {
             best.alternatives
                 .push((other.effect, (score(other) - score(best)) / 2.0));
         }
@@ -153,7 +138,7 @@ fn claim_of_variance(scores: &[f64], lr: f64, what: impl FnOnce(usize) -> String
         .max_by(|a, b| scores[*a].abs().total_cmp(&scores[*b].abs()))
         .unwrap_or(0);
     Outcome {
-        id: CLAIM,
+        id: VARIANCE_CLAIM,
         statistic,
         p_value: if statistic < DEPARTURE * lr {
             1.0

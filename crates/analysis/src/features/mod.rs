@@ -8,12 +8,9 @@ use model::effect::{
 use model::record::Quantity;
 use model::simulate::Simulation;
 
-use crate::search::Term;
+use crate::fit::channel::{ID, Term};
 
 pub(crate) mod lagged;
-
-/// Id of the stand-in that the search knows them by; no cause of the library.
-pub const ID: &str = "beyond";
 
 /// The stand-in.
 pub struct Beyond;

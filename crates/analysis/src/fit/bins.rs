@@ -6,9 +6,8 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Frequencies};
 
-use crate::numerics::column::{Column, dot};
+use crate::numerics::column::{Column, add_sums};
 use crate::numerics::log_product::sum_of_logs;
-use crate::numerics::simd::wide;
 
 /// Bins of single coefficients at the low end.
 const SINGLE: usize = 256;
@@ -131,31 +130,6 @@ impl Bins {
             rest = &rest[bins..];
         }
         all
-    }
-}
-
-wide! {
-    /// Adds sums of a[k] b[k] over bins, which begin at the places in `start` and end at its last, to others.
-    pub(crate) fn add_sums[A: Copy + Into<f64>, B: Copy + Into<f64>](
-        start: &[usize],
-        a: &[A],
-        b: &[B],
-        sums: &mut Vec<f64>,
-    ) -> () = add_sums_of
-}
-
-#[inline(always)]
-fn add_sums_of<A, B>(start: &[usize], a: &[A], b: &[B], sums: &mut Vec<f64>)
-where
-    A: Copy + Into<f64>,
-    B: Copy + Into<f64>,
-{
-    for w in start.windows(2) {
-        sums.push(if w[1] - w[0] == 1 {
-            a[w[0]].into() * b[w[0]].into()
-        } else {
-            dot(&a[w[0]..w[1]], &b[w[0]..w[1]])
-        });
     }
 }
 

@@ -2,8 +2,8 @@
 
 use model::effect::Found;
 
+use crate::fit::channel::{Form, State};
 use crate::fit::likelihood::{Noise, Panel, invert, least_walk};
-use crate::search::{Form, State};
 
 /// Points of the random walk that coefficients are averaged over.
 const WALKS: u32 = 28;
@@ -198,7 +198,7 @@ const REACH: f64 = 1.2;
 fn shaped(
     panel: &Panel,
     state: &State,
-    term: &crate::search::Term,
+    term: &crate::fit::channel::Term,
     shape: &dyn model::effect::Shape,
     at: f64,
 ) -> ((f64, f64), Vec<(f64, f64)>) {

@@ -10,9 +10,9 @@ use std::rc::Rc;
 
 use statrs::function::gamma::ln_gamma;
 
+use crate::fit::channel::{Form, State};
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel, least_walk};
 use crate::numerics::log_product::LogProduct;
-use crate::search::{Form, State};
 
 /// Blocks, and the part of the record before the first.
 const BLOCKS: usize = 12;

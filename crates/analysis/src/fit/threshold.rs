@@ -6,13 +6,10 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Median of chi-square of one degree: of the square of a normal variable.
-pub(crate) const MEDIAN: f64 = 0.4549;
-
 /// Chance of a false alarm of one hypothesis on one clean channel.
 pub const FALSE_ALARM: f64 = 7e-5;
 /// Refitting the random walk widens the null distribution of slow regressors by this factor.
-const WIDENED: f64 = 1.12;
+pub(crate) const WIDENED: f64 = 1.12;
 
 fn quantile(degrees: usize, places: f64) -> f64 {
     tail(degrees, FALSE_ALARM / places)

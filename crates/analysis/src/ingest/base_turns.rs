@@ -11,11 +11,11 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use crate::criticise::residual::LEAST_CHANCE;
 use crate::fit::threshold;
-use crate::ingest::grid::{MOTION_RMS, white_by_differences};
 use crate::numerics::column::dot;
+use crate::numerics::series::white_by_differences;
 use crate::numerics::simd::wide;
+use crate::test_level::OMNIBUS_LEVEL;
 
 /// Shortest and longest turn, s: a blow rings for less; what takes longer is drift to a gyro that warms up.
 const SHORTEST_S: f64 = 0.8;
@@ -157,7 +157,7 @@ fn places(y: &[f64], white: f64, rate_hz: f64) -> (Vec<Place>, f64) {
     let basis = basis(WINDOW, REST as f64, (REST + BLOCKS) as f64);
     let blocks = lengths(rate_hz);
     let looks: usize = blocks.iter().map(|b| y.len() / b).sum();
-    let limit = threshold::tail(SHAPES, LEAST_CHANCE / looks.max(1) as f64);
+    let limit = threshold::tail(SHAPES, OMNIBUS_LEVEL / looks.max(1) as f64);
     // A rate of a third of the least peak, all the time of a turn.
     let least = BLOCKS as f64 * (LEAST_PEAK / 3.0).powi(2);
     let mut places = vec![];
@@ -412,6 +412,9 @@ fn means(y: &[f64], by: usize) -> Vec<f64> {
     let mean = |part: &[f64]| part.iter().sum::<f64>() / by as f64;
     y.chunks_exact(by).map(mean).collect()
 }
+
+/// Rate between [`MOTION_BAND_HZ`] beyond what a bias can wander, deg/s rms.
+pub(crate) const MOTION_RMS: f64 = 0.3;
 
 #[cfg(test)]
 mod tests {

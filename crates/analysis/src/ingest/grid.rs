@@ -10,18 +10,16 @@ use model::record::{Axis, Base, Channel, Quantity, Record};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::audit::repeats::smallest_step;
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
-use crate::ingest::base_turns::{Excursion, excursions, largest_rate};
+use crate::ingest::base_turns::{Excursion, MOTION_RMS, excursions, largest_rate};
 use crate::ingest::dequantise;
+use crate::numerics::series::{smallest_step, white_by_differences};
 use crate::records::error::AnalysisError;
 
 /// Least number of samples of a gyro.
 pub const LEAST_SAMPLES: usize = 600;
 /// Least length, s.
 pub const LEAST_SECONDS: f64 = 30.0;
-/// Rate between [`MOTION_BAND_HZ`] beyond what a bias can wander, deg/s rms.
-pub(crate) const MOTION_RMS: f64 = 0.3;
 const MOTION_BAND_HZ: (f64, f64) = (0.02, 0.6);
 
 /// Largest share of another axis' rate that a gyro sees by its own fault: a mounting off by six degrees.
@@ -29,7 +27,7 @@ const LARGEST_SHARE: f64 = 0.1;
 
 /// So many readings show their step.
 fn few(values: &[f64]) -> &[f64] {
-    &values[..values.len().min(crate::criticise::residual::MOST)]
+    &values[..values.len().min(crate::test_level::MOST)]
 }
 
 /// A gyro on the grid.
@@ -141,18 +139,6 @@ fn interpolated(values: &[f64]) -> Vec<f64> {
         }
     }
     out
-}
-
-/// White variance from first differences, robust against steps and spikes.
-pub(crate) fn white_by_differences(y: &[f64]) -> f64 {
-    let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
-    let mut d: Vec<f64> = known.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-    if d.is_empty() {
-        return 0.0;
-    }
-    let middle = d.len() / 2;
-    let (_, median, _) = d.select_nth_unstable_by(middle, f64::total_cmp);
-    (*median / 0.6745).powi(2) / 2.0
 }
 
 /// Put a record on its grid. `masked(name)` gives the rows of a channel that are not to be believed.
@@ -300,7 +286,7 @@ pub fn lay_out(
             .collect();
         let lost = [lost, spikes.clone()].concat();
         if motion_rms <= MOTION_RMS {
-            c = crate::search::impute::first(&channel.name, &dct, &bins, &mut y, &lost, &mut fit);
+            c = crate::ingest::fill::first(&channel.name, &dct, &bins, &mut y, &lost, &mut fit);
         }
         if is_rate && !spikes.is_empty() {
             motion_rms = motion_of(&y, &c, &lost, &fit);
@@ -444,8 +430,8 @@ fn spikes(
 /// Distance in sigma that one of `n` samples reaches once in 10^5 records.
 pub(crate) fn spike_limit(n: usize) -> f64 {
     let tail = |z: f64| {
-        (n as f64 * crate::criticise::residual::normal_tail(z)).ln()
-            - crate::criticise::residual::LEAST_CHANCE.ln()
+        (n as f64 * crate::numerics::tails::normal_tail(z)).ln()
+            - crate::test_level::OMNIBUS_LEVEL.ln()
     };
     crate::numerics::minimise::golden(&|z| tail(z).abs(), 4.0, 12.0, 40)
 }
@@ -508,7 +494,7 @@ fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64, turns: bo
     let white = if above.is_empty() {
         0.0
     } else {
-        *above.select_nth_unstable_by(middle, f64::total_cmp).1 / crate::fit::threshold::MEDIAN
+        *above.select_nth_unstable_by(middle, f64::total_cmp).1 / crate::numerics::tails::MEDIAN
     };
     take_off(c, drivers, low..high);
     let band = &c[low..high];

@@ -4,5 +4,6 @@ pub mod base_turns;
 pub mod conditional_draw;
 pub mod dead;
 pub mod dequantise;
+pub mod fill;
 pub mod grid;
 pub mod kalman;

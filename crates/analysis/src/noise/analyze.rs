@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::noise::allan::{Deviation, Gapped, Phase, TauGrid};
 use crate::noise::angles::{Angle, Attitude, angle, attitude};
+pub use crate::noise::curves::DeviationPoint;
 use crate::noise::curves::{curve, gapped_curve, gaps_note};
 use crate::noise::fit::{Described, Estimated, NoiseFit, Ramp, Spectrum, Term, fit_described};
 use crate::noise::paper::{Figure, paper_figures};
@@ -76,27 +77,6 @@ pub struct AnalysisInput {
     /// Scatter of the sample times about an even grid, s rms, where times are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub jitter_s: Option<f64>,
-}
-
-/// A deviation at one cluster time, with its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct DeviationPoint {
-    /// Cluster time, s.
-    pub tau_s: f64,
-    /// The deviation, in the unit of the channel (`tdev`: times s).
-    pub deviation: f64,
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-    /// Equivalent degrees of freedom.
-    pub edf: f64,
-    /// Differences in it.
-    pub n: usize,
-    /// Noise that was identified there and that the degrees of freedom are of: exponent α of the rate's spectral density
-    /// f^α. 2: quantization (white phase), 1: flicker phase, 0: white, −1: flicker, −2: random walk.
-    #[serde(default)]
-    pub noise_alpha: i32,
 }
 
 /// A figure with its 95 % interval.

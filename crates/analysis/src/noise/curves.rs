@@ -1,11 +1,11 @@
 //! Curves of a deviation with their intervals, with and without gaps.
 
 use crate::noise::allan::{Deviation, Gapped, GappedEstimate, Phase, TauGrid};
-use crate::noise::analyze::DeviationPoint;
 use crate::noise::edf::{NoiseType, chi_square_interval, edf};
 use crate::noise::fit::NoiseFit;
 use crate::noise::identify::identify;
 use crate::noise::units::Scale;
+use serde::{Deserialize, Serialize};
 
 pub(crate) fn gaps_note(gapped: &Gapped, phase: &Phase, tau0: f64) -> String {
     let longest = gapped.lengths().into_iter().max().unwrap_or(0);
@@ -18,6 +18,27 @@ pub(crate) fn gaps_note(gapped: &Gapped, phase: &Phase, tau0: f64) -> String {
         (longest / 2) as f64 * tau0,
         (phase.longest_run() / 2) as f64 * tau0
     )
+}
+
+/// A deviation at one cluster time, with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeviationPoint {
+    /// Cluster time, s.
+    pub tau_s: f64,
+    /// The deviation, in the unit of the channel (`tdev`: times s).
+    pub deviation: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Equivalent degrees of freedom.
+    pub edf: f64,
+    /// Differences in it.
+    pub n: usize,
+    /// Noise that was identified there and that the degrees of freedom are of: exponent α of the rate's spectral density
+    /// f^α. 2: quantization (white phase), 1: flicker phase, 0: white, −1: flicker, −2: random walk.
+    #[serde(default)]
+    pub noise_alpha: i32,
 }
 
 /// The curve of a record with gaps. The freedom is that of the grid, less the share of differences that

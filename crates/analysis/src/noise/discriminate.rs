@@ -9,9 +9,9 @@ use model::record::{Axis, Base, Quantity};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::fit::likelihood::Dct;
 use crate::noise::fit::{Coefficients, Spectrum, Term};
 use crate::noise::plan::KnownNoise;
+use crate::numerics::transform::Dct;
 
 /// Distance d = √(2 × expected log-likelihood ratio) from which two causes count as told apart.
 pub const TOLD_APART: f64 = 5.0;

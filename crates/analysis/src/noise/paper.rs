@@ -7,15 +7,10 @@ use rand_core::Rng;
 
 use crate::noise::allan::{Deviation, Gapped, Phase, TauGrid, deviation};
 use crate::noise::fit::{NoiseFit, Spectrum, Term, replicate};
+use crate::noise::paper_model::{FLAT_S, LINE_S, PER_DECADE};
 
-/// Cluster times of the line, s.
-pub(crate) const LINE_S: (f64, f64) = (0.1, 10.0);
-/// Cluster times of the flat level, s.
-pub(crate) const FLAT_S: (f64, f64) = (10.0, 100.0);
 /// Length of a record over the longest cluster time that the paper asks for.
 const LENGTH_OVER_TAU: f64 = 10.0;
-/// Points for each decade in both fits.
-pub(crate) const PER_DECADE: u32 = 20;
 /// Draws behind an interval.
 const REPLICATES: usize = 400;
 

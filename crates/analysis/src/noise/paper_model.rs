@@ -8,9 +8,14 @@
 
 use crate::noise::allan::{Phase, TauGrid};
 use crate::noise::fit::{Coefficients, Term, model_allan_variance};
-use crate::noise::paper::{FLAT_S, LINE_S, PER_DECADE};
 use crate::numerics::minimise::golden;
 
+/// Cluster times of the line, s.
+pub(crate) const LINE_S: (f64, f64) = (0.1, 10.0);
+/// Cluster times of the flat level, s.
+pub(crate) const FLAT_S: (f64, f64) = (10.0, 100.0);
+/// Points for each decade in both fits.
+pub(crate) const PER_DECADE: u32 = 20;
 /// Stated angle random walk, deg/sqrt(h).
 pub const STATED_ARW_DEG_SQRT_H: f64 = 5.27;
 /// Stated level of the flat part, deg/h.

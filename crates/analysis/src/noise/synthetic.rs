@@ -4,7 +4,7 @@
 use rand_core::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::fit::likelihood::Dct;
+use crate::numerics::transform::Dct;
 
 /// The noise of a record in IEEE Std 952 letters, unit U. What is 0 is absent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

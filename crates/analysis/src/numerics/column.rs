@@ -3,7 +3,6 @@
 use std::ops::Range;
 use std::rc::Rc;
 
-use crate::fit::bins::add_sums;
 use crate::numerics::simd::wide;
 
 /// Sum of products, in eight sums that a processor makes at once.
@@ -124,6 +123,31 @@ pub(crate) fn sum_of(a: &[f64], f: impl Fn(f64) -> f64) -> f64 {
         }
     }
     sum_of_eight(sums) + rest.iter().map(|v| f(*v)).sum::<f64>()
+}
+
+wide! {
+    /// Adds sums of a[k] b[k] over bins, which begin at the places in `start` and end at its last, to others.
+    pub(crate) fn add_sums[A: Copy + Into<f64>, B: Copy + Into<f64>](
+        start: &[usize],
+        a: &[A],
+        b: &[B],
+        sums: &mut Vec<f64>,
+    ) -> () = add_sums_of
+}
+
+#[inline(always)]
+fn add_sums_of<A, B>(start: &[usize], a: &[A], b: &[B], sums: &mut Vec<f64>)
+where
+    A: Copy + Into<f64>,
+    B: Copy + Into<f64>,
+{
+    for w in start.windows(2) {
+        sums.push(if w[1] - w[0] == 1 {
+            a[w[0]].into() * b[w[0]].into()
+        } else {
+            dot(&a[w[0]..w[1]], &b[w[0]..w[1]])
+        });
+    }
 }
 
 /// Coefficients of a column.

@@ -55,6 +55,42 @@ pub fn farthest(n: usize, chance: f64) -> f64 {
     high
 }
 
+pub(crate) fn chi_tail(x: f64, degrees: f64) -> f64 {
+    ChiSquared::new(degrees).map_or(f64::NAN, |c| c.sf(x))
+}
+
+/// Two-sided tail of the standard normal.
+#[must_use]
+pub fn normal_tail(z: f64) -> f64 {
+    2.0 * Normal::standard().sf(z.abs())
+}
+
+/// Standard errors of a sum of products that are 0 on average and independent: exact to the second moment whatever changes
+/// the spread of their factors.
+pub(crate) fn errors_of_sum(products: impl Iterator<Item = f64>) -> f64 {
+    let (sum, square) = products.fold((0.0, 0.0), |(sum, square), p| (sum + p, square + p * p));
+    sum / f64::max(square, f64::MIN_POSITIVE).sqrt()
+}
+
+/// Kurtosis of `n` values as a standard normal score. Anscombe and Glynn (1983): the cube root makes the skewed statistic
+/// normal.
+pub(crate) fn kurtosis_score(b2: f64, n: f64) -> f64 {
+    let mean = 3.0 * (n - 1.0) / (n + 1.0);
+    let variance = 24.0 * n * (n - 2.0) * (n - 3.0) / ((n + 1.0).powi(2) * (n + 3.0) * (n + 5.0));
+    let x = (b2 - mean) / variance.sqrt();
+    let skew = 6.0 * (n * n - 5.0 * n + 2.0) / ((n + 7.0) * (n + 9.0))
+        * (6.0 * (n + 3.0) * (n + 5.0) / (n * (n - 2.0) * (n - 3.0))).sqrt();
+    let a = 6.0 + 8.0 / skew * (2.0 / skew + (1.0 + 4.0 / (skew * skew)).sqrt());
+    let inner = (1.0 - 2.0 / a) / (1.0 + x * (2.0 / (a - 4.0)).sqrt());
+    ((1.0 - 2.0 / (9.0 * a)) - inner.cbrt()) / (2.0 / (9.0 * a)).sqrt()
+}
+
+/// The 95 % quantile of the standard normal.
+pub(crate) const ONE_SIDED: f64 = 1.644_854;
+
+/// Median of chi-square of one degree: of the square of a normal variable.
+pub(crate) const MEDIAN: f64 = 0.4549;
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,23 +9,21 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use model::effect::{Found, Hypothesis, Parameters, VarianceLaw};
+use model::effect::{Found, Hypothesis, VarianceLaw};
 use model::effects::EFFECTS;
 
-use crate::features;
+use crate::fit::channel::Form;
 use crate::fit::likelihood::{Noise, Panel, least_walk};
-use crate::fit::scan;
-use crate::fit::threshold;
-use crate::ingest::grid::MOTION_RMS;
+use crate::fit::{channel, scan, threshold};
+use crate::ingest::base_turns::MOTION_RMS;
 use crate::numerics::column::dot;
 use crate::numerics::log_product::sum_of_logs;
 use crate::numerics::minimise::{peak, size_for};
-use crate::pipeline::Searched;
-use crate::result::{DetectionLimit, Finding, Parameter};
-use crate::search::{Candidate, Form};
+use crate::numerics::tails::ONE_SIDED;
+use crate::result::{DetectionLimit, Finding, limit};
+use crate::search::Candidate;
+use crate::search::searched::Searched;
 
-/// The 95 % quantile of the standard normal.
-pub(crate) const ONE_SIDED: f64 = 1.644_854;
 /// Random walks that are tried without the cause, from none to that of this logarithm of the ratio to white.
 const WALKS: usize = 64;
 const MOST_WALK: f64 = 4.0;
@@ -208,7 +206,7 @@ pub(crate) fn of_channel(s: &Searched<'_>) -> Vec<DetectionLimit> {
     let mut all: Vec<DetectionLimit> = vec![];
     for c in &s.search.candidates {
         let id = c.effect.id();
-        if id == features::ID || s.state.terms.iter().any(|t| t.effect.id() == id) {
+        if id == channel::ID || s.state.terms.iter().any(|t| t.effect.id() == id) {
             continue;
         }
         let Some(smallest) = smallest(s, &meter, c) else {
@@ -389,27 +387,6 @@ fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smalle
         }),
         Hypothesis::Common | Hypothesis::Scale | Hypothesis::Audit => None,
     }
-}
-
-/// The limit of one parameter of an effect that is described, the others named in `at`.
-pub(crate) fn limit(
-    cause: &str,
-    channel: &str,
-    described: &Parameters,
-    parameter: &str,
-    at: &[&str],
-) -> Option<DetectionLimit> {
-    let size = described.get(parameter)?;
-    let exact = |p: &Parameter| Parameter::exact(p.value, &p.unit);
-    let others = at.iter().filter_map(|name| described.get_key_value(*name));
-    Some(DetectionLimit {
-        cause: cause.into(),
-        channel: channel.into(),
-        parameter: parameter.into(),
-        value: size.value,
-        unit: size.unit.clone(),
-        at: others.map(|(name, p)| (name.clone(), exact(p))).collect(),
-    })
 }
 
 /// Those of causes that were not found where they hold, in the order of the library.

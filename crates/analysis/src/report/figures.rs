@@ -4,12 +4,12 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::{Dct, Panel};
 use crate::ingest::grid::Grid;
 use crate::numerics::column::dot;
-use crate::pipeline::Searched;
 use crate::result::{Evidence, Series, SeriesStyle};
-use crate::search::{Form, State, Term};
+use crate::search::searched::Searched;
 
 /// Replicates of the Allan misfit, made in pairs.
 const REPLICATES: usize = 32;
@@ -182,7 +182,7 @@ fn blocks(values: &[f64], count: usize) -> Vec<f64> {
 
 /// One figure for each term of a channel.
 pub(crate) fn of_channel(s: &Searched<'_>, grid: &Grid) -> Vec<Evidence> {
-    let named = |t: &&Term| t.effect.id() != crate::features::ID;
+    let named = |t: &&Term| t.effect.id() != crate::fit::channel::ID;
     s.state
         .terms
         .iter()

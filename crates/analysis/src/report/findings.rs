@@ -9,18 +9,16 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::attribute::events;
+use crate::attribute::events::{BLOW_S, blow_of, step_at};
 use crate::criticise::scale;
-use crate::criticise::variance_law::VarianceFound;
-use crate::fit::prequential;
-use crate::fit::scan;
-use crate::fit::threshold;
+use crate::fit::channel::{Form, VarianceFound};
+use crate::fit::{prequential, scan, threshold};
 use crate::ingest::grid::Grid;
 use crate::numerics::transform::Dct;
-use crate::pipeline::Searched;
-use crate::report::detection_limits;
-use crate::report::figures;
-use crate::result::{Alternative, DetectionLimit, Finding, Gain, Unexplained};
-use crate::search::Form;
+use crate::report::{detection_limits, figures};
+use crate::result;
+use crate::result::{Alternative, DetectionLimit, Finding, Gain, Unexplained, sentence};
+use crate::search::searched::Searched;
 
 pub(crate) fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {
     let first = alternatives.first()?;
@@ -47,42 +45,6 @@ pub(crate) fn alternatives(all: &[(&'static dyn Effect, f64)]) -> Vec<Alternativ
             log_odds: *odds,
         })
         .collect()
-}
-
-/// Below it a value is told with an exponent.
-const SMALL: f64 = 1e-4;
-
-/// Decimal places that show two digits of a standard error.
-fn decimals(error: f64) -> usize {
-    if error > 0.0 && error.is_finite() {
-        (1.0 - error.log10().floor()).clamp(0.0, 9.0) as usize
-    } else {
-        4
-    }
-}
-
-pub(crate) fn sentence(title: &str, channel: &str, parameters: &Parameters) -> String {
-    let values: Vec<String> = parameters
-        .iter()
-        .map(|(name, p)| {
-            let unit = if p.unit == "1" { "" } else { &p.unit };
-            let text = match p.std_error {
-                Some(error) if p.value.abs().max(error) < SMALL => {
-                    format!("{name} {:.2e} +- {error:.1e} {unit}", p.value)
-                }
-                Some(error) => {
-                    let places = decimals(error);
-                    format!("{name} {:.places$} +- {error:.places$} {unit}", p.value)
-                }
-                None if p.value != 0.0 && p.value.abs() < SMALL => {
-                    format!("{name} {:.2e} {unit}", p.value)
-                }
-                None => format!("{name} {:.4} {unit}", p.value),
-            };
-            text.trim_end().to_owned()
-        })
-        .collect();
-    format!("{title} on {channel}: {}", values.join(", "))
 }
 
 pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Finding> {
@@ -337,20 +299,6 @@ pub(crate) fn turning(mut findings: Vec<Finding>, grid: &Grid) -> Vec<Finding> {
     findings
 }
 
-/// Longest that a blow lasts that shifts a bias, s: far readings within it of the step are the blow itself.
-const BLOW_S: f64 = 1.0;
-
-/// When a bias steps, s, where a finding says so.
-pub(crate) fn step_at(f: &Finding) -> Option<f64> {
-    let time = f.parameters.get("time").map(|p| p.value);
-    time.filter(|_| f.cause == "bias_step")
-}
-
-/// Whether the far readings of a finding lie all at a step at that time, s.
-pub(crate) fn blow_of(f: &Finding, at: f64) -> bool {
-    !f.times_s.is_empty() && f.times_s.iter().all(|t| (t - at).abs() < BLOW_S)
-}
-
 /// Far readings that lie all at a step of the same channel are told with the step, not as a cause of their own.
 pub(crate) fn blows(mut findings: Vec<Finding>) -> Vec<Finding> {
     let steps: Vec<(String, f64)> = (findings.iter())
@@ -496,7 +444,7 @@ pub(crate) fn scale_finding(
     if lr < least {
         let smallest = describe(detection_limits::strength_for(least) * found.std_error);
         return Ok(Scaled {
-            limit: detection_limits::limit(of.id(), &s.target.name, &smallest, "relative", &[]),
+            limit: result::limit(of.id(), &s.target.name, &smallest, "relative", &[]),
             finding: None,
         });
     }

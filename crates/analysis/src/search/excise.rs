@@ -9,10 +9,12 @@
 use std::f64::consts::{PI, TAU};
 
 use super::envelope::{STEADY, swing};
-use super::{Form, MOST_ALIKE, Note, Search, State, Term, Wandering};
+use super::{MOST_ALIKE, Search};
+use crate::fit::channel::{Form, Note, State, Term, Wandering};
 use crate::fit::likelihood::Noise;
 use crate::fit::scan::residual;
 use crate::fit::threshold;
+use crate::numerics::tails;
 
 /// Span of a crowd of lines over their frequency, below which they are one that wanders.
 const WANDERING: f64 = 0.02;
@@ -130,7 +132,7 @@ impl Search<'_> {
             return None;
         }
         let middle = about.len() / 2;
-        let white = *about.select_nth_unstable_by(middle, f64::total_cmp).1 / threshold::MEDIAN;
+        let white = *about.select_nth_unstable_by(middle, f64::total_cmp).1 / tails::MEDIAN;
         let mean = |a: usize, b: usize| (a..b).map(scaled).sum::<f64>() / (b - a) as f64 / white;
         let (mut from, mut to) = (from, to);
         let farthest = (FARTHEST * to as f64) as usize;

@@ -10,29 +10,26 @@ mod process_pairs;
 mod refine;
 mod rivals;
 mod score;
+pub(crate) mod searched;
 
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::rc::Rc;
 use std::sync::Arc;
 
-use model::effect::{Effect, Hypothesis, Shape, View};
+use model::effect::{Effect, Hypothesis, View};
 use model::effects::EFFECTS;
 use model::record::Quantity;
 
-use crate::criticise::process::LEAST_CHANCE;
-use crate::criticise::residual::Outcome;
 use crate::features;
-use crate::fit::likelihood::{Noise, Panel, Solution};
-use crate::fit::threshold;
-use power_law::PowerLawFound;
+use crate::fit::channel::{Form, Note, RIVAL_SPAN, State, Term, Wandering};
+use crate::fit::likelihood::{Noise, Panel};
+use crate::fit::{channel, threshold};
+use crate::test_level::CLAIM_LEVEL;
 
 /// Most terms on one channel.
 const MOST_TERMS: usize = 8;
 /// Most lines, and most steps, that are told as separate causes.
 pub const MOST_ALIKE: usize = 2;
-/// Scores closer than this (twice 3 nats) leave the answer open.
-pub const RIVAL_SPAN: f64 = 6.0;
 /// Fewest cycles of a line in the record.
 const LEAST_CYCLES: f64 = 3.0;
 /// A swing of a line is slow up to here, Hz; faster ones are sought up to this share of the line's own frequency, beyond
@@ -40,106 +37,6 @@ const LEAST_CYCLES: f64 = 3.0;
 const SLOW_BEAT_HZ: f64 = 0.6;
 const FASTEST_BEAT: f64 = 0.25;
 const LEAST_BEATS: f64 = 3.0;
-
-/// What an accepted or weighed term is made of.
-#[derive(Clone)]
-pub enum Form {
-    /// Columns of a regression.
-    Columns,
-    /// Columns of a shape at its coordinate.
-    Shaped(Arc<dyn Shape>, f64),
-    /// A step at that time in samples, with its standard error.
-    Step(f64, f64),
-    /// A line of that angular frequency.
-    Line(f64),
-    /// A line with side bands at that distance, both rad per sample.
-    SideBands(f64, f64),
-    /// A stationary term of the noise.
-    Covariance(Arc<dyn model::effect::Covariance>, Vec<f64>),
-}
-
-/// A term of the model of a channel.
-#[derive(Clone)]
-pub struct Term {
-    /// The effect.
-    pub effect: &'static dyn Effect,
-    /// Number of its hypothesis in the list of candidates.
-    pub candidate: usize,
-    /// What it is made of.
-    pub form: Form,
-    /// Columns of the panel that it uses.
-    pub columns: Vec<usize>,
-    /// Names of the coefficients.
-    pub names: Vec<&'static str>,
-    /// Values held fixed.
-    pub fixed: Vec<(&'static str, f64, &'static str)>,
-    /// The channel that it follows.
-    pub follows: Option<String>,
-    /// Likelihood ratio against the model without it.
-    pub lr: f64,
-    /// What a false one reaches once in the stated number of clean channels.
-    pub threshold: f64,
-    /// Effects that leave the answer open, with their log odds.
-    pub alternatives: Vec<(&'static dyn Effect, f64)>,
-    /// Coefficients found by other means than the fit.
-    pub stated: Option<Vec<(f64, f64)>>,
-    /// What its name claims, where a contest has weighed that.
-    pub claims: Vec<Outcome>,
-}
-
-impl Term {
-    /// A term of candidate number `candidate`, not weighed yet.
-    pub(crate) fn new(
-        effect: &'static dyn Effect,
-        candidate: usize,
-        form: Form,
-        threshold: f64,
-    ) -> Self {
-        Self {
-            effect,
-            candidate,
-            form,
-            columns: vec![],
-            names: vec![],
-            fixed: vec![],
-            follows: None,
-            lr: 0.0,
-            threshold,
-            alternatives: vec![],
-            stated: None,
-            claims: vec![],
-        }
-    }
-
-    /// Likelihood ratio beyond the threshold.
-    #[must_use]
-    pub fn score(&self) -> f64 {
-        self.lr - self.threshold
-    }
-
-    /// Whether it is a process that is added.
-    pub(crate) fn is_process(&self) -> bool {
-        matches!(&self.form, Form::Covariance(c, _) if !c.filters_white())
-    }
-
-    /// Whether it is a filter that the white noise goes through.
-    pub(crate) fn is_filter(&self) -> bool {
-        self.is_covariance() && !self.is_process()
-    }
-
-    pub(crate) fn is_covariance(&self) -> bool {
-        matches!(self.form, Form::Covariance(..))
-    }
-
-    fn has_no_name(&self) -> bool {
-        self.effect.id() == features::ID
-    }
-
-    /// Whether it has the freedom to stand for several terms of the library.
-    fn may_swallow(&self) -> bool {
-        self.is_covariance() || self.has_no_name()
-    }
-}
 
 /// A hypothesis under test.
 pub struct Candidate {
@@ -178,93 +75,6 @@ impl Candidate {
     }
 }
 
-/// Structure that was seen and that no single effect explains.
-#[derive(Clone, Debug)]
-pub struct Note {
-    /// What is seen.
-    pub what: String,
-    /// Lowest and highest angular frequency, rad per sample, where it has such a place.
-    pub at: Option<(f64, f64)>,
-}
-
-/// The narrow crowd that a line is the strongest one of, rad per sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wandering {
-    /// Angular frequency of the line.
-    pub line: f64,
-    /// Half the width of the crowd.
-    pub half: f64,
-}
-
-/// A model of a channel.
-#[derive(Clone)]
-pub struct State {
-    /// Terms.
-    pub terms: Vec<Term>,
-    /// Noise shape, the covariance terms in it.
-    pub noise: Noise,
-    /// Its fit.
-    pub solution: Solution,
-    /// Structure that was seen and that no single effect explains.
-    pub notes: Vec<Note>,
-    /// The line that wanders: a line still, though no steady one.
-    pub wandering: Option<Wandering>,
-    /// The level of a process that is not Gaussian, where one was named: sample by sample.
-    pub level: Option<Rc<Vec<f64>>>,
-    /// The one power law that explains as much as the processes.
-    pub power_law: Option<PowerLawFound>,
-    /// How much wider lost readings make the errors of the noise: of the white variance, the random walk, the coordinates of
-    /// the terms; none where they are few.
-    pub wider: Vec<f64>,
-}
-
-impl State {
-    /// All columns in use, term by term.
-    #[must_use]
-    pub fn columns(&self) -> Vec<usize> {
-        self.terms
-            .iter()
-            .flat_map(|t| t.columns.iter().copied())
-            .collect()
-    }
-
-    /// Whether a line of that angular frequency is the one that wanders.
-    pub(crate) fn wanders(&self, omega: f64) -> Option<Wandering> {
-        self.wandering.filter(|w| (w.line - omega).abs() <= w.half)
-    }
-
-    /// Every term with the coefficients of its columns.
-    pub(crate) fn parts(&self) -> impl Iterator<Item = (&Term, &[f64])> {
-        let mut rest = self.solution.beta.as_slice();
-        self.terms.iter().map(move |t| {
-            let (own, others) = rest.split_at(t.columns.len());
-            rest = others;
-            (t, own)
-        })
-    }
-
-    /// Angular frequencies of the lines, with the places of their columns.
-    fn lines(&self) -> Vec<(f64, usize)> {
-        let mut at = 0;
-        let mut all = vec![];
-        for t in &self.terms {
-            if let Form::Line(omega) | Form::SideBands(omega, _) = t.form {
-                all.push((omega, at));
-            }
-            at += t.columns.len();
-        }
-        all
-    }
-
-    /// Angular frequency of the first line, and phase p of its cos(w t + p).
-    fn carrier(&self) -> Option<(f64, f64)> {
-        self.parts().find_map(|(t, own)| match (&t.form, own) {
-            (Form::Line(omega), [c, s, ..]) => Some((*omega, (-s).atan2(*c))),
-            _ => None,
-        })
-    }
-}
-
 /// The search on one channel.
 pub struct Search<'a> {
     /// Data and columns.
@@ -280,6 +90,9 @@ pub struct Search<'a> {
     /// What candidates offered to states without processes.
     offered: RefCell<HashMap<Place, HashMap<usize, Option<Term>>>>,
 }
+
+/// What was set aside on the way: the note of it, and the line that wanders.
+pub type SetAside = (Note, Option<Wandering>);
 
 /// What a state without processes is known by: the data's revision, its random walk, its terms with their columns.
 type Place = (usize, u64, Vec<(usize, Vec<usize>)>);
@@ -460,16 +273,23 @@ impl<'a> Search<'a> {
 
     /// Search from the baseline. What is set aside on the way is no longer in the data of the panel.
     #[must_use]
-    pub fn run(&self, baseline: State) -> State {
+    pub fn ascend(&self, baseline: State) -> (State, Option<SetAside>) {
         let mut state = self.climb(baseline);
         let aside = self.set_aside(&state);
         if let Some((rest, _, _)) = &aside {
             state = self.climb(rest.clone());
         }
-        state = self.pair_up(state);
-        state = crate::two_level::compare::hold(self, state);
+        (
+            self.pair_up(state),
+            aside.map(|(_, note, line)| (note, line)),
+        )
+    }
+
+    /// The end of a search, once whole explanations have been compared: what is told beside the terms, and their rivals.
+    #[must_use]
+    pub fn conclude(&self, mut state: State, aside: Option<SetAside>) -> State {
         let mut notes = std::mem::take(&mut state.notes);
-        if let Some((_, note, wandering)) = aside {
+        if let Some((note, wandering)) = aside {
             notes.push(note);
             state.wandering = wandering;
         }
@@ -547,7 +367,7 @@ impl<'a> Search<'a> {
                     if covariance {
                         !matches!(c.hypothesis, Hypothesis::Covariance(_))
                     } else {
-                        c.effect.id() != features::ID
+                        c.effect.id() != channel::ID
                     }
                 });
                 let Some(offer) = Self::simplest_best(offers) else {
@@ -565,7 +385,7 @@ impl<'a> Search<'a> {
                     let by_chance = match best.columns().len().saturating_sub(rest.columns().len())
                     {
                         0 => 0.0,
-                        more => threshold::tail(more, LEAST_CHANCE),
+                        more => threshold::tail(more, CLAIM_LEVEL),
                     };
                     2.0 * (rest.solution.log_likelihood - best.solution.log_likelihood)
                         + RIVAL_SPAN.max(by_chance)

@@ -9,7 +9,8 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Frequencies, Hypothesis};
 
-use crate::search::{Form, Search, State, Term};
+use crate::fit::channel::{Form, PowerLawFound, State, Term};
+use crate::search::Search;
 
 /// Exponents from next to white to next to a random walk, which the noise has anyway.
 const EXPONENTS: (f64, f64) = (0.05, 1.95);
@@ -41,15 +42,6 @@ impl Covariance for PowerLaw {
     fn starts(&self, _samples: usize) -> Vec<Vec<f64>> {
         vec![vec![0.0, 0.5], vec![-4.5, 1.0], vec![-6.0, 1.4]]
     }
-}
-
-/// The one power law that explains a state without what is named in it.
-#[derive(Clone, Copy, Debug)]
-pub struct PowerLawFound {
-    /// Exponent gamma.
-    pub exponent: f64,
-    /// Whether it stands for a filter of the white noise as well.
-    pub filter: bool,
 }
 
 /// The one power law that explains a state as well as its processes do, each coordinate that they have

@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Hypothesis};
 
-use super::{Form, Search, State, Term};
+use super::Search;
+use crate::fit::channel::{Form, State, Term};
 use crate::fit::threshold;
 
 /// Correlation times, samples, at which a second process is sought beside the first: a record's length over these.
@@ -82,7 +83,8 @@ impl Search<'_> {
             let ahead = Self::total(&b.1).total_cmp(&Self::total(&a.1));
             a.0.cmp(&b.0).then(ahead)
         });
-        let close = |(_, s): &(usize, State)| Self::total(s) > best - super::RIVAL_SPAN;
+        let close =
+            |(_, s): &(usize, State)| Self::total(s) > best - crate::fit::channel::RIVAL_SPAN;
         let mut open: Vec<State> = pairs.into_iter().filter(close).map(|p| p.1).collect();
         let chosen = self.filter_first(open.swap_remove(0));
         self.earned(chosen, open)
@@ -137,7 +139,7 @@ impl Search<'_> {
         put(process, vec![-of_process[0], slow.ln()]);
         let other = self.refit(terms, state.noise.log_walk - of_process[0]);
         // A triangular window is no pole, and loses by the exchange.
-        let close = super::RIVAL_SPAN / 2.0;
+        let close = crate::fit::channel::RIVAL_SPAN / 2.0;
         if other.solution.log_likelihood > state.solution.log_likelihood - close {
             other
         } else {

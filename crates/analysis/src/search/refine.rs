@@ -1,8 +1,8 @@
 //! A term that was found on a grid gets its exact place, and joins the model.
 
-use super::{Form, Search, State, Term};
-use crate::fit::scan;
-use crate::fit::threshold;
+use super::Search;
+use crate::fit::channel::{Form, State, Term};
+use crate::fit::{scan, threshold};
 
 /// The points of a grid beside one of it.
 pub(super) fn neighbours(grid: &[f64], at: f64) -> (f64, f64) {

@@ -4,8 +4,9 @@ use std::f64::consts::PI;
 
 use model::record::Quantity;
 
-use super::{Form, MOST_ALIKE, Note, RIVAL_SPAN, Search, State, Term};
-use crate::ingest::grid::white_by_differences;
+use super::{MOST_ALIKE, Search};
+use crate::fit::channel::{Form, Note, RIVAL_SPAN, State, Term};
+use crate::numerics::series::white_by_differences;
 
 /// Part of its frequency by which a crowd of lines reaches beyond the outermost ones.
 const AROUND: f64 = 0.02;
@@ -197,7 +198,7 @@ impl Search<'_> {
             let mut alternatives = std::mem::take(&mut state.terms[i].alternatives);
             let mut better: Option<(Term, f64)> = None;
             for offer in self.offers(&rest, &|c| {
-                c.effect.id() != own && c.effect.id() != crate::features::ID
+                c.effect.id() != own && c.effect.id() != crate::fit::channel::ID
             }) {
                 let lost = self.lost_to_noise(&rest, &offer);
                 let close = offer.score() > 0.0 && offer.score() + lost > score - RIVAL_SPAN;

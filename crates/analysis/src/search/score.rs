@@ -5,12 +5,10 @@ use std::sync::Arc;
 
 use model::effect::{Hypothesis, Shape};
 
-use super::{
-    Candidate, FASTEST_BEAT, Form, LEAST_BEATS, LEAST_CYCLES, SLOW_BEAT_HZ, Search, State, Term,
-};
+use super::{Candidate, FASTEST_BEAT, LEAST_BEATS, LEAST_CYCLES, SLOW_BEAT_HZ, Search};
+use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::Noise;
-use crate::fit::scan;
-use crate::fit::threshold;
+use crate::fit::{scan, threshold};
 
 impl Search<'_> {
     /// Best term that candidate `i` offers to `state`; `quick` leaves out refinements.

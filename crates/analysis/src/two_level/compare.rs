@@ -12,11 +12,14 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Effect, Hypothesis};
 
-use crate::criticise::process;
+use crate::fit::channel::{Form, Note, State, Term};
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel, least_walk};
 use crate::fit::scan::residual;
 use crate::fit::threshold;
-use crate::search::{Form, Note, Search, State, Term};
+use crate::numerics::tails::normal_tail;
+use crate::search::Search;
+use crate::test_level;
+use crate::test_level::{CLAIMS, Outcome};
 pub use crate::two_level::fit::two_level;
 use crate::two_level::fit::{
     Coordinates, Side, Sides, again, covariance_of, fitted, many_ahead, path,
@@ -252,7 +255,7 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     let mut state = state;
     if ahead <= MARGIN && wandering {
         let z = cox(two, &x, other.clone(), Side::Gaussian);
-        let claim = process::levels(z, "a Gaussian process");
+        let claim = levels_claim(z, "a Gaussian process");
         for t in state.terms.iter_mut().filter(|t| contested(t)) {
             t.claims.push(claim.clone());
         }
@@ -277,7 +280,7 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     // What switches by a clock has no steps beside it: its own are surprises to levels that switch at random.
     if !switches
         .as_ref()
-        .is_some_and(|s| s.p_value < process::LEAST_CHANCE)
+        .is_some_and(|s| s.p_value < test_level::CLAIM_LEVEL)
     {
         settled = steps::beside(search, settled, &mut rest, length, &x);
     }
@@ -327,8 +330,21 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         ]);
         t.lr = 2.0 * (ahead - MARGIN) + t.threshold;
         let z = cox(two, &x, other, Side::TwoLevels);
-        t.claims.push(process::levels(z, "two levels"));
+        t.claims.push(levels_claim(z, "two levels"));
         t.claims.extend(switches);
     }
     settled
+}
+
+/// The claim of a contest of levels: `z` standard errors from what the lead of two levels is for what was named.
+pub(crate) fn levels_claim(z: f64, named: &str) -> Outcome {
+    let more = if z > 0.0 { "more" } else { "less" };
+    Outcome {
+        id: CLAIMS[3],
+        statistic: z,
+        p_value: normal_tail(z),
+        what: format!(
+            "told as {named}, it lies {more} about two levels than one does, in standard errors"
+        ),
+    }
 }

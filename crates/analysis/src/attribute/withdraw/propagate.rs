@@ -9,10 +9,10 @@ use model::effect::Signal;
 
 use super::{Doubt, LEFT, generic, nearest_of};
 use crate::criticise::residual;
-use crate::features;
-use crate::pipeline::Searched;
+use crate::fit::channel;
+use crate::fit::channel::{Form, Term};
 use crate::result::{Check, Finding, Unexplained};
-use crate::search::{Form, Term};
+use crate::search::searched::Searched;
 
 /// Share of the noise where a term acts that a fallen process makes, from which on the term may be a piece of it.
 const MADE: f64 = 0.25;
@@ -93,7 +93,7 @@ impl Kin<'_> {
     fn beside_larger(&self, t: &Term, doubts: &[Doubt]) -> bool {
         let mut terms = self.s.state.terms.iter().zip(doubts);
         let larger = |(o, d): (&Term, &Doubt)| {
-            let follows = o.effect.id() == features::ID || *d != Doubt::No && !generic(o);
+            let follows = o.effect.id() == channel::ID || *d != Doubt::No && !generic(o);
             follows && o.lr > t.lr
         };
         t.is_covariance() && terms.any(larger)
@@ -107,7 +107,7 @@ impl Kin<'_> {
         let by_variance = self.s.variance.as_ref().filter(|_| self.variance.1);
         let by_variance = by_variance.and_then(|v| v.follows.as_deref());
         let terms = self.s.state.terms.iter().zip(doubts);
-        let by_terms = terms.filter(|(o, d)| **d != Doubt::No || o.effect.id() == features::ID);
+        let by_terms = terms.filter(|(o, d)| **d != Doubt::No || o.effect.id() == channel::ID);
         let others: Vec<&str> = by_terms
             .filter(|(o, _)| o.effect.id() != t.effect.id())
             .filter_map(|(o, _)| self.s.search.followed(o))
@@ -152,7 +152,7 @@ impl Kin<'_> {
         let of_source = |o: &str| v.follows.as_deref().is_some_and(|s| o.contains(s));
         let by_term = |(t, doubt): (&Term, &Doubt)| {
             let followed = self.s.search.followed(t);
-            t.effect.id() == features::ID && t.lr > v.lr
+            t.effect.id() == channel::ID && t.lr > v.lr
                 || *doubt != Doubt::No && followed.is_some_and(of_source)
         };
         self.felt

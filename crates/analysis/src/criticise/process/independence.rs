@@ -8,13 +8,15 @@
 use model::effect::{Hypothesis, Signal};
 use model::record::Quantity;
 
-use super::CLAIMS;
-use crate::criticise::follower_shape::WIDENED;
-use crate::criticise::residual::{Outcome, chi_tail};
 use crate::features;
 use crate::features::lagged::{self, Departure};
+use crate::fit::channel;
+use crate::fit::channel::{State, Term};
 use crate::fit::score_test::Beside;
-use crate::search::{Candidate, Search, State, Term};
+use crate::fit::threshold::WIDENED;
+use crate::numerics::tails::chi_tail;
+use crate::search::{Candidate, Search};
+use crate::test_level::{CLAIMS, Outcome};
 
 /// What columns of one kind explain beside all that the library has of a channel.
 struct Asked {
@@ -72,7 +74,7 @@ fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked>
         _ => false,
     };
     let candidates = || search.candidates.iter();
-    let library = || candidates().filter(|c| c.effect.id() != features::ID);
+    let library = || candidates().filter(|c| c.effect.id() != channel::ID);
     let ids: Vec<&str> = library().filter(follows).map(|c| c.effect.id()).collect();
     let mut own = state.columns();
     let of_it = library().filter(|c| ids.contains(&c.effect.id()));

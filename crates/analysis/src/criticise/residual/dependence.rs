@@ -8,9 +8,10 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rustfft::num_complex::Complex;
 
-use super::{Outcome, RECORD, chi_tail, errors_of_sum};
 use crate::numerics::column::dot;
+use crate::numerics::tails::{chi_tail, errors_of_sum};
 use crate::numerics::transform::{Dct, RealFft};
+use crate::test_level::{MOST, Outcome, RECORD, RHYTHM};
 
 /// Lags, either way, of the bicovariance.
 const LAGS: usize = 20;
@@ -257,9 +258,6 @@ fn strongest_line(series: &[f64], fft: &mut Option<RealFft>) -> Option<(f64, f64
     Some((most / level, 0.5 * at as f64 / n as f64, count))
 }
 
-/// Name of the check for a rhythm of the variance.
-pub(crate) const RHYTHM: &str = "variance_rhythm";
-
 /// A rhythm of the variance, or of how neighbours depend on each other: the strongest line of the squares of the whitened
 /// residual, or of its products. What is held, switched or coded by a clock of its own has one.
 pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
@@ -296,9 +294,6 @@ pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
 /// Longest period, samples, and fewest of them in the record.
 const LONGEST: usize = 512;
 const FEWEST: usize = 8;
-/// Samples that are looked at: so many show what repeats itself.
-pub(crate) const MOST: usize = 1 << 18;
-
 /// A period of the sampling with which the residual repeats itself.
 pub(crate) struct Repeats {
     /// Samples.

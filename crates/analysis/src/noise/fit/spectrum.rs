@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::fit::likelihood::Dct;
+use crate::numerics::transform::Dct;
 
 /// Noise terms with a variance of their own. The rate ramp is a mean, not a variance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

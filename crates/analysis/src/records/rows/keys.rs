@@ -4,10 +4,8 @@ use std::cmp::Ordering;
 
 use model::record::Record;
 
-use super::{Place, rate};
+use super::{LARGEST, Place, rate};
 
-/// Largest counter that is one.
-pub(super) const LARGEST: u64 = 1 << 53;
 /// Sequence numbers from a board's start that are its first.
 pub(super) const START: usize = 20;
 /// Steps of the sequence numbers on the wire before they begin again.

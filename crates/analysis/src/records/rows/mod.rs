@@ -20,6 +20,8 @@ use keys::Keys;
 pub use parts::longest_part;
 pub(crate) use rate::by_times;
 
+/// Largest counter that is one.
+const LARGEST: u64 = 1 << 53;
 /// Latency of host times that a start of the board may seem earlier by, s.
 const LATENCY_S: f64 = 0.2;
 /// Settings of a host's clock that one record is believed to hold.
@@ -326,7 +328,7 @@ fn taken(record: &Record, places: &[Place]) -> Record {
 /// Counters that count nothing are none.
 fn drop_useless(record: &mut Cow<'_, Record>) {
     let rows = record.len();
-    let counts = |c: &[u64]| c.len() == rows && c.iter().all(|v| *v <= keys::LARGEST);
+    let counts = |c: &[u64]| c.len() == rows && c.iter().all(|v| *v <= LARGEST);
     let rises = |c: &[u64]| counts(c) && c.windows(2).all(|w| w[0] < w[1]);
     if record.seq.as_deref().is_some_and(|s| !rises(s)) {
         let record = record.to_mut();

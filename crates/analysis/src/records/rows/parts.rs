@@ -6,7 +6,8 @@ use std::ops::Range;
 
 use model::record::Record;
 
-use super::keys::{Keys, LARGEST};
+use super::LARGEST;
+use super::keys::Keys;
 use super::{Place, rate, taken};
 
 /// Rows of which an interruption may be as long as one, in a part that is taken as one record.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use model::record::Record;
 
-use super::keys::LARGEST;
+use super::LARGEST;
 
 /// Deviation of a stated rate that is no matter of clocks: rate and tick are nominal by the same crystal.
 const WRONG: f64 = 0.01;

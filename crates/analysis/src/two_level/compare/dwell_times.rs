@@ -6,8 +6,7 @@ use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use crate::criticise::process::{CLAIMS, LEAST_CHANCE};
-use crate::criticise::residual::Outcome;
+use crate::test_level::{CLAIM_LEVEL, CLAIMS, Outcome};
 use crate::two_level::fit::{Coordinates, decoded, replicate};
 
 /// Replicates that say what short stays, which decoding loses, make of the score: its mean to 0.07 and its spread to 5 %.
@@ -54,7 +53,7 @@ pub(super) fn at_random(y: &[f64], x: &Coordinates, block_s: f64) -> Option<Outc
     let chance = |z: f64| Normal::standard().cdf(z);
     // Stays too short to be seen join their neighbours, which makes random ones more alike than they are: only a conviction
     // has to be held against that.
-    if chance(z) < LEAST_CHANCE {
+    if chance(z) < CLAIM_LEVEL {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x6477_656c_6c73);
         let scores: Vec<f64> = (0..REPLICATES)
             .filter_map(|_| score(&dwells(&decoded(&replicate(y.len(), x, &mut rng), x))))

@@ -2,8 +2,9 @@
 
 use model::effect::Hypothesis;
 
+use crate::fit::channel::{Form, State};
 use crate::fit::likelihood::least_walk;
-use crate::search::{Form, MOST_ALIKE, Search, State};
+use crate::search::{MOST_ALIKE, Search};
 use crate::two_level::fit::{Coordinates, with_column};
 
 /// Blocks on either side of a step that it is weighed on.

@@ -1,0 +1,271 @@
+//! The model of a channel: its terms, their form, the noise and the fit.
+
+use std::rc::Rc;
+use std::sync::Arc;
+
+use model::effect::{Effect, Parameters, Shape};
+
+use crate::fit::likelihood::{Noise, Panel, Solution};
+use crate::fit::scan::residual;
+use crate::test_level::Outcome;
+
+/// Id of the stand-in that the search knows them by; no cause of the library.
+pub const ID: &str = "beyond";
+
+/// Scores closer than this (twice 3 nats) leave the answer open.
+pub const RIVAL_SPAN: f64 = 6.0;
+
+/// What an accepted or weighed term is made of.
+#[derive(Clone)]
+pub enum Form {
+    /// Columns of a regression.
+    Columns,
+    /// Columns of a shape at its coordinate.
+    Shaped(Arc<dyn Shape>, f64),
+    /// A step at that time in samples, with its standard error.
+    Step(f64, f64),
+    /// A line of that angular frequency.
+    Line(f64),
+    /// A line with side bands at that distance, both rad per sample.
+    SideBands(f64, f64),
+    /// A stationary term of the noise.
+    Covariance(Arc<dyn model::effect::Covariance>, Vec<f64>),
+}
+
+/// A term of the model of a channel.
+#[derive(Clone)]
+pub struct Term {
+    /// The effect.
+    pub effect: &'static dyn Effect,
+    /// Number of its hypothesis in the list of candidates.
+    pub candidate: usize,
+    /// What it is made of.
+    pub form: Form,
+    /// Columns of the panel that it uses.
+    pub columns: Vec<usize>,
+    /// Names of the coefficients.
+    pub names: Vec<&'static str>,
+    /// Values held fixed.
+    pub fixed: Vec<(&'static str, f64, &'static str)>,
+    /// The channel that it follows.
+    pub follows: Option<String>,
+    /// Likelihood ratio against the model without it.
+    pub lr: f64,
+    /// What a false one reaches once in the stated number of clean channels.
+    pub threshold: f64,
+    /// Effects that leave the answer open, with their log odds.
+    pub alternatives: Vec<(&'static dyn Effect, f64)>,
+    /// Coefficients found by other means than the fit.
+    pub stated: Option<Vec<(f64, f64)>>,
+    /// What its name claims, where a contest has weighed that.
+    pub claims: Vec<Outcome>,
+}
+
+impl Term {
+    /// A term of candidate number `candidate`, not weighed yet.
+    pub(crate) fn new(
+        effect: &'static dyn Effect,
+        candidate: usize,
+        form: Form,
+        threshold: f64,
+    ) -> Self {
+        Self {
+            effect,
+            candidate,
+            form,
+            columns: vec![],
+            names: vec![],
+            fixed: vec![],
+            follows: None,
+            lr: 0.0,
+            threshold,
+            alternatives: vec![],
+            stated: None,
+            claims: vec![],
+        }
+    }
+
+    /// Likelihood ratio beyond the threshold.
+    #[must_use]
+    pub fn score(&self) -> f64 {
+        self.lr - self.threshold
+    }
+
+    /// Whether it is a process that is added.
+    pub(crate) fn is_process(&self) -> bool {
+        matches!(&self.form, Form::Covariance(c, _) if !c.filters_white())
+    }
+
+    /// Whether it is a filter that the white noise goes through.
+    pub(crate) fn is_filter(&self) -> bool {
+        self.is_covariance() && !self.is_process()
+    }
+
+    pub(crate) fn is_covariance(&self) -> bool {
+        matches!(self.form, Form::Covariance(..))
+    }
+
+    pub(crate) fn has_no_name(&self) -> bool {
+        self.effect.id() == ID
+    }
+
+    /// Whether it has the freedom to stand for several terms of the library.
+    pub(crate) fn may_swallow(&self) -> bool {
+        self.is_covariance() || self.has_no_name()
+    }
+}
+
+/// Structure that was seen and that no single effect explains.
+#[derive(Clone, Debug)]
+pub struct Note {
+    /// What is seen.
+    pub what: String,
+    /// Lowest and highest angular frequency, rad per sample, where it has such a place.
+    pub at: Option<(f64, f64)>,
+}
+
+/// The narrow crowd that a line is the strongest one of, rad per sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wandering {
+    /// Angular frequency of the line.
+    pub line: f64,
+    /// Half the width of the crowd.
+    pub half: f64,
+}
+
+/// A model of a channel.
+#[derive(Clone)]
+pub struct State {
+    /// Terms.
+    pub terms: Vec<Term>,
+    /// Noise shape, the covariance terms in it.
+    pub noise: Noise,
+    /// Its fit.
+    pub solution: Solution,
+    /// Structure that was seen and that no single effect explains.
+    pub notes: Vec<Note>,
+    /// The line that wanders: a line still, though no steady one.
+    pub wandering: Option<Wandering>,
+    /// The level of a process that is not Gaussian, where one was named: sample by sample.
+    pub level: Option<Rc<Vec<f64>>>,
+    /// The one power law that explains as much as the processes.
+    pub power_law: Option<PowerLawFound>,
+    /// How much wider lost readings make the errors of the noise: of the white variance, the random walk, the coordinates of
+    /// the terms; none where they are few.
+    pub wider: Vec<f64>,
+}
+
+impl State {
+    /// All columns in use, term by term.
+    #[must_use]
+    pub fn columns(&self) -> Vec<usize> {
+        self.terms
+            .iter()
+            .flat_map(|t| t.columns.iter().copied())
+            .collect()
+    }
+
+    /// Whether a line of that angular frequency is the one that wanders.
+    pub(crate) fn wanders(&self, omega: f64) -> Option<Wandering> {
+        self.wandering.filter(|w| (w.line - omega).abs() <= w.half)
+    }
+
+    /// Every term with the coefficients of its columns.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (&Term, &[f64])> {
+        let mut rest = self.solution.beta.as_slice();
+        self.terms.iter().map(move |t| {
+            let (own, others) = rest.split_at(t.columns.len());
+            rest = others;
+            (t, own)
+        })
+    }
+
+    /// Angular frequencies of the lines, with the places of their columns.
+    pub(crate) fn lines(&self) -> Vec<(f64, usize)> {
+        let mut at = 0;
+        let mut all = vec![];
+        for t in &self.terms {
+            if let Form::Line(omega) | Form::SideBands(omega, _) = t.form {
+                all.push((omega, at));
+            }
+            at += t.columns.len();
+        }
+        all
+    }
+
+    /// Angular frequency of the first line, and phase p of its cos(w t + p).
+    pub(crate) fn carrier(&self) -> Option<(f64, f64)> {
+        self.parts().find_map(|(t, own)| match (&t.form, own) {
+            (Form::Line(omega), [c, s, ..]) => Some((*omega, (-s).atan2(*c))),
+            _ => None,
+        })
+    }
+}
+
+/// The one power law that explains a state without what is named in it.
+#[derive(Clone, Copy, Debug)]
+pub struct PowerLawFound {
+    /// Exponent gamma.
+    pub exponent: f64,
+    /// Whether it stands for a filter of the white noise as well.
+    pub filter: bool,
+}
+
+/// A law of the variance that was found.
+pub(crate) struct VarianceFound {
+    pub effect: &'static dyn Effect,
+    pub parameters: Parameters,
+    pub lr: f64,
+    pub threshold: f64,
+    pub alternatives: Vec<(&'static dyn Effect, f64)>,
+    /// Variance over its mean, by sample.
+    pub law: Vec<f64>,
+    /// The channel that it follows.
+    pub follows: Option<String>,
+}
+
+/// Whitened coefficients, and the same in time: independent N(0, 1) under the model. A level that is known sample by
+/// sample is taken off.
+#[must_use]
+pub fn whitened(panel: &Panel, state: &State) -> (Vec<f64>, Vec<f64>) {
+    let Some(level) = &state.level else {
+        return whitened_by_spectrum(panel, state);
+    };
+    let level = panel.dct.forward(level);
+    let mut r = residual(panel, &state.columns(), &state.solution);
+    r.iter_mut().zip(level).skip(1).for_each(|(r, l)| *r -= l);
+    let mut noise = state.noise.clone();
+    let covariances = state
+        .terms
+        .iter()
+        .filter(|t| matches!(t.form, Form::Covariance(..)));
+    let mut stated = covariances.map(|t| t.stated.is_some());
+    noise.terms.retain(|_| !stated.next().unwrap_or(false));
+    // What the process took of the random walk is the walk's again.
+    let rest = Panel::new(&panel.dct, &panel.bins, &panel.dct.inverse(&r));
+    let (noise, solution) = rest.fit(&noise, &[]);
+    by_model(panel, &r, &noise, solution.white)
+}
+
+/// The same with every process as its spectrum alone.
+#[must_use]
+pub fn whitened_by_spectrum(panel: &Panel, state: &State) -> (Vec<f64>, Vec<f64>) {
+    let r = residual(panel, &state.columns(), &state.solution);
+    by_model(panel, &r, &state.noise, state.solution.white)
+}
+
+pub(crate) fn by_model(
+    panel: &Panel,
+    r: &[f64],
+    noise: &Noise,
+    white: f64,
+) -> (Vec<f64>, Vec<f64>) {
+    let g = noise.everywhere(&panel.bins);
+    let u: Vec<f64> = r
+        .iter()
+        .zip(&g)
+        .map(|(r, g)| r / (white * g).sqrt())
+        .collect();
+    let e = panel.dct.inverse(&u);
+    (u, e)
+}
