@@ -26,6 +26,8 @@ mod criticise;
 mod attribute;
 mod report;
 
+pub mod replicates;
+
 mod pipeline;
 
 pub use fit::{likelihood, scan};

@@ -25,6 +25,7 @@ use crate::report::findings::{
     blows, complete, joined, loud, motion_findings, scale_finding, term_findings, turning,
     variance_finding,
 };
+use crate::replicates;
 use crate::report::{detection_limits, figures};
 use crate::result::{
     Check, DIAGNOSIS_FORMAT, Diagnosed, Diagnosis, Finding, Input, NotTested, Parameter,
@@ -47,6 +48,9 @@ pub struct DiagnoseOptions {
     pub hash: Option<String>,
     /// Whether [`Diagnosed::evidence`], which a report alone shows, is left out.
     pub no_evidence: bool,
+    /// Replicates of the model before and after that the record is held against; 0 for none. Where there are some, a
+    /// model is extended only if they hold the record ([`crate::replicates`]).
+    pub replicates: usize,
 }
 
 /// Diagnose a record.
@@ -224,7 +228,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     let mut not_tested = not_tested(&searched);
     not_tested.extend(scale_not_tested);
     not_tested.extend(audited.not_tested);
-    let verdict = match (unexplained.is_empty(), findings.is_empty()) {
+    let mut verdict = match (unexplained.is_empty(), findings.is_empty()) {
         (false, _) => Verdict::Unexplained,
         (true, true) => Verdict::Adequate,
         (true, false) => Verdict::Extended,
@@ -253,12 +257,25 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
             .collect(),
         effects,
     };
+    let baseline_model = model(&|s| baseline_of(s, &s.baseline, &grid), vec![]);
+    let extended_model = model(
+        &|s| baseline_of(s, &s.state, &grid),
+        effects_of(findings.iter().chain(&nearest)),
+    );
+    let replicates = match options.replicates {
+        0 => BTreeMap::new(),
+        count => replicates::judge(&grid, &baseline_model, &extended_model, count, options.seed)
+            .unwrap_or_default(),
+    };
+    let held = replicates::held(&replicates, verdict, options.replicates);
+    if !held.unexplained.is_empty() {
+        verdict = Verdict::Unexplained;
+    }
+    checks.extend(held.checks);
+    unexplained.extend(held.unexplained);
     Diagnosed {
-        baseline_model: model(&|s| baseline_of(s, &s.baseline, &grid), vec![]),
-        extended_model: model(
-            &|s| baseline_of(s, &s.state, &grid),
-            effects_of(findings.iter().chain(&nearest)),
-        ),
+        baseline_model,
+        extended_model,
         evidence: (searched.iter().filter(|_| !options.no_evidence))
             .flat_map(|s| figures::of_channel(s, &grid))
             .collect(),
@@ -278,6 +295,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
             findings,
             unexplained,
             not_tested,
+            replicates,
             verdict,
         },
     }

@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 pub use model::Parameter;
 
+pub use crate::replicates::{Among, Replicated, Worst};
+
 /// The `format` of a diagnosis.
 pub const DIAGNOSIS_FORMAT: &str = "imu-stand-diagnosis/1";
 
@@ -180,6 +182,9 @@ pub struct Diagnosis {
     /// What would have been found.
     #[serde(default)]
     pub detection_limits: Vec<DetectionLimit>,
+    /// The record among simulations of the model before and after, by channel; empty where that was not asked.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub replicates: BTreeMap<String, Replicated>,
     /// The verdict.
     pub verdict: Verdict,
 }

@@ -142,6 +142,18 @@ pub struct World {
 }
 
 impl World {
+    /// A world in which nothing acts.
+    pub(crate) fn at_rest(samples: usize) -> Self {
+        let zeros = || vec![0.0; samples];
+        Self {
+            temperature: std::array::from_fn(|_| zeros()),
+            supply: zeros(),
+            duty: zeros(),
+            acc: std::array::from_fn(|_| zeros()),
+            motion: std::array::from_fn(|_| zeros()),
+        }
+    }
+
     /// The world that the settings describe.
     #[must_use]
     pub fn stated(

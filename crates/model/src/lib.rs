@@ -13,4 +13,4 @@ pub mod simulate;
 
 pub use file::ModelFile;
 pub use parameter::Parameter;
-pub use simulate::{simulate, simulate_in_the_world_of};
+pub use simulate::{Replicas, simulate, simulate_in_the_world_of};

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use rand_distr::{Distribution, StandardNormal};
-
 use crate::effect::{
     Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
     Plot, Rival, Stage, View, parameter, value,
@@ -90,23 +88,16 @@ impl Effect for Flicker {
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let b = value(parameters, "bias_instability") / 3600.0;
-        // A sum of Gauss-Markov processes with log-spaced correlation times approximates 1/f within 1 %:
-        // int S(tau) d ln tau of 2 s^2 tau / (1 + (w tau)^2) = pi s^2 / w, and the density per sample is B^2 / w.
-        let (per_e_fold, shortest) = (4.0, 0.05);
-        let longest = simulation.samples as f64 * 30.0;
-        let count = ((longest / shortest).ln() * per_e_fold).ceil() as usize;
-        let sigma = b * (1.0 / (std::f64::consts::PI * per_e_fold)).sqrt();
+        // A sum of Gauss-Markov processes, one per e-fold of the correlation time: int S(tau) d ln tau of
+        // 2 s^2 tau / (1 + (w tau)^2) = pi s^2 / w, and the density per sample is B^2 / w. The sum swings about that by
+        // 2 / cosh(pi^2), 2e-4 (Poisson's sum over sech(ln w tau)).
+        let shortest: f64 = 0.05;
+        let longest = simulation.span as f64 * 30.0;
+        let count = (longest / shortest).ln().ceil() as usize;
+        let sigma = b / std::f64::consts::PI.sqrt();
         for &axis in channels {
             for j in 0..count {
-                let tau = shortest * (j as f64 / per_e_fold).exp();
-                let p = (-1.0 / tau).exp();
-                let step = sigma * (1.0 - p * p).sqrt();
-                let normal = |s: &mut Simulation| -> f64 { StandardNormal.sample(&mut s.rng) };
-                let mut x = sigma * normal(simulation);
-                for i in 0..simulation.samples {
-                    simulation.rate[axis][i] += x;
-                    x = p * x + step * normal(simulation);
-                }
+                simulation.add_markov(axis, sigma, shortest * (j as f64).exp());
             }
         }
     }

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use rand_distr::{Distribution, StandardNormal};
-
 use crate::effect::{
     Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
     Plot, Rival, Stage, View, parameter, value,
@@ -102,18 +100,8 @@ impl Effect for GaussMarkov {
             value(parameters, "sigma"),
             value(parameters, "correlation_time"),
         );
-        let p = if tau > 0.0 {
-            (-1.0 / (tau * simulation.rate_hz)).exp()
-        } else {
-            0.0
-        };
         for &axis in channels {
-            let normal = |s: &mut Simulation| -> f64 { StandardNormal.sample(&mut s.rng) };
-            let mut x = sigma * normal(simulation);
-            for i in 0..simulation.samples {
-                simulation.rate[axis][i] += x;
-                x = p * x + sigma * (1.0 - p * p).sqrt() * normal(simulation);
-            }
+            simulation.add_markov(axis, sigma, tau * simulation.rate_hz);
         }
     }
 }

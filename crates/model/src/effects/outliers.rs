@@ -65,7 +65,7 @@ impl Effect for Outliers {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        let count = value(parameters, "count").round().max(0.0) as usize;
+        let count = simulation.events(value(parameters, "count").round().max(0.0) as usize);
         let Ok(at) = Uniform::new(0, simulation.samples.max(1)) else {
             return;
         };

@@ -55,7 +55,7 @@ impl Effect for StaleSamples {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        let count = value(parameters, "count").round().max(0.0) as usize;
+        let count = simulation.events(value(parameters, "count").round().max(0.0) as usize);
         let silent = value(parameters, "silent") != 0.0;
         let Ok(at) = Uniform::new(1, simulation.samples.max(2)) else {
             return;

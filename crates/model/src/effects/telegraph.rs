@@ -100,13 +100,16 @@ impl Effect for Telegraph {
         for &axis in channels {
             let mut level = half;
             let mut left = dwell * Distribution::<f64>::sample(&Exp1, &mut simulation.rng);
-            for i in 0..simulation.samples {
-                while left < 0.0 {
-                    level = -level;
-                    left += dwell * Distribution::<f64>::sample(&Exp1, &mut simulation.rng);
+            for k in 0..simulation.stretches.len() {
+                left -= simulation.stretches[k].skipped as f64 / simulation.rate_hz;
+                for i in simulation.stretches[k].samples.clone() {
+                    while left < 0.0 {
+                        level = -level;
+                        left += dwell * Distribution::<f64>::sample(&Exp1, &mut simulation.rng);
+                    }
+                    simulation.rate[axis][i] += level;
+                    left -= 1.0 / simulation.rate_hz;
                 }
-                simulation.rate[axis][i] += level;
-                left -= 1.0 / simulation.rate_hz;
             }
         }
     }

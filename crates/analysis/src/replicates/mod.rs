@@ -1,0 +1,62 @@
+//! The record among its replicates: would the model have given a record like this one?
+//!
+//! A model is simulated again and again in the world that the record saw. The same statistics are taken of the record and
+//! of every replicate, and a global envelope test says how often a record of the model strays, anywhere, as far as the
+//! measured one does (docs/replicates.md).
+
+mod envelope;
+mod judge;
+mod statistics;
+mod verdict;
+mod world;
+
+use serde::{Deserialize, Serialize};
+
+pub use judge::{Judged, judge};
+pub(crate) use verdict::held;
+
+/// Chance at or below which the replicates of a model do not hold the record.
+pub const LEVEL: f64 = 0.05;
+/// Replicates that tell such a chance to a tenth of it: the smallest chance is 1 / (199 + 1).
+pub const REPLICATES: usize = 199;
+
+/// The statistic by which a record strays farthest from the replicates of a model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Worst {
+    /// Which.
+    pub statistic: String,
+    /// Of the record, in `unit`.
+    pub value: f64,
+    /// Lower edge of the envelope that holds 95 % of the replicates in all statistics of all channels at once.
+    pub low: f64,
+    /// Its upper edge.
+    pub high: f64,
+    /// Unit of the three.
+    pub unit: String,
+}
+
+/// The record among the replicates of one model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Among {
+    /// Chance that a record of the model strays in any channel as far as this channel of the record.
+    pub p_value: f64,
+    /// Where it strays farthest.
+    pub worst: Worst,
+}
+
+impl Among {
+    /// Whether the replicates hold the record.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.p_value > LEVEL
+    }
+}
+
+/// A channel of the record among the replicates of the model before and after it was extended.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Replicated {
+    /// White noise, random walk and a constant bias.
+    pub before: Among,
+    /// The same with the causes found.
+    pub after: Among,
+}

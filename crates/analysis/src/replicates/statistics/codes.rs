@@ -1,0 +1,57 @@
+//! The readings as counts: equal neighbours, and the bits.
+
+use super::Statistic;
+
+/// Lowest bits whose share of ones is compared.
+const BITS: usize = 8;
+
+/// Share of readings that are equal to the one before, and of ones in each of the lowest bits.
+pub(super) struct Codes {
+    step: f64,
+    /// Lowest byte of each count.
+    codes: Vec<u8>,
+}
+
+impl Codes {
+    /// For readings in steps, 0 where there are none.
+    pub fn new(step: f64) -> Self {
+        Self {
+            step,
+            codes: vec![],
+        }
+    }
+
+    pub fn name(&self, all: &mut Vec<Statistic>) {
+        if self.step > 0.0 {
+            all.push(Statistic::new(
+                "share of readings equal to the one before",
+                "1",
+            ));
+            for bit in 0..BITS {
+                all.push(Statistic::new(format!("share of ones in bit {bit}"), "1"));
+            }
+        }
+    }
+
+    pub fn take(&mut self, x: &[f64], all: &mut Vec<f64>) {
+        if self.step <= 0.0 {
+            return;
+        }
+        let n = x.len() as f64;
+        let near = 0.5 * self.step;
+        let equal = x.windows(2).map(|w| u32::from((w[1] - w[0]).abs() < near));
+        all.push(f64::from(equal.sum::<u32>()) / n);
+        let scale = 1.0 / self.step;
+        self.codes.clear();
+        let lowest = x.iter().map(|v| (v * scale).round() as i32 as u8);
+        self.codes.extend(lowest);
+        // Counted in bytes, emptied before they overflow.
+        let mut ones = [0usize; BITS];
+        for some in self.codes.chunks(usize::from(u8::MAX)) {
+            for (bit, ones) in ones.iter_mut().enumerate() {
+                *ones += usize::from(some.iter().map(|c| c >> bit & 1).sum::<u8>());
+            }
+        }
+        all.extend(ones.map(|count| count as f64 / n));
+    }
+}

@@ -1,0 +1,101 @@
+//! What the replicates say to the verdict.
+
+use std::collections::BTreeMap;
+
+use super::{Among, LEVEL, Replicated};
+use crate::result::{Check, Unexplained, Verdict};
+
+/// Id of the check, and of the entry where the replicates do not hold the record.
+const ID: &str = "replicates";
+
+/// What follows from the record among its replicates.
+pub(crate) struct Held {
+    pub checks: Vec<Check>,
+    pub unexplained: Vec<Unexplained>,
+}
+
+/// The checks, and what is unexplained by a model of that verdict.
+///
+/// An extended model has to hold the record in every channel. Of a baseline to which nothing was found the
+/// whole search has said that it describes the record, at a level of alarms far below that of the replicates: it falls
+/// only where none of `count` replicates strays as far as the record.
+pub(crate) fn held(all: &BTreeMap<String, Replicated>, verdict: Verdict, count: usize) -> Held {
+    let least = 1.0 / (count + 1) as f64;
+    let limit = match verdict {
+        Verdict::Adequate => least.min(LEVEL),
+        Verdict::Extended | Verdict::Unexplained => LEVEL,
+    };
+    let check = |(name, r): (&String, &Replicated)| Check {
+        id: ID.into(),
+        channel: name.clone(),
+        statistic: r.before.p_value,
+        p_value: Some(r.after.p_value),
+        threshold: LEVEL,
+        fails_before: !r.before.holds(),
+        fails_after: !r.after.holds(),
+        what: format!(
+            "chance that a record of the model strays as far from its replicates, {} before and {} after; farthest after: {}",
+            chance(r.before.p_value, count),
+            chance(r.after.p_value, count),
+            farthest(&r.after)
+        ),
+    };
+    let entry = |(name, r): (&String, &Replicated)| {
+        let worse = if r.before.holds() && verdict != Verdict::Adequate {
+            "; the baseline model alone holds it: the extended one is worse here"
+        } else {
+            ""
+        };
+        Unexplained {
+            channel: name.clone(),
+            what: format!(
+                "the replicates of the model do not hold the record (chance {}): {}{worse}",
+                chance(r.after.p_value, count),
+                farthest(&r.after)
+            ),
+        }
+    };
+    Held {
+        checks: all.iter().map(check).collect(),
+        unexplained: (all.iter().filter(|(_, r)| r.after.p_value <= limit + 1e-9))
+            .map(entry)
+            .collect(),
+    }
+}
+
+/// A chance that replicates tell, of which the smallest is that none strays as far.
+fn chance(p: f64, count: usize) -> String {
+    let least = 1.0 / (count + 1) as f64;
+    if p <= least * 1.001 {
+        format!("at most {least:.3}")
+    } else {
+        format!("{p:.3}")
+    }
+}
+
+/// Where a record strays farthest.
+fn farthest(among: &Among) -> String {
+    let worst = &among.worst;
+    let unit = if worst.unit == "1" {
+        String::new()
+    } else {
+        format!(" {}", worst.unit)
+    };
+    format!(
+        "{} is {}{unit}, replicates have {} to {}",
+        worst.statistic,
+        digits(worst.value),
+        digits(worst.low),
+        digits(worst.high)
+    )
+}
+
+/// Four digits, so that a value just outside its envelope is seen to be.
+fn digits(v: f64) -> String {
+    let size = v.abs();
+    if size >= 1e4 || size > 0.0 && size < 1e-3 {
+        return format!("{v:.3e}");
+    }
+    let places = (3 - size.max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{v:.places$}")
+}

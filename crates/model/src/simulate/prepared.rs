@@ -1,0 +1,292 @@
+//! A model in a world: what chance has no part in is done, the rest is drawn.
+
+use std::ops::Range;
+
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::{COUNT_LIMIT, STEPLESS_DPS, SimulateError, Simulation, Stretch, axis_of};
+use crate::effect::{Effect, Parameters, Stage};
+use crate::effects::effect;
+use crate::excitation::{World, slow};
+use crate::file::ModelFile;
+use crate::record::flag;
+
+/// An effect of a model, and the axes that it acts on.
+struct Acting {
+    effect: &'static dyn Effect,
+    parameters: Parameters,
+    axes: Vec<usize>,
+}
+
+impl Acting {
+    fn on(&self, run: &mut Simulation) {
+        self.effect.simulate(&self.parameters, &self.axes, run);
+    }
+
+    /// Whether chance has a part in it: it takes random numbers even for two samples in a world at rest.
+    fn draws(&self, rate_hz: f64) -> bool {
+        let rng = Xoshiro256PlusPlus::seed_from_u64(0);
+        let mut probe = started(World::at_rest(2), rate_hz, rng.clone());
+        self.on(&mut probe);
+        probe.rng != rng
+    }
+}
+
+/// A run of a model, without what is random.
+pub(super) struct Prepared {
+    pub run: Simulation,
+    /// Axes that the model has.
+    pub present: [bool; 3],
+    /// Unit per count, where the model states one.
+    pub lsb: [Option<f64>; 3],
+    /// Unit in which readings come, and the largest count.
+    pub steps: [(f64, i32); 3],
+    /// Random walk from sample to sample, deg/s.
+    walk: [f64; 3],
+    /// White standard deviation at each sample, deg/s.
+    white: [Vec<f64>; 3],
+    /// Effects on rate and noise that chance has a part in.
+    random: Vec<Acting>,
+    /// Effects on what the sensor puts out, and later.
+    late: Vec<Acting>,
+    /// Slow part of the axes that moved, deg/s.
+    read: [Option<Vec<f64>>; 3],
+}
+
+impl Prepared {
+    pub fn new(
+        model: &ModelFile,
+        world: World,
+        read: [Option<Vec<f64>>; 3],
+        rate_hz: f64,
+        rng: Xoshiro256PlusPlus,
+    ) -> Result<Self, SimulateError> {
+        let mut run = started(world, rate_hz, rng);
+        let (mut present, mut lsb, mut walk) = ([false; 3], [None; 3], [0.0; 3]);
+        for channel in &model.channels {
+            let axis = axis_of(channel)?;
+            let get = |name: &str| channel.baseline.get(name).map_or(0.0, |p| p.value);
+            present[axis] = true;
+            lsb[axis] = channel.lsb;
+            // deg/sqrt(h) -> deg/s at one sample: N sqrt(rate), N in deg/s/sqrt(Hz).
+            run.white_sigma[axis] = get("angle_random_walk") / 60.0 * rate_hz.sqrt();
+            walk[axis] = get("rate_random_walk") / rate_hz.sqrt();
+            run.rate[axis].fill(get("bias"));
+        }
+        let acting = acting(model, present)?;
+        let (mut early, late): (Vec<_>, Vec<_>) = acting
+            .into_iter()
+            .partition(|a| a.effect.stage() < Stage::Output);
+        early.sort_by_key(|a| a.effect.stage());
+        // What the base does is an input of the run: the same each time, even where it is random.
+        let again = |a: &Acting| a.effect.stage() != Stage::World && a.draws(rate_hz);
+        let (random, once): (Vec<_>, Vec<_>) = early.into_iter().partition(again);
+        for acting in &once {
+            acting.on(&mut run);
+        }
+        let steps = lsb.map(|lsb| match lsb {
+            Some(lsb) => (lsb, COUNT_LIMIT),
+            None => (STEPLESS_DPS, i32::MAX - 1),
+        });
+        let mut prepared = Self {
+            run,
+            present,
+            lsb,
+            steps,
+            walk,
+            white: Default::default(),
+            random,
+            late,
+            read,
+        };
+        prepared.sized();
+        Ok(prepared)
+    }
+
+    /// What is drawn is as large as the run now says.
+    fn sized(&mut self) {
+        let run = &self.run;
+        self.white = std::array::from_fn(|axis| {
+            let sigma = run.white_sigma[axis];
+            let variance = run.variance[axis].iter();
+            variance.map(|v| sigma * v.sqrt()).collect()
+        });
+    }
+
+    /// Only these stretches of the run from now on.
+    pub fn only(&mut self, stretches: &[Range<usize>]) {
+        let run = &mut self.run;
+        let pick = |values: &mut Vec<f64>| {
+            *values = stretches
+                .iter()
+                .flat_map(|s| values[s.clone()].iter().copied())
+                .collect();
+        };
+        let columns = run
+            .temperature
+            .iter_mut()
+            .chain([&mut run.supply, &mut run.duty]);
+        let columns = columns.chain(&mut run.acc).chain(&mut run.motion);
+        let columns = columns.chain(&mut run.rate).chain(&mut run.variance);
+        columns
+            .chain(&mut self.white)
+            .chain(self.read.iter_mut().flatten())
+            .for_each(pick);
+        let (mut until, mut from) = (0, 0);
+        run.stretches = stretches
+            .iter()
+            .map(|s| {
+                let stretch = Stretch {
+                    samples: from..from + s.len(),
+                    skipped: s.start - until,
+                };
+                (until, from) = (s.end, from + s.len());
+                stretch
+            })
+            .collect();
+        run.samples = from;
+        run.flags.truncate(from);
+    }
+
+    /// Clocks and frames, which only a run that is written has.
+    pub fn clocks(&mut self) {
+        let run = &mut self.run;
+        run.keep = vec![true; run.samples];
+        run.device_time = (0..run.samples).map(|i| i as f64 / run.rate_hz).collect();
+        run.host_time.clone_from(&run.device_time);
+    }
+
+    /// Draw what is random, up to the counts.
+    pub fn draw(&mut self) {
+        let present = self.present;
+        for axis in (0..3).filter(|a| present[*a]) {
+            wander(&mut self.run, axis, self.walk[axis]);
+        }
+        for acting in &self.random {
+            acting.on(&mut self.run);
+        }
+        if self.random.iter().any(|a| a.effect.stage() == Stage::Noise) {
+            self.sized();
+        }
+        for axis in (0..3).filter(|a| present[*a]) {
+            let mut white = std::mem::take(&mut self.run.white[axis]);
+            white.clear();
+            let run = &mut self.run;
+            white.extend(self.white[axis].iter().map(|sd| sd * run.normal()));
+            self.run.white[axis] = white;
+        }
+        self.stage(Stage::Output);
+        for axis in (0..3).filter(|a| present[*a]) {
+            self.count(axis);
+        }
+        self.stage(Stage::Counts);
+    }
+
+    /// What happens to frames.
+    pub fn frames(&mut self) {
+        self.stage(Stage::Frames);
+    }
+
+    fn stage(&mut self, at: Stage) {
+        for acting in self.late.iter().filter(|a| a.effect.stage() == at) {
+            acting.on(&mut self.run);
+        }
+    }
+
+    fn count(&mut self, axis: usize) {
+        let run = &mut self.run;
+        let scale = run.scale[axis];
+        for ((rate, moves), white) in run.rate[axis]
+            .iter_mut()
+            .zip(&run.motion[axis])
+            .zip(&run.white[axis])
+        {
+            *rate += scale * moves + white;
+        }
+        if let Some(read) = &self.read[axis] {
+            for stretch in &run.stretches {
+                let samples = stretch.samples.clone();
+                let own = slow(&run.rate[axis][samples.clone()], run.rate_hz);
+                let moved = run.rate[axis][samples.clone()]
+                    .iter_mut()
+                    .zip(own.iter().zip(&read[samples]));
+                moved.for_each(|(w, (own, read))| *w += read - own);
+            }
+        }
+        let (unit, limit) = self.steps[axis];
+        let (low, high) = (f64::from(-limit - 1), f64::from(limit));
+        let counts = run.rate[axis]
+            .iter()
+            .map(|w| (w / unit).round().clamp(low, high) as i32);
+        run.counts[axis].clear();
+        run.counts[axis].extend(counts);
+    }
+}
+
+/// Effects of the model on the axes that it has.
+fn acting(model: &ModelFile, present: [bool; 3]) -> Result<Vec<Acting>, SimulateError> {
+    let of = |e: &crate::file::EffectModel| {
+        let effect = effect(&e.cause).ok_or_else(|| SimulateError::NoEffect {
+            cause: e.cause.clone(),
+        })?;
+        let names = ["gyro_x", "gyro_y", "gyro_z"].iter().enumerate();
+        let named = |n: &str| e.channels.is_empty() || e.channels.iter().any(|c| c == n);
+        Ok(Acting {
+            effect,
+            parameters: e.parameters.clone(),
+            axes: names
+                .filter(|(i, n)| present[*i] && named(n))
+                .map(|(i, _)| i)
+                .collect(),
+        })
+    };
+    model.effects.iter().map(of).collect()
+}
+
+/// A run in a world before anything acts.
+fn started(world: World, rate_hz: f64, rng: Xoshiro256PlusPlus) -> Simulation {
+    let samples = world.duty.len();
+    Simulation {
+        rate_hz,
+        samples,
+        span: samples,
+        stretches: vec![Stretch {
+            samples: 0..samples,
+            skipped: 0,
+        }],
+        rng,
+        temperature: world.temperature,
+        supply: world.supply,
+        duty: world.duty,
+        acc: world.acc,
+        motion: world.motion,
+        scale: [1.0; 3],
+        rate: std::array::from_fn(|_| vec![0.0; samples]),
+        white_sigma: [0.0; 3],
+        variance: std::array::from_fn(|_| vec![1.0; samples]),
+        white: Default::default(),
+        counts: Default::default(),
+        flags: vec![flag::IN_ORDER; samples],
+        keep: vec![],
+        device_time: vec![],
+        host_time: vec![],
+    }
+}
+
+/// Adds a random walk that starts at 0 with the run.
+fn wander(run: &mut Simulation, axis: usize, step: f64) {
+    let mut level = 0.0;
+    for k in 0..run.stretches.len() {
+        let Stretch { samples, skipped } = run.stretches[k].clone();
+        if skipped > 0 {
+            level += step * (skipped as f64).sqrt() * run.normal();
+        }
+        let mut rates = std::mem::take(&mut run.rate[axis]);
+        for rate in &mut rates[samples] {
+            *rate += level;
+            level += step * run.normal();
+        }
+        run.rate[axis] = rates;
+    }
+}

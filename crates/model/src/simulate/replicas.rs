@@ -1,0 +1,176 @@
+//! One model again and again in one world.
+
+use std::ops::Range;
+
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::prepared::Prepared;
+use super::{SimulateError, world_of};
+use crate::file::ModelFile;
+use crate::record::Record;
+
+/// Counts that the largest reading of a record without a step is to take, far below the noise of any gyro.
+const FINE: f64 = 1e9;
+
+/// Replicates of a model in the world that a record saw: what chance has no part in is simulated once.
+pub struct Replicas {
+    prepared: Prepared,
+    rate: [Vec<f64>; 3],
+    variance: [Vec<f64>; 3],
+    /// Axis of each channel of the model.
+    axes: Vec<usize>,
+}
+
+impl Replicas {
+    /// For the model, in the world of the record, whose rows are `rate_hz` apart and none missing. Only the readings of
+    /// `stretches`, ranges of rows in order, are simulated; all of them where it is empty.
+    ///
+    /// # Errors
+    /// As [`super::simulate`].
+    pub fn new(
+        model: &ModelFile,
+        record: &Record,
+        rate_hz: f64,
+        stretches: &[Range<usize>],
+    ) -> Result<Self, SimulateError> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
+        let (model, world, read) = world_of(model, record, rate_hz, &mut rng)?;
+        let mut prepared = Prepared::new(&model, world, read, rate_hz, rng)?;
+        let axes = model
+            .channels
+            .iter()
+            .map(super::axis_of)
+            .collect::<Result<Vec<_>, _>>()?;
+        for (channel, axis) in model.channels.iter().zip(&axes) {
+            let readings = record.channel(&channel.name).map(|c| c.values.as_slice());
+            let [low, high] = crate::effect::extremes(readings.unwrap_or_default());
+            let (step, limit) = &mut prepared.steps[*axis];
+            let largest = low.abs().max(high.abs());
+            if channel.lsb.is_none() && largest.is_finite() {
+                *step = step.max(largest / FINE);
+            }
+            // A part with a longer word than the stand's.
+            if largest.is_finite() && largest / *step > f64::from(*limit) + 1.0 {
+                *limit = i32::MAX - 1;
+            }
+        }
+        if !stretches.is_empty() {
+            prepared.only(stretches);
+        }
+        let (rate, variance) = (prepared.run.rate.clone(), prepared.run.variance.clone());
+        Ok(Self {
+            prepared,
+            rate,
+            variance,
+            axes,
+        })
+    }
+
+    /// Simulates once more, and puts the readings of each channel of the model into `readings`, in its order.
+    pub fn draw(&mut self, seed: u64, readings: &mut Vec<Vec<f64>>) {
+        let run = &mut self.prepared.run;
+        run.rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        for (rate, start) in run.rate.iter_mut().zip(&self.rate) {
+            rate.copy_from_slice(start);
+        }
+        for (variance, start) in run.variance.iter_mut().zip(&self.variance) {
+            variance.copy_from_slice(start);
+        }
+        self.prepared.draw();
+        readings.resize_with(self.axes.len(), Vec::new);
+        for (out, axis) in readings.iter_mut().zip(&self.axes) {
+            let (step, _) = self.prepared.steps[*axis];
+            out.clear();
+            out.extend(
+                self.prepared.run.counts[*axis]
+                    .iter()
+                    .map(|c| f64::from(*c) * step),
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::file::EffectModel;
+    use crate::parameter::Parameter;
+
+    type Tested = Result<(), Box<dyn std::error::Error>>;
+
+    /// The paper's stand without noise but that of the baseline parameter given, and effects.
+    fn stand(noise: &[(&str, f64)], effects: &[(&str, &[(&str, f64, &str)])]) -> ModelFile {
+        let mut model = ModelFile::paper();
+        for channel in &mut model.channels {
+            for (name, p) in &mut channel.baseline {
+                p.value = noise.iter().find(|n| n.0 == name).map_or(0.0, |n| n.1);
+            }
+        }
+        let effect = |(cause, parameters): &(&str, &[(&str, f64, &str)])| EffectModel {
+            cause: (*cause).to_owned(),
+            channels: vec!["gyro_x".into()],
+            parameters: (parameters.iter())
+                .map(|(name, value, unit)| ((*name).to_owned(), Parameter::exact(*value, unit)))
+                .collect(),
+        };
+        model.effects = effects.iter().map(effect).collect();
+        model
+    }
+
+    #[test]
+    fn without_noise_every_replica_and_every_stretch_is_the_simulated_run() -> Tested {
+        let step: &[_] = &[("time", 50.0, "s"), ("height", 3.0, "deg/s")];
+        let line: &[_] = &[("frequency", 0.3, "Hz"), ("amplitude", 2.0, "deg/s")];
+        let warm: &[_] = &[("amplitude", 5.0, "deg/s"), ("time_constant", 30.0, "s")];
+        let model = stand(
+            &[("bias", 1.0)],
+            &[("bias_step", step), ("line", line), ("warm_up", warm)],
+        );
+        let record = crate::simulate(&model, 100.0, 20.0, 1)?;
+        let run = &record.channels[0].values;
+        let (mut whole, mut parts) = (vec![], vec![]);
+        Replicas::new(&model, &record, 20.0, &[])?.draw(2, &mut whole);
+        let stretches = [100..400, 1200..1500];
+        Replicas::new(&model, &record, 20.0, &stretches)?.draw(3, &mut parts);
+        let near = |a: &f64, b: &f64| (a - b).abs() < 1e-9;
+        assert!(run.iter().zip(&whole[0]).all(|(a, b)| near(a, b)));
+        let picked = stretches.iter().flat_map(|s| &run[s.clone()]);
+        assert_eq!(parts[0].len(), 600);
+        assert!(picked.zip(&parts[0]).all(|(a, b)| near(a, b)));
+        Ok(())
+    }
+
+    #[test]
+    fn a_seed_makes_one_replica_whatever_was_drawn_before() -> Tested {
+        let noise: &[_] = &[("sigma", 0.5, "deg/s"), ("correlation_time", 2.0, "s")];
+        let model = stand(&[("angle_random_walk", 5.0)], &[("gauss_markov", noise)]);
+        let record = crate::simulate(&model, 100.0, 20.0, 1)?;
+        let mut replicas = Replicas::new(&model, &record, 20.0, &[])?;
+        let (mut first, mut other, mut again) = (vec![], vec![], vec![]);
+        replicas.draw(5, &mut first);
+        replicas.draw(6, &mut other);
+        replicas.draw(5, &mut again);
+        assert_eq!(first, again);
+        assert_ne!(first, other);
+        Ok(())
+    }
+
+    #[test]
+    fn a_random_walk_wanders_on_between_stretches() -> Tested {
+        let k = 0.02;
+        let model = stand(&[("rate_random_walk", k)], &[]);
+        let record = crate::simulate(&model, 100.0, 20.0, 1)?;
+        let mut replicas = Replicas::new(&model, &record, 20.0, &[0..10, 1990..2000])?;
+        let mut readings = vec![];
+        let mut square = 0.0;
+        for seed in 0..400 {
+            replicas.draw(seed, &mut readings);
+            square += readings.iter().map(|r| (r[10] - r[0]).powi(2)).sum::<f64>();
+        }
+        // 99.5 s later; 1200 squares of a normal value are known to 4 %, and 5 of that are allowed. The step is 0.07.
+        let ratio = square / 1200.0 / (k * k * 99.5 + 0.07326f64.powi(2) / 6.0);
+        assert!((ratio - 1.0).abs() < 0.2, "{ratio}");
+        Ok(())
+    }
+}
