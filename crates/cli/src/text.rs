@@ -84,6 +84,7 @@ pub fn diagnosis(d: &Diagnosis) -> String {
         let _ = writeln!(out, "\nunexplained on {}", unexplained.channel);
         let _ = writeln!(out, "{}", item("", &unexplained.what));
     }
+    write_replicates(&mut out, d);
     if let Some(walks) = slow_noise(d) {
         let _ = writeln!(
             out,
@@ -99,6 +100,29 @@ pub fn diagnosis(d: &Diagnosis) -> String {
     }
     write_limits(&mut out, d);
     out
+}
+
+/// The record among simulations of the model before and after, a line for each channel.
+fn write_replicates(out: &mut String, d: &Diagnosis) {
+    if d.replicates.is_empty() {
+        return;
+    }
+    let _ = writeln!(
+        out,
+        "\nchance that a record of the model strays as far from its simulations"
+    );
+    for (channel, r) in &d.replicates {
+        let chances = format!(
+            "before {}, after {}",
+            number(r.before.p_value, 2),
+            number(r.after.p_value, 2)
+        );
+        let _ = writeln!(
+            out,
+            "{}",
+            item(&format!("{channel}: {chances}; "), &r.after.strays())
+        );
+    }
 }
 
 /// One row of the detection limits: what it is of, where it holds, and the sizes by channel.

@@ -45,6 +45,20 @@ pub struct Among {
 }
 
 impl Among {
+    /// In words where the record strays farthest.
+    #[must_use]
+    pub fn strays(&self) -> String {
+        let worst = &self.worst;
+        let unit = if worst.unit == "1" {
+            String::new()
+        } else {
+            format!(" {}", worst.unit)
+        };
+        let [value, low, high] = [worst.value, worst.low, worst.high].map(digits);
+        let what = &worst.statistic;
+        format!("{what} {value}{unit}, its simulations {low} to {high}")
+    }
+
     /// Whether the replicates hold the record.
     #[must_use]
     pub fn holds(&self) -> bool {
@@ -59,4 +73,14 @@ pub struct Replicated {
     pub before: Among,
     /// The same with the causes found.
     pub after: Among,
+}
+
+/// Four digits, so that a value just outside its envelope is seen to be.
+fn digits(v: f64) -> String {
+    let size = v.abs();
+    if size >= 1e4 || size > 0.0 && size < 1e-3 {
+        return format!("{v:.3e}");
+    }
+    let places = (3 - size.max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{v:.places$}")
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Among, LEVEL, Replicated};
+use super::{LEVEL, Replicated};
 use crate::result::{Check, Unexplained, Verdict};
 
 /// Id of the check, and of the entry where the replicates do not hold the record.
@@ -37,7 +37,7 @@ pub(crate) fn held(all: &BTreeMap<String, Replicated>, verdict: Verdict, count: 
             "chance that a record of the model strays as far from its replicates, {} before and {} after; farthest after: {}",
             chance(r.before.p_value, count),
             chance(r.after.p_value, count),
-            farthest(&r.after)
+            r.after.strays()
         ),
     };
     let entry = |(name, r): (&String, &Replicated)| {
@@ -51,7 +51,7 @@ pub(crate) fn held(all: &BTreeMap<String, Replicated>, verdict: Verdict, count: 
             what: format!(
                 "the replicates of the model do not hold the record (chance {}): {}{worse}",
                 chance(r.after.p_value, count),
-                farthest(&r.after)
+                r.after.strays()
             ),
         }
     };
@@ -71,31 +71,4 @@ fn chance(p: f64, count: usize) -> String {
     } else {
         format!("{p:.3}")
     }
-}
-
-/// Where a record strays farthest.
-fn farthest(among: &Among) -> String {
-    let worst = &among.worst;
-    let unit = if worst.unit == "1" {
-        String::new()
-    } else {
-        format!(" {}", worst.unit)
-    };
-    format!(
-        "{} is {}{unit}, replicates have {} to {}",
-        worst.statistic,
-        digits(worst.value),
-        digits(worst.low),
-        digits(worst.high)
-    )
-}
-
-/// Four digits, so that a value just outside its envelope is seen to be.
-fn digits(v: f64) -> String {
-    let size = v.abs();
-    if size >= 1e4 || size > 0.0 && size < 1e-3 {
-        return format!("{v:.3e}");
-    }
-    let places = (3 - size.max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
-    format!("{v:.places$}")
 }

@@ -10,7 +10,7 @@ use imu_stand::text;
 use miette::Result;
 use serde::Serialize;
 
-use super::{Input, Outputs};
+use super::{Input, Outputs, Replicates};
 
 /// What `diagnose` takes.
 #[derive(Args)]
@@ -20,6 +20,8 @@ pub struct Arguments {
     captures: Vec<PathBuf>,
     #[command(flatten)]
     input: Input,
+    #[command(flatten)]
+    replicates: Replicates,
     /// Seed of whatever is random
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -68,6 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             file: super::name(path),
             hash: Some(hash.clone()),
             no_evidence: arguments.report.is_none(),
+            replicates: arguments.replicates.count(),
         };
         let is_needed = arguments.model_out.is_some() || arguments.report.is_some();
         let found = if is_needed {

@@ -51,6 +51,35 @@ pub struct Input {
     pub quiet: bool,
 }
 
+/// Simulations that the record is held against; the same for every command that diagnoses.
+#[derive(Args)]
+pub struct Replicates {
+    /// Simulations of the model before and after that the record is held against: a model that does not hold it is not
+    /// called extended
+    #[arg(long, value_name = "N", default_value_t = analysis::replicates::REPLICATES,
+        value_parser = enough_replicates)]
+    replicates: usize,
+    /// Hold the record against no simulation
+    #[arg(long, conflicts_with = "replicates")]
+    no_replicates: bool,
+}
+
+impl Replicates {
+    /// How many.
+    pub fn count(&self) -> usize {
+        if self.no_replicates { 0 } else { self.replicates }
+    }
+}
+
+/// As many as tell a chance of 5 %.
+fn enough_replicates(text: &str) -> Result<usize, String> {
+    const LEAST: usize = 19;
+    match text.parse() {
+        Ok(n) if n >= LEAST => Ok(n),
+        _ => Err(format!("takes a whole number, {LEAST} at least; --no-replicates for none")),
+    }
+}
+
 impl Input {
     /// Reads a capture by these options; says how many rows were left out.
     pub fn read(&self, path: &Path) -> Result<Read> {

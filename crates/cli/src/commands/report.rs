@@ -10,7 +10,7 @@ use imu_stand::report::{Subject, report};
 use imu_stand::text::shell_word;
 use miette::{IntoDiagnostic, Result, WrapErr};
 
-use super::{Input, Outputs};
+use super::{Input, Outputs, Replicates};
 
 /// What `report` takes.
 #[derive(Args)]
@@ -19,6 +19,8 @@ pub struct Arguments {
     capture: PathBuf,
     #[command(flatten)]
     input: Input,
+    #[command(flatten)]
+    replicates: Replicates,
     /// Seed of whatever is random
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -40,6 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         file: super::name(&arguments.capture),
         hash: Some(hash.clone()),
         no_evidence: false,
+        replicates: arguments.replicates.count(),
     };
     let diagnosed = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
     let subject = Subject {

@@ -19,6 +19,7 @@ use miette::IntoDiagnostic;
 use miette::Result;
 use model::record::Record;
 
+use super::Replicates;
 use super::outputs::{self, Outputs};
 
 /// What `run` takes.
@@ -59,6 +60,8 @@ pub struct Arguments {
     /// Write a report, one self-contained HTML file
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    replicates: Replicates,
     /// Print nothing but errors
     #[arg(long, short)]
     quiet: bool,
@@ -132,6 +135,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         file,
         hash: Some(hash.clone()),
         no_evidence: arguments.report.is_none(),
+        replicates: arguments.replicates.count(),
     };
     let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
     super::write_json(arguments.json.as_ref(), &found.diagnosis)?;

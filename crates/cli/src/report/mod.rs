@@ -94,6 +94,7 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
                             " repeats what was read below 1 Hz, and only what is faster is simulated."
                         }
                     }
+                    (tables::replicates(subject))
                     @for channel in &channels { (channel) }
                 }
                 (tables::details(subject))
@@ -118,9 +119,7 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
     let sampling = Sampling::of(record, subject.rate_hz)?;
     let places = Places::new(&sampling, record.len());
     let simulate = |model: &model::file::ModelFile, stream: u64| {
-        let seed = subject.seed ^ stream;
-        let all = replicates::replicate(model, record, &places, REPLICATES, seed)?;
-        Ok((replicates::one(model, record, seed)?, all))
+        replicates::replicate(model, record, &places, REPLICATES, subject.seed ^ stream)
     };
     let simulated = simulate(before, 0x6265_666f_7265).and_then(|b| {
         let a = simulate(after, 0x0061_6674_6572)?;

@@ -4,6 +4,7 @@ use analysis::allan::{Deviation, Phase, TauGrid, deviation};
 use analysis::sampling::Sampling;
 use model::file::ModelFile;
 use model::record::Record;
+use model::simulate::{Replicas, SimulateError};
 
 /// Instants at which the integrated angle is compared.
 const ANGLE_POINTS: usize = 150;
@@ -139,7 +140,8 @@ impl<'a> Places<'a> {
     }
 }
 
-/// Simulates a model in the world that the record saw, `count` times, and reads off the curves of each of its channels.
+/// Simulates a model in the world that the record saw, `count` times, with the record's own gaps: the readings of each
+/// channel of the model once, and the curves of each every time.
 ///
 /// # Errors
 /// Those of the simulation.
@@ -149,63 +151,29 @@ pub fn replicate(
     places: &Places<'_>,
     count: usize,
     seed: u64,
-) -> Result<Vec<Vec<Curves>>, model::simulate::SimulateError> {
-    let mut out = vec![Vec::with_capacity(count); model.channels.len()];
+) -> Result<(Vec<Vec<f64>>, Vec<Vec<Curves>>), SimulateError> {
+    let mut replicas = Replicas::new(model, record, model.rate_hz, &[])?;
+    let mut readings = vec![];
+    let mut curves = vec![Vec::with_capacity(count); model.channels.len()];
+    let mut once = vec![];
     for k in 0..count as u64 {
-        let simulated = one(model, record, seed.wrapping_add(k))?;
-        for (out, values) in out.iter_mut().zip(&simulated) {
-            out.push(places.curves(values));
-        }
-    }
-    Ok(out)
-}
-
-/// One replicate: the readings of each channel of the model, with the record's own gaps.
-///
-/// # Errors
-/// Those of the simulation.
-pub fn one(
-    model: &ModelFile,
-    record: &Record,
-    seed: u64,
-) -> Result<Vec<Vec<f64>>, model::simulate::SimulateError> {
-    let model = &stepless(model, record);
-    let simulated = model::simulate_in_the_world_of(model, record, model.rate_hz, seed)?;
-    let column = |name: &str| {
-        let mut values = simulated
-            .channel(name)
-            .map(|c| c.values.clone())
-            .unwrap_or_default();
-        // A model with lost frames gives fewer rows than the record has.
-        values.resize(record.len(), f64::NAN);
-        if let Some(measured) = record.channel(name) {
-            for (value, measured) in values.iter_mut().zip(&measured.values) {
+        replicas.draw(seed.wrapping_add(k), &mut readings);
+        for (channel, values) in model.channels.iter().zip(&mut readings) {
+            let measured = record.channel(&channel.name).map(|c| c.values.iter());
+            for (value, measured) in values.iter_mut().zip(measured.into_iter().flatten()) {
                 if !measured.is_finite() {
                     *value = f64::NAN;
                 }
             }
         }
-        values
-    };
-    Ok(model.channels.iter().map(|c| column(&c.name)).collect())
-}
-
-/// The simulation counts in steps, by default those of the stand's gyro. A record that names no step gets one that its
-/// largest reading fits into with room to spare, far below the noise of any gyro whose bias does not dwarf it.
-fn stepless(model: &ModelFile, record: &Record) -> ModelFile {
-    /// Half of the counts of the stand's gyro: 14 bits, both signs.
-    const COUNTS: f64 = 4096.0;
-    let mut model = model.clone();
-    for channel in model.channels.iter_mut().filter(|c| c.lsb.is_none()) {
-        let readings = record.channel(&channel.name).map(|c| c.values.iter());
-        let largest = readings
-            .into_iter()
-            .flatten()
-            .filter(|v| v.is_finite())
-            .fold(0.0, |far: f64, v| far.max(v.abs()));
-        channel.lsb = (largest > 0.0).then_some(largest / COUNTS);
+        for (curves, values) in curves.iter_mut().zip(&readings) {
+            curves.push(places.curves(values));
+        }
+        if k == 0 {
+            once.clone_from(&readings);
+        }
     }
-    model
+    Ok((once, curves))
 }
 
 /// Holds the measured curves against replicates.
@@ -287,7 +255,8 @@ mod tests {
                 let record = record(model, 1000 + seed);
                 let sampling = Sampling::of(&record, None).unwrap();
                 let places = Places::new(&sampling, record.len());
-                let replicates = replicate(&paper, &record, &places, 99, seed * 1000).unwrap();
+                let (_, replicates) =
+                    replicate(&paper, &record, &places, 99, seed * 1000).unwrap();
                 let measured = places.curves(&record.channel("gyro_x").unwrap().values);
                 *outcome += usize::from(against(&measured, &replicates[0]).adev_p <= 0.02);
             }

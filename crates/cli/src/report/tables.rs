@@ -55,6 +55,39 @@ pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
     }
 }
 
+/// The record among simulations of the model before and after.
+pub(super) fn replicates(subject: &Subject<'_>) -> Markup {
+    let all = &subject.diagnosed.diagnosis.replicates;
+    html! {
+        @if !all.is_empty() {
+            table {
+                thead {
+                    tr {
+                        th { "channel" }
+                        th { "chance before" }
+                        th { "chance after" }
+                        th { "where it strays farthest after" }
+                    }
+                }
+                tbody {
+                    @for (channel, r) in all {
+                        tr {
+                            td { code { (channel) } }
+                            td.number { (number(r.before.p_value, 2)) }
+                            td.number { (number(r.after.p_value, 2)) }
+                            td { (r.after.strays()) }
+                        }
+                    }
+                }
+            }
+            p {
+                "The chance that a record of the model strays as far from its simulations as this one, in any of its "
+                "statistics and channels. Up to 0.05 the model does not hold the record."
+            }
+        }
+    }
+}
+
 fn finding(found: &Finding) -> Markup {
     html! {
         article {
