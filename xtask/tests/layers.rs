@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The layers, each of which may use those before it.
-const LAYERS: [&str; 15] = [
+const LAYERS: [&str; 16] = [
     "numerics",
     "records",
     "noise",
@@ -20,6 +20,7 @@ const LAYERS: [&str; 15] = [
     "criticise",
     "attribute",
     "report",
+    "replicates",
     "pipeline",
 ];
 

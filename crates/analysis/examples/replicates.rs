@@ -7,8 +7,7 @@
 
 use std::time::Instant;
 
-use analysis::grid::lay_out;
-use analysis::replicates::{LEVEL, REPLICATES, judge};
+use analysis::replicates::{LEVEL, REPLICATES, judge_record};
 use analysis::{DiagnoseOptions, diagnose};
 use model::file::EffectModel;
 use model::record::Record;
@@ -76,8 +75,7 @@ fn chances(
     models: [&ModelFile; 2],
     seed: u64,
 ) -> Fallible<Vec<[(f64, String); 2]>> {
-    let grid = lay_out(record, &|_| vec![], seed)?;
-    let all = judge(&grid, models[0], models[1], REPLICATES, seed)?;
+    let all = judge_record(record, models, REPLICATES, seed)?;
     let pair = |r: analysis::result::Replicated| {
         [r.before, r.after].map(|a| (a.p_value, a.worst.statistic))
     };
@@ -259,9 +257,8 @@ fn speed() -> Fallible<()> {
             &[("slope", 0.2, "deg/s/degC")],
         );
         let record = model::simulate(&model, seconds, rate, 1)?;
-        let grid = lay_out(&record, &|_| vec![], 0)?;
         let start = Instant::now();
-        judge(&grid, &ModelFile::paper(), &model, REPLICATES, 0)?;
+        judge_record(&record, [&ModelFile::paper(), &model], REPLICATES, 0)?;
         println!(
             "{seconds} s at {rate} Hz: {:.2} s",
             start.elapsed().as_secs_f64()

@@ -1,5 +1,7 @@
 //! The diagnosis as it leaves the program: `imu-stand-diagnosis/1`.
 
+mod replicated;
+
 use model::effect::Parameters;
 use std::collections::BTreeMap;
 
@@ -8,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 pub use model::Parameter;
 
-pub use crate::replicates::{Among, Replicated, Worst};
+pub use replicated::{Among, LEVEL, Replicated, Worst};
 
 /// The `format` of a diagnosis.
 pub const DIAGNOSIS_FORMAT: &str = "imu-stand-diagnosis/1";

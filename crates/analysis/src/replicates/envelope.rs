@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::statistics::Statistic;
-use super::{Among, LEVEL, Worst};
+use crate::result::{Among, LEVEL, Worst};
 
 /// Statistics of the record and of the replicates of a model, the record first.
 pub(super) struct Table {

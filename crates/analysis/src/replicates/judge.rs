@@ -9,11 +9,13 @@ use model::simulate::{Replicas, SimulateError};
 use super::envelope::Table;
 use super::statistics::{Battery, Subject};
 use super::world::{Measured, Parts, bridge, in_steps, measured, record_of};
-use super::{Among, Replicated};
-use crate::grid::Grid;
+
+use crate::ingest::grid::{Grid, lay_out};
+use crate::records::error::AnalysisError;
+use crate::result::{Among, Replicated};
 
 /// A record on its grid, ready to be held against models.
-pub struct Judged<'a> {
+pub(crate) struct Judged<'a> {
     grid: &'a Grid,
     record: Record,
     parts: Parts,
@@ -23,7 +25,6 @@ pub struct Judged<'a> {
 
 impl<'a> Judged<'a> {
     /// With the baseline, by whose noise spectra are whitened.
-    #[must_use]
     pub fn new(grid: &'a Grid, baseline: &ModelFile) -> Self {
         let parts = Parts::of(grid.n, grid.rate_hz);
         let record = record_of(grid);
@@ -100,7 +101,7 @@ fn walk_over_white(channel: Option<&ChannelModel>, rate_hz: f64) -> f64 {
 ///
 /// # Errors
 /// Those of the simulation: a channel that it does not know.
-pub fn judge(
+pub(crate) fn judge(
     grid: &Grid,
     baseline: &ModelFile,
     extended: &ModelFile,
@@ -121,4 +122,19 @@ pub fn judge(
         .zip(both)
         .map(|(name, (before, after))| (name, Replicated { before, after }))
         .collect())
+}
+
+/// As [`judge`], of a record that is laid on its grid for that; of no channel where one is not known to the simulation.
+///
+/// # Errors
+/// Those of the grid: a record too short, without a rate or a gyro.
+pub fn judge_record(
+    record: &Record,
+    models: [&ModelFile; 2],
+    count: usize,
+    seed: u64,
+) -> Result<BTreeMap<String, Replicated>, AnalysisError> {
+    let grid = lay_out(record, &|_| vec![], seed)?;
+    let [baseline, extended] = models;
+    Ok(judge(&grid, baseline, extended, count, seed).unwrap_or_default())
 }

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{LEVEL, Replicated};
-use crate::result::{Check, Unexplained, Verdict};
+use crate::result::{Check, LEVEL, Replicated, Unexplained, Verdict};
 
 /// Id of the check, and of the entry where the replicates do not hold the record.
 const ID: &str = "replicates";

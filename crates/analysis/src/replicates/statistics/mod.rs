@@ -86,6 +86,7 @@ impl Battery {
         for (subject, of) in subjects.iter().zip(&of) {
             let from = statistics.len();
             let unit = subject.unit.as_str();
+            statistics.push(Statistic::new("mean", unit));
             statistics.push(Statistic::new("rms about the mean", unit));
             deviations.name(unit, &mut statistics);
             spectrum.name(unit, &mut statistics);
@@ -117,6 +118,7 @@ impl Battery {
             centred.clear();
             centred.extend(x.iter().map(|v| v - mean));
             let square = centred.iter().map(|v| v * v).sum::<f64>();
+            all.push(mean);
             all.push((square / x.len() as f64).sqrt());
             self.deviations.take(&centred, &mut all);
             self.spectrum.take(&whitened[k], &mut all);

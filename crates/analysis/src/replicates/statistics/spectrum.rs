@@ -5,9 +5,9 @@ use rustfft::num_complex::Complex;
 
 use super::deviations::short;
 use super::{Statistic, Subject};
-use crate::column::dot;
+use crate::numerics::column::dot;
+use crate::numerics::transform::{Dct, RealFft};
 use crate::replicates::world::Parts;
-use crate::transform::{Dct, RealFft};
 
 /// Bands in an octave, and fewest coefficients in one.
 const BANDS: i32 = 3;
