@@ -98,6 +98,7 @@ impl Spectrum {
                 unit,
             ));
         }
+        all.push(Statistic::new("amplitude of the strongest line", unit));
         for lag in 1..=LAGS {
             let plural = if lag > 1 { "s" } else { "" };
             all.push(Statistic::new(
@@ -113,9 +114,22 @@ impl Spectrum {
 
     pub fn take(&self, of: &Whitened, all: &mut Vec<f64>) {
         all.extend(of.bands.iter().map(|b| b.sqrt()));
+        all.push(self.strongest_line(of));
         let (single, largest) = self.correlations(of);
         all.extend(single);
         all.push(largest);
+    }
+
+    /// A tone has its energy, a quarter of N A^2 in each, in two neighbouring coefficients; below the random walk's corner it
+    /// is whitened with that.
+    fn strongest_line(&self, of: &Whitened) -> f64 {
+        let mut energies = vec![0.0; self.length];
+        for u in of.coefficients.chunks_exact(self.length) {
+            energies.iter_mut().zip(u).for_each(|(e, u)| *e += u * u);
+        }
+        let pairs = energies.windows(2).map(|e| e[0] + e[1]);
+        let most = pairs.fold(0.0, f64::max);
+        (2.0 * most / of.coefficients.len() as f64).sqrt()
     }
 
     /// Correlation of the whitened record with itself, mirrored at its ends, at the single lags, and the largest beyond.
