@@ -1,6 +1,6 @@
 //! Level and power of the test among replicates, and its time.
 //!
-//! `cargo run --release -p analysis --example replicates -- level|power|speed [records] [seed]`
+//! `cargo run --release -p analysis --example replicates -- level|power|speed [records] [seed] [name of a row]`
 //!
 //! Runs are simulated from random stands as in `closed_loop`, 600 s at 20 Hz, and held against models that are the true one,
 //! or that differ from it in one thing.
@@ -214,12 +214,15 @@ fn wrongs(model: &ModelFile) -> Vec<(&'static str, ModelFile, ModelFile)> {
 
 /// Share of records that the replicates of a wrong model do not hold, in any channel. Where the noise that a term adds would
 /// be seen in N, a diagnosis would have put it there: the model has the N of the record's white part all the same.
-fn power(records: u64, seed: u64) -> Fallible<()> {
+fn power(records: u64, seed: u64, only: Option<&String>) -> Fallible<()> {
     let names: Vec<_> = wrongs(&ModelFile::paper())
         .into_iter()
         .map(|w| w.0)
         .collect();
     for (which, name) in names.iter().enumerate() {
+        if only.is_some_and(|only| only != name) {
+            continue;
+        }
         let (mut wrong, mut fitted) = ([0, 0], [0, 0]);
         let mut channels = 0;
         let mut seen = std::collections::BTreeMap::<String, usize>::new();
@@ -277,7 +280,7 @@ fn main() -> Fallible<()> {
     };
     match arguments.first().map(String::as_str) {
         Some("level") => level(number(1, 200), number(2, 1)),
-        Some("power") => power(number(1, 20), number(2, 1)),
+        Some("power") => power(number(1, 20), number(2, 1), arguments.get(3)),
         Some("speed") => speed(),
         _ => Err("level, power or speed".into()),
     }
