@@ -157,7 +157,7 @@ mod tests {
             let x = f64::from(i) / 200.0;
             // The record is row 0: ordinary in the one statistic, far off in the other.
             vec![
-                (x * 37.0).fract(),
+                (x * 37.0 + 0.4).fract(),
                 if i == 0 {
                     9.0
                 } else {
