@@ -21,11 +21,11 @@ use crate::ingest::dead;
 use crate::ingest::grid::{Grid, Target, lay_out};
 use crate::records::error::AnalysisError;
 use crate::records::rows;
+use crate::replicates;
 use crate::report::findings::{
     blows, complete, joined, loud, motion_findings, scale_finding, term_findings, turning,
     variance_finding,
 };
-use crate::replicates;
 use crate::report::{detection_limits, figures};
 use crate::result::{
     Check, DIAGNOSIS_FORMAT, Diagnosed, Diagnosis, Finding, Input, NotTested, Parameter,
