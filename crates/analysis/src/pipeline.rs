@@ -34,7 +34,7 @@ use crate::result::{
 use crate::search::searched::Searched;
 use crate::search::{Search, impute};
 use crate::test_level;
-use crate::test_level::OMNIBUS_LEVEL;
+use crate::test_level::{CheckId, OMNIBUS_LEVEL, all_worded, worded};
 use crate::two_level::compare;
 
 /// Options of [`diagnose`].
@@ -98,6 +98,10 @@ fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisErro
     let (mended, sticking) = sign_bit::mend(&alive);
     let record = &*mended;
     let mut audited = audit(record);
+    audited.findings = all_worded(audited.findings);
+    audited.checks = all_worded(audited.checks);
+    audited.unexplained = all_worded(audited.unexplained);
+    audited.not_tested = all_worded(audited.not_tested);
     // Put right by the sign, but for the readings that lay beyond the bit.
     for f in &sticking {
         audited.put_right(f);
@@ -127,8 +131,8 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     } = of;
     let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();
     grid.dct.forget();
-    let mut findings = sticking;
-    findings.extend(masking::findings(&audited, &searched, &grid));
+    let mut findings = all_worded(sticking);
+    findings.extend(all_worded(masking::findings(&audited, &searched, &grid)));
     let mut findings = turning(findings, &grid);
     let mut scale_not_tested = vec![];
     let mut smallest = std::mem::take(&mut audited.limits);
@@ -137,8 +141,9 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         .flat_map(|s| std::mem::take(&mut s.checks))
         .collect();
     masking::suppress(&mut checks, &audited);
-    let shared = common(&searched, &grid);
-    checks.extend(couplings(&searched, &grid));
+    let mut shared = common(&searched, &grid);
+    shared.checks = all_worded(shared.checks);
+    checks.extend(all_worded(couplings(&searched, &grid)));
     let mut nearest = vec![];
     let mut doubts = vec![];
     for s in &searched {
@@ -146,18 +151,18 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
             let all = checks.iter().chain(&audited.checks);
             all.filter(|c| c.channel == s.target.name && c.fails_after)
         };
-        let failing = |id: &str| fails().any(|c| c.id == id);
+        let failing = |id: CheckId| fails().any(|c| c.id == id);
         let (moved, told) = motion_findings(s, &grid, &failing);
-        findings.extend(moved);
-        doubts.extend(told);
-        let of_terms = term_findings(s, &grid, options.seed);
+        findings.extend(all_worded(moved));
+        doubts.extend(all_worded(told));
+        let of_terms = all_worded(term_findings(s, &grid, options.seed));
         // What an axis takes from another one later has a spectrum, and is no process of its own.
         let late = shared.late.iter().filter(|l| l.0 == s.target.name);
-        let mut colours = fails().filter(|c| c.id == test_level::COLOUR);
+        let mut colours = fails().filter(|c| c.id == CheckId::ColourFollows);
         let left = withdraw::Left {
             late: late.map(|l| l.1).sum(),
             colour: colours.next().map_or(0.0, |c| c.statistic),
-            said: fails().map(|c| c.what.clone()).collect(),
+            about: fails().flat_map(|c| c.about.iter().cloned()).collect(),
         };
         // A bit that sticks makes a noise of its own, which depends on the level.
         let by_counts = s.variance.as_ref().is_some_and(|v| {
@@ -165,7 +170,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
             let ratio = more.map(|p| 1.0 + p.value);
             audited.explains_variance(&s.target.name, v.lr, v.threshold, ratio)
         });
-        let variance = variance_finding(s).filter(|_| !by_counts);
+        let variance = variance_finding(s).filter(|_| !by_counts).map(worded);
         let (kept, doubted, told) = withdraw::withdraw(s, of_terms, variance, &failing, &left);
         doubts.extend(withdraw::propagate::stale(s, &mut findings, &failing));
         doubts.extend(events::hold_outliers(s, &kept, &mut findings, &failing));
@@ -203,7 +208,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         let found = |s: &&Searched<'_>| {
             !s.state.terms.is_empty() || s.variance.is_some() || s.target.moving
         };
-        let tails = |c: &Check| c.id == "kurtosis" && c.channel == name && c.fails_after;
+        let tails = |c: &Check| c.id == CheckId::Kurtosis && c.channel == name && c.fails_after;
         let mut own = searched.iter().filter(|s| s.target.name == name);
         own.any(|s| found(&s)) && !checks.iter().any(tails)
     };
@@ -220,9 +225,10 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     smallest.extend(shared.limits);
     // What the audit could not ask a channel for has no smallest size there.
     smallest.retain(|l| {
-        let here = format!("{}: ", l.channel);
-        let of = |n: &NotTested| n.cause == l.cause && n.why.starts_with(&here);
-        !audited.not_tested.iter().any(of)
+        let not_asked = audited.not_asked.iter();
+        !not_asked
+            .into_iter()
+            .any(|(channel, cause)| *channel == l.channel && *cause == l.cause)
     });
     let findings = complete(joined(loud(blows(findings))));
     let mut not_tested = not_tested(&searched);
@@ -368,6 +374,10 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     };
     s.limits = detection_limits::of_channel(&s);
     s.laws = follower_shape::of_followers(&s.search, &s.state);
+    s.state.notes = all_worded(s.state.notes);
+    for (_, outcome) in &mut s.laws {
+        *outcome = worded(outcome.clone());
+    }
     s.search.panel.release(&s.state.columns());
     grid.dct.keep_no_more();
     if !target.moving {
@@ -388,13 +398,14 @@ fn channel_checks(s: &Searched<'_>, before: Vec<test_level::Outcome>) -> Vec<Che
     };
     // Before a process was named nothing was claimed of it.
     let claims = process::of_processes(&s.search, &s.state);
-    let mut rhythms = after.iter().filter(|c| c.id == test_level::RHYTHM);
+    let mut rhythms = after.iter().filter(|c| c.id == CheckId::VarianceRhythm);
     let stationary = rhythms.next().and_then(|r| process::stationary(s, r));
     let claims = claims.into_iter().chain(stationary);
     let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
     let laws = laws.chain(variance_law::claims(s));
     let claims = claims.chain(laws).map(|c| Check {
         id: c.id.into(),
+        about: c.about,
         channel: s.target.name.clone(),
         statistic: c.statistic,
         p_value: Some(c.p_value),
@@ -408,6 +419,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<test_level::Outcome>) -> Vec<Che
         .zip(after)
         .map(|(b, a)| Check {
             id: b.id.into(),
+            about: a.about,
             channel: s.target.name.clone(),
             statistic: b.statistic,
             p_value: Some(b.p_value),
@@ -424,6 +436,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<test_level::Outcome>) -> Vec<Che
         .chain(claims)
         .chain(short_time::checks(s))
         .chain(random_walk::check(s))
+        .map(worded)
         .collect()
 }
 
@@ -578,4 +591,59 @@ fn effects_of<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<EffectMode
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use model::docs::example;
+
+    use super::*;
+    use crate::test_level::rewording;
+
+    /// Everything but texts.
+    fn decided(d: Diagnosis) -> Diagnosis {
+        let none = String::new;
+        let mut d = d;
+        d.checks.iter_mut().for_each(|c| c.what = none());
+        d.findings.iter_mut().for_each(|f| f.what = none());
+        d.unexplained.iter_mut().for_each(|u| u.what = none());
+        d.not_tested.iter_mut().for_each(|n| n.why = none());
+        d.input.notes = vec![];
+        d
+    }
+
+    #[test]
+    fn no_verdict_hangs_on_the_wording_of_a_message() {
+        // Followers of channels, a process, noise by a channel, a fault of the counts: what the rules compare channels of.
+        let causes = [
+            "temperature",
+            "motor_noise",
+            "motor_bias",
+            "g_sensitivity",
+            "gauss_markov",
+            "coarse_lsb",
+            "common_noise",
+            "telegraph",
+        ];
+        for cause in causes {
+            let model = example(effect(cause).unwrap(), true);
+            let record = model::simulate(&model, 120.0, 20.0, 3).unwrap();
+            let told = || {
+                diagnose(&record, &DiagnoseOptions::default())
+                    .unwrap()
+                    .diagnosis
+            };
+            let reworded = rewording::during(told);
+            let plain = told();
+            let texts = |d: &Diagnosis| -> Vec<String> {
+                d.checks.iter().map(|c| c.what.clone()).collect()
+            };
+            assert_ne!(
+                texts(&plain),
+                texts(&reworded),
+                "{cause}: no text was replaced"
+            );
+            assert_eq!(decided(plain), decided(reworded), "{cause}");
+        }
+    }
 }

@@ -46,6 +46,9 @@ pub struct Check {
     pub p_value: Option<f64>,
     /// The statistic, or for a `p_value` the chance, beyond which the check fails.
     pub threshold: f64,
+    /// Names of the recorded channels that it is about beside its own: for rules, and in no file.
+    #[serde(skip)]
+    pub about: Vec<String>,
     /// Whether the baseline model fails it.
     pub fails_before: bool,
     /// Whether the extended model still fails it.

@@ -21,7 +21,7 @@ use crate::ingest::base_turns::Excursion;
 use crate::numerics::tails;
 use crate::result::{Finding, Parameter, Unexplained};
 use crate::search::searched::Searched;
-use crate::test_level;
+use crate::test_level::CheckId;
 
 /// Chance below which a claim fails, over everything that it is asked for. It is asked only where an event is named.
 const LEAST_CHANCE: f64 = 1e-3;
@@ -41,15 +41,15 @@ const FAULT: f64 = 1000.0;
 /// Part of the readings whose excesses tell how the tail of the noise goes on.
 const TAIL: f64 = 0.01;
 /// Checks of the law of the noise: where one fails, wild readings have to stand clear of the tail that there is.
-const LAWS: [&str; 8] = [
-    "skewness",
-    "bicovariance",
-    "three_readings",
-    "neighbours",
-    "variance_rhythm",
-    "variance_in_time",
-    "time_frequency",
-    test_level::VARIANCE_CLAIM,
+const LAWS: [CheckId; 8] = [
+    CheckId::Skewness,
+    CheckId::Bicovariance,
+    CheckId::ThreeReadings,
+    CheckId::Neighbours,
+    CheckId::VarianceRhythm,
+    CheckId::VarianceInTime,
+    CheckId::TimeFrequency,
+    CheckId::VarianceLaw,
 ];
 /// Half cycles of the fastest part of a turn of the base: twice as many as its shape has.
 const FASTEST: f64 = 6.0;
@@ -240,7 +240,7 @@ pub(crate) fn hold_outliers(
     s: &Searched<'_>,
     kept: &[Finding],
     findings: &mut Vec<Finding>,
-    failing: &dyn Fn(&str) -> bool,
+    failing: &dyn Fn(CheckId) -> bool,
 ) -> Vec<Unexplained> {
     // Far readings at a step are told with it.
     let blow = |f: &Finding| kept.iter().filter_map(step_at).any(|at| blow_of(f, at));
@@ -272,13 +272,13 @@ fn outliers(
     s: &Searched<'_>,
     e: &[f64],
     finding: Finding,
-    failing: &dyn Fn(&str) -> bool,
+    failing: &dyn Fn(CheckId) -> bool,
 ) -> (Option<Finding>, Option<Unexplained>) {
     let told = |why: &str, what: &str| Unexplained {
         channel: s.target.name.clone(),
         what: format!("{why}: {what}"),
     };
-    if failing("kurtosis") {
+    if failing(CheckId::Kurtosis) {
         // Single far readings of a noise whose bulk is not normal are its tails.
         return (None, Some(told("noise with tails", &finding.what)));
     }
@@ -331,7 +331,7 @@ fn unlike(
     s: &Searched<'_>,
     e: &[f64],
     wild: &[Wild],
-    failing: &dyn Fn(&str) -> bool,
+    failing: &dyn Fn(CheckId) -> bool,
 ) -> (Vec<Wild>, Option<String>) {
     if wild.is_empty() {
         return (vec![], None);
@@ -361,7 +361,7 @@ fn unlike(
         let why = format!("no readings that come by themselves, for they lie where {what}");
         return (wild.to_vec(), Some(why));
     }
-    if LAWS.iter().any(|id| failing(id)) {
+    if LAWS.into_iter().any(failing) {
         let beyond = carried_on(&residual, wild);
         let tail = |w: &&Wild| beyond(w.size.abs()) > LEAST_CHANCE;
         let apart: Vec<Wild> = wild.iter().filter(tail).copied().collect();
@@ -375,7 +375,7 @@ fn unlike(
 pub(crate) fn no_turn(
     s: &Searched<'_>,
     turn: &Excursion,
-    failing: &dyn Fn(&str) -> bool,
+    failing: &dyn Fn(CheckId) -> bool,
 ) -> Option<&'static str> {
     let around = turn.with_margin(s.e.len());
     let residual = Residual::new(s, &s.e, 0);
@@ -393,14 +393,18 @@ pub(crate) fn no_turn(
         return Some("the level is another one after it");
     }
     let fastest = (FASTEST / turn.samples.len().max(1) as f64).min(1.0);
-    let wandering = ["process_law", "process_levels", "process_steadiness"];
+    let wandering = [
+        CheckId::ProcessLaw,
+        CheckId::ProcessLevels,
+        CheckId::ProcessSteadiness,
+    ];
     let notes = s.state.notes.iter().any(|note| match note.at {
         None => true,
         Some((from, _)) => from / PI < fastest,
     });
     let mut left = residual::failing_bands(&s.u).chain(residual::unsteady(&s.e));
     let has_its_like =
-        notes || wandering.iter().any(|id| failing(id)) || left.any(|p| p.from < fastest);
+        notes || wandering.into_iter().any(failing) || left.any(|p| p.from < fastest);
     has_its_like.then_some("it has its like in what is left")
 }
 

@@ -20,8 +20,9 @@ use crate::fit::channel;
 use crate::fit::channel::{Form, PowerLawFound, Term};
 use crate::result::{Finding, Unexplained};
 use crate::search::searched::Searched;
-use crate::test_level::{OMNIBUS_LEVEL, Outcome};
+use crate::test_level::{CheckId, OMNIBUS_LEVEL, Outcome};
 use crate::{features, test_level};
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 use propagate::Kin;
@@ -114,27 +115,31 @@ fn generic(t: &Term) -> bool {
 
 /// Chi-square by which a channel is not of linear, normal noise. A stationary process of the library is nothing else; far
 /// readings beside it make heavy tails, but no light ones.
-fn bent(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool) -> f64 {
+fn bent(s: &Searched<'_>, failing: &dyn Fn(CheckId) -> bool) -> f64 {
     let (e, rate_hz) = (&s.e, s.search.view.rate_hz);
     let n = e.len() as f64;
     // Variances of skewness and kurtosis of n normal values.
     let skewness = || n / 6.0 * residual::skewness_of(e).powi(2);
     let lightness = || n / 24.0 * residual::excess_kurtosis(e).min(0.0).powi(2);
-    let all: [(&str, &dyn Fn() -> f64); 8] = [
-        ("slew", &|| f64::INFINITY),
-        ("repeated_readings", &|| f64::INFINITY),
-        ("skewness", &skewness),
-        ("kurtosis", &lightness),
-        ("bicovariance", &|| residual::bicovariance(e).statistic),
-        ("three_readings", &|| residual::three_readings(e).statistic),
-        ("neighbours", &|| {
+    let all: [(CheckId, &dyn Fn() -> f64); 8] = [
+        (CheckId::Slew, &|| f64::INFINITY),
+        (CheckId::RepeatedReadings, &|| f64::INFINITY),
+        (CheckId::Skewness, &skewness),
+        (CheckId::Kurtosis, &lightness),
+        (CheckId::Bicovariance, &|| {
+            residual::bicovariance(e).statistic
+        }),
+        (CheckId::ThreeReadings, &|| {
+            residual::three_readings(e).statistic
+        }),
+        (CheckId::Neighbours, &|| {
             residual::neighbours(e, s.step()).statistic
         }),
-        ("variance_rhythm", &|| {
+        (CheckId::VarianceRhythm, &|| {
             residual::variance_rhythm(e, rate_hz).statistic
         }),
     ];
-    let failed = all.iter().filter(|(id, _)| failing(id));
+    let failed = all.iter().filter(|(id, _)| failing(*id));
     failed.map(|(_, chi_square)| chi_square()).sum()
 }
 
@@ -165,7 +170,7 @@ fn swings_as(s: &Searched<'_>, t: &Term) -> Option<String> {
 }
 
 /// For each term of a channel, whether the checks doubt it; and whether they doubt the law of its variance.
-fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Vec<Doubt>, bool) {
+fn doubted(s: &Searched<'_>, failing: &dyn Fn(CheckId) -> bool, left: &Left) -> (Vec<Doubt>, bool) {
     let panel = &s.search.panel;
     let g = s.state.noise.over(&panel.bins);
     let n = panel.bins.n as f64;
@@ -215,7 +220,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
             && places.iter().map(left).sum::<f64>() > LEFT * lr
     };
     let crowd = s.state.notes.iter().any(|note| note.at.is_none());
-    let correlated = failing("ljung_box");
+    let correlated = failing(CheckId::LjungBox);
     let repeats = residual::repeats(&s.e).filter(|r| r.chance < OMNIBUS_LEVEL);
     // A harmonic of what repeats itself, to a coefficient.
     let harmonic = |omega: f64| {
@@ -223,17 +228,17 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
         let apart = |r| (tooth(r) - tooth(r).round()).abs() * 2.0 * n / r.period as f64;
         repeats.as_ref().is_some_and(|r| apart(r) < 1.0)
     };
-    let miscoded = failing("fine_codes") || failing("foretold");
-    let followed_by_noise = test_level::IDS.iter().any(|id| failing(id));
+    let miscoded = failing(CheckId::FineCodes) || failing(CheckId::Foretold);
+    let followed_by_noise = CheckId::OF_SHORT_TIME.into_iter().any(failing);
     // Of a longer record what is left counts by what one of that length would show.
     let shown = (test_level::RECORD / n).min(1.0);
     // Where the energy of a band follows what moves, a process may still hold that makes far more than that.
     let knows = |t: &Term| {
-        failing(test_level::ORDER)
-            || failing(test_level::LEANING)
+        failing(CheckId::Order)
+            || failing(CheckId::Leaning)
             || left.colour * shown > REMAINDER * t.lr
     };
-    let unlike = test_level::CLAIMS.iter().any(|c| failing(c));
+    let unlike = CheckId::OF_PROCESS.into_iter().any(failing);
     // Beside a wander that is not the process it was told as, a step is as likely a piece of that.
     let unlike_step = |t: &Term| unlike && matches!(t.form, Form::Step(..));
     let by_power_law = |filter: bool| s.state.power_law.is_some_and(|p| p.filter || !filter);
@@ -273,7 +278,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
         let beside = |o: &Term| {
             o.effect.id() == channel::ID
                 && o.lr > test_level::DEPARTURE * t.lr
-                && features::source(&s.search.view, o) == signal
+                && features::source(o) == signal
         };
         signal.is_some() && (s.laws.iter().any(failed) || s.state.terms.iter().any(beside))
     };
@@ -302,7 +307,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
                 };
                 within(&crowds, omega)
                     || harmonic(omega)
-                    || failing(test_level::ORDER)
+                    || failing(CheckId::Order)
                     || 2.0 * about.max(beside) > LEFT * t.lr
             } else if let Form::Covariance(process, theta) = &t.form {
                 let own = process.density(theta, &panel.bins.at);
@@ -311,7 +316,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
                 let filter = process.filters_white();
                 by_power_law(filter)
                     || knows(t)
-                    || failing(test_level::STATIONARY_CLAIM)
+                    || failing(CheckId::ProcessRhythm)
                     || unlike && !filter
                     || repeats.is_some()
                     || bent > LEFT * t.lr
@@ -343,13 +348,13 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
             }
         })
         .collect();
-    let mut variance = failing("variance_in_time")
-        || failing(test_level::VARIANCE_CLAIM)
+    let mut variance = failing(CheckId::VarianceInTime)
+        || failing(CheckId::VarianceLaw)
         || followed_by_noise
-        || failing("kurtosis")
+        || failing(CheckId::Kurtosis)
         || crowd
         || if places.is_empty() {
-            correlated || failing("time_frequency")
+            correlated || failing(CheckId::TimeFrequency)
         } else {
             !everywhere(s, &|k| within(&places, k as f64 * PI / n))
         };
@@ -357,9 +362,9 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
         s,
         g: &g,
         counts: &counts,
-        said: &left.said,
-        variance: (failing(test_level::VARIANCE_CLAIM), variance),
-        felt: failing("variance_follows"),
+        about: &left.about,
+        variance: (failing(CheckId::VarianceLaw), variance),
+        felt: failing(CheckId::VarianceFollows),
         bent,
         again: repeats.is_some(),
     };
@@ -396,8 +401,8 @@ pub(crate) struct Left {
     pub late: f64,
     /// The same of the energies that follow something recorded, where they do.
     pub colour: f64,
-    /// What the checks say that fail.
-    pub said: Vec<String>,
+    /// Recorded channels that the checks are about that fail.
+    pub about: BTreeSet<String>,
 }
 
 /// What the library comes nearest to a channel with.
@@ -414,7 +419,7 @@ pub(crate) fn withdraw(
     s: &Searched<'_>,
     of_terms: Vec<Finding>,
     of_variance: Option<Finding>,
-    failing: &dyn Fn(&str) -> bool,
+    failing: &dyn Fn(CheckId) -> bool,
     left: &Left,
 ) -> (Vec<Finding>, Vec<Finding>, Vec<Unexplained>) {
     let (terms, variance) = doubted(s, failing, left);

@@ -19,6 +19,7 @@ use crate::audit::local::{Levels, Local};
 use crate::numerics::tails;
 use crate::numerics::tails::ONE_SIDED;
 use crate::result::{Alternative, Finding, Unexplained};
+use crate::test_level::{AUDIT_LEVEL, CheckId};
 
 /// Most low bits that are looked at.
 const BITS: u32 = 8;
@@ -63,7 +64,7 @@ fn coarse(counts: &[i32], known: &[bool]) -> Option<Coarse> {
         let even = changes.iter().filter(|e| **e).count() as u64;
         let trials = changes.len() as u64;
         if (even as f64) < ON_GRID * trials as f64
-            || tails::hits_at_least(even, trials, 0.5) > super::FALSE_ALARM
+            || tails::hits_at_least(even, trials, 0.5) > AUDIT_LEVEL
         {
             break;
         }
@@ -183,7 +184,13 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
             1 << c.bits,
             c.changes
         );
-        audit.check("low_bits", name, f64::from(c.bits), chance, what.clone());
+        audit.check(
+            CheckId::LowBits,
+            name,
+            f64::from(c.bits),
+            chance,
+            what.clone(),
+        );
         // One bit at 1 throughout is no grid that a converter makes.
         let sticks = c.bits == 1 && c.residue == 1;
         let mut finding = Finding {
@@ -229,9 +236,10 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
         .filter_map(|b| share(ones(b), &levels, b, sigma))
         .collect();
     let Some(worst) = tested.iter().max_by(|a, b| a.z.abs().total_cmp(&b.z.abs())) else {
-        audit.untested(
+        audit.untested_on(
+            name,
             "stuck_bit",
-            &format!("{name}: the noise is less than a count, so the level alone decides the bits"),
+            "the noise is less than a count, so the level alone decides the bits",
         );
         return Shape::Unknown;
     };
@@ -246,7 +254,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
         worst.value,
         worst.z.abs()
     );
-    let alarmed = audit.check("bit_share", name, worst.z, chance, what);
+    let alarmed = audit.check(CheckId::BitShare, name, worst.z, chance, what);
     let own = counts.iter().zip(&known).filter(|(_, k)| **k);
     let codes: Vec<i32> = own.map(|(c, _)| *c).collect();
     match stuck::judge(&codes, sigma, BITS, alarmed) {

@@ -13,9 +13,9 @@ use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
 use super::rounding::in_steps;
-use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS};
+use super::{Audit, Gyro, LEAST_READINGS};
 use crate::numerics::tails;
-use crate::test_level::{MOST, RECORD};
+use crate::test_level::{AUDIT_LEVEL, CheckId, MOST, RECORD};
 
 /// Residues of a code that are told apart.
 const CODES: usize = 32;
@@ -171,14 +171,16 @@ impl Table {
     }
 }
 
-pub(super) fn audit(gyros: &[Gyro<'_>], audit: &mut Audit) {
-    let all: Vec<Codes<'_>> = gyros.iter().filter_map(|g| Codes::of(g, audit)).collect();
+pub(super) fn audit<'a>(gyros: &'a [Gyro<'a>], audit: &mut Audit) {
+    let all: Vec<Codes<'a>> = gyros.iter().filter_map(|g| Codes::of(g, audit)).collect();
     let fft = FftPlanner::new().plan_fft_forward(CODES);
     for (i, own) in all.iter().enumerate() {
-        let mut found: Vec<(Common, String)> = vec![];
-        let mut ask = |first: &Codes<'_>, lag: usize, distinct: bool, of: String| {
+        // What is common, the other channel, and in words.
+        let mut found: Vec<(Common, Option<&str>, String)> = vec![];
+        let mut ask = |first: &Codes<'a>, lag: usize, distinct: bool, of: String| {
             let table = Table::new(first, own, lag);
-            found.extend(table.common(fft.as_ref(), distinct).map(|c| (c, of)));
+            let other = Some(first.name).filter(|name| *name != own.name);
+            found.extend(table.common(fft.as_ref(), distinct).map(|c| (c, other, of)));
         };
         for lag in LAGS {
             ask(own, lag, own.repeats, format!("its own {lag} before"));
@@ -203,7 +205,7 @@ pub(super) fn audit(gyros: &[Gyro<'_>], audit: &mut Audit) {
         let most = found
             .into_iter()
             .min_by(|a, b| a.0.chance.total_cmp(&b.0.chance));
-        let Some((common, of)) = most else {
+        let Some((common, other, of)) = most else {
             continue;
         };
         let [first, second] = common.periods;
@@ -212,14 +214,10 @@ pub(super) fn audit(gyros: &[Gyro<'_>], audit: &mut Audit) {
             own.name
         );
         let chance = (looks * common.chance).min(1.0);
-        if audit.check(
-            "fine_codes",
-            own.name,
-            common.statistic,
-            chance,
-            what.clone(),
-        ) && chance < FALSE_ALARM
-        {
+        let id = CheckId::FineCodes;
+        let fails = audit.check(id, own.name, common.statistic, chance, what.clone());
+        audit.about(other.as_slice());
+        if fails && chance < AUDIT_LEVEL {
             audit.unexplain(own.name, what);
         }
     }

@@ -11,6 +11,7 @@ use model::record::{Channel, Quantity, Record, flag};
 use super::repeats::{agreement, equal};
 use super::{Audit, LEAST_READINGS, counted};
 use crate::numerics::series::smallest_step;
+use crate::test_level::CheckId;
 
 /// Largest share of agreeing neighbours with which a reading that stands still says anything.
 const MOST_AGREEING: f64 = 0.5;
@@ -108,7 +109,13 @@ pub(super) fn audit(all: &[Still], at: &[f64], audit: &mut Audit) {
         );
         let chance = if still.rows.is_empty() { 1.0 } else { CHANCE };
         let longest = still.longest as f64;
-        if audit.check("frozen_readings", &still.channel, longest, chance, what) {
+        if audit.check(
+            CheckId::FrozenReadings,
+            &still.channel,
+            longest,
+            chance,
+            what,
+        ) {
             match told.iter_mut().find(|(first, _)| together(first, still)) {
                 Some((_, names)) => names.push(still.channel.clone()),
                 None => told.push((still, vec![still.channel.clone()])),

@@ -8,10 +8,11 @@ use std::collections::BTreeMap;
 
 use model::record::Record;
 
-use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS};
+use super::{Audit, Gyro, LEAST_READINGS};
 use crate::numerics::order_statistics::robust_sigma;
 use crate::numerics::tails;
 use crate::result::Unexplained;
+use crate::test_level::{AUDIT_LEVEL, CheckId};
 
 /// Spread of the differences, counts, below which their distribution is not smooth.
 const LEAST_SPREAD: f64 = 2.0;
@@ -145,7 +146,7 @@ fn longest(x: &[i32], y: &[i32]) -> Option<Run> {
     let most = runs.first()?.0;
     let ln_chance = |length: usize, share: f64| length as f64 * (NARROWER * share).min(1.0).ln();
     let own = largest_share(&[x]).max(largest_share(&[y]));
-    if ln_chance(most, own) > (FALSE_ALARM / d.len() as f64).ln() {
+    if ln_chance(most, own) > (AUDIT_LEVEL / d.len() as f64).ln() {
         return None;
     }
     let weighed = runs.into_iter().take(MOST_RUNS).map(|(length, first)| {
@@ -232,13 +233,10 @@ fn stretch(a: &Gyro<'_>, b: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     };
     let looks = (BEHIND.len() * rows.len()) as f64;
     let chance = (looks * run.ln_chance.exp()).min(1.0);
-    if audit.check(
-        "copied_stretch",
-        name,
-        run.length as f64,
-        chance,
-        what.clone(),
-    ) {
+    let length = run.length as f64;
+    let fails = audit.check(CheckId::CopiedStretch, name, length, chance, what.clone());
+    audit.about(&[first, second]);
+    if fails {
         audit.unexplain(name, what);
         // Where it is not known which is the copy, neither is.
         for (own, held) in [(first, &of_a), (second, &of_b)] {
@@ -280,7 +278,9 @@ fn pair(a: &Gyro<'_>, b: &Gyro<'_>, audit: &mut Audit) {
             "{same} frames hold one reading as {first} and as {second}, {expected:.0} are expected: one holds the other's"
         )
     };
-    if audit.check("equal_readings", second, same, chance, what.clone()) && chance < FALSE_ALARM {
+    let fails = audit.check(CheckId::EqualReadings, second, same, chance, what.clone());
+    audit.about(&[first, second]);
+    if fails && chance < AUDIT_LEVEL {
         let copies: Vec<usize> = rows
             .into_iter()
             .zip(&d)

@@ -5,6 +5,7 @@ use model::record::{Axis, Record, flag};
 use super::{Audit, Gyro, counted};
 use crate::numerics::order_statistics::{median, width};
 use crate::result::Unexplained;
+use crate::test_level::CheckId;
 
 /// Frames before and after a leap of the time that say whether it lasts.
 const AROUND: usize = 20;
@@ -118,7 +119,13 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         lost - with_gaps
     );
     audit.smallest("dropped_samples", "record", "count", 1.0, "1");
-    let fails = audit.limit("dropped_samples", "record", lost as f64, 0.0, what.clone());
+    let fails = audit.limit(
+        CheckId::DroppedSamples,
+        "record",
+        lost as f64,
+        0.0,
+        what.clone(),
+    );
     if fails && !names.is_empty() {
         events.sort_unstable();
         let times: Vec<f64> = events.iter().map(|e| at[e.0 - 1]).collect();
@@ -147,7 +154,7 @@ fn flags(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
             .filter(|i| flags[*i] & bit(flag::NEW_DATA_X, axis) == 0)
             .collect();
         let what = format!("{} readings of {name} are flagged as not new", old.len());
-        audit.limit("new_data_flag", name, old.len() as f64, 0.0, what);
+        audit.limit(CheckId::NewDataFlag, name, old.len() as f64, 0.0, what);
         old.iter().for_each(|i| audit.mask(name, *i));
         all.push((name, old));
         let alarms: Vec<usize> = (0..flags.len())
@@ -158,7 +165,13 @@ fn flags(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
             alarms.len(),
             alarms.first().map_or(0.0, |i| at[*i])
         );
-        if audit.limit("error_alarm", name, alarms.len() as f64, 0.0, what.clone()) {
+        if audit.limit(
+            CheckId::ErrorAlarm,
+            name,
+            alarms.len() as f64,
+            0.0,
+            what.clone(),
+        ) {
             if let Some(c) = audit.checks.last_mut() {
                 c.fails_after = true;
             }

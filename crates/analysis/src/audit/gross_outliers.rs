@@ -9,6 +9,7 @@ use model::record::{Channel, Quantity, Record};
 
 use super::{Audit, LEAST_READINGS, counted};
 use crate::numerics::order_statistics::{median, width};
+use crate::test_level::CheckId;
 
 /// Share of the readings on either side that such readings are at most.
 const SHARE: f64 = 0.002;
@@ -71,7 +72,7 @@ pub(super) fn audit(all: &[Wild], record: &Record, at: &[f64], audit: &mut Audit
             farthest.unwrap_or(f64::NAN),
             channel.unit
         );
-        audit.limit("wild_readings", name, count, 0.0, what.clone());
+        audit.limit(CheckId::WildReadings, name, count, 0.0, what.clone());
         let times: Vec<f64> = wild.rows.iter().map(|i| at[*i]).collect();
         let names = vec![name.to_owned()];
         let finding = counted("outliers", names, count, None, &times, what);

@@ -15,6 +15,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::rounding::in_steps;
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::numerics::tails;
+use crate::test_level::CheckId;
 
 /// Orders of the differences: a line leaves no second one, a cubic no fourth one.
 const ORDERS: [usize; 2] = [2, 4];
@@ -320,7 +321,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         found.expected,
     );
     let fails = audit.check(
-        "foretold",
+        CheckId::Foretold,
         name,
         found.counted as f64,
         found.chance,

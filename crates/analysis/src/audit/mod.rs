@@ -2,7 +2,7 @@
 //!
 //! Each audit takes the record alone. It needs no fit, so it also works where the base moves or the noise is not what
 //! the model says: every reading is held against its own neighbourhood ([`local`]). Chances are those of one channel
-//! and one audit; [`FALSE_ALARM`] is what each may spend.
+//! and one audit; [`AUDIT_LEVEL`] is what each may spend.
 
 mod bits;
 mod code_dependence;
@@ -28,11 +28,8 @@ use std::collections::BTreeMap;
 use model::record::{Channel, Quantity, Record};
 
 use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter, Unexplained};
-use crate::test_level;
+use crate::test_level::{AUDIT_LEVEL, CheckId};
 use local::Local;
-
-/// Chance of a false alarm of one audit on one channel.
-pub const FALSE_ALARM: f64 = 2e-5;
 
 /// Steps of a converter that lacks a bit, over the noise, up to which the variance of readings is the same at any level: to
 /// 5e-4 at this width, by the first harmonic of a rounded normal variable.
@@ -66,6 +63,8 @@ pub struct Audit {
     pub checks: Vec<Check>,
     /// Audits that could not be made.
     pub not_tested: Vec<NotTested>,
+    /// Causes that one channel could not be asked for: channel, cause.
+    pub not_asked: Vec<(String, String)>,
     /// What is wrong and has no name in the library.
     pub unexplained: Vec<Unexplained>,
     /// Channels whose counts are not normal about their level; a noise that changes makes them so as well.
@@ -122,8 +121,8 @@ impl Audit {
                 "three_readings",
                 "neighbours",
                 "variance_rhythm",
-                test_level::COLOUR,
-                test_level::LEANING,
+                CheckId::ColourFollows.as_str(),
+                CheckId::Leaning.as_str(),
             ],
             channel,
             by,
@@ -141,7 +140,7 @@ impl Audit {
                 "bicovariance",
                 "three_readings",
                 "neighbours",
-                test_level::LEANING,
+                CheckId::Leaning.as_str(),
             ];
             self.suppress(&ids, channel, by);
             return;
@@ -149,10 +148,11 @@ impl Audit {
         self.converter_at_fault(channel, by);
         self.suppress(&["spikes"], channel, by);
         for cause in ["noise_change", "motor_noise"] {
-            self.untested(
-                cause,
-                &format!("{channel}: with the bit that is missing it steps by {:.1} sigma, so the size of its noise hangs on the level: mend the converter first", step / sigma),
+            let why = format!(
+                "with the bit that is missing it steps by {:.1} sigma, so the size of its noise hangs on the level: mend the converter first",
+                step / sigma
             );
+            self.untested_on(channel, cause, &why);
         }
     }
 
@@ -207,24 +207,32 @@ impl Audit {
 
     fn check(
         &mut self,
-        id: &str,
+        id: CheckId,
         channel: &str,
         statistic: f64,
         p_value: f64,
         what: String,
     ) -> bool {
-        let fails = p_value < FALSE_ALARM;
+        let fails = p_value < AUDIT_LEVEL;
         self.checks.push(Check {
             id: id.into(),
+            about: vec![],
             channel: channel.into(),
             statistic,
             p_value: Some(p_value),
-            threshold: FALSE_ALARM,
+            threshold: AUDIT_LEVEL,
             fails_before: fails,
             fails_after: false,
             what,
         });
         fails
+    }
+
+    /// The last check is about other channels, too.
+    fn about(&mut self, channels: &[&str]) {
+        if let Some(check) = self.checks.last_mut() {
+            check.about = channels.iter().map(|c| (*c).to_owned()).collect();
+        }
     }
 
     /// What the last check has found has no name in the library.
@@ -239,10 +247,18 @@ impl Audit {
     }
 
     /// A check against a plain limit.
-    fn limit(&mut self, id: &str, channel: &str, statistic: f64, limit: f64, what: String) -> bool {
+    fn limit(
+        &mut self,
+        id: CheckId,
+        channel: &str,
+        statistic: f64,
+        limit: f64,
+        what: String,
+    ) -> bool {
         let fails = statistic > limit;
         self.checks.push(Check {
             id: id.into(),
+            about: vec![],
             channel: channel.into(),
             statistic,
             p_value: None,
@@ -264,6 +280,12 @@ impl Audit {
             unit: unit.into(),
             ..DetectionLimit::default()
         });
+    }
+
+    /// An audit that one channel does not allow.
+    fn untested_on(&mut self, channel: &str, cause: &str, why: &str) {
+        self.not_asked.push((channel.to_owned(), cause.to_owned()));
+        self.untested(cause, &format!("{channel}: {why}"));
     }
 
     fn untested(&mut self, cause: &str, why: &str) {

@@ -4,10 +4,11 @@
 //! with the chance of a false alarm. It does not need to know the noise; the whitened residual of the search sees a
 //! little farther where the base is at rest.
 
-use super::{Audit, FALSE_ALARM, Gyro, counted};
+use super::{Audit, Gyro, counted};
 use crate::numerics::tails;
 use crate::numerics::tails::ONE_SIDED;
 use crate::result::Finding;
+use crate::test_level::{AUDIT_LEVEL, CheckId};
 
 /// Two farther than this apart are single ones.
 const ALONE: usize = 2;
@@ -30,7 +31,7 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     if n < super::LEAST_READINGS || local.sigma <= 0.0 {
         return;
     }
-    let limit = tails::farthest(n, FALSE_ALARM) * if local.bent { MOVING } else { 1.0 };
+    let limit = tails::farthest(n, AUDIT_LEVEL) * if local.bent { MOVING } else { 1.0 };
     let unit = g
         .of_readings
         .as_ref()
@@ -69,7 +70,7 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
         "{} readings of {name} lie more than {limit:.1} sigma from their neighbours, the farthest {most:.1}",
         single.len()
     );
-    let fails = audit.check("outliers", name, most, chance, what.clone());
+    let fails = audit.check(CheckId::Outliers, name, most, chance, what.clone());
     // A base that is knocked, or noise with heavy tails, makes runs and crowds, no single readings.
     if !fails || single.is_empty() || audit.is_suppressed("outliers", name) {
         return;

@@ -3,6 +3,7 @@
 //! Of any noise, larger changes from one reading to the next are rarer than smaller ones. Where they end in a pile, something
 //! holds them back.
 
+use crate::test_level::CheckId;
 use std::collections::BTreeMap;
 
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -69,7 +70,7 @@ pub(super) fn audit(gyro: &Gyro<'_>, audit: &mut Audit) {
         size - next
     );
     let chance = (LARGEST as f64 * chance).min(1.0);
-    let fails = audit.check("slew", name, pile as f64, chance, what.clone());
+    let fails = audit.check(CheckId::Slew, name, pile as f64, chance, what.clone());
     if fails && pile >= LEAST_PILE {
         audit.unexplain(name, what);
     }

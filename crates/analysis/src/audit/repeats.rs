@@ -9,12 +9,13 @@ use std::f64::consts::SQRT_2;
 
 use model::record::Record;
 
-use super::{Audit, FALSE_ALARM, Gyro, LEAST_READINGS, counted};
+use super::{Audit, Gyro, LEAST_READINGS, counted};
 use crate::fit::likelihood::invert;
 use crate::numerics::order_statistics::robust_sigma;
 use crate::numerics::series::smallest_step;
 use crate::numerics::tails;
 use crate::numerics::tails::{ONE_SIDED, chi_tail};
+use crate::test_level::{AUDIT_LEVEL, CheckId};
 
 /// Distances of the pairs that tell the chance of agreement.
 const LAGS: std::ops::RangeInclusive<usize> = 20..=25;
@@ -368,7 +369,7 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
     if columns.len() > 1 {
         let mean = expected * (1.0 + 3.0 * doubt);
         let mut counts = mean as u64..rows as u64;
-        if let Some(enough) = counts.find(|k| tails::at_least(*k, mean) < FALSE_ALARM) {
+        if let Some(enough) = counts.find(|k| tails::at_least(*k, mean) < AUDIT_LEVEL) {
             let by_chance = (expected - ONE_SIDED * expected.sqrt()).max(0.0);
             let planted = (enough as f64 - by_chance).ceil();
             for name in &names {
@@ -381,7 +382,7 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         names.join(", ")
     );
     if audit.check(
-        "repeated_frames",
+        CheckId::RepeatedFrames,
         "record",
         observed as f64,
         chance,
@@ -428,19 +429,19 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         );
         let excess = own.len() as f64 - expected;
         if columns.len() == 1 {
-            let reach = tails::farthest(1, 2.0 * FALSE_ALARM) + ONE_SIDED;
+            let reach = tails::farthest(1, 2.0 * AUDIT_LEVEL) + ONE_SIDED;
             let planted = (reach * error.max(1.0)).max(EXCESS * expected).ceil();
             audit.smallest("stale_samples", name, "count", planted, "1");
         }
         let told = audit.is_suppressed("stale_samples", name);
         let relative = excess > EXCESS * expected;
         if audit.check(
-            "repeated_readings",
+            CheckId::RepeatedReadings,
             name,
             z,
             if relative && !told { chance } else { 1.0 },
             what.clone(),
-        ) && chance < FALSE_ALARM
+        ) && chance < AUDIT_LEVEL
         {
             if let Some((near, far)) = held(values, *step, rows, excess) {
                 audit.unexplain(name, format!("{what}; and it changes by one step {near:.0} times, where {far:.0} are expected: a reading is held until the next one is some steps away"));

@@ -12,7 +12,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};
 use crate::numerics::series::smallest_step;
-use crate::test_level;
+use crate::test_level::CheckId;
 
 /// What explains the checks that rounding makes fail.
 pub(super) const STEP: &str = "the step of the converter";
@@ -200,7 +200,11 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         return;
     };
     if rounded.explains_tails {
-        audit.suppress(&["kurtosis", "skewness", test_level::LEANING], name, STEP);
+        audit.suppress(
+            &["kurtosis", "skewness", CheckId::Leaning.as_str()],
+            name,
+            STEP,
+        );
     }
     let [least, largest] = rounded.variances;
     if largest - least > SWINGS {
@@ -212,14 +216,14 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             "neighbours",
             "variance_rhythm",
             "variance_follows",
-            test_level::COLOUR,
-            test_level::VARIANCE_CLAIM,
+            CheckId::ColourFollows.as_str(),
+            CheckId::VarianceLaw.as_str(),
         ];
         audit.suppress(&ids, name, STEP);
     }
     if rounded.sigma < LOST {
         audit.suppress(
-            &["ljung_box", "band_energy", test_level::VARIANCE_CLAIM],
+            &["ljung_box", "band_energy", CheckId::VarianceLaw.as_str()],
             name,
             STEP,
         );
@@ -228,9 +232,10 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         // The far readings of a residual are single codes.
         audit.suppress(&["spikes"], name, STEP);
         let lost = if rounded.sigma < LOST {
-            audit.untested(
+            audit.untested_on(
+                name,
                 "noise_change",
-                &format!("{name}: the noise is below {LOST} steps, so its size hangs on the level: choose a finer range"),
+                &format!("the noise is below {LOST} steps, so its size hangs on the level: choose a finer range"),
             );
             ", and what changes by less than a step is lost or bent"
         } else {

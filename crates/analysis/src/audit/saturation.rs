@@ -9,11 +9,11 @@ use model::Parameter;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::bits::Shape;
-use super::{Audit, FALSE_ALARM, Gyro};
+use super::{Audit, Gyro};
 use crate::audit::local::Levels;
 use crate::numerics::tails;
 use crate::result::Finding;
-use crate::test_level;
+use crate::test_level::{AUDIT_LEVEL, CheckId};
 
 /// Chance of the pile on the last code that light tails may have.
 const PILE: f64 = 1e-2;
@@ -57,7 +57,7 @@ fn swing(values: impl Iterator<Item = (f64, f64)>) -> f64 {
 
 /// Readings that have to be missing beyond one of both ends: the chance of so many is exp(-them).
 fn least_beyond() -> f64 {
-    (2.0 / FALSE_ALARM).ln()
+    (2.0 / AUDIT_LEVEL).ln()
 }
 
 /// One end.
@@ -140,11 +140,11 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
         low.expected
     );
     audit.check(
-        "missing_tail",
+        CheckId::MissingTail,
         name,
         both,
         if piled {
-            chance.min(FALSE_ALARM / 2.0)
+            chance.min(AUDIT_LEVEL / 2.0)
         } else {
             1.0
         },
@@ -189,8 +189,8 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
             "stale_samples",
             "kurtosis",
             "skewness",
-            test_level::COLOUR,
-            test_level::LEANING,
+            CheckId::ColourFollows.as_str(),
+            CheckId::Leaning.as_str(),
         ],
         name,
         "saturation",

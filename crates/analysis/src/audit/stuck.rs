@@ -7,6 +7,7 @@
 
 use super::codes::{Course, Fault, Fit, Histogram, Laws};
 use crate::numerics::tails;
+use crate::test_level::AUDIT_LEVEL;
 
 /// Spreads of a reading that are tried, over what was measured: bits that stick widen it more than they narrow it.
 const SPREADS: [f64; 7] = [0.15, 0.23, 0.35, 0.5, 0.7, 0.9, 1.1];
@@ -178,7 +179,7 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
     };
     if !alarmed
         && first.cost < PLAIN
-        && left_by(&h, &laws, &first).1 > super::FALSE_ALARM
+        && left_by(&h, &laws, &first).1 > AUDIT_LEVEL
         && !looks_stuck()
     {
         return Verdict::Smooth;
@@ -234,7 +235,7 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
         (fault, sound_fit)
     };
     let (over, chance) = left_by(&h, &Laws::new(&h, fault, sound_fit.spread), &sound_fit);
-    let unlike = chance < super::FALSE_ALARM && over > UNLIKE.max(UNLIKE_BY_READING * h.n);
+    let unlike = chance < AUDIT_LEVEL && over > UNLIKE.max(UNLIKE_BY_READING * h.n);
     let without = |nearest| {
         if unlike {
             Verdict::Unlike {

@@ -10,6 +10,7 @@ use crate::numerics::order_statistics::{median, width};
 use crate::numerics::tails;
 use crate::numerics::tails::ONE_SIDED;
 use crate::result::Finding;
+use crate::test_level::{AUDIT_LEVEL, CheckId};
 
 /// Jitter of a sound board, rounding to ticks included, is about 36 us; beyond this it is a fault.
 const JITTER_LIMIT_S: f64 = 70e-6;
@@ -69,7 +70,13 @@ fn jitter(record: &Record, device: &[f64], tick_s: f64, names: &[String], audit:
     let relative = (1.5 / single.len() as f64).sqrt();
     let seen = limit * (1.0 + ONE_SIDED * relative);
     audit.smallest("timestamp_jitter", "record", "sigma", seen, "s");
-    if audit.limit("timestamp_jitter", "record", sigma, limit, what.clone()) {
+    if audit.limit(
+        CheckId::TimestampJitter,
+        "record",
+        sigma,
+        limit,
+        what.clone(),
+    ) {
         let error = sigma * relative;
         audit.findings.push(Finding {
             cause: "timestamp_jitter".into(),
@@ -109,7 +116,13 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
         if *kind == Uneven::Wanders {
             audit.untested("clock_rate", what);
         } else {
-            audit.limit("clock_course", "record", course.told, 1.0, what.clone());
+            audit.limit(
+                CheckId::ClockCourse,
+                "record",
+                course.told,
+                1.0,
+                what.clone(),
+            );
             audit.unexplain("record", what.clone());
         }
         // Two rates are not one.
@@ -137,7 +150,7 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
     if let Some(law) = law {
         // The scatter itself is known to 1.17 / sqrt(blocks) of it, here and in the run that would show the fault.
         let scatter = 1.17 * (2.0 / drift::BLOCKS as f64).sqrt();
-        let limit = law.inverse_cdf(1.0 - super::FALSE_ALARM);
+        let limit = law.inverse_cdf(1.0 - AUDIT_LEVEL);
         let reach = limit * (1.0 + ONE_SIDED * scatter) + ONE_SIDED;
         audit.smallest(
             "clock_rate",
@@ -147,7 +160,7 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
             "ppm",
         );
     }
-    if audit.check("clock_rate", "record", ppm, chance, what.clone()) {
+    if audit.check(CheckId::ClockRate, "record", ppm, chance, what.clone()) {
         audit.findings.push(Finding {
             cause: "clock_rate".into(),
             channels: names.to_vec(),

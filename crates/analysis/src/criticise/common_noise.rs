@@ -11,7 +11,7 @@ use crate::numerics::tails::ONE_SIDED;
 use crate::result::{Check, DetectionLimit, Finding, Gain, Unexplained, limit, sentence};
 use crate::search::searched::Searched;
 use crate::test_level;
-use crate::test_level::OMNIBUS_LEVEL;
+use crate::test_level::{CheckId, OMNIBUS_LEVEL};
 
 /// Correlation in sigma that each pair has to show before a source is said to be that of all axes.
 const LEAST_OF_ALL: f64 = 0.5;
@@ -101,6 +101,7 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         straight &= !doubted;
         shared.checks.push(Check {
             id: claim.id.into(),
+            about: vec![],
             channel,
             statistic: claim.statistic,
             p_value: Some(claim.p_value),
@@ -171,7 +172,8 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         let fails = *p < OMNIBUS_LEVEL;
         let explained = shared.finding.is_some();
         shared.checks.push(Check {
-            id: "cross_correlation".into(),
+            id: CheckId::CrossCorrelation.into(),
+            about: vec![],
             channel: format!("{}, {}", a.target.name, b.target.name),
             statistic: *r,
             p_value: Some(*p),
@@ -262,7 +264,7 @@ fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
     );
     let fails = p < OMNIBUS_LEVEL;
     shared.checks.push(Check {
-        id: "cross_correlation_late".into(),
+        id: CheckId::CrossCorrelationLate.into(), about: vec![],
         channel: format!("{}, {}", a.target.name, b.target.name),
         statistic,
         p_value: Some(p),

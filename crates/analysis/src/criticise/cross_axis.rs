@@ -9,7 +9,7 @@ use crate::numerics::column::{dot, sum_of, sums_of_products};
 use crate::numerics::tails;
 use crate::result::Check;
 use crate::search::searched::Searched;
-use crate::test_level::{MOST, OMNIBUS_LEVEL};
+use crate::test_level::{CheckId, MOST, OMNIBUS_LEVEL};
 
 /// Bits of a code that are looked at.
 const BITS: u32 = 14;
@@ -18,6 +18,8 @@ const LEAST_SHARE: f64 = 0.01;
 
 /// Something of the other axes, and what it is.
 struct Source {
+    /// Names of the channels that it is made of.
+    of: Vec<String>,
     what: String,
     values: Vec<f64>,
 }
@@ -44,10 +46,12 @@ fn of_one(s: &Searched<'_>, samples: usize) -> Vec<Source> {
         .map(|(i, v)| if i % 2 == 0 { *v } else { -v });
     let mut all = vec![
         Source {
+            of: vec![name.clone()],
             what: format!("{name} with its sign alternating"),
             values: alternating.collect(),
         },
         Source {
+            of: vec![name.clone()],
             what: format!("the square of {name}"),
             values: beyond(e.iter().map(|v| v * v).collect(), e),
         },
@@ -64,6 +68,7 @@ fn of_one(s: &Searched<'_>, samples: usize) -> Vec<Source> {
         let share = values.iter().sum::<f64>() / samples as f64;
         if (LEAST_SHARE..=1.0 - LEAST_SHARE).contains(&share) {
             all.push(Source {
+                of: vec![name.clone()],
                 what,
                 values: beyond(values, e),
             });
@@ -102,6 +107,7 @@ fn felt(grid: &Grid, samples: usize) -> Vec<Source> {
             held
         });
         Source {
+            of: vec![s.name.clone()],
             what: format!("what {} felt within {tau} s", s.name),
             values: without_mean(course.collect()),
         }
@@ -112,15 +118,16 @@ fn felt(grid: &Grid, samples: usize) -> Vec<Source> {
 }
 
 /// The one that stands out most, with its standard errors, and its chance among all of them.
-fn most<'a>(e: &[f64], sources: impl Iterator<Item = &'a Source>) -> Option<(f64, &'a str, f64)> {
-    let scored: Vec<(f64, &str)> = sources
-        .map(|s| (errors(e, &s.values), s.what.as_str()))
-        .collect();
-    let (z, what) = scored
+fn most<'a>(
+    e: &[f64],
+    sources: impl Iterator<Item = &'a Source>,
+) -> Option<(f64, &'a Source, f64)> {
+    let scored: Vec<(f64, &Source)> = sources.map(|s| (errors(e, &s.values), s)).collect();
+    let (z, source) = scored
         .iter()
         .max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
     let p = (tails::normal_tail(*z) * scored.len() as f64).min(1.0);
-    Some((*z, *what, p))
+    Some((*z, *source, p))
 }
 
 /// Each axis at rest against what the others are made of, and its variance against what the accelerometers felt.
@@ -135,13 +142,14 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
     };
     let sources: Vec<Vec<Source>> = still.iter().map(|s| of_one(s, samples)).collect();
     let felt = felt(grid, samples);
-    let mut tell = |id: &str, channel: &str, what: &str, most: Option<(f64, &str, f64)>| {
+    let mut tell = |id: CheckId, channel: &str, what: &str, most: Option<(f64, &Source, f64)>| {
         let Some((z, of, p)) = most else { return };
         let share = z / (samples as f64).sqrt();
         let fails = p < OMNIBUS_LEVEL;
-        let what = format!("{what} {of} ({share:+.3} of it)");
+        let what = format!("{what} {} ({share:+.3} of it)", of.what);
         found.push(Check {
             id: id.into(),
+            about: of.of.clone(),
             channel: channel.into(),
             statistic: z,
             p_value: Some(p),
@@ -164,6 +172,7 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
                 let (b, c) = (still[j], still[k]);
                 let product = b.e.iter().zip(&c.e).map(|(b, c)| b * c);
                 Source {
+                    of: vec![b.target.name.clone(), c.target.name.clone()],
                     what: format!("the product of {} and {}", b.target.name, c.target.name),
                     values: without_mean(product.take(samples).collect()),
                 }
@@ -172,14 +181,14 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
         let all = others().flat_map(|j| &sources[j]).chain(&products);
         let name = &a.target.name;
         tell(
-            "couplings",
+            CheckId::Couplings,
             name,
             "the whitened residual follows",
             most(e, all),
         );
         let square = without_mean(e.iter().map(|v| v * v).collect());
         tell(
-            "variance_follows",
+            CheckId::VarianceFollows,
             name,
             "the variance follows",
             most(&square, felt.iter()),

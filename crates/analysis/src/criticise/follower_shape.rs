@@ -17,7 +17,7 @@ use crate::fit::score_test::Beside;
 use crate::fit::threshold::WIDENED;
 use crate::numerics::tails::{chi_tail, normal_tail};
 use crate::search::{Candidate, Search};
-use crate::test_level::{DEPARTURE, FOLLOWER_CLAIM, Outcome};
+use crate::test_level::{CheckId, DEPARTURE, Outcome};
 
 /// For each effect that follows a channel, whether its law holds.
 pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static str, Outcome)> {
@@ -56,7 +56,8 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
         all.push((
             effect,
             Outcome {
-                id: FOLLOWER_CLAIM,
+                id: CheckId::FollowerLaw,
+                about: vec![(*name).to_owned()],
                 statistic: lr,
                 p_value,
                 what: format!(
@@ -104,7 +105,14 @@ fn in_proportion(state: &State, term: &Term) -> Option<(&'static str, Outcome)> 
     Some((
         id,
         Outcome {
-            id: FOLLOWER_CLAIM,
+            id: CheckId::FollowerLaw,
+            // What is told late is the part of a channel that is told at once by its name.
+            about: term
+                .effect
+                .at_most(name)
+                .into_iter()
+                .map(|(whole, _)| whole.to_owned())
+                .collect(),
             statistic: most,
             p_value: chance.min(1.0),
             what: format!(

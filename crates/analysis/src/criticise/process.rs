@@ -28,7 +28,7 @@ use crate::numerics::column::dot;
 use crate::numerics::tails::{chi_tail, errors_of_sum, kurtosis_score, normal_tail};
 use crate::search::Search;
 use crate::search::searched::Searched;
-use crate::test_level::{CLAIMS, DEPARTURE, Outcome, STATIONARY_CLAIM};
+use crate::test_level::{CheckId, DEPARTURE, Outcome};
 
 /// Highest order of the polynomials in ln w that bend a spectrum.
 const BENDS: usize = 6;
@@ -91,14 +91,12 @@ pub(crate) fn stationary(s: &Searched<'_>, rhythm: &Outcome) -> Option<Outcome> 
     };
     let term = s.state.terms.iter().find(|t| is_one(t))?;
     Some(Outcome {
-        id: STATIONARY_CLAIM,
+        id: CheckId::ProcessRhythm,
+        about: vec![],
         what: format!("told as {}: {}", term.effect.id(), rhythm.what),
         ..*rhythm
     })
 }
-
-/// The claim of noise that axes share.
-pub(crate) const COMMON_CLAIM: &str = "common_noise_law";
 
 /// A series and its square and cube, each without its mean and what the powers below it have of it.
 fn powers(e: &[f64]) -> [Vec<f64>; 3] {
@@ -129,7 +127,8 @@ pub(crate) fn straight(a: &[f64], b: &[f64], lr: f64, pairs: usize) -> Outcome {
     let statistic: f64 = scores.iter().map(|z| z * z).sum();
     let bent = scores.iter().map(|z| z.abs()).fold(0.0, f64::max);
     Outcome {
-        id: COMMON_CLAIM,
+        id: CheckId::CommonNoiseLaw,
+        about: vec![],
         statistic,
         p_value: if statistic < DEPARTURE * lr {
             1.0
@@ -176,9 +175,10 @@ fn orthogonal(x: &mut [f64], basis: &[Vec<f64>], m: &[f64]) -> f64 {
 }
 
 impl Process<'_> {
-    fn outcome(&self, id: &'static str, statistic: f64, p_value: f64, what: String) -> Outcome {
+    fn outcome(&self, id: CheckId, statistic: f64, p_value: f64, what: String) -> Outcome {
         Outcome {
             id,
+            about: vec![],
             statistic,
             p_value,
             what: format!("told as {}: {what}", self.id),
@@ -275,7 +275,7 @@ impl Process<'_> {
             "its spectrum is bent otherwise; all noise is {:.2} of the model's about {hz:.3} Hz",
             bent(heaviest).exp()
         );
-        Some(self.outcome(CLAIMS[0], statistic, p_value, what))
+        Some(self.outcome(CheckId::ProcessSpectrum, statistic, p_value, what))
     }
 
     /// Whether it is Gaussian, and there all the time.
@@ -304,7 +304,7 @@ impl Process<'_> {
         let law = worst.map(|(z, p, name)| {
             let p = (p * f64::from(count)).min(1.0);
             self.outcome(
-                CLAIMS[1],
+                CheckId::ProcessLaw,
                 z,
                 p,
                 format!("{name}, in standard errors of a Gaussian one"),
@@ -317,7 +317,7 @@ impl Process<'_> {
                 j as f64 * length,
                 (j + 1) as f64 * length
             );
-            self.outcome(CLAIMS[2], statistic, p, what)
+            self.outcome(CheckId::ProcessSteadiness, statistic, p, what)
         });
         let size = self.size(&drive);
         law.into_iter().chain(steadiness).chain(size).collect()
@@ -337,7 +337,11 @@ impl Process<'_> {
         let chance = (asked.len() as f64 * chi_tail(*statistic, 2.0)).min(1.0);
         let p = if *depth < DEPTH { 1.0 } else { chance };
         let what = format!("its energy follows {name}, by {:.0} % rms", 100.0 * depth);
-        Some(self.outcome(CLAIMS[5], *statistic, p, what))
+        let outcome = self.outcome(CheckId::ProcessSize, *statistic, p, what);
+        Some(Outcome {
+            about: vec![(*name).to_owned()],
+            ..outcome
+        })
     }
 }
 

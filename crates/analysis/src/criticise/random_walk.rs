@@ -15,7 +15,7 @@ use crate::numerics::minimise::golden;
 use crate::numerics::tails::chi_tail;
 use crate::result::Check;
 use crate::search::searched::Searched;
-use crate::test_level::OMNIBUS_LEVEL;
+use crate::test_level::{CheckId, OMNIBUS_LEVEL};
 
 /// Last half cycles of the slow part that are tried: from one cycle and a half on, fewer are a trend, to eight.
 const LAST: std::ops::RangeInclusive<usize> = 3..=16;
@@ -165,7 +165,8 @@ pub(crate) fn check(s: &Searched<'_>) -> Option<Check> {
     let p_value = chance(lr);
     let fails = p_value < OMNIBUS_LEVEL;
     Some(Check {
-        id: "slow_cycles".into(),
+        id: CheckId::SlowCycles.into(),
+        about: vec![],
         channel: target.name.clone(),
         statistic: lr,
         p_value: Some(p_value),

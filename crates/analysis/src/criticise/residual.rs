@@ -4,7 +4,7 @@ use statrs::distribution::{ContinuousCDF, Gamma};
 
 use crate::numerics::column::{dot, sum_of};
 use crate::numerics::tails::{chi_tail, kurtosis_score, normal_tail};
-use crate::test_level::{OMNIBUS_LEVEL, Outcome, RECORD};
+use crate::test_level::{CheckId, OMNIBUS_LEVEL, Outcome, RECORD};
 
 mod dependence;
 
@@ -49,7 +49,8 @@ pub(crate) fn ljung_box(e: &[f64]) -> Outcome {
         })
         .sum();
     Outcome {
-        id: "ljung_box",
+        id: CheckId::LjungBox,
+        about: vec![],
         statistic,
         p_value: chi_tail(statistic, LAGS as f64),
         what: format!(
@@ -137,14 +138,16 @@ fn bands(u: &[f64], rate_hz: f64) -> Outcome {
     });
     let Some(worst) = worst else {
         return Outcome {
-            id: "band_energy",
+            id: CheckId::BandEnergy,
+            about: vec![],
             statistic: 1.0,
             p_value: 1.0,
             what: "too short for bands".into(),
         };
     };
     Outcome {
-        id: "band_energy",
+        id: CheckId::BandEnergy,
+        about: vec![],
         statistic: worst.energy,
         p_value: worst.chance,
         what: format!(
@@ -262,7 +265,8 @@ fn tiles(e: &[f64], rate_hz: f64) -> Outcome {
             .unwrap_or((0, 0));
         let (seconds, hz) = (tiles.length as f64 / rate_hz, 0.5 * rate_hz / count as f64);
         worst = Some(Outcome {
-            id: "time_frequency",
+            id: CheckId::TimeFrequency,
+            about: vec![],
             statistic: sum / (segments * count) as f64,
             p_value: p,
             what: format!(
@@ -277,7 +281,8 @@ fn tiles(e: &[f64], rate_hz: f64) -> Outcome {
         });
     }
     worst.unwrap_or_else(|| Outcome {
-        id: "time_frequency",
+        id: CheckId::TimeFrequency,
+        about: vec![],
         statistic: 1.0,
         p_value: 1.0,
         what: "too short for tiles".into(),
@@ -311,7 +316,8 @@ fn variance_cusum(e: &[f64], rate_hz: f64) -> Outcome {
     );
     let size = if low.1 < high.1 { "larger" } else { "smaller" };
     Outcome {
-        id: "variance_in_time",
+        id: CheckId::VarianceInTime,
+        about: vec![],
         statistic: v,
         p_value: if v < 0.9 { 1.0 } else { p.clamp(0.0, 1.0) },
         what: format!(
@@ -335,7 +341,8 @@ fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
         .unwrap_or(0);
     let z = kurtosis_score(excess + 3.0, n);
     Outcome {
-        id: "kurtosis",
+        id: CheckId::Kurtosis,
+        about: vec![],
         statistic: excess,
         p_value: normal_tail(z),
         what: format!(
@@ -377,7 +384,8 @@ fn skewness(e: &[f64]) -> Outcome {
     let n = e.len() as f64;
     let skewness = skewness_of(e);
     Outcome {
-        id: "skewness",
+        id: CheckId::Skewness,
+        about: vec![],
         statistic: skewness,
         p_value: if n > RECORD && skewness.abs() < LEAST_SKEWNESS {
             1.0

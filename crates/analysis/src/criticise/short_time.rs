@@ -18,7 +18,7 @@ use crate::numerics::tails::{chi_tail, errors_of_sum, normal_tail};
 use crate::result::Check;
 use crate::search::searched::Searched;
 use crate::test_level;
-use crate::test_level::{COLOUR, LEANING, MOST, OMNIBUS_LEVEL, ORDER, Outcome};
+use crate::test_level::{CheckId, MOST, OMNIBUS_LEVEL, Outcome};
 
 /// Lengths of the windows, s: what a motor holds a speed for, and the time in which a slow pitch comes round.
 const WINDOWS_S: [f64; 2] = [3.2, 12.8];
@@ -41,6 +41,8 @@ const BESIDE: usize = 1;
 
 /// Something recorded.
 struct Course {
+    /// Name of its channel.
+    channel: String,
     what: String,
     values: Vec<f64>,
 }
@@ -137,19 +139,26 @@ fn motor<'a>(view: &'a View<'_>) -> Option<&'a Signal> {
 /// What noise may be held against, by sample.
 fn courses(view: &View<'_>, samples: usize) -> Vec<Course> {
     let mut all = vec![];
-    let mut add = |what: String, values: Vec<f64>| all.push(Course { what, values });
+    let mut add = |s: &Signal, what: String, values: Vec<f64>| {
+        all.push(Course {
+            channel: s.name.clone(),
+            what,
+            values,
+        });
+    };
     if let Some(m) = motor(view) {
         let (v, name) = (&m.smooth[..samples], &m.name);
         let of = |f: &dyn Fn(f64) -> f64| v.iter().map(|v| f(*v)).collect::<Vec<f64>>();
         let on = |v: f64| v.abs() >= 1.0;
-        add(name.clone(), v.to_vec());
-        add(format!("the size of {name}"), of(&f64::abs));
+        add(m, name.clone(), v.to_vec());
+        add(m, format!("the size of {name}"), of(&f64::abs));
         let runs = of(&|v| f64::from(u8::from(on(v))));
-        add(format!("whether {name} is on"), runs);
+        add(m, format!("whether {name} is on"), runs);
         let sense = of(&|v| if on(v) { v.signum() } else { 0.0 });
-        add(format!("the sense of {name}"), sense);
+        add(m, format!("the sense of {name}"), sense);
         for tau in FADES_S {
             add(
+                m,
                 format!("changes of {name} within {tau} s"),
                 lagged(&changes(v), tau * view.rate_hz),
             );
@@ -162,14 +171,14 @@ fn courses(view: &View<'_>, samples: usize) -> Vec<Course> {
     for (quantity, least) in slow {
         let signal = view.signal(quantity).filter(|s| s.range() >= least);
         if let Some(s) = signal {
-            add(s.name.clone(), s.smooth[..samples].to_vec());
+            add(s, s.name.clone(), s.smooth[..samples].to_vec());
         }
     }
     for a in view.all(Quantity::Acc) {
         let values = &a.values[..samples];
         let middle = mean(values);
         let square = values.iter().map(|v| (v - middle).powi(2)).collect();
-        add(format!("the vibration of {}", a.name), square);
+        add(a, format!("the vibration of {}", a.name), square);
     }
     all
 }
@@ -241,7 +250,7 @@ fn colour(
     all: &[Spectra],
     steady: &[Vec<f64>],
 ) -> Outcome {
-    let mut worst: Option<(f64, f64, String)> = None;
+    let mut worst: Option<(f64, f64, Option<&Course>, String)> = None;
     let mut asked = 0usize;
     for (spectra, steady) in all.iter().zip(steady) {
         let law = law.map(|law| spectra.means(law));
@@ -277,6 +286,7 @@ fn colour(
                 worst = Some((
                     statistic,
                     p,
+                    Some(course),
                     format!(
                         "energy from {:.2} to {:.2} Hz follows {} by {:+.1} standard errors",
                         hz(bands[most].0),
@@ -288,9 +298,11 @@ fn colour(
             }
         }
     }
-    let (statistic, p, what) = worst.unwrap_or((0.0, 1.0, "nothing recorded moves".into()));
+    let nothing = (0.0, 1.0, None, "nothing recorded moves".into());
+    let (statistic, p, course, what) = worst.unwrap_or(nothing);
     Outcome {
-        id: COLOUR,
+        id: CheckId::ColourFollows,
+        about: course.iter().map(|c| c.channel.clone()).collect(),
         statistic,
         p_value: (p * asked.max(1) as f64).min(1.0),
         what: format!("short-time spectra of the whitened residual: {what}"),
@@ -384,7 +396,8 @@ fn order(view: &View<'_>, e: &[f64], all: &[Spectra]) -> Option<Outcome> {
     };
     let energy = worst.energy / worst.count.max(1.0);
     Some(Outcome {
-        id: ORDER,
+        id: CheckId::Order,
+        about: vec![motor.name.clone()],
         statistic: energy,
         p_value: (chance * asked.max(1) as f64).min(1.0),
         what: format!(
@@ -397,7 +410,7 @@ fn order(view: &View<'_>, e: &[f64], all: &[Spectra]) -> Option<Outcome> {
 /// Whether what is left leans by what was recorded: its third moment, of sums over some samples. Noise that is even about
 /// its level, of whatever size, leans to no side; what winds up and slips, or is pushed, does by the sense of the motor.
 fn leaning(e: &[f64], courses: &[Course]) -> Outcome {
-    let mut worst = (1.0, 0.0, String::new());
+    let mut worst = (1.0, 0.0, None, String::new());
     let mut asked = 0usize;
     for m in SUMS
         .into_iter()
@@ -422,17 +435,18 @@ fn leaning(e: &[f64], courses: &[Course]) -> Outcome {
                     "of {m} samples follows {} by {z:+.1} standard errors",
                     course.what
                 );
-                worst = (p, z, what);
+                worst = (p, z, Some(course), what);
             }
         }
     }
     Outcome {
-        id: LEANING,
+        id: CheckId::Leaning,
+        about: worst.2.iter().map(|c| c.channel.clone()).collect(),
         statistic: worst.1,
         p_value: (worst.0 * asked.max(1) as f64).min(1.0),
         what: format!(
             "third moment of the whitened residual: that of sums {}",
-            worst.2
+            worst.3
         ),
     }
 }
@@ -484,6 +498,7 @@ pub(crate) fn checks(s: &Searched<'_>) -> impl Iterator<Item = Check> {
         let fails = o.p_value < threshold;
         Check {
             id: o.id.into(),
+            about: o.about,
             channel: channel.clone(),
             statistic: o.statistic,
             p_value: Some(o.p_value),

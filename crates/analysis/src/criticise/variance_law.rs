@@ -8,7 +8,7 @@ use crate::fit::channel::VarianceFound;
 use crate::fit::{scan, threshold};
 use crate::numerics::tails::{chi_tail, errors_of_sum};
 use crate::search::searched::Searched;
-use crate::test_level::{DEPARTURE, Outcome, VARIANCE_CLAIM};
+use crate::test_level::{CheckId, DEPARTURE, Outcome};
 
 /// The best law of the variance, if one passes its threshold.
 pub(crate) fn best(s: &Searched<'_>) -> Option<VarianceFound> {
@@ -138,7 +138,8 @@ fn claim_of_variance(scores: &[f64], lr: f64, what: impl FnOnce(usize) -> String
         .max_by(|a, b| scores[*a].abs().total_cmp(&scores[*b].abs()))
         .unwrap_or(0);
     Outcome {
-        id: VARIANCE_CLAIM,
+        id: CheckId::VarianceLaw,
+        about: vec![],
         statistic,
         p_value: if statistic < DEPARTURE * lr {
             1.0
@@ -194,9 +195,13 @@ fn either_sign(s: &Searched<'_>, found: &VarianceFound) -> Option<Outcome> {
     let middle = odd.iter().sum::<f64>() / n;
     let mean = e.iter().map(|v| v * v).sum::<f64>() / n;
     let score = errors_of_sum((e.iter().zip(&odd)).map(|(e, o)| (e * e - mean) * (o - middle)));
-    Some(claim_of_variance(&[score], found.lr, |_| {
+    let claim = claim_of_variance(&[score], found.lr, |_| {
         let more = if score > 0.0 { "above" } else { "below" };
         let id = found.effect.id();
         format!("told as {id}: it adds more while {channel} is {more} 0 than at the other sign")
-    }))
+    });
+    Some(Outcome {
+        about: vec![channel.clone()],
+        ..claim
+    })
 }

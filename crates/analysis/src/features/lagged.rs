@@ -84,6 +84,7 @@ pub(super) fn combinations<'a>(
         for t in resolved(view, times) {
             all.push(Combination {
                 what: format!("{what} with a memory of about {t} s"),
+                channels: vec![s.name.clone()],
                 columns: Box::new(move || pair(&of(s), t * view.rate_hz)),
             });
         }
@@ -107,6 +108,7 @@ pub(super) fn combinations<'a>(
                 a.name,
                 shifts(view.samples) as f64 / view.rate_hz
             ),
+            channels: vec![a.name.clone()],
             columns: Box::new(|| shifted(&a.values).collect()),
         });
     }

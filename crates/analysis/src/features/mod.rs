@@ -77,13 +77,16 @@ type Maker<'a> = Box<dyn Fn() -> Vec<Vec<f64>> + 'a>;
 /// A combination: what it is, and its columns.
 pub(crate) struct Combination<'a> {
     pub(crate) what: String,
+    /// Names of the channels that it is made of.
+    pub(crate) channels: Vec<String>,
     pub(crate) columns: Maker<'a>,
 }
 
 impl<'a> Combination<'a> {
-    fn of(what: String, values: impl Fn() -> Vec<f64> + 'a) -> Self {
+    fn of(what: String, channels: &[&Signal], values: impl Fn() -> Vec<f64> + 'a) -> Self {
         Self {
             what,
+            channels: channels.iter().map(|c| c.name.clone()).collect(),
             columns: Box::new(move || vec![values()]),
         }
     }
@@ -108,31 +111,39 @@ pub(crate) fn combinations<'a>(view: &'a View<'_>) -> Vec<Combination<'a>> {
         let name = &t.name;
         all.push(Combination::of(
             format!("rate of change of {name}"),
+            &[t],
             move || slope(&t.smooth, reach),
         ));
-        all.push(Combination::of(format!("{name} behind a lag"), || {
-            lagged(&t.smooth, LAG_S * view.rate_hz)
-        }));
+        all.push(Combination::of(
+            format!("{name} behind a lag"),
+            &[t],
+            || lagged(&t.smooth, LAG_S * view.rate_hz),
+        ));
         for share in PLAYS {
             let play = share * t.range();
             all.push(Combination::of(
                 format!("{name} with a play of {play:.1} {}", t.unit),
+                &[t],
                 move || played(&t.smooth, 0.5 * play),
             ));
         }
-        all.push(Combination::of(format!("cube of {name}"), move || {
-            c().iter().map(|v| v.powi(3)).collect()
-        }));
+        all.push(Combination::of(
+            format!("cube of {name}"),
+            &[t],
+            move || c().iter().map(|v| v.powi(3)).collect(),
+        ));
         // The command has a zero of its own; the supply has none that means anything.
         if let Some(m) = motor {
             all.push(Combination::of(
                 format!("{} times {name}", m.name),
+                &[m, t],
                 move || product(&m.smooth, &c()),
             ));
         }
         if let Some(u) = supply {
             all.push(Combination::of(
                 format!("{} times {name}", u.name),
+                &[u, t],
                 move || product(&centred(&u.smooth), &c()),
             ));
         }
@@ -140,6 +151,7 @@ pub(crate) fn combinations<'a>(view: &'a View<'_>) -> Vec<Combination<'a>> {
             let size = || m.smooth.iter().map(|v| v.abs()).collect::<Vec<f64>>();
             all.push(Combination::of(
                 format!("size of {} times {name}", m.name),
+                &[m, t],
                 move || product(&size(), &c()),
             ));
         }
@@ -147,18 +159,23 @@ pub(crate) fn combinations<'a>(view: &'a View<'_>) -> Vec<Combination<'a>> {
     if let (Some(m), Some(u)) = (motor, supply) {
         all.push(Combination::of(
             format!("{} times {}", m.name, u.name),
+            &[m, u],
             move || product(&m.smooth, &centred(&u.smooth)),
         ));
     }
     for a in accelerations(view) {
-        all.push(Combination::of(format!("square of {}", a.name), || {
-            centred(&a.values).iter().map(|v| v * v).collect()
-        }));
+        all.push(Combination::of(
+            format!("square of {}", a.name),
+            &[a],
+            || centred(&a.values).iter().map(|v| v * v).collect(),
+        ));
     }
     for w in turning(view) {
-        all.push(Combination::of(format!("square of {}", w.name), || {
-            w.smooth.iter().map(|v| v * v).collect()
-        }));
+        all.push(Combination::of(
+            format!("square of {}", w.name),
+            &[w],
+            || w.smooth.iter().map(|v| v * v).collect(),
+        ));
     }
     all.extend(lagged::combinations(view, motor, supply));
     all
@@ -179,11 +196,11 @@ fn turning<'a>(view: &'a View<'_>) -> impl Iterator<Item = &'a Signal> {
 }
 
 /// The one channel that a term without a name is made of, if it is one.
-pub(crate) fn source<'a>(view: &'a View<'_>, term: &Term) -> Option<&'a str> {
-    let what = term.follows.as_deref()?;
-    let mut parts = view.signals.iter().filter(|s| what.contains(&s.name));
-    let one = parts.next()?;
-    parts.next().is_none().then_some(one.name.as_str())
+pub(crate) fn source(term: &Term) -> Option<&str> {
+    match term.of.as_slice() {
+        [one] => Some(one),
+        _ => None,
+    }
 }
 
 /// Names of its columns; they are no parameters of anything.
@@ -241,4 +258,61 @@ impl Effect for Beyond {
 
     /// It has no physics that could be simulated.
     fn simulate(&self, _: &Parameters, _: &[usize], _: &mut Simulation) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+
+    #[test]
+    fn the_words_of_a_combination_name_its_channels() {
+        let signal = |name: &str, quantity, moving| {
+            let values: Arc<Vec<f64>> = Arc::new(
+                (0..2000)
+                    .map(|i| 20.0 * (f64::from(i) * 0.01).sin())
+                    .collect(),
+            );
+            Signal {
+                name: name.into(),
+                quantity,
+                axis: None,
+                unit: "1".into(),
+                smooth: Arc::clone(&values),
+                values,
+                lsb: None,
+                moving,
+            }
+        };
+        let signals = [
+            signal("temp_x", Quantity::Temp, false),
+            signal("supply", Quantity::Supply, false),
+            signal("pwm", Quantity::Pwm, false),
+            signal("acc_x", Quantity::Acc, false),
+            signal("acc_y", Quantity::Acc, false),
+            signal("gyro_y", Quantity::Gyro, true),
+        ];
+        let view = View {
+            channel: "gyro_x",
+            axis: None,
+            lsb: None,
+            white_sigma: 0.3,
+            rate_hz: 20.0,
+            samples: 2000,
+            base: None,
+            moving: false,
+            signals: &signals,
+        };
+        let all = combinations(&view);
+        assert!(all.len() > 15, "{}", all.len());
+        for c in all {
+            let named = signals.iter().map(|s| &s.name);
+            let mut named: Vec<&String> = named.filter(|n| c.what.contains(*n)).collect();
+            let mut of: Vec<&String> = c.channels.iter().collect();
+            named.sort();
+            of.sort();
+            assert_eq!(named, of, "{}", c.what);
+        }
+    }
 }

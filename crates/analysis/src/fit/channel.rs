@@ -7,7 +7,7 @@ use model::effect::{Effect, Parameters, Shape};
 
 use crate::fit::likelihood::{Noise, Panel, Solution};
 use crate::fit::scan::residual;
-use crate::test_level::Outcome;
+use crate::test_level::{Outcome, Worded};
 
 /// Id of the stand-in that the search knows them by; no cause of the library.
 pub const ID: &str = "beyond";
@@ -47,8 +47,10 @@ pub struct Term {
     pub names: Vec<&'static str>,
     /// Values held fixed.
     pub fixed: Vec<(&'static str, f64, &'static str)>,
-    /// The channel that it follows.
+    /// What it follows, in words.
     pub follows: Option<String>,
+    /// Names of the recorded channels that this is made of.
+    pub of: Vec<String>,
     /// Likelihood ratio against the model without it.
     pub lr: f64,
     /// What a false one reaches once in the stated number of clean channels.
@@ -77,6 +79,7 @@ impl Term {
             names: vec![],
             fixed: vec![],
             follows: None,
+            of: vec![],
             lr: 0.0,
             threshold,
             alternatives: vec![],
@@ -122,6 +125,12 @@ pub struct Note {
     pub what: String,
     /// Lowest and highest angular frequency, rad per sample, where it has such a place.
     pub at: Option<(f64, f64)>,
+}
+
+impl Worded for Note {
+    fn text(&mut self) -> &mut String {
+        &mut self.what
+    }
 }
 
 /// The narrow crowd that a line is the strongest one of, rad per sample.

@@ -19,6 +19,7 @@ use crate::report::{detection_limits, figures};
 use crate::result;
 use crate::result::{Alternative, DetectionLimit, Finding, Gain, Unexplained, sentence};
 use crate::search::searched::Searched;
+use crate::test_level::CheckId;
 
 pub(crate) fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {
     let first = alternatives.first()?;
@@ -227,7 +228,7 @@ fn peak_rate(dct: &Dct, y: &[f64], white: f64, rate_hz: f64) -> (f64, f64) {
 pub(crate) fn motion_findings(
     s: &Searched<'_>,
     grid: &Grid,
-    failing: &dyn Fn(&str) -> bool,
+    failing: &dyn Fn(CheckId) -> bool,
 ) -> (Vec<Finding>, Vec<Unexplained>) {
     let candidates = &mut s.search.candidates.iter();
     let of = candidates.find(|c| matches!(c.hypothesis, Hypothesis::Motion));

@@ -24,7 +24,7 @@ use crate::features;
 use crate::fit::channel::{Form, Note, RIVAL_SPAN, State, Term, Wandering};
 use crate::fit::likelihood::{Noise, Panel};
 use crate::fit::{channel, threshold};
-use crate::test_level::CLAIM_LEVEL;
+use crate::test_level::{CLAIM_LEVEL, worded};
 
 /// Most terms on one channel.
 const MOST_TERMS: usize = 8;
@@ -44,6 +44,8 @@ pub struct Candidate {
     pub effect: &'static dyn Effect,
     /// The hypothesis.
     pub hypothesis: Hypothesis,
+    /// Names of the recorded channels that a regression follows.
+    of: Vec<String>,
     columns: Vec<usize>,
     grid: Vec<(f64, Vec<usize>)>,
     siblings: usize,
@@ -97,6 +99,16 @@ pub type SetAside = (Note, Option<Wandering>);
 /// What a state without processes is known by: the data's revision, its random walk, its terms with their columns.
 type Place = (usize, u64, Vec<(usize, Vec<usize>)>);
 
+/// Names of the recorded channels that a hypothesis of the library follows: it lists them.
+fn channels_of(hypothesis: &Hypothesis) -> Vec<String> {
+    let follows = match hypothesis {
+        Hypothesis::Regression(r) => r.follows.as_deref(),
+        _ => None,
+    };
+    let names = follows.into_iter().flat_map(|f| f.split(", "));
+    names.map(str::to_owned).collect()
+}
+
 impl<'a> Search<'a> {
     /// Lay out all hypotheses for a channel.
     #[must_use]
@@ -104,12 +116,12 @@ impl<'a> Search<'a> {
         let mut candidates = vec![];
         let mut not_tested = vec![];
         // What follows a thermometer of this axis is no column of another one.
-        let own = |follows: &str| {
+        let own = |of: &[String]| {
             let mut thermometers = view
                 .signals
                 .iter()
                 .filter(|s| s.quantity == Quantity::Temp && s.axis.is_some());
-            thermometers.any(|s| follows.contains(&s.name))
+            thermometers.any(|s| of.contains(&s.name))
         };
         for effect in EFFECTS {
             let hypotheses = match effect.hypotheses(&view) {
@@ -121,11 +133,8 @@ impl<'a> Search<'a> {
             };
             let siblings = hypotheses.len();
             for mut hypothesis in hypotheses {
-                let follows = match &hypothesis {
-                    Hypothesis::Regression(r) => r.follows.as_deref(),
-                    _ => None,
-                };
-                let common = !follows.is_some_and(own);
+                let of = channels_of(&hypothesis);
+                let common = !own(&of);
                 let columns = match &mut hypothesis {
                     // The panel has them now.
                     Hypothesis::Regression(r) => {
@@ -150,6 +159,7 @@ impl<'a> Search<'a> {
                 candidates.push(Candidate {
                     effect: *effect,
                     hypothesis,
+                    of,
                     columns,
                     grid,
                     siblings,
@@ -159,12 +169,15 @@ impl<'a> Search<'a> {
         }
         let unknown = features::combinations(&view);
         let siblings = unknown.len();
-        for combination in unknown {
-            let common = !own(&combination.what);
+        for mut combination in unknown {
+            combination.what = worded(combination.what);
+            let of = combination.channels.clone();
+            let common = !own(&of);
             let columns = panel.add_named(&combination.what, common, &combination.columns);
             candidates.push(Candidate {
                 effect: &features::EFFECT,
                 hypothesis: combination.hypothesis(columns.len()),
+                of,
                 columns,
                 grid: vec![],
                 siblings,
@@ -182,21 +195,31 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The channel that a term follows; what has a shape of its own follows what else of its effect does.
+    /// What a term follows, in words; what has a shape of its own follows what else of its effect does.
     pub(crate) fn followed<'b>(&'b self, term: &'b Term) -> Option<&'b str> {
-        let of_effect = || {
-            let own = |c: &&Candidate| c.effect.id() == term.effect.id();
-            self.candidates
-                .iter()
-                .filter(own)
-                .find_map(|c| match &c.hypothesis {
-                    Hypothesis::Regression(r) => r.follows.as_deref(),
-                    _ => None,
-                })
+        let of_effect = || match &self.beside(term)?.hypothesis {
+            Hypothesis::Regression(r) => r.follows.as_deref(),
+            _ => None,
+        };
+        term.follows.as_deref().or_else(of_effect)
+    }
+
+    /// Names of the recorded channels that a term follows, in the same way.
+    pub(crate) fn sources<'b>(&'b self, term: &'b Term) -> &'b [String] {
+        match self.beside(term) {
+            Some(c) if term.follows.is_none() => &c.of,
+            _ => &term.of,
+        }
+    }
+
+    /// The first hypothesis of the effect of a shape that follows a channel.
+    fn beside(&self, term: &Term) -> Option<&Candidate> {
+        let own = |c: &&Candidate| {
+            let follows = matches!(&c.hypothesis, Hypothesis::Regression(r) if r.follows.is_some());
+            follows && c.effect.id() == term.effect.id()
         };
         let shaped = matches!(term.form, Form::Shaped(..));
-        let of_shape = || of_effect().filter(|_| shaped);
-        term.follows.as_deref().or_else(of_shape)
+        self.candidates.iter().find(own).filter(|_| shaped)
     }
 
     /// The state with these terms, fitted from a starting noise.

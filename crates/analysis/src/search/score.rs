@@ -45,6 +45,7 @@ impl Search<'_> {
                 let mut t = term(Form::Columns, candidate.columns.clone(), names, lr, limit);
                 t.fixed.clone_from(&r.fixed);
                 t.follows.clone_from(&r.follows);
+                t.of.clone_from(&candidate.of);
                 Some(t)
             }
             Hypothesis::Shaped(shape) => {

@@ -19,7 +19,7 @@ use crate::fit::threshold;
 use crate::numerics::tails::normal_tail;
 use crate::search::Search;
 use crate::test_level;
-use crate::test_level::{CLAIMS, Outcome};
+use crate::test_level::{CheckId, Outcome};
 pub use crate::two_level::fit::two_level;
 use crate::two_level::fit::{
     Coordinates, Side, Sides, again, covariance_of, fitted, many_ahead, path,
@@ -340,7 +340,8 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
 pub(crate) fn levels_claim(z: f64, named: &str) -> Outcome {
     let more = if z > 0.0 { "more" } else { "less" };
     Outcome {
-        id: CLAIMS[3],
+        id: CheckId::ProcessLevels,
+        about: vec![],
         statistic: z,
         p_value: normal_tail(z),
         what: format!(

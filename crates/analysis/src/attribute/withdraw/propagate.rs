@@ -5,7 +5,7 @@
 //! a side of that thing as a cause of its own: the strokes of a bearing have a mean that follows the motor as well as a size,
 //! and a draught that comes and goes leaves a line in the band of the process that it was told as.
 
-use model::effect::Signal;
+use std::collections::BTreeSet;
 
 use super::{Doubt, LEFT, generic, nearest_of};
 use crate::criticise::residual;
@@ -13,6 +13,7 @@ use crate::fit::channel;
 use crate::fit::channel::{Form, Term};
 use crate::result::{Check, Finding, Unexplained};
 use crate::search::searched::Searched;
+use crate::test_level::CheckId;
 
 /// Share of the noise where a term acts that a fallen process makes, from which on the term may be a piece of it.
 const MADE: f64 = 0.25;
@@ -26,8 +27,8 @@ pub(super) struct Kin<'a> {
     pub g: &'a [f64],
     /// Coefficients by bin.
     pub counts: &'a [f64],
-    /// What the failing checks of the channel say.
-    pub said: &'a [String],
+    /// Recorded channels that the failing checks of the channel are about.
+    pub about: &'a BTreeSet<String>,
     /// Whether a claim of the law of the variance fails, and whether its name falls.
     pub variance: (bool, bool),
     /// Whether the variance follows an acceleration.
@@ -39,12 +40,6 @@ pub(super) struct Kin<'a> {
 }
 
 impl Kin<'_> {
-    /// Recorded channels that `what` speaks of.
-    fn signals<'b>(&'b self, what: &'b str) -> impl Iterator<Item = &'b Signal> {
-        let all = self.s.search.view.signals.iter();
-        all.filter(move |c| what.contains(&c.name))
-    }
-
     /// Densities of the processes that have fallen, with what each explains.
     fn fallen(&self, doubts: &[Doubt]) -> Vec<(Vec<f64>, f64)> {
         let at = &self.s.search.panel.bins.at;
@@ -101,21 +96,17 @@ impl Kin<'_> {
 
     /// Whether what is left over, or has fallen, follows the recorded channel that a term does.
     fn of_its_source(&self, t: &Term, doubts: &[Doubt]) -> bool {
-        let Some(followed) = self.s.search.followed(t) else {
-            return false;
-        };
         let by_variance = self.s.variance.as_ref().filter(|_| self.variance.1);
-        let by_variance = by_variance.and_then(|v| v.follows.as_deref());
+        let by_variance = by_variance.and_then(|v| v.follows.as_ref());
         let terms = self.s.state.terms.iter().zip(doubts);
         let by_terms = terms.filter(|(o, d)| **d != Doubt::No || o.effect.id() == channel::ID);
-        let others: Vec<&str> = by_terms
+        let others: BTreeSet<&String> = by_terms
             .filter(|(o, _)| o.effect.id() != t.effect.id())
-            .filter_map(|(o, _)| self.s.search.followed(o))
+            .flat_map(|(o, _)| self.s.search.sources(o))
             .chain(by_variance)
-            .chain(self.said.iter().map(String::as_str))
+            .chain(self.about)
             .collect();
-        let mut own = self.signals(followed);
-        own.any(|c| others.iter().any(|o| o.contains(&c.name)))
+        self.s.search.sources(t).iter().any(|c| others.contains(c))
     }
 
     /// Doubt what is of a kind with what has fallen.
@@ -149,15 +140,15 @@ impl Kin<'_> {
         let Some(v) = &self.s.variance else {
             return false;
         };
-        let of_source = |o: &str| v.follows.as_deref().is_some_and(|s| o.contains(s));
+        let source = v.follows.as_ref();
         let by_term = |(t, doubt): (&Term, &Doubt)| {
-            let followed = self.s.search.followed(t);
+            let follows = |s: &String| self.s.search.sources(t).contains(s);
             t.effect.id() == channel::ID && t.lr > v.lr
-                || *doubt != Doubt::No && followed.is_some_and(of_source)
+                || *doubt != Doubt::No && source.is_some_and(follows)
         };
         self.felt
             || self.bent > LEFT * v.lr
-            || self.said.iter().any(|w| of_source(w))
+            || source.is_some_and(|s| self.about.contains(s))
             || self.s.state.terms.iter().zip(doubts).any(by_term)
     }
 }
@@ -166,12 +157,11 @@ impl Kin<'_> {
 pub(crate) fn shared_falls(finding: &Finding, checks: &[Check]) -> bool {
     let channels = &finding.channels;
     let takes = |c: &Check| {
-        let ids = ["couplings", "foretold"];
-        let others = channels.iter().filter(|o| **o != c.channel);
+        let mut others = channels.iter().filter(|o| **o != c.channel);
         c.fails_after
-            && ids.contains(&c.id.as_str())
+            && (c.id == CheckId::Couplings || c.id == CheckId::Foretold)
             && channels.contains(&c.channel)
-            && others.into_iter().any(|o| c.what.contains(o))
+            && others.any(|o| c.about.contains(o))
     };
     checks.iter().any(takes)
 }
@@ -181,9 +171,9 @@ pub(crate) fn shared_falls(finding: &Finding, checks: &[Check]) -> bool {
 pub(crate) fn stale(
     s: &Searched<'_>,
     findings: &mut Vec<Finding>,
-    failing: &dyn Fn(&str) -> bool,
+    failing: &dyn Fn(CheckId) -> bool,
 ) -> Vec<Unexplained> {
-    if !failing("kurtosis") || residual::excess_kurtosis(&s.e) > 0.0 {
+    if !failing(CheckId::Kurtosis) || residual::excess_kurtosis(&s.e) > 0.0 {
         return vec![];
     }
     let name = s.target.name.as_str();

@@ -16,10 +16,12 @@ use crate::fit::score_test::Beside;
 use crate::fit::threshold::WIDENED;
 use crate::numerics::tails::chi_tail;
 use crate::search::{Candidate, Search};
-use crate::test_level::{CLAIMS, Outcome};
+use crate::test_level::{CheckId, Outcome};
 
 /// What columns of one kind explain beside all that the library has of a channel.
 struct Asked {
+    /// Name of the channel.
+    channel: String,
     how: String,
     chi_square: f64,
     degrees: usize,
@@ -52,7 +54,8 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<(&'static 
     let outcome = |t: &Term| {
         let id = t.effect.id();
         let outcome = Outcome {
-            id: CLAIMS[6],
+            id: CheckId::ProcessSource,
+            about: vec![most.channel.clone()],
             statistic: most.chi_square,
             p_value: (most.chance * asked.len() as f64).min(1.0),
             what: format!(
@@ -86,6 +89,7 @@ fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked>
     let asked = asked.map(|Departure { how, columns }| {
         let (chi_square, degrees) = beside.gain_of(columns);
         Asked {
+            channel: signal.name.clone(),
             how: format!("{} {how}", signal.name),
             chi_square,
             degrees,

@@ -11,7 +11,7 @@ use rustfft::num_complex::Complex;
 use crate::numerics::column::dot;
 use crate::numerics::tails::{chi_tail, errors_of_sum};
 use crate::numerics::transform::{Dct, RealFft};
-use crate::test_level::{MOST, Outcome, RECORD, RHYTHM};
+use crate::test_level::{CheckId, MOST, Outcome, RECORD};
 
 /// Lags, either way, of the bicovariance.
 const LAGS: usize = 20;
@@ -46,7 +46,8 @@ pub(crate) fn bicovariance(e: &[f64]) -> Outcome {
     }
     let order = if worst.0 > 0 { "earlier" } else { "later" };
     Outcome {
-        id: "bicovariance",
+        id: CheckId::Bicovariance,
+        about: vec![],
         statistic,
         p_value: chi_tail(statistic, 2.0 * lags as f64),
         what: format!(
@@ -144,7 +145,8 @@ pub(crate) fn neighbours(e: &[f64], step: f64) -> Outcome {
     let least = CERTAIN * (2.0 * freedom).sqrt() / RECORD;
     let small = e.len() as f64 > RECORD && (statistic - freedom) / (e.len() as f64) < least;
     Outcome {
-        id: "neighbours",
+        id: CheckId::Neighbours,
+        about: vec![],
         statistic,
         p_value: if small || freedom < 1.0 {
             1.0
@@ -190,7 +192,8 @@ pub(crate) fn three_readings(e: &[f64]) -> Outcome {
         }
     }
     Outcome {
-        id: "three_readings",
+        id: CheckId::ThreeReadings,
+        about: vec![],
         statistic,
         p_value: if pairs > 0.0 {
             chi_tail(statistic, pairs)
@@ -272,7 +275,8 @@ pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
         .max_by(|a, b| a.1.0.total_cmp(&b.1.0));
     let Some((span, (statistic, at, count))) = found else {
         return Outcome {
-            id: RHYTHM,
+            id: CheckId::VarianceRhythm,
+            about: vec![],
             statistic: 0.0,
             p_value: 1.0,
             what: "too short for a rhythm of the variance".into(),
@@ -284,7 +288,8 @@ pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
         format!("in products of the whitened residual with itself up to {span} samples later")
     };
     Outcome {
-        id: RHYTHM,
+        id: CheckId::VarianceRhythm,
+        about: vec![],
         statistic,
         p_value: (chi_tail(statistic, 2.0) * (count * SPANS.len()) as f64).min(1.0),
         what: format!("lines {of}; {:.4} Hz stands out most", at * rate_hz),
@@ -397,14 +402,16 @@ pub(crate) fn repeats(e: &[f64]) -> Option<Repeats> {
 pub(super) fn period(e: &[f64], rate_hz: f64) -> Outcome {
     let Some(found) = repeats(e) else {
         return Outcome {
-            id: "period",
+            id: CheckId::Period,
+            about: vec![],
             statistic: 0.0,
             p_value: 1.0,
             what: "too short to repeat itself".into(),
         };
     };
     Outcome {
-        id: "period",
+        id: CheckId::Period,
+        about: vec![],
         statistic: found.chi_square / (found.period as f64 - 1.0),
         p_value: found.chance,
         what: format!(

@@ -6,7 +6,7 @@ use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use crate::test_level::{CLAIM_LEVEL, CLAIMS, Outcome};
+use crate::test_level::{CLAIM_LEVEL, CheckId, Outcome};
 use crate::two_level::fit::{Coordinates, decoded, replicate};
 
 /// Replicates that say what short stays, which decoding loses, make of the score: its mean to 0.07 and its spread to 5 %.
@@ -66,7 +66,8 @@ pub(super) fn at_random(y: &[f64], x: &Coordinates, block_s: f64) -> Option<Outc
         count => format!("{count} of {:.1} s", mean(d, |v| v) * block_s),
     };
     Some(Outcome {
-        id: CLAIMS[4],
+        id: CheckId::ProcessDwells,
+        about: vec![],
         statistic: z,
         p_value: chance(z),
         what: format!(
