@@ -1,41 +1,40 @@
-//! What the simulation of a sensor gets wrong, and why.
+//! What the simulation of a sensor gets wrong, and why: the order of the steps. Each takes values and gives values.
+//!
+//! | step | takes | gives |
+//! |---|---|---|
+//! | [`prepared`] | a record | its grid, what the audits saw in counts and frames |
+//! | [`channel::searched`] | a channel of the grid | its model, residual and checks |
+//! | [`tested`] | all channels | checks of one by the others, what axes share |
+//! | [`name_channel`] | a channel, its checks | findings, and names withdrawn |
+//! | [`concluded`] | all of that | the lists of the diagnosis |
+
+mod channel;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::rc::Rc;
 
-use model::effect::{Hypothesis, Parameters, View};
-use model::effects::{EFFECTS, effect};
-use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
+use model::file::FittedOn;
 use model::record::Record;
 
-use crate::attribute::{events, masking, withdraw};
+use crate::attribute::{events, masking, merge, withdraw};
 use crate::audit::{Audit, audit, sign_bit};
 use crate::criticise::common_noise::{Shared, common};
 use crate::criticise::cross_axis::couplings;
-use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
-use crate::fit::channel::{Note, State};
-use crate::fit::likelihood::Panel;
-use crate::fit::{channel, estimate};
+use crate::fit::channel::Note;
 use crate::ingest::dead;
-use crate::ingest::grid::{Grid, Target, lay_out};
+use crate::ingest::grid::{Grid, lay_out};
 use crate::records::error::AnalysisError;
 use crate::records::rows;
 use crate::replicates;
-use crate::report::findings::{
-    blows, complete, joined, loud, motion_findings, scale_finding, term_findings, turning,
-    variance_finding,
-};
-use crate::report::{detection_limits, figures};
+use crate::report::findings::{motion_findings, scale_finding, term_findings, variance_finding};
+use crate::report::untested::not_tested;
+use crate::report::{detection_limits, figures, fitted};
 use crate::result::{
-    Check, DIAGNOSIS_FORMAT, Diagnosed, Diagnosis, Finding, Input, NotTested, Parameter,
+    Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, Input, NotTested,
     Unexplained, Verdict,
 };
 use crate::search::searched::Searched;
-use crate::search::{Search, impute};
-use crate::test_level;
-use crate::test_level::{CheckId, OMNIBUS_LEVEL, all_worded, worded};
-use crate::two_level::compare;
+use crate::test_level::{CheckId, all_worded, worded};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -86,9 +85,7 @@ struct Prepared {
     audited: Audit,
     sticking: Vec<Finding>,
     dead: Vec<Unexplained>,
-    samples: usize,
-    channels: Vec<String>,
-    notes: Vec<String>,
+    input: Input,
 }
 
 fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisError> {
@@ -108,14 +105,20 @@ fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisErro
     }
     let record = &*masking::renumbered(record, &audited);
     let grid = lay_out(record, &|name| audited.masked(name), seed)?;
+    let input = Input {
+        file: String::new(),
+        seconds: grid.n as f64 / grid.rate_hz,
+        rate_hz: grid.rate_hz,
+        samples: record.len(),
+        channels: record.channels.iter().map(|c| c.name.clone()).collect(),
+        notes: record.notes.clone(),
+    };
     Ok(Prepared {
         grid,
         audited,
         sticking,
         dead,
-        samples: record.len(),
-        channels: record.channels.iter().map(|c| c.name.clone()).collect(),
-        notes: record.notes.clone(),
+        input,
     })
 }
 
@@ -125,149 +128,39 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         mut audited,
         sticking,
         dead,
-        samples,
-        channels,
-        notes,
+        mut input,
     } = of;
-    let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(|t| search(&grid, t)).collect();
+    let search = |t| channel::searched(&grid, t);
+    let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(search).collect();
     grid.dct.forget();
-    let mut findings = all_worded(sticking);
-    findings.extend(all_worded(masking::findings(&audited, &searched, &grid)));
-    let mut findings = turning(findings, &grid);
-    let mut scale_not_tested = vec![];
-    let mut smallest = std::mem::take(&mut audited.limits);
-    let mut checks: Vec<Check> = searched
-        .iter_mut()
-        .flat_map(|s| std::mem::take(&mut s.checks))
-        .collect();
-    masking::suppress(&mut checks, &audited);
-    let mut shared = common(&searched, &grid);
-    shared.checks = all_worded(shared.checks);
-    checks.extend(all_worded(couplings(&searched, &grid)));
-    let mut nearest = vec![];
-    let mut doubts = vec![];
-    for s in &searched {
-        let fails = || {
-            let all = checks.iter().chain(&audited.checks);
-            all.filter(|c| c.channel == s.target.name && c.fails_after)
-        };
-        let failing = |id: CheckId| fails().any(|c| c.id == id);
-        let (moved, told) = motion_findings(s, &grid, &failing);
-        findings.extend(all_worded(moved));
-        doubts.extend(all_worded(told));
-        let of_terms = all_worded(term_findings(s, &grid, options.seed));
-        // What an axis takes from another one later has a spectrum, and is no process of its own.
-        let late = shared.late.iter().filter(|l| l.0 == s.target.name);
-        let mut colours = fails().filter(|c| c.id == CheckId::ColourFollows);
-        let left = withdraw::Left {
-            late: late.map(|l| l.1).sum(),
-            colour: colours.next().map_or(0.0, |c| c.statistic),
-            about: fails().flat_map(|c| c.about.iter().cloned()).collect(),
-        };
-        // A bit that sticks makes a noise of its own, which depends on the level.
-        let by_counts = s.variance.as_ref().is_some_and(|v| {
-            let more = v.parameters.get("variance_increase");
-            let ratio = more.map(|p| 1.0 + p.value);
-            audited.explains_variance(&s.target.name, v.lr, v.threshold, ratio)
-        });
-        let variance = variance_finding(s).filter(|_| !by_counts).map(worded);
-        let (kept, doubted, told) = withdraw::withdraw(s, of_terms, variance, &failing, &left);
-        doubts.extend(withdraw::propagate::stale(s, &mut findings, &failing));
-        doubts.extend(events::hold_outliers(s, &kept, &mut findings, &failing));
-        findings.extend(kept);
-        nearest.extend(doubted);
-        doubts.extend(told);
-        match scale_finding(s, &grid) {
-            Ok(scaled) => {
-                findings.extend(scaled.finding);
-                smallest.extend(scaled.limit);
-            }
-            Err((cause, why)) => scale_not_tested.push(NotTested {
-                cause: cause.into(),
-                why: format!("{}: {why}", s.target.name),
-            }),
-        }
-    }
-    let notes = [notes, std::mem::take(&mut audited.notes)].concat();
-    let mut unexplained = left_over(&checks, &shared);
-    for s in &searched {
-        let note = |note: &Note| Unexplained {
-            channel: s.target.name.clone(),
-            what: note.what.clone(),
-        };
-        unexplained.extend(s.state.notes.iter().map(note));
-        unexplained.extend(astray(s));
-    }
-    unexplained.extend(dead);
-    unexplained.extend(doubts);
-    checks.extend(shared.checks);
-    checks.extend(audited.checks);
-    unexplained.extend(audited.unexplained);
-    // What was found on the channel may have bent the distribution; then the residual decides.
-    let bent = |name: &str| {
-        let found = |s: &&Searched<'_>| {
-            !s.state.terms.is_empty() || s.variance.is_some() || s.target.moving
-        };
-        let tails = |c: &Check| c.id == CheckId::Kurtosis && c.channel == name && c.fails_after;
-        let mut own = searched.iter().filter(|s| s.target.name == name);
-        own.any(|s| found(&s)) && !checks.iter().any(tails)
+    let tested = tested(&mut searched, &audited, &grid);
+    let first = Named {
+        findings: merge::turning(
+            [
+                all_worded(sticking),
+                all_worded(masking::findings(&audited, &searched, &grid)),
+            ]
+            .concat(),
+            &grid,
+        ),
+        limits: std::mem::take(&mut audited.limits),
+        ..Named::default()
     };
-    unexplained.extend(audited.not_normal.into_iter().filter(|u| !bent(&u.channel)));
-    if let Some(finding) = shared.finding {
-        if withdraw::propagate::shared_falls(&finding, &checks) {
-            unexplained.push(withdraw::nearest_of(&finding.channels[0], &finding.what));
-            nearest.push(finding);
-        } else {
-            findings.push(finding);
-        }
-    }
-    smallest.extend(searched.iter().flat_map(|s| s.limits.iter().cloned()));
-    smallest.extend(shared.limits);
-    // What the audit could not ask a channel for has no smallest size there.
-    smallest.retain(|l| {
-        let not_asked = audited.not_asked.iter();
-        !not_asked
-            .into_iter()
-            .any(|(channel, cause)| *channel == l.channel && *cause == l.cause)
-    });
-    let findings = complete(joined(loud(blows(findings))));
-    let mut not_tested = not_tested(&searched);
-    not_tested.extend(scale_not_tested);
-    not_tested.extend(audited.not_tested);
-    let mut verdict = match (unexplained.is_empty(), findings.is_empty()) {
-        (false, _) => Verdict::Unexplained,
-        (true, true) => Verdict::Adequate,
-        (true, false) => Verdict::Extended,
+    let name = |named, s| name_channel(named, s, &tested, &audited, &grid, options.seed);
+    let named = searched.iter().fold(first, name);
+    input.notes.append(&mut audited.notes);
+    input.file.clone_from(&options.file);
+    let mut told = concluded(&searched, tested, audited, dead, named);
+    let fitted_on = || FittedOn {
+        file: options.file.clone(),
+        hash: options.hash.clone(),
+        seconds: input.seconds,
     };
-    let baseline: BTreeMap<_, _> = searched
-        .iter()
-        .map(|s| (s.target.name.clone(), baseline_of(s, &s.baseline, &grid)))
-        .collect();
-    let model = |of: &dyn Fn(&Searched<'_>) -> Parameters, effects| ModelFile {
-        stand: "fitted".into(),
-        rate_hz: grid.rate_hz,
-        fitted_on: Some(FittedOn {
-            file: options.file.clone(),
-            hash: options.hash.clone(),
-            seconds: grid.n as f64 / grid.rate_hz,
-        }),
-        excitation: BTreeMap::new(),
-        channels: searched
-            .iter()
-            .map(|s| ChannelModel {
-                name: s.target.name.clone(),
-                unit: s.target.unit.clone(),
-                lsb: s.target.lsb,
-                baseline: of(s),
-            })
-            .collect(),
-        effects,
-    };
-    let baseline_model = model(&|s| baseline_of(s, &s.baseline, &grid), vec![]);
-    let extended_model = model(
-        &|s| baseline_of(s, &s.state, &grid),
-        effects_of(findings.iter().chain(&nearest)),
-    );
+    let extended = told.findings.iter().chain(&told.nearest);
+    let baseline_model =
+        fitted::model(&searched, &grid, false, std::iter::empty(), fitted_on());
+    let extended_model = fitted::model(&searched, &grid, true, extended, fitted_on());
+    let mut verdict = verdict(&told.findings, &told.unexplained);
     let replicates = match options.replicates {
         0 => BTreeMap::new(),
         count => replicates::judge(&grid, &baseline_model, &extended_model, count, options.seed)
@@ -277,8 +170,8 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     if !held.unexplained.is_empty() {
         verdict = Verdict::Unexplained;
     }
-    checks.extend(held.checks);
-    unexplained.extend(held.unexplained);
+    told.checks.extend(held.checks);
+    told.unexplained.extend(held.unexplained);
     Diagnosed {
         baseline_model,
         extended_model,
@@ -287,24 +180,203 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
             .collect(),
         diagnosis: Diagnosis {
             format: DIAGNOSIS_FORMAT.into(),
-            input: Input {
-                file: options.file.clone(),
-                seconds: grid.n as f64 / grid.rate_hz,
-                rate_hz: grid.rate_hz,
-                samples,
-                channels,
-                notes,
-            },
-            baseline,
-            checks,
-            detection_limits: detection_limits::of_not_found(smallest, &findings),
-            findings,
-            unexplained,
-            not_tested,
-            replicates,
+            baseline: fitted::parameters(&searched, &grid, false),
+            detection_limits: detection_limits::of_not_found(told.limits, &told.findings),
             verdict,
+            replicates,
+            input,
+            checks: told.checks,
+            findings: told.findings,
+            unexplained: told.unexplained,
+            not_tested: told.not_tested,
         },
     }
+}
+
+fn verdict(findings: &[Finding], unexplained: &[Unexplained]) -> Verdict {
+    match (unexplained.is_empty(), findings.is_empty()) {
+        (false, _) => Verdict::Unexplained,
+        (true, true) => Verdict::Adequate,
+        (true, false) => Verdict::Extended,
+    }
+}
+
+/// The checks of all channels, those that a fault of the counts explains put right.
+struct Tested {
+    /// Of channels alone, and of one by the others.
+    checks: Vec<Check>,
+    /// What the axes share.
+    shared: Shared,
+}
+
+fn tested(searched: &mut [Searched<'_>], audited: &Audit, grid: &Grid) -> Tested {
+    let own = searched.iter_mut();
+    let mut checks: Vec<Check> = own.flat_map(|s| std::mem::take(&mut s.checks)).collect();
+    masking::suppress(&mut checks, audited);
+    let mut shared = common(searched, grid);
+    shared.checks = all_worded(shared.checks);
+    checks.extend(all_worded(couplings(searched, grid)));
+    Tested { checks, shared }
+}
+
+/// What is named so far.
+#[derive(Default)]
+struct Named {
+    /// Causes.
+    findings: Vec<Finding>,
+    /// What stands in the model for what has no name.
+    nearest: Vec<Finding>,
+    /// Names that were withdrawn, in words.
+    withdrawn: Vec<Unexplained>,
+    /// Smallest sizes that would have been found.
+    limits: Vec<DetectionLimit>,
+    /// What could not be asked.
+    not_tested: Vec<NotTested>,
+}
+
+/// Adds what is named on a channel: motion, then the terms and the law of the variance that the checks bear out. Names that
+/// stand already may fall by what is found here.
+fn name_channel(
+    mut named: Named,
+    s: &Searched<'_>,
+    tested: &Tested,
+    audited: &Audit,
+    grid: &Grid,
+    seed: u64,
+) -> Named {
+    let all = tested.checks.iter().chain(&audited.checks);
+    let fails: Vec<&Check> = all
+        .filter(|c| c.channel == s.target.name && c.fails_after)
+        .collect();
+    let failing = |id: CheckId| fails.iter().any(|c| c.id == id);
+    let (moved, unmoved) = motion_findings(s, grid, &failing);
+    named.findings.extend(all_worded(moved));
+    named.withdrawn.extend(all_worded(unmoved));
+    let of_terms = all_worded(term_findings(s, grid, seed));
+    let variance = variance_finding(s)
+        .filter(|_| !by_counts(s, audited))
+        .map(worded);
+    let left = left_on(s, &fails, &tested.shared);
+    let (kept, nearest, told) = withdraw::withdraw(s, of_terms, variance, &failing, &left);
+    let findings = &mut named.findings;
+    let stale = withdraw::propagate::stale(s, findings, &failing);
+    let outliers = events::hold_outliers(s, &kept, findings, &failing);
+    findings.extend(kept);
+    named.nearest.extend(nearest);
+    named
+        .withdrawn
+        .extend([stale, outliers, told].into_iter().flatten());
+    match scale_finding(s, grid) {
+        Ok(scaled) => {
+            named.findings.extend(scaled.finding);
+            named.limits.extend(scaled.limit);
+        }
+        Err((cause, why)) => named.not_tested.push(NotTested {
+            cause: cause.into(),
+            why: format!("{}: {why}", s.target.name),
+        }),
+    }
+    named
+}
+
+/// What the failing checks leave on a channel.
+fn left_on(s: &Searched<'_>, fails: &[&Check], shared: &Shared) -> withdraw::Left {
+    // What an axis takes from another one later has a spectrum, and is no process of its own.
+    let late = shared.late.iter().filter(|l| l.0 == s.target.name);
+    let mut colours = fails.iter().filter(|c| c.id == CheckId::ColourFollows);
+    withdraw::Left {
+        late: late.map(|l| l.1).sum(),
+        colour: colours.next().map_or(0.0, |c| c.statistic),
+        about: fails.iter().flat_map(|c| c.about.iter().cloned()).collect(),
+    }
+}
+
+/// Whether counts explain the law of the variance: a bit that sticks makes a noise of its own, which depends on the level.
+fn by_counts(s: &Searched<'_>, audited: &Audit) -> bool {
+    s.variance.as_ref().is_some_and(|v| {
+        let more = v.parameters.get("variance_increase");
+        let ratio = more.map(|p| 1.0 + p.value);
+        audited.explains_variance(&s.target.name, v.lr, v.threshold, ratio)
+    })
+}
+
+/// The lists of a diagnosis.
+struct Told {
+    checks: Vec<Check>,
+    findings: Vec<Finding>,
+    nearest: Vec<Finding>,
+    unexplained: Vec<Unexplained>,
+    limits: Vec<DetectionLimit>,
+    not_tested: Vec<NotTested>,
+}
+
+fn concluded(
+    searched: &[Searched<'_>],
+    tested: Tested,
+    audited: Audit,
+    dead: Vec<Unexplained>,
+    named: Named,
+) -> Told {
+    let Tested { mut checks, shared } = tested;
+    let Named {
+        mut findings,
+        mut nearest,
+        withdrawn,
+        mut limits,
+        not_tested: unasked,
+    } = named;
+    let mut unexplained = left_over(&checks, &shared);
+    for s in searched {
+        let note = |note: &Note| Unexplained {
+            channel: s.target.name.clone(),
+            what: note.what.clone(),
+        };
+        unexplained.extend(s.state.notes.iter().map(note));
+        unexplained.extend(astray(s));
+    }
+    unexplained.extend(dead);
+    unexplained.extend(withdrawn);
+    checks.extend(shared.checks);
+    checks.extend(audited.checks);
+    unexplained.extend(audited.unexplained);
+    let not_normal = audited.not_normal.into_iter();
+    unexplained.extend(not_normal.filter(|u| !bent(&u.channel, searched, &checks)));
+    if let Some(finding) = shared.finding {
+        if withdraw::propagate::shared_falls(&finding, &checks) {
+            unexplained.push(withdraw::nearest_of(&finding.channels[0], &finding.what));
+            nearest.push(finding);
+        } else {
+            findings.push(finding);
+        }
+    }
+    limits.extend(searched.iter().flat_map(|s| s.limits.iter().cloned()));
+    limits.extend(shared.limits);
+    // What the audit could not ask a channel for has no smallest size there.
+    let asked = |l: &DetectionLimit| {
+        let mut not = audited.not_asked.iter();
+        !not.any(|(channel, cause)| *channel == l.channel && *cause == l.cause)
+    };
+    limits.retain(asked);
+    let mut not_tested = not_tested(searched);
+    not_tested.extend(unasked);
+    not_tested.extend(audited.not_tested);
+    Told {
+        checks,
+        findings: merge::complete(merge::joined(merge::loud(merge::blows(findings)))),
+        nearest,
+        unexplained,
+        limits,
+        not_tested,
+    }
+}
+
+/// Whether what was found on a channel may have bent the distribution of its counts; then the residual decides.
+fn bent(name: &str, searched: &[Searched<'_>], checks: &[Check]) -> bool {
+    let found =
+        |s: &Searched<'_>| !s.state.terms.is_empty() || s.variance.is_some() || s.target.moving;
+    let tails = |c: &Check| c.id == CheckId::Kurtosis && c.channel == name && c.fails_after;
+    let mut own = searched.iter().filter(|s| s.target.name == name);
+    own.any(found) && !checks.iter().any(tails)
 }
 
 /// An axis that moves on a table that turns another one.
@@ -318,128 +390,6 @@ fn astray(s: &Searched<'_>) -> Option<Unexplained> {
     })
 }
 
-fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
-    let panel = Panel::of(&grid.dct, &grid.bins, Rc::clone(&target.coefficients));
-    let view = View {
-        channel: &target.name,
-        axis: target.axis,
-        lsb: target.lsb,
-        white_sigma: target.white.sqrt(),
-        rate_hz: grid.rate_hz,
-        samples: grid.n,
-        base: grid.base,
-        moving: target.moving,
-        signals: &grid.signals,
-    };
-    let mut search = Search::new(panel, view);
-    search.read = 1.0 - target.lost.len() as f64 / grid.n as f64;
-    let baseline = search.baseline(&target.noise);
-    let mut plain = channel::whitened(&search.panel, &baseline);
-    let plain_checks = |(u, e): &(Vec<f64>, Vec<f64>)| {
-        let step = target.step / baseline.solution.white.sqrt();
-        residual::all(u, e, grid.rate_hz, step)
-    };
-    let mut before = plain_checks(&plain);
-    let (ascended, aside) = search.ascend(baseline.clone());
-    let mut state = search.conclude(compare::hold(&search, ascended), aside);
-    let refilled = impute::again(&search, &state, target);
-    if let Some(refilled) = refilled.clone() {
-        state = refilled;
-        if state.terms.is_empty() {
-            plain = channel::whitened(&search.panel, &state);
-            before = plain_checks(&plain);
-        }
-    }
-    let told = refilled.map(|s| impute::told(&search, &s, &target.lost));
-    let found = estimate::found(&search.panel, &state, &target.unit, grid.rate_hz);
-    let (u, e) = if state.terms.is_empty() {
-        plain
-    } else {
-        drop(plain);
-        channel::whitened(&search.panel, &state)
-    };
-    let mut s = Searched {
-        target,
-        search,
-        baseline,
-        state,
-        found,
-        e,
-        u,
-        told,
-        checks: vec![],
-        variance: None,
-        limits: vec![],
-        laws: vec![],
-    };
-    s.limits = detection_limits::of_channel(&s);
-    s.laws = follower_shape::of_followers(&s.search, &s.state);
-    s.state.notes = all_worded(s.state.notes);
-    for (_, outcome) in &mut s.laws {
-        *outcome = worded(outcome.clone());
-    }
-    s.search.panel.release(&s.state.columns());
-    grid.dct.keep_no_more();
-    if !target.moving {
-        s.variance = variance_law::best(&s);
-    }
-    if let Some(v) = &s.variance {
-        s.e.iter_mut().zip(&v.law).for_each(|(e, v)| *e /= v.sqrt());
-    }
-    s.checks = channel_checks(&s, before);
-    s
-}
-
-fn channel_checks(s: &Searched<'_>, before: Vec<test_level::Outcome>) -> Vec<Check> {
-    let after = if s.state.terms.is_empty() && s.variance.is_none() {
-        before.clone()
-    } else {
-        residual::all(&s.u, &s.e, s.search.view.rate_hz, s.step())
-    };
-    // Before a process was named nothing was claimed of it.
-    let claims = process::of_processes(&s.search, &s.state);
-    let mut rhythms = after.iter().filter(|c| c.id == CheckId::VarianceRhythm);
-    let stationary = rhythms.next().and_then(|r| process::stationary(s, r));
-    let claims = claims.into_iter().chain(stationary);
-    let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
-    let laws = laws.chain(variance_law::claims(s));
-    let claims = claims.chain(laws).map(|c| Check {
-        id: c.id.into(),
-        about: c.about,
-        channel: s.target.name.clone(),
-        statistic: c.statistic,
-        p_value: Some(c.p_value),
-        threshold: test_level::CLAIM_LEVEL,
-        fails_before: false,
-        fails_after: c.p_value < test_level::CLAIM_LEVEL,
-        what: c.what,
-    });
-    before
-        .into_iter()
-        .zip(after)
-        .map(|(b, a)| Check {
-            id: b.id.into(),
-            about: a.about,
-            channel: s.target.name.clone(),
-            statistic: b.statistic,
-            p_value: Some(b.p_value),
-            threshold: OMNIBUS_LEVEL,
-            fails_before: b.p_value < OMNIBUS_LEVEL,
-            // A base that moves is told as an input; what it leaves in the residual is no riddle.
-            fails_after: a.p_value < OMNIBUS_LEVEL && !s.target.moving && !s.search.view.sways(),
-            what: if a.p_value < OMNIBUS_LEVEL {
-                a.what
-            } else {
-                b.what
-            },
-        })
-        .chain(claims)
-        .chain(short_time::checks(s))
-        .chain(random_walk::check(s))
-        .map(worded)
-        .collect()
-}
-
 fn left_over(checks: &[Check], shared: &Shared) -> Vec<Unexplained> {
     let failing = checks.iter().filter(|c| c.fails_after);
     failing
@@ -451,151 +401,10 @@ fn left_over(checks: &[Check], shared: &Shared) -> Vec<Unexplained> {
         .collect()
 }
 
-fn not_tested(searched: &[Searched<'_>]) -> Vec<NotTested> {
-    let mut all: Vec<(NotTested, Vec<&str>)> = vec![];
-    let sways = searched.iter().any(|s| s.search.view.sways());
-    for s in searched {
-        let mut own: Vec<(&'static str, String)> = s.search.not_tested.clone();
-        let in_library = |id: &str| id != channel::ID;
-        if s.target.moving {
-            let why = "the base moves about this axis: record it at rest";
-            let slow = |h: &Hypothesis| {
-                matches!(
-                    h,
-                    Hypothesis::Regression(_)
-                        | Hypothesis::Shaped(_)
-                        | Hypothesis::Step
-                        | Hypothesis::Line
-                        | Hypothesis::Covariance(_)
-                        | Hypothesis::Variance(_)
-                        | Hypothesis::TwoLevel
-                )
-            };
-            for c in s.search.candidates.iter().filter(|c| slow(&c.hypothesis)) {
-                if in_library(c.effect.id()) && own.iter().all(|o| o.0 != c.effect.id()) {
-                    own.push((c.effect.id(), why.to_owned()));
-                }
-            }
-        }
-        if sways && !s.target.moving {
-            let why = "the base sways, and turns a little about this axis too: record it at rest";
-            let unsafe_here =
-                |h: &Hypothesis| matches!(h, Hypothesis::Line | Hypothesis::Covariance(_));
-            for c in s
-                .search
-                .candidates
-                .iter()
-                .filter(|c| unsafe_here(&c.hypothesis))
-            {
-                if own.iter().all(|o| o.0 != c.effect.id()) {
-                    own.push((c.effect.id(), why.to_owned()));
-                }
-            }
-        }
-        for (cause, why) in own {
-            match all
-                .iter_mut()
-                .find(|(n, _)| n.cause == cause && n.why == why)
-            {
-                Some((_, channels)) => channels.push(&s.target.name),
-                None => all.push((
-                    NotTested {
-                        cause: cause.into(),
-                        why,
-                    },
-                    vec![&s.target.name],
-                )),
-            }
-        }
-    }
-    let order = |id: &str| EFFECTS.iter().position(|e| e.id() == id);
-    all.sort_by_key(|(n, _)| order(&n.cause));
-    all.into_iter()
-        .map(|(mut n, channels)| {
-            if channels.len() < searched.len() {
-                n.why = format!("{}: {}", channels.join(", "), n.why);
-            }
-            n
-        })
-        .collect()
-}
-
-fn baseline_of(s: &Searched<'_>, state: &State, grid: &Grid) -> Parameters {
-    let (unit, rate) = (s.target.unit.as_str(), grid.rate_hz);
-    let white = state.solution.white.sqrt();
-    let n = grid.n as f64;
-    let mean = s.target.y.iter().sum::<f64>() / n;
-    let errors = estimate::noise_errors(&s.search.panel, state);
-    let walk = white * (state.noise.log_walk / 2.0).exp() * rate.sqrt();
-    let walk_error = walk * errors.first().copied().unwrap_or(f64::NAN) / 2.0;
-    let in_degrees = unit == "deg/s";
-    let (density, density_unit) = if in_degrees {
-        (60.0 / rate.sqrt(), "deg/sqrt(h)".to_owned())
-    } else {
-        (1.0 / rate.sqrt(), format!("{unit}*sqrt(s)"))
-    };
-    let mut all = Parameters::new();
-    all.insert(
-        "bias".into(),
-        Parameter::estimated(
-            mean,
-            (white * white / n + walk * walk * n / rate / 3.0).sqrt(),
-            unit,
-        ),
-    );
-    all.insert(
-        "angle_random_walk".into(),
-        Parameter::estimated(
-            white * density,
-            white * density / (2.0 * n).sqrt() * state.wider.first().unwrap_or(&1.0),
-            &density_unit,
-        ),
-    );
-    all.insert(
-        "rate_random_walk".into(),
-        Parameter::estimated(walk, walk_error, &format!("{unit}/sqrt(s)")),
-    );
-    all
-}
-
-/// The effects of the extended model: the causes, and what stands for the unexplained in it.
-fn effects_of<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<EffectModel> {
-    let mut all = vec![];
-    for f in findings {
-        let Some(e) = effect(&f.cause) else { continue };
-        let known = |p: &Parameters| -> Parameters {
-            p.iter()
-                .filter(|(k, _)| e.parameters().iter().any(|s| s.name == *k))
-                .map(|(k, v)| (k.clone(), v.clone()))
-                .collect()
-        };
-        if f.per_channel.is_empty() {
-            all.push(EffectModel {
-                cause: f.cause.clone(),
-                channels: f.channels.clone(),
-                parameters: known(&f.parameters),
-            });
-        }
-        // What is the same to the last digit on several channels is one event on all of them.
-        let first = all.len();
-        for (channel, p) in &f.per_channel {
-            let parameters = known(p);
-            match all[first..].iter_mut().find(|e| e.parameters == parameters) {
-                Some(same) => same.channels.push(channel.clone()),
-                None => all.push(EffectModel {
-                    cause: f.cause.clone(),
-                    channels: vec![channel.clone()],
-                    parameters,
-                }),
-            }
-        }
-    }
-    all
-}
-
 #[cfg(test)]
 mod tests {
     use model::docs::example;
+    use model::effects::effect;
 
     use super::*;
     use crate::test_level::rewording;

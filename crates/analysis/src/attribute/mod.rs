@@ -2,4 +2,5 @@
 
 pub mod events;
 pub mod masking;
+pub mod merge;
 pub mod withdraw;

@@ -1,0 +1,161 @@
+//! One channel from its readings to a searched one: baseline, search, checks.
+
+use std::rc::Rc;
+
+use model::effect::View;
+
+use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
+use crate::fit::channel::{State, whitened};
+use crate::fit::estimate;
+use crate::fit::likelihood::Panel;
+use crate::ingest::grid::{Grid, Target};
+use crate::report::detection_limits;
+use crate::result::Check;
+use crate::search::searched::Searched;
+use crate::search::{Search, impute};
+use crate::test_level::{CLAIM_LEVEL, CheckId, OMNIBUS_LEVEL, Outcome, all_worded, worded};
+use crate::two_level::compare;
+
+/// The search of a channel, its hypotheses laid out.
+fn laid_out<'a>(grid: &'a Grid, target: &'a Target) -> Search<'a> {
+    let panel = Panel::of(&grid.dct, &grid.bins, Rc::clone(&target.coefficients));
+    let view = View {
+        channel: &target.name,
+        axis: target.axis,
+        lsb: target.lsb,
+        white_sigma: target.white.sqrt(),
+        rate_hz: grid.rate_hz,
+        samples: grid.n,
+        base: grid.base,
+        moving: target.moving,
+        signals: &grid.signals,
+    };
+    let mut search = Search::new(panel, view);
+    search.read = 1.0 - target.lost.len() as f64 / grid.n as f64;
+    search
+}
+
+/// Coefficients and samples of a residual.
+type Whitened = (Vec<f64>, Vec<f64>);
+
+/// The checks of the residual of the baseline.
+fn plain_checks((u, e): &Whitened, baseline: &State, grid: &Grid, target: &Target) -> Vec<Outcome> {
+    let step = target.step / baseline.solution.white.sqrt();
+    residual::all(u, e, grid.rate_hz, step)
+}
+
+/// Search a channel, and ask its model and what that leaves.
+pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
+    let search = laid_out(grid, target);
+    let baseline = search.baseline(&target.noise);
+    let mut plain = whitened(&search.panel, &baseline);
+    let mut before = plain_checks(&plain, &baseline, grid, target);
+    let (ascended, aside) = search.ascend(baseline.clone());
+    let mut state = search.conclude(compare::hold(&search, ascended), aside);
+    let refilled = impute::again(&search, &state, target);
+    if let Some(refilled) = refilled.clone() {
+        state = refilled;
+        if state.terms.is_empty() {
+            plain = whitened(&search.panel, &state);
+            before = plain_checks(&plain, &baseline, grid, target);
+        }
+    }
+    let told = refilled.map(|s| impute::told(&search, &s, &target.lost));
+    let found = estimate::found(&search.panel, &state, &target.unit, grid.rate_hz);
+    let (u, e) = if state.terms.is_empty() {
+        plain
+    } else {
+        drop(plain);
+        whitened(&search.panel, &state)
+    };
+    let mut s = Searched {
+        target,
+        search,
+        baseline,
+        state,
+        found,
+        e,
+        u,
+        told,
+        checks: vec![],
+        variance: None,
+        limits: vec![],
+        laws: vec![],
+    };
+    s.limits = detection_limits::of_channel(&s);
+    s.laws = follower_shape::of_followers(&s.search, &s.state);
+    s.state.notes = all_worded(s.state.notes);
+    for (_, outcome) in &mut s.laws {
+        *outcome = worded(outcome.clone());
+    }
+    s.search.panel.release(&s.state.columns());
+    grid.dct.keep_no_more();
+    if !target.moving {
+        s.variance = variance_law::best(&s);
+    }
+    if let Some(v) = &s.variance {
+        s.e.iter_mut().zip(&v.law).for_each(|(e, v)| *e /= v.sqrt());
+    }
+    s.checks = channel_checks(&s, before);
+    s
+}
+
+/// All checks of a channel, those of the residual `before` the extension beside those after it.
+fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
+    let after = if s.state.terms.is_empty() && s.variance.is_none() {
+        before.clone()
+    } else {
+        residual::all(&s.u, &s.e, s.search.view.rate_hz, s.step())
+    };
+    let rhythm = after
+        .iter()
+        .find(|c| c.id == CheckId::VarianceRhythm)
+        .cloned();
+    before
+        .into_iter()
+        .zip(after)
+        .map(|(b, a)| Check {
+            id: b.id.into(),
+            about: a.about,
+            channel: s.target.name.clone(),
+            statistic: b.statistic,
+            p_value: Some(b.p_value),
+            threshold: OMNIBUS_LEVEL,
+            fails_before: b.p_value < OMNIBUS_LEVEL,
+            // A base that moves is told as an input; what it leaves in the residual is no riddle.
+            fails_after: a.p_value < OMNIBUS_LEVEL && !s.target.moving && !s.search.view.sways(),
+            what: if a.p_value < OMNIBUS_LEVEL {
+                a.what
+            } else {
+                b.what
+            },
+        })
+        .chain(claims(s, rhythm.as_ref()))
+        .chain(short_time::checks(s))
+        .chain(random_walk::check(s))
+        .map(worded)
+        .collect()
+}
+
+/// What the names on a channel claim; `rhythm` is the check for a rhythm of the variance.
+fn claims(s: &Searched<'_>, rhythm: Option<&Outcome>) -> Vec<Check> {
+    // Before a process was named nothing was claimed of it.
+    let claims = process::of_processes(&s.search, &s.state);
+    let stationary = rhythm.and_then(|r| process::stationary(s, r));
+    let claims = claims.into_iter().chain(stationary);
+    let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
+    let laws = laws.chain(variance_law::claims(s));
+    let all = claims.chain(laws);
+    all.map(|c| Check {
+        id: c.id.into(),
+        about: c.about,
+        channel: s.target.name.clone(),
+        statistic: c.statistic,
+        p_value: Some(c.p_value),
+        threshold: CLAIM_LEVEL,
+        fails_before: false,
+        fails_after: c.p_value < CLAIM_LEVEL,
+        what: c.what,
+    })
+    .collect()
+}
