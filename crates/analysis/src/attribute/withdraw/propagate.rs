@@ -7,7 +7,8 @@
 
 use std::collections::BTreeSet;
 
-use super::{Doubt, LEFT, generic, nearest_of};
+use super::facts::{Facts, LEFT, generic};
+use super::{Doubt, nearest_of};
 use crate::criticise::residual;
 use crate::fit::channel;
 use crate::fit::channel::{Form, Term};
@@ -20,30 +21,18 @@ const MADE: f64 = 0.25;
 /// Likelihood ratio of a term over that of the process, from which on it is none.
 const LARGER: f64 = 2.0;
 
-/// What the doubts spread by.
+/// How withdrawals spread from one name to others.
 pub(super) struct Kin<'a> {
-    pub s: &'a Searched<'a>,
-    /// Density of all noise over the white one.
-    pub g: &'a [f64],
-    /// Coefficients by bin.
-    pub counts: &'a [f64],
-    /// Recorded channels that the failing checks of the channel are about.
-    pub about: &'a BTreeSet<String>,
-    /// Whether a claim of the law of the variance fails, and whether its name falls.
-    pub variance: (bool, bool),
-    /// Whether the variance follows an acceleration.
-    pub felt: bool,
-    /// Chi-square by which the channel is not of linear, normal noise.
-    pub bent: f64,
-    /// Whether something comes again and again that is left over.
-    pub again: bool,
+    pub facts: &'a Facts<'a>,
+    /// Whether the name of the law of the variance falls.
+    pub variance: bool,
 }
 
 impl Kin<'_> {
     /// Densities of the processes that have fallen, with what each explains.
     fn fallen(&self, doubts: &[Doubt]) -> Vec<(Vec<f64>, f64)> {
-        let at = &self.s.search.panel.bins.at;
-        let terms = self.s.state.terms.iter().zip(doubts);
+        let at = &self.facts.s.search.panel.bins.at;
+        let terms = self.facts.s.state.terms.iter().zip(doubts);
         terms
             .filter(|(_, d)| **d != Doubt::No)
             .filter_map(|(t, _)| match &t.form {
@@ -55,30 +44,16 @@ impl Kin<'_> {
             .collect()
     }
 
-    /// What tells a term, by bin.
-    fn information(&self, t: &Term, own: &[f64]) -> Vec<f64> {
-        let panel = &self.s.search.panel;
-        if let Form::Covariance(process, theta) = &t.form {
-            let own = process.density(theta, &panel.bins.at);
-            let by_bin = own.iter().zip(self.g).zip(self.counts);
-            return by_bin.map(|((d, g), m)| m * (d / g).powi(2)).collect();
-        }
-        let mut sum = vec![0.0; panel.bins.n];
-        panel.add_columns(&mut sum, 0, &t.columns, own);
-        let energy = panel.bins.products(&sum, &sum);
-        energy.iter().zip(self.g).map(|(e, g)| e / g).collect()
-    }
-
     /// Whether a term acts where a fallen process makes the noise, and is no larger.
     fn in_its_band(&self, t: &Term, own: &[f64], fallen: &[(Vec<f64>, f64)]) -> bool {
         let large: Vec<_> = fallen.iter().filter(|f| LARGER * f.1 > t.lr).collect();
         if large.is_empty() {
             return false;
         }
-        let information = self.information(t, own);
+        let information = self.facts.information(t, own);
         let all: f64 = information.iter().sum();
         large.iter().any(|(density, _)| {
-            let shares = density.iter().zip(self.g).map(|(d, g)| d / g);
+            let shares = density.iter().zip(&self.facts.g).map(|(d, g)| d / g);
             let held: f64 = information.iter().zip(shares).map(|(i, s)| i * s).sum();
             all > 0.0 && held > MADE * all
         })
@@ -86,7 +61,7 @@ impl Kin<'_> {
 
     /// Whether a process explains less than what follows a recorded channel beside it by no law of the library.
     fn beside_larger(&self, t: &Term, doubts: &[Doubt]) -> bool {
-        let mut terms = self.s.state.terms.iter().zip(doubts);
+        let mut terms = self.facts.s.state.terms.iter().zip(doubts);
         let larger = |(o, d): (&Term, &Doubt)| {
             let follows = o.effect.id() == channel::ID || *d != Doubt::No && !generic(o);
             follows && o.lr > t.lr
@@ -96,35 +71,40 @@ impl Kin<'_> {
 
     /// Whether what is left over, or has fallen, follows the recorded channel that a term does.
     fn of_its_source(&self, t: &Term, doubts: &[Doubt]) -> bool {
-        let by_variance = self.s.variance.as_ref().filter(|_| self.variance.1);
+        let by_variance = self.facts.s.variance.as_ref().filter(|_| self.variance);
         let by_variance = by_variance.and_then(|v| v.follows.as_ref());
-        let terms = self.s.state.terms.iter().zip(doubts);
+        let terms = self.facts.s.state.terms.iter().zip(doubts);
         let by_terms = terms.filter(|(o, d)| **d != Doubt::No || o.effect.id() == channel::ID);
         let others: BTreeSet<&String> = by_terms
             .filter(|(o, _)| o.effect.id() != t.effect.id())
-            .flat_map(|(o, _)| self.s.search.sources(o))
+            .flat_map(|(o, _)| self.facts.s.search.sources(o))
             .chain(by_variance)
-            .chain(self.about)
+            .chain(&self.facts.left.about)
             .collect();
-        self.s.search.sources(t).iter().any(|c| others.contains(c))
+        self.facts
+            .s
+            .search
+            .sources(t)
+            .iter()
+            .any(|c| others.contains(c))
     }
 
     /// Doubt what is of a kind with what has fallen.
     pub(super) fn fall(&self, doubts: &mut [Doubt]) {
         let fallen = self.fallen(doubts);
-        let falls: Vec<bool> = (self.s.state.parts().zip(&*doubts))
+        let falls: Vec<bool> = (self.facts.s.state.parts().zip(&*doubts))
             .map(|((t, own), doubt)| {
                 let line = match t.form {
                     Form::Line(omega) | Form::SideBands(omega, _) => Some(omega),
                     _ => None,
                 };
                 // A line that wanders is told as such, and set aside.
-                let aside = line.is_some_and(|omega| self.s.state.wanders(omega).is_some());
+                let aside = line.is_some_and(|omega| self.facts.s.state.wanders(omega).is_some());
                 let of_kind = self.in_its_band(t, own, &fallen)
                     || self.of_its_source(t, doubts)
                     || self.beside_larger(t, doubts)
-                    || line.is_some() && self.again
-                    || t.is_filter() && self.variance.0;
+                    || line.is_some() && self.facts.repeats.is_some()
+                    || t.is_filter() && self.facts.fails(CheckId::VarianceLaw);
                 *doubt == Doubt::No && !aside && of_kind
             })
             .collect();
@@ -137,19 +117,19 @@ impl Kin<'_> {
 
     /// Whether the name of a law of the variance falls beside what is left.
     pub(super) fn variance_falls(&self, doubts: &[Doubt]) -> bool {
-        let Some(v) = &self.s.variance else {
+        let Some(v) = &self.facts.s.variance else {
             return false;
         };
         let source = v.follows.as_ref();
         let by_term = |(t, doubt): (&Term, &Doubt)| {
-            let follows = |s: &String| self.s.search.sources(t).contains(s);
+            let follows = |s: &String| self.facts.s.search.sources(t).contains(s);
             t.effect.id() == channel::ID && t.lr > v.lr
                 || *doubt != Doubt::No && source.is_some_and(follows)
         };
-        self.felt
-            || self.bent > LEFT * v.lr
-            || source.is_some_and(|s| self.about.contains(s))
-            || self.s.state.terms.iter().zip(doubts).any(by_term)
+        self.facts.fails(CheckId::VarianceFollows)
+            || self.facts.bent > LEFT * v.lr
+            || source.is_some_and(|s| self.facts.left.about.contains(s))
+            || self.facts.s.state.terms.iter().zip(doubts).any(by_term)
     }
 }
 
