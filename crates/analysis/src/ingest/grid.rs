@@ -12,7 +12,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
 use crate::ingest::base_turns::{Excursion, MOTION_RMS, excursions, largest_rate};
-use crate::ingest::dequantise;
+use crate::ingest::{dequantise, fill, kalman};
 use crate::numerics::series::{smallest_step, white_by_differences};
 use crate::records::error::AnalysisError;
 
@@ -141,6 +141,16 @@ fn interpolated(values: &[f64]) -> Vec<f64> {
     out
 }
 
+/// Too little for a diagnosis.
+fn short(have: f64, need: f64, unit: &'static str) -> AnalysisError {
+    AnalysisError::Inconclusive {
+        what: "a diagnosis".into(),
+        have,
+        need,
+        unit,
+    }
+}
+
 /// Put a record on its grid. `masked(name)` gives the rows of a channel that are not to be believed.
 ///
 /// # Errors
@@ -150,193 +160,17 @@ pub fn lay_out(
     masked: &dyn Fn(&str) -> Vec<usize>,
     seed: u64,
 ) -> Result<Grid, AnalysisError> {
-    let rate_hz = rate_of(record).ok_or(AnalysisError::NoRate)?;
-    let gyros: Vec<&Channel> = record.all(Quantity::Gyro).collect();
-    if gyros.is_empty() {
-        let present = record.channels.iter().map(|c| c.name.clone()).collect();
-        return Err(AnalysisError::NoChannel {
-            name: "gyro_x, gyro_y or gyro_z".into(),
-            present,
-        });
-    }
-    let (places, n) = places(record);
-    let seconds = n as f64 / rate_hz;
-    let short = |have: f64, need: f64, unit| AnalysisError::Inconclusive {
-        what: "a diagnosis".into(),
-        have,
-        need,
-        unit,
-    };
-    if n < LEAST_SAMPLES {
-        return Err(short(n as f64, LEAST_SAMPLES as f64, "samples"));
-    }
-    if seconds < LEAST_SECONDS {
-        return Err(short(seconds, LEAST_SECONDS, "s"));
-    }
-    let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
+    let layout = Layout::new(record, masked)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
-    // Of the coefficients of what may drive a bias only the band of motion is asked for.
-    let top = places_of(MOTION_BAND_HZ.1, n, rate_hz);
-    let mut known: Vec<Vec<f64>> = vec![];
-    let mut others = vec![];
-    for channel in record
-        .channels
-        .iter()
-        .filter(|c| c.quantity != Quantity::Gyro)
-    {
-        let (signal, driver) = other(channel, &places, n, &dct, &bins);
-        known.extend(driver.map(|c| c[..top].to_vec()));
-        others.push(signal);
-    }
-    let turns = matches!(record.header.base, Some(Base::Moving | Base::Turntable));
-    // Where the base moves, and where the motor turns it, they explain nothing away.
-    let drivers: &[Vec<f64>] = if turns { &[] } else { &known };
-    // Over a gap the fill wanders as the noise does that was fitted, which a process beside it swells: only what was read
-    // tells of motion.
-    let motion_of = |y: &[f64], c: &[f64], lost: &[usize], (noise, white): &(Noise, f64)| {
-        let all = |mut c: Vec<f64>| motion(&mut c, drivers, n, rate_hz, turns);
-        let whole = all(c.to_vec());
-        if lost.is_empty() || whole <= MOTION_RMS {
-            return whole;
-        }
-        let mut read = y.to_vec();
-        lost.iter().for_each(|i| read[*i] = f64::NAN);
-        crate::ingest::kalman::bridge(&mut read, *white, white * noise.log_walk.exp());
-        all(dct.forward(&read)) * (n as f64 / (n - lost.len()).max(1) as f64).sqrt()
-    };
-    let read = |channel: &Channel| {
-        let mut y = spread(&channel.values, &places, n, &masked(&channel.name));
-        let (scale, _) = unit_of(channel);
-        y.iter_mut().for_each(|v| *v *= scale);
-        y
-    };
-    // Where the base is known to move, a turn of seconds is part of that.
-    let felt = |channel: &Channel| match unit_of(channel).1.as_str() {
-        "deg/s" if !turns => felt(&interpolated(&read(channel)), &others, rate_hz, &dct),
-        _ => vec![],
-    };
-    let felt: Vec<Vec<Excursion>> = gyros.iter().map(|g| felt(g)).collect();
-    let mut targets = vec![];
-    for (channel, own) in gyros.into_iter().zip(&felt) {
-        let (scale, unit) = unit_of(channel);
-        let mut y = read(channel);
-        let lost: Vec<usize> = (0..n).filter(|i| !y[*i].is_finite()).collect();
-        if n - lost.len() < LEAST_SAMPLES {
-            return Err(short(
-                (n - lost.len()) as f64,
-                LEAST_SAMPLES as f64,
-                "samples",
-            ));
-        }
-        // While the base turns, no axis of it is at rest.
-        for e in felt.iter().flatten() {
-            y[e.with_margin(n)].fill(f64::NAN);
-        }
-        let lost: Vec<usize> = (0..n).filter(|i| !y[*i].is_finite()).collect();
-        let guess =
-            white_by_differences(&y).max(channel.lsb.map_or(0.0, |l| (l * scale).powi(2) / 12.0));
-        let constant = y
-            .iter()
-            .filter(|v| v.is_finite())
-            .all(|v| Some(v) == y.iter().find(|v| v.is_finite()));
-        if constant || guess <= 0.0 && white_of(&y) <= 0.0 {
-            let value = channel
-                .values
-                .iter()
-                .copied()
-                .find(|v| v.is_finite())
-                .unwrap_or(f64::NAN);
-            return Err(AnalysisError::Constant {
-                name: channel.name.clone(),
-                value,
-            });
-        }
-        let given = y.clone();
-        let mut fit = (Noise::new(0.0), guess.max(1e-300));
-        crate::ingest::kalman::fill(&mut y, fit.1, fit.1 * 1e-4, &mut rng);
-        let mut c = Rc::default();
-        for pass in 0..2 {
-            let panel = Panel::new(&dct, &bins, &y);
-            let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
-            (fit, c) = ((noise, solution.white), panel.column(0));
-            if lost.is_empty() || pass == 1 {
-                break;
-            }
-            y = given.clone();
-            crate::ingest::kalman::fill(&mut y, fit.1, fit.1 * fit.0.log_walk.exp(), &mut rng);
-        }
-        let is_rate = unit == "deg/s";
-        let mut motion_rms = if is_rate {
-            motion_of(&y, &c, &lost, &fit)
-        } else {
-            0.0
-        };
-        let spikes = if motion_rms > MOTION_RMS {
-            vec![]
-        } else {
-            spikes(&given, &mut y, &mut c, &mut fit, &dct, &bins, &mut rng)
-        };
-        let of_audit = masked(&channel.name).into_iter();
-        let of_audit = of_audit.filter_map(|row| {
-            let given = channel.values.get(row).filter(|v| v.is_finite())?;
-            Some((*places.get(row)?, given * scale))
-        });
-        let aside = of_audit
-            .chain(spikes.iter().map(|i| (*i, given[*i])))
-            .collect();
-        let lost = [lost, spikes.clone()].concat();
-        if motion_rms <= MOTION_RMS {
-            c = crate::ingest::fill::first(&channel.name, &dct, &bins, &mut y, &lost, &mut fit);
-        }
-        if is_rate && !spikes.is_empty() {
-            motion_rms = motion_of(&y, &c, &lost, &fit);
-        }
-        targets.push(Target {
-            name: channel.name.clone(),
-            axis: channel.axis,
-            unit,
-            lsb: channel.lsb.map(|l| l * scale),
-            step: scale
-                * channel
-                    .lsb
-                    .unwrap_or_else(|| smallest_step(few(&channel.values))),
-            y: Arc::new(y),
-            coefficients: c,
-            lost,
-            spikes,
-            aside,
-            excursions: own.clone(),
-            motion_rms,
-            moving: motion_rms > MOTION_RMS,
-            astray: false,
-            noise: fit.0,
-            white: fit.1,
-        });
-    }
-    let turntable = record.header.base == Some(Base::Turntable);
-    followers(&mut targets, &|t, strongest| {
-        let axis = [strongest.coefficients[..top].to_vec()];
-        let left =
-            |with: &[Vec<f64>], slow| motion(&mut t.coefficients.to_vec(), with, n, rate_hz, slow);
-        if turntable {
-            // A table turns one axis: what the others do with the motor, the supply or the temperature, and what is slow
-            // on them, is their own.
-            let (by_axis, by_known) = (left(&axis, turns), left(&known, turns));
-            let follows = (t.motion_rms.powi(2) - by_axis.powi(2)).max(0.0).sqrt();
-            Rest {
-                follows: if by_known < by_axis { 0.0 } else { follows },
-                own: left(&[known.as_slice(), &axis].concat(), false),
-                table: true,
-            }
-        } else {
-            Rest {
-                follows: t.motion_rms,
-                own: left(&[drivers, &axis].concat(), turns),
-                table: false,
-            }
-        }
-    });
-    let (mut others, mut of_gyros) = (others.into_iter(), targets.iter());
+    let gyros = || record.all(Quantity::Gyro);
+    let felt: Vec<Vec<Excursion>> = gyros().map(|g| layout.felt(g)).collect();
+    let targets: Result<Vec<Target>, _> = gyros()
+        .zip(&felt)
+        .map(|(channel, own)| layout.target(channel, own, &felt, &mut rng))
+        .collect();
+    let mut targets = targets?;
+    followers(&mut targets, &|t, strongest| layout.rest(t, strongest));
+    let (mut others, mut of_gyros) = (layout.others.into_iter(), targets.iter());
     let signals = (record.channels.iter())
         .filter_map(|c| match c.quantity {
             Quantity::Gyro => of_gyros.next().map(|t| of_gyro(c, t)),
@@ -344,14 +178,258 @@ pub fn lay_out(
         })
         .collect();
     Ok(Grid {
-        rate_hz,
-        n,
-        dct,
-        bins,
+        rate_hz: layout.rate_hz,
+        n: layout.n,
+        dct: layout.dct,
+        bins: layout.bins,
         base: record.header.base,
         targets,
         signals,
     })
+}
+
+/// The grid while channels are put on it.
+struct Layout<'a> {
+    masked: &'a dyn Fn(&str) -> Vec<usize>,
+    base: Option<Base>,
+    rate_hz: f64,
+    /// Places, and that of every row.
+    n: usize,
+    places: Vec<usize>,
+    dct: Dct,
+    bins: Rc<Bins>,
+    /// All channels but the gyros.
+    others: Vec<Signal>,
+    /// Coefficients, in the band of motion, of what may drive a bias.
+    known: Vec<Vec<f64>>,
+}
+
+impl<'a> Layout<'a> {
+    fn new(record: &Record, masked: &'a dyn Fn(&str) -> Vec<usize>) -> Result<Self, AnalysisError> {
+        let rate_hz = rate_of(record).ok_or(AnalysisError::NoRate)?;
+        if record.all(Quantity::Gyro).next().is_none() {
+            let present = record.channels.iter().map(|c| c.name.clone()).collect();
+            return Err(AnalysisError::NoChannel {
+                name: "gyro_x, gyro_y or gyro_z".into(),
+                present,
+            });
+        }
+        let (places, n) = places(record);
+        let seconds = n as f64 / rate_hz;
+        if n < LEAST_SAMPLES {
+            return Err(short(n as f64, LEAST_SAMPLES as f64, "samples"));
+        }
+        if seconds < LEAST_SECONDS {
+            return Err(short(seconds, LEAST_SECONDS, "s"));
+        }
+        let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
+        // Of the coefficients of what may drive a bias only the band of motion is asked for.
+        let top = places_of(MOTION_BAND_HZ.1, n, rate_hz);
+        let (mut others, mut known) = (vec![], vec![]);
+        let channels = record.channels.iter();
+        for channel in channels.filter(|c| c.quantity != Quantity::Gyro) {
+            let (signal, driver) = other(channel, &places, n, &dct, &bins);
+            known.extend(driver.map(|c| c[..top].to_vec()));
+            others.push(signal);
+        }
+        Ok(Self {
+            masked,
+            base: record.header.base,
+            rate_hz,
+            n,
+            places,
+            dct,
+            bins,
+            others,
+            known,
+        })
+    }
+
+    /// Whether the header says that the base moves.
+    fn turns(&self) -> bool {
+        matches!(self.base, Some(Base::Moving | Base::Turntable))
+    }
+
+    /// What may drive a bias. Where the base moves, and where the motor turns it, it explains nothing away.
+    fn drivers(&self) -> &[Vec<f64>] {
+        if self.turns() { &[] } else { &self.known }
+    }
+
+    /// The readings of a gyro on the grid, those that are not believed left out.
+    fn read(&self, channel: &Channel) -> Vec<f64> {
+        let masked = (self.masked)(&channel.name);
+        let mut y = spread(&channel.values, &self.places, self.n, &masked);
+        let (scale, _) = unit_of(channel);
+        y.iter_mut().for_each(|v| *v *= scale);
+        y
+    }
+
+    /// Turns of a base at rest that a gyro felt. Where it is known to move, a turn of seconds is part of that.
+    fn felt(&self, channel: &Channel) -> Vec<Excursion> {
+        if unit_of(channel).1 != "deg/s" || self.turns() {
+            return vec![];
+        }
+        let y = interpolated(&self.read(channel));
+        felt(&y, &self.others, self.rate_hz, &self.dct)
+    }
+
+    /// Excess rms in the band of base motion. Over a gap the fill wanders as the noise does that was fitted, which a process
+    /// beside it swells: only what was read tells of motion.
+    fn motion(&self, y: &[f64], c: &[f64], lost: &[usize], (noise, white): &(Noise, f64)) -> f64 {
+        let all =
+            |mut c: Vec<f64>| motion(&mut c, self.drivers(), self.n, self.rate_hz, self.turns());
+        let whole = all(c.to_vec());
+        if lost.is_empty() || whole <= MOTION_RMS {
+            return whole;
+        }
+        let mut read = y.to_vec();
+        lost.iter().for_each(|i| read[*i] = f64::NAN);
+        kalman::bridge(&mut read, *white, white * noise.log_walk.exp());
+        let known = (self.n - lost.len()).max(1);
+        all(self.dct.forward(&read)) * (self.n as f64 / known as f64).sqrt()
+    }
+
+    /// White noise and a random walk fitted to the readings `given`, with the lost ones filled, their coefficients and the fit.
+    fn filled(
+        &self,
+        given: &[f64],
+        guess: f64,
+        rng: &mut Xoshiro256PlusPlus,
+    ) -> (Vec<f64>, Rc<Vec<f64>>, (Noise, f64)) {
+        let lost = given.iter().any(|v| !v.is_finite());
+        let mut fit = (Noise::new(0.0), guess.max(1e-300));
+        let mut y = given.to_vec();
+        kalman::fill(&mut y, fit.1, fit.1 * 1e-4, rng);
+        let mut pass = 0;
+        loop {
+            let panel = Panel::new(&self.dct, &self.bins, &y);
+            let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
+            fit = (noise, solution.white);
+            if !lost || pass == 1 {
+                return (y, panel.column(0), fit);
+            }
+            y = given.to_vec();
+            kalman::fill(&mut y, fit.1, fit.1 * fit.0.log_walk.exp(), rng);
+            pass += 1;
+        }
+    }
+
+    /// A gyro on the grid; `own` are the turns that it felt, `felt` those of all gyros: while the base turns, no axis of it is
+    /// at rest.
+    fn target(
+        &self,
+        channel: &Channel,
+        own: &[Excursion],
+        felt: &[Vec<Excursion>],
+        rng: &mut Xoshiro256PlusPlus,
+    ) -> Result<Target, AnalysisError> {
+        let (scale, unit) = unit_of(channel);
+        let mut given = self.read(channel);
+        let read = given.iter().filter(|v| v.is_finite()).count();
+        if read < LEAST_SAMPLES {
+            return Err(short(read as f64, LEAST_SAMPLES as f64, "samples"));
+        }
+        for e in felt.iter().flatten() {
+            given[e.with_margin(self.n)].fill(f64::NAN);
+        }
+        let lost: Vec<usize> = (0..self.n).filter(|i| !given[*i].is_finite()).collect();
+        let guess = white_by_differences(&given)
+            .max(channel.lsb.map_or(0.0, |l| (l * scale).powi(2) / 12.0));
+        if is_constant(&given) || guess <= 0.0 && white_of(&given) <= 0.0 {
+            let mut known = channel.values.iter().copied().filter(|v| v.is_finite());
+            return Err(AnalysisError::Constant {
+                name: channel.name.clone(),
+                value: known.next().unwrap_or(f64::NAN),
+            });
+        }
+        let (mut y, mut c, mut fit) = self.filled(&given, guess, rng);
+        let is_rate = unit == "deg/s";
+        let mut motion_rms = if is_rate {
+            self.motion(&y, &c, &lost, &fit)
+        } else {
+            0.0
+        };
+        let still = motion_rms <= MOTION_RMS;
+        let spikes = if still {
+            let (dct, bins) = (&self.dct, &self.bins);
+            spikes(&given, &mut y, &mut c, &mut fit, dct, bins, rng)
+        } else {
+            vec![]
+        };
+        let of_audit = (self.masked)(&channel.name).into_iter();
+        let of_audit = of_audit.filter_map(|row| {
+            let given = channel.values.get(row).filter(|v| v.is_finite())?;
+            Some((*self.places.get(row)?, given * scale))
+        });
+        let aside = of_audit.chain(spikes.iter().map(|i| (*i, given[*i])));
+        let aside = aside.collect();
+        let lost = [lost, spikes.clone()].concat();
+        if still {
+            c = fill::first(
+                &channel.name,
+                &self.dct,
+                &self.bins,
+                &mut y,
+                &lost,
+                &mut fit,
+            );
+        }
+        if is_rate && !spikes.is_empty() {
+            motion_rms = self.motion(&y, &c, &lost, &fit);
+        }
+        let shown = || smallest_step(few(&channel.values));
+        Ok(Target {
+            name: channel.name.clone(),
+            axis: channel.axis,
+            unit,
+            lsb: channel.lsb.map(|l| l * scale),
+            step: scale * channel.lsb.unwrap_or_else(shown),
+            y: Arc::new(y),
+            coefficients: c,
+            lost,
+            spikes,
+            aside,
+            excursions: own.to_vec(),
+            motion_rms,
+            moving: motion_rms > MOTION_RMS,
+            astray: false,
+            noise: fit.0,
+            white: fit.1,
+        })
+    }
+
+    /// What the motion of an axis is made of beside the one that turns most.
+    fn rest(&self, t: &Target, strongest: &Target) -> Rest {
+        let top = places_of(MOTION_BAND_HZ.1, self.n, self.rate_hz);
+        let axis = [strongest.coefficients[..top].to_vec()];
+        let left = |with: &[Vec<f64>], slow| {
+            let mut c = t.coefficients.to_vec();
+            motion(&mut c, with, self.n, self.rate_hz, slow)
+        };
+        if self.base != Some(Base::Turntable) {
+            return Rest {
+                follows: t.motion_rms,
+                own: left(&[self.drivers(), &axis].concat(), self.turns()),
+                table: false,
+            };
+        }
+        // A table turns one axis: what the others do with the motor, the supply or the temperature, and what is slow
+        // on them, is their own.
+        let (by_axis, by_known) = (left(&axis, self.turns()), left(&self.known, self.turns()));
+        let follows = (t.motion_rms.powi(2) - by_axis.powi(2)).max(0.0).sqrt();
+        Rest {
+            follows: if by_known < by_axis { 0.0 } else { follows },
+            own: left(&[self.known.as_slice(), &axis].concat(), false),
+            table: true,
+        }
+    }
+}
+
+/// Whether the readings that there are are all the same.
+fn is_constant(y: &[f64]) -> bool {
+    let mut known = y.iter().filter(|v| v.is_finite());
+    let first = known.next();
+    known.all(|v| Some(v) == first)
 }
 
 /// Factor to the unit in which a gyro is searched, and that unit.
@@ -417,7 +495,7 @@ fn spikes(
         for i in &found {
             rest[*i] = f64::NAN;
         }
-        crate::ingest::kalman::fill(&mut rest, fit.1, fit.1 * fit.0.log_walk.exp(), rng);
+        kalman::fill(&mut rest, fit.1, fit.1 * fit.0.log_walk.exp(), rng);
         let panel = Panel::new(dct, bins, &rest);
         let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
         *fit = (noise, solution.white);
