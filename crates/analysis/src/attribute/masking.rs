@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use model::record::Record;
 
 use crate::audit::{Audit, MOST_TIMES};
-use crate::ingest::grid::Grid;
+use crate::ingest::types::Grid;
 use crate::result::{Check, Finding, Parameter};
 use crate::search::searched::Searched;
 

@@ -4,7 +4,7 @@
 use model::effects::effect;
 
 use crate::attribute::events::{BLOW_S, blow_of, step_at};
-use crate::ingest::grid::Grid;
+use crate::ingest::types::Grid;
 use crate::result::{Finding, Parameter};
 
 /// Far readings while the base turns are its motion.

@@ -4,7 +4,7 @@ use model::effect::{Effect, Found, Hypothesis};
 
 use crate::criticise::process;
 use crate::fit::{prequential, threshold};
-use crate::ingest::grid::Grid;
+use crate::ingest::types::Grid;
 use crate::numerics::column::{dot, dots_behind};
 use crate::numerics::tails;
 use crate::numerics::tails::ONE_SIDED;

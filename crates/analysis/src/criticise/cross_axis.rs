@@ -4,7 +4,7 @@
 use model::effect::Signal;
 use model::record::Quantity;
 
-use crate::ingest::grid::Grid;
+use crate::ingest::types::Grid;
 use crate::numerics::column::{dot, sum_of, sums_of_products};
 use crate::numerics::tails;
 use crate::result::Check;

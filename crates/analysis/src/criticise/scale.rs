@@ -4,7 +4,7 @@ use model::effect::Signal;
 use model::record::{Axis, Quantity};
 
 use crate::fit::likelihood::Dct;
-use crate::ingest::grid::{Grid, Target};
+use crate::ingest::types::{Grid, Target};
 
 /// Band in which a sway is sought, Hz.
 const BAND_HZ: (f64, f64) = (0.02, 2.0);

@@ -1,17 +1,18 @@
 //! From a record to an even grid: gaps found by the sequence numbers, lost samples filled so that the likelihood cannot
 //! tell, slow channels smoothed, motion of the base noticed.
 
-use std::ops::Range;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::Signal;
-use model::record::{Axis, Base, Channel, Quantity, Record};
+use model::record::{Base, Channel, Quantity, Record};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
-use crate::ingest::base_turns::{Excursion, MOTION_RMS, excursions, largest_rate};
+use crate::ingest::base_turns::{Excursion, MOTION_RMS};
+use crate::ingest::motion::{MOTION_BAND_HZ, Rest, drives, felt, followers, motion, places_of};
+use crate::ingest::types::{Grid, Target};
 use crate::ingest::{dequantise, fill, kalman};
 use crate::numerics::series::{smallest_step, white_by_differences};
 use crate::records::error::AnalysisError;
@@ -20,68 +21,9 @@ use crate::records::error::AnalysisError;
 pub const LEAST_SAMPLES: usize = 600;
 /// Least length, s.
 pub const LEAST_SECONDS: f64 = 30.0;
-const MOTION_BAND_HZ: (f64, f64) = (0.02, 0.6);
-
-/// Largest share of another axis' rate that a gyro sees by its own fault: a mounting off by six degrees.
-const LARGEST_SHARE: f64 = 0.1;
-
 /// So many readings show their step.
 fn few(values: &[f64]) -> &[f64] {
     &values[..values.len().min(crate::test_level::MOST)]
-}
-
-/// A gyro on the grid.
-pub struct Target {
-    /// Channel name.
-    pub name: String,
-    /// Axis.
-    pub axis: Option<Axis>,
-    /// Unit of `y`.
-    pub unit: String,
-    /// Unit per count.
-    pub lsb: Option<f64>,
-    /// The step in which its readings come, `lsb` or what they show themselves; 0 where there is none.
-    pub step: f64,
-    /// Readings, lost ones filled.
-    pub y: Arc<Vec<f64>>,
-    /// Their coefficients.
-    pub coefficients: Rc<Vec<f64>>,
-    /// Grid places without a reading, spikes included.
-    pub lost: Vec<usize>,
-    /// Places whose reading the noise cannot have made.
-    pub spikes: Vec<usize>,
-    /// Places whose reading is not believed, and what was read there.
-    pub aside: Vec<(usize, f64)>,
-    /// Turns of the base that it felt, taken out of `y` as lost readings are.
-    pub excursions: Vec<Excursion>,
-    /// Excess rms in the band of base motion, deg/s.
-    pub motion_rms: f64,
-    /// Whether that is more than a bias can wander.
-    pub moving: bool,
-    /// Whether it moves on a table that turns another axis, and does not follow that.
-    pub astray: bool,
-    /// Baseline noise as first fitted, and its white variance.
-    pub noise: Noise,
-    /// White variance.
-    pub white: f64,
-}
-
-/// A record on its grid.
-pub struct Grid {
-    /// Sample rate, Hz.
-    pub rate_hz: f64,
-    /// Places.
-    pub n: usize,
-    /// Transform of that length.
-    pub dct: Dct,
-    /// Its bins.
-    pub bins: Rc<Bins>,
-    /// What the base did.
-    pub base: Option<Base>,
-    /// The gyros.
-    pub targets: Vec<Target>,
-    /// All channels, gyros included.
-    pub signals: Vec<Signal>,
 }
 
 /// Sample rate of a record: the header's, else by the times of the rows.
@@ -440,22 +382,6 @@ fn unit_of(channel: &Channel) -> (f64, String) {
     }
 }
 
-/// Turns of a base at rest that a gyro felt, without those of which what drives its bias makes up most.
-fn felt(y: &[f64], others: &[Signal], rate_hz: f64, dct: &Dct) -> Vec<Excursion> {
-    let mut found = excursions(y, rate_hz);
-    let drivers = others.iter().filter(|s| drives(s.quantity));
-    if found.is_empty() || drivers.clone().next().is_none() {
-        return found;
-    }
-    let drivers: Vec<Vec<f64>> = drivers.map(|s| dct.forward(&s.smooth)).collect();
-    let mut c = dct.forward(y);
-    let [low, high] = [MOTION_BAND_HZ.0, MOTION_BAND_HZ.1].map(|f| places_of(f, y.len(), rate_hz));
-    take_off(&mut c, &drivers, low..high);
-    let beyond = dct.inverse(&c);
-    found.retain(|e| largest_rate(&beyond, &e.samples) > 0.5 * largest_rate(y, &e.samples));
-    found
-}
-
 /// Take out single samples that the noise cannot have made, and fill their places; largest first, since each one
 /// widens the noise that the others are held against.
 fn spikes(
@@ -518,100 +444,6 @@ fn white_of(y: &[f64]) -> f64 {
     let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
     let d: Vec<f64> = known.windows(2).map(|w| w[1] - w[0]).collect();
     d.iter().map(|d| d * d).sum::<f64>() / (2.0 * d.len().max(1) as f64)
-}
-
-/// What the motion of an axis is made of, deg/s rms.
-struct Rest {
-    /// What follows the axis that turns most; all of it, where that is not known.
-    follows: f64,
-    /// What does not.
-    own: f64,
-    /// Whether a table turns that axis, and no other.
-    table: bool,
-}
-
-/// An axis that only follows the one that turns most, and little of it, is not moved itself: its gyro sees a part of the
-/// other axis.
-fn followers(targets: &mut [Target], rest: &dyn Fn(&Target, &Target) -> Rest) {
-    let Some(strongest) =
-        (0..targets.len()).max_by(|a, b| targets[*a].motion_rms.total_cmp(&targets[*b].motion_rms))
-    else {
-        return;
-    };
-    let most = LARGEST_SHARE * targets[strongest].motion_rms;
-    for i in (0..targets.len()).filter(|i| *i != strongest) {
-        let t = &targets[i];
-        if !t.moving {
-            continue;
-        }
-        let rest = rest(t, &targets[strongest]);
-        let little = rest.follows < most;
-        targets[i].moving = !(little && rest.own <= MOTION_RMS);
-        targets[i].astray = rest.table && little && targets[i].moving;
-    }
-}
-
-/// Half cycles of the slowest motion that is looked for where the header says that the base moves.
-const SLOWEST_MOTION: usize = 3;
-
-/// Place of a frequency among `n` coefficients.
-fn places_of(hz: f64, n: usize, rate_hz: f64) -> usize {
-    ((2.0 * hz / rate_hz * n as f64) as usize).clamp(1, n - 1)
-}
-
-/// Excess rms in the band of base motion, white noise and what follows the `drivers` taken off. Where the base is known to
-/// move (`turns`), slower motion counts too; else that is drift.
-fn motion(c: &mut [f64], drivers: &[Vec<f64>], n: usize, rate_hz: f64, turns: bool) -> f64 {
-    let k_of = |f: f64| places_of(f, n, rate_hz);
-    let (mut low, high) = (k_of(MOTION_BAND_HZ.0), k_of(MOTION_BAND_HZ.1));
-    if turns {
-        low = low.min(SLOWEST_MOTION);
-    }
-    let mut above: Vec<f64> = c[high..].iter().map(|v| v * v).collect();
-    let middle = above.len() / 2;
-    let white = if above.is_empty() {
-        0.0
-    } else {
-        *above.select_nth_unstable_by(middle, f64::total_cmp).1 / crate::numerics::tails::MEDIAN
-    };
-    take_off(c, drivers, low..high);
-    let band = &c[low..high];
-    let excess: f64 = band.iter().map(|v| v * v - white).sum();
-    (excess.max(0.0) / n as f64).sqrt()
-}
-
-/// Takes off coefficients what follows the drivers, by what is in the band.
-fn take_off(c: &mut [f64], drivers: &[Vec<f64>], band: Range<usize>) {
-    let dot = |a: &[f64], b: &[f64]| {
-        let pairs = a[band.clone()].iter().zip(&b[band.clone()]);
-        pairs.map(|(a, b)| a * b).sum::<f64>()
-    };
-    let less = |c: &mut [f64], share: f64, o: &[f64]| {
-        c.iter_mut().zip(o).for_each(|(c, o)| *c -= share * o);
-    };
-    let mut orthogonal: Vec<Vec<f64>> = vec![];
-    for driver in drivers {
-        let mut x = driver.clone();
-        let before = dot(&x, &x);
-        for o in &orthogonal {
-            let share = dot(&x, o);
-            less(&mut x, share, o);
-        }
-        let length = dot(&x, &x);
-        // What is left of a driver that the others make up is rounding.
-        if length <= 1e-9 * before.max(f64::MIN_POSITIVE) {
-            continue;
-        }
-        x.iter_mut().for_each(|x| *x /= length.sqrt());
-        let share = dot(c, &x);
-        less(c, share, &x);
-        orthogonal.push(x);
-    }
-}
-
-/// Whether a quantity can drive a gyro's bias.
-fn drives(quantity: Quantity) -> bool {
-    matches!(quantity, Quantity::Temp | Quantity::Supply | Quantity::Pwm)
 }
 
 /// What a gyro reads, to the effects of the others.

@@ -7,3 +7,5 @@ pub mod dequantise;
 pub mod fill;
 pub mod grid;
 pub mod kalman;
+pub mod motion;
+pub mod types;

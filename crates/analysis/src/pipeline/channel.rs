@@ -8,7 +8,7 @@ use crate::criticise::{follower_shape, process, random_walk, residual, short_tim
 use crate::fit::channel::{State, whitened};
 use crate::fit::estimate;
 use crate::fit::likelihood::Panel;
-use crate::ingest::grid::{Grid, Target};
+use crate::ingest::types::{Grid, Target};
 use crate::report::detection_limits;
 use crate::result::Check;
 use crate::search::searched::Searched;

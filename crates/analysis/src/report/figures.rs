@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::{Dct, Panel};
-use crate::ingest::grid::Grid;
+use crate::ingest::types::Grid;
 use crate::numerics::column::dot;
 use crate::result::{Evidence, Series, SeriesStyle};
 use crate::search::searched::Searched;

@@ -11,7 +11,7 @@ use crate::attribute::events;
 use crate::criticise::scale;
 use crate::fit::channel::{Form, VarianceFound};
 use crate::fit::{prequential, scan, threshold};
-use crate::ingest::grid::Grid;
+use crate::ingest::types::Grid;
 use crate::numerics::transform::Dct;
 use crate::report::{detection_limits, figures};
 use crate::result;

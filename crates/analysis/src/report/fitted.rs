@@ -8,7 +8,7 @@ use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
 
 use crate::fit::channel::State;
 use crate::fit::estimate;
-use crate::ingest::grid::Grid;
+use crate::ingest::types::Grid;
 use crate::result::{Finding, Parameter};
 use crate::search::searched::Searched;
 

@@ -11,7 +11,7 @@ use crate::fit::likelihood::{Noise, Panel, invert};
 use crate::fit::scan::residual;
 use crate::ingest::conditional_draw;
 use crate::ingest::fill::{draws, many};
-use crate::ingest::grid::Target;
+use crate::ingest::types::Target;
 use crate::search::Search;
 
 /// Times that it is done: of a hole of a third, 1/81 is left.

@@ -3,7 +3,7 @@
 use model::effect::Found;
 
 use crate::fit::channel::{State, VarianceFound};
-use crate::ingest::grid::Target;
+use crate::ingest::types::Target;
 use crate::result::{Check, DetectionLimit};
 use crate::search::Search;
 use crate::test_level::Outcome;

@@ -1,0 +1,64 @@
+//! A record on an even grid, and a gyro of it.
+
+use std::rc::Rc;
+use std::sync::Arc;
+
+use model::effect::Signal;
+use model::record::{Axis, Base};
+
+use crate::fit::likelihood::{Bins, Dct, Noise};
+use crate::ingest::base_turns::Excursion;
+
+/// A gyro on the grid.
+pub struct Target {
+    /// Channel name.
+    pub name: String,
+    /// Axis.
+    pub axis: Option<Axis>,
+    /// Unit of `y`.
+    pub unit: String,
+    /// Unit per count.
+    pub lsb: Option<f64>,
+    /// The step in which its readings come, `lsb` or what they show themselves; 0 where there is none.
+    pub step: f64,
+    /// Readings, lost ones filled.
+    pub y: Arc<Vec<f64>>,
+    /// Their coefficients.
+    pub coefficients: Rc<Vec<f64>>,
+    /// Grid places without a reading, spikes included.
+    pub lost: Vec<usize>,
+    /// Places whose reading the noise cannot have made.
+    pub spikes: Vec<usize>,
+    /// Places whose reading is not believed, and what was read there.
+    pub aside: Vec<(usize, f64)>,
+    /// Turns of the base that it felt, taken out of `y` as lost readings are.
+    pub excursions: Vec<Excursion>,
+    /// Excess rms in the band of base motion, deg/s.
+    pub motion_rms: f64,
+    /// Whether that is more than a bias can wander.
+    pub moving: bool,
+    /// Whether it moves on a table that turns another axis, and does not follow that.
+    pub astray: bool,
+    /// Baseline noise as first fitted, and its white variance.
+    pub noise: Noise,
+    /// White variance.
+    pub white: f64,
+}
+
+/// A record on its grid.
+pub struct Grid {
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Places.
+    pub n: usize,
+    /// Transform of that length.
+    pub dct: Dct,
+    /// Its bins.
+    pub bins: Rc<Bins>,
+    /// What the base did.
+    pub base: Option<Base>,
+    /// The gyros.
+    pub targets: Vec<Target>,
+    /// All channels, gyros included.
+    pub signals: Vec<Signal>,
+}
