@@ -9,7 +9,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use model::effect::{Found, Hypothesis, VarianceLaw};
+use model::effect::{Covariance, Found, Hypothesis, Regression, Shape, VarianceLaw};
 use model::effects::EFFECTS;
 
 use crate::fit::channel::Form;
@@ -234,151 +234,16 @@ pub(crate) fn of_channel(s: &Searched<'_>) -> Vec<DetectionLimit> {
 
 /// The smallest size of one hypothesis; `None` where there is none, or where those say it that look for it.
 fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smallest> {
-    let (panel, rate_hz, n) = (
-        &s.search.panel,
-        s.search.view.rate_hz,
-        s.search.panel.bins.n,
-    );
-    let own = s.state.columns();
     let first = c.effect.parameters().first()?.name;
     match &c.hypothesis {
-        Hypothesis::Regression(r) => {
-            let (column, rest) = c.columns().split_last()?;
-            let parameter = r.columns.last()?.parameter;
-            let wanted = strength_for(threshold::regression(1, c.siblings()));
-            let size = meter.column(&[own.as_slice(), rest].concat(), *column, wanted)?;
-            Some(Smallest {
-                coefficients: vec![size],
-                names: vec![parameter],
-                fixed: r.fixed.clone(),
-                parameter,
-                at: r.fixed.iter().map(|f| f.0).collect(),
-                ..Smallest::default()
-            })
-        }
-        Hypothesis::Shaped(shape) => {
-            let (place, columns) = c.grid().get(c.grid().len() / 2)?;
-            let parameter = shape.columns(*place).first()?.parameter;
-            let (first, rest) = columns.split_first()?;
-            let wanted = strength_for(threshold::shaped(columns.len()));
-            let size = meter.column(&[own.as_slice(), rest].concat(), *first, wanted)?;
-            Some(Smallest {
-                coefficients: vec![size],
-                location: vec![*place],
-                names: vec![parameter],
-                parameter,
-                at: vec![shape.coordinate().0],
-                ..Smallest::default()
-            })
-        }
-        Hypothesis::Step => {
-            let jump: Vec<f64> = (0..n).map(|i| f64::from(u8::from(i >= n / 2))).collect();
-            Some(Smallest {
-                coefficients: vec![meter.values(&own, &jump, strength_for(threshold::step(n)))?],
-                location: vec![(n / 2) as f64 / rate_hz],
-                parameter: "height",
-                at: vec!["time"],
-                ..Smallest::default()
-            })
-        }
-        Hypothesis::Line => {
-            // n/2 of the square of the amplitude, at one frequency: no random walk takes it.
-            let variance = meter.white * s.state.noise.at(TAU * LINE);
-            let size = strength_for(threshold::line(n)) * (2.0 * variance / n as f64).sqrt();
-            Some(Smallest {
-                coefficients: vec![size, 0.0],
-                location: vec![LINE * rate_hz],
-                parameter: "amplitude",
-                at: vec!["frequency"],
-                ..Smallest::default()
-            })
-        }
-        Hypothesis::SideBands => {
-            let line = s.state.parts().find_map(|(t, own)| match (&t.form, own) {
-                (Form::Line(omega), [c, s, ..]) => Some((*omega, c.hypot(*s))),
-                _ => None,
-            });
-            let omega = line.map_or(TAU * LINE, |l| l.0);
-            let wanted = strength_for(threshold::side_bands(s.search.slow_beats()));
-            // The swing holds n/4 of the square of amplitude times depth.
-            let variance = meter.white * s.state.noise.at(omega);
-            let swing = wanted * (4.0 * variance / n as f64).sqrt();
-            let (parameter, at) = match line {
-                Some(_) => ("depth", vec!["amplitude", "frequency"]),
-                // Where there is no line, its amplitude is that of full depth.
-                None => ("amplitude", vec!["depth", "frequency"]),
-            };
-            Some(Smallest {
-                coefficients: vec![line.map_or(swing, |l| l.1), 0.0, swing, 0.0],
-                location: vec![omega / TAU * rate_hz],
-                parameter,
-                at,
-                ..Smallest::default()
-            })
-        }
-        Hypothesis::Covariance(process) => {
-            let starts = process.starts(n);
-            let start = starts.get(starts.len() / 2)?;
-            let theta = |x: f64| [&[x], &start[1..]].concat();
-            let shape = |x: f64| {
-                let mut noise = s.state.noise.clone();
-                noise.terms.push((Arc::clone(process), theta(x)));
-                noise.over(&panel.bins)
-            };
-            let wanted = strength_for(threshold::covariance(process.dimensions()));
-            let x = meter.shape(*process.bounds(n).first()?, wanted, &shape)?;
-            let others = c.effect.parameters().iter().skip(1);
-            Some(Smallest {
-                coefficients: theta(x),
-                parameter: first,
-                at: others.filter(|p| p.required).map(|p| p.name).collect(),
-                ..Smallest::default()
-            })
-        }
-        Hypothesis::TwoLevel => {
-            let stay = n as f64 / STAYS;
-            // Correlated as exp(-2 t / stay).
-            let density = panel.bins.at.one_pole(1.0, (-2.0 / stay).exp());
-            let shape = |x: f64| {
-                let each = meter.g.iter().zip(&density);
-                each.map(|(g, d)| g + x.exp() * d).collect()
-            };
-            let x = meter.shape(SPREAD, strength_for(threshold::two_level()), &shape)?;
-            Some(Smallest {
-                coefficients: vec![(meter.white * x.exp()).sqrt(), stay / rate_hz],
-                parameter: "half_height",
-                at: vec!["dwell_time"],
-                ..Smallest::default()
-            })
-        }
-        Hypothesis::Variance(law) => {
-            // Samples, and what one of them has of the increase.
-            let (levels, wanted, (parameter, at)) = match law {
-                VarianceLaw::Shape { shape, .. } => {
-                    let levels = scan::levels(&s.e, shape);
-                    let means = levels.iter().map(|(count, sum, _)| (*count, sum / count));
-                    (means.collect(), threshold::variance_law(), (first, vec![]))
-                }
-                VarianceLaw::Segment => {
-                    let inside = (STRETCH.1 - STRETCH.0) * n as f64;
-                    let levels = vec![(inside, 1.0), (n as f64 - inside, 0.0)];
-                    (
-                        levels,
-                        threshold::segment(),
-                        ("variance_increase", vec!["start", "end"]),
-                    )
-                }
-            };
-            let strength = |x: f64| of_variance(levels.iter().map(|(m, s)| (*m, 1.0 + x * s)));
-            let seconds = n as f64 / rate_hz;
-            Some(Smallest {
-                coefficients: vec![size_for(strength_for(wanted), &strength)],
-                location: vec![STRETCH.0 * seconds, STRETCH.1 * seconds],
-                parameter,
-                at,
-                ..Smallest::default()
-            })
-        }
+        Hypothesis::Regression(r) => of_regression(s, meter, c, r),
+        Hypothesis::Shaped(shape) => of_shape(s, meter, c, shape.as_ref()),
+        Hypothesis::Step => of_step(s, meter),
+        Hypothesis::Line => Some(of_line(s, meter)),
+        Hypothesis::SideBands => Some(of_side_bands(s, meter)),
+        Hypothesis::Covariance(process) => of_process(s, meter, c, process),
+        Hypothesis::TwoLevel => of_two_levels(s, meter),
+        Hypothesis::Variance(law) => Some(of_variance_law(s, first, law)),
         Hypothesis::Motion => (s.target.unit == "deg/s").then(|| Smallest {
             // Of a sway.
             coefficients: vec![MOTION_RMS * 2f64.sqrt()],
@@ -386,6 +251,190 @@ fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smalle
             ..Smallest::default()
         }),
         Hypothesis::Common | Hypothesis::Scale | Hypothesis::Audit => None,
+    }
+}
+
+/// Of the last column of a regression.
+fn of_regression(
+    s: &Searched<'_>,
+    meter: &Meter<'_>,
+    c: &Candidate,
+    r: &Regression,
+) -> Option<Smallest> {
+    let own = s.state.columns();
+    let (column, rest) = c.columns().split_last()?;
+    let parameter = r.columns.last()?.parameter;
+    let wanted = strength_for(threshold::regression(1, c.siblings()));
+    let size = meter.column(&[own.as_slice(), rest].concat(), *column, wanted)?;
+    Some(Smallest {
+        coefficients: vec![size],
+        names: vec![parameter],
+        fixed: r.fixed.clone(),
+        parameter,
+        at: r.fixed.iter().map(|f| f.0).collect(),
+        ..Smallest::default()
+    })
+}
+
+/// Of a shape at the middle of its grid.
+fn of_shape(
+    s: &Searched<'_>,
+    meter: &Meter<'_>,
+    c: &Candidate,
+    shape: &dyn Shape,
+) -> Option<Smallest> {
+    let own = s.state.columns();
+    let (place, columns) = c.grid().get(c.grid().len() / 2)?;
+    let parameter = shape.columns(*place).first()?.parameter;
+    let (first, rest) = columns.split_first()?;
+    let wanted = strength_for(threshold::shaped(columns.len()));
+    let size = meter.column(&[own.as_slice(), rest].concat(), *first, wanted)?;
+    Some(Smallest {
+        coefficients: vec![size],
+        location: vec![*place],
+        names: vec![parameter],
+        parameter,
+        at: vec![shape.coordinate().0],
+        ..Smallest::default()
+    })
+}
+
+/// Of a step in the middle of the record.
+fn of_step(s: &Searched<'_>, meter: &Meter<'_>) -> Option<Smallest> {
+    let n = s.search.panel.bins.n;
+    let rate_hz = s.search.view.rate_hz;
+    let own = s.state.columns();
+    let jump: Vec<f64> = (0..n).map(|i| f64::from(u8::from(i >= n / 2))).collect();
+    Some(Smallest {
+        coefficients: vec![meter.values(&own, &jump, strength_for(threshold::step(n)))?],
+        location: vec![(n / 2) as f64 / rate_hz],
+        parameter: "height",
+        at: vec!["time"],
+        ..Smallest::default()
+    })
+}
+
+/// Of a line wherever the noise is white.
+fn of_line(s: &Searched<'_>, meter: &Meter<'_>) -> Smallest {
+    let n = s.search.panel.bins.n;
+    let rate_hz = s.search.view.rate_hz;
+    // n/2 of the square of the amplitude, at one frequency: no random walk takes it.
+    let variance = meter.white * s.state.noise.at(TAU * LINE);
+    let size = strength_for(threshold::line(n)) * (2.0 * variance / n as f64).sqrt();
+    Smallest {
+        coefficients: vec![size, 0.0],
+        location: vec![LINE * rate_hz],
+        parameter: "amplitude",
+        at: vec!["frequency"],
+        ..Smallest::default()
+    }
+}
+
+/// Of the swing of the line that was found, or of one that would swing by all of itself.
+fn of_side_bands(s: &Searched<'_>, meter: &Meter<'_>) -> Smallest {
+    let n = s.search.panel.bins.n;
+    let rate_hz = s.search.view.rate_hz;
+    let line = s.state.parts().find_map(|(t, own)| match (&t.form, own) {
+        (Form::Line(omega), [c, s, ..]) => Some((*omega, c.hypot(*s))),
+        _ => None,
+    });
+    let omega = line.map_or(TAU * LINE, |l| l.0);
+    let wanted = strength_for(threshold::side_bands(s.search.slow_beats()));
+    // The swing holds n/4 of the square of amplitude times depth.
+    let variance = meter.white * s.state.noise.at(omega);
+    let swing = wanted * (4.0 * variance / n as f64).sqrt();
+    let (parameter, at) = match line {
+        Some(_) => ("depth", vec!["amplitude", "frequency"]),
+        // Where there is no line, its amplitude is that of full depth.
+        None => ("amplitude", vec!["depth", "frequency"]),
+    };
+    Smallest {
+        coefficients: vec![line.map_or(swing, |l| l.1), 0.0, swing, 0.0],
+        location: vec![omega / TAU * rate_hz],
+        parameter,
+        at,
+        ..Smallest::default()
+    }
+}
+
+/// Of a stationary process with the middle one of its starts.
+fn of_process(
+    s: &Searched<'_>,
+    meter: &Meter<'_>,
+    c: &Candidate,
+    process: &Arc<dyn Covariance>,
+) -> Option<Smallest> {
+    let panel = &s.search.panel;
+    let n = s.search.panel.bins.n;
+    let starts = process.starts(n);
+    let start = starts.get(starts.len() / 2)?;
+    let theta = |x: f64| [&[x], &start[1..]].concat();
+    let shape = |x: f64| {
+        let mut noise = s.state.noise.clone();
+        noise.terms.push((Arc::clone(process), theta(x)));
+        noise.over(&panel.bins)
+    };
+    let wanted = strength_for(threshold::covariance(process.dimensions()));
+    let x = meter.shape(*process.bounds(n).first()?, wanted, &shape)?;
+    let others = c.effect.parameters().iter().skip(1);
+    Some(Smallest {
+        coefficients: theta(x),
+        parameter: c.effect.parameters().first()?.name,
+        at: others.filter(|p| p.required).map(|p| p.name).collect(),
+        ..Smallest::default()
+    })
+}
+
+/// Of two levels that stay as long as one would be seen best.
+fn of_two_levels(s: &Searched<'_>, meter: &Meter<'_>) -> Option<Smallest> {
+    let panel = &s.search.panel;
+    let n = s.search.panel.bins.n;
+    let rate_hz = s.search.view.rate_hz;
+    let stay = n as f64 / STAYS;
+    // Correlated as exp(-2 t / stay).
+    let density = panel.bins.at.one_pole(1.0, (-2.0 / stay).exp());
+    let shape = |x: f64| {
+        let each = meter.g.iter().zip(&density);
+        each.map(|(g, d)| g + x.exp() * d).collect()
+    };
+    let x = meter.shape(SPREAD, strength_for(threshold::two_level()), &shape)?;
+    Some(Smallest {
+        coefficients: vec![(meter.white * x.exp()).sqrt(), stay / rate_hz],
+        parameter: "half_height",
+        at: vec!["dwell_time"],
+        ..Smallest::default()
+    })
+}
+
+/// Of an increase of the variance.
+fn of_variance_law(s: &Searched<'_>, first: &'static str, law: &VarianceLaw) -> Smallest {
+    let n = s.search.panel.bins.n;
+    let rate_hz = s.search.view.rate_hz;
+    // Samples, and what one of them has of the increase.
+    let (levels, wanted, (parameter, at)) = match law {
+        VarianceLaw::Shape { shape, .. } => {
+            let levels = scan::levels(&s.e, shape);
+            let means = levels.iter().map(|(count, sum, _)| (*count, sum / count));
+            (means.collect(), threshold::variance_law(), (first, vec![]))
+        }
+        VarianceLaw::Segment => {
+            let inside = (STRETCH.1 - STRETCH.0) * n as f64;
+            let levels = vec![(inside, 1.0), (n as f64 - inside, 0.0)];
+            (
+                levels,
+                threshold::segment(),
+                ("variance_increase", vec!["start", "end"]),
+            )
+        }
+    };
+    let strength = |x: f64| of_variance(levels.iter().map(|(m, s)| (*m, 1.0 + x * s)));
+    let seconds = n as f64 / rate_hz;
+    Smallest {
+        coefficients: vec![size_for(strength_for(wanted), &strength)],
+        location: vec![STRETCH.0 * seconds, STRETCH.1 * seconds],
+        parameter,
+        at,
+        ..Smallest::default()
     }
 }
 

@@ -3,15 +3,46 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use model::effect::{Hypothesis, Shape};
+use model::effect::{Covariance, Hypothesis, Regression, Shape};
 
 use super::{Candidate, FASTEST_BEAT, LEAST_BEATS, LEAST_CYCLES, SLOW_BEAT_HZ, Search};
 use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::Noise;
 use crate::fit::{scan, threshold};
 
+/// A candidate that is weighed beside a state.
+struct Weighed<'a> {
+    candidate: &'a Candidate,
+    i: usize,
+    state: &'a State,
+    /// Random walks that are tried.
+    walks: &'a [(Noise, Vec<f64>, f64)],
+    /// Columns of the state, and its log likelihood.
+    own: Vec<usize>,
+    null: f64,
+}
+
+impl Weighed<'_> {
+    /// A term of the candidate.
+    fn term(
+        &self,
+        form: Form,
+        columns: Vec<usize>,
+        names: Vec<&'static str>,
+        lr: f64,
+        threshold: f64,
+    ) -> Term {
+        Term {
+            columns,
+            names,
+            lr,
+            ..Term::new(self.candidate.effect, self.i, form, threshold)
+        }
+    }
+}
+
 impl Search<'_> {
-    /// Best term that candidate `i` offers to `state`; `quick` leaves out refinements.
+    /// Best term that candidate `i` offers to `state`.
     pub(super) fn weigh(
         &self,
         state: &State,
@@ -19,154 +50,188 @@ impl Search<'_> {
         i: usize,
     ) -> Option<Term> {
         let candidate = &self.candidates[i];
-        let null = state.solution.log_likelihood;
-        let own = state.columns();
-        let term = |form, columns: Vec<usize>, names, lr, threshold| Term {
-            columns,
-            names,
-            lr,
-            ..Term::new(candidate.effect, i, form, threshold)
+        let of = Weighed {
+            candidate,
+            i,
+            state,
+            walks,
+            own: state.columns(),
+            null: state.solution.log_likelihood,
         };
-        let n = self.panel.bins.n;
         match &candidate.hypothesis {
-            Hypothesis::Regression(r) => {
-                let columns = [own, candidate.columns.clone()].concat();
-                let lr = 2.0 * (self.panel.profile(walks, &columns) - null);
-                let names = r.columns.iter().map(|c| c.parameter).collect();
-                // In the place of a narrower term, only the columns beyond it are new.
-                let held: usize = state
-                    .terms
-                    .iter()
-                    .filter(|t| candidate.effect.extends() == Some(t.effect.id()))
-                    .map(|t| t.columns.len())
-                    .sum();
-                let new = r.columns.len().saturating_sub(held).max(1);
-                let limit = threshold::regression(new, candidate.siblings) + candidate.handicap;
-                let mut t = term(Form::Columns, candidate.columns.clone(), names, lr, limit);
-                t.fixed.clone_from(&r.fixed);
-                t.follows.clone_from(&r.follows);
-                t.of.clone_from(&candidate.of);
-                Some(t)
-            }
-            Hypothesis::Shaped(shape) => {
-                let (at, columns, lr) = candidate
-                    .grid
-                    .iter()
-                    .map(|(at, c)| {
-                        (
-                            *at,
-                            c,
-                            2.0 * (self
-                                .panel
-                                .profile(walks, &[own.clone(), c.clone()].concat())
-                                - null),
-                        )
-                    })
-                    .max_by(|a, b| a.2.total_cmp(&b.2))?;
-                let names: Vec<_> = shape.columns(at).iter().map(|c| c.parameter).collect();
-                let limit = threshold::shaped(names.len());
-                // Between the points of the grid it may be much better: what is a rival is weighed at its best.
-                let lr = if lr > limit {
-                    lr.max(2.0 * (self.between(walks, &own, shape.as_ref(), at) - null))
-                } else {
-                    lr
-                };
-                Some(term(
-                    Form::Shaped(Arc::clone(shape), at),
-                    columns.clone(),
-                    names,
-                    lr,
-                    limit,
-                ))
-            }
-            Hypothesis::Step => {
-                let margin = (0.5 * self.view.rate_hz).max(4.0);
-                let noises: Vec<Noise> = walks.iter().step_by(2).map(|w| w.0.clone()).collect();
-                let curve = scan::steps(&self.panel, &noises, &own, null);
-                let inside: Vec<_> = curve
-                    .into_iter()
-                    .filter(|(t, _)| *t >= margin && *t <= n as f64 - margin)
-                    .collect();
-                let (at, lr) = inside.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
-                let weight = |l: f64| ((l - lr) / 2.0).exp();
-                let near = |t: f64| (t - at).abs() < 0.1 * n as f64;
-                let (mut sum, mut square) = (0.0, 0.0);
-                for (t, l) in inside.iter().filter(|(t, _)| near(*t)) {
-                    sum += weight(*l);
-                    square += weight(*l) * (t - at).powi(2);
-                }
-                let error = (square / sum).sqrt().max(0.5);
-                Some(term(
-                    Form::Step(at, error),
-                    vec![],
-                    vec!["height"],
-                    lr,
-                    threshold::step(n),
-                ))
-            }
-            Hypothesis::Line => {
-                let least = (2.0 * LEAST_CYCLES) as usize;
-                let (k, lr) =
-                    scan::best_line(&self.panel, &state.noise, &own, &state.solution, least)?;
-                let omega = std::f64::consts::PI * k as f64 / n as f64;
-                Some(term(
-                    Form::Line(omega),
-                    vec![],
-                    vec!["cosine", "sine"],
-                    lr,
-                    threshold::line(n),
-                ))
-            }
-            Hypothesis::SideBands => {
-                let (carrier, phase) = state.carrier()?;
-                let lr = scan::beats(
-                    &self.panel,
-                    &state.noise,
-                    &own,
-                    &state.solution,
-                    carrier,
-                    phase,
-                );
-                let slow = self.slow_beats();
-                let bin = std::f64::consts::PI / n as f64;
-                let fastest = (FASTEST_BEAT * carrier / bin) as usize;
-                let limit = |d: usize| threshold::side_bands(if d <= slow { slow } else { n });
-                let margin = |d: usize| lr[d] - limit(d);
-                let d = ((2.0 * LEAST_BEATS) as usize..=slow.max(fastest).min(n - 1))
-                    .filter(|d| carrier > bin * (d + 1) as f64)
-                    .filter(|d| carrier + bin * (d + 1) as f64 <= std::f64::consts::PI)
-                    .max_by(|a, b| margin(*a).total_cmp(&margin(*b)))?;
-                Some(term(
-                    Form::SideBands(carrier, d as f64 * bin),
-                    vec![],
-                    vec!["cosine", "sine", "in_phase", "quadrature"],
-                    lr[d],
-                    limit(d),
-                ))
-            }
-            Hypothesis::Covariance(c) => {
-                let best = c
-                    .starts(n)
-                    .into_iter()
-                    .map(|theta| {
-                        let mut noise = state.noise.clone();
-                        noise.terms.push((Arc::clone(c), theta));
-                        self.panel.fit(&noise, &own)
-                    })
-                    .max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;
-                let lr = self.of_read() * 2.0 * (best.1.log_likelihood - null);
-                let theta = best.0.terms.last().map(|t| t.1.clone())?;
-                let limit = threshold::covariance(c.dimensions());
-                Some(term(
-                    Form::Covariance(Arc::clone(c), theta),
-                    vec![],
-                    vec![],
-                    lr,
-                    limit,
-                ))
-            }
+            Hypothesis::Regression(r) => Some(self.weigh_regression(&of, r)),
+            Hypothesis::Shaped(shape) => self.weigh_shaped(&of, shape),
+            Hypothesis::Step => self.weigh_step(&of),
+            Hypothesis::Line => self.weigh_line(&of),
+            Hypothesis::SideBands => self.weigh_side_bands(&of),
+            Hypothesis::Covariance(c) => self.weigh_covariance(&of, c),
             _ => None,
         }
+    }
+
+    /// What columns offer.
+    fn weigh_regression(&self, of: &Weighed<'_>, r: &Regression) -> Term {
+        let columns = [of.own.clone(), of.candidate.columns.clone()].concat();
+        let lr = 2.0 * (self.panel.profile(of.walks, &columns) - of.null);
+        let names = r.columns.iter().map(|c| c.parameter).collect();
+        // In the place of a narrower term, only the columns beyond it are new.
+        let held: usize = of
+            .state
+            .terms
+            .iter()
+            .filter(|t| of.candidate.effect.extends() == Some(t.effect.id()))
+            .map(|t| t.columns.len())
+            .sum();
+        let new = r.columns.len().saturating_sub(held).max(1);
+        let limit = threshold::regression(new, of.candidate.siblings) + of.candidate.handicap;
+        let mut t = of.term(
+            Form::Columns,
+            of.candidate.columns.clone(),
+            names,
+            lr,
+            limit,
+        );
+        t.fixed.clone_from(&r.fixed);
+        t.follows.clone_from(&r.follows);
+        t.of.clone_from(&of.candidate.of);
+        t
+    }
+
+    /// What a shape offers at the best point of its grid.
+    fn weigh_shaped(&self, of: &Weighed<'_>, shape: &Arc<dyn Shape>) -> Option<Term> {
+        let (at, columns, lr) = of
+            .candidate
+            .grid
+            .iter()
+            .map(|(at, c)| {
+                (
+                    *at,
+                    c,
+                    2.0 * (self
+                        .panel
+                        .profile(of.walks, &[of.own.clone(), c.clone()].concat())
+                        - of.null),
+                )
+            })
+            .max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let names: Vec<_> = shape.columns(at).iter().map(|c| c.parameter).collect();
+        let limit = threshold::shaped(names.len());
+        // Between the points of the grid it may be much better: what is a rival is weighed at its best.
+        let lr = if lr > limit {
+            lr.max(2.0 * (self.between(of.walks, &of.own, shape.as_ref(), at) - of.null))
+        } else {
+            lr
+        };
+        Some(of.term(
+            Form::Shaped(Arc::clone(shape), at),
+            columns.clone(),
+            names,
+            lr,
+            limit,
+        ))
+    }
+
+    /// What a step offers at its best time.
+    fn weigh_step(&self, of: &Weighed<'_>) -> Option<Term> {
+        let n = self.panel.bins.n;
+        let margin = (0.5 * self.view.rate_hz).max(4.0);
+        let noises: Vec<Noise> = of.walks.iter().step_by(2).map(|w| w.0.clone()).collect();
+        let curve = scan::steps(&self.panel, &noises, &of.own, of.null);
+        let inside: Vec<_> = curve
+            .into_iter()
+            .filter(|(t, _)| *t >= margin && *t <= n as f64 - margin)
+            .collect();
+        let (at, lr) = inside.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let weight = |l: f64| ((l - lr) / 2.0).exp();
+        let near = |t: f64| (t - at).abs() < 0.1 * n as f64;
+        let (mut sum, mut square) = (0.0, 0.0);
+        for (t, l) in inside.iter().filter(|(t, _)| near(*t)) {
+            sum += weight(*l);
+            square += weight(*l) * (t - at).powi(2);
+        }
+        let error = (square / sum).sqrt().max(0.5);
+        Some(of.term(
+            Form::Step(at, error),
+            vec![],
+            vec!["height"],
+            lr,
+            threshold::step(n),
+        ))
+    }
+
+    /// What a line offers at its best frequency.
+    fn weigh_line(&self, of: &Weighed<'_>) -> Option<Term> {
+        let n = self.panel.bins.n;
+        let least = (2.0 * LEAST_CYCLES) as usize;
+        let (k, lr) = scan::best_line(
+            &self.panel,
+            &of.state.noise,
+            &of.own,
+            &of.state.solution,
+            least,
+        )?;
+        let omega = std::f64::consts::PI * k as f64 / n as f64;
+        Some(of.term(
+            Form::Line(omega),
+            vec![],
+            vec!["cosine", "sine"],
+            lr,
+            threshold::line(n),
+        ))
+    }
+
+    /// What side bands of the first line offer at their best distance.
+    fn weigh_side_bands(&self, of: &Weighed<'_>) -> Option<Term> {
+        let n = self.panel.bins.n;
+        let (carrier, phase) = of.state.carrier()?;
+        let lr = scan::beats(
+            &self.panel,
+            &of.state.noise,
+            &of.own,
+            &of.state.solution,
+            carrier,
+            phase,
+        );
+        let slow = self.slow_beats();
+        let bin = std::f64::consts::PI / n as f64;
+        let fastest = (FASTEST_BEAT * carrier / bin) as usize;
+        let limit = |d: usize| threshold::side_bands(if d <= slow { slow } else { n });
+        let margin = |d: usize| lr[d] - limit(d);
+        let d = ((2.0 * LEAST_BEATS) as usize..=slow.max(fastest).min(n - 1))
+            .filter(|d| carrier > bin * (d + 1) as f64)
+            .filter(|d| carrier + bin * (d + 1) as f64 <= std::f64::consts::PI)
+            .max_by(|a, b| margin(*a).total_cmp(&margin(*b)))?;
+        Some(of.term(
+            Form::SideBands(carrier, d as f64 * bin),
+            vec![],
+            vec!["cosine", "sine", "in_phase", "quadrature"],
+            lr[d],
+            limit(d),
+        ))
+    }
+
+    /// What a stationary term offers from the best of its starts.
+    fn weigh_covariance(&self, of: &Weighed<'_>, c: &Arc<dyn Covariance>) -> Option<Term> {
+        let n = self.panel.bins.n;
+        let best = c
+            .starts(n)
+            .into_iter()
+            .map(|theta| {
+                let mut noise = of.state.noise.clone();
+                noise.terms.push((Arc::clone(c), theta));
+                self.panel.fit(&noise, &of.own)
+            })
+            .max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;
+        let lr = self.of_read() * 2.0 * (best.1.log_likelihood - of.null);
+        let theta = best.0.terms.last().map(|t| t.1.clone())?;
+        let limit = threshold::covariance(c.dimensions());
+        Some(of.term(
+            Form::Covariance(Arc::clone(c), theta),
+            vec![],
+            vec![],
+            lr,
+            limit,
+        ))
     }
 
     /// Fastest slow swing of a line, half cycles in the record.
