@@ -158,8 +158,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         seconds: input.seconds,
     };
     let extended = told.findings.iter().chain(&told.nearest);
-    let baseline_model =
-        fitted::model(&searched, &grid, false, std::iter::empty(), fitted_on());
+    let baseline_model = fitted::model(&searched, &grid, false, std::iter::empty(), fitted_on());
     let extended_model = fitted::model(&searched, &grid, true, extended, fitted_on());
     let mut verdict = verdict(&told.findings, &told.unexplained);
     let replicates = match options.replicates {

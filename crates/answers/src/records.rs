@@ -55,6 +55,7 @@ fn answer(record: &Record, file: &str, full: bool) -> Value {
         file: file.to_owned(),
         hash: None,
         no_evidence: !full,
+        ..DiagnoseOptions::default()
     };
     let diagnosed = match diagnose(record, &options) {
         Ok(d) => json!({

@@ -10,7 +10,8 @@ use super::envelope::Table;
 use super::statistics::{Battery, Subject};
 use super::world::{Measured, Parts, bridge, in_steps, measured, record_of};
 
-use crate::ingest::grid::{Grid, lay_out};
+use crate::ingest::grid::lay_out;
+use crate::ingest::types::Grid;
 use crate::records::error::AnalysisError;
 use crate::result::{Among, Replicated};
 

@@ -26,6 +26,7 @@ pub(crate) fn held(all: &BTreeMap<String, Replicated>, verdict: Verdict, count: 
     };
     let check = |(name, r): (&String, &Replicated)| Check {
         id: ID.into(),
+        about: vec![],
         channel: name.clone(),
         statistic: r.before.p_value,
         p_value: Some(r.after.p_value),

@@ -5,7 +5,7 @@ use std::ops::Range;
 use model::file::ModelFile;
 use model::record::{Channel, Header, Quantity, Record};
 
-use crate::ingest::grid::{Grid, Target};
+use crate::ingest::types::{Grid, Target};
 
 /// Longest record of which every sample is simulated; of a longer one as many in all, in stretches.
 const MOST: usize = 1 << 17;
