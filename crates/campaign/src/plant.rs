@@ -5,7 +5,7 @@ use model::effect::{Parameters, Stage};
 use model::effects::effect;
 use model::file::EffectModel;
 use model::record::flag;
-use model::simulate::Simulation;
+use model::simulate::{Simulation, Stretch};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -148,6 +148,11 @@ fn blank(stand: &Stand) -> Simulation {
     Simulation {
         rate_hz: stand.rate_hz,
         samples: n,
+        span: n,
+        stretches: vec![Stretch {
+            samples: 0..n,
+            skipped: 0,
+        }],
         rng: Xoshiro256PlusPlus::seed_from_u64(1),
         temperature: stand.world.temperature.clone(),
         supply: stand.world.supply.clone(),
