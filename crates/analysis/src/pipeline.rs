@@ -15,7 +15,7 @@ use crate::criticise::common_noise::{Shared, common};
 use crate::criticise::cross_axis::couplings;
 use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
 use crate::fit::channel::{Note, State};
-use crate::fit::likelihood::Panel;
+use crate::fit::likelihood::{Bins, Panel};
 use crate::fit::{channel, estimate};
 use crate::ingest::dead;
 use crate::ingest::grid::{Grid, Target, lay_out};
@@ -32,7 +32,7 @@ use crate::result::{
     Unexplained, Verdict,
 };
 use crate::search::searched::Searched;
-use crate::search::{Search, impute};
+use crate::search::{Search, bands, impute};
 use crate::test_level;
 use crate::test_level::OMNIBUS_LEVEL;
 use crate::two_level::compare;
@@ -313,7 +313,12 @@ fn astray(s: &Searched<'_>) -> Option<Unexplained> {
 }
 
 fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
-    let panel = Panel::of(&grid.dct, &grid.bins, Rc::clone(&target.coefficients));
+    let coefficients = &target.coefficients;
+    let bins = match bands::peaks(coefficients, &target.noise, target.white, &grid.bins) {
+        none if none.is_empty() => Rc::clone(&grid.bins),
+        peaks => Rc::new(Bins::about(grid.n, &peaks)),
+    };
+    let panel = Panel::of(&grid.dct, &bins, Rc::clone(coefficients));
     let view = View {
         channel: &target.name,
         axis: target.axis,
@@ -334,8 +339,8 @@ fn search<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         residual::all(u, e, grid.rate_hz, step)
     };
     let mut before = plain_checks(&plain);
-    let (ascended, aside) = search.ascend(baseline.clone());
-    let mut state = search.conclude(compare::hold(&search, ascended), aside);
+    let ascended = search.ascend(baseline.clone());
+    let mut state = search.conclude(compare::hold(&search, ascended));
     let refilled = impute::again(&search, &state, target);
     if let Some(refilled) = refilled.clone() {
         state = refilled;
@@ -456,6 +461,7 @@ fn not_tested(searched: &[Searched<'_>]) -> Vec<NotTested> {
                         | Hypothesis::Covariance(_)
                         | Hypothesis::Variance(_)
                         | Hypothesis::TwoLevel
+                        | Hypothesis::WanderingTone
                 )
             };
             for c in s.search.candidates.iter().filter(|c| slow(&c.hypothesis)) {
@@ -466,8 +472,12 @@ fn not_tested(searched: &[Searched<'_>]) -> Vec<NotTested> {
         }
         if sways && !s.target.moving {
             let why = "the base sways, and turns a little about this axis too: record it at rest";
-            let unsafe_here =
-                |h: &Hypothesis| matches!(h, Hypothesis::Line | Hypothesis::Covariance(_));
+            let unsafe_here = |h: &Hypothesis| {
+                matches!(
+                    h,
+                    Hypothesis::Line | Hypothesis::WanderingTone | Hypothesis::Covariance(_)
+                )
+            };
             for c in s
                 .search
                 .candidates
@@ -557,11 +567,12 @@ fn effects_of<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<EffectMode
                 .collect()
         };
         if f.per_channel.is_empty() {
-            all.push(EffectModel {
+            let whole = f.components.is_empty().then_some(&f.parameters);
+            all.extend(whole.into_iter().chain(&f.components).map(|p| EffectModel {
                 cause: f.cause.clone(),
                 channels: f.channels.clone(),
-                parameters: known(&f.parameters),
-            });
+                parameters: known(p),
+            }));
         }
         // What is the same to the last digit on several channels is one event on all of them.
         let first = all.len();

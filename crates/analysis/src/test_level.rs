@@ -34,6 +34,15 @@ pub(crate) const CLAIMS: [&str; 7] = [
     "process_size",
     "process_source",
 ];
+/// The same of what stands at one frequency.
+pub(crate) const BAND_CLAIMS: [&str; 4] = [
+    "band_spectrum",
+    "band_steadiness",
+    "band_size",
+    ENVELOPE_CLAIM,
+];
+/// That of its envelope.
+pub(crate) const ENVELOPE_CLAIM: &str = "band_envelope";
 /// The claim of every stationary process, filters among them: neither its variance nor how its neighbours depend on each other
 /// has a rhythm, as what is held, bridged or switched by a clock of its own has.
 pub(crate) const STATIONARY_CLAIM: &str = "process_rhythm";

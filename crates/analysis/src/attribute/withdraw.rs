@@ -308,6 +308,17 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
                 let own = process.density(theta, &panel.bins.at);
                 let information = own.iter().zip(&g).zip(&counts);
                 let information = information.map(|((d, g), m)| m * (d / g).powi(2));
+                // What stands at one frequency answers for what is left there, and for its own claims.
+                if process.is_peak() {
+                    let lr = t.cluster.map_or(t.lr, |c| c.lr);
+                    return if test_level::BAND_CLAIMS.iter().any(|c| failing(c))
+                        || share(&information.collect::<Vec<_>>(), lr)
+                    {
+                        Doubt::Checks
+                    } else {
+                        Doubt::No
+                    };
+                }
                 let filter = process.filters_white();
                 by_power_law(filter)
                     || knows(t)
@@ -325,9 +336,7 @@ fn doubted(s: &Searched<'_>, failing: &dyn Fn(&str) -> bool, left: &Left) -> (Ve
                 let energy = energy.iter().zip(&g).map(|(e, g)| e / g);
                 share(&energy.collect::<Vec<_>>(), t.lr)
             };
-            if line.is_some_and(|omega| s.state.wanders(omega).is_some()) {
-                Doubt::No
-            } else if let Some(name) = beside_swing(t) {
+            if let Some(name) = beside_swing(t) {
                 Doubt::Beside(name)
             } else if there
                 || unlawful(t)
@@ -422,6 +431,10 @@ pub(crate) fn withdraw(
     let mut unexplained = vec![];
     let (mut kept, mut nearest, mut beside) = (vec![], vec![], vec![]);
     for ((finding, doubt), term) in of_terms.into_iter().zip(terms).zip(&s.state.terms) {
+        // It is told with the band that it is a part of.
+        if term.is_part() {
+            continue;
+        }
         if term.effect.id() == channel::ID {
             unexplained.push(Unexplained {
                 channel: name.into(),

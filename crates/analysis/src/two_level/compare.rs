@@ -212,7 +212,7 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
         s.terms
             .iter()
             .filter_map(|t| match &t.form {
-                Form::Covariance(c, theta) if !c.filters_white() => {
+                Form::Covariance(c, theta) if t.is_process() => {
                     let mut theta = theta.clone();
                     theta[0] += shorter;
                     if let Some(tau) = theta.get_mut(1) {
