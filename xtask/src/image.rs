@@ -3,17 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::step::{Failure, run};
-use crate::toolchain;
+use crate::step::{Crates, Failure, Pace, Said, run, watched};
+use crate::toolchain::{self, Toolchain};
 
 /// Where the image's build keeps its files.
 fn target(root: &Path) -> PathBuf {
     root.join("target/avr")
 }
 
-/// A cargo that compiles for the ATmega16.
-fn cargo(root: &Path, arguments: &[&str]) -> Result<Command, Failure> {
-    let toolchain = toolchain::find()?;
+/// The cargo of a toolchain, compiling for the ATmega16.
+fn cargo(toolchain: &Toolchain, root: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(&toolchain.cargo);
     command
         .current_dir(root)
@@ -22,6 +21,9 @@ fn cargo(root: &Path, arguments: &[&str]) -> Result<Command, Failure> {
         .env("RUSTC", &toolchain.rustc);
     // -Zbuild-std on a rustc that is not a nightly.
     command.env("RUSTC_BOOTSTRAP", "1");
+    // rustc hands -no-pie to every GNU linker, and warns where it has to link again without: the avr-gcc of Debian 12
+    // (5.4) does not know it, and the target knows no linker of another flavour.
+    command.env("RUSTC_LOG", "warn,rustc_codegen_ssa::back::link=error");
     // What an outer cargo or a CI sets for the host would replace the flags of the target.
     for variable in [
         "RUSTFLAGS",
@@ -32,15 +34,29 @@ fn cargo(root: &Path, arguments: &[&str]) -> Result<Command, Failure> {
     ] {
         command.env_remove(variable);
     }
-    Ok(command)
+    command
 }
 
-/// Builds the firmware for the ATmega16; returns the ELF. memory.x makes the link fail where it does not fit.
+/// An image that was built.
+#[derive(Debug)]
+pub struct Built {
+    /// The ELF file; the hex file lies beside it.
+    pub elf: PathBuf,
+    /// What the compiler complained of: warnings, and anything that LLVM prints of its own accord.
+    pub complaints: Vec<String>,
+    /// Whether it is of the pinned toolchain.
+    pub is_pinned: bool,
+}
+
+/// Builds the firmware for the ATmega16. memory.x makes the link fail where it does not fit.
 ///
 /// # Errors
 /// Toolchain or build.
-pub fn build(root: &Path) -> Result<PathBuf, Failure> {
-    run("the build of the image", &mut cargo(root, &["fw"])?)?;
+pub fn build(root: &Path, pace: &mut Pace) -> Result<Built, Failure> {
+    let toolchain = toolchain::find()?;
+    let mut fw = cargo(&toolchain, root, &["fw"]);
+    let what = "the build of the image";
+    let said = watched(what, &mut fw, &mut Crates::default(), pace)?;
     let elf = target(root).join("avr-none/firmware/firmware.elf");
     let hex = elf.with_extension("hex");
     let mut objcopy = Command::new("avr-objcopy");
@@ -49,7 +65,36 @@ pub fn build(root: &Path) -> Result<PathBuf, Failure> {
         .arg(&elf)
         .arg(&hex);
     run("avr-objcopy", &mut objcopy)?;
-    Ok(elf)
+    let complaints = complaints(&said);
+    Ok(Built {
+        elf,
+        complaints,
+        is_pinned: toolchain.is_pinned,
+    })
+}
+
+/// Lines of a build that neither say what is compiled nor that it is done, and what belongs to them.
+fn complaints(said: &Said) -> Vec<String> {
+    const PROGRESS: &[&str] = &[
+        "Compiling",
+        "Finished",
+        "Downloading",
+        "Downloaded",
+        "Updating",
+        "Blocking",
+        "Locking",
+        "Adding",
+        "Fresh",
+    ];
+    let is_progress = |line: &&String| {
+        let first = line.split_whitespace().next();
+        first.is_none_or(|word| PROGRESS.contains(&word))
+    };
+    said.all
+        .iter()
+        .filter(|l| !is_progress(l))
+        .cloned()
+        .collect()
 }
 
 /// Sizes of an image, bytes.
@@ -91,4 +136,23 @@ pub fn sizes(elf: &Path) -> Result<Sizes, Failure> {
         flash: code + data,
         sram: data + zero.unwrap_or(0) + section(".noinit").unwrap_or(0),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_compiler_complains_of_is_told_from_what_it_does() {
+        let lines = [
+            "   Compiling core v0.0.0 (/x)",
+            "warning: suspicious definition of the runtime `memcpy` symbol",
+            " WARN rustc_codegen_ssa::back::link Linker does not support -no-pie",
+            "BISECT: running pass (1) verify on f",
+            "    Finished `firmware` profile [optimized + debuginfo] target(s) in 1.00s",
+        ];
+        let all = lines.map(str::to_owned).to_vec();
+        let said = Said { all, out: vec![] };
+        assert_eq!(complaints(&said), lines[1..4]);
+    }
 }

@@ -2,24 +2,29 @@
 
 mod answers;
 mod campaign;
+mod demo;
 mod effects;
 mod image;
 mod peers;
 mod size;
 mod step;
+mod suite;
 mod toolchain;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::time::Instant;
 
-use step::{Failure, run};
+use step::{Failure, Pace};
+use suite::Extent;
 
 const USAGE: &str = "usage: cargo xtask COMMAND
 
   test     sets up what is missing and runs every check and test
+  check    the everyday part of it: format, lints, and the tests that are quick
   demo     hides something in the simulated stand, runs the image on it in the simulated ATmega16 for 600 s, captures,
-           analyzes and diagnoses; a number after it is the seed
+           diagnoses, and shows what was planted beside what was found; a number after it is the seed, `--hide KIND` hides
+           something else
   campaign measures by rates what the diagnosis can tell, and writes docs/power.md: up to an hour on two cores;
            --quick for minutes, --full for hours, --seed N for a run that was made before, --help for the rest
   answers  --write [DIR] keeps what the engine says of some 400 records of every kind; --compare [DIR] names by record and
@@ -34,12 +39,15 @@ fn main() -> ExitCode {
     let command = std::env::args().nth(1);
     // Where it runs, not where it was built: checkouts may share a target folder.
     let own = std::env::var_os("CARGO_MANIFEST_DIR");
-    let root = own.map_or_else(|| env!("CARGO_MANIFEST_DIR").into(), PathBuf::from);
-    let root = root.join("..");
+    let own = own.map_or_else(|| env!("CARGO_MANIFEST_DIR").into(), PathBuf::from);
+    let root = own.parent().unwrap_or(&own).to_owned();
     let done = match command.as_deref() {
-        Some("test") => test(&root),
-        Some("demo") => demo(&root),
-        Some("image") => build_image(&root),
+        Some("test") => suite::suite(&root, Extent::All),
+        Some("check") => suite::suite(&root, Extent::Everyday),
+        Some("demo") => demo::demo(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("image") => build_image(&root, &mut Pace::Rarer(0)).map(|complaints| {
+            complaints.iter().for_each(|line| eprintln!("{line}"));
+        }),
         Some("campaign") => campaign::measure(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("answers") => answers::freeze(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("effects") => effects::page(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
@@ -66,95 +74,24 @@ fn cargo(root: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// no_std crates, tested each alone as well: a run of the workspace unites features.
-const ALONE: &[&str] = &["wire", "adis16250", "mma7260qt"];
-
-fn test(root: &Path) -> Result<(), Failure> {
-    let start = Instant::now();
-    if !toolchain::has("cc") {
-        toolchain::install("a C compiler, which Rust links with", &["gcc", "libc6-dev"])?;
-    }
-    if !toolchain::has("avrdude") {
-        toolchain::install(
-            "avrdude, which `imu-stand flash` is tested with",
-            &["avrdude"],
-        )?;
-    }
-    match std::env::var_os("IMU_STAND_DATA") {
-        Some(folder) => println!("measured records: {}", Path::new(&folder).display()),
-        None => println!(
-            "measured records: IMU_STAND_DATA is unset, tests on them will say so and not run"
-        ),
-    }
-    run("format", &mut cargo(root, &["fmt", "--all", "--check"]))?;
-    toolchain::simulator()?;
-    println!("== firmware for the ATmega16");
-    build_image(root)?;
-    let lints = "clippy --workspace --all-targets --quiet -- -D warnings";
-    let mut steps: Vec<(String, Vec<&str>)> = vec![
-        ("lints".into(), lints.split(' ').collect()),
-        ("tests".into(), vec!["test", "--workspace", "--quiet"]),
-    ];
-    for package in ALONE {
-        steps.push((
-            format!("{package} alone"),
-            vec!["test", "--quiet", "-p", package, "--no-default-features"],
-        ));
-    }
-    for (name, arguments) in &steps {
-        let from = Instant::now();
-        println!("== {name}: cargo {}", arguments.join(" "));
-        run(name, &mut cargo(root, arguments))?;
-        println!("== {name}: {:.0} s", from.elapsed().as_secs_f64());
-    }
-    println!("all passed in {:.0} s", start.elapsed().as_secs_f64());
-    Ok(())
-}
-
-fn build_image(root: &Path) -> Result<(), Failure> {
+/// Builds the image and says how large it is; returns what the compiler complained of.
+fn build_image(root: &Path, pace: &mut Pace) -> Result<Vec<String>, Failure> {
     let from = Instant::now();
-    let elf = image::build(root)?;
-    let sizes = image::sizes(&elf)?;
+    let built = image::build(root, pace)?;
     println!(
-        "image: {} B of 16384 B flash, {} B of 1024 B SRAM static, built in {:.0} s: {}",
-        sizes.flash,
-        sizes.sram,
+        "image: {}, built in {:.0} s: {}",
+        say_sizes(&built.elf)?,
         from.elapsed().as_secs_f64(),
-        elf.display()
+        built.elf.display()
     );
-    Ok(())
+    Ok(built.complaints)
 }
 
-fn demo(root: &Path) -> Result<(), Failure> {
-    toolchain::simulator()?;
-    build_image(root)?;
-    // Relative to the root, so that the command in the report can be typed again.
-    let folder = Path::new("target/demo");
-    std::fs::create_dir_all(root.join(folder)).map_err(|error| {
-        Failure::new(
-            &format!("{}: {error}", folder.display()),
-            "make room or rights for it",
-        )
-    })?;
-    // The capture of an earlier demo, which may be of a version that did not mark it as simulated.
-    let _ = std::fs::remove_file(root.join(folder).join("capture.csv"));
-    let seed = std::env::args().nth(2).unwrap_or_else(|| "2009".to_owned());
-    // By cargo, which knows the target folder, wherever the user has set it.
-    let build = "run --release -p imu-stand --features simavr -- run --seconds 600 --seed";
-    let mut program = cargo(root, &build.split(' ').collect::<Vec<_>>());
-    program.arg(&seed);
-    for (option, file) in [
-        ("--out", "capture.csv"),
-        ("--analysis", "analysis.json"),
-        ("--json", "diagnosis.json"),
-        ("--report", "report.html"),
-    ] {
-        program.arg(option).arg(folder.join(file));
-    }
-    run("the demo", &mut program)?;
-    println!(
-        "capture, analysis and diagnosis beside the report: {}",
-        folder.display()
-    );
-    Ok(())
+/// How large an image is, of what there is.
+fn say_sizes(elf: &Path) -> Result<String, Failure> {
+    let sizes = image::sizes(elf)?;
+    Ok(format!(
+        "{} B of 16384 B flash, {} B of 1024 B SRAM static",
+        sizes.flash, sizes.sram
+    ))
 }

@@ -30,7 +30,7 @@ pub mod replicates;
 
 mod pipeline;
 
-pub use fit::{likelihood, scan};
+pub use fit::{likelihood, scan, threshold};
 pub use ingest::kalman;
 pub use noise::{
     allan, analyze, attitude, discriminate as separate, edf, fit as noise_fit, paper_model, plan,
@@ -38,6 +38,7 @@ pub use noise::{
 };
 pub use numerics::minimise as optimise;
 pub use records::{error, rows, sampling};
+pub use search::peak_of_white;
 pub use two_level::compare as contest;
 
 pub use error::AnalysisError;

@@ -107,6 +107,10 @@ pub struct Finding {
     /// Parameters of each channel, where there are several.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub per_channel: BTreeMap<String, BTreeMap<String, Parameter>>,
+    /// Parameters of the parts that it is the sum of, where one of its kind does not make its shape: a band that is no
+    /// Lorentzian.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub components: Vec<BTreeMap<String, Parameter>>,
     /// Times of the events, s from the start, for causes that happen at instants.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub times_s: Vec<f64>,

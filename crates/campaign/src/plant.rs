@@ -5,7 +5,7 @@ use model::effect::{Parameters, Stage};
 use model::effects::effect;
 use model::file::EffectModel;
 use model::record::flag;
-use model::simulate::Simulation;
+use model::simulate::{Simulation, Stretch};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -15,7 +15,7 @@ use crate::stand::{GYROS, LSB, Needs, Stand};
 use crate::strength::{Meter, of_common, of_variance, size_for};
 
 /// Causes whose strength is a d'.
-pub const BY_STRENGTH: [&str; 20] = [
+pub const BY_STRENGTH: [&str; 22] = [
     "temperature",
     "temperature_quadratic",
     "warm_up",
@@ -36,6 +36,8 @@ pub const BY_STRENGTH: [&str; 20] = [
     "telegraph",
     "common_noise",
     "noise_change",
+    "narrow_band",
+    "wandering_line",
 ];
 /// Causes that are counted, at sizes that are certain to show.
 pub const BY_COUNT: [&str; 9] = [
@@ -148,6 +150,11 @@ fn blank(stand: &Stand) -> Simulation {
     Simulation {
         rate_hz: stand.rate_hz,
         samples: n,
+        span: n,
+        stretches: vec![Stretch {
+            samples: 0..n,
+            skipped: 0,
+        }],
         rng: Xoshiro256PlusPlus::seed_from_u64(1),
         temperature: stand.world.temperature.clone(),
         supply: stand.world.supply.clone(),
@@ -436,6 +443,29 @@ pub fn plant(
             let (rho, d, density) = of_density(stand, f64::INFINITY, &density);
             let p = parameters_of(cause, &[("lag1_correlation", of(rho))]);
             process(p, d, density)
+        }
+        "narrow_band" | "wandering_line" => {
+            let (size_name, wide, per_rms) = if cause == "narrow_band" {
+                ("rms", "bandwidth", 1.0)
+            } else {
+                ("amplitude", "linewidth", 2f64.sqrt())
+            };
+            let centre = draw.by_ratio(0.03, 0.45) * stand.rate_hz;
+            // Some hundred independent values of the envelope, and no wider than a tenth of the centre.
+            let width = draw.by_ratio(30.0, 300.0) / (std::f64::consts::PI * seconds);
+            let width = width.min(0.1 * centre);
+            let per_sample = std::f64::consts::TAU / stand.rate_hz;
+            let pole = (-0.5 * per_sample * width).exp();
+            let (rms, d, density) = of_density(stand, f64::INFINITY, &|rms, w| {
+                let turn = per_sample * centre;
+                0.5 * rms * rms * (one_pole(pole, w - turn) + one_pole(pole, w + turn))
+            });
+            let values = [
+                (size_name, rms * per_rms),
+                ("center_frequency", centre),
+                (wide, width),
+            ];
+            process(parameters_of(cause, &values), d, density)
         }
         "common_noise" => {
             let whites: Vec<f64> = (0..3).map(|i| stand.white(i)).collect();

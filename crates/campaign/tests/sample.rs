@@ -17,6 +17,9 @@ const SAMPLE: Size = Size {
     pairs: 12,
     foreign: 1,
 };
+/// Of the foreign effects, whose rates `cargo xtask campaign` grades and this test does not: one in so many is drawn, others
+/// with each seed, to see that they can be made and are answered.
+const ONE_IN: u64 = 10;
 /// Chance that an engine that just meets a bar fails the test on it.
 const UNLUCKY: f64 = 1e-3;
 
@@ -50,7 +53,12 @@ fn a_fresh_sample_of_the_campaign_is_not_worse_than_its_bars() {
     println!("IMU_STAND_SEED={seed}");
     let threads = std::thread::available_parallelism().map_or(1, Into::into);
     let never = AtomicBool::new(false);
-    let all = run_all(seed, &cases(SAMPLE, None), threads, &never, &|o| {
+    let mut drawn = cases(SAMPLE, None);
+    drawn.retain(|(family, _)| match family {
+        Family::Foreign(number) => *number as u64 % ONE_IN == seed % ONE_IN,
+        _ => true,
+    });
+    let all = run_all(seed, &drawn, threads, &never, &|o| {
         if report::worth_a_line(o) {
             println!("{}", report::line(o));
         }

@@ -252,8 +252,22 @@ fn write_finding(out: &mut String, finding: &Finding) {
 /// Digits of a value without an error.
 const DIGITS: usize = 6;
 
+/// A value with as many places as one that was measured with this standard error is shown with.
+#[must_use]
+pub fn rounded_as(value: f64, std_error: Option<f64>) -> String {
+    match std_error {
+        Some(_) => {
+            let shown = measured(value, std_error);
+            let end = shown.find(" +- ").unwrap_or(shown.len());
+            shown[..end].to_owned()
+        }
+        None => tidy(value, 4),
+    }
+}
+
 /// A value to the second digit of its standard error, both with the same places; as it is where it has none, as counts.
-fn measured(value: f64, std_error: Option<f64>) -> String {
+#[must_use]
+pub fn measured(value: f64, std_error: Option<f64>) -> String {
     let error = match std_error {
         Some(error) if error > 0.0 && error.is_finite() && value.is_finite() => error,
         Some(error) => return format!("{} +- {}", tidy(value, DIGITS), tidy(error, 2)),

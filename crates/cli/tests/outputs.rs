@@ -144,3 +144,24 @@ fn a_dash_is_standard_input_and_output_and_nothing_else_is_said_there() {
     let twice = run(&folder, "diagnose run.csv --json - --report -");
     assert_eq!(twice.status.code(), Some(1));
 }
+
+#[test]
+fn a_capture_is_not_written_to_a_name_that_promises_another_form() {
+    let folder = folder("named");
+    for line in [
+        "simulate --seconds 60 --out s.npz",
+        "simulate --seconds 60 --out s.Parquet",
+        "run --native --seconds 60 --out r.h5",
+        "capture --port none --out c.parquet",
+    ] {
+        let output = run(&folder, line);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{line}: {said}");
+        assert!(
+            said.contains("a capture is CSV") && said.contains("imu-stand export"),
+            "{line}: {said}"
+        );
+        let name = line.rsplit(' ').next().expect("a name");
+        assert!(!folder.join(name).exists(), "{line}");
+    }
+}

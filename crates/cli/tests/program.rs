@@ -342,6 +342,12 @@ fn a_fault_hidden_in_the_stand_goes_through_the_boards_logic_and_is_named() {
                     .any(|rival| rival["cause"] == "motor_bias")
         });
     assert!(named, "{said}");
+    let (_, compared) = said.split_once("planted and found").expect("it ends so");
+    assert!(
+        compared.contains("motor_bias on gyro_") && compared.contains(": planted "),
+        "{said}"
+    );
+    assert!(!said.contains(" { "), "{said}");
 }
 
 /// Measured records: `IMU_STAND_DATA` names their folder.

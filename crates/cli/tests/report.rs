@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 
 fn program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_imu-stand"))
@@ -21,27 +22,31 @@ fn succeed(command: &mut Command) {
     assert!(output.status.success(), "{said}");
 }
 
-/// A run with a bias that follows the temperature, its report and its diagnosis.
-fn reported(name: &str) -> (PathBuf, String, serde_json::Value) {
-    let folder = folder(name);
-    let arguments = [
-        "run", "--native", "--hide", "tempco", "--seed", "5", "--quiet",
-    ];
-    succeed(
-        program()
-            .current_dir(&folder)
-            .args(arguments)
-            .args(["--out", "run.csv", "--report", "r.html", "--json", "d.json"]),
-    );
-    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("it was written");
-    let diagnosis = serde_json::from_str(&read("d.json")).expect("it is JSON");
-    let page = read("r.html");
-    (folder, page, diagnosis)
+/// A run with a bias that follows the temperature, its report and its diagnosis: made once for all tests, none of which
+/// writes over them.
+fn reported() -> &'static (PathBuf, String, serde_json::Value) {
+    static MADE: OnceLock<(PathBuf, String, serde_json::Value)> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let folder = folder("report");
+        let arguments = [
+            "run", "--native", "--hide", "tempco", "--seed", "5", "--quiet",
+        ];
+        succeed(
+            program()
+                .current_dir(&folder)
+                .args(arguments)
+                .args(["--out", "run.csv", "--report", "r.html", "--json", "d.json"]),
+        );
+        let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("it was written");
+        let diagnosis = serde_json::from_str(&read("d.json")).expect("it is JSON");
+        let page = read("r.html");
+        (folder, page, diagnosis)
+    })
 }
 
 #[test]
 fn the_report_is_one_file_that_refers_to_no_other() {
-    let (_, page, _) = reported("self_contained");
+    let (_, page, _) = reported();
     for reference in [
         "<script", "<link", "<img", "src=", "href=", "url(", "@import",
     ] {
@@ -57,7 +62,7 @@ fn the_report_is_one_file_that_refers_to_no_other() {
 
 #[test]
 fn the_report_says_the_verdict_first_and_what_the_json_says() {
-    let (_, page, diagnosis) = reported("says");
+    let (_, page, diagnosis) = reported();
     let at = |text: &str| {
         page.find(text)
             .unwrap_or_else(|| panic!("{text} is missing"))
@@ -86,15 +91,21 @@ fn the_report_says_the_verdict_first_and_what_the_json_says() {
     at("imu-stand run --native --hide tempco --seed 5");
     at("sha256:");
     at("Hidden in the simulated stand");
+    // What was planted stands beside what was found, here and in the JSON.
+    at("temperature on gyro_x, slope: planted -0.1315, found -0.13");
+    let planted = &diagnosis["planted"]["items"][0];
+    assert_eq!(planted["cause"], "temperature");
+    assert_eq!(planted["matches"], true);
+    assert_eq!(planted["sizes"][0]["parameter"], "slope");
 }
 
 #[test]
 fn the_same_record_and_seed_give_the_same_report() {
-    let (folder, _, _) = reported("again");
+    let (folder, _, _) = reported();
     let make = || {
         succeed(
             program()
-                .current_dir(&folder)
+                .current_dir(folder)
                 .args(["report", "run.csv", "--out", "again.html"]),
         );
         std::fs::read_to_string(folder.join("again.html")).unwrap()
@@ -114,7 +125,9 @@ fn a_reader_that_has_had_enough_is_no_failure() {
     ]));
     let mut child = program()
         .current_dir(&folder)
-        .args(["diagnose", "c.csv"])
+        .args([
+            "diagnose", "c.csv", "--json", "d.json", "--report", "r.html",
+        ])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -127,16 +140,18 @@ fn a_reader_that_has_had_enough_is_no_failure() {
         "{:?} {said}",
         output.status
     );
+    // What it was asked to write is there all the same.
+    assert!(folder.join("d.json").exists() && folder.join("r.html").exists());
 }
 
 #[test]
 fn the_convicting_figures_can_be_had_as_files() {
-    let (folder, _, _) = reported("report_figures");
+    let (folder, _, _) = reported();
     let arguments = [
         "report",
         "run.csv",
         "--out",
-        "again.html",
+        "figures.html",
         "--figures",
         "figures",
     ];

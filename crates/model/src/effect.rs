@@ -351,6 +351,17 @@ impl Frequencies {
     }
 }
 
+/// A peak in a spectrum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peak {
+    /// Angular frequency of its middle, rad per sample.
+    pub omega: f64,
+    /// Half its width at half its height, rad per sample.
+    pub half_width: f64,
+    /// Its variance over the white one.
+    pub variance: f64,
+}
+
 /// A stationary process added to the noise, or a filter on it.
 pub trait Covariance: Send + Sync {
     /// Names of the shape's coordinates; they are optimised unconstrained within [`Covariance::bounds`].
@@ -365,6 +376,23 @@ pub trait Covariance: Send + Sync {
     fn bounds(&self, samples: usize) -> Vec<(f64, f64)>;
     /// Where to start the search from.
     fn starts(&self, samples: usize) -> Vec<Vec<f64>>;
+    /// The same term with its coordinates measured from a peak of the spectrum, in widths of it, and where it starts from
+    /// there: of a term that stands at one frequency, which has to be sought in the data.
+    fn about(&self, _peak: &Peak) -> Option<(Arc<dyn Covariance>, Vec<f64>)> {
+        None
+    }
+    /// Whether it is such a term.
+    fn is_peak(&self) -> bool {
+        false
+    }
+    /// The peak that such a term is.
+    fn peak(&self, _theta: &[f64]) -> Option<Peak> {
+        None
+    }
+    /// Coordinates with their standard errors as [`Effect::describe`] takes them.
+    fn described(&self, coordinates: &[(f64, f64)]) -> Vec<(f64, f64)> {
+        coordinates.to_vec()
+    }
 }
 
 /// A law by which the white variance changes in time.
@@ -402,6 +430,8 @@ pub enum Hypothesis {
     Variance(VarianceLaw),
     /// A process with two levels.
     TwoLevel,
+    /// A tone of steady size whose phase wanders: it has the spectrum of a noise that stands at one frequency.
+    WanderingTone,
     /// Noise shared by the gyros.
     Common,
     /// The rate held against the tilt that the accelerometers see.

@@ -69,6 +69,10 @@ pub(crate) fn withdraw(
     let mut unexplained = vec![];
     let (mut kept, mut nearest, mut beside) = (vec![], vec![], vec![]);
     for ((finding, doubt), term) in of_terms.into_iter().zip(terms).zip(&s.state.terms) {
+        // It is told with the band that it is a part of.
+        if term.is_part() {
+            continue;
+        }
         if term.effect.id() == channel::ID {
             unexplained.push(Unexplained {
                 channel: name.into(),

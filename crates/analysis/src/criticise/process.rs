@@ -30,6 +30,12 @@ use crate::search::Search;
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, DEPARTURE, Outcome};
 
+/// Part of what a band explains that its shape may leave: it is off by a fifth of its size. No mode of a real structure is
+/// a Lorentzian to the last.
+const LEFT: f64 = 0.05;
+/// How many more independent values a band has to have in a stretch, or the record: energies of a narrow one are far from
+/// normal, and a claim fails by chance once in a thousand bands.
+const MORE: f64 = 4.0;
 /// Highest order of the polynomials in ln w that bend a spectrum.
 const BENDS: usize = 6;
 /// Fewest independent values that a bend or a moment may rest on.
@@ -52,24 +58,47 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<Outcome> {
         return all;
     }
     let (u, _) = whitened_by_spectrum(&search.panel, state);
-    let covariances = state.terms.iter().filter_map(|t| match &t.form {
-        Form::Covariance(c, _) => Some((t, c.filters_white())),
-        _ => None,
-    });
-    for (i, (term, filter)) in covariances.enumerate() {
-        // A filter is no process of its own.
-        if filter {
+    let covariances: Vec<&Term> = state.terms.iter().filter(|t| t.is_covariance()).collect();
+    for term in &covariances {
+        // A filter is no process of its own, and a part of a band is asked with it.
+        if term.is_filter() || term.is_part() {
             continue;
         }
+        // Bands that overlap are one.
+        let of_it = |o: &Term| match (term.cluster, o.cluster) {
+            (Some(own), Some(other)) => own.number == other.number,
+            _ => std::ptr::eq(*term, o),
+        };
+        let all_terms = covariances.iter().zip(&state.noise.terms);
+        let own = all_terms.filter(|(o, _)| of_it(o)).map(|(_, t)| t.clone());
         let process = Process {
             panel: &search.panel,
             state,
             u: &u,
             id: term.effect.id(),
+            // Whether it is Gaussian, the envelope of a band has told.
+            claims: if term.is_band() {
+                [
+                    Some(CheckId::BandSpectrum),
+                    None,
+                    Some(CheckId::BandSteadiness),
+                    Some(CheckId::BandSize),
+                ]
+            } else {
+                [
+                    CheckId::ProcessSpectrum,
+                    CheckId::ProcessLaw,
+                    CheckId::ProcessSteadiness,
+                    CheckId::ProcessSize,
+                ]
+                .map(Some)
+            },
+            least: term.cluster.map_or(0.0, |c| LEFT * c.lr),
+            more: if term.is_band() { MORE } else { 1.0 },
             view: &search.view,
             alone: Noise {
                 log_walk: f64::NEG_INFINITY,
-                terms: vec![state.noise.terms[i].clone()],
+                terms: own.collect(),
             },
         };
         all.extend(process.shape());
@@ -86,6 +115,9 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<Outcome> {
 /// its variance.
 pub(crate) fn stationary(s: &Searched<'_>, rhythm: &Outcome) -> Option<Outcome> {
     let is_one = |t: &Term| {
+        if t.is_band() {
+            return false;
+        }
         let hypothesis = &s.search.candidates[t.candidate].hypothesis;
         matches!(t.form, Form::Covariance(..)) && matches!(hypothesis, Hypothesis::Covariance(_))
     };
@@ -148,6 +180,12 @@ struct Process<'a> {
     /// Whitened coefficients of the residual.
     u: &'a [f64],
     id: &'static str,
+    /// Its claims of shape, law, steadiness and size.
+    claims: [Option<CheckId>; 4],
+    /// Chi-square below which its shape is not off by much, whatever the chance.
+    least: f64,
+    /// Independent values that its energies rest on, over those that others do.
+    more: f64,
     view: &'a View<'a>,
     /// Its noise beside a white one of variance 1.
     alone: Noise,
@@ -259,7 +297,7 @@ impl Process<'_> {
             })
             .collect();
         let statistic: f64 = scores.iter().map(|s| s * s).sum();
-        let p_value = if bends.is_empty() {
+        let p_value = if bends.is_empty() || statistic < self.least {
             1.0
         } else {
             chi_tail(statistic, bends.len() as f64)
@@ -275,7 +313,7 @@ impl Process<'_> {
             "its spectrum is bent otherwise; all noise is {:.2} of the model's about {hz:.3} Hz",
             bent(heaviest).exp()
         );
-        Some(self.outcome(CheckId::ProcessSpectrum, statistic, p_value, what))
+        Some(self.outcome(self.claims[0]?, statistic, p_value, what))
     }
 
     /// Whether it is Gaussian, and there all the time.
@@ -301,23 +339,19 @@ impl Process<'_> {
                 worst = Some((z, normal_tail(z), name));
             }
         }
-        let law = worst.map(|(z, p, name)| {
+        let law = worst.and_then(|(z, p, name)| {
             let p = (p * f64::from(count)).min(1.0);
-            self.outcome(
-                CheckId::ProcessLaw,
-                z,
-                p,
-                format!("{name}, in standard errors of a Gaussian one"),
-            )
+            let what = format!("{name}, in standard errors of a Gaussian one");
+            Some(self.outcome(self.claims[1]?, z, p, what))
         });
-        let steadiness = drive.steadiness().map(|(statistic, p, j, energy)| {
+        let steadiness = drive.steadiness(self.more).and_then(|(statistic, p, j, energy)| {
             let length = self.u.len() as f64 / self.view.rate_hz / STRETCHES as f64;
             let what = format!(
                 "it is not there all the time alike; {energy:.2} of its mean from {:.0} to {:.0} s",
                 j as f64 * length,
                 (j + 1) as f64 * length
             );
-            self.outcome(CheckId::ProcessSteadiness, statistic, p, what)
+            Some(self.outcome(self.claims[2]?, statistic, p, what))
         });
         let size = self.size(&drive);
         law.into_iter().chain(steadiness).chain(size).collect()
@@ -329,7 +363,7 @@ impl Process<'_> {
         let recorded = quantities.iter().filter_map(|q| self.view.signal(*q));
         let asked: Vec<(&str, f64, f64)> = recorded
             .filter_map(|s| {
-                let (statistic, depth) = drive.follows(&s.smooth)?;
+                let (statistic, depth) = drive.follows(&s.smooth, self.more)?;
                 Some((s.name.as_str(), statistic, depth))
             })
             .collect();
@@ -337,7 +371,7 @@ impl Process<'_> {
         let chance = (asked.len() as f64 * chi_tail(*statistic, 2.0)).min(1.0);
         let p = if *depth < DEPTH { 1.0 } else { chance };
         let what = format!("its energy follows {name}, by {:.0} % rms", 100.0 * depth);
-        let outcome = self.outcome(CheckId::ProcessSize, *statistic, p, what);
+        let outcome = self.outcome(self.claims[3]?, *statistic, p, what);
         Some(Outcome {
             about: vec![(*name).to_owned()],
             ..outcome
@@ -386,9 +420,9 @@ impl Filtered {
 
     /// Sum of the squared deviations of the energies in stretches, its chance, the stretch that is farthest off and its
     /// energy over the mean.
-    fn steadiness(&self) -> Option<(f64, f64, usize, f64)> {
+    fn steadiness(&self, more: f64) -> Option<(f64, f64, usize, f64)> {
         let length = self.values.len() / STRETCHES;
-        if (length as f64) < LEAST * self.sums[0] {
+        if (length as f64) < more * LEAST * self.sums[0] {
             return None;
         }
         let energies: Vec<f64> = self
@@ -409,9 +443,9 @@ impl Filtered {
 
     /// Chi-square of two degrees of the energy against a course and its square, and the part of the energy, rms, that
     /// follows them. `None` where too few independent values stand behind.
-    fn follows(&self, course: &[f64]) -> Option<(f64, f64)> {
+    fn follows(&self, course: &[f64], more: f64) -> Option<(f64, f64)> {
         let n = self.values.len() as f64;
-        if n < LEAST_OF_COURSE * self.sums[0] {
+        if n < more * LEAST_OF_COURSE * self.sums[0] {
             return None;
         }
         let energy = self.values.iter().map(|v| v * v).sum::<f64>() / n;
@@ -464,7 +498,7 @@ mod tests {
         assert!((spread - 1.0).abs() < 0.1, "{spread}");
         let far = z.iter().filter(|z| z.abs() > 3.3).count();
         assert!(far <= 5, "{far}");
-        let unsteady = all.iter().filter(|f| f.steadiness().unwrap().1 < 0.01);
+        let unsteady = all.iter().filter(|f| f.steadiness(1.0).unwrap().1 < 0.01);
         let unsteady = unsteady.count();
         // 4 are expected.
         assert!(unsteady <= 12, "{unsteady}");
@@ -474,7 +508,7 @@ mod tests {
     fn a_size_that_follows_a_thermometer_is_told_and_one_that_does_not_is_not() {
         let warm = |i: usize| (i as f64 / 450.0).sin() + 0.4;
         let course: Vec<f64> = (0..6000).map(warm).collect();
-        let chance_of = |f: &Filtered, c: &[f64]| chi_tail(f.follows(c).unwrap().0, 2.0);
+        let chance_of = |f: &Filtered, c: &[f64]| chi_tail(f.follows(c, 1.0).unwrap().0, 2.0);
         let runs = 400;
         let low = (0..runs).filter(|s| chance_of(&filtered(*s), &course) < 0.01);
         let low = low.count();
@@ -483,11 +517,11 @@ mod tests {
         for seed in 0..10 {
             let mut f = filtered(seed);
             f.values.iter_mut().zip(&course).for_each(|(v, c)| *v *= c);
-            let (statistic, depth) = f.follows(&course).unwrap();
+            let (statistic, depth) = f.follows(&course, 1.0).unwrap();
             assert!(chi_tail(statistic, 2.0) < 1e-6 && depth > DEPTH, "{depth}");
         }
         // What rests, and what has two levels, whose square is the same course.
-        assert!(filtered(1).follows(&[25.29; 6000]).unwrap().0 < 1e-6);
+        assert!(filtered(1).follows(&[25.29; 6000], 1.0).unwrap().0 < 1e-6);
         let levels: Vec<f64> = (0..6000)
             .map(|i| if i % 700 < 90 { 0.3 } else { 0.7 })
             .collect();
@@ -498,7 +532,7 @@ mod tests {
     fn a_process_that_stops_half_way_is_unsteady_and_has_tails() {
         let mut f = filtered(7);
         f.values[3000..].iter_mut().for_each(|v| *v *= 0.3);
-        assert!(f.steadiness().unwrap().1 < 1e-9);
+        assert!(f.steadiness(1.0).unwrap().1 < 1e-9);
         assert!(f.moments()[1].1 > 4.0);
     }
 

@@ -1,10 +1,10 @@
-//! The shape of the noise over bins of coefficients in which it hardly changes.
+//! The shape of the noise over bins of coefficients in which it hardly changes: finer than elsewhere about a peak.
 
 use std::cell::OnceCell;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use model::effect::{Covariance, Frequencies};
+use model::effect::{Covariance, Frequencies, Peak};
 
 use crate::numerics::column::{Column, add_sums};
 use crate::numerics::log_product::sum_of_logs;
@@ -16,11 +16,18 @@ const AT_HAND: usize = 1 << 13;
 /// Width of the other bins over their frequency.
 const WIDTH: f64 = 0.01;
 
+/// Bins in half a width of a peak, and in the way from its middle to any place beside it: over one of them a Lorentzian
+/// changes by a quarter at most, and its mean is that in the middle to some thousandths.
+const IN_A_PEAK: f64 = 6.0;
+const BESIDE_A_PEAK: f64 = 8.0;
+
 /// The bins of a length.
 #[derive(Clone, Debug)]
 pub struct Bins {
     /// Samples.
     pub n: usize,
+    /// Whether they are those of every record of this length.
+    pub(crate) plain: bool,
     /// First coefficient of each bin, and the end.
     start: Vec<usize>,
     counts: Vec<f64>,
@@ -42,6 +49,22 @@ impl Bins {
     /// Bins for `n` samples.
     #[must_use]
     pub fn new(n: usize) -> Self {
+        Self::about(n, &[])
+    }
+
+    /// Bins for `n` samples of a noise that has these peaks.
+    #[must_use]
+    pub fn about(n: usize, peaks: &[Peak]) -> Self {
+        let to_k = n as f64 / PI;
+        // Next to a peak a bin may end within it, however far off it begins.
+        let widest = |k: f64| {
+            let beside = peaks.iter().map(|p| {
+                let (middle, half) = (p.omega * to_k, p.half_width * to_k);
+                let ahead = (k - middle).max((middle - k) / (1.0 + BESIDE_A_PEAK.recip()));
+                (half / IN_A_PEAK).max(ahead / BESIDE_A_PEAK)
+            });
+            beside.fold(k * WIDTH, f64::min)
+        };
         let mut start = vec![];
         let mut k = 1;
         while k < n {
@@ -49,7 +72,7 @@ impl Bins {
             k += if k < SINGLE {
                 1
             } else {
-                ((k as f64 * WIDTH) as usize).max(1)
+                (widest(k as f64) as usize).max(1)
             };
         }
         start.push(n);
@@ -62,6 +85,7 @@ impl Bins {
         let counts = start.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
         Self {
             n,
+            plain: peaks.is_empty(),
             start,
             counts,
             at: Frequencies { omega, cosine },
@@ -152,6 +176,13 @@ impl Noise {
         }
     }
 
+    /// The peaks that its terms are.
+    #[must_use]
+    pub fn peaks(&self) -> Vec<Peak> {
+        let all = self.terms.iter();
+        all.filter_map(|(term, theta)| term.peak(theta)).collect()
+    }
+
     fn shape(&self, at: &Frequencies, walk: &[f64]) -> Vec<f64> {
         let lambda = self.log_walk.exp();
         let mut g: Vec<f64> = walk.iter().map(|w| lambda * w).collect();
@@ -224,11 +255,16 @@ impl Noise {
     /// g at one angular frequency, rad per sample.
     #[must_use]
     pub fn at(&self, omega: f64) -> f64 {
-        let at = Frequencies {
-            omega: vec![omega],
-            cosine: vec![omega.cos()],
-        };
-        self.shape(&at, &[walk_shape(omega)])[0]
+        self.through([omega])[0]
+    }
+
+    /// g at angular frequencies, rad per sample.
+    #[must_use]
+    pub fn through(&self, omega: impl IntoIterator<Item = f64>) -> Vec<f64> {
+        let omega: Vec<f64> = omega.into_iter().collect();
+        let walk: Vec<f64> = omega.iter().map(|w| walk_shape(*w)).collect();
+        let cosine = omega.iter().map(|w| w.cos()).collect();
+        self.shape(&Frequencies { omega, cosine }, &walk)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
-use model::effect::{Effect, Parameters, Shape};
+use model::effect::{Effect, Parameters, Peak, Shape};
 
 use crate::fit::likelihood::{Noise, Panel, Solution};
 use crate::fit::scan::residual;
@@ -61,6 +61,21 @@ pub struct Term {
     pub stated: Option<Vec<(f64, f64)>>,
     /// What its name claims, where a contest has weighed that.
     pub claims: Vec<Outcome>,
+    /// Of a band: the bands that it is one with.
+    pub cluster: Option<Cluster>,
+    /// How much wider the errors of its coordinates are than those of Gaussian noise of its spectrum; none where it is that.
+    pub wider: Vec<f64>,
+}
+
+/// Bands that overlap: one phenomenon, and one entry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cluster {
+    /// Which one of the channel.
+    pub number: usize,
+    /// Place of the band among them, the strongest first.
+    pub place: usize,
+    /// Likelihood ratio of all of them against none.
+    pub lr: f64,
 }
 
 impl Term {
@@ -85,6 +100,8 @@ impl Term {
             alternatives: vec![],
             stated: None,
             claims: vec![],
+            cluster: None,
+            wider: vec![],
         }
     }
 
@@ -94,14 +111,32 @@ impl Term {
         self.lr - self.threshold
     }
 
-    /// Whether it is a process that is added.
+    /// Whether it is a process that is added and stands at no one frequency.
     pub(crate) fn is_process(&self) -> bool {
-        matches!(&self.form, Form::Covariance(c, _) if !c.filters_white())
+        matches!(&self.form, Form::Covariance(c, _) if !c.filters_white() && !c.is_peak())
+    }
+
+    /// The peak that it is, where it stands at one frequency.
+    pub(crate) fn peak(&self) -> Option<Peak> {
+        match &self.form {
+            Form::Covariance(c, theta) => c.peak(theta),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a noise, or a tone that wanders, at one frequency.
+    pub(crate) fn is_band(&self) -> bool {
+        self.peak().is_some()
+    }
+
+    /// Whether it is told with another band that it is a part of.
+    pub(crate) fn is_part(&self) -> bool {
+        self.cluster.is_some_and(|c| c.place > 0)
     }
 
     /// Whether it is a filter that the white noise goes through.
     pub(crate) fn is_filter(&self) -> bool {
-        self.is_covariance() && !self.is_process()
+        matches!(&self.form, Form::Covariance(c, _) if c.filters_white())
     }
 
     pub(crate) fn is_covariance(&self) -> bool {
@@ -133,15 +168,6 @@ impl Worded for Note {
     }
 }
 
-/// The narrow crowd that a line is the strongest one of, rad per sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wandering {
-    /// Angular frequency of the line.
-    pub line: f64,
-    /// Half the width of the crowd.
-    pub half: f64,
-}
-
 /// A model of a channel.
 #[derive(Clone)]
 pub struct State {
@@ -153,8 +179,6 @@ pub struct State {
     pub solution: Solution,
     /// Structure that was seen and that no single effect explains.
     pub notes: Vec<Note>,
-    /// The line that wanders: a line still, though no steady one.
-    pub wandering: Option<Wandering>,
     /// The level of a process that is not Gaussian, where one was named: sample by sample.
     pub level: Option<Rc<Vec<f64>>>,
     /// The one power law that explains as much as the processes.
@@ -172,11 +196,6 @@ impl State {
             .iter()
             .flat_map(|t| t.columns.iter().copied())
             .collect()
-    }
-
-    /// Whether a line of that angular frequency is the one that wanders.
-    pub(crate) fn wanders(&self, omega: f64) -> Option<Wandering> {
-        self.wandering.filter(|w| (w.line - omega).abs() <= w.half)
     }
 
     /// Every term with the coefficients of its columns.

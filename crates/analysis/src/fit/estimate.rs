@@ -1,8 +1,9 @@
 //! Estimates with honest errors: coefficients averaged over the random walk, noise parameters from the curvature.
 
-use model::effect::Found;
+use model::effect::{Found, Peak};
 
 use crate::fit::channel::{Form, State};
+use crate::fit::likelihood::scoring;
 use crate::fit::likelihood::{Noise, Panel, invert, least_walk};
 
 /// Points of the random walk that coefficients are averaged over.
@@ -64,10 +65,28 @@ pub fn coefficients(panel: &Panel, state: &State) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Coordinates of the noise shape (random walk first) with standard errors from the curvature of the likelihood.
+/// Standard errors of the coordinates of the noise shape (random walk first).
 #[must_use]
 pub fn noise_errors(panel: &Panel, state: &State) -> Vec<f64> {
+    let covariance = noise_covariance(panel, state);
+    (0..covariance.len())
+        .map(|i| {
+            if covariance[i][i] > 0.0 {
+                covariance[i][i].sqrt() * state.wider.get(i + 1).unwrap_or(&1.0)
+            } else {
+                f64::NAN
+            }
+        })
+        .collect()
+}
+
+/// Covariance of the coordinates of the noise shape (random walk first): by the information of a noise that has peaks, by
+/// the curvature of the likelihood of any other.
+fn noise_covariance(panel: &Panel, state: &State) -> Vec<Vec<f64>> {
     let columns = state.columns();
+    if !state.noise.peaks().is_empty() {
+        return invert(&scoring::information(panel, &state.noise, &columns)).0;
+    }
     let mut x = vec![state.noise.log_walk];
     x.extend(state.noise.terms.iter().flat_map(|t| t.1.iter().copied()));
     let at = |x: &[f64]| {
@@ -106,16 +125,100 @@ pub fn noise_errors(panel: &Panel, state: &State) -> Vec<f64> {
     let information: Vec<Vec<f64>> = (0..m)
         .map(|i| (0..m).map(|j| -second(i.min(j), i.max(j))).collect())
         .collect();
-    let (inverse, _) = invert(&information);
-    (0..m)
-        .map(|i| {
-            if inverse[i][i] > 0.0 {
-                inverse[i][i].sqrt() * state.wider.get(i + 1).unwrap_or(&1.0)
-            } else {
-                f64::NAN
+    invert(&information).0
+}
+
+/// Places between the outermost at which the density of overlapping bands is asked for its width, and how far beyond them in
+/// half widths.
+const PLACES: usize = 2000;
+const BEYOND: f64 = 2.0;
+
+/// Of Lorentzian bands together: ln of the variance over the white one, mean frequency by variance, ln of half the width
+/// between the outermost places of half the largest density; rad per sample.
+fn together(peaks: &[Peak]) -> [f64; 3] {
+    let variance: f64 = peaks.iter().map(|p| p.variance).sum();
+    let omega = peaks.iter().map(|p| p.variance * p.omega).sum::<f64>() / variance;
+    let reach = |by: f64| peaks.iter().map(move |p| p.omega + by * p.half_width);
+    let low = reach(-BEYOND).fold(f64::INFINITY, f64::min);
+    let high = reach(BEYOND).fold(f64::NEG_INFINITY, f64::max);
+    let step = (high - low) / PLACES as f64;
+    let density = |w: f64| -> f64 {
+        let of =
+            |p: &Peak| p.variance / p.half_width / (1.0 + ((w - p.omega) / p.half_width).powi(2));
+        peaks.iter().map(of).sum()
+    };
+    let all: Vec<f64> = (0..=PLACES)
+        .map(|i| density(low + step * i as f64))
+        .collect();
+    let half = 0.5 * all.iter().copied().fold(0.0, f64::max);
+    // Between the two places about a crossing it lies by their densities.
+    let first = all.iter().position(|d| *d >= half).unwrap_or(0).max(1);
+    let last = all
+        .iter()
+        .rposition(|d| *d >= half)
+        .unwrap_or(PLACES)
+        .min(PLACES - 1);
+    let within = |a: usize, b: usize| (half - all[a]) / (all[b] - all[a]);
+    let from = first as f64 - 1.0 + within(first - 1, first);
+    let to = last as f64 + within(last, last + 1);
+    [variance.ln(), omega, (0.5 * step * (to - from)).ln()]
+}
+
+/// Bands that overlap as one: terms `members` of a state together, as [`model::effect::Covariance::described`] gives one.
+pub(crate) fn of_bands(
+    panel: &Panel,
+    state: &State,
+    members: &[usize],
+    unit: &str,
+    rate_hz: f64,
+) -> Found {
+    const STEP: f64 = 1e-2;
+    let covariance = noise_covariance(panel, state);
+    let (mut places, mut bands, mut at) = (vec![], vec![], 1);
+    for (i, t) in state.terms.iter().enumerate() {
+        if let Form::Covariance(c, theta) = &t.form {
+            if members.contains(&i) {
+                places.extend(at..at + theta.len());
+                bands.push((c, theta.clone()));
             }
+            at += theta.len();
+        }
+    }
+    let of = |moved: Option<(usize, f64)>| {
+        let mut rest = 0;
+        let peaks = bands.iter().filter_map(|(c, theta)| {
+            let mut theta = theta.clone();
+            if let Some((i, by)) = moved
+                && let Some(x) = i.checked_sub(rest).and_then(|i| theta.get_mut(i))
+            {
+                *x += by;
+            }
+            rest += theta.len();
+            c.peak(&theta)
+        });
+        together(&peaks.collect::<Vec<_>>())
+    };
+    let slopes: Vec<[f64; 3]> = (0..places.len())
+        .map(|i| {
+            let (up, down) = (of(Some((i, STEP))), of(Some((i, -STEP))));
+            std::array::from_fn(|k| (up[k] - down[k]) / (2.0 * STEP))
         })
-        .collect()
+        .collect();
+    let error = |k: usize| {
+        let sum = places.iter().zip(&slopes).map(|(i, a)| {
+            let row = places.iter().zip(&slopes);
+            a[k] * row.map(|(j, b)| covariance[*i][*j] * b[k]).sum::<f64>()
+        });
+        sum.sum::<f64>().max(0.0).sqrt()
+    };
+    let values = of(None);
+    Found {
+        unit: unit.to_owned(),
+        rate_hz,
+        white_sigma: state.solution.white.sqrt(),
+        coefficients: (0..3).map(|k| (values[k], error(k))).collect(),
+        ..Found::default()
+    }
 }
 
 /// What was found for each term of a state.
@@ -142,10 +245,8 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
                 location: vec![],
             };
             // Cramer-Rao bound of a frequency, rad per sample: 24 s^2 / (A^2 n^3).
-            // One that wanders has no place narrower than that.
             let frequency = |omega: f64, amplitude: f64| {
                 let error = (24.0 * state.solution.white * g(omega) / n.powi(3)).sqrt() / amplitude;
-                let error = error.max(state.wanders(omega).map_or(0.0, |w| w.half));
                 let hz = rate_hz / std::f64::consts::TAU;
                 (omega * hz, error * hz)
             };
@@ -171,12 +272,11 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
                     found.location.push(place);
                     found.coefficients = coefficients;
                 }
-                Form::Covariance(_, theta) => {
-                    let own = theta
-                        .iter()
-                        .zip(&errors[coordinate..])
-                        .map(|(v, e)| (*v, *e));
-                    found.coefficients = own.collect();
+                Form::Covariance(c, theta) => {
+                    let wider = t.wider.iter().copied().chain(std::iter::repeat(1.0));
+                    let own = theta.iter().zip(&errors[coordinate..]).zip(wider);
+                    let own: Vec<(f64, f64)> = own.map(|((v, e), by)| (*v, e * by)).collect();
+                    found.coefficients = c.described(&own);
                     coordinate += theta.len();
                 }
             }

@@ -10,6 +10,8 @@ use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
+pub(crate) mod scoring;
+
 pub use crate::fit::bins::{Bins, Noise, least_walk};
 use crate::numerics::column::{Column, dot};
 use crate::numerics::simd::wide;
@@ -257,7 +259,9 @@ impl Panel {
             if pairs.contains_key(key) || missing.contains(key) {
                 continue;
             }
-            match known.products(two(key)) {
+            // What others know is over the bins that every record of this length has.
+            let shared = || known.products(two(key)).filter(|_| self.bins.plain);
+            match shared() {
                 Some(p) => drop(pairs.insert(*key, p)),
                 None => missing.push(*key),
             }
@@ -265,7 +269,9 @@ impl Panel {
         let of: Vec<_> = missing.iter().map(two).collect();
         for ((key, two), made) in missing.iter().zip(&of).zip(self.bins.products_of(&of)) {
             let made = Rc::new(made);
-            known.keep_products(*two, &made);
+            if self.bins.plain {
+                known.keep_products(*two, &made);
+            }
             pairs.insert(*key, made);
         }
         asked(&pairs).unwrap_or_default()
@@ -297,6 +303,24 @@ impl Panel {
                     .iter_mut()
                     .zip(pair.iter())
                     .for_each(|(e, p)| *e += a * b * p);
+            }
+        }
+        // What rounding leaves of nothing.
+        energy.iter_mut().for_each(|e| *e = e.max(0.0));
+        energy
+    }
+
+    /// Energy in each bin of what columns of these coefficients leave of the data.
+    pub(crate) fn energy_left(&self, columns: &[usize], beta: &[f64]) -> Vec<f64> {
+        let mut energy = self.pair(0, 0).to_vec();
+        for (i, (a, by)) in columns.iter().zip(beta).enumerate() {
+            let mut add = |pair: &[f64], by: f64| {
+                energy.iter_mut().zip(pair).for_each(|(e, p)| *e += by * p);
+            };
+            add(&self.pair(0, *a), -2.0 * by);
+            add(&self.pair(*a, *a), by * by);
+            for (b, other) in columns[i + 1..].iter().zip(&beta[i + 1..]) {
+                add(&self.pair(*a, *b), 2.0 * by * other);
             }
         }
         // What rounding leaves of nothing.
@@ -356,6 +380,9 @@ impl Panel {
             let walk = self.best_walk(noise, columns);
             let solution = self.solve(&walk.over(&self.bins), columns);
             return (walk, solution);
+        }
+        if !noise.peaks().is_empty() {
+            return scoring::fit(self, noise, columns);
         }
         let n = self.bins.n;
         let mut bounds = vec![(least_walk(n), 6.0)];

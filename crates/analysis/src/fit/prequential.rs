@@ -124,6 +124,7 @@ fn marginal(panel: &Panel, mixture: &[Mixed], columns: &[usize], walk: f64) -> P
 #[must_use]
 pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) -> Vec<Score> {
     let n = y.len();
+    let peaks = state.noise.peaks();
     let ends = ends(n);
     let moved: Vec<Vec<bool>> = (values.iter())
         .map(|term| {
@@ -141,7 +142,7 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
         .collect();
     let mut squares = vec![vec![(0.0, 0usize); windows.len()]; models.len()];
     for (j, end) in ends.iter().enumerate() {
-        let (dct, bins) = (Dct::new(*end), Rc::new(Bins::new(*end)));
+        let (dct, bins) = (Dct::new(*end), Rc::new(Bins::about(*end, &peaks)));
         let shapes = values.iter().flatten().map(Vec::as_slice);
         let beginnings: Vec<&[f64]> = std::iter::once(y)
             .chain(shapes)

@@ -62,6 +62,15 @@ pub fn covariance(dimensions: usize) -> f64 {
     quantile(dimensions, 1.0)
 }
 
+/// A peak of any width at any place of the spectrum of `n` samples. Its size is the root Z of the likelihood ratio, a field
+/// over centre and width whose maxima above z number A z exp(-z^2 / 2) / (2 pi)^(3/2) (Adler, 1981): a Lorentzian of half
+/// width h has the metric 1 / (8 h^2) there, and h from 1.5 coefficients on A = n / (8^(1/2) 1.5). For z about 6 that is
+/// n / 11 places of two degrees; `cargo run --release -p analysis --example bands -- white` counts them.
+#[must_use]
+pub fn peak(n: usize) -> f64 {
+    quantile(2, n as f64 / 10.0)
+}
+
 /// A law of the variance with one size: no random walk is refitted under it.
 #[must_use]
 pub fn variance_law() -> f64 {

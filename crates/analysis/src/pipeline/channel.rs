@@ -7,18 +7,23 @@ use model::effect::View;
 use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
 use crate::fit::channel::{State, whitened};
 use crate::fit::estimate;
-use crate::fit::likelihood::Panel;
+use crate::fit::likelihood::{Bins, Panel};
 use crate::ingest::types::{Grid, Target};
 use crate::report::detection_limits;
 use crate::result::Check;
 use crate::search::searched::Searched;
-use crate::search::{Search, impute};
+use crate::search::{Search, bands, impute};
 use crate::test_level::{CLAIM_LEVEL, CheckId, OMNIBUS_LEVEL, Outcome, all_worded, worded};
 use crate::two_level::compare;
 
 /// The search of a channel, its hypotheses laid out.
 fn laid_out<'a>(grid: &'a Grid, target: &'a Target) -> Search<'a> {
-    let panel = Panel::of(&grid.dct, &grid.bins, Rc::clone(&target.coefficients));
+    let coefficients = &target.coefficients;
+    let bins = match bands::peaks(coefficients, &target.noise, target.white, &grid.bins) {
+        none if none.is_empty() => Rc::clone(&grid.bins),
+        peaks => Rc::new(Bins::about(grid.n, &peaks)),
+    };
+    let panel = Panel::of(&grid.dct, &bins, Rc::clone(coefficients));
     let view = View {
         channel: &target.name,
         axis: target.axis,
@@ -50,8 +55,8 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     let baseline = search.baseline(&target.noise);
     let mut plain = whitened(&search.panel, &baseline);
     let mut before = plain_checks(&plain, &baseline, grid, target);
-    let (ascended, aside) = search.ascend(baseline.clone());
-    let mut state = search.conclude(compare::hold(&search, ascended), aside);
+    let ascended = search.ascend(baseline.clone());
+    let mut state = search.conclude(compare::hold(&search, ascended));
     let refilled = impute::again(&search, &state, target);
     if let Some(refilled) = refilled.clone() {
         state = refilled;

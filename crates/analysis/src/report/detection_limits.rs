@@ -250,7 +250,9 @@ fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smalle
             parameter: "peak",
             ..Smallest::default()
         }),
-        Hypothesis::Common | Hypothesis::Scale | Hypothesis::Audit => None,
+        Hypothesis::WanderingTone | Hypothesis::Common | Hypothesis::Scale | Hypothesis::Audit => {
+            None
+        }
     }
 }
 
@@ -374,11 +376,17 @@ fn of_process(
         noise.terms.push((Arc::clone(process), theta(x)));
         noise.over(&panel.bins)
     };
-    let wanted = strength_for(threshold::covariance(process.dimensions()));
+    let wanted = strength_for(if process.is_peak() {
+        threshold::peak(n)
+    } else {
+        threshold::covariance(process.dimensions())
+    });
     let x = meter.shape(*process.bounds(n).first()?, wanted, &shape)?;
     let others = c.effect.parameters().iter().skip(1);
+    let exact: Vec<(f64, f64)> = theta(x).into_iter().map(|v| (v, 0.0)).collect();
+    let described = process.described(&exact).into_iter();
     Some(Smallest {
-        coefficients: theta(x),
+        coefficients: described.map(|d| d.0).collect(),
         parameter: c.effect.parameters().first()?.name,
         at: others.filter(|p| p.required).map(|p| p.name).collect(),
         ..Smallest::default()

@@ -9,8 +9,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::attribute::events;
 use crate::criticise::scale;
-use crate::fit::channel::{Form, VarianceFound};
-use crate::fit::{prequential, scan, threshold};
+use crate::fit::channel::{Form, Term, VarianceFound};
+use crate::fit::{estimate, prequential, scan, threshold};
 use crate::ingest::types::Grid;
 use crate::numerics::transform::Dct;
 use crate::report::{detection_limits, figures};
@@ -46,6 +46,16 @@ pub(crate) fn alternatives(all: &[(&'static dyn Effect, f64)]) -> Vec<Alternativ
         .collect()
 }
 
+/// The terms that are one band with this one, of which it is the first; none where it is no band, or not the first.
+fn overlapping(s: &Searched<'_>, term: &Term) -> Vec<usize> {
+    let Some(own) = term.cluster.filter(|c| c.place == 0) else {
+        return vec![];
+    };
+    let terms = s.state.terms.iter().enumerate();
+    let of_it = terms.filter(|(_, t)| t.cluster.is_some_and(|c| c.number == own.number));
+    of_it.map(|(i, _)| i).collect()
+}
+
 pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Finding> {
     if s.state.terms.is_empty() {
         return vec![];
@@ -76,7 +86,27 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
         .zip(&s.found)
         .zip(scores)
         .map(|((term, found), score)| {
-            let parameters = term.effect.describe(found);
+            let parts = overlapping(s, term);
+            let parameters = if parts.len() > 1 {
+                let (panel, unit) = (&s.search.panel, &s.target.unit);
+                term.effect.describe(&estimate::of_bands(
+                    panel,
+                    &s.state,
+                    &parts,
+                    unit,
+                    grid.rate_hz,
+                ))
+            } else {
+                term.effect.describe(found)
+            };
+            let gaussian = &s.search.candidates[term.candidate].hypothesis;
+            // One tone is no sum of several.
+            let parted = parts.len() > 1 && matches!(gaussian, Hypothesis::Covariance(_));
+            let components = parts.iter().filter(|_| parted);
+            let components = components
+                .map(|i| term.effect.describe(&s.found[*i]))
+                .collect();
+            let lr = term.cluster.map_or(term.lr, |c| c.lr);
             let mut alternatives = alternatives(&term.alternatives);
             if let Some(motion) = motion.filter(|_| term.follows.as_deref().is_some_and(turning)) {
                 alternatives.push(Alternative {
@@ -93,7 +123,7 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
                 gain: Some(Gain {
                     held_out_log_score_nats: Some(score.nats),
                     std_error: Some(score.std_error),
-                    delta_bic: Some(term.lr - size * n),
+                    delta_bic: Some(lr - size * n),
                     allan_misfit_before: Some(misfit[0]),
                     allan_misfit_after: Some(misfit[1]),
                     // The filter behind the angles knows the random walk alone: a stationary term leaves it as it is.
@@ -106,11 +136,12 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
                             ((*k).to_owned(), [*before, *after])
                         })
                         .collect(),
-                    ablation_nats: Some(term.lr / 2.0),
+                    ablation_nats: Some(lr / 2.0),
                 }),
                 what: sentence(term.effect.docs().title, &s.target.name, &parameters),
                 parameters,
-                likelihood_ratio: Some(term.lr),
+                components,
+                likelihood_ratio: Some(lr),
                 confirmed_on_held_out_data: Some(score.nats > 0.0),
                 ..Finding::default()
             }

@@ -100,11 +100,12 @@ fn effects_of<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<EffectMode
                 .collect()
         };
         if f.per_channel.is_empty() {
-            all.push(EffectModel {
+            let whole = f.components.is_empty().then_some(&f.parameters);
+            all.extend(whole.into_iter().chain(&f.components).map(|p| EffectModel {
                 cause: f.cause.clone(),
                 channels: f.channels.clone(),
-                parameters: known(&f.parameters),
-            });
+                parameters: known(p),
+            }));
         }
         // What is the same to the last digit on several channels is one event on all of them.
         let first = all.len();

@@ -20,11 +20,17 @@ fn by_motion(s: &Searched<'_>) -> Option<(&'static str, fn(&Hypothesis) -> bool)
                     | Hypothesis::Covariance(_)
                     | Hypothesis::Variance(_)
                     | Hypothesis::TwoLevel
+                    | Hypothesis::WanderingTone
             )
         };
         return Some(("the base moves about this axis: record it at rest", slow));
     }
-    let unsafe_here = |h: &Hypothesis| matches!(h, Hypothesis::Line | Hypothesis::Covariance(_));
+    let unsafe_here = |h: &Hypothesis| {
+        matches!(
+            h,
+            Hypothesis::Line | Hypothesis::WanderingTone | Hypothesis::Covariance(_)
+        )
+    };
     let why = "the base sways, and turns a little about this axis too: record it at rest";
     s.search.view.sways().then_some((why, unsafe_here))
 }

@@ -2,8 +2,8 @@
 //! walk refitted, the best one joins, covariance terms are challenged by what they may have swallowed, and what the
 //! others make superfluous is dropped. The search knows hypotheses, not effects.
 
-mod envelope;
-mod excise;
+pub(crate) mod bands;
+pub(crate) mod envelope;
 pub(crate) mod impute;
 pub(crate) mod power_law;
 mod process_pairs;
@@ -14,6 +14,7 @@ pub(crate) mod searched;
 
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::{Effect, Hypothesis, View};
@@ -21,8 +22,8 @@ use model::effects::EFFECTS;
 use model::record::Quantity;
 
 use crate::features;
-use crate::fit::channel::{Form, Note, RIVAL_SPAN, State, Term, Wandering};
-use crate::fit::likelihood::{Noise, Panel};
+use crate::fit::channel::{Form, RIVAL_SPAN, State, Term};
+use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
 use crate::fit::{channel, threshold};
 use crate::test_level::{CLAIM_LEVEL, worded};
 
@@ -77,6 +78,39 @@ impl Candidate {
     }
 }
 
+/// Likelihood ratio of the best peak that the search would offer to white noise: what its threshold is calibrated by.
+#[must_use]
+pub fn peak_of_white(y: &[f64]) -> f64 {
+    let n = y.len();
+    let (dct, plain) = (Dct::new(n), Rc::new(Bins::new(n)));
+    let coefficients = Rc::new(dct.forward(y));
+    let mean_square = y.iter().map(|v| v * v).sum::<f64>() / n as f64;
+    let start = Noise::new(f64::NEG_INFINITY);
+    let peaks = bands::peaks(&coefficients, &start, mean_square, &plain);
+    let bins = Rc::new(Bins::about(n, &peaks));
+    let view = View {
+        channel: "gyro_x",
+        axis: None,
+        lsb: None,
+        white_sigma: mean_square.sqrt(),
+        rate_hz: 1.0,
+        samples: n,
+        base: None,
+        moving: false,
+        signals: &[],
+    };
+    let search = Search::new(Panel::of(&dct, &bins, coefficients), view);
+    let state = search.baseline(&Noise::new(-9.0));
+    let best = search.candidates.iter().enumerate().filter_map(|(i, c)| {
+        let Hypothesis::Covariance(c) = &c.hypothesis else {
+            return None;
+        };
+        let term = c.is_peak().then(|| search.weigh_peak(&state, i, c, 0.0));
+        Some(term??.lr)
+    });
+    best.fold(0.0, f64::max)
+}
+
 /// The search on one channel.
 pub struct Search<'a> {
     /// Data and columns.
@@ -92,9 +126,6 @@ pub struct Search<'a> {
     /// What candidates offered to states without processes.
     offered: RefCell<HashMap<Place, HashMap<usize, Option<Term>>>>,
 }
-
-/// What was set aside on the way: the note of it, and the line that wanders.
-pub type SetAside = (Note, Option<Wandering>);
 
 /// What a state without processes is known by: the data's revision, its random walk, its terms with their columns.
 type Place = (usize, u64, Vec<(usize, Vec<usize>)>);
@@ -197,7 +228,7 @@ impl<'a> Search<'a> {
 
     /// What a term follows, in words; what has a shape of its own follows what else of its effect does.
     pub(crate) fn followed<'b>(&'b self, term: &'b Term) -> Option<&'b str> {
-        let of_effect = || match &self.beside(term)?.hypothesis {
+        let of_effect = || match &self.follower_beside(term)?.hypothesis {
             Hypothesis::Regression(r) => r.follows.as_deref(),
             _ => None,
         };
@@ -206,14 +237,14 @@ impl<'a> Search<'a> {
 
     /// Names of the recorded channels that a term follows, in the same way.
     pub(crate) fn sources<'b>(&'b self, term: &'b Term) -> &'b [String] {
-        match self.beside(term) {
+        match self.follower_beside(term) {
             Some(c) if term.follows.is_none() => &c.of,
             _ => &term.of,
         }
     }
 
     /// The first hypothesis of the effect of a shape that follows a channel.
-    fn beside(&self, term: &Term) -> Option<&Candidate> {
+    fn follower_beside(&self, term: &Term) -> Option<&Candidate> {
         let own = |c: &&Candidate| {
             let follows = matches!(&c.hypothesis, Hypothesis::Regression(r) if r.follows.is_some());
             follows && c.effect.id() == term.effect.id()
@@ -241,7 +272,6 @@ impl<'a> Search<'a> {
             noise,
             solution,
             notes: vec![],
-            wandering: None,
             level: None,
             power_law: None,
             wider: vec![],
@@ -294,29 +324,18 @@ impl<'a> Search<'a> {
         self.refit(vec![], start.log_walk)
     }
 
-    /// Search from the baseline. What is set aside on the way is no longer in the data of the panel.
+    /// Search from the baseline.
     #[must_use]
-    pub fn ascend(&self, baseline: State) -> (State, Option<SetAside>) {
-        let mut state = self.climb(baseline);
-        let aside = self.set_aside(&state);
-        if let Some((rest, _, _)) = &aside {
-            state = self.climb(rest.clone());
-        }
-        (
-            self.pair_up(state),
-            aside.map(|(_, note, line)| (note, line)),
-        )
+    pub fn ascend(&self, baseline: State) -> State {
+        self.pair_up(self.climb(baseline))
     }
 
     /// The end of a search, once whole explanations have been compared: what is told beside the terms, and their rivals.
     #[must_use]
-    pub fn conclude(&self, mut state: State, aside: Option<SetAside>) -> State {
+    pub fn conclude(&self, mut state: State) -> State {
         let mut notes = std::mem::take(&mut state.notes);
-        if let Some((note, wandering)) = aside {
-            notes.push(note);
-            state.wandering = wandering;
-        }
         notes.extend(self.crowds(&mut state));
+        self.name_bands(&mut state);
         self.find_rivals(&mut state);
         state.power_law = power_law::instead(self, &state);
         state.notes = notes;
@@ -382,12 +401,15 @@ impl<'a> Search<'a> {
             let Some(term) = best.terms.get(i).filter(|t| t.may_swallow()) else {
                 continue;
             };
-            let covariance = term.is_covariance();
+            let (covariance, band) = (term.is_covariance(), term.is_band());
             let mut rest = self.without(&best, i);
             // Up to three terms may share what the one took.
             for _ in 0..3 {
                 let offers = self.offers(&rest, &|c| {
-                    if covariance {
+                    if band {
+                        // What stands at one frequency has taken what does.
+                        matches!(c.hypothesis, Hypothesis::Line | Hypothesis::SideBands)
+                    } else if covariance {
                         !matches!(c.hypothesis, Hypothesis::Covariance(_))
                     } else {
                         c.effect.id() != channel::ID

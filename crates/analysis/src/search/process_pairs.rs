@@ -20,7 +20,7 @@ impl Search<'_> {
     fn processes(&self) -> Vec<Process<'_>> {
         let all = self.candidates.iter().enumerate();
         all.filter_map(|(i, c)| match &c.hypothesis {
-            Hypothesis::Covariance(p) => Some((i, p)),
+            Hypothesis::Covariance(p) if !p.is_peak() => Some((i, p)),
             _ => None,
         })
         .collect()
@@ -34,16 +34,12 @@ impl Search<'_> {
 
     /// The state with the pair of processes that explains most, where that is better than those that were found.
     pub(super) fn pair_up(&self, state: State) -> State {
-        if !state.terms.iter().any(Term::is_covariance) {
+        let paired = |t: &Term| t.is_covariance() && !t.is_band();
+        if !state.terms.iter().any(paired) {
             return state;
         }
         let all = self.processes();
-        let others: Vec<Term> = state
-            .terms
-            .iter()
-            .filter(|t| !t.is_covariance())
-            .cloned()
-            .collect();
+        let others: Vec<Term> = state.terms.iter().filter(|t| !paired(t)).cloned().collect();
         let n = self.panel.bins.n;
         let starts = |c: &Arc<dyn Covariance>| -> Vec<Vec<f64>> {
             if c.dimensions() == 2 {
@@ -109,7 +105,9 @@ impl Search<'_> {
         let place = |filter: bool| {
             state.terms.iter().position(|t| match &t.form {
                 Form::Covariance(c, _) => {
-                    c.filters_white() == filter && c.dimensions() == 2 - usize::from(filter)
+                    c.filters_white() == filter
+                        && !c.is_peak()
+                        && c.dimensions() == 2 - usize::from(filter)
                 }
                 _ => false,
             })

@@ -2,10 +2,12 @@
 
 use std::f64::consts::PI;
 
+use model::effect::Hypothesis;
 use model::record::Quantity;
 
-use super::{MOST_ALIKE, Search};
-use crate::fit::channel::{Form, Note, RIVAL_SPAN, State, Term};
+use super::{Candidate, MOST_ALIKE, Search};
+use crate::fit::channel::{self, Form, Note, RIVAL_SPAN, State, Term};
+use crate::fit::threshold;
 use crate::numerics::series::white_by_differences;
 
 /// Part of its frequency by which a crowd of lines reaches beyond the outermost ones.
@@ -86,7 +88,6 @@ impl Search<'_> {
                 Form::Line(w) | Form::SideBands(w, _) => Some((w, t.lr)),
                 _ => None,
             })
-            .filter(|(w, _)| state.wanders(*w).is_none())
             .map(|(w, lr)| (hz(w), lr))
             .collect();
         let span = |low: f64, high: f64| {
@@ -127,11 +128,8 @@ impl Search<'_> {
             let at = span(low, high);
             notes.push(Note { what, at });
             let strongest = lines.iter().map(|l| l.1).fold(0.0, f64::max);
-            let wandering = state.wandering;
             state.terms.retain(|t| match t.form {
-                Form::Line(w) | Form::SideBands(w, _) => {
-                    t.lr == strongest || wandering.is_some_and(|of| (of.line - w).abs() <= of.half)
-                }
+                Form::Line(_) | Form::SideBands(..) => t.lr == strongest,
                 _ => true,
             });
             self.as_line(&mut state.terms);
@@ -159,12 +157,30 @@ impl Search<'_> {
         notes
     }
 
+    /// What is no steady line swings in no single time: it is a line and no more.
+    fn as_line(&self, terms: &mut [Term]) {
+        let line = self
+            .candidates
+            .iter()
+            .position(|c| matches!(c.hypothesis, Hypothesis::Line));
+        for t in terms {
+            if let (Form::SideBands(carrier, _), Some(i)) = (&t.form, line) {
+                t.form = Form::Line(*carrier);
+                t.effect = self.candidates[i].effect;
+                t.candidate = i;
+                t.columns.truncate(2);
+                t.names.truncate(2);
+                t.threshold = threshold::line(self.panel.bins.n);
+            }
+        }
+    }
+
     /// Estimate again after terms, or the data, were changed by hand.
     pub(crate) fn settle(&self, state: &mut State) {
         let terms = std::mem::take(&mut state.terms);
         let before = std::mem::replace(state, self.refit(terms, state.noise.log_walk));
-        (state.notes, state.wandering) = (before.notes, before.wandering);
-        (state.level, state.power_law) = (before.level, before.power_law);
+        (state.notes, state.level) = (before.notes, before.level);
+        state.power_law = before.power_law;
         self.reweigh(state);
     }
 
@@ -197,9 +213,13 @@ impl Search<'_> {
             let score = state.terms[i].score();
             let mut alternatives = std::mem::take(&mut state.terms[i].alternatives);
             let mut better: Option<(Term, f64)> = None;
-            for offer in self.offers(&rest, &|c| {
-                c.effect.id() != own && c.effect.id() != crate::fit::channel::ID
-            }) {
+            // What else a band may be, its envelope has told.
+            let band = state.terms[i].is_band();
+            let asked = |c: &Candidate| {
+                let peak = matches!(&c.hypothesis, Hypothesis::Covariance(c) if c.is_peak());
+                c.effect.id() != own && c.effect.id() != channel::ID && !(band && peak)
+            };
+            for offer in self.offers(&rest, &asked) {
                 let lost = self.lost_to_noise(&rest, &offer);
                 let close = offer.score() > 0.0 && offer.score() + lost > score - RIVAL_SPAN;
                 // The narrower case of an extension that needed more than it is no rival.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Hypothesis, Regression, Shape};
 
-use super::{Candidate, FASTEST_BEAT, LEAST_BEATS, LEAST_CYCLES, SLOW_BEAT_HZ, Search};
+use super::{Candidate, FASTEST_BEAT, LEAST_BEATS, LEAST_CYCLES, SLOW_BEAT_HZ, Search, bands};
 use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::Noise;
 use crate::fit::{scan, threshold};
@@ -64,6 +64,10 @@ impl Search<'_> {
             Hypothesis::Step => self.weigh_step(&of),
             Hypothesis::Line => self.weigh_line(&of),
             Hypothesis::SideBands => self.weigh_side_bands(&of),
+            Hypothesis::Covariance(c) if c.is_peak() => {
+                let n = self.panel.bins.n;
+                self.weigh_peak(state, i, c, threshold::peak(n) / bands::AHEAD)
+            }
             Hypothesis::Covariance(c) => self.weigh_covariance(&of, c),
             _ => None,
         }
@@ -268,10 +272,14 @@ impl Search<'_> {
             Hypothesis::Step => !self.view.moving,
             Hypothesis::Line => !self.view.moving && !self.view.sways(),
             Hypothesis::SideBands => state.terms.iter().all(|t| t.candidate != i),
-            Hypothesis::Covariance(_) => {
+            Hypothesis::Covariance(of) => {
                 !self.view.moving
                     && !self.view.sways()
-                    && state.terms.iter().all(|t| t.effect.id() != c.effect.id())
+                    && if of.is_peak() {
+                        Self::open_to_bands(state)
+                    } else {
+                        state.terms.iter().all(|t| t.effect.id() != c.effect.id())
+                    }
             }
             Hypothesis::Regression(r) => {
                 let other = |t: &Term| r.columns.iter().all(|c| !t.names.contains(&c.parameter));

@@ -315,7 +315,7 @@ impl<'a> Field<'a> {
     fn processes(&self, state: &State) -> Processes {
         let shorter = (self.length as f64).ln();
         let of = |t: &Term| match &t.form {
-            Form::Covariance(c, theta) if !c.filters_white() => {
+            Form::Covariance(c, theta) if t.is_process() => {
                 let mut theta = theta.clone();
                 theta[0] += shorter;
                 if let Some(tau) = theta.get_mut(1) {

@@ -67,7 +67,11 @@ pub struct Replicates {
 impl Replicates {
     /// How many.
     pub fn count(&self) -> usize {
-        if self.no_replicates { 0 } else { self.replicates }
+        if self.no_replicates {
+            0
+        } else {
+            self.replicates
+        }
     }
 }
 
@@ -76,7 +80,9 @@ fn enough_replicates(text: &str) -> Result<usize, String> {
     const LEAST: usize = 19;
     match text.parse() {
         Ok(n) if n >= LEAST => Ok(n),
-        _ => Err(format!("takes a whole number, {LEAST} at least; --no-replicates for none")),
+        _ => Err(format!(
+            "takes a whole number, {LEAST} at least; --no-replicates for none"
+        )),
     }
 }
 
@@ -189,8 +195,8 @@ impl Line {
     }
 }
 
-/// Prints a line, to standard error where a result goes to standard output. Ends the program where the reader has gone:
-/// with success if it merely had enough, else with 1.
+/// Prints a line, to standard error where a result goes to standard output. Where the reader has had enough, the rest is
+/// not printed and the command goes on: its files are still asked for. Ends the program where it cannot be printed else.
 pub fn say(line: std::fmt::Arguments<'_>) {
     use std::io::Write as _;
     let said = if outputs::stdout_is_taken() {
@@ -198,9 +204,8 @@ pub fn say(line: std::fmt::Arguments<'_>) {
     } else {
         writeln!(std::io::stdout(), "{line}")
     };
-    if let Err(error) = said {
-        let enough = error.kind() == std::io::ErrorKind::BrokenPipe;
-        std::process::exit(i32::from(!enough));
+    if said.is_err_and(|error| error.kind() != std::io::ErrorKind::BrokenPipe) {
+        std::process::exit(1);
     }
 }
 

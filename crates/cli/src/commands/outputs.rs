@@ -43,6 +43,23 @@ const DATA: [&str; 10] = [
     "csv", "gz", "raw", "npz", "npy", "parquet", "pq", "mat", "h5", "hdf5",
 ];
 
+/// Endings that promise another form of table than the text that a capture is.
+const OTHER_TABLES: [&str; 7] = ["npz", "npy", "parquet", "pq", "mat", "h5", "hdf5"];
+
+/// Refuses to write a capture, which is CSV, to a file whose name says that it is something else.
+pub fn named_as_text(option: &str, path: &Path) -> Result<()> {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    let ending = ending.map(str::to_ascii_lowercase).unwrap_or_default();
+    if OTHER_TABLES.contains(&ending.as_str()) {
+        miette::bail!(
+            help = "name it .csv or .csv.gz; `imu-stand export run.csv --out run.npz` (or .parquet) makes another form of it",
+            "{option}: {}: a capture is CSV, and would not be what its name says",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
 impl Outputs {
     /// With what the command reads.
     pub fn beside<'a>(inputs: impl IntoIterator<Item = &'a PathBuf>) -> Self {
@@ -73,6 +90,7 @@ impl Outputs {
 
     /// A simulated capture. It can be had again by its seed, and goes over another one; what a board delivered cannot.
     pub fn simulated(mut self, option: &'static str, path: Option<&PathBuf>) -> Result<Self> {
+        path.map_or(Ok(()), |path| named_as_text(option, path))?;
         if let Some(path) = self.add(option, path)? {
             if has_header(path, "# start_unix_s:") {
                 return Err(refused(option, path, "is a capture of a board"));

@@ -7,10 +7,12 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
+use analysis::result::Diagnosis;
 use analysis::{AnalyzeOptions, DiagnoseOptions};
 use clap::Args;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
+use imu_stand::stand::planted::{Comparison, RULE, compare, planted};
 use imu_stand::stand::{Board, Hidden, Plan, Sizes, plan, plan_fitted, run_native};
 use imu_stand::text;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -18,6 +20,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use miette::IntoDiagnostic;
 use miette::Result;
 use model::record::Record;
+use serde::Serialize;
 
 use super::Replicates;
 use super::outputs::{self, Outputs};
@@ -119,6 +122,38 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::mark_simulated(&mut record, "run");
     outputs::write_record(&arguments.out, &record)?;
 
+    let found = answered(arguments, &plan, &record)?;
+    if arguments.quiet {
+        return Ok(());
+    }
+    say!(
+        "{}: {} samples, {}",
+        arguments.out.display(),
+        record.len(),
+        text::link(&link)
+    );
+    say!("{}", text::diagnosis(&found.diagnosis).trim_end());
+    let lines = found.comparison.lines();
+    say!("\nplanted and found\n{}", text::item("", RULE));
+    // One line each, not wrapped.
+    lines.iter().for_each(|line| say!("    {line}"));
+    if let Some(page) = &arguments.report {
+        say!("report: {}", page.display());
+    }
+    Ok(())
+}
+
+/// What the program says of a run, and what was planted in it: as `--json` writes it.
+#[derive(Serialize)]
+struct Answer {
+    #[serde(flatten)]
+    diagnosis: Diagnosis,
+    #[serde(rename = "planted")]
+    comparison: Comparison,
+}
+
+/// Analyzes and diagnoses the capture that was written, and writes what was asked for.
+fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answer> {
     // The engine gets the capture as it was written, and nothing else.
     let read = read_capture(&arguments.out, &ReadOptions::default())?;
     let file = super::name(&arguments.out);
@@ -138,18 +173,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         replicates: arguments.replicates.count(),
     };
     let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
-    super::write_json(arguments.json.as_ref(), &found.diagnosis)?;
-    if !arguments.quiet {
-        say!(
-            "{}: {} samples, {}",
-            arguments.out.display(),
-            record.len(),
-            text::link(&link)
-        );
-        say!("{}", text::diagnosis(&found.diagnosis).trim_end());
-        say!("\nhidden in the stand: {}", plan.hidden);
-    }
+    let times = record.host_time_s.as_ref();
+    let start_s = times.and_then(|times| times.first()).map_or(0.0, |t| *t);
+    let comparison = compare(&planted(&plan.run, start_s), &found.diagnosis);
     if let Some(page) = &arguments.report {
+        let hidden = format!("{}\n({RULE}.)", comparison.lines().join("\n"));
         let subject = Subject {
             record: &read.record,
             diagnosed: &found,
@@ -157,11 +185,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             command: &super::report::command(),
             seed: arguments.seed,
             hash: Some(&hash),
-            hidden: Some(&plan.hidden),
+            hidden: Some(&hidden),
         };
-        super::report::write(page, &subject, arguments.quiet)?;
+        super::report::write(page, &subject, true)?;
     }
-    Ok(())
+    let answer = Answer {
+        diagnosis: found.diagnosis,
+        comparison,
+    };
+    super::write_json(arguments.json.as_ref(), &answer)?;
+    Ok(answer)
 }
 
 /// What was asked for: a fault, or the parts of a model file.

@@ -35,7 +35,7 @@ pub struct Subject<'a> {
     pub seed: u64,
     /// Digest of the file.
     pub hash: Option<&'a str>,
-    /// What was hidden in the stand, where it was a simulated one.
+    /// What was hidden in the stand, where it was a simulated one, beside what was found of it: lines of text.
     pub hidden: Option<&'a str>,
 }
 

@@ -255,8 +255,7 @@ mod tests {
                 let record = record(model, 1000 + seed);
                 let sampling = Sampling::of(&record, None).unwrap();
                 let places = Places::new(&sampling, record.len());
-                let (_, replicates) =
-                    replicate(&paper, &record, &places, 99, seed * 1000).unwrap();
+                let (_, replicates) = replicate(&paper, &record, &places, 99, seed * 1000).unwrap();
                 let measured = places.curves(&record.channel("gyro_x").unwrap().values);
                 *outcome += usize::from(against(&measured, &replicates[0]).adev_p <= 0.02);
             }

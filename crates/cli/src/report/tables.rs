@@ -31,7 +31,10 @@ pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
                 }
             }
             @if let Some(hidden) = subject.hidden {
-                p.hidden { b { "Hidden in the simulated stand: " } (hidden) }
+                .hidden {
+                    p { b { "Hidden in the simulated stand" } }
+                    @for line in hidden.lines() { p { (line) } }
+                }
             }
         }
         @if !d.findings.is_empty() {

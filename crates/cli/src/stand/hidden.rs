@@ -100,14 +100,6 @@ pub enum Sizes {
     Any,
 }
 
-/// What is wrong with a stand.
-pub(super) struct Planted {
-    /// In words.
-    pub words: String,
-    /// The gyro it is in; `None` where it is in none, or in all.
-    pub channel: Option<usize>,
-}
-
 impl Sizes {
     fn draw(self, rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
         match self {
@@ -126,13 +118,13 @@ fn one_of(rng: &mut Xoshiro256PlusPlus, count: usize) -> usize {
     (uniform(rng, 0.0, count as f64) as usize).min(count - 1)
 }
 
-/// Plants it in a scenario whose length is set.
+/// Plants it in a scenario whose length is set; returns the gyro it is in, `None` where it is in none, or in all.
 pub(super) fn plant(
     hidden: Hidden,
     sizes: Sizes,
     scenario: &mut Scenario,
     rng: &mut Xoshiro256PlusPlus,
-) -> Planted {
+) -> Option<usize> {
     let hidden = match hidden {
         Hidden::Random => Hidden::ALL[one_of(rng, Hidden::ALL.len())],
         other => other,
@@ -143,52 +135,37 @@ pub(super) fn plant(
     } else {
         1.0
     };
-    if let Some(planted) = plant_in_parts(hidden, sizes, sign, scenario, rng) {
-        return planted;
+    match hidden {
+        Hidden::ScaleError => {
+            plant_scale_error(sizes, sign, scenario, rng);
+            return Some(0);
+        }
+        Hidden::WrongCrystal => {
+            scenario.crystal_ppm = sign * by_ratio(rng, 300.0, 3000.0);
+            return None;
+        }
+        _ => {}
     }
     let fault = fault(hidden, sizes, gyro, sign, scenario, rng);
     let channel = match fault {
         None | Some(Fault::CommonNoise { .. } | Fault::LossyLine { .. }) => None,
         Some(_) => Some(gyro),
     };
-    let words = fault
-        .as_ref()
-        .map_or_else(|| "nothing".to_owned(), |fault| format!("{fault:?}"));
     scenario.faults.extend(fault);
-    Planted { words, channel }
+    channel
 }
 
-/// What is wrong with a part from the start, and no [`Fault`].
-fn plant_in_parts(
-    hidden: Hidden,
+/// Only what turns about x tilts, and only a tilt gives a second measure of the angle.
+fn plant_scale_error(
     sizes: Sizes,
     sign: f64,
     scenario: &mut Scenario,
     rng: &mut Xoshiro256PlusPlus,
-) -> Option<Planted> {
-    match hidden {
-        Hidden::ScaleError => {
-            // Only what turns about x tilts, and only a tilt gives a second measure of the angle.
-            let base = &mut scenario.base;
-            base.sway_deg = uniform(rng, 2.0, 8.0);
-            base.sway_period_s = uniform(rng, 5.0, 20.0);
-            let relative = sign * sizes.draw(rng, 0.06, 0.3);
-            scenario.gyros[0].scale_error = relative;
-            Some(Planted {
-                words: format!("ScaleError {{ gyro: 0, relative: {relative} }}"),
-                channel: Some(0),
-            })
-        }
-        Hidden::WrongCrystal => {
-            let ppm = sign * by_ratio(rng, 300.0, 3000.0);
-            scenario.crystal_ppm = ppm;
-            Some(Planted {
-                words: format!("WrongCrystal {{ ppm: {ppm} }}"),
-                channel: None,
-            })
-        }
-        _ => None,
-    }
+) {
+    let base = &mut scenario.base;
+    base.sway_deg = uniform(rng, 2.0, 8.0);
+    base.sway_period_s = uniform(rng, 5.0, 20.0);
+    scenario.gyros[0].scale_error = sign * sizes.draw(rng, 0.06, 0.3);
 }
 
 fn fault(

@@ -15,6 +15,7 @@ use crate::capture::Calibration;
 
 mod fitted;
 mod hidden;
+pub mod planted;
 
 pub use fitted::{Carried, FittedError};
 pub use hidden::{Hidden, Sizes};
@@ -47,11 +48,20 @@ pub fn plan(hidden: Hidden, sizes: Sizes, seconds: f64, seed: u64) -> Plan {
     let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x9e37_79b9_7f4a_7c15);
     let mut scenario = Scenario::lively(seed);
     scenario.seconds = seconds;
-    let planted = hidden::plant(hidden, sizes, &mut scenario, rng);
+    let channel = hidden::plant(hidden, sizes, &mut scenario, rng);
+    let run = driven(scenario, rng);
+    let what: Vec<String> = (planted::planted(&run, 0.0).into_iter())
+        .map(|planted| planted.what)
+        .collect();
+    let hidden = if what.is_empty() {
+        "nothing".to_owned()
+    } else {
+        what.join("; ")
+    };
     Plan {
-        run: driven(scenario, rng),
-        hidden: planted.words,
-        channel: planted.channel,
+        run,
+        hidden,
+        channel,
     }
 }
 

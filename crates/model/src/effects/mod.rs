@@ -17,6 +17,7 @@ pub mod line;
 pub mod low_pass;
 pub mod motor_bias;
 pub mod motor_noise;
+pub mod narrow_band;
 pub mod noise_change;
 pub mod outliers;
 pub mod rate_ramp;
@@ -29,6 +30,7 @@ pub mod telegraph;
 pub mod temperature;
 pub mod temperature_quadratic;
 pub mod timestamp_jitter;
+pub mod wandering_line;
 pub mod warm_up;
 
 /// Every effect of the library, in the order of docs/effects.md.
@@ -50,6 +52,8 @@ pub static EFFECTS: &[&dyn Effect] = &[
     &gauss_markov::EFFECT,
     &flicker::EFFECT,
     &low_pass::EFFECT,
+    &narrow_band::EFFECT,
+    &wandering_line::EFFECT,
     &telegraph::EFFECT,
     &common_noise::EFFECT,
     &noise_change::EFFECT,

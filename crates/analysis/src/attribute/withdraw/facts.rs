@@ -190,7 +190,7 @@ impl<'a> Facts<'a> {
 
     /// Whether a good part of what tells a term lies where more is left over than it leaves by being off a little. Of what
     /// is left in a place it answers for its part of the coefficients.
-    pub(super) fn left_where_it_acts(&self, t: &Term, own: &[f64]) -> bool {
+    pub(super) fn left_where_it_acts(&self, t: &Term, own: &[f64], lr: f64) -> bool {
         let panel = &self.s.search.panel;
         let information = self.information(t, own);
         let (n, omega) = (panel.bins.n as f64, &panel.bins.at.omega);
@@ -213,7 +213,7 @@ impl<'a> Facts<'a> {
         };
         all > 0.0
             && of(&|w| self.within(w)).0 > SHARE * all
-            && self.places.iter().map(left).sum::<f64>() > LEFT * t.lr
+            && self.places.iter().map(left).sum::<f64>() > LEFT * lr
     }
 
     /// The effect that follows a channel beside a term, and the share of what it explains that the term holds, where that is

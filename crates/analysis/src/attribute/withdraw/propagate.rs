@@ -98,14 +98,12 @@ impl Kin<'_> {
                     Form::Line(omega) | Form::SideBands(omega, _) => Some(omega),
                     _ => None,
                 };
-                // A line that wanders is told as such, and set aside.
-                let aside = line.is_some_and(|omega| self.facts.s.state.wanders(omega).is_some());
                 let of_kind = self.in_its_band(t, own, &fallen)
                     || self.of_its_source(t, doubts)
                     || self.beside_larger(t, doubts)
                     || line.is_some() && self.facts.repeats.is_some()
                     || t.is_filter() && self.facts.fails(CheckId::VarianceLaw);
-                *doubt == Doubt::No && !aside && of_kind
+                *doubt == Doubt::No && !t.is_band() && of_kind
             })
             .collect();
         for (doubt, falls) in doubts.iter_mut().zip(falls) {

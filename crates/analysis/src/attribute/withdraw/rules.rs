@@ -155,12 +155,12 @@ const TERMS: &[Rule] = &[
     Rule {
         name: "what tells a process lies where more is left over",
         of: stationary,
-        holds: |f, t| f.left_where_it_acts(t.term, t.own),
+        holds: |f, t| f.left_where_it_acts(t.term, t.own, t.term.lr),
     },
     Rule {
         name: "what tells a shape lies where more is left over",
         of: in_time,
-        holds: |f, t| f.left_where_it_acts(t.term, t.own),
+        holds: |f, t| f.left_where_it_acts(t.term, t.own, t.term.lr),
     },
     Rule {
         name: "it follows a channel by another law than its name claims",
@@ -206,11 +206,12 @@ fn unlike(f: &Facts<'_>) -> bool {
 
 /// Why the name of a term is not given, by itself.
 pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
-    // A line that wanders is told as such, and set aside.
-    if t.line()
-        .is_some_and(|omega| f.s.state.wanders(omega).is_some())
-    {
-        return Doubt::No;
+    // What stands at one frequency answers for what is left there, and for its own claims.
+    if t.term.is_band() {
+        let lr = t.term.cluster.map_or(t.term.lr, |c| c.lr);
+        let falls = CheckId::OF_BAND.into_iter().any(|id| f.fails(id))
+            || f.left_where_it_acts(t.term, t.own, lr);
+        return if falls { Doubt::Checks } else { Doubt::No };
     }
     if let Some(name) = f.swings_beside(t.term) {
         return Doubt::Beside(name);

@@ -15,10 +15,8 @@ const REACH: usize = 1000;
 fn from_levels(search: &Search<'_>, state: State, length: usize, x: &Coordinates) -> State {
     let mut terms = state.terms.clone();
     let blocks = (length as f64).ln();
-    for t in &mut terms {
-        if let Form::Covariance(c, theta) = &mut t.form
-            && !c.filters_white()
-        {
+    for t in terms.iter_mut().filter(|t| t.is_process()) {
+        if let Form::Covariance(_, theta) = &mut t.form {
             // Two levels have the spectrum of a one-pole process of their variance, half their dwell time long.
             *theta = vec![2.0 * x[2] - blocks, x[3] + blocks - std::f64::consts::LN_2];
         }

@@ -151,6 +151,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             arguments.out.display()
         );
     }
+    super::outputs::named_as_text("--out", &arguments.out)?;
     let own = [arguments.out.clone(), raw_path(&arguments.out)];
     super::Outputs::beside(own.iter().chain(&arguments.replay))
         .result("--json", arguments.json.as_ref())?;

@@ -1,0 +1,479 @@
+//! Every check and test, and the everyday part of them.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use crate::image;
+use crate::step::{Crates, Failure, Pace, Progress, Silent, run, watched};
+use crate::{cargo, say_sizes, toolchain};
+
+/// no_std crates, tested each alone as well: a run of the workspace unites features.
+const ALONE: &[&str] = &["wire", "adis16250", "mma7260qt"];
+
+/// Test programs that diagnose records by the hundred or run the image for minutes of its time, the longest first: they
+/// are started first, so that none is left for the end, and the everyday check leaves them out.
+const LONG: &[&str] = &[
+    "campaign sample",
+    "imu-stand hidden_effect",
+    "hil-tests hidden",
+    "analysis closed_loop",
+    "analysis limits",
+    "analysis claims",
+    "hil-tests rates",
+    "hil-tests timing",
+    "hil-tests same",
+    "hil-tests stack",
+    "hil-tests faults",
+    "analysis counts",
+    "analysis events",
+    "analysis couplings",
+    "analysis kin",
+];
+
+/// How much is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Everything.
+    All,
+    /// Format, lints, and the tests that are quick.
+    Everyday,
+}
+
+/// Runs the checks and tests.
+///
+/// # Errors
+/// The first step that fails.
+pub fn suite(root: &Path, extent: Extent) -> Result<(), Failure> {
+    let start = Instant::now();
+    prepared()?;
+    let mut steps = Steps { root };
+    steps.step("format", |root| {
+        run("format", &mut cargo(root, &["fmt", "--all", "--check"])).map(|()| String::new())
+    })?;
+    steps.step("image for the ATmega16", image_without_complaint)?;
+    steps.step("lints", |root| {
+        let lints = [
+            "clippy",
+            "--workspace",
+            "--all-targets",
+            "--",
+            "-D",
+            "warnings",
+        ];
+        watched(
+            "lints",
+            &mut cargo(root, &lints),
+            &mut Crates::default(),
+            &mut Pace::Steady,
+        )?;
+        Ok("no warning".to_owned())
+    })?;
+    let mut built = Built::default();
+    steps.step("build of the tests", |root| {
+        built = Built::of(root)?;
+        Ok(format!("{} programs", built.tests.len()))
+    })?;
+    steps.step("tests", |_| built.run(extent))?;
+    if extent == Extent::All {
+        steps.step("examples in the documentation", |root| {
+            let mut docs = cargo(root, &["test", "--workspace", "--doc"]);
+            watched(
+                "examples",
+                &mut docs,
+                &mut Crates::default(),
+                &mut Pace::Steady,
+            )?;
+            Ok(String::new())
+        })?;
+        for package in ALONE {
+            steps.step(&format!("{package} alone"), |root| {
+                let mut alone = cargo(root, &["test", "--no-default-features", "-p", package]);
+                watched(
+                    package,
+                    &mut alone,
+                    &mut Crates::default(),
+                    &mut Pace::Steady,
+                )?;
+                Ok(String::new())
+            })?;
+        }
+        steps.step("demo", |root| short_demo(root, &built))?;
+    }
+    println!("all passed in {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+/// Installs what is missing and says what is not run.
+fn prepared() -> Result<(), Failure> {
+    if !toolchain::has("cc") {
+        toolchain::install("a C compiler, which Rust links with", &["gcc", "libc6-dev"])?;
+    }
+    if !toolchain::has("avrdude") {
+        toolchain::install(
+            "avrdude, which `imu-stand flash` is tested with",
+            &["avrdude"],
+        )?;
+    }
+    match std::env::var_os("IMU_STAND_DATA") {
+        Some(folder) => println!("measured records: {}", Path::new(&folder).display()),
+        None => println!(
+            "measured records: IMU_STAND_DATA is unset, tests on them will say so and not run"
+        ),
+    }
+    toolchain::simulator()
+}
+
+/// Steps, each with a line before it and one after.
+struct Steps<'a> {
+    root: &'a Path,
+}
+
+impl Steps<'_> {
+    fn step(
+        &mut self,
+        name: &str,
+        step: impl FnOnce(&Path) -> Result<String, Failure>,
+    ) -> Result<(), Failure> {
+        let from = Instant::now();
+        println!("== {name}");
+        let said = step(self.root)?;
+        let comma = if said.is_empty() { "" } else { ", " };
+        println!(
+            "== {name}: {:.0} s{comma}{said}",
+            from.elapsed().as_secs_f64()
+        );
+        Ok(())
+    }
+}
+
+/// Builds the image; a build by the pinned toolchain that complains of anything fails.
+fn image_without_complaint(root: &Path) -> Result<String, Failure> {
+    let built = image::build(root, &mut Pace::Steady)?;
+    for line in &built.complaints {
+        eprintln!("{line}");
+    }
+    if built.complaints.is_empty() || !built.is_pinned {
+        return say_sizes(&built.elf);
+    }
+    Err(Failure::new(
+        "the build of the image says more than what it compiles",
+        "mend what it complains of, above",
+    ))
+}
+
+/// A test program.
+#[derive(Clone, Debug)]
+struct TestProgram {
+    /// Package and target.
+    name: String,
+    file: PathBuf,
+    /// Folder of its package, in which cargo would run it.
+    folder: PathBuf,
+}
+
+/// What the build of the tests made.
+#[derive(Debug, Default)]
+struct Built {
+    tests: Vec<TestProgram>,
+    /// The program itself, with the simulated ATmega16.
+    program: Option<PathBuf>,
+}
+
+impl Built {
+    fn of(root: &Path) -> Result<Self, Failure> {
+        let mut build = cargo(root, &["test", "--workspace", "--no-run"]);
+        build.arg("--message-format=json-render-diagnostics");
+        let said = watched(
+            "the build of the tests",
+            &mut build,
+            &mut Crates::default(),
+            &mut Pace::Steady,
+        )?;
+        Ok(Self::read(&said.out))
+    }
+
+    /// Of the messages of cargo, one a line, whose fields come in an order that does not matter here.
+    fn read(messages: &[String]) -> Self {
+        let mut built = Built::default();
+        for message in messages {
+            let Some(file) = field(message, "executable").map(PathBuf::from) else {
+                continue;
+            };
+            let (Some(manifest), Some(name)) =
+                (field(message, "manifest_path"), field(message, "name"))
+            else {
+                continue;
+            };
+            let folder = Path::new(manifest)
+                .parent()
+                .map(Path::to_owned)
+                .unwrap_or_default();
+            // The profile's; the target has a `test` of its own, which says whether it could be one.
+            let is_test = message.contains("\"test\":true},\"features\"");
+            if !is_test {
+                if name == "imu-stand" {
+                    built.program = Some(file);
+                }
+                continue;
+            }
+            let package = folder.file_name().unwrap_or_default().to_string_lossy();
+            let package = if package == "cli" {
+                "imu-stand".into()
+            } else {
+                package
+            };
+            let name = format!("{package} {name}");
+            built.tests.push(TestProgram { name, file, folder });
+        }
+        built
+    }
+
+    /// Runs the test programs, one on each core.
+    fn run(&self, extent: Extent) -> Result<String, Failure> {
+        let unknown = (LONG.iter()).find(|long| self.tests.iter().all(|test| test.name != **long));
+        if let Some(name) = unknown {
+            return Err(Failure::new(
+                &format!("`{name}` is listed as a long test and is none"),
+                "put xtask/src/suite.rs in order",
+            ));
+        }
+        let order = |test: &TestProgram| {
+            LONG.iter()
+                .position(|long| *long == test.name)
+                .unwrap_or(LONG.len())
+        };
+        let mut tests: Vec<&TestProgram> = self.tests.iter().collect();
+        tests.sort_by_key(|test| order(test));
+        if extent == Extent::Everyday {
+            tests.retain(|test| order(test) == LONG.len());
+        }
+        let left_out = self.tests.len() - tests.len();
+        let done = side_by_side(&tests)?;
+        let failed: Vec<&str> = (done.iter())
+            .filter(|d| !d.passed)
+            .map(|d| d.name.as_str())
+            .collect();
+        if !failed.is_empty() {
+            return Err(Failure::new(
+                &format!("tests failed: {}", failed.join(", ")),
+                "what they said stands above; `cargo test -p PACKAGE --test NAME` runs one alone",
+            ));
+        }
+        let passed: usize = done.iter().map(|d| d.tests).sum();
+        let mut text = format!("{passed} passed in {} programs", done.len());
+        if left_out > 0 {
+            text += &format!("; {left_out} long ones are left to `cargo xtask test`");
+        }
+        Ok(text)
+    }
+}
+
+/// The value of a field of text in a line of JSON, the first of that name. Paths and names have no escapes here.
+fn field<'a>(message: &'a str, name: &str) -> Option<&'a str> {
+    let start = message.find(&format!("\"{name}\":\""))? + name.len() + 4;
+    message[start..].split('"').next()
+}
+
+/// How a test program ended.
+struct Done {
+    name: String,
+    passed: bool,
+    tests: usize,
+    seconds: f64,
+    said: String,
+}
+
+/// Runs test programs, as many at a time as there are cores, each with one thread; prints what the failed ones said, and
+/// how long the longest took.
+fn side_by_side(tests: &[&TestProgram]) -> Result<Vec<Done>, Failure> {
+    let mut progress = Progress::new("tests", Pace::Steady);
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    let next = Mutex::new(tests.iter());
+    let (send, results) = channel();
+    let mut done: Vec<Done> = Vec::new();
+    let mut broken = None;
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            let (send, next) = (send.clone(), &next);
+            scope.spawn(move || {
+                loop {
+                    let test = next.lock().ok().and_then(|mut tests| tests.next());
+                    let Some(test) = test else { return };
+                    if send.send(run_one(test)).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(send);
+        loop {
+            match results.recv_timeout(Duration::from_millis(500)) {
+                Ok(Ok(one)) => done.push(one),
+                Ok(Err(failure)) => broken = Some(failure),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            let counted: usize = done.iter().map(|d| d.tests).sum();
+            progress.tick(&format!(
+                "{} of {} programs done, {counted} tests",
+                done.len(),
+                tests.len()
+            ));
+        }
+    });
+    progress.end();
+    if let Some(failure) = broken {
+        return Err(failure);
+    }
+    for failed in done.iter().filter(|d| !d.passed) {
+        eprintln!("---- {}\n{}", failed.name, failed.said);
+    }
+    done.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
+    let longest = done.iter().take(5);
+    let longest: Vec<String> = longest
+        .map(|d| format!("{} {:.0} s", d.name, d.seconds))
+        .collect();
+    println!("   longest: {}", longest.join(", "));
+    Ok(done)
+}
+
+fn run_one(test: &TestProgram) -> Result<Done, Failure> {
+    let from = Instant::now();
+    let output = Command::new(&test.file)
+        .current_dir(&test.folder)
+        .env("CARGO_MANIFEST_DIR", &test.folder)
+        .env("RUST_TEST_THREADS", "1")
+        .output()
+        .map_err(|error| {
+            Failure::new(
+                &format!("{} cannot be started: {error}", test.file.display()),
+                "run it again: another build may have taken it away",
+            )
+        })?;
+    let mut said = String::from_utf8_lossy(&output.stdout).into_owned();
+    said += &String::from_utf8_lossy(&output.stderr);
+    Ok(Done {
+        name: test.name.clone(),
+        passed: output.status.success(),
+        tests: passed(&said),
+        seconds: from.elapsed().as_secs_f64(),
+        said,
+    })
+}
+
+/// Tests that passed, of what a test program says.
+fn passed(said: &str) -> usize {
+    let counts = said.lines().filter_map(|line| {
+        let (before, _) = line.strip_prefix("test result: ")?.split_once(" passed")?;
+        before.split_whitespace().last()?.parse::<usize>().ok()
+    });
+    counts.sum()
+}
+
+/// Most lines that the demo may print, whatever state the machine is in.
+const MOST_LINES: usize = 60;
+
+/// Runs the demo with the program that the tests were built with: it is short, complains of nothing, and finds what is
+/// planted.
+fn short_demo(root: &Path, built: &Built) -> Result<String, Failure> {
+    let wrong = |what: &str| Failure::new(what, "`cargo xtask demo` shows it");
+    let own = std::env::current_exe().map_err(|error| wrong(&format!("the demo: {error}")))?;
+    let program = built
+        .program
+        .as_ref()
+        .ok_or_else(|| wrong("the build of the tests made no program `imu-stand`"))?;
+    let mut demo = Command::new(own);
+    demo.arg("demo")
+        .arg("--program")
+        .arg(program)
+        .current_dir(root);
+    demo.env("CARGO_MANIFEST_DIR", root.join("xtask"));
+    let said = watched(
+        "the demo",
+        &mut demo,
+        &mut Silent("runs"),
+        &mut Pace::Steady,
+    )?;
+    if let Some(what) = objection(&said.all) {
+        said.all.iter().for_each(|line| eprintln!("{line}"));
+        return Err(wrong(&what));
+    }
+    Ok(format!("{} lines", said.all.len()))
+}
+
+/// What is wrong with what the demo printed.
+fn objection(lines: &[String]) -> Option<String> {
+    if lines.len() > MOST_LINES {
+        return Some(format!(
+            "the demo prints {} lines, more than {MOST_LINES}",
+            lines.len()
+        ));
+    }
+    for word in ["warning", "BISECT", " WARN ", " { "] {
+        if let Some(line) = lines.iter().find(|line| line.contains(word)) {
+            return Some(format!("the demo prints `{word}`: {line}"));
+        }
+    }
+    let compared = |line: &&String| line.contains("planted ") && line.ends_with(": match");
+    if !lines.iter().any(|line| compared(&line)) {
+        return Some("the demo ends without what was planted beside what was found".to_owned());
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn test_programs_and_the_program_are_read_from_cargos_messages() {
+        let message = |target: &str, kind: &str, test: bool, file: &str| {
+            format!(
+                r#"{{"reason":"compiler-artifact","package_id":"path+file:///r/crates/cli#imu-stand@0.1.0","manifest_path":"/r/crates/cli/Cargo.toml","target":{{"kind":["{kind}"],"name":"{target}"}},"profile":{{"opt_level":"0","test":{test}}},"features":[],"executable":{file}}}"#
+            )
+        };
+        let messages = [
+            message("imu_stand", "lib", false, "null"),
+            message("imu-stand", "bin", false, r#""/t/imu-stand""#),
+            message("report", "test", true, r#""/t/report-1""#),
+        ];
+        let built = Built::read(&messages);
+        assert_eq!(built.program, Some(PathBuf::from("/t/imu-stand")));
+        let [test] = built.tests.as_slice() else {
+            panic!("{built:?}")
+        };
+        assert_eq!(test.name, "imu-stand report");
+        assert_eq!(test.folder, Path::new("/r/crates/cli"));
+    }
+
+    #[test]
+    fn a_demo_that_is_long_complains_or_compares_nothing_is_objected_to() {
+        let good = "    temperature on gyro_x, slope: planted 1, found 1 +- 1 deg/s/degC: match";
+        let lines = |more: &[&str]| -> Vec<String> {
+            more.iter()
+                .chain(&[good])
+                .map(|l| (*l).to_owned())
+                .collect()
+        };
+        assert_eq!(objection(&lines(&[])), None);
+        for word in [
+            "warning: unused",
+            "BISECT: running pass",
+            " WARN rustc",
+            "Tempco { gyro: 0 }",
+        ] {
+            assert!(objection(&lines(&[word])).is_some(), "{word}");
+        }
+        assert!(objection(&lines(&["a line"; 60])).is_some());
+        assert!(objection(&[]).is_some());
+    }
+
+    #[test]
+    fn passed_tests_are_counted() {
+        let said = "test result: ok. 12 passed; 0 failed; 1 ignored\nx\ntest result: FAILED. 3 passed; 1 failed";
+        assert_eq!(passed(said), 15);
+    }
+}
