@@ -16,7 +16,7 @@ const TEXT: &str = "diagnosis.txt";
 /// Lines that it prints of that, before what was planted stands beside what was found.
 const LINES: usize = 12;
 /// Most lines of what was planted and found.
-const MOST_COMPARED: usize = 9;
+const MOST_COMPARED: usize = 11;
 /// How that part begins.
 const COMPARED: &str = "planted and found";
 

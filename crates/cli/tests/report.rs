@@ -155,7 +155,7 @@ fn the_convicting_figures_can_be_had_as_files() {
         "--figures",
         "figures",
     ];
-    succeed(program().current_dir(&folder).args(arguments));
+    succeed(program().current_dir(folder).args(arguments));
     let figures = folder.join("figures");
     let svg = std::fs::read_to_string(figures.join("temperature-gyro_x.svg")).unwrap();
     assert!(

@@ -140,6 +140,9 @@ impl<'a> Places<'a> {
     }
 }
 
+/// Readings of each channel, once, and the curves of each, every time.
+type Drawn = (Vec<Vec<f64>>, Vec<Vec<Curves>>);
+
 /// Simulates a model in the world that the record saw, `count` times, with the record's own gaps: the readings of each
 /// channel of the model once, and the curves of each every time.
 ///
@@ -151,7 +154,7 @@ pub fn replicate(
     places: &Places<'_>,
     count: usize,
     seed: u64,
-) -> Result<(Vec<Vec<f64>>, Vec<Vec<Curves>>), SimulateError> {
+) -> Result<Drawn, SimulateError> {
     let mut replicas = Replicas::new(model, record, model.rate_hz, &[])?;
     let mut readings = vec![];
     let mut curves = vec![Vec::with_capacity(count); model.channels.len()];

@@ -58,6 +58,7 @@ impl Replicas {
         if !stretches.is_empty() {
             prepared.only(stretches);
         }
+        prepared.clocks();
         let (rate, variance) = (prepared.run.rate.clone(), prepared.run.variance.clone());
         Ok(Self {
             prepared,
@@ -78,6 +79,8 @@ impl Replicas {
             variance.copy_from_slice(start);
         }
         self.prepared.draw();
+        // A frame that repeats the one before does so to its counts; those that are lost are in the record's own places.
+        self.prepared.frames();
         readings.resize_with(self.axes.len(), Vec::new);
         for (out, axis) in readings.iter_mut().zip(&self.axes) {
             let (step, _) = self.prepared.steps[*axis];
@@ -153,6 +156,25 @@ mod tests {
         replicas.draw(5, &mut again);
         assert_eq!(first, again);
         assert_ne!(first, other);
+        Ok(())
+    }
+
+    #[test]
+    fn repeated_samples_are_repeated_in_replicas() -> Tested {
+        let model = stand(
+            &[("angle_random_walk", 5.0)],
+            &[(
+                "stale_samples",
+                &[("count", 300.0, "1"), ("silent", 1.0, "1")],
+            )],
+        );
+        let record = crate::simulate(&model, 100.0, 20.0, 1)?;
+        let mut readings = vec![];
+        Replicas::new(&model, &record, 20.0, &[])?.draw(5, &mut readings);
+        let equal = |x: &[f64]| x.windows(2).filter(|w| w[0] == w[1]).count();
+        // By chance 1 / (2 sqrt(pi) sigma) of 2000 at 5.1 counts, 110 +- 10; 300 of 2000 places besides, few of them twice.
+        assert!(equal(&readings[1]) < 170, "{}", equal(&readings[1]));
+        assert!(equal(&readings[0]) > 300, "{}", equal(&readings[0]));
         Ok(())
     }
 

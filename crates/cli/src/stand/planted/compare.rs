@@ -108,7 +108,7 @@ pub fn compare(planted: &[Planted], diagnosis: &Diagnosis) -> Comparison {
 
 fn is_on(finding: &Finding, planted: &Planted) -> bool {
     let has = |channel: &&str| finding.channels.iter().any(|c| c == channel);
-    planted.channels.iter().all(|channel| has(channel))
+    planted.channels.iter().all(has)
 }
 
 fn one(planted: &Planted, diagnosis: &Diagnosis) -> Compared {
