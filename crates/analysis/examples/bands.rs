@@ -291,7 +291,7 @@ fn planted(
     rng: &mut Xoshiro256PlusPlus,
     strength: f64,
 ) -> (&'static str, &'static str, f64) {
-    let (n, rate_hz) = (values.len(), 100.0_f64);
+    let (n, rate_hz) = (values.len(), 100.0f64);
     // About the record's: white noise of 0.043 deg/s/sqrt(Hz), a random walk of 0.003 deg/s/sqrt(s).
     let (white, walk) = (0.43f64, 0.003f64);
     let (density, seconds) = (white / rate_hz.sqrt(), n as f64 / rate_hz);

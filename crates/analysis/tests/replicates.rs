@@ -123,13 +123,9 @@ fn diagnosed(record: &Record, replicates: usize) -> Diagnosis {
 
 #[test]
 fn an_extended_model_is_called_so_only_where_its_replicates_hold_the_record() {
-    let warm = [("amplitude", 2.0, "deg/s"), ("time_constant", 60.0, "s")];
-    for (k, parameters) in [&warm[..]].into_iter().enumerate() {
-        let record = record(
-            &with(&stand(0.001), "warm_up", parameters),
-            600.0,
-            40 + k as u64,
-        );
+    let line = [("frequency", 3.7, "Hz"), ("amplitude", 0.2, "deg/s")];
+    for seed in 40..42 {
+        let record = record(&with(&stand(0.001), "line", &line), 600.0, seed);
         let without = diagnosed(&record, 0);
         assert!(without.replicates.is_empty());
         assert_eq!(without.verdict, Verdict::Extended);

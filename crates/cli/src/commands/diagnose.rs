@@ -34,6 +34,9 @@ pub struct Arguments {
     /// Write a report, one self-contained HTML file
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// Print the details too: gains, checks that fail, why something was not tested, the smallest sizes
+    #[arg(long)]
+    details: bool,
 }
 
 /// Several captures, each diagnosed by itself.
@@ -84,7 +87,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             super::write(path, &fitted.to_toml())?;
         }
         if !arguments.input.quiet {
-            say!("{}", text::diagnosis(&found.diagnosis).trim_end());
+            say!("{}", text::diagnosis(&found).trim_end());
+            if arguments.details {
+                say!("{}", text::details(&found.diagnosis).trim_end());
+            }
         }
         if let Some(page) = &arguments.report {
             let subject = Subject {

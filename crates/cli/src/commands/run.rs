@@ -65,6 +65,9 @@ pub struct Arguments {
     report: Option<PathBuf>,
     #[command(flatten)]
     replicates: Replicates,
+    /// Print the details of the diagnosis too: gains, checks that fail, the smallest sizes
+    #[arg(long)]
+    details: bool,
     /// Print nothing but errors
     #[arg(long, short)]
     quiet: bool,
@@ -132,7 +135,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         record.len(),
         text::link(&link)
     );
-    say!("{}", text::diagnosis(&found.diagnosis).trim_end());
+    say!("{}", found.screen.trim_end());
+    if arguments.details {
+        say!("{}", text::details(&found.diagnosis).trim_end());
+    }
     let lines = found.comparison.lines();
     say!("\nplanted and found\n{}", text::item("", RULE));
     // One line each, not wrapped.
@@ -150,6 +156,9 @@ struct Answer {
     diagnosis: Diagnosis,
     #[serde(rename = "planted")]
     comparison: Comparison,
+    /// What a terminal shows of it.
+    #[serde(skip)]
+    screen: String,
 }
 
 /// Analyzes and diagnoses the capture that was written, and writes what was asked for.
@@ -190,6 +199,7 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
         super::report::write(page, &subject, true)?;
     }
     let answer = Answer {
+        screen: text::diagnosis(&found),
         diagnosis: found.diagnosis,
         comparison,
     };

@@ -3,7 +3,7 @@
 //! An effect names the kind of its figure and the run that shows it in its own file ([`model::effect::Example`]); what is
 //! drawn here knows kinds, never effects.
 
-mod views;
+pub(super) mod views;
 
 use model::docs::{EXAMPLE_SECONDS, EXAMPLE_SEED, example};
 use model::effect::Effect;
@@ -67,7 +67,13 @@ pub fn exhibit(effect: &dyn Effect) -> Result<String, ExhibitError> {
     };
     let docs = effect.docs();
     let channel = docs.example.channels.first().copied().unwrap_or("gyro_x");
-    let figure = views::figure(docs.example.plot, channel, &run(true)?, &run(false)?)
+    let pair = views::Pair {
+        with: &run(true)?,
+        without: &run(false)?,
+        labels: ["with the effect", "without it"],
+        at: None,
+    };
+    let figure = views::figure(docs.example.plot, channel, &pair)
         .map_err(|what| ExhibitError::Lacks { cause, what })?;
     Ok(compact(&alone(docs.title, &figure)?))
 }

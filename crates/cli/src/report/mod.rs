@@ -1,12 +1,13 @@
 //! The report: one self-contained HTML file, verdict first, then the figures that it rests on.
 
+mod convict;
 pub mod exhibits;
 pub mod plot;
 pub mod replicates;
 pub mod standalone;
 mod tables;
 
-use analysis::result::{Diagnosed, Evidence, Verdict};
+use analysis::result::{Diagnosed, Verdict};
 use analysis::sampling::Sampling;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use model::record::Record;
@@ -58,12 +59,7 @@ pub enum ReportError {
 pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
     let diagnosis = &subject.diagnosed.diagnosis;
     let channels = channels(subject)?;
-    let evidence = subject
-        .diagnosed
-        .evidence
-        .iter()
-        .map(evidence)
-        .collect::<Result<Vec<_>, _>>()?;
+    let convicting = convict::figures(subject)?;
     let title = format!("{}: {}", diagnosis.input.file, headline(subject.diagnosed));
     let page = html! {
         (DOCTYPE)
@@ -75,13 +71,14 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
                 style { (PreEscaped(STYLE)) }
             }
             body {
-                (tables::verdict(subject, headline(subject.diagnosed)))
-                @if !evidence.is_empty() {
+                (tables::verdict(subject, &headline(subject.diagnosed)))
+                @if !convicting.is_empty() {
                     section {
                         h2 { "What convicts each cause" }
-                        @for figure in &evidence { (figure) }
+                        @for figure in &convicting { (figure) }
                     }
                 }
+                (tables::noise(subject))
                 section {
                     h2 { "The measurement beside its simulation" }
                     p.lead {
@@ -104,11 +101,23 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
     Ok(page.into_string())
 }
 
-fn headline(diagnosed: &Diagnosed) -> &'static str {
-    match diagnosed.diagnosis.verdict {
-        Verdict::Adequate => "the model describes this run",
-        Verdict::Extended => "the simulation lacks something, and here is what",
-        Verdict::Unexplained => "something is left that no known cause explains",
+/// What the verdict means for this record: the cause itself where there is one.
+fn headline(diagnosed: &Diagnosed) -> String {
+    let d = &diagnosed.diagnosis;
+    match (d.verdict, d.findings.as_slice()) {
+        (Verdict::Adequate, _) => "the model describes this run".into(),
+        (Verdict::Extended, [one]) => crate::text::answer::headline(one),
+        (Verdict::Extended, all) => {
+            format!("the simulation lacks {} causes", all.len())
+        }
+        (Verdict::Unexplained, []) => "something is left that no known cause explains".into(),
+        (Verdict::Unexplained, all) => format!(
+            "{} found, and something is left that no known cause explains",
+            match all.len() {
+                1 => "1 cause".to_owned(),
+                n => format!("{n} causes"),
+            }
+        ),
     }
 }
 
@@ -215,15 +224,6 @@ impl View<'_> {
         let name = self.name;
         let same = !self.extended;
         Ok(html! {
-            figure {
-                (self.signal()?)
-                figcaption {
-                    b { "Signal. " }
-                    "Measured, then simulated by the "
-                    @if same { "model" } @else { "model before and after the extension" }
-                    ", on one scale. Alike to the eye is no test: the figures below are."
-                }
-            }
             .pair {
                 figure {
                     (self.allan(own, at, against)?)
@@ -241,6 +241,15 @@ impl View<'_> {
                         b { "Angle by integration" } ", less the mean of the first " (number(at.calibration_s, 2))
                         " s. Bands hold 95 % of the replicates at each instant."
                     }
+                }
+            }
+            figure {
+                (self.signal()?)
+                figcaption {
+                    b { "Signal. " }
+                    "Measured, then simulated by the "
+                    @if same { "model" } @else { "model before and after the extension" }
+                    ", on one scale. Alike to the eye is no test: the figures above are."
                 }
             }
         })
@@ -280,7 +289,7 @@ impl View<'_> {
                 },
                 y_label: self.unit.to_owned(),
                 width: plot::WIDE,
-                height: if k == last { 200 } else { 178 },
+                height: if k == last { 132 } else { 110 },
                 y_range: (low < high).then_some(low - margin..high + margin),
                 layers: vec![Drawn::new(
                     label,
@@ -372,15 +381,6 @@ impl View<'_> {
         };
         drawing(&figure)
     }
-}
-
-fn evidence(evidence: &Evidence) -> Result<Markup, ReportError> {
-    Ok(html! {
-        figure {
-            (drawing(&standalone::figure(evidence))?)
-            figcaption { b { (evidence.title) ". " } (evidence.caption) }
-        }
-    })
 }
 
 /// A figure with its legend above it.

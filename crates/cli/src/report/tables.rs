@@ -1,10 +1,12 @@
 //! The words and tables of the report.
 
-use analysis::result::{Finding, Parameter, Verdict};
+use analysis::result::{Check, Finding, Unexplained, Verdict};
 use maud::{Markup, html};
+use model::file::ModelFile;
 
 use super::Subject;
 use super::plot::number;
+use crate::text::answer;
 
 /// Verdict, input and findings: what a reader in a hurry reads.
 pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
@@ -42,16 +44,35 @@ pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
                 @for found in &d.findings { (finding(found)) }
             }
         }
-        @if !d.unexplained.is_empty() {
+        (left_over(&d.unexplained))
+    }
+}
+
+/// What has no name, in one row a channel.
+fn left_over(all: &[Unexplained]) -> Markup {
+    let mut channels: Vec<&str> = vec![];
+    for left in all {
+        if !channels.contains(&left.channel.as_str()) {
+            channels.push(&left.channel);
+        }
+    }
+    html! {
+        @if !all.is_empty() {
             section {
-                h2 { "Unexplained" }
+                h2 { "Left over, without a name" }
                 table {
                     thead { tr { th { "channel" } th { "what is seen" } } }
                     tbody {
-                        @for left in &d.unexplained {
-                            tr { td { code { (left.channel) } } td { (left.what) } }
+                        @for channel in channels {
+                            tr {
+                                td { code { (channel) } }
+                                td { @for left in all.iter().filter(|u| u.channel == channel) { div { (left.what) } } }
+                            }
                         }
                     }
+                }
+                p.note {
+                    "What to do: record again, twice as long. What comes again belongs to the sensor or the stand."
                 }
             }
         }
@@ -95,11 +116,11 @@ fn finding(found: &Finding) -> Markup {
     html! {
         article {
             h2 { (found.cause.replace('_', " ")) small { " on " (found.channels.join(", ")) } }
-            @if !found.what.is_empty() { p { (found.what) } }
+            @if let Some(cost) = answer::cost(found) { p { (cost) } }
             table.plain {
                 tbody {
                     @for (name, parameter) in &found.parameters {
-                        tr { th { (name.replace('_', " ")) } td.number { (value(parameter)) } }
+                        tr { th { (name.replace('_', " ")) } td.number { (answer::with_interval(parameter)) } }
                     }
                 }
             }
@@ -123,34 +144,10 @@ fn finding(found: &Finding) -> Markup {
     }
 }
 
-fn value(parameter: &Parameter) -> String {
-    let unit = if parameter.unit == "1" {
-        ""
-    } else {
-        &parameter.unit
-    };
-    let text = match parameter.std_error {
-        // The error says how many digits of the value mean anything.
-        Some(error) if error > 0.0 && error < parameter.value.abs() => {
-            let digits = 2.0 + (parameter.value.abs().log10().floor() - error.log10().floor());
-            let digits = (digits.max(2.0) as usize).min(9);
-            format!(
-                "{} \u{b1} {}",
-                number(parameter.value, digits),
-                number(error, 2)
-            )
-        }
-        Some(error) => format!("{} \u{b1} {}", number(parameter.value, 2), number(error, 2)),
-        None => number(parameter.value, 5),
-    };
-    format!("{text} {unit}").trim_end().to_owned()
-}
-
 /// Gain, checks, limits, and how it was made.
 pub(super) fn details(subject: &Subject<'_>) -> Markup {
     html! {
         (gain(subject))
-        (baseline(subject))
         (checks(subject))
         (limits(subject))
         (made(subject))
@@ -192,7 +189,9 @@ fn gain(subject: &Subject<'_>) -> Markup {
                     } } }
                 } }
                 p.note {
-                    "The log score is that of data not used for the fit, extended minus baseline: above 0 it helps. "
+                    "The log score is that of data not used for the fit, extended minus baseline, in nats: x nats make unseen data e^x times "
+                    "as likely, so above 0 the cause helps. BIC (Bayesian information criterion) weighs the likelihood against the "
+                    "number of parameters: more is better. "
                     "The misfit is the largest distance of the Allan curve from the model's replicates, in their standard deviations."
                 }
             }
@@ -200,19 +199,33 @@ fn gain(subject: &Subject<'_>) -> Markup {
     }
 }
 
-fn baseline(subject: &Subject<'_>) -> Markup {
+/// The noise model before and after the causes, with 95 % intervals.
+pub(super) fn noise(subject: &Subject<'_>) -> Markup {
+    let diagnosed = subject.diagnosed;
+    let of = |model: &ModelFile, channel: &str, name: &str| {
+        let own = model.channels.iter().find(|c| c.name == channel)?;
+        let shown = match name {
+            "bias" => answer::with_interval,
+            _ => answer::level,
+        };
+        own.baseline.get(name).map(shown)
+    };
+    let dash = || "\u{2013}".to_owned();
     html! {
         section {
-            h2 { "The baseline model" }
+            h2 { "The noise, before and after the causes" }
             .scroll { table {
-                thead { tr { th { "channel" } th { "parameter" } th.number { "value" } } }
+                thead { tr {
+                    th { "channel" } th { "parameter" } th.number { "without the causes" } th.number { "beside the causes" }
+                } }
                 tbody {
-                    @for (channel, parameters) in &subject.diagnosed.diagnosis.baseline {
-                        @for (name, parameter) in parameters {
+                    @for channel in &diagnosed.extended_model.channels {
+                        @for name in channel.baseline.keys() {
                             tr {
-                                td { code { (channel) } }
+                                td { code { (channel.name) } }
                                 td { (name.replace('_', " ")) }
-                                td.number { (value(parameter)) }
+                                td.number { (of(&diagnosed.baseline_model, &channel.name, name).unwrap_or_else(dash)) }
+                                td.number { (of(&diagnosed.extended_model, &channel.name, name).unwrap_or_else(dash)) }
                             }
                         }
                     }
@@ -222,27 +235,48 @@ fn baseline(subject: &Subject<'_>) -> Markup {
     }
 }
 
+/// The checks that fail, and all of them folded.
 fn checks(subject: &Subject<'_>) -> Markup {
-    let mark = |fails: bool| html! { @if fails { span.fails { "fails" } } @else { span.passes { "passes" } } };
+    let all = &subject.diagnosed.diagnosis.checks;
+    let failing: Vec<&Check> = all
+        .iter()
+        .filter(|c| c.fails_before || c.fails_after)
+        .collect();
     html! {
         section {
             h2 { "Checks" }
-            .scroll { table {
-                thead { tr {
-                    th { "check" } th { "channel" } th.number { "statistic" } th.number { "p" } th { "before" }
-                    th { "after" } th { "what it looks at" }
-                } }
-                tbody { @for check in &subject.diagnosed.diagnosis.checks { tr {
-                    td { (check.id.replace('_', " ")) }
-                    td { code { (check.channel) } }
-                    td.number { (number(check.statistic, 3)) }
-                    td.number { (check.p_value.map_or_else(|| "\u{2013}".to_owned(), chance)) }
-                    td { (mark(check.fails_before)) }
-                    td { (mark(check.fails_after)) }
-                    td { (check.what) }
-                } } }
-            } }
+            @if failing.is_empty() {
+                p { "All " (all.len()) " checks pass." }
+            } @else {
+                p { (failing.len()) " of " (all.len()) " checks fail, before the extension or after it:" }
+                (check_table(&failing))
+            }
+            details.fold {
+                summary { "All checks" }
+                (check_table(&all.iter().collect::<Vec<_>>()))
+            }
         }
+    }
+}
+
+fn check_table(checks: &[&Check]) -> Markup {
+    let mark = |fails: bool| html! { @if fails { span.fails { "fails" } } @else { span.passes { "passes" } } };
+    html! {
+        .scroll { table {
+            thead { tr {
+                th { "check" } th { "channel" } th.number { "statistic" } th.number { "p" } th { "before" }
+                th { "after" } th { "what it looks at" }
+            } }
+            tbody { @for check in checks { tr {
+                td { (check.id.replace('_', " ")) }
+                td { code { (check.channel) } }
+                td.number { (number(check.statistic, 3)) }
+                td.number { (check.p_value.map_or_else(|| "\u{2013}".to_owned(), chance)) }
+                td { (mark(check.fails_before)) }
+                td { (mark(check.fails_after)) }
+                td { (check.what) }
+            } } }
+        } }
     }
 }
 
@@ -253,7 +287,7 @@ fn limits(subject: &Subject<'_>) -> Markup {
             section {
                 h2 { "What this run would have found" }
                 p.lead { "The smallest size of each cause that was looked for and not found, that would have been found 95 % of the time." }
-                .scroll { table {
+                details.fold { summary { "All sizes" } .scroll { table {
                     thead { tr { th { "cause" } th { "channel" } th { "parameter" } th.number { "size" } } }
                     tbody { @for limit in &d.detection_limits { tr {
                         td { (limit.cause.replace('_', " ")) }
@@ -261,7 +295,7 @@ fn limits(subject: &Subject<'_>) -> Markup {
                         td { (limit.parameter.replace('_', " ")) (crate::text::held_at(limit)) }
                         td.number { (number(limit.value, 2)) " " @if limit.unit != "1" { (limit.unit) } }
                     } } }
-                } }
+                } } }
             }
         }
         @if !d.not_tested.is_empty() {

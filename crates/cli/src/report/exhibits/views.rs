@@ -26,16 +26,28 @@ type Points = Vec<(f64, f64)>;
 /// A record's series, or what the record lacks.
 type Drawing = Result<Points, String>;
 
-/// The figure of that kind of a channel, with the effect and without it.
+/// Two records that a figure holds beside each other.
+pub(in crate::report) struct Pair<'a> {
+    /// The one with the effect.
+    pub with: &'a Record,
+    /// The one without it.
+    pub without: &'a Record,
+    /// Legend entries: of the one with the effect, of the one without it.
+    pub labels: [&'a str; 2],
+    /// The sample that [`Plot::Around`] shows; where it is left out, the one in which the two differ most.
+    pub at: Option<usize>,
+}
+
+/// The figure of that kind of a channel, with the effect and without it. What is the same in both is drawn once.
 ///
 /// # Errors
 /// What the records lack.
-pub(super) fn figure(
+pub(in crate::report) fn figure(
     plot: Plot,
     channel: &str,
-    with: &Record,
-    without: &Record,
+    pair: &Pair<'_>,
 ) -> Result<Figure, String> {
+    let Pair { with, without, .. } = *pair;
     let unit = named(with, channel)?.unit.clone();
     let rate = format!("rate of {channel}, {unit}");
     let of = |name: &str| -> Result<String, String> {
@@ -120,7 +132,13 @@ pub(super) fn figure(
         }
         Plot::Around => {
             (x_label, y_label) = (time(), rate);
-            let middle = most_changed(named(with, channel)?, named(without, channel)?);
+            let most_changed = || -> Result<usize, String> {
+                Ok(most_changed(
+                    named(with, channel)?,
+                    named(without, channel)?,
+                ))
+            };
+            let middle = pair.at.map_or_else(most_changed, Ok)?;
             extra = Some(Drawn {
                 label: None,
                 colour: MEASURED,
@@ -176,16 +194,16 @@ pub(super) fn figure(
             Layer::Line(points)
         }
     };
-    let mut layers = vec![Drawn::new("without it", BEFORE, layer(series(without)?))];
+    let (changed, plain) = (series(with)?, series(without)?);
+    let mut layers = vec![];
+    if changed != plain {
+        layers.push(Drawn::new(pair.labels[1], BEFORE, layer(plain)));
+    }
     // What joins the dots lies behind them, a law before them.
     let (behind, before): (Vec<Drawn>, Vec<Drawn>) =
         extra.into_iter().partition(|e| e.label.is_none());
     layers.extend(behind);
-    layers.push(Drawn::new(
-        "with the effect",
-        MEASURED,
-        layer(series(with)?),
-    ));
+    layers.push(Drawn::new(pair.labels[0], MEASURED, layer(changed)));
     layers.extend(before);
     Ok(Figure {
         x_label,

@@ -1,90 +1,22 @@
-//! What people read in a terminal.
+//! What stands behind an answer: every parameter with its standard error, gains, checks that fail, what was not tested,
+//! and the smallest size of each cause that would have been found.
 
 use std::fmt::Write;
 
-use analysis::result::{DetectionLimit, Diagnosis, Finding, Verdict};
+use analysis::result::{DetectionLimit, Diagnosis, Finding};
 
+use super::item;
 use crate::report::plot::{number, tidy};
 
-/// Columns of a terminal that text is wrapped to.
-const WIDTH: usize = 100;
-
-/// A word as a shell takes it, in quotes where it needs them.
+/// The details of a diagnosis.
 #[must_use]
-pub fn shell_word(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
-}
-
-/// A wrapped paragraph, indented, with a lead before its first line.
-#[must_use]
-pub fn item(lead: &str, text: &str) -> String {
-    let indent = " ".repeat(4);
-    let mut out = format!("{indent}{lead}");
-    let mut column = out.chars().count();
-    let mut first = true;
-    for word in text.split_whitespace() {
-        let length = word.chars().count();
-        if !first && column + 1 + length > WIDTH {
-            out.push('\n');
-            out.push_str(&indent);
-            out.push_str("  ");
-            column = indent.len() + 2;
-        } else if !first {
-            out.push(' ');
-            column += 1;
-        }
-        out.push_str(word);
-        column += length;
-        first = false;
-    }
-    out
-}
-
-/// What the line did: frames in order and frames that were not.
-#[must_use]
-pub fn link(counts: &wire::LinkCounts) -> String {
-    format!(
-        "{} frames in order, {} rejected",
-        counts.frames,
-        counts.rejected()
-    )
-}
-
-/// A diagnosis, verdict first.
-#[must_use]
-pub fn diagnosis(d: &Diagnosis) -> String {
+pub fn details(d: &Diagnosis) -> String {
     let mut out = String::new();
-    let verdict = match d.verdict {
-        Verdict::Adequate => {
-            "adequate: white noise, random walk and a constant bias describe this record"
-        }
-        Verdict::Extended => "extended: the simulation lacks the causes below",
-        Verdict::Unexplained => {
-            "unexplained: the record has structure that no effect of the library explains"
-        }
-    };
-    let input = &d.input;
-    let _ = writeln!(
-        out,
-        "{}: {:.0} s at {:.4} Hz, {} samples",
-        input.file, input.seconds, input.rate_hz, input.samples
-    );
-    for note in &input.notes {
-        let _ = writeln!(out, "{}", item("note: ", note));
-    }
-    let _ = writeln!(out, "verdict  {verdict}");
     for finding in &d.findings {
         write_finding(&mut out, finding);
     }
-    for unexplained in &d.unexplained {
-        let _ = writeln!(out, "\nunexplained on {}", unexplained.channel);
-        let _ = writeln!(out, "{}", item("", &unexplained.what));
-    }
     write_replicates(&mut out, d);
+    write_checks(&mut out, d);
     if let Some(walks) = slow_noise(d) {
         let _ = writeln!(
             out,
@@ -122,6 +54,22 @@ fn write_replicates(out: &mut String, d: &Diagnosis) {
             "{}",
             item(&format!("{channel}: {chances}; "), &r.after.strays())
         );
+    }
+}
+
+/// The checks that fail, before the extension or after it, and how many pass.
+fn write_checks(out: &mut String, d: &Diagnosis) {
+    let failing = |c: &&analysis::result::Check| c.fails_before || c.fails_after;
+    let count = d.checks.iter().filter(failing).count();
+    let _ = writeln!(out, "\nchecks: {count} of {} fail", d.checks.len());
+    for check in d.checks.iter().filter(failing) {
+        let when = match (check.fails_before, check.fails_after) {
+            (true, true) => "before and after",
+            (true, false) => "before, not after",
+            _ => "after",
+        };
+        let lead = format!("{} on {}, {when}: ", check.id, check.channel);
+        let _ = writeln!(out, "{}", item(&lead, &check.what));
     }
 }
 
@@ -198,7 +146,7 @@ fn short(value: f64) -> String {
 fn write_finding(out: &mut String, finding: &Finding) {
     let _ = writeln!(
         out,
-        "\n{} on {}",
+        "\n{} on {}: parameters with their standard errors, and gain",
         finding.cause,
         finding.channels.join(", ")
     );
@@ -339,16 +287,6 @@ mod tests {
         assert_eq!(
             shorts,
             ["0.038", "0.41", "4.2", "42", "280", "2.0e-4", "1.2e3"]
-        );
-    }
-
-    #[test]
-    fn long_text_is_wrapped_and_indented() {
-        let text = super::item("why: ", &"word ".repeat(40));
-        assert!(text.lines().count() > 1);
-        assert!(
-            text.lines()
-                .all(|line| line.starts_with("    ") && line.chars().count() <= super::WIDTH)
         );
     }
 }

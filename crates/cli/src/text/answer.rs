@@ -1,0 +1,256 @@
+//! A finding in sentences for a person: what it is and how large, what it costs to leave it out, what is still open.
+
+use analysis::result::{Finding, Parameter};
+use model::effects::effect;
+
+use crate::report::plot::{number, tidy};
+
+/// Half the width of a 95 % interval, in standard errors of a normal law.
+pub const HALF_WIDTH_95: f64 = 1.96;
+/// Parameters that a sentence names; the others stand in the details.
+const NAMED: usize = 3;
+/// An angle error that changes by less than this share of itself is not worth a sentence (design: `--matters`, percent).
+const MATTERS: f64 = 0.05;
+/// Digits of an angle error.
+const ANGLE_DIGITS: usize = 2;
+
+/// What the cause is, where it acts, and its size with 95 % intervals.
+#[must_use]
+pub fn headline(finding: &Finding) -> String {
+    let title = effect(&finding.cause).map_or(finding.cause.as_str(), |e| e.docs().title);
+    let sizes: Vec<String> = named(finding)
+        .into_iter()
+        .map(|(name, p)| format!("{} {}", name.replace('_', " "), with_interval(p)))
+        .collect();
+    let place = finding.channels.join(", ");
+    match sizes.is_empty() {
+        true => format!("{place}: {title} ({})", finding.cause),
+        false => format!("{place}: {title} ({}), {}", finding.cause, sizes.join("; ")),
+    }
+}
+
+/// The parameters that say how large a finding is: those that its effect requires, then those that were estimated.
+fn named(finding: &Finding) -> Vec<(&String, &Parameter)> {
+    let specs = effect(&finding.cause).map_or(&[][..], |e| e.parameters());
+    let required = |name: &str| specs.iter().any(|s| s.name == name && s.required);
+    let estimated = |p: &Parameter| p.std_error.is_some_and(|e| e.is_finite() && e > 0.0);
+    let all = || finding.parameters.iter();
+    let first = all().filter(|(name, _)| required(name));
+    let then = all().filter(|(name, p)| !required(name) && estimated(p));
+    first.chain(then).take(NAMED).collect()
+}
+
+/// What leaving it out of the simulation costs in the integrated angle; `None` where the diagnosis has no angle for it.
+#[must_use]
+pub fn cost(finding: &Finding) -> Option<String> {
+    let angles = &finding.gain.as_ref()?.angle_rms_deg;
+    let finite = |pair: &&[f64; 2]| pair.iter().all(|v| v.is_finite());
+    let mut horizons: Vec<(&String, &[f64; 2])> =
+        angles.iter().filter(|(_, pair)| finite(pair)).collect();
+    if horizons.is_empty() {
+        return None;
+    }
+    // The longest first: that is where a user meets it. Keys are `10s`, `100s`.
+    horizons.sort_by_key(|(over, _)| std::cmp::Reverse(over.len()));
+    let matters = |[before, after]: &[f64; 2]| (before - after).abs() > MATTERS * before.abs();
+    if !horizons.iter().any(|(_, pair)| matters(pair)) {
+        let seconds: Vec<String> = horizons
+            .iter()
+            .rev()
+            .map(|(over, _)| spaced(over))
+            .collect();
+        return Some(format!(
+            "Left out, it changes the integrated angle by less than 5 % over {}.",
+            seconds.join(" and ")
+        ));
+    }
+    let each: Vec<String> = horizons
+        .iter()
+        .map(|(over, [before, after])| {
+            format!(
+                "{} deg rms after {} instead of {}",
+                number(*before, ANGLE_DIGITS),
+                spaced(over),
+                number(*after, ANGLE_DIGITS)
+            )
+        })
+        .collect();
+    Some(format!(
+        "Left out, the integrated angle is off by {}.",
+        each.join(", ")
+    ))
+}
+
+/// `10s` as `10 s`.
+fn spaced(over: &str) -> String {
+    over.strip_suffix('s')
+        .map_or_else(|| over.to_owned(), |n| format!("{n} s"))
+}
+
+/// What this record leaves open, and what to record to close it.
+#[must_use]
+pub fn open_question(finding: &Finding) -> Option<String> {
+    let rivals: Vec<&str> = finding
+        .alternatives
+        .iter()
+        .map(|a| a.cause.as_str())
+        .collect();
+    let experiment = finding.experiment.as_deref();
+    match (rivals.is_empty(), experiment) {
+        (true, None) => None,
+        (true, Some(e)) => Some(format!("To be sure: {}.", ended(e))),
+        (false, e) => Some(format!(
+            "This record cannot tell it from {}.{}",
+            rivals.join(", "),
+            e.map_or_else(String::new, |e| format!(" To decide: {}.", ended(e)))
+        )),
+    }
+}
+
+/// A sentence without its full stop.
+fn ended(text: &str) -> &str {
+    text.trim_end_matches('.')
+}
+
+/// A value with its 95 % interval and unit.
+#[must_use]
+pub fn with_interval(p: &Parameter) -> String {
+    let unit = match p.unit.as_str() {
+        "1" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    let error = p
+        .std_error
+        .filter(|e| *e > 0.0 && e.is_finite() && p.value.is_finite());
+    let Some(error) = error else {
+        return format!("{}{unit}", tidy(p.value, 6));
+    };
+    let half = HALF_WIDTH_95 * error;
+    let show = |v: f64| to_place_of(v, half);
+    format!(
+        "{}{unit} (95\u{a0}%: {} to {})",
+        show(p.value),
+        show(p.value - half),
+        show(p.value + half)
+    )
+}
+
+/// A size that cannot be negative: with its interval, or the upper limit where the interval reaches 0.
+#[must_use]
+pub fn level(p: &Parameter) -> String {
+    match p.std_error {
+        Some(error) if error.is_finite() && p.value < HALF_WIDTH_95 * error => {
+            let limit = p.value + HALF_WIDTH_95 * error;
+            format!("< {} {}", number(limit, 2), p.unit)
+        }
+        _ => with_interval(p),
+    }
+}
+
+/// A value to the second digit of `half`, the half width of its interval.
+fn to_place_of(value: f64, half: f64) -> String {
+    let exponent = |v: f64| format!("{v:.1e}").rsplit_once('e')?.1.parse::<i32>().ok();
+    let place = exponent(half).unwrap_or(0) - 1;
+    let size = exponent(value.abs().max(half)).unwrap_or(0);
+    if (-4..9).contains(&size) && place > -10 {
+        return format!("{value:.*}", (-place).max(0) as usize);
+    }
+    format!("{value:.*e}", (size - place).max(1) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use analysis::result::{Alternative, Gain};
+
+    use super::*;
+
+    fn finding(cause: &str, parameters: &[(&str, f64, Option<f64>, &str)]) -> Finding {
+        Finding {
+            cause: cause.into(),
+            channels: vec!["gyro_x".into()],
+            parameters: parameters
+                .iter()
+                .map(|(name, value, std_error, unit)| {
+                    let p = Parameter {
+                        value: *value,
+                        std_error: *std_error,
+                        unit: (*unit).into(),
+                    };
+                    ((*name).to_owned(), p)
+                })
+                .collect(),
+            ..Finding::default()
+        }
+    }
+
+    #[test]
+    fn the_headline_says_where_what_and_how_large_with_its_interval() {
+        let f = finding(
+            "temperature",
+            &[("slope", -0.130_8, Some(0.002_8), "deg/s/degC")],
+        );
+        assert_eq!(
+            headline(&f).replace('\u{a0}', " "),
+            "gyro_x: Bias follows temperature (temperature), slope -0.1308 deg/s/degC (95 %: -0.1363 to -0.1253)"
+        );
+    }
+
+    #[test]
+    fn a_switch_is_no_size() {
+        let f = finding(
+            "motor_noise",
+            &[
+                ("by_magnitude", 1.0, None, "1"),
+                ("variance_increase_at_full_duty", 2.9, Some(0.18), "1"),
+            ],
+        );
+        let said = headline(&f).replace('\u{a0}', " ");
+        assert!(!said.contains("magnitude"), "{said}");
+        assert!(
+            said.ends_with("variance increase at full duty 2.90 (95 %: 2.55 to 3.25)"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn the_cost_names_the_longest_horizon_first_and_a_small_one_is_called_small() {
+        let mut f = finding("temperature", &[]);
+        assert_eq!(cost(&f), None);
+        let angle = |pairs: &[(&str, [f64; 2])]| {
+            let each = pairs.iter().map(|(k, v)| ((*k).to_owned(), *v));
+            Some(Gain {
+                angle_rms_deg: each.collect::<BTreeMap<_, _>>(),
+                ..Gain::default()
+            })
+        };
+        f.gain = angle(&[("10s", [0.378, 0.214]), ("100s", [17.4, 1.35])]);
+        assert_eq!(
+            cost(&f).unwrap(),
+            "Left out, the integrated angle is off by 17 deg rms after 100 s instead of 1.4, 0.38 deg rms after 10 s instead of 0.21."
+        );
+        f.gain = angle(&[("10s", [0.300, 0.299]), ("100s", [1.35, 1.34])]);
+        assert_eq!(
+            cost(&f).unwrap(),
+            "Left out, it changes the integrated angle by less than 5 % over 10 s and 100 s."
+        );
+        f.gain = angle(&[("10s", [f64::NAN, 0.3])]);
+        assert_eq!(cost(&f), None);
+    }
+
+    #[test]
+    fn what_is_left_open_is_said_with_the_experiment_that_decides() {
+        let mut f = finding("gauss_markov", &[]);
+        assert_eq!(open_question(&f), None);
+        f.alternatives = vec![Alternative {
+            cause: "flicker".into(),
+            log_odds: -1.0,
+        }];
+        f.experiment = Some("a longer record.".into());
+        assert_eq!(
+            open_question(&f).unwrap(),
+            "This record cannot tell it from flicker. To decide: a longer record."
+        );
+    }
+}

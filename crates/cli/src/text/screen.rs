@@ -1,0 +1,184 @@
+//! A diagnosis on the first screen of a terminal: the verdict, one entry a cause, what is left, and the noise.
+
+use std::fmt::Write;
+
+use analysis::result::{Diagnosed, Diagnosis, Parameter, Unexplained, Verdict};
+use model::file::ModelFile;
+
+use super::{answer, item};
+
+/// Entries of what is left over that the first screen shows; the rest is counted.
+const SHOWN: usize = 4;
+/// Words of such an entry.
+const WORDS: usize = 28;
+
+/// A diagnosis, verdict first.
+#[must_use]
+pub fn diagnosis(diagnosed: &Diagnosed) -> String {
+    let d = &diagnosed.diagnosis;
+    let mut out = String::new();
+    let input = &d.input;
+    let _ = writeln!(
+        out,
+        "{}: {:.0} s at {:.4} Hz, {} samples",
+        input.file, input.seconds, input.rate_hz, input.samples
+    );
+    for note in &input.notes {
+        let _ = writeln!(out, "{}", item("note: ", note));
+    }
+    let _ = writeln!(out, "verdict  {}", verdict(d));
+    for (k, finding) in d.findings.iter().enumerate() {
+        let _ = writeln!(out, "\n{:>2}. {}", k + 1, lead(&answer::headline(finding)));
+        for line in [answer::cost(finding), answer::open_question(finding)]
+            .into_iter()
+            .flatten()
+        {
+            let _ = writeln!(out, "{}", item("", &line));
+        }
+        if finding.confirmed_on_held_out_data == Some(false) {
+            let not = "Detected in the whole run, not confirmed on held-out data.";
+            let _ = writeln!(out, "{}", item("", not));
+        }
+    }
+    write_unexplained(&mut out, &d.unexplained);
+    write_replicates(&mut out, d);
+    write_noise(&mut out, diagnosed);
+    write_rest(&mut out, d);
+    out
+}
+
+/// Whether simulations of the model that is handed over look like the record: one line.
+fn write_replicates(out: &mut String, d: &Diagnosis) {
+    let outside: Vec<String> = (d.replicates.iter())
+        .filter(|(_, r)| !r.after.holds())
+        .map(|(channel, r)| format!("{channel} ({})", r.after.strays()))
+        .collect();
+    if d.replicates.is_empty() {
+        return;
+    }
+    let said = match outside.is_empty() {
+        true => "simulations of this model look like the record on every channel".to_owned(),
+        false => format!("simulations of this model differ from the record: {}", outside.join("; ")),
+    };
+    let _ = writeln!(out, "\n{}", item("", &said).trim_start());
+}
+
+fn verdict(d: &Diagnosis) -> String {
+    let causes = |n: usize| match n {
+        1 => "1 cause".to_owned(),
+        n => format!("{n} causes"),
+    };
+    match (d.verdict, d.findings.len()) {
+        (Verdict::Adequate, _) => {
+            "adequate: white noise, random walk and a constant bias describe this record".into()
+        }
+        (Verdict::Extended, n) => format!("extended: the simulation lacks {}", causes(n)),
+        (Verdict::Unexplained, 0) => {
+            "unexplained: the record has structure that no known cause explains".into()
+        }
+        (Verdict::Unexplained, n) => format!(
+            "unexplained: the simulation lacks {}, and something is left that no known cause explains",
+            causes(n)
+        ),
+    }
+}
+
+/// A headline behind its number: wrapped like an item, without the indent of its first line.
+fn lead(text: &str) -> String {
+    item("", text).trim_start().to_owned()
+}
+
+fn write_unexplained(out: &mut String, all: &[Unexplained]) {
+    if all.is_empty() {
+        return;
+    }
+    let _ = writeln!(out, "\nleft over, without a name");
+    for left in all.iter().take(SHOWN) {
+        let lead = format!("{}: ", left.channel);
+        let _ = writeln!(out, "{}", item(&lead, &shortened(&left.what)));
+    }
+    if all.len() > SHOWN {
+        let more = all.len() - SHOWN;
+        let _ = writeln!(
+            out,
+            "    and {more} more (all of them: --json, or the report)"
+        );
+    }
+    let next = "Record again, twice as long: what comes again belongs to the sensor or the stand. The report shows where it lies.";
+    let _ = writeln!(out, "{}", item("", next));
+}
+
+fn shortened(what: &str) -> String {
+    let words: Vec<&str> = what.split_whitespace().collect();
+    match words.len() > WORDS {
+        true => format!("{} ...", words[..WORDS].join(" ")),
+        false => what.to_owned(),
+    }
+}
+
+/// N and K of every channel with their 95 % intervals, before and after where the causes change them.
+fn write_noise(out: &mut String, of: &Diagnosed) {
+    let channels: Vec<&str> = (of.extended_model.channels.iter())
+        .map(|c| c.name.as_str())
+        .collect();
+    if channels.is_empty() {
+        return;
+    }
+    let found = !of.diagnosis.findings.is_empty();
+    let title = if found {
+        "noise beside the causes"
+    } else {
+        "noise"
+    };
+    let _ = writeln!(out, "\n{title}, with 95 % intervals");
+    for name in channels {
+        let of_term = |term: &str| {
+            let after = baseline(&of.extended_model, name, term)?;
+            let before = baseline(&of.baseline_model, name, term);
+            Some(change(before, after))
+        };
+        for (letter, term) in [("N", "angle_random_walk"), ("K", "rate_random_walk")] {
+            if let Some(text) = of_term(term) {
+                let text = text.replace('\u{a0}', " ");
+                let _ = writeln!(out, "    {name}  {letter} {text}");
+            }
+        }
+    }
+}
+
+fn baseline<'a>(model: &'a ModelFile, channel: &str, term: &str) -> Option<&'a Parameter> {
+    let own = model.channels.iter().find(|c| c.name == channel)?;
+    own.baseline.get(term)
+}
+
+/// A parameter, and what it was before where it was clearly another.
+fn change(before: Option<&Parameter>, after: &Parameter) -> String {
+    let now = answer::level(after);
+    let error = after.std_error.unwrap_or(0.0).max(f64::MIN_POSITIVE);
+    match before {
+        Some(b) if (b.value - after.value).abs() > answer::HALF_WIDTH_95 * error => {
+            format!("{now}; without the causes {}", bare(b))
+        }
+        _ => now,
+    }
+}
+
+fn bare(p: &Parameter) -> String {
+    crate::report::plot::number(p.value, 3)
+}
+
+fn write_rest(out: &mut String, d: &Diagnosis) {
+    if !d.not_tested.is_empty() {
+        let mut causes: Vec<&str> = d.not_tested.iter().map(|n| n.cause.as_str()).collect();
+        causes.dedup();
+        let _ = writeln!(
+            out,
+            "\n{}",
+            item("not tested: ", &causes.join(", ")).trim_start()
+        );
+    }
+    let _ = writeln!(
+        out,
+        "--details: gains, failing checks, what was not tested, sizes that would have shown"
+    );
+}
