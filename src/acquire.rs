@@ -19,6 +19,8 @@ pub trait Sensors {
     fn gyros(&mut self) -> &mut [Adis16250<Self::Spi>; 3];
     /// The delay that goes with them.
     fn delay(&mut self) -> Self::Delay;
+    /// Slows SPI down to what a gyro of any sample period stands (1 MHz), or back to the sampling's own clock.
+    fn slow(&mut self, _slow: bool) {}
     /// All sampling instants have passed: from here on interruptions do no harm.
     fn sampled(&mut self) {}
     /// Starts the conversion of accelerometer output 0, 1 or 2 (x, y, z).
@@ -30,9 +32,10 @@ pub trait Sensors {
 /// Pause between two rounds over the gyros, us: a round takes about 33 us, a gyro wants 40 us.
 const ROUND_STALL_US: u32 = 12;
 
-/// Pause after a frame when one gyro is spoken to alone, us: 40 us from frame to frame, of which a frame takes 10 us.
-/// The data sheet's pace for slow sample periods is kept, as a gyro that has just been powered may have one.
-const FRAME_STALL_US: u32 = 100;
+/// Pause after a frame when one gyro is spoken to alone, us: 40 us from frame to frame, of which a frame takes 10 us, and 30 us
+/// between them; for slow sample periods 100 us, as a gyro that has just been powered may have one.
+const FAST_STALL_US: u8 = 32;
+const SLOW_STALL_US: u8 = 100;
 
 /// What one tick delivered, as it came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,7 +91,7 @@ pub enum Task {
     Read,
     /// Write a register, and read it back where it can be read.
     Write,
-    /// Bring range and filter of all three into line: `value` is SENS/AVG; the result is that of [`configure`].
+    /// Set a gyro up: `value` is SENS/AVG; the result is that of [`configure`].
     Configure,
 }
 
@@ -184,29 +187,35 @@ fn convert<S: Sensors>(sensors: &mut S, raw: &mut Raw, channel: u8) {
 
 /// Does a job, after the sample and before the next tick.
 pub fn work<S: Sensors>(sensors: &mut S, job: &Job, done: &mut Done) {
+    if matches!(job.task, Task::None) {
+        *done = Done::NONE;
+        return;
+    }
+    sensors.slow(true);
     (done.status, done.value) = match job.task {
         Task::None => (Status::Ok, 0),
-        Task::Configure => (Status::Ok, configure(sensors, job.value).into()),
-        Task::Read => reach(sensors, job),
-        Task::Write => match reach(sensors, job) {
+        Task::Configure => (Status::Ok, configure(sensors, job.axis, job.value).into()),
+        Task::Read => reach(sensors, job, SLOW_STALL_US),
+        Task::Write => match reach(sensors, job, SLOW_STALL_US) {
             (Status::Ok, value) if value != job.value => (Status::ReadBackWrong, value),
             reached => reached,
         },
     };
+    sensors.slow(false);
     done.task = job.task;
 }
 
 /// One frame with one gyro, and the pause that it wants after it.
 #[inline(never)]
-fn frame<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Option<Word> {
+fn frame<S: Sensors>(sensors: &mut S, axis: u8, command: Command, stall_us: u8) -> Option<Word> {
     let reply = exchange(sensors, axis, command);
-    sensors.delay().delay_us(FRAME_STALL_US);
+    sensors.delay().delay_us(stall_us.into());
     reply
 }
 
 /// Reads the job's register, after writing it where that is asked for. The value is 0 but for [`Status::Ok`].
 #[inline(never)]
-fn reach<S: Sensors>(sensors: &mut S, job: &Job) -> (Status, u16) {
+fn reach<S: Sensors>(sensors: &mut S, job: &Job, stall_us: u8) -> (Status, u16) {
     let (axis, address) = (job.axis, job.address & !1);
     let [low, high] = job.value.to_le_bytes();
     let read = Command::read_at(address);
@@ -223,15 +232,15 @@ fn reach<S: Sensors>(sensors: &mut S, job: &Job) -> (Status, u16) {
     }
     let value = (|| {
         if let Some((low, high)) = write.filter(|_| is_write) {
-            frame(sensors, axis, low)?;
-            frame(sensors, axis, high)?;
+            frame(sensors, axis, low, stall_us)?;
+            frame(sensors, axis, high, stall_us)?;
         }
         let Some(read) = read else {
             return Some(job.value);
         };
-        frame(sensors, axis, read)?;
+        frame(sensors, axis, read, stall_us)?;
         // The reply comes with any next frame; one that asks for ENDURANCE disturbs nothing.
-        frame(sensors, axis, Command::read(Register::Endurance)).map(Word::bits)
+        frame(sensors, axis, Command::read(Register::Endurance), stall_us).map(Word::bits)
     })();
     match value {
         Some(value) => (Status::Ok, value),
@@ -241,31 +250,56 @@ fn reach<S: Sensors>(sensors: &mut S, job: &Job) -> (Status, u16) {
 
 /// GYRO_SCALE as the parts leave the factory: 1.
 const FACTORY_SCALE: u16 = 0x0800;
+/// SMPL_PRD of 256 samples a second, the part's fastest and the only one that the firmware supports.
+pub const FASTEST: u16 = 1;
 
-/// Sets range and filter of all three gyros and reads them back; bits 0..=2 for each axis that does not read as written,
-/// bits 3..=5 for each whose GYRO_SCALE is not what the part was calibrated to.
+/// Sets a gyro up and reads it back; bit `axis` when a register does not read as written, bit `axis` + 3 when GYRO_SCALE is
+/// not what the part was calibrated to. A part that was used elsewhere may have kept anything: its sample period comes first,
+/// as the pace of all else hangs on it, then what would shift, flag or disturb the rate without a word.
 #[inline(never)]
-pub fn configure<S: Sensors>(sensors: &mut S, sens_avg: u16) -> u8 {
-    let (mut wrong, mut bit) = (0, 1);
-    for axis in 0..3 {
+pub fn configure<S: Sensors>(sensors: &mut S, axis: u8, sens_avg: u16) -> u8 {
+    let bit = 1u8.wrapping_shl(axis.into());
+    let mut stall_us = SLOW_STALL_US;
+    sensors.slow(true);
+    for (register, value) in [
+        (Register::SmplPrd, FASTEST),
+        (Register::SensAvg, sens_avg),
+        (Register::GyroOff, 0),
+        (Register::AlmCtrl, 0),
+        (Register::MscCtrl, 0),
+    ] {
         let job = Job {
             task: Task::Write,
             axis,
-            address: Register::SensAvg.address(),
-            value: sens_avg,
-        };
-        let scale = Job {
-            task: Task::Read,
-            address: Register::GyroScale.address(),
-            ..job
+            address: register.address(),
+            value,
         };
         // A gyro that does not answer has no value.
-        if reach(sensors, &job) != (Status::Ok, sens_avg) {
-            wrong |= bit;
-        } else if reach(sensors, &scale).1 & 0x0fff != FACTORY_SCALE {
-            wrong |= bit << 3;
+        if reach(sensors, &job, stall_us) != (Status::Ok, value) {
+            return bit;
         }
-        bit <<= 1;
+        // From here on it has its fastest sample period.
+        sensors.slow(false);
+        stall_us = FAST_STALL_US;
     }
+    let scale = Job {
+        task: Task::Read,
+        axis,
+        address: Register::GyroScale.address(),
+        value: 0,
+    };
+    if reach(sensors, &scale, stall_us).1 & 0x0fff != FACTORY_SCALE {
+        return bit << 3;
+    }
+    0
+}
+
+/// Sets all three up; their bits.
+pub fn configure_all<S: Sensors>(sensors: &mut S, sens_avg: u16) -> u8 {
+    let mut wrong = 0;
+    for axis in 0..3 {
+        wrong |= configure(sensors, axis, sens_avg);
+    }
+    sensors.slow(false);
     wrong
 }

@@ -1,6 +1,8 @@
 //! What the board is set to, and how it outlives a power cut: two copies in EEPROM, each with a generation and a
 //! CRC, of which the older one is overwritten. A cut at any byte leaves the other.
 
+use crate::acquire::FASTEST;
+use adis16250::{Filter, Range};
 use wire::fields::SetUp;
 use zerocopy::little_endian::{I32, U16, U32};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
@@ -29,8 +31,11 @@ pub struct Config {
     pub max_duty: u8,
 }
 
-/// 0.07326 deg/s for each count at the 320 deg/s range (data sheet), in Q8.24.
-pub const SCALE_320: i32 = 1_229_099;
+/// Largest scale, Q8.24 deg/s for each count: 0.25, more than three times that of the widest range. 2^13 counts times it are
+/// 2048 deg/s, which Q16.16 holds with room for any bias.
+pub const MAX_SCALE: i32 = (1 << 22) - 1;
+/// A bias is below this in magnitude, Q16.16 deg/s: 512 deg/s, more than the widest range.
+pub const BIAS_BOUND: i32 = 512 << 16;
 /// Fastest rate: 256 Hz, the gyro's own.
 pub const MIN_PERIOD: u16 = 976;
 /// A 16-bit timer of 4 us holds no more than 262 ms; slower rates take every n-th of its periods, n up to 4.
@@ -82,14 +87,8 @@ impl Config {
     /// The nominal scale of the range.
     #[inline(never)]
     pub fn set_scale_of_range(&mut self) {
-        let shift = match self.set_up.gyro_range {
-            4 => 0,
-            2 => 1,
-            _ => 2,
-        };
-        for scale in &mut self.set_up.scale {
-            scale.set(SCALE_320 >> shift);
-        }
+        let range = Range::from_code(self.set_up.gyro_range).unwrap_or_default();
+        self.set_up.scale = [I32::new(range.scale_q24()); 3];
     }
 
     /// SENS/AVG of the gyros.
@@ -104,14 +103,25 @@ impl Config {
     #[must_use]
     #[inline(never)]
     pub fn is_in_order(&self) -> bool {
-        let fewest_taps = match self.set_up.gyro_range {
-            4 => 0,
-            2 => 2,
-            1 => 4,
-            _ => return false,
+        let Some(range) = Range::from_code(self.set_up.gyro_range) else {
+            return false;
         };
-        self.set_up.gyro_filter >= fewest_taps
-            && self.set_up.gyro_filter <= 6
+        for (scale, bias) in self.set_up.scale.iter().zip(&self.set_up.bias) {
+            let (scale, bias) = (scale.get(), bias.get());
+            // Their high words tell: no comparison of four bytes with four.
+            let high = (bias >> 16) as i16;
+            const HIGH: i16 = (BIAS_BOUND >> 16) as i16;
+            if scale == 0
+                || (scale >> 16) as u16 > (MAX_SCALE >> 16) as u16
+                || high >= HIGH
+                || high < -HIGH
+            {
+                return false;
+            }
+        }
+        self.set_up.gyro_filter >= range.shortest_filter() as u8
+            && self.set_up.gyro_filter <= Filter::Taps64 as u8
+            && u16::from(self.set_up.gyro_sample_period) == FASTEST
             && self.set_up.acc_range <= 3
             && (MIN_PERIOD..=MAX_PERIOD).contains(&self.set_up.period_ticks.get())
             && (1..=MAX_PERIODS).contains(&self.set_up.periods_per_sample)
@@ -222,6 +232,45 @@ mod tests {
                     .unwrap()
                     .is_in_order()
             );
+        }
+    }
+
+    #[test]
+    fn scale_and_bias_are_bounded_so_that_no_rate_wraps() {
+        let with = |axis: usize, scale: i32, bias: i32| {
+            let mut config = Config::default();
+            config.set_up.scale[axis].set(scale);
+            config.set_up.bias[axis].set(bias);
+            config.is_in_order()
+        };
+        let usual = Range::Dps320.scale_q24();
+        for axis in 0..3 {
+            assert!(with(axis, 1, 0) && with(axis, MAX_SCALE, BIAS_BOUND - 1));
+            assert!(with(axis, usual, -BIAS_BOUND));
+            for scale in [0, -1, i32::MIN, MAX_SCALE + 1, i32::MAX] {
+                assert!(!with(axis, scale, 0), "{scale}");
+            }
+            for bias in [BIAS_BOUND, -BIAS_BOUND - 1, i32::MAX, i32::MIN] {
+                assert!(!with(axis, usual, bias), "{bias}");
+            }
+        }
+        // Counts have 14 bits.
+        for counts in [-8192, 8191] {
+            let exact = i64::from(counts) * i64::from(MAX_SCALE) >> 8;
+            let rate = adis16250::RateCounts(counts).dps_q16(MAX_SCALE);
+            assert!((i64::from(rate) - exact).abs() <= 1, "{rate} {exact}");
+            assert!(
+                rate.checked_sub(BIAS_BOUND).is_some() && rate.checked_add(BIAS_BOUND).is_some()
+            );
+        }
+    }
+
+    #[test]
+    fn a_sample_period_that_the_clock_does_not_suit_is_not_in_order() {
+        for period in [0, 2, 8, 0x81] {
+            let mut config = Config::default();
+            config.set_up.gyro_sample_period = period;
+            assert!(!config.is_in_order(), "{period:#04x}");
         }
     }
 

@@ -17,7 +17,7 @@ pub mod math;
 pub mod motor;
 pub mod stand;
 
-pub use acquire::{Done, Job, Raw, Sensors, Task, acquire, configure};
+pub use acquire::{Done, Job, Raw, Sensors, Task, acquire, configure_all};
 pub use stand::{Board, Stand};
 
 /// Length of a tick of the time stamps, ns: 16 MHz / 64 in timer 1.

@@ -92,9 +92,10 @@ mod tests {
 
     #[test]
     fn a_product_with_a_scale_is_exact_to_its_last_bit() {
+        let scale = adis16250::Range::Dps320.scale_q24();
         for counts in [0, 1, 68 << 8, u16::MAX] {
-            let exact = (i64::from(counts) * i64::from(crate::config::SCALE_320)) >> 16;
-            assert!((i64::from(scaled(counts, crate::config::SCALE_320)) - exact).abs() <= 1);
+            let exact = (i64::from(counts) * i64::from(scale)) >> 16;
+            assert!((i64::from(scaled(counts, scale)) - exact).abs() <= 1);
         }
     }
 }

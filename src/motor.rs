@@ -7,6 +7,9 @@ use crate::math::divide;
 pub const KEEP_ALIVE_MS: u8 = 200;
 /// Default ramp, command steps a second: from rest to full in half a second.
 pub const DEFAULT_RAMP_PER_S: u16 = 510;
+/// Milliseconds that it rests before it turns the other way, whatever the ramp: longer than a small motor's current takes to
+/// die away (some tenths of a millisecond to a millisecond), so that the bridge never reverses under current.
+const DEAD_MS: i8 = 3;
 /// Largest command.
 pub const FULL: i16 = 255;
 
@@ -26,6 +29,8 @@ pub struct Motor {
     output_q6: i16,
     /// The same in whole steps.
     output: i16,
+    /// Milliseconds until it may turn the other way, with the sign of the way that it turned.
+    dead: i8,
     max_duty: i16,
     /// Q6 steps a millisecond.
     ramp_q6: i16,
@@ -47,6 +52,7 @@ impl Motor {
             target: 0,
             output_q6: 0,
             output: 0,
+            dead: 0,
             max_duty: 0,
             ramp_q6: 0,
             shape: shape::STOP,
@@ -172,6 +178,15 @@ impl Motor {
     /// A millisecond has passed.
     #[inline(always)]
     pub fn on_millisecond(&mut self) {
+        if self.output > 0 {
+            self.dead = DEAD_MS;
+        } else if self.output < 0 {
+            self.dead = -DEAD_MS;
+        } else if self.dead > 0 {
+            self.dead = self.dead.wrapping_sub(1);
+        } else if self.dead < 0 {
+            self.dead = self.dead.wrapping_add(1);
+        }
         if !self.turns() {
             return;
         }
@@ -183,6 +198,9 @@ impl Motor {
             .min(self.ramp_q6)
             .max(self.ramp_q6.wrapping_neg());
         self.output_q6 = self.output_q6.wrapping_add(step);
+        if self.dead > 0 && self.output_q6 < 0 || self.dead < 0 && self.output_q6 > 0 {
+            self.output_q6 = 0;
+        }
         // Towards zero, as a division rounds.
         let round = if self.output_q6 < 0 { 63 } else { 0 };
         self.output = self.output_q6.wrapping_add(round) >> 6;
@@ -253,6 +271,40 @@ mod tests {
             highest = highest.max(before);
         }
         assert_eq!(highest, 100);
+    }
+
+    #[test]
+    fn it_rests_before_it_turns_the_other_way_whatever_the_ramp() {
+        for ramp in [510, 20_000, u16::MAX] {
+            let mut motor = motor(255, ramp);
+            let (mut way, mut rested, mut turns) = (0, 0, 0);
+            for ms in 0..4000 {
+                motor.command(if ms / 1000 % 2 == 0 { 255 } else { -255 });
+                motor.on_millisecond();
+                let now = motor.output().signum();
+                if now == 0 {
+                    rested += 1;
+                } else {
+                    if way == -now {
+                        assert!(rested >= DEAD_MS, "{rested} ms at ramp {ramp}");
+                        turns += 1;
+                    }
+                    (way, rested) = (now, 0);
+                }
+            }
+            assert_eq!(turns, 3);
+        }
+    }
+
+    #[test]
+    fn a_cut_does_not_shorten_the_rest() {
+        let mut motor = motor(255, u16::MAX);
+        motor.command(255);
+        (0..10).for_each(|_| motor.on_millisecond());
+        motor.cut();
+        motor.command(-255);
+        motor.on_millisecond();
+        assert_eq!(motor.output(), 0);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The board's work below the tick: scaling, framing, counting. What the PC asks for is in [`requests`].
 
+use adis16250::Register;
 use wire::fields::{Health, Reply, Sample};
 use wire::{Asked, Fault, RequestDecoder, Status, code, flags, kind, reset_cause};
 use zerocopy::{FromZeros, IntoBytes};
@@ -61,6 +62,8 @@ mod source {
     pub const SET: u8 = 3;
 }
 
+/// Less stack than this left at any time is counted with each health frame: an interrupt's worth.
+const STACK_GUARD: u16 = 32;
 /// Milliseconds from health frame to health frame.
 const HEALTH_MS: u16 = 1_000;
 /// Bits of what is owed to the host.
@@ -68,8 +71,11 @@ const HELLO: u8 = 1;
 const HEALTH: u8 = 2;
 /// The counters return to zero once the health frame has told them.
 const CLEAR: u8 = 4;
-/// SUPPLY_OUT of 4.75 V and 5.25 V at 1.8315 mV a count: the part's operating range (data sheet).
-const SUPPLY_COUNTS: core::ops::RangeInclusive<u16> = 2_594..=2_866;
+/// [`Stand::setting`] when all gyros are set up.
+const SET: u8 = 3;
+/// The flags of EA begin here.
+const ERROR_SHIFT: u8 = 3;
+const _: () = assert!(flags::error(0) == 1 << ERROR_SHIFT);
 /// Lengths on the line.
 const SAMPLE_LEN: u8 = wire::Sample::FRAME_LEN as u8;
 const REPLY_LEN: u8 = wire::Reply::FRAME_LEN as u8;
@@ -108,11 +114,19 @@ pub struct Stand {
     misconfigured: u8,
     /// The gyros have to be set up (anew).
     unset: bool,
+    /// The gyro that is being set up; [`SET`]: none.
+    setting: u8,
+    /// Bit per axis: has not read back since the first of them.
+    wrong: u8,
+    /// Bit per axis: its STATUS has been read in this second.
+    cleared: u8,
+    /// What the sensors' noise has come to, and the nonce that arms the motor; 0: none.
+    noise: u32,
+    nonce: u16,
     /// Who waits for the work on the gyros that is under way.
     job: Pending,
     self_test: requests::SelfTest,
     null: Pending,
-    null_samples: u16,
     millisecond: u16,
     /// [`HELLO`], [`HEALTH`], [`CLEAR`]: to be sent as soon as there is room.
     owed: u8,
@@ -140,10 +154,14 @@ impl Stand {
             silent: 0,
             misconfigured: 0,
             unset: false,
+            setting: 0,
+            wrong: 0,
+            cleared: 0,
+            noise: 0,
+            nonce: 0,
             job: Pending::NONE,
             self_test: requests::SelfTest::new(),
             null: Pending::NONE,
-            null_samples: 0,
             millisecond: 0,
             owed: 0,
             late: 0,
@@ -192,10 +210,11 @@ impl Stand {
         self.config.sens_avg()
     }
 
-    /// What [`crate::configure`] returned at start; says hello.
+    /// What [`crate::configure_all`] returned at start; says hello.
     pub fn started<B: Board>(&mut self, board: &mut B, misconfigured: u8) {
         self.unset = false;
-        self.note_configured(misconfigured);
+        self.setting = SET;
+        self.note_configured(7, misconfigured);
         self.tell(board, HELLO);
     }
 
@@ -229,22 +248,24 @@ impl Stand {
         sample.seq.set(self.take_seq(1));
         sample.t_ticks.set(raw.t_ticks);
         sample.pwm.set(self.motor.output());
-        let (mut silent, mut bit) = (0, 1);
+        let (mut silent, mut bit, mut noise) = (0, 1, 0);
         for axis in 0..3 {
             let gyro = self.gyro(axis, bit, raw, &mut sample);
             if gyro & flags::GYRO_NOT_ANSWERING != 0 {
                 silent |= bit;
             }
             seen |= gyro | self.accelerometer(axis, bit, raw, &mut sample);
+            noise ^= raw.gyro[axis as usize].bits() as u8;
             bit <<= 1;
         }
-        self.look_after_gyros(board, silent);
-        if self.misconfigured & !silent != 0 {
+        self.noise = wire::crc::update(self.noise, noise);
+        self.look_after_gyros(board, silent, (seen >> ERROR_SHIFT) as u8 & 7);
+        if self.misconfigured & !silent != 0 || self.setting != SET {
             seen |= flags::GYRO_MISCONFIGURED;
         }
         seen |= self.supply(silent, raw, &mut sample);
         if !self.null.is_none() {
-            let in_order = seen & flags::IN_ORDER == flags::IN_ORDER;
+            let in_order = seen == flags::IN_ORDER;
             seen |= flags::BIAS_NULL;
             self.step_bias_null(board, in_order, &sample);
         }
@@ -269,26 +290,61 @@ impl Stand {
         }
     }
 
-    /// A gyro that answers again may have lost its set-up with its power.
-    fn look_after_gyros<B: Board>(&mut self, board: &mut B, silent: u8) {
+    /// A gyro that answers again may have lost its set-up with its power; one that raises its error or alarm bit, bit per
+    /// axis in `errors`, keeps it up until its STATUS is read.
+    #[inline(never)]
+    fn look_after_gyros<B: Board>(&mut self, board: &mut B, silent: u8, errors: u8) {
         let back = self.silent & !silent;
         self.silent = silent;
         if back != 0 {
             self.record_each(Fault::GyroRecoveredX, back);
             self.unset = true;
         }
-        if self.unset && self.job.is_none() && board.post(self.configure_job()) {
-            self.unset = false;
+        if !self.job.is_none() {
+            return;
+        }
+        if self.unset {
+            if self.configure(board, 0) {
+                self.unset = false;
+                self.job.code = Pending::OWN;
+            }
+            return;
+        }
+        let uncleared = errors & !self.cleared;
+        if uncleared == 0 {
+            return;
+        }
+        // The lowest of them.
+        let (mut axis, mut bit) = (0, 1);
+        while uncleared & bit == 0 {
+            axis += 1;
+            bit <<= 1;
+        }
+        let job = Job {
+            task: Task::Read,
+            axis,
+            address: Register::Status.address(),
+            value: 0,
+        };
+        if board.post(job) {
+            self.cleared |= bit;
             self.job.code = Pending::OWN;
         }
     }
 
-    fn configure_job(&self) -> Job {
-        Job {
+    /// Has a gyro set up in the next slot; the others follow, each in its own.
+    #[inline(never)]
+    fn configure<B: Board>(&mut self, board: &mut B, axis: u8) -> bool {
+        let posted = board.post(Job {
             task: Task::Configure,
+            axis,
             value: self.config.sens_avg(),
-            ..Job::default()
+            address: 0,
+        });
+        if posted {
+            self.setting = axis;
         }
+        posted
     }
 
     /// Counts a fault of each axis that has its bit set.
@@ -364,7 +420,7 @@ impl Stand {
             if silent & bit == 0 {
                 let counts = word.unsigned_12();
                 sample.supply.set(counts);
-                if SUPPLY_COUNTS.contains(&counts) {
+                if word.supply().is_in_range() {
                     return 0;
                 }
                 self.record(Fault::SupplyOutOfRange, 0);
@@ -375,21 +431,33 @@ impl Stand {
         0
     }
 
-    /// Only samples in order count: a gyro that is silent or stale would be averaged as if it were at rest.
     #[inline(never)]
     fn step_bias_null<B: Board>(&mut self, board: &mut B, in_order: bool, sample: &Sample) {
-        let moving =
-            self.motor.is_on() || in_order && self.bias_null.take(&sample.gyro) == Outcome::Moving;
-        if moving || self.bias_null.have() >= self.null_samples {
-            let status = if !moving && self.take_biases() {
-                Status::Ok
-            } else {
-                self.answer.zero();
-                Status::Moving
-            };
-            let asked = core::mem::replace(&mut self.null, Pending::NONE);
-            self.reply(board, asked, status);
+        let outcome = if self.motor.is_on() {
+            Outcome::Moving
+        } else {
+            self.bias_null.take(&sample.gyro, in_order)
+        };
+        let status = match outcome {
+            Outcome::GoesOn => return,
+            Outcome::NotInOrder => Status::NotAnswering,
+            Outcome::Done if self.take_biases() => Status::Ok,
+            _ => Status::Moving,
+        };
+        self.end_bias_null(board, status);
+    }
+
+    /// The reply to the bias measurement that is under way, if one is.
+    #[inline(never)]
+    fn end_bias_null<B: Board>(&mut self, board: &mut B, status: Status) {
+        if self.null.is_none() {
+            return;
         }
+        if !matches!(status, Status::Ok) {
+            self.answer.zero();
+        }
+        let asked = core::mem::replace(&mut self.null, Pending::NONE);
+        self.reply(board, asked, status);
     }
 
     /// The means become the biases; false, and nothing changed, when the stand turns.
@@ -449,6 +517,7 @@ impl Stand {
         self.millisecond = self.millisecond.wrapping_add(1);
         if self.millisecond >= HEALTH_MS {
             self.millisecond = 0;
+            self.cleared = 0;
             // What does not read back is tried anew each second.
             self.unset |= self.misconfigured & !self.silent != 0;
             self.health
@@ -515,7 +584,11 @@ impl Stand {
             }
         }
         if self.owed & HEALTH != 0 && self.may_report(board, HEALTH_LEN) {
-            self.health.stack_free.set(board.stack_free());
+            let stack_free = board.stack_free();
+            self.health.stack_free.set(stack_free);
+            if stack_free < STACK_GUARD {
+                self.record(Fault::StackLow, 0);
+            }
             if board.send(kind::HEALTH, self.health.as_bytes()) {
                 if self.owed & CLEAR != 0 {
                     self.health.faults.zero();
@@ -531,17 +604,19 @@ impl Stand {
         (self.since_report, self.late) = (0, 0);
     }
 
+    /// What has come of setting up the gyros that have their bit in `axes`.
     #[inline(never)]
-    fn note_configured(&mut self, wrong: u8) {
+    fn note_configured(&mut self, axes: u8, wrong: u8) {
         let now = (wrong | wrong >> 3) & 7;
-        self.record_each(Fault::GyroRecoveredX, self.misconfigured & !now);
-        self.misconfigured = now;
+        self.record_each(Fault::GyroRecoveredX, self.misconfigured & axes & !now);
+        self.misconfigured = self.misconfigured & !axes | now;
         self.record_each(Fault::GyroRegisterMismatchX, wrong);
         self.record_each(Fault::GyroScaleImpossibleX, wrong >> 3);
     }
 
     #[inline(never)]
     fn apply<B: Board>(&mut self, board: &mut B) {
+        self.end_bias_null(board, Status::Aborted);
         self.motor
             .limit(self.config.max_duty, self.config.ramp_per_s.get());
         board.set_motor(0);

@@ -3,7 +3,7 @@
 #include "serial.h"
 
 /* CRC-32C, reflected, bit by bit; the carry that C lacks makes a third of the cycles. The Rust image has the same. */
-static uint32_t __attribute__((noinline)) update(uint32_t crc, uint8_t byte)
+uint32_t __attribute__((noinline)) crc_update_byte(uint32_t crc, uint8_t byte)
 {
     uint8_t left = 8;
     crc ^= byte;
@@ -26,7 +26,7 @@ static uint32_t __attribute__((noinline)) update(uint32_t crc, uint8_t byte)
 uint32_t crc_update(uint32_t crc, const void *bytes, uint8_t length)
 {
     for (const uint8_t *at = bytes; length; length--)
-        crc = update(crc, *at++);
+        crc = crc_update_byte(crc, *at++);
     return crc;
 }
 
@@ -53,7 +53,7 @@ bool frame_send(uint8_t kind, void *payload, uint8_t length)
             from = (const uint8_t *)&tail;
         }
         uint8_t byte = *from++;
-        crc = update(crc, byte);
+        crc = crc_update_byte(crc, byte);
         if (byte) {
             serial_put(at, byte);
             code++;
@@ -106,7 +106,7 @@ enum received frame_receive(uint8_t byte)
         broken = true;
     } else if (!broken) {
         frame_incoming.bytes[length++] = content;
-        crc = update(crc, content);
+        crc = crc_update_byte(crc, content);
     }
     return RECEIVED_NOTHING;
 }

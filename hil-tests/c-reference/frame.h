@@ -11,6 +11,7 @@
 #define CRC_RESIDUE 0xb798b438UL
 
 /* The CRC's register after `length` more bytes. */
+uint32_t crc_update_byte(uint32_t crc, uint8_t byte);
 uint32_t crc_update(uint32_t crc, const void *bytes, uint8_t length);
 
 /* Queues a payload, which begins with its header; false, and nothing queued, when there is no room. */

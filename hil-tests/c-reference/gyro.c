@@ -7,8 +7,10 @@
 #include "wire.h"
 
 #define WRITE 0x80
-/* From frame to frame, at any sample period. */
-#define PAUSE_US 100
+/* Behind a frame, at a fast sample period and at any. */
+#define FAST_PAUSE_US 32
+#define SLOW_PAUSE_US 100
+static bool fast;
 
 /* GYRO_SCALE as the parts leave the factory: 1. */
 #define FACTORY_SCALE 0x0800
@@ -24,10 +26,19 @@ static const uint8_t __flash access[32] = {
     [0x3e / 2] = WRITABLE,
 };
 
+static void set_pace(bool is_fast)
+{
+    fast = is_fast;
+    sensors_slow(!is_fast);
+}
+
 static bool frame(uint8_t axis, uint8_t address, uint8_t value, uint16_t *reply)
 {
     bool done = sensors_exchange(axis, address, value, reply);
-    _delay_us(PAUSE_US);
+    if (fast)
+        _delay_us(FAST_PAUSE_US);
+    else
+        _delay_us(SLOW_PAUSE_US);
     return done;
 }
 
@@ -65,25 +76,44 @@ static uint8_t work_on_register(struct gyro_job *job)
     return is_write && job->value != wanted ? STATUS_READ_BACK_WRONG : STATUS_OK;
 }
 
-uint8_t gyro_configure(uint16_t sens_avg)
+/* Bit axis: a register does not read as written; bit axis + 3: GYRO_SCALE is not what the part was calibrated to. */
+static uint8_t configure(uint8_t axis, uint16_t sens_avg)
+{
+    /* The sample period comes first: the pace of all else hangs on it. */
+    const struct {
+        uint8_t address;
+        uint16_t value;
+    } wanted[] = {{SMPL_PRD, GYRO_FASTEST}, {SENS_AVG, sens_avg}, {GYRO_OFF, 0}, {ALM_CTRL, 0}, {MSC_CTRL, 0}};
+    uint16_t value;
+    set_pace(false);
+    for (uint8_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+        if (!write(axis, wanted[i].address, wanted[i].value) || !read(axis, wanted[i].address, &value) ||
+            value != wanted[i].value)
+            return (uint8_t)(1 << axis);
+        set_pace(true); /* from here on it has its fastest sample period */
+    }
+    if (!read(axis, GYRO_SCALE, &value) || (value & 0x0fff) != FACTORY_SCALE)
+        return (uint8_t)(8 << axis);
+    return 0;
+}
+
+uint8_t gyro_configure_all(uint16_t sens_avg)
 {
     uint8_t wrong = 0;
-    for (uint8_t axis = 0; axis < 3; axis++) {
-        uint16_t value;
-        if (!write(axis, SENS_AVG, sens_avg) || !read(axis, SENS_AVG, &value) || value != sens_avg)
-            wrong |= (uint8_t)(1 << axis);
-        else if (!read(axis, GYRO_SCALE, &value) || (value & 0x0fff) != FACTORY_SCALE)
-            wrong |= (uint8_t)(8 << axis);
-    }
+    for (uint8_t axis = 0; axis < 3; axis++)
+        wrong |= configure(axis, sens_avg);
+    set_pace(true);
     return wrong;
 }
 
 void gyro_work(struct gyro_job *job)
 {
+    set_pace(false);
     if (job->what == JOB_CONFIGURE) {
-        job->value = gyro_configure(job->value);
+        job->value = configure(job->axis, job->value);
         job->status = STATUS_OK;
-        return;
+    } else {
+        job->status = work_on_register(job);
     }
-    job->status = work_on_register(job);
+    set_pace(true);
 }

@@ -9,8 +9,11 @@ enum gyro_register {
     SUPPLY_OUT = 0x02,
     GYRO_OUT = 0x04,
     TEMP_OUT = 0x0c,
+    GYRO_OFF = 0x14,
     GYRO_SCALE = 0x16,
+    ALM_CTRL = 0x28,
     MSC_CTRL = 0x34,
+    SMPL_PRD = 0x36,
     SENS_AVG = 0x38,
     GYRO_STATUS = 0x3c,
     GYRO_COMMAND = 0x3e,
@@ -28,6 +31,8 @@ struct gyro_job {
 };
 
 void gyro_work(struct gyro_job *job);
-/* Sets range and filter of all three and reads them back; bits 0..2 for each axis that does not read as written, bits 3..5
- * for each whose GYRO_SCALE is not what the part was calibrated to. */
-uint8_t gyro_configure(uint16_t sens_avg);
+/* SMPL_PRD of 256 samples a second. */
+#define GYRO_FASTEST 1
+/* Sets all three up and reads back; bits 0..2 for each axis that does not read as written, bits 3..5 for each whose
+ * GYRO_SCALE is not what the part was calibrated to. */
+uint8_t gyro_configure_all(uint16_t sens_avg);

@@ -31,6 +31,17 @@ pub fn busy_max(script: &Script) -> u16 {
     healths.max().unwrap_or(0)
 }
 
+/// The nonce that the board told last; 0 before it has told one.
+pub fn nonce(line: &[u8]) -> u16 {
+    let mut decoder = Decoder::new();
+    let frames = line.iter().filter_map(|&byte| decoder.push(byte));
+    let told = frames.filter_map(|frame| match frame {
+        Ok(Frame::Reply(reply)) if reply.command == wire::code::ARM => Some(reply.value as u16),
+        _ => None,
+    });
+    told.last().unwrap_or(0)
+}
+
 /// What came over the line, frame by frame, without what depends on the image's speed and stack.
 pub fn frames(line: &[u8]) -> Vec<String> {
     let whole = line.split_inclusive(|&byte| byte == 0);

@@ -15,10 +15,8 @@
 
 static void take_bytes(void)
 {
-    for (uint8_t left = BYTES_PER_PASS; left && stand_listens(); left--) {
+    for (uint8_t left = BYTES_PER_PASS; left && serial_has_received() && stand_listens(); left--) {
         int16_t byte = serial_receive();
-        if (byte < 0)
-            return;
         if (console_takes((uint8_t)byte))
             continue;
         switch (frame_receive((uint8_t)byte)) {
@@ -42,7 +40,7 @@ int main(void)
     serial_start();
     sensors_start();
     stand_boot();
-    stand_started(gyro_configure(config_sens_avg()));
+    stand_started(gyro_configure_all(config_sens_avg()));
     tick_start();
     sei();
     for (;;) {
@@ -67,6 +65,6 @@ int main(void)
             ticked = passed = false;
         }
         serial_work();
-        tick_sleep_until_work(stand_listens());
+        tick_sleep_until_work(!serial_has_received() || stand_listens());
     }
 }

@@ -3,6 +3,9 @@
 #include <stdlib.h>
 
 static int16_t target, output_q6, output, max_duty, ramp_q6, amplitude, offset;
+/* Rest before it turns the other way, ms. */
+#define DEAD_MS 3
+static int8_t dead; /* left of it, with the sign of the way that it turned */
 static uint32_t phase, phase_per_ms; /* of a period, in 2^-32 */
 static uint8_t shape, cycles;
 
@@ -100,10 +103,20 @@ void motor_cut(void)
 
 void motor_on_millisecond(void)
 {
+    if (output > 0)
+        dead = DEAD_MS;
+    else if (output < 0)
+        dead = -DEAD_MS;
+    else if (dead > 0)
+        dead--;
+    else if (dead < 0)
+        dead++;
     if (!motor_is_on())
         return;
     if (shape != SHAPE_STOP)
         step_profile();
     output_q6 = (int16_t)(output_q6 + clamp((int16_t)(target * 64 - output_q6), ramp_q6));
+    if ((dead > 0 && output_q6 < 0) || (dead < 0 && output_q6 > 0))
+        output_q6 = 0;
     output = output_q6 / 64;
 }

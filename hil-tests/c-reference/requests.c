@@ -36,6 +36,7 @@ static uint8_t arguments_of(uint8_t code)
     case CODE_SET_BAUD ... CODE_SET_GYRO:
     case CODE_BIAS_NULL:
     case CODE_MOTOR_DUTY:
+    case CODE_ARM:
     case CODE_READ_REGISTER:
     case CODE_SET_BOARD_ID:
         return 2;
@@ -93,15 +94,35 @@ static uint8_t begin_self_test(const struct request *request)
 
 static uint8_t begin_bias_null(const struct request *request)
 {
-    if (request->u16 < BIAS_MIN_SAMPLES || request->u16 > BIAS_MAX_SAMPLES)
-        return STATUS_BAD_ARGUMENT;
     if (stand_null.code)
         return STATUS_BUSY;
+    if (!bias_begin(request->u16, config.set_up.gyro_filter, config.set_up.period_ticks))
+        return STATUS_BAD_ARGUMENT;
     if (motor_is_on())
         return STATUS_MOVING;
-    stand_null_samples = request->u16;
-    bias_begin();
     return pend(&stand_null, request);
+}
+
+/* A measurement of the bias mixes what was before with what is now. */
+static void set_up_changes(void)
+{
+    stand_end_bias_null(STATUS_ABORTED);
+}
+
+/* Without a nonce: makes one of the sensors' noise so far and tells it. With that one, once: the host is there. */
+static uint8_t arm(uint16_t said)
+{
+    static uint16_t told;
+    uint16_t nonce = told;
+    stand_miss_host();
+    told = 0;
+    if (said == 0)
+        stand_answer.value = told = (uint16_t)stand_noise | 1;
+    else if (said == nonce)
+        tick_keep_alive();
+    else
+        return STATUS_BAD_ARGUMENT;
+    return STATUS_OK;
 }
 
 static uint8_t carry_out(const struct request *request)
@@ -115,6 +136,8 @@ static uint8_t carry_out(const struct request *request)
         return STATUS_OK;
     case CODE_KEEP_ALIVE:
         stand_miss_host();
+        if (!tick_host_is_there())
+            return STATUS_NO_KEEP_ALIVE;
         tick_keep_alive();
         return STATUS_OK;
     case CODE_COUNTERS:
@@ -134,6 +157,7 @@ static uint8_t carry_out(const struct request *request)
             every = 1;
         if (!config_rate_in_order(request->rate.period_ticks, every))
             return STATUS_BAD_ARGUMENT;
+        set_up_changes();
         set_up->period_ticks = request->rate.period_ticks;
         set_up->periods_per_sample = every;
         tick_set_period(set_up->period_ticks, every);
@@ -142,6 +166,7 @@ static uint8_t carry_out(const struct request *request)
     case CODE_SET_BAUD:
         if (!config_baud_in_order(request->u16))
             return STATUS_BAD_ARGUMENT;
+        set_up_changes();
         set_up->baud_divisor = request->u16;
         changed();
         stand_reply(CODE_SET_BAUD, request->number, STATUS_OK);
@@ -151,31 +176,41 @@ static uint8_t carry_out(const struct request *request)
         uint8_t range = request->gyro.range, filter = request->gyro.filter;
         if (!config_gyro_in_order(range, filter))
             return STATUS_BAD_ARGUMENT;
-        uint8_t status = post(request, JOB_CONFIGURE, 0, 0, (uint16_t)(range << 8 | filter));
-        if (status == LATER) {
-            set_up->gyro_range = range;
-            set_up->gyro_filter = filter;
-            config_set_scale_of_range();
-            changed();
+        /* Whether it is busy or not: as the measurement would go on with the set-up that is asked for. */
+        set_up_changes();
+        if (stand_job.code)
+            return STATUS_BUSY;
+        uint8_t range_was = set_up->gyro_range, filter_was = set_up->gyro_filter;
+        set_up->gyro_range = range;
+        set_up->gyro_filter = filter;
+        if (!stand_configure(0)) {
+            set_up->gyro_range = range_was;
+            set_up->gyro_filter = filter_was;
+            return STATUS_BUSY;
         }
-        return status;
+        config_set_scale_of_range();
+        changed();
+        return pend(&stand_job, request);
     }
     case CODE_SET_ACC_RANGE:
         if (request->u8 > 3)
             return STATUS_BAD_ARGUMENT;
+        set_up_changes();
         set_up->acc_range = request->u8;
         sensors_set_acc_range(request->u8);
         return changed();
     case CODE_BIAS_NULL:
         return begin_bias_null(request);
     case CODE_SET_BIAS:
-        if (request->axis.axis > 2)
+        if (request->axis.axis > 2 || !config_bias_in_order(request->axis.value))
             return STATUS_BAD_ARGUMENT;
+        set_up_changes();
         set_up->bias[request->axis.axis] = request->axis.value;
         return changed();
     case CODE_SET_SCALE:
-        if (request->axis.axis > 2 || request->axis.value <= 0)
+        if (request->axis.axis > 2 || !config_scale_in_order(request->axis.value))
             return STATUS_BAD_ARGUMENT;
+        set_up_changes();
         set_up->scale[request->axis.axis] = request->axis.value;
         return changed();
     case CODE_MOTOR_DUTY:
@@ -197,6 +232,8 @@ static uint8_t carry_out(const struct request *request)
         config.ramp_per_s = request->limits.ramp_per_s;
         motor_limit(config.max_duty, config.ramp_per_s);
         return changed();
+    case CODE_ARM:
+        return arm(request->u16);
     case CODE_READ_REGISTER:
         return post(request, JOB_READ, request->reg.gyro, request->reg.address, 0);
     case CODE_WRITE_REGISTER:
@@ -277,9 +314,20 @@ void requests_on_sample(void)
         return;
     uint16_t value = done->value;
     uint8_t status = done->status;
+    static uint8_t wrong; /* bit per axis: has not read back since the first of them */
+    if (done->what == JOB_CONFIGURE) {
+        stand_note_configured((uint8_t)(1 << stand_setting), (uint8_t)value);
+        if (stand_setting == 0)
+            wrong = 0;
+        wrong |= value & 7;
+        uint8_t next = stand_setting + 1;
+        /* The slot is free: this was the job in it. */
+        if (next != SET && stand_configure(next))
+            return;
+        stand_setting = SET;
+    }
     switch (stand_job.code) {
     case CODE_OWN:
-        stand_note_configured((uint8_t)value);
         stand_job.code = 0;
         return;
     case CODE_SELF_TEST:
@@ -288,8 +336,7 @@ void requests_on_sample(void)
             return;
         break;
     case CODE_SET_GYRO:
-        stand_note_configured((uint8_t)value);
-        value &= 7;
+        value = wrong;
         if (value)
             status = STATUS_READ_BACK_WRONG;
         /* fall through */

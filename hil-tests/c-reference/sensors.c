@@ -10,7 +10,7 @@
 #define SELECTS (_BV(PB2) | _BV(PB3) | _BV(PB4))
 /* Master, mode 3; with SPI2X clock / 8 = 2 MHz, below the part's 2.5 MHz. */
 #define SPCR_MASTER (_BV(SPE) | _BV(MSTR) | _BV(CPOL) | _BV(CPHA) | _BV(SPR0))
-/* Polls: a byte takes 64 cycles, a conversion 1664, the first of a tick 3200. */
+/* Polls: a byte takes 64 cycles, 128 at the slow clock, a conversion 1664, the first of a tick 3200. */
 #define SPI_BUDGET 60
 #define ADC_BUDGET 1000
 /* Clock / 128 = 125 kHz. */
@@ -23,7 +23,6 @@ void sensors_start(void)
 {
     PORTB = SELECTS | _BV(PB7);
     DDRB = SELECTS | _BV(PB5) | _BV(PB7);
-    SPSR = _BV(SPI2X);
     SPCR = SPCR_MASTER;
     DDRA = 0;
     PORTA = 0;
@@ -36,6 +35,11 @@ void sensors_start(void)
 void sensors_set_acc_range(uint8_t range)
 {
     DDRC = ~range & (_BV(PC0) | _BV(PC1));
+}
+
+void sensors_slow(bool slow)
+{
+    SPSR = slow ? 0 : _BV(SPI2X);
 }
 
 static bool transfer(uint8_t out, uint8_t *in)

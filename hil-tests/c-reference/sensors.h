@@ -22,5 +22,7 @@ void sensors_start(void);
 void sensors_acquire(struct raw *raw, void (*sampled)(void));
 /* A frame to a gyro: sends a command, brings the reply to the one before; false when a byte does not end. */
 bool sensors_exchange(uint8_t axis, uint8_t address, uint8_t value, uint16_t *reply);
+/* SPI at 1 MHz, which a gyro of any sample period stands, or at the sampling's own clock. */
+void sensors_slow(bool slow);
 /* g-select: 0..3 for 1.5, 2, 4, 6 g. */
 void sensors_set_acc_range(uint8_t range);

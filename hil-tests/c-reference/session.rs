@@ -11,6 +11,7 @@ use wire::{Command, Shape, code, encode_request, kind};
 mod hearing;
 #[path = "script.rs"]
 mod script;
+use hearing::nonce;
 pub use hearing::{busy_max, frames, jitter};
 pub use script::Script;
 use script::spread;
@@ -21,6 +22,8 @@ const MILLISECOND: u64 = CLOCK_HZ as u64 / 1_000;
 enum Deed {
     Send(Vec<u8>),
     SendWithoutStopBit(u8),
+    /// The answer with the nonce that the board has told, under this number.
+    Arm(u16),
     /// The stand comes to rest, or moves again.
     Quiet(bool),
     /// From here on the ticks' phase means nothing: a reset comes.
@@ -75,9 +78,13 @@ fn plain_commands() -> Vec<(u8, [u8; 8])> {
     }
     ask(code::SET_SCALE, &[0, 0, 0, 0, 0]);
     ask(code::SET_SCALE, &[0, 0, 0, 0, 0x80]);
-    // Far out of range, so that the rate saturates.
-    ask(code::SET_BIAS, &[1, 0, 0, 0, 0x80]);
-    ask(code::SET_BIAS, &[2, 0xFF, 0xFF, 0xFF, 0x7F]);
+    ask(code::SET_SCALE, &[0, 0, 0, 0x40, 0]);
+    ask(code::SET_SCALE, &[0, 0xFF, 0xFF, 0x3F, 0]);
+    // Out of range, and at its ends.
+    for high in [0x0200, 0x01FF, 0xFDFF, 0xFE00, 0x7FFF, 0x8000u16] {
+        let [low, high] = high.to_le_bytes();
+        ask(code::SET_BIAS, &[1, 0, 0, low, high]);
+    }
     ask(code::SET_RATE, &[0xCF, 0x03, 0]);
     ask(code::SET_RATE, &[0x25, 0xF4, 0]);
     ask(code::SET_RATE, &[0x51, 0xC3, 5]);
@@ -143,7 +150,7 @@ fn deeds() -> Vec<(u64, Deed)> {
                 range: 2,
                 filter: 4,
             },
-            200,
+            300,
         ),
         (
             Command::SetGyro {
@@ -157,14 +164,14 @@ fn deeds() -> Vec<(u64, Deed)> {
                 range: 4,
                 filter: 2,
             },
-            195,
+            395,
         ),
         (
             Command::SetGyro {
                 range: 4,
                 filter: 2,
             },
-            200,
+            300,
         ),
         (
             Command::ReadRegister {
@@ -268,6 +275,9 @@ fn deeds() -> Vec<(u64, Deed)> {
         raw_request(next(), code::READ_REGISTER, [3, 0x38, 0, 0, 0, 0, 0, 0]),
     ));
     at += 100;
+    // z does not keep its filter: the set-up that it has from the factory, so that what follows finds all in order.
+    all.push((at, request(next(), Command::DefaultConfig)));
+    at += 500;
     // The motor: refused, driven, limited, left alone; profiles of all shapes.
     let alive =
         |all: &mut Vec<(u64, Deed)>, from: u64, ms: u64, number: &mut dyn FnMut() -> u16| {
@@ -275,6 +285,15 @@ fn deeds() -> Vec<(u64, Deed)> {
                 all.push((from + keep * 100, request(number(), Command::KeepAlive)));
             }
         };
+    // Keep-alives alone do not arm it, nor does a nonce that nobody told, which spoils the one that was; nor one twice.
+    all.push((at, request(next(), Command::KeepAlive)));
+    all.push((at + 50, request(next(), Command::Arm { nonce: 0 })));
+    all.push((at + 100, request(next(), Command::Arm { nonce: 2 })));
+    all.push((at + 150, Deed::Arm(next())));
+    all.push((at + 200, request(next(), Command::Arm { nonce: 0 })));
+    all.push((at + 250, Deed::Arm(next())));
+    all.push((at + 300, Deed::Arm(next())));
+    at += 350;
     for (command, ms) in [
         (Command::MotorDuty { duty: 200 }, 700),
         (Command::MotorDuty { duty: -255 }, 1300),
@@ -286,7 +305,7 @@ fn deeds() -> Vec<(u64, Deed)> {
             200,
         ),
         (Command::MotorDuty { duty: 200 }, 600),
-        (Command::BiasNull { samples: 4 }, 100),
+        (Command::BiasNull { samples: 24 }, 100),
         (
             Command::MotorLimits {
                 max_duty: 255,
@@ -331,13 +350,21 @@ fn deeds() -> Vec<(u64, Deed)> {
     }
     at += 500;
     // Bias: moving, then at rest, and another one meanwhile.
-    all.push((at, request(next(), Command::BiasNull { samples: 10 })));
+    all.push((at, request(next(), Command::BiasNull { samples: 24 })));
     at += 200;
     all.push((at, Deed::Quiet(true)));
     at += 100;
     all.push((at, request(next(), Command::BiasNull { samples: 33 })));
     all.push((at + 50, request(next(), Command::BiasNull { samples: 33 })));
     at += 2500;
+    // Broken off by what changes what it measures.
+    all.push((at, request(next(), Command::BiasNull { samples: 33 })));
+    let to = Command::SetBias {
+        axis: wire::Axis::X,
+        value: 5,
+    };
+    all.push((at + 200, request(next(), to)));
+    at += 250;
     all.push((at, Deed::Quiet(false)));
     at += 50;
     // EEPROM: store twice, spoil the newer, load; store, and spoil both.
@@ -362,7 +389,10 @@ fn deeds() -> Vec<(u64, Deed)> {
         all.push((at + 150, request(next(), Command::GetHello)));
         at += 500;
     }
-    // Fast: 256 Hz at 250 kBd, with everything going on; slow: 1 Hz.
+    // Fast: 256 Hz at 250 kBd, with everything going on; slow: 1 Hz. Before it all gyros are set up as they should be: one that
+    // is not is tried anew each second, and before or behind which sample that begins is a matter of the image's speed.
+    all.push((at, request(next(), Command::DefaultConfig)));
+    at += 500;
     all.push((at, request(next(), Command::SetBaud { divisor: 3 })));
     at += 100;
     all.push((
@@ -414,7 +444,11 @@ fn deeds() -> Vec<(u64, Deed)> {
 pub fn requests() -> usize {
     deeds()
         .iter()
-        .filter(|(_, deed)| matches!(deed, Deed::Send(bytes) if bytes.len() == wire::Request::FRAME_LEN))
+        .filter(|(_, deed)| match deed {
+            Deed::Send(bytes) => bytes.len() == wire::Request::FRAME_LEN,
+            Deed::Arm(_) => true,
+            _ => false,
+        })
         .count()
 }
 
@@ -451,7 +485,10 @@ pub fn start(mcu: &mut Mcu, script: &mut Script) -> Result<u64, String> {
 /// and codes that no command has. Without a reboot, and at the rate and speed of the start: at others, what comes first
 /// is a matter of the image's speed.
 fn chance(seed: u64) -> Vec<(u64, Deed)> {
-    const CODES: [u8; 21] = [
+    const CODES: [u8; 24] = [
+        code::ARM,
+        code::ARM,
+        code::ARM,
         code::PING,
         code::GET_HELLO,
         code::KEEP_ALIVE,
@@ -475,6 +512,7 @@ fn chance(seed: u64) -> Vec<(u64, Deed)> {
         code::KEEP_ALIVE,
     ];
     let mut all = vec![(1, Deed::Quiet(seed.is_multiple_of(2)))];
+    let mut asked_for_nonce = false;
     for n in 0..CHANCE_REQUESTS {
         let bits = |salt: u64| spread(seed ^ spread(n << 8 | salt));
         let code = match bits(0) % 16 {
@@ -496,6 +534,17 @@ fn chance(seed: u64) -> Vec<(u64, Deed)> {
         }
         // A copy takes 0.6 s to write: the last one is to be whole when the EEPROMs are compared.
         if code == code::STORE_CONFIG && n + 20 > CHANCE_REQUESTS {
+            continue;
+        }
+        // Asked for a nonce, the board is given it in the next slot, seven times of eight.
+        if asked_for_nonce && bits(3) % 8 != 0 {
+            all.push((20 + 50 * n, Deed::Arm(n as u16)));
+            asked_for_nonce = false;
+            continue;
+        }
+        if code == code::ARM {
+            all.push((20 + 50 * n, raw_request(n as u16, code, [0; 8])));
+            asked_for_nonce = true;
             continue;
         }
         // As many bytes as the command has, more often than not.
@@ -555,6 +604,12 @@ fn act(mcu: &mut Mcu, deeds: Vec<(u64, Deed)>) -> Result<Script, String> {
         run(mcu, &mut script, first + ms * MILLISECOND + OFF_THE_EDGE)?;
         match deed {
             Deed::Send(bytes) => bytes.into_iter().for_each(|byte| mcu.send(byte)),
+            Deed::Arm(number) => {
+                let nonce = nonce(&script.line);
+                if let Deed::Send(bytes) = request(number, Command::Arm { nonce }) {
+                    bytes.into_iter().for_each(|byte| mcu.send(byte));
+                }
+            }
             Deed::LastTick => script.reset = true,
             Deed::SendWithoutStopBit(byte) => mcu.send_without_stop_bit(byte),
             Deed::Quiet(quiet) => script.quiet = quiet,

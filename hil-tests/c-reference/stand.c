@@ -14,6 +14,8 @@
 
 #define TICK_NS 4000
 #define HEALTH_MS 1000
+/* Less stack than this left is counted with each health frame. */
+#define STACK_GUARD 32
 /* SUPPLY_OUT at 4.75 V and 5.25 V. */
 #define SUPPLY_LOWEST 2594
 #define SUPPLY_HIGHEST 2866
@@ -25,7 +27,8 @@
 #define ON_LINE(fields) (sizeof(fields) + 6)
 
 struct pending stand_job, stand_null;
-uint16_t stand_null_samples;
+uint8_t stand_setting;
+uint32_t stand_noise;
 struct reply stand_answer;
 uint8_t stand_misconfigured;
 static struct health health;
@@ -33,6 +36,7 @@ static uint8_t silent; /* bit per axis: not answering at the last sample */
 static uint8_t owed;   /* to the host, as soon as there is room */
 static uint8_t late;   /* of it, what has been owed since a sample ago */
 static uint8_t since_reply, since_report; /* samples sent since then; they saturate */
+static uint8_t cleared; /* bit per axis: its STATUS has been read in this second */
 static bool unset;     /* the gyros have to be set up (anew) */
 
 void stand_count(uint8_t fault, uint8_t times)
@@ -88,6 +92,8 @@ void stand_tell(uint8_t more)
     }
     if (owed & OWED_HEALTH && may_report(ON_LINE(struct health))) {
         health.stack_free = board_stack_free();
+        if (health.stack_free < STACK_GUARD)
+            stand_count(FAULT_STACK_LOW, 1);
         if (frame_send(KIND_HEALTH, &health, sizeof health)) {
             if (owed & OWED_CLEAR)
                 memset(health.faults, 0, sizeof health.faults);
@@ -115,11 +121,11 @@ void stand_reply_pending(struct pending *pending, uint8_t status)
     stand_reply(code, pending->number, status);
 }
 
-void stand_note_configured(uint8_t wrong)
+void stand_note_configured(uint8_t axes, uint8_t wrong)
 {
     uint8_t now = (wrong | wrong >> 3) & 7;
-    stand_count_each(FAULT_GYRO_RECOVERED_X, stand_misconfigured & (uint8_t)~now);
-    stand_misconfigured = now;
+    stand_count_each(FAULT_GYRO_RECOVERED_X, stand_misconfigured & axes & (uint8_t)~now);
+    stand_misconfigured = (uint8_t)((stand_misconfigured & ~axes) | now);
     stand_count_each(FAULT_GYRO_REGISTER_MISMATCH_X, wrong & 7);
     stand_count_each(FAULT_GYRO_SCALE_IMPOSSIBLE_X, wrong >> 3);
 }
@@ -134,6 +140,7 @@ void stand_miss_host(void)
 
 void stand_apply(void)
 {
+    stand_end_bias_null(STATUS_ABORTED);
     motor_limit(config.max_duty, config.ramp_per_s);
     board_set_motor(0);
     tick_set_period(config.set_up.period_ticks, config.set_up.periods_per_sample);
@@ -156,7 +163,8 @@ void stand_boot(void)
 void stand_started(uint8_t wrong)
 {
     unset = false;
-    stand_note_configured(wrong);
+    stand_setting = SET;
+    stand_note_configured(7, wrong);
     stand_tell(OWED_HELLO);
 }
 
@@ -234,8 +242,17 @@ static uint16_t take_supply(const struct raw *raw, struct sample *sample)
     return 0;
 }
 
-/* A gyro that answers again may have lost its set-up with its power. */
-static void look_after_gyros(uint8_t silent_now)
+bool stand_configure(uint8_t axis)
+{
+    if (!tick_post(JOB_CONFIGURE, axis, 0, config_sens_avg()))
+        return false;
+    stand_setting = axis;
+    return true;
+}
+
+/* A gyro that answers again may have lost its set-up with its power; one that raises its error or alarm bit keeps it up until
+ * its STATUS is read. */
+static void look_after_gyros(uint8_t silent_now, uint8_t errors)
 {
     uint8_t back = silent & (uint8_t)~silent_now;
     silent = silent_now;
@@ -243,41 +260,68 @@ static void look_after_gyros(uint8_t silent_now)
         stand_count_each(FAULT_GYRO_RECOVERED_X, back);
         unset = true;
     }
-    if (unset && stand_job.code == 0 && tick_post(JOB_CONFIGURE, 0, 0, config_sens_avg())) {
-        unset = false;
+    if (stand_job.code)
+        return;
+    if (unset) {
+        if (stand_configure(0)) {
+            unset = false;
+            stand_job.code = CODE_OWN;
+        }
+        return;
+    }
+    errors &= (uint8_t)~cleared;
+    if (errors == 0)
+        return;
+    uint8_t axis = 0;
+    while (!(errors & 1 << axis))
+        axis++;
+    if (tick_post(JOB_READ, axis, GYRO_STATUS, 0)) {
+        cleared |= (uint8_t)(1 << axis);
         stand_job.code = CODE_OWN;
     }
 }
 
-static void end_bias_null(bool moving)
+void stand_end_bias_null(uint8_t status)
+{
+    if (stand_null.code == 0)
+        return;
+    if (status != STATUS_OK)
+        memset(&stand_answer, 0, sizeof stand_answer);
+    stand_reply_pending(&stand_null, status);
+}
+
+/* The means become the biases; false, and nothing changed, when the stand turns. */
+static bool take_biases(void)
 {
     int32_t largest = 0;
     for (uint8_t axis = 0; axis < 3; axis++) {
         int32_t error;
         if (!bias_mean(axis, config.set_up.scale[axis], &stand_answer.detail[axis], &error))
-            moving = true;
-        else if (error > largest)
+            return false;
+        if (error > largest)
             largest = error;
-    }
-    if (moving) {
-        memset(stand_answer.detail, 0, sizeof stand_answer.detail);
-        stand_reply_pending(&stand_null, STATUS_MOVING);
-        return;
     }
     stand_answer.value = largest;
     memcpy(config.set_up.bias, stand_answer.detail, sizeof config.set_up.bias);
     config.set_up.config_source = SOURCE_SET;
-    stand_reply_pending(&stand_null, STATUS_OK);
+    return true;
 }
 
-/* Only samples in order count: a gyro that is silent or stale would be averaged as if it were at rest. */
 static void step_bias_null(bool in_order, const struct sample *sample)
 {
-    bool moving = motor_is_on();
-    if (in_order && !moving)
-        moving = !bias_take(sample->gyro);
-    if (moving || bias_have() >= stand_null_samples)
-        end_bias_null(moving);
+    switch (motor_is_on() ? BIAS_MOVING : bias_take(sample->gyro, in_order)) {
+    case BIAS_GOES_ON:
+        break;
+    case BIAS_NOT_IN_ORDER:
+        stand_end_bias_null(STATUS_NOT_ANSWERING);
+        break;
+    case BIAS_MOVING:
+        stand_end_bias_null(STATUS_MOVING);
+        break;
+    case BIAS_DONE:
+        stand_end_bias_null(take_biases() ? STATUS_OK : STATUS_MOVING);
+        break;
+    }
 }
 
 void stand_on_sample(const struct raw *raw, uint8_t missed)
@@ -293,19 +337,21 @@ void stand_on_sample(const struct raw *raw, uint8_t missed)
     sample.seq = health.next_seq++;
     sample.t_ticks = raw->t_ticks;
     sample.pwm = motor_output();
-    uint8_t silent_now = 0;
+    uint8_t silent_now = 0, noise = 0;
     for (uint8_t axis = 0; axis < 3; axis++) {
         uint16_t gyro = take_gyro(axis, raw, &sample);
         if (gyro == FLAG_GYRO_NOT_ANSWERING)
             silent_now |= (uint8_t)(1 << axis);
         flags |= gyro | take_accelerometer(axis, raw, &sample);
+        noise ^= (uint8_t)raw->gyro[axis];
     }
-    look_after_gyros(silent_now);
-    if (stand_misconfigured & ~silent_now)
+    stand_noise = crc_update_byte(stand_noise, noise);
+    look_after_gyros(silent_now, (flags >> 3) & 7); /* the flags of EA */
+    if ((stand_misconfigured & ~silent_now) || stand_setting != SET)
         flags |= FLAG_GYRO_MISCONFIGURED;
     flags |= take_supply(raw, &sample);
     if (stand_null.code) {
-        bool in_order = (flags & FLAGS_IN_ORDER) == FLAGS_IN_ORDER;
+        bool in_order = flags == FLAGS_IN_ORDER;
         flags |= FLAG_BIAS_NULL;
         step_bias_null(in_order, &sample);
     }
@@ -335,6 +381,7 @@ void stand_on_millisecond(void)
     requests_on_millisecond();
     if (++millisecond >= HEALTH_MS) {
         millisecond = 0;
+        cleared = 0;
         /* What does not read back is tried anew each second. */
         if (stand_misconfigured & (uint8_t)~silent)
             unset = true;

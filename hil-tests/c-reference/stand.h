@@ -9,7 +9,7 @@
 
 /* Reads the stored set-up and applies it. */
 void stand_boot(void);
-/* What gyro_configure returned at start; says hello. */
+/* What gyro_configure_all returned at start; says hello. */
 void stand_started(uint8_t misconfigured);
 void stand_on_sample(const struct raw *raw, uint8_t missed);
 void stand_on_millisecond(void);
@@ -33,7 +33,6 @@ struct pending {
 #define CODE_OWN 0xff
 
 extern struct pending stand_job, stand_null;
-extern uint16_t stand_null_samples;
 /* What the next reply says beside its status. */
 extern struct reply stand_answer;
 /* Bit per axis: not set up as the hello frame says. */
@@ -46,7 +45,17 @@ enum { OWED_HELLO = 1, OWED_HEALTH = 2, OWED_CLEAR = 4 };
 void stand_miss_host(void);
 /* Applies the set-up to motor, clock, line and sensors. */
 void stand_apply(void);
-void stand_note_configured(uint8_t wrong);
+/* What has come of setting up the gyros that have their bit in axes. */
+void stand_note_configured(uint8_t axes, uint8_t wrong);
+/* Has a gyro set up in the next slot. */
+bool stand_configure(uint8_t axis);
+/* The reply to the bias measurement that is under way, if one is. */
+void stand_end_bias_null(uint8_t status);
+/* The gyro that is being set up; SET: none. */
+#define SET 3
+extern uint8_t stand_setting;
+/* What the sensors' noise has come to. */
+extern uint32_t stand_noise;
 /* The one reply to a request. */
 void stand_reply(uint8_t code, uint16_t number, uint8_t status);
 /* The same for one that was pending, and is no more. */

@@ -4,12 +4,18 @@
 #include <util/atomic.h>
 
 #include "frame.h"
+#include "gyro.h"
 #include "motor.h"
 #include "stand.h"
 
 #define FORMAT 2
-/* 0.07326 deg/s for each count at 320 deg/s, Q8.24. */
+/* Q8.24 deg/s for each count: 0.07326, 0.03663, 0.018315. */
 #define SCALE_320 1229099L
+#define SCALE_160 614549L
+#define SCALE_80 307275L
+/* Bounds of scale and bias, by their high words: 0.25 deg/s for each count, 512 deg/s. */
+#define MAX_SCALE_HIGH 0x3f
+#define BIAS_BOUND_HIGH 512
 #define MIN_PERIOD 976
 #define MAX_PERIOD 62500U
 #define MAX_PERIODS 4 /* 1 Hz is the slowest rate */
@@ -35,7 +41,7 @@ void config_set_scale_of_range(void)
 {
     int32_t scale = SCALE_320;
     if (config.set_up.gyro_range != 4)
-        scale = config.set_up.gyro_range == 2 ? SCALE_320 >> 1 : SCALE_320 >> 2;
+        scale = config.set_up.gyro_range == 2 ? SCALE_160 : SCALE_80;
     for (uint8_t axis = 0; axis < 3; axis++)
         config.set_up.scale[axis] = scale;
 }
@@ -79,6 +85,17 @@ bool config_gyro_in_order(uint8_t range, uint8_t filter)
     return filter >= fewest_taps && filter <= 6;
 }
 
+bool config_scale_in_order(int32_t scale)
+{
+    return scale && (uint16_t)(scale >> 16) <= MAX_SCALE_HIGH;
+}
+
+bool config_bias_in_order(int32_t bias)
+{
+    int16_t high = (int16_t)(bias >> 16);
+    return high < BIAS_BOUND_HIGH && high >= -BIAS_BOUND_HIGH;
+}
+
 static uint8_t eeprom_read(uint16_t address)
 {
     EEAR = address;
@@ -100,8 +117,13 @@ static void eeprom_write(uint16_t address, uint8_t byte)
 static bool copy_is_in_order(void)
 {
     const struct set_up *set_up = &copy.config.set_up;
+    for (uint8_t axis = 0; axis < 3; axis++) {
+        if (!config_scale_in_order(set_up->scale[axis]) || !config_bias_in_order(set_up->bias[axis]))
+            return false;
+    }
     return crc_update(CRC_INIT, &copy, sizeof copy) == CRC_RESIDUE && copy.format == FORMAT &&
            config_gyro_in_order(set_up->gyro_range, set_up->gyro_filter) && set_up->acc_range <= 3 &&
+           set_up->gyro_sample_period == GYRO_FASTEST &&
            config_rate_in_order(set_up->period_ticks, set_up->periods_per_sample) &&
            config_baud_in_order(set_up->baud_divisor);
 }

@@ -24,6 +24,8 @@ uint16_t config_sens_avg(void);
 bool config_rate_in_order(uint16_t period_ticks, uint8_t periods_per_sample);
 bool config_baud_in_order(uint16_t divisor);
 bool config_gyro_in_order(uint8_t range, uint8_t filter);
+bool config_scale_in_order(int32_t scale);
+bool config_bias_in_order(int32_t bias);
 
 /* Whether no copy is being written. */
 bool store_is_idle(void);

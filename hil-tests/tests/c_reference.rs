@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command as Process;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use atmega16_sim::Mcu;
 use hil_tests::{image, seed};
@@ -13,7 +14,10 @@ mod session;
 /// Builds the C reference as its README says.
 fn reference() -> Vec<u8> {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("c-reference");
-    let elf = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("reference.elf");
+    // Tests run side by side: each builds its own.
+    static NUMBER: AtomicU32 = AtomicU32::new(0);
+    let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+    let elf = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("reference-{number}.elf"));
     let run = Process::new("sh")
         .current_dir(&source)
         .args(["-c", "exec avr-gcc @flags *.c -o \"$0\""])
@@ -83,6 +87,7 @@ fn it_sends_byte_for_byte_what_the_rust_image_sends() {
         "ReadBackWrong",
         "SelfTestFailed",
         "NoKeepAlive",
+        "Aborted",
         "NoConfig",
     ] {
         let said = format!("status: {status},");

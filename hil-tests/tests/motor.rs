@@ -2,7 +2,7 @@
 
 use atmega16_sim::{ResetCause, register};
 use bench::simavr::{Event, Probe, Simulated};
-use bench::{Ending, Scenario, SerialByte, TimedRequest, uniform};
+use bench::{Ending, Scenario, SerialByte, TimedRequest, arming, uniform};
 use hil_tests::{Heard, at, generator, image, seed};
 use wire::{Command, Fault, reset_cause};
 
@@ -67,12 +67,11 @@ impl Board {
     }
 }
 
-/// A host that keeps the motor at a duty from `from_s` to `to_s`.
+/// A host that arms the motor and keeps it at a duty from `from_s` to `to_s`.
 fn drive(duty: i16, from_s: f64, to_s: f64) -> Vec<TimedRequest> {
     let count = ((to_s - from_s) / 0.1) as u16;
-    let mut requests: Vec<_> = (0..count)
-        .map(|n| at(from_s + 0.1 * f64::from(n), n, Command::KeepAlive))
-        .collect();
+    let mut requests = arming(((from_s - 0.18) * 1e6) as u64, 9_900).to_vec();
+    requests.extend((0..count).map(|n| at(from_s + 0.1 * f64::from(n), n, Command::KeepAlive)));
     requests.push(at(from_s + 0.03, 9_000, Command::MotorDuty { duty }));
     requests.sort_by_key(|timed| timed.at_us);
     requests
@@ -230,6 +229,94 @@ fn a_millisecond_clock_that_never_moves_ends_in_a_watchdog_reset_with_the_motor_
     assert!(!board.turned_since(stopped + 1e-6));
     // The watchdog's second.
     assert!(stopped < 2.8 + 1.2, "stopped at {stopped} s");
+}
+
+#[test]
+fn recorded_requests_sent_again_do_not_start_it() {
+    // What a host sent that drove it, byte for byte, with the nonce of that session.
+    let mut first = Board::new();
+    first.simulated.request(&drive(120, 1.0, 2.0));
+    first.run(1.5);
+    assert_ne!(first.simulated.duty(), 0.0);
+    let nonce = (first.heard.replies())
+        .find(|(_, reply)| reply.command == wire::code::ARM)
+        .map(|(_, reply)| reply.value as u16)
+        .expect("it told one");
+    let recorded: Vec<_> = (drive(120, 1.0, 2.0).into_iter())
+        .map(|mut timed| {
+            if let Command::Arm { nonce: said } = &mut timed.request.command
+                && *said != 0
+            {
+                *said = nonce;
+            }
+            timed
+        })
+        .collect();
+    // Later on the same board, and on one whose sensors' noise is another.
+    first.run(4.0);
+    let later: Vec<_> = (recorded.iter().copied())
+        .map(|mut timed| {
+            timed.at_us += 4_000_000;
+            timed
+        })
+        .collect();
+    first.simulated.request(&later);
+    first.run(7.0);
+    assert!(!first.turned_since(4.0));
+    let mut other = Board {
+        simulated: Simulated::new(&image(), &Scenario::quiet(2), Shaft::default())
+            .expect("an image"),
+        heard: Heard::default(),
+    };
+    other.simulated.request(&recorded);
+    other.run(3.0);
+    assert!(other.simulated.probe().0.is_empty());
+    for board in [first, other] {
+        let refused = (board.heard.replies())
+            .filter(|(_, reply)| reply.command == wire::code::ARM)
+            .any(|(_, reply)| reply.status == wire::Status::BadArgument);
+        assert!(refused, "the nonce is told to be wrong");
+    }
+}
+
+#[test]
+fn it_rests_for_2_ms_before_it_turns_the_other_way_at_the_steepest_ramp() {
+    let mut board = Board::new();
+    let mut requests = drive(255, 1.0, 3.0);
+    let ramp = Command::MotorLimits {
+        max_duty: 255,
+        ramp_per_s: u16::MAX,
+    };
+    requests.push(at(0.7, 9_002, ramp));
+    for (n, duty) in (0..8).zip([-255, 255].into_iter().cycle()) {
+        let t = 1.2 + 0.2 * f64::from(n);
+        requests.push(at(t + 0.033, 9_010 + n, Command::MotorDuty { duty }));
+    }
+    requests.sort_by_key(|timed| timed.at_us);
+    board.simulated.request(&requests);
+    board.run(3.0);
+    let hz = board.simulated.hz();
+    let (mut last, mut turns) = ((0.0, 0.0), 0);
+    for &(at, duty) in &board.simulated.probe().0 {
+        let t = at as f64 / hz;
+        if duty == 0.0 {
+            continue;
+        }
+        let (way, until) = last;
+        if way * duty < 0.0 {
+            turns += 1;
+            assert!(t - until >= 0.002, "{} ms", (t - until) * 1e3);
+        }
+        // It turned this way until the next event.
+        let next = board
+            .simulated
+            .probe()
+            .0
+            .iter()
+            .find(|&&(next, _)| next > at);
+        last = (duty, next.map_or(t, |&(next, _)| next as f64 / hz));
+    }
+    assert_eq!(turns, 8);
 }
 
 #[test]

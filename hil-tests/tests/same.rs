@@ -154,7 +154,8 @@ fn a_host_that_asks_for_everything() {
     let mut run = run(Scenario::lively(5), 60.0);
     let asked = [
         Command::Ping,
-        Command::BiasNull { samples: 100 },
+        Command::BiasNull { samples: 50 },
+        Command::Arm { nonce: 0 },
         Command::ReadRegister {
             gyro: Axis::Y,
             address: 0x38,

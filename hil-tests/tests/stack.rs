@@ -3,7 +3,7 @@
 use atmega16_sim::Image;
 use bench::Scenario;
 use bench::simavr::{NoProbe, Simulated};
-use hil_tests::calls::recursion;
+use hil_tests::calls::{recursion, stack_bound};
 use hil_tests::{Heard, at, generator, image, run, seed};
 use wire::{Axis, Command, Sensor, Shape};
 
@@ -17,6 +17,8 @@ fn the_deepest_stack_leaves_room_with_every_command_at_any_phase_of_the_tick() {
     let asked = [
         Command::Ping,
         Command::KeepAlive,
+        Command::Arm { nonce: 0 },
+        Command::Arm { nonce: 7 },
         Command::GetHello,
         Command::Counters,
         Command::ReadRegister {
@@ -53,7 +55,7 @@ fn the_deepest_stack_leaves_room_with_every_command_at_any_phase_of_the_tick() {
             max_duty: 200,
             ramp_per_s: 500,
         },
-        Command::BiasNull { samples: 20 },
+        Command::BiasNull { samples: 24 },
         Command::SelfTest {
             sensor: Sensor::GyroX,
         },
@@ -114,4 +116,30 @@ fn no_function_calls_itself() {
     let image = Image::read(&image()).expect("an image");
     let recursion = recursion(&image.flash, VECTORS);
     assert_eq!(recursion, Ok(None), "addresses of the functions");
+}
+
+/// From the call graph: the main program at its deepest, the guard of the tick on top of it, which runs with interrupts on,
+/// and the deepest of the interrupts that may come in there, which do not let each other in.
+#[test]
+fn the_stacks_bound_from_the_call_graph_leaves_room() {
+    const GUARD: usize = 7;
+    /// Compare A of timer 1, the USART's two, the millisecond; no other is ever enabled.
+    const OTHERS: [usize; 4] = [6, 11, 12, 19];
+    /// What has to be left beside the bound, bytes.
+    const SPARE: u32 = 64;
+    let image = Image::read(&image()).expect("an image");
+    let of = |vector: usize| stack_bound(&image.flash, 2 * vector).expect("calls can be followed");
+    let deepest = OTHERS.map(of).into_iter().max().unwrap_or(0);
+    let bound = of(0) + 2 + of(GUARD) + 2 + deepest;
+    let end = image.symbol("_end").expect("the linker's") & 0xffff;
+    println!(
+        "main {} B, guard {} B, another interrupt {deepest} B: {bound} B of {}",
+        of(0),
+        of(GUARD),
+        0x460 - end
+    );
+    assert!(
+        end + bound + SPARE <= 0x460,
+        "{bound} B, the statics end at {end:#x}"
+    );
 }

@@ -22,7 +22,7 @@ mod serial;
 mod tick;
 
 use avr_device::{asm, interrupt};
-use firmware::{Stand, configure};
+use firmware::{Stand, configure_all};
 
 /// Nothing that panics may be reachable: the symbol is defined nowhere, so an image that could get here does not link.
 #[panic_handler]
@@ -51,7 +51,7 @@ fn main() -> ! {
     // SAFETY: the one reference to it.
     let stand = unsafe { &mut *core::ptr::addr_of_mut!(STAND) };
     stand.boot(&mut board);
-    let misconfigured = configure(sensors, stand.sens_avg());
+    let misconfigured = configure_all(sensors, stand.sens_avg());
     stand.started(&mut board, misconfigured);
     // SAFETY: called once, before interrupts are on.
     unsafe { tick::start() };
@@ -69,7 +69,7 @@ fn main() -> ! {
             ticked = true;
         }
         for _ in 0..BYTES_PER_PASS {
-            if !stand.listens(&board) {
+            if !serial::has_received() || !stand.listens(&board) {
                 break;
             }
             let Some(byte) = serial::received() else {
@@ -91,6 +91,6 @@ fn main() -> ! {
             (ticked, passed) = (false, false);
         }
         board.work();
-        tick::sleep_until_work(stand.listens(&board));
+        tick::sleep_until_work(!serial::has_received() || stand.listens(&board));
     }
 }

@@ -16,7 +16,7 @@ const SCK: u8 = 1 << 7;
 const SPCR: u8 = 1 << 6 | 1 << 4 | 1 << 3 | 1 << 2 | 1;
 const SPI2X: u8 = 1;
 const SPIF: u8 = 1 << 7;
-/// Polls for the end of a byte: it takes 64 cycles, a poll about 6.
+/// Polls for the end of a byte: it takes 64 cycles, 128 at the slow clock, a poll about 6.
 const SPI_BUDGET: u8 = 60;
 /// ADEN, clock / 128 = 125 kHz: the only setting at 16 MHz inside the 50..200 kHz that 10 bits need.
 const ADC_ON: u8 = 1 << 7 | 7;
@@ -194,7 +194,6 @@ pub unsafe fn start() -> &'static mut AvrSensors {
     let port = port_b();
     port.portb.write(|w| bits!(w, selects | SCK));
     port.ddrb.write(|w| bits!(w, selects | MOSI | SCK));
-    spi().spsr.write(|w| bits!(w, SPI2X));
     spi().spcr.write(|w| bits!(w, SPCR));
     // SAFETY: port A and C are set up here, before anything else uses them.
     unsafe {
@@ -230,6 +229,11 @@ impl Sensors for AvrSensors {
 
     fn delay(&mut self) -> Delay {
         Delay
+    }
+
+    fn slow(&mut self, slow: bool) {
+        // Without SPI2X: clock / 16.
+        spi().spsr.write(|w| bits!(w, if slow { 0 } else { SPI2X }));
     }
 
     fn sampled(&mut self) {

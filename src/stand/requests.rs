@@ -2,11 +2,9 @@
 
 use adis16250::{Register, control};
 use wire::{Asked, Sensor, Status, code};
-use zerocopy::little_endian::I32;
 
-use super::{Board, Pending, Stand, source};
+use super::{Board, Pending, SET, Stand, source};
 use crate::acquire::{Done, Job, Task};
-use crate::bias::{BiasNull, MAX_SAMPLES, MIN_SAMPLES};
 use crate::motor::FULL;
 
 /// What becomes of a request at once.
@@ -73,8 +71,12 @@ impl Stand {
             }
             code::KEEP_ALIVE => {
                 self.miss_host(board);
-                board.keep_alive();
-                Status::Ok
+                if board.host_is_there() {
+                    board.keep_alive();
+                    Status::Ok
+                } else {
+                    Status::NoKeepAlive
+                }
             }
             code::COUNTERS | code::CLEAR_COUNTERS => {
                 let clear = if asked.code == code::CLEAR_COUNTERS {
@@ -92,32 +94,27 @@ impl Stand {
                 board.reboot();
                 return Answer::Later;
             }
-            code::SET_RATE..=code::SET_ACC_RANGE => return self.set_up(board, asked),
+            code::SET_RATE..=code::SET_ACC_RANGE | code::SET_BIAS | code::SET_SCALE => {
+                return self.set_up(board, asked);
+            }
             code::BIAS_NULL => {
-                let samples = asked.u16::<0>();
-                if !(MIN_SAMPLES..=MAX_SAMPLES).contains(&samples) {
-                    Status::BadArgument
-                } else if !self.null.is_none() {
+                let set_up = &self.config.set_up;
+                if !self.null.is_none() {
                     Status::Busy
+                } else if !self.bias_null.begin(
+                    asked.u16::<0>(),
+                    set_up.gyro_filter,
+                    set_up.period_ticks.get(),
+                ) {
+                    Status::BadArgument
                 } else if self.motor.is_on() {
                     Status::Moving
                 } else {
                     self.null = asked.into();
-                    self.null_samples = samples;
-                    self.bias_null = BiasNull::new();
                     return Answer::Later;
                 }
             }
-            code::SET_BIAS => {
-                let bias = &mut self.config.set_up.bias;
-                let done = set(bias, axis, asked.i32::<1>());
-                self.changed(done)
-            }
-            code::SET_SCALE => {
-                let value = asked.i32::<1>();
-                let done = value > 0 && set(&mut self.config.set_up.scale, axis, value);
-                self.changed(done)
-            }
+            code::ARM => self.arm(board, asked),
             code::MOTOR_DUTY => {
                 let duty = asked.i16::<0>();
                 if !(-FULL..=FULL).contains(&duty) {
@@ -212,12 +209,25 @@ impl Stand {
             code::SET_GYRO => {
                 (set_up.gyro_range, set_up.gyro_filter) = (asked.u8::<0>(), asked.u8::<1>())
             }
-            _ => set_up.acc_range = asked.u8::<0>(),
+            code::SET_ACC_RANGE => set_up.acc_range = asked.u8::<0>(),
+            _ => {
+                let values = if asked.code == code::SET_BIAS {
+                    &mut set_up.bias
+                } else {
+                    &mut set_up.scale
+                };
+                match values.get_mut(asked.u8::<0>() as usize) {
+                    Some(place) => place.set(asked.i32::<1>()),
+                    None => return Answer::Now(Status::BadArgument),
+                }
+            }
         }
         if !self.config.is_in_order() {
             self.config = was;
             return Answer::Now(Status::BadArgument);
         }
+        // A measurement of the bias mixes what was before with what is now.
+        self.end_bias_null(board, Status::Aborted);
         let set_up = &mut self.config.set_up;
         set_up.config_source = source::SET;
         match asked.code {
@@ -231,16 +241,36 @@ impl Stand {
                 return Answer::Later;
             }
             code::SET_GYRO => {
-                let answer = self.post(board, asked, self.configure_job());
-                match answer {
-                    Answer::Now(_) => self.config = was,
-                    Answer::Later => self.config.set_scale_of_range(),
+                if !self.job.is_none() || !self.configure(board, 0) {
+                    self.config = was;
+                    return Answer::Now(Status::Busy);
                 }
-                return answer;
+                self.config.set_scale_of_range();
+                self.job = asked.into();
+                return Answer::Later;
             }
-            _ => board.set_acc_range(set_up.acc_range),
+            code::SET_ACC_RANGE => board.set_acc_range(set_up.acc_range),
+            _ => {}
         }
         Answer::Now(Status::Ok)
+    }
+
+    /// Without a nonce: makes one of the sensors' noise so far and tells it. With that one, once: the host is there, and the
+    /// motor may turn for as long as its keep-alives come. What somebody has recorded and sends again has another's nonce.
+    #[inline(never)]
+    fn arm<B: Board>(&mut self, board: &mut B, asked: &Asked) -> Status {
+        let said = asked.u16::<0>();
+        self.miss_host(board);
+        let nonce = core::mem::take(&mut self.nonce);
+        if said == 0 {
+            self.nonce = self.noise as u16 | 1;
+            self.answer.value.set(self.nonce.into());
+        } else if said == nonce {
+            board.keep_alive();
+        } else {
+            return Status::BadArgument;
+        }
+        Status::Ok
     }
 
     #[inline(never)]
@@ -267,7 +297,17 @@ impl Stand {
     pub(super) fn job_done<B: Board>(&mut self, board: &mut B, done: Done) {
         let (value, mut status) = (done.value, done.status);
         if matches!(done.task, Task::Configure) {
-            self.note_configured(value as u8);
+            self.note_configured(1u8.wrapping_shl(self.setting.into()), value as u8);
+            if self.setting == 0 {
+                self.wrong = 0;
+            }
+            self.wrong |= value as u8 & 7;
+            let next = self.setting.wrapping_add(1);
+            // The slot is free: this was the job in it.
+            if next != SET && self.configure(board, next) {
+                return;
+            }
+            self.setting = SET;
         }
         match self.job.code {
             Pending::OWN => {
@@ -279,9 +319,8 @@ impl Stand {
                 None => return,
             },
             code::SET_GYRO => {
-                let wrong = value & 7;
-                self.answer.value.set(wrong.into());
-                if wrong != 0 {
+                self.answer.value.set(self.wrong.into());
+                if self.wrong != 0 {
                     status = Status::ReadBackWrong;
                 }
             }
@@ -377,13 +416,4 @@ fn done(in_range: bool) -> Status {
     } else {
         Status::BadArgument
     }
-}
-
-#[inline(never)]
-fn set(values: &mut [I32; 3], axis: u8, value: i32) -> bool {
-    let Some(place) = values.get_mut(axis as usize) else {
-        return false;
-    };
-    place.set(value);
-    true
 }

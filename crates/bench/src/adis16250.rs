@@ -306,6 +306,16 @@ impl Adis16250 {
         self.registers[usize::from(address >> 1) & 31] = value;
     }
 
+    /// A register's content as an earlier user left it in the part's flash.
+    pub fn keep(&mut self, address: u8, value: u16) {
+        self.set(address, value);
+    }
+
+    /// Bits of STATUS rise; they stay until it is read.
+    pub fn raise(&mut self, bits: u16) {
+        self.status |= bits;
+    }
+
     /// STATUS as it stands.
     #[must_use]
     pub fn status(&self) -> u16 {

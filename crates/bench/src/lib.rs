@@ -32,7 +32,7 @@ pub use mma7260qt::{AccSelect, Mma7260Qt};
 pub use motor::Motor;
 pub use native::{Instants, Timeline, native, native_live};
 pub use random::{Stream, standard_normal, uniform};
-pub use run::{Ending, Run, SerialByte, TimedRequest, duty_profile};
+pub use run::{Ending, Run, SerialByte, TimedRequest, arming, duty_profile};
 pub use scenario::{Fault, Scenario};
 pub use stand::{MECHANICAL_STEP_S, Stand};
 pub use supply::Supply;

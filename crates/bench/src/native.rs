@@ -14,9 +14,9 @@ use adis16250::Adis16250;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use firmware::{Board, Job, Sensors};
-use wire::{Request, encode_request, reset_cause};
+use wire::{Frame, Request, code, encode_request, reset_cause};
 
-use crate::run::Cable;
+use crate::run::{Cable, with_nonce};
 use crate::{AccSelect, Ending, Run, SerialByte, Stand};
 
 pub(crate) const CLOCK_HZ: f64 = 16e6;
@@ -70,16 +70,16 @@ pub struct Timeline {
 impl Default for Timeline {
     fn default() -> Self {
         Timeline {
-            start: 3_588_608,
-            configure: 3_543_509,
+            start: 3_629_568,
+            configure: 3_543_347,
             // Four rounds of three frames.
             spi_bytes: vec![
-                150, 238, 397, 485, 644, 732, 1144, 1232, 1391, 1479, 1638, 1726, 1944, 2032, 2191,
-                2279, 2438, 2526, 2907, 2995, 3154, 3242, 3401, 3489,
+                150, 238, 397, 485, 644, 732, 1154, 1242, 1401, 1489, 1648, 1736, 3504, 3592, 3751,
+                3839, 3998, 4086, 4467, 4555, 4714, 4802, 4961, 5049,
             ],
-            adc: [284, 2_076, 3_868],
-            acquired: 5_500,
-            framed: 14_500,
+            adc: [1_894, 3_686, 5_478],
+            acquired: 7_100,
+            framed: 16_100,
             guard: 1_024,
             eeprom: 136_000,
             queue: 191,
@@ -108,6 +108,8 @@ struct Chip {
     next_divisor: Option<u16>,
     /// Milliseconds that the motor may still turn without a word from the host.
     alive: u8,
+    /// The nonce that the board told last.
+    nonce: u16,
     period: u32,
     /// Ends of the bytes that are queued or on their way.
     line: VecDeque<u64>,
@@ -277,6 +279,12 @@ impl Board for HostBoard {
         if chip.room() < wire::fields::room_for(kind, fields.len()) {
             return false;
         }
+        let mut decoder = wire::Decoder::new();
+        if let Some(Ok(Frame::Reply(reply))) = frame.iter().find_map(|&byte| decoder.push(byte))
+            && reply.command == code::ARM
+        {
+            chip.nonce = reply.value as u16;
+        }
         let (now, byte) = (chip.now, byte_cycles(chip.divisor.unwrap_or(25)));
         for &out in frame {
             chip.line_free = chip.line_free.max(now) + byte;
@@ -384,28 +392,37 @@ impl Board for HostBoard {
     }
 }
 
-/// The host's bytes with the cycle at which each has arrived.
-fn arrivals(requests: &[crate::TimedRequest], hz: f64) -> VecDeque<(u64, u8)> {
-    let mut bytes = VecDeque::new();
-    let mut free = 0;
-    for timed in requests {
-        let mut line = [0; Request::FRAME_LEN];
-        let len = encode_request(&timed.request, &mut line).unwrap_or(0);
-        free = free.max((timed.at_us as f64 * 1e-6 * hz) as u64);
-        for &byte in &line[..len] {
-            free += byte_cycles(25);
-            // The receiver has it in the middle of the stop bit: after the tenth of its sixteenths.
-            bytes.push_back((free - byte_cycles(25) * 6 / 160, byte));
-        }
-    }
-    bytes
-}
-
 /// What the board's receiver gets: requests that were planned, and bytes that somebody sends while the run lasts.
 struct Incoming<'a> {
+    /// Requests with the cycle at which each is to begin.
+    planned: VecDeque<(u64, Request)>,
     /// Bytes with the cycle at which each has arrived.
     queue: VecDeque<(u64, u8)>,
+    /// The host's line is busy until then.
+    free: u64,
     listen: &'a mut dyn FnMut(f64) -> Vec<u8>,
+}
+
+impl Incoming<'_> {
+    /// Puts the next planned request on the line if it begins by `until` and the one before it has been received: what it
+    /// says may hang on an answer.
+    fn begin(&mut self, until: u64, nonce: u16) {
+        if !self.queue.is_empty() || self.planned.front().is_none_or(|&(at, _)| at > until) {
+            return;
+        }
+        let Some((at, request)) = self.planned.pop_front() else {
+            return;
+        };
+        let mut line = [0; Request::FRAME_LEN];
+        let len = encode_request(&with_nonce(request, nonce), &mut line).unwrap_or(0);
+        self.free = self.free.max(at);
+        for &byte in &line[..len] {
+            self.free += byte_cycles(25);
+            // The receiver has it in the middle of the stop bit: after the tenth of its sixteenths.
+            self.queue
+                .push_back((self.free - byte_cycles(25) * 6 / 160, byte));
+        }
+    }
 }
 
 /// Runs the firmware's logic on the stand of `run` and hands each received byte to `receive`, in order. A callback that
@@ -443,6 +460,7 @@ pub fn native_live(
         divisor: None,
         next_divisor: None,
         alive: 0,
+        nonce: 0,
         period: 12_500,
         line: VecDeque::new(),
         line_free: 0,
@@ -455,7 +473,11 @@ pub fn native_live(
     }));
     let mut cable = Cable::new(&run.scenario);
     let mut received = Incoming {
-        queue: arrivals(&run.requests, hz),
+        planned: (run.requests.iter())
+            .map(|timed| ((timed.at_us as f64 * 1e-6 * hz) as u64, timed.request))
+            .collect(),
+        queue: VecDeque::new(),
+        free: 0,
         listen: &mut listen,
     };
     let mut deliver = |chip: &Shared, until: u64| {
@@ -525,17 +547,18 @@ fn life(
     chip.borrow_mut().now = power + timeline.configure;
     let mut stand = firmware::Stand::new();
     stand.boot(board);
-    let misconfigured = firmware::configure(&mut sensors, stand.sens_avg());
+    let misconfigured = firmware::configure_all(&mut sensors, stand.sens_avg());
     stand.started(board, misconfigured);
     // Before the receiver is on, bytes are lost.
     let lost_until = chip.borrow().seconds(power + timeline.configure);
     drop((received.listen)(lost_until));
-    while received
-        .queue
-        .front()
-        .is_some_and(|&(at, _)| at < power + timeline.configure)
-    {
-        received.queue.pop_front();
+    let deaf_until = power + timeline.configure;
+    loop {
+        received.begin(deaf_until, 0);
+        match received.queue.front() {
+            Some(&(at, _)) if at < deaf_until => received.queue.pop_front(),
+            _ => break,
+        };
     }
     chip.borrow_mut().now = start;
     let mut period = chip.borrow().period;
@@ -600,6 +623,7 @@ fn work(
 ) {
     let board = &mut HostBoard(Rc::clone(chip));
     loop {
+        received.begin(until, chip.borrow().nonce);
         let byte = (received.queue.front().copied()).filter(|&(at, _)| at <= until);
         // Where there is no room for a reply the bytes wait for the next millisecond, and so on.
         let byte = byte.filter(|&(at, _)| {

@@ -47,13 +47,43 @@ pub enum Ending {
 /// Keeps the motor alive: well within the board's 200 ms.
 const KEEP_ALIVE_US: u64 = 100_000;
 
+/// In a planned request: the nonce that the board has told by then.
+pub const TOLD_NONCE: u16 = u16::MAX;
+/// From the question for the nonce to the answer with it, and from there to the first keep-alive: a reply takes no longer.
+const ARM_STEP_US: u64 = 90_000;
+
+/// The two requests that arm the motor, the first at `at_us`; after the second, 90 ms later, keep-alives are due.
+#[must_use]
+pub fn arming(at_us: u64, number: u16) -> [TimedRequest; 2] {
+    [(0, 0), (1, TOLD_NONCE)].map(|(step, nonce)| TimedRequest {
+        at_us: at_us + step * ARM_STEP_US,
+        request: Request {
+            number: number.wrapping_add(step as u16),
+            command: Command::Arm { nonce },
+        },
+    })
+}
+
+/// The request with the nonce that the board told, where it asks for that.
+pub(crate) fn with_nonce(request: Request, nonce: u16) -> Request {
+    match request.command {
+        Command::Arm { nonce: TOLD_NONCE } => Request {
+            command: Command::Arm { nonce },
+            ..request
+        },
+        _ => request,
+    }
+}
+
 /// Requests that drive the motor by `steps` of (time s, duty -255..=255), with keep-alives from the first step to the
-/// end of the run at `seconds`.
+/// end of the run at `seconds`, and armed before the first step, which is at 0.6 s at the earliest.
 #[must_use]
 pub fn duty_profile(steps: &[(f64, i16)], seconds: f64) -> Vec<TimedRequest> {
     let us = |s: f64| (s * 1e6) as u64;
     let mut commands: Vec<(u64, Command)> = Vec::new();
     if let Some(&(first, _)) = steps.first() {
+        let armed = arming(us(first).saturating_sub(2 * ARM_STEP_US), 0);
+        commands.extend(armed.map(|timed| (timed.at_us, timed.request.command)));
         commands.extend(
             (us(first)..us(seconds))
                 .step_by(KEEP_ALIVE_US as usize)

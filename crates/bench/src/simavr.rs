@@ -8,10 +8,10 @@ use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
 use atmega16_sim::{Board, LoadError, Mcu, Pins, Port, Pwm, ResetCause, Stop};
-use wire::{Request, encode_request};
+use wire::{Decoder, Frame, Request, code, encode_request};
 
 use crate::native::{CLOCK_HZ, Instants, Timeline};
-use crate::run::Cable;
+use crate::run::{Cable, with_nonce};
 use crate::{AccSelect, Ending, Run, Scenario, SerialByte, Stand, TimedRequest};
 
 const SELECTS: [u8; 3] = [2, 3, 4];
@@ -202,6 +202,9 @@ struct World<P> {
     reverse: bool,
     duty: f64,
     sent: VecDeque<(u64, u8)>,
+    /// Listens for the nonce that the board told last.
+    decoder: Decoder,
+    nonce: u16,
 }
 
 impl<P: Probe> World<P> {
@@ -222,6 +225,8 @@ impl<P: Probe> World<P> {
             reverse: false,
             duty: 0.0,
             sent: VecDeque::new(),
+            decoder: Decoder::new(),
+            nonce: 0,
         }
     }
 
@@ -325,6 +330,11 @@ impl<P: Probe> Board for World<P> {
 
     fn uart_byte(&mut self, at: u64, byte: u8) {
         self.sent.push_back((at, byte));
+        if let Some(Ok(Frame::Reply(reply))) = self.decoder.push(byte)
+            && reply.command == code::ARM
+        {
+            self.nonce = reply.value as u16;
+        }
     }
 
     fn pins_changed(&mut self, at: u64, pins: &Pins) {
@@ -365,7 +375,7 @@ pub struct Simulated<P = NoProbe> {
     mcu: Mcu,
     world: World<P>,
     cable: Cable,
-    requests: VecDeque<(u64, Vec<u8>)>,
+    requests: VecDeque<(u64, Request)>,
 }
 
 impl<P: Probe> Simulated<P> {
@@ -398,6 +408,11 @@ impl<P: Probe> Simulated<P> {
     #[must_use]
     pub fn stand(&self) -> &Stand {
         &self.world.stand
+    }
+
+    /// The stand, to meddle with.
+    pub fn stand_mut(&mut self) -> &mut Stand {
+        &mut self.world.stand
     }
 
     /// The probe.
@@ -438,10 +453,8 @@ impl<P: Probe> Simulated<P> {
     /// The host will send requests at their times, which must not lie behind those given before.
     pub fn request(&mut self, requests: &[TimedRequest]) {
         for timed in requests {
-            let mut line = [0; Request::FRAME_LEN];
-            let len = encode_request(&timed.request, &mut line).unwrap_or(0);
             let at = (timed.at_us as f64 * 1e-6 * self.world.hz) as u64;
-            self.requests.push_back((at, line[..len].to_vec()));
+            self.requests.push_back((at, timed.request));
         }
     }
 
@@ -478,9 +491,12 @@ impl<P: Probe> Simulated<P> {
         loop {
             let until = end.min(self.mcu.cycle() + PIECE);
             while self.requests.front().is_some_and(|&(at, _)| at <= until) {
-                if let Some((at, bytes)) = self.requests.pop_front() {
-                    bytes
-                        .into_iter()
+                if let Some((at, request)) = self.requests.pop_front() {
+                    let mut line = [0; Request::FRAME_LEN];
+                    let request = with_nonce(request, self.world.nonce);
+                    let len = encode_request(&request, &mut line).unwrap_or(0);
+                    line.into_iter()
+                        .take(len)
                         .for_each(|byte| self.mcu.send_at(at, byte));
                 }
             }

@@ -190,6 +190,11 @@ impl Stand {
         &self.gyros[axis].adis
     }
 
+    /// A gyro's registers, to meddle with: those of a part that was used elsewhere, or an error that it raises.
+    pub fn gyro_mut(&mut self, axis: usize) -> &mut Adis16250 {
+        &mut self.gyros[axis].adis
+    }
+
     /// The motor, for looking only.
     #[must_use]
     pub fn motor(&self) -> &Motor {

@@ -24,6 +24,7 @@ pub mod code {
     pub const MOTOR_DUTY: u8 = 48;
     pub const MOTOR_PROFILE: u8 = 49;
     pub const MOTOR_LIMITS: u8 = 50;
+    pub const ARM: u8 = 51;
     pub const READ_REGISTER: u8 = 64;
     pub const WRITE_REGISTER: u8 = 65;
     pub const SELF_TEST: u8 = 66;
@@ -190,6 +191,12 @@ pub enum Command {
         /// -255 ..= 255.
         duty: i16,
     },
+    /// Arms the motor: without a nonce asks for one, which comes as the reply's value; with it, once, the motor may turn for
+    /// the next 200 ms, and for as long as keep-alives come in time.
+    Arm {
+        /// 0, or the one that was told.
+        nonce: u16,
+    },
     /// Turns the motor by a periodic profile.
     MotorProfile {
         /// Shape over a period.
@@ -281,6 +288,7 @@ impl Command {
             Command::MotorDuty { .. } => code::MOTOR_DUTY,
             Command::MotorProfile { .. } => code::MOTOR_PROFILE,
             Command::MotorLimits { .. } => code::MOTOR_LIMITS,
+            Command::Arm { .. } => code::ARM,
             Command::ReadRegister { .. } => code::READ_REGISTER,
             Command::WriteRegister { .. } => code::WRITE_REGISTER,
             Command::SelfTest { .. } => code::SELF_TEST,
@@ -320,6 +328,7 @@ impl Command {
             }
             Command::SetBaud { divisor: value }
             | Command::BiasNull { samples: value }
+            | Command::Arm { nonce: value }
             | Command::SetBoardId { board_id: value } => word(value),
             Command::SetGyro { range, filter } => [range, filter, 0, 0, 0, 0, 0, 0],
             Command::SetAccRange { range } => [range, 0, 0, 0, 0, 0, 0, 0],
@@ -384,6 +393,7 @@ impl Asked {
             code::SET_BAUD..=code::SET_GYRO
             | code::BIAS_NULL
             | code::MOTOR_DUTY
+            | code::ARM
             | code::READ_REGISTER
             | code::SET_BOARD_ID => 2,
             code::SET_RATE | code::MOTOR_LIMITS => 3,
@@ -498,6 +508,9 @@ impl Asked {
             code::MOTOR_LIMITS => Command::MotorLimits {
                 max_duty: self.u8::<0>(),
                 ramp_per_s: self.u16::<1>(),
+            },
+            code::ARM => Command::Arm {
+                nonce: self.u16::<0>(),
             },
             code::READ_REGISTER => Command::ReadRegister {
                 gyro: axis()?,

@@ -101,7 +101,7 @@ faults! {
     WatchdogReset = 33, "watchdog_reset";
     /// The supply sagged and the brown-out detector reset the board. Kept over resets, as far as SRAM survived.
     BrownOutReset = 34, "brown_out_reset";
-    /// The stack reached its guard.
+    /// A health frame was made after the stack had had less than 32 bytes left.
     StackLow = 35, "stack_low";
 }
 

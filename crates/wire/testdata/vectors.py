@@ -68,6 +68,7 @@ vectors = {
     "request_motor_duty": request(14, 48, "h", -255),
     "request_motor_profile": request(15, 49, "BhhHB", 3, 200, -20, 1500, 4),
     "request_motor_limits": request(16, 50, "BH", 200, 500),
+    "request_arm": request(28, 51, "H", 0xA55A),
     "request_read_register": request(17, 64, "BB", 0, 0x38),
     "request_write_register": request(18, 65, "BBH", 1, 0x38, 0x0402),
     "request_self_test": request(19, 66, "B", 3),

@@ -204,6 +204,7 @@ fn ref_requests() {
             ramp_per_s: 500,
         },
     );
+    request_is("request_arm", 28, Command::Arm { nonce: 0xA55A });
     request_is(
         "request_read_register",
         17,

@@ -114,6 +114,7 @@ fn command() -> impl Strategy<Value = Command> {
                 }
             }
         ),
+        any::<u16>().prop_map(|nonce| Command::Arm { nonce }),
         any::<(u8, u16)>().prop_map(|(max_duty, ramp_per_s)| Command::MotorLimits {
             max_duty,
             ramp_per_s

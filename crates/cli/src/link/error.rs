@@ -103,6 +103,7 @@ pub const fn name(command: &Command) -> &'static str {
         Command::MotorDuty { .. } => "motor duty",
         Command::MotorProfile { .. } => "motor profile",
         Command::MotorLimits { .. } => "motor limits",
+        Command::Arm { .. } => "arm motor",
         Command::ReadRegister { .. } => "read register",
         Command::WriteRegister { .. } => "write register",
         Command::SelfTest { .. } => "self-test",
@@ -123,10 +124,10 @@ pub const fn words(status: Status) -> &'static str {
         Status::BadArgument => "an argument is out of range",
         Status::Busy => "it is still busy with another command",
         Status::Moving => "the stand moves",
-        Status::NotAnswering => "the sensor does not answer",
+        Status::NotAnswering => "the sensor does not answer, or says that something is wrong",
         Status::ReadBackWrong => "the sensor does not read back what was written",
         Status::SelfTestFailed => "the self-test failed",
-        Status::NoKeepAlive => "the motor does not turn without keep-alive",
+        Status::NoKeepAlive => "the motor is not armed, or keep-alive came late",
         Status::NotStored => "the EEPROM does not read back what was written",
         Status::NoConfig => "no stored set-up passes its check",
         Status::Aborted => "another command broke it off",
@@ -163,7 +164,9 @@ fn remedy(code: u8, status: Status) -> &'static str {
         Status::SelfTestFailed => {
             "repeat it at rest; if it fails again the part is damaged or its supply is out of range"
         }
-        Status::NoKeepAlive => "use `imu-stand board motor`, which keeps the motor alive",
+        Status::NoKeepAlive => {
+            "use `imu-stand board motor`, which arms the motor and keeps it alive"
+        }
         Status::NotStored => {
             "repeat it with a steady supply; if it fails again the EEPROM is worn out"
         }

@@ -28,6 +28,8 @@ const READ_WAIT: Duration = Duration::from_millis(20);
 const REPLY_WAIT: Duration = Duration::from_millis(700);
 /// How long work on the gyros may take, which is done beside a sample and told with the next: two of them at 1 Hz.
 const GYRO_WAIT: Duration = Duration::from_millis(2_700);
+/// Setting the gyros up is one such work for each, beside three samples that follow one another.
+const SET_GYRO_WAIT: Duration = Duration::from_millis(5_500);
 /// A self-test is four such works, and 40 ms.
 const SELF_TEST_WAIT: Duration = Duration::from_secs(11);
 /// How often a command that may be repeated is sent.
@@ -55,6 +57,7 @@ impl Patience {
     /// | bias null, self-test | measures anew, or is refused as busy |
     /// | store set-up | overwrites the other copy too: then both are the same |
     /// | motor profile | begins anew |
+    /// | arm | a nonce is good for once |
     /// | write register COMMAND | a reset or a flash update, again |
     #[must_use]
     pub fn of(command: &Command) -> Self {
@@ -65,15 +68,17 @@ impl Patience {
             Command::StoreConfig => once(Duration::from_secs(2)),
             Command::SelfTest { .. } => once(SELF_TEST_WAIT),
             Command::BiasNull { .. } => once(Duration::from_secs(3)),
-            Command::MotorProfile { .. } => once(REPLY_WAIT),
+            Command::MotorProfile { .. } | Command::Arm { .. } => once(REPLY_WAIT),
+            Command::SetGyro { .. } => Patience {
+                wait: SET_GYRO_WAIT,
+                tries: TRIES,
+            },
             Command::WriteRegister { address, .. }
                 if *address & !1 == adis16250::Register::Command.address() =>
             {
                 once(GYRO_WAIT)
             }
-            Command::ReadRegister { .. }
-            | Command::WriteRegister { .. }
-            | Command::SetGyro { .. } => Patience {
+            Command::ReadRegister { .. } | Command::WriteRegister { .. } => Patience {
                 wait: GYRO_WAIT,
                 tries: TRIES,
             },
@@ -295,6 +300,27 @@ impl Link {
         done(&command, self.ask_any(command, |_| {})?)
     }
 
+    /// Arms the motor: asks for a nonce and gives it back. From then on keep-alives are due.
+    ///
+    /// # Errors
+    /// As [`ask`](Self::ask).
+    pub fn arm(&mut self) -> Result<(), LinkError> {
+        let mut tried = 0;
+        loop {
+            tried += 1;
+            let armed = self.ask(Command::Arm { nonce: 0 }).and_then(|told| {
+                let nonce = told.value as u16;
+                self.ask(Command::Arm { nonce })
+            });
+            match armed {
+                Ok(_) => return Ok(()),
+                // A request or a reply was lost: both are asked anew, as the nonce may be spent.
+                Err(LinkError::NoReply { .. } | LinkError::Unknown { .. }) if tried < TRIES => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
     fn no_reply(&self, command: &Command, patience: Patience, heard: Heard) -> LinkError {
         let remedy = heard.remedy(self.baud);
         if patience.tries == 1 && heard.counts.frames > 0 {
@@ -507,6 +533,7 @@ mod tests {
             Command::SetBaud { divisor: 3 },
             Command::BiasNull { samples: 1 },
             Command::StoreConfig,
+            Command::Arm { nonce: 0 },
             write(0x3e),
             write(0x3f),
         ] {

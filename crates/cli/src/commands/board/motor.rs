@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use imu_stand::link::{Link, LinkError};
 use miette::{IntoDiagnostic, Result};
 use serde::Serialize;
-use wire::{Command, Frame, Shape};
+use wire::{Command, Frame, Shape, Status};
 
 use super::Session;
 
@@ -101,7 +101,7 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let flag = Arc::clone(&stop);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).into_diagnostic()?;
 
-    session.link.ask(Command::KeepAlive)?;
+    session.link.arm()?;
     let reply = session.link.ask(command)?;
     let began = Instant::now();
     let mut turning = Turning::default();
@@ -188,7 +188,7 @@ fn turn(
         if answered.elapsed() > DEAF {
             return Err(LinkError::NotAsAsked {
                 what: format!(
-                    "the board has not answered a keep-alive for {} s; heard so far: {}",
+                    "the board has not taken a keep-alive for {} s; heard so far: {}",
                     DEAF.as_secs(),
                     link.heard()
                 ),
@@ -228,7 +228,9 @@ fn listen(link: &mut Link, turning: &mut Turning) -> Result<bool, LinkError> {
     let mut answered = false;
     while let Some(frame) = link.next() {
         match frame {
-            Frame::Reply(reply) if reply.command == Command::KeepAlive.code() => {
+            Frame::Reply(reply)
+                if reply.command == Command::KeepAlive.code() && reply.status == Status::Ok =>
+            {
                 turning.answered += 1;
                 answered = true;
             }

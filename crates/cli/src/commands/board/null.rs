@@ -15,7 +15,8 @@ use super::show::{Q16, Q24, rate_hz};
 /// What `bias-null` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// Samples to average, 1 to 16384; 600 are half a minute at 20 Hz
+    /// Samples to average, at most 16384; 600 are half a minute at 20 Hz. At the least eight blocks of 31 ms times the filter's
+    /// taps: 24 at 20 Hz and 264 at 256 Hz with four taps
     #[arg(long, default_value_t = 600)]
     samples: u16,
     /// Keep it over resets
@@ -27,8 +28,9 @@ pub struct Arguments {
 const WITHOUT: u32 = 10;
 /// Silence after which the board is given up.
 const SILENCE: Duration = Duration::from_secs(3);
-/// Time without a sample in order after which a measurement is given up: the board would wait for ever.
-const STUCK: Duration = Duration::from_secs(5);
+/// Time without a sample in order after which a measurement is given up: the board gives up after 16 samples, and its reply may
+/// be lost; at 1 Hz.
+const STUCK: Duration = Duration::from_secs(20);
 /// How long the sample behind a reply may take, at 1 Hz.
 const LAST_WITHIN: Duration = Duration::from_millis(1_500);
 /// Requests sent at the most; a further one only where the board does not measure.
@@ -52,7 +54,7 @@ impl Seen {
         }
         self.without = 0;
         // As the board: only samples in order.
-        if sample.flags & flags::IN_ORDER != flags::IN_ORDER {
+        if sample.flags & !flags::BIAS_NULL != flags::IN_ORDER {
             return;
         }
         self.count += 1;
@@ -83,6 +85,8 @@ struct Answer {
     reply_lost: bool,
     bias_before_dps: [f64; 3],
     bias_dps: [f64; 3],
+    /// The largest of the three, by the board, which knows of the filter; absent where its reply was lost.
+    std_error_dps: Option<f64>,
     std_error_if_white_dps: [Option<f64>; 3],
     stored: bool,
 }
@@ -117,6 +121,7 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         reply_lost: reply.is_none(),
         bias_before_dps: before.bias.map(|b| f64::from(b) / Q16),
         bias_dps: bias.map(|b| f64::from(b) / Q16),
+        std_error_dps: reply.map(|reply| f64::from(reply.value) / Q16),
         std_error_if_white_dps: [0, 1, 2].map(|k| Some(seen.standard_error(k)? * scale[k])),
         stored: arguments.store,
     };
@@ -132,6 +137,11 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
             "gyro {axis}  {:>11.5}   {error:>24}   {:>8.5}",
             answer.bias_dps[k],
             answer.bias_before_dps[k]
+        );
+    }
+    if let Some(error) = answer.std_error_dps {
+        say!(
+            "standard error, the largest of the three, with what the gyros' filter does to the noise: {error:.5} deg/s"
         );
     }
     if reply.is_none() {

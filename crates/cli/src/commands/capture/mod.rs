@@ -114,6 +114,10 @@ enum Motor {
     Off,
     /// It starts as soon as rows are written.
     Wanted(Command),
+    /// A nonce was asked for under this number; when.
+    Arming(Command, u16, Instant),
+    /// The nonce has come.
+    Armed(Command, u16),
     /// It was asked for under this number; when.
     Asked(Command, u16, Instant),
     /// It turns; when the last keep-alive went out.
@@ -228,11 +232,17 @@ impl<'a> Capture<'a> {
     fn drive(&mut self, feed: &mut Feed) -> Result<()> {
         match self.motor {
             Motor::Wanted(command) if self.live.is_some() && !feed.is_gone() => {
-                feed.link.send(Command::KeepAlive)?;
+                let number = feed.link.send(Command::Arm { nonce: 0 })?;
+                self.motor = Motor::Arming(command, number, Instant::now());
+            }
+            Motor::Armed(command, nonce) => {
+                feed.link.send(Command::Arm { nonce })?;
                 let number = feed.link.send(command)?;
                 self.motor = Motor::Asked(command, number, Instant::now());
             }
-            Motor::Asked(command, _, asked) if asked.elapsed() > ASK => {
+            Motor::Arming(command, _, asked) | Motor::Asked(command, _, asked)
+                if asked.elapsed() > ASK =>
+            {
                 self.motor = Motor::Wanted(command);
             }
             Motor::Alive(last) if last.elapsed() >= KEEP_ALIVE && !feed.is_gone() => {
@@ -245,8 +255,14 @@ impl<'a> Capture<'a> {
         Ok(())
     }
 
-    /// A reply; to the motor's command it says whether it turns.
+    /// A reply: the nonce that arms the motor; to the motor's command it says whether it turns.
     fn replied(&mut self, reply: Reply) -> Result<()> {
+        if let Motor::Arming(command, number, _) = self.motor
+            && reply.number == number
+        {
+            link::done(&Command::Arm { nonce: 0 }, reply)?;
+            self.motor = Motor::Armed(command, reply.value as u16);
+        }
         if let Motor::Asked(command, number, _) = self.motor
             && reply.number == number
             && reply.command == command.code()
