@@ -235,7 +235,7 @@ impl<'a> Capture<'a> {
                 let number = feed.link.send(Command::Arm { nonce: 0 })?;
                 self.motor = Motor::Arming(command, number, Instant::now());
             }
-            Motor::Armed(command, nonce) => {
+            Motor::Armed(command, nonce) if !feed.is_gone() => {
                 feed.link.send(Command::Arm { nonce })?;
                 let number = feed.link.send(command)?;
                 self.motor = Motor::Asked(command, number, Instant::now());
