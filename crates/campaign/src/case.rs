@@ -42,7 +42,7 @@ impl Family {
             Self::Pair => 3,
             Self::One(i) => 100 + i as u64,
             Self::Counted(i) => 200 + i as u64,
-            Self::Foreign(i) => 300 + i as u64,
+            Self::Foreign(i) => foreign::number(i),
         }
     }
 
@@ -232,7 +232,7 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
             motor: true,
             vibration: true,
         },
-        Family::Foreign(i) => foreign::needs(FOREIGN[i]),
+        Family::Foreign(i) => foreign::needs(i),
         _ => Needs::default(),
     };
     let mut stand = Stand::draw(draw, seconds, rate_hz, needed);
@@ -256,9 +256,9 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         Family::Pair => pair(draw, &mut stand, &mut truths),
         Family::Foreign(i) => {
             let wanted = draw.by_ratio(25.0, 40.0);
-            axis = foreign::on_axis(FOREIGN[i], axis);
-            allowed.extend(foreign::parts(FOREIGN[i]));
-            let f = foreign(draw, &mut stand, FOREIGN[i], axis, wanted);
+            axis = foreign::on_axis(i, axis);
+            allowed.extend(foreign::parts(i));
+            let f = foreign(draw, &mut stand, i, axis, wanted);
             strange = f.strength;
             unknown = Some(f);
         }
@@ -283,7 +283,7 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         );
     }
     if let Some(f) = &unknown {
-        f.act(&mut record, GYROS[axis], &stand, axis, draw);
+        f.act(&mut record, &stand, axis, draw);
     }
     Planted {
         record,
@@ -292,6 +292,44 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         walks: stand.walk_of_rate,
         strange,
     }
+}
+
+/// Digest (FNV-1a, 64 bits) of what case `index` of a family plants: counts, flags and times of the record, and what is
+/// true of it to nine digits. Builds that draw the same give the same.
+#[must_use]
+pub fn digest(seed: u64, family: Family, index: u64) -> u64 {
+    let p = planted(seed, family, index);
+    let mut hash = 0xcbf2_9ce4_8422_2325u64;
+    let mut take = |bytes: &[u8]| {
+        for byte in bytes {
+            hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    };
+    let number = |v: f64| format!("{v:.8e};");
+    for c in &p.record.channels {
+        take(c.name.as_bytes());
+        match &c.counts {
+            Some(counts) => counts.iter().for_each(|c| take(&c.to_le_bytes())),
+            None => c.values.iter().for_each(|v| take(number(*v).as_bytes())),
+        }
+    }
+    let numbers = p.record.seq.iter().chain(&p.record.t_ticks).flatten();
+    numbers.for_each(|n| take(&n.to_le_bytes()));
+    let flags = p.record.flags.iter().flatten();
+    flags.for_each(|f| take(&f.to_le_bytes()));
+    let times = p.record.host_time_s.iter().flatten();
+    times.for_each(|t| take(number(*t).as_bytes()));
+    for t in &p.truths {
+        take(format!("{} {} {};", t.label, t.cause, t.channel).as_bytes());
+        take(number(t.strength).as_bytes());
+        for (name, parameter) in &t.parameters {
+            take(format!("{name} {};", number(parameter.value)).as_bytes());
+        }
+    }
+    p.allowed.iter().for_each(|a| take(a.as_bytes()));
+    let own = p.walks.iter().chain([&p.strange]);
+    own.for_each(|v| take(number(*v).as_bytes()));
+    hash
 }
 
 /// What case `index` of a family plants, in words, and the whole answer.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::case::{Estimate, Family, Hit, Outcome};
-use crate::foreign::{FOREIGN, SEEN, has_twin};
+use crate::foreign::{FOREIGN, has_twin, is_seen, sets};
 use crate::plant::{BY_COUNT, BY_STRENGTH, asked_from, asked_ratio};
 use crate::tally::{ORACLE, Rate, d95, oracle};
 
@@ -228,7 +228,6 @@ depth 1 and 21 at depth 0.5, and depths are drawn from 0.5 to 1.
 ";
 
 const NAMES: &str = include_str!("report/names.md");
-const KEPT: &str = include_str!("report/kept.md");
 
 fn bars(out: &mut String, all: &[Outcome]) {
     let clean = Rate::of(
@@ -252,12 +251,13 @@ fn bars(out: &mut String, all: &[Outcome]) {
     );
     let strange = |seen: bool| {
         all.iter().filter(move |o| {
-            matches!(o.family, Family::Foreign(i) if (i < SEEN) == seen)
+            matches!(o.family, Family::Foreign(i) if is_seen(i) == seen)
                 && (o.strength.is_nan() || o.strength >= 0.99 * 25.0)
         })
     };
     let told = |seen| Rate::of(strange(seen).map(|o| !o.unexplained.is_empty()));
-    let alone_of_its_kind = || strange(false).filter(|o| !has_twin(o.family.label()));
+    let alone_of_its_kind =
+        || strange(false).filter(|o| matches!(o.family, Family::Foreign(i) if !has_twin(i)));
     let misnamed = |seen| Rate::of(strange(seen).map(|o| !o.wrong.is_empty()));
     let fit: Vec<_> = estimates(all).into_values().flatten().collect();
     let covered = Rate::of(
@@ -501,7 +501,8 @@ fn pairs(out: &mut String, all: &[Outcome]) {
 fn foreign(out: &mut String, all: &[Outcome]) {
     let _ = writeln!(
         out,
-        "\n{NAMES}## Effects that the library does not have\n\n{KEPT}\n\n| effect | unexplained | given a name | names given |\n|---|---|---|---|"
+        "\n{NAMES}## Effects that the library does not have\n\n{}\n\n| effect | unexplained | given a name | names given |\n|---|---|---|---|",
+        sets::page()
     );
     for (i, label) in FOREIGN.iter().enumerate() {
         let own: Vec<&Outcome> = all

@@ -1,0 +1,482 @@
+//! Converters: where one code ends and the next one begins.
+
+use std::f64::consts::TAU;
+use std::rc::Rc;
+
+use super::super::super::act::Change;
+use super::super::super::known::{Known, law, mean_and_sigma, shares};
+use super::super::super::shape::{Shape, edges, sized};
+use crate::random::Draw;
+use crate::stand::{LSB, Stand};
+
+/// Most that the line of a wavy converter leans: at 1 it would turn back, and codes be missing.
+pub(super) const STEEPEST: f64 = 0.9;
+
+/// First code and lower edges, counts, of an amplifier that reads asinh(bend x) / bend of what is x off its middle.
+pub(super) fn of_bend(middle: f64, reach: i32, bend: f64) -> (i32, Vec<f64>) {
+    let first = middle.round() as i32 - reach;
+    let edge = |code: i32| {
+        let off = f64::from(code) - 0.5 - middle;
+        middle + (bend * off).sinh() / bend
+    };
+    (first, (first..=first + 2 * reach).map(edge).collect())
+}
+
+/// The major carry: at mid-scale, which lies near the rate at rest, all bits of the converter turn over, and the largest
+/// weighs more than all others together by so many counts, or less: readings on one side are off from those on the other,
+/// with codes between that never come, or that come from both sides.
+pub(super) fn mid_scale(
+    draw: &mut Draw,
+    stand: &Stand,
+    axis: usize,
+) -> impl Fn(f64) -> Stage + use<> {
+    let (zero, sign) = (zero_of(draw, stand, axis), draw.sign());
+    move |size| Stage {
+        zero,
+        threshold: 0.0,
+        inside: 1.0,
+        beyond: 1.0,
+        from: 0.5 * sign * size,
+    }
+}
+
+/// First code and lower edges, counts, of a stage that does not answer until its input is `zone` counts off zero, and then
+/// answers by what is beyond; zero lies at `middle`.
+pub(super) fn with_zone(middle: i32, reach: i32, zone: f64) -> (i32, Vec<f64>) {
+    let edge = |code: i32| {
+        let off = if code > middle { zone } else { -zone };
+        f64::from(code) - 0.5 + off
+    };
+    let first = middle - reach;
+    (first, (first..=middle + reach).map(edge).collect())
+}
+
+/// Lower edges, counts, of even codes about a middle, of which all rates within `band` read the middle.
+pub(super) fn with_band(middle: i32, reach: i32, band: f64) -> (i32, Vec<f64>) {
+    let first = middle - reach;
+    let edge = |code: i32| {
+        let off = f64::from(code - middle);
+        let even = off - 0.5;
+        f64::from(middle)
+            + if off <= 0.0 {
+                even.min(-band)
+            } else {
+                even.max(band)
+            }
+    };
+    (first, (first..=first + 2 * reach).map(edge).collect())
+}
+
+/// Lower edges, counts, of codes about a middle, above which the rate counts `exp(log_ratio / 2)` times, below it the
+/// inverse.
+pub(super) fn of_two_gains(middle: f64, reach: i32, log_ratio: f64) -> (i32, Vec<f64>) {
+    let gain = (0.5 * log_ratio).exp();
+    let first = middle.round() as i32 - reach;
+    let edge = |code: i32| {
+        let off = f64::from(code) - 0.5 - middle;
+        middle + if off > 0.0 { off / gain } else { off * gain }
+    };
+    (first, (first..=first + 2 * reach).map(edge).collect())
+}
+
+/// Lower edges, counts, of codes about a middle when every other is missing beyond a limit, and three of four beyond twice
+/// as much.
+pub(super) fn of_growing(middle: i32, limit: i32, reach: i32) -> (i32, Vec<f64>) {
+    let mut codes = vec![0];
+    let mut last = 0;
+    while last < reach {
+        last += match last {
+            l if l < limit => 1,
+            l if l < 2 * limit => 2,
+            _ => 4,
+        };
+        codes.push(last);
+        codes.insert(0, -last);
+    }
+    let first = codes[0];
+    let edges = (first..=last)
+        .map(|code| {
+            // A code that is missing begins where the next one does that is not.
+            let next = codes.partition_point(|c| *c < code);
+            let below = if next == 0 {
+                f64::from(codes[0]) - 1.0
+            } else {
+                f64::from(codes[next - 1])
+            };
+            f64::from(middle) + 0.5 * (below + f64::from(codes[next]))
+        })
+        .collect();
+    (middle + first, edges)
+}
+
+/// A stage whose output is a straight line of its input on each side of two thresholds and between them, counts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stage {
+    /// Zero rate.
+    pub(super) zero: f64,
+    /// The thresholds are this far from it.
+    pub(super) threshold: f64,
+    /// Gain between them.
+    pub(super) inside: f64,
+    /// Gain beyond.
+    pub(super) beyond: f64,
+    /// What comes out just beyond them, from zero.
+    pub(super) from: f64,
+}
+
+impl Stage {
+    /// What comes out.
+    pub(super) fn of(self, rate: f64) -> f64 {
+        let off = rate - self.zero;
+        let past = off.abs() - self.threshold;
+        self.zero
+            + if past < 0.0 {
+                self.inside * off
+            } else {
+                off.signum() * (self.from + self.beyond * past)
+            }
+    }
+
+    /// The first code and the share of each, of a rate that is normal: piece by piece, what comes to lie between the edges
+    /// of a code.
+    pub(super) fn law(self, stand: &Stand, axis: usize) -> (i32, Vec<f64>) {
+        let (first, even) = law(stand, axis);
+        let (mean, sigma) = (stand.bias[axis] / LSB, stand.white(axis).sqrt() / LSB);
+        let far = even.len() as f64;
+        let (low, high) = (self.zero - self.threshold, self.zero + self.threshold);
+        let pieces = [
+            (low - 2.0 * far, low, self.beyond),
+            (low, high, self.inside),
+            (high, high + 2.0 * far, self.beyond),
+        ];
+        let mut read = vec![0.0; even.len()];
+        for (from, to, gain) in pieces {
+            let middle = 0.5 * (from + to);
+            let comes_out = self.of(middle);
+            // The rate at which the piece's line comes to an edge between codes.
+            let at = |edge: f64| match gain {
+                0.0 if edge > comes_out => to,
+                0.0 => from,
+                _ => (middle + (edge - comes_out) / gain).clamp(from, to),
+            };
+            // What is beyond the codes looked at counts to the last of them.
+            let inner = (1..even.len()).map(|i| at(f64::from(first) + i as f64 - 0.5));
+            let edges: Vec<f64> = [from].into_iter().chain(inner).chain([to]).collect();
+            let own = shares(&edges, mean, sigma);
+            read.iter_mut().zip(own).for_each(|(r, o)| *r += o);
+        }
+        (first, read)
+    }
+
+    /// What it does to an axis.
+    pub(super) fn change(self, axis: usize) -> Change {
+        Change::made(move |counts, draw| {
+            counts[axis]
+                .iter()
+                // Within its step the rate is anywhere.
+                .map(|c| self.of(f64::from(*c) + draw.between(-0.5, 0.5)).round() as i32)
+                .collect()
+        })
+    }
+}
+
+/// Zero rate of a stage, counts: not quite that of the part.
+pub(super) fn zero_of(draw: &mut Draw, stand: &Stand, axis: usize) -> f64 {
+    let sigma = stand.white(axis).sqrt();
+    (stand.bias[axis] + sigma * draw.between(-0.7, 0.7)) / LSB
+}
+
+/// Nothing comes out until the rate is so far from zero, counts, and only what is beyond afterwards.
+pub(super) fn dead_zone(
+    draw: &mut Draw,
+    stand: &Stand,
+    axis: usize,
+) -> impl Fn(f64) -> Stage + use<> {
+    let zero = zero_of(draw, stand, axis);
+    move |size| Stage {
+        zero,
+        threshold: size,
+        inside: 0.0,
+        beyond: 1.0,
+        from: 0.0,
+    }
+}
+
+/// A stage that changes its range beyond a rate: the coarse one has an offset from the fine one, counts, and another gain.
+pub(super) fn ranges(draw: &mut Draw, stand: &Stand, axis: usize) -> impl Fn(f64) -> Stage + use<> {
+    let zero = zero_of(draw, stand, axis);
+    let threshold = stand.white(axis).sqrt() / LSB * draw.between(0.7, 1.5);
+    let (offset, gain) = (draw.sign(), draw.sign() * draw.between(0.02, 0.08));
+    move |size| Stage {
+        zero,
+        threshold,
+        inside: 1.0,
+        beyond: (gain * size).exp(),
+        from: threshold * (offset * size / threshold).exp(),
+    }
+}
+
+/// Lower edges of the readings, counts, when codes `fine` counts apart, the first of them `offset` counts off, are rounded
+/// to whole counts; with the first reading.
+pub(super) fn edges_of(fine: f64, offset: f64, from: i32, to: i32) -> Vec<f64> {
+    // The lowest code that rounds to a reading begins half a code below itself.
+    (from..=to)
+        .map(|reading| {
+            let lowest = ((f64::from(reading) - 0.5 - offset) / fine).ceil();
+            (lowest - 0.5) * fine + offset
+        })
+        .collect()
+}
+
+/// A converter by successive approximation of which one bit is not what it should be, counts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weight {
+    bit: u32,
+    /// The word's code of the zero code, of which only what is below the next bit counts.
+    offset: i32,
+    sign: f64,
+}
+
+impl Weight {
+    /// Bits that may be off: the lowest is told by its share of ones alone, as one that sticks.
+    const BITS: (u32, u32) = (1, 3);
+    /// Most that it may be off, of what it is.
+    const MOST: f64 = 0.95;
+
+    pub(super) fn any(draw: &mut Draw) -> Self {
+        let bit = Self::BITS.0 + draw.of_many((Self::BITS.1 - Self::BITS.0 + 1) as usize) as u32;
+        Self {
+            bit,
+            offset: draw.of_many(1 << (bit + 1)) as i32,
+            sign: draw.sign(),
+        }
+    }
+
+    /// One that is as strong as wanted at the most that it may be off, if a few draws have one.
+    pub(super) fn new(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Self {
+        const TRIES: usize = 20;
+        let mut own = Self::any(draw);
+        for _ in 0..TRIES {
+            if own.strength(stand, axis, f64::INFINITY) >= wanted {
+                break;
+            }
+            own = Self::any(draw);
+        }
+        own
+    }
+
+    /// Lower edges of the codes from the first on, counts. A code whose edge lies above a later one's never comes: the higher
+    /// bit is tried first.
+    pub(super) fn edges(self, stand: &Stand, axis: usize, off: f64) -> (i32, Vec<f64>) {
+        let (first, even) = law(stand, axis);
+        let off = self.sign * off.min(Self::MOST * f64::from(1 << self.bit));
+        let mut edges: Vec<f64> = (first..=first + even.len() as i32)
+            .map(|code| {
+                let set = (code + self.offset) >> self.bit & 1;
+                f64::from(code) - 0.5 + off * f64::from(set)
+            })
+            .collect();
+        for i in (1..edges.len()).rev() {
+            edges[i - 1] = edges[i - 1].min(edges[i]);
+        }
+        (first, edges)
+    }
+
+    pub(super) fn strength(self, stand: &Stand, axis: usize, off: f64) -> f64 {
+        Known::edges(stand, axis, &self.edges(stand, axis, off)).strength(stand, axis)
+    }
+}
+
+/// A folding converter: its line waves about the straight one, once for each fold.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wave {
+    /// Codes of a fold.
+    period: f64,
+    /// Where it begins, rad.
+    first: f64,
+}
+
+impl Wave {
+    /// Folds of this many sigma of the noise at least, and at most: wider ones are a change of the gain.
+    const FOLDS: (f64, f64) = (1.2, 3.0);
+
+    pub(super) fn new(draw: &mut Draw, stand: &Stand, axis: usize) -> Self {
+        let (_, sigma) = mean_and_sigma(stand, axis);
+        Self {
+            period: sigma * draw.by_ratio(Self::FOLDS.0, Self::FOLDS.1),
+            first: draw.between(0.0, TAU),
+        }
+    }
+
+    /// What is read, before it is rounded, of a rate, counts.
+    pub(super) fn of(self, lean: f64, rate: f64) -> f64 {
+        let turn = TAU / self.period;
+        rate + lean.min(STEEPEST) / turn * (turn * rate + self.first).sin()
+    }
+
+    /// Lower edges of the codes from the first on, counts.
+    pub(super) fn edges(self, stand: &Stand, axis: usize, lean: f64) -> (i32, Vec<f64>) {
+        let (first, even) = law(stand, axis);
+        let edge = |i: usize| {
+            let read = f64::from(first) + i as f64 - 0.5;
+            // No farther off than the wave is high; the line rises.
+            let (mut low, mut high) = (read - self.period, read + self.period);
+            while high - low > 1e-6 {
+                let middle = 0.5 * (low + high);
+                if self.of(lean, middle) < read {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            low
+        };
+        (first, (0..=even.len()).map(edge).collect())
+    }
+}
+
+/// Codes that are missing: one in so many.
+pub(super) fn missing(draw: &mut Draw) -> Shape {
+    let every = [3, 5, 6, 7, 10][draw.of_many(5)];
+    Shape::Fixed(Known::Strength(f64::NAN), Change::Missing(every))
+}
+
+/// A dead band about the middle, of the size of the noise.
+pub(super) fn still_band(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let band = stand.white(axis).sqrt() * draw.between(0.5, 1.2);
+    Shape::Fixed(Known::Strength(f64::NAN), Change::DeadBand(band))
+}
+
+/// Sigma either way of the bias within which the edges between codes are drawn.
+const REACH: f64 = 7.0;
+
+/// First and last code within that reach of an axis.
+fn reach(stand: &Stand, axis: usize) -> (i32, i32) {
+    let (bias, sigma) = mean_and_sigma(stand, axis);
+    let (first, last) = (bias - REACH * sigma, bias + REACH * sigma);
+    (first.floor() as i32, last.ceil() as i32)
+}
+
+/// What edges are, held for those of an even converter of the same mean and variance.
+fn against_even(stand: &Stand, axis: usize, first: i32, edges: &[f64], even: &[f64]) -> Known {
+    let (bias, sigma) = mean_and_sigma(stand, axis);
+    Known::Codes {
+        first,
+        read: shares(edges, bias, sigma),
+        held: shares(even, bias, sigma),
+    }
+}
+
+/// A converter whose steps are not of equal width: each edge between two codes lies off its place by its own amount.
+pub(super) fn uneven_steps(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let (first, last) = reach(stand, axis);
+    let off: Vec<f64> = (first..=last).map(|_| draw.between(-0.5, 0.5)).collect();
+    let edges = move |size: f64| -> Vec<f64> {
+        let at = |(i, o): (usize, &f64)| f64::from(first) + i as f64 - 0.5 + size.min(0.98) * o;
+        off.iter().enumerate().map(at).collect()
+    };
+    let known = edges.clone();
+    sized(
+        0.98,
+        move |stand, size| against_even(stand, axis, first, &known(size), &known(0.0)),
+        move |_, _, size| Change::Edges(first, edges(size)),
+    )
+}
+
+/// A gain below 1 in fixed point, by which the firmware brings the part to its nominal scale: now and then two codes of the
+/// part become one reading, which then comes twice as often as its neighbours. Its strength is what the gain makes it.
+pub(super) fn two_in_one(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    // Below that, every other reading would be double: a bit that sticks at times does the same.
+    let (gain, offset) = (draw.between(0.72, 0.91), draw.between(-0.5, 0.5));
+    let (first, last) = reach(stand, axis);
+    let edges = edges_of(gain, offset, first, last);
+    let even: Vec<f64> = (first..=last).map(|c| f64::from(c) - 0.5).collect();
+    let known = against_even(stand, axis, first, &edges, &even);
+    Shape::Fixed(known, Change::Edges(first, edges))
+}
+
+/// Crossover: of two transistors that push and pull, neither leads until the input is a little off zero. Firmware that takes
+/// the bias off and then divides whole numbers does the same by half a count: the quotient is cut towards zero. What is
+/// left of the bias lies within a sigma of that zero.
+pub(super) fn push_pull(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let (bias, sigma) = mean_and_sigma(stand, axis);
+    let middle = (bias + draw.between(-1.0, 1.0) * sigma).round() as i32;
+    let reach = (8.0 * sigma).ceil() as i32;
+    // Two sigma of it would leave few readings but zero.
+    edges(axis, move |_, zone| {
+        with_zone(middle, reach, zone.min(2.0 * sigma))
+    })
+}
+
+/// A threshold against drift: rates that are small, the bias taken off, read zero, and the others are left as they are.
+pub(super) fn dead_band(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let (bias, sigma) = mean_and_sigma(stand, axis);
+    let middle = (bias + sigma * draw.between(-0.5, 0.5)).round() as i32;
+    let reach = (10.0 * sigma).ceil() as i32;
+    edges(axis, move |_, wider| {
+        with_band(middle, reach, 0.5 + wider.min(3.0 * sigma))
+    })
+}
+
+/// A push-pull read-out of two electrodes, of which one has the smaller gain: the reading has a kink where the sense of
+/// the rate changes, near the middle of the noise.
+pub(super) fn two_gains(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let (mean, sigma) = mean_and_sigma(stand, axis);
+    let (middle, sign) = (mean + sigma * draw.between(-0.3, 0.3), draw.sign());
+    let reach = (20.0 * sigma).ceil() as i32;
+    edges(axis, move |_, log_ratio| {
+        of_two_gains(middle, reach, sign * log_ratio.min(1.6))
+    })
+}
+
+/// A word of few bits that is a number times a power of two, the bias taken off before: small readings are told to the
+/// count, larger ones by twos and by fours. The limit is the largest that makes it as strong as wanted.
+pub(super) fn growing_steps(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
+    let (mean, sigma) = mean_and_sigma(stand, axis);
+    let middle = (mean + sigma * draw.between(-0.5, 0.5)).round() as i32;
+    let reach = (8.0 * sigma).ceil() as i32;
+    let known = |limit: i32| Known::edges(stand, axis, &of_growing(middle, limit, reach));
+    let limit = (1..reach)
+        .rev()
+        .find(|limit| known(*limit).strength(stand, axis) >= wanted)
+        .unwrap_or(1);
+    let (first, edges) = of_growing(middle, limit, reach);
+    Shape::Fixed(known(limit), Change::Edges(first, edges))
+}
+
+/// An amplifier that is straight for small rates and bends to a logarithm for large ones, either way, so that they fit into
+/// few codes; nobody has bent them back.
+pub(super) fn bent(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let (mean, sigma) = mean_and_sigma(stand, axis);
+    let middle = mean + sigma * draw.between(-0.3, 0.3);
+    let reach = (10.0 * sigma).ceil() as i32;
+    edges(axis, move |_, bend| {
+        of_bend(middle, reach, bend.min(3.0) / sigma)
+    })
+}
+
+/// A converter whose line is wavy.
+pub(super) fn wavy(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let wave = Wave::new(draw, stand, axis);
+    edges(axis, move |stand, lean| wave.edges(stand, axis, lean))
+}
+
+/// A bit of the converter that weighs wrong.
+pub(super) fn weighs_wrong(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
+    let weight = Weight::new(draw, stand, axis, wanted);
+    edges(axis, move |stand, off| weight.edges(stand, axis, off))
+}
+
+/// A stage of a size.
+pub(super) fn by_stage(axis: usize, stage: impl Fn(f64) -> Stage + 'static) -> Shape {
+    let stage = Rc::new(stage);
+    let known = Rc::clone(&stage);
+    sized(
+        f64::INFINITY,
+        move |stand, size| {
+            let (first, read) = known(size).law(stand, axis);
+            Known::codes(first, read)
+        },
+        move |_, _, size| stage(size).change(axis),
+    )
+}

@@ -1,0 +1,80 @@
+//! Gaps that a driver hides.
+
+use std::f64::consts::TAU;
+
+use super::super::super::act::Change;
+use super::super::super::known::Known;
+use super::super::super::shape::Shape;
+use crate::random::Draw;
+use crate::stand::{LSB, Stand};
+
+/// Readings of a gap, least and most.
+pub(super) const GAP: (usize, usize) = (4, 10);
+
+/// Nats by which a straight line tells a reading that lies on it from one of the noise: that of the density at the line,
+/// for the converter's step, averaged over a gap of this many readings.
+pub(super) fn nats_of_gap(length: usize, sigma_counts: f64) -> f64 {
+    let square = |k: usize| {
+        let part = k as f64 / (length + 1) as f64;
+        part.powi(2) + (1.0 - part).powi(2)
+    };
+    let mean = (1..=length).map(square).sum::<f64>() / length as f64;
+    (sigma_counts * TAU.sqrt()).ln() + 0.5 * mean
+}
+
+/// Gaps that a link has lost, as strong as wanted together, none touching another: the first reading and the length of each,
+/// with half the d'^2 that is left.
+fn gaps_for(
+    draw: &mut Draw,
+    stand: &Stand,
+    axis: usize,
+    wanted: f64,
+) -> (Vec<(usize, usize)>, f64) {
+    let (n, sigma) = (stand.samples(), stand.white(axis).sqrt() / LSB);
+    let mut gaps: Vec<(usize, usize)> = vec![];
+    let mut left = 0.5 * wanted * wanted;
+    while left > 0.0 {
+        let (from, length) = (
+            1 + draw.of_many(n - GAP.1 - 2),
+            GAP.0 + draw.of_many(GAP.1 + 1 - GAP.0),
+        );
+        let free = |(f, l): &(usize, usize)| from > f + l || *f > from + length;
+        if !gaps.iter().all(free) {
+            continue;
+        }
+        // The last one is as short as it has to be.
+        let of = |length: &usize| *length as f64 * nats_of_gap(*length, sigma);
+        let off = |length: &usize| (of(length) - left).abs();
+        let length = (1..=length)
+            .min_by(|a, b| off(a).total_cmp(&off(b)))
+            .unwrap_or(length);
+        left -= of(&length);
+        gaps.push((from, length));
+        if left < 0.5 * nats_of_gap(1, sigma) {
+            break;
+        }
+    }
+    (gaps, left)
+}
+
+/// A driver that hides what the link has lost: between the last reading before a gap and the first one after it there is a
+/// straight line.
+pub(super) fn bridged(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
+    let (gaps, left) = gaps_for(draw, stand, axis, wanted);
+    let change = Change::made(move |counts, _| {
+        let mut own = counts[axis].clone();
+        for (from, length) in &gaps {
+            let (before, after) = (own[from - 1], own[from + length]);
+            for k in 1..=*length {
+                let part = k as f64 / (length + 1) as f64;
+                let along = f64::from(before) + part * f64::from(after - before);
+                own[from + k - 1] = along.round() as i32;
+            }
+        }
+        own
+    });
+    Shape::Fixed(
+        Known::Strength((wanted * wanted - 2.0 * left).sqrt()),
+        change,
+    )
+}

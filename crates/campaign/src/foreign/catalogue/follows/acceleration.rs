@@ -1,0 +1,257 @@
+//! Signals that follow an acceleration.
+
+use std::f64::consts::TAU;
+
+use super::super::super::words::{
+    Turning, about_mean, behind_plays, cycles, from_trim, resonating, shaken, shaking, shocks,
+    swelling, without_line,
+};
+use crate::random::Draw;
+use crate::stand::{Stand, lagged};
+
+/// Vibration along a slant in spells: the anisoelastic error goes with the mean square over a sample, while the
+/// accelerometers see single aliased values.
+pub(super) fn rectified(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let (rms, slant) = (draw.between(0.05, 0.25), draw.between(0.3, 1.2));
+    let gain = 1.0 - (-1.0 / (draw.between(0.2, 1.0) * stand.rate_hz)).exp();
+    let (mut now, mut goal, mut left) = (0.0, 0.0, draw.between(0.0, 12.0));
+    let size: Vec<f64> = (0..stand.samples())
+        .map(|_| {
+            left -= 1.0 / stand.rate_hz;
+            if left <= 0.0 {
+                goal = if goal == 0.0 {
+                    draw.between(0.4, 1.0)
+                } else {
+                    0.0
+                };
+                left = draw.between(2.0, 12.0);
+            }
+            now += gain * (goal - now);
+            now
+        })
+        .collect();
+    for (i, s) in size.iter().enumerate() {
+        let shake = rms * s * draw.normal();
+        stand.world.acc[0][i] = shake * slant.cos();
+        stand.world.acc[1][i] = shake * slant.sin();
+    }
+    size.iter().map(|s| s * s).collect()
+}
+
+/// A capacitor lets through how fast the acceleration changes, and nothing of what it is.
+pub(super) fn change(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let shake = shaken(draw, stand, (0.3, 3.0));
+    let last = shake.len() - 1;
+    (0..shake.len())
+        .map(|i| shake[(i + 1).min(last)] - shake[i.saturating_sub(1)])
+        .collect()
+}
+
+/// A mass between stops that are close: what it does follows the acceleration for a little and is then the same however
+/// hard it is pushed.
+pub(super) fn stop(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let shake = shaken(draw, stand, (0.3, 4.0));
+    let free = draw.by_ratio(0.05, 0.3);
+    shake.iter().map(|s| (s / free).tanh()).collect()
+}
+
+/// Vibration rectification: what the part makes of a vibration far above its band follows the running mean square, which
+/// the accelerometer shows; its read-out takes a second or more over that mean.
+pub(super) fn vibration_level(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let level = swelling(draw, stand);
+    let square: Vec<f64> = stand.world.acc[level].iter().map(|a| a * a).collect();
+    let runs = lagged(&square, draw.by_ratio(0.3, 2.0), stand.rate_hz);
+    let sign = draw.sign();
+    about_mean(&runs).iter().map(|r| sign * r).collect()
+}
+
+/// A mount that was aligned at one temperature and leans as it warms up: a level axis sees the turning of the table about
+/// z, which the gyro of that axis reads, times what the temperature is off that one.
+pub(super) fn misaligned(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
+    cycles(draw, stand);
+    let period = draw.by_ratio(5.0, 15.0);
+    stand.excitation = vec![
+        ("turn_dps", draw.between(7.0, 28.0)),
+        ("turn_period_s", period),
+    ];
+    let temperature = from_trim(draw, stand, axis);
+    let sign = draw.sign();
+    let lean = |(i, t): (usize, &f64)| sign * t * (TAU * i as f64 / stand.rate_hz / period).sin();
+    temperature.iter().enumerate().map(lean).collect()
+}
+
+/// A multiplexer that comes to this gyro first in each frame, from the accelerometer that was last in the frame before: a
+/// share of that sample is still on the capacitor.
+pub(super) fn rest_of_sample(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let force = about_mean(&stand.world.acc[draw.of_many(3)]);
+    let sign = draw.sign();
+    let before = |i: usize| sign * force[i.saturating_sub(1)];
+    (0..force.len()).map(before).collect()
+}
+
+/// A gyro's sensitivity to acceleration is trimmed away at one temperature, near the middle of its range; what the springs
+/// lose in stiffness by a degree brings it back, with one sign above and the other below.
+pub(super) fn weighed(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
+    let temperature = from_trim(draw, stand, axis);
+    let force = about_mean(&stand.world.acc[draw.of_many(3)]);
+    temperature.iter().zip(force).map(|(t, a)| t * a).collect()
+}
+
+/// A hard shock, which the accelerometers show, throws the proof mass at its stop, where it sticks for a while. When it comes
+/// free, the charge that the stop has left on it leaks away.
+pub(super) fn stuck(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let (hard, sticks) = (draw.between(0.5, 0.8), draw.by_ratio(0.3, 2.5));
+    let (left, leaks) = (draw.between(0.2, 0.8), draw.by_ratio(0.5, 4.0));
+    let mut y = vec![0.0; stand.samples()];
+    for (at, force) in shocks(draw, stand) {
+        if force.abs() < hard {
+            continue;
+        }
+        let free = sticks * draw.between(0.3, 1.7);
+        for (k, v) in y.iter_mut().skip(at + 1).enumerate() {
+            let since = k as f64 / stand.rate_hz - free;
+            let off = if since < 0.0 {
+                1.0
+            } else {
+                left * (-since / leaks).exp()
+            };
+            *v = force.signum() * off;
+        }
+    }
+    y
+}
+
+/// Anisoelasticity (IEEE Std 528): along its two principal axes a suspension yields unequally, and the mass that has moved
+/// along one is turned by the acceleration along the other. Its axes lie at a slant to the board's.
+pub(super) fn anisoelastic(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let (sin, cos) = draw.between(0.0, TAU).sin_cos();
+    let [x, y, _] = &stand.world.acc;
+    x.iter()
+        .zip(y)
+        .map(|(x, y)| sin * x * y + 0.5 * cos * (x * x - y * y))
+        .collect()
+}
+
+/// A part with play in its mount is held by friction: only what an acceleration has beyond that moves it, and turns it.
+pub(super) fn play(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let force = about_mean(&stand.world.acc[draw.of_many(3)]);
+    let rms = (force.iter().map(|a| a * a).sum::<f64>() / force.len() as f64).sqrt();
+    let holds = rms * draw.between(0.8, 1.6);
+    force
+        .iter()
+        .map(|a| a.signum() * (a.abs() - holds).max(0.0))
+        .collect()
+}
+
+/// A part on a spring that the accelerometer does not have: what the acceleration does to it rings on at a pitch of its
+/// own.
+pub(super) fn driven(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let mode = (draw.by_ratio(0.8, 8.5), draw.by_ratio(0.05, 0.3));
+    resonating(&shaking(draw, stand), mode, stand.rate_hz)
+}
+
+/// A contact under a spring: closed until the acceleration is beyond a limit in one sense, then open, however far it goes.
+pub(super) fn opens(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let shake = shaking(draw, stand);
+    let rms = (shake.iter().map(|a| a * a).sum::<f64>() / shake.len() as f64).sqrt();
+    let (limit, sign) = (draw.between(0.7, 1.4) * rms, draw.sign());
+    let open = |a: &f64| f64::from(u8::from(sign * a > limit));
+    about_mean(&shake.iter().map(open).collect::<Vec<f64>>())
+}
+
+/// Many small contacts, each of which follows the acceleration only after its own play (Prandtl and Ishlinskii): the way
+/// there is another than the way back. The straight line through the loop is taken off, for the part is calibrated.
+pub(super) fn slips(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    const CONTACTS: usize = 5;
+    let (n, along) = (stand.samples(), draw.of_many(3));
+    let rms = draw.between(0.08, 0.3);
+    let sway = Turning::new(
+        draw.by_ratio(0.15, 1.5),
+        draw.by_ratio(0.02, 0.2),
+        stand.rate_hz,
+    );
+    let force: Vec<f64> = sway.of(draw, n).iter().map(|s| rms * s).collect();
+    let contacts: [(f64, f64); CONTACTS] =
+        std::array::from_fn(|_| (rms * draw.between(0.3, 1.5), draw.between(0.5, 1.5)));
+    let y = behind_plays(&force, &contacts);
+    let still = if along == 2 { 1.0 } else { 0.0 };
+    for (acc, a) in stand.world.acc[along].iter_mut().zip(&force) {
+        *acc = still + a + 0.005 * draw.normal();
+    }
+    without_line(&y, &force)
+}
+
+/// A shaking that the accelerometers follow from sample to sample, strong and weak by turns, and a rate that answers to
+/// its square alone.
+pub(super) fn squared(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let (rate_hz, n) = (stand.rate_hz, stand.samples());
+    let (along, rms) = (draw.of_many(3), draw.between(0.08, 0.3));
+    let shake = Turning::new(
+        draw.by_ratio(0.4, 6.0),
+        draw.by_ratio(0.02, 0.3),
+        stand.rate_hz,
+    );
+    let shake = shake.of(draw, n);
+    let depth = draw.between(0.3, 0.9);
+    let swell = TAU / (draw.by_ratio(10.0, 80.0) * rate_hz);
+    let first = draw.between(0.0, TAU);
+    let still = if along == 2 { 1.0 } else { 0.0 };
+    shake
+        .iter()
+        .enumerate()
+        .map(|(i, s)| {
+            let a = rms * s * (1.0 + depth * (first + swell * i as f64).sin());
+            stand.world.acc[along][i] = still + a + 0.005 * draw.normal();
+            a * a
+        })
+        .collect()
+}
+
+/// A shock drives the loop that holds the part's amplitude to its stop. It comes back from there over seconds, and the rate
+/// is off meanwhile: nothing at the shock itself, most of it when the accelerometer has long been still.
+pub(super) fn recovery(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let shocks = shocks(draw, stand);
+    let (rises, falls) = (draw.by_ratio(0.2, 0.6), draw.by_ratio(0.8, 3.0));
+    let mut y = vec![0.0; stand.samples()];
+    for (at, hard) in shocks {
+        for (k, v) in y.iter_mut().skip(at + 1).enumerate() {
+            let since = k as f64 / stand.rate_hz;
+            *v += hard * ((-since / falls).exp() - (-since / rises).exp());
+        }
+    }
+    y
+}
+
+/// Rectification (g^2 of IEEE Std 528): the square of the acceleration along a level axis, whose vibration swells and fades.
+pub(super) fn squared_acceleration(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let level = swelling(draw, stand);
+    let square: Vec<f64> = stand.world.acc[level].iter().map(|a| a * a).collect();
+    let sign = draw.sign();
+    about_mean(&square).iter().map(|s| sign * s).collect()
+}
+
+/// Sensitivity to an acceleration that the frames show earlier: the rate passes the part's digital filter, which delays
+/// it by some samples and smooths it, the accelerometer is read at once. Of a vibration the value of now tells nothing
+/// about that of then.
+pub(super) fn late(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let (after, from) = (1 + draw.of_many(5), draw.of_many(3));
+    let smoothed = lagged(
+        &stand.world.acc[from],
+        draw.by_ratio(0.02, 0.15),
+        stand.rate_hz,
+    );
+    (0..stand.samples())
+        .map(|i| smoothed[i.saturating_sub(after)])
+        .collect()
+}
+
+/// Rectification behind a mount of rubber: not the acceleration that is told, but what the mount's own mode makes of it, is
+/// squared.
+pub(super) fn mount(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let level = swelling(draw, stand);
+    let mode = (draw.by_ratio(1.0, 8.0), draw.by_ratio(0.1, 0.8));
+    let moves = resonating(&stand.world.acc[level], mode, stand.rate_hz);
+    let sign = draw.sign();
+    let square: Vec<f64> = moves.iter().map(|m| sign * m * m).collect();
+    about_mean(&square)
+}

@@ -1,0 +1,328 @@
+//! Signals that follow the motor's command, its current or the angle that it has turned.
+
+use std::f64::consts::{PI, TAU};
+
+use super::super::super::words::{DWELL, changes, in_steps, programme, resonating, with_rests};
+use crate::motor::current;
+use crate::random::Draw;
+use crate::stand::{Stand, held, lagged, wander};
+
+/// A rotor's ripple: its pitch is the speed of the motor, which follows the duty behind a lag and under a load that
+/// wanders.
+pub(super) fn ripple(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let top_hz = draw.by_ratio(1.5, 9.0);
+    let gain = 1.0 - (-1.0 / (draw.between(0.3, 2.0) * stand.rate_hz)).exp();
+    let keep = (-1.0 / (5.0 * stand.rate_hz)).exp();
+    let (mut speed, mut load, mut phase) = (0.0, draw.normal(), draw.between(0.0, TAU));
+    stand
+        .world
+        .duty
+        .iter()
+        .map(|duty| {
+            load = keep * load + (1.0 - keep * keep).sqrt() * draw.normal();
+            speed += gain * (duty - speed);
+            phase += TAU * top_hz * speed * (1.0 + 0.1 * load) / stand.rate_hz;
+            speed.abs() * phase.sin()
+        })
+        .collect()
+}
+
+/// What the motor's field does to the part wears off in the course of the run, and comes out on the other side.
+pub(super) fn ageing(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let n = stand.samples();
+    stand.world.duty = held(draw, n, stand.rate_hz, (3.0, 12.0), |d| {
+        (d.between(-1.0, 1.0) * 255.0).round() / 255.0
+    });
+    let (none, sign) = (n as f64 * draw.between(0.35, 0.65), draw.sign());
+    let left = |i: usize| sign * (1.0 - i as f64 / none);
+    let duty = stand.world.duty.iter().enumerate();
+    duty.map(|(i, d)| left(i) * d).collect()
+}
+
+/// Each change of the motor's current, that of spinning up included, induces a kick in a loop of the wiring. The loop and
+/// what hangs on it are not damped much: the kick swings to either side and dies away.
+pub(super) fn kicks(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    programme(draw, stand, DWELL);
+    let induced = changes(&current(draw, &stand.world.duty, stand.rate_hz));
+    let mode = (draw.by_ratio(0.8, 5.0), draw.by_ratio(0.1, 0.4));
+    resonating(&induced, mode, stand.rate_hz)
+}
+
+/// A bridge chops the motor's current: in the coil it rises while the bridge is on, and falls while it is off, by
+/// duty x (1 - duty), the most at half duty and nothing at rest and at full. What the part makes of a field that swings so
+/// fast goes with its size or with its square, whatever its sense. The command is changed by steps.
+pub(super) fn chopped(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let power = 1 + draw.of_many(2) as i32;
+    stand.world.duty = held(draw, stand.samples(), stand.rate_hz, (3.0, 15.0), |d| {
+        (d.sign() * d.between(0.0, 1.0) * 255.0).round() / 255.0
+    });
+    let ripple = |d: &f64| 4.0 * d.abs() * (1.0 - d.abs());
+    stand
+        .world
+        .duty
+        .iter()
+        .map(|d| ripple(d).powi(power))
+        .collect()
+}
+
+/// A piece of iron near the part keeps some of the field of the motor's last strong current, until one of the other sense
+/// turns it over: the play operator, of which models of hysteresis are sums (Prandtl 1928). The motor moves in short
+/// strokes.
+pub(super) fn iron(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let coercive = draw.between(0.2, 0.4);
+    let (mut stroke, mut left, mut command) = (true, 0.0, 0.0);
+    stand.world.duty = (0..stand.samples())
+        .map(|_| {
+            left -= 1.0 / stand.rate_hz;
+            if left <= 0.0 {
+                stroke = !stroke;
+                (command, left) = if stroke {
+                    (draw.sign() * draw.between(0.3, 1.0), draw.between(0.5, 3.0))
+                } else {
+                    (0.0, draw.between(5.0, 25.0))
+                };
+                command = (command * 255.0).round() / 255.0;
+            }
+            command
+        })
+        .collect();
+    let mut kept = 0.0f64;
+    stand
+        .world
+        .duty
+        .iter()
+        .map(|d| {
+            kept = kept.clamp(d - coercive, d + coercive);
+            kept
+        })
+        .collect()
+}
+
+/// Two brushes carry the current at rest; while the motor turns now one lifts and now the other, none for long.
+pub(super) fn chatter(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    stand.world.duty = with_rests(draw, stand);
+    let dwell = draw.by_ratio(0.15, 0.5);
+    let mut lifted = 1.0;
+    let brush = held(
+        draw,
+        stand.samples(),
+        stand.rate_hz,
+        (0.5 * dwell, 1.5 * dwell),
+        |_| {
+            lifted = -lifted;
+            lifted
+        },
+    );
+    let turns = |(b, d): (&f64, &f64)| if *d == 0.0 { 0.0 } else { *b };
+    brush.iter().zip(&stand.world.duty).map(turns).collect()
+}
+
+/// A motor on a governor, whose gear sticks: it starts where the command is beyond one threshold, then runs at its own
+/// speed, and stops below a lower one. What it does to the rate follows that it runs, and which way.
+pub(super) fn sticking(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let tau = draw.by_ratio(1.5, 5.0);
+    let command = wander(draw, stand.samples(), stand.rate_hz, 0.45, tau);
+    stand.world.duty = command
+        .iter()
+        .map(|d| (d.clamp(-1.0, 1.0) * 255.0).round() / 255.0)
+        .collect();
+    let starts = draw.between(0.45, 0.7);
+    let stops = starts * draw.between(0.2, 0.5);
+    let (sign, mut runs) = (draw.sign(), 0.0);
+    let duty = stand.world.duty.iter();
+    duty.map(|d| {
+        if d.abs() > starts {
+            runs = d.signum();
+        } else if d * runs < stops {
+            runs = 0.0;
+        }
+        sign * runs
+    })
+    .collect()
+}
+
+/// Whenever the motor is turned about, the gear runs through its play and strikes on the other flank, and the arm that
+/// carries the part rings. A change of pace in one sense stays on its flank and is not felt.
+pub(super) fn reversals(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    let mut sense = draw.sign();
+    stand.world.duty = held(draw, n, rate_hz, (2.0, 9.0), |d| {
+        if d.chance(0.5) {
+            sense = -sense;
+        }
+        in_steps(sense * d.between(0.3, 1.0))
+    });
+    let (f, decay) = (draw.by_ratio(0.8, 7.0), draw.by_ratio(0.3, 1.2));
+    // The slower the motor after it was turned about, the longer it takes through the play.
+    let play = draw.between(0.05, 0.2);
+    let mut y = vec![0.0; n];
+    for i in 1..n {
+        let (before, now) = (stand.world.duty[i - 1], stand.world.duty[i]);
+        if before * now >= 0.0 {
+            continue;
+        }
+        let at = i as f64 / rate_hz + play / now.abs();
+        for (k, v) in y.iter_mut().enumerate().skip(i) {
+            let since = k as f64 / rate_hz - at;
+            if since > 8.0 * decay {
+                break;
+            }
+            if since >= 0.0 {
+                *v += now * (-since / decay).exp() * (TAU * f * since).sin();
+            }
+        }
+    }
+    y
+}
+
+/// The cable to the table hangs slack over a part of a turn either way; beyond, it twists and pulls the part's mount
+/// askew. It knows the angle that the motor has turned, the sum of its speed, not its command.
+pub(super) fn winding(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    const SLACK: f64 = 0.35;
+    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    // Turned about before the cable breaks, or of the operator's will.
+    let end = draw.between(4.0, 9.0);
+    let (mut angle, mut command, mut left) = (0.0f64, 0.0, 0.0);
+    stand.world.duty = (0..n)
+        .map(|_| {
+            left -= 1.0 / rate_hz;
+            if left <= 0.0 || angle * command > 0.0 && angle.abs() > end {
+                let sense = if angle.abs() > 0.3 * end {
+                    -angle.signum()
+                } else {
+                    draw.sign()
+                };
+                command = in_steps(sense * draw.between(0.5, 1.0));
+                left = draw.between(3.0, 14.0);
+            }
+            angle += command / rate_hz;
+            command
+        })
+        .collect();
+    let speed = lagged(&stand.world.duty, draw.between(0.1, 0.5), rate_hz);
+    let mut angle = 0.0f64;
+    speed
+        .iter()
+        .map(|s| {
+            angle += s / rate_hz;
+            angle.signum() * (angle.abs() - SLACK * end).max(0.0)
+        })
+        .collect()
+}
+
+/// One pit in the bearing of the table: at one angle of each turn it dips in and out again, the harder the faster it turns,
+/// and the angle is the sum of a speed that follows the command behind a lag.
+pub(super) fn pit(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    stand.world.duty = held(draw, n, rate_hz, (3.0, 15.0), |d| {
+        in_steps(d.sign() * d.between(0.3, 1.0))
+    });
+    let (top, width) = (draw.by_ratio(0.3, 1.2), draw.between(0.04, 0.08));
+    let mut angle = draw.between(0.0, 1.0);
+    lagged(&stand.world.duty, draw.between(0.1, 0.8), rate_hz)
+        .iter()
+        .map(|speed| {
+            angle += top * speed / rate_hz;
+            let off = (angle - angle.round()) / width;
+            -speed * off * (-0.5 * off * off).exp()
+        })
+        .collect()
+}
+
+/// Below a certain speed the table does not glide but sticks and slips, many times a second, and not quite regularly. The
+/// motor is swept up and down through zero.
+pub(super) fn judder(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let (rate_hz, period) = (stand.rate_hz, draw.between(20.0, 60.0));
+    let (top, first) = (draw.between(0.5, 1.0), draw.between(0.0, 1.0));
+    stand.world.duty = (0..stand.samples())
+        .map(|i| in_steps(top * (TAU * (first + i as f64 / rate_hz / period)).sin()))
+        .collect();
+    let (least, most) = (0.04, top * draw.between(0.25, 0.45));
+    let pitch = draw.between(2.5, 6.5);
+    let (mut place, mut pace) = (0.0, pitch);
+    stand
+        .world
+        .duty
+        .iter()
+        .map(|d| {
+            if !(least..most).contains(&d.abs()) {
+                place = 0.0;
+                return 0.0;
+            }
+            place += pace / rate_hz;
+            if place >= 1.0 {
+                place -= 1.0;
+                pace = pitch * draw.between(0.75, 1.25);
+            }
+            d.signum() * (place - 0.5)
+        })
+        .collect()
+}
+
+/// The rotor's magnet comes to rest at any angle, and its stray field is then that of this angle until the next stroke;
+/// while it turns, the field turns too and leaves nothing.
+pub(super) fn rotor(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let rate_hz = stand.rate_hz;
+    let (mut runs, mut left, mut command, mut field) = (false, draw.between(1.0, 8.0), 0.0, 0.0);
+    let mut y = vec![];
+    stand.world.duty = (0..stand.samples())
+        .map(|_| {
+            left -= 1.0 / rate_hz;
+            if left <= 0.0 {
+                runs = !runs;
+                if runs {
+                    (command, field) = (in_steps(draw.sign() * draw.between(0.3, 1.0)), 0.0);
+                    left = draw.between(1.5, 6.0);
+                } else {
+                    (command, field) = (0.0, draw.between(0.0, TAU).cos());
+                    left = draw.between(4.0, 15.0);
+                }
+            }
+            y.push(field);
+            command
+        })
+        .collect();
+    y
+}
+
+/// The heat of the motor's driver, current squared, reaches the part through the driver's case and the board, seconds after
+/// the command and whatever its sign, as a strain that the part's own thermometer does not show. The motor runs in spells
+/// of its own; where the supply sags, it does so by another load.
+pub(super) fn heat(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let mut on = true;
+    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    stand.world.duty = held(draw, n, rate_hz, (3.0, 20.0), |d| {
+        on = !on;
+        let command = d.sign() * d.between(0.4, 1.0);
+        f64::from(u8::from(on)) * (command * 255.0).round() / 255.0
+    });
+    let warm: Vec<f64> = current(draw, &stand.world.duty, rate_hz)
+        .iter()
+        .map(|i| i * i)
+        .collect();
+    let case = lagged(&warm, draw.by_ratio(0.5, 2.0), rate_hz);
+    lagged(&case, draw.by_ratio(1.0, 4.0), rate_hz)
+}
+
+/// A harmonic of the motor's pulses, folded by the sampling. Its size is that of a pulse train, sin(pi harmonic duty), so
+/// it comes and goes with the command and vanishes at some; its pitch is the difference of two clocks that are not the
+/// same, RC oscillators that wander.
+pub(super) fn beat(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    // The bridge needs its dead time: full duty is never reached.
+    const FULL: f64 = 0.93;
+    let harmonic = (1 + draw.of_many(3)) as f64;
+    let middle = draw.between(1.5, 8.5);
+    let (swing, memory) = (draw.by_ratio(0.05, 0.4), draw.by_ratio(3.0, 20.0));
+    let off = wander(draw, stand.samples(), stand.rate_hz, swing, memory);
+    let mut phase = draw.between(0.0, TAU);
+    stand
+        .world
+        .duty
+        .iter()
+        .zip(off)
+        .map(|(duty, off)| {
+            phase += TAU * (middle + off) / stand.rate_hz;
+            (PI * harmonic * FULL * duty).sin() * phase.sin()
+        })
+        .collect()
+}

@@ -1,0 +1,399 @@
+//! Noise whose readings depend on each other where a spectrum does not show it, or not all of it.
+
+use std::f64::consts::{PI, TAU};
+
+use super::super::super::known::Known;
+use super::super::super::shape::{Shape, noise, share};
+use super::super::super::words::{about_mean, extremes, in_steps};
+use crate::random::Draw;
+use crate::stand::{Stand, held};
+
+/// Most of the noise that may be of another kind.
+pub(super) const MOST: f64 = 0.95;
+
+/// Readings beyond which two have no sample in common, for ratios from [`RATIO`].0 on.
+pub(super) const FAR: usize = 4;
+
+/// Samples of the part for each reading.
+pub(super) const RATIO: (f64, f64) = (0.5, 0.95);
+
+/// Mean and variance of that autoregression.
+pub(super) fn moments(push: f64) -> (f64, f64) {
+    let square = 1.0 / (1.0 - push * push);
+    let mean = push * (2.0 / PI * square).sqrt();
+    (mean, square - mean * mean)
+}
+
+/// d'^2 over the samples of a reference that stands for `length` readings and has `part` times the variance of the rest.
+pub(super) fn of_reference(length: usize, part: f64) -> f64 {
+    let m = length as f64;
+    part.ln_1p() - (m * part).ln_1p() / m
+}
+
+/// Mean over the places of a reading between two samples, and over frequency, of the logarithm of what interpolation
+/// leaves of white noise, when it has variance 1 in the mean and `share` of the noise.
+pub(super) fn mean_log(share: f64) -> f64 {
+    const PLACES: usize = 60;
+    const TONES: usize = 120;
+    let at = |i: usize, of: usize| (i as f64 + 0.5) / of as f64;
+    let mut sum = 0.0;
+    for f in (0..PLACES).map(|i| at(i, PLACES)) {
+        for w in (0..TONES).map(|i| PI * at(i, TONES)) {
+            let power = 1.0 - 2.0 * f * (1.0 - f) * (1.0 - w.cos());
+            sum += (1.5 * share * power + 1.0 - share).ln();
+        }
+    }
+    sum / (PLACES * TONES) as f64
+}
+
+/// A filter that is slow for small changes and fast for large ones, which it takes for motion: of a change d it follows
+/// d (1 - share / (1 + (d / large)^2)).
+pub(super) struct Adaptive {
+    pub(super) share: f64,
+    pub(super) large: f64,
+}
+
+impl Adaptive {
+    /// What it makes of a series from 0 on, with the mean logarithm of its slope, which is what it gains.
+    pub(super) fn of(&self, series: &[f64]) -> (Vec<f64>, f64) {
+        let (mut y, mut logs) = (0.0, 0.0);
+        let all = series
+            .iter()
+            .map(|x| {
+                let d = x - y;
+                let near = 1.0 / (1.0 + (d / self.large).powi(2));
+                y += d * (1.0 - self.share * near);
+                // Of d near: near - 2 d^2 / large^2 near^2 = 2 near^2 - near.
+                logs += (1.0 - self.share * (2.0 * near * near - near)).ln();
+                y
+            })
+            .collect();
+        (all, logs / series.len() as f64)
+    }
+}
+
+/// Where a reading lies among the samples of a part that gives `ratio` of them for each reading: the one before it, and
+/// how far it is on the way to the next.
+pub(super) fn between(ratio: f64, reading: usize) -> (usize, f64) {
+    let at = ratio * reading as f64;
+    (at as usize, at.fract())
+}
+
+/// Covariance of readings `apart` from each other, that of the samples being 1.
+pub(super) fn covariance(ratio: f64, reading: usize, apart: usize) -> f64 {
+    let ((from, u), (to, v)) = (between(ratio, reading), between(ratio, reading + apart));
+    match to - from {
+        0 => (1.0 - u) * (1.0 - v) + u * v,
+        1 => u * (1.0 - v),
+        _ => 0.0,
+    }
+}
+
+/// Mean covariance of `n` readings with those `apart` from them.
+pub(super) fn mean_covariance(ratio: f64, n: usize, apart: usize) -> f64 {
+    (0..n).map(|i| covariance(ratio, i, apart)).sum::<f64>() / n as f64
+}
+
+/// d' of `n` readings of which `share` of the variance is filled up so, the variance refitted: the determinant of their
+/// covariance, by Cholesky's factors of a band.
+pub(super) fn of_filled(ratio: f64, share: f64, n: usize) -> f64 {
+    let share = share.min(MOST);
+    let mean = mean_covariance(ratio, n, 0);
+    let mut logs = 0.0;
+    // Rows of the factor, the last ones: [k] is the element k before the diagonal.
+    let mut rows: Vec<[f64; FAR]> = Vec::with_capacity(n);
+    for i in 0..n {
+        let mut row = [0.0; FAR];
+        for apart in (0..FAR.min(i + 1)).rev() {
+            let own = share / mean * covariance(ratio, i - apart, apart);
+            let white = if apart == 0 { 1.0 - share } else { 0.0 };
+            let known: f64 = (apart + 1..FAR.min(i + 1))
+                .map(|k| {
+                    let other = if apart == 0 { &row } else { &rows[i - apart] };
+                    row[k] * other[k - apart]
+                })
+                .sum();
+            let left = own + white - known;
+            row[apart] = if apart == 0 {
+                left.max(1e-12).sqrt()
+            } else {
+                left / rows[i - apart][0]
+            };
+        }
+        logs += 2.0 * row[0].ln();
+        rows.push(row);
+    }
+    (-logs).max(0.0).sqrt()
+}
+
+/// Straight lines between samples, at `n` readings.
+pub(super) fn filled_up(ratio: f64, samples: &[f64], n: usize) -> Vec<f64> {
+    (0..n)
+        .map(|i| {
+            let (before, part) = between(ratio, i);
+            (1.0 - part) * samples[before] + part * samples[before + 1]
+        })
+        .collect()
+}
+
+/// A d' by the nats that each of the samples tells, twice over: d'^2 = samples x nats.
+fn by_nats(stand: &Stand, nats: f64) -> Known {
+    Known::Strength((stand.samples() as f64 * nats).max(0.0).sqrt())
+}
+
+/// Thermal tail of an amplifier: the heat of a swing, its square, unbalances the input when the next reading is taken.
+/// x[i] = e[i] + tail (e[i-1]^2 - 1), of variance 1 + 2 tail^2, is white: e and its square do not correlate. Who knows the
+/// law predicts it down to variance 1, d'^2 = samples x ln(1 + 2 tail^2).
+pub(super) fn square_behind() -> Shape {
+    noise(
+        f64::INFINITY,
+        |stand, tail| by_nats(stand, (2.0 * tail * tail).ln_1p()),
+        |stand, draw, tail| {
+            let (size, tail) = ((1.0 + 2.0 * tail * tail).sqrt(), tail * draw.sign());
+            let mut before = draw.normal();
+            (0..stand.samples())
+                .map(|_| {
+                    let e = draw.normal();
+                    let x = e + tail * (before * before - 1.0);
+                    before = e;
+                    x / size
+                })
+                .collect()
+        },
+    )
+}
+
+/// A part with a clock of its own, brought to the board's by drawing a straight line between its two last samples. As the
+/// clocks move past each other, a reading is now one sample and now the mean of two: white of variance 1 here, smoothed and
+/// of half the variance there, and back within seconds.
+pub(super) fn interpolated(draw: &mut Draw, stand: &Stand) -> Shape {
+    let n = stand.samples();
+    // The part's samples are a little further apart: none is left out.
+    let pace = 1.0 - draw.by_ratio(0.003, 0.03);
+    let first = draw.between(0.0, 1.0);
+    let white: Vec<f64> = (0..n + 2).map(|_| draw.normal()).collect();
+    let at = |i| {
+        let place = first + pace * i as f64;
+        let (k, f) = (place as usize, place.fract());
+        1.5f64.sqrt() * ((1.0 - f) * white[k] + f * white[k + 1])
+    };
+    let nats = |stand: &Stand, share: f64| by_nats(stand, -mean_log(share.min(0.999)));
+    share(0.999, nats, (0..n).map(at).collect())
+}
+
+/// A capacitor that holds a sample keeps some of the one before, and a second one is switched against it; what they differ
+/// by moves with the temperature, and was trimmed away in the middle of its range: neighbours correlate in the cold and
+/// anticorrelate in the heat, or the other way. Predicted, the noise has variance 1; as a whole 1 + the mean of what is
+/// kept squared.
+pub(super) fn trimmed(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let off = about_mean(&stand.world.temperature[axis]);
+    let (low, high) = extremes(&off);
+    let most = high.max(-low).max(1e-9);
+    let (kept, sign): (Vec<f64>, f64) = (off.iter().map(|t| t / most).collect(), draw.sign());
+    let square = kept.iter().map(|c| c * c).sum::<f64>() / stand.samples() as f64;
+    noise(
+        0.98,
+        move |stand, size| by_nats(stand, (size * size * square).ln_1p()),
+        move |_, draw, size| {
+            let scale = (1.0 + size * size * square).sqrt();
+            let mut before = draw.normal();
+            let next = |c: &f64| {
+                let e = draw.normal();
+                let x = e + sign * size * c * before;
+                before = e;
+                x / scale
+            };
+            kept.iter().map(next).collect()
+        },
+    )
+}
+
+/// A mixer whose two inputs still hold the last two swings gives out their product: white, without skew, and only three
+/// readings together tell. Who knows the law predicts it down to variance 1, d'^2 = samples x ln(1 + share^2).
+pub(super) fn product() -> Shape {
+    noise(
+        f64::INFINITY,
+        |stand, share| by_nats(stand, (share * share).ln_1p()),
+        |stand, draw, share| {
+            let (scale, sign) = ((1.0 + share * share).sqrt(), draw.sign());
+            let (mut one, mut two) = (draw.normal(), draw.normal());
+            (0..stand.samples())
+                .map(|_| {
+                    let e = draw.normal();
+                    let x = e + sign * share * one * two;
+                    (two, one) = (one, e);
+                    x / scale
+                })
+                .collect()
+        },
+    )
+}
+
+/// Mean square of a series.
+fn mean_square(y: &[f64]) -> f64 {
+    y.iter().map(|v| v * v).sum::<f64>() / y.len() as f64
+}
+
+/// Firmware with a filter that lets large changes through. Given its last output, its next has the law of white noise
+/// through a bent line: d'^2 = samples x (ln variance - 2 mean ln slope), the random walk left out.
+pub(super) fn adaptive(draw: &mut Draw, stand: &Stand) -> Shape {
+    let white: Vec<f64> = (0..stand.samples()).map(|_| draw.normal()).collect();
+    let large = draw.between(0.4, 0.8);
+    let input = mean_square(&white);
+    let known = white.clone();
+    let of = move |share: f64, white: &[f64]| {
+        let share = share.min(0.97);
+        Adaptive { share, large }.of(white)
+    };
+    noise(
+        0.97,
+        move |stand, share| {
+            let (y, logs) = of(share, &known);
+            by_nats(stand, (mean_square(&y) / input).ln() - 2.0 * logs)
+        },
+        move |_, _, share| {
+            let (y, _) = of(share, &white);
+            let scale = mean_square(&y).sqrt();
+            y.iter().map(|v| v / scale).collect()
+        },
+    )
+}
+
+/// Firmware that smooths while the motor runs, against its hum, and not while it rests: each reading then is drawn to the
+/// one before. Below a half, what is left is predicted from the past with variance (1 - f)^2.
+pub(super) fn switched(draw: &mut Draw, stand: &mut Stand) -> Shape {
+    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    let mut on = draw.chance(0.5);
+    stand.world.duty = held(draw, n, rate_hz, (4.0, 20.0), |d| {
+        on = !on;
+        f64::from(u8::from(on)) * in_steps(d.sign() * d.between(0.2, 1.0))
+    });
+    let runs: Vec<bool> = stand.world.duty.iter().map(|d| *d != 0.0).collect();
+    let share = runs.iter().filter(|r| **r).count() as f64 / n as f64;
+    noise(
+        0.5,
+        move |stand, f| {
+            let f = f.min(0.5);
+            let left = (1.0 - f).powi(2) + f * f;
+            let nats = (1.0 - share + share * left).ln() - 2.0 * share * (1.0 - f).ln();
+            by_nats(stand, nats)
+        },
+        move |_, draw, f| {
+            let mut before = draw.normal();
+            let next = |runs: &bool| {
+                let e = draw.normal();
+                let x = if *runs { (1.0 - f) * e + f * before } else { e };
+                before = e;
+                x
+            };
+            runs.iter().map(next).collect()
+        },
+    )
+}
+
+/// Firmware that takes its zero anew from each block of a few readings, and most of it off the readings of the next: the
+/// steps of this zero come back as noise, and who knows the blocks knows the zero. d'^2 = samples x ln(1 + share^2 /
+/// length).
+pub(super) fn blocks(draw: &mut Draw) -> Shape {
+    let length = 4 + draw.of_many(4);
+    noise(
+        f64::INFINITY,
+        move |stand, share| by_nats(stand, (share * share / length as f64).ln_1p()),
+        move |stand, draw, share| {
+            let n = stand.samples();
+            let scale = (1.0 + share * share / length as f64).sqrt();
+            let first = draw.of_many(length);
+            let white: Vec<f64> = (0..n + 2 * length).map(|_| draw.normal()).collect();
+            let off = |i: usize| {
+                let (here, block) = (i + first + length, (i + first) / length * length);
+                let zero = white[block..block + length].iter().sum::<f64>() / length as f64;
+                (white[here] - share * zero) / scale
+            };
+            (0..n).map(off).collect()
+        },
+    )
+}
+
+/// Neighbours that correlate now and anticorrelate then, turn by turn, while the variance stays: over the whole periods of
+/// the record the noise is white. d'^2 = - samples x mean ln(1 - c^2).
+pub(super) fn turning_colour(draw: &mut Draw, stand: &Stand) -> Shape {
+    let n = stand.samples();
+    let periods = draw.by_ratio(2.0, 40.0).round();
+    let first = draw.between(0.0, TAU);
+    let shape: Vec<f64> = (0..n)
+        .map(|i| (first + TAU * periods * i as f64 / n as f64).sin())
+        .collect();
+    let known = shape.clone();
+    noise(
+        0.98,
+        move |_, size| {
+            let size = size.min(0.98);
+            let nats = |s: &f64| -(-(size * s).powi(2)).ln_1p();
+            Known::Strength(known.iter().map(nats).sum::<f64>().sqrt())
+        },
+        move |_, draw, size| {
+            let mut x = draw.normal();
+            let next = |s: &f64| {
+                let c = size * s;
+                x = c * x + (1.0 - c * c).sqrt() * draw.normal();
+                x
+            };
+            shape.iter().map(next).collect()
+        },
+    )
+}
+
+/// A valve, or a diode, that turns either swing into a push of one sense for the next: x[i] = e[i] + push |x[i-1]|, the
+/// threshold autoregression whose law is known, skew-normal with |x| that of half a normal law (Andel, Netuka and Svara
+/// 1984). d'^2 = samples x ln(variance).
+pub(super) fn pushing() -> Shape {
+    noise(
+        0.95,
+        |stand, push| by_nats(stand, moments(push.min(0.95)).1.ln()),
+        |stand, draw, push| {
+            let ((mean, variance), sign) = (moments(push), draw.sign());
+            let mut x = draw.normal();
+            for _ in 0..200 {
+                x = draw.normal() + push * x.abs();
+            }
+            (0..stand.samples())
+                .map(|_| {
+                    x = draw.normal() + push * x.abs();
+                    sign * (x - mean) / variance.sqrt()
+                })
+                .collect()
+        },
+    )
+}
+
+/// A reference is sampled anew, noise and all, every few readings only, and stands for those between.
+pub(super) fn renewed(draw: &mut Draw) -> Shape {
+    let length = 2 + draw.of_many(5);
+    noise(
+        f64::INFINITY,
+        move |stand, part| by_nats(stand, of_reference(length, part)),
+        move |stand, draw, part| {
+            let first = draw.of_many(length);
+            let mut reference = part.sqrt() * draw.normal();
+            (0..stand.samples())
+                .map(|i| {
+                    if (i + first).is_multiple_of(length) {
+                        reference = part.sqrt() * draw.normal();
+                    }
+                    (reference + draw.normal()) / (1.0 + part).sqrt()
+                })
+                .collect()
+        },
+    )
+}
+
+/// A part of a lower rate whose output is drawn as straight lines between its samples, and converted once more at the
+/// stand's rate: what the second conversion adds is white.
+pub(super) fn filled(draw: &mut Draw, stand: &Stand) -> Shape {
+    let n = stand.samples();
+    let ratio = draw.between(RATIO.0, RATIO.1);
+    let size = 1.0 / mean_covariance(ratio, n, 0).sqrt();
+    let samples: Vec<f64> = (0..n + 2).map(|_| size * draw.normal()).collect();
+    let known = move |_: &Stand, share: f64| Known::Strength(of_filled(ratio, share, n));
+    share(MOST, known, filled_up(ratio, &samples, n))
+}

@@ -1,0 +1,255 @@
+//! Processes beside the white noise: modes that noise drives, and humps that move.
+
+use std::f64::consts::TAU;
+
+use super::super::super::act::Change;
+use super::super::super::known::Known;
+use super::super::super::shape::{Shape, sized};
+use super::super::super::words::{Turning, extremes, resonating};
+use crate::random::Draw;
+use crate::stand::{Stand, lagged};
+use crate::strength::Meter;
+
+/// A damped mode that something random drives: x[i] = first x[i-1] + second x[i-2] + sqrt(drive) e[i], of variance 1.
+#[derive(Clone, Copy)]
+pub(super) struct Mode {
+    first: f64,
+    second: f64,
+    drive: f64,
+}
+
+impl Mode {
+    /// By frequency and half width, Hz.
+    pub(super) fn new(f: f64, half_width: f64, rate_hz: f64) -> Self {
+        let r = (-TAU * half_width / rate_hz).exp();
+        let (first, second) = (2.0 * r * (TAU * f / rate_hz).cos(), -r * r);
+        Self {
+            first,
+            second,
+            // Yule and Walker.
+            drive: (1.0 + second) * ((1.0 - second).powi(2) - first * first) / (1.0 - second),
+        }
+    }
+
+    /// Its density at an angular frequency, rad per sample.
+    pub(super) fn density(&self, w: f64) -> f64 {
+        let re = 1.0 - self.first * w.cos() - self.second * (2.0 * w).cos();
+        let im = self.first * w.sin() + self.second * (2.0 * w).sin();
+        self.drive / (re * re + im * im)
+    }
+}
+
+/// A rate that follows its ramp, each forgetting by a time constant of its own, samples: of variance 1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ramp {
+    ramp: f64,
+    rate: f64,
+}
+
+impl Ramp {
+    /// Longest time constant, s: what is slower is hidden by a random walk.
+    const LONGEST_S: f64 = 4.0;
+
+    pub(super) fn new(draw: &mut Draw, rate_hz: f64) -> Self {
+        let mut samples = || rate_hz * draw.by_ratio(0.8, Self::LONGEST_S);
+        let (ramp, rate) = (samples(), samples());
+        Self { ramp, rate }
+    }
+
+    /// Variance of the white noise that drives it.
+    pub(super) fn drive(self) -> f64 {
+        // Of two poles in series, which are many samples long.
+        2.0 * (self.ramp + self.rate)
+    }
+
+    /// Its density at an angular frequency, rad per sample.
+    pub(super) fn density(self, w: f64) -> f64 {
+        let pole = |samples: f64| {
+            let keep = (-1.0 / samples).exp();
+            (1.0 - keep).powi(2) / (1.0 - 2.0 * keep * w.cos() + keep * keep)
+        };
+        self.drive() * pole(self.ramp) * pole(self.rate)
+    }
+
+    /// So many samples.
+    pub(super) fn of(self, draw: &mut Draw, n: usize) -> Vec<f64> {
+        // It wandered before.
+        let before = (10.0 * self.ramp.max(self.rate)) as usize;
+        let size = self.drive().sqrt();
+        let drive: Vec<f64> = (0..before + n).map(|_| size * draw.normal()).collect();
+        lagged(&lagged(&drive, self.ramp, 1.0), self.rate, 1.0).split_off(before)
+    }
+}
+
+/// Density of a mode of this pitch and half width, Hz, driven by white noise of variance 1.
+pub(super) fn of_mode((pitch, half_width): (f64, f64), rate_hz: f64, w: f64) -> f64 {
+    let (keep, own) = ((-TAU * half_width / rate_hz).exp(), TAU * pitch / rate_hz);
+    let pole = |off: f64| 1.0 - 2.0 * keep * off.cos() + keep * keep;
+    (keep * own.sin()).powi(2) / (pole(w - own) * pole(w + own))
+}
+
+/// Density of a hump about a frequency, of variance 1, at an angular frequency: the real part of a circle that turns, fades
+/// and is driven at random.
+pub(super) fn of_hump(turn: f64, keep: f64, w: f64) -> f64 {
+    let side = |from: f64| 1.0 / (1.0 - 2.0 * keep * (w - from).cos() + keep * keep);
+    0.5 * (1.0 - keep * keep) * (side(turn) + side(-turn))
+}
+
+/// A process of this density at size 1 beside the noise.
+fn beside(
+    axis: usize,
+    density: impl Fn(f64) -> f64 + 'static,
+    series: impl FnOnce(&Stand, &mut Draw) -> Vec<f64> + 'static,
+) -> Shape {
+    sized(
+        f64::INFINITY,
+        move |stand, sigma| Known::beside(stand, axis, |w| sigma * sigma * density(w)),
+        move |stand, draw, sigma| {
+            Change::Add(series(stand, draw).iter().map(|v| sigma * v).collect())
+        },
+    )
+}
+
+/// A resonance that something random drives.
+pub(super) fn resonance(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let f = draw.by_ratio(0.6, 8.0);
+    // A mode damped much more has no peak left.
+    let half_width = draw.by_ratio(0.03, 0.3).min(f / 4.0);
+    let mode = Mode::new(f, half_width, stand.rate_hz);
+    let density = move |w| mode.density(w);
+    beside(axis, density, move |stand, draw| {
+        let (mut now, mut before) = (0.0, 0.0);
+        let mut next = || {
+            let new = mode.first * now + mode.second * before + mode.drive.sqrt() * draw.normal();
+            (now, before) = (new, now);
+            new
+        };
+        for _ in 0..(5.0 * stand.rate_hz / half_width) as usize {
+            next();
+        }
+        (0..stand.samples()).map(|_| next()).collect()
+    })
+}
+
+/// Places of the run at which a hump that moves is looked at for its strength.
+const PLACES: usize = 12;
+
+/// A hump of noise that moves through the band, of the width that `keep` gives it and at `at_hz` by sample. Its d' is that of
+/// humps that stay at each of `places`, Hz, averaged over the run.
+fn moving_hump(
+    stand: &Stand,
+    axis: usize,
+    keep: f64,
+    at_hz: Vec<f64>,
+    places: impl Iterator<Item = f64>,
+) -> Shape {
+    let meter = Meter::new(stand, axis);
+    let places: Vec<Vec<f64>> = places
+        .map(|f| of_humps(&meter, f, keep, stand.rate_hz))
+        .collect();
+    let knows = move |_: &Stand, sigma: f64| {
+        let of = |place: &Vec<f64>| place.iter().map(|d| sigma * sigma * d).collect();
+        Known::Beside(places.iter().map(of).collect())
+    };
+    sized(f64::INFINITY, knows, move |stand, draw, sigma| {
+        let (mut re, mut im) = (draw.normal(), draw.normal());
+        let drive = (1.0 - keep * keep).sqrt();
+        let turned = at_hz.iter().map(|f| {
+            let (sin, cos) = (TAU * f / stand.rate_hz).sin_cos();
+            (re, im) = (
+                keep * (re * cos - im * sin) + drive * draw.normal(),
+                keep * (re * sin + im * cos) + drive * draw.normal(),
+            );
+            sigma * re
+        });
+        Change::Add(turned.collect())
+    })
+}
+
+/// A resonance of the structure, at kilohertz, folded by the sampling: it softens as it warms, some 30 ppm a degree, and
+/// what it makes of the molecules' blows wanders through the band with the temperature.
+pub(super) fn hump(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let temperature = &stand.world.temperature[axis];
+    let (low, high) = extremes(temperature);
+    let from = draw.between(1.5, 8.5);
+    let to = loop {
+        let to = draw.between(1.0, 9.0);
+        if (to - from).abs() > 1.2 {
+            break to;
+        }
+    };
+    let keep = (-TAU * draw.by_ratio(0.08, 0.4) / stand.rate_hz).exp();
+    let at_hz: Vec<f64> = temperature
+        .iter()
+        .map(|t| from + (to - from) * (t - low) / (high - low).max(1e-9))
+        .collect();
+    let places: Vec<f64> = (0..PLACES)
+        .map(|i| at_hz[(2 * i + 1) * at_hz.len() / (2 * PLACES)])
+        .collect();
+    moving_hump(stand, axis, keep, at_hz, places.into_iter())
+}
+
+/// What flows past a body rubs and whistles at a pitch that rises with its speed, never quite the same: a hump of noise that
+/// takes the whole run to go through the band.
+pub(super) fn running(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let (mut from, mut to) = (draw.between(1.0, 4.0), draw.between(6.0, 9.3));
+    if draw.chance(0.5) {
+        std::mem::swap(&mut from, &mut to);
+    }
+    let keep = (-TAU * draw.by_ratio(0.08, 0.5) / stand.rate_hz).exp();
+    let n = stand.samples();
+    let at_hz = (0..n)
+        .map(|i| from + (to - from) * i as f64 / n as f64)
+        .collect();
+    let place = |i| from + (to - from) * (i as f64 + 0.5) / PLACES as f64;
+    moving_hump(stand, axis, keep, at_hz, (0..PLACES).map(place))
+}
+
+/// A lightly damped mode of the mount that whatever is random drives.
+pub(super) fn mode(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let (pitch, quality) = (draw.by_ratio(0.5, 8.5), draw.by_ratio(4.0, 60.0));
+    let part = Turning::new(pitch, 0.5 * pitch / quality, stand.rate_hz);
+    beside(
+        axis,
+        move |w| part.density(w),
+        move |stand, draw| part.of(draw, stand.samples()),
+    )
+}
+
+/// A mode of the stand, of second order, that the air of a fan keeps ringing. Its size is the variance of what drives it.
+pub(super) fn narrow_band(draw: &mut Draw, axis: usize) -> Shape {
+    let mode = (draw.by_ratio(0.8, 8.5), draw.by_ratio(0.05, 0.4));
+    sized(
+        f64::INFINITY,
+        move |stand, variance| {
+            let rate_hz = stand.rate_hz;
+            Known::beside(stand, axis, |w| variance * of_mode(mode, rate_hz, w))
+        },
+        move |stand, draw, variance| {
+            // It rang before.
+            let before = (5.0 / mode.1 * stand.rate_hz) as usize;
+            let drive: Vec<f64> = (0..before + stand.samples())
+                .map(|_| variance.sqrt() * draw.normal())
+                .collect();
+            Change::Add(resonating(&drive, mode, stand.rate_hz).split_off(before))
+        },
+    )
+}
+
+/// Not the rate but its ramp takes a random walk: a spectrum by the fourth power, above corners where both leak, for else it
+/// would leave the scale.
+pub(super) fn wandering_ramp(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let ramp = Ramp::new(draw, stand.rate_hz);
+    beside(
+        axis,
+        move |w| ramp.density(w),
+        move |stand, draw| ramp.of(draw, stand.samples()),
+    )
+}
+
+/// Density of a hump about a frequency, Hz, of variance 1: of a circle that turns, fades and is driven at random, the real
+/// part.
+fn of_humps(meter: &Meter, f: f64, keep: f64, rate_hz: f64) -> Vec<f64> {
+    let of = |w: &f64| of_hump(TAU * f / rate_hz, keep, *w);
+    meter.omega().iter().map(of).collect()
+}

@@ -1,0 +1,409 @@
+//! Noise whose variance changes: by what is recorded, by its own course, or by its last readings.
+
+use std::f64::consts::TAU;
+
+use super::super::super::known::Known;
+use super::super::super::shape::{Shape, noise, variance};
+use super::super::super::words::{
+    DWELL, about_mean, angle_of_table, extremes, in_time, programme, rate_of_table, shocks, swing,
+};
+use crate::random::Draw;
+use crate::stand::{Stand, held, lagged, wander};
+
+/// What noise that feeds its own size makes of independent draws: variance[i] = 1 - stays + gain last^2 + (stays - gain)
+/// variance[i-1], with the series itself.
+pub(super) fn fed(gain: f64, stays: f64, independent: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let gain = gain.min(stays);
+    let (mut variance, mut last) = (1.0f64, 1.0f64);
+    independent
+        .iter()
+        .map(|z| {
+            variance = 1.0 - stays + gain * last * last + (stays - gain) * variance;
+            last = variance.sqrt() * z;
+            (variance, last)
+        })
+        .unzip()
+}
+
+/// A part that ages in the course of the record, or settles: by so many decibels an hour its noise goes up or down.
+pub(super) fn ramp(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let (sign, n) = (draw.sign(), stand.samples() as f64);
+    (0..stand.samples())
+        .map(|i| sign * (i as f64 / n - 0.5))
+        .collect()
+}
+
+/// Leakage that doubles every so many degrees: so does the variance of its noise.
+pub(super) fn warmth(stand: &Stand, axis: usize) -> Vec<f64> {
+    let own = about_mean(&stand.world.temperature[axis]);
+    let span = swing(&own);
+    own.iter().map(|t| t / span).collect()
+}
+
+/// A slip ring whose brushes ride over one to three worn places a turn, at which the contact is noisy whether it turns or
+/// not. The programme turns slowly enough to tell them.
+pub(super) fn worn(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    programme(draw, stand, DWELL);
+    let rate = rate_of_table(draw, stand);
+    let full = draw.by_ratio(0.1, 0.5);
+    let places: Vec<(f64, f64)> = (0..1 + draw.of_many(3))
+        .map(|_| (draw.between(0.0, 1.0), draw.between(0.05, 0.15)))
+        .collect();
+    angle_of_table(&rate, full, stand.rate_hz)
+        .iter()
+        .map(|angle| {
+            let turns = angle / std::f64::consts::TAU;
+            let on = |(at, wide): &(f64, f64)| (turns - at).rem_euclid(1.0) < *wide;
+            f64::from(u8::from(places.iter().any(on)))
+        })
+        .collect()
+}
+
+/// How much of its input's noise a regulator lets through, by sample: the less is left above its output, the less its loop
+/// can hold it down, by a factor e for every few millivolts. The loads are of many sizes.
+pub(super) fn near_end(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    let most = draw.between(0.05, 0.15);
+    let load = held(draw, n, rate_hz, (3.0, 25.0), |d| d.between(0.0, most));
+    let slow = wander(draw, n, rate_hz, 0.001, 60.0);
+    stand.world.supply = load.iter().zip(slow).map(|(l, s)| 5.0 - l - s).collect();
+    let fold = most * draw.between(0.1, 0.4);
+    let supply = &stand.world.supply;
+    let least = supply.iter().copied().fold(f64::INFINITY, f64::min);
+    supply.iter().map(|u| ((least - u) / fold).exp()).collect()
+}
+
+/// Air whistles at an edge of the turning table while its speed is within a band, and shakes the element. A tone that sounds
+/// holds on beyond the band in which it begins.
+pub(super) fn whistle(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    programme(draw, stand, DWELL);
+    let speed = lagged(&stand.world.duty, draw.by_ratio(0.5, 3.0), stand.rate_hz);
+    let (low, wide) = (draw.between(0.1, 0.4), draw.between(0.1, 0.25));
+    let (high, holds) = (low + wide, wide * draw.between(0.2, 0.5));
+    let mut on = false;
+    let sounds: Vec<f64> = speed
+        .iter()
+        .map(|s| {
+            let beyond = if on { holds } else { 0.0 };
+            on = (low - beyond..high + beyond).contains(&s.abs());
+            f64::from(u8::from(on))
+        })
+        .collect();
+    lagged(&sounds, draw.by_ratio(0.1, 0.6), stand.rate_hz)
+}
+
+/// How much is left, by sample, of what the last changes of the motor's command have stirred up: brushes that leave their
+/// seat spark until they have found another, the more the larger the change, whether the motor runs then or not. The
+/// command changes by steps.
+pub(super) fn after_changes(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    stand.world.duty = held(draw, n, rate_hz, (6.0, 30.0), |d| {
+        (d.between(-1.0, 1.0) * 255.0).round() / 255.0
+    });
+    let keep = (-1.0 / (draw.by_ratio(0.8, 4.0) * rate_hz)).exp();
+    let (mut left, mut last) = (0.0f64, stand.world.duty[0]);
+    stand
+        .world
+        .duty
+        .iter()
+        .map(|d| {
+            left = keep * left + (d - last).abs();
+            last = *d;
+            left
+        })
+        .collect()
+}
+
+/// Noise whose size is exp(size z / 2) for the swing z before it, itself of variance 1: the law of its variance, with the
+/// series.
+pub(super) fn louder(size: f64, independent: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut last = 0.0f64;
+    independent
+        .iter()
+        .map(|z| {
+            let variance = (size * last).exp();
+            last = *z;
+            (variance, variance.sqrt() * z)
+        })
+        .unzip()
+}
+
+/// Where an amplifier that a shock has driven to its stop does not answer: 1 for a while after each shock, by sample.
+pub(super) fn blocked(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let lasts = draw.by_ratio(0.4, 1.5) * stand.rate_hz;
+    let mut all = vec![0.0; stand.samples()];
+    for (at, hard) in shocks(draw, stand) {
+        // The harder the shock, the longer.
+        let length = (lasts * hard.abs()).ceil() as usize;
+        all.iter_mut()
+            .skip(at + 1)
+            .take(length)
+            .for_each(|b| *b = 1.0);
+    }
+    all
+}
+
+/// A reading is the mean of as many looks at the part as fit before it has to go out: one to four, by where the clock of
+/// the looks stands, which is no multiple of the readings'.
+pub(super) fn looks(draw: &mut Draw, n: usize) -> Vec<f64> {
+    let (mut place, pace) = (draw.between(0.0, 1.0), draw.between(0.1, 0.9));
+    (0..n)
+        .map(|_| {
+            place = (place + pace).fract();
+            1.0 + (4.0 * place).floor()
+        })
+        .collect()
+}
+
+/// Brushes that spark while the current changes: each change of the command by its size, then dying away.
+pub(super) fn sparks(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    programme(draw, stand, (3.0, 15.0));
+    let keep = (-1.0 / (draw.by_ratio(0.4, 2.0) * stand.rate_hz)).exp();
+    let (mut last, mut spark) = (stand.world.duty[0], 0.0f64);
+    let duty = stand.world.duty.iter();
+    duty.map(|d| {
+        spark = keep * spark + (d - std::mem::replace(&mut last, *d)).abs();
+        spark
+    })
+    .collect()
+}
+
+/// A scale factor that is noisy: the noise grows with the rate. The table is heavy, and follows its motor late.
+pub(super) fn rate_squared(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    programme(draw, stand, DWELL);
+    let rate = lagged(&stand.world.duty, draw.by_ratio(3.0, 12.0), stand.rate_hz);
+    rate.iter().map(|r| r * r).collect()
+}
+
+/// What noise with a memory of its own size makes of independent draws: variance 1 - share + share x last^2, with the
+/// series itself.
+pub(super) fn remembered(share: f64, independent: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let share = share.min(0.95);
+    let mut last = 1.0;
+    independent
+        .iter()
+        .map(|z| {
+            let variance = 1.0 - share + share * last * last;
+            last = variance.sqrt() * z;
+            (variance, last)
+        })
+        .unzip()
+}
+
+/// How fast the temperature moves either way, the fastest 1: while parts of unlike expansion rub along each other they
+/// crackle, too fast and too small to tell one jerk from another, and are quiet once it has settled.
+pub(super) fn pace(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
+    let temperature = &stand.world.temperature[axis];
+    let (n, half) = (
+        stand.samples(),
+        (draw.between(1.0, 4.0) * stand.rate_hz) as usize,
+    );
+    let pace: Vec<f64> = (0..n)
+        .map(|i| (temperature[(i + half).min(n - 1)] - temperature[i.saturating_sub(half)]).abs())
+        .collect();
+    let fastest = extremes(&pace).1.max(1e-9);
+    pace.iter().map(|p| p / fastest).collect()
+}
+
+/// A fan coil that blows until its thermostat is content, on one of three steps, and runs up and down within seconds. The
+/// pressure of turbulence goes with the square of the speed, and its variance with the fourth power.
+pub(super) fn fan(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    const STEPS: [f64; 3] = [0.6, 0.8, 1.0];
+    let (period, blows) = (draw.by_ratio(12.0, 80.0), draw.between(0.2, 0.6));
+    let runs_up = draw.by_ratio(0.5, 3.0);
+    let (mut on, mut left, mut step) = (draw.chance(0.5), 0.0, 1.0);
+    let asked: Vec<f64> = (0..stand.samples())
+        .map(|_| {
+            left -= 1.0 / stand.rate_hz;
+            if left <= 0.0 {
+                (on, step) = (!on, STEPS[draw.of_many(STEPS.len())]);
+                let share = if on { blows } else { 1.0 - blows };
+                left = period * share * draw.between(0.75, 1.25);
+            }
+            f64::from(u8::from(on)) * step
+        })
+        .collect();
+    let speed = lagged(&asked, runs_up, stand.rate_hz);
+    speed.iter().map(|s| s.powi(4)).collect()
+}
+
+/// Helium that is blown about the stand now and then, as for a leak test, goes through the lid and into the cavity behind
+/// it, and out again: a lag for each. The gas damps the element, and the noise of damping goes with it.
+pub(super) fn gas(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let (lid, cavity) = (draw.by_ratio(8.0, 30.0), draw.by_ratio(20.0, 90.0));
+    let mut blown = true;
+    // Once a record would be a stretch of more noise.
+    let outside = held(draw, stand.samples(), stand.rate_hz, (15.0, 120.0), |d| {
+        blown = !blown;
+        f64::from(u8::from(blown)) * d.between(0.5, 1.0)
+    });
+    let inside = lagged(&outside, lid, stand.rate_hz);
+    lagged(&inside, cavity, stand.rate_hz)
+}
+
+/// A bus or a radio that is busy for a moment every few seconds, and adds noise as long as it is; its clock is another than
+/// that of the readings.
+pub(super) fn bursts(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let period = draw.by_ratio(1.5, 10.0);
+    let busy = draw.between(0.06, 0.3);
+    let first = draw.between(0.0, 1.0);
+    in_time(stand, |t| {
+        f64::from(u8::from((first + t / period).fract() < busy))
+    })
+}
+
+/// A variance that swings about its mean.
+pub(super) fn swinging(draw: &mut Draw, stand: &Stand) -> Shape {
+    let period = draw.between(30.0, 150.0);
+    let swing = in_time(stand, |t| (TAU * t / period).sin());
+    variance(move |depth| {
+        let law = |s: &f64| (1.0 + depth.min(0.999) * s).max(1e-3);
+        swing.iter().map(law).collect()
+    })
+}
+
+/// A variance that grows through the run. The period that is drawn is that of the one that swings.
+pub(super) fn growing(draw: &mut Draw, stand: &Stand) -> Shape {
+    draw.between(30.0, 150.0);
+    let (seconds, times) = (stand.seconds, in_time(stand, |t| t));
+    variance(move |depth| times.iter().map(|t| 1.0 + depth * t / seconds).collect())
+}
+
+/// Noise that comes for seconds and rests for longer.
+pub(super) fn spells(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let (mut on, mut left) = (false, draw.between(5.0, 40.0));
+    (0..stand.samples())
+        .map(|_| {
+            left -= 1.0 / stand.rate_hz;
+            if left <= 0.0 {
+                on = !on;
+                left = if on {
+                    draw.between(2.0, 10.0)
+                } else {
+                    draw.between(20.0, 60.0)
+                };
+            }
+            f64::from(u8::from(on))
+        })
+        .collect()
+}
+
+/// Where an axis's temperature is between the lowest and the highest of the run. The spell that is drawn is that of noise
+/// in bursts.
+pub(super) fn place_of_temperature(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
+    draw.between(5.0, 40.0);
+    let temperature = &stand.world.temperature[axis];
+    let (low, high) = extremes(temperature);
+    temperature
+        .iter()
+        .map(|t| (t - low) / (high - low))
+        .collect()
+}
+
+/// A logarithm of the size that wanders.
+pub(super) fn wandering_size(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let keep = (-1.0 / (draw.by_ratio(5.0, 40.0) * stand.rate_hz)).exp();
+    let mut x = draw.normal();
+    (0..stand.samples())
+        .map(|_| {
+            x = keep * x + (1.0 - keep * keep).sqrt() * draw.normal();
+            x
+        })
+        .collect()
+}
+
+/// The same by another pace.
+pub(super) fn random_size(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let tau = draw.by_ratio(0.5, 30.0);
+    wander(draw, stand.samples(), stand.rate_hz, 1.0, tau)
+}
+
+/// A read-out that serves something else in between, or converters that take turns: every few samples are noisier.
+pub(super) fn every_few(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let every = 2 + draw.of_many(6);
+    let phase = draw.of_many(every);
+    let noisier = |i| f64::from(u8::from(i % every == phase));
+    (0..stand.samples()).map(noisier).collect()
+}
+
+/// Noise that swells and ebbs with a period.
+pub(super) fn swell(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let swell = TAU / (draw.by_ratio(5.0, 150.0) * stand.rate_hz);
+    let first = draw.between(0.0, TAU);
+    let at = |i| (first + swell * f64::from(i)).sin();
+    (0..stand.samples() as u32).map(at).collect()
+}
+
+/// A gyro reads its rate as a carrier's size; what the carrier leaks into the read-out, its quadrature, is as large as the
+/// acceleration that pushes the two plates apart, and the phase of the demodulator is never quiet: noise whose size is
+/// the acceleration of the same instant.
+pub(super) fn by_acceleration(draw: &mut Draw, stand: &Stand) -> Shape {
+    let force = about_mean(&stand.world.acc[draw.of_many(3)]);
+    let square = force.iter().map(|a| a * a).sum::<f64>() / force.len() as f64;
+    variance(move |size| force.iter().map(|a| 1.0 + size * a * a / square).collect())
+}
+
+/// An amplifier that a shock has driven to its stop gives out nothing.
+pub(super) fn silenced(draw: &mut Draw, stand: &mut Stand) -> Shape {
+    let blocked = blocked(draw, stand);
+    variance(move |size| blocked.iter().map(|b| 1.0 / (1.0 + size * b)).collect())
+}
+
+/// A mean of a share of the noise over as many looks as fit.
+pub(super) fn averaged(draw: &mut Draw, stand: &Stand) -> Shape {
+    let looks = looks(draw, stand.samples());
+    variance(move |share| {
+        let of = |l: &f64| 1.0 - share.min(1.0) * (1.0 - 1.0 / l);
+        looks.iter().map(of).collect()
+    })
+}
+
+/// So many independent draws of the normal law.
+fn independent(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    (0..stand.samples()).map(|_| draw.normal()).collect()
+}
+
+/// A gain control that is pumped by what it has just passed: the variance of a reading goes with the square of the one
+/// before (Engle 1982). The spectrum stays white.
+pub(super) fn remembering(draw: &mut Draw, stand: &Stand) -> Shape {
+    let independent = independent(draw, stand);
+    let known = independent.clone();
+    noise(
+        f64::INFINITY,
+        move |_, share| Known::Variance(remembered(share, &known).0),
+        move |_, _, share| remembered(share, &independent).1,
+    )
+}
+
+/// A series over the root of the mean of its law of variance: the variance of a run is seldom 1, and what it adds to it
+/// would be told before its shape.
+fn evened((law, series): (Vec<f64>, Vec<f64>), sign: f64) -> Vec<f64> {
+    let mean = law.iter().sum::<f64>() / law.len() as f64;
+    series.iter().map(|x| sign * x / mean.sqrt()).collect()
+}
+
+/// A large swing makes the next ones larger, and the unrest dies down over some tens of readings (GARCH, Bollerslev 1986).
+/// The spectrum stays white.
+pub(super) fn feeding(draw: &mut Draw, stand: &Stand) -> Shape {
+    let stays = 1.0 - draw.by_ratio(0.02, 0.1);
+    let independent = independent(draw, stand);
+    let known = independent.clone();
+    noise(
+        f64::INFINITY,
+        move |_, gain| Known::Variance(fed(gain, stays, &known).0),
+        move |_, _, gain| evened(fed(gain, stays, &independent), 1.0),
+    )
+}
+
+/// An amplifier whose working point is carried along by what it last gave out: after a swing to one side the next reading
+/// is noisier, after one to the other quieter (the asymmetry of Nelson 1991). Neither readings nor their squares correlate
+/// by much; a reading does with the square after it.
+pub(super) fn one_sided(draw: &mut Draw, stand: &Stand) -> Shape {
+    let independent = independent(draw, stand);
+    let (known, sign) = (independent.clone(), draw.sign());
+    noise(
+        f64::INFINITY,
+        move |_, size| Known::Variance(louder(size, &known).0),
+        move |_, _, size| evened(louder(size, &independent), sign),
+    )
+}

@@ -1,0 +1,328 @@
+//! Words that the makers of foreign effects share: what drives the world of a stand, what follows it, and events.
+
+use std::f64::consts::TAU;
+
+use crate::random::Draw;
+use crate::stand::{Stand, held, lagged, wander};
+
+/// Least and largest of some values.
+pub(super) fn extremes(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {
+            (l.min(v), h.max(v))
+        })
+}
+
+/// How far the largest is from the least.
+pub(super) fn swing(values: &[f64]) -> f64 {
+    let (low, high) = extremes(values);
+    high - low
+}
+
+/// How long a programme of rates stays at one, s.
+pub(super) const DWELL: (f64, f64) = (3.0, 12.0);
+
+/// A swing of the bench that the accelerometer along one axis follows from sample to sample, of variance 1, with its size
+/// there, g.
+pub(super) fn shaken(draw: &mut Draw, stand: &mut Stand, pitch: (f64, f64)) -> Vec<f64> {
+    let (along, rms) = (draw.of_many(3), draw.between(0.08, 0.3));
+    let part = Turning::new(
+        draw.by_ratio(pitch.0, pitch.1),
+        draw.by_ratio(0.05, 0.3),
+        stand.rate_hz,
+    );
+    let shake = part.of(draw, stand.samples());
+    let still = if along == 2 { 1.0 } else { 0.0 };
+    for (a, s) in stand.world.acc[along].iter_mut().zip(&shake) {
+        *a = still + rms * s + 0.005 * draw.normal();
+    }
+    shake
+}
+
+/// What follows a command no faster than so much a second.
+pub(super) fn ramped(command: &[f64], most_per_s: f64, rate_hz: f64) -> Vec<f64> {
+    let most = most_per_s / rate_hz;
+    let mut follows = command.first().copied().unwrap_or(0.0);
+    command
+        .iter()
+        .map(|c| {
+            follows += (c - follows).clamp(-most, most);
+            follows
+        })
+        .collect()
+}
+
+/// Change since the sample before.
+pub(super) fn changes(series: &[f64]) -> Vec<f64> {
+    let mut last = series.first().copied().unwrap_or(0.0);
+    let change = |v: &f64| v - std::mem::replace(&mut last, *v);
+    series.iter().map(change).collect()
+}
+
+/// An axis's temperature from that at which something of it was trimmed, near the middle of its range.
+pub(super) fn from_trim(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
+    let temperature = about_mean(&stand.world.temperature[axis]);
+    let trimmed = draw.between(-0.1, 0.1) * swing(&temperature);
+    temperature.iter().map(|t| t - trimmed).collect()
+}
+
+/// A small heater on the board with a thermostat of short cycles: the temperatures it makes.
+pub(super) fn cycles(draw: &mut Draw, stand: &mut Stand) {
+    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    let (swing, mut on) = (draw.between(4.0, 10.0), draw.chance(0.5));
+    let heater = held(draw, n, rate_hz, (8.0, 30.0), |_| {
+        on = !on;
+        f64::from(u8::from(on))
+    });
+    let warm = lagged(&heater, draw.between(3.0, 9.0), rate_hz);
+    let size = draw.by_ratio(0.02, 0.2);
+    let room = wander(draw, n, rate_hz, size, 200.0);
+    for temperature in &mut stand.world.temperature {
+        let (first, gain) = (temperature[0], draw.between(0.95, 1.05));
+        for (t, (w, r)) in temperature.iter_mut().zip(warm.iter().zip(&room)) {
+            *t = first + gain * (swing * (w - warm[0]) + r - room[0]);
+        }
+    }
+}
+
+pub(super) fn about_mean(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter().map(|v| v - mean).collect()
+}
+
+/// A signal of time, s.
+pub(super) fn in_time(stand: &Stand, mut of: impl FnMut(f64) -> f64) -> Vec<f64> {
+    (0..stand.samples())
+        .map(|i| of(i as f64 / stand.rate_hz))
+        .collect()
+}
+
+/// Commands of a motor that rests in between.
+pub(super) fn with_rests(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let mut turning = draw.chance(0.5);
+    held(draw, stand.samples(), stand.rate_hz, (3.0, 12.0), |d| {
+        turning = !turning;
+        let command = d.sign() * d.between(0.3, 1.0);
+        f64::from(u8::from(turning)) * (command * 255.0).round() / 255.0
+    })
+}
+
+/// What a series does to a mode of this pitch and half width, Hz, from the sample after on.
+pub(super) fn resonating(
+    series: &[f64],
+    (pitch, half_width): (f64, f64),
+    rate_hz: f64,
+) -> Vec<f64> {
+    let keep = (-TAU * half_width / rate_hz).exp();
+    let (sin, cos) = (TAU * pitch / rate_hz).sin_cos();
+    let (mut push, mut moves) = (0.0, 0.0);
+    series
+        .iter()
+        .map(|v| {
+            (push, moves) = (
+                keep * (cos * push - sin * moves) + v,
+                keep * (sin * push + cos * moves),
+            );
+            moves
+        })
+        .collect()
+}
+
+/// The acceleration along an axis, without what it is at rest, g.
+pub(super) fn shaking(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    about_mean(&stand.world.acc[draw.of_many(3)])
+}
+
+/// What follows a series, from 0, by many contacts, each after its own play and with its own weight.
+pub(super) fn behind_plays(series: &[f64], contacts: &[(f64, f64)]) -> Vec<f64> {
+    let mut held = vec![0.0f64; contacts.len()];
+    series
+        .iter()
+        .map(|a| {
+            let follow = |((play, weight), held): (&(f64, f64), &mut f64)| {
+                *held = held.clamp(a - play, a + play);
+                weight * *held
+            };
+            contacts.iter().zip(&mut held).map(follow).sum()
+        })
+        .collect()
+}
+
+/// What is left of a series when the straight line in another is taken off.
+pub(super) fn without_line(y: &[f64], x: &[f64]) -> Vec<f64> {
+    let n = y.len() as f64;
+    let (my, mx) = (y.iter().sum::<f64>() / n, x.iter().sum::<f64>() / n);
+    let (mut xy, mut xx) = (0.0, 0.0);
+    for (y, x) in y.iter().zip(x) {
+        xy += (y - my) * (x - mx);
+        xx += (x - mx).powi(2);
+    }
+    let slope = if xx > 0.0 { xy / xx } else { 0.0 };
+    let rest = |(y, x): (&f64, &f64)| y - my - slope * (x - mx);
+    y.iter().zip(x).map(rest).collect()
+}
+
+/// The temperatures that a lamp close by makes, which is switched on and off within seconds.
+pub(super) fn lamp(draw: &mut Draw, stand: &mut Stand) {
+    lit(draw, stand, (2.0, 14.0), (2.0, 6.0));
+}
+
+/// Those of one that is switched after so long and warms within so long, s.
+pub(super) fn lit(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64), lag_s: (f64, f64)) {
+    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    let (room, top) = (draw.between(20.0, 30.0), draw.between(3.0, 10.0));
+    let mut on = draw.chance(0.5);
+    let lamp = held(draw, n, rate_hz, dwell_s, |d| {
+        on = !on;
+        room + if on { top * d.between(0.5, 1.0) } else { 0.0 }
+    });
+    let heat = lagged(&lamp, draw.by_ratio(lag_s.0, lag_s.1), rate_hz);
+    // Three parts on one board: nearly the same temperature.
+    stand.world.temperature = std::array::from_fn(|_| {
+        let off = draw.between(-0.5, 0.5);
+        heat.iter().map(|t| t + off).collect()
+    });
+}
+
+/// A swing whose phasor turns at a pitch and forgets itself as a Gauss-Markov process does: r^k cos(w k), variance 1.
+#[derive(Clone, Copy)]
+pub(super) struct Turning {
+    keep: f64,
+    turn: f64,
+}
+
+impl Turning {
+    /// By pitch and half width, Hz.
+    pub(super) fn new(pitch: f64, half_width: f64, rate_hz: f64) -> Self {
+        Self {
+            keep: (-TAU * half_width / rate_hz).exp(),
+            turn: TAU * pitch / rate_hz,
+        }
+    }
+
+    /// Its density at an angular frequency, rad per sample; 1 in the mean.
+    pub(super) fn density(&self, w: f64) -> f64 {
+        let r = self.keep;
+        let side = |w: f64| (1.0 - r * r) / (1.0 + r * r - 2.0 * r * w.cos());
+        0.5 * (side(w - self.turn) + side(w + self.turn))
+    }
+
+    /// A stretch of it, from any state on.
+    pub(super) fn of(&self, draw: &mut Draw, n: usize) -> Vec<f64> {
+        let drive = (1.0 - self.keep * self.keep).sqrt();
+        let (sin, cos) = self.turn.sin_cos();
+        let (mut a, mut b) = (draw.normal(), draw.normal());
+        (0..n)
+            .map(|_| {
+                (a, b) = (
+                    self.keep * (cos * a - sin * b) + drive * draw.normal(),
+                    self.keep * (sin * a + cos * b) + drive * draw.normal(),
+                );
+                a
+            })
+            .collect()
+    }
+}
+
+pub(super) fn in_steps(command: f64) -> f64 {
+    (command * 255.0).round() / 255.0
+}
+
+/// Shocks that the accelerometers show, each a single reading: samples, and how hard, g.
+pub(super) fn shocks(draw: &mut Draw, stand: &mut Stand) -> Vec<(usize, f64)> {
+    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    let along = draw.of_many(2);
+    let mut all = vec![];
+    let mut at = draw.between(3.0, 12.0);
+    while at < stand.seconds - 1.0 {
+        let (i, hard) = (
+            ((at * rate_hz) as usize).min(n - 1),
+            draw.sign() * draw.between(0.5, 1.2),
+        );
+        stand.world.acc[along][i] += hard;
+        all.push((i, hard));
+        at += 4.0 + 12.0 * draw.exponential();
+    }
+    all
+}
+
+/// Commands of a rate table's programme, which the stand gets: levels held for so long, s, slow ones more often than fast
+/// ones, in either sense, and a rest now and then.
+pub(super) fn programme(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64)) {
+    const RESTS: f64 = 0.25;
+    stand.world.duty = held(draw, stand.samples(), stand.rate_hz, dwell_s, |d| {
+        if d.chance(RESTS) {
+            0.0
+        } else {
+            in_steps((0.45 * d.normal()).clamp(-1.0, 1.0))
+        }
+    });
+}
+
+/// The table's rate over that at full duty: behind the command by the time that the motor takes to spin up.
+pub(super) fn rate_of_table(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    lagged(&stand.world.duty, draw.by_ratio(0.3, 1.5), stand.rate_hz)
+}
+
+/// The angle that the table has turned by, rad, where its rate at full duty is so many turns per second.
+pub(super) fn angle_of_table(rate: &[f64], full: f64, rate_hz: f64) -> Vec<f64> {
+    let mut angle = 0.0;
+    rate.iter()
+        .map(|r| {
+            angle += TAU * full * r / rate_hz;
+            angle
+        })
+        .collect()
+}
+
+/// Vibration along a level axis, told, that swells and fades.
+pub(super) fn swelling(draw: &mut Draw, stand: &mut Stand) -> usize {
+    const RAIL_G: f64 = 1.9;
+    let (usual, tau) = (draw.by_ratio(0.1, 0.4), draw.by_ratio(10.0, 60.0));
+    let swell = wander(draw, stand.samples(), stand.rate_hz, 0.5, tau);
+    let level = draw.of_many(2);
+    stand.world.acc[level] = swell
+        .iter()
+        .map(|s| (usual * s.exp() * draw.normal()).clamp(-RAIL_G, RAIL_G))
+        .collect();
+    level
+}
+
+/// Events of a record, s: `count` of them, the first after a tenth of it, and no two within a twentieth.
+pub(super) fn events(draw: &mut Draw, stand: &Stand, count: usize) -> Vec<f64> {
+    let mut all: Vec<f64> = vec![];
+    while all.len() < count {
+        let at = stand.seconds * draw.between(0.1, 0.9);
+        if all.iter().all(|a| (a - at).abs() > 0.05 * stand.seconds) {
+            all.push(at);
+        }
+    }
+    all
+}
+
+/// How large each of them is, of either sign.
+pub(super) fn sizes(draw: &mut Draw, events: &[f64]) -> Vec<f64> {
+    let size = |_: &f64| draw.sign() * draw.between(0.5, 1.5);
+    events.iter().map(size).collect()
+}
+
+/// What events add, by the time since each of them, s.
+pub(super) fn since(stand: &Stand, events: &[f64], of: impl Fn(usize, f64) -> f64) -> Vec<f64> {
+    (0..stand.samples())
+        .map(|i| {
+            let t = i as f64 / stand.rate_hz;
+            let one = |(k, at): (usize, &f64)| if t < *at { 0.0 } else { of(k, t - at) };
+            events.iter().enumerate().map(one).sum()
+        })
+        .collect()
+}
+
+/// How often each reading passes one of so many places of a turn, which lie at equal angles.
+pub(super) fn passes(angle: &[f64], per_turn: f64, first: f64) -> Vec<f64> {
+    let places: Vec<f64> = angle
+        .iter()
+        .map(|a| (a / TAU * per_turn + first).floor())
+        .collect();
+    changes(&places).iter().map(|c| c.abs()).collect()
+}

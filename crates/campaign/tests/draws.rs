@@ -1,0 +1,71 @@
+//! Golden: what the first case of each family plants, by a digest. It says "unchanged", not "correct": a campaign can be
+//! compared with an earlier one only where both draw the same. A change that is meant renews the file by
+//! `IMU_STAND_RENEW=1 cargo test -p campaign --test draws`.
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use campaign::{Family, Size, case, cases};
+
+/// Seed of the cases.
+const SEED: u64 = 17;
+/// Where their digests are, with the row of the tables.
+const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/draws.txt");
+
+/// The digest of the first case of each family, in the order of their numbers.
+fn digests() -> Vec<(Family, u64)> {
+    let mut all: Vec<Family> = cases(Size::even(1), None).iter().map(|c| c.0).collect();
+    all.sort_by_key(|f| f.number());
+    let next = AtomicUsize::new(0);
+    let found = Mutex::new(vec![]);
+    let threads = std::thread::available_parallelism().map_or(1, Into::into);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while let Some(family) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let digest = case::digest(SEED, *family, 0);
+                    found.lock().expect("no panic").push((*family, digest));
+                }
+            });
+        }
+    });
+    let mut found = found.into_inner().expect("no panic");
+    found.sort_by_key(|(f, _)| f.number());
+    found
+}
+
+#[test]
+fn golden_the_first_case_of_each_family_is_drawn_as_before() {
+    let new = digests();
+    if std::env::var_os("IMU_STAND_RENEW").is_some() {
+        let mut text = String::new();
+        for (family, digest) in &new {
+            let _ = writeln!(text, "{digest:016x} {}", family.label());
+        }
+        std::fs::write(PATH, text).expect("the file can be written");
+        return;
+    }
+    let old: HashMap<&str, &str> = include_str!("draws.txt")
+        .lines()
+        .filter_map(|line| line.split_once(' '))
+        .map(|(digest, label)| (label, digest))
+        .collect();
+    let changed: Vec<&str> = new
+        .iter()
+        .filter(|(f, digest)| old.get(f.label()) != Some(&format!("{digest:016x}").as_str()))
+        .map(|(f, _)| f.label())
+        .collect();
+    assert!(changed.is_empty(), "drawn otherwise: {changed:?}");
+    assert_eq!(new.len(), old.len(), "families that are gone");
+}
+
+#[test]
+fn two_cases_of_a_family_and_two_seeds_differ() {
+    let family = Family::Clean;
+    let first = case::digest(SEED, family, 0);
+    assert_ne!(first, case::digest(SEED, family, 1));
+    assert_ne!(first, case::digest(SEED + 1, family, 0));
+    assert_eq!(first, case::digest(SEED, family, 0));
+}
