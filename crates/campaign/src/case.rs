@@ -8,12 +8,13 @@ use model::file::EffectModel;
 use model::record::Record;
 use serde::{Deserialize, Serialize};
 
-use crate::foreign::{self, FOREIGN, add, foreign};
+use crate::foreign::{self, FOREIGN, Foreign, add, foreign};
 use crate::plant::{
-    BY_COUNT, BY_STRENGTH, Truth, as_effect, asked_from, id_of, needs, plant, plant_counted,
+    BY_COUNT, BY_STRENGTH, COUNTED, STRONG, Truth, as_effect, plant, plant_counted, strong,
 };
 use crate::random::Draw;
 use crate::stand::{GYROS, Needs, Stand};
+use crate::strength::Meter;
 
 /// Families of runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -40,8 +41,8 @@ impl Family {
             Self::Clean => 1,
             Self::Elsewhere => 2,
             Self::Pair => 3,
-            Self::One(i) => 100 + i as u64,
-            Self::Counted(i) => 200 + i as u64,
+            Self::One(i) => u64::from(STRONG[i].id),
+            Self::Counted(i) => u64::from(COUNTED[i].id),
             Self::Foreign(i) => foreign::number(i),
         }
     }
@@ -215,17 +216,10 @@ struct Planted {
     strange: f64,
 }
 
-fn planted(seed: u64, family: Family, index: u64) -> Planted {
-    let draw = &mut Draw::of(seed, family.number(), index);
-    let mut truths: Vec<Truth> = vec![];
-    let mut strange = f64::NAN;
-    let mut allowed: Vec<&'static str> = vec![];
-    let (rate_hz, seconds) = match family {
-        Family::Elsewhere => ELSEWHERE[index as usize % ELSEWHERE.len()],
-        _ => (20.0, 600.0),
-    };
-    let needed = match family {
-        Family::One(i) => needs(BY_STRENGTH[i]),
+/// The environment that a family needs.
+fn needed(family: Family) -> Needs {
+    match family {
+        Family::One(i) => STRONG[i].needs,
         Family::Pair => Needs {
             temperature: true,
             supply: true,
@@ -234,64 +228,70 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         },
         Family::Foreign(i) => foreign::needs(i),
         _ => Needs::default(),
+    }
+}
+
+fn planted(seed: u64, family: Family, index: u64) -> Planted {
+    let draw = &mut Draw::of(seed, family.number(), index);
+    let mut truths: Vec<Truth> = vec![];
+    let mut allowed: Vec<&'static str> = vec![];
+    let (rate_hz, seconds) = match family {
+        Family::Elsewhere => ELSEWHERE[index as usize % ELSEWHERE.len()],
+        _ => (20.0, 600.0),
     };
-    let mut stand = Stand::draw(draw, seconds, rate_hz, needed);
+    let mut stand = Stand::draw(draw, seconds, rate_hz, needed(family));
     let mut axis = draw.of_many(3);
     let mut unknown = None;
     match family {
         Family::Clean | Family::Elsewhere => {}
         Family::One(i) => {
-            let label = BY_STRENGTH[i];
-            let axis = match label {
-                "cross_axis" | "scale_error" => axis.min(1),
-                _ => axis,
-            };
-            let wanted = strength(draw, asked_from(label));
-            truths.push(plant(draw, &mut stand, label, axis, wanted));
-            if label == "scale_error" {
-                allowed.push("base_motion");
-            }
+            let row = &STRONG[i];
+            let axis = if row.moves { axis.min(1) } else { axis };
+            let wanted = strength(draw, row.asked_from);
+            truths.push(plant(draw, &mut stand, row.label, axis, wanted));
+            allowed.extend(row.true_parts);
         }
-        Family::Counted(i) => truths.push(plant_counted(draw, &stand, BY_COUNT[i], axis)),
+        Family::Counted(i) => truths.push(plant_counted(draw, &stand, i, axis)),
         Family::Pair => pair(draw, &mut stand, &mut truths),
         Family::Foreign(i) => {
             let wanted = draw.by_ratio(25.0, 40.0);
             axis = foreign::on_axis(i, axis);
             allowed.extend(foreign::parts(i));
-            let f = foreign(draw, &mut stand, i, axis, wanted);
-            strange = f.strength;
-            unknown = Some(f);
+            unknown = Some(foreign(draw, &mut stand, i, axis, wanted));
         }
     }
+    Planted {
+        record: recorded(draw, &stand, &truths, unknown.as_ref().map(|f| (axis, f))),
+        truths,
+        allowed,
+        walks: stand.walk_of_rate,
+        strange: unknown.map_or(f64::NAN, |f| f.strength),
+    }
+}
+
+/// What a stand reads with these effects, and with a foreign one on an axis.
+fn recorded(
+    draw: &mut Draw,
+    stand: &Stand,
+    truths: &[Truth],
+    unknown: Option<(usize, &Foreign)>,
+) -> Record {
     let effects: Vec<EffectModel> = truths.iter().filter_map(as_effect).collect();
     let mut measured = stand.clone();
-    if unknown
-        .as_ref()
-        .is_some_and(foreign::Foreign::replaces_noise)
-    {
+    if let Some((axis, _)) = unknown.filter(|(_, f)| f.replaces_noise()) {
         measured.walk_of_angle[axis] = 0.0;
     }
     let mut record = measured
         .record(&effects, draw.seed())
         .expect("a stand of this crate can be simulated");
     for t in truths.iter().filter(|t| as_effect(t).is_none()) {
-        add(
-            &mut record,
-            &t.channel,
-            t.signal.as_deref().unwrap_or(&[]),
-            draw,
-        );
+        let signal = t.signal.as_deref().unwrap_or(&[]);
+        add(&mut record, &t.channel, signal, draw);
     }
-    if let Some(f) = &unknown {
-        f.act(&mut record, &stand, axis, draw);
+    if let Some((axis, f)) = unknown {
+        f.act(&mut record, stand, axis, draw);
     }
-    Planted {
-        record,
-        truths,
-        allowed,
-        walks: stand.walk_of_rate,
-        strange,
-    }
+    record
 }
 
 /// Digest (FNV-1a, 64 bits) of what case `index` of a family plants: counts, flags and times of the record, and what is
@@ -411,56 +411,56 @@ pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
     }
 }
 
+/// Whether of two effects on one channel one is a part of the other: a parabola holds a line.
+fn holds_the_other(truths: &[Truth]) -> bool {
+    let both = |one, other| {
+        let has = |cause| truths.iter().any(|t| t.cause == cause);
+        has(one) && has(other)
+    };
+    both("temperature", "temperature_quadratic") || both("line", "am_line")
+}
+
+/// How strong an effect is beside another on its channel. What two processes leave of each other is not worked out.
+fn beside(meter: &Meter, one: &Truth, other: &Truth) -> f64 {
+    match (&one.signal, &other.signal, &other.density) {
+        (Some(x), Some(y), _) => {
+            meter.of_signal(&meter.energy(&meter.beyond(x, std::slice::from_ref(y))))
+        }
+        (Some(s), _, Some(d)) => meter.over(d).of_signal(&meter.energy(s)),
+        (None, None, Some(_)) if one.density.is_some() => 0.0,
+        _ => one.strength,
+    }
+}
+
 /// Two effects, each as strong as asked beside the other.
 fn pair(draw: &mut Draw, stand: &mut Stand, truths: &mut Vec<Truth>) {
     // Those that need a moving base exclude most others.
-    let fit: Vec<&'static str> = BY_STRENGTH
-        .into_iter()
-        .filter(|l| !matches!(*l, "cross_axis" | "scale_error"))
-        .collect();
+    let fit: Vec<_> = STRONG.iter().filter(|row| !row.moves).collect();
     loop {
         truths.clear();
-        let first = fit[draw.of_many(fit.len())];
-        let second = fit[draw.of_many(fit.len())];
-        if id_of(first) == id_of(second) {
+        let rows = [0, 1].map(|_| fit[draw.of_many(fit.len())]);
+        if rows[0].cause == rows[1].cause {
             continue;
         }
-        for label in [first, second] {
+        for row in rows {
             let axis = draw.of_many(3);
-            let from = asked_from(label);
-            let wanted = draw.by_ratio(1.1 * from, 2.2 * from);
-            truths.push(plant(draw, stand, label, axis, wanted));
+            let wanted = draw.by_ratio(1.1 * row.asked_from, 2.2 * row.asked_from);
+            truths.push(plant(draw, stand, row.label, axis, wanted));
         }
-        // A parabola holds a line.
         if truths[0].channel == truths[1].channel {
-            let ids = [truths[0].cause, truths[1].cause];
-            if ids.contains(&"temperature") && ids.contains(&"temperature_quadratic")
-                || ids.contains(&"line") && ids.contains(&"am_line")
-            {
+            if holds_the_other(truths) {
                 continue;
             }
-            let axis = GYROS
-                .iter()
-                .position(|g| *g == truths[0].channel)
-                .unwrap_or(0);
-            let meter = crate::strength::Meter::new(stand, axis);
-            let beside = |x: &Truth, y: &Truth| match (&x.signal, &y.signal, &y.density) {
-                (Some(x), Some(y), _) => {
-                    meter.of_signal(&meter.energy(&meter.beyond(x, std::slice::from_ref(y))))
-                }
-                (Some(s), _, Some(d)) => meter.over(d).of_signal(&meter.energy(s)),
-                // What two processes leave of each other is not worked out.
-                (None, None, Some(_)) if x.density.is_some() => 0.0,
-                _ => x.strength,
-            };
-            let left = [
-                beside(&truths[0], &truths[1]),
-                beside(&truths[1], &truths[0]),
-            ];
-            truths[0].strength = left[0];
-            truths[1].strength = left[1];
+            let own = GYROS.iter().position(|g| *g == truths[0].channel);
+            let meter = Meter::new(stand, own.unwrap_or(0));
+            let [one, other] = [0, 1].map(|i: usize| beside(&meter, &truths[i], &truths[1 - i]));
+            truths[0].strength = one;
+            truths[1].strength = other;
         }
-        if truths.iter().all(|t| t.strength >= asked_from(t.label)) {
+        if truths
+            .iter()
+            .all(|t| t.strength >= strong(t.label).asked_from)
+        {
             return;
         }
     }

@@ -9,6 +9,8 @@ use crate::random::Draw;
 use crate::stand::{Needs, Stand};
 
 mod act;
+#[cfg(test)]
+mod battery;
 mod catalogue;
 mod known;
 pub mod sets;

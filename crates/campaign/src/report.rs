@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::case::{Estimate, Family, Hit, Outcome};
-use crate::foreign::{FOREIGN, has_twin, is_seen, sets};
-use crate::plant::{BY_COUNT, BY_STRENGTH, asked_from, asked_ratio};
+use crate::foreign::{FOREIGN, sets};
+use crate::plant::{BY_COUNT, BY_STRENGTH, asked_from, strong as row_of};
 use crate::tally::{ORACLE, Rate, d95, oracle};
+
+mod bars;
 
 /// Whether a run says something that a summary hides.
 #[must_use]
@@ -55,56 +57,17 @@ fn percent(r: Rate) -> String {
     )
 }
 
-/// A bar: what is asked, what was measured, whether it is met.
-struct Bar {
-    what: String,
-    asked: String,
-    measured: Rate,
-    met: bool,
-}
-
-/// A bar of "at least" or "at most"; a rate just short of it by less than its binomial error is told as open.
-fn bar(what: &str, least: bool, limit: f64, measured: Rate) -> Bar {
-    let sign = if least { ">=" } else { "<=" };
-    let met = if least {
-        measured.share() >= limit
-    } else {
-        measured.share() <= limit
-    };
-    Bar {
-        what: what.into(),
-        asked: format!("{sign} {:.1} %", 100.0 * limit),
-        measured,
-        met,
-    }
-}
-
-fn verdict(b: &Bar) -> &'static str {
-    if b.measured.trials == 0 {
-        return "not run";
-    }
-    let (low, high) = b.measured.interval();
-    let limit: f64 = b
-        .asked
-        .trim_start_matches(['<', '>', '=', ' '])
-        .trim_end_matches([' ', '%'])
-        .parse()
-        .unwrap_or(f64::NAN)
-        / 100.0;
-    match (b.met, low <= limit && limit <= high) {
-        (true, false) => "met",
-        (true, true) => "met, within the error",
-        (false, true) => "**missed, within the error**",
-        (false, false) => "**missed**",
-    }
-}
-
 fn strong(o: &Outcome) -> bool {
     o.truths.iter().all(|t| t.1 >= asked_from(t.0))
 }
 
 fn singles(all: &[Outcome]) -> impl Iterator<Item = &Outcome> {
     all.iter().filter(|o| matches!(o.family, Family::One(_)))
+}
+
+/// Whether the 95 % interval of an estimate holds the truth.
+fn covers(e: &Estimate) -> bool {
+    (e.value - e.truth).abs() <= 1.959_964 * e.std_error
 }
 
 /// Relative deviations of the estimates of a parameter, and how often its interval holds the truth.
@@ -116,11 +79,7 @@ struct Spread {
 }
 
 fn spread(estimates: &[&Estimate]) -> Spread {
-    let covered = Rate::of(
-        estimates
-            .iter()
-            .map(|e| (e.value - e.truth).abs() <= 1.959_964 * e.std_error),
-    );
+    let covered = Rate::of(estimates.iter().map(|e| covers(e)));
     let mut ratios: Vec<f64> = estimates
         .iter()
         .filter(|e| e.truth != 0.0)
@@ -181,7 +140,7 @@ pub fn page(all: &[Outcome], command: &str, date: &str, seconds: f64, planned: u
         );
     }
     out.push_str(METHOD);
-    bars(&mut out, all);
+    bars::bars(&mut out, all);
     clean(&mut out, all);
     causes(&mut out, all);
     curves(&mut out, all);
@@ -216,119 +175,7 @@ current of the motor, the foreign effects, docs/hidden-effect.md and docs/real-d
 
 ";
 
-const BEYOND_REACH: &str = "
-AM line from d' 13; telegraph, noise change and scale from 10. Foreign effects without a d' (noise of another law, codes)
-count as strong; those that stay below 25 within 0.28 deg/s rms do not count.
-
-Smallest sizes are out of reach where the asked ratio leaves no room for the search. A single test at the chance of 7e-5
-that 0.5 % of alarms in all leaves to each of some twenty hypotheses on three axes finds 95 of 100 from d' 5.6..5.8 on,
-1.33..1.38 of the oracle's, not 1.3. A line may lie at any of 12 000 frequencies: d' 7.8, 1.85 instead of 1.7. An AM line
-is one only by its swing, which holds depth^2 / (2 + depth^2) of its energy: d' 6.9 of the swing is 12 of the line at
-depth 1 and 21 at depth 0.5, and depths are drawn from 0.5 to 1.
-";
-
 const NAMES: &str = include_str!("report/names.md");
-
-fn bars(out: &mut String, all: &[Outcome]) {
-    let clean = Rate::of(
-        all.iter()
-            .filter(|o| o.family == Family::Clean)
-            .map(|o| !o.quiet()),
-    );
-    let single: Vec<&Outcome> = singles(all).filter(|o| strong(o)).collect();
-    let alone = Rate::of(single.iter().map(|o| o.right()));
-    let pairs: Vec<&Outcome> = all.iter().filter(|o| o.family == Family::Pair).collect();
-    let effects = Rate::of(
-        pairs
-            .iter()
-            .flat_map(|o| o.truths.iter().map(|t| t.2 != Hit::Missed)),
-    );
-    let whole = Rate::of(pairs.iter().map(|o| o.right()));
-    let wrong = Rate::of(
-        all.iter()
-            .filter(|o| matches!(o.family, Family::One(_) | Family::Pair | Family::Counted(_)))
-            .map(|o| !o.wrong.is_empty()),
-    );
-    let strange = |seen: bool| {
-        all.iter().filter(move |o| {
-            matches!(o.family, Family::Foreign(i) if is_seen(i) == seen)
-                && (o.strength.is_nan() || o.strength >= 0.99 * 25.0)
-        })
-    };
-    let told = |seen| Rate::of(strange(seen).map(|o| !o.unexplained.is_empty()));
-    let alone_of_its_kind =
-        || strange(false).filter(|o| matches!(o.family, Family::Foreign(i) if !has_twin(i)));
-    let misnamed = |seen| Rate::of(strange(seen).map(|o| !o.wrong.is_empty()));
-    let fit: Vec<_> = estimates(all).into_values().flatten().collect();
-    let covered = Rate::of(
-        fit.iter()
-            .map(|e| (e.value - e.truth).abs() <= 1.959_964 * e.std_error),
-    );
-    let bars = [
-        bar("clean runs with an alarm", false, 0.005, clean),
-        bar(
-            "one effect of d' >= 8: named and nothing else said",
-            true,
-            0.98,
-            alone,
-        ),
-        bar(
-            "two effects, each d' >= 8: effects named",
-            true,
-            0.98,
-            effects,
-        ),
-        bar("two effects: runs wholly right", true, 0.95, whole),
-        bar(
-            "runs with an effect in which a wrong name is given, any strength",
-            false,
-            0.02,
-            wrong,
-        ),
-        bar(
-            "foreign effects of d' >= 25, fourteenth set (2026-11-22), unseen: told as unexplained",
-            true,
-            0.90,
-            told(false),
-        ),
-        bar("the same: given a name", false, 0.05, misnamed(false)),
-        bar(
-            "those of them without a near twin in an earlier set: told as unexplained",
-            true,
-            0.90,
-            Rate::of(alone_of_its_kind().map(|o| !o.unexplained.is_empty())),
-        ),
-        bar(
-            "the same: given a name",
-            false,
-            0.05,
-            Rate::of(alone_of_its_kind().map(|o| !o.wrong.is_empty())),
-        ),
-        bar(
-            "foreign effects of d' >= 25 that the engine was developed with or changed after: told as unexplained",
-            true,
-            0.90,
-            told(true),
-        ),
-        bar("the same: given a name", false, 0.05, misnamed(true)),
-        bar("95 % intervals that hold the truth", true, 0.93, covered),
-    ];
-    let _ = writeln!(
-        out,
-        "## Bars\n\n| bar | asked | measured | |\n|---|---|---|---|"
-    );
-    for b in &bars {
-        let _ = writeln!(
-            out,
-            "| {} | {} | {} | {} |",
-            b.what,
-            b.asked,
-            percent(b.measured),
-            verdict(b)
-        );
-    }
-    let _ = writeln!(out, "{BEYOND_REACH}");
-}
 
 fn clean(out: &mut String, all: &[Outcome]) {
     let _ = writeln!(
@@ -412,7 +259,7 @@ fn causes(out: &mut String, all: &[Outcome]) {
             short(Rate::of(strong.iter().map(|o| o.truths[0].2 == Hit::Named))),
             short(Rate::of(strong.iter().map(|o| o.right()))),
             short(Rate::of(own.iter().map(|o| !o.wrong.is_empty()))),
-            asked_ratio(label),
+            row_of(label).asked_ratio,
         );
     }
 }

@@ -249,13 +249,9 @@ pub(crate) fn wander(
         .collect()
 }
 
-fn world(draw: &mut Draw, samples: usize, rate_hz: f64, needs: Needs) -> World {
+/// What the room and a heater make of the temperature, deg C.
+fn temperature(draw: &mut Draw, samples: usize, rate_hz: f64, needs: Needs) -> Vec<f64> {
     let seconds = samples as f64 / rate_hz;
-    let duty = if needs.motor || draw.chance(0.6) {
-        duty(draw, samples, rate_hz)
-    } else {
-        vec![0.0; samples]
-    };
     let heater = needs.temperature || draw.chance(0.5);
     let mut temperature = vec![draw.between(18.0, 32.0); samples];
     let mut add = |values: Vec<f64>| {
@@ -287,6 +283,12 @@ fn world(draw: &mut Draw, samples: usize, rate_hz: f64, needs: Needs) -> World {
     }
     let room = draw.by_ratio(0.02, 0.3);
     add(wander(draw, samples, rate_hz, room, 200.0));
+    temperature
+}
+
+/// A supply of 5 V that a load and the motor pull down, V.
+fn supply(draw: &mut Draw, duty: &[f64], rate_hz: f64, needs: Needs) -> Vec<f64> {
+    let samples = duty.len();
     let mut supply = vec![5.0; samples];
     let mut sag = |values: Vec<f64>| supply.iter_mut().zip(values).for_each(|(u, v)| *u -= v);
     sag(wander(draw, samples, rate_hz, 0.001, 60.0));
@@ -300,11 +302,22 @@ fn world(draw: &mut Draw, samples: usize, rate_hz: f64, needs: Needs) -> World {
     }
     if draw.chance(0.3) {
         let drop = draw.between(0.01, 0.04);
-        sag(lagged(&duty, 0.3, rate_hz)
+        sag(lagged(duty, 0.3, rate_hz)
             .iter()
             .map(|d| drop * d.abs())
             .collect());
     }
+    supply
+}
+
+fn world(draw: &mut Draw, samples: usize, rate_hz: f64, needs: Needs) -> World {
+    let duty = if needs.motor || draw.chance(0.6) {
+        duty(draw, samples, rate_hz)
+    } else {
+        vec![0.0; samples]
+    };
+    let temperature = temperature(draw, samples, rate_hz, needs);
+    let supply = supply(draw, &duty, rate_hz, needs);
     let rms = if needs.vibration || draw.chance(0.5) {
         draw.between(0.05, 0.2)
     } else {

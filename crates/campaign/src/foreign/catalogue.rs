@@ -49,6 +49,7 @@ pub(super) struct ForeignEffect {
     /// How it is drawn.
     pub make: Make,
     /// How strong it comes.
+    #[cfg_attr(not(test), expect(dead_code, reason = "what the battery holds it to"))]
     pub strength: Strength,
     /// The environment that it needs.
     pub needs: Needs,

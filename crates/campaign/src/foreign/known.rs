@@ -21,6 +21,7 @@ pub(super) enum Known {
     Beside(Vec<Vec<f64>>),
     /// Shares of the codes from the first on, and those that they are held for.
     Codes {
+        #[cfg_attr(not(test), expect(dead_code, reason = "where the battery begins"))]
         first: i32,
         read: Vec<f64>,
         held: Vec<f64>,
@@ -28,6 +29,7 @@ pub(super) enum Known {
     /// Chances from each code (row) to the next reading's, shares of the codes from the first on, and those of readings that
     /// they are held for, each on its own.
     Steps {
+        #[cfg_attr(not(test), expect(dead_code, reason = "where the battery begins"))]
         first: i32,
         steps: Vec<Vec<f64>>,
         shares: Vec<f64>,

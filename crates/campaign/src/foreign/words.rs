@@ -265,6 +265,12 @@ pub(super) fn rate_of_table(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     lagged(&stand.world.duty, draw.by_ratio(0.3, 1.5), stand.rate_hz)
 }
 
+/// The rate of a table on a programme whose rates last so long, s.
+pub(super) fn turned(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64)) -> Vec<f64> {
+    programme(draw, stand, dwell_s);
+    rate_of_table(draw, stand)
+}
+
 /// The angle that the table has turned by, rad, where its rate at full duty is so many turns per second.
 pub(super) fn angle_of_table(rate: &[f64], full: f64, rate_hz: f64) -> Vec<f64> {
     let mut angle = 0.0;

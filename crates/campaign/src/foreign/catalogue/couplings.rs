@@ -8,7 +8,7 @@ use super::Make::Shaped;
 use super::{ForeignEffect, TM, row};
 use crate::random::Draw;
 use crate::stand::{LSB, Stand};
-use crate::strength::{Meter, size_for};
+use crate::strength::Meter;
 
 /// One row each, unbroken so that columns can be read down.
 #[rustfmt::skip]
@@ -123,25 +123,6 @@ impl Diode {
             .max(0.0)
             .sqrt()
     }
-}
-
-/// The size of a diode that is `wanted` strong, and the readings it was found on.
-fn diode_of(
-    draw: &mut Draw,
-    stand: &Stand,
-    (axis, other): (usize, usize),
-    wanted: f64,
-) -> (Diode, [Vec<f64>; 2]) {
-    let white = stand.white(axis);
-    let threshold = white.sqrt() * draw.between(0.0, 1.0);
-    let own = white_of(draw, stand, axis);
-    let of = white_of(draw, stand, other);
-    let at = |share: f64| Diode {
-        threshold,
-        share: share.min(Diode::MOST),
-    };
-    let share = size_for(wanted, &|share| at(share).strength(&own, &of, white));
-    (at(share), [own, of])
 }
 
 /// What a tail does to a spectrum.

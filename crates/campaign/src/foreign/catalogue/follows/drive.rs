@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::super::super::words::{
     DWELL, about_mean, angle_of_table, changes, in_steps, passes, programme, ramped, rate_of_table,
-    resonating,
+    resonating, turned,
 };
 use crate::random::Draw;
 use crate::stand::{Stand, held, lagged};
@@ -15,8 +15,7 @@ pub(super) const FINE: usize = 20;
 /// The cable to the table drags over an edge and jumps off it at a few angles: a kick, and the table rings. Turned back it
 /// slides over without one.
 pub(super) fn edge(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let angle = angle_of_table(&rate, draw.by_ratio(0.2, 0.8), stand.rate_hz);
     let mut kicks = vec![0.0; rate.len()];
     for _ in 0..1 + draw.of_many(3) {
@@ -34,8 +33,7 @@ pub(super) fn edge(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// The rubber that the part stands on gives way to the centrifugal load, and the more, the softer a load has made it (Payne):
 /// it softens at once, and takes its time to harden. The part reads the rate at which it leans.
 pub(super) fn rubber(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let hardens = 1.0 / (draw.by_ratio(5.0, 40.0) * stand.rate_hz);
     let (softens, sign, mut soft) = (draw.between(1.0, 4.0), draw.sign(), 0.0f64);
     let leans: Vec<f64> = rate
@@ -52,8 +50,7 @@ pub(super) fn rubber(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// The cages of the table's two bearings, with the balls in them, go round a little differently: two ripples of the angle
 /// that beat by the angle, and not by time.
 pub(super) fn cages(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     // Balls that pass in a turn, of eight to twelve in a cage that goes 0.4 turns.
     let (balls, apart) = (draw.between(3.0, 5.0), draw.between(0.02, 0.08));
     let angle = angle_of_table(&rate, balls * draw.by_ratio(0.3, 1.2), stand.rate_hz);
@@ -151,8 +148,7 @@ pub(super) fn stick_slip(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// Cogging of the motor: so many ripples a turn, so that their pitch is the speed; slow ones are the larger, and none at
 /// rest.
 pub(super) fn cogging(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     // Ripples per second at full duty; inertia is what counts beyond a corner.
     let (pitch, corner) = (draw.by_ratio(3.0, 9.5), draw.between(0.1, 0.3));
     let first = draw.between(0.0, TAU);
@@ -237,8 +233,7 @@ pub(super) fn friction(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// A toothed belt between the motor, which has the encoder, and the table: each change of the rate twists it and it swings
 /// out, and each tooth that comes on the pulley pushes it, the harder the nearer their pitch is to that of the swing.
 pub(super) fn belt(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let teeth = angle_of_table(&rate, draw.by_ratio(2.0, 9.0), stand.rate_hz);
     let height = draw.by_ratio(0.005, 0.03);
     let bumps: Vec<f64> = teeth.iter().map(|a| height * a.cos()).collect();
@@ -254,8 +249,7 @@ pub(super) fn belt(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// The cable chain beside the table lays down its links one by one, at equal angles: each is a kick as large as the link is
 /// loose, forward when it is laid down and backward when it is taken up, and no harder the faster the table turns.
 pub(super) fn chain(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     // Links a second at full duty.
     let angle = angle_of_table(&rate, draw.by_ratio(0.8, 4.0), stand.rate_hz);
     let links = passes(&angle, 1.0, draw.between(0.0, 1.0));
@@ -299,8 +293,7 @@ pub(super) fn structure(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// A chipped ball of the table's bearing strikes the races at fixed angles, a few times a turn and never a whole number, the
 /// harder the faster; each stroke is a short ring of the bearing.
 pub(super) fn chipped(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let (full, per_turn) = (draw.by_ratio(0.4, 1.2), draw.between(2.2, 5.8));
     let angle = angle_of_table(&rate, full, stand.rate_hz);
     let strokes = passes(&angle, per_turn, draw.between(0.0, 1.0));
@@ -312,8 +305,7 @@ pub(super) fn chipped(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// A toothed wheel or a pulley out of centre: the table runs ahead and behind by a share of its rate, which the encoder on
 /// the motor does not see, once a turn, and by less twice and thrice.
 pub(super) fn gear(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let full = draw.by_ratio(0.1, 0.6);
     let waves: [(f64, f64); 3] = std::array::from_fn(|k| {
         let most = if k == 0 { 1.0 } else { draw.between(0.1, 0.5) };

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::super::super::words::{
     DWELL, about_mean, angle_of_table, changes, cycles, extremes, from_trim, in_steps, programme,
-    ramped, rate_of_table, swing,
+    ramped, rate_of_table, swing, turned,
 };
 use crate::random::Draw;
 use crate::stand::{Stand, held, lagged, wander};
@@ -23,8 +23,7 @@ pub(super) fn converted_late(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 
 /// A scale factor that follows temperature: the rate times what the temperature is off that of the calibration.
 pub(super) fn scale(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
-    programme(draw, stand, (1.0, 5.0));
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, (1.0, 5.0));
     let temperature = from_trim(draw, stand, axis);
     let sign = draw.sign();
     let error = |(r, t): (&f64, &f64)| sign * r * t;
@@ -34,8 +33,7 @@ pub(super) fn scale(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64>
 /// Firmware that multiplies the rate in a word that is too narrow: beyond a rate the product wraps around, and the reading
 /// is off by the whole range of the word, one way turning one way, and the other way the other.
 pub(super) fn overflow(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     // Where the word ends, and the reading's noise, over the rate at full duty.
     let (ends, noise) = (draw.between(0.35, 0.65), draw.by_ratio(0.005, 0.03));
     let sign = draw.sign();
@@ -46,8 +44,7 @@ pub(super) fn overflow(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 
 /// An odd term of the scale factor: its cube, less the straight line that is right at the rate at which it was calibrated.
 pub(super) fn cubed_rate(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let (calibrated, sign) = (draw.between(0.5, 0.9), draw.sign());
     let error = |r: &f64| sign * r * (r * r - calibrated * calibrated);
     rate.iter().map(error).collect()
@@ -56,8 +53,7 @@ pub(super) fn cubed_rate(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// Two converters take the readings in turn; at rest they are trimmed alike, and their gains are not. The part is clocked a
 /// little slower than the frames, so that now and then one is read twice running.
 pub(super) fn converters(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let (mut turn, pace) = (draw.between(0.0, 2.0), draw.between(0.8, 0.995));
     rate.iter()
         .map(|r| {
@@ -71,8 +67,7 @@ pub(super) fn converters(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// whichever phase the demodulator has.
 pub(super) fn modes(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     cycles(draw, stand);
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let own = &stand.world.temperature[axis];
     let (low, span) = (extremes(own).0, swing(own));
     let (middle, half_width) = (
@@ -114,8 +109,7 @@ pub(super) fn differences(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// Lamps about the stand shine on a die without a lid: photo current while the part is turned to one of them, and the
 /// housing shades it else.
 pub(super) fn lamps(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let angle = angle_of_table(&rate, draw.by_ratio(0.1, 0.4), stand.rate_hz);
     let (shade, sign) = (draw.between(-0.2, 0.6), draw.sign());
     let mut light = vec![0.0; angle.len()];
@@ -131,8 +125,7 @@ pub(super) fn lamps(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// The loop that holds the drive's amplitude goes to and fro between two limits, and the scale factor with it: of a rate, a
 /// swing as large as the rate.
 pub(super) fn limit_cycle(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let pace = 1.0 / draw.by_ratio(0.5, 6.0);
     let wavers = wander(draw, stand.samples(), stand.rate_hz, 0.1, 5.0);
     let mut phase = draw.between(0.0, 1.0);
@@ -148,8 +141,7 @@ pub(super) fn limit_cycle(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// Firmware that takes readings which stay within a window for a while for a standstill, and leads its zero there: a steady
 /// turn is eaten up, and comes back with the other sign in the next.
 pub(super) fn steady(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, (1.5, 7.0));
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, (1.5, 7.0));
     let waits = (draw.between(0.4, 1.5) * stand.rate_hz) as usize;
     let window = draw.by_ratio(0.02, 0.1);
     let follows = 1.0 / (draw.by_ratio(0.5, 3.0) * stand.rate_hz);
@@ -168,8 +160,7 @@ pub(super) fn steady(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// that the charge is lost as a logarithm of time.
 pub(super) fn charged(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     const TRAPS: i32 = 4;
-    programme(draw, stand, (1.0, 5.0));
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, (1.0, 5.0));
     let (fills, sign) = (draw.by_ratio(0.3, 3.0), draw.sign());
     let (fastest, apart) = (draw.by_ratio(0.5, 2.0), draw.between(2.0, 4.0));
     let mut all = vec![0.0; rate.len()];
@@ -186,8 +177,7 @@ pub(super) fn charged(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// A part that takes its wide range beyond a rate, and its narrow one again below a lower rate: the wide one has an offset
 /// and a gain of its own.
 pub(super) fn range(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let up = draw.between(0.3, 0.6);
     let down = up * draw.between(0.4, 0.8);
     let (offset, gain) = (draw.sign(), draw.between(-1.0, 1.0));
@@ -204,16 +194,14 @@ pub(super) fn range(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 
 /// An even term of the scale factor: turning one way a little too much is read, the other way too little.
 pub(super) fn squared_rate(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let sign = draw.sign();
     about_mean(&rate.iter().map(|r| sign * r * r).collect::<Vec<f64>>())
 }
 
 /// A stray magnetic field: the bias goes round with the table, and, by soft iron, a little twice as fast.
 pub(super) fn heading(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let (full, soft) = (draw.by_ratio(0.1, 0.4), draw.between(0.0, 0.4));
     let (first, second) = (draw.between(0.0, TAU), draw.between(0.0, TAU));
     let bias: Vec<f64> = angle_of_table(&rate, full, stand.rate_hz)
@@ -226,8 +214,7 @@ pub(super) fn heading(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// Dielectric absorption of a ceramic capacitor in the signal's way, which strong fields polarise out of proportion:
 /// relaxations of four time constants, an octave or two apart, carry on what strong rates have left.
 pub(super) fn remembered(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, (1.0, 5.0));
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, (1.0, 5.0));
     let (shortest, apart) = (draw.by_ratio(0.3, 1.0), draw.between(2.5, 4.0));
     let sign = draw.sign();
     let strong: Vec<f64> = rate.iter().map(|r| r.powi(3)).collect();
@@ -273,8 +260,7 @@ pub(super) fn zeroed(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 
 /// A table whose axis is not square to its face: a level axis sees the sine of the angle times the rate.
 pub(super) fn wobble(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let (full, first) = (draw.by_ratio(0.1, 0.5), draw.between(0.0, TAU));
     let angle = angle_of_table(&rate, full, stand.rate_hz);
     let seen = |(a, r): (&f64, &f64)| r * (a + first).sin();
@@ -335,8 +321,7 @@ pub(super) fn slow_turns(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// alone.
 pub(super) fn sense(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     const TRAPS: i32 = 4;
-    programme(draw, stand, (1.0, 5.0));
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, (1.0, 5.0));
     let (least, fastest) = (draw.between(0.1, 0.3), draw.by_ratio(0.3, 0.8));
     let (apart, sign) = (draw.between(1.6, 2.5), draw.sign());
     let mut all = vec![0.0; rate.len()];
@@ -356,8 +341,7 @@ pub(super) fn sense(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// Cogging of a motor of many poles, more than ten a second: the sampling folds it to anywhere, at each speed to another
 /// place, and its overtone to a third. As torque, by inertia: slow ones are the larger, and none is at rest.
 pub(super) fn folded_cogging(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let poles = angle_of_table(&rate, draw.by_ratio(20.0, 90.0), stand.rate_hz);
     let (corner, overtone) = (draw.between(0.1, 0.3), draw.between(0.2, 0.7));
     let [first, second] = [0, 1].map(|_| draw.between(0.0, TAU));

@@ -142,14 +142,6 @@ impl Notch {
         let pulse = (0..length).map(|i| f64::from(u8::from(i == 0)));
         self.of(pulse).iter().map(|y| y * y).sum()
     }
-
-    /// Its squared gain at an angular frequency, rad per sample.
-    #[cfg(test)]
-    pub(super) fn gain(&self, w: f64) -> f64 {
-        let away = |r: f64, from: f64| 1.0 - 2.0 * r * (w - from).cos() + r * r;
-        let both = |r: f64| away(r, self.turn) * away(r, -self.turn);
-        both(self.zeros) / both(self.poles)
-    }
 }
 
 /// What a capacitor of this corner, Hz, leaves of the power at an angular frequency, rad per sample.

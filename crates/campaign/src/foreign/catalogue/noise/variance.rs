@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::super::super::known::Known;
 use super::super::super::shape::{Shape, noise, variance};
 use super::super::super::words::{
-    DWELL, about_mean, angle_of_table, extremes, in_time, programme, rate_of_table, shocks, swing,
+    DWELL, about_mean, angle_of_table, extremes, in_time, programme, shocks, swing, turned,
 };
 use crate::random::Draw;
 use crate::stand::{Stand, held, lagged, wander};
@@ -43,8 +43,7 @@ pub(super) fn warmth(stand: &Stand, axis: usize) -> Vec<f64> {
 /// A slip ring whose brushes ride over one to three worn places a turn, at which the contact is noisy whether it turns or
 /// not. The programme turns slowly enough to tell them.
 pub(super) fn worn(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = rate_of_table(draw, stand);
+    let rate = turned(draw, stand, DWELL);
     let full = draw.by_ratio(0.1, 0.5);
     let places: Vec<(f64, f64)> = (0..1 + draw.of_many(3))
         .map(|_| (draw.between(0.0, 1.0), draw.between(0.05, 0.15)))

@@ -1,0 +1,357 @@
+//! How much of what a signal or a spectrum adds to the likelihood the closest effect of the library describes. From 95 % on
+//! it would not be foreign.
+
+use std::f64::consts::TAU;
+
+use analysis::likelihood::{Bins, Dct};
+use analysis::optimise::nelder_mead;
+use model::effect::{Column, Effect, Hypothesis, Signal, View};
+use model::effects::EFFECTS;
+use model::record::{Axis, Base, Quantity};
+
+use crate::stand::{GYROS, LSB, Stand};
+use crate::strength::Meter;
+
+/// Share of the gain from which an effect of the library describes it.
+pub(super) const DESCRIBED: f64 = 0.95;
+
+/// The signals of a stand, as an effect sees them, without reading noise.
+fn signals(stand: &Stand) -> Vec<Signal> {
+    let signal = |name: &str, quantity, axis: Option<usize>, values: Vec<f64>| Signal {
+        name: name.to_owned(),
+        quantity,
+        axis: axis.map(|i| Axis::ALL[i]),
+        unit: String::new(),
+        smooth: values.clone().into(),
+        values: values.into(),
+        lsb: None,
+        moving: false,
+    };
+    let scaled = |v: &[f64], by: f64| v.iter().map(|x| x * by).collect::<Vec<_>>();
+    let mut all = vec![
+        signal("supply", Quantity::Supply, None, stand.world.supply.clone()),
+        signal("pwm", Quantity::Pwm, None, scaled(&stand.world.duty, 255.0)),
+    ];
+    for (i, letter) in ["x", "y", "z"].iter().enumerate() {
+        let own = stand.world.temperature[i].clone();
+        all.push(signal(
+            &format!("temp_{letter}"),
+            Quantity::Temp,
+            Some(i),
+            own,
+        ));
+        let force = scaled(&stand.world.acc[i], 9.80665);
+        all.push(signal(
+            &format!("acc_{letter}"),
+            Quantity::Acc,
+            Some(i),
+            force,
+        ));
+    }
+    all
+}
+
+pub(super) fn hypotheses(effect: &dyn Effect, stand: &Stand, axis: usize) -> Vec<Hypothesis> {
+    let all = signals(stand);
+    let view = View {
+        channel: GYROS[axis],
+        axis: Some(Axis::ALL[axis]),
+        lsb: Some(LSB),
+        white_sigma: stand.white(axis).sqrt(),
+        rate_hz: stand.rate_hz,
+        samples: stand.samples(),
+        base: Some(Base::Static),
+        moving: false,
+        signals: &all,
+    };
+    effect.hypotheses(&view).unwrap_or_default()
+}
+
+/// Columns of an effect's regressions. What is at most a part of another comes with it, nothing of it or all that it may be
+/// either way.
+fn within_bounds(effect: &dyn Effect, all: &[Column]) -> Vec<Vec<Vec<f64>>> {
+    let (parts, whole): (Vec<&Column>, Vec<&Column>) = all
+        .iter()
+        .partition(|c| effect.at_most(c.parameter).is_some());
+    let signs: &[f64] = if parts.is_empty() {
+        &[0.0]
+    } else {
+        &[-1.0, 0.0, 1.0]
+    };
+    let with = |c: &Column, sign: f64| {
+        let mut values = c.values.clone();
+        for p in &parts {
+            if let Some((_, most)) = effect.at_most(p.parameter).filter(|a| a.0 == c.parameter) {
+                values
+                    .iter_mut()
+                    .zip(&p.values)
+                    .for_each(|(v, p)| *v += sign * most * p);
+            }
+        }
+        values
+    };
+    let set = |sign: &f64| whole.iter().map(|c| with(c, *sign)).collect();
+    signs.iter().map(set).collect()
+}
+
+/// Sets of columns by which an effect could describe a signal: all its regressions together, each with each value of a
+/// shape, and every step.
+fn columns(effect: &dyn Effect, stand: &Stand, axis: usize) -> Vec<Vec<Vec<f64>>> {
+    let (mut regressions, mut shaped, mut sets) = (vec![], vec![], vec![]);
+    for h in hypotheses(effect, stand, axis) {
+        match h {
+            Hypothesis::Regression(r) => regressions.extend(r.columns),
+            Hypothesis::Shaped(s) => {
+                let at = |x: f64| {
+                    s.columns(x)
+                        .into_iter()
+                        .map(|c| c.values)
+                        .collect::<Vec<_>>()
+                };
+                shaped.extend(s.grid().into_iter().map(at));
+            }
+            Hypothesis::Step => {
+                for at in (40..stand.samples()).step_by(40) {
+                    let step = |i| f64::from(u8::from(i >= at));
+                    sets.push(vec![(0..stand.samples()).map(step).collect()]);
+                }
+            }
+            _ => {}
+        }
+    }
+    for fixed in within_bounds(effect, &regressions) {
+        sets.extend(
+            shaped
+                .iter()
+                .map(|s: &Vec<_>| [fixed.clone(), s.clone()].concat()),
+        );
+        if !fixed.is_empty() {
+            sets.push(fixed);
+        }
+    }
+    sets
+}
+
+/// Share of a signal's gain that the strongest line takes, and a line with two neighbours wherever they lie, of which one
+/// that swings is a case.
+fn of_lines(stand: &Stand, axis: usize, signal: &[f64]) -> (f64, f64) {
+    let meter = Meter::new(stand, axis);
+    let whole = meter.of_signal(&meter.energy(signal)).powi(2);
+    let mut rest = signal.to_vec();
+    let mut taken = vec![];
+    for _ in 0..3 {
+        rest = meter.beyond(&rest, &strongest_line(stand, axis, &rest));
+        taken.push(1.0 - meter.of_signal(&meter.energy(&rest)).powi(2) / whole);
+    }
+    (taken[0], taken[2])
+}
+
+/// The line, as two columns, that takes most of a signal.
+fn strongest_line(stand: &Stand, axis: usize, signal: &[f64]) -> [Vec<f64>; 2] {
+    let (n, meter) = (stand.samples(), Meter::new(stand, axis));
+    let c = Dct::new(n).forward(signal);
+    let weight = |k: usize| {
+        let w = std::f64::consts::PI * k as f64 / n as f64;
+        c[k] * c[k] / (stand.white(axis) + stand.step(axis) / (2.0 - 2.0 * w.cos()))
+    };
+    let mut order: Vec<usize> = (2..n).collect();
+    order.sort_by(|a, b| weight(*b).total_cmp(&weight(*a)));
+    let tries = order
+        .iter()
+        .take(6)
+        .flat_map(|k| [-0.5, 0.0, 0.5].map(|d| *k as f64 + d));
+    let left = |line: &[Vec<f64>; 2]| meter.of_signal(&meter.energy(&meter.beyond(signal, line)));
+    tries
+        .map(|k| {
+            let w = std::f64::consts::PI * k / n as f64;
+            [0.0, TAU / 4.0].map(|phase| (0..n).map(|i| (w * i as f64 + phase).cos()).collect())
+        })
+        .min_by(|a, b| left(a).total_cmp(&left(b)))
+        .expect("there are tries")
+}
+
+/// Share of the gain of an expected spectrum that the best process of an effect describes, random walk and white noise
+/// refitted. `truth` is minus twice the log likelihood of what there is.
+pub(super) fn of_process(
+    stand: &Stand,
+    axis: usize,
+    expected: &[f64],
+    truth: f64,
+    effect: &dyn Effect,
+) -> f64 {
+    let bins = Bins::new(stand.samples());
+    let ones = vec![1.0; stand.samples()];
+    let count = bins.products(&ones, &ones);
+    let walk: Vec<f64> = bins
+        .at
+        .omega
+        .iter()
+        .map(|w| 1.0 / (2.0 - 2.0 * w.cos()))
+        .collect();
+    let n: f64 = count.iter().sum();
+    let minus_two_l = |lambda: f64, density: &dyn Fn(usize) -> f64| {
+        let (mut sum, mut logs) = (0.0, 0.0);
+        for b in 0..count.len() {
+            let g = (density(b) + lambda * walk[b]).max(1e-9);
+            sum += expected[b] / g;
+            logs += count[b] * g.ln();
+        }
+        n * (sum / n).ln() + logs + n
+    };
+    let baseline = (-30..=6)
+        .map(|k| minus_two_l(f64::from(k).exp(), &|_| 1.0))
+        .fold(minus_two_l(0.0, &|_| 1.0), f64::min);
+    let mut best = baseline;
+    for h in hypotheses(effect, stand, axis) {
+        let Hypothesis::Covariance(process) = h else {
+            continue;
+        };
+        let bounds = process.bounds(stand.samples());
+        let white = f64::from(u8::from(!process.filters_white()));
+        let value = |x: &[f64]| {
+            let inside = |(v, (low, high)): (&f64, &(f64, f64))| v.clamp(*low, *high);
+            let theta: Vec<f64> = x[1..].iter().zip(&bounds).map(inside).collect();
+            let density = process.density(&theta, &bins.at);
+            minus_two_l(x[0].min(6.0).exp(), &|b| white + density[b])
+        };
+        for start in process.starts(stand.samples()) {
+            for log_walk in [-16.0, -8.0] {
+                let from = [vec![log_walk], start.clone()].concat();
+                let steps = vec![1.0; from.len()];
+                let once = nelder_mead(&value, &from, &steps, 300);
+                best = best.min(value(&nelder_mead(&value, &once, &steps, 300)));
+            }
+        }
+    }
+    (baseline - best) / (baseline - truth)
+}
+
+/// Minus twice the log likelihood of a spectrum under itself.
+pub(super) fn saturated(stand: &Stand, expected: &[f64]) -> f64 {
+    let ones = vec![1.0; stand.samples()];
+    let count = Bins::new(stand.samples()).products(&ones, &ones);
+    expected
+        .iter()
+        .zip(&count)
+        .map(|(e, m)| m * (1.0 + (e / m).ln()))
+        .sum()
+}
+
+/// The spectrum that a channel has: its noise, with the white part shaped, and a process beside it.
+pub(super) fn spectrum(
+    stand: &Stand,
+    axis: usize,
+    shape: &dyn Fn(f64) -> f64,
+    beside: &[f64],
+) -> Vec<f64> {
+    let bins = Bins::new(stand.samples());
+    let ones = vec![1.0; stand.samples()];
+    let count = bins.products(&ones, &ones);
+    (0..count.len())
+        .map(|b| {
+            let w = bins.at.omega[b];
+            let walk = stand.step(axis) / (2.0 - 2.0 * w.cos());
+            count[b] * (stand.white(axis) * shape(w) + walk) + beside.get(b).copied().unwrap_or(0.0)
+        })
+        .collect()
+}
+
+/// The largest share of a signal's gain that each effect of the library describes.
+pub(super) fn of_all(stand: &Stand, axis: usize, signal: &[f64]) -> Vec<(&'static str, f64)> {
+    let meter = Meter::new(stand, axis);
+    let whole = meter.of_signal(&meter.energy(signal)).powi(2);
+    let expected = spectrum(stand, axis, &|_| 1.0, &meter.energy(signal));
+    let own = saturated(stand, &expected);
+    let mut all: Vec<_> = EFFECTS
+        .iter()
+        .map(|effect| {
+            let left = |set: &Vec<Vec<f64>>| meter.energy(&meter.beyond(signal, set));
+            let described = columns(*effect, stand, axis)
+                .iter()
+                .map(|set| 1.0 - meter.of_signal(&left(set)).powi(2) / whole)
+                .fold(of_process(stand, axis, &expected, own, *effect), f64::max);
+            (effect.id(), described)
+        })
+        .collect();
+    let (line, swinging) = of_lines(stand, axis, signal);
+    all.extend([("line", line), ("am_line", swinging)]);
+    all
+}
+
+/// What the best two effects of the library describe together.
+pub(super) struct OfTwo {
+    /// The best, then the best beside it.
+    pub names: Vec<&'static str>,
+    /// Share of a signal's gain that both describe.
+    pub share: f64,
+    /// Share that the best describes with the best process for what is left beside it.
+    pub with_process: f64,
+}
+
+/// Each effect of the library with each set of columns that it can be.
+fn all_columns(stand: &Stand, axis: usize) -> Vec<(&'static str, Vec<Vec<f64>>)> {
+    let of = |e: &&'static dyn Effect| {
+        let (id, effect) = (e.id(), *e);
+        columns(effect, stand, axis)
+            .into_iter()
+            .map(move |set| (id, set))
+    };
+    EFFECTS.iter().flat_map(of).collect()
+}
+
+/// Of an effect with bounds one set is all that it can be: two of them would be beyond these.
+fn is_bounded(id: &str) -> bool {
+    let of = EFFECTS.iter().find(|e| e.id() == id);
+    of.is_some_and(|e| e.parameters().iter().any(|p| e.at_most(p.name).is_some()))
+}
+
+/// Two effects of the library against a signal: the best, then the best beside it.
+pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> OfTwo {
+    let meter = Meter::new(stand, axis);
+    let gain = |s: &[f64]| meter.of_signal(&meter.energy(s)).powi(2);
+    let whole = gain(signal);
+    let sets = all_columns(stand, axis);
+    let (mut taken, mut names, mut with_process) = (vec![], vec![], 0.0);
+    let mut rest = signal.to_vec();
+    for turn in 0..2 {
+        // A line, and one that swings: a line with two beside it.
+        let mut lines = vec![];
+        let mut own = vec![];
+        for _ in 0..3 {
+            let left = meter.beyond(&rest, &lines);
+            lines.extend(strongest_line(stand, axis, &left));
+            own.push(("line", lines.clone()));
+        }
+        let with = |set: &[Vec<f64>]| meter.beyond(signal, &[taken.as_slice(), set].concat());
+        let (id, best) = sets
+            .iter()
+            .chain([&own[0], &own[2]])
+            .filter(|(id, _)| !(names.contains(id) && is_bounded(id)))
+            .min_by(|a, b| gain(&with(&a.1)).total_cmp(&gain(&with(&b.1))))
+            .expect("the library has regressions");
+        rest = with(best);
+        taken.extend(best.clone());
+        names.push(*id);
+        if turn == 0 {
+            // Beside the first a process may take more than a second regression.
+            let expected = spectrum(stand, axis, &|_| 1.0, &meter.energy(&rest));
+            let (_, process) = best_process(stand, axis, &expected);
+            with_process = 1.0 - gain(&rest) / whole * (1.0 - process);
+        }
+    }
+    OfTwo {
+        names,
+        share: 1.0 - gain(&rest) / whole,
+        with_process,
+    }
+}
+
+/// The process of the library that describes most of an expected spectrum, with the share of its gain.
+pub(super) fn best_process(stand: &Stand, axis: usize, expected: &[f64]) -> (&'static str, f64) {
+    let own = saturated(stand, expected);
+    EFFECTS
+        .iter()
+        .map(|e| (e.id(), of_process(stand, axis, expected, own, *e)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .expect("the library has processes")
+}

@@ -1,0 +1,356 @@
+//! Effects of the library whose strength is a d', one row each: what their parameters are drawn from.
+
+use super::{Asked, Drawn, LibraryEffect, Values};
+use crate::motor;
+use crate::random::Draw;
+use crate::stand::{Needs, Stand};
+use crate::strength::{Meter, of_common, of_variance, size_for};
+
+/// How one is drawn on a stand whose excitation may gain a turn or a sway.
+pub type How = fn(&mut Draw, &mut Stand, Asked) -> Drawn;
+type Row = LibraryEffect<How>;
+
+/// The motor's bias by physics: it follows the current of a motor that has to spin up, not the command.
+pub(super) const CURRENT: &str = "motor_bias by current";
+
+const NONE: Needs = Needs {
+    temperature: false,
+    supply: false,
+    motor: false,
+    vibration: false,
+};
+const TEMPERATURE: Needs = Needs {
+    temperature: true,
+    ..NONE
+};
+const MOTOR: Needs = Needs {
+    motor: true,
+    ..NONE
+};
+
+const fn row(id: u16, cause: &'static str, how: How) -> Row {
+    Row::new(id, cause, how)
+}
+
+/// The rows, by number. What is asked beyond the usual has its reason in docs/power.md, "Bars".
+pub const STRONG: [Row; 22] = [
+    Row {
+        needs: TEMPERATURE,
+        ..row(100, "temperature", |_, _, a| size("slope", a.sign))
+    },
+    Row {
+        needs: TEMPERATURE,
+        ..row(101, "temperature_quadratic", parabola)
+    },
+    row(102, "warm_up", warm_up),
+    row(103, "rate_ramp", |_, _, a| size("slope", a.sign)),
+    Row {
+        asked_ratio: 1.7,
+        ..row(104, "line", line)
+    },
+    Row {
+        asked_from: 13.0,
+        asked_ratio: 2.5,
+        ..row(105, "am_line", am_line)
+    },
+    Row {
+        needs: MOTOR,
+        ..row(106, "motor_bias", motor_bias)
+    },
+    Row {
+        label: CURRENT,
+        needs: MOTOR,
+        ..row(107, "motor_bias", by_current)
+    },
+    Row {
+        needs: MOTOR,
+        ..row(108, "motor_noise", motor_noise)
+    },
+    Row {
+        needs: Needs {
+            vibration: true,
+            ..NONE
+        },
+        ..row(109, "g_sensitivity", g_sensitivity)
+    },
+    Row {
+        needs: Needs {
+            supply: true,
+            ..NONE
+        },
+        ..row(110, "supply_sensitivity", |_, _, a| size("slope", a.sign))
+    },
+    Row {
+        asked_ratio: 1.5,
+        ..row(111, "bias_step", bias_step)
+    },
+    Row {
+        moves: true,
+        ..row(112, "cross_axis", cross_axis)
+    },
+    Row {
+        asked_from: 10.0,
+        asked_ratio: 2.0,
+        moves: true,
+        true_parts: &["base_motion"],
+        ..row(113, "scale_error", scale_error)
+    },
+    row(114, "gauss_markov", gauss_markov),
+    row(115, "flicker", flicker),
+    row(116, "low_pass", low_pass),
+    Row {
+        asked_from: 10.0,
+        asked_ratio: 2.0,
+        ..row(117, "telegraph", telegraph)
+    },
+    Row {
+        everywhere: true,
+        ..row(118, "common_noise", common_noise)
+    },
+    Row {
+        asked_from: 10.0,
+        asked_ratio: 2.0,
+        ..row(119, "noise_change", noise_change)
+    },
+    row(120, "narrow_band", |d, s, a| {
+        let (rms, strength, values, density) = band(d, s, a, "bandwidth");
+        Drawn::Process([vec![("rms", rms)], values].concat(), strength, density)
+    }),
+    row(121, "wandering_line", |d, s, a| {
+        let (rms, strength, values, density) = band(d, s, a, "linewidth");
+        let values = [vec![("amplitude", rms * 2f64.sqrt())], values].concat();
+        Drawn::Process(values, strength, density)
+    }),
+];
+
+/// Largest process, deg/s rms: slower ones, which a random walk hides better, would need more for the strength, and what
+/// moves that much below 1 Hz is a turn of the base to anyone who has the gyro alone.
+const LARGEST_RMS: f64 = 0.25;
+
+/// A shape whose size is one parameter.
+fn size(name: &'static str, sign: f64) -> Drawn {
+    shape(vec![], (name, sign))
+}
+
+/// A shape of these parameters, whose size is another.
+fn shape(shape: Values, size: (&'static str, f64)) -> Drawn {
+    Drawn::Shape {
+        shape,
+        sized: vec![size],
+        less: vec![],
+    }
+}
+
+/// Measured beyond a straight line, for a parabola that a line fits is none.
+fn parabola(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let lean = draw.between(-5.0, 5.0);
+    Drawn::Shape {
+        shape: vec![],
+        sized: vec![("slope", asked.sign * lean), ("curvature", asked.sign)],
+        less: vec![stand.world.temperature[asked.axis].clone()],
+    }
+}
+
+fn warm_up(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let tau = draw.by_ratio(stand.seconds / 60.0, stand.seconds / 4.0);
+    shape(vec![("time_constant", tau)], ("amplitude", asked.sign))
+}
+
+fn line(draw: &mut Draw, stand: &mut Stand, _: Asked) -> Drawn {
+    let f = draw.by_ratio(0.05, 0.49 * stand.rate_hz);
+    let phase = draw.between(-3.1, 3.1);
+    shape(vec![("frequency", f), ("phase", phase)], ("amplitude", 1.0))
+}
+
+fn am_line(draw: &mut Draw, stand: &mut Stand, _: Asked) -> Drawn {
+    let frequency = draw.between(0.05, 0.45) * stand.rate_hz;
+    let values = vec![
+        ("frequency", frequency),
+        ("modulation_frequency", draw.by_ratio(0.02, 0.2 * frequency)),
+        ("depth", draw.between(0.5, 1.0)),
+        ("phase", draw.between(-3.1, 3.1)),
+        ("modulation_phase", draw.between(-3.1, 3.1)),
+    ];
+    shape(values, ("amplitude", 1.0))
+}
+
+fn motor_bias(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let both = stand.world.duty.iter().any(|d| *d < 0.0);
+    let size = f64::from(u8::from(both && draw.chance(0.4)));
+    shape(vec![("by_magnitude", size)], ("at_full_duty", asked.sign))
+}
+
+fn by_current(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let unit = motor::current(draw, &stand.world.duty, stand.rate_hz);
+    let meter = Meter::new(stand, asked.axis);
+    let (size, strength) = meter.sized(&meter.energy(&unit), asked.wanted);
+    let signal = unit.iter().map(|v| asked.sign * size * v).collect();
+    Drawn::Known(vec![], strength, Some(signal))
+}
+
+fn motor_noise(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let square: Vec<f64> = stand.world.duty.iter().map(|d| d * d).collect();
+    let law = |size: f64| square.iter().map(|d| 1.0 + size * d).collect::<Vec<f64>>();
+    let size = size_for(asked.wanted, &|x| of_variance(&law(x)));
+    let values = vec![("variance_increase_at_full_duty", size)];
+    Drawn::Known(values, of_variance(&law(size)), None)
+}
+
+fn noise_change(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let seconds = stand.seconds;
+    let length = seconds * draw.between(0.1, 0.4);
+    let start = draw.between(0.02 * seconds, 0.98 * seconds - length);
+    let inside = length / seconds;
+    let strength = |x: f64| {
+        let n = stand.samples() as f64;
+        (n * ((1.0 + inside * x).ln() - inside * (1.0 + x).ln()))
+            .max(0.0)
+            .sqrt()
+    };
+    let size = size_for(asked.wanted, &strength);
+    let values = vec![
+        ("start", start),
+        ("end", start + length),
+        ("variance_increase", size),
+    ];
+    Drawn::Known(values, strength(size), None)
+}
+
+fn g_sensitivity(draw: &mut Draw, _: &mut Stand, asked: Asked) -> Drawn {
+    size(["acc_x", "acc_y", "acc_z"][draw.of_many(3)], asked.sign)
+}
+
+fn bias_step(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let at = stand.seconds * draw.between(0.1, 0.9);
+    shape(vec![("time", at)], ("height", asked.sign))
+}
+
+fn cross_axis(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let turn = draw.between(7.0, 28.0);
+    stand.excitation = vec![
+        ("turn_dps", turn),
+        ("turn_period_s", draw.between(15.0, 60.0)),
+    ];
+    size("from_gyro_z", asked.sign)
+}
+
+fn scale_error(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let (sway, period) = (draw.between(2.0, 8.0), draw.between(5.0, 20.0));
+    stand.excitation = vec![("sway_deg", sway), ("sway_period_s", period)];
+    // Amplitude of the rate, and how well rate and tilt give it: sqrt(2 / n) of their white noise.
+    let w = std::f64::consts::TAU / period;
+    let n = stand.samples() as f64;
+    let tilt = (4.7f64 / 800.0).to_degrees() * w;
+    let error = ((2.0 / n) * (stand.white(asked.axis) + tilt * tilt)).sqrt() / (sway * w);
+    let relative = asked.sign * (asked.wanted * error).min(0.5);
+    Drawn::Known(vec![("relative", relative)], relative.abs() / error, None)
+}
+
+/// A process of the size that is as strong as asked, or of the largest: size, strength, density by bin.
+fn of_density(
+    stand: &Stand,
+    asked: Asked,
+    largest: f64,
+    density: &dyn Fn(f64, f64) -> f64,
+) -> (f64, f64, Vec<f64>) {
+    let meter = Meter::new(stand, asked.axis);
+    let all = |size: f64| -> Vec<f64> { meter.omega().iter().map(|w| density(size, *w)).collect() };
+    let strength = |size: f64| meter.of_density(&all(size));
+    let size = size_for(asked.wanted, &strength).min(largest);
+    (size, strength(size), all(size))
+}
+
+/// Density of a process of variance 1 with one pole, rad per sample.
+fn one_pole(pole: f64, w: f64) -> f64 {
+    (1.0 - pole * pole) / (1.0 + pole * pole - 2.0 * pole * w.cos())
+}
+
+/// A process with one pole whose time is drawn anew until it is as strong as wanted, or else the strongest of many: the
+/// time, the size, the strength and the density. The pole is exp(-`per_time` / samples of the time).
+fn strongest(
+    draw: &mut Draw,
+    stand: &Stand,
+    asked: Asked,
+    (times, per_time): ((f64, f64), f64),
+) -> (f64, f64, f64, Vec<f64>) {
+    const TRIES: usize = 40;
+    let mut drawn = || {
+        let time = draw.by_ratio(times.0, times.1);
+        let pole = (-per_time / (time * stand.rate_hz)).exp();
+        let density = |size: f64, w: f64| size * size * one_pole(pole, w);
+        let (size, strength, all) = of_density(stand, asked, LARGEST_RMS, &density);
+        (time, size, strength, all)
+    };
+    let mut best = drawn();
+    for _ in 0..TRIES {
+        if best.2 >= 0.99 * asked.wanted {
+            break;
+        }
+        let other = drawn();
+        if other.2 > best.2 {
+            best = other;
+        }
+    }
+    best
+}
+
+fn gauss_markov(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let (tau, sigma, strength, density) = strongest(draw, stand, asked, ((0.2, 10.0), 1.0));
+    let values = vec![("sigma", sigma), ("correlation_time", tau)];
+    Drawn::Process(values, strength, density)
+}
+
+fn telegraph(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let (dwell, half, strength, density) = strongest(draw, stand, asked, ((3.0, 40.0), 2.0));
+    let values = vec![("half_height", half), ("dwell_time", dwell)];
+    Drawn::Process(values, strength, density)
+}
+
+/// A band about a centre, of the width that is called so: rms, strength, centre and width, density. Some hundred independent
+/// values of the envelope, and no wider than a tenth of the centre.
+fn band(
+    draw: &mut Draw,
+    stand: &Stand,
+    asked: Asked,
+    wide: &'static str,
+) -> (f64, f64, Values, Vec<f64>) {
+    let centre = draw.by_ratio(0.03, 0.45) * stand.rate_hz;
+    let width = draw.by_ratio(30.0, 300.0) / (std::f64::consts::PI * stand.seconds);
+    let width = width.min(0.1 * centre);
+    let per_sample = std::f64::consts::TAU / stand.rate_hz;
+    let (pole, turn) = ((-0.5 * per_sample * width).exp(), per_sample * centre);
+    let density =
+        |rms: f64, w: f64| 0.5 * rms * rms * (one_pole(pole, w - turn) + one_pole(pole, w + turn));
+    let (rms, strength, all) = of_density(stand, asked, f64::INFINITY, &density);
+    let values = vec![("center_frequency", centre), (wide, width)];
+    (rms, strength, values, all)
+}
+
+/// Two-sided density B^2 / (2 pi f): B^2 / w per sample.
+fn flicker(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let (b, strength, density) = of_density(stand, asked, LARGEST_RMS, &|b, w| b * b / w);
+    Drawn::Process(vec![("bias_instability", b * 3600.0)], strength, density)
+}
+
+fn low_pass(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let white = stand.white(asked.axis);
+    let of = |rho: f64| rho.min(0.7);
+    let density = |rho: f64, w: f64| {
+        let rho = of(rho);
+        white
+            * if rho <= 0.3 {
+                2.0 * rho * w.cos()
+            } else {
+                one_pole(rho, w) - 1.0
+            }
+    };
+    let (rho, strength, density) = of_density(stand, asked, f64::INFINITY, &density);
+    Drawn::Process(vec![("lag1_correlation", of(rho))], strength, density)
+}
+
+fn common_noise(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let whites: Vec<f64> = (0..3).map(|i| stand.white(i)).collect();
+    let strength = |s: f64| of_common(&whites, s * s, stand.samples());
+    let sigma = size_for(asked.wanted, &strength);
+    Drawn::Known(vec![("sigma", sigma)], strength(sigma), None)
+}
