@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The layers, each of which may use those before it.
-const LAYERS: [&str; 16] = [
+const LAYERS: [&str; 17] = [
     "numerics",
     "records",
     "noise",
@@ -17,6 +17,7 @@ const LAYERS: [&str; 16] = [
     "features",
     "search",
     "two_level",
+    "joint",
     "criticise",
     "attribute",
     "report",

@@ -21,6 +21,8 @@ mod search;
 
 mod two_level;
 
+mod joint;
+
 mod criticise;
 
 mod attribute;

@@ -29,7 +29,7 @@ use crate::records::rows;
 use crate::replicates;
 use crate::report::findings::{motion_findings, scale_finding, term_findings, variance_finding};
 use crate::report::untested::not_tested;
-use crate::report::{detection_limits, figures, fitted};
+use crate::report::{detection_limits, figures, handover};
 use crate::result::{
     Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, Input, NotTested,
     Unexplained, Verdict,
@@ -157,9 +157,9 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         hash: options.hash.clone(),
         seconds: input.seconds,
     };
-    let extended = told.findings.iter().chain(&told.nearest);
-    let baseline_model = fitted::model(&searched, &grid, false, std::iter::empty(), fitted_on());
-    let extended_model = fitted::model(&searched, &grid, true, extended, fitted_on());
+    let baseline_model = handover::baseline_model(&searched, &grid, fitted_on());
+    let in_model: Vec<&Finding> = told.findings.iter().chain(&told.nearest).collect();
+    let extended_model = handover::extended_model(&searched, &grid, &in_model, fitted_on());
     let mut verdict = verdict(&told.findings, &told.unexplained);
     let replicates = match options.replicates {
         0 => BTreeMap::new(),
@@ -173,14 +173,9 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     told.checks.extend(held.checks);
     told.unexplained.extend(held.unexplained);
     Diagnosed {
-        baseline_model,
-        extended_model,
-        evidence: (searched.iter().filter(|_| !options.no_evidence))
-            .flat_map(|s| figures::of_channel(s, &grid))
-            .collect(),
         diagnosis: Diagnosis {
             format: DIAGNOSIS_FORMAT.into(),
-            baseline: fitted::parameters(&searched, &grid, false),
+            baseline: handover::parameters_of(&baseline_model),
             detection_limits: detection_limits::of_not_found(told.limits, &told.findings),
             verdict,
             replicates,
@@ -190,6 +185,11 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
             unexplained: told.unexplained,
             not_tested: told.not_tested,
         },
+        baseline_model,
+        extended_model,
+        evidence: (searched.iter().filter(|_| !options.no_evidence))
+            .flat_map(|s| figures::of_channel(s, &grid))
+            .collect(),
     }
 }
 
@@ -360,10 +360,11 @@ fn concluded(
     let mut not_tested = not_tested(searched);
     not_tested.extend(unasked);
     not_tested.extend(audited.not_tested);
+    handover::size_outliers(&mut findings, searched);
     Told {
         checks,
         findings: merge::complete(merge::joined(merge::loud(merge::blows(findings)))),
-        nearest,
+        nearest: merge::complete(nearest),
         unexplained,
         limits,
         not_tested,

@@ -117,6 +117,10 @@ pub struct Finding {
     /// Likelihood ratio statistic (2 x log) of the whole record.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub likelihood_ratio: Option<f64>,
+    /// Whether the parameters hold for the excitation of this record alone: what the sensor feels went through its own filter,
+    /// which the channel that it follows did not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub effective: bool,
     /// Whether data not used for the fit confirm it; `None` where that was not asked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub confirmed_on_held_out_data: Option<bool>,

@@ -171,6 +171,8 @@ fn blank(stand: &Stand) -> Simulation {
         scale: [1.0; 3],
         rate: zeros(),
         white_sigma: [0.0; 3],
+        rounding: [0.0; 3],
+        shared: Default::default(),
         variance: std::array::from_fn(|_| vec![1.0; n]),
         white: Default::default(),
         counts: Default::default(),

@@ -372,6 +372,15 @@ pub trait Covariance: Send + Sync {
     fn filters_white(&self) -> bool {
         false
     }
+    /// Parameters that say which of the effect's processes it is.
+    fn fixed(&self) -> Vec<(&'static str, f64, &'static str)> {
+        vec![]
+    }
+    /// The same as first-order processes, each its variance in units of the white variance and its pole, of `samples` samples;
+    /// none where it is no sum of such.
+    fn poles(&self, _theta: &[f64], _samples: usize) -> Option<Vec<(f64, f64)>> {
+        None
+    }
     /// Lower and upper bound of each coordinate, for `samples` samples.
     fn bounds(&self, samples: usize) -> Vec<(f64, f64)>;
     /// Where to start the search from.
@@ -496,6 +505,14 @@ pub trait Effect: Send + Sync {
     /// simulation; empty where it needs none.
     fn excited_by(&self) -> &'static [&'static str] {
         &[]
+    }
+    /// Whether the sensor feels what it follows through its own filter, and at another instant than the channel shows it.
+    fn felt_late(&self) -> bool {
+        false
+    }
+    /// Factor by which it makes the step of the readings larger.
+    fn coarsens(&self, _parameters: &Parameters) -> f64 {
+        1.0
     }
     /// When it acts in a simulation.
     fn stage(&self) -> Stage;

@@ -89,6 +89,8 @@ pub const SETTINGS: &[Setting] = &[
         "amplitude of a sway of the base about x and y",
     ),
     setting("sway_period_s", 10.0, "period of the sway"),
+    setting("sway_about_x", 1.0, "part of the sway that is about x"),
+    setting("sway_about_y", 1.0, "part of the sway that is about y"),
     setting(
         "turn_dps",
         0.0,
@@ -199,9 +201,9 @@ impl World {
             };
             supply.push(get("supply_v") - load - get("supply_motor_v") * d.abs());
         }
-        let sway = |i: usize, shift: f64| {
+        let sway = |i: usize, shift: f64, part: f64| {
             let w = std::f64::consts::TAU / get("sway_period_s");
-            let amplitude = get("sway_deg");
+            let amplitude = part * get("sway_deg");
             (
                 amplitude * (w * time(i) + shift).sin(),
                 amplitude * w * (w * time(i) + shift).cos(),
@@ -215,9 +217,10 @@ impl World {
         let mut acc: [Vec<f64>; 3] =
             std::array::from_fn(|_| (0..samples).map(&mut shake).collect());
         let mut motion: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; samples]);
+        let parts = [get("sway_about_x"), get("sway_about_y")];
         for i in 0..samples {
-            let (roll, roll_rate) = sway(i, 0.0);
-            let (pitch, pitch_rate) = sway(i, 1.0);
+            let (roll, roll_rate) = sway(i, 0.0, parts[0]);
+            let (pitch, pitch_rate) = sway(i, 1.0, parts[1]);
             // Gravity and rates in the axes of the body, turned by the pitch first and then by the roll.
             let (sin_pitch, cos_pitch) = pitch.to_radians().sin_cos();
             let (sin_roll, cos_roll) = roll.to_radians().sin_cos();

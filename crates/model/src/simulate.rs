@@ -102,9 +102,13 @@ pub struct Simulation {
     pub scale: [f64; 3],
     /// Errors of the rate but for the white noise, deg/s.
     pub rate: [Vec<f64>; 3],
-    /// White standard deviation of the baseline, deg/s.
+    /// White standard deviation of the baseline, rounding included, deg/s.
     pub white_sigma: [f64; 3],
-    /// White variance over that of the baseline.
+    /// Variance that rounding to the step of the readings adds, (deg/s)^2.
+    pub rounding: [f64; 3],
+    /// White noise that the axis shares with others, deg/s; empty where it shares none.
+    pub shared: [Vec<f64>; 3],
+    /// White variance over that of the baseline and the shared part.
     pub variance: [Vec<f64>; 3],
     /// White noise, deg/s; empty before the stage [`Stage::Output`].
     pub white: [Vec<f64>; 3],

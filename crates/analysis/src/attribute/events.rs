@@ -234,6 +234,19 @@ fn wild_of(s: &Searched<'_>, e: &[f64], times: &[f64]) -> Vec<Wild> {
     times.iter().filter_map(nearest).collect()
 }
 
+/// How far the readings at some times lie from what the model expects there, unit of the channel.
+pub(crate) fn sizes(s: &Searched<'_>, times: &[f64]) -> Vec<f64> {
+    let white = s.state.solution.white.sqrt();
+    let e: Cow<'_, [f64]> = s.variance.as_ref().map_or(Cow::Borrowed(&s.e), |v| {
+        let undivided = s.e.iter().zip(&v.law).map(|(e, v)| e * v.sqrt());
+        undivided.collect()
+    });
+    wild_of(s, &e, times)
+        .iter()
+        .map(|w| w.size * white)
+        .collect()
+}
+
 /// Take the name of wild readings from what is none, of one channel: `kept` are its findings whose names hold, `failing`
 /// tells its checks that fail.
 pub(crate) fn hold_outliers(

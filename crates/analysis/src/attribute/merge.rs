@@ -90,6 +90,7 @@ pub(crate) fn joined(findings: Vec<Finding>) -> Vec<Finding> {
         });
         if let Some(other) = same_channel {
             other.parameters.extend(f.parameters);
+            other.effective |= f.effective;
             other.likelihood_ratio =
                 Some(other.likelihood_ratio.unwrap_or(0.0) + f.likelihood_ratio.unwrap_or(0.0));
             other.what = format!("{}; {}", other.what, f.what);
@@ -103,6 +104,7 @@ pub(crate) fn joined(findings: Vec<Finding>) -> Vec<Finding> {
             })
         });
         if let Some(other) = event {
+            other.effective |= f.effective;
             if other.per_channel.is_empty() {
                 other
                     .per_channel
@@ -136,7 +138,9 @@ pub(crate) fn complete(mut findings: Vec<Finding>) -> Vec<Finding> {
         let Some(of) = effect(&f.cause) else { continue };
         for p in of.parameters().iter().filter(|p| p.required) {
             let absent = || Parameter::exact(0.0, p.unit);
-            f.parameters.entry(p.name.to_owned()).or_insert_with(absent);
+            for all in f.per_channel.values_mut().chain([&mut f.parameters]) {
+                all.entry(p.name.to_owned()).or_insert_with(absent);
+            }
         }
     }
     findings

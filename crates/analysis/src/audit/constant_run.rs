@@ -130,7 +130,9 @@ pub(super) fn audit(all: &[Still], at: &[f64], audit: &mut Audit) {
             names.join(", "),
             still.longest
         );
-        let finding = counted("stale_samples", names, count, Some(0.0), &times, what);
+        let mut finding = counted("stale_samples", names, count, Some(0.0), &times, what);
+        let runs = super::running(&still.rows, 0.0, at.len());
+        finding.parameters.insert("running".into(), runs);
         audit.findings.push(finding);
     }
 }

@@ -192,7 +192,9 @@ fn flags(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
         };
         let times: Vec<f64> = rows.iter().map(|i| at[*i]).collect();
         let count = rows.len() as f64;
-        let finding = counted("stale_samples", names, count, None, &times, what);
+        let mut finding = counted("stale_samples", names, count, None, &times, what);
+        let runs = super::running(&rows, 0.0, flags.len());
+        finding.parameters.insert("running".into(), runs);
         audit.findings.push(finding);
     }
 }

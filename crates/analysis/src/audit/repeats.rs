@@ -401,6 +401,8 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
             &times,
             what,
         );
+        let runs = super::running(&repeated, expected, rows);
+        finding.parameters.insert("running".into(), runs);
         if record.flags.is_some() {
             finding.what.push_str("; the new-data flags do not tell");
         }
@@ -471,14 +473,12 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
             own.iter().filter(held).for_each(|i| audit.mask(name, *i));
             let times: Vec<f64> = own.iter().map(|i| at[*i]).collect();
             let times = if excess > expected { times } else { vec![] };
-            audit.findings.push(counted(
-                "stale_samples",
-                vec![name.to_owned()],
-                excess.round(),
-                Some(error),
-                &times,
-                what,
-            ));
+            let names = vec![name.to_owned()];
+            let count = excess.round();
+            let mut finding = counted("stale_samples", names, count, Some(error), &times, what);
+            let runs = super::running(&own, expected, rows);
+            finding.parameters.insert("running".into(), runs);
+            audit.findings.push(finding);
         }
     }
 }

@@ -31,15 +31,11 @@ pub(crate) fn best(s: &Searched<'_>) -> Option<VarianceFound> {
                 VarianceLaw::Shape { follows, .. } => Some(follows.clone()),
                 VarianceLaw::Segment => None,
             };
-            let (lr, limit, law) = match law {
+            let (lr, limit, shape) = match law {
                 VarianceLaw::Shape { shape, .. } => {
                     let (lr, gamma, error) = scan::variance_law(e, shape);
                     found.coefficients = vec![(gamma, error)];
-                    (
-                        lr,
-                        threshold::variance_law(),
-                        shape.iter().map(|d| 1.0 + gamma * d).collect::<Vec<f64>>(),
-                    )
+                    (lr, threshold::variance_law(), shape.clone())
                 }
                 VarianceLaw::Segment => {
                     let (lr, start, end, increase) = scan::segment(e);
@@ -51,25 +47,20 @@ pub(crate) fn best(s: &Searched<'_>) -> Option<VarianceFound> {
                     found.location = [first, last]
                         .map(|(at, error)| (at / rate_hz, error / rate_hz))
                         .to_vec();
-                    let law = (0..e.len())
-                        .map(|i| {
-                            if i >= start && i < end {
-                                1.0 + increase
-                            } else {
-                                1.0
-                            }
-                        })
-                        .collect();
-                    (lr, threshold::segment(), law)
+                    let inside = (0..e.len()).map(|i| f64::from(u8::from(i >= start && i < end)));
+                    (lr, threshold::segment(), inside.collect())
                 }
             };
+            let gamma = found.coefficients[0].0;
             Some(VarianceFound {
                 effect: c.effect,
                 parameters: c.effect.describe(&found),
+                found,
                 lr,
                 threshold: limit,
                 alternatives: vec![],
-                law,
+                law: shape.iter().map(|d| 1.0 + gamma * d).collect(),
+                shape,
                 follows,
             })
         })
@@ -87,6 +78,38 @@ pub(crate) fn best(s: &Searched<'_>) -> Option<VarianceFound> {
     let mean = best.law.iter().sum::<f64>() / best.law.len() as f64;
     best.law.iter_mut().for_each(|v| *v /= mean);
     Some(all.swap_remove(0))
+}
+
+/// Nats by which one law of an effect's variance has to be ahead of its others; within them the record does not tell which it
+/// is, and the effect's own is the first.
+const OPEN: f64 = 3.0;
+
+/// Of the laws of the effect that was found, the one that the residual `e` tells.
+pub(crate) fn settle(s: &Searched<'_>, v: &mut VarianceFound, e: &[f64]) {
+    let own = s.search.candidates.iter();
+    let own = own.filter(|c| c.effect.id() == v.effect.id());
+    let laws: Vec<_> = own
+        .filter_map(|c| match &c.hypothesis {
+            Hypothesis::Variance(VarianceLaw::Shape { shape, fixed, .. }) => {
+                Some((scan::variance_law(e, shape), fixed, shape))
+            }
+            _ => None,
+        })
+        .collect();
+    let best = laws.iter().map(|((lr, ..), ..)| *lr).fold(0.0, f64::max);
+    let near: Vec<_> = laws
+        .iter()
+        .filter(|((lr, ..), ..)| best - lr < 2.0 * OPEN)
+        .collect();
+    let ((_, increase, error), fixed, shape) = match (near.as_slice(), laws.first()) {
+        ([(told, fixed, shape)], _) => (*told, (*fixed).clone(), *shape),
+        (_, Some((first, _, shape))) => (*first, vec![], *shape),
+        _ => return,
+    };
+    v.found.coefficients = vec![(increase, error)];
+    v.found.fixed = fixed;
+    v.shape.clone_from(shape);
+    v.parameters = v.effect.describe(&v.found);
 }
 
 /// What the law of the variance that was found on a channel claims, each claim with its chance.

@@ -3,7 +3,7 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
-use model::effect::{Effect, Parameters, Peak, Shape};
+use model::effect::{Effect, Found, Parameters, Peak, Shape};
 
 use crate::fit::likelihood::{Noise, Panel, Solution};
 use crate::fit::scan::residual;
@@ -243,6 +243,10 @@ pub struct PowerLawFound {
 pub(crate) struct VarianceFound {
     pub effect: &'static dyn Effect,
     pub parameters: Parameters,
+    /// What was estimated.
+    pub found: Found,
+    /// What it adds, by sample, in units of the coefficient: the law is 1 + coefficient x shape.
+    pub shape: Vec<f64>,
     pub lr: f64,
     pub threshold: f64,
     pub alternatives: Vec<(&'static dyn Effect, f64)>,
@@ -250,6 +254,30 @@ pub(crate) struct VarianceFound {
     pub law: Vec<f64>,
     /// The channel that it follows.
     pub follows: Option<String>,
+}
+
+/// What the noise of a channel is, at the law's zero where it follows one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Levels {
+    /// White variance of a reading.
+    pub white: f64,
+    /// Standard error of its logarithm.
+    pub white_error: f64,
+    /// ln of the random walk's step variance over the white variance.
+    pub log_walk: f64,
+    /// Standard error of ln K.
+    pub walk_error: f64,
+}
+
+/// The estimate of everything on a channel together, under a law of the variance.
+#[derive(Clone, Debug)]
+pub(crate) struct Joint {
+    /// Noise.
+    pub levels: Levels,
+    /// Coefficient of the law with its standard error.
+    pub law: (f64, f64),
+    /// What was found for each term.
+    pub found: Vec<Found>,
 }
 
 /// Whitened coefficients, and the same in time: independent N(0, 1) under the model. A level that is known sample by

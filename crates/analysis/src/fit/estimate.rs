@@ -39,7 +39,11 @@ pub fn mixture(
     noise: &Noise,
     columns: &[usize],
 ) -> Vec<(f64, crate::fit::likelihood::Solution)> {
-    let points = weighted(panel, noise, columns);
+    normalised(weighted(panel, noise, columns))
+}
+
+/// Weights out of their logarithms.
+pub(crate) fn normalised<T>(points: Vec<(f64, T)>) -> Vec<(f64, T)> {
     let top = points.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
     let sum: f64 = points.iter().map(|p| (p.0 - top).exp()).sum();
     points
@@ -52,8 +56,15 @@ pub fn mixture(
 #[must_use]
 pub fn coefficients(panel: &Panel, state: &State) -> Vec<(f64, f64)> {
     let columns = state.columns();
-    let mixed = mixture(panel, &state.noise, &columns);
-    (0..columns.len())
+    averaged(&mixture(panel, &state.noise, &columns), columns.len())
+}
+
+/// The first `count` coefficients of a mixture with standard errors.
+pub(crate) fn averaged(
+    mixed: &[(f64, crate::fit::likelihood::Solution)],
+    count: usize,
+) -> Vec<(f64, f64)> {
+    (0..count)
         .map(|i| {
             let mean: f64 = mixed.iter().map(|(w, s)| w * s.beta[i]).sum();
             let variance: f64 = mixed
@@ -244,6 +255,9 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
                 fixed: t.fixed.clone(),
                 location: vec![],
             };
+            if let Form::Covariance(c, _) = &t.form {
+                found.fixed.extend(c.fixed());
+            }
             // Cramer-Rao bound of a frequency, rad per sample: 24 s^2 / (A^2 n^3).
             let frequency = |omega: f64, amplitude: f64| {
                 let error = (24.0 * state.solution.white * g(omega) / n.powi(3)).sqrt() / amplitude;

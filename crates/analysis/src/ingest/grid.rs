@@ -32,8 +32,11 @@ pub fn rate_of(record: &Record) -> Option<f64> {
     let stated = record.header.rate_hz;
     stated
         .or_else(|| crate::records::rows::by_times(record))
-        .filter(|r| r.is_finite() && *r > 0.0)
+        .filter(|r| (LARGEST.recip()..LARGEST).contains(r))
 }
+
+/// Largest reading, and rate, of which sums of products are numbers.
+const LARGEST: f64 = 1e100;
 
 /// Place of every row on the grid, and the number of places.
 fn places(record: &Record) -> (Vec<usize>, usize) {
@@ -53,7 +56,7 @@ fn places(record: &Record) -> (Vec<usize>, usize) {
 
 fn spread(values: &[f64], places: &[usize], n: usize, masked: &[usize]) -> Vec<f64> {
     let mut grid = vec![f64::NAN; n];
-    for (v, p) in values.iter().zip(places) {
+    for (v, p) in values.iter().zip(places).filter(|(v, _)| v.abs() < LARGEST) {
         grid[*p] = *v;
     }
     for row in masked {

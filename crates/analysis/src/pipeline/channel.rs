@@ -9,6 +9,7 @@ use crate::fit::channel::{State, whitened};
 use crate::fit::estimate;
 use crate::fit::likelihood::{Bins, Panel};
 use crate::ingest::types::{Grid, Target};
+use crate::joint;
 use crate::report::detection_limits;
 use crate::result::Check;
 use crate::search::searched::Searched;
@@ -84,6 +85,7 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         told,
         checks: vec![],
         variance: None,
+        joint: None,
         limits: vec![],
         laws: vec![],
     };
@@ -98,11 +100,25 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     if !target.moving {
         s.variance = variance_law::best(&s);
     }
-    if let Some(v) = &s.variance {
-        s.e.iter_mut().zip(&v.law).for_each(|(e, v)| *e /= v.sqrt());
-    }
+    estimate_under_law(&mut s);
     s.checks = channel_checks(&s, before);
     s
+}
+
+/// Everything that was found, estimated anew under the law of the variance where there is one, and the residual by it.
+fn estimate_under_law(s: &mut Searched<'_>) {
+    let Some(mut v) = s.variance.take() else {
+        return;
+    };
+    variance_law::settle(s, &mut v, &s.e);
+    s.joint = joint::estimate(s, &v.shape, v.found.coefficients[0].0);
+    if let Some(joint) = &s.joint {
+        s.found.clone_from(&joint.found);
+        v.found.coefficients = vec![joint.law];
+        v.parameters = v.effect.describe(&v.found);
+    }
+    s.e.iter_mut().zip(&v.law).for_each(|(e, v)| *e /= v.sqrt());
+    s.variance = Some(v);
 }
 
 /// All checks of a channel, those of the residual `before` the extension beside those after it.

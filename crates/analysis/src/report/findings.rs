@@ -1,6 +1,6 @@
 //! Findings out of what was estimated: one for each cause, with its rivals, its experiment and its gain.
 
-use model::effect::{Effect, Found, Hypothesis, Parameters, VarianceLaw};
+use model::effect::{Effect, Found, Hypothesis};
 use model::effects::effect;
 use model::record::Base;
 use rand_core::SeedableRng;
@@ -9,8 +9,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::attribute::events;
 use crate::criticise::scale;
-use crate::fit::channel::{Form, Term, VarianceFound};
-use crate::fit::{estimate, prequential, scan, threshold};
+use crate::fit::channel::{Form, Term};
+use crate::fit::{estimate, prequential, threshold};
 use crate::ingest::types::Grid;
 use crate::numerics::transform::Dct;
 use crate::report::{detection_limits, figures};
@@ -115,6 +115,9 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
                 });
             }
             let size = (found.coefficients.len() + found.location.len()) as f64;
+            let effective = effective(s, term, found);
+            let told = if effective { EFFECTIVE } else { "" };
+            let what = sentence(term.effect.docs().title, &s.target.name, &parameters);
             Finding {
                 cause: term.effect.id().into(),
                 channels: vec![s.target.name.clone()],
@@ -138,7 +141,8 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
                         .collect(),
                     ablation_nats: Some(lr / 2.0),
                 }),
-                what: sentence(term.effect.docs().title, &s.target.name, &parameters),
+                what: what + told,
+                effective,
                 parameters,
                 components,
                 likelihood_ratio: Some(lr),
@@ -149,39 +153,35 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
         .collect()
 }
 
-/// Nats by which one law of an effect's variance has to be ahead of its others; within them the record does not tell which it
-/// is, and the effect's own is the first.
-const OPEN: f64 = 3.0;
+/// What is said of a value that holds for one excitation alone.
+const EFFECTIVE: &str = "; effective for this excitation: what is fast goes through the gyro's filter, and is read at another instant";
 
-/// Parameters of a law of the variance of the residual `e`: of the effect's laws, the one that the record tells.
-fn variance_parameters(s: &Searched<'_>, v: &VarianceFound, e: &[f64]) -> Parameters {
-    let own = s.search.candidates.iter();
-    let own = own.filter(|c| c.effect.id() == v.effect.id());
-    let laws: Vec<_> = own
-        .filter_map(|c| match &c.hypothesis {
-            Hypothesis::Variance(VarianceLaw::Shape { shape, fixed, .. }) => {
-                Some((scan::variance_law(e, shape), fixed))
-            }
-            _ => None,
-        })
-        .collect();
-    let best = laws.iter().map(|((lr, ..), _)| *lr).fold(0.0, f64::max);
-    let near: Vec<_> = laws
+/// Whether a delay of a sample between a sensor and the channel that a term follows could make a coefficient wrong by more
+/// than half of its interval: by 1 minus the correlation of neighbouring readings of the channel.
+fn effective(s: &Searched<'_>, term: &Term, found: &Found) -> bool {
+    let follows = term.follows.as_deref().filter(|_| term.effect.felt_late());
+    let Some(follows) = follows else { return false };
+    let own = s
+        .search
+        .view
+        .signals
         .iter()
-        .filter(|((lr, ..), _)| best - lr < 2.0 * OPEN)
-        .collect();
-    let ((_, increase, error), fixed) = match (near.as_slice(), laws.first()) {
-        ([told], _) => (told.0, told.1.clone()),
-        (_, Some(first)) => (first.0, vec![]),
-        _ => return v.parameters.clone(),
-    };
-    v.effect.describe(&Found {
-        unit: s.target.unit.clone(),
-        rate_hz: s.search.view.rate_hz,
-        coefficients: vec![(increase, error)],
-        fixed,
-        ..Found::default()
-    })
+        .filter(|c| follows.contains(&c.name));
+    let lost = own.map(|c| 1.0 - neighbours(&c.values)).fold(0.0, f64::max);
+    let far = |(value, error): &(f64, f64)| lost * value.abs() > 1.96 * error;
+    found.coefficients.iter().any(far)
+}
+
+/// Correlation of neighbouring values.
+fn neighbours(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let all: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    let pairs = values.windows(2).map(|w| (w[0] - mean) * (w[1] - mean));
+    if all > 0.0 {
+        pairs.sum::<f64>() / all
+    } else {
+        1.0
+    }
 }
 
 pub(crate) fn variance_finding(s: &Searched<'_>) -> Option<Finding> {
@@ -189,7 +189,7 @@ pub(crate) fn variance_finding(s: &Searched<'_>) -> Option<Finding> {
     let alternatives = alternatives(&v.alternatives);
     let undivided: Vec<f64> = s.e.iter().zip(&v.law).map(|(e, v)| e * v.sqrt()).collect();
     let (nats, std_error) = prequential::of_variance(&undivided, &v.law);
-    let parameters = variance_parameters(s, v, &undivided);
+    let parameters = v.parameters.clone();
     Some(Finding {
         cause: v.effect.id().into(),
         channels: vec![s.target.name.clone()],

@@ -3,5 +3,5 @@
 pub mod detection_limits;
 pub mod figures;
 pub mod findings;
-pub mod fitted;
+pub mod handover;
 pub mod untested;

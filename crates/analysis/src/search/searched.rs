@@ -2,7 +2,7 @@
 
 use model::effect::Found;
 
-use crate::fit::channel::{State, VarianceFound};
+use crate::fit::channel::{Joint, State, VarianceFound};
 use crate::ingest::types::Target;
 use crate::result::{Check, DetectionLimit};
 use crate::search::Search;
@@ -25,6 +25,8 @@ pub(crate) struct Searched<'a> {
     pub checks: Vec<Check>,
     /// The law of the variance, where one was found.
     pub variance: Option<VarianceFound>,
+    /// The estimate of all parameters under it.
+    pub joint: Option<Joint>,
     /// Smallest sizes that the search would have named, whether it did or not.
     pub limits: Vec<DetectionLimit>,
     /// Effects that follow a channel, and whether by the law that their name claims.

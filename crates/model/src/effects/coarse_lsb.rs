@@ -46,16 +46,24 @@ impl Effect for CoarseLsb {
         Ok(vec![Hypothesis::Audit])
     }
 
+    fn coarsens(&self, parameters: &Parameters) -> f64 {
+        f64::from(1u32 << missing(parameters))
+    }
+
     fn stage(&self) -> Stage {
         Stage::Counts
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        let bits = value(parameters, "missing_bits").round().clamp(0.0, 13.0) as u32;
+        let bits = missing(parameters);
         for &axis in channels {
             for c in &mut simulation.counts[axis] {
                 *c = (*c >> bits) << bits;
             }
         }
     }
+}
+
+fn missing(parameters: &Parameters) -> u32 {
+    value(parameters, "missing_bits").round().clamp(0.0, 13.0) as u32
 }

@@ -25,7 +25,7 @@ impl Effect for CommonNoise {
         const PARAMETERS: &[ParameterSpec] = &[parameter(
             "sigma",
             "deg/s",
-            "standard deviation of the shared part",
+            "standard deviation of the shared part, beside which angle_random_walk is each axis' own",
         )];
         PARAMETERS
     }
@@ -33,7 +33,7 @@ impl Effect for CommonNoise {
     fn docs(&self) -> Docs {
         Docs {
             title: "Common noise",
-            physics: "e_i(t) = own noise + c(t): a shared supply or reference, broadband shaking of the base.",
+            physics: "e_i(t) = own noise + c(t): a shared supply or reference, broadband shaking of the base. The shared part is white as the own one and goes through the same filter.",
             excitation: "At least two gyros.",
             test: "Correlation of the whitened residuals of each pair of axes.",
             figure: "Whitened residual of one axis against another.",
@@ -76,15 +76,18 @@ impl Effect for CommonNoise {
     }
 
     fn stage(&self) -> Stage {
-        Stage::Rate
+        Stage::Noise
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let sigma = value(parameters, "sigma");
+        for &axis in channels {
+            simulation.shared[axis].resize(simulation.samples, 0.0);
+        }
         for i in 0..simulation.samples {
             let c: f64 = StandardNormal.sample(&mut simulation.rng);
             for &axis in channels {
-                simulation.rate[axis][i] += sigma * c;
+                simulation.shared[axis][i] += sigma * c;
             }
         }
     }

@@ -88,19 +88,25 @@ impl Effect for Flicker {
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let b = value(parameters, "bias_instability") / 3600.0;
-        // A sum of Gauss-Markov processes, one per e-fold of the correlation time: int S(tau) d ln tau of
-        // 2 s^2 tau / (1 + (w tau)^2) = pi s^2 / w, and the density per sample is B^2 / w. The sum swings about that by
-        // 2 / cosh(pi^2), 2e-4 (Poisson's sum over sech(ln w tau)).
-        let shortest: f64 = 0.05;
-        let longest = simulation.span as f64 * 30.0;
-        let count = (longest / shortest).ln().ceil() as usize;
-        let sigma = b / std::f64::consts::PI.sqrt();
         for &axis in channels {
-            for j in 0..count {
-                simulation.add_markov(axis, sigma, shortest * (j as f64).exp());
+            for (variance, samples) in ladder(simulation.span, 1.0) {
+                simulation.add_markov(axis, b * variance.sqrt(), samples);
             }
         }
     }
+}
+
+/// Gauss-Markov processes with correlation times `apart` in their logarithm that sum up to flicker noise of B = 1: variances
+/// and correlation times in samples. int S(tau) d ln tau of 2 s^2 tau / (1 + (w tau)^2) = pi s^2 / w, and the density per sample is B^2 / w; the ripple
+/// is 1 / cosh(pi^2 / apart).
+fn ladder(samples: usize, apart: f64) -> Vec<(f64, f64)> {
+    // Sampled, the fastest ones are white: from this correlation time on, in samples, they sum up to 1 / w at half the sample rate.
+    let (shortest, longest) = (0.45, samples as f64 * 30.0);
+    let count = ((longest / shortest).ln() / apart).ceil().max(1.0) as usize;
+    let tau = |j: usize| shortest * ((j as f64 + 0.5) * apart).exp();
+    (0..count)
+        .map(|j| (apart / std::f64::consts::PI, tau(j)))
+        .collect()
 }
 
 /// Coordinate: ln(B^2 / white variance).
@@ -115,11 +121,48 @@ impl Covariance for Pink {
         at.omega.iter().map(|w| theta[0].exp() / w).collect()
     }
 
+    fn poles(&self, theta: &[f64], samples: usize) -> Option<Vec<(f64, f64)>> {
+        let all = ladder(samples, 2.0).into_iter();
+        Some(
+            all.map(|(variance, p)| (theta[0].exp() * variance, (-1.0 / p).exp()))
+                .collect(),
+        )
+    }
+
     fn bounds(&self, _samples: usize) -> Vec<(f64, f64)> {
         vec![(-18.0, 6.0)]
     }
 
     fn starts(&self, _samples: usize) -> Vec<Vec<f64>> {
         vec![vec![-4.5], vec![-8.0]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ladder_has_the_density_of_flicker() {
+        let omega = [1e-3, 1e-2, 0.1, 0.5, std::f64::consts::PI];
+        let at = Frequencies {
+            omega: omega.to_vec(),
+            cosine: omega.map(f64::cos).to_vec(),
+        };
+        let wanted = Pink.density(&[0.0], &at);
+        for apart in [1.0, 2.0] {
+            let all = ladder(12_000, apart)
+                .into_iter()
+                .map(|(v, p)| at.one_pole(v, (-1.0f64 / p).exp()));
+            let sum = all.fold(vec![0.0; omega.len()], |sum, d| {
+                sum.iter().zip(d).map(|(a, b)| a + b).collect()
+            });
+            for (found, wanted) in sum.iter().zip(&wanted) {
+                assert!(
+                    (found / wanted - 1.0).abs() < 0.1,
+                    "{apart}: {sum:?} {wanted:?}"
+                );
+            }
+        }
     }
 }

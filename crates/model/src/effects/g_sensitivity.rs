@@ -125,6 +125,10 @@ impl Effect for GSensitivity {
         Some((AT_ONCE[axis], MOST_LATE))
     }
 
+    fn felt_late(&self) -> bool {
+        true
+    }
+
     fn stage(&self) -> Stage {
         Stage::Rate
     }

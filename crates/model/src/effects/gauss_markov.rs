@@ -118,6 +118,10 @@ impl Covariance for Process {
         at.one_pole(theta[0].exp(), (-(-theta[1]).exp()).exp())
     }
 
+    fn poles(&self, theta: &[f64], _samples: usize) -> Option<Vec<(f64, f64)>> {
+        Some(vec![(theta[0].exp(), (-(-theta[1]).exp()).exp())])
+    }
+
     fn bounds(&self, samples: usize) -> Vec<(f64, f64)> {
         vec![(-16.0, 6.0), (0.0, (samples as f64 / 10.0).ln())]
     }

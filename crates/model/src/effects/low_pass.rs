@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::effect::{
     Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
-    Plot, Rival, Stage, View, parameter, value,
+    Plot, Rival, Stage, View, optional, parameter, value,
 };
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
@@ -21,11 +21,18 @@ impl Effect for LowPass {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[parameter(
-            "lag1_correlation",
-            "1",
-            "correlation of neighbouring samples of the white part",
-        )];
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter(
+                "lag1_correlation",
+                "1",
+                "correlation of neighbouring samples of the white part",
+            ),
+            optional(
+                "triangular",
+                "1",
+                "1 where the filter is a triangular window, 0 where it is one pole; left out, a mean of two samples up to a correlation of 0.3 and one pole beyond",
+            ),
+        ];
         PARAMETERS
     }
 
@@ -69,11 +76,15 @@ impl Effect for LowPass {
             return Parameters::new();
         };
         let rho = logistic(theta);
-        [(
+        let fixed = found
+            .fixed
+            .iter()
+            .map(|(name, value, unit)| ((*name).to_owned(), Parameter::exact(*value, unit)));
+        let size = (
             "lag1_correlation".to_owned(),
             Parameter::estimated(rho, error * rho * (1.0 - rho), "1"),
-        )]
-        .into()
+        );
+        fixed.chain([size]).collect()
     }
 
     fn stage(&self) -> Stage {
@@ -81,32 +92,109 @@ impl Effect for LowPass {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        // Two-point average with weights 1 : w has the lag-1 correlation w / (1 + w^2) <= 1/2; beyond it, one pole.
-        let rho = value(parameters, "lag1_correlation").clamp(0.0, 0.999);
+        let stated = value(parameters, "lag1_correlation");
+        let kind = parameters.get("triangular").map(|p| p.value != 0.0);
         for &axis in channels {
+            // The correlation is that of the readings: rounding, which comes behind the filter, has none.
+            let rounding = simulation.rounding[axis] / simulation.white_sigma[axis].powi(2);
+            let drawn = if rounding < 1.0 { 1.0 - rounding } else { 1.0 };
+            let rho = (stated / drawn).clamp(0.0, 0.999);
             let noise = &mut simulation.white[axis];
-            if rho <= 0.3 {
-                let w = if rho > 0.0 {
-                    (1.0 - (1.0 - 4.0 * rho * rho).sqrt()) / (2.0 * rho)
-                } else {
-                    0.0
-                };
-                let norm = (1.0 + w * w).sqrt();
-                let mut before = noise.first().copied().unwrap_or(0.0);
-                for v in noise.iter_mut() {
-                    let now = *v;
-                    *v = (now + w * before) / norm;
-                    before = now;
-                }
-            } else {
-                let step = (1.0 - rho * rho).sqrt();
-                let mut x = noise.first().copied().unwrap_or(0.0);
-                for v in noise.iter_mut().skip(1) {
-                    x = rho * x + step * *v;
-                    *v = x;
-                }
+            match kind {
+                Some(true) => averaged(noise, &window(rho)),
+                None if rho <= 0.3 => averaged(noise, &two_samples(rho)),
+                Some(false) | None => through_a_pole(noise, rho),
             }
         }
+    }
+}
+
+/// A mean of a sample and the one before, weights 1 : w, of the lag-1 correlation w / (1 + w^2) <= 1/2; sum of squares 1.
+fn two_samples(rho: f64) -> Vec<f64> {
+    let w = if rho > 0.0 {
+        (1.0 - (1.0 - 4.0 * rho * rho).sqrt()) / (2.0 * rho)
+    } else {
+        0.0
+    };
+    let norm = (1.0 + w * w).sqrt();
+    vec![1.0 / norm, w / norm]
+}
+
+/// Taps of a noise that has the correlations of a triangular window of that lag-1 correlation, sum of squares 1: the factor
+/// of its density without zeros outside the unit circle (Wilson's iteration, SIAM J. Numer. Anal. 6, 1969).
+fn window(rho: f64) -> Vec<f64> {
+    let unit = inverse_spline(rho);
+    let all = (0..)
+        .map(|l| spline(f64::from(l) * unit))
+        .take_while(|r| *r > 0.0);
+    let mut r: Vec<f64> = all.collect();
+    r[0] += FLOOR;
+    let lags = r.len();
+    let mut b = vec![0.0; lags];
+    b[0] = r.iter().map(|v| v.abs()).sum::<f64>().sqrt();
+    for _ in 0..FACTORING {
+        // The next factor x of b solves sum_i (b_i x_{i+l} + x_i b_{i+l}) = r_l + (correlation of b at l).
+        let mut a = vec![vec![0.0; lags]; lags];
+        let mut right = r.clone();
+        for (l, (row, right)) in a.iter_mut().zip(&mut right).enumerate() {
+            for i in 0..lags - l {
+                row[i + l] += b[i];
+                row[i] += b[i + l];
+                *right += b[i] * b[i + l];
+            }
+        }
+        b = solved(a, right);
+    }
+    let norm = b.iter().map(|v| v * v).sum::<f64>().sqrt();
+    b.iter_mut().for_each(|v| *v /= norm);
+    b
+}
+
+/// Iterations of [`window`]: they converge quadratically but near a zero of the density, where each halves what is off.
+const FACTORING: usize = 40;
+
+/// The solution of a x = right, by elimination with pivots.
+fn solved(mut a: Vec<Vec<f64>>, mut right: Vec<f64>) -> Vec<f64> {
+    let m = right.len();
+    for k in 0..m {
+        let best = (k..m)
+            .max_by(|i, j| a[*i][k].abs().total_cmp(&a[*j][k].abs()))
+            .unwrap_or(k);
+        a.swap(k, best);
+        right.swap(k, best);
+        for i in k + 1..m {
+            let f = a[i][k] / a[k][k];
+            let (above, below) = a.split_at_mut(i);
+            below[0]
+                .iter_mut()
+                .zip(&above[k])
+                .for_each(|(v, u)| *v -= f * u);
+            right[i] -= f * right[k];
+        }
+    }
+    for k in (0..m).rev() {
+        let known: f64 = (k + 1..m).map(|j| a[k][j] * right[j]).sum();
+        right[k] = (right[k] - known) / a[k][k];
+    }
+    right
+}
+
+/// A moving average in place; what lies before the first sample is the first sample.
+fn averaged(noise: &mut [f64], taps: &[f64]) {
+    let given = noise.to_vec();
+    for (i, v) in noise.iter_mut().enumerate() {
+        let at = |k: usize| given[i.saturating_sub(k)];
+        *v = taps.iter().enumerate().map(|(k, t)| t * at(k)).sum();
+    }
+}
+
+/// One pole in place, variance kept.
+fn through_a_pole(noise: &mut [f64], rho: f64) {
+    let step = (1.0 - rho * rho).sqrt();
+    let mut x = noise.first().copied().unwrap_or(0.0);
+    for v in noise.iter_mut().skip(1) {
+        x = rho * x + step * *v;
+        *v = x;
     }
 }
 
@@ -130,6 +218,10 @@ impl Covariance for Pole {
         at.one_pole(1.0, logistic(theta[0]))
     }
 
+    fn fixed(&self) -> Vec<(&'static str, f64, &'static str)> {
+        vec![("triangular", 0.0, "1")]
+    }
+
     fn bounds(&self, _samples: usize) -> Vec<(f64, f64)> {
         vec![(-7.0, 3.0)]
     }
@@ -141,6 +233,9 @@ impl Covariance for Pole {
 
 /// Triangular window (the data sheet's Bartlett filter). Coordinate: logit of the lag-1 correlation.
 struct Triangle;
+
+/// Density that quantization and the electronics behind the filter leave where the window has none, over the white one.
+const FLOOR: f64 = 2e-3;
 
 /// Autocorrelation of a triangular window at `u` half-bases: the cubic B-spline, 1 at 0 and 0 from 2 on.
 fn spline(u: f64) -> f64 {
@@ -191,10 +286,13 @@ impl Covariance for Triangle {
                     .rev()
                     .fold((0.0, 0.0), |(b, next), r| (r + 2.0 * c * b - next, b));
                 let tail = 2.0 * (c * first - second);
-                // Quantization and the electronics behind the filter keep the density off zero.
-                (1.0 + tail).max(0.0) + 2e-3
+                (1.0 + tail).max(0.0) + FLOOR
             })
             .collect()
+    }
+
+    fn fixed(&self) -> Vec<(&'static str, f64, &'static str)> {
+        vec![("triangular", 1.0, "1")]
     }
 
     fn bounds(&self, _samples: usize) -> Vec<(f64, f64)> {
@@ -203,5 +301,27 @@ impl Covariance for Triangle {
 
     fn starts(&self, _samples: usize) -> Vec<Vec<f64>> {
         vec![vec![-3.0], vec![0.0]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_simulated_has_the_correlations_that_are_fitted() {
+        for rho in [0.1, 0.25, 0.5, 0.8] {
+            let unit = inverse_spline(rho);
+            let taps = window(rho);
+            for lag in 0..taps.len() {
+                let found: f64 = taps.iter().zip(&taps[lag..]).map(|(a, b)| a * b).sum();
+                let floor = if lag == 0 { FLOOR } else { 0.0 };
+                let wanted = (spline(lag as f64 * unit) + floor) / (1.0 + FLOOR);
+                assert!(
+                    (found - wanted).abs() < 1e-3,
+                    "{rho}, lag {lag}: {found} {wanted}"
+                );
+            }
+        }
     }
 }

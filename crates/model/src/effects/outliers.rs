@@ -25,7 +25,7 @@ impl Effect for Outliers {
             optional(
                 "size",
                 "deg/s",
-                "distance from the truth in a simulation; 10 white sigma where it is left out",
+                "root mean square of their distance from the truth; 10 white sigma where it is left out",
             ),
         ];
         PARAMETERS

@@ -60,8 +60,7 @@ impl Effect for RateRamp {
     }
 
     fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
-        let centre = view.seconds() / 2.0;
-        let values = (0..view.samples).map(|i| view.time(i) - centre).collect();
+        let values = (0..view.samples).map(|i| view.time(i)).collect();
         Ok(vec![Hypothesis::Regression(Regression {
             columns: vec![Column {
                 parameter: "slope",

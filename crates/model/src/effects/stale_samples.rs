@@ -22,6 +22,11 @@ impl Effect for StaleSamples {
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
             parameter("count", "1", "frames that repeat the one before"),
+            optional(
+                "running",
+                "1",
+                "such frames in a row, on the average; 1 where it is left out",
+            ),
             optional("silent", "1", "1 where the new-data flags do not tell"),
         ];
         PARAMETERS
@@ -60,14 +65,22 @@ impl Effect for StaleSamples {
         let Ok(at) = Uniform::new(1, simulation.samples.max(2)) else {
             return;
         };
-        for _ in 0..count {
-            let i = at.sample(&mut simulation.rng).min(simulation.samples - 1);
-            for &axis in channels {
-                simulation.counts[axis][i] = simulation.counts[axis][i - 1];
-                if !silent {
-                    simulation.flags[i] &= !(1 << axis);
+        let running = parameters.get("running").map_or(1.0, |p| p.value).max(1.0);
+        let mut done = 0.0;
+        while done < count as f64 {
+            let first = at.sample(&mut simulation.rng).min(simulation.samples - 1);
+            // As many as make the average right by then.
+            let frames = ((done / running).floor() + 1.0) * running - done;
+            let frames = (frames.round() as usize).clamp(1, count - done as usize);
+            for i in first..(first + frames).min(simulation.samples) {
+                for &axis in channels {
+                    simulation.counts[axis][i] = simulation.counts[axis][i - 1];
+                    if !silent {
+                        simulation.flags[i] &= !(1 << axis);
+                    }
                 }
             }
+            done += frames as f64;
         }
     }
 }

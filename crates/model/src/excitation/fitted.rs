@@ -1,5 +1,6 @@
 //! Settings that make a world like a record's: alike in size and pace, not in its course.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -8,6 +9,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::moved::{BLOCK_S, MOVED, at_rest, moved_channels, moves_throughout};
 use super::{MOTION, World};
+use crate::effect::value;
 use crate::file::{EffectModel, ModelFile};
 use crate::parameter::Parameter;
 use crate::record::{Axis, Base, Channel, Quantity, Record};
@@ -28,7 +30,8 @@ impl ModelFile {
     pub fn excited_like(mut self, record: &Record) -> Self {
         let named = moved_channels(&self);
         let moves = !named.is_empty() || record.header.base.is_some_and(|b| b != Base::Static);
-        self.excitation = settings_like(record, self.rate_hz, moves);
+        let turned = self.turned(record, &named);
+        self.excitation = settings_like(&turned, self.rate_hz, moves, &named);
         // What of the motion the settings do not make, each axis makes by itself: alike in size and pace too.
         let acts = |key: &&str| self.excitation.contains_key(*key);
         let by_settings: &[&str] = match MOTION.iter().find(|k| acts(k)) {
@@ -36,16 +39,16 @@ impl ModelFile {
             Some(_) => &["gyro_z"],
             None => &[],
         };
-        let fit = Fit::fine(record, self.rate_hz);
+        let fit = Fit::fine(&turned, self.rate_hz);
         self.effects.retain(|e| !moves_throughout(e));
         for channel in &mut self.channels {
-            let Some(seen) = record
-                .channel(&channel.name)
-                .filter(|_| named.contains(&channel.name))
+            let moved = named.contains(&channel.name);
+            let [Some(read), Some(seen)] =
+                [record, &*turned].map(|r| r.channel(&channel.name).filter(|_| moved))
             else {
                 continue;
             };
-            at_rest(channel, &seen.values, self.rate_hz);
+            at_rest(channel, &read.values, self.rate_hz);
             if by_settings.contains(&channel.name.as_str()) {
                 continue;
             }
@@ -62,10 +65,33 @@ impl ModelFile {
         }
         self
     }
+
+    /// The record with the rates of the axes that moved as they truly were: a simulation makes the error of their scale anew.
+    fn turned<'a>(&self, record: &'a Record, moved: &[String]) -> Cow<'a, Record> {
+        let scale = |name: &String| {
+            let own = self.effects.iter().filter(|e| e.cause == "scale_error");
+            let own = own.filter(|e| e.channels.is_empty() || e.channels.contains(name));
+            let relative = own.map(|e| 1.0 + value(&e.parameters, "relative"));
+            relative.product::<f64>()
+        };
+        let mut turned = Cow::Borrowed(record);
+        for name in moved.iter().filter(|n| ![0.0, 1.0].contains(&scale(n))) {
+            let mut all = turned.to_mut().channels.iter_mut();
+            if let Some(c) = all.find(|c| c.name == *name) {
+                c.values.iter_mut().for_each(|v| *v /= scale(name));
+            }
+        }
+        turned
+    }
 }
 
 /// The settings of such a world. What the record does not have, or what does not move, is left out.
-fn settings_like(record: &Record, rate_hz: f64, moves: bool) -> BTreeMap<String, f64> {
+fn settings_like(
+    record: &Record,
+    rate_hz: f64,
+    moves: bool,
+    moved: &[String],
+) -> BTreeMap<String, f64> {
     let samples = record.len();
     if samples < 2 || !(rate_hz.is_finite() && rate_hz > 0.0) {
         return BTreeMap::new();
@@ -83,7 +109,7 @@ fn settings_like(record: &Record, rate_hz: f64, moves: bool) -> BTreeMap<String,
     fit.motor(&mut settings);
     fit.vibration(&mut settings);
     if moves {
-        fit.motion(&mut settings);
+        fit.motion(&mut settings, moved);
     }
     let rounded = |v: f64| format!("{v:.3e}").parse().unwrap_or(v);
     settings
@@ -293,7 +319,7 @@ impl Fit<'_> {
 
     /// The turning of a table or the sway of a base, by the gyro that sees most of it. A sway tilts the accelerometers: what
     /// they do not see is none, as a shove.
-    fn motion(&self, settings: &mut Settings) {
+    fn motion(&self, settings: &mut Settings, moved: &[String]) {
         let fine = Self::fine(self.record, self.rate_hz);
         let seen = Axis::ALL.into_iter().filter_map(|axis| {
             let channel = self.record.of(Quantity::Gyro, Some(axis))?;
@@ -317,6 +343,17 @@ impl Fit<'_> {
         if tilt > 0.5 * sway.to_radians().sin() {
             settings.push(("sway_deg", sway));
             settings.push(("sway_period_s", period));
+            // Where it is not said which axes moved, both may have.
+            let about = [
+                (Axis::X, "gyro_x", "sway_about_x"),
+                (Axis::Y, "gyro_y", "sway_about_y"),
+            ];
+            for (own, name, key) in about.into_iter().filter(|a| a.0 != axis) {
+                let still = !moved.is_empty() && !moved.iter().any(|m| m == name);
+                let seen = self.record.of(Quantity::Gyro, Some(own)).filter(|_| !still);
+                let part = seen.map_or(0.0, |c| fine.swing(&c.values).0 / amplitude);
+                settings.push((key, part));
+            }
         }
     }
 }

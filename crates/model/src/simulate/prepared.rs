@@ -75,6 +75,13 @@ impl Prepared {
             run.rate[axis].fill(get("bias"));
         }
         let acting = acting(model, present)?;
+        for (axis, lsb) in lsb.iter().enumerate() {
+            let here = acting.iter().filter(|a| a.axes.contains(&axis));
+            let step = here.fold(lsb.unwrap_or(0.0), |step, a| {
+                step * a.effect.coarsens(&a.parameters)
+            });
+            run.rounding[axis] = step * step / 12.0;
+        }
         let (mut early, late): (Vec<_>, Vec<_>) = acting
             .into_iter()
             .partition(|a| a.effect.stage() < Stage::Output);
@@ -104,13 +111,16 @@ impl Prepared {
         Ok(prepared)
     }
 
-    /// What is drawn is as large as the run now says.
+    /// What is drawn is as large as the run now says. The noise of a model is that of the readings, of which rounding makes a
+    /// part by itself.
     fn sized(&mut self) {
         let run = &self.run;
         self.white = std::array::from_fn(|axis| {
-            let sigma = run.white_sigma[axis];
+            let (own, rounding) = (run.white_sigma[axis].powi(2), run.rounding[axis]);
             let variance = run.variance[axis].iter();
-            variance.map(|v| sigma * v.sqrt()).collect()
+            variance
+                .map(|v| (own * v - rounding).max(0.0).sqrt())
+                .collect()
         });
     }
 
@@ -160,6 +170,7 @@ impl Prepared {
     /// Draw what is random, up to the counts.
     pub fn draw(&mut self) {
         let present = self.present;
+        self.run.shared.iter_mut().for_each(Vec::clear);
         for axis in (0..3).filter(|a| present[*a]) {
             wander(&mut self.run, axis, self.walk[axis]);
         }
@@ -174,6 +185,10 @@ impl Prepared {
             white.clear();
             let run = &mut self.run;
             white.extend(self.white[axis].iter().map(|sd| sd * run.normal()));
+            let shared = run.shared[axis].iter().zip(&run.variance[axis]);
+            for (white, (shared, v)) in white.iter_mut().zip(shared) {
+                *white += v.sqrt() * shared;
+            }
             self.run.white[axis] = white;
         }
         self.stage(Stage::Output);
@@ -264,6 +279,8 @@ fn started(world: World, rate_hz: f64, rng: Xoshiro256PlusPlus) -> Simulation {
         scale: [1.0; 3],
         rate: std::array::from_fn(|_| vec![0.0; samples]),
         white_sigma: [0.0; 3],
+        rounding: [0.0; 3],
+        shared: Default::default(),
         variance: std::array::from_fn(|_| vec![1.0; samples]),
         white: Default::default(),
         counts: Default::default(),

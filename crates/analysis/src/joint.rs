@@ -1,0 +1,261 @@
+//! One estimate of everything on a channel whose white variance follows a law: white noise at the law's zero, random walk,
+//! processes, regressors and the law itself, in one likelihood.
+//!
+//! y_t = x_t'b + m_t + sum_j z_jt + e_t with a flat-start random walk m, first-order processes z_j and white noise e of variance
+//! s2 (1 + gamma d_t). Lost readings are missing. The likelihood is exact ([`filter`]); where the white noise went through a
+//! filter, data and columns are divided by its square root in the DCT domain first, which is exact but for the noise within a
+//! filter's memory of a change of the variance. Without a law the DCT-II likelihood of [`crate::fit::likelihood`] is the same one,
+//! and its fit is the joint estimate already.
+
+mod climb;
+mod filter;
+
+use model::effect::Found;
+
+use crate::fit::channel::{Form, Joint, Levels, State, Term};
+use crate::fit::estimate;
+use crate::fit::likelihood::{Noise, least_walk};
+use crate::search::searched::Searched;
+
+use climb::{Peak, climb};
+use filter::{Point, Series};
+
+/// Random walks that coefficients are averaged over, as [`crate::fit::estimate::mixture`] does.
+const WALKS: u32 = 20;
+/// Largest ln(1 + gamma) of a law.
+const MOST_LAW: f64 = 5.0;
+
+/// The joint estimate of a channel under white noise of variance s2 (1 + gamma shape); none where a process of the channel is
+/// no sum of first-order ones.
+pub(crate) fn estimate(s: &Searched<'_>, shape: &[f64], gamma: f64) -> Option<Joint> {
+    let model = Model::of(s, shape)?;
+    let start = model.start(&s.state, shape, gamma);
+    let value = |x: &[f64]| {
+        let (normal, log_det) = model.series.through(&model.point(x));
+        let solution = normal.solved(model.series.free(), log_det);
+        (solution.log_likelihood, solution.white.ln())
+    };
+    let peak = climb(&value, &start, &model.steps(), &model.bounds());
+    let (levels, coordinates) = model.told(&peak);
+    let found = model.found(s, &peak, levels.white, &coordinates);
+    let top = filter::top(shape);
+    let last = peak.x.len() - 1;
+    let law = (
+        (peak.x[last].exp() - 1.0) / top,
+        peak.x[last].exp() / top * peak.error(last),
+    );
+    Some(Joint { levels, law, found })
+}
+
+/// A channel as the filter sees it.
+struct Model<'a> {
+    series: Series<'a>,
+    /// Processes that are added, with their coordinates.
+    processes: Vec<&'a Term>,
+    samples: usize,
+    /// Density at zero frequency of the filter that the white noise goes through: what is slow is divided by it.
+    slow: f64,
+}
+
+impl<'a> Model<'a> {
+    fn of(s: &'a Searched<'_>, shape: &'a [f64]) -> Option<Self> {
+        let (panel, state) = (&s.search.panel, &s.state);
+        let samples = panel.bins.n;
+        let known = |t: &&Term| match &t.form {
+            Form::Covariance(c, theta) => c.poles(theta, samples).is_some(),
+            _ => false,
+        };
+        let processes: Vec<&Term> = state.terms.iter().filter(|t| t.is_process()).collect();
+        if !processes.iter().all(known) {
+            return None;
+        }
+        let density = filter_of(state).map(|only| only.everywhere(&panel.bins));
+        let slow = density.as_ref().and_then(|h| h.get(1)).copied();
+        let numbers: Vec<usize> = std::iter::once(0).chain(state.columns()).collect();
+        let columns = panel.dct.inverse_all(numbers.iter().map(|c| {
+            let mut c = panel.column(*c).to_vec();
+            if let Some(h) = &density {
+                c.iter_mut().zip(h).for_each(|(c, h)| *c /= h.sqrt());
+            }
+            c
+        }));
+        Some(Self {
+            series: Series::new(columns, shape, &s.target.lost),
+            processes,
+            samples,
+            slow: slow.unwrap_or(1.0),
+        })
+    }
+
+    /// Coordinates: ln of the walk, those of the processes, ln(1 + gamma) at the top of the law.
+    fn start(&self, state: &State, shape: &[f64], gamma: f64) -> Vec<f64> {
+        // The search's are over the mean white variance.
+        let mean = 1.0 + gamma * shape.iter().sum::<f64>() / shape.len() as f64;
+        let over = mean.max(f64::MIN_POSITIVE).ln();
+        let law = (1.0 + gamma * filter::top(shape)).max(1e-3).ln();
+        let mut x = vec![state.noise.log_walk + over - self.slow.ln()];
+        for theta in self.processes.iter().map(|t| coordinates(t)) {
+            x.push(theta[0] + over - self.slow.ln());
+            x.extend(&theta[1..]);
+        }
+        x.push(law);
+        let bounds = self.bounds();
+        x.iter()
+            .zip(bounds)
+            .map(|(v, b)| v.clamp(b.0, b.1))
+            .collect()
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        let n = self.samples;
+        let all = self.processes.iter().flat_map(|t| match &t.form {
+            Form::Covariance(c, _) => c.bounds(n),
+            _ => vec![],
+        });
+        let walk = std::iter::once((least_walk(n), 6.0));
+        walk.chain(all).chain([(-MOST_LAW, MOST_LAW)]).collect()
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        let mut steps = vec![0.1; self.bounds().len()];
+        if let Some(law) = steps.last_mut() {
+            *law = 0.02;
+        }
+        steps
+    }
+
+    fn point(&self, x: &[f64]) -> Point {
+        let mut rest = &x[1..];
+        let mut poles = vec![];
+        for t in &self.processes {
+            let Form::Covariance(c, theta) = &t.form else {
+                continue;
+            };
+            let (own, tail) = rest.split_at(theta.len());
+            rest = tail;
+            poles.extend(c.poles(own, self.samples).unwrap_or_default());
+        }
+        Point {
+            log_walk: x[0],
+            poles,
+            law: rest.first().map_or(0.0, |v| v.exp() - 1.0),
+        }
+    }
+
+    /// The noise at the peak, and the coordinates of the processes with their errors.
+    fn told(&self, peak: &Peak) -> (Levels, Vec<(f64, f64)>) {
+        let slow = self.slow.ln();
+        let levels = Levels {
+            white: peak.log_scale.exp(),
+            white_error: peak.scale_error(self.series.free(), None),
+            log_walk: peak.x[0] + slow,
+            walk_error: 0.5 * peak.scale_error(self.series.free(), Some(0)),
+        };
+        let mut at = 1;
+        let mut all = vec![];
+        for theta in self.processes.iter().map(|t| coordinates(t)) {
+            // A size over the white variance is told as a size.
+            all.push((
+                peak.x[at] + slow,
+                peak.scale_error(self.series.free(), Some(at)),
+            ));
+            all.extend((at + 1..at + theta.len()).map(|i| (peak.x[i], peak.error(i))));
+            at += theta.len();
+        }
+        (levels, all)
+    }
+
+    /// Coefficients of the columns with standard errors, averaged over the random walk (flat in its size, restricted likelihood).
+    fn coefficients(&self, peak: &Peak) -> Vec<(f64, f64)> {
+        let count = self.series.columns();
+        if count == 0 {
+            return vec![];
+        }
+        let low = least_walk(self.samples);
+        let high = (peak.x[0] + 4.0).max(low + 14.0);
+        let step = (high - low) / f64::from(WALKS);
+        let all = (0..=WALKS).map(|i| {
+            let mut x = peak.x.clone();
+            x[0] = low + step * f64::from(i);
+            let (normal, log_det) = self.series.through(&self.point(&x));
+            let n = self.series.free();
+            let s = normal.solved(n, log_det);
+            let free = n - count as f64;
+            let l = -0.5 * (free * s.rss.ln() + log_det + s.log_det_normal) + 0.5 * x[0];
+            (l, s)
+        });
+        estimate::averaged(&estimate::normalised(all.collect()), count)
+    }
+
+    /// What was found for each term. A shape's coordinate, and with it its columns', is the search's.
+    fn found(
+        &self,
+        s: &Searched<'_>,
+        peak: &Peak,
+        white: f64,
+        coordinates: &[(f64, f64)],
+    ) -> Vec<Found> {
+        let beta = self.coefficients(peak);
+        let (mut column, mut coordinate) = (0, 0);
+        let each = s.state.terms.iter().zip(&s.found).map(|(t, before)| {
+            let mut found = before.clone();
+            let own = &beta[column..column + t.columns.len()];
+            column += t.columns.len();
+            match &t.form {
+                Form::Covariance(_, theta) if t.is_process() => {
+                    found.white_sigma = white.sqrt();
+                    if t.stated.is_none() {
+                        found.coefficients =
+                            coordinates[coordinate..coordinate + theta.len()].to_vec();
+                    }
+                    coordinate += theta.len();
+                }
+                Form::Covariance(..) | Form::Shaped(..) => {}
+                _ if t.stated.is_none() => found.coefficients = own.to_vec(),
+                _ => {}
+            }
+            found
+        });
+        each.collect()
+    }
+}
+
+fn coordinates(t: &Term) -> &[f64] {
+    match &t.form {
+        Form::Covariance(_, theta) => theta,
+        _ => &[],
+    }
+}
+
+/// The filter that the white noise goes through, where there is one.
+fn filter_of(state: &State) -> Option<Noise> {
+    let filters = state.noise.terms.iter().filter(|t| t.0.filters_white());
+    let terms: Vec<_> = filters.cloned().collect();
+    (!terms.is_empty()).then_some(Noise {
+        log_walk: f64::NEG_INFINITY,
+        terms,
+    })
+}
+
+/// The noise of a state whose white variance is the same throughout.
+pub(crate) fn levels_of(s: &Searched<'_>, state: &State) -> Levels {
+    let n = s.search.panel.bins.n as f64;
+    let errors = estimate::noise_errors(&s.search.panel, state);
+    Levels {
+        white: state.solution.white,
+        white_error: (2.0 / n).sqrt() * state.wider.first().unwrap_or(&1.0),
+        log_walk: state.noise.log_walk,
+        walk_error: errors.first().copied().unwrap_or(f64::NAN) / 2.0,
+    }
+}
+
+/// The noise at the zero of a law where no joint estimate can be made: that of the state, whose white variance is the mean.
+pub(crate) fn levels_under(s: &Searched<'_>, shape: &[f64], gamma: f64) -> Levels {
+    let mean = 1.0 + gamma * shape.iter().sum::<f64>() / shape.len() as f64;
+    let all = levels_of(s, &s.state);
+    Levels {
+        white: all.white / mean.max(f64::MIN_POSITIVE),
+        log_walk: all.log_walk + mean.max(f64::MIN_POSITIVE).ln(),
+        ..all
+    }
+}

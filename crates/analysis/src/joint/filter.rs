@@ -1,0 +1,175 @@
+//! The filter of a random walk and first-order processes in white noise of a variance that changes, through which several
+//! series go by the same gains.
+
+use crate::fit::likelihood::Normal;
+
+/// Variance of the walk before the first reading, over the white one: as good as flat.
+const FLAT: f64 = 1e8;
+
+/// Largest value of a law's shape.
+pub(super) fn top(shape: &[f64]) -> f64 {
+    shape
+        .iter()
+        .copied()
+        .fold(0.0, f64::max)
+        .max(f64::MIN_POSITIVE)
+}
+
+/// Shape of the noise in units of the white variance at the law's zero.
+pub(super) struct Point {
+    /// ln of the step variance of the walk.
+    pub log_walk: f64,
+    /// Variance and pole of each first-order process.
+    pub poles: Vec<(f64, f64)>,
+    /// Increase of the white variance at the top of the law.
+    pub law: f64,
+}
+
+/// The data, the columns that may explain them, and the law's shape.
+pub(super) struct Series<'a> {
+    /// Values by sample: the data, then the columns.
+    values: Vec<f64>,
+    width: usize,
+    /// What a law adds, 1 at its top.
+    shape: &'a [f64],
+    top: f64,
+    /// Whether a sample was read.
+    read: Vec<bool>,
+    /// Samples that were.
+    count: usize,
+}
+
+impl<'a> Series<'a> {
+    /// The data first, then the columns; `lost` samples were not read.
+    pub(super) fn new(
+        columns: impl Iterator<Item = Vec<f64>>,
+        shape: &'a [f64],
+        lost: &[usize],
+    ) -> Self {
+        let columns: Vec<Vec<f64>> = columns.collect();
+        let (width, n) = (columns.len(), shape.len());
+        let mut values = vec![0.0; width * n];
+        for (j, column) in columns.iter().enumerate() {
+            // The level is the walk's: what is far from zero costs digits.
+            let first = column.first().copied().unwrap_or(0.0);
+            for (row, v) in values.chunks_exact_mut(width).zip(column) {
+                row[j] = v - first;
+            }
+        }
+        let mut read = vec![true; n];
+        lost.iter().for_each(|i| read[*i] = false);
+        let count = read.iter().filter(|r| **r).count();
+        Self {
+            values,
+            width,
+            shape,
+            top: top(shape),
+            read,
+            count,
+        }
+    }
+
+    /// Columns beside the data.
+    pub(super) fn columns(&self) -> usize {
+        self.width - 1
+    }
+
+    /// Innovations that count: the first reading tells the level.
+    pub(super) fn free(&self) -> f64 {
+        self.count as f64 - 1.0
+    }
+
+    /// Sums of products of the innovations over their variances, and the sum of the logarithms of these.
+    pub(super) fn through(&self, at: &Point) -> (Normal, f64) {
+        let (w, d) = (self.width, 1 + at.poles.len());
+        let (step, law) = (at.log_walk.exp(), at.law / self.top);
+        let mut p = vec![0.0; d * d];
+        p[0] = FLAT;
+        for (j, (variance, _)) in at.poles.iter().enumerate() {
+            p[(j + 1) * (d + 1)] = *variance;
+        }
+        // State by component: that of every series.
+        let mut state = vec![0.0; d * w];
+        let (mut sums, mut nu, mut row_sums) = (vec![0.0; w * w], vec![0.0; w], vec![0.0; d]);
+        let (mut logs, mut product) = (0.0, 1.0f64);
+        let mut begun = false;
+        let rows = self.values.chunks_exact(w).zip(self.shape).zip(&self.read);
+        for ((row, shape), read) in rows {
+            if begun || !at.poles.is_empty() {
+                predict(
+                    &mut p,
+                    &mut state,
+                    step * f64::from(u8::from(begun)),
+                    &at.poles,
+                    w,
+                );
+            }
+            if !*read {
+                continue;
+            }
+            for (sum, p) in row_sums.iter_mut().zip(p.chunks_exact(d)) {
+                *sum = p.iter().sum();
+            }
+            let s = row_sums.iter().sum::<f64>() + (1.0 + law * shape).max(f64::MIN_POSITIVE);
+            nu.copy_from_slice(row);
+            for component in state.chunks_exact(w) {
+                nu.iter_mut().zip(component).for_each(|(nu, m)| *nu -= m);
+            }
+            for (component, sum) in state.chunks_exact_mut(w).zip(&row_sums) {
+                let gain = sum / s;
+                component
+                    .iter_mut()
+                    .zip(&nu)
+                    .for_each(|(m, nu)| *m += gain * nu);
+            }
+            for (p, own) in p.chunks_exact_mut(d).zip(&row_sums) {
+                p.iter_mut()
+                    .zip(&row_sums)
+                    .for_each(|(p, other)| *p -= own * other / s);
+            }
+            if begun {
+                for (i, a) in nu.iter().enumerate() {
+                    let by = a / s;
+                    let sums = &mut sums[i * w..(i + 1) * w];
+                    sums[i..]
+                        .iter_mut()
+                        .zip(&nu[i..])
+                        .for_each(|(sum, b)| *sum += by * b);
+                }
+                // A logarithm for many: their product stays within the numbers.
+                product *= s;
+                if !(1e-200..1e200).contains(&product) {
+                    logs += product.ln();
+                    product = 1.0;
+                }
+            }
+            begun = true;
+        }
+        (normal(&sums, w), logs + product.ln())
+    }
+}
+
+/// Everything one sample on: the walk by its step variance, the processes by their poles.
+fn predict(p: &mut [f64], state: &mut [f64], step: f64, poles: &[(f64, f64)], w: usize) {
+    p[0] += step;
+    let d = 1 + poles.len();
+    for (j, (variance, pole)) in poles.iter().enumerate() {
+        let j = j + 1;
+        state[j * w..(j + 1) * w]
+            .iter_mut()
+            .for_each(|m| *m *= pole);
+        p[j * d..(j + 1) * d].iter_mut().for_each(|p| *p *= pole);
+        p[j..].iter_mut().step_by(d).for_each(|p| *p *= pole);
+        p[j * (d + 1)] += variance * (1.0 - pole * pole);
+    }
+}
+
+/// The same of sums whose lower half is left out.
+fn normal(sums: &[f64], w: usize) -> Normal {
+    let at = |i: usize, j: usize| sums[i.min(j) * w + i.max(j)];
+    Normal {
+        total: at(0, 0),
+        right: (1..w).map(|j| at(0, j)).collect(),
+        matrix: (1..w).map(|i| (1..w).map(|j| at(i, j)).collect()).collect(),
+    }
+}

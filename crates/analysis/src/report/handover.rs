@@ -1,0 +1,297 @@
+//! The model that is handed over: of everything that was found the parameters under which a simulation is the record's.
+//! What each of them is to a simulation, docs/model-file.md states.
+
+use std::collections::BTreeMap;
+
+use model::effect::{Effect, Hypothesis, Parameters, Stage};
+use model::effects::effect;
+use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
+
+use crate::attribute::events;
+use crate::fit::channel::{Levels, State};
+use crate::ingest::types::Grid;
+use crate::joint::{levels_of, levels_under};
+use crate::result::{Finding, Parameter};
+use crate::search::searched::Searched;
+
+/// Least part of the white variance that is an axis' own.
+const LEAST_OWN: f64 = 1e-6;
+
+/// The model that the record was held against.
+pub(crate) fn baseline_model(
+    searched: &[Searched<'_>],
+    grid: &Grid,
+    fitted_on: FittedOn,
+) -> ModelFile {
+    model(searched, grid, &|s| baseline(s, grid), fitted_on)
+}
+
+/// The model extended by the findings `named`.
+pub(crate) fn extended_model(
+    searched: &[Searched<'_>],
+    grid: &Grid,
+    named: &[&Finding],
+    fitted_on: FittedOn,
+) -> ModelFile {
+    let mut extended = model(searched, grid, &|s| beside(s, named, grid), fitted_on);
+    extended.effects = effects_of(named);
+    for (channel, s) in extended.channels.iter_mut().zip(searched) {
+        let lost = s.target.lost.len() as f64 / grid.n as f64;
+        before_counts(channel, &extended.effects, grid.rate_hz, lost);
+    }
+    extended
+}
+
+/// The noise and bias of each channel of a model.
+pub(crate) fn parameters_of(model: &ModelFile) -> BTreeMap<String, Parameters> {
+    let own = |c: &ChannelModel| (c.name.clone(), c.baseline.clone());
+    model.channels.iter().map(own).collect()
+}
+
+fn model(
+    searched: &[Searched<'_>],
+    grid: &Grid,
+    of: &dyn Fn(&Searched<'_>) -> Parameters,
+    fitted_on: FittedOn,
+) -> ModelFile {
+    let channel = |s: &Searched<'_>| ChannelModel {
+        name: s.target.name.clone(),
+        unit: s.target.unit.clone(),
+        lsb: s.target.lsb,
+        baseline: of(s),
+    };
+    ModelFile {
+        stand: "fitted".into(),
+        rate_hz: grid.rate_hz,
+        fitted_on: Some(fitted_on),
+        excitation: BTreeMap::new(),
+        channels: searched.iter().map(channel).collect(),
+        effects: vec![],
+    }
+}
+
+/// The baseline that the record was held against.
+fn baseline(s: &Searched<'_>, grid: &Grid) -> Parameters {
+    parameters(s, &s.baseline, &levels_of(s, &s.baseline), grid)
+}
+
+/// The baseline beside the causes `named`.
+fn beside(s: &Searched<'_>, named: &[&Finding], grid: &Grid) -> Parameters {
+    let on_it = |f: &&&Finding| f.channels.contains(&s.target.name);
+    let law = s.variance.as_ref();
+    let law = law.filter(|v| named.iter().filter(on_it).any(|f| f.cause == v.effect.id()));
+    let mut levels = match (law, &s.joint) {
+        (None, _) => levels_of(s, &s.state),
+        (Some(_), Some(joint)) => joint.levels,
+        (Some(v), None) => levels_under(s, &v.shape, v.found.coefficients[0].0),
+    };
+    let mut common = s.search.candidates.iter();
+    let common = common.find(|c| matches!(c.hypothesis, Hypothesis::Common));
+    let common = common.map(|c| c.effect.id());
+    let mut shared = named
+        .iter()
+        .filter(on_it)
+        .filter(|f| Some(f.cause.as_str()) == common);
+    if let Some(sigma) = shared.next().and_then(|f| f.parameters.get("sigma")) {
+        levels = own_part(&levels, sigma, grid.n as f64);
+    }
+    parameters(s, &s.state, &levels, grid)
+}
+
+/// The noise of an axis without what it shares with others.
+fn own_part(all: &Levels, sigma: &Parameter, n: f64) -> Levels {
+    let shared = sigma.value * sigma.value;
+    let shared_error = 2.0 * sigma.value * sigma.std_error.unwrap_or(0.0);
+    let own = (all.white - shared).max(LEAST_OWN * all.white);
+    // Of jointly normal values, cov(aa, ab) = 2 E[aa] E[ab].
+    let error = (all.white * all.white_error).powi(2) + shared_error * shared_error
+        - 2.0 * 2.0 * all.white * shared / n;
+    let white_error = error.max(0.0).sqrt() / own;
+    let log_walk = all.log_walk + (all.white / own).ln();
+    Levels {
+        white: own,
+        white_error,
+        log_walk,
+        ..*all
+    }
+}
+
+fn parameters(s: &Searched<'_>, state: &State, levels: &Levels, grid: &Grid) -> Parameters {
+    let (unit, rate) = (s.target.unit.as_str(), grid.rate_hz);
+    let white = levels.white.sqrt();
+    let n = grid.n as f64;
+    let walk = white * (levels.log_walk / 2.0).exp() * rate.sqrt();
+    let (density, density_unit) = if unit == "deg/s" {
+        (60.0 / rate.sqrt(), "deg/sqrt(h)".to_owned())
+    } else {
+        (1.0 / rate.sqrt(), format!("{unit}*sqrt(s)"))
+    };
+    let mean_error = (state.solution.white / n + walk * walk * n / rate / 3.0).sqrt();
+    let named = |name: &str, value, error, unit: &str| {
+        (name.to_owned(), Parameter::estimated(value, error, unit))
+    };
+    [
+        named("bias", bias(s, state, grid), mean_error, unit),
+        named(
+            "angle_random_walk",
+            white * density,
+            white * density * levels.white_error / 2.0,
+            &density_unit,
+        ),
+        named(
+            "rate_random_walk",
+            walk,
+            walk * levels.walk_error,
+            &format!("{unit}/sqrt(s)"),
+        ),
+    ]
+    .into()
+}
+
+/// The mean of the readings less that of what the terms add.
+fn bias(s: &Searched<'_>, state: &State, grid: &Grid) -> f64 {
+    let n = grid.n as f64;
+    let mean = s.target.y.iter().sum::<f64>() / n;
+    let beta = state.terms.iter().zip(&s.found).flat_map(|(t, found)| {
+        let own = t.columns.iter().zip(&found.coefficients);
+        own.map(|(c, (beta, _))| (*c, *beta))
+    });
+    let added = beta.filter_map(|(c, beta)| {
+        let first = s.search.panel.first(c, 1);
+        first.first().map(|sum| beta * sum / n.sqrt())
+    });
+    mean - added.sum::<f64>()
+}
+
+/// Samples of a simulation that tells what a fault of the counts adds, and how often it is made.
+const SAMPLES: f64 = 20_000.0;
+const TIMES: usize = 8;
+
+/// The channel without what faults of the counts among the `effects` add by themselves: noise and level that readings of the
+/// noise and level `channel` has come of, by simulations with them and without, of the same random numbers. What the audit
+/// took out, a part `lost` of the readings, was not fitted.
+fn before_counts(channel: &mut ChannelModel, effects: &[EffectModel], rate_hz: f64, lost: f64) {
+    let faults = effects.iter().filter(|e| {
+        let on_counts = |known: &&dyn Effect| {
+            known.stage() == Stage::Counts && known.coarsens(&e.parameters) == 1.0
+        };
+        e.channels.contains(&channel.name) && effect(&e.cause).is_some_and(|k| on_counts(&k))
+    });
+    let mut model = ModelFile {
+        rate_hz,
+        effects: faults.cloned().collect(),
+        ..ModelFile::default()
+    };
+    model
+        .effects
+        .iter_mut()
+        .for_each(|e| e.channels = vec![channel.name.clone()]);
+    if model.effects.is_empty() {
+        return;
+    }
+    let mut own = channel.clone();
+    own.baseline.remove("rate_random_walk");
+    for _ in 0..TIMES {
+        let Some(added) = added_by_counts(&mut model, &own, lost) else {
+            return;
+        };
+        for (name, by) in [("bias", added.0), ("angle_random_walk", added.1)] {
+            let (Some(own), Some(read)) = (own.baseline.get_mut(name), channel.baseline.get(name))
+            else {
+                return;
+            };
+            let wanted = if name == "bias" {
+                read.value - by
+            } else {
+                read.value / by
+            };
+            own.value = 0.5 * (own.value + wanted);
+        }
+    }
+    for name in ["bias", "angle_random_walk"] {
+        if let (Some(to), Some(of)) = (channel.baseline.get_mut(name), own.baseline.get(name)) {
+            to.value = of.value;
+        }
+    }
+}
+
+/// What the effects of a model add to the mean of a channel, and the factor by which they make its noise larger; none where
+/// most of the readings that they change are taken out, or nothing can be simulated.
+fn added_by_counts(model: &mut ModelFile, channel: &ChannelModel, lost: f64) -> Option<(f64, f64)> {
+    model.channels = vec![channel.clone()];
+    let effects = std::mem::take(&mut model.effects);
+    let run = |model: &ModelFile| {
+        let record = model::simulate(model, SAMPLES / model.rate_hz, model.rate_hz, 1).ok()?;
+        let own = record.channels.into_iter().find(|c| c.name == channel.name);
+        own.map(|c| c.values)
+    };
+    let without = run(model);
+    model.effects = effects;
+    let (without, with) = (without?, run(model)?);
+    let count = with.len() as f64;
+    let changed = with.iter().zip(&without).filter(|(a, b)| a != b).count() as f64 / count;
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / count;
+    let power = |x: &[f64]| x.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>();
+    let factor = (power(&with) / power(&without)).sqrt();
+    let told = lost < 0.5 * changed && factor.is_finite() && factor > 0.0;
+    told.then(|| (mean(&with) - mean(&without), factor))
+}
+
+/// Gives far readings their size: the root of the mean square of how far they lie from what the model expects there, less that
+/// of the noise.
+pub(crate) fn size_outliers(findings: &mut [Finding], searched: &[Searched<'_>]) {
+    for f in findings.iter_mut().filter(|f| f.cause == "outliers") {
+        let own = searched
+            .iter()
+            .find(|s| f.channels == [s.target.name.as_str()]);
+        let Some(s) = own.filter(|s| !s.target.moving) else {
+            continue;
+        };
+        let sizes = events::sizes(s, &f.times_s);
+        if sizes.is_empty() {
+            continue;
+        }
+        let count = sizes.len() as f64;
+        let square = sizes.iter().map(|v| v * v).sum::<f64>() / count;
+        let white = s.state.solution.white;
+        let size = (square - white).max(0.0).sqrt();
+        let size = Parameter::estimated(size, (white / count).sqrt(), &s.target.unit);
+        f.parameters.insert("size".into(), size);
+    }
+}
+
+/// The effects of the extended model: the causes, and what stands for the unexplained in it.
+fn effects_of(findings: &[&Finding]) -> Vec<EffectModel> {
+    let mut all = vec![];
+    for f in findings {
+        let Some(e) = effect(&f.cause) else { continue };
+        let known = |p: &Parameters| -> Parameters {
+            p.iter()
+                .filter(|(k, _)| e.parameters().iter().any(|s| s.name == *k))
+                .map(|(k, v)| (k.clone(), v.clone()))
+                .collect()
+        };
+        if f.per_channel.is_empty() {
+            let whole = f.components.is_empty().then_some(&f.parameters);
+            all.extend(whole.into_iter().chain(&f.components).map(|p| EffectModel {
+                cause: f.cause.clone(),
+                channels: f.channels.clone(),
+                parameters: known(p),
+            }));
+        }
+        // What is the same to the last digit on several channels is one event on all of them.
+        let first = all.len();
+        for (channel, p) in &f.per_channel {
+            let parameters = known(p);
+            match all[first..].iter_mut().find(|e| e.parameters == parameters) {
+                Some(same) => same.channels.push(channel.clone()),
+                None => all.push(EffectModel {
+                    cause: f.cause.clone(),
+                    channels: vec![channel.clone()],
+                    parameters,
+                }),
+            }
+        }
+    }
+    all
+}
