@@ -176,6 +176,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         diagnosis: Diagnosis {
             format: DIAGNOSIS_FORMAT.into(),
             baseline: handover::parameters_of(&baseline_model),
+            extended: handover::parameters_of(&extended_model),
             detection_limits: detection_limits::of_not_found(told.limits, &told.findings),
             verdict,
             replicates,

@@ -184,6 +184,9 @@ pub struct Diagnosis {
     pub input: Input,
     /// By channel: `angle_random_walk`, `rate_random_walk`, `bias` and others.
     pub baseline: BTreeMap<String, BTreeMap<String, Parameter>>,
+    /// The same of the extended model: the noise that is left after the causes.
+    #[serde(default)]
+    pub extended: BTreeMap<String, BTreeMap<String, Parameter>>,
     /// Omnibus checks.
     pub checks: Vec<Check>,
     /// Causes found.

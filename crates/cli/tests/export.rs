@@ -51,6 +51,8 @@ fn imu() -> ImuNoise {
             axis("acc_z", 3.4e-3, 4.0e-4, 6.0e-5),
         ],
         remarks: Vec::new(),
+        causes: Vec::new(),
+        is_after_causes: false,
     }
 }
 

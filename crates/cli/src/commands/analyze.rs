@@ -6,6 +6,7 @@ use analysis::AnalyzeOptions;
 use analysis::allan::{Deviation, TauGrid};
 use analysis::analyze::{Analysis, ChannelAnalysis, Interval, NoiseParameters};
 use clap::Args;
+use imu_stand::export::noise::may_have_causes;
 use imu_stand::report::plot::{number, tidy};
 use imu_stand::text;
 use miette::Result;
@@ -15,7 +16,7 @@ use super::{Input, Outputs};
 /// What `analyze` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// The capture: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .txt
+    /// The capture: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .mcap, .bag, .ulg, .txt
     capture: PathBuf,
     #[command(flatten)]
     input: Input,
@@ -145,6 +146,7 @@ fn print(analysis: &Analysis) {
             }
         }
     }
+    point_to_diagnosis(analysis);
     if let Some(attitude) = &analysis.attitude
         && let Some(last) = attitude.points.last()
     {
@@ -167,6 +169,29 @@ fn print(analysis: &Analysis) {
             "{}",
             text::item(&format!("{}: ", channels.join(", ")), note)
         );
+    }
+}
+
+/// Where the terms stand for something else, or may: who finds out.
+fn point_to_diagnosis(analysis: &Analysis) {
+    let names = |is: &dyn Fn(&ChannelAnalysis) -> bool| {
+        let channels = analysis.channels.iter().filter(|(_, c)| is(c));
+        let names: Vec<&str> = channels.map(|(name, _)| name.as_str()).collect();
+        names.join(", ")
+    };
+    let is_other = |c: &ChannelAnalysis| {
+        c.parameters.angle_random_walk.high.is_some() && c.parameters_hold_from_s.is_none()
+    };
+    let others = names(&is_other);
+    if !others.is_empty() {
+        let what = "its curve is not that of the terms; `imu-stand diagnose` says what is in it";
+        say!("{}", text::item(&format!("{others}: "), what));
+    }
+    let rising = names(&|c| !is_other(c) && may_have_causes(c));
+    if !rising.is_empty() {
+        let what = "the slow part stands under K or R, and causes (temperature, supply, motor) may be in it; `imu-stand \
+                    diagnose` tells, and `export` takes its result";
+        say!("{}", text::item(&format!("{rising}: "), what));
     }
 }
 

@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use analysis::AnalyzeOptions;
-use analysis::analyze::{ANALYSIS_FORMAT, Analysis};
+use analysis::analyze::Analysis;
 use clap::{Args, ValueEnum};
 use imu_stand::export::data::{DataError, Table};
 use imu_stand::export::noise::{Consumer, ImuNoise};
+use imu_stand::export::px4::EKF2_RATE_HZ;
 use miette::Result;
 
 use super::Input;
+use super::export_source::{self, Source};
 use super::outputs::{self, Outputs};
 
 /// Into what.
@@ -31,14 +33,19 @@ pub enum To {
     Gz,
     /// Noise: the dictionary of an IMU in gnss-ins-sim
     GnssInsSim,
+    /// Noise: parameters of PX4's EKF2, and the thermal calibration of its gyro
+    Px4,
 }
 
 /// What `export` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// A capture; for noise also an analysis (`analyze --json`)
+    /// A capture; for noise also a diagnosis (`diagnose --json`), a model (`--model-out`) or an analysis (`analyze --json`)
     file: PathBuf,
-    /// Into what; without it by the ending of --out: .csv, .csv.gz, .npz, .parquet, .yaml (Kalibr), .m, .sdf, .py
+    /// Noise: a capture or analysis beside a diagnosis or model, for the accelerometers
+    beside: Option<PathBuf>,
+    /// Into what; without it by the ending of --out: .csv, .csv.gz, .npz, .parquet, .yaml (Kalibr), .m, .sdf, .py, .params
+    /// (PX4)
     #[arg(long, value_enum)]
     to: Option<To>,
     /// The file to write; noise goes to standard output without it
@@ -74,6 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         To::Matlab => Consumer::Matlab,
         To::Gz => Consumer::Gz,
         To::GnssInsSim => Consumer::GnssInsSim,
+        To::Px4 => Consumer::Px4,
     };
     noise(arguments, consumer)
 }
@@ -90,6 +98,7 @@ fn by_ending(out: &Path) -> Result<To> {
         (".m", To::Matlab),
         (".sdf", To::Gz),
         (".py", To::GnssInsSim),
+        (".params", To::Px4),
     ];
     match endings.iter().find(|(ending, _)| name.ends_with(ending)) {
         Some((_, to)) => Ok(*to),
@@ -101,6 +110,13 @@ fn by_ending(out: &Path) -> Result<To> {
 }
 
 fn data(arguments: &Arguments, to: To) -> Result<()> {
+    if let Some(beside) = &arguments.beside {
+        miette::bail!(
+            help = "export them one by one",
+            "data are of one capture: {} is a second file",
+            beside.display()
+        );
+    }
     let Some(out) = &arguments.out else {
         miette::bail!(help = "add `--out FILE`", "data are written to a file");
     };
@@ -137,9 +153,9 @@ fn data(arguments: &Arguments, to: To) -> Result<()> {
 }
 
 fn noise(arguments: &Arguments, consumer: Consumer) -> Result<()> {
-    Outputs::beside([&arguments.file]).result("--out", arguments.out.as_ref())?;
-    let analysis = analysis(arguments)?;
-    let noise = ImuNoise::of(&analysis);
+    let inputs = std::iter::once(&arguments.file).chain(&arguments.beside);
+    Outputs::beside(inputs).result("--out", arguments.out.as_ref())?;
+    let noise = imu_noise(arguments)?;
     if noise.gyro.is_empty() && noise.acc.is_empty() {
         miette::bail!(
             help = "map the columns and say the units: `--columns gyro_x=gx --units gyro=deg/s,acc=m/s2`",
@@ -147,7 +163,12 @@ fn noise(arguments: &Arguments, consumer: Consumer) -> Result<()> {
             arguments.file.display()
         );
     }
-    let rate = arguments.at_rate.unwrap_or(noise.rate_hz);
+    let own = match consumer {
+        // The filter's rate, which no record of a sensor knows.
+        Consumer::Px4 => EKF2_RATE_HZ,
+        _ => noise.rate_hz,
+    };
+    let rate = arguments.at_rate.unwrap_or(own);
     if let Some((axis, term)) = noise.lacks(consumer) {
         miette::bail!(
             help = "record for longer: `imu-stand plan` says how long; `imu-stand analyze` says what this record shows",
@@ -168,33 +189,59 @@ fn noise(arguments: &Arguments, consumer: Consumer) -> Result<()> {
     Ok(())
 }
 
-/// From a file of `analyze --json`, or made of a capture.
-fn analysis(arguments: &Arguments) -> Result<Analysis> {
-    if arguments.file.extension().is_some_and(|e| e == "json") {
-        let text = super::read_text(&arguments.file)?;
-        let analysis: Analysis = serde_json::from_str(&text).map_err(|error| {
-            miette::miette!(
-                help = "`imu-stand analyze C --json A` writes one",
-                "{} is no analysis: {error}",
-                arguments.file.display()
-            )
-        })?;
-        if analysis.format != ANALYSIS_FORMAT {
-            miette::bail!(
-                help = "`imu-stand analyze C --json A` writes one",
-                "{}: the format is `{}`, expected `{ANALYSIS_FORMAT}`",
-                arguments.file.display(),
-                analysis.format
-            );
-        }
-        return Ok(analysis);
-    }
-    let read = arguments.input.read(&arguments.file)?;
-    super::tell(&arguments.file, &read.record);
+/// What the files say: of the gyros a diagnosis or model where there is one, of the rest the capture or analysis.
+fn imu_noise(arguments: &Arguments) -> Result<ImuNoise> {
+    let first = export_source::recognise(&arguments.file)?;
+    let Some(beside) = &arguments.beside else {
+        return of_one(arguments, &arguments.file, first, None);
+    };
+    let second = export_source::recognise(beside)?;
+    let (after, rest) = match (first.is_after_causes(), second.is_after_causes()) {
+        (true, false) => ((&arguments.file, first), (beside, second)),
+        (false, true) => ((beside, second), (&arguments.file, first)),
+        _ => miette::bail!(
+            help = "name a diagnosis or model for the gyros, and a capture or analysis for the accelerometers",
+            "{} and {}: two files of one kind",
+            arguments.file.display(),
+            beside.display()
+        ),
+    };
+    let mut noise = of_one(arguments, after.0, after.1, None)?;
+    let others = of_one(arguments, rest.0, rest.1, Some("acc"))?;
+    noise.acc = others.acc;
+    noise.remarks.extend(others.remarks);
+    Ok(noise)
+}
+
+/// What one file says; with `only`, of the channels whose names begin so.
+fn of_one(
+    arguments: &Arguments,
+    path: &Path,
+    source: Source,
+    only: Option<&str>,
+) -> Result<ImuNoise> {
+    let is_wanted = |name: &str| only.is_none_or(|start| name.starts_with(start));
+    let mut analysis = match source {
+        Source::Ready(noise) => return Ok(*noise),
+        Source::Analysis(analysis) => *analysis,
+        Source::Capture => analyzed(arguments, path, &is_wanted)?,
+    };
+    analysis.channels.retain(|name, _| is_wanted(name));
+    Ok(ImuNoise::of(&analysis))
+}
+
+fn analyzed(
+    arguments: &Arguments,
+    path: &Path,
+    is_wanted: &dyn Fn(&str) -> bool,
+) -> Result<Analysis> {
+    let mut read = arguments.input.read(path)?;
+    super::tell(path, &read.record);
+    read.record.channels.retain(|c| is_wanted(&c.name));
     let options = AnalyzeOptions {
         seed: arguments.seed,
         rate_hz: None,
-        file: super::name(&arguments.file),
+        file: super::name(path),
         ..AnalyzeOptions::default()
     };
     analysis::analyze(&read.record, &options).map_err(super::explain)

@@ -9,6 +9,8 @@ use std::fmt::Write;
 
 use analysis::analyze::{Analysis, ChannelAnalysis, Interval};
 
+use super::causes::Cause;
+
 /// Who takes the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Consumer {
@@ -22,12 +24,14 @@ pub enum Consumer {
     Gz,
     /// gnss-ins-sim: the dictionary of an IMU
     GnssInsSim,
+    /// PX4: noise of EKF2, thermal calibration of the gyro
+    Px4,
 }
 
 /// Reported units to SI.
-const DEG: f64 = std::f64::consts::PI / 180.0;
+pub(super) const DEG: f64 = std::f64::consts::PI / 180.0;
 /// sqrt(s) in sqrt(h).
-const ROOT_HOUR: f64 = 60.0;
+pub(super) const ROOT_HOUR: f64 = 60.0;
 
 /// A figure in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,6 +110,10 @@ pub struct ImuNoise {
     pub acc: Vec<AxisNoise>,
     /// What a reader of the numbers has to know: where the terms do not describe an axis.
     pub remarks: Vec<String>,
+    /// Causes that were found beside the noise, channel by channel.
+    pub causes: Vec<Cause>,
+    /// Whether N and K are those of a diagnosis, after its causes; else causes are in them.
+    pub is_after_causes: bool,
 }
 
 impl ImuNoise {
@@ -135,6 +143,8 @@ impl ImuNoise {
             gyro: of("deg/s", DEG, DEG / 3600.0),
             acc: of("m/s^2", 1.0, 1.0),
             remarks: remarks(analysis),
+            causes: Vec::new(),
+            is_after_causes: false,
         }
     }
 
@@ -142,7 +152,7 @@ impl ImuNoise {
     /// everywhere, the walk where a filter would trust a bias without one.
     #[must_use]
     pub fn lacks(&self, consumer: Consumer) -> Option<(&str, &'static str)> {
-        let is_filter = matches!(consumer, Consumer::Kalibr | Consumer::Vins);
+        let is_filter = matches!(consumer, Consumer::Kalibr | Consumer::Vins | Consumer::Px4);
         let lacks = |axes: &[AxisNoise]| {
             let unknown = |of: fn(&AxisNoise) -> Figure| {
                 let is_unknown = |axis: &AxisNoise| of(axis) == Figure::Unknown;
@@ -169,10 +179,12 @@ impl ImuNoise {
             Consumer::Matlab => self.matlab(rate_hz),
             Consumer::Gz => self.gz(rate_hz),
             Consumer::GnssInsSim => self.gnss_ins_sim(),
+            Consumer::Px4 => self.px4(rate_hz),
         }
     }
 
-    fn origin(&self, comment: &str) -> String {
+    /// Where the numbers come from, what they leave out, and the causes, in lines of comments.
+    pub(super) fn origin(&self, comment: &str, consumer: Consumer) -> String {
         let mut out = format!(
             "{comment} from {}: {:.0} s at {} Hz, by imu-stand {}\n",
             self.file,
@@ -180,7 +192,7 @@ impl ImuNoise {
             tidy(self.rate_hz),
             env!("CARGO_PKG_VERSION")
         );
-        for remark in &self.remarks {
+        for remark in self.remarks.iter().chain(&self.on_causes(consumer)) {
             let _ = writeln!(out, "{comment} {remark}");
         }
         out
@@ -188,7 +200,7 @@ impl ImuNoise {
 
     /// Continuous time, two-sided densities, one number for all axes: their root mean square.
     fn kalibr(&self, rate_hz: f64) -> String {
-        let mut out = self.origin("#");
+        let mut out = self.origin("#", Consumer::Kalibr);
         out.push_str(
             "# Continuous time, two-sided: discrete white noise is density * sqrt(rate), a step of the bias walk / sqrt(rate).\n\
              # One number for all axes: their root mean square. What is not established stands at its 95 % limit.\n\
@@ -234,7 +246,7 @@ impl ImuNoise {
 
     /// Discrete numbers for one rate: VINS integrates them with dt where a density wants sqrt(dt).
     fn vins(&self, rate_hz: f64) -> String {
-        let mut out = self.origin("#");
+        let mut out = self.origin("#", Consumer::Vins);
         let _ = writeln!(
             out,
             "# For {rate_hz} Hz and no other rate. VINS adds dt^2/2 * n^2 to a variance at each step, and dt^2 * w^2 to that of \
@@ -257,7 +269,7 @@ impl ImuNoise {
 
     /// Continuous time; two-sided with NoiseType "single-sided", whose steps are N sqrt(fs) and K / sqrt(fs).
     fn matlab(&self, rate_hz: f64) -> String {
-        let mut out = self.origin("%");
+        let mut out = self.origin("%", Consumer::Matlab);
         out.push_str(
             "% imuSensor scales its noise by sqrt(fs/2) by default (NoiseType \"double-sided\"), which is short of N by sqrt(2);\n\
              % \"single-sided\" scales by sqrt(fs). Where a release has no NoiseType: NoiseDensity * sqrt(2), RandomWalk / sqrt(2).\n\
@@ -303,6 +315,16 @@ impl ImuNoise {
                     remarks.join("; ")
                 );
             }
+            let slopes = axes.iter().map(|axis| self.temperature_slope(&axis.name));
+            let slopes: Vec<f64> = slopes.collect();
+            if slopes.iter().any(|slope| *slope != 0.0) {
+                let slopes: Vec<String> = slopes.iter().map(|s| format!("{s:.6e}")).collect();
+                let _ = writeln!(
+                    out,
+                    "    'TemperatureBias', [{}], ... % {unit}/degC from 25 degC on; imu.Temperature sets the temperature",
+                    slopes.join(" ")
+                );
+            }
             out.push_str("    'NoiseType', 'single-sided');\n");
         }
         out
@@ -312,7 +334,8 @@ impl ImuNoise {
     fn gz(&self, rate_hz: f64) -> String {
         let corr = self.long();
         let mut out = String::from("<!--\n");
-        out.push_str(&self.origin(" "));
+        // Two hyphens would end the comment.
+        out.push_str(&self.origin(" ", Consumer::Gz).replace("--", "- -"));
         let _ = writeln!(
             out,
             "  stddev is per sample, for {rate_hz} Hz and no other rate: N sqrt(rate). dynamic_bias_stddev is K, a density: the bias\n  \
@@ -338,14 +361,20 @@ impl ImuNoise {
                 let _ = writeln!(out, "          <mean>0</mean>");
                 let stddev = axis.white.simulated() * rate_hz.sqrt();
                 let _ = writeln!(out, "          <stddev>{stddev:.6e}</stddev>");
-                if let Figure::Known(walk) = axis.walk {
+                let bias = match (axis.walk, self.process(&axis.name)) {
+                    (Figure::Known(walk), _) => Some((walk, corr)),
+                    // A process of this density has the variance density^2 time / 2.
+                    (_, Some(p)) => Some((
+                        p.sigma * (2.0 / p.correlation_time).sqrt(),
+                        p.correlation_time,
+                    )),
+                    _ => None,
+                };
+                if let Some((density, time)) = bias {
                     let _ = writeln!(
                         out,
-                        "          <dynamic_bias_stddev>{walk:.6e}</dynamic_bias_stddev>"
-                    );
-                    let _ = writeln!(
-                        out,
-                        "          <dynamic_bias_correlation_time>{corr:.0}</dynamic_bias_correlation_time>"
+                        "          <dynamic_bias_stddev>{density:.6e}</dynamic_bias_stddev>\n          \
+                         <dynamic_bias_correlation_time>{time:.6}</dynamic_bias_correlation_time>"
                     );
                 }
                 let _ = writeln!(out, "        </noise>\n      </{letter}>");
@@ -359,7 +388,7 @@ impl ImuNoise {
     /// deg/sqrt(h), deg/h; the bias is a Gauss-Markov process given by its standard deviation.
     fn gnss_ins_sim(&self) -> String {
         let corr = self.long();
-        let mut out = self.origin("#");
+        let mut out = self.origin("#", Consumer::GnssInsSim);
         let _ = writeln!(
             out,
             "# arw and vrw: N, for any rate. gnss-ins-sim has no random walk of the bias, but a Gauss-Markov process with the\n\
@@ -385,8 +414,14 @@ impl ImuNoise {
             };
             let zero = vec!["0.0"; axes.len().max(3)].join(", ");
             let n = list(&|axis| axis.white.simulated() * to_n);
-            let b = list(&|axis| axis.walk.simulated() * (corr / 2.0).sqrt() * to_b);
-            let c = list(&|_| corr);
+            let b = list(&|axis| match self.process(&axis.name) {
+                Some(process) => process.sigma * to_b,
+                None => axis.walk.simulated() * (corr / 2.0).sqrt() * to_b,
+            });
+            let c = list(&|axis| {
+                self.process(&axis.name)
+                    .map_or(corr, |p| p.correlation_time)
+            });
             let _ = writeln!(out, "    '{name}_b': np.array([{zero}]),");
             let _ = writeln!(out, "    '{name}_{noise}': np.array([{n}]),");
             let _ = writeln!(out, "    '{name}_b_stability': np.array([{b}]),");
@@ -419,7 +454,32 @@ fn remarks(analysis: &Analysis) -> Vec<String> {
             )),
             Some(_) => None,
         })
+        .chain(walks(analysis))
         .collect()
+}
+
+/// Whether the slow part of a channel is a random walk or ramp to the analysis, which knows no other name for it: a cause may
+/// be what makes it.
+#[must_use]
+pub fn may_have_causes(channel: &ChannelAnalysis) -> bool {
+    let p = &channel.parameters;
+    p.rate_random_walk.value.is_some() || p.rate_ramp.value.is_some()
+}
+
+/// Says of which axes.
+fn walks(analysis: &Analysis) -> Option<String> {
+    let channels = analysis.channels.iter();
+    let names: Vec<&str> = channels
+        .filter(|(_, c)| may_have_causes(c))
+        .map(|(name, _)| name.as_str())
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: the slow part stands here as a random walk, and causes (temperature, supply, motor) may be in it; `imu-stand \
+             diagnose` finds them, and `export` of its model or JSON is without them",
+            names.join(", ")
+        )
+    })
 }
 
 /// A rate as a person would write it: a sample interval that was measured or computed has a last digit of its own.
@@ -428,7 +488,7 @@ fn tidy(rate_hz: f64) -> f64 {
 }
 
 /// Root mean square of those that are known; 0 where none is.
-fn rms(values: impl Iterator<Item = Option<f64>>) -> f64 {
+pub(super) fn rms(values: impl Iterator<Item = Option<f64>>) -> f64 {
     let known: Vec<f64> = values.flatten().collect();
     if known.is_empty() {
         return 0.0;
