@@ -77,6 +77,44 @@ fn parquet_gives_nulls_as_missing_and_stamps_as_seconds() {
     );
 }
 
+/// 200 rows by pyarrow: nulls, floats of 32 bits, two row groups, data pages of version 1 and 2.
+#[test]
+fn every_codec_of_parquet_is_unpacked() {
+    for codec in ["gzip", "zstd", "brotli", "lz4"] {
+        let path = data(&format!("{codec}.parquet"));
+        let columns = "time=t,gyro_x=gx,gyro_y=gy,count=n";
+        let record = read(&path, columns, "gyro=deg/s").expect(codec);
+        assert_eq!(record.len(), 200, "{codec}");
+        let (x, y) = (values(&record, "gyro_x"), values(&record, "gyro_y"));
+        assert!(x[7].is_nan() && x[6] == 3.0 && x[199] == 99.5, "{codec}");
+        assert_eq!((y[121], y[119]), (1.0, 3.0), "{codec}");
+        assert_eq!(values(&record, "count")[150], 150.0, "{codec}");
+        // By what is in it: another ending is no other file.
+        let other = folder_of("every_codec_of_parquet").join("table.dat");
+        std::fs::copy(&path, &other).unwrap();
+        assert_eq!(read(&other, columns, "gyro=deg/s").expect(codec).len(), 200);
+    }
+}
+
+/// A column of the wrong length, a page that is damaged: an error with a reason, never a panic.
+#[test]
+fn a_damaged_page_is_refused() {
+    let folder = folder_of("a_damaged_page_is_refused");
+    for codec in ["gzip", "zstd", "brotli", "lz4"] {
+        let bytes = std::fs::read(data(&format!("{codec}.parquet"))).unwrap();
+        for at in (4..bytes.len() - 8).step_by(97) {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0xff;
+            let path = folder.join("damaged.parquet");
+            std::fs::write(&path, damaged).unwrap();
+            // Damage may lie where nothing is read.
+            if let Err(error) = read(&path, "time=t,gyro_x=gx", "gyro=deg/s") {
+                assert!(!error.is_empty());
+            }
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_read_is_named_with_what_there_is() {
     let error = read(&data("imu.parquet"), "", "").unwrap_err();

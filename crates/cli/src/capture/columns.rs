@@ -2,12 +2,14 @@
 
 use model::record::Quantity;
 
+use super::conventions::unit_of;
 use super::error::{brief, brief_list};
 use super::foreign::meaning;
 use super::header::Lines;
+use super::mapped::{beside_ours, by_known_names, mapped};
 use super::names::{TIMES, meant, not_read, respelt};
-use super::propose::{alias, nearest, proposal};
-use super::units::{COUNTS, What, at_the_end, convert, in_brackets, known, usual};
+use super::propose::proposal;
+use super::units::{COUNTS, What, convert, in_brackets, known, usual};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
 
 /// A column of the file: what it is here, and how its cells become values.
@@ -59,12 +61,33 @@ pub(super) struct Columns {
     pub notes: Vec<String>,
     /// Whether the time column is in a unit that nobody said.
     pub time_is_assumed: bool,
+    /// Whether the gyros are.
+    pub gyro_is_assumed: bool,
+}
+
+impl Columns {
+    /// Takes what nobody stated in the usual units, and says so.
+    pub fn assume(&mut self, assumed: &[(String, What)]) {
+        self.notes.extend(note(assumed));
+        let is_gyro = |(_, what): &(String, What)| *what == What::Channel(Quantity::Gyro);
+        self.gyro_is_assumed |= assumed.iter().any(is_gyro);
+    }
 }
 
 /// Chooses: the mapping's columns; those of the stand's own format; or those of our names, in the units stated.
 pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
     let found = if !mapping.columns.is_empty() {
-        mapped(said, mapping)?
+        match beside_ours(said, mapping) {
+            Some((names, units)) => {
+                let said = Said {
+                    names: &names,
+                    units: &units,
+                    ..*said
+                };
+                by_our_names(&said, mapping)?
+            }
+            None => mapped(said, mapping)?,
+        }
     } else if said.lines.get("format").is_some() {
         refuse_units(said, mapping)?;
         own(said, said.names, mapping)?
@@ -78,7 +101,14 @@ pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Column
             ..Columns::default()
         }
     } else {
-        by_our_names(said, mapping)?
+        match by_known_names(said, mapping) {
+            Some(mapping) => {
+                let mut found = mapped(said, &mapping)?;
+                found.notes.push(taken(said, &mapping, &found));
+                found
+            }
+            None => by_our_names(said, mapping)?,
+        }
     };
     let names = found.columns.iter().map(|c| c.name.as_str());
     mapping.check_units(names)?;
@@ -99,6 +129,21 @@ pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Column
     Ok(found)
 }
 
+/// Says what was made of names that say it themselves.
+fn taken(said: &Said<'_>, mapping: &ColumnMapping, found: &Columns) -> String {
+    let columns = found.columns.iter();
+    let columns = columns.map(|c| format!("{} from `{}`", c.name, brief(&said.names[c.at])));
+    let units = mapping
+        .units
+        .iter()
+        .map(|(key, unit)| format!("{key} in {unit}"));
+    format!(
+        "columns are taken as their names say: {}; {}; `--columns` and `--units` say otherwise",
+        columns.collect::<Vec<_>>().join(", "),
+        units.collect::<Vec<_>>().join(", ")
+    )
+}
+
 /// A capture of the stand is in counts, and its header says what they mean.
 fn refuse_units(said: &Said<'_>, mapping: &ColumnMapping) -> Result<(), CaptureError> {
     let is_other = |key: &str| {
@@ -114,7 +159,7 @@ fn refuse_units(said: &Said<'_>, mapping: &ColumnMapping) -> Result<(), CaptureE
     }
 }
 
-fn unknown(said: &Said<'_>, why: String) -> CaptureError {
+pub(super) fn unknown(said: &Said<'_>, why: String) -> CaptureError {
     let (example, is_guessed) = proposal(said.names, said.numbered);
     CaptureError::Columns {
         why,
@@ -138,7 +183,7 @@ fn is_inertial(column: &Column) -> bool {
     )
 }
 
-fn measured(
+pub(super) fn measured(
     at: usize,
     name: &str,
     quantity: Quantity,
@@ -238,7 +283,7 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
     if !found.columns.iter().any(is_inertial) {
         return Err(unknown(said, NONE_OF_OURS.to_owned()));
     }
-    found.notes.extend(note(&assumed));
+    found.assume(&assumed);
     found.notes.extend(not_read(&unread, &names));
     Ok(found)
 }
@@ -246,7 +291,7 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
 const NONE_OF_OURS: &str = "no column has a name of the stand's captures (gyro_x, acc_x, ...)";
 
 /// The time column at a place, in the unit that is given, stated or usual.
-fn time(
+pub(super) fn time(
     said: &Said<'_>,
     mapping: &ColumnMapping,
     at: usize,
@@ -254,7 +299,7 @@ fn time(
 ) -> Result<Role, CaptureError> {
     let given = mapping.unit("time", What::Time);
     let stated = said.units[at].as_deref();
-    let stated = stated.or_else(|| at_the_end(&said.names[at], What::Time));
+    let stated = stated.or_else(|| unit_of(&said.names[at], What::Time, said.names));
     let unit = given.or(stated);
     found
         .notes
@@ -271,7 +316,7 @@ fn time(
 }
 
 /// Says that a unit given is another one than the column's own.
-fn contradiction(
+pub(super) fn contradiction(
     ours: &str,
     column: &str,
     given: Option<&str>,
@@ -394,86 +439,4 @@ fn own(
         notes,
         ..Columns::default()
     })
-}
-
-/// The place of a column by its name, by its name without a unit, or by its number from 1 on.
-fn place(said: &Said<'_>, theirs: &str) -> Option<usize> {
-    let by_stem = || {
-        let stems = said.names.iter().map(|name| in_brackets(name).0);
-        let mut places = stems.enumerate().filter(|(_, stem)| *stem == theirs);
-        // Two of one stem are told apart by their units alone.
-        places.next().filter(|_| places.next().is_none())
-    };
-    let by_number = || {
-        let number: usize = theirs.parse().ok()?;
-        (1..=said.names.len()).contains(&number).then(|| number - 1)
-    };
-    (said.names.iter().position(|name| name == theirs))
-        .or_else(|| by_stem().map(|(at, _)| at))
-        .or_else(by_number)
-}
-
-fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
-    let mut found = Columns::default();
-    let mut assumed = Vec::new();
-    for (given, theirs) in &mapping.columns {
-        let Some(at) = place(said, theirs) else {
-            return Err(unknown(said, format!("there is no column `{theirs}`")));
-        };
-        if let Some(other) = found.columns.iter().find(|c: &&Column| c.at == at) {
-            return Err(CaptureError::Option {
-                option: "--columns",
-                why: format!(
-                    "the column `{}` is given to {} and to {given}",
-                    brief(&said.names[at]),
-                    other.name
-                ),
-                help: "one column is one channel: leave one of the two out, or name its own column"
-                    .to_owned(),
-            });
-        }
-        let is_taken = |name: &str| mapping.columns.iter().any(|(other, _)| other == name);
-        let alias = alias(given).filter(|name| !is_taken(name));
-        if let Some(name) = &alias {
-            found.notes.push(format!(
-                "`{given}` is taken as `{name}`, the name that it has here"
-            ));
-        }
-        let ours = alias.unwrap_or_else(|| given.clone());
-        let role = match ours.as_str() {
-            "seq" => Role::Seq,
-            "time" | "host_time_s" => time(said, mapping, at, &mut found)?,
-            "flags" => Role::Flags,
-            name => {
-                let what = What::Channel(meaning(name).0);
-                let column = &said.names[at];
-                let stated = said.units[at].as_deref();
-                let stated = stated.or_else(|| at_the_end(column, what));
-                let given = mapping.unit(name, what);
-                let unit = given.or(stated);
-                let note = contradiction(name, column, given, stated);
-                found.notes.extend(note);
-                if unit.is_none() {
-                    assumed.push((name.to_owned(), what));
-                }
-                if what == What::Channel(Quantity::Other)
-                    && let Some(nearest) = nearest(name)
-                {
-                    found.notes.push(format!(
-                        "`{name}` is no name of this program's, so the column is a channel of its own that explains nothing: did \
-                         you mean {nearest}? (time, gyro_x .. gyro_z, acc_x .. acc_z, temp or temp_x .. temp_z, supply, pwm)"
-                    ));
-                }
-                measured(at, name, meaning(name).0, unit)?.role
-            }
-        };
-        found.columns.push(Column {
-            at,
-            name: ours,
-            role,
-            is_asked: true,
-        });
-    }
-    found.notes.extend(note(&assumed));
-    Ok(found)
 }

@@ -184,7 +184,7 @@ pub enum CaptureError {
     #[diagnostic(
         code(capture::table),
         help(
-            "NPZ, NPY, Parquet, .mat (version 5 to 7.3) and HDF5 (.h5) are read by their endings, everything else as text"
+            "NPZ, NPY, Parquet, .mat (version 5 to 7.3) and HDF5 (.h5) are read, logs (MCAP, ROS 1 bags, ULog), everything else as text"
         )
     )]
     Table {
@@ -192,6 +192,17 @@ pub enum CaptureError {
         path: PathBuf,
         /// What is wrong with it.
         why: String,
+    },
+    /// A log of a robot that yields no IMU.
+    #[error("{kind}: {why}")]
+    #[diagnostic(code(capture::log), help("{help}"))]
+    Log {
+        /// What kind of log.
+        kind: &'static str,
+        /// What is wrong with it.
+        why: String,
+        /// What to do.
+        help: String,
     },
     /// No rows at all.
     #[error("there is no row of data")]

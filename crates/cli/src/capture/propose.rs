@@ -4,120 +4,152 @@ use model::record::Quantity;
 
 use crate::text::shell_word;
 
-use super::units::{What, at_the_end, in_brackets, is_unit_of, known};
+use super::conventions::unit_of;
+use super::units::{What, in_brackets, is_unit_of, known};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 /// Bytes of a name beyond which its number is easier to write.
 const LONG: usize = 80;
 
-/// `--columns ... --units ...` made of a file's column names, as a shell takes them, and whether a unit in it is a guess.
-/// `numbered` says that the names are made up, and columns are called by their numbers.
-pub(super) fn proposal(names: &[String], numbered: bool) -> (String, bool) {
-    let (mut columns, mut units) = (Vec::new(), Vec::new());
-    // The time column of a logger for phones, whose systems deliver rad/s.
-    let is_phone = names.iter().any(|name| name == "seconds_elapsed");
-    let mut is_guessed = false;
-    let mut add = |ours: &str, at: usize, what: What| {
-        let name = &names[at];
-        // What would be taken for the list's own commas goes by its number.
-        let theirs = if numbered || name.contains(',') || name.len() > LONG {
-            (at + 1).to_string()
-        } else {
-            name.clone()
-        };
-        columns.push(format!("{ours}={theirs}"));
+/// What the columns of a file most probably are.
+pub(super) struct Guess {
+    /// Our name, and the place of the column.
+    pub columns: Vec<(String, usize)>,
+    /// Key of `--units`, and the unit that the file or a convention says; nothing inside where neither does.
+    pub units: Vec<(&'static str, Option<&'static str>)>,
+    /// Whether another column could be one of them, or a gyro's may be something else: the choice is then not ours.
+    pub is_ambiguous: bool,
+}
+
+impl Guess {
+    fn add(&mut self, names: &[String], ours: &str, at: usize, what: What) {
+        self.columns.push((ours.to_owned(), at));
         let key = match what {
             What::Time => "time",
             What::Channel(Quantity::Gyro) => "gyro",
             What::Channel(Quantity::Acc) => "acc",
             What::Channel(_) => return,
         };
-        let said = in_brackets(name).1.or_else(|| at_the_end(name, what));
-        let unit = match (what, said) {
-            // Seconds go without saying; other times are guessed by nobody.
-            (What::Time, None | Some("s")) => return,
-            (What::Channel(Quantity::Gyro), None) if is_phone => "rad/s",
-            (What::Channel(Quantity::Gyro), None) => "deg/s",
-            (What::Channel(_), None) => "m/s2",
-            (_, Some(unit)) => unit,
-        };
-        is_guessed |= said.is_none();
-        if !units.iter().any(|(k, _)| *k == key) {
-            units.push((key, unit));
+        // The unit of a quantity is that of its first column.
+        if !self.units.iter().any(|(k, _)| *k == key) {
+            self.units.push((key, unit_of(&names[at], what, names)));
         }
+    }
+}
+
+/// What the columns of a file most probably are, by their names. `numbered` says that the names are made up.
+pub(super) fn guess(names: &[String], numbered: bool) -> Guess {
+    let mut guess = Guess {
+        columns: Vec::new(),
+        units: Vec::new(),
+        is_ambiguous: false,
     };
     if numbered {
+        guess_by_number(names, &mut guess);
+    } else {
+        guess_by_name(names, &mut guess);
+    }
+    guess
+}
+
+/// As such files usually are: three gyros, three accelerometers, a time before them where the number is odd.
+fn guess_by_number(names: &[String], guess: &mut Guess) {
+    let first = usize::from(names.len() > 3 && names.len() != 6);
+    if first == 1 {
+        guess.add(names, "time", 0, What::Time);
+    }
+    for (k, axis) in AXES.iter().enumerate().take(names.len() - first) {
         let gyro = What::Channel(Quantity::Gyro);
-        // As such files usually are: three gyros, three accelerometers, a time before them where the number is odd.
-        let first = usize::from(names.len() > 3 && names.len() != 6);
-        if first == 1 {
-            add("time", 0, What::Time);
+        guess.add(names, &format!("gyro_{axis}"), first + k, gyro);
+    }
+    if names.len() >= first + 6 {
+        for (k, axis) in AXES.iter().enumerate() {
+            let acc = What::Channel(Quantity::Acc);
+            guess.add(names, &format!("acc_{axis}"), first + 3 + k, acc);
         }
-        for (k, axis) in AXES.iter().enumerate().take(names.len() - first) {
-            add(&format!("gyro_{axis}"), first + k, gyro);
-        }
-        if names.len() >= first + 6 {
-            for (k, axis) in AXES.iter().enumerate() {
-                add(
-                    &format!("acc_{axis}"),
-                    first + 3 + k,
-                    What::Channel(Quantity::Acc),
+    }
+}
+
+fn guess_by_name(names: &[String], guess: &mut Guess) {
+    let meanings = meanings(names);
+    let time = |with_unit: bool| {
+        meanings.iter().zip(names).position(|(m, name)| {
+            let says = || unit_of(name, What::Time, names).is_some();
+            m.kind == Kind::Time && (!with_unit || says() || m.is_seconds)
+        })
+    };
+    if let Some(at) = time(true).or_else(|| time(false)) {
+        guess.add(names, "time", at, What::Time);
+    }
+    let find = |kind: Kind, axis: usize| {
+        (meanings.iter()).position(|m| m.kind == kind && m.axis == Some(axis))
+    };
+    let has_gyro = (0..3).any(|axis| find(Kind::Gyro, axis).is_some());
+    let has_acc = (0..3).any(|axis| find(Kind::Acc, axis).is_some());
+    // Bare x, y, z are what the file is about, and most often a gyro here.
+    let gyro = if has_gyro || has_acc {
+        Kind::Gyro
+    } else {
+        Kind::Bare
+    };
+    guess.is_ambiguous |= gyro == Kind::Bare;
+    for (kind, stem, quantity) in [
+        (gyro, "gyro", Quantity::Gyro),
+        (Kind::Acc, "acc", Quantity::Acc),
+    ] {
+        for (k, axis) in AXES.iter().enumerate() {
+            if let Some(at) = find(kind, k) {
+                let same = |m: &&Meaning| m.kind == kind && m.axis == Some(k);
+                guess.is_ambiguous |= meanings.iter().filter(same).count() > 1;
+                guess.add(
+                    names,
+                    &format!("{stem}_{axis}"),
+                    at,
+                    What::Channel(quantity),
                 );
             }
         }
-    } else {
-        let meanings = meanings(names);
-        let time = |with_unit: bool| {
-            meanings.iter().zip(names).position(|(m, name)| {
-                let says = || {
-                    in_brackets(name)
-                        .1
-                        .or_else(|| at_the_end(name, What::Time))
-                        .is_some()
-                };
-                m.kind == Kind::Time && (!with_unit || says() || m.is_seconds)
-            })
-        };
-        if let Some(at) = time(true).or_else(|| time(false)) {
-            add("time", at, What::Time);
-        }
-        let find = |kind: Kind, axis: usize| {
-            (meanings.iter()).position(|m| m.kind == kind && m.axis == Some(axis))
-        };
-        let has_gyro = (0..3).any(|axis| find(Kind::Gyro, axis).is_some());
-        let has_acc = (0..3).any(|axis| find(Kind::Acc, axis).is_some());
-        // Bare x, y, z are what the file is about, and most often a gyro here.
-        let gyro = if has_gyro || has_acc {
-            Kind::Gyro
-        } else {
-            Kind::Bare
-        };
-        for (kind, stem, quantity) in [
-            (gyro, "gyro", Quantity::Gyro),
-            (Kind::Acc, "acc", Quantity::Acc),
-        ] {
-            for (k, axis) in AXES.iter().enumerate() {
-                if let Some(at) = find(kind, k) {
-                    add(&format!("{stem}_{axis}"), at, What::Channel(quantity));
-                }
-            }
-        }
-        if let Some(at) = meanings.iter().position(|m| m.kind == Kind::Temp) {
-            add("temp", at, What::Channel(Quantity::Temp));
-        }
-        if !has_gyro && !has_acc && (0..3).all(|axis| find(Kind::Bare, axis).is_none()) {
-            // A gyro without an axis; or nothing is recognized: the form of a mapping, with the first column that is no time.
-            let first = |wanted: fn(Kind) -> bool| meanings.iter().position(|m| wanted(m.kind));
-            if let Some(at) = first(|k| k == Kind::Gyro).or_else(|| first(|k| k != Kind::Time)) {
-                add("gyro_x", at, What::Channel(Quantity::Gyro));
-            }
+    }
+    if let Some(at) = meanings.iter().position(|m| m.kind == Kind::Temp) {
+        guess.add(names, "temp", at, What::Channel(Quantity::Temp));
+    }
+    if !has_gyro && !has_acc && (0..3).all(|axis| find(Kind::Bare, axis).is_none()) {
+        // A gyro without an axis; or nothing is recognized: the form of a mapping, with the first column that is no time.
+        let first = |wanted: fn(Kind) -> bool| meanings.iter().position(|m| wanted(m.kind));
+        if let Some(at) = first(|k| k == Kind::Gyro).or_else(|| first(|k| k != Kind::Time)) {
+            guess.add(names, "gyro_x", at, What::Channel(Quantity::Gyro));
         }
     }
+}
+
+/// `--columns ... --units ...` made of a file's column names, as a shell takes them, and whether a unit in it is a guess.
+/// `numbered` says that the names are made up, and columns are called by their numbers.
+pub(super) fn proposal(names: &[String], numbered: bool) -> (String, bool) {
+    let guess = guess(names, numbered);
+    let column = |(ours, at): &(String, usize)| {
+        let name = &names[*at];
+        // What would be taken for the list's own commas goes by its number.
+        if numbered || name.contains(',') || name.len() > LONG {
+            format!("{ours}={}", at + 1)
+        } else {
+            format!("{ours}={name}")
+        }
+    };
+    let mut is_guessed = false;
+    let unit = |(key, said): &(&str, Option<&str>)| {
+        let unit = match (*key, *said) {
+            // Seconds go without saying; other times are guessed by nobody.
+            ("time", None | Some("s")) => return None,
+            (_, Some(unit)) => unit,
+            ("gyro", None) => "deg/s",
+            (_, None) => "m/s2",
+        };
+        is_guessed |= said.is_none();
+        Some(format!("{key}={unit}"))
+    };
+    let units: Vec<String> = guess.units.iter().filter_map(unit).collect();
+    let columns: Vec<String> = guess.columns.iter().map(column).collect();
     let columns = shell_word(&columns.join(","));
-    let units: Vec<String> = units
-        .iter()
-        .map(|(key, unit)| format!("{key}={unit}"))
-        .collect();
     if units.is_empty() {
         return (format!("--columns {columns}"), false);
     }
@@ -462,7 +494,7 @@ mod tests {
             let (proposed, is_guessed) = proposal(&names, false);
             assert_eq!(proposed, expected);
             // A name that says no unit leaves it to be checked.
-            let says = ["/s", " s^", "dps"]
+            let says = ["/s", " s^", "dps", "seconds_elapsed"]
                 .iter()
                 .any(|unit| names[1 % names.len()].contains(unit));
             assert_eq!(is_guessed, !says, "{names:?}");

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use model::record::{Channel, Header, Record};
+use model::record::{Channel, Header, Quantity, Record};
 
 use super::angle::difference_angles;
 use super::columns::{Column, Columns, Role, Said, columns};
@@ -12,7 +12,9 @@ use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
 use super::layout::{Cells, Layout, next_row_into};
+use super::logs::read_log;
 use super::order::{check_rate, check_times, check_varies, in_order, unwrap, unwrap_times};
+use super::plausible::doubts;
 use super::skipped::keep_places;
 use super::stream::{TextLines, io, named, unpacked};
 use super::tables::{Table, read_table};
@@ -28,6 +30,8 @@ pub struct ReadOptions {
     pub rate_hz: Option<f64>,
     /// Leave out what stands in rows that cannot be read, and count them.
     pub skip_bad: bool,
+    /// Which topic of a log that has several IMUs.
+    pub topic: Option<String>,
 }
 
 /// A record, and what was left out of it.
@@ -60,11 +64,23 @@ pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureE
         .map_err(|error| named(error, path))
 }
 
-/// Reads a capture from a stream of text.
+/// Reads a capture from a stream of text, or of a log: MCAP, ROS 1 bag, ULog.
 ///
 /// # Errors
 /// [`CaptureError`].
-pub fn read_from(input: impl BufRead, options: &ReadOptions) -> Result<Read, CaptureError> {
+pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read, CaptureError> {
+    if let Some(table) = read_log(&mut input, options.topic.as_deref()) {
+        return from_table(table?, options);
+    }
+    if options.topic.is_some() {
+        return Err(CaptureError::Option {
+            option: "--topic",
+            why: "this file has no topics".to_owned(),
+            help:
+                "it is for logs: MCAP, ROS 1 bags, ULog; of a table `--columns` says what is what"
+                    .to_owned(),
+        });
+    }
     let mut text = TextLines::new(input)?;
     let mut layout = Layout::read(&mut text)?;
     let mut header = layout.lines.header()?;
@@ -122,7 +138,8 @@ fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError>
         units: &units,
         is_scaled: true,
     };
-    let found = columns(&said, &options.mapping)?;
+    let mut found = columns(&said, &options.mapping)?;
+    found.notes.splice(..0, table.notes);
     let mut cells = Vec::new();
     for column in &found.columns {
         let mut values = table.columns[column.at].clone();
@@ -331,10 +348,35 @@ fn finish(
     }
     check_rate(&mut record, rate_hz)?;
     difference_angles(&mut record)?;
+    share_thermometer(&mut record);
+    let doubts = doubts(&record, found.gyro_is_assumed);
+    record.notes.extend(doubts);
     Ok(Read {
         record,
         skipped: skipped.len(),
     })
+}
+
+/// One thermometer of others' data is that of all gyros, whichever axis its name has: a name of one axis would leave the
+/// others without. The stand's own gyros have one each.
+fn share_thermometer(record: &mut Record) {
+    if record.header.entries.iter().any(|(key, _)| key == "format") {
+        return;
+    }
+    let gyros: Vec<_> = record.all(Quantity::Gyro).map(|c| c.axis).collect();
+    let mut all = (record.channels.iter_mut()).filter(|c| c.quantity == Quantity::Temp);
+    if let (Some(only), None) = (all.next(), all.next())
+        && only.axis.is_some()
+        && gyros.iter().any(|axis| *axis != only.axis)
+    {
+        let note = format!(
+            "{} is the only thermometer, and is taken for all gyros: here it is called temp",
+            only.name
+        );
+        only.axis = None;
+        only.name = "temp".to_owned();
+        record.notes.push(note);
+    }
 }
 
 fn whole(values: &[f64]) -> Vec<u64> {

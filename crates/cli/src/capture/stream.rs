@@ -5,20 +5,33 @@ use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read as _, Result};
 use std::path::Path;
 
-use super::CaptureError;
+use super::{CaptureError, unpack};
 
 /// How gzip begins.
 const GZIP: &[u8] = &[0x1f, 0x8b];
 /// No row of numbers is longer.
 const LONGEST_LINE: u64 = 1 << 20;
 
-/// The text of a stream that is gzip, or of one that is not.
+/// How Zstandard begins.
+const ZSTANDARD: &[u8] = b"\x28\xb5\x2f\xfd";
+/// How bzip2 begins.
+const BZIP2: &[u8] = b"BZh";
+
+/// What is in a stream of gzip, Zstandard or bzip2, or the stream where it is none of them.
 ///
 /// # Errors
 /// The stream's.
 pub fn unpacked<'a>(mut input: impl BufRead + 'a) -> Result<Box<dyn BufRead + 'a>> {
-    if input.fill_buf()?.starts_with(GZIP) {
+    let start = input.fill_buf()?;
+    if start.starts_with(GZIP) {
         let text = flate2::bufread::MultiGzDecoder::new(input);
+        return Ok(Box::new(BufReader::new(text)));
+    }
+    if start.starts_with(ZSTANDARD) {
+        return Ok(Box::new(BufReader::new(unpack::zstd(input)?)));
+    }
+    if start.starts_with(BZIP2) {
+        let text = bzip2::bufread::MultiBzDecoder::new(input);
         return Ok(Box::new(BufReader::new(text)));
     }
     Ok(Box::new(input))
@@ -26,9 +39,9 @@ pub fn unpacked<'a>(mut input: impl BufRead + 'a) -> Result<Box<dyn BufRead + 'a
 
 /// What a file is that is no text, by how it begins, and what to do.
 fn no_text(start: &[u8]) -> Option<(&'static str, &'static str)> {
-    const ENDING: &str = "give it the ending of its kind: .npz, .npy, .parquet, .mat, .h5";
-    const UNPACK: &str = "unpack it first; text and gzip are read";
-    let known: [(&[u8], _, _); 10] = [
+    const FILE: &str = "name it as a file of its own: such a file is read from its end, and neither from a pipe nor packed";
+    const UNPACK: &str = "unpack it first; gzip, Zstandard and bzip2 are read as they are";
+    let known: [(&[u8], _, _); 13] = [
         (
             b"\xff\xfe",
             "UTF-16",
@@ -44,13 +57,37 @@ fn no_text(start: &[u8]) -> Option<(&'static str, &'static str)> {
             "a ZIP archive, as spreadsheets and NPZ are",
             "save the sheet as CSV; an NPZ has the ending .npz",
         ),
-        (b"PAR1", "Parquet", ENDING),
-        (b"\x89HDF", "HDF5", ENDING),
-        (b"\x93NUMPY", "a NumPy array", ENDING),
-        (b"MATLAB", "a .mat file", ENDING),
-        (b"BZh", "bzip2", UNPACK),
+        (b"PAR1", "Parquet", FILE),
+        (b"\x89HDF", "HDF5", FILE),
+        (b"\x93NUMPY", "a NumPy array", FILE),
+        (b"MATLAB", "a .mat file", FILE),
         (b"\xfd7zXZ", "xz", UNPACK),
-        (b"\x28\xb5\x2f\xfd", "Zstandard", UNPACK),
+        (
+            b"SQLite format 3",
+            "SQLite, as a rosbag2 of the ending .db3 is",
+            "make an MCAP of it, which is read: `mcap convert FILE.db3 FILE.mcap`, or `ros2 bag convert`",
+        ),
+        (
+            b"\xa3\x95",
+            "a log of ArduPilot",
+            "make a CSV of it: `mavlogdump.py --types IMU --format csv LOG.BIN > imu.csv`, and map GyrX in rad/s, AccX in m/s2, \
+             TimeUS in us",
+        ),
+        (
+            b"H Product:Blackbox",
+            "a Blackbox log of Betaflight or INAV",
+            "make a CSV of it: `blackbox_decode LOG`",
+        ),
+        (
+            b"ARROW1",
+            "Arrow, as Feather is",
+            "make a Parquet file of it: `pandas.read_feather(FILE).to_parquet(OTHER)`",
+        ),
+        (
+            b"\xd0\xcf\x11\xe0",
+            "an old spreadsheet",
+            "save the sheet as CSV",
+        ),
     ];
     if let Some((_, what, help)) = known.iter().find(|(magic, ..)| start.starts_with(magic)) {
         return Some((what, help));
@@ -70,7 +107,7 @@ fn no_text(start: &[u8]) -> Option<(&'static str, &'static str)> {
     }
     start.contains(&0).then_some((
         "binary data",
-        "is it the right file? Text, gzip, NPZ, NPY, Parquet, .mat and HDF5 are read",
+        "is it the right file? Text, NPZ, NPY, Parquet, .mat, HDF5, MCAP, ROS 1 bags and ULog are read",
     ))
 }
 

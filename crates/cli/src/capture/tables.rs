@@ -6,11 +6,12 @@ use std::io::{BufReader, Cursor, Read as _};
 use std::path::Path;
 
 use parquet::basic::{LogicalType, TimeUnit};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::DataType;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 use super::CaptureError;
+use super::pages::{Pages, is_packed_otherwise};
 
 /// Named columns of one length.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,19 +20,50 @@ pub(crate) struct Table {
     pub columns: Vec<Vec<f64>>,
     /// What else the file says, as `key: value`; a unit as `unit of COLUMN`.
     pub about: Vec<(String, String)>,
+    /// What a reader of the results has to know.
+    pub notes: Vec<String>,
 }
 
-/// Reads a file by its ending; `None` where it is none of these.
-pub(crate) fn read_table(path: &Path) -> Option<Result<Table, CaptureError>> {
+impl Table {
+    /// Adds a column of a known unit.
+    pub fn add(&mut self, name: &str, unit: &str, values: Vec<f64>) {
+        self.names.push(name.to_owned());
+        self.columns.push(values);
+        self.about
+            .push((format!("unit of {name}"), unit.to_owned()));
+    }
+}
+
+type Reader = fn(&Path) -> Result<Arrays, String>;
+
+/// Who reads a file: by how it begins, else by its ending.
+fn reader(path: &Path) -> Option<Reader> {
+    let mut start = [0; 8];
+    let whole = File::open(path).and_then(|mut file| file.read_exact(&mut start));
+    let by_start: [(&[u8], Reader); 4] = [
+        (b"PAR1", parquet_file),
+        (b"\x89HDF\r\n\x1a\n", hdf5),
+        (b"\x93NUMPY", npy),
+        (b"MATLAB", mat),
+    ];
+    let known = by_start.iter().find(|(magic, _)| start.starts_with(magic));
+    if let (Ok(()), Some((_, read))) = (whole, known) {
+        return Some(*read);
+    }
     let ending = path.extension()?.to_str()?.to_ascii_lowercase();
-    let read: fn(&Path) -> Result<Arrays, String> = match ending.as_str() {
+    Some(match ending.as_str() {
         "npz" => npz,
         "npy" => npy,
         "parquet" | "pq" => parquet_file,
         "mat" => mat,
         "h5" | "hdf5" => hdf5,
         _ => return None,
-    };
+    })
+}
+
+/// Reads a file of arrays; `None` where it is none.
+pub(crate) fn read_table(path: &Path) -> Option<Result<Table, CaptureError>> {
+    let read = reader(path)?;
     Some(
         read(path)
             .and_then(Arrays::table)
@@ -108,6 +140,7 @@ impl Arrays {
             names,
             columns,
             about: self.about,
+            notes: Vec::new(),
         })
     }
 }
@@ -274,6 +307,7 @@ fn hdf5_group(
 fn parquet_file(path: &Path) -> Result<Arrays, String> {
     let bad = |error: parquet::errors::ParquetError| format!("it is no Parquet file: {error}");
     let reader = SerializedFileReader::new(open(path)?).map_err(bad)?;
+    let mut file = open(path)?;
     let metadata = reader.metadata();
     let mut out = Arrays::default();
     for entry in metadata
@@ -309,7 +343,14 @@ fn parquet_file(path: &Path) -> Result<Arrays, String> {
         for group in 0..reader.num_row_groups() {
             let group = reader.get_row_group(group).map_err(bad)?;
             let rows = group.metadata().num_rows() as usize;
-            let part = match group.get_column_reader(at).map_err(bad)? {
+            let chunk = group.metadata().column(at);
+            let column_reader = if is_packed_otherwise(chunk.compression()) {
+                Pages::of(&mut file, chunk)
+                    .map(|pages| get_column_reader(column.clone(), Box::new(pages)))
+            } else {
+                group.get_column_reader(at)
+            };
+            let part = match column_reader.map_err(bad)? {
                 ColumnReader::DoubleColumnReader(r) => numbers(r, rows, present, |v| *v),
                 ColumnReader::FloatColumnReader(r) => numbers(r, rows, present, |v| f64::from(*v)),
                 ColumnReader::Int32ColumnReader(r) => numbers(r, rows, present, |v| f64::from(*v)),

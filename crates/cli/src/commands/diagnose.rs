@@ -15,7 +15,7 @@ use super::{Input, Outputs, Replicates};
 /// What `diagnose` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// Captures: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .txt
+    /// Captures: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .mcap, .bag, .ulg, .txt
     #[arg(required = true)]
     captures: Vec<PathBuf>,
     #[command(flatten)]

@@ -5,6 +5,7 @@ pub mod board;
 pub mod capture;
 pub mod diagnose;
 pub mod export;
+mod export_source;
 pub mod flash;
 pub mod monitor;
 pub mod outputs;
@@ -46,6 +47,9 @@ pub struct Input {
     /// Leave out what stands in rows that cannot be read, and count them
     #[arg(long)]
     skip_bad: bool,
+    /// Which topic of a log (MCAP, ROS bag, ULog) that has several IMUs
+    #[arg(long, value_name = "NAME")]
+    topic: Option<String>,
     /// Print nothing but errors
     #[arg(long, short)]
     pub quiet: bool,
@@ -94,6 +98,7 @@ impl Input {
             mapping,
             rate_hz: self.rate,
             skip_bad: self.skip_bad,
+            topic: self.topic.clone(),
         };
         let read = if path.as_os_str() == outputs::DASH {
             unpacked(stdin()?).map_or_else(

@@ -39,8 +39,9 @@ pub struct Outputs {
 }
 
 /// Endings of files that hold data: no JSON, report or model goes over one.
-const DATA: [&str; 10] = [
-    "csv", "gz", "raw", "npz", "npy", "parquet", "pq", "mat", "h5", "hdf5",
+const DATA: [&str; 16] = [
+    "csv", "gz", "zst", "bz2", "raw", "npz", "npy", "parquet", "pq", "mat", "h5", "hdf5", "mcap",
+    "bag", "ulg", "db3",
 ];
 
 /// Endings that promise another form of table than the text that a capture is.

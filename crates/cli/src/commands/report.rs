@@ -15,7 +15,7 @@ use super::{Input, Outputs, Replicates};
 /// What `report` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// The capture: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .txt
+    /// The capture: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .mcap, .bag, .ulg, .txt
     capture: PathBuf,
     #[command(flatten)]
     input: Input,

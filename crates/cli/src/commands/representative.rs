@@ -15,7 +15,7 @@ use super::{Input, Outputs};
 /// What `representative` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// Captures of one stand, four at least: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .txt
+    /// Captures of one stand, four at least: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .mcap, .bag, .ulg, .txt
     #[arg(required = true)]
     captures: Vec<PathBuf>,
     #[command(flatten)]

@@ -1,0 +1,195 @@
+//! Columns that `--columns` names, or that names of known writers do.
+
+use model::record::Quantity;
+
+use super::columns::{Column, Columns, Role, Said, contradiction, measured, time, unknown};
+use super::conventions::unit_of;
+use super::error::brief;
+use super::foreign::meaning;
+use super::names::TIMES;
+use super::propose::{alias, guess, nearest};
+use super::units::{What, in_brackets};
+use super::{CaptureError, ColumnMapping};
+
+/// Where a mapping names nothing that is analyzed (a time, a temperature, ...), and the file has gyros or accelerometers by
+/// names of ours, these are read too: the file's names with the mapping's in their places, and its units. Nothing where the
+/// mapping chooses, or the file is a capture of the stand.
+pub(super) fn beside_ours(
+    said: &Said<'_>,
+    mapping: &ColumnMapping,
+) -> Option<(Vec<String>, Vec<Option<String>>)> {
+    let is_beside = |name: &str| {
+        matches!(name, "time" | "host_time_s" | "seq" | "flags")
+            || matches!(
+                meaning(name).0,
+                Quantity::Temp | Quantity::Supply | Quantity::Pwm
+            )
+    };
+    let ours = |given: &str| alias(given).unwrap_or_else(|| given.to_owned());
+    let is_inertial = |name: &String| {
+        matches!(
+            meaning(in_brackets(name).0).0,
+            Quantity::Gyro | Quantity::Acc
+        )
+    };
+    let all_beside = mapping
+        .columns
+        .iter()
+        .all(|(given, _)| is_beside(&ours(given)));
+    if !all_beside || said.lines.get("format").is_some() || !said.names.iter().any(is_inertial) {
+        return None;
+    }
+    let (mut names, mut units) = (said.names.to_vec(), said.units.to_vec());
+    let mut given_places = Vec::new();
+    for (given, theirs) in &mapping.columns {
+        // What is not there is told by who reads the mapping.
+        let at = place(said, theirs).filter(|at| !given_places.contains(at))?;
+        given_places.push(at);
+        let what = match meaning(&ours(given)).0 {
+            Quantity::Other => What::Time,
+            quantity => What::Channel(quantity),
+        };
+        units[at] = units[at].take().or_else(|| {
+            let said = unit_of(&said.names[at], what, said.names);
+            said.map(str::to_owned)
+        });
+        names[at] = ours(given);
+    }
+    // A column of the same kind that is not the one given is none of ours here.
+    let is_time = |name: &str| name == "host_time_s" || TIMES.contains(&name);
+    let gives_time = mapping
+        .columns
+        .iter()
+        .any(|(given, _)| is_time(&ours(given)));
+    for at in (0..names.len()).filter(|at| !given_places.contains(at)) {
+        let stem = in_brackets(&said.names[at]).0;
+        let is_given = mapping.columns.iter().any(|(given, _)| ours(given) == stem);
+        if is_given || (gives_time && is_time(stem)) {
+            names[at] = format!("({})", said.names[at]);
+        }
+    }
+    Some((names, units))
+}
+
+/// The mapping of a file whose names say of each column what it is and in which unit, and leave no choice; nothing where
+/// anything would have to be guessed.
+pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option<ColumnMapping> {
+    let is_ours = |name: &String| {
+        matches!(
+            meaning(in_brackets(name).0).0,
+            Quantity::Gyro | Quantity::Acc
+        )
+    };
+    if said.numbered || said.names.iter().any(is_ours) {
+        return None;
+    }
+    let guess = guess(said.names, false);
+    let has_gyro = guess
+        .columns
+        .iter()
+        .any(|(ours, _)| ours.starts_with("gyro"));
+    let mut units = mapping.units.clone();
+    for (key, of_name) in &guess.units {
+        // A row of units under the names says it as well.
+        let of_column = (guess.columns.iter())
+            .find(|(ours, _)| ours.starts_with(key))
+            .and_then(|(_, at)| said.units[*at].as_deref());
+        let is_given = units.iter().any(|(known, _)| known == key);
+        match (*of_name).or(of_column) {
+            _ if is_given => {}
+            Some(unit) => units.push(((*key).to_owned(), unit.to_owned())),
+            // Times without a unit are held against their steps.
+            None if *key == "time" => {}
+            None => return None,
+        }
+    }
+    let columns = guess.columns.iter();
+    let columns = columns.map(|(ours, at)| (ours.clone(), (at + 1).to_string()));
+    (has_gyro && !guess.is_ambiguous).then(|| ColumnMapping {
+        columns: columns.collect(),
+        units,
+    })
+}
+
+/// The place of a column by its name, by its name without a unit, or by its number from 1 on.
+fn place(said: &Said<'_>, theirs: &str) -> Option<usize> {
+    let by_stem = || {
+        let stems = said.names.iter().map(|name| in_brackets(name).0);
+        let mut places = stems.enumerate().filter(|(_, stem)| *stem == theirs);
+        // Two of one stem are told apart by their units alone.
+        places.next().filter(|_| places.next().is_none())
+    };
+    let by_number = || {
+        let number: usize = theirs.parse().ok()?;
+        (1..=said.names.len()).contains(&number).then(|| number - 1)
+    };
+    (said.names.iter().position(|name| name == theirs))
+        .or_else(|| by_stem().map(|(at, _)| at))
+        .or_else(by_number)
+}
+
+/// The columns of a mapping.
+pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
+    let mut found = Columns::default();
+    let mut assumed = Vec::new();
+    for (given, theirs) in &mapping.columns {
+        let Some(at) = place(said, theirs) else {
+            return Err(unknown(said, format!("there is no column `{theirs}`")));
+        };
+        if let Some(other) = found.columns.iter().find(|c: &&Column| c.at == at) {
+            return Err(CaptureError::Option {
+                option: "--columns",
+                why: format!(
+                    "the column `{}` is given to {} and to {given}",
+                    brief(&said.names[at]),
+                    other.name
+                ),
+                help: "one column is one channel: leave one of the two out, or name its own column"
+                    .to_owned(),
+            });
+        }
+        let is_taken = |name: &str| mapping.columns.iter().any(|(other, _)| other == name);
+        let alias = alias(given).filter(|name| !is_taken(name));
+        if let Some(name) = &alias {
+            found.notes.push(format!(
+                "`{given}` is taken as `{name}`, the name that it has here"
+            ));
+        }
+        let ours = alias.unwrap_or_else(|| given.clone());
+        let role = match ours.as_str() {
+            "seq" => Role::Seq,
+            "time" | "host_time_s" => time(said, mapping, at, &mut found)?,
+            "flags" => Role::Flags,
+            name => {
+                let what = What::Channel(meaning(name).0);
+                let column = &said.names[at];
+                let stated = said.units[at].as_deref();
+                let stated = stated.or_else(|| unit_of(column, what, said.names));
+                let given = mapping.unit(name, what);
+                let unit = given.or(stated);
+                let note = contradiction(name, column, given, stated);
+                found.notes.extend(note);
+                if unit.is_none() {
+                    assumed.push((name.to_owned(), what));
+                }
+                if what == What::Channel(Quantity::Other)
+                    && let Some(nearest) = nearest(name)
+                {
+                    found.notes.push(format!(
+                        "`{name}` is no name of this program's, so the column is a channel of its own that explains nothing: did \
+                         you mean {nearest}? (time, gyro_x .. gyro_z, acc_x .. acc_z, temp or temp_x .. temp_z, supply, pwm)"
+                    ));
+                }
+                measured(at, name, meaning(name).0, unit)?.role
+            }
+        };
+        found.columns.push(Column {
+            at,
+            name: ours,
+            role,
+            is_asked: true,
+        });
+    }
+    found.assume(&assumed);
+    Ok(found)
+}

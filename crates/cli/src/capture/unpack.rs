@@ -1,0 +1,155 @@
+//! What is packed in pieces of a known length.
+
+use std::io::{BufRead, Error, ErrorKind, Read, Result};
+
+use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
+
+use super::logs::Bytes;
+
+/// Reads all of it, and no byte more than was said.
+fn whole(mut input: impl Read, size: u64) -> Result<Vec<u8>> {
+    let mut out = Vec::new();
+    input.by_ref().take(size).read_to_end(&mut out)?;
+    if out.len() as u64 != size {
+        let why = format!("{} bytes of {size} are in a packed piece", out.len());
+        return Err(Error::new(ErrorKind::InvalidData, why));
+    }
+    Ok(out)
+}
+
+/// Of Zstandard.
+pub(super) fn unpack_zstd(packed: &[u8], size: u64) -> Result<Vec<u8>> {
+    whole(zstd(packed)?, size)
+}
+
+/// Of LZ4 in its frame format.
+pub(super) fn unpack_lz4(packed: &[u8], size: u64) -> Result<Vec<u8>> {
+    whole(lz4_flex::frame::FrameDecoder::new(packed), size)
+}
+
+/// Of bzip2.
+pub(super) fn unpack_bzip2(packed: &[u8], size: u64) -> Result<Vec<u8>> {
+    whole(bzip2::read::MultiBzDecoder::new(packed), size)
+}
+
+/// Of gzip.
+pub(super) fn unpack_gzip(packed: &[u8], size: u64) -> Result<Vec<u8>> {
+    whole(flate2::read::MultiGzDecoder::new(packed), size)
+}
+
+/// Bytes that the decoder of Brotli takes at once.
+const AT_ONCE: usize = 1 << 12;
+
+/// Of Brotli.
+pub(super) fn unpack_brotli(packed: &[u8], size: u64) -> Result<Vec<u8>> {
+    whole(
+        brotli_decompressor::Decompressor::new(packed, AT_ONCE),
+        size,
+    )
+}
+
+/// LZ4 can make 255 bytes of one at most.
+const LZ4_RATIO: usize = 255;
+
+/// One block of LZ4, without a frame.
+pub(super) fn unpack_lz4_block(packed: &[u8], size: usize) -> Result<Vec<u8>> {
+    let wrong = |why: String| Error::new(ErrorKind::InvalidData, format!("LZ4: {why}"));
+    if size / LZ4_RATIO > packed.len() {
+        return Err(wrong(format!("{size} bytes cannot be in {}", packed.len())));
+    }
+    let out =
+        lz4_flex::block::decompress(packed, size).map_err(|error| wrong(error.to_string()))?;
+    if out.len() != size {
+        return Err(wrong(format!("{} bytes of {size}", out.len())));
+    }
+    Ok(out)
+}
+
+/// Blocks of LZ4 as Hadoop frames them: two lengths, unpacked and packed, big-endian, before each.
+pub(super) fn unpack_lz4_hadoop(packed: &[u8], size: usize) -> Result<Vec<u8>> {
+    let cut = || Error::new(ErrorKind::InvalidData, "LZ4: a frame is cut off");
+    let mut bytes = Bytes::new(packed).with_order(true);
+    let mut out = Vec::new();
+    while !bytes.is_empty() {
+        let unpacked = bytes.u32().ok_or_else(cut)? as usize;
+        let block = bytes.counted().ok_or_else(cut)?;
+        out.extend(unpack_lz4_block(block, unpacked)?);
+        if out.len() > size {
+            break;
+        }
+    }
+    if out.len() == size {
+        Ok(out)
+    } else {
+        Err(cut())
+    }
+}
+
+/// A stream of Zstandard, of one frame after the other.
+pub(super) fn zstd<R: BufRead>(packed: R) -> Result<impl Read> {
+    Ok(Frames::Within(frame(packed)?))
+}
+
+type Frame<R> = StreamingDecoder<R, FrameDecoder>;
+
+fn frame<R: Read>(packed: R) -> Result<Frame<R>> {
+    StreamingDecoder::new(packed).map_err(|error| bad(&error))
+}
+
+fn bad(error: &dyn std::fmt::Display) -> Error {
+    Error::new(ErrorKind::InvalidData, format!("Zstandard: {error}"))
+}
+
+/// The decoder reads one frame; parallel writers make many.
+enum Frames<R: BufRead> {
+    Within(Frame<R>),
+    Ended,
+}
+
+impl<R: BufRead> Read for Frames<R> {
+    fn read(&mut self, into: &mut [u8]) -> Result<usize> {
+        if into.is_empty() {
+            return Ok(0);
+        }
+        while let Frames::Within(decoder) = self {
+            let count = decoder.read(into).map_err(|error| bad(&error))?;
+            if count > 0 {
+                return Ok(count);
+            }
+            let Frames::Within(decoder) = std::mem::replace(self, Frames::Ended) else {
+                break;
+            };
+            let mut rest = decoder.into_inner();
+            if !rest.fill_buf()?.is_empty() {
+                *self = Frames::Within(frame(rest)?);
+            }
+        }
+        Ok(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame of one raw block (RFC 8878): magic, descriptor with a size of one byte, that size, header of a last block.
+    fn raw(text: &[u8]) -> Vec<u8> {
+        let mut out = vec![0x28, 0xb5, 0x2f, 0xfd, 0x20, text.len() as u8];
+        let block = (text.len() << 3) | 1;
+        out.extend([block as u8, (block >> 8) as u8, 0]);
+        out.extend(text);
+        out
+    }
+
+    #[test]
+    fn frames_of_zstandard_follow_one_another_and_a_size_is_held() {
+        let both = [raw(b"time,"), raw(b"gyro_x")].concat();
+        let mut text = String::new();
+        let read = zstd(&both[..]).unwrap().read_to_string(&mut text);
+        assert_eq!((read.unwrap(), text.as_str()), (11, "time,gyro_x"));
+        assert_eq!(unpack_zstd(&both, 5).unwrap(), b"time,");
+        let short = unpack_zstd(&both, 12).unwrap_err();
+        assert_eq!(short.kind(), ErrorKind::InvalidData);
+        assert!(unpack_zstd(&both[..9], 5).is_err());
+    }
+}
