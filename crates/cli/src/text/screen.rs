@@ -58,7 +58,10 @@ fn write_replicates(out: &mut String, d: &Diagnosis) {
     }
     let said = match outside.is_empty() {
         true => "simulations of this model look like the record on every channel".to_owned(),
-        false => format!("simulations of this model differ from the record: {}", outside.join("; ")),
+        false => format!(
+            "simulations of this model differ from the record: {}",
+            outside.join("; ")
+        ),
     };
     let _ = writeln!(out, "\n{}", item("", &said).trim_start());
 }
