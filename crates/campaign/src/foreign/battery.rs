@@ -90,7 +90,8 @@ impl Drawn {
                     .map(|(id, share)| (id.to_owned(), share))
                     .collect();
                 all.push((two.names.join(" and "), two.share));
-                all.push((format!("{} and a process", two.names[0]), two.with_process));
+                let (process, share) = two.with_process;
+                all.push((format!("{} and {process}", two.names[0]), share));
                 return all;
             }
             (Known::Variance(law), _) => of_variance_laws(stand, axis, law),
@@ -158,6 +159,15 @@ fn hold_each(kinds: &[&str], of: &(dyn Fn(usize, &ForeignEffect) -> Vec<String> 
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Effects that a cause describes which the library got only after their set was written, with that cause: a signal whose
+/// spectrum is a band. They keep their rows, for grades are compared with earlier ones.
+const DESCRIBED_SINCE: [(&str, &str); 4] = [
+    ("change of the acceleration", "narrow_band"),
+    ("swing that builds up and is quenched", "narrow_band"),
+    ("belt that rings by its teeth", "narrow_band"),
+    ("kick by each change of the motor's current", "narrow_band"),
+];
+
 /// No effect of the library, nor of a signal two, describes one of a kind. The first set was written to show what an engine
 /// passes over, not to this rule.
 fn hold_foreign(kind: &str) {
@@ -168,11 +178,17 @@ fn hold_foreign(kind: &str) {
         let (mut drawn, _) = drawn(place, 600.0, 0, Some(25.0));
         let described = drawn.described(kind == "couplings");
         assert!(!described.is_empty(), "nothing to hold {}", effect.name);
-        described
+        let since = DESCRIBED_SINCE.iter().find(|s| s.0 == effect.name);
+        let by_later = |id: &str| since.is_some_and(|(_, later)| id.contains(later));
+        let (later, mut wrong): (Vec<_>, Vec<_>) = described
             .into_iter()
             .filter(|(_, share)| *share >= DESCRIBED || share.is_nan())
-            .map(|(id, share)| format!("{id} describes {share:.3}"))
-            .collect()
+            .map(|(id, share)| (by_later(&id), format!("{id} describes {share:.3}")))
+            .partition(|(by_later, _)| *by_later);
+        if since.is_some() && later.is_empty() {
+            wrong.push((false, "no later cause describes it".to_owned()));
+        }
+        wrong.into_iter().map(|(_, what)| what).collect()
     });
 }
 

@@ -284,8 +284,8 @@ pub(super) struct OfTwo {
     pub names: Vec<&'static str>,
     /// Share of a signal's gain that both describe.
     pub share: f64,
-    /// Share that the best describes with the best process for what is left beside it.
-    pub with_process: f64,
+    /// The best process for what is left beside the best, and the share that both describe.
+    pub with_process: (&'static str, f64),
 }
 
 /// Each effect of the library with each set of columns that it can be.
@@ -311,7 +311,7 @@ pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> OfTwo {
     let gain = |s: &[f64]| meter.of_signal(&meter.energy(s)).powi(2);
     let whole = gain(signal);
     let sets = all_columns(stand, axis);
-    let (mut taken, mut names, mut with_process) = (vec![], vec![], 0.0);
+    let (mut taken, mut names, mut with_process) = (vec![], vec![], ("", 0.0));
     let mut rest = signal.to_vec();
     for turn in 0..2 {
         // A line, and one that swings: a line with two beside it.
@@ -335,8 +335,8 @@ pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> OfTwo {
         if turn == 0 {
             // Beside the first a process may take more than a second regression.
             let expected = spectrum(stand, axis, &|_| 1.0, &meter.energy(&rest));
-            let (_, process) = best_process(stand, axis, &expected);
-            with_process = 1.0 - gain(&rest) / whole * (1.0 - process);
+            let (id, process) = best_process(stand, axis, &expected);
+            with_process = (id, 1.0 - gain(&rest) / whole * (1.0 - process));
         }
     }
     OfTwo {
