@@ -82,9 +82,10 @@ fn a_mode_that_noise_drives_and_a_tone_that_wanders_are_named_and_sized() {
 
 #[test]
 fn beside_a_band_a_line_a_ramp_and_a_step_keep_their_names() {
-    // Some ten to fifteen times their standard errors; the line stands in the middle of the band.
+    // Some ten to fifteen times their standard errors. The line stands six half widths beside the middle, where the density
+    // is 0.019 (deg/s)^2/Hz: d' = A sqrt(T / S) = 14. One in the middle of the band is taken for a part of it.
     let others: [(&str, &[(&str, f64)]); 3] = [
-        ("line", &[("frequency", 4.31), ("amplitude", 0.2)]),
+        ("line", &[("frequency", 4.6), ("amplitude", 0.08)]),
         ("rate_ramp", &[("slope", 3e-3)]),
         ("bias_step", &[("time", 250.0), ("height", 0.4)]),
     ];

@@ -6,7 +6,7 @@ mod graded;
 use std::f64::consts::TAU;
 
 use analysis::result::Finding;
-use graded::{LEAST, RUNS, add, graded, named, record, said, told, values};
+use graded::{LEAST, RUNS, add, graded, graded_over, named, record, said, told, values};
 use model::file::EffectModel;
 use model::record::{Base, Quantity, Record};
 use model::{ModelFile, Parameter};
@@ -88,12 +88,14 @@ fn a_bias_late_behind_its_thermometer_is_no_line() {
 fn noise_below_half_a_step_whose_level_drifts_is_no_effect() {
     graded("three axes of coarse readings", |run, rng| {
         let mut model = ModelFile::paper();
-        let share = Uniform::new(0.28, 0.45).expect("a range").sample(rng);
+        let share: f64 = Uniform::new(0.28, 0.45).expect("a range").sample(rng);
+        // N holds the rounding too (docs/model-file.md): `share` is of the noise before the converter.
+        let read = share.hypot(1.0 / 12f64.sqrt());
         for c in &mut model.channels {
             let step = c.lsb.expect("a step");
             let walk = Uniform::new(0.2, 1.0).expect("a range").sample(rng) * step;
             for (name, value) in [
-                ("angle_random_walk", share * step * 60.0 / 20f64.sqrt()),
+                ("angle_random_walk", read * step * 60.0 / 20f64.sqrt()),
                 ("rate_random_walk", walk / 600f64.sqrt()),
             ] {
                 c.baseline.get_mut(name).expect("a parameter").value = value;
@@ -282,7 +284,7 @@ fn noise_of_another_slope_is_no_bias_that_comes_back() {
 }
 
 #[test]
-fn a_tone_whose_pitch_wanders_is_a_line_and_a_mode_that_noise_drives_is_none() {
+fn a_tone_whose_pitch_wanders_and_a_mode_that_noise_drives_have_names_of_their_own() {
     let wide =
         |rng: &mut Xoshiro256PlusPlus| TAU * Uniform::new(0.1, 0.4).expect("a range").sample(rng);
     graded("a tone whose phase walks", |run, rng| {
@@ -298,7 +300,7 @@ fn a_tone_whose_pitch_wanders_is_a_line_and_a_mode_that_noise_drives_is_none() {
             .collect();
         add(&mut r, "gyro_y", |i| tone[i]);
         let d = told(&r);
-        let right = named(&d) == [("line", "gyro_y")] && !d.unexplained.is_empty();
+        let right = named(&d) == [("wandering_line", "gyro_y")];
         right.then_some(()).ok_or_else(|| said(&d))
     });
     graded("a mode that noise drives", |run, rng| {
@@ -316,7 +318,7 @@ fn a_tone_whose_pitch_wanders_is_a_line_and_a_mode_that_noise_drives_is_none() {
         let rms = (mode.iter().map(|v| v * v).sum::<f64>() / mode.len() as f64).sqrt();
         add(&mut r, "gyro_y", |i| 0.18 * mode[i] / rms);
         let d = told(&r);
-        let right = named(&d).is_empty() && !d.unexplained.is_empty();
+        let right = named(&d) == [("narrow_band", "gyro_y")];
         right.then_some(()).ok_or_else(|| said(&d))
     });
 }
@@ -355,12 +357,17 @@ fn a_filter_and_a_process_beside_it_are_told_as_both() {
     };
     planted("low_pass", "lag1_correlation", 0.4, "1");
     planted("flicker", "bias_instability", 450.0, "deg/h");
-    graded("a filter beside flicker noise", |run, _| {
+    // Right in 95 of 100: 20 of 24 are reached in 99 of 100 tries.
+    graded_over((24, 20), "a filter beside flicker noise", |run, _| {
         let r = model::simulate(&model, 1200.0, 20.0, 6300 + run).expect("a run");
         let d = told(&r);
-        let mut names = named(&d);
-        names.sort_unstable();
-        let right = names == [("flicker", "gyro_y"), ("low_pass", "gyro_y")];
+        // Where the record leaves it open, flicker stands among the alternatives of the process.
+        let tells = |cause: &str| {
+            d.findings.iter().any(|f| {
+                f.cause == cause || f.alternatives.iter().any(|other| other.cause == cause)
+            })
+        };
+        let right = named(&d).len() == 2 && tells("flicker") && tells("low_pass");
         right.then_some(()).ok_or_else(|| said(&d))
     });
 }

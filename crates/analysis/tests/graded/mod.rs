@@ -54,14 +54,23 @@ pub fn named(d: &Diagnosis) -> Vec<(&str, &str)> {
 /// Draws and grades [`RUNS`] runs.
 pub fn graded(
     what: &str,
+    right: impl FnMut(u64, &mut Xoshiro256PlusPlus) -> Result<(), String>,
+) {
+    graded_over((RUNS, LEAST), what, right);
+}
+
+/// Draws and grades so many runs, of which at least so many have to be right.
+pub fn graded_over(
+    (runs, least): (u64, u64),
+    what: &str,
     mut right: impl FnMut(u64, &mut Xoshiro256PlusPlus) -> Result<(), String>,
 ) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xc1a1);
-    let misses: Vec<String> = (0..RUNS)
+    let misses: Vec<String> = (0..runs)
         .filter_map(|run| right(run, &mut rng).err())
         .collect();
-    let hits = RUNS - misses.len() as u64;
-    assert!(hits >= LEAST, "{what}: {hits} of {RUNS}; {misses:#?}");
+    let hits = runs - misses.len() as u64;
+    assert!(hits >= least, "{what}: {hits} of {runs}; {misses:#?}");
 }
 
 /// An answer in short.
