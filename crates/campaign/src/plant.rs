@@ -225,11 +225,11 @@ fn sized(
     stand: &Stand,
     cause: &str,
     asked: Asked,
-    (shape, sized, less): (&[(&str, f64)], &[(&str, f64)], &[Vec<f64>]),
+    (shape, sized, less): (&Values, &Values, &[Vec<f64>]),
 ) -> (Parameters, f64, Vec<f64>) {
     let all = |size: f64| {
-        let scaled: Vec<(&str, f64)> = sized.iter().map(|(k, v)| (*k, v * size)).collect();
-        parameters_of(cause, &[shape, &scaled[..]].concat())
+        let scaled: Values = sized.iter().map(|(k, v)| (*k, v * size)).collect();
+        parameters_of(cause, &[shape.as_slice(), &scaled].concat())
     };
     let meter = Meter::new(stand, asked.axis);
     let unit = signal_of(stand, cause, &all(1.0), asked.axis);

@@ -273,7 +273,7 @@ fn each_acts_on_its_channel_and_leaves_the_others() {
             pairs.map(|(a, b)| (a - b).abs()).collect()
         };
         let mut wrong = vec![];
-        for axis in 0..3 {
+        for (axis, name) in GYROS.iter().enumerate() {
             let moved = moved(axis);
             let share = moved.iter().filter(|d| **d > 0.0).count() as f64 / moved.len() as f64;
             let most = moved.iter().copied().fold(0.0, f64::max);
@@ -281,7 +281,7 @@ fn each_acts_on_its_channel_and_leaves_the_others() {
             if axis == own && !(share > 0.005 && most < 5.0) {
                 wrong.push(format!("{share} of the readings, by up to {most} deg/s"));
             } else if axis != own && share > 0.0 {
-                wrong.push(format!("moves {}", GYROS[axis]));
+                wrong.push(format!("moves {name}"));
             }
         }
         wrong

@@ -24,7 +24,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(461, 9, "another axis through a resonance", Shaped(|d, s, a, _| resonance(d, s, a))).needs(TM),
     row(462, 9, "gain that another axis turns", Shaped(|d, s, a, w| gain(d, s, a, w))).needs(TM),
     row(463, 9, "diode between two axes", Shaped(|d, s, a, _| diode(d, s, a))).needs(TM).parts(&["cross_axis"]),
-    row(515, 12, "axis that reads its neighbour for a while", Shaped(|d, s, a, w| neighbour(d, s, a, w))).parts(&["noise_change"]).twin(367),
+    row(515, 12, "axis that reads its neighbour for a while", Shaped(neighbour)).parts(&["noise_change"]).twin(367),
 ];
 
 /// One of the two others.
