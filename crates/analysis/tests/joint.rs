@@ -30,11 +30,14 @@ fn stand(axes: usize, effects: Vec<EffectModel>) -> ModelFile {
     model
 }
 
+/// A parameter of an answer, with its truth.
+type Truth<'a> = (&'a dyn Fn(&Diagnosed) -> Option<Parameter>, f64);
+
 /// How often the interval of each of some parameters holds its truth, of the draws in which `cause` was found.
 fn coverage(
     model: &ModelFile,
     cause: &str,
-    truth: &[(&dyn Fn(&Diagnosed) -> Option<Parameter>, f64)],
+    truth: &[Truth<'_>],
 ) -> Result<(usize, Vec<usize>), Box<dyn std::error::Error>> {
     let (mut draws, mut held) = (0, vec![0; truth.len()]);
     for seed in 0..DRAWS {

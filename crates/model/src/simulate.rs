@@ -218,13 +218,16 @@ pub fn simulate_in_the_world_of(
     run(&model, world, read, rate_hz, rng)
 }
 
+/// What each gyro read, where the record has it.
+type Read = [Option<Vec<f64>>; 3];
+
 /// The model as it is simulated in the world of a record, that world, and the slow part of each axis that moved, deg/s.
 fn world_of(
     model: &ModelFile,
     record: &Record,
     rate_hz: f64,
     rng: &mut Xoshiro256PlusPlus,
-) -> Result<(ModelFile, World, [Option<Vec<f64>>; 3]), SimulateError> {
+) -> Result<(ModelFile, World, Read), SimulateError> {
     let samples = record.len();
     if samples == 0 {
         return Err(SimulateError::BadLength {

@@ -30,7 +30,7 @@ impl Parts {
             let length = (2..=n).rev().find(|m| handy(*m)).unwrap_or(n);
             return Self {
                 length,
-                stretches: vec![0..length],
+                stretches: std::iter::once(0..length).collect(),
             };
         }
         let wanted = (STRETCH_S * rate_hz).max(1.0).log2().ceil() as u32;

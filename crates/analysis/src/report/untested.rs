@@ -7,8 +7,11 @@ use crate::fit::channel;
 use crate::result::NotTested;
 use crate::search::searched::Searched;
 
+/// A reason, and the hypotheses that it keeps from being tested.
+type Untested = (&'static str, fn(&Hypothesis) -> bool);
+
 /// What of the library a channel was not asked for, beyond what its search could not lay out, and why.
-fn by_motion(s: &Searched<'_>) -> Option<(&'static str, fn(&Hypothesis) -> bool)> {
+fn by_motion(s: &Searched<'_>) -> Option<Untested> {
     if s.target.moving {
         let slow = |h: &Hypothesis| {
             matches!(

@@ -52,10 +52,7 @@ pub fn named(d: &Diagnosis) -> Vec<(&str, &str)> {
 }
 
 /// Draws and grades [`RUNS`] runs.
-pub fn graded(
-    what: &str,
-    right: impl FnMut(u64, &mut Xoshiro256PlusPlus) -> Result<(), String>,
-) {
+pub fn graded(what: &str, right: impl FnMut(u64, &mut Xoshiro256PlusPlus) -> Result<(), String>) {
     graded_over((RUNS, LEAST), what, right);
 }
 

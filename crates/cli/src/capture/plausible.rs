@@ -60,9 +60,11 @@ fn gravity(record: &Record) -> Option<String> {
             "{read}: is the file in {unit}? Then say `--units acc={unit}`"
         )),
         // Some systems take gravity off, and some parts are turned during a record.
-        None if norm > 2.0 * STANDARD_GRAVITY || norm < 0.5 * STANDARD_GRAVITY => Some(format!(
-            "{read}: see that the unit is right (`--units acc=...`), or gravity was taken off"
-        )),
+        None if !(0.5 * STANDARD_GRAVITY..=2.0 * STANDARD_GRAVITY).contains(&norm) => {
+            Some(format!(
+                "{read}: see that the unit is right (`--units acc=...`), or gravity was taken off"
+            ))
+        }
         None => None,
     }
 }

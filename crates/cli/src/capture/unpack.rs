@@ -87,7 +87,7 @@ pub(super) fn unpack_lz4_hadoop(packed: &[u8], size: usize) -> Result<Vec<u8>> {
 
 /// A stream of Zstandard, of one frame after the other.
 pub(super) fn zstd<R: BufRead>(packed: R) -> Result<impl Read> {
-    Ok(Frames::Within(frame(packed)?))
+    Ok(Frames::Within(Box::new(frame(packed)?)))
 }
 
 type Frame<R> = StreamingDecoder<R, FrameDecoder>;
@@ -102,7 +102,7 @@ fn bad(error: &dyn std::fmt::Display) -> Error {
 
 /// The decoder reads one frame; parallel writers make many.
 enum Frames<R: BufRead> {
-    Within(Frame<R>),
+    Within(Box<Frame<R>>),
     Ended,
 }
 
@@ -121,7 +121,7 @@ impl<R: BufRead> Read for Frames<R> {
             };
             let mut rest = decoder.into_inner();
             if !rest.fill_buf()?.is_empty() {
-                *self = Frames::Within(frame(rest)?);
+                *self = Frames::Within(Box::new(frame(rest)?));
             }
         }
         Ok(0)

@@ -102,8 +102,10 @@ mod tests {
 
     type Tested = Result<(), Box<dyn std::error::Error>>;
 
+    type Planted<'a> = (&'a str, &'a [(&'a str, f64, &'a str)]);
+
     /// The paper's stand without noise but that of the baseline parameter given, and effects.
-    fn stand(noise: &[(&str, f64)], effects: &[(&str, &[(&str, f64, &str)])]) -> ModelFile {
+    fn stand(noise: &[(&str, f64)], effects: &[Planted<'_>]) -> ModelFile {
         let mut model = ModelFile::paper();
         for channel in &mut model.channels {
             for (name, p) in &mut channel.baseline {
