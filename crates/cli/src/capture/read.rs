@@ -54,6 +54,7 @@ const READ_AT_ONCE: usize = 1 << 16;
 /// [`CaptureError`], which says what to do.
 pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureError> {
     if let Some(table) = read_table(path) {
+        no_topics(options)?;
         return from_table(table?, options);
     }
     let open = || unpacked(BufReader::with_capacity(READ_AT_ONCE, File::open(path)?));
@@ -64,6 +65,19 @@ pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureE
         .map_err(|error| named(error, path))
 }
 
+/// Refuses the name of a topic for a file that has none.
+fn no_topics(options: &ReadOptions) -> Result<(), CaptureError> {
+    if options.topic.is_none() {
+        return Ok(());
+    }
+    Err(CaptureError::Option {
+        option: "--topic",
+        why: "this file has no topics".to_owned(),
+        help: "it is for logs: MCAP, ROS 1 bags, ULog; of a table `--columns` says what is what"
+            .to_owned(),
+    })
+}
+
 /// Reads a capture from a stream of text, or of a log: MCAP, ROS 1 bag, ULog.
 ///
 /// # Errors
@@ -72,15 +86,7 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
     if let Some(table) = read_log(&mut input, options.topic.as_deref()) {
         return from_table(table?, options);
     }
-    if options.topic.is_some() {
-        return Err(CaptureError::Option {
-            option: "--topic",
-            why: "this file has no topics".to_owned(),
-            help:
-                "it is for logs: MCAP, ROS 1 bags, ULog; of a table `--columns` says what is what"
-                    .to_owned(),
-        });
-    }
+    no_topics(options)?;
     let mut text = TextLines::new(input)?;
     let mut layout = Layout::read(&mut text)?;
     let mut header = layout.lines.header()?;

@@ -182,6 +182,6 @@ fn write_rest(out: &mut String, d: &Diagnosis) {
     }
     let _ = writeln!(
         out,
-        "--details: gains, failing checks, what was not tested, sizes that would have shown"
+        "--details: gains, failing checks, why not tested, the smallest sizes found"
     );
 }
