@@ -5,6 +5,11 @@ macro_rules! say {
     ($($words:tt)*) => { $crate::commands::say(format_args!($($words)*)) };
 }
 
+/// `eprintln!` for words with names from files in them.
+macro_rules! warn {
+    ($($words:tt)*) => { $crate::commands::warn(format_args!($($words)*)) };
+}
+
 mod commands;
 
 use clap::{Parser, Subcommand};
@@ -102,10 +107,7 @@ fn keep_memory() {
 fn main() -> miette::Result<()> {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     keep_memory();
-    // A command that a help proposes is to be copied whole: the terminal may wrap it, the text does not.
-    miette::set_hook(Box::new(|_| {
-        Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())
-    }))?;
+    miette::set_hook(Box::new(|_| Box::new(commands::terminal::Handler::new())))?;
     match Program::parse().command {
         Command::Analyze(arguments) => commands::analyze::run(&arguments),
         Command::Diagnose(arguments) => commands::diagnose::run(&arguments),

@@ -109,8 +109,8 @@ pub fn effects_markdown() -> String {
         }
         let _ = write!(
             out,
-            "\n- Needs: {}\n- Test: {}\n- Figure: {}\n",
-            docs.excitation, docs.test, docs.figure
+            "\n- Needs: {}\n- Test: {}\n- Figure: {}\n- What to do: {}\n",
+            docs.excitation, docs.test, docs.figure, docs.remedy
         );
         for r in e.rivals() {
             let _ = writeln!(out, "- Not `{}`? {}.", r.cause, r.experiment);

@@ -151,6 +151,8 @@ pub struct Docs {
     pub excitation: &'static str,
     /// How it is tested.
     pub test: &'static str,
+    /// What the user changes about the stand, the filter or the model: one sentence.
+    pub remedy: &'static str,
     /// The figure that convicts it.
     pub figure: &'static str,
     /// A run that shows it in that figure.

@@ -34,6 +34,7 @@ use crate::effect::{Parameters, unit_on};
 use crate::effects::effect;
 use crate::excitation::SETTINGS;
 use crate::parameter::Parameter;
+use crate::range::{self, Range};
 
 /// Format line of a model file.
 pub const FORMAT: &str = "imu-stand-model/1";
@@ -272,6 +273,15 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// A number of a range.
+    fn ranged(&self, value: &Spanned<DeValue<'a>>, name: &str, range: Range) -> Parsed<f64> {
+        let number = self.number(value, name)?;
+        match range.refuses(name, number) {
+            None => Ok(number),
+            Some(what) => self.error(value.span().start, what),
+        }
+    }
+
     fn file(&self) -> Parsed<ModelFile> {
         let document = DeTable::parse(self.text).map_err(|e| ModelFileError {
             line: 1 + self
@@ -288,12 +298,21 @@ impl<'a> Parser<'a> {
             match &**key.get_ref() {
                 "format" => format = Some((self.string(value, "format")?, value.span().start)),
                 "stand" => file.stand = self.string(value, "stand")?,
-                "rate_hz" => file.rate_hz = self.number(value, "rate_hz")?,
+                "rate_hz" => file.rate_hz = self.ranged(value, "rate_hz", range::POSITIVE)?,
                 "fitted_on" => file.fitted_on = Some(self.fitted_on(value)?),
                 "excitation" => file.excitation = self.excitation(value)?,
                 "channel" => {
                     for v in self.array(value, "channel")? {
-                        file.channels.push(self.channel(v)?);
+                        let channel = self.channel(v)?;
+                        let at = v.span().start;
+                        if file.channels.iter().any(|c| c.name == channel.name) {
+                            return self.error(at, format!("a second channel {}", channel.name));
+                        }
+                        file.channels.push(channel);
+                        if file.channels.len() > range::MOST_CHANNELS {
+                            return self
+                                .error(at, format!("more than {} channels", range::MOST_CHANNELS));
+                        }
                     }
                 }
                 "effect" => {}
@@ -324,7 +343,12 @@ impl<'a> Parser<'a> {
         }
         if let Some(value) = document.get_ref().get("effect") {
             for v in self.array(value, "effect")? {
-                file.effects.push(self.effect(v, &file.channels)?);
+                file.effects
+                    .push(self.effect(v, &file.channels, file.rate_hz)?);
+                if file.effects.len() > range::MOST_EFFECTS {
+                    let what = format!("more than {} effects", range::MOST_EFFECTS);
+                    return self.error(v.span().start, what);
+                }
             }
         }
         Ok(file)
@@ -359,7 +383,10 @@ impl<'a> Parser<'a> {
                     format!("unknown excitation {name}; known are {}", known.join(", ")),
                 );
             }
-            all.insert(name.to_owned(), self.number(v, name)?);
+            all.insert(
+                name.to_owned(),
+                self.ranged(v, name, range::of_setting(name))?,
+            );
         }
         Ok(all)
     }
@@ -369,12 +396,13 @@ impl<'a> Parser<'a> {
         name: &str,
         value: &Spanned<DeValue<'a>>,
         units: &[String],
+        range: Range,
     ) -> Parsed<Parameter> {
         let (mut number, mut error, mut unit) = (None, None, None);
         for (key, v) in self.table(value, name)? {
             match &**key.get_ref() {
-                "value" => number = Some(self.number(v, "value")?),
-                "std_error" => error = Some(self.number(v, "std_error")?),
+                "value" => number = Some(self.ranged(v, name, range)?),
+                "std_error" => error = Some(self.ranged(v, "std_error", range::SIZE)?),
                 "unit" => unit = Some((self.string(v, "unit")?, v.span().start)),
                 other => {
                     return self.error(
@@ -409,7 +437,7 @@ impl<'a> Parser<'a> {
             match &**key.get_ref() {
                 "name" => channel.name = self.string(v, "name")?,
                 "unit" => channel.unit = self.string(v, "unit")?,
-                "lsb" => channel.lsb = Some(self.number(v, "lsb")?),
+                "lsb" => channel.lsb = Some(self.ranged(v, "lsb", range::STEP)?),
                 _ => {}
             }
         }
@@ -432,9 +460,13 @@ impl<'a> Parser<'a> {
                 );
             };
             let units = [baseline_unit(spec, &channel.unit)];
-            channel
-                .baseline
-                .insert(name.to_owned(), self.parameter(name, v, &units)?);
+            let range = if name == "bias" {
+                range::ANY
+            } else {
+                range::SIZE
+            };
+            let parameter = self.parameter(name, v, &units, range)?;
+            channel.baseline.insert(name.to_owned(), parameter);
         }
         Ok(channel)
     }
@@ -443,6 +475,7 @@ impl<'a> Parser<'a> {
         &self,
         value: &Spanned<DeValue<'a>>,
         channels: &[ChannelModel],
+        rate_hz: f64,
     ) -> Parsed<EffectModel> {
         let table = self.table(value, "effect")?;
         let at = value.span().start;
@@ -499,9 +532,9 @@ impl<'a> Parser<'a> {
             } else {
                 unit_on(spec.unit, unit)
             }];
-            found
-                .parameters
-                .insert(name.to_owned(), self.parameter(name, v, &units)?);
+            let range = range::of_parameter(name, spec.unit, rate_hz);
+            let parameter = self.parameter(name, v, &units, range)?;
+            found.parameters.insert(name.to_owned(), parameter);
         }
         if let Some(missing) = known
             .parameters()

@@ -8,6 +8,7 @@ pub mod effects;
 pub mod excitation;
 pub mod file;
 pub mod parameter;
+mod range;
 pub mod record;
 pub mod simulate;
 

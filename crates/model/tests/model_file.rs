@@ -12,7 +12,7 @@ fn full() -> ModelFile {
         let parameters = e
             .parameters()
             .iter()
-            .map(|p| (p.name.to_owned(), Parameter::estimated(0.5, 0.125, p.unit)))
+            .map(|p| (p.name.to_owned(), Parameter::estimated(1.0, 0.125, p.unit)))
             .collect();
         model.effects.push(EffectModel {
             cause: e.id().into(),
@@ -55,7 +55,10 @@ fn every_effect_has_an_id_of_its_own_a_page_and_rivals_that_exist() {
     for (i, e) in EFFECTS.iter().enumerate() {
         assert!(EFFECTS.iter().skip(i + 1).all(|o| o.id() != e.id()));
         assert!(
-            !e.parameters().is_empty() && e.docs().physics.len() > 40,
+            !e.parameters().is_empty()
+                && e.docs().physics.len() > 40
+                && e.docs().remedy.ends_with('.')
+                && e.docs().remedy.len() > 40,
             "{}",
             e.id()
         );
@@ -101,4 +104,76 @@ fn a_channel_without_a_step_is_not_rounded() {
     let y = &record.channel("gyro_x").expect("gyro_x").values;
     let equal = y.windows(2).filter(|w| w[0] == w[1]).count();
     assert!(equal < 10, "{equal} of {} repeat", y.len());
+}
+
+#[test]
+fn what_no_stand_has_is_refused_with_its_line() {
+    let paper = ModelFile::paper().to_toml();
+    let effect = |text: &str| format!("{paper}\n[[effect]]\n{text}\n");
+    let excitation = |text: &str| format!("{paper}\n[excitation]\n{text}\n");
+    let first = |from: &str, to: &str| paper.replacen(from, to, 1);
+    for (text, what) in [
+        (
+            excitation("motor_duty = 5"),
+            "motor_duty is 5; it has to be from 0 to 1",
+        ),
+        (excitation("heater_period_s = 0"), "heater_period_s is 0"),
+        (
+            effect("cause = \"low_pass\"\nlag1_correlation = { value = 5, unit = \"1\" }"),
+            "from -1 to 1",
+        ),
+        (
+            effect(
+                "cause = \"stuck_bit\"\nbit = { value = 99, unit = \"1\" }\nvalue = { value = 1, unit = \"1\" }\n\
+                 fraction = { value = 1, unit = \"1\" }",
+            ),
+            "bit is 99; it has to be a whole number from 0 to 13",
+        ),
+        (
+            effect("cause = \"coarse_lsb\"\nmissing_bits = { value = 200, unit = \"1\" }"),
+            "missing_bits is 200",
+        ),
+        (
+            effect("cause = \"outliers\"\ncount = { value = 1e18, unit = \"1\" }"),
+            "count is 1",
+        ),
+        (
+            effect("cause = \"dropped_samples\"\ncount = { value = -1, unit = \"1\" }"),
+            "count is -1",
+        ),
+        (
+            effect(
+                "cause = \"telegraph\"\nhalf_height = { value = 1, unit = \"deg/s\" }\n\
+                 dwell_time = { value = 1e-300, unit = \"s\" }",
+            ),
+            "dwell_time is",
+        ),
+        (first("lsb = 0.07326", "lsb = -1"), "lsb is -1"),
+        (first("lsb = 0.07326", "lsb = 1e300"), "lsb is 1"),
+        (
+            first(
+                "value = 0.0, unit = \"deg/s\"",
+                "value = 1e308, unit = \"deg/s\"",
+            ),
+            "bias is 1",
+        ),
+        (
+            first("value = 5.27", "value = -5.27"),
+            "angle_random_walk is -5.27; it has to be from 0",
+        ),
+        (first("rate_hz = 20.0", "rate_hz = 1e300"), "rate_hz is 1"),
+        (first("gyro_y", "gyro_x"), "a second channel gyro_x"),
+        (
+            effect("cause = \"clock_rate\"\nppm = { value = 1, unit = \"ppm\" }").repeat(1)
+                + &"[[effect]]\ncause = \"clock_rate\"\nppm = { value = 1, unit = \"ppm\" }\n"
+                    .repeat(1000),
+            "more than 1000 effects",
+        ),
+    ] {
+        let error = ModelFile::parse(&text).expect_err(what);
+        assert!(
+            error.what.contains(what) && error.line > 1,
+            "{what}: {error}"
+        );
+    }
 }

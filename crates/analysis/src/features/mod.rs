@@ -238,6 +238,7 @@ impl Effect for Beyond {
             physics: "",
             excitation: "",
             test: "",
+            remedy: "",
             figure: "",
             example: Example::new(Plot::Spectrum, &[]),
         }

@@ -1,5 +1,7 @@
 //! Which column of a file is what: by its own names, or by a mapping.
 
+use std::collections::BTreeMap;
+
 use model::record::Quantity;
 
 use super::conventions::unit_of;
@@ -7,7 +9,7 @@ use super::error::{brief, brief_list};
 use super::foreign::meaning;
 use super::header::Lines;
 use super::mapped::{beside_ours, by_known_names, mapped};
-use super::names::{TIMES, meant, not_read, respelt};
+use super::names::{TIMES, meant, missing, not_read, respelt};
 use super::propose::proposal;
 use super::units::{COUNTS, What, convert, in_brackets, known, usual};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
@@ -112,13 +114,17 @@ pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Column
     };
     let names = found.columns.iter().map(|c| c.name.as_str());
     mapping.check_units(names)?;
+    let mut often: BTreeMap<&String, usize> = BTreeMap::new();
+    for name in said.names {
+        *often.entry(name).or_default() += 1;
+    }
     for column in &found.columns {
         let name = &said.names[column.at];
         let is_by_number = mapping
             .columns
             .iter()
             .any(|(_, theirs)| theirs == &(column.at + 1).to_string());
-        if !is_by_number && said.names.iter().filter(|n| *n == name).count() > 1 {
+        if !is_by_number && often.get(name).is_some_and(|n| *n > 1) {
             return Err(CaptureError::Twice {
                 name: name.clone(),
                 ours: column.name.clone(),
@@ -368,6 +374,7 @@ fn own(
     let theirs = names;
     let (names, mut notes) = respelt(theirs, &[], is_capture);
     let (mut columns, mut unread) = (Vec::new(), Vec::new());
+    let missing = missing(&names);
     for (at, name) in names.iter().enumerate() {
         let (quantity, _) = meaning(name);
         let scaled = |zero, scale, unit: &str| Role::Measured {
@@ -406,7 +413,7 @@ fn own(
                     unread.push(&theirs[at]);
                     continue;
                 }
-                if let Some(ours) = meant(name, &names) {
+                if let Some(ours) = meant(name, &missing) {
                     notes.push(format!(
                         "column `{}` is none of the format's, so it is a channel of its own that explains nothing: did you \
                          mean `{ours}`? Then rename it in the line of the names",

@@ -7,6 +7,9 @@ use super::CaptureError;
 /// How the key begins that states the unit of a column.
 const UNIT_OF: &str = "unit of ";
 
+/// Rates, Hz, and ticks, s, that a stand can have; beyond them nothing has digits that mean anything.
+pub(crate) const BELIEVED: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+
 /// The header with where each key stands.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
@@ -83,9 +86,9 @@ impl Lines {
             });
         }
         let positive = |key: &str| match self.number(key)? {
-            Some(value) if value <= 0.0 => {
+            Some(value) if !BELIEVED.contains(&value) => {
                 let (line, text) = self.get(key).unwrap_or_default();
-                Err(bad(line, key, text, "a number above 0"))
+                Err(bad(line, key, text, "a number above 0, from 1e-12 to 1e12"))
             }
             value => Ok(value),
         };

@@ -46,11 +46,14 @@ impl Layout {
                 if !lines.take(number as usize, said) && !said.is_empty() {
                     comment = said.to_owned();
                 }
+                text.is_no_row(&line)?;
             } else if let Some(said) = line.strip_prefix("sep=") {
                 // A spreadsheet's own line.
                 separator = said.chars().next();
             } else if !line.trim().is_empty() {
                 break (number, line);
+            } else {
+                text.is_no_row(&line)?;
             }
         };
         let begin = number;
@@ -219,8 +222,10 @@ pub(super) fn next_row_into(
 ) -> Result<Option<u64>, CaptureError> {
     while let Some(number) = text.next_line_into(line)? {
         if !line.trim().is_empty() && !line.starts_with(['#', '%']) {
+            text.is_row();
             return Ok(Some(number));
         }
+        text.is_no_row(line)?;
     }
     Ok(None)
 }

@@ -48,13 +48,17 @@ pub(super) fn respelt(
         return (names.to_vec(), Vec::new());
     }
     let plains: Vec<String> = names.iter().map(|name| plain(name)).collect();
+    // A letter of its own may be anything.
+    let known = OURS.iter().chain(more).filter(|ours| ours.len() > 1);
+    let known: Vec<(&str, String)> = known.map(|ours| (*ours, plain(ours))).collect();
     let mut notes = Vec::new();
     let ours = |(name, own): (&String, &String)| {
-        let is_only = plains.iter().filter(|other| *other == own).count() == 1;
-        // A letter of its own may be anything.
-        let mut all = OURS.iter().chain(more).filter(|ours| ours.len() > 1);
-        let found = all.find(|ours| plain(ours) == *own && is_only)?;
-        if *found != name {
+        let (found, _) = known.iter().find(|(_, plain)| plain == own)?;
+        // Looked for last: a table may have a hundred thousand columns.
+        if plains.iter().filter(|other| *other == own).nth(1).is_some() {
+            return None;
+        }
+        if found != name {
             notes.push(format!(
                 "column `{}` is taken as `{found}`, the name that it has here",
                 brief(name)
@@ -68,23 +72,30 @@ pub(super) fn respelt(
     (names.collect(), notes)
 }
 
-/// The name of ours that a column was probably meant to have; none where several are as near. `names` are those that are
-/// there: they are not missing.
-pub(super) fn meant(name: &str, names: &[String]) -> Option<String> {
-    let own = plain(name);
+/// The names of ours that are not among a file's.
+pub(super) fn missing(names: &[String]) -> Vec<&'static str> {
     let is_there = |ours: &str| names.iter().any(|name| name == ours);
-    let mut near: Vec<(usize, &str)> = (OURS.iter().filter(|ours| !is_there(ours)))
-        .map(|ours| (distance(&plain(ours), &own), *ours))
-        .filter(|(distance, ours)| *distance <= if plain(ours).len() > SHORT { 2 } else { 1 })
+    (OURS.into_iter()).filter(|ours| !is_there(ours)).collect()
+}
+
+/// The name of ours that a column was probably meant to have, of those that are missing; none where several are as near.
+pub(super) fn meant(name: &str, missing: &[&'static str]) -> Option<String> {
+    let own = plain(name);
+    let mut near: Vec<(usize, &str)> = (missing.iter().map(|ours| (plain(ours), *ours)))
+        .filter(|(plain, _)| plain.len().abs_diff(own.len()) <= WRONG)
+        .map(|(plain, ours)| (distance(&plain, &own), ours))
+        .filter(|(distance, ours)| *distance <= if plain(ours).len() > SHORT { WRONG } else { 1 })
         .collect();
     near.sort_unstable();
     match near[..] {
-        [] => alias(name).filter(|ours| OURS.contains(&ours.as_str()) && !is_there(ours)),
+        [] => alias(name).filter(|ours| missing.contains(&ours.as_str())),
         [(first, _), (second, _), ..] if first == second => None,
         [(_, ours), ..] => Some(ours.to_owned()),
     }
 }
 
+/// Wrong letters that a longer name of ours stands.
+const WRONG: usize = 2;
 /// Letters of a name up to which one wrong one is all that it stands.
 const SHORT: usize = 4;
 
@@ -114,7 +125,8 @@ const LISTED: usize = 20;
 
 /// Says which columns are not read because of their names.
 pub(super) fn not_read(unread: &[&String], names: &[String]) -> Option<String> {
-    let say = |name: &&String| match meant(name, names) {
+    let missing = missing(names);
+    let say = |name: &&String| match meant(name, &missing) {
         Some(ours) => format!("`{}` (did you mean `{ours}`?)", brief(name)),
         None => format!("`{}`", brief(name)),
     };
@@ -166,7 +178,7 @@ mod tests {
 
     #[test]
     fn the_name_that_was_meant_is_told_where_it_is_one_and_missing() {
-        let names = list("seq,gyro_x,gyro_y,acc_x");
+        let missing = missing(&list("seq,gyro_x,gyro_y,acc_x"));
         for (name, ours) in [
             ("gyro_zz", Some("gyro_z")),
             ("gyor_z", Some("gyro_z")),
@@ -183,7 +195,7 @@ mod tests {
             ("vibration_g", None),
             ("heater_degc", None),
         ] {
-            assert_eq!(meant(name, &names).as_deref(), ours, "{name}");
+            assert_eq!(meant(name, &missing).as_deref(), ours, "{name}");
         }
     }
 }

@@ -11,6 +11,8 @@ use super::{CaptureError, unpack};
 const GZIP: &[u8] = &[0x1f, 0x8b];
 /// No row of numbers is longer.
 const LONGEST_LINE: u64 = 1 << 20;
+/// Bytes without a row of numbers, empty lines and comments, after which there is none: packed, a gigabyte of them is small.
+const NO_ROW: u64 = 1 << 24;
 
 /// How Zstandard begins.
 const ZSTANDARD: &[u8] = b"\x28\xb5\x2f\xfd";
@@ -41,7 +43,17 @@ pub fn unpacked<'a>(mut input: impl BufRead + 'a) -> Result<Box<dyn BufRead + 'a
 fn no_text(start: &[u8]) -> Option<(&'static str, &'static str)> {
     const FILE: &str = "name it as a file of its own: such a file is read from its end, and neither from a pipe nor packed";
     const UNPACK: &str = "unpack it first; gzip, Zstandard and bzip2 are read as they are";
-    let known: [(&[u8], _, _); 13] = [
+    let known: [(&[u8], _, _); 15] = [
+        (
+            b"\xff\xfe\0\0",
+            "UTF-32",
+            "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)",
+        ),
+        (
+            b"\0\0\xfe\xff",
+            "UTF-32",
+            "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)",
+        ),
         (
             b"\xff\xfe",
             "UTF-16",
@@ -121,6 +133,8 @@ pub(super) struct TextLines<R> {
     input: R,
     number: u64,
     bytes: Vec<u8>,
+    /// Bytes since the last row.
+    without_row: u64,
     /// Lines that were looked at already, the next one first.
     ahead: VecDeque<(u64, String)>,
     /// What lines end with: some old programs write a carriage return alone.
@@ -148,6 +162,7 @@ impl<R: BufRead> TextLines<R> {
             ahead: VecDeque::new(),
             end,
             number: 0,
+            without_row: 0,
             bytes: Vec::new(),
         })
     }
@@ -175,6 +190,9 @@ impl<R: BufRead> TextLines<R> {
             return Ok(None);
         }
         self.number += 1;
+        if self.bytes.len() as u64 == LONGEST_LINE && self.bytes.last() != Some(&self.end) {
+            return Err(self.no_table("is longer than 1 MiB"));
+        }
         // Byte by byte: no character need be decoded for it.
         while self.bytes.pop_if(|b| is_around(char::from(*b))).is_some() {}
         let text: Cow<'_, str> = match std::str::from_utf8(&self.bytes) {
@@ -193,6 +211,27 @@ impl<R: BufRead> TextLines<R> {
 }
 
 impl<R> TextLines<R> {
+    /// Counts a line that is no row; an error where nothing else comes.
+    pub fn is_no_row(&mut self, line: &str) -> std::result::Result<(), CaptureError> {
+        self.without_row += line.len() as u64 + 1;
+        if self.without_row > NO_ROW {
+            return Err(self.no_table("ends 16 MiB of empty lines and comments"));
+        }
+        Ok(())
+    }
+
+    /// A row came.
+    pub fn is_row(&mut self) {
+        self.without_row = 0;
+    }
+
+    fn no_table(&self, what: &str) -> CaptureError {
+        CaptureError::NoText {
+            what: format!("a text whose line {} {what}", self.number),
+            help: "is it the right file? A table has a line of column names and then a row for each sample".to_owned(),
+        }
+    }
+
     /// Gives lines back, which come again in their order.
     pub fn put_back(&mut self, lines: impl DoubleEndedIterator<Item = (u64, String)>) {
         lines.rev().for_each(|line| self.ahead.push_front(line));

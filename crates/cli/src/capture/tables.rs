@@ -2,15 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Cursor, Read as _};
+use std::io::{BufReader, Cursor, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
-use parquet::basic::{LogicalType, TimeUnit};
+use parquet::basic::{LogicalType, TimeUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::DataType;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 use super::CaptureError;
+use super::error::brief;
 use super::pages::{Pages, is_packed_otherwise};
 
 /// Named columns of one length.
@@ -75,13 +76,50 @@ pub(crate) fn read_table(path: &Path) -> Option<Result<Table, CaptureError>> {
 }
 
 /// Arrays as they stand in a file: name and columns; several of them are called `name[0]`, `name[1]`, ...
-#[derive(Default)]
 struct Arrays {
     columns: Vec<(String, Vec<f64>)>,
     about: Vec<(String, String)>,
+    /// Bytes that its numbers may still take.
+    room: u64,
 }
 
+/// Bytes that the numbers of a file may take beyond its own length: packed files can claim, and unpack to, any size.
+const ROOM: u64 = 1 << 30;
+/// Bytes of a number here.
+const NUMBER: u64 = size_of::<f64>() as u64;
+
 impl Arrays {
+    /// Nothing yet of that file.
+    fn of(file: &File) -> Result<Self, String> {
+        let length = file.metadata().map_err(|error| error.to_string())?.len();
+        Ok(Self {
+            columns: Vec::new(),
+            about: Vec::new(),
+            room: ROOM.saturating_add(length),
+        })
+    }
+
+    /// Takes room for an array before it is read; an error where there is none.
+    fn reserve(&mut self, name: &str, shape: &[u64]) -> Result<(), String> {
+        let size = (shape.iter()).try_fold(NUMBER, |size, n| size.checked_mul(*n));
+        match size.and_then(|size| self.room.checked_sub(size)) {
+            Some(left) => {
+                self.room = left;
+                Ok(())
+            }
+            None => {
+                let shape: Vec<String> = shape.iter().map(u64::to_string).collect();
+                Err(format!(
+                    "array `{}` of {} numbers, and what is read before it, would take more than {} GiB beyond the length of the \
+                     file; write the columns that are needed, or a part of the rows, to a file of their own",
+                    brief(name),
+                    shape.join(" x "),
+                    ROOM >> 30
+                ))
+            }
+        }
+    }
+
     /// Takes an array of up to two dimensions; the longer one is time. `by_rows` says that the last index runs fastest.
     fn add(&mut self, name: &str, shape: &[usize], values: Vec<f64>, by_rows: bool) {
         let (rows, columns) = match *shape {
@@ -150,15 +188,17 @@ fn open(path: &Path) -> Result<File, String> {
 }
 
 fn npy(path: &Path) -> Result<Arrays, String> {
-    let mut out = Arrays::default();
-    npy_array(&mut out, "values", BufReader::new(open(path)?))?;
+    let file = open(path)?;
+    let mut out = Arrays::of(&file)?;
+    npy_array(&mut out, "values", BufReader::new(file))?;
     Ok(out)
 }
 
 fn npz(path: &Path) -> Result<Arrays, String> {
     let bad = |error: zip::result::ZipError| format!("it is no NPZ: {error}");
-    let mut archive = zip::ZipArchive::new(BufReader::new(open(path)?)).map_err(bad)?;
-    let mut out = Arrays::default();
+    let file = open(path)?;
+    let mut out = Arrays::of(&file)?;
+    let mut archive = zip::ZipArchive::new(BufReader::new(file)).map_err(bad)?;
     for i in 0..archive.len() {
         let mut entry = archive.by_index(i).map_err(bad)?;
         let name = entry.name().map_err(bad)?.into_owned();
@@ -167,8 +207,7 @@ fn npz(path: &Path) -> Result<Arrays, String> {
                 .map_err(|why| format!("array `{name}`: {why}"))?;
         } else if name == "about.json" {
             let mut text = String::new();
-            entry
-                .read_to_string(&mut text)
+            (entry.by_ref().take(LONGEST_TEXT).read_to_string(&mut text))
                 .map_err(|error| format!("about.json: {error}"))?;
             let about: BTreeMap<String, String> =
                 serde_json::from_str(&text).map_err(|error| format!("about.json: {error}"))?;
@@ -178,8 +217,45 @@ fn npz(path: &Path) -> Result<Arrays, String> {
     Ok(out)
 }
 
+/// Bytes of the text about a file, and of the header of an array, that are read at most.
+const LONGEST_TEXT: u64 = 1 << 16;
+
+/// The header of an array of NumPy as it stands, and the shape that it says. Magic, version of the format and length of the text
+/// come before it, that in two bytes in version 1 and in four later. The shape is read here, since whoever multiplies it without
+/// looking fails.
+fn npy_header(mut input: impl std::io::Read) -> Result<(Vec<u8>, Vec<u64>), String> {
+    let mut header = vec![0; 10];
+    let mut fill = |bytes: &mut [u8]| input.read_exact(bytes).map_err(|error| error.to_string());
+    fill(&mut header)?;
+    let mut length = [header[8], header[9], 0, 0];
+    if header[6] > 1 {
+        fill(&mut length[2..])?;
+        header.extend(&length[2..]);
+    }
+    let length = u32::from_le_bytes(length);
+    if u64::from(length) > LONGEST_TEXT {
+        return Err(format!("its header claims {length} bytes"));
+    }
+    let from = header.len();
+    header.resize(from + length as usize, 0);
+    fill(&mut header[from..])?;
+    let text = String::from_utf8_lossy(&header[from..]);
+    let said = text
+        .split_once("shape")
+        .and_then(|(_, rest)| rest.split_once('('));
+    let said = said.and_then(|(_, rest)| rest.split_once(')'));
+    let sizes = said
+        .map_or("", |(sizes, _)| sizes)
+        .split(',')
+        .map(str::trim);
+    let sizes = sizes.filter(|size| !size.is_empty()).map(str::parse);
+    let shape: Result<Vec<u64>, _> = sizes.collect();
+    let shape = shape.map_err(|_| format!("its shape is `{}`", brief(said.map_or("", |s| s.0))))?;
+    Ok((header, shape))
+}
+
 /// Adds an array; one of text or objects is left out.
-fn npy_array(out: &mut Arrays, name: &str, input: impl std::io::Read) -> Result<(), String> {
+fn npy_array(out: &mut Arrays, name: &str, mut input: impl std::io::Read) -> Result<(), String> {
     fn cells<T: npyz::Deserialize>(
         file: npyz::NpyFile<impl std::io::Read>,
         number: fn(T) -> f64,
@@ -187,7 +263,15 @@ fn npy_array(out: &mut Arrays, name: &str, input: impl std::io::Read) -> Result<
         let cells = file.into_vec::<T>().map_err(|error| error.to_string())?;
         Ok(cells.into_iter().map(number).collect())
     }
-    let file = npyz::NpyFile::new(input).map_err(|error| error.to_string())?;
+    let (header, shape) = npy_header(&mut input)?;
+    out.reserve(name, &shape)?;
+    let header = npyz::NpyHeader::from_reader(Cursor::new(header));
+    let header = header.map_err(|error| {
+        // A parser shows the text that it does not understand, however long.
+        let why = error.to_string();
+        brief(why.lines().next().unwrap_or_default())
+    })?;
+    let file = npyz::NpyFile::with_header(header, input);
     let shape: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
     let by_rows = file.order() == npyz::Order::C;
     let npyz::DType::Plain(kind) = file.dtype() else {
@@ -214,12 +298,13 @@ fn npy_array(out: &mut Arrays, name: &str, input: impl std::io::Read) -> Result<
 fn mat(path: &Path) -> Result<Arrays, String> {
     let mut start = [0; 10];
     let mut file = open(path)?;
+    let mut out = Arrays::of(&file)?;
     if file.read_exact(&mut start).is_ok() && &start == b"MATLAB 7.3" {
         return hdf5(path);
     }
+    out.reserve("of all", &[unpacked_mat(&mut file)? / NUMBER])?;
     let file = matfile::MatFile::parse(Cursor::new(start).chain(file))
         .map_err(|error| format!("it is no .mat of version 5 to 7: {error}"))?;
-    let mut out = Arrays::default();
     for array in file.arrays() {
         use matfile::NumericData as N;
         let values: Vec<f64> = match array.data() {
@@ -246,6 +331,42 @@ fn mat(path: &Path) -> Result<Arrays, String> {
     Ok(out)
 }
 
+/// Bytes that the packed elements of a .mat of version 5 to 7 unpack to, up to where they are too many; the file stands behind
+/// its first ten bytes before and after. An element has its kind and length before it, 4 bytes each, and kind 15 is packed.
+fn unpacked_mat(file: &mut File) -> Result<u64, String> {
+    const PACKED: u32 = 15;
+    let wrong = |error: std::io::Error| error.to_string();
+    let mut bytes = BufReader::new(&mut *file);
+    // The header, of 128 bytes, says the order of bytes in its last two.
+    let mut header = [0; 118];
+    let mut size = 0;
+    if bytes.read_exact(&mut header).is_ok() {
+        let is_little = header.ends_with(b"IM");
+        let word = |b: [u8; 4]| match is_little {
+            true => u32::from_le_bytes(b),
+            false => u32::from_be_bytes(b),
+        };
+        let mut tag = [0; 8];
+        while bytes.read_exact(&mut tag).is_ok() {
+            let [a, b, c, d, e, f, g, h] = tag;
+            let (kind, length) = (word([a, b, c, d]), word([e, f, g, h]));
+            let mut element = bytes.by_ref().take(length.into());
+            if kind == PACKED {
+                let unpacked = flate2::read::ZlibDecoder::new(&mut element).take(ROOM);
+                // Damage is for who reads it to tell.
+                size += std::io::copy(&mut { unpacked }, &mut std::io::sink()).unwrap_or(0);
+            }
+            if size >= ROOM {
+                size = u64::MAX;
+                break;
+            }
+            std::io::copy(&mut element, &mut std::io::sink()).map_err(wrong)?;
+        }
+    }
+    file.seek(SeekFrom::Start(10)).map_err(wrong)?;
+    Ok(size)
+}
+
 /// HDF5, which MATLAB's .mat of version 7.3 is. An array of a group or struct is called `GROUP.ARRAY`.
 fn hdf5(path: &Path) -> Result<Arrays, String> {
     let bad = |error: hdf5_pure::Error| {
@@ -253,10 +374,11 @@ fn hdf5(path: &Path) -> Result<Arrays, String> {
             "it cannot be read as HDF5: {error}. In MATLAB, `save(FILE, '-v7')` writes a version without HDF5"
         )
     };
+    let mut out = Arrays::of(&open(path)?)?;
     let file = hdf5_pure::File::open_streaming(path).map_err(bad)?;
-    let mut out = Arrays::default();
-    hdf5_group(&file.root(), "", 0, &mut out).map_err(bad)?;
-    Ok(out)
+    let mut too_large = Ok(());
+    hdf5_group(&file.root(), "", 0, &mut out, &mut too_large).map_err(bad)?;
+    too_large.map(|()| out)
 }
 
 /// Groups within groups that are followed.
@@ -267,6 +389,7 @@ fn hdf5_group(
     within: &str,
     depth: usize,
     out: &mut Arrays,
+    too_large: &mut Result<(), String>,
 ) -> Result<(), hdf5_pure::Error> {
     use hdf5_pure::DType as D;
     for name in group.datasets()? {
@@ -279,6 +402,11 @@ fn hdf5_group(
         {
             continue;
         }
+        let shape = array.shape()?;
+        if let Err(why) = out.reserve(&format!("{within}{name}"), &shape) {
+            *too_large = Err(why);
+            return Ok(());
+        }
         let values = match array.dtype()? {
             D::F64 | D::F32 | D::I8 | D::I16 | D::I32 | D::U8 | D::U16 | D::U32 => {
                 array.read_f64()?
@@ -287,7 +415,7 @@ fn hdf5_group(
             D::U64 => array.read_u64()?.into_iter().map(|v| v as f64).collect(),
             _ => continue,
         };
-        let shape: Vec<usize> = array.shape()?.iter().map(|n| *n as usize).collect();
+        let shape: Vec<usize> = shape.iter().map(|n| *n as usize).collect();
         out.add(&format!("{within}{name}"), &shape, values, true);
     }
     for name in group.groups()? {
@@ -298,6 +426,7 @@ fn hdf5_group(
                 &format!("{within}{name}."),
                 depth + 1,
                 out,
+                too_large,
             )?;
         }
     }
@@ -309,7 +438,9 @@ fn parquet_file(path: &Path) -> Result<Arrays, String> {
     let reader = SerializedFileReader::new(open(path)?).map_err(bad)?;
     let mut file = open(path)?;
     let metadata = reader.metadata();
-    let mut out = Arrays::default();
+    let mut out = Arrays::of(&file)?;
+    let rows = metadata.file_metadata().num_rows();
+    let rows = u64::try_from(rows).map_err(|_| format!("it claims {rows} rows"))?;
     for entry in metadata
         .file_metadata()
         .key_value_metadata()
@@ -337,6 +468,13 @@ fn parquet_file(path: &Path) -> Result<Arrays, String> {
             },
             _ => None,
         };
+        if matches!(
+            column.physical_type(),
+            Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY | Type::INT96
+        ) {
+            continue;
+        }
+        out.reserve(column.name(), &[rows])?;
         let mut cells: Vec<f64> = Vec::new();
         let mut first = None;
         let mut known = true;

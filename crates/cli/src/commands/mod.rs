@@ -16,6 +16,7 @@ pub mod report;
 pub mod representative;
 pub mod run;
 pub mod simulate;
+pub mod terminal;
 mod wish;
 
 use std::io::Read as _;
@@ -136,7 +137,7 @@ impl Input {
             }
         })?;
         if read.skipped > 0 {
-            eprintln!(
+            warn!(
                 "{}: rows that cannot be read and are left out: {}",
                 path.display(),
                 read.skipped
@@ -161,7 +162,7 @@ fn unreadable(path: &Path, error: &std::io::Error) -> miette::Report {
 /// Says on standard error what was wrong with the rows of a capture, for commands whose results have no place for it.
 pub fn tell(path: &Path, record: &model::record::Record) {
     for note in &record.notes {
-        eprintln!("{}: {note}", path.display());
+        warn!("{}: {note}", path.display());
     }
 }
 
@@ -204,6 +205,8 @@ impl Line {
 /// not printed and the command goes on: its files are still asked for. Ends the program where it cannot be printed else.
 pub fn say(line: std::fmt::Arguments<'_>) {
     use std::io::Write as _;
+    let line = line.to_string();
+    let line = terminal::harmless(&line);
     let said = if outputs::stdout_is_taken() {
         writeln!(std::io::stderr(), "{line}")
     } else {
@@ -212,6 +215,11 @@ pub fn say(line: std::fmt::Arguments<'_>) {
     if said.is_err_and(|error| error.kind() != std::io::ErrorKind::BrokenPipe) {
         std::process::exit(1);
     }
+}
+
+/// Prints a line to standard error.
+pub fn warn(line: std::fmt::Arguments<'_>) {
+    eprintln!("{}", terminal::harmless(&line.to_string()));
 }
 
 /// Standard input in messages and reports.

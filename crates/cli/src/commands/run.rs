@@ -222,7 +222,7 @@ fn planned(arguments: &Arguments) -> Result<Plan> {
         )
     })?;
     for what in &carried.not {
-        eprintln!("warning: not on the stand: {what}");
+        warn!("warning: not on the stand: {what}");
     }
     Ok(plan)
 }

@@ -41,7 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let rate = arguments.rate.unwrap_or(model.rate_hz);
     for (cause, settings) in model::excitation::unexcited(&model) {
-        eprintln!(
+        warn!(
             "warning: {cause} will not show: nothing excites it. help: under [excitation], set {}",
             settings.join(" or ")
         );

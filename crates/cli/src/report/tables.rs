@@ -117,6 +117,7 @@ fn finding(found: &Finding) -> Markup {
         article {
             h2 { (found.cause.replace('_', " ")) small { " on " (found.channels.join(", ")) } }
             @if let Some(cost) = answer::cost(found) { p { (cost) } }
+            @if let Some(remedy) = answer::remedy(found) { p { (remedy) } }
             table.plain {
                 tbody {
                     @for (name, parameter) in &found.parameters {

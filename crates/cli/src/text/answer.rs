@@ -87,6 +87,13 @@ fn spaced(over: &str) -> String {
         .map_or_else(|| over.to_owned(), |n| format!("{n} s"))
 }
 
+/// What to change about the stand, the filter or the model.
+#[must_use]
+pub fn remedy(finding: &Finding) -> Option<String> {
+    let remedy = effect(&finding.cause)?.docs().remedy;
+    (!remedy.is_empty()).then(|| format!("What to do: {remedy}"))
+}
+
 /// What this record leaves open, and what to record to close it.
 #[must_use]
 pub fn open_question(finding: &Finding) -> Option<String> {

@@ -29,10 +29,12 @@ pub fn diagnosis(diagnosed: &Diagnosed) -> String {
     let _ = writeln!(out, "verdict  {}", verdict(d));
     for (k, finding) in d.findings.iter().enumerate() {
         let _ = writeln!(out, "\n{:>2}. {}", k + 1, lead(&answer::headline(finding)));
-        for line in [answer::cost(finding), answer::open_question(finding)]
-            .into_iter()
-            .flatten()
-        {
+        let lines = [
+            answer::cost(finding),
+            answer::remedy(finding),
+            answer::open_question(finding),
+        ];
+        for line in lines.into_iter().flatten() {
             let _ = writeln!(out, "{}", item("", &line));
         }
         if finding.confirmed_on_held_out_data == Some(false) {

@@ -36,6 +36,7 @@ impl Effect for AmLine {
             physics: "b(t) = amplitude (1 + depth cos(2 pi modulation_frequency t + modulation_phase)) cos(2 pi frequency t + phase): two vibrations that beat, a rotor with an eccentric load.",
             excitation: "Nothing; several cycles of the swing.",
             test: "After a line: pairs of side bands at equal distances, tested together.",
+            remedy: "Find and damp the two vibrations that beat, or filter at their frequencies; until then simulate the line with its modulation.",
             figure: "Amplitude spectrum of the rate around it, other terms taken out: a peak with two symmetric neighbours.",
             example: Example::new(
                 Plot::Lines {

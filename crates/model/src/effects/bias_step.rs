@@ -32,6 +32,7 @@ impl Effect for BiasStep {
             physics: "b(t) = height for t >= time: a knock that shifts the mount or the element, a latch-up, a charge that moves.",
             excitation: "Nothing.",
             test: "Likelihood ratio at all times at once, random walk refitted; largest one taken.",
+            remedy: "Fasten mount and connectors and repeat the run; where the step comes again, let the filter estimate the bias anew after it.",
             figure: "Rate in time blocks with the two levels.",
             example: Example::new(
                 Plot::RateInTime { block_s: 5.0 },

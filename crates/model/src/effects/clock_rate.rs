@@ -32,6 +32,7 @@ impl Effect for ClockRate {
             physics: "The device clock runs fast or slow beyond its stated tolerance: a wrong crystal, an RC oscillator, a wrong divider.",
             excitation: "Device and host times.",
             test: "Audit: slope of host time against device time, against the stated tolerance.",
+            remedy: "Measure the clock against a reference and write the true tick into the configuration, or fit a better crystal.",
             figure: "Host time minus device time.",
             example: Example::new(Plot::HostTime, &[("ppm", 800.0)]).on_all(),
         }

@@ -29,6 +29,7 @@ impl Effect for CoarseLsb {
             physics: "The lowest bits are always zero: a wrong shift, a format with fewer bits.",
             excitation: "Nothing.",
             test: "Audit: share of ones in the low bits against the share that the noise makes.",
+            remedy: "Correct the shift or the data format in the reading code; if the part has no more bits, give the simulation the larger step.",
             figure: "Share of ones by bit.",
             example: Example::new(Plot::Bits, &[("missing_bits", 2.0)]),
         }

@@ -36,6 +36,7 @@ impl Effect for CommonNoise {
             physics: "e_i(t) = own noise + c(t): a shared supply or reference, broadband shaking of the base. The shared part is white as the own one and goes through the same filter.",
             excitation: "At least two gyros.",
             test: "Correlation of the whitened residuals of each pair of axes.",
+            remedy: "Filter the shared supply and reference and isolate the base; until then give the filter correlated measurement noise.",
             figure: "Whitened residual of one axis against another.",
             example: Example::new(Plot::AxisAgainst("gyro_y"), &[("sigma", 0.5)]).on_all(),
         }

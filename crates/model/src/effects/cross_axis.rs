@@ -33,6 +33,7 @@ impl Effect for CrossAxis {
             physics: "b(t) = sum of shares x rates about the other axes: misaligned mounting, coupled modes of the element.",
             excitation: "Rotation about another axis, while this one is at rest.",
             test: "Least squares on the other gyros that turn, random walk refitted.",
+            remedy: "Calibrate the alignment on a rate table and multiply the three rates by the inverse of the measured matrix.",
             figure: "Rate in blocks of the other rate against that rate.",
             example: Example::new(Plot::RateByValue("gyro_z"), &[("from_gyro_z", 0.03)])
                 .in_a_world(&[("turn_dps", 20.0)]),

@@ -30,6 +30,7 @@ impl Effect for DroppedSamples {
             physics: "Frames are lost between the board and the file: a line error, a full buffer, a slow host.",
             excitation: "Nothing.",
             test: "Audit: gaps of the sequence numbers, and time that passes without a number.",
+            remedy: "Lower the rate or raise the speed of the line, enlarge the buffer, and let the filter step by the time stamps.",
             figure: "Gaps over time.",
             example: Example::new(Plot::Gaps, &[("count", 30.0)]).on_all(),
         }

@@ -48,6 +48,7 @@ impl Effect for GSensitivity {
             physics: "b(t) = sum over axes of k a(t) / g: the proof mass of a vibrating gyro is also an accelerometer; the ADIS16250 data sheet gives 0.2 deg/s/g. The gyro's own filter, and its pole, delay what it feels, and not what the accelerometer shows: a part of fast vibration comes in the sample after, late (a(t - 1) - a(t)) / g.",
             excitation: "Acceleration that changes by more than 0.015 g rms: shaking, tilting, a six-position test.",
             test: "Least squares on each accelerometer axis, and on its change since the sample before where the base is still; random walk refitted. More than half of it late is no filter of the gyro, unless its noise went through one.",
+            remedy: "Mount the gyro away from vibration, and subtract the sensitivity times the measured acceleration from the rate.",
             figure: "Rate in blocks of acceleration against acceleration.",
             example: Example::new(Plot::RateByValue("acc_x"), &[("acc_x", 0.6)])
                 .in_a_world(&[("vibration_g", 0.15)]),

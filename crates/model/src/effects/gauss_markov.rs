@@ -38,6 +38,7 @@ impl Effect for GaussMarkov {
             physics: "First-order Gauss-Markov process: autocorrelation sigma^2 exp(-|t| / correlation_time); loops in the electronics, air currents, slow modes.",
             excitation: "Nothing; several correlation times.",
             test: "White variance, random walk, sigma and correlation time refitted by maximum likelihood.",
+            remedy: "Add a first-order Gauss-Markov bias state with this sigma and correlation time to the filter, in place of a larger random walk.",
             figure: "Spectrum of the rate with the model before and after: a shoulder.",
             example: Example::new(Plot::Spectrum, &[("sigma", 0.2), ("correlation_time", 2.0)]),
         }

@@ -37,6 +37,7 @@ impl Effect for Line {
             physics: "b(t) = amplitude cos(2 pi frequency t + phase): vibration of a structure, mains, a switching supply, an unbalanced rotor, seen directly or as an alias.",
             excitation: "Nothing; more than three cycles.",
             test: "Periodogram of the whitened residual at twice the Fourier frequencies, then the exact likelihood of the refined frequency.",
+            remedy: "Remove or isolate the source of this frequency, or notch it; check for an alias by a run at another sample rate.",
             figure: "Amplitude spectrum of the rate around it, other terms taken out: one peak.",
             example: Example::new(
                 Plot::Lines {

@@ -42,6 +42,7 @@ impl Effect for LowPass {
             physics: "The white noise has passed a filter whose memory reaches over a sample: the Bartlett filter of the ADIS16250 with many taps, or a pole of the read-out.",
             excitation: "Nothing.",
             test: "White noise shaped by one pole or by a triangular window, one width each, refitted by maximum likelihood.",
+            remedy: "Simulate white noise through this filter, and take fewer taps, or a lower sample rate, if the filter has to see white noise.",
             figure: "Spectrum of the rate with the model before and after: it falls towards half the sample rate.",
             example: Example::new(Plot::Spectrum, &[("lag1_correlation", 0.5)]),
         }

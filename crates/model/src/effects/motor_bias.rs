@@ -64,6 +64,7 @@ impl Effect for MotorBias {
             physics: "b(t) = at_full_duty x duty, or x |duty| where both directions are driven and the magnitude fits better: magnetic field or ground shift of the motor current. Current surges until the motor has spun up: with w' = (duty - w) / surge_time, surge_at_full_duty x (duty - w) is added, and surge_at_start x exp(-t / surge_time) where the record begins while it does. Dry friction takes the same current at any speed: while_turning x sign(duty).",
             excitation: "A motor command that changes, while the axis itself does not turn.",
             test: "Least squares on the command, and on the surge over a grid of times, refined; random walk refitted.",
+            remedy: "Twist and shield the motor leads, give the motor a ground return of its own, or subtract the bias times the duty.",
             figure: "Rate in time blocks against duty.",
             example: Example::new(Plot::RateAgainst("pwm"), &[("at_full_duty", 0.4)])
                 .in_a_world(&[("motor_duty", 0.8)]),

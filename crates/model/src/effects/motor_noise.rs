@@ -41,6 +41,7 @@ impl Effect for MotorNoise {
             physics: "var e(t) = s^2 (1 + increase x duty^2), where an amplitude grows with the duty, or s^2 (1 + increase x |duty|), where pulses come more often: brush noise and vibration coupled into the rate.",
             excitation: "A motor command that changes.",
             test: "Likelihood of the whitened residual with a variance that follows the square of duty, or |duty| where that is clearly better.",
+            remedy: "Balance and isolate the motor and suppress its brushes, or raise the filter's measurement noise with the duty.",
             figure: "Mean square of the whitened residual in time blocks against duty.",
             example: Example::new(
                 Plot::PowerAgainst("pwm"),

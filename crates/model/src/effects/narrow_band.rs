@@ -49,6 +49,7 @@ impl Effect for NarrowBand {
             physics: "Autocorrelation rms^2 exp(-pi bandwidth |t|) cos(2 pi center_frequency t), a Lorentzian peak of the spectrum: a mode of the structure or of the sensor that noise drives (a fan, a shaking floor, a bearing); its quality factor is center_frequency / bandwidth.",
             excitation: "Nothing; some ten times 1 / bandwidth.",
             test: "Energy of the whitened residual over all centres and widths, then all noise refitted by maximum likelihood; the envelope tells it from a tone whose pitch wanders.",
+            remedy: "Stiffen or damp the mode at this frequency, or filter the band; until then simulate it as a second-order process.",
             figure: "Spectrum of the rate with the model before and after: a peak that is wider than a line.",
             example: Example::new(
                 Plot::Spectrum,

@@ -37,6 +37,7 @@ impl Effect for NoiseChange {
             physics: "var e(t) = s^2 (1 + variance_increase) for start <= t < end: a machine nearby, a loose part, a range switched.",
             excitation: "Nothing.",
             test: "Likelihood of all stretches of the whitened residual.",
+            remedy: "Find what ran nearby between these times and repeat the run without it, or raise the measurement noise for that time.",
             figure: "Mean square of the whitened residual in time blocks.",
             example: Example::new(
                 Plot::PowerInTime,

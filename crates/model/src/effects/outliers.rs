@@ -37,6 +37,7 @@ impl Effect for Outliers {
             physics: "Single samples that the noise cannot have made: a disturbed SPI word, a discharge, a knock.",
             excitation: "Nothing.",
             test: "Audit: distance of the whitened sample against the normal tail of the record length.",
+            remedy: "Check wiring and signal levels of the data line, and let the filter reject innovations beyond 5 sigma.",
             figure: "The rate around each of them.",
             example: Example::new(Plot::Around, &[("count", 4.0)]),
         }

@@ -32,6 +32,7 @@ impl Effect for RateRamp {
             physics: "b(t) = slope t, the R of IEEE Std 952: slow ageing, or a drift much longer than the record.",
             excitation: "Nothing but time; a longer record shows it better by the power 3/2.",
             test: "Least squares on time, random walk refitted.",
+            remedy: "Let the part warm up and age before the run, and give the filter a bias with a slope, or null the bias more often.",
             figure: "Rate in time blocks with the straight line.",
             example: Example::new(Plot::RateInTime { block_s: 5.0 }, &[("slope", 1e-3)]),
         }

@@ -32,6 +32,7 @@ impl Effect for Saturation {
             physics: "Readings beyond a limit are given as the limit: the range of the converter or of the register was chosen too small.",
             excitation: "Rates that reach the limit.",
             test: "Audit: the tail that should lie beyond the extreme readings, and does not.",
+            remedy: "Choose a larger range, or excite the stand less; clipped readings have to be left out of any integration.",
             figure: "Histogram of the counts with the normal curve.",
             example: Example::new(Plot::Histogram, &[("high", 8.0)]),
         }

@@ -34,6 +34,7 @@ impl Effect for ScaleError {
             physics: "reading = (1 + relative) x rate: tolerance of the part (1 % for the ADIS16250) or a wrong constant in the chain.",
             excitation: "A slow sway of the base whose tilt the accelerometers see.",
             test: "The tilt of the accelerometers regressed on the integrated rate, in a band around the sway.",
+            remedy: "Calibrate the scale factor on a rate table and correct the constant of this axis.",
             figure: "Tilt from the accelerometers against tilt from the rate.",
             example: Example::new(Plot::Tilt, &[("relative", 0.15)])
                 .in_a_world(&[("sway_deg", 5.0)]),

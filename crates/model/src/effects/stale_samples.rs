@@ -38,6 +38,7 @@ impl Effect for StaleSamples {
             physics: "A frame repeats the readings of the frame before: the sensor was read before it had a new sample, or a buffer was sent twice.",
             excitation: "Nothing.",
             test: "Audit: new-data flags, and frames with all gyros equal to the frame before against their chance.",
+            remedy: "Read on the sensor's data-ready signal, or read more slowly, and skip frames whose new-data flag is not set.",
             figure: "The rate around each of them.",
             example: Example::new(Plot::Around, &[("count", 40.0)]).on_all(),
         }

@@ -34,6 +34,7 @@ impl Effect for StuckBit {
             physics: "One bit of the word is always, or too often, 0 or 1: a weak line, a solder joint, a marginal set-up time.",
             excitation: "Nothing.",
             test: "Audit: share of ones in each low bit against the share that the noise makes.",
+            remedy: "Check solder joint, series resistor and clock rate of the data line, and replace the part where the bit stays.",
             figure: "Share of ones by bit.",
             example: Example::new(
                 Plot::Bits,

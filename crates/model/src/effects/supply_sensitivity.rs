@@ -30,6 +30,7 @@ impl Effect for SupplySensitivity {
             physics: "b(t) = slope (U(t) - mean U): references of the read-out that are not ratiometric; the ADIS16250 data sheet gives 1 deg/s/V.",
             excitation: "A supply that moves by more than 5 mV.",
             test: "Least squares on the supply channel, random walk refitted.",
+            remedy: "Regulate the supply of the sensor by itself, or subtract the slope times the measured supply from the rate.",
             figure: "Rate in time blocks against supply.",
             example: Example::new(Plot::RateAgainst("supply"), &[("slope", 5.0)])
                 .in_a_world(&[("supply_load_v", 0.06)]),

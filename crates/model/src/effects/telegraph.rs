@@ -34,6 +34,7 @@ impl Effect for Telegraph {
             physics: "b(t) = +-half_height, switching at random with the mean dwell time on either level: a single charge trap, a loose contact, popcorn noise.",
             excitation: "Nothing; many switches within the record.",
             test: "Likelihood of a two-level hidden Markov chain against Gauss-Markov and steps; Bartlett's test of the dwell times, which are exponential where it switches at random.",
+            remedy: "Check contacts and replace the part where it persists; until then simulate two levels with this dwell time and let the filter's bias follow.",
             figure: "Rate in time blocks with the most probable level.",
             example: Example::new(
                 Plot::RateInTime { block_s: 2.0 },

@@ -33,6 +33,7 @@ impl Effect for Temperature {
             physics: "b(t) = slope (T(t) - mean T). The mechanical and electrical offsets of the gyro drift with its die temperature; the ADIS16250 data sheet gives 0.03 deg/s/degC typically.",
             excitation: "A temperature that moves by at least half a degree, best up and down again (a heater cycle).",
             test: "Least squares on the smoothed temperature channel, random walk refitted.",
+            remedy: "Subtract the slope times the measured temperature from the rate, or hold the temperature steady.",
             figure: "Rate in time blocks, the other terms taken out, against temperature: a straight line.",
             example: Example::new(Plot::RateAgainst("temp_x"), &[("slope", 0.08)])
                 .in_a_world(&[("heater_degc", 6.0)]),

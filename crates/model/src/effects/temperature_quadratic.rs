@@ -41,6 +41,7 @@ impl Effect for TemperatureQuadratic {
             physics: "b(t) = slope (T - T0) + curvature (T - T0)^2 with T0 = 25 degC, the zero of the sensor.",
             excitation: "A temperature swing of a few degrees; the power grows with the square of the swing.",
             test: "Least squares on T and T^2 of the smoothed temperature channel; against a linear term already found, the square alone.",
+            remedy: "Subtract slope and curvature times the measured temperature from the rate, or hold the temperature steady.",
             figure: "Rate in time blocks, the other terms taken out, against temperature: a parabola.",
             example: Example::new(
                 Plot::RateAgainst("temp_x"),

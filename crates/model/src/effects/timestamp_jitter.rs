@@ -34,6 +34,7 @@ impl Effect for TimestampJitter {
             physics: "Samples are taken, or stamped, late by a random time: an interrupt that waits, a busy loop in place of a timer.",
             excitation: "Device times.",
             test: "Audit: robust spread of the device times about their line.",
+            remedy: "Sample by a hardware timer and stamp the instant of sampling; until then integrate with the nominal interval.",
             figure: "Device time minus its line.",
             example: Example::new(Plot::DeviceTime, &[("sigma", 2e-3)]).on_all(),
         }

@@ -38,6 +38,7 @@ impl Effect for WarmUp {
             physics: "b(t) = amplitude exp(-t / time_constant): self-heating of a part whose thermometer lags or sits elsewhere, or settling of its electronics.",
             excitation: "A record that starts at power-up and lasts several time constants.",
             test: "Least squares on exponentials over a grid of time constants, refined; random walk refitted.",
+            remedy: "Wait several of these time constants after power-up before the run, or subtract the exponential.",
             figure: "Rate in time blocks with the exponential.",
             example: Example::new(
                 Plot::RateInTime { block_s: 5.0 },

@@ -271,7 +271,8 @@ impl Fit<'_> {
             .windows(2)
             .filter(|w| w[0].abs() < largest / 2.0 && w[1].abs() >= largest / 2.0)
             .count();
-        settings.push(("motor_duty", largest));
+        // A column of others' may count otherwise.
+        settings.push(("motor_duty", largest.min(1.0)));
         // The profile has two starts in a period.
         let period = 2.0 * self.seconds() / starts.max(1) as f64;
         settings.push(("motor_period_s", period));

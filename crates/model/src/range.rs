@@ -1,0 +1,89 @@
+//! What the numbers of a model file may be. A file is written by people and programs, and read where a motor turns: what no
+//! stand has is refused before anything acts on it.
+
+/// Least and greatest value, both included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Range {
+    least: f64,
+    most: f64,
+    whole: bool,
+}
+
+/// No reading is larger, in its unit: those beyond it are none in a capture either.
+const LARGEST: f64 = 1e100;
+/// Seconds and hertz that mean anything.
+const LONGEST: f64 = 1e15;
+const SHORTEST: f64 = 1e-12;
+/// Samples that an effect of single samples may touch.
+const MOST_SAMPLES: f64 = 1e8;
+/// Bits of a reading of the gyro, the lowest of which is 0.
+const HIGHEST_BIT: f64 = 13.0;
+/// A process that switches oftener between two samples shows nothing more, and a simulation draws each switch.
+const SWITCHES_A_SAMPLE: f64 = 100.0;
+/// Effects of one file, and its channels: no stand has more.
+pub(crate) const MOST_EFFECTS: usize = 1000;
+pub(crate) const MOST_CHANNELS: usize = 64;
+
+/// Of anything.
+pub(crate) const ANY: Range = range(-LARGEST, LARGEST);
+/// Of a size: a standard error, N, K, Q.
+pub(crate) const SIZE: Range = range(0.0, LARGEST);
+/// Of a step of the readings.
+pub(crate) const STEP: Range = range(1e-100, LARGEST);
+/// Of a sample rate, Hz, and of a time, s, that divides.
+pub(crate) const POSITIVE: Range = range(SHORTEST, LONGEST);
+
+const fn range(least: f64, most: f64) -> Range {
+    Range {
+        least,
+        most,
+        whole: false,
+    }
+}
+
+const fn whole(least: f64, most: f64) -> Range {
+    Range {
+        least,
+        most,
+        whole: true,
+    }
+}
+
+impl Range {
+    /// Says what a value has to be, where it is not.
+    pub fn refuses(self, name: &str, value: f64) -> Option<String> {
+        let Self { least, most, whole } = self;
+        let holds = (least..=most).contains(&value) && !(whole && value.fract() != 0.0);
+        let kind = if whole { "a whole number " } else { "" };
+        (!holds).then(|| format!("{name} is {value}; it has to be {kind}from {least} to {most}"))
+    }
+}
+
+/// Of a setting of the excitation. Periods and time constants divide.
+pub(crate) fn of_setting(key: &str) -> Range {
+    match key {
+        "motor_duty" => range(0.0, 1.0),
+        "vibration_g" => SIZE,
+        key if key.ends_with("_s") => POSITIVE,
+        _ => ANY,
+    }
+}
+
+/// Of a parameter of an effect by its name and unit, on a stand of that rate.
+pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
+    match (name, unit) {
+        ("count" | "clipped", _) => range(0.0, MOST_SAMPLES),
+        ("running", _) => range(1.0, MOST_SAMPLES),
+        ("bit" | "missing_bits", _) => whole(0.0, HIGHEST_BIT),
+        ("value" | "by_magnitude" | "triangular" | "silent", _) => whole(0.0, 1.0),
+        ("fraction", _) => range(0.0, 1.0),
+        ("lag1_correlation", _) => range(-1.0, 1.0),
+        ("variance_increase" | "variance_increase_at_full_duty", _) => range(-1.0, LARGEST),
+        ("dwell_time", _) => range(1.0 / (SWITCHES_A_SAMPLE * rate_hz), LONGEST),
+        ("time_constant" | "correlation_time" | "surge_time", _) => POSITIVE,
+        ("sigma" | "rms" | "size" | "bias_instability", _) => SIZE,
+        (_, "Hz") => range(0.0, LONGEST),
+        (_, "s") => range(-LONGEST, LONGEST),
+        _ => ANY,
+    }
+}
