@@ -117,6 +117,17 @@ fn prepared() -> Result<(), Failure> {
             &["avrdude"],
         )?;
     }
+    // What looks at results as their users do: without them those tests say that they are left out.
+    if !["chromium", "chromium-browser", "google-chrome"]
+        .iter()
+        .any(|name| toolchain::has(name))
+        && let Err(failure) = toolchain::install(
+            "Chromium, in which the report is looked at",
+            &["chromium", "fonts-dejavu-core"],
+        )
+    {
+        eprintln!("{failure}");
+    }
     match std::env::var_os("IMU_STAND_DATA") {
         Some(folder) => println!("measured records: {}", Path::new(&folder).display()),
         None => println!(

@@ -1,5 +1,6 @@
 //! The program `imu-stand` as a library: captures in and out, and what the commands share.
 
+pub mod browser;
 pub mod capture;
 pub mod export;
 pub mod link;

@@ -164,7 +164,7 @@ fn what_no_stand_has_is_refused_with_its_line() {
         (first("rate_hz = 20.0", "rate_hz = 1e300"), "rate_hz is 1"),
         (first("gyro_y", "gyro_x"), "a second channel gyro_x"),
         (
-            effect("cause = \"clock_rate\"\nppm = { value = 1, unit = \"ppm\" }").repeat(1)
+            effect("cause = \"clock_rate\"\nppm = { value = 1, unit = \"ppm\" }")
                 + &"[[effect]]\ncause = \"clock_rate\"\nppm = { value = 1, unit = \"ppm\" }\n"
                     .repeat(1000),
             "more than 1000 effects",

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use analysis::DiagnoseOptions;
 use analysis::result::Diagnosed;
 use clap::Args;
+use imu_stand::browser::Browser;
 use imu_stand::report::standalone::figures;
 use imu_stand::report::{Subject, report};
 use imu_stand::text::shell_word;
@@ -27,6 +28,9 @@ pub struct Arguments {
     /// The report to write
     #[arg(long, default_value = "report.html")]
     out: PathBuf,
+    /// Print the report as PDF, too; needs Chromium, Chrome or Edge
+    #[arg(long, value_name = "FILE")]
+    pdf: Option<PathBuf>,
     /// Write the figures that convict as SVG files, too, into this folder
     #[arg(long, value_name = "FOLDER")]
     figures: Option<PathBuf>,
@@ -34,7 +38,17 @@ pub struct Arguments {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    Outputs::beside([&arguments.capture]).result("--out", Some(&arguments.out))?;
+    Outputs::beside([&arguments.capture])
+        .result("--out", Some(&arguments.out))?
+        .result("--pdf", arguments.pdf.as_ref())?;
+    // Before the work: without a browser there is no PDF.
+    let printer = match &arguments.pdf {
+        Some(path) if path.as_os_str() == super::outputs::DASH => {
+            miette::bail!(help = "write `--pdf report.pdf`", "--pdf: it takes a file")
+        }
+        Some(path) => Some((Browser::find()?, path)),
+        None => None,
+    };
     let read = arguments.input.read(&arguments.capture)?;
     let hash = super::digest(&arguments.capture)?;
     let options = DiagnoseOptions {
@@ -57,7 +71,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(folder) = &arguments.figures {
         write_figures(folder, &diagnosed, arguments.input.quiet)?;
     }
-    write(&arguments.out, &subject, arguments.input.quiet)
+    let page = write(&arguments.out, &subject, arguments.input.quiet)?;
+    if let Some((browser, path)) = printer {
+        browser.print(&page, path)?;
+        if !arguments.input.quiet {
+            say!("report: {}", path.display());
+        }
+    }
+    Ok(())
 }
 
 fn write_figures(folder: &Path, diagnosed: &Diagnosed, quiet: bool) -> Result<()> {
@@ -78,8 +99,8 @@ fn write_figures(folder: &Path, diagnosed: &Diagnosed, quiet: bool) -> Result<()
     Ok(())
 }
 
-/// Makes a report and writes it.
-pub fn write(path: &Path, subject: &Subject<'_>, quiet: bool) -> Result<()> {
+/// Makes a report, writes it and returns it.
+pub fn write(path: &Path, subject: &Subject<'_>, quiet: bool) -> Result<String> {
     let page = report(subject).map_err(|error| {
         miette::miette!(
             help = "`imu-stand diagnose` without a report gives the same answers as text and JSON",
@@ -90,7 +111,7 @@ pub fn write(path: &Path, subject: &Subject<'_>, quiet: bool) -> Result<()> {
     if !quiet {
         say!("report: {}", path.display());
     }
-    Ok(())
+    Ok(page)
 }
 
 /// The command as it was typed; the program by its name.
