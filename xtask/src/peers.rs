@@ -132,7 +132,7 @@ pub fn compare(root: &Path, long: bool) -> Result<(), Failure> {
                 "--release",
                 "--quiet",
                 "-p",
-                "analysis",
+                "noise",
                 "--example",
                 "peers",
                 "--target-dir",

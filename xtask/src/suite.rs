@@ -13,24 +13,33 @@ use crate::{cargo, say_sizes, toolchain};
 /// no_std crates, tested each alone as well: a run of the workspace unites features.
 const ALONE: &[&str] = &["wire", "adis16250", "mma7260qt"];
 
+/// Test programs of a minute or two that the everyday check runs as well. They are started first of all, so that none is left
+/// for the end, when one core would wait for it.
+const FIRST: &[&str] = &[
+    "campaign campaign",
+    "diagnosis diagnosis",
+    "imu-stand capture",
+    "imu-stand board",
+];
+
 /// Test programs that diagnose records by the hundred or run the image for minutes of its time, the longest first: they
-/// are started first, so that none is left for the end, and the everyday check leaves them out.
+/// are started next, and the everyday check leaves them out.
 const LONG: &[&str] = &[
     "campaign sample",
     "imu-stand hidden_effect",
     "hil-tests hidden",
-    "analysis closed_loop",
-    "analysis limits",
-    "analysis claims",
+    "diagnosis closed_loop",
+    "diagnosis limits",
+    "diagnosis claims",
     "hil-tests rates",
     "hil-tests timing",
     "hil-tests same",
     "hil-tests stack",
     "hil-tests faults",
-    "analysis counts",
-    "analysis events",
-    "analysis couplings",
-    "analysis kin",
+    "diagnosis counts",
+    "diagnosis events",
+    "diagnosis couplings",
+    "diagnosis kin",
 ];
 
 /// How much is run.
@@ -244,7 +253,8 @@ impl Built {
 
     /// Runs the test programs, one on each core.
     fn run(&self, extent: Extent) -> Result<String, Failure> {
-        let unknown = (LONG.iter()).find(|long| self.tests.iter().all(|test| test.name != **long));
+        let started = || FIRST.iter().chain(LONG);
+        let unknown = started().find(|long| self.tests.iter().all(|test| test.name != **long));
         if let Some(name) = unknown {
             return Err(Failure::new(
                 &format!("`{name}` is listed as a long test and is none"),
@@ -252,14 +262,14 @@ impl Built {
             ));
         }
         let order = |test: &TestProgram| {
-            LONG.iter()
+            started()
                 .position(|long| *long == test.name)
-                .unwrap_or(LONG.len())
+                .unwrap_or(usize::MAX)
         };
         let mut tests: Vec<&TestProgram> = self.tests.iter().collect();
         tests.sort_by_key(|test| order(test));
         if extent == Extent::Everyday {
-            tests.retain(|test| order(test) == LONG.len());
+            tests.retain(|test| !LONG.contains(&test.name.as_str()));
         }
         let left_out = self.tests.len() - tests.len();
         let done = side_by_side(&tests)?;

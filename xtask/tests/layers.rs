@@ -1,14 +1,12 @@
-//! The layers of the engine: no `use` line and no qualified path of `crates/analysis` points to a layer above its own, and no
-//! modules know each other but a parent and its private children.
+//! The layers of the engine: no `use` line and no qualified path of `crates/diagnosis` points to a layer above its own, no
+//! modules of an engine's crate know each other but a parent and its private children, and `noise` and `diagnosis` stand side
+//! by side on `model` and `numerics`.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// The layers, each of which may use those before it.
-const LAYERS: [&str; 17] = [
-    "numerics",
-    "records",
-    "noise",
+/// The layers of `crates/diagnosis`, each of which may use those before it.
+const LAYERS: [&str; 14] = [
     "result",
     "test_level",
     "fit",
@@ -177,10 +175,14 @@ fn arrows(sources: &Sources) -> Arrows {
     all
 }
 
-fn of_engine() -> Sources {
+fn folder(name: &str) -> PathBuf {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates");
+    crates.join(name)
+}
+
+fn of_crate(name: &str) -> Sources {
     let mut all = Sources::new();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/analysis/src");
-    sources(&root, &[], &mut all);
+    sources(&folder(name).join("src"), &[], &mut all);
     all
 }
 
@@ -215,8 +217,8 @@ fn circular(arrows: &Arrows) -> Vec<String> {
 }
 
 #[test]
-fn no_module_of_the_engine_uses_a_layer_above_its_own() {
-    let sources = of_engine();
+fn no_module_of_the_diagnosis_uses_a_layer_above_its_own() {
+    let sources = of_crate("diagnosis");
     let unknown: Vec<_> = sources
         .keys()
         .filter(|m| !LAYERS.contains(&m[0].as_str()))
@@ -229,7 +231,31 @@ fn no_module_of_the_engine_uses_a_layer_above_its_own() {
 
 #[test]
 fn no_modules_of_the_engine_know_each_other_but_parent_and_child() {
-    assert_eq!(circular(&arrows(&of_engine())), Vec::<String>::new());
+    for name in ["numerics", "noise", "diagnosis"] {
+        let found = circular(&arrows(&of_crate(name)));
+        assert_eq!(found, Vec::<String>::new(), "crates/{name}");
+    }
+}
+
+#[test]
+fn the_crates_of_the_engine_use_only_what_stands_below() {
+    let ours = ["numerics", "model", "noise", "diagnosis", "bench", "wire"];
+    for (name, below) in [
+        ("numerics", &[][..]),
+        ("model", &[]),
+        ("noise", &["model", "numerics"]),
+        ("diagnosis", &["model", "numerics"]),
+        ("bench", &["wire"]),
+    ] {
+        let text = std::fs::read_to_string(folder(name).join("Cargo.toml")).expect("a manifest");
+        let (_, rest) = text.split_once("[dependencies]").expect("dependencies");
+        let table = rest.split("\n[").next().expect("a table");
+        let used = table
+            .lines()
+            .filter_map(|line| line.split(['.', ' ', '=']).next());
+        let used: Vec<_> = used.filter(|u| ours.contains(u)).collect();
+        assert!(used.iter().all(|u| below.contains(u)), "{name}: {used:?}");
+    }
 }
 
 #[test]
@@ -238,14 +264,11 @@ fn an_arrow_up_and_a_circle_are_seen() {
     let sources: Sources = [
         (
             "fit::scan",
-            "use crate::{\n    numerics::tails,\n    report::findings::sentence,\n};\n",
+            "use crate::{\n    result::tails,\n    report::findings::sentence,\n};\n",
         ),
         ("report::findings", "fn a() { crate::fit::scan::b(); }\n"),
-        ("numerics::tails", "// crate::pipeline::x\n"),
-        (
-            "search",
-            "use super::numerics::tails; fn b() { tails::c() }",
-        ),
+        ("result::tails", "// crate::pipeline::x\n"),
+        ("search", "use super::result::tails; fn b() { tails::c() }"),
     ]
     .into_iter()
     .map(|(name, text)| (module(name), code(text)))
@@ -253,5 +276,5 @@ fn an_arrow_up_and_a_circle_are_seen() {
     let arrows = arrows(&sources);
     assert_eq!(upward(&arrows), ["fit::scan -> report::findings"]);
     assert_eq!(circular(&arrows), ["fit::scan", "report::findings"]);
-    assert!(arrows.contains(&(module("search"), module("numerics::tails"))));
+    assert!(arrows.contains(&(module("search"), module("result::tails"))));
 }

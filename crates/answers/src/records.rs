@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use analysis::{AnalyzeOptions, DiagnoseOptions, analyze, diagnose};
 use campaign::{Family, Size};
+use diagnosis::{DiagnoseOptions, diagnose};
 use imu_stand::ReadOptions;
 use imu_stand::capture::{ColumnMapping, read_capture, read_from, write_to};
 use imu_stand::stand::{Hidden, Sizes, plan, run_native};
@@ -11,6 +11,7 @@ use model::ModelFile;
 use model::docs::example;
 use model::effects::EFFECTS;
 use model::record::{Channel, Record};
+use noise::{AnalyzeOptions, analyze};
 use serde_json::{Value, json};
 
 /// Seed of every draw.

@@ -5,7 +5,7 @@
 //! millisecond, each gyro at its own 256 samples a second), so the answers depend on the times of the questions only,
 //! not on how many were asked: the image in simavr and the firmware's logic on the host meet the same world.
 //!
-//! The crate knows neither `model` nor `analysis`. What it does to the data it does by physics, and they have to find
+//! The crate knows neither `model` nor `diagnosis`. What it does to the data it does by physics, and they have to find
 //! it by statistics.
 //!
 //! Every random draw comes from the scenario's seed; each part has a stream of its own, so that planting a fault

@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use analysis::result::{Diagnosis, Finding};
-use analysis::{DiagnoseOptions, diagnose};
+use diagnosis::result::{Diagnosis, Finding};
+use diagnosis::{DiagnoseOptions, diagnose};
 use model::file::EffectModel;
 use model::record::Record;
 use serde::{Deserialize, Serialize};

@@ -5,9 +5,9 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use analysis::likelihood::{Bins, Dct, least_walk};
-use analysis::optimise::golden;
-pub use analysis::optimise::size_for;
+use diagnosis::likelihood::{Bins, Dct, least_walk};
+use numerics::minimise::golden;
+pub use numerics::minimise::size_for;
 
 use crate::stand::Stand;
 

@@ -4,8 +4,8 @@
 use std::collections::VecDeque;
 use std::fmt::Write;
 
-use analysis::allan::{Deviation, Streaming};
-use analysis::edf::{NoiseType, chi_square_interval, edf};
+use noise::allan::{Deviation, Streaming};
+use noise::edf::{NoiseType, chi_square_interval, edf};
 use serde::Serialize;
 use wire::{Frame, Hello, Sample, flags};
 

@@ -122,8 +122,8 @@ fn a_row_that_cannot_be_read_keeps_its_place_and_is_no_sample_that_was_lost() {
     };
     let (head, rows) = capture(150.0);
     let dropped = |read: &Read| {
-        let options = analysis::DiagnoseOptions::default();
-        let found = analysis::diagnose(&read.record, &options).expect("a diagnosis");
+        let options = diagnosis::DiagnoseOptions::default();
+        let found = diagnosis::diagnose(&read.record, &options).expect("a diagnosis");
         let count = found.diagnosis.findings.iter();
         count
             .filter(|f| f.cause == "dropped_samples")

@@ -1,14 +1,14 @@
 //! The way back: what was fitted on a run goes onto the parts of the bench, the firmware samples them, and the
 //! diagnosis of that capture finds the same errors again.
 
-use analysis::DiagnoseOptions;
-use analysis::result::Diagnosed;
+use diagnosis::DiagnoseOptions;
+use diagnosis::result::Diagnosed;
 use imu_stand::stand::{Hidden, Sizes, plan, plan_fitted, run_native};
 use model::file::ModelFile;
 use model::record::Record;
 
 fn diagnosed(record: &Record) -> Diagnosed {
-    analysis::diagnose(record, &DiagnoseOptions::default()).expect("600 s are enough")
+    diagnosis::diagnose(record, &DiagnoseOptions::default()).expect("600 s are enough")
 }
 
 /// Value and standard error of a parameter of a cause on a channel.

@@ -1,12 +1,12 @@
 //! The model that `diagnose` hands over is the record's: simulated in the world that the record saw, it has the record's Allan
 //! deviation, whatever was hidden in the stand.
 
-use analysis::DiagnoseOptions;
-use analysis::allan::{Deviation, Phase, deviation};
-use analysis::sampling::Sampling;
+use diagnosis::DiagnoseOptions;
 use imu_stand::stand::{Hidden, Sizes, plan, run_native};
 use model::file::ModelFile;
 use model::record::Record;
+use model::record::sampling::Sampling;
+use noise::allan::{Deviation, Phase, deviation};
 
 type Tested = Result<(), Box<dyn std::error::Error>>;
 
@@ -47,7 +47,7 @@ fn error(samples: usize, m: usize) -> f64 {
 /// Simulated over measured deviations of every channel and factor.
 fn ratios(hidden: Hidden, seed: u64) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
     let (record, _) = run_native(&plan(hidden, Sizes::Visible, 600.0, seed), |_| {});
-    let found = analysis::diagnose(&record, &DiagnoseOptions::default())?;
+    let found = diagnosis::diagnose(&record, &DiagnoseOptions::default())?;
     // What is written is read again, and simulated by itself.
     let written = found.extended_model.clone().excited_like(&record).to_toml();
     let written = ModelFile::parse(&written).map_err(|e| format!("{hidden:?}: {e}"))?;

@@ -1,7 +1,7 @@
 //! What is hidden in the stand is said in words, and compared with what is found in the units of the diagnosis, whatever
 //! it is.
 
-use analysis::result::{Alternative, Diagnosis, Finding, Parameter};
+use diagnosis::result::{Alternative, Diagnosis, Finding, Parameter};
 use imu_stand::stand::planted::{Named, Planted, compare, planted};
 use imu_stand::stand::{Hidden, Plan, Sizes, plan};
 

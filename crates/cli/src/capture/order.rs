@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use analysis::sampling::Sampling;
 use model::record::Record;
+use model::record::sampling::Sampling;
 
 use super::CaptureError;
 
@@ -111,7 +111,7 @@ pub(super) fn check_varies(times: &[f64]) -> Result<(), CaptureError> {
 
 /// The record with its rows in order of time.
 pub(super) fn in_order(record: Record) -> Record {
-    match analysis::rows::in_order(&record) {
+    match model::record::rows::in_order(&record) {
         Cow::Owned(mended) => Some(mended),
         Cow::Borrowed(_) => None,
     }

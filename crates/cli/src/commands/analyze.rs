@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use analysis::AnalyzeOptions;
-use analysis::allan::{Deviation, TauGrid};
-use analysis::analyze::{Analysis, ChannelAnalysis, Interval, NoiseParameters};
 use clap::Args;
 use imu_stand::export::noise::may_have_causes;
 use imu_stand::report::plot::{number, tidy};
 use imu_stand::text;
 use miette::Result;
+use noise::AnalyzeOptions;
+use noise::allan::{Deviation, TauGrid};
+use noise::analyze::{Analysis, ChannelAnalysis, Interval, NoiseParameters};
 
 use super::{Input, Outputs};
 
@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         seed: arguments.seed,
         file: super::name(&arguments.capture),
     };
-    let analysis = analysis::analyze(&read.record, &options).map_err(super::explain)?;
+    let analysis = noise::analyze(&read.record, &options).map_err(super::explain)?;
     super::write_json(arguments.json.as_ref(), &analysis)?;
     if !arguments.input.quiet {
         print(&analysis);

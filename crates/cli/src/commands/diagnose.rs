@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use analysis::DiagnoseOptions;
-use analysis::result::Diagnosis;
 use clap::Args;
+use diagnosis::DiagnoseOptions;
+use diagnosis::result::Diagnosis;
 use imu_stand::report::Subject;
 use imu_stand::text;
 use miette::Result;
@@ -77,9 +77,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         };
         let is_needed = arguments.model_out.is_some() || arguments.report.is_some();
         let found = if is_needed {
-            analysis::diagnose(&read.record, &options)
+            diagnosis::diagnose(&read.record, &options)
         } else {
-            analysis::diagnose_owned(std::mem::take(&mut read.record), &options)
+            diagnosis::diagnose_owned(std::mem::take(&mut read.record), &options)
         };
         let found = found.map_err(super::explain)?;
         if let Some(path) = &arguments.model_out {

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use analysis::AnalyzeOptions;
-use analysis::analyze::Analysis;
 use clap::{Args, ValueEnum};
 use imu_stand::export::data::{DataError, Table};
 use imu_stand::export::noise::{Consumer, ImuNoise};
 use imu_stand::export::px4::EKF2_RATE_HZ;
 use miette::Result;
+use noise::AnalyzeOptions;
+use noise::analyze::Analysis;
 
 use super::Input;
 use super::export_source::{self, Source};
@@ -244,5 +244,5 @@ fn analyzed(
         file: super::name(path),
         ..AnalyzeOptions::default()
     };
-    analysis::analyze(&read.record, &options).map_err(super::explain)
+    noise::analyze(&read.record, &options).map_err(super::explain)
 }

@@ -3,11 +3,11 @@
 use std::io::Read as _;
 use std::path::Path;
 
-use analysis::analyze::{ANALYSIS_FORMAT, Analysis};
-use analysis::result::{DIAGNOSIS_FORMAT, Diagnosis};
+use diagnosis::result::{DIAGNOSIS_FORMAT, Diagnosis};
 use imu_stand::export::noise::ImuNoise;
 use miette::Result;
 use model::file::FORMAT as MODEL_FORMAT;
+use noise::analyze::{ANALYSIS_FORMAT, Analysis};
 use serde::Deserialize;
 
 /// What a file holds.

@@ -61,7 +61,7 @@ pub struct Input {
 pub struct Replicates {
     /// Simulations of the model before and after that the record is held against: a model that does not hold it is not
     /// called extended
-    #[arg(long, value_name = "N", default_value_t = analysis::replicates::REPLICATES,
+    #[arg(long, value_name = "N", default_value_t = diagnosis::replicates::REPLICATES,
         value_parser = enough_replicates)]
     replicates: usize,
     /// Hold the record against no simulation
@@ -296,19 +296,19 @@ pub fn read_model(path: &Path) -> Result<model::ModelFile> {
 }
 
 /// Turns an analysis error into what the user is told, with what to do next.
-pub fn explain(error: analysis::AnalysisError) -> miette::Report {
+pub fn explain(error: model::record::AnalysisError) -> miette::Report {
     let help = match &error {
-        analysis::AnalysisError::Inconclusive {
+        model::record::AnalysisError::Inconclusive {
             need, unit: "runs", ..
         } => format!("name {need} captures of the same stand at least"),
-        analysis::AnalysisError::Inconclusive { have: 0.0, .. } => {
+        model::record::AnalysisError::Inconclusive { have: 0.0, .. } => {
             "no gyro has a reading: map the columns that hold numbers, `--columns gyro_x=...`".to_owned()
         }
-        analysis::AnalysisError::Inconclusive { need, unit, .. } => {
+        model::record::AnalysisError::Inconclusive { need, unit, .. } => {
             format!("record for longer: {need} {unit} at least")
         }
-        analysis::AnalysisError::NoRate => "add `--rate HZ`, or map a time column".to_owned(),
-        analysis::AnalysisError::NoChannel { name, present } => match present.first() {
+        model::record::AnalysisError::NoRate => "add `--rate HZ`, or map a time column".to_owned(),
+        model::record::AnalysisError::NoChannel { name, present } => match present.first() {
             Some(_) if name.starts_with("gyro_x,") => {
                 let known = ["temp", "acc", "supply", "pwm"];
                 let is_known = |name: &&String| known.iter().any(|stem| name.starts_with(stem));
@@ -322,11 +322,11 @@ pub fn explain(error: analysis::AnalysisError) -> miette::Report {
             }
             _ => "name one of the channels that are there".to_owned(),
         },
-        analysis::AnalysisError::Constant { name, .. } => format!(
+        model::record::AnalysisError::Constant { name, .. } => format!(
             "see to the sensor's supply and wiring (`imu-stand board self-test`); to go on without {name}, name the others: \
              `analyze --channels ...`, or `--columns` without it"
         ),
-        analysis::AnalysisError::NeverNew { .. } => {
+        model::record::AnalysisError::NeverNew { .. } => {
             "check the gyros' SPI lines; where the flags come from elsewhere, leave the column `flags` out".to_owned()
         }
         _ => "`--help` after the command lists its options, with an example".to_owned(),

@@ -2,17 +2,17 @@
 
 use std::path::PathBuf;
 
-use analysis::analyze::misfit_warning;
-use analysis::noise_fit::{Spectrum, Term, fit, fit_described};
-use analysis::plan::{KnownNoise, Letter, expected, seconds_for};
-use analysis::sampling::Sampling;
-use analysis::synthetic::Truth;
 use clap::Args;
 use imu_stand::report::plot::{number, tidy};
 use imu_stand::text;
 use miette::Result;
 use model::ModelFile;
 use model::record::Quantity;
+use model::record::sampling::Sampling;
+use noise::analyze::misfit_warning;
+use noise::fit::{Spectrum, Term, fit, fit_described};
+use noise::plan::{KnownNoise, Letter, expected, seconds_for};
+use noise::synthetic::Truth;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
@@ -322,7 +322,7 @@ fn of_capture(arguments: &Arguments, path: &std::path::Path) -> Result<Noise> {
     let spectrum = Spectrum::with_gaps(&channel.values, &runs, &sampling.slots, sampling.tau0);
     let samples: usize = runs.iter().map(ExactSizeIterator::len).sum();
     if samples < LEAST_SAMPLES {
-        return Err(super::explain(analysis::AnalysisError::Inconclusive {
+        return Err(super::explain(model::record::AnalysisError::Inconclusive {
             what: format!("a plan by the noise of {}", channel.name),
             have: samples as f64,
             need: LEAST_SAMPLES as f64,
@@ -343,7 +343,7 @@ fn of_capture(arguments: &Arguments, path: &std::path::Path) -> Result<Noise> {
         found.rate_ramp,
     ];
     let limits = estimates.map(|e| if e.value.is_none() { e.high } else { 0.0 });
-    let mut value = |name: &str, unit: &str, e: analysis::noise_fit::Estimated| {
+    let mut value = |name: &str, unit: &str, e: noise::fit::Estimated| {
         e.value.unwrap_or_else(|| {
             notes.push(format!(
                 "{name} is not established in this capture: planned as absent, it is {} {unit} at the most",

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use analysis::plan::KnownNoise;
-use analysis::separate::{PRESETS, TOLD_APART, separation};
 use miette::Result;
 use model::effects::{EFFECTS, effect};
+use noise::discriminate::{PRESETS, TOLD_APART, separation};
+use noise::plan::KnownNoise;
 use serde::Serialize;
 
 use super::plan::duration;

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use analysis::DiagnoseOptions;
-use analysis::result::Diagnosed;
 use clap::Args;
+use diagnosis::DiagnoseOptions;
+use diagnosis::result::Diagnosed;
 use imu_stand::browser::Browser;
 use imu_stand::report::standalone::figures;
 use imu_stand::report::{Subject, report};
@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         no_evidence: false,
         replicates: arguments.replicates.count(),
     };
-    let diagnosed = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
+    let diagnosed = diagnosis::diagnose(&read.record, &options).map_err(super::explain)?;
     let subject = Subject {
         record: &read.record,
         diagnosed: &diagnosed,

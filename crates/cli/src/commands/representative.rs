@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use analysis::Representative;
 use clap::Args;
 use imu_stand::report::plot::number;
 use imu_stand::text;
 use miette::Result;
 use model::record::{Quantity, Record};
+use noise::Representative;
 use serde::Serialize;
 
 use super::{Input, Outputs};
@@ -70,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             );
         }
     }
-    let found = analysis::representative(&records, arguments.seed).map_err(super::explain)?;
+    let found = noise::representative(&records, arguments.seed).map_err(super::explain)?;
     let files: Vec<String> = arguments.captures.iter().map(|p| super::name(p)).collect();
     if !arguments.input.quiet {
         print(&files, &found);

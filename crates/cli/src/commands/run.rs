@@ -7,9 +7,9 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-use analysis::result::Diagnosis;
-use analysis::{AnalyzeOptions, DiagnoseOptions};
 use clap::Args;
+use diagnosis::DiagnoseOptions;
+use diagnosis::result::Diagnosis;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
 use imu_stand::stand::planted::{Comparison, RULE, compare, planted};
@@ -20,6 +20,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use miette::IntoDiagnostic;
 use miette::Result;
 use model::record::Record;
+use noise::AnalyzeOptions;
 use serde::Serialize;
 
 use super::Replicates;
@@ -171,7 +172,7 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
         file: file.clone(),
         ..AnalyzeOptions::default()
     };
-    let analysis = analysis::analyze(&read.record, &options).map_err(super::explain)?;
+    let analysis = noise::analyze(&read.record, &options).map_err(super::explain)?;
     super::write_json(arguments.analysis.as_ref(), &analysis)?;
     let hash = super::digest(&arguments.out)?;
     let options = DiagnoseOptions {
@@ -181,7 +182,7 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
         no_evidence: arguments.report.is_none(),
         replicates: arguments.replicates.count(),
     };
-    let found = analysis::diagnose(&read.record, &options).map_err(super::explain)?;
+    let found = diagnosis::diagnose(&read.record, &options).map_err(super::explain)?;
     let times = record.host_time_s.as_ref();
     let start_s = times.and_then(|times| times.first()).map_or(0.0, |t| *t);
     let comparison = compare(&planted(&plan.run, start_s), &found.diagnosis);

@@ -1,8 +1,8 @@
 //! What `imu-stand plan --want` understands.
 
-use analysis::plan::{KnownNoise, Letter, calibration_for};
-use analysis::synthetic::Truth;
 use miette::Result;
+use noise::plan::{KnownNoise, Letter, calibration_for};
+use noise::synthetic::Truth;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use analysis::result::{Diagnosis, Parameter};
+use diagnosis::result::{Diagnosis, Parameter};
 use model::ModelFile;
 
 use super::noise::{AxisNoise, Consumer, DEG, Figure, ImuNoise, ROOT_HOUR};

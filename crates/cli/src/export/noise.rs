@@ -7,7 +7,7 @@
 
 use std::fmt::Write;
 
-use analysis::analyze::{Analysis, ChannelAnalysis, Interval};
+use noise::analyze::{Analysis, ChannelAnalysis, Interval};
 
 use super::causes::Cause;
 

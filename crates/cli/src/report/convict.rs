@@ -1,7 +1,7 @@
 //! The figure that convicts each cause: the one that the engine drew of it, or the view that its effect names, of the
 //! measurement beside a simulation without the cause.
 
-use analysis::result::{Evidence, Finding};
+use diagnosis::result::{Evidence, Finding};
 use maud::{Markup, PreEscaped, html};
 use model::effect::Plot;
 use model::effects::effect;

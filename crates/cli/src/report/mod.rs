@@ -7,10 +7,10 @@ pub mod replicates;
 pub mod standalone;
 mod tables;
 
-use analysis::result::{Diagnosed, Verdict};
-use analysis::sampling::Sampling;
+use diagnosis::result::{Diagnosed, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use model::record::Record;
+use model::record::sampling::Sampling;
 
 use plot::{AFTER, BEFORE, Drawn, Figure, Layer, MEASURED, number};
 use replicates::{Against, Places};
@@ -49,7 +49,7 @@ pub enum ReportError {
     Plot(#[from] plot::PlotError),
     /// The record has no rate.
     #[error(transparent)]
-    Analysis(#[from] analysis::AnalysisError),
+    Analysis(#[from] model::record::AnalysisError),
 }
 
 /// Makes the report.

@@ -1,10 +1,10 @@
 //! Simulated replicates of a record: what its model would have given, again and again.
 
-use analysis::allan::{Deviation, Phase, TauGrid, deviation};
-use analysis::sampling::Sampling;
 use model::file::ModelFile;
 use model::record::Record;
+use model::record::sampling::Sampling;
 use model::simulate::{Replicas, SimulateError};
+use noise::allan::{Deviation, Phase, TauGrid, deviation};
 
 /// Instants at which the integrated angle is compared.
 const ANGLE_POINTS: usize = 150;

@@ -1,6 +1,6 @@
 //! The figures that convict, as files of their own: for a page of somebody else's.
 
-use analysis::result::{Diagnosed, Evidence, SeriesStyle};
+use diagnosis::result::{Diagnosed, Evidence, SeriesStyle};
 use maud::{PreEscaped, html};
 
 use super::ReportError;

@@ -1,6 +1,6 @@
 //! The words and tables of the report.
 
-use analysis::result::{Check, Finding, Unexplained, Verdict};
+use diagnosis::result::{Check, Finding, Unexplained, Verdict};
 use maud::{Markup, html};
 use model::file::ModelFile;
 

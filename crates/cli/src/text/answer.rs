@@ -1,6 +1,6 @@
 //! A finding in sentences for a person: what it is and how large, what it costs to leave it out, what is still open.
 
-use analysis::result::{Finding, Parameter};
+use diagnosis::result::{Finding, Parameter};
 use model::effects::effect;
 
 use crate::report::plot::{number, tidy};
@@ -169,7 +169,7 @@ fn to_place_of(value: f64, half: f64) -> String {
 mod tests {
     use std::collections::BTreeMap;
 
-    use analysis::result::{Alternative, Gain};
+    use diagnosis::result::{Alternative, Gain};
 
     use super::*;
 

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use analysis::result::{DetectionLimit, Diagnosis, Finding};
+use diagnosis::result::{DetectionLimit, Diagnosis, Finding};
 
 use super::item;
 use crate::report::plot::{number, tidy};
@@ -59,7 +59,7 @@ fn write_replicates(out: &mut String, d: &Diagnosis) {
 
 /// The checks that fail, before the extension or after it, and how many pass.
 fn write_checks(out: &mut String, d: &Diagnosis) {
-    let failing = |c: &&analysis::result::Check| c.fails_before || c.fails_after;
+    let failing = |c: &&diagnosis::result::Check| c.fails_before || c.fails_after;
     let count = d.checks.iter().filter(failing).count();
     let _ = writeln!(out, "\nchecks: {count} of {} fail", d.checks.len());
     for check in d.checks.iter().filter(failing) {

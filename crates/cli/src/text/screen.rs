@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use analysis::result::{Diagnosed, Diagnosis, Parameter, Unexplained, Verdict};
+use diagnosis::result::{Diagnosed, Diagnosis, Parameter, Unexplained, Verdict};
 use model::file::ModelFile;
 
 use super::{answer, item};

@@ -5,9 +5,9 @@ mod strength;
 
 use std::collections::BTreeMap;
 
-use analysis::DiagnoseOptions;
-use analysis::result::{Diagnosis, Finding};
 use campaign::tally::Rate;
+use diagnosis::DiagnoseOptions;
+use diagnosis::result::{Diagnosis, Finding};
 use imu_stand::ReadOptions;
 use imu_stand::capture::{read_from, write_to};
 use imu_stand::stand::{Hidden, Plan, Sizes, plan};
@@ -129,7 +129,7 @@ pub fn diagnosed(record: &Record, seed: u64) -> Diagnosis {
         no_evidence: true,
         replicates: 0,
     };
-    analysis::diagnose(&read.record, &options)
+    diagnosis::diagnose(&read.record, &options)
         .expect("600 s are enough")
         .diagnosis
 }

@@ -1,6 +1,6 @@
 //! The same of laws of variance, of codes, and of steps from reading to reading.
 
-use analysis::likelihood::Bins;
+use diagnosis::likelihood::Bins;
 use model::effect::{Hypothesis, VarianceLaw};
 use model::effects::EFFECTS;
 

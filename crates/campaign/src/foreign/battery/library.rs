@@ -3,11 +3,11 @@
 
 use std::f64::consts::TAU;
 
-use analysis::likelihood::{Bins, Dct};
-use analysis::optimise::nelder_mead;
+use diagnosis::likelihood::{Bins, Dct};
 use model::effect::{Column, Effect, Hypothesis, Signal, View};
 use model::effects::EFFECTS;
 use model::record::{Axis, Base, Quantity};
+use numerics::minimise::nelder_mead;
 
 use crate::stand::{GYROS, LSB, Stand};
 use crate::strength::Meter;

@@ -35,7 +35,7 @@ fn other_than(draw: &mut Draw, axis: usize) -> usize {
 /// What an axis reads, without its bias, by bin of the spectrum: expected energies.
 fn energy_of(stand: &Stand, axis: usize) -> Vec<f64> {
     let ones = vec![1.0; stand.samples()];
-    let count = analysis::likelihood::Bins::new(stand.samples()).products(&ones, &ones);
+    let count = diagnosis::likelihood::Bins::new(stand.samples()).products(&ones, &ones);
     let omega = Meter::new(stand, axis).omega().to_vec();
     omega
         .iter()

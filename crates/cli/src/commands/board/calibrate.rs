@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use analysis::result::{DIAGNOSIS_FORMAT, Diagnosis};
 use clap::Args;
+use diagnosis::result::{DIAGNOSIS_FORMAT, Diagnosis};
 use imu_stand::link::LinkError;
 use miette::{IntoDiagnostic, Result, WrapErr};
 use model::Parameter;
@@ -107,7 +107,7 @@ fn from_json(text: &str, path: &Path) -> Result<(Calibration, Vec<String>)> {
         .wrap_err_with(|| format!("{} is no JSON", path.display()))?;
     match value.get("format").and_then(serde_json::Value::as_str) {
         Some(DIAGNOSIS_FORMAT) => {}
-        Some(analysis::analyze::ANALYSIS_FORMAT) => miette::bail!(
+        Some(noise::analyze::ANALYSIS_FORMAT) => miette::bail!(
             help = "`imu-stand diagnose C --json D`, then `imu-stand board calibrate D`",
             "{} is an analysis: it describes noise, and holds no bias",
             path.display()

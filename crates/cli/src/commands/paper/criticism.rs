@@ -1,12 +1,12 @@
 //! What the paper's figures say about each other, in numbers.
 
-use analysis::allan::Phase;
-use analysis::analyze::{Analysis, ChannelAnalysis};
-use analysis::paper_model::{PaperStand, Reading, STATED_FLAT_DEG_H, STATED_SECONDS, Slow};
-use analysis::{DiagnoseOptions, diagnose};
+use diagnosis::{DiagnoseOptions, diagnose};
 use miette::Result;
 use model::file::EffectModel;
 use model::parameter::Parameter;
+use noise::allan::Phase;
+use noise::analyze::{Analysis, ChannelAnalysis};
+use noise::paper_model::{PaperStand, Reading, STATED_FLAT_DEG_H, STATED_SECONDS, Slow};
 use serde::Serialize;
 
 /// Slope of the flat part within which a reader calls it flat.

@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use analysis::allan::TauGrid;
-use analysis::analyze::{Analysis, ChannelAnalysis, Interval};
-use analysis::attitude::angle_growth;
-use analysis::noise_fit::{Spectrum, fit};
-use analysis::paper_model::{PaperStand, STATED_ARW_DEG_SQRT_H, STATED_FLAT_DEG_H, Slow};
-use analysis::sampling::Sampling;
 use imu_stand::report::plot::{
     AFTER, BEFORE, Drawn, Figure, HALF, Layer, MEASURED, WIDE, envelope, number,
 };
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use miette::Result;
+use model::record::sampling::Sampling;
+use noise::allan::TauGrid;
+use noise::analyze::{Analysis, ChannelAnalysis, Interval};
+use noise::attitude::angle_growth;
+use noise::fit::{Spectrum, fit};
+use noise::paper_model::{PaperStand, STATED_ARW_DEG_SQRT_H, STATED_FLAT_DEG_H, Slow};
 
 use super::criticism::{Claim, Hypothesis, LooksAlike, Range};
 use super::{Arguments, Shown};

@@ -5,17 +5,17 @@ mod figures;
 
 use std::path::PathBuf;
 
-use analysis::analyze::{Analysis, ChannelAnalysis};
-use analysis::paper_model::{
-    PaperStand, STATED_ARW_DEG_SQRT_H, STATED_FLAT_DEG_H, STATED_RATE_HZ, STATED_SECONDS, Slow,
-};
-use analysis::{AnalyzeOptions, allan::TauGrid};
 use clap::Args;
 use imu_stand::text;
 use miette::{IntoDiagnostic, Result, WrapErr};
 use model::file::{ChannelModel, EffectModel, ModelFile};
 use model::parameter::Parameter;
 use model::record::{Quantity, Record};
+use noise::analyze::{Analysis, ChannelAnalysis};
+use noise::paper_model::{
+    PaperStand, STATED_ARW_DEG_SQRT_H, STATED_FLAT_DEG_H, STATED_RATE_HZ, STATED_SECONDS, Slow,
+};
+use noise::{AnalyzeOptions, allan::TauGrid};
 use serde::Serialize;
 
 use super::{Input, Outputs};
@@ -70,9 +70,9 @@ struct Answer<'a> {
     record: String,
     channel: &'a str,
     stated: Stated,
-    two_numbers: &'a analysis::analyze::Paper,
-    parameters: &'a analysis::analyze::NoiseParameters,
-    deviations: &'a [analysis::analyze::DeviationPoint],
+    two_numbers: &'a noise::analyze::Paper,
+    parameters: &'a noise::analyze::NoiseParameters,
+    deviations: &'a [noise::analyze::DeviationPoint],
     claims: &'a [Claim],
     hypotheses: &'a [Hypothesis],
     looks_alike: &'a LooksAlike,
@@ -174,7 +174,7 @@ fn shown(arguments: &Arguments, stand: &PaperStand) -> Result<Shown> {
     }
     let readings = channel.values.iter().filter(|v| v.is_finite()).count();
     if readings < LEAST_READINGS {
-        return Err(super::explain(analysis::AnalysisError::Inconclusive {
+        return Err(super::explain(model::record::AnalysisError::Inconclusive {
             what: format!("the paper's curve of {}", channel.name),
             have: readings as f64,
             need: LEAST_READINGS as f64,
@@ -204,7 +204,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         file: shown.from.clone(),
         ..AnalyzeOptions::default()
     };
-    let analysis = analysis::analyze(&shown.record, &options).map_err(super::explain)?;
+    let analysis = noise::analyze(&shown.record, &options).map_err(super::explain)?;
     let found = &analysis.channels[&arguments.channel];
     let hypotheses = criticism::hypotheses(arguments.runs, arguments.seed, n, level, tau0)?;
     let alike = criticism::looks_alike(arguments.draws, arguments.seed, &stand)?;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use analysis::likelihood::Dct;
+use diagnosis::likelihood::Dct;
 use model::effect::Plot;
 use model::record::{Channel, Record};
 

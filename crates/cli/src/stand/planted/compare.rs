@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use analysis::result::{Diagnosis, Finding, Parameter};
+use diagnosis::result::{Diagnosis, Finding, Parameter};
 use serde::Serialize;
 
 use super::{Planted, Size};

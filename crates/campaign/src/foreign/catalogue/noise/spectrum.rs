@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use analysis::likelihood::Dct;
+use diagnosis::likelihood::Dct;
 
 use super::super::super::act::Change;
 use super::super::super::known::Known;

@@ -1,0 +1,338 @@
+//! Low bits: missing ones, and one that sticks.
+//!
+//! Missing bits need no noise model. Where all counts are one residue apart by 2^k, every change is a multiple of 2^k;
+//! a change of a finer converter is even with a chance below 1/2, however small or large its noise.
+//!
+//! A bit that sticks moves the share of ones. With the reading normal about what its neighbours predict, L, the square
+//! wave s of period P = 2^(b+1) (+1 where bit b is 0) has the mean
+//! E s = sum over odd m of 4/(pi m) exp(-2 pi^2 sigma^2 m^2 / P^2) sin(2 pi m (L + 1/2) / P),
+//! nearly 0 for the lowest bits and far from it where P exceeds 4 sigma. That shows that the counts are not what normal
+//! noise makes them; whether a bit sticks, and which, is decided by the likelihood of their histogram ([`super::stuck`]).
+
+use std::f64::consts::PI;
+
+use model::Parameter;
+
+use super::stuck::{self, Verdict};
+use super::{Audit, Gyro, LEAST_READINGS};
+use crate::audit::local::{Levels, Local};
+use crate::result::{Alternative, Finding, Unexplained};
+use crate::test_level::{AUDIT_LEVEL, CheckId};
+use numerics::tails;
+use numerics::tails::ONE_SIDED;
+
+/// Most low bits that are looked at.
+const BITS: u32 = 8;
+/// Share of the readings that have to lie on the coarse grid; the rails may lie beside it.
+const ON_GRID: f64 = 0.97;
+/// A bit is tested while its weight is below this many sigma: beyond, the level decides it, not the noise.
+const WITHIN_SIGMA: f64 = 2.0;
+/// Least noise, counts: below it the level decides even the lowest bit.
+const LEAST_SIGMA: f64 = 0.9;
+/// Coarse grid that the counts lie on.
+struct Coarse {
+    bits: u32,
+    residue: i32,
+    changes: u64,
+}
+
+fn coarse(counts: &[i32], known: &[bool]) -> Option<Coarse> {
+    let mut found = None;
+    for bits in 1..=BITS {
+        let step = 1 << bits;
+        let mut tally = vec![0u64; step as usize];
+        let mut all = 0u64;
+        for (c, _) in counts.iter().zip(known).filter(|(_, k)| **k) {
+            tally[c.rem_euclid(step) as usize] += 1;
+            all += 1;
+        }
+        let (residue, most) = tally
+            .iter()
+            .enumerate()
+            .max_by_key(|(_, t)| **t)
+            .map(|(r, t)| (r as i32, *t))?;
+        if (most as f64) < ON_GRID * all as f64 {
+            break;
+        }
+        // Pairs that do not share a reading are independent.
+        let changes: Vec<bool> = counts
+            .chunks_exact(2)
+            .zip(known.chunks_exact(2))
+            .filter(|(c, k)| k[0] && k[1] && c[0] != c[1])
+            .map(|(c, _)| (c[1] - c[0]).rem_euclid(step) == 0)
+            .collect();
+        let even = changes.iter().filter(|e| **e).count() as u64;
+        let trials = changes.len() as u64;
+        if (even as f64) < ON_GRID * trials as f64
+            || tails::hits_at_least(even, trials, 0.5) > AUDIT_LEVEL
+        {
+            break;
+        }
+        found = Some(Coarse {
+            bits,
+            residue,
+            changes: trials,
+        });
+    }
+    found
+}
+
+/// Mean of a square wave (+1 in the first half of its period) of normal readings, rounded.
+pub(super) struct Square {
+    /// 2 pi over the period.
+    turn: f64,
+    /// Of sin(m turn (level + 1/2)), m = 1, 3, 5, ...
+    sizes: Vec<f64>,
+}
+
+impl Square {
+    pub(super) fn new(sigma: f64, period: f64) -> Self {
+        let mut sizes = vec![];
+        for j in 0..200 {
+            let m = f64::from(2 * j + 1);
+            sizes.push(4.0 / (PI * m) * (-2.0 * (PI * sigma * m / period).powi(2)).exp());
+            if sizes.last().is_none_or(|s| *s < 1e-9) {
+                break;
+            }
+        }
+        Self {
+            turn: 2.0 * PI / period,
+            sizes,
+        }
+    }
+
+    /// Under N(`level`, sigma^2).
+    pub(super) fn at(&self, level: f64) -> f64 {
+        let (sine, cosine) = (self.turn * (level + 0.5)).sin_cos();
+        // sin (m + 2)x = 2 cos 2x sin mx - sin (m - 2)x.
+        let twice = 2.0 * (1.0 - 2.0 * sine * sine);
+        let (mut before, mut now, mut sum) = (-sine, sine, 0.0);
+        if self.sizes.len() > 40 {
+            // Long sums of the recurrence lose digits.
+            let x = sine.atan2(cosine);
+            let terms = self.sizes.iter().enumerate();
+            sum = terms.map(|(j, s)| s * ((2 * j + 1) as f64 * x).sin()).sum();
+        } else {
+            for size in &self.sizes {
+                sum += size * now;
+                (before, now) = (now, twice * now - before);
+            }
+        }
+        sum.clamp(-1.0, 1.0)
+    }
+}
+
+/// Standard deviation of the readings before they were rounded, far ones left out. A spread between two shares of the
+/// readings would be a whole number of counts where the level stands still.
+fn unrounded(local: &Local) -> f64 {
+    const FAR: f64 = 4.5;
+    let limit = FAR * local.sigma.max(1.0);
+    let near = local.residual.iter().filter(|r| r.abs() < limit);
+    let (sum, count) = near.fold((0.0, 0.0), |(s, n), r| (s + r * r, n + 1.0));
+    (sum / f64::max(count, 1.0) - 1.0 / 12.0).max(1e-4).sqrt()
+}
+
+/// A bit whose share of ones the noise does not explain.
+struct Share {
+    bit: u32,
+    value: u8,
+    z: f64,
+}
+
+/// Share of ones of a bit against the expected one.
+fn share(ones: f64, levels: &Levels, bit: u32, sigma: f64) -> Option<Share> {
+    let square = Square::new(sigma, 2.0 * f64::from(1u32 << bit));
+    let (mut expected, mut variance) = (0.0, 0.0);
+    for (level, readings) in levels.iter() {
+        let p = 0.5 * (1.0 - square.at(level));
+        expected += readings * p;
+        variance += readings * p * (1.0 - p);
+    }
+    (variance > 0.0).then(|| Share {
+        bit,
+        value: u8::from(ones > expected),
+        z: (ones - expected) / variance.sqrt(),
+    })
+}
+
+/// What the histogram of the codes says of rails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shape {
+    /// It was not judged.
+    Unknown,
+    /// It is smooth.
+    Sound,
+    /// Rails explain it.
+    Rails,
+    /// Something else does, or nothing.
+    Other,
+}
+
+pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
+    let Some(counts) = g.counts else {
+        return Shape::Unknown;
+    };
+    let local = &g.local;
+    let name = g.channel.name.as_str();
+    audit.smallest("coarse_lsb", name, "missing_bits", 1.0, "1");
+    let known: Vec<bool> = (0..counts.len()).map(|i| g.known(i)).collect();
+    if let Some(c) = coarse(counts, &known) {
+        let chance = 0.5f64.powi(c.changes.min(900) as i32);
+        let what = format!(
+            "the {} lowest bits of {name} never change: its step is {} counts ({} changes, all of whole steps)",
+            c.bits,
+            1 << c.bits,
+            c.changes
+        );
+        audit.check(
+            CheckId::LowBits,
+            name,
+            f64::from(c.bits),
+            chance,
+            what.clone(),
+        );
+        // One bit at 1 throughout is no grid that a converter makes.
+        let sticks = c.bits == 1 && c.residue == 1;
+        let mut finding = Finding {
+            cause: if sticks { "stuck_bit" } else { "coarse_lsb" }.into(),
+            channels: vec![name.into()],
+            what,
+            ..Finding::default()
+        };
+        if sticks {
+            finding.parameters = parameters(0, 1, 1.0, None);
+        } else {
+            finding.parameters.insert(
+                "missing_bits".into(),
+                Parameter::exact(f64::from(c.bits), "1"),
+            );
+            if c.bits == 1 {
+                finding.alternatives.push(Alternative {
+                    cause: "stuck_bit".into(),
+                    log_odds: 0.0,
+                });
+                finding.experiment = Some("read a register with known odd contents over the same line: a stuck line shows there too".into());
+            }
+        }
+        audit.findings.push(finding);
+        let step = f64::from(1u32 << c.bits);
+        audit.lacks_a_bit(name, "coarse_lsb", step, unrounded(local));
+        audit.suppress(&["stuck_bit", "stale_samples"], name, "coarse_lsb");
+        return Shape::Other;
+    }
+    let sigma = unrounded(local);
+    if known.iter().filter(|k| **k).count() < LEAST_READINGS {
+        return Shape::Unknown;
+    }
+    let levels = Levels::new(&local.level, &known);
+    // How often each bit is 1.
+    let ones = |bit: u32| {
+        let own = counts.iter().zip(&known).filter(|(_, k)| **k);
+        own.map(|(c, _)| u64::from(((c >> bit) & 1) as u32))
+            .sum::<u64>() as f64
+    };
+    let tested: Vec<Share> = (0..BITS)
+        .filter(|b| sigma >= LEAST_SIGMA && f64::from(1u32 << b) <= WITHIN_SIGMA * sigma)
+        .filter_map(|b| share(ones(b), &levels, b, sigma))
+        .collect();
+    let Some(worst) = tested.iter().max_by(|a, b| a.z.abs().total_cmp(&b.z.abs())) else {
+        audit.untested_on(
+            name,
+            "stuck_bit",
+            "the noise is less than a count, so the level alone decides the bits",
+        );
+        return Shape::Unknown;
+    };
+    // A bit that changes the readings by one count leaves nothing but its share of ones.
+    let readings = levels.iter().map(|l| l.1).sum::<f64>();
+    let reach = (2.0 * stuck::CLEARLY).sqrt() + ONE_SIDED;
+    audit.smallest("stuck_bit", name, "fraction", reach / readings.sqrt(), "1");
+    let chance = (tested.len() as f64 * tails::two_sided(worst.z)).min(1.0);
+    let what = format!(
+        "bit {} of {name} reads {} more often than normal noise makes it ({:.1} sigma)",
+        worst.bit,
+        worst.value,
+        worst.z.abs()
+    );
+    let alarmed = audit.check(CheckId::BitShare, name, worst.z, chance, what);
+    let own = counts.iter().zip(&known).filter(|(_, k)| **k);
+    let codes: Vec<i32> = own.map(|(c, _)| *c).collect();
+    match stuck::judge(&codes, sigma, BITS, alarmed) {
+        Verdict::Smooth => Shape::Sound,
+        Verdict::Rails => Shape::Rails,
+        Verdict::Bit(s) => {
+            audit.findings.push(Finding {
+                cause: "stuck_bit".into(),
+                channels: vec![name.into()],
+                parameters: parameters(s.bit, s.value, s.fraction, Some(s.error)),
+                what: format!(
+                    "bit {} of {name} reads {} too often: it sticks in {:.1} +- {:.1} % of the samples",
+                    s.bit,
+                    s.value,
+                    100.0 * s.fraction,
+                    100.0 * s.error,
+                ),
+                ..Finding::default()
+            });
+            let step = f64::from(1u32 << (s.bit + 1));
+            audit.lacks_a_bit(name, "stuck_bit", step, sigma);
+            Shape::Other
+        }
+        Verdict::Unlike { nats, nearest } => {
+            let bit = nearest.map_or("no bit that sticks makes them so".to_owned(), |s| {
+                format!(
+                    "bit {} at {} in {:.0} % of the samples comes nearest and leaves much of it",
+                    s.bit,
+                    s.value,
+                    100.0 * s.fraction
+                )
+            });
+            audit.not_normal.push(Unexplained {
+                channel: name.into(),
+                what: format!(
+                    "the codes of {name} have shares that no smooth distribution has ({nats:.0} nats; {:.1} sigma at bit {}), and {bit}",
+                    worst.z.abs(),
+                    worst.bit
+                ),
+            });
+            Shape::Other
+        }
+    }
+}
+
+fn parameters(bit: u32, value: u8, fraction: f64, error: Option<f64>) -> model::effect::Parameters {
+    let mut share = Parameter::exact(fraction, "1");
+    share.std_error = error;
+    [
+        ("bit".to_owned(), Parameter::exact(f64::from(bit), "1")),
+        ("value".to_owned(), Parameter::exact(f64::from(value), "1")),
+        ("fraction".to_owned(), share),
+    ]
+    .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use statrs::distribution::{ContinuousCDF, Normal};
+
+    #[test]
+    fn the_square_wave_agrees_with_a_sum_over_codes() {
+        for (level, sigma, bit) in [
+            (0.3, 2.0, 2u32),
+            (-5.2, 5.3, 3),
+            (11.7, 0.7, 0),
+            (3.0, 4.0, 2),
+        ] {
+            let normal = Normal::new(level, sigma).unwrap();
+            let direct: f64 = (-200i32..200)
+                .map(|c| {
+                    let p = normal.cdf(f64::from(c) + 0.5) - normal.cdf(f64::from(c) - 0.5);
+                    if (c >> bit) & 1 == 0 { p } else { -p }
+                })
+                .sum();
+            let series = Square::new(sigma, f64::from(1u32 << (bit + 1))).at(level);
+            assert!((direct - series).abs() < 1e-6, "{direct} {series}");
+        }
+    }
+}

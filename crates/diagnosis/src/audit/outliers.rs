@@ -1,0 +1,92 @@
+//! Single readings that the noise cannot have made.
+//!
+//! Residual against the neighbourhood over its local spread, beyond the distance that one of n normal samples reaches
+//! with the chance of a false alarm. It does not need to know the noise; the whitened residual of the search sees a
+//! little farther where the base is at rest.
+
+use super::{Audit, Gyro, counted};
+use crate::result::Finding;
+use crate::test_level::{AUDIT_LEVEL, CheckId};
+use numerics::tails;
+use numerics::tails::ONE_SIDED;
+
+/// Two farther than this apart are single ones.
+const ALONE: usize = 2;
+
+/// Where the base moves the prediction errs by the motion too, in its bends more than elsewhere.
+const MOVING: f64 = 1.3;
+
+pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
+    let name = g.channel.name.as_str();
+    let (local, step) = match (&g.of_readings, g.counts) {
+        (None, Some(_)) => (&g.local, 1.0),
+        (apart, _) => (
+            apart.as_ref().unwrap_or(&g.local),
+            g.channel.lsb.unwrap_or(0.0),
+        ),
+    };
+    // A bit that is missing moves a reading by half of what its lack makes a step of.
+    let step = step * audit.steps.get(name).copied().unwrap_or(1.0);
+    let n = local.residual.len();
+    if n < super::LEAST_READINGS || local.sigma <= 0.0 {
+        return;
+    }
+    let limit = tails::farthest(n, AUDIT_LEVEL) * if local.bent { MOVING } else { 1.0 };
+    let unit = g
+        .of_readings
+        .as_ref()
+        .map_or_else(|| g.channel.lsb.unwrap_or(1.0), |_| 1.0);
+    let farthest = (limit + ONE_SIDED) * local.sigma.max(0.3 * step) + 0.5 * step;
+    audit.smallest("outliers", name, "size", unit * farthest, &g.channel.unit);
+    // Where the noise is within a count, a residual of one or two counts is rounding.
+    let z: Vec<f64> = local
+        .residual
+        .iter()
+        .zip(local.spread())
+        .map(|(r, s)| ((r.abs() - 0.5 * step).max(0.0)) / s.max(0.3 * step))
+        .enumerate()
+        .map(|(i, z)| {
+            let inside = i >= local.edge && i + local.edge < n;
+            if inside { z } else { 0.0 }
+        })
+        .collect();
+    let far: Vec<usize> = (0..n).filter(|i| z[*i] > limit).collect();
+    let near = |a: Option<&usize>, b: usize| a.is_some_and(|a| a.abs_diff(b) <= ALONE);
+    let single: Vec<usize> = (0..far.len())
+        .filter(|i| !near(far.get(i.wrapping_sub(1)), far[*i]) && !near(far.get(i + 1), far[*i]))
+        .map(|i| far[i])
+        .collect();
+    let most = z
+        .iter()
+        .copied()
+        .filter(|v| v.is_finite())
+        .fold(0.0, f64::max);
+    let chance = if local.bent && most < limit {
+        1.0
+    } else {
+        (n as f64 * tails::two_sided(most)).min(1.0)
+    };
+    let what = format!(
+        "{} readings of {name} lie more than {limit:.1} sigma from their neighbours, the farthest {most:.1}",
+        single.len()
+    );
+    let fails = audit.check(CheckId::Outliers, name, most, chance, what.clone());
+    // A base that is knocked, or noise with heavy tails, makes runs and crowds, no single readings.
+    if !fails || single.is_empty() || audit.is_suppressed("outliers", name) {
+        return;
+    }
+    let times: Vec<f64> = single.iter().map(|i| at[*i]).collect();
+    single.iter().for_each(|i| audit.mask(name, *i));
+    let own = |f: &Finding| f.cause == "outliers" && f.channels == [name];
+    let wild = audit.findings.iter().position(own);
+    let (mut times, mut what) = (times, what);
+    if let Some(wild) = wild.map(|i| audit.findings.remove(i)) {
+        times.extend(wild.times_s);
+        times.sort_by(f64::total_cmp);
+        what = format!("{what}; {}", wild.what);
+    }
+    let count = times.len() as f64;
+    let names = vec![name.to_owned()];
+    let finding = counted("outliers", names, count, None, &times, what);
+    audit.findings.push(finding);
+}

@@ -1,0 +1,273 @@
+//! What a converter does to the codes: nothing, a bit that sticks, or rails, by the likelihood of their histogram.
+//!
+//! Each fault is fitted with the smooth law ([`super::codes`]) that suits it best. A bit that sticks is told where it
+//! describes the codes better than any smooth law and than rails do, and leaves next to nothing of what any shares
+//! of the codes could explain: a hole inside the range has no place in rails, a pile on one code none in a bit. What
+//! nothing here explains is not passed over ([`Verdict::Unlike`]).
+
+use super::codes::{Course, Fault, Fit, Histogram, Laws};
+use crate::test_level::AUDIT_LEVEL;
+use numerics::tails;
+
+/// Spreads of a reading that are tried, over what was measured: bits that stick widen it more than they narrow it.
+const SPREADS: [f64; 7] = [0.15, 0.23, 0.35, 0.5, 0.7, 0.9, 1.1];
+/// Spread, over what noise without the fault has, below which a law has edges of its own: one that narrow is made to hold a
+/// code that is never read, or read too often, and no converter's noise.
+const NATURAL: f64 = 0.35;
+/// A finer step between them, once one is known.
+const FINER: f64 = 1.12;
+/// Shares of the readings that a search begins with.
+const SHARES: [f64; 2] = [0.1, 0.6];
+/// Rounds of a first fit, and of a last one.
+const FIRST: usize = 48;
+const LAST: usize = 320;
+/// Bits that are fitted to the end.
+const BEST: usize = 2;
+/// A bit beyond this many spreads is not looked at.
+const WITHIN: f64 = 24.0;
+
+/// Nats by which a bit that sticks has to describe the codes better than sound ones and than rails.
+pub(super) const CLEARLY: f64 = 12.0;
+/// Cost up to which a smooth law is plain: one of many narrow levels explains almost anything.
+const PLAIN: f64 = 8.0;
+/// Spreads of a reading about its level from which on the codes' own says that the level moves far.
+const MOVES: f64 = 2.0;
+/// Nats that a bit has to gain, with the smooth law as it is, to be fitted at all.
+const WORTH_A_LOOK: f64 = 5.0;
+/// Share that it has to explain of what shares of the codes of their own would.
+const NEARLY_ALL: f64 = 0.9;
+/// Chance below which a law with a bit that sticks does not hold, and share of what the bit explains that may be left where
+/// a long record shows how uneven the steps of any converter are.
+const LEAST_CHANCE: f64 = 1e-3;
+const LITTLE: f64 = 0.05;
+/// Nats, and nats for each reading, that the best law without a bit that sticks has to leave before the codes are told to
+/// be unlike any: converters have uneven steps by nature, and a long record shows them.
+const UNLIKE: f64 = 20.0;
+const UNLIKE_BY_READING: f64 = 1e-3;
+/// Least expected occurrences of the codes that are held against a law together.
+const LEAST_EXPECTED: f64 = 8.0;
+
+/// A fitted bit.
+#[derive(Clone, Debug)]
+pub(super) struct Stuck {
+    pub bit: u32,
+    pub value: u8,
+    pub fraction: f64,
+    /// Standard error of the fraction.
+    pub error: f64,
+}
+
+/// What the histogram says.
+#[derive(Clone, Debug)]
+pub(super) enum Verdict {
+    /// A smooth law explains it.
+    Smooth,
+    /// Rails do, and a smooth law does not.
+    Rails,
+    /// A bit that sticks does.
+    Bit(Stuck),
+    /// Nothing here does; `nats` are left over. With the bit that comes nearest.
+    Unlike { nats: f64, nearest: Option<Stuck> },
+}
+
+/// Fits of one fault on their way, at several spreads and from several starts.
+struct Tries<'a> {
+    of: &'a Histogram,
+    fault: Fault,
+    by_spread: Vec<(Laws<'a>, Vec<Course>)>,
+}
+
+impl<'a> Tries<'a> {
+    /// Over the spreads that noise of `sigma` may have.
+    fn new(of: &'a Histogram, fault: Fault, sigma: f64) -> Self {
+        let mut new = Self::none(of, fault);
+        SPREADS.iter().for_each(|s| new.also(s * sigma));
+        new
+    }
+
+    fn none(of: &'a Histogram, fault: Fault) -> Self {
+        let by_spread = vec![];
+        Self {
+            of,
+            fault,
+            by_spread,
+        }
+    }
+
+    /// Those at another spread too.
+    fn also(&mut self, spread: f64) {
+        if spread <= LEAST_SPREAD {
+            return;
+        }
+        let mut laws = Laws::new(self.of, self.fault, spread);
+        let never = |bit: u32, value: i32| self.of.iter().all(|(c, _)| (c >> bit) & 1 == value);
+        let courses = match self.fault {
+            // What a bit that never changes has taken may be most of the readings: then a fit begins where they came from.
+            Fault::Bit { bit, value } if never(bit, value) => {
+                let weight = f64::from(1u32 << bit);
+                let away = if value == 1 { -weight } else { weight };
+                let from = |shift| {
+                    laws.shift = shift;
+                    laws.begin(None, 1.0, false)
+                };
+                [0.0, away].map(from).into()
+            }
+            Fault::Bit { .. } => SHARES.map(|share| laws.begin(None, share, false)).into(),
+            Fault::None | Fault::Rails { .. } => vec![laws.begin(None, 1.0, false)],
+        };
+        self.by_spread.push((laws, courses));
+    }
+
+    /// Those about a spread, that one included.
+    fn around(&mut self, spread: f64) {
+        [-1, 0, 1]
+            .iter()
+            .for_each(|i| self.also(spread * FINER.powi(*i)));
+    }
+
+    /// The best of them after so many rounds.
+    fn best(&mut self, rounds: usize) -> Option<Fit> {
+        let all = self.by_spread.iter_mut();
+        all.flat_map(|(laws, courses)| laws.go_on_together(courses, rounds))
+            .max_by(|a, b| a.score().total_cmp(&b.score()))
+    }
+}
+
+/// Least spread, counts: below it a law has edges of its own.
+const LEAST_SPREAD: f64 = 0.7;
+
+/// What a law leaves of the histogram: the excess of the chi-square of codes, taken together where few are expected, in
+/// nats, and its chance.
+fn left_by(h: &Histogram, laws: &Laws<'_>, fit: &Fit) -> (f64, f64) {
+    let (mut sum, mut cells) = (0.0, 0usize);
+    let (mut seen, mut expected) = (0.0, 0.0);
+    for (t, e) in h.times.iter().zip(laws.expected(fit)) {
+        seen += t;
+        expected += e;
+        if expected >= LEAST_EXPECTED {
+            sum += (seen - expected).powi(2) / expected;
+            cells += 1;
+            (seen, expected) = (0.0, 0.0);
+        }
+    }
+    // Mean, spread and the size, at least; more of them would only make it fail sooner.
+    let free = cells.saturating_sub(3).max(1) as f64;
+    (0.5 * (sum - free), tails::chi_square(sum, free))
+}
+
+/// Judge codes with the spread `sigma` about their level, bits below `bits`; `alarmed` where something else has shown
+/// already that they are no law.
+pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verdict {
+    const FAR: f64 = 8.0;
+    let Some(h) = Histogram::new(codes, FAR * sigma) else {
+        return Verdict::Smooth;
+    };
+    // Where the level moves far it is the share of ones about each level that tells.
+    if !alarmed && h.spread > MOVES * sigma {
+        return Verdict::Smooth;
+    }
+    let Some(first) = Tries::new(&h, Fault::None, sigma).best(FIRST) else {
+        return Verdict::Smooth;
+    };
+    let laws = Laws::new(&h, Fault::None, first.spread);
+    let every = || {
+        let near = (0..bits).filter(|b| f64::from(1u32 << b) <= WITHIN * sigma);
+        near.flat_map(|bit| [(bit, 0), (bit, 1)])
+    };
+    let looks_stuck = || {
+        every().any(|(bit, value)| laws.gain_of(&first, Fault::Bit { bit, value }) > WORTH_A_LOOK)
+    };
+    if !alarmed
+        && first.cost < PLAIN
+        && left_by(&h, &laws, &first).1 > AUDIT_LEVEL
+        && !looks_stuck()
+    {
+        return Verdict::Smooth;
+    }
+    let sound = |spread: f64, from: Option<&Fit>| {
+        Laws::new(&h, Fault::None, spread).fit(from, 0.0, true, LAST)
+    };
+    let mut finer = Tries::none(&h, Fault::None);
+    finer.around(first.spread);
+    let plain = finer.best(LAST).unwrap_or(first);
+    let smooth = plain.score();
+    let (low, high) = (h.first, h.last());
+    let railed = [(low, i32::MAX), (i32::MIN, high), (low, high)]
+        .into_iter()
+        .filter_map(|(low, high)| {
+            let fault = Fault::Rails { low, high };
+            let fit = Tries::new(&h, fault, sigma).best(LAST)?;
+            Some((fault, fit))
+        })
+        .max_by(|a, b| a.1.score().total_cmp(&b.1.score()));
+    let rails = railed
+        .as_ref()
+        .map_or(f64::NEG_INFINITY, |(_, fit)| fit.score());
+    let mut all: Vec<(u32, i32, Fit, Tries<'_>)> = every()
+        .filter_map(|(bit, value)| {
+            let mut tries = Tries::new(&h, Fault::Bit { bit, value }, sigma);
+            Some((bit, value, tries.best(FIRST)?, tries))
+        })
+        .collect();
+    all.sort_by(|a, b| b.2.score().total_cmp(&a.2.score()));
+    all.truncate(BEST);
+    let nearest = all
+        .into_iter()
+        .filter_map(|(bit, value, fit, mut tries)| {
+            // A bit that folds most of the readings over is far from where a fit begins: with few rounds another spread
+            // may look best than with many, and all go on.
+            tries.around(fit.spread);
+            Some((bit, value, tries.best(LAST)?))
+        })
+        .max_by(|a, b| a.2.score().total_cmp(&b.2.score()));
+    let own = h.of_its_own();
+    let other = smooth.max(rails);
+    let (fault, sound_fit) = railed
+        .filter(|(_, fit)| fit.score() > smooth)
+        .unwrap_or((Fault::None, plain));
+    // What only a law with edges of its own explains is not explained.
+    let (fault, sound_fit) = if sound_fit.spread < NATURAL * sigma {
+        let anew = |spread: &f64| (Fault::None, sound(spread * sigma, None));
+        let wide = SPREADS.iter().filter(|s| **s >= NATURAL).map(anew);
+        wide.max_by(|a, b| a.1.score().total_cmp(&b.1.score()))
+            .unwrap_or((fault, sound_fit))
+    } else {
+        (fault, sound_fit)
+    };
+    let (over, chance) = left_by(&h, &Laws::new(&h, fault, sound_fit.spread), &sound_fit);
+    let unlike = chance < AUDIT_LEVEL && over > UNLIKE.max(UNLIKE_BY_READING * h.n);
+    let without = |nearest| {
+        if unlike {
+            Verdict::Unlike {
+                nats: over,
+                nearest,
+            }
+        } else if rails > smooth + CLEARLY {
+            Verdict::Rails
+        } else {
+            Verdict::Smooth
+        }
+    };
+    let Some((bit, value, fit)) = nearest else {
+        return without(None);
+    };
+    // At the same spread too, so that it is the edges that decide and not how many levels a law needs.
+    let gain = (fit.score() - other).min(fit.likelihood - sound(fit.spread, None).likelihood);
+    let laws = Laws::new(&h, Fault::Bit { bit, value }, fit.spread);
+    let stuck = Stuck {
+        bit,
+        value: u8::from(value == 1),
+        fraction: fit.share,
+        error: laws.share_error(&fit),
+    };
+    let (rest, chance) = left_by(&h, &laws, &fit);
+    // A bit adds at most a quarter of its square to the variance.
+    let without_bit = (sigma * sigma - 0.25 * f64::from(1u32 << bit).powi(2)).max(0.0);
+    let natural = fit.spread >= NATURAL * without_bit.sqrt();
+    let whole = chance > LEAST_CHANCE || rest < LITTLE * (fit.score() - smooth);
+    if gain > CLEARLY && natural && whole && fit.score() - smooth >= NEARLY_ALL * (own - smooth) {
+        Verdict::Bit(stuck)
+    } else {
+        without((gain > CLEARLY).then_some(stuck))
+    }
+}

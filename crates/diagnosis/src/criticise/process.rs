@@ -1,0 +1,569 @@
+//! What the name of a process claims, held against the record.
+//!
+//! White noise, a random walk and one stationary term have the freedom to come near almost any wandering signal: the
+//! omnibus checks then see little, because what is off is spread over the few coefficients in which the term acts. Here the
+//! term is asked alone, where it acts: has its part of the spectrum its shape, is it Gaussian, and is it there all the
+//! time? With d_k its density and g_k that of all noise, its share of coefficient k is f_k = d_k / g_k.
+//!
+//! * Shape: Rao's score test of ln d_k against smooth bends over ln w (Neyman's smooth test), which leave room for the
+//!   estimated parameters by being orthogonal to them in the information.
+//! * Law: third and fourth Hermite moments of the smoothed process (coefficients c_k f_k) and of what drives it (u_k f_k),
+//!   whose variances over a Gaussian process of correlation r are 6 and 24 times the sum of r^3 and r^4.
+//! * Levels: Cox's test of how far two levels are ahead or behind (`contest`).
+//! * Dwells: Bartlett's test of whether two levels switch at random (`contest::dwells`).
+//! * Steadiness: energies of what drives it in stretches of the record, whose variance follows from the sum of r^2.
+//! * Source: what it knows nothing of, by its mean (`source`).
+//! * Size: the same energy against temperature, supply and command and their squares, which it knows nothing of.
+
+pub(crate) mod independence;
+
+use std::f64::consts::PI;
+
+use model::effect::{Hypothesis, View};
+use model::record::Quantity;
+
+use crate::fit::channel::{Form, State, Term, whitened_by_spectrum};
+use crate::fit::likelihood::{Bins, Noise, Panel};
+use crate::search::Search;
+use crate::search::searched::Searched;
+use crate::test_level::{CheckId, DEPARTURE, Outcome};
+use numerics::column::dot;
+use numerics::tails::{chi_tail, errors_of_sum, kurtosis_score, normal_tail};
+
+/// Part of what a band explains that its shape may leave: it is off by a fifth of its size. No mode of a real structure is
+/// a Lorentzian to the last.
+const LEFT: f64 = 0.05;
+/// How many more independent values a band has to have in a stretch, or the record: energies of a narrow one are far from
+/// normal, and a claim fails by chance once in a thousand bands.
+const MORE: f64 = 4.0;
+/// Highest order of the polynomials in ln w that bend a spectrum.
+const BENDS: usize = 6;
+/// Fewest independent values that a bend or a moment may rest on.
+const LEAST: f64 = 24.0;
+/// Stretches of the record.
+const STRETCHES: usize = 12;
+/// The same for a course over the whole record.
+const LEAST_OF_COURSE: f64 = 4.0 * LEAST;
+/// Part of its energy, rms, that may follow what else was recorded: its size is then off by a tenth.
+const DEPTH: f64 = 0.2;
+/// Energy of a column over that of what it was made of, below which it is rounding.
+const ROUNDING: f64 = 1e-9;
+/// Step of a numerical derivative.
+const STEP: f64 = 1e-3;
+
+/// What the processes among the terms of a state claim, each claim with its chance.
+pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<Outcome> {
+    let mut all: Vec<Outcome> = state.terms.iter().flat_map(|t| t.claims.clone()).collect();
+    if state.noise.terms.is_empty() {
+        return all;
+    }
+    let (u, _) = whitened_by_spectrum(&search.panel, state);
+    let covariances: Vec<&Term> = state.terms.iter().filter(|t| t.is_covariance()).collect();
+    for term in &covariances {
+        // A filter is no process of its own, and a part of a band is asked with it.
+        if term.is_filter() || term.is_part() {
+            continue;
+        }
+        // Bands that overlap are one.
+        let of_it = |o: &Term| match (term.cluster, o.cluster) {
+            (Some(own), Some(other)) => own.number == other.number,
+            _ => std::ptr::eq(*term, o),
+        };
+        let all_terms = covariances.iter().zip(&state.noise.terms);
+        let own = all_terms.filter(|(o, _)| of_it(o)).map(|(_, t)| t.clone());
+        let process = Process {
+            panel: &search.panel,
+            state,
+            u: &u,
+            id: term.effect.id(),
+            // Whether it is Gaussian, the envelope of a band has told.
+            claims: if term.is_band() {
+                [
+                    Some(CheckId::BandSpectrum),
+                    None,
+                    Some(CheckId::BandSteadiness),
+                    Some(CheckId::BandSize),
+                ]
+            } else {
+                [
+                    CheckId::ProcessSpectrum,
+                    CheckId::ProcessLaw,
+                    CheckId::ProcessSteadiness,
+                    CheckId::ProcessSize,
+                ]
+                .map(Some)
+            },
+            least: term.cluster.map_or(0.0, |c| LEFT * c.lr),
+            more: if term.is_band() { MORE } else { 1.0 },
+            view: &search.view,
+            alone: Noise {
+                log_walk: f64::NEG_INFINITY,
+                terms: own.collect(),
+            },
+        };
+        all.extend(process.shape());
+        // Two levels have the spectrum of a process that is Gaussian, and are not.
+        let gaussian = &search.candidates[term.candidate].hypothesis;
+        if matches!(gaussian, Hypothesis::Covariance(_)) {
+            all.extend(process.in_time());
+        }
+    }
+    all
+}
+
+/// Whether a channel that was told as a stationary, Gaussian process is stationary from reading to reading, by the `rhythm` of
+/// its variance.
+pub(crate) fn stationary(s: &Searched<'_>, rhythm: &Outcome) -> Option<Outcome> {
+    let is_one = |t: &Term| {
+        if t.is_band() {
+            return false;
+        }
+        let hypothesis = &s.search.candidates[t.candidate].hypothesis;
+        matches!(t.form, Form::Covariance(..)) && matches!(hypothesis, Hypothesis::Covariance(_))
+    };
+    let term = s.state.terms.iter().find(|t| is_one(t))?;
+    Some(Outcome {
+        id: CheckId::ProcessRhythm,
+        about: vec![],
+        what: format!("told as {}: {}", term.effect.id(), rhythm.what),
+        ..*rhythm
+    })
+}
+
+/// A series and its square and cube, each without its mean and what the powers below it have of it.
+fn powers(e: &[f64]) -> [Vec<f64>; 3] {
+    let mean = e.iter().sum::<f64>() / e.len().max(1) as f64;
+    let centred: Vec<f64> = e.iter().map(|v| v - mean).collect();
+    let ones = vec![1.0; e.len()];
+    let without = |mut own: Vec<f64>, below: &[&[f64]]| {
+        for b in below {
+            let share = dot(&own, b) / dot(b, b).max(f64::MIN_POSITIVE);
+            own.iter_mut().zip(*b).for_each(|(o, b)| *o -= share * b);
+        }
+        own
+    };
+    let power = |k| centred.iter().map(|v| v.powi(k)).collect();
+    let square = without(power(2), &[&ones, &centred]);
+    let cube = without(power(3), &[&ones, &centred, &square]);
+    [centred, square, cube]
+}
+
+/// The claim of noise that two axes share: each follows the other in a straight line, the same way up and down. What comes
+/// over on one side alone, or beyond a threshold, follows the square or the cube as well. `lr` is the likelihood ratio of
+/// their correlation, of which a twentieth may be left, and `pairs` the number of pairs that are asked.
+pub(crate) fn straight(a: &[f64], b: &[f64], lr: f64, pairs: usize) -> Outcome {
+    let score = |e: &[f64], bend: &[f64]| errors_of_sum(e.iter().zip(bend).map(|(e, b)| e * b));
+    let scores = [(a, powers(b)), (b, powers(a))]
+        .map(|(e, [_, square, cube])| [square, cube].map(|bend| score(e, &bend)));
+    let scores = scores.as_flattened();
+    let statistic: f64 = scores.iter().map(|z| z * z).sum();
+    let bent = scores.iter().map(|z| z.abs()).fold(0.0, f64::max);
+    Outcome {
+        id: CheckId::CommonNoiseLaw,
+        about: vec![],
+        statistic,
+        p_value: if statistic < DEPARTURE * lr {
+            1.0
+        } else {
+            (pairs as f64 * chi_tail(statistic, scores.len() as f64)).min(1.0)
+        },
+        what: format!(
+            "told as common_noise: one follows the square or the cube of the other by {bent:.1} standard errors, what they share would do so in a straight line"
+        ),
+    }
+}
+
+/// A process that was named.
+struct Process<'a> {
+    panel: &'a Panel,
+    state: &'a State,
+    /// Whitened coefficients of the residual.
+    u: &'a [f64],
+    id: &'static str,
+    /// Its claims of shape, law, steadiness and size.
+    claims: [Option<CheckId>; 4],
+    /// Chi-square below which its shape is not off by much, whatever the chance.
+    least: f64,
+    /// Independent values that its energies rest on, over those that others do.
+    more: f64,
+    view: &'a View<'a>,
+    /// Its noise beside a white one of variance 1.
+    alone: Noise,
+}
+
+/// Sum of m a b / 2: the information that deviations a and b of ln variance share.
+fn information(m: &[f64], a: &[f64], b: &[f64]) -> f64 {
+    m.iter()
+        .zip(a)
+        .zip(b)
+        .map(|((m, a), b)| 0.5 * m * a * b)
+        .sum()
+}
+
+/// Takes out of `x` what the orthonormal `basis` holds and returns the length of the rest.
+fn orthogonal(x: &mut [f64], basis: &[Vec<f64>], m: &[f64]) -> f64 {
+    // Twice is enough (Kahan and Parlett).
+    for _ in 0..2 {
+        for b in basis {
+            let share = information(m, x, b);
+            x.iter_mut().zip(b).for_each(|(x, b)| *x -= share * b);
+        }
+    }
+    information(m, x, x).sqrt()
+}
+
+impl Process<'_> {
+    fn outcome(&self, id: CheckId, statistic: f64, p_value: f64, what: String) -> Outcome {
+        Outcome {
+            id,
+            about: vec![],
+            statistic,
+            p_value,
+            what: format!("told as {}: {what}", self.id),
+        }
+    }
+
+    /// Deviations of ln g by each coordinate of the noise, and by the white variance.
+    fn estimated(&self, bins: &Bins, g: &[f64]) -> Vec<Vec<f64>> {
+        let noise = &self.state.noise;
+        let mut all = vec![vec![1.0; g.len()]];
+        let mut add = |moved: &Noise| {
+            let by = |(a, b): (f64, &f64)| (a / b).ln() / STEP;
+            all.push(moved.over(bins).into_iter().zip(g).map(by).collect());
+        };
+        let mut moved = noise.clone();
+        moved.log_walk += STEP;
+        add(&moved);
+        for (i, (_, theta)) in noise.terms.iter().enumerate() {
+            for k in 0..theta.len() {
+                let mut moved = noise.clone();
+                moved.terms[i].1[k] += STEP;
+                add(&moved);
+            }
+        }
+        all
+    }
+
+    /// Whether its part of the spectrum has its shape.
+    fn shape(&self) -> Option<Outcome> {
+        let bins = &self.panel.bins;
+        let ones = vec![1.0; bins.n];
+        let m = bins.products(&ones, &ones);
+        let energy = bins.products(self.u, self.u);
+        let g = self.state.noise.over(bins);
+        let alone = self.alone.over(bins);
+        let share: Vec<f64> = alone.iter().zip(&g).map(|(a, g)| (a - 1.0) / g).collect();
+        let mut basis: Vec<Vec<f64>> = vec![];
+        for mut x in self.estimated(bins, &g) {
+            let before = information(&m, &x, &x).sqrt();
+            let length = orthogonal(&mut x, &basis, &m);
+            if length > 1e-6 * before.max(1e-6) {
+                x.iter_mut().for_each(|x| *x /= length);
+                basis.push(x);
+            }
+        }
+        let estimated = basis.len();
+        // ln w about where the process acts, in standard deviations of it.
+        let ln: Vec<f64> = bins.at.omega.iter().map(|w| w.ln()).collect();
+        let weight: Vec<f64> = m.iter().zip(&share).map(|(m, f)| m * f * f).collect();
+        let total: f64 = weight.iter().sum();
+        let mean = |of: &dyn Fn(f64) -> f64| -> f64 {
+            ln.iter().zip(&weight).map(|(x, w)| w * of(*x)).sum::<f64>() / total
+        };
+        let middle = mean(&|x| x);
+        let spread = mean(&|x| (x - middle).powi(2)).sqrt();
+        for order in 1..=BENDS as i32 {
+            let bend = |(x, f): (&f64, &f64)| f * ((x - middle) / spread).powi(order);
+            let mut x: Vec<f64> = ln.iter().zip(&share).map(bend).collect();
+            let before = information(&m, &x, &x).sqrt();
+            let length = orthogonal(&mut x, &basis, &m);
+            // A shape that lies in the others' span has no length of its own; 0 of 0 is none either.
+            if length.is_nan() || length <= 1e-3 * before {
+                continue;
+            }
+            let power = |k| m.iter().zip(&x).map(|(m, x)| m * x.powi(k)).sum::<f64>();
+            let rests_on = power(2).powi(2) / power(4);
+            x.iter_mut().for_each(|x| *x /= length);
+            if rests_on > LEAST {
+                basis.push(x);
+            }
+        }
+        let bends = &basis[estimated..];
+        let scores: Vec<f64> = bends
+            .iter()
+            .map(|x| {
+                let off = energy.iter().zip(&m).zip(x);
+                off.map(|((e, m), x)| 0.5 * (e - m) * x).sum()
+            })
+            .collect();
+        let statistic: f64 = scores.iter().map(|s| s * s).sum();
+        let p_value = if bends.is_empty() || statistic < self.least {
+            1.0
+        } else {
+            chi_tail(statistic, bends.len() as f64)
+        };
+        // Where it acts, how far the bent spectrum is from the named one.
+        let bent = |b: usize| -> f64 { scores.iter().zip(bends).map(|(s, x)| s * x[b]).sum() };
+        let heaviest = (0..m.len()).max_by(|a, b| {
+            let weigh = |b: usize| bent(b).abs() * weight[b].sqrt();
+            weigh(*a).total_cmp(&weigh(*b))
+        })?;
+        let hz = bins.at.omega[heaviest] / (2.0 * PI) * self.view.rate_hz;
+        let what = format!(
+            "its spectrum is bent otherwise; all noise is {:.2} of the model's about {hz:.3} Hz",
+            bent(heaviest).exp()
+        );
+        Some(self.outcome(self.claims[0]?, statistic, p_value, what))
+    }
+
+    /// Whether it is Gaussian, and there all the time.
+    fn in_time(&self) -> Vec<Outcome> {
+        let bins = &self.panel.bins;
+        let g = self.state.noise.everywhere(bins);
+        let share: Vec<f64> = (self.alone.everywhere(bins).iter().zip(&g))
+            .map(|(a, g)| if g.is_finite() { (a - 1.0) / g } else { 0.0 })
+            .collect();
+        let drive = Filtered::new(self.panel, self.u, &share);
+        let filter: Vec<f64> = (share.iter().zip(&g))
+            .map(|(f, g)| if g.is_finite() { f * g.sqrt() } else { 0.0 })
+            .collect();
+        let level = Filtered::new(self.panel, self.u, &filter);
+        let mut worst: Option<(f64, f64, String)> = None;
+        let moments = [("what drives it", &drive), ("its level", &level)]
+            .into_iter()
+            .flat_map(|(name, f)| f.moments().map(|(of, z)| (z, format!("{of} of {name}"))));
+        let mut count = 0;
+        for (z, name) in moments.filter(|m| m.0.is_finite()) {
+            count += 1;
+            if worst.as_ref().is_none_or(|w| z.abs() > w.0.abs()) {
+                worst = Some((z, normal_tail(z), name));
+            }
+        }
+        let law = worst.and_then(|(z, p, name)| {
+            let p = (p * f64::from(count)).min(1.0);
+            let what = format!("{name}, in standard errors of a Gaussian one");
+            Some(self.outcome(self.claims[1]?, z, p, what))
+        });
+        let steadiness = drive.steadiness(self.more).and_then(|(statistic, p, j, energy)| {
+            let length = self.u.len() as f64 / self.view.rate_hz / STRETCHES as f64;
+            let what = format!(
+                "it is not there all the time alike; {energy:.2} of its mean from {:.0} to {:.0} s",
+                j as f64 * length,
+                (j + 1) as f64 * length
+            );
+            Some(self.outcome(self.claims[2]?, statistic, p, what))
+        });
+        let size = self.size(&drive);
+        law.into_iter().chain(steadiness).chain(size).collect()
+    }
+
+    /// Whether its size follows what else was recorded.
+    fn size(&self, drive: &Filtered) -> Option<Outcome> {
+        let quantities = [Quantity::Temp, Quantity::Supply, Quantity::Pwm];
+        let recorded = quantities.iter().filter_map(|q| self.view.signal(*q));
+        let asked: Vec<(&str, f64, f64)> = recorded
+            .filter_map(|s| {
+                let (statistic, depth) = drive.follows(&s.smooth, self.more)?;
+                Some((s.name.as_str(), statistic, depth))
+            })
+            .collect();
+        let (name, statistic, depth) = asked.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let chance = (asked.len() as f64 * chi_tail(*statistic, 2.0)).min(1.0);
+        let p = if *depth < DEPTH { 1.0 } else { chance };
+        let what = format!("its energy follows {name}, by {:.0} % rms", 100.0 * depth);
+        let outcome = self.outcome(self.claims[3]?, *statistic, p, what);
+        Some(Outcome {
+            about: vec![(*name).to_owned()],
+            ..outcome
+        })
+    }
+}
+
+/// Whitened coefficients behind a filter, in time, and how such values correlate.
+struct Filtered {
+    values: Vec<f64>,
+    /// Sums of the second to fourth power of the correlation over all lags.
+    sums: [f64; 3],
+}
+
+impl Filtered {
+    fn new(panel: &Panel, u: &[f64], filter: &[f64]) -> Self {
+        let passed: Vec<f64> = u.iter().zip(filter).map(|(u, f)| u * f).collect();
+        let power: Vec<f64> = filter.iter().map(|f| f * f).collect();
+        let total: f64 = power.iter().sum();
+        // The inverse transform gives the correlation at the middles between lags: twice their sum is that over all lags.
+        let scale = (u.len() as f64 / 2.0).sqrt() / total;
+        let correlation = panel.dct.inverse(&power);
+        let sums = [2, 3, 4].map(|k| {
+            let all = correlation.iter().map(|r| (r * scale).powi(k));
+            2.0 * all.sum::<f64>()
+        });
+        Self {
+            values: panel.dct.inverse(&passed),
+            sums,
+        }
+    }
+
+    /// Skewness and kurtosis over their standard errors; NaN where too few independent values stand behind.
+    fn moments(&self) -> [(&'static str, f64); 2] {
+        let n = self.values.len() as f64;
+        let mean = |k| self.values.iter().map(|v| v.powi(k)).sum::<f64>() / n;
+        let variance = mean(2);
+        let independent = |sum: f64| Some(n / sum.max(1.0)).filter(|n| *n > LEAST);
+        // The third Hermite moment: the mean that lies beside zero is taken off.
+        let third = mean(3) / variance.powf(1.5) - 3.0 * mean(1) / variance.sqrt();
+        let skewness = independent(self.sums[1]).map_or(f64::NAN, |n| third * (n / 6.0).sqrt());
+        let fourth = mean(4) / (variance * variance);
+        let kurtosis = independent(self.sums[2]).map_or(f64::NAN, |n| kurtosis_score(fourth, n));
+        [("skewness", skewness), ("kurtosis", kurtosis)]
+    }
+
+    /// Sum of the squared deviations of the energies in stretches, its chance, the stretch that is farthest off and its
+    /// energy over the mean.
+    fn steadiness(&self, more: f64) -> Option<(f64, f64, usize, f64)> {
+        let length = self.values.len() / STRETCHES;
+        if (length as f64) < more * LEAST * self.sums[0] {
+            return None;
+        }
+        let energies: Vec<f64> = self
+            .values
+            .chunks_exact(length)
+            .take(STRETCHES)
+            .map(|c| c.iter().map(|v| v * v).sum::<f64>() / length as f64)
+            .collect();
+        let mean = energies.iter().sum::<f64>() / STRETCHES as f64;
+        let variance = 2.0 * self.sums[0] / length as f64;
+        let off = |e: &f64| (e / mean - 1.0).powi(2) / variance;
+        let statistic: f64 = energies.iter().map(off).sum();
+        let worst =
+            (0..STRETCHES).max_by(|a, b| off(&energies[*a]).total_cmp(&off(&energies[*b])))?;
+        let chance = chi_tail(statistic, STRETCHES as f64 - 1.0);
+        Some((statistic, chance, worst, energies[worst] / mean))
+    }
+
+    /// Chi-square of two degrees of the energy against a course and its square, and the part of the energy, rms, that
+    /// follows them. `None` where too few independent values stand behind.
+    fn follows(&self, course: &[f64], more: f64) -> Option<(f64, f64)> {
+        let n = self.values.len() as f64;
+        if n < more * LEAST_OF_COURSE * self.sums[0] {
+            return None;
+        }
+        let energy = self.values.iter().map(|v| v * v).sum::<f64>() / n;
+        let [first, square, _] = powers(course);
+        // What is left of a course that rests, or of the square of one of two levels, is rounding.
+        let score = |c: &[f64], of: &[f64], power: i32| {
+            let raw: f64 = of.iter().map(|v| v.powi(2 * power)).sum();
+            if dot(c, c) < ROUNDING * raw {
+                return 0.0;
+            }
+            let more = self.values.iter().map(|v| v * v / energy - 1.0);
+            more.zip(c).map(|(m, c)| m * c).sum::<f64>() / dot(c, c).sqrt()
+        };
+        let scores = score(&first, course, 1).powi(2) + score(&square, &first, 2).powi(2);
+        let follows = (scores / (2.0 * self.sums[0]), (scores / n).sqrt());
+        Some(follows)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::rc::Rc;
+
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+    use crate::fit::likelihood::Dct;
+
+    /// White coefficients behind the filter of a process with a correlation of some 3 of 6000 samples.
+    fn filtered(seed: u64) -> Filtered {
+        let n = 6000;
+        let panel = Panel::new(&Dct::new(n), &Rc::new(Bins::new(n)), &vec![0.0; n]);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let u: Vec<f64> = (0..n).map(|_| StandardNormal.sample(&mut rng)).collect();
+        let filter: Vec<f64> = (0..n)
+            .map(|k| 1.0 / (1.0 + (PI * k as f64 / n as f64 * 3.0).powi(2)))
+            .collect();
+        Filtered::new(&panel, &u, &filter)
+    }
+
+    #[test]
+    fn moments_and_energies_of_a_gaussian_process_are_as_far_off_as_their_errors_say() {
+        let runs = 400;
+        let all: Vec<Filtered> = (0..runs).map(filtered).collect();
+        let z: Vec<f64> = all.iter().flat_map(|f| f.moments().map(|m| m.1)).collect();
+        let spread = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
+        // 800 scores of spread 1: 0.025 of error, and kurtosis is a little skewed.
+        assert!((spread - 1.0).abs() < 0.1, "{spread}");
+        let far = z.iter().filter(|z| z.abs() > 3.3).count();
+        assert!(far <= 5, "{far}");
+        let unsteady = all.iter().filter(|f| f.steadiness(1.0).unwrap().1 < 0.01);
+        let unsteady = unsteady.count();
+        // 4 are expected.
+        assert!(unsteady <= 12, "{unsteady}");
+    }
+
+    #[test]
+    fn a_size_that_follows_a_thermometer_is_told_and_one_that_does_not_is_not() {
+        let warm = |i: usize| (i as f64 / 450.0).sin() + 0.4;
+        let course: Vec<f64> = (0..6000).map(warm).collect();
+        let chance_of = |f: &Filtered, c: &[f64]| chi_tail(f.follows(c, 1.0).unwrap().0, 2.0);
+        let runs = 400;
+        let low = (0..runs).filter(|s| chance_of(&filtered(*s), &course) < 0.01);
+        let low = low.count();
+        // 4 are expected.
+        assert!(low <= 12, "{low}");
+        for seed in 0..10 {
+            let mut f = filtered(seed);
+            f.values.iter_mut().zip(&course).for_each(|(v, c)| *v *= c);
+            let (statistic, depth) = f.follows(&course, 1.0).unwrap();
+            assert!(chi_tail(statistic, 2.0) < 1e-6 && depth > DEPTH, "{depth}");
+        }
+        // What rests, and what has two levels, whose square is the same course.
+        assert!(filtered(1).follows(&[25.29; 6000], 1.0).unwrap().0 < 1e-6);
+        let levels: Vec<f64> = (0..6000)
+            .map(|i| if i % 700 < 90 { 0.3 } else { 0.7 })
+            .collect();
+        assert!(chance_of(&filtered(1), &levels) > 1e-3);
+    }
+
+    #[test]
+    fn a_process_that_stops_half_way_is_unsteady_and_has_tails() {
+        let mut f = filtered(7);
+        f.values[3000..].iter_mut().for_each(|v| *v *= 0.3);
+        assert!(f.steadiness(1.0).unwrap().1 < 1e-9);
+        assert!(f.moments()[1].1 > 4.0);
+    }
+
+    /// Two series, the second with a part of a shared one, and the first with what `comes_over` makes of the second.
+    fn coupled(comes_over: impl Fn(f64, f64) -> f64, shared: f64, seed: u64) -> Outcome {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        let (a, b): (Vec<f64>, Vec<f64>) = (0..6000)
+            .map(|_| {
+                let common = shared * draw();
+                let (own, other) = (common + draw(), common + draw());
+                (own + comes_over(own, other), other)
+            })
+            .unzip();
+        let r = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
+        straight(&a, &b, -6000.0 * (1.0 - r * r).ln(), 1)
+    }
+
+    #[test]
+    fn what_two_axes_share_is_straight_and_what_comes_over_on_one_side_is_not() {
+        let runs = 300;
+        let low = (0..runs).filter(|s| coupled(|_, _| 0.0, 0.5, *s).statistic > 13.28);
+        let low = low.count();
+        // Chi-square of four degrees is beyond 13.28 once in 100: 3 are expected.
+        assert!(low <= 10, "{low}");
+        for seed in 0..10 {
+            let diode = coupled(|own, other| 0.4 * (other - own - 0.5).max(0.0), 0.0, seed);
+            assert!(diode.p_value < 1e-6, "{seed}: {}", diode.p_value);
+            let beyond = |_: f64, other: f64| 0.9 * (other - other.clamp(-1.5, 1.5));
+            let beyond = coupled(beyond, 0.0, seed);
+            assert!(beyond.p_value < 1e-5, "{seed}: {}", beyond.p_value);
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! Laws of the variance: which one the residual of a channel follows, and what its name claims.
+
+use std::f64::consts::PI;
+
+use model::effect::{Found, Hypothesis, VarianceLaw};
+
+use crate::fit::channel::VarianceFound;
+use crate::fit::{scan, threshold};
+use crate::search::searched::Searched;
+use crate::test_level::{CheckId, DEPARTURE, Outcome};
+use numerics::tails::{chi_tail, errors_of_sum};
+
+/// The best law of the variance, if one passes its threshold.
+pub(crate) fn best(s: &Searched<'_>) -> Option<VarianceFound> {
+    let e = &s.e;
+    let mut all: Vec<VarianceFound> = s
+        .search
+        .candidates
+        .iter()
+        .filter_map(|c| {
+            let Hypothesis::Variance(law) = &c.hypothesis else {
+                return None;
+            };
+            let rate_hz = s.search.view.rate_hz;
+            let mut found = Found {
+                unit: s.target.unit.clone(),
+                rate_hz,
+                ..Found::default()
+            };
+            let follows = match law {
+                VarianceLaw::Shape { follows, .. } => Some(follows.clone()),
+                VarianceLaw::Segment => None,
+            };
+            let (lr, limit, shape) = match law {
+                VarianceLaw::Shape { shape, .. } => {
+                    let (lr, gamma, error) = scan::variance_law(e, shape);
+                    found.coefficients = vec![(gamma, error)];
+                    (lr, threshold::variance_law(), shape.clone())
+                }
+                VarianceLaw::Segment => {
+                    let (lr, start, end, increase) = scan::segment(e);
+                    let (n, inside) = (e.len() as f64, (end - start) as f64);
+                    let error = (1.0 + increase)
+                        * (2.0 / inside.max(1.0) + 2.0 / (n - inside).max(1.0)).sqrt();
+                    found.coefficients = vec![(increase, error)];
+                    let (first, last) = scan::ends(e, start, end, increase);
+                    found.location = [first, last]
+                        .map(|(at, error)| (at / rate_hz, error / rate_hz))
+                        .to_vec();
+                    let inside = (0..e.len()).map(|i| f64::from(u8::from(i >= start && i < end)));
+                    (lr, threshold::segment(), inside.collect())
+                }
+            };
+            let gamma = found.coefficients[0].0;
+            Some(VarianceFound {
+                effect: c.effect,
+                parameters: c.effect.describe(&found),
+                found,
+                lr,
+                threshold: limit,
+                alternatives: vec![],
+                law: shape.iter().map(|d| 1.0 + gamma * d).collect(),
+                shape,
+                follows,
+            })
+        })
+        .filter(|v| v.lr > v.threshold)
+        .collect();
+    let score = |v: &VarianceFound| v.lr - v.threshold;
+    all.sort_by(|a, b| score(b).total_cmp(&score(a)));
+    let (best, rest) = all.split_first_mut()?;
+    for other in rest.iter().filter(|o| o.effect.id() != best.effect.id()) {
+        if score(best) - score(other) < crate::fit::channel::RIVAL_SPAN {
+            best.alternatives
+                .push((other.effect, (score(other) - score(best)) / 2.0));
+        }
+    }
+    let mean = best.law.iter().sum::<f64>() / best.law.len() as f64;
+    best.law.iter_mut().for_each(|v| *v /= mean);
+    Some(all.swap_remove(0))
+}
+
+/// Nats by which one law of an effect's variance has to be ahead of its others; within them the record does not tell which it
+/// is, and the effect's own is the first.
+const OPEN: f64 = 3.0;
+
+/// Of the laws of the effect that was found, the one that the residual `e` tells.
+pub(crate) fn settle(s: &Searched<'_>, v: &mut VarianceFound, e: &[f64]) {
+    let own = s.search.candidates.iter();
+    let own = own.filter(|c| c.effect.id() == v.effect.id());
+    let laws: Vec<_> = own
+        .filter_map(|c| match &c.hypothesis {
+            Hypothesis::Variance(VarianceLaw::Shape { shape, fixed, .. }) => {
+                Some((scan::variance_law(e, shape), fixed, shape))
+            }
+            _ => None,
+        })
+        .collect();
+    let best = laws.iter().map(|((lr, ..), ..)| *lr).fold(0.0, f64::max);
+    let near: Vec<_> = laws
+        .iter()
+        .filter(|((lr, ..), ..)| best - lr < 2.0 * OPEN)
+        .collect();
+    let ((_, increase, error), fixed, shape) = match (near.as_slice(), laws.first()) {
+        ([(told, fixed, shape)], _) => (*told, (*fixed).clone(), *shape),
+        (_, Some((first, _, shape))) => (*first, vec![], *shape),
+        _ => return,
+    };
+    v.found.coefficients = vec![(increase, error)];
+    v.found.fixed = fixed;
+    v.shape.clone_from(shape);
+    v.parameters = v.effect.describe(&v.found);
+}
+
+/// What the law of the variance that was found on a channel claims, each claim with its chance.
+pub(crate) fn claims(s: &Searched<'_>) -> impl Iterator<Item = Outcome> {
+    let found = s.variance.iter();
+    found.flat_map(|v| {
+        let (rate_hz, id) = (s.search.view.rate_hz, v.effect.id());
+        [
+            evenness(&s.e, id, v.lr, rate_hz),
+            added_white(&s.e, &v.law, id, v.lr),
+        ]
+        .into_iter()
+        .chain(either_sign(s, v))
+    })
+}
+
+/// Half cycles of the cosines that a changed variance is held against.
+const COSINES: usize = 16;
+
+/// The claim of a law of the variance: divided by it, the squares of the residual `e` are even. They are held against cosines
+/// over the record; what swells, fades or follows a history is no stretch with two ends, and no law of the motor.
+/// `lr` is its likelihood ratio, of which a twentieth may be left.
+fn evenness(e: &[f64], named: &str, lr: f64, rate_hz: f64) -> Outcome {
+    let n = e.len() as f64;
+    let mean = e.iter().map(|v| v * v).sum::<f64>() / n;
+    let squares: Vec<f64> = e.iter().map(|v| v * v - mean).collect();
+    let spread = squares.iter().map(|s| s * s).sum::<f64>() / n;
+    let score = |k: usize| {
+        let step = PI * k as f64 / n;
+        let sum: f64 = (squares.iter().enumerate())
+            .map(|(i, s)| s * (step * (i as f64 + 0.5)).cos())
+            .sum();
+        sum / (0.5 * n * spread).sqrt()
+    };
+    let scores: Vec<f64> = (1..=COSINES).map(score).collect();
+    claim_of_variance(&scores, lr, |worst| {
+        let over_s = 2.0 * n / rate_hz / (worst + 1) as f64;
+        format!(
+            "told as {named}: divided by it, the variance still swings, most over {over_s:.0} s"
+        )
+    })
+}
+
+/// A claim of a law of the variance, by scores that are standard normal where it holds; a part [`DEPARTURE`] of its likelihood
+/// ratio may be left. `what` tells it by the score that stands out most.
+fn claim_of_variance(scores: &[f64], lr: f64, what: impl FnOnce(usize) -> String) -> Outcome {
+    let statistic: f64 = scores.iter().map(|z| z * z).sum();
+    let worst = (0..scores.len())
+        .max_by(|a, b| scores[*a].abs().total_cmp(&scores[*b].abs()))
+        .unwrap_or(0);
+    Outcome {
+        id: CheckId::VarianceLaw,
+        about: vec![],
+        statistic,
+        p_value: if statistic < DEPARTURE * lr {
+            1.0
+        } else {
+            chi_tail(statistic, scores.len() as f64)
+        },
+        what: what(worst),
+    }
+}
+
+/// Samples over which what a law of the variance adds is asked whether it is white.
+const LAGS_OF_ADDED: usize = 20;
+
+/// The other claim of a law of the variance: what it adds is white. `law` is the variance over its mean, by sample, which `e`
+/// was divided by; where more of it is added, a correlation counts for more.
+fn added_white(e: &[f64], law: &[f64], named: &str, lr: f64) -> Outcome {
+    let least = law.iter().copied().fold(f64::INFINITY, f64::min);
+    let added: Vec<f64> = e
+        .iter()
+        .zip(law)
+        .map(|(e, v)| e * (1.0 - least / v))
+        .collect();
+    let score = |lag: usize| errors_of_sum(added.iter().zip(&added[lag..]).map(|(a, b)| a * b));
+    let scores: Vec<f64> = (1..=LAGS_OF_ADDED.min(e.len() / 2)).map(score).collect();
+    claim_of_variance(&scores, lr, |worst| {
+        let lag = worst + 1;
+        format!(
+            "told as {named}: what it adds is not white, readings {lag} samples apart correlate most"
+        )
+    })
+}
+
+/// The third claim of a law of the variance, where it follows a channel of both signs: what it adds is as large under either.
+fn either_sign(s: &Searched<'_>, found: &VarianceFound) -> Option<Outcome> {
+    let channel = found.follows.as_ref()?;
+    let follows = &s
+        .search
+        .view
+        .signals
+        .iter()
+        .find(|c| c.name == *channel)?
+        .values;
+    let has = |sign: f64| follows.iter().any(|x| sign * x > 0.0);
+    if !(has(1.0) && has(-1.0)) {
+        return None;
+    }
+    let (e, n) = (&s.e, s.e.len() as f64);
+    let least = found.law.iter().copied().fold(f64::INFINITY, f64::min);
+    // What moves ln of the variance where one sign has more of it and the other less.
+    let odd: Vec<f64> = (found.law.iter().zip(follows.iter()))
+        .map(|(v, x)| (1.0 - least / v) * if *x == 0.0 { 0.0 } else { x.signum() })
+        .collect();
+    let middle = odd.iter().sum::<f64>() / n;
+    let mean = e.iter().map(|v| v * v).sum::<f64>() / n;
+    let score = errors_of_sum((e.iter().zip(&odd)).map(|(e, o)| (e * e - mean) * (o - middle)));
+    let claim = claim_of_variance(&[score], found.lr, |_| {
+        let more = if score > 0.0 { "above" } else { "below" };
+        let id = found.effect.id();
+        format!("told as {id}: it adds more while {channel} is {more} 0 than at the other sign")
+    });
+    Some(Outcome {
+        about: vec![channel.clone()],
+        ..claim
+    })
+}

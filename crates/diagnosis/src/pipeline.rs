@@ -1,0 +1,460 @@
+//! What the simulation of a sensor gets wrong, and why: the order of the steps. Each takes values and gives values.
+//!
+//! | step | takes | gives |
+//! |---|---|---|
+//! | [`prepared`] | a record | its grid, what the audits saw in counts and frames |
+//! | [`channel::searched`] | a channel of the grid | its model, residual and checks |
+//! | [`tested`] | all channels | checks of one by the others, what axes share |
+//! | [`name_channel`] | a channel, its checks | findings, and names withdrawn |
+//! | [`concluded`] | all of that | the lists of the diagnosis |
+
+mod channel;
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use model::file::FittedOn;
+use model::record::Record;
+
+use crate::attribute::{events, masking, merge, withdraw};
+use crate::audit::{Audit, audit, sign_bit};
+use crate::criticise::common_noise::{Shared, common};
+use crate::criticise::cross_axis::couplings;
+use crate::fit::channel::Note;
+use crate::ingest::dead;
+use crate::ingest::grid::lay_out;
+use crate::ingest::types::Grid;
+use crate::replicates;
+use crate::report::findings::{motion_findings, scale_finding, term_findings, variance_finding};
+use crate::report::untested::not_tested;
+use crate::report::{detection_limits, figures, handover};
+use crate::result::{
+    Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, Input, NotTested,
+    Unexplained, Verdict,
+};
+use crate::search::searched::Searched;
+use crate::test_level::{CheckId, all_worded, worded};
+use model::record::AnalysisError;
+use model::record::rows;
+
+/// Options of [`diagnose`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DiagnoseOptions {
+    /// Seed of whatever is random (fill of lost samples, replicates).
+    pub seed: u64,
+    /// Name of the file, for the report.
+    pub file: String,
+    /// Digest of the file, for the model file.
+    pub hash: Option<String>,
+    /// Whether [`Diagnosed::evidence`], which a report alone shows, is left out.
+    pub no_evidence: bool,
+    /// Replicates of the model before and after that the record is held against; 0 for none. Where there are some, a
+    /// model is extended only if they hold the record ([`crate::replicates`]).
+    pub replicates: usize,
+}
+
+/// Diagnose a record.
+///
+/// # Errors
+/// [`AnalysisError::Inconclusive`] when the record is too short, [`AnalysisError::NoChannel`] when it holds no gyro,
+/// [`AnalysisError::NoRate`] when its sample rate is unknown, [`AnalysisError::Constant`] when a gyro never changes,
+/// [`AnalysisError::NeverNew`] when no gyro's readings are flagged as new.
+pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosed, AnalysisError> {
+    Ok(diagnosed(
+        prepared(Cow::Borrowed(record), options.seed)?,
+        options,
+    ))
+}
+
+/// As [`diagnose`], of a record that nobody needs any longer: the search has its memory.
+///
+/// # Errors
+/// Those of [`diagnose`].
+pub fn diagnose_owned(
+    record: Record,
+    options: &DiagnoseOptions,
+) -> Result<Diagnosed, AnalysisError> {
+    Ok(diagnosed(
+        prepared(Cow::Owned(record), options.seed)?,
+        options,
+    ))
+}
+
+/// What the search needs of a record, and what was seen of it before.
+struct Prepared {
+    grid: Grid,
+    audited: Audit,
+    sticking: Vec<Finding>,
+    dead: Vec<Unexplained>,
+    input: Input,
+}
+
+fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisError> {
+    let record = &*rows::in_order(&record);
+    let record = &*rows::longest_part(record);
+    let (alive, dead) = dead::left_out(record)?;
+    let (mended, sticking) = sign_bit::mend(&alive);
+    let record = &*mended;
+    let mut audited = audit(record);
+    audited.findings = all_worded(audited.findings);
+    audited.checks = all_worded(audited.checks);
+    audited.unexplained = all_worded(audited.unexplained);
+    audited.not_tested = all_worded(audited.not_tested);
+    // Put right by the sign, but for the readings that lay beyond the bit.
+    for f in &sticking {
+        audited.put_right(f);
+    }
+    let record = &*masking::renumbered(record, &audited);
+    let grid = lay_out(record, &|name| audited.masked(name), seed)?;
+    let input = Input {
+        file: String::new(),
+        seconds: grid.n as f64 / grid.rate_hz,
+        rate_hz: grid.rate_hz,
+        samples: record.len(),
+        channels: record.channels.iter().map(|c| c.name.clone()).collect(),
+        notes: record.notes.clone(),
+    };
+    Ok(Prepared {
+        grid,
+        audited,
+        sticking,
+        dead,
+        input,
+    })
+}
+
+fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
+    let Prepared {
+        grid,
+        mut audited,
+        sticking,
+        dead,
+        mut input,
+    } = of;
+    let search = |t| channel::searched(&grid, t);
+    let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(search).collect();
+    grid.dct.forget();
+    let tested = tested(&mut searched, &audited, &grid);
+    let first = Named {
+        findings: merge::turning(
+            [
+                all_worded(sticking),
+                all_worded(masking::findings(&audited, &searched, &grid)),
+            ]
+            .concat(),
+            &grid,
+        ),
+        limits: std::mem::take(&mut audited.limits),
+        ..Named::default()
+    };
+    let name = |named, s| name_channel(named, s, &tested, &audited, &grid, options.seed);
+    let named = searched.iter().fold(first, name);
+    input.notes.append(&mut audited.notes);
+    input.file.clone_from(&options.file);
+    let mut told = concluded(&searched, tested, audited, dead, named);
+    let fitted_on = || FittedOn {
+        file: options.file.clone(),
+        hash: options.hash.clone(),
+        seconds: input.seconds,
+    };
+    let baseline_model = handover::baseline_model(&searched, &grid, fitted_on());
+    let in_model: Vec<&Finding> = told.findings.iter().chain(&told.nearest).collect();
+    let extended_model = handover::extended_model(&searched, &grid, &in_model, fitted_on());
+    let mut verdict = verdict(&told.findings, &told.unexplained);
+    let replicates = match options.replicates {
+        0 => BTreeMap::new(),
+        count => replicates::judge(&grid, &baseline_model, &extended_model, count, options.seed)
+            .unwrap_or_default(),
+    };
+    let held = replicates::held(&replicates, verdict, options.replicates);
+    if !held.unexplained.is_empty() {
+        verdict = Verdict::Unexplained;
+    }
+    told.checks.extend(held.checks);
+    told.unexplained.extend(held.unexplained);
+    Diagnosed {
+        diagnosis: Diagnosis {
+            format: DIAGNOSIS_FORMAT.into(),
+            baseline: handover::parameters_of(&baseline_model),
+            extended: handover::parameters_of(&extended_model),
+            detection_limits: detection_limits::of_not_found(told.limits, &told.findings),
+            verdict,
+            replicates,
+            input,
+            checks: told.checks,
+            findings: told.findings,
+            unexplained: told.unexplained,
+            not_tested: told.not_tested,
+        },
+        baseline_model,
+        extended_model,
+        evidence: (searched.iter().filter(|_| !options.no_evidence))
+            .flat_map(|s| figures::of_channel(s, &grid))
+            .collect(),
+    }
+}
+
+fn verdict(findings: &[Finding], unexplained: &[Unexplained]) -> Verdict {
+    match (unexplained.is_empty(), findings.is_empty()) {
+        (false, _) => Verdict::Unexplained,
+        (true, true) => Verdict::Adequate,
+        (true, false) => Verdict::Extended,
+    }
+}
+
+/// The checks of all channels, those that a fault of the counts explains put right.
+struct Tested {
+    /// Of channels alone, and of one by the others.
+    checks: Vec<Check>,
+    /// What the axes share.
+    shared: Shared,
+}
+
+fn tested(searched: &mut [Searched<'_>], audited: &Audit, grid: &Grid) -> Tested {
+    let own = searched.iter_mut();
+    let mut checks: Vec<Check> = own.flat_map(|s| std::mem::take(&mut s.checks)).collect();
+    masking::suppress(&mut checks, audited);
+    let mut shared = common(searched, grid);
+    shared.checks = all_worded(shared.checks);
+    checks.extend(all_worded(couplings(searched, grid)));
+    Tested { checks, shared }
+}
+
+/// What is named so far.
+#[derive(Default)]
+struct Named {
+    /// Causes.
+    findings: Vec<Finding>,
+    /// What stands in the model for what has no name.
+    nearest: Vec<Finding>,
+    /// Names that were withdrawn, in words.
+    withdrawn: Vec<Unexplained>,
+    /// Smallest sizes that would have been found.
+    limits: Vec<DetectionLimit>,
+    /// What could not be asked.
+    not_tested: Vec<NotTested>,
+}
+
+/// Adds what is named on a channel: motion, then the terms and the law of the variance that the checks bear out. Names that
+/// stand already may fall by what is found here.
+fn name_channel(
+    mut named: Named,
+    s: &Searched<'_>,
+    tested: &Tested,
+    audited: &Audit,
+    grid: &Grid,
+    seed: u64,
+) -> Named {
+    let all = tested.checks.iter().chain(&audited.checks);
+    let fails: Vec<&Check> = all
+        .filter(|c| c.channel == s.target.name && c.fails_after)
+        .collect();
+    let failing = |id: CheckId| fails.iter().any(|c| c.id == id);
+    let (moved, unmoved) = motion_findings(s, grid, &failing);
+    named.findings.extend(all_worded(moved));
+    named.withdrawn.extend(all_worded(unmoved));
+    let of_terms = all_worded(term_findings(s, grid, seed));
+    let variance = variance_finding(s)
+        .filter(|_| !by_counts(s, audited))
+        .map(worded);
+    let left = left_on(s, &fails, &tested.shared);
+    let (kept, nearest, told) = withdraw::withdraw(s, of_terms, variance, &failing, &left);
+    let findings = &mut named.findings;
+    let stale = withdraw::propagate::stale(s, findings, &failing);
+    let outliers = events::hold_outliers(s, &kept, findings, &failing);
+    findings.extend(kept);
+    named.nearest.extend(nearest);
+    named
+        .withdrawn
+        .extend([stale, outliers, told].into_iter().flatten());
+    match scale_finding(s, grid) {
+        Ok(scaled) => {
+            named.findings.extend(scaled.finding);
+            named.limits.extend(scaled.limit);
+        }
+        Err((cause, why)) => named.not_tested.push(NotTested {
+            cause: cause.into(),
+            why: format!("{}: {why}", s.target.name),
+        }),
+    }
+    named
+}
+
+/// What the failing checks leave on a channel.
+fn left_on(s: &Searched<'_>, fails: &[&Check], shared: &Shared) -> withdraw::Left {
+    // What an axis takes from another one later has a spectrum, and is no process of its own.
+    let late = shared.late.iter().filter(|l| l.0 == s.target.name);
+    let mut colours = fails.iter().filter(|c| c.id == CheckId::ColourFollows);
+    withdraw::Left {
+        late: late.map(|l| l.1).sum(),
+        colour: colours.next().map_or(0.0, |c| c.statistic),
+        about: fails.iter().flat_map(|c| c.about.iter().cloned()).collect(),
+    }
+}
+
+/// Whether counts explain the law of the variance: a bit that sticks makes a noise of its own, which depends on the level.
+fn by_counts(s: &Searched<'_>, audited: &Audit) -> bool {
+    s.variance.as_ref().is_some_and(|v| {
+        let more = v.parameters.get("variance_increase");
+        let ratio = more.map(|p| 1.0 + p.value);
+        audited.explains_variance(&s.target.name, v.lr, v.threshold, ratio)
+    })
+}
+
+/// The lists of a diagnosis.
+struct Told {
+    checks: Vec<Check>,
+    findings: Vec<Finding>,
+    nearest: Vec<Finding>,
+    unexplained: Vec<Unexplained>,
+    limits: Vec<DetectionLimit>,
+    not_tested: Vec<NotTested>,
+}
+
+fn concluded(
+    searched: &[Searched<'_>],
+    tested: Tested,
+    audited: Audit,
+    dead: Vec<Unexplained>,
+    named: Named,
+) -> Told {
+    let Tested { mut checks, shared } = tested;
+    let Named {
+        mut findings,
+        mut nearest,
+        withdrawn,
+        mut limits,
+        not_tested: unasked,
+    } = named;
+    let mut unexplained = left_over(&checks, &shared);
+    for s in searched {
+        let note = |note: &Note| Unexplained {
+            channel: s.target.name.clone(),
+            what: note.what.clone(),
+        };
+        unexplained.extend(s.state.notes.iter().map(note));
+        unexplained.extend(astray(s));
+    }
+    unexplained.extend(dead);
+    unexplained.extend(withdrawn);
+    checks.extend(shared.checks);
+    checks.extend(audited.checks);
+    unexplained.extend(audited.unexplained);
+    let not_normal = audited.not_normal.into_iter();
+    unexplained.extend(not_normal.filter(|u| !bent(&u.channel, searched, &checks)));
+    if let Some(finding) = shared.finding {
+        if withdraw::propagate::shared_falls(&finding, &checks) {
+            unexplained.push(withdraw::nearest_of(&finding.channels[0], &finding.what));
+            nearest.push(finding);
+        } else {
+            findings.push(finding);
+        }
+    }
+    limits.extend(searched.iter().flat_map(|s| s.limits.iter().cloned()));
+    limits.extend(shared.limits);
+    // What the audit could not ask a channel for has no smallest size there.
+    let asked = |l: &DetectionLimit| {
+        let mut not = audited.not_asked.iter();
+        !not.any(|(channel, cause)| *channel == l.channel && *cause == l.cause)
+    };
+    limits.retain(asked);
+    let mut not_tested = not_tested(searched);
+    not_tested.extend(unasked);
+    not_tested.extend(audited.not_tested);
+    handover::size_outliers(&mut findings, searched);
+    Told {
+        checks,
+        findings: merge::complete(merge::joined(merge::loud(merge::blows(findings)))),
+        nearest: merge::complete(nearest),
+        unexplained,
+        limits,
+        not_tested,
+    }
+}
+
+/// Whether what was found on a channel may have bent the distribution of its counts; then the residual decides.
+fn bent(name: &str, searched: &[Searched<'_>], checks: &[Check]) -> bool {
+    let found =
+        |s: &Searched<'_>| !s.state.terms.is_empty() || s.variance.is_some() || s.target.moving;
+    let tails = |c: &Check| c.id == CheckId::Kurtosis && c.channel == name && c.fails_after;
+    let mut own = searched.iter().filter(|s| s.target.name == name);
+    own.any(found) && !checks.iter().any(tails)
+}
+
+/// An axis that moves on a table that turns another one.
+fn astray(s: &Searched<'_>) -> Option<Unexplained> {
+    s.target.astray.then(|| Unexplained {
+        channel: s.target.name.clone(),
+        what: format!(
+            "moves by {:.2} deg/s rms and does not follow the axis that the table turns: it was searched for no cause; where the stand was shaken or tilted, say `base: moving`",
+            s.target.motion_rms
+        ),
+    })
+}
+
+fn left_over(checks: &[Check], shared: &Shared) -> Vec<Unexplained> {
+    let failing = checks.iter().filter(|c| c.fails_after);
+    failing
+        .map(|c| Unexplained {
+            channel: c.channel.clone(),
+            what: format!("{}: {}", c.id, c.what),
+        })
+        .chain(shared.left.iter().cloned())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use model::docs::example;
+    use model::effects::effect;
+
+    use super::*;
+    use crate::test_level::rewording;
+
+    /// Everything but texts.
+    fn decided(d: Diagnosis) -> Diagnosis {
+        let none = String::new;
+        let mut d = d;
+        d.checks.iter_mut().for_each(|c| c.what = none());
+        d.findings.iter_mut().for_each(|f| f.what = none());
+        d.unexplained.iter_mut().for_each(|u| u.what = none());
+        d.not_tested.iter_mut().for_each(|n| n.why = none());
+        d.input.notes = vec![];
+        d
+    }
+
+    #[test]
+    fn no_verdict_hangs_on_the_wording_of_a_message() {
+        // Followers of channels, a process, noise by a channel, a fault of the counts: what the rules compare channels of.
+        let causes = [
+            "temperature",
+            "motor_noise",
+            "motor_bias",
+            "g_sensitivity",
+            "gauss_markov",
+            "coarse_lsb",
+            "common_noise",
+            "telegraph",
+        ];
+        for cause in causes {
+            let model = example(effect(cause).unwrap(), true);
+            let record = model::simulate(&model, 120.0, 20.0, 3).unwrap();
+            let told = || {
+                diagnose(&record, &DiagnoseOptions::default())
+                    .unwrap()
+                    .diagnosis
+            };
+            let reworded = rewording::during(told);
+            let plain = told();
+            let texts = |d: &Diagnosis| -> Vec<String> {
+                d.checks.iter().map(|c| c.what.clone()).collect()
+            };
+            assert_ne!(
+                texts(&plain),
+                texts(&reworded),
+                "{cause}: no text was replaced"
+            );
+            assert_eq!(decided(plain), decided(reworded), "{cause}");
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! Both models of a diagnosis held against their record.
+
+use std::collections::BTreeMap;
+
+use model::file::{ChannelModel, ModelFile};
+use model::record::Record;
+use model::simulate::{Replicas, SimulateError};
+
+use super::envelope::Table;
+use super::statistics::{Battery, Subject};
+use super::world::{Measured, Parts, bridge, in_steps, measured, record_of};
+
+use crate::ingest::grid::lay_out;
+use crate::ingest::types::Grid;
+use crate::result::{Among, Replicated};
+use model::record::AnalysisError;
+
+/// A record on its grid, ready to be held against models.
+pub(crate) struct Judged<'a> {
+    grid: &'a Grid,
+    record: Record,
+    parts: Parts,
+    measured: Vec<Measured>,
+    battery: Battery,
+}
+
+impl<'a> Judged<'a> {
+    /// With the baseline, by whose noise spectra are whitened.
+    pub fn new(grid: &'a Grid, baseline: &ModelFile) -> Self {
+        let parts = Parts::of(grid.n, grid.rate_hz);
+        let record = record_of(grid);
+        let subjects: Vec<Subject> = (grid.targets.iter())
+            .map(|t| Subject {
+                name: t.name.clone(),
+                unit: t.unit.clone(),
+                step: t.step,
+                walk: walk_over_white(
+                    baseline.channels.iter().find(|c| c.name == t.name),
+                    grid.rate_hz,
+                ),
+            })
+            .collect();
+        Self {
+            grid,
+            battery: Battery::new(&subjects, &record, grid.rate_hz, &parts),
+            measured: grid.targets.iter().map(|t| measured(t, &parts)).collect(),
+            record,
+            parts,
+        }
+    }
+
+    /// The channels of the record among `count` replicates of a model that has the same ones, in their order.
+    ///
+    /// # Errors
+    /// Those of the simulation.
+    pub fn among(
+        &mut self,
+        model: &ModelFile,
+        count: usize,
+        seed: u64,
+    ) -> Result<Vec<Among>, SimulateError> {
+        let model = in_steps(model, self.grid);
+        let mut replicas = Replicas::new(
+            &model,
+            &self.record,
+            self.grid.rate_hz,
+            &self.parts.stretches,
+        )?;
+        let mut readings: Vec<Vec<f64>> = self.measured.iter().map(|m| m.values.clone()).collect();
+        let mut rows = vec![self.battery.of(&readings)];
+        for k in 0..count as u64 {
+            replicas.draw(seed.wrapping_add(k), &mut readings);
+            for (values, measured) in readings.iter_mut().zip(&self.measured) {
+                bridge(values, &measured.lost);
+            }
+            rows.push(self.battery.of(&readings));
+        }
+        let table = Table {
+            rows,
+            channels: self.battery.channels.clone(),
+        };
+        Ok(table.among(&self.battery.statistics))
+    }
+}
+
+/// Variance of a step of the random walk over that of the white noise of a sample.
+fn walk_over_white(channel: Option<&ChannelModel>, rate_hz: f64) -> f64 {
+    let Some(channel) = channel else { return 0.0 };
+    let value = |name: &str| channel.baseline.get(name).map_or(0.0, |p| p.value);
+    let (walk, white) = (
+        value("rate_random_walk") / rate_hz.sqrt(),
+        value("angle_random_walk") / 60.0 * rate_hz.sqrt(),
+    );
+    if white > 0.0 {
+        (walk / white).powi(2)
+    } else {
+        0.0
+    }
+}
+
+/// Holds the record against `count` replicates of the baseline and of the extended model, by channel.
+///
+/// # Errors
+/// Those of the simulation: a channel that it does not know.
+pub(crate) fn judge(
+    grid: &Grid,
+    baseline: &ModelFile,
+    extended: &ModelFile,
+    count: usize,
+    seed: u64,
+) -> Result<BTreeMap<String, Replicated>, SimulateError> {
+    let mut judged = Judged::new(grid, baseline);
+    let before = judged.among(baseline, count, seed)?;
+    let same = baseline.channels == extended.channels && extended.effects.is_empty();
+    let after = if same {
+        before.clone()
+    } else {
+        judged.among(extended, count, seed)?
+    };
+    let names = grid.targets.iter().map(|t| t.name.clone());
+    let both = before.into_iter().zip(after);
+    Ok(names
+        .zip(both)
+        .map(|(name, (before, after))| (name, Replicated { before, after }))
+        .collect())
+}
+
+/// As [`judge`], of a record that is laid on its grid for that; of no channel where one is not known to the simulation.
+///
+/// # Errors
+/// Those of the grid: a record too short, without a rate or a gyro.
+pub fn judge_record(
+    record: &Record,
+    models: [&ModelFile; 2],
+    count: usize,
+    seed: u64,
+) -> Result<BTreeMap<String, Replicated>, AnalysisError> {
+    let grid = lay_out(record, &|_| vec![], seed)?;
+    let [baseline, extended] = models;
+    Ok(judge(&grid, baseline, extended, count, seed).unwrap_or_default())
+}

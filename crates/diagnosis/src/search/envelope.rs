@@ -1,0 +1,229 @@
+//! Whether a narrow band is a tone of steady size whose phase wanders, or noise behind a resonance.
+//!
+//! Of a tone A cos(phase) whose phase alone wanders, the square of the envelope is A^2 all the time; of a Gaussian
+//! process it is exponential. The mean of its square over the square of its mean is 1 of the one and 2 of the other, of
+//! many independent values without other noise. What it is of as many as there are, beside the noise that there is, is
+//! simulated for both.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use model::effect::{Covariance, Frequencies, Peak};
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal, Uniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+
+use crate::fit::likelihood::{Dct, invert};
+use crate::test_level::{CheckId, Outcome};
+use numerics::tails::normal_tail;
+
+/// Nats within which the name stays open.
+pub(super) const OPEN: f64 = 3.0;
+/// Half widths either side of a band that belong to it: 0.9 of its energy.
+pub(super) const REACH: f64 = 6.0;
+/// Simulations of either kind, and the most coefficients of one.
+const RUNS: usize = 64;
+const MOST: usize = 2048;
+/// Values of the envelope for each coefficient of the band.
+const OVERSAMPLED: usize = 4;
+/// Part of its mean by which the ratio of a real band is off as a rule, beside chance: a size that swings by a fifth, or tails
+/// a little heavier, is no other cause.
+const TOLERATED: f64 = 0.1;
+
+/// Mean square of the squared envelope over its squared mean; `band` holds neighbouring DCT-II coefficients.
+fn swing(band: &[f64]) -> f64 {
+    // Coefficient k turns by k pi over the record, which is half of what the transform spans.
+    let length = (2 * OVERSAMPLED * band.len()).next_power_of_two();
+    let mut z = vec![Complex::default(); length];
+    z.iter_mut().zip(band).for_each(|(z, c)| z.re = *c);
+    FftPlanner::new().plan_fft_inverse(length).process(&mut z);
+    let record = &z[..length / 2];
+    let mean = |k| {
+        let all = record.iter().map(|z| z.norm_sqr().powi(k));
+        all.sum::<f64>() / record.len() as f64
+    };
+    mean(2) / mean(1).powi(2)
+}
+
+/// A band as it is seen: neighbouring coefficients over the noise beside it, and its density there over that.
+pub(super) struct Band {
+    pub coefficients: Vec<f64>,
+    pub density: Vec<f64>,
+}
+
+/// What an envelope says.
+pub(super) struct Seen {
+    /// ln of how much likelier it is of a steady tone than of noise.
+    pub odds: f64,
+    ratio: f64,
+    /// Mean and spread of the ratio of a steady tone and of noise.
+    of: [(f64, f64); 2],
+}
+
+/// Coefficients less what the noise beside the band has of them.
+fn kept(coefficients: &[f64], density: &[f64]) -> Vec<f64> {
+    let both = coefficients.iter().zip(density);
+    both.map(|(c, d)| c * d / (1.0 + d)).collect()
+}
+
+fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// Middle and spread of the logarithm of what `run` makes.
+fn spread_of(mut run: impl FnMut() -> f64) -> (f64, f64) {
+    let all: Vec<f64> = (0..RUNS).map(|_| run().ln()).collect();
+    let count = all.len() as f64;
+    let mean = all.iter().sum::<f64>() / count;
+    let variance = all.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    (mean, variance.sqrt())
+}
+
+/// A tone of variance 1 whose phase wanders: its coefficients, the band in their middle and `half` of them wide either side of
+/// it at half power.
+fn tone(dct: &Dct, count: usize, half: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+    let step = (2.0 * PI * half / count as f64).sqrt();
+    let mut phase = Uniform::new(-PI, PI).map_or(0.0, |u| u.sample(rng));
+    let samples = (0..count).map(|_| {
+        phase += 0.5 * PI + step * normal(rng);
+        2f64.sqrt() * phase.cos()
+    });
+    dct.forward(&samples.collect::<Vec<_>>())
+}
+
+impl Seen {
+    /// What the envelope of a band is like; `None` where no more than the noise is there.
+    pub(super) fn new(band: &Band, seed: u64) -> Option<Self> {
+        let count = band.density.len();
+        let top = band.density.iter().copied().fold(0.0, f64::max);
+        if count < 4 || top <= 0.0 {
+            return None;
+        }
+        // Of a Lorentzian the sum over all coefficients is pi times its half width and its height; what lies within the
+        // reach is 2 / pi atan(REACH) of it.
+        let half = band.density.iter().sum::<f64>() / (2.0 * REACH.atan() * top);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        // A shorter record has fewer values of the same kind.
+        let stride = count.div_ceil(MOST);
+        let fewer = (stride as f64).sqrt();
+        let thinned: Vec<f64> = band.density.iter().copied().step_by(stride).collect();
+        let noise = spread_of(|| {
+            let own = thinned.iter().map(|d| (1.0 + d).sqrt() * normal(&mut rng));
+            swing(&kept(&own.collect::<Vec<_>>(), &thinned))
+        });
+        let half = half / stride as f64;
+        let reach = ((2.0 * REACH * half) as usize).clamp(8, 2 * MOST);
+        let length = (2 * reach).next_power_of_two();
+        let from = length / 2 - reach / 2;
+        let dct = Dct::new(length);
+        let size = (top * PI * half / length as f64).sqrt();
+        let lorentzian: Vec<f64> = (from..from + reach)
+            .map(|k| top / (1.0 + ((k as f64 - 0.5 * length as f64) / half).powi(2)))
+            .collect();
+        let steady = spread_of(|| {
+            let c = tone(&dct, length, half, &mut rng);
+            let own = c[from..from + reach]
+                .iter()
+                .map(|c| size * c + normal(&mut rng));
+            swing(&kept(&own.collect::<Vec<_>>(), &lorentzian))
+        });
+        let ratio = swing(&kept(&band.coefficients, &band.density));
+        let of = [steady, noise].map(|(mean, spread)| (mean, spread / fewer));
+        let likely = |(mean, spread): (f64, f64)| {
+            let spread = spread.hypot(TOLERATED);
+            -0.5 * ((ratio.ln() - mean) / spread).powi(2) - spread.ln()
+        };
+        let odds = likely(of[0]) - likely(of[1]);
+        odds.is_finite().then_some(Self { odds, ratio, of })
+    }
+
+    /// What the name claims of the envelope.
+    pub(super) fn claim(&self, named: &str) -> Outcome {
+        let (mean, spread) = self.of[usize::from(self.odds <= 0.0)];
+        let off = self.ratio.ln() - mean;
+        let z = off / spread.hypot(TOLERATED);
+        let [steady, noise] = self.of.map(|(mean, _)| mean.exp());
+        Outcome {
+            id: CheckId::BandEnvelope,
+            about: vec![],
+            statistic: self.ratio,
+            p_value: normal_tail(z),
+            what: format!(
+                "told as {named}: the mean square of its squared envelope over its squared mean is {:.2}; of a steady tone it would be {steady:.2}, of noise {noise:.2}",
+                self.ratio
+            ),
+        }
+    }
+}
+
+/// Coefficients of a simulated tone, and half its width in them; its runs.
+const LENGTH: usize = 1024;
+const HALF_WIDTH: f64 = 12.0;
+const TONES: usize = 200;
+
+/// How much wider the errors of variance, centre and width are of a tone whose phase wanders than those of Gaussian noise of
+/// its density: with the information I of the noise and the variance J of its gradient of such a tone, the variance is
+/// I^-1 J I^-1 (White, 1982). `level` is the other noise at the band, over the white one; `mode` its density, and `at` its
+/// coordinates.
+pub(super) fn wider(mode: &Arc<dyn Covariance>, peak: &Peak, level: f64) -> Vec<f64> {
+    const STEP: f64 = 1e-4;
+    let half_width = PI * HALF_WIDTH / LENGTH as f64;
+    // Both have the same height over the other noise: variance over width.
+    let here = Peak {
+        omega: 0.5 * PI,
+        half_width,
+        variance: peak.variance / peak.half_width * half_width / level,
+    };
+    let Some((mode, theta)) = mode.about(&here) else {
+        return vec![];
+    };
+    let omega: Vec<f64> = (0..LENGTH).map(|k| PI * k as f64 / LENGTH as f64).collect();
+    let cosine = omega.iter().map(|w| w.cos()).collect();
+    let at = Frequencies { omega, cosine };
+    let density: Vec<f64> = mode.density(&theta, &at).iter().map(|d| 1.0 + d).collect();
+    let deviation = |i: usize| -> Vec<f64> {
+        let mut moved = theta.clone();
+        moved[i] += STEP;
+        let there = mode.density(&moved, &at);
+        there
+            .iter()
+            .zip(&density)
+            .map(|(t, d)| ((1.0 + t) / d).ln() / STEP)
+            .collect()
+    };
+    let by: Vec<Vec<f64>> = (0..theta.len()).map(deviation).collect();
+    let half_sum = |a: &[f64], b: &[f64]| 0.5 * numerics::column::dot(a, b);
+    let information: Vec<Vec<f64>> = by
+        .iter()
+        .map(|a| by.iter().map(|b| half_sum(a, b)).collect())
+        .collect();
+    let (inverse, _) = invert(&information);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x746f_6e65);
+    let dct = Dct::new(LENGTH);
+    let size = here.variance.sqrt();
+    let steps: Vec<Vec<f64>> = (0..TONES)
+        .map(|_| {
+            let c = tone(&dct, LENGTH, HALF_WIDTH, &mut rng);
+            let energies = c
+                .iter()
+                .zip(&density)
+                .map(|(c, d)| (size * c + normal(&mut rng)).powi(2) / d);
+            let energies: Vec<f64> = energies.collect();
+            let gradient: Vec<f64> = by.iter().map(|d| half_sum(d, &energies)).collect();
+            inverse
+                .iter()
+                .map(|row| row.iter().zip(&gradient).map(|(v, g)| v * g).sum())
+                .collect()
+        })
+        .collect();
+    (0..theta.len())
+        .map(|i| {
+            let mean = steps.iter().map(|s| s[i]).sum::<f64>() / TONES as f64;
+            let variance =
+                steps.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>() / (TONES - 1) as f64;
+            (variance / inverse[i][i]).sqrt()
+        })
+        .collect()
+}

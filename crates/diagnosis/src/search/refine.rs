@@ -1,0 +1,103 @@
+//! A term that was found on a grid gets its exact place, and joins the model.
+
+use super::Search;
+use crate::fit::channel::{Form, State, Term};
+use crate::fit::{scan, threshold};
+
+/// The points of a grid beside one of it.
+pub(super) fn neighbours(grid: &[f64], at: f64) -> (f64, f64) {
+    let i = grid.iter().position(|g| *g == at).unwrap_or(0);
+    (grid[i.saturating_sub(1)], grid[(i + 1).min(grid.len() - 1)])
+}
+
+impl Search<'_> {
+    /// Build the columns of a scanned term and refine its location.
+    pub(super) fn refine(&self, state: &State, mut term: Term) -> Term {
+        let n = self.panel.bins.n;
+        let own = state.columns();
+        let g = state.noise.over(&self.panel.bins);
+        let width = self.panel.width();
+        let with = |columns: &[Vec<f64>]| {
+            let added = self.panel.add_all(columns);
+            let l = self
+                .panel
+                .solve(&g, &[own.clone(), added].concat())
+                .log_likelihood;
+            self.panel.truncate(width);
+            -l
+        };
+        let bin = std::f64::consts::PI / n as f64;
+        let values: Vec<Vec<f64>> = match &mut term.form {
+            Form::Columns | Form::Covariance(..) => return term,
+            Form::Step(at, _) => vec![
+                (0..n)
+                    .map(|i| f64::from(u8::from(i as f64 >= *at)))
+                    .collect(),
+            ],
+            Form::Shaped(shape, at) => {
+                let (low, high) = neighbours(&shape.grid(), *at);
+                let make = |x: f64| -> Vec<Vec<f64>> {
+                    shape
+                        .columns(x.exp())
+                        .into_iter()
+                        .map(|c| c.values)
+                        .collect()
+                };
+                *at = numerics::minimise::golden(&|x| with(&make(x)), low.ln(), high.ln(), 8).exp();
+                make(at.ln())
+            }
+            Form::Line(omega) => {
+                let place = scan::place_of_line(
+                    &self.panel,
+                    &state.noise,
+                    &own,
+                    &state.solution,
+                    &state.lines(),
+                    *omega,
+                );
+                *omega = place.unwrap_or_else(|| {
+                    numerics::minimise::golden(
+                        &|w| with(&scan::sinusoid(n, w)),
+                        *omega - bin,
+                        *omega + bin,
+                        12,
+                    )
+                });
+                scan::sinusoid(n, *omega).into()
+            }
+            Form::SideBands(carrier, distance) => {
+                let phase = state.carrier().map_or(0.0, |c| c.1);
+                let bands = |d: f64| scan::swings(n, *carrier, phase, d).to_vec();
+                *distance = numerics::minimise::golden(
+                    &|d| with(&bands(d)),
+                    *distance - bin,
+                    *distance + bin,
+                    10,
+                );
+                let d = *distance;
+                [scan::sinusoid(n, *carrier).to_vec(), bands(d)].concat()
+            }
+        };
+        term.columns = self.panel.add_all(&values);
+        term
+    }
+
+    /// Add a term, in place of the one that it extends.
+    pub(crate) fn accept(&self, state: &State, term: Term) -> State {
+        let mut term = self.refine(state, term);
+        let mut terms = state.terms.clone();
+        if term.effect.extends().is_some() && matches!(term.form, Form::Columns) {
+            // Later it is weighed as a whole.
+            term.threshold = threshold::regression(term.columns.len(), 1);
+        }
+        if let Some(extended) = term.effect.extends() {
+            let carrier = |t: &Term| match (&t.form, &term.form) {
+                (Form::Line(a), Form::SideBands(b, _)) => a == b,
+                _ => true,
+            };
+            terms.retain(|t| !(t.effect.id() == extended && carrier(t)));
+        }
+        terms.push(term);
+        self.refit(terms, state.noise.log_walk)
+    }
+}

@@ -1,0 +1,326 @@
+//! What each hypothesis offers to a model: its best place, its likelihood ratio, its threshold.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use model::effect::{Covariance, Hypothesis, Regression, Shape};
+
+use super::{Candidate, FASTEST_BEAT, LEAST_BEATS, LEAST_CYCLES, SLOW_BEAT_HZ, Search, bands};
+use crate::fit::channel::{Form, State, Term};
+use crate::fit::likelihood::Noise;
+use crate::fit::{scan, threshold};
+
+/// A candidate that is weighed beside a state.
+struct Weighed<'a> {
+    candidate: &'a Candidate,
+    i: usize,
+    state: &'a State,
+    /// Random walks that are tried.
+    walks: &'a [(Noise, Vec<f64>, f64)],
+    /// Columns of the state, and its log likelihood.
+    own: Vec<usize>,
+    null: f64,
+}
+
+impl Weighed<'_> {
+    /// A term of the candidate.
+    fn term(
+        &self,
+        form: Form,
+        columns: Vec<usize>,
+        names: Vec<&'static str>,
+        lr: f64,
+        threshold: f64,
+    ) -> Term {
+        Term {
+            columns,
+            names,
+            lr,
+            ..Term::new(self.candidate.effect, self.i, form, threshold)
+        }
+    }
+}
+
+impl Search<'_> {
+    /// Best term that candidate `i` offers to `state`.
+    pub(super) fn weigh(
+        &self,
+        state: &State,
+        walks: &[(Noise, Vec<f64>, f64)],
+        i: usize,
+    ) -> Option<Term> {
+        let candidate = &self.candidates[i];
+        let of = Weighed {
+            candidate,
+            i,
+            state,
+            walks,
+            own: state.columns(),
+            null: state.solution.log_likelihood,
+        };
+        match &candidate.hypothesis {
+            Hypothesis::Regression(r) => Some(self.weigh_regression(&of, r)),
+            Hypothesis::Shaped(shape) => self.weigh_shaped(&of, shape),
+            Hypothesis::Step => self.weigh_step(&of),
+            Hypothesis::Line => self.weigh_line(&of),
+            Hypothesis::SideBands => self.weigh_side_bands(&of),
+            Hypothesis::Covariance(c) if c.is_peak() => {
+                let n = self.panel.bins.n;
+                self.weigh_peak(state, i, c, threshold::peak(n) / bands::AHEAD)
+            }
+            Hypothesis::Covariance(c) => self.weigh_covariance(&of, c),
+            _ => None,
+        }
+    }
+
+    /// What columns offer.
+    fn weigh_regression(&self, of: &Weighed<'_>, r: &Regression) -> Term {
+        let columns = [of.own.clone(), of.candidate.columns.clone()].concat();
+        let lr = 2.0 * (self.panel.profile(of.walks, &columns) - of.null);
+        let names = r.columns.iter().map(|c| c.parameter).collect();
+        // In the place of a narrower term, only the columns beyond it are new.
+        let held: usize = of
+            .state
+            .terms
+            .iter()
+            .filter(|t| of.candidate.effect.extends() == Some(t.effect.id()))
+            .map(|t| t.columns.len())
+            .sum();
+        let new = r.columns.len().saturating_sub(held).max(1);
+        let limit = threshold::regression(new, of.candidate.siblings) + of.candidate.handicap;
+        let mut t = of.term(
+            Form::Columns,
+            of.candidate.columns.clone(),
+            names,
+            lr,
+            limit,
+        );
+        t.fixed.clone_from(&r.fixed);
+        t.follows.clone_from(&r.follows);
+        t.of.clone_from(&of.candidate.of);
+        t
+    }
+
+    /// What a shape offers at the best point of its grid.
+    fn weigh_shaped(&self, of: &Weighed<'_>, shape: &Arc<dyn Shape>) -> Option<Term> {
+        let (at, columns, lr) = of
+            .candidate
+            .grid
+            .iter()
+            .map(|(at, c)| {
+                (
+                    *at,
+                    c,
+                    2.0 * (self
+                        .panel
+                        .profile(of.walks, &[of.own.clone(), c.clone()].concat())
+                        - of.null),
+                )
+            })
+            .max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let names: Vec<_> = shape.columns(at).iter().map(|c| c.parameter).collect();
+        let limit = threshold::shaped(names.len());
+        // Between the points of the grid it may be much better: what is a rival is weighed at its best.
+        let lr = if lr > limit {
+            lr.max(2.0 * (self.between(of.walks, &of.own, shape.as_ref(), at) - of.null))
+        } else {
+            lr
+        };
+        Some(of.term(
+            Form::Shaped(Arc::clone(shape), at),
+            columns.clone(),
+            names,
+            lr,
+            limit,
+        ))
+    }
+
+    /// What a step offers at its best time.
+    fn weigh_step(&self, of: &Weighed<'_>) -> Option<Term> {
+        let n = self.panel.bins.n;
+        let margin = (0.5 * self.view.rate_hz).max(4.0);
+        let noises: Vec<Noise> = of.walks.iter().step_by(2).map(|w| w.0.clone()).collect();
+        let curve = scan::steps(&self.panel, &noises, &of.own, of.null);
+        let inside: Vec<_> = curve
+            .into_iter()
+            .filter(|(t, _)| *t >= margin && *t <= n as f64 - margin)
+            .collect();
+        let (at, lr) = inside.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let weight = |l: f64| ((l - lr) / 2.0).exp();
+        let near = |t: f64| (t - at).abs() < 0.1 * n as f64;
+        let (mut sum, mut square) = (0.0, 0.0);
+        for (t, l) in inside.iter().filter(|(t, _)| near(*t)) {
+            sum += weight(*l);
+            square += weight(*l) * (t - at).powi(2);
+        }
+        let error = (square / sum).sqrt().max(0.5);
+        Some(of.term(
+            Form::Step(at, error),
+            vec![],
+            vec!["height"],
+            lr,
+            threshold::step(n),
+        ))
+    }
+
+    /// What a line offers at its best frequency.
+    fn weigh_line(&self, of: &Weighed<'_>) -> Option<Term> {
+        let n = self.panel.bins.n;
+        let least = (2.0 * LEAST_CYCLES) as usize;
+        let (k, lr) = scan::best_line(
+            &self.panel,
+            &of.state.noise,
+            &of.own,
+            &of.state.solution,
+            least,
+        )?;
+        let omega = std::f64::consts::PI * k as f64 / n as f64;
+        Some(of.term(
+            Form::Line(omega),
+            vec![],
+            vec!["cosine", "sine"],
+            lr,
+            threshold::line(n),
+        ))
+    }
+
+    /// What side bands of the first line offer at their best distance.
+    fn weigh_side_bands(&self, of: &Weighed<'_>) -> Option<Term> {
+        let n = self.panel.bins.n;
+        let (carrier, phase) = of.state.carrier()?;
+        let lr = scan::beats(
+            &self.panel,
+            &of.state.noise,
+            &of.own,
+            &of.state.solution,
+            carrier,
+            phase,
+        );
+        let slow = self.slow_beats();
+        let bin = std::f64::consts::PI / n as f64;
+        let fastest = (FASTEST_BEAT * carrier / bin) as usize;
+        let limit = |d: usize| threshold::side_bands(if d <= slow { slow } else { n });
+        let margin = |d: usize| lr[d] - limit(d);
+        let d = ((2.0 * LEAST_BEATS) as usize..=slow.max(fastest).min(n - 1))
+            .filter(|d| carrier > bin * (d + 1) as f64)
+            .filter(|d| carrier + bin * (d + 1) as f64 <= std::f64::consts::PI)
+            .max_by(|a, b| margin(*a).total_cmp(&margin(*b)))?;
+        Some(of.term(
+            Form::SideBands(carrier, d as f64 * bin),
+            vec![],
+            vec!["cosine", "sine", "in_phase", "quadrature"],
+            lr[d],
+            limit(d),
+        ))
+    }
+
+    /// What a stationary term offers from the best of its starts.
+    fn weigh_covariance(&self, of: &Weighed<'_>, c: &Arc<dyn Covariance>) -> Option<Term> {
+        let n = self.panel.bins.n;
+        let best = c
+            .starts(n)
+            .into_iter()
+            .map(|theta| {
+                let mut noise = of.state.noise.clone();
+                noise.terms.push((Arc::clone(c), theta));
+                self.panel.fit(&noise, &of.own)
+            })
+            .max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;
+        let lr = self.of_read() * 2.0 * (best.1.log_likelihood - of.null);
+        let theta = best.0.terms.last().map(|t| t.1.clone())?;
+        let limit = threshold::covariance(c.dimensions());
+        Some(of.term(
+            Form::Covariance(Arc::clone(c), theta),
+            vec![],
+            vec![],
+            lr,
+            limit,
+        ))
+    }
+
+    /// Fastest slow swing of a line, half cycles in the record.
+    pub(crate) fn slow_beats(&self) -> usize {
+        (2.0 * SLOW_BEAT_HZ / self.view.rate_hz * self.panel.bins.n as f64) as usize
+    }
+
+    /// Highest log likelihood of a shape near the point `at` of its grid.
+    fn between(
+        &self,
+        walks: &[(Noise, Vec<f64>, f64)],
+        own: &[usize],
+        shape: &dyn Shape,
+        at: f64,
+    ) -> f64 {
+        const STEPS: usize = 6;
+        let width = self.panel.width();
+        let minus_l = |x: f64| {
+            let columns = shape.columns(x.exp()).into_iter().map(|c| c.values);
+            let added = self.panel.add_all(columns);
+            let l = self.panel.profile(walks, &[own, &added].concat());
+            self.panel.truncate(width);
+            -l
+        };
+        let (low, high) = super::refine::neighbours(&shape.grid(), at);
+        let best = numerics::minimise::golden(&minus_l, low.ln(), high.ln(), STEPS);
+        -minus_l(best)
+    }
+
+    /// Whether a candidate may still join.
+    pub(super) fn open(&self, state: &State, i: usize) -> bool {
+        let c = &self.candidates[i];
+        match &c.hypothesis {
+            Hypothesis::Step => !self.view.moving,
+            Hypothesis::Line => !self.view.moving && !self.view.sways(),
+            Hypothesis::SideBands => state.terms.iter().all(|t| t.candidate != i),
+            Hypothesis::Covariance(of) => {
+                !self.view.moving
+                    && !self.view.sways()
+                    && if of.is_peak() {
+                        Self::open_to_bands(state)
+                    } else {
+                        state.terms.iter().all(|t| t.effect.id() != c.effect.id())
+                    }
+            }
+            Hypothesis::Regression(r) => {
+                let other = |t: &Term| r.columns.iter().all(|c| !t.names.contains(&c.parameter));
+                !self.view.moving
+                    && state.terms.iter().all(|t| {
+                        t.effect.id() != c.effect.id() || t.follows != r.follows || other(t)
+                    })
+            }
+            Hypothesis::Shaped(_) => {
+                !self.view.moving && state.terms.iter().all(|t| t.candidate != i)
+            }
+            _ => false,
+        }
+    }
+
+    /// What every open candidate offers, those that extend a term in its place.
+    pub(crate) fn offers(&self, state: &State, allow: &dyn Fn(&Candidate) -> bool) -> Vec<Term> {
+        let walks = self.panel.walks(&state.noise);
+        (0..self.candidates.len())
+            .filter(|i| allow(&self.candidates[*i]) && self.open(state, *i))
+            .filter_map(|i| self.offer(state, &walks, i))
+            .filter(|t| t.lr.is_finite())
+            .collect()
+    }
+
+    /// As [`Search::weigh`]; the search comes back to states without processes, term by term, and is told what it was.
+    fn offer(&self, state: &State, walks: &[(Noise, Vec<f64>, f64)], i: usize) -> Option<Term> {
+        if !state.noise.terms.is_empty() {
+            return self.weigh(state, walks, i);
+        }
+        let terms = state.terms.iter().map(|t| (t.candidate, t.columns.clone()));
+        let (data, walk) = (self.panel.revision(), state.noise.log_walk.to_bits());
+        let place = (data, walk, terms.collect());
+        let known =
+            |all: &HashMap<_, HashMap<usize, Option<Term>>>| all.get(&place)?.get(&i).cloned();
+        let known = known(&self.offered.borrow());
+        known.unwrap_or_else(|| {
+            let new = self.weigh(state, walks, i);
+            let mut all = self.offered.borrow_mut();
+            all.entry(place).or_default().insert(i, new.clone());
+            new
+        })
+    }
+}

@@ -1,0 +1,410 @@
+//! Block means that lie about two levels: white noise, a random walk of the level, switches at random ([`crate::two_level::filter_bank`]); and
+//! how the answer is held against replicates of either side.
+
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, Exp1, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::fit::likelihood::{Bins, Dct, Noise};
+pub(crate) use crate::two_level::filter_bank::Coordinates;
+use crate::two_level::filter_bank::{ABREAST, filter};
+use numerics::minimise::side_by_side;
+
+/// Levels of the two-level process, in half heights.
+const TWO: [f64; 2] = [1.0, -1.0];
+/// Levels that stand for any: five of a normal distribution.
+const MANY: [f64; 5] = [-1.5, -0.7, 0.0, 0.7, 1.5];
+
+/// Log likelihood of block means under white noise + random walk + two levels, the mean taken out.
+#[must_use]
+pub fn two_level(y: &[f64], x: &Coordinates) -> f64 {
+    likelihoods(&[(y, *x)], &TWO)[0]
+}
+
+/// The same of several, all of one length, for jumps between any of `levels`, all equally likely.
+fn likelihoods<const K: usize>(of: &[(&[f64], Coordinates)], levels: &[f64; K]) -> Vec<f64> {
+    of.chunks(ABREAST)
+        .flat_map(|few| {
+            // Places that are left hold the last one again.
+            let all = std::array::from_fn(|l| few[l.min(few.len() - 1)]);
+            let each = filter(all.map(|(y, _)| y), &all.map(|(_, x)| x), levels, |_| {});
+            each.into_iter().take(few.len())
+        })
+        .collect()
+}
+
+/// Chances of the upper level after each block: from the blocks before it and itself, and from those behind it and itself.
+fn chances(y: &[f64], x: &Coordinates) -> [Vec<f64>; 2] {
+    let back: Vec<f64> = y.iter().rev().copied().collect();
+    let (mut before, mut after) = (vec![], vec![]);
+    filter([y, &back, y, &back], &[*x; ABREAST], &TWO, |upper| {
+        before.push(upper[0]);
+        after.push(upper[1]);
+    });
+    [before, after]
+}
+
+/// The most probable mean level of each block, from the blocks before it, itself, and those behind it.
+pub(crate) fn path(y: &[f64], x: &Coordinates) -> Vec<f64> {
+    let half = (x[2] + 0.5 * x[0]).exp();
+    let [before, mut after] = chances(y, x);
+    after.reverse();
+    let switch = switch_of(x);
+    let known = |upper: f64| upper * (1.0 - switch) + (1.0 - upper) * switch;
+    (0..y.len())
+        .map(|t| {
+            let from_before = if t > 0 { known(before[t - 1]) } else { 0.5 };
+            let upper = from_before * after[t];
+            let lower = (1.0 - from_before) * (1.0 - after[t]);
+            half * (upper - lower) / (upper + lower).max(f64::MIN_POSITIVE)
+        })
+        .collect()
+}
+
+/// Chance that two levels have switched from block to block.
+fn switch_of(x: &Coordinates) -> f64 {
+    0.5 * (1.0 - (-2.0 * (-x[3]).exp()).exp())
+}
+
+/// Whether each block lies on the upper level: from a filter's last block back, the more probable one before the next. A
+/// filter learns by the first switch which level it started from, so each half is decoded by the one that comes from the other
+/// end.
+pub(crate) fn decoded(y: &[f64], x: &Coordinates) -> Vec<bool> {
+    let switch = switch_of(x);
+    let back = |upper: Vec<f64>| {
+        let next = upper.into_iter().rev().scan(None, move |next, u| {
+            let upper = match next {
+                None => u > 0.5,
+                Some(true) => u > switch,
+                Some(false) => u > 1.0 - switch,
+            };
+            *next = Some(upper);
+            *next
+        });
+        next.take(y.len().div_ceil(2)).collect::<Vec<bool>>()
+    };
+    let [before, after] = chances(y, x);
+    let (mut first, second) = (back(after), back(before));
+    first.extend(second.into_iter().take(y.len() / 2).rev());
+    first
+}
+
+/// Block means of two levels as they were fitted.
+pub(crate) fn replicate(m: usize, x: &Coordinates, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+    let [log_white, log_walk, log_half, log_dwell] = *x;
+    let sigma = (0.5 * log_white).exp();
+    let (walk, half) = (sigma * (0.5 * log_walk).exp(), sigma * log_half.exp());
+    let wait = |rng: &mut _| log_dwell.exp() * Distribution::<f64>::sample(&Exp1, rng);
+    let (mut level, mut drift, mut left) = (half, 0.0, wait(rng));
+    let mut y: Vec<f64> = (0..m)
+        .map(|_| {
+            // A block in which the level switches reads the mean.
+            let (mut rest, mut mean) = (1.0, 0.0);
+            while left < rest {
+                mean += level * left;
+                rest -= left;
+                level = -level;
+                left = wait(rng);
+            }
+            mean += level * rest;
+            left -= rest;
+            let e: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(rng));
+            drift += walk * e[0];
+            mean + drift + sigma * e[1]
+        })
+        .collect();
+    let middle = y.iter().sum::<f64>() / m as f64;
+    y.iter_mut().for_each(|v| *v -= middle);
+    y
+}
+
+/// The coordinates within their bounds on `m` blocks.
+fn inside(x: &[f64], m: usize) -> Coordinates {
+    [
+        x[0],
+        x[1].clamp(-25.0, 2.0),
+        x[2].clamp(-6.0, 6.0),
+        x[3].clamp(0.7, (m as f64 / 3.0).ln()),
+    ]
+}
+
+/// Coordinates within their bounds on `m` blocks, and how far outside they were.
+fn clamped(x: &[f64], m: usize) -> (Coordinates, f64) {
+    let clamped = inside(x, m);
+    let outside = x.iter().zip(&clamped).map(|(a, b)| (a - b).powi(2)).sum();
+    (clamped, outside)
+}
+
+/// Highest log likelihoods over `levels`, and their places, from several starts.
+fn highest<const K: usize>(
+    y: &[f64],
+    starts: &[Coordinates],
+    levels: &[f64; K],
+    steps: usize,
+) -> Vec<(f64, Coordinates)> {
+    let objective = |all: &[Vec<f64>]| {
+        let (at, outside): (Vec<_>, Vec<f64>) = (all.iter())
+            .map(|x| clamped(x, y.len()))
+            .map(|(x, outside)| ((y, x), outside))
+            .unzip();
+        let l = likelihoods(&at, levels);
+        outside.iter().zip(l).map(|(o, l)| o - l).collect()
+    };
+    let best = side_by_side(&objective, starts, &[0.1, 2.0, 0.3, 0.7], steps);
+    let inside = |(least, x): (f64, Vec<f64>)| (-least, inside(&x, y.len()));
+    best.into_iter().map(inside).collect()
+}
+
+/// The same from one start.
+fn highest_from<const K: usize>(
+    y: &[f64],
+    start: &Coordinates,
+    levels: &[f64; K],
+    steps: usize,
+) -> (f64, Coordinates) {
+    highest(y, &[*start], levels, steps)[0]
+}
+
+/// Highest log likelihood of two levels, and its place; `starts` are shares of the `excess` over the white variance that
+/// the levels make, and dwell times in blocks.
+pub(crate) fn fitted(
+    y: &[f64],
+    white: f64,
+    excess: f64,
+    starts: &[(f64, f64)],
+    steps: usize,
+) -> (f64, Coordinates) {
+    let from = |(share, dwell): &(f64, f64)| {
+        let log_half = 0.5 * (share * excess / white).ln();
+        [white.ln(), -12.0, log_half, dwell.ln()]
+    };
+    let starts: Vec<Coordinates> = starts.iter().map(from).collect();
+    let all = highest(y, &starts, &TWO, steps).into_iter();
+    let best = all.max_by(|a, b| a.0.total_cmp(&b.0));
+    // A simplex that has shrunk too early goes on from where it is.
+    best.map(|(_, x)| highest_from(y, &x, &TWO, steps))
+        .unwrap_or((f64::NEG_INFINITY, [0.0; 4]))
+}
+
+/// The two levels fitted again, from where they were.
+pub(crate) fn again(y: &[f64], x: &Coordinates) -> (f64, Coordinates) {
+    highest_from(y, x, &TWO, 160)
+}
+
+/// Coefficient of a column beside the two levels, and the nats that it gains.
+pub(crate) fn with_column(y: &[f64], x: &Coordinates, column: &[f64]) -> (f64, f64) {
+    let without = highest_from(y, x, &TWO, 60);
+    let less = |coefficient: f64| -> Vec<f64> {
+        let parts = y.iter().zip(column);
+        parts.map(|(v, c)| v - coefficient * c).collect()
+    };
+    // What the coefficient is in doubt by at least: the levels' own height.
+    let half = (x[2] + 0.5 * x[0]).exp();
+    let objective = |all: &[Vec<f64>]| {
+        let rests: Vec<Vec<f64>> = all.iter().map(|p| less(p[4] * half)).collect();
+        let (x, outside): (Vec<Coordinates>, Vec<f64>) =
+            all.iter().map(|p| clamped(p, y.len())).unzip();
+        let at: Vec<_> = rests.iter().map(Vec::as_slice).zip(x).collect();
+        let l = likelihoods(&at, &TWO);
+        outside.iter().zip(l).map(|(o, l)| o - l).collect()
+    };
+    let [a, b, c, d] = without.1;
+    let starts = [-3.0, 3.0].map(|start| [a, b, c, d, start]);
+    let mut best = (0.0, without.0);
+    for (least, at) in side_by_side(&objective, &starts, &[0.1, 2.0, 0.3, 0.7, 1.0], 240) {
+        if -least > best.1 {
+            best = (at[4] * half, -least);
+        }
+    }
+    (best.0, best.1 - without.0)
+}
+
+/// Nats that many levels are ahead of two, from where the two are at their best.
+pub(crate) fn many_ahead(y: &[f64], two: &Coordinates) -> f64 {
+    highest_from(y, two, &MANY, 60).0 - two_level(y, two)
+}
+
+/// Covariance of the coordinates at a highest point of the two levels' likelihood: the inverse of its curvature, all
+/// coordinates free. One that the data do not bend, such as a random walk of nearly nothing, is held.
+pub(crate) fn covariance_of(y: &[f64], x: &Coordinates) -> Vec<Vec<f64>> {
+    const H: f64 = 0.06;
+    let at = |moves: &[&[(usize, f64)]]| {
+        let moved = moves.iter().map(|moves| {
+            let mut at = *x;
+            for (i, by) in *moves {
+                at[*i] += by * H;
+            }
+            (y, at)
+        });
+        likelihoods(&moved.collect::<Vec<_>>(), &TWO)
+    };
+    let second = |i: usize, j: usize| {
+        if i == j {
+            let l = at(&[&[(i, 1.0)], &[], &[(i, -1.0)]]);
+            return (l[0] - 2.0 * l[1] + l[2]) / (H * H);
+        }
+        let corners =
+            [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(a, b)| [(i, a), (j, b)]);
+        let l = at(&corners.each_ref().map(|c| &c[..]));
+        (l[0] - l[1] - l[2] + l[3]) / (4.0 * H * H)
+    };
+    let count = x.len();
+    let bend: Vec<Vec<f64>> = (0..count)
+        .map(|i| (0..=i).map(|j| second(j, i)).collect())
+        .collect();
+    let bends = |i: usize| bend[i][i] < -0.05;
+    let information: Vec<Vec<f64>> = (0..count)
+        .map(|i| {
+            (0..count)
+                .map(|j| match (i == j, bends(i) && bends(j)) {
+                    (_, true) => -bend[i.max(j)][i.min(j)],
+                    (true, false) => 1e12,
+                    (false, false) => 0.0,
+                })
+                .collect()
+        })
+        .collect();
+    crate::fit::likelihood::invert(&information).0
+}
+
+/// Replicates of one side of a contest.
+const REPLICATES: usize = 40;
+/// Coordinates that both sides have: white noise, random walk, size and time of the one, and of the other.
+const FITTED: f64 = 8.0;
+
+/// One side of a contest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Side {
+    Gaussian,
+    TwoLevels,
+}
+
+/// Both sides of a contest, fitted to the same block means.
+pub(crate) struct Sides<'a> {
+    pub dct: &'a Dct,
+    pub bins: &'a Bins,
+    /// The Gaussian one: noise and its white variance.
+    pub noise: Noise,
+    pub white: f64,
+    pub two: Coordinates,
+}
+
+impl Sides<'_> {
+    /// Nats that the two levels are ahead on block means, both as they were fitted.
+    fn ahead(&self, all: &[Vec<f64>], g: &[f64]) -> Vec<f64> {
+        let variances: Vec<f64> = g[1..].iter().map(|g| self.white * g).collect();
+        let logs = (variances.iter()).map(|v| (std::f64::consts::TAU * v).ln());
+        let logs: f64 = logs.sum();
+        let gaussian = self.dct.forward_all(all).map(|c| {
+            let squares = c[1..].iter().zip(&variances).map(|(c, v)| c * c / v);
+            -0.5 * (squares.sum::<f64>() + logs)
+        });
+        let at: Vec<_> = all.iter().map(|y| (&y[..], self.two)).collect();
+        let two = likelihoods(&at, &TWO);
+        two.into_iter().zip(gaussian).map(|(l, g)| l - g).collect()
+    }
+
+    /// Coefficients of block means of the Gaussian side.
+    fn gaussian(&self, g: &[f64], rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+        let mut c: Vec<f64> = g
+            .iter()
+            .map(|g| {
+                let e: f64 = StandardNormal.sample(rng);
+                e * (self.white * g).sqrt()
+            })
+            .collect();
+        c[0] = 0.0;
+        c
+    }
+
+    /// Cox's test of separate families: standard errors between `ahead`, the nats by which two levels are better, and
+    /// what it is where `truth` holds. Replicates are weighed with both sides as they were fitted; what the fits add is
+    /// half a chi-square of the fitted coordinates.
+    pub fn cox(&self, ahead: f64, truth: Side) -> f64 {
+        let g = self.noise.everywhere(self.bins);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x7477_6f20_7369_6465);
+        let mut drawn = |draw: &mut dyn FnMut(&mut _) -> Vec<f64>| -> Vec<Vec<f64>> {
+            (0..REPLICATES).map(|_| draw(&mut rng)).collect()
+        };
+        let all = match truth {
+            Side::Gaussian => {
+                let c = drawn(&mut |rng| self.gaussian(&g, rng));
+                self.dct.inverse_all(&c).collect()
+            }
+            Side::TwoLevels => drawn(&mut |rng| replicate(g.len(), &self.two, rng)),
+        };
+        let all = self.ahead(&all, &g);
+        let n = all.len() as f64;
+        let mean = all.iter().sum::<f64>() / n;
+        let variance = all.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        (ahead - mean) / (variance + 0.5 * FITTED).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use model::effect::{Covariance, Frequencies};
+
+    use super::*;
+
+    /// A process of variance exp(theta0) and correlation of exp(theta1) blocks.
+    struct OnePole;
+
+    impl Covariance for OnePole {
+        fn dimensions(&self) -> usize {
+            2
+        }
+
+        fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
+            at.one_pole(theta[0].exp(), (-(-theta[1]).exp()).exp())
+        }
+
+        fn bounds(&self, _: usize) -> Vec<(f64, f64)> {
+            vec![(-16.0, 6.0), (0.0, 8.0)]
+        }
+
+        fn starts(&self, _: usize) -> Vec<Vec<f64>> {
+            vec![vec![0.0, 3.0]]
+        }
+    }
+
+    #[test]
+    fn replicates_tell_two_levels_from_a_gaussian_process_of_their_spectrum() {
+        let m = 2000;
+        let (dct, bins) = (Dct::new(m), Bins::new(m));
+        // Two levels of 1 sigma that stay 40 blocks have this spectrum.
+        let sides = Sides {
+            dct: &dct,
+            bins: &bins,
+            noise: Noise {
+                log_walk: f64::NEG_INFINITY,
+                terms: vec![(Arc::new(OnePole), vec![0.0, 20f64.ln()])],
+            },
+            white: 1.0,
+            two: [0.0, -25.0, 0.0, 40f64.ln()],
+        };
+        let g = sides.noise.everywhere(&bins);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+        let scores = |y: Vec<f64>| {
+            let ahead = sides.ahead(&[y], &g)[0];
+            [Side::Gaussian, Side::TwoLevels].map(|s| sides.cox(ahead, s))
+        };
+        // What holds stays within a few errors; what does not lies, on average, where its claim fails.
+        let (runs, fails) = (5, 3.3);
+        let (mut as_two, mut as_gaussian) = (0.0, 0.0);
+        for _ in 0..runs {
+            let [gaussian, two] = scores(dct.inverse(&sides.gaussian(&g, &mut rng)));
+            assert!(gaussian.abs() < 3.5, "{gaussian}");
+            as_two += two / f64::from(runs);
+            let [gaussian, two] = scores(replicate(m, &sides.two, &mut rng));
+            assert!(two.abs() < 3.5, "{two}");
+            as_gaussian += gaussian / f64::from(runs);
+        }
+        assert!(
+            as_two < -fails && as_gaussian > fails,
+            "{as_two} {as_gaussian}"
+        );
+    }
+}
