@@ -140,8 +140,15 @@ fn compare_with(
     let (mut moved, mut paths) = (0, BTreeSet::new());
     for (entry, answer) in entries.iter().zip(answers) {
         let path = file(folder, &entry.name);
-        let text = std::fs::read_to_string(&path)
-            .map_err(|e| format!("{}: {e}; write the answers first", path.display()))?;
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound && folder.is_dir() => {
+                moved += 1;
+                println!("{}: no answer there, a new record", entry.name);
+                continue;
+            }
+            Err(e) => return Err(format!("{}: {e}; write the answers first", path.display())),
+        };
         let before: Value =
             serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
         let differences = compare::differences(&before, answer);
