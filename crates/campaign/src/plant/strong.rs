@@ -33,7 +33,7 @@ const fn row(id: u16, cause: &'static str, how: How) -> Row {
 }
 
 /// The rows, by number. What is asked beyond the usual has its reason in docs/power.md, "Bars".
-pub const STRONG: [Row; 22] = [
+pub const STRONG: [Row; 23] = [
     Row {
         needs: TEMPERATURE,
         ..row(100, "temperature", |_, _, a| size("slope", a.sign))
@@ -121,6 +121,7 @@ pub const STRONG: [Row; 22] = [
         let values = [vec![("amplitude", rms * 2f64.sqrt())], values].concat();
         Drawn::Process(values, strength, density)
     }),
+    row(122, "quantization_noise", quantization_noise),
 ];
 
 /// Largest process, deg/s rms: slower ones, which a random walk hides better, would need more for the strength, and what
@@ -330,6 +331,14 @@ fn band(
 fn flicker(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let (b, strength, density) = of_density(stand, asked, LARGEST_RMS, &|b, w| b * b / w);
     Drawn::Process(vec![("bias_instability", b * 3600.0)], strength, density)
+}
+
+/// The angle's rounding of standard deviation q, differenced: 2 (q f_s)^2 (1 - cos w) per sample.
+fn quantization_noise(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let rate = stand.rate_hz;
+    let density = |q: f64, w: f64| 2.0 * (q * rate).powi(2) * (1.0 - w.cos());
+    let (q, strength, density) = of_density(stand, asked, f64::INFINITY, &density);
+    Drawn::Process(vec![("q", q)], strength, density)
 }
 
 fn low_pass(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {

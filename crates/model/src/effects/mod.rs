@@ -20,6 +20,7 @@ pub mod motor_noise;
 pub mod narrow_band;
 pub mod noise_change;
 pub mod outliers;
+pub mod quantization_noise;
 pub mod rate_ramp;
 pub mod saturation;
 pub mod scale_error;
@@ -54,6 +55,7 @@ pub static EFFECTS: &[&dyn Effect] = &[
     &low_pass::EFFECT,
     &narrow_band::EFFECT,
     &wandering_line::EFFECT,
+    &quantization_noise::EFFECT,
     &telegraph::EFFECT,
     &common_noise::EFFECT,
     &noise_change::EFFECT,
