@@ -18,6 +18,7 @@ const ALONE: &[&str] = &["wire", "adis16250", "mma7260qt"];
 const FIRST: &[&str] = &[
     "campaign campaign",
     "diagnosis diagnosis",
+    "noise noise",
     "imu-stand capture",
     "imu-stand board",
 ];

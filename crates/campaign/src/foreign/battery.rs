@@ -159,15 +159,6 @@ fn hold_each(kinds: &[&str], of: &(dyn Fn(usize, &ForeignEffect) -> Vec<String> 
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Effects that a cause describes which the library got only after their set was written, with that cause: a signal whose
-/// spectrum is a band. They keep their rows, for grades are compared with earlier ones.
-const DESCRIBED_SINCE: [(&str, &str); 4] = [
-    ("change of the acceleration", "narrow_band"),
-    ("swing that builds up and is quenched", "narrow_band"),
-    ("belt that rings by its teeth", "narrow_band"),
-    ("kick by each change of the motor's current", "narrow_band"),
-];
-
 /// No effect of the library, nor of a signal two, describes one of a kind. The first set was written to show what an engine
 /// passes over, not to this rule.
 fn hold_foreign(kind: &str) {
@@ -178,14 +169,13 @@ fn hold_foreign(kind: &str) {
         let (mut drawn, _) = drawn(place, 600.0, 0, Some(25.0));
         let described = drawn.described(kind == "couplings");
         assert!(!described.is_empty(), "nothing to hold {}", effect.name);
-        let since = DESCRIBED_SINCE.iter().find(|s| s.0 == effect.name);
-        let by_later = |id: &str| since.is_some_and(|(_, later)| id.contains(later));
+        let by_later = |id: &str| effect.later.is_some_and(|later| id.contains(later));
         let (later, mut wrong): (Vec<_>, Vec<_>) = described
             .into_iter()
             .filter(|(_, share)| *share >= DESCRIBED || share.is_nan())
             .map(|(id, share)| (by_later(&id), format!("{id} describes {share:.3}")))
             .partition(|(by_later, _)| *by_later);
-        if since.is_some() && later.is_empty() {
+        if effect.later.is_some() && later.is_empty() {
             wrong.push((false, "no later cause describes it".to_owned()));
         }
         wrong.into_iter().map(|(_, what)| what).collect()
@@ -380,7 +370,7 @@ fn rows_have_names_sets_twins_and_parts_that_there_are() {
         assert!(EFFECTS[..place].iter().all(|e| e.name != name), "{name}");
         assert!((1..=sets::SETS.len()).contains(&effect.set), "{name}");
         assert!(place == 0 || EFFECTS[place - 1].set <= effect.set, "{name}");
-        for part in effect.true_parts {
+        for part in effect.true_parts.iter().chain(effect.later.as_ref()) {
             assert!(LIBRARY.iter().any(|e| e.id() == *part), "{name}: {part}");
         }
         if let Some(id) = effect.twin {

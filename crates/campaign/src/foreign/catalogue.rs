@@ -58,6 +58,9 @@ pub(super) struct ForeignEffect {
     /// The one of an earlier set that is a near twin: the same kind of signal or of law by the same kind of cause, sizes and
     /// pace apart. What is in doubt counts as one. Looked for from the tenth set on.
     pub twin: Option<u16>,
+    /// Cause that describes it and that the library got only after its set was written: it keeps its row, for grades are
+    /// compared with earlier ones, and that name is right.
+    pub later: Option<&'static str>,
     /// Whether it acts on a level axis alone.
     pub level: bool,
 }
@@ -100,6 +103,7 @@ const fn row(id: u16, set: usize, name: &'static str, make: Make) -> ForeignEffe
         needs: NONE,
         true_parts: &[],
         twin: None,
+        later: None,
         level: false,
     }
 }
@@ -111,6 +115,13 @@ impl ForeignEffect {
 
     const fn parts(self, true_parts: &'static [&'static str]) -> Self {
         Self { true_parts, ..self }
+    }
+
+    const fn later(self, cause: &'static str) -> Self {
+        Self {
+            later: Some(cause),
+            ..self
+        }
     }
 
     const fn twin(self, id: u16) -> Self {

@@ -1,4 +1,4 @@
-//! What a likelihood ratio has to reach, by the kind of hypothesis: a false one seven times in 100 000 clean channels.
+//! What a likelihood ratio has to reach, by the kind of hypothesis: a false one 65 times in a million clean channels.
 //!
 //! The tails are those of chi-square widened for the random walk that is refitted under each hypothesis, and, for
 //! scans, for the number of independent places. `cargo run --release -p diagnosis --example closed_loop -- 1500 0`
@@ -7,7 +7,8 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Chance of a false alarm of one hypothesis on one clean channel.
-pub const FALSE_ALARM: f64 = 7e-5;
+/// The sum of all is the promise of `test_level`.
+pub const FALSE_ALARM: f64 = 6.5e-5;
 /// Refitting the random walk widens the null distribution of slow regressors by this factor.
 pub(crate) const WIDENED: f64 = 1.12;
 

@@ -21,7 +21,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(328, 2, "swing without a period", Signal(|d, s, _| tones::swing_without_period(d, s))).needs(TM),
     row(341, 3, "two oscillators that pull each other", Signal(|d, s, _| tones::pulled(d, s))).needs(TM),
     row(343, 3, "dither that repeats itself", Signal(|d, s, _| levels::dither(d, s))).needs(TM),
-    row(357, 4, "swing that builds up and is quenched", Signal(|d, s, _| tones::quenched(d, s))).needs(TM),
+    row(357, 4, "swing that builds up and is quenched", Signal(|d, s, _| tones::quenched(d, s))).needs(TM).later("narrow_band"),
     row(358, 4, "pulse of another clock", Signal(|d, s, _| levels::pulse(d, s))).needs(TM),
     row(359, 4, "tone that hops between two pitches", Signal(|d, s, _| tones::hopping(d, s))).needs(TM),
     row(374, 5, "elements that take turns", Signal(|d, s, _| levels::in_turn(d, s))).needs(TM),
