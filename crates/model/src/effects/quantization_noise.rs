@@ -41,6 +41,7 @@ impl Effect for QuantizationNoise {
             physics: "A reading is the difference of two rounded angles, over the time between them: what one reading gains by rounding, the next one loses. Two-sided spectral density 2 Q^2 f_s (1 - cos(2 pi f / f_s)), Allan deviation sqrt(3) Q / tau. Counts of an integrating gyro, or of an encoder, differenced.",
             excitation: "Nothing.",
             test: "White variance, random walk and Q refitted by maximum likelihood.",
+            remedy: "Read the angle with finer steps, or sum the readings in place of differencing them; until then simulate Q beside the white noise.",
             figure: "Spectrum of the rate with the model before and after: it rises towards half the sample rate.",
             example: Example::new(Plot::Spectrum, &[("q", 0.02)]),
         }
