@@ -32,7 +32,7 @@ enum Command {
     Analyze(commands::analyze::Arguments),
     /// What the simulation gets wrong, the causes, the extended model, the measured gain.
     #[command(
-        after_help = "Example:\n  imu-stand diagnose run.csv --json diagnosis.json --model-out model.toml --report report.html"
+        after_help = "Examples:\n  imu-stand diagnose run.csv --json diagnosis.json --model-out model.toml --report report.html\n  imu-stand diagnose runs --json all.json"
     )]
     Diagnose(commands::diagnose::Arguments),
     /// The paper's figures 3, 4, 5 and 8 and its two numbers again, and what does not fit in them.
@@ -57,7 +57,7 @@ enum Command {
     Report(commands::report::Arguments),
     /// The simulated stand with something hidden in it: capture, analysis, diagnosis in one go.
     #[command(
-        after_help = "Example:\n  imu-stand run --native --hide random --seed 7 --out run.csv --report report.html"
+        after_help = "Examples:\n  imu-stand run --native --hide random --seed 7 --out run.csv --report report.html\n  imu-stand run --native --hide none --stand-seed 3 --noise-seed 2 --out run2.csv"
     )]
     Run(commands::run::Arguments),
     /// A capture straight from a model file.

@@ -1,21 +1,22 @@
 //! `imu-stand diagnose`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use diagnosis::DiagnoseOptions;
-use diagnosis::result::Diagnosis;
+use diagnosis::result::{Diagnosed, Diagnosis, Verdict};
 use imu_stand::report::Subject;
 use imu_stand::text;
 use miette::Result;
+use model::record::Record;
 use serde::Serialize;
 
-use super::{Input, Outputs, Replicates};
+use super::{Input, Outputs, Replicates, many};
 
 /// What `diagnose` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// Captures: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .mcap, .bag, .ulg, .txt
+    /// Captures, or folders of them: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .mcap, .bag, .ulg, .txt
     #[arg(required = true)]
     captures: Vec<PathBuf>,
     #[command(flatten)]
@@ -44,76 +45,190 @@ pub struct Arguments {
 struct Several {
     format: &'static str,
     runs: Vec<Diagnosis>,
+    /// Those that cannot be read or diagnosed.
+    failed: Vec<Failed>,
+}
+
+/// A capture of several that was not diagnosed.
+#[derive(Serialize)]
+struct Failed {
+    file: String,
+    why: String,
 }
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let captures = many::captures(&arguments.captures)?;
     let one_only = [
         ("--model-out", arguments.model_out.is_some()),
         ("--report", arguments.report.is_some()),
     ];
     for (option, given) in one_only {
-        if given && arguments.captures.len() > 1 {
+        if given && captures.len() > 1 {
             miette::bail!(
                 help = "diagnose them one by one",
                 "{option} is for one capture"
             );
         }
     }
-    Outputs::beside(&arguments.captures)
+    Outputs::beside(&captures)
         .result("--json", arguments.json.as_ref())?
         .result("--model-out", arguments.model_out.as_ref())?
         .result("--report", arguments.report.as_ref())?;
-    let mut runs = Vec::new();
-    for path in &arguments.captures {
-        let mut read = arguments.input.read(path)?;
-        let hash = super::digest(path)?;
-        let options = DiagnoseOptions {
-            seed: arguments.seed,
-            file: super::name(path),
-            hash: Some(hash.clone()),
-            no_evidence: arguments.report.is_none(),
-            replicates: arguments.replicates.count(),
-        };
-        let is_needed = arguments.model_out.is_some() || arguments.report.is_some();
-        let found = if is_needed {
-            diagnosis::diagnose(&read.record, &options)
-        } else {
-            diagnosis::diagnose_owned(std::mem::take(&mut read.record), &options)
-        };
-        let found = found.map_err(super::explain)?;
-        if let Some(path) = &arguments.model_out {
-            let fitted = found.extended_model.clone().excited_like(&read.record);
-            super::write(path, &fitted.to_toml())?;
+    match captures.as_slice() {
+        [one] => alone(arguments, one),
+        all => several(arguments, all),
+    }
+}
+
+/// A capture and what was found in it.
+struct Found {
+    record: Record,
+    hash: String,
+    diagnosed: Diagnosed,
+}
+
+/// Diagnoses a capture; its record is kept only where it is needed again.
+fn found(arguments: &Arguments, path: &Path, is_needed: bool) -> Result<Found> {
+    let mut record = arguments.input.read(path)?.record;
+    let hash = super::digest(path)?;
+    let options = DiagnoseOptions {
+        seed: arguments.seed,
+        file: super::name(path),
+        hash: Some(hash.clone()),
+        no_evidence: arguments.report.is_none(),
+        replicates: arguments.replicates.count(),
+    };
+    let diagnosed = if is_needed {
+        diagnosis::diagnose(&record, &options)
+    } else {
+        diagnosis::diagnose_owned(std::mem::take(&mut record), &options)
+    };
+    Ok(Found {
+        record,
+        hash,
+        diagnosed: diagnosed.map_err(super::explain)?,
+    })
+}
+
+fn alone(arguments: &Arguments, path: &Path) -> Result<()> {
+    let is_needed = arguments.model_out.is_some() || arguments.report.is_some();
+    let Found {
+        record,
+        hash,
+        diagnosed,
+    } = found(arguments, path, is_needed)?;
+    if let Some(path) = &arguments.model_out {
+        let fitted = diagnosed.extended_model.clone().excited_like(&record);
+        super::write(path, &fitted.to_toml())?;
+    }
+    if !arguments.input.quiet {
+        say!("{}", text::diagnosis(&diagnosed).trim_end());
+        if arguments.details {
+            say!("{}", text::details(&diagnosed.diagnosis).trim_end());
         }
-        if !arguments.input.quiet {
-            say!("{}", text::diagnosis(&found).trim_end());
-            if arguments.details {
-                say!("{}", text::details(&found.diagnosis).trim_end());
+    }
+    if let Some(page) = &arguments.report {
+        let subject = Subject {
+            record: &record,
+            diagnosed: &diagnosed,
+            rate_hz: None,
+            command: &super::report::command(),
+            seed: arguments.seed,
+            hash: Some(&hash),
+            hidden: None,
+        };
+        super::report::write(page, &subject, arguments.input.quiet)?;
+    }
+    super::write_json(arguments.json.as_ref(), &diagnosed.diagnosis)
+}
+
+/// What is left of one of several: what is said of it, and what is written.
+struct Short {
+    text: String,
+    diagnosis: Diagnosis,
+}
+
+/// Diagnoses captures side by side. One that cannot be read keeps no other from its answer.
+fn several(arguments: &Arguments, captures: &[PathBuf]) -> Result<()> {
+    let all: Vec<Result<Short>> = many::in_parallel(captures, arguments.input.quiet, |path| {
+        let diagnosed = found(arguments, path, false)?.diagnosed;
+        let mut text = String::new();
+        if arguments.details {
+            text = text::diagnosis(&diagnosed) + &text::details(&diagnosed.diagnosis);
+        }
+        let diagnosis = diagnosed.diagnosis;
+        Ok(Short { text, diagnosis })
+    });
+    let mut several = Several {
+        format: "imu-stand-diagnoses/1",
+        runs: Vec::new(),
+        failed: Vec::new(),
+    };
+    let mut rows = Vec::new();
+    for (path, one) in captures.iter().zip(all) {
+        let file = super::name(path);
+        match one {
+            Ok(short) => {
+                if !short.text.is_empty() && !arguments.input.quiet {
+                    say!("{}\n", short.text.trim_end());
+                }
+                rows.push(row(&file, &short.diagnosis));
+                several.runs.push(short.diagnosis);
+            }
+            Err(error) => {
+                let causes: Vec<String> = error.chain().map(ToString::to_string).collect();
+                let why = causes.join(": ");
+                rows.push([file.clone(), "not read".to_owned(), why.clone()]);
+                several.failed.push(Failed { file, why });
             }
         }
-        if let Some(page) = &arguments.report {
-            let subject = Subject {
-                record: &read.record,
-                diagnosed: &found,
-                rate_hz: None,
-                command: &super::report::command(),
-                seed: arguments.seed,
-                hash: Some(&hash),
-                hidden: None,
-            };
-            super::report::write(page, &subject, arguments.input.quiet)?;
-        }
-        runs.push(found.diagnosis);
     }
-    match runs.as_slice() {
-        [one] => super::write_json(arguments.json.as_ref(), one),
-        _ => super::write_json(
-            arguments.json.as_ref(),
-            &Several {
-                format: "imu-stand-diagnoses/1",
-                runs,
-            },
-        ),
+    super::write_json(arguments.json.as_ref(), &several)?;
+    if !arguments.input.quiet {
+        table(&rows);
+    }
+    match several.failed.as_slice() {
+        [] => Ok(()),
+        [first, ..] => Err(miette::miette!(
+            help = "`imu-stand diagnose` of one alone says what to do about it",
+            "{} of {} captures could not be diagnosed, first {}",
+            several.failed.len(),
+            captures.len(),
+            first.file
+        )),
+    }
+}
+
+/// A capture in the summary: its name, the verdict, and what was found.
+fn row(file: &str, d: &Diagnosis) -> [String; 3] {
+    let verdict = match d.verdict {
+        Verdict::Adequate => "adequate",
+        Verdict::Extended => "extended",
+        Verdict::Unexplained => "unexplained",
+    };
+    let mut said: Vec<String> = d.findings.iter().map(text::answer::brief).collect();
+    let mut left: Vec<&str> = d.unexplained.iter().map(|u| u.channel.as_str()).collect();
+    left.dedup();
+    if !left.is_empty() {
+        said.push(format!("left over on {}", left.join(", ")));
+    }
+    [file.to_owned(), verdict.to_owned(), said.join("; ")]
+}
+
+fn table(rows: &[[String; 3]]) {
+    let heads = ["capture", "verdict", "found"];
+    let width = |column: usize| {
+        let cells = rows.iter().map(|row| row[column].chars().count());
+        cells.max().unwrap_or(0).max(heads[column].len())
+    };
+    let (first, second) = (width(0), width(1));
+    let line = |[a, b, c]: [&str; 3]| {
+        let line = format!("{a:<first$}  {b:<second$}  {c}");
+        say!("{}", line.trim_end());
+    };
+    line(heads);
+    for [file, verdict, found] in rows {
+        line([file, verdict, found]);
     }
 }

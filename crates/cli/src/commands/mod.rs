@@ -7,6 +7,7 @@ pub mod diagnose;
 pub mod export;
 mod export_source;
 pub mod flash;
+mod many;
 pub mod monitor;
 pub mod outputs;
 pub mod paper;

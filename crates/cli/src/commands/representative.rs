@@ -10,12 +10,13 @@ use model::record::{Quantity, Record};
 use noise::Representative;
 use serde::Serialize;
 
-use super::{Input, Outputs};
+use super::{Input, Outputs, many};
 
 /// What `representative` takes.
 #[derive(Args)]
 pub struct Arguments {
-    /// Captures of one stand, four at least: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .mcap, .bag, .ulg, .txt
+    /// Captures of one stand, four at least, or folders of them: .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .mcap, .bag,
+    /// .ulg, .txt
     #[arg(required = true)]
     captures: Vec<PathBuf>,
     #[command(flatten)]
@@ -39,9 +40,9 @@ struct Answer<'a> {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    Outputs::beside(&arguments.captures).result("--json", arguments.json.as_ref())?;
-    let records = arguments
-        .captures
+    let captures = many::captures(&arguments.captures)?;
+    Outputs::beside(&captures).result("--json", arguments.json.as_ref())?;
+    let records = captures
         .iter()
         .map(|path| {
             let record = arguments.input.read(path)?.record;
@@ -65,13 +66,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             miette::bail!(
                 help = "give each run once; a channel that is copied or stuck has to be left out by --columns",
                 "{} and {} have the same readings",
-                arguments.captures[j].display(),
-                arguments.captures[i].display()
+                captures[j].display(),
+                captures[i].display()
             );
         }
     }
     let found = noise::representative(&records, arguments.seed).map_err(super::explain)?;
-    let files: Vec<String> = arguments.captures.iter().map(|p| super::name(p)).collect();
+    let files: Vec<String> = captures.iter().map(|p| super::name(p)).collect();
     if !arguments.input.quiet {
         print(&files, &found);
     }

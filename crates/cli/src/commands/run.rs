@@ -13,7 +13,7 @@ use diagnosis::result::Diagnosis;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
 use imu_stand::stand::planted::{Comparison, RULE, compare, planted};
-use imu_stand::stand::{Board, Hidden, Plan, Sizes, plan, plan_fitted, run_native};
+use imu_stand::stand::{Board, Hidden, Plan, Seeds, Sizes, plan, plan_fitted, run_native};
 use imu_stand::text;
 use indicatif::{ProgressBar, ProgressStyle};
 #[cfg(unix)]
@@ -49,9 +49,18 @@ pub struct Arguments {
     /// Length, s
     #[arg(long, default_value_t = 600.0)]
     seconds: f64,
-    /// Seed: the same seed gives the same run
+    /// Seed of all that is random: the same seed gives the same run
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Seed of the stand alone, its parts and surroundings: the same one for many runs of one stand
+    #[arg(long, value_name = "SEED")]
+    stand_seed: Option<u64>,
+    /// Seed of what is hidden, and of the course of the motor
+    #[arg(long, value_name = "SEED")]
+    fault_seed: Option<u64>,
+    /// Seed of the noise: another one for each run of one stand
+    #[arg(long, value_name = "SEED")]
+    noise_seed: Option<u64>,
     /// The capture to write, .csv or .csv.gz
     #[arg(long, default_value = "capture.csv")]
     out: PathBuf,
@@ -210,12 +219,18 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
 
 /// What was asked for: a fault, or the parts of a model file.
 fn planned(arguments: &Arguments) -> Result<Plan> {
-    let (seconds, seed) = (arguments.seconds, arguments.seed);
+    let seconds = arguments.seconds;
+    let or_all = |seed: Option<u64>| seed.unwrap_or(arguments.seed);
+    let seeds = Seeds {
+        stand: or_all(arguments.stand_seed),
+        fault: or_all(arguments.fault_seed),
+        noise: or_all(arguments.noise_seed),
+    };
     let Some(path) = &arguments.model else {
-        return Ok(plan(arguments.hide, Sizes::Visible, seconds, seed));
+        return Ok(plan(arguments.hide, Sizes::Visible, seconds, seeds));
     };
     let model = super::read_model(path)?;
-    let (plan, carried) = plan_fitted(&model, seconds, seed).map_err(|error| {
+    let (plan, carried) = plan_fitted(&model, seconds, seeds).map_err(|error| {
         miette::miette!(
             help = "`imu-stand simulate --model` makes a capture of any model",
             "{}: {error}",

@@ -40,14 +40,51 @@ pub struct Plan {
     pub channel: Option<usize>,
 }
 
+/// What a run is drawn from. One number for all three gives the same run as ever; apart, one stand can be recorded again and
+/// again, or the same fault be planted in many.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seeds {
+    /// Parts and surroundings: noise and turn-on bias of each gyro, room, heater, supply, floor.
+    pub stand: u64,
+    /// What is hidden, where and how large, and the course of the motor.
+    pub fault: u64,
+    /// Every reading's noise and all that comes at random while the run lasts.
+    pub noise: u64,
+}
+
+impl From<u64> for Seeds {
+    fn from(seed: u64) -> Self {
+        Self {
+            stand: seed,
+            fault: seed,
+            noise: seed,
+        }
+    }
+}
+
+impl Seeds {
+    /// A stream beside the bench's own.
+    fn beside(self) -> Xoshiro256PlusPlus {
+        Xoshiro256PlusPlus::seed_from_u64(self.fault ^ 0x9e37_79b9_7f4a_7c15)
+    }
+
+    /// A sound stand of that length.
+    fn sound(self, seconds: f64) -> Scenario {
+        let mut scenario = Scenario::lively(self.stand);
+        // Its parts are drawn; from here on the seed is that of what happens to them.
+        scenario.seed = self.noise;
+        scenario.seconds = seconds;
+        scenario
+    }
+}
+
 /// Plans a run: a sound stand in a lively environment, the motor spinning free in steps (the belt is off, so the table
 /// stays at rest), and one thing wrong.
 #[must_use]
-pub fn plan(hidden: Hidden, sizes: Sizes, seconds: f64, seed: u64) -> Plan {
-    // A stream beside the bench's own, which is seeded by `seed` too.
-    let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x9e37_79b9_7f4a_7c15);
-    let mut scenario = Scenario::lively(seed);
-    scenario.seconds = seconds;
+pub fn plan(hidden: Hidden, sizes: Sizes, seconds: f64, seeds: impl Into<Seeds>) -> Plan {
+    let seeds = seeds.into();
+    let rng = &mut seeds.beside();
+    let mut scenario = seeds.sound(seconds);
     let channel = hidden::plant(hidden, sizes, &mut scenario, rng);
     let run = driven(scenario, rng);
     let what: Vec<String> = (planted::planted(&run, 0.0).into_iter())
@@ -73,11 +110,11 @@ pub fn plan(hidden: Hidden, sizes: Sizes, seconds: f64, seed: u64) -> Plan {
 pub fn plan_fitted(
     model: &ModelFile,
     seconds: f64,
-    seed: u64,
+    seeds: impl Into<Seeds>,
 ) -> Result<(Plan, Carried), FittedError> {
-    let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x9e37_79b9_7f4a_7c15);
-    let mut scenario = Scenario::lively(seed);
-    scenario.seconds = seconds;
+    let seeds = seeds.into();
+    let rng = &mut seeds.beside();
+    let mut scenario = seeds.sound(seconds);
     let carried = fitted::onto(model, &mut scenario)?;
     let plan = Plan {
         run: driven(scenario, rng),

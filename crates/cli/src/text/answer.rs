@@ -29,6 +29,20 @@ pub fn headline(finding: &Finding) -> String {
     }
 }
 
+/// The cause, where it acts and how large it is, in a few words.
+#[must_use]
+pub fn brief(finding: &Finding) -> String {
+    let size = named(finding)
+        .into_iter()
+        .next()
+        .map(|(_, p)| match p.unit.as_str() {
+            "1" => format!(" {}", number(p.value, 3)),
+            unit => format!(" {} {unit}", number(p.value, 3)),
+        });
+    let place = finding.channels.join(", ");
+    format!("{} on {place}{}", finding.cause, size.unwrap_or_default())
+}
+
 /// The parameters that say how large a finding is: those that its effect requires, then those that were estimated.
 fn named(finding: &Finding) -> Vec<(&String, &Parameter)> {
     let specs = effect(&finding.cause).map_or(&[][..], |e| e.parameters());
