@@ -96,6 +96,38 @@ assert imu['rostopic'] == '/imu0' and imu['update_rate'] == 20, imu
     holds(&python, program, &[&files[1]]);
 }
 
+/// YAML 1.1 takes a number whose exponent has no sign for a text.
+#[test]
+fn pyyaml_reads_large_densities_as_numbers_too() {
+    let Some(python) = python("yaml") else { return };
+    let folder = folder("consumers_large");
+    let (model, out) = (folder.join("m.toml"), folder.join("vins.yaml"));
+    let toml = "format = \"imu-stand-model/1\"\nstand = \"large\"\nrate_hz = 20\n\n[[channel]]\nname = \"gyro_x\"\nunit = \"deg/s\"\n\
+        angle_random_walk = { value = 90000, unit = \"deg/sqrt(h)\" }\nrate_random_walk = { value = 700, unit = \"deg/s/sqrt(s)\" }\n";
+    std::fs::write(&model, toml).expect("room");
+    let text = |path: &Path| path.display().to_string();
+    for to in ["vins", "kalibr"] {
+        let words = [
+            "export",
+            &text(&model),
+            "--to",
+            to,
+            "--at-rate",
+            "200",
+            "--out",
+            &text(&out),
+        ];
+        assert_success(&run(&words));
+        let program = "
+import sys, yaml
+numbers = {k: v for k, v in yaml.safe_load(open(sys.argv[1])).items() if not str(v).startswith('/')}
+assert all(isinstance(v, (int, float)) for v in numbers.values()), numbers
+assert max(numbers.values()) > 1, numbers
+";
+        holds(&python, program, &[&out]);
+    }
+}
+
 #[test]
 fn an_xml_parser_reads_the_noise_of_each_axis_from_sdf() {
     let Some(python) = python("xml.etree.ElementTree") else {

@@ -19,6 +19,7 @@ mod plausible;
 mod propose;
 mod read;
 mod skipped;
+mod steady;
 mod stream;
 mod tables;
 mod time;

@@ -16,6 +16,7 @@ use super::logs::read_log;
 use super::order::{check_rate, check_times, check_varies, in_order, unwrap, unwrap_times};
 use super::plausible::doubts;
 use super::skipped::keep_places;
+use super::steady::unsteady;
 use super::stream::{TextLines, io, named, unpacked};
 use super::tables::{Table, read_table};
 use super::time::Clock;
@@ -357,6 +358,8 @@ fn finish(
     share_thermometer(&mut record);
     let doubts = doubts(&record, found.gyro_is_assumed);
     record.notes.extend(doubts);
+    let unsteady = unsteady(&record);
+    record.notes.extend(unsteady);
     Ok(Read {
         record,
         skipped: skipped.len(),

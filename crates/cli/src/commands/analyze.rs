@@ -88,7 +88,9 @@ fn print(analysis: &Analysis) {
             &channel.parameters,
             channel.parameters_hold_from_s.is_some() || !known,
         );
-        for warning in &channel.warnings {
+        // What is of the whole record stands above.
+        let is_told = |w: &&String| !analysis.input.notes.contains(*w);
+        for warning in channel.warnings.iter().filter(is_told) {
             say!("{}", text::item("warning: ", warning));
         }
         say!("  by the paper's procedure");

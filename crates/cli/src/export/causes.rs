@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use diagnosis::result::{Diagnosis, Parameter};
 use model::ModelFile;
 
-use super::noise::{AxisNoise, Consumer, DEG, Figure, ImuNoise, ROOT_HOUR};
+use super::noise::{AxisNoise, Consumer, DEG, Figure, ImuNoise, ROOT_HOUR, noted};
 
 /// Parameters by name.
 type Parameters = BTreeMap<String, Parameter>;
@@ -155,14 +155,14 @@ impl ImuNoise {
             noise,
             causes,
         );
-        imu.remarks = (diagnosis.unexplained.iter())
-            .map(|left| {
-                format!(
-                    "NOT ALL OF IT, {}: something in the record has no cause yet and is not in these numbers: {}",
-                    left.channel, left.what
-                )
-            })
-            .collect();
+        let notes = diagnosis.input.notes.iter().map(|note| noted(note));
+        let left = diagnosis.unexplained.iter().map(|left| {
+            format!(
+                "NOT ALL OF IT, {}: something in the record has no cause yet and is not in these numbers: {}",
+                left.channel, left.what
+            )
+        });
+        imu.remarks = notes.chain(left).collect();
         Some(imu)
     }
 

@@ -218,8 +218,7 @@ impl ImuNoise {
                 continue;
             }
             for axis in axes {
-                let figure =
-                    |f: Figure| f.expected().map_or("?".to_owned(), |v| format!("{v:.6e}"));
+                let figure = |f: Figure| f.expected().map_or("?".to_owned(), float);
                 let remark = |f: Figure| match f.remark() {
                     remark if remark.is_empty() => remark,
                     remark => format!(" ({remark})"),
@@ -236,8 +235,16 @@ impl ImuNoise {
             }
             let white = rms(axes.iter().map(|axis| axis.white.expected()));
             let walk = rms(axes.iter().map(|axis| axis.walk.expected()));
-            let _ = writeln!(out, "{name}_noise_density: {white:.6e}  # {unit}/sqrt(Hz)");
-            let _ = writeln!(out, "{name}_random_walk: {walk:.6e}  # {unit}/s/sqrt(Hz)");
+            let _ = writeln!(
+                out,
+                "{name}_noise_density: {}  # {unit}/sqrt(Hz)",
+                float(white)
+            );
+            let _ = writeln!(
+                out,
+                "{name}_random_walk: {}  # {unit}/s/sqrt(Hz)",
+                float(walk)
+            );
         }
         let _ = writeln!(out, "rostopic: /imu0");
         let _ = writeln!(out, "update_rate: {rate_hz}  # Hz");
@@ -261,8 +268,8 @@ impl ImuNoise {
             let walk = rms(axes.iter().map(|axis| axis.walk.expected()));
             let n = white * (2.0 * rate_hz).sqrt();
             let w = walk * rate_hz.sqrt();
-            let _ = writeln!(out, "{name}_n: {n:.6e}  # {unit}");
-            let _ = writeln!(out, "{name}_w: {w:.6e}  # {unit}/s");
+            let _ = writeln!(out, "{name}_n: {}  # {unit}", float(n));
+            let _ = writeln!(out, "{name}_w: {}  # {unit}/s", float(w));
         }
         out
     }
@@ -437,12 +444,20 @@ impl ImuNoise {
     }
 }
 
-/// The axes whose noise the terms do not describe, or only at long cluster times.
+/// A number as YAML 1.1 reads it, PyYAML for one: with an exponent without a sign it would be a text.
+fn float(value: f64) -> String {
+    let text = format!("{value:.6e}");
+    match text.split_once('e') {
+        Some((digits, exponent)) if !exponent.starts_with('-') => format!("{digits}e+{exponent}"),
+        _ => text,
+    }
+}
+
+/// What was doubtful of the record, and the axes whose noise the terms do not describe, or only at long cluster times.
 fn remarks(analysis: &Analysis) -> Vec<String> {
     let tau0 = 1.0 / analysis.input.rate_hz;
-    analysis
-        .channels
-        .iter()
+    let of_record = analysis.input.notes.iter().map(|note| noted(note));
+    let of_axes = (analysis.channels.iter())
         .filter(|(_, c)| c.parameters.angle_random_walk.high.is_some())
         .filter_map(|(name, c)| match c.parameters_hold_from_s {
             None => Some(format!(
@@ -453,9 +468,13 @@ fn remarks(analysis: &Analysis) -> Vec<String> {
                 tidy(from)
             )),
             Some(_) => None,
-        })
-        .chain(walks(analysis))
-        .collect()
+        });
+    of_record.chain(of_axes).chain(walks(analysis)).collect()
+}
+
+/// A note on a record, in one line of a comment.
+pub(super) fn noted(note: &str) -> String {
+    format!("note: {}", note.replace(['\n', '\r'], " "))
 }
 
 /// Whether the slow part of a channel is a random walk or ramp to the analysis, which knows no other name for it: a cause may

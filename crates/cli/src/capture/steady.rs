@@ -1,0 +1,184 @@
+//! Whether a record is one record: one sample rate, sampling times, one attitude. Every command sees the same notes.
+
+use model::record::sampling::Sampling;
+use model::record::{Axis, Base, Quantity, Record};
+
+use super::STANDARD_GRAVITY;
+
+/// Parts of a record that are compared, and steps that each has at least.
+const BLOCKS: usize = 30;
+const STEPS: usize = 8;
+/// Ratio of two rates beyond which no clock's drift makes them.
+const OTHER_RATE: f64 = 1.2;
+/// Turn against gravity, deg, that no vibration and no temperature of an accelerometer makes.
+const TURNED_DEG: f64 = 5.0;
+/// Size of a mean acceleration, g, that is gravity.
+const GRAVITY: std::ops::Range<f64> = 0.7..1.3;
+
+/// What is not steady.
+pub(super) fn unsteady(record: &Record) -> Vec<String> {
+    let times = times(record);
+    let rates = times.as_deref().and_then(two_rates);
+    let own = match (&rates, Sampling::of(record, None)) {
+        // It says of such times that they come in bursts.
+        (None, Ok(sampling)) => sampling.warnings,
+        _ => Vec::new(),
+    };
+    let turned = turned(record, times.as_deref());
+    own.into_iter().chain(rates).chain(turned).collect()
+}
+
+/// Device time where there is one, else the time column, s from the first row on.
+fn times(record: &Record) -> Option<Vec<f64>> {
+    match (&record.t_ticks, record.header.tick_s, &record.host_time_s) {
+        (Some(ticks), Some(tick_s), _) => {
+            let first = *ticks.first()?;
+            let since = |t: &u64| t.wrapping_sub(first) as i64 as f64 * tick_s;
+            Some(ticks.iter().map(since).collect())
+        }
+        (_, _, Some(times)) => {
+            let first = *times.first()?;
+            Some(times.iter().map(|t| t - first).collect())
+        }
+        _ => None,
+    }
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Two rates in one file. By median and mean of the steps in parts of the record: a gap moves one part's mean, arrival in
+/// bursts the medians alone.
+fn two_rates(times: &[f64]) -> Option<String> {
+    let steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+    let length = steps.len() / BLOCKS;
+    if length < STEPS {
+        return None;
+    }
+    let parts = steps.chunks_exact(length).take(BLOCKS);
+    let (medians, means): (Vec<f64>, Vec<f64>) = parts
+        .map(|part| {
+            let mean = part.iter().sum::<f64>() / part.len() as f64;
+            (median(&mut part.to_vec()), mean)
+        })
+        .unzip();
+    let thirds = |of: &[f64]| -> Vec<f64> {
+        let parts = of.chunks_exact(BLOCKS / 3);
+        parts.map(|third| median(&mut third.to_vec())).collect()
+    };
+    let is_other = |of: &[f64]| {
+        let [least, most] = [f64::min, f64::max].map(|pick| of.iter().copied().reduce(pick));
+        let (Some(least), Some(most)) = (least, most) else {
+            return false;
+        };
+        least > 0.0 && most > OTHER_RATE * least
+    };
+    if !is_other(&thirds(&medians)) || !is_other(&thirds(&means)) {
+        return None;
+    }
+    let (first, last) = (medians[0], medians[BLOCKS - 1]);
+    let (least, most) = medians
+        .iter()
+        .fold((first, first), |(low, high), v| (low.min(*v), high.max(*v)));
+    let between = (least * most).sqrt();
+    let at = medians
+        .iter()
+        .position(|m| (*m > between) != (first > between));
+    let row = at.map_or(0, |block| block * length);
+    Some(format!(
+        "the sample rate changes: {:.4} Hz at the start, {:.4} Hz at the end, the first change near row {} ({:.4} s): \
+         what is said of rates, noise and spectra mixes them; cut the file there, and take the parts one by one",
+        1.0 / first,
+        1.0 / last,
+        row + 1,
+        times.get(row).copied().unwrap_or(0.0)
+    ))
+}
+
+/// A sensor that lies in another attitude later on, where nobody says that its base moves.
+fn turned(record: &Record, times: Option<&[f64]>) -> Option<String> {
+    if matches!(record.header.base, Some(Base::Moving | Base::Turntable)) {
+        return None;
+    }
+    let axis = |axis| {
+        let channel = record.of(Quantity::Acc, Some(axis))?;
+        (channel.unit == "m/s^2").then_some(channel.values.as_slice())
+    };
+    let [Some(x), Some(y), Some(z)] = Axis::ALL.map(axis) else {
+        return None;
+    };
+    let length = record.len() / BLOCKS;
+    if length < STEPS {
+        return None;
+    }
+    let mean = |of: &[f64], block: usize| {
+        let mut part: Vec<f64> = of.get(block * length..(block + 1) * length)?.to_vec();
+        part.retain(|v| v.is_finite());
+        (!part.is_empty()).then(|| median(&mut part) / STANDARD_GRAVITY)
+    };
+    let down = |block: usize| {
+        let v = [mean(x, block)?, mean(y, block)?, mean(z, block)?];
+        let size = v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        GRAVITY.contains(&size).then(|| v.map(|v| v / size))
+    };
+    let first = down(0)?;
+    let angle = |block: usize| {
+        let cosine: f64 = down(block)?.iter().zip(first).map(|(a, b)| a * b).sum();
+        Some(cosine.clamp(-1.0, 1.0).acos().to_degrees())
+    };
+    // Two parts in a row: what sways comes back within one.
+    let is_turned = |block: &usize| {
+        let far = |block| angle(block).is_some_and(|a| a > TURNED_DEG);
+        far(*block) && (far(block + 1) || block + 1 == BLOCKS)
+    };
+    let at = (1..BLOCKS).find(is_turned)?;
+    let most = (at..BLOCKS).filter_map(angle).fold(0.0, f64::max);
+    let row = at * length;
+    let when = times.and_then(|times| times.get(row));
+    let place = when.map_or(format!("row {}", row + 1), |t| format!("{t:.4} s"));
+    Some(format!(
+        "the sensor is turned against gravity, by {most:.0} deg at most, from {place} on: noise figures are of a sensor that \
+         lies still; cut the file there, or say in its header what the base does (`# base: moving`)"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_rates_are_told_with_their_place_and_gaps_and_bursts_are_none() {
+        let at = |step: &dyn Fn(usize) -> f64| {
+            let steps = (0..1200).map(step);
+            let times: Vec<f64> = steps
+                .scan(0.0, |t, step| {
+                    *t += step;
+                    Some(*t)
+                })
+                .collect();
+            two_rates(&times)
+        };
+        let joined = at(&|k| if k < 600 { 0.05 } else { 1e-4 }).expect("two rates");
+        assert!(
+            joined.contains("20.0000 Hz at the start, 10000.0000 Hz at the end"),
+            "{joined}"
+        );
+        assert!(joined.contains("row 601 "), "{joined}");
+        assert!(at(&|k| 0.1 * 1.006f64.powi(k as i32)).is_some());
+        assert_eq!(at(&|_| 0.05), None);
+        assert_eq!(at(&|k| if k == 700 { 500.0 } else { 0.05 }), None);
+        // Ten rows at once, twice a second; and in the last third twenty at once, once a second.
+        assert_eq!(at(&|k| if k % 10 == 0 { 0.5 } else { 1e-6 }), None);
+        let later = |k: usize| match (k >= 800, k % 10, k % 20) {
+            (false, 0, _) => 0.5,
+            (true, _, 0) => 1.0,
+            _ => 1e-6,
+        };
+        assert_eq!(at(&later), None);
+    }
+}

@@ -1,0 +1,155 @@
+//! What is doubtful of a record is said by every command that believes it, on the screen and in the files.
+
+mod common;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use common::{assert_success, folder, json, run};
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a name in UTF-8")
+}
+
+/// A table with a gyro, and accelerometers where the sensor lies as `down` says, in units of gravity.
+fn table(
+    folder: &Path,
+    name: &str,
+    time: impl Fn(usize) -> f64,
+    down: impl Fn(usize) -> [f64; 3],
+) -> PathBuf {
+    let mut out = "time_s,gyro_x [deg/s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]\n".to_owned();
+    let mut state = 7u64;
+    let mut noise = || {
+        // Twelve even draws less their mean: normal enough for a sensor.
+        let mut draw = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (0..12).map(|_| draw()).sum::<f64>() - 6.0
+    };
+    for k in 0..2400 {
+        let acc = down(k).map(|g| 9.806_65 * g + 0.02 * noise());
+        let _ = writeln!(
+            out,
+            "{:.6},{:.4},{:.4},{:.4},{:.4}",
+            time(k),
+            0.3 * noise(),
+            acc[0],
+            acc[1],
+            acc[2]
+        );
+    }
+    let path = folder.join(name);
+    std::fs::write(&path, out).expect("room");
+    path
+}
+
+/// Every command that believes the record says so, and its files have it.
+fn told_by_all(path: &Path, what: &str) {
+    let folder = path.parent().expect("a folder");
+    let (a, d, h) = (
+        folder.join("a.json"),
+        folder.join("d.json"),
+        folder.join("r.html"),
+    );
+    let file = text(path);
+    let said = assert_success(&run(&["analyze", file, "--json", text(&a)]));
+    assert_eq!(said.matches(what).count(), 1, "analyze: {said}");
+    let words = [
+        "diagnose",
+        file,
+        "--no-replicates",
+        "--json",
+        text(&d),
+        "--report",
+        text(&h),
+    ];
+    let said = assert_success(&run(&words));
+    assert_eq!(said.matches(what).count(), 1, "diagnose: {said}");
+    let from = |file: &Path| {
+        assert_success(&run(&[
+            "export",
+            text(file),
+            "--to",
+            "vins",
+            "--at-rate",
+            "200",
+        ]))
+    };
+    for file in [path, &a, &d] {
+        let said = from(file);
+        let comment = said.split("# ").any(|line| line.contains(what));
+        assert!(comment, "export of {}: {said}", file.display());
+    }
+    for file in [&a, &d] {
+        let notes = &json(file)["input"]["notes"];
+        let notes = notes.as_array().expect("notes");
+        let told = notes
+            .iter()
+            .filter(|n| n.as_str().is_some_and(|n| n.contains(what)));
+        assert_eq!(told.count(), 1, "{notes:?}");
+    }
+    assert!(
+        std::fs::read_to_string(&h)
+            .expect("a report")
+            .contains(what)
+    );
+}
+
+const FLAT: fn(usize) -> [f64; 3] = |_| [0.0, 0.0, 1.0];
+
+fn even(k: usize) -> f64 {
+    0.05 * k as f64
+}
+
+#[test]
+fn two_sample_rates_in_one_file_are_told_by_all() {
+    let folder = folder("doubts_rates");
+    let time = |k: usize| match k.checked_sub(1200) {
+        None => even(k),
+        Some(later) => 60.0 + 0.01 * later as f64,
+    };
+    told_by_all(
+        &table(&folder, "joined.csv", time, FLAT),
+        "the sample rate changes: 20.0000 Hz at the start, 100.0000 Hz",
+    );
+}
+
+#[test]
+fn times_that_tell_arrival_are_told_by_all() {
+    let folder = folder("doubts_bursts");
+    let time = |k: usize| 0.1 * (k / 2) as f64 + 0.02 * (k % 2) as f64;
+    told_by_all(
+        &table(&folder, "bursts.csv", time, FLAT),
+        "the times come in bursts",
+    );
+}
+
+#[test]
+fn a_sensor_that_was_laid_on_its_side_is_told_by_all() {
+    let folder = folder("doubts_turned");
+    let down = |k: usize| {
+        if k < 1600 {
+            [0.0, 0.0, 1.0]
+        } else {
+            [0.0, 1.0, 0.0]
+        }
+    };
+    told_by_all(
+        &table(&folder, "turned.csv", even, down),
+        "turned against gravity, by 90 deg at most, from 80.0000 s on",
+    );
+}
+
+#[test]
+fn a_sound_record_has_no_doubts() {
+    let folder = folder("doubts_none");
+    let path = table(&folder, "sound.csv", even, FLAT);
+    for command in ["analyze", "diagnose"] {
+        let said = assert_success(&run(&[command, text(&path)]));
+        assert!(!said.contains("note:"), "{command}: {said}");
+    }
+}
