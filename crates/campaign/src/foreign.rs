@@ -73,7 +73,6 @@ pub fn on_axis(place: usize, axis: usize) -> usize {
 }
 
 /// Causes of the library that are a true part of one, by its place in [`FOREIGN`].
-#[must_use]
 pub fn parts(place: usize) -> impl Iterator<Item = &'static str> {
     let effect = &EFFECTS[place];
     effect.true_parts.iter().copied().chain(effect.later)

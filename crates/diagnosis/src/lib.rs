@@ -32,4 +32,4 @@ pub use ingest::kalman;
 pub use search::peak_of_white;
 pub use two_level::compare;
 
-pub use pipeline::{DiagnoseOptions, diagnose, diagnose_owned};
+pub use pipeline::{DiagnoseOptions, MATTERS, diagnose, diagnose_owned};

@@ -12,6 +12,7 @@ mod channel;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 use model::file::FittedOn;
 use model::record::Record;
@@ -25,6 +26,7 @@ use crate::ingest::dead;
 use crate::ingest::grid::lay_out;
 use crate::ingest::types::Grid;
 use crate::replicates;
+use crate::report::entries::{Ranked, entries, rank};
 use crate::report::findings::{motion_findings, scale_finding, term_findings, variance_finding};
 use crate::report::untested::not_tested;
 use crate::report::{detection_limits, figures, handover};
@@ -33,12 +35,12 @@ use crate::result::{
     Unexplained, Verdict,
 };
 use crate::search::searched::Searched;
-use crate::test_level::{CheckId, all_worded, worded};
+use crate::test_level::{CheckId, Observation, all_worded, worded};
 use model::record::AnalysisError;
 use model::record::rows;
 
 /// Options of [`diagnose`].
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct DiagnoseOptions {
     /// Seed of whatever is random (fill of lost samples, replicates).
     pub seed: u64,
@@ -51,6 +53,24 @@ pub struct DiagnoseOptions {
     /// Replicates of the model before and after that the record is held against; 0 for none. Where there are some, a
     /// model is extended only if they hold the record ([`crate::replicates`]).
     pub replicates: usize,
+    /// Relative change of an angle or a deviation from which on a cause, or what has no name, is material.
+    pub matters: f64,
+}
+
+/// Change that matters where nobody says: 5 %, which takes 100 independent readings of a deviation to see at all.
+pub const MATTERS: f64 = 0.05;
+
+impl Default for DiagnoseOptions {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            file: String::new(),
+            hash: None,
+            no_evidence: false,
+            replicates: 0,
+            matters: MATTERS,
+        }
+    }
 }
 
 /// Diagnose a record.
@@ -85,7 +105,7 @@ struct Prepared {
     grid: Grid,
     audited: Audit,
     sticking: Vec<Finding>,
-    dead: Vec<Unexplained>,
+    dead: Vec<Observation>,
     input: Input,
 }
 
@@ -160,18 +180,34 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     let baseline_model = handover::baseline_model(&searched, &grid, fitted_on());
     let in_model: Vec<&Finding> = told.findings.iter().chain(&told.nearest).collect();
     let extended_model = handover::extended_model(&searched, &grid, &in_model, fitted_on());
-    let mut verdict = verdict(&told.findings, &told.unexplained);
+    for f in &mut told.findings {
+        f.material = true;
+    }
+    let judged = options.replicates > 0;
+    if judged {
+        let (matters, seed) = (options.matters, options.seed);
+        replicates::consequence::state(&mut told.findings, &extended_model, &grid, matters, seed);
+    }
+    let unnamed = !told.unexplained.is_empty();
     let replicates = match options.replicates {
         0 => BTreeMap::new(),
         count => replicates::judge(&grid, &baseline_model, &extended_model, count, options.seed)
             .unwrap_or_default(),
     };
-    let held = replicates::held(&replicates, verdict, options.replicates);
-    if !held.unexplained.is_empty() {
-        verdict = Verdict::Unexplained;
-    }
+    let adequate = told.findings.is_empty() && !unnamed;
+    let held = replicates::held(&replicates, adequate, options.replicates);
+    let strays = !held.unexplained.is_empty();
     told.checks.extend(held.checks);
     told.unexplained.extend(held.unexplained);
+    let mut unexplained = entries(told.unexplained, &searched, &grid, options.matters);
+    ranked(&mut told.findings, &mut unexplained);
+    // Without replicates nothing says that what is left does not matter.
+    let unnamed = unexplained.iter().any(|u| u.material || !judged);
+    let verdict = match (strays || unnamed, told.findings.is_empty()) {
+        (true, _) => Verdict::Unexplained,
+        (false, true) => Verdict::Adequate,
+        (false, false) => Verdict::Extended,
+    };
     Diagnosed {
         diagnosis: Diagnosis {
             format: DIAGNOSIS_FORMAT.into(),
@@ -183,7 +219,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
             input,
             checks: told.checks,
             findings: told.findings,
-            unexplained: told.unexplained,
+            unexplained,
             not_tested: told.not_tested,
         },
         baseline_model,
@@ -194,12 +230,13 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     }
 }
 
-fn verdict(findings: &[Finding], unexplained: &[Unexplained]) -> Verdict {
-    match (unexplained.is_empty(), findings.is_empty()) {
-        (false, _) => Verdict::Unexplained,
-        (true, true) => Verdict::Adequate,
-        (true, false) => Verdict::Extended,
-    }
+/// Gives causes and entries their places, and puts them in that order.
+fn ranked(findings: &mut [Finding], unexplained: &mut [Unexplained]) {
+    let causes = findings.iter_mut().map(|f| f as &mut dyn Ranked);
+    let entries = unexplained.iter_mut().map(|u| u as &mut dyn Ranked);
+    rank(causes.chain(entries).collect());
+    findings.sort_by_key(|f| f.rank);
+    unexplained.sort_by_key(|u| u.rank);
 }
 
 /// The checks of all channels, those that a fault of the counts explains put right.
@@ -227,8 +264,8 @@ struct Named {
     findings: Vec<Finding>,
     /// What stands in the model for what has no name.
     nearest: Vec<Finding>,
-    /// Names that were withdrawn, in words.
-    withdrawn: Vec<Unexplained>,
+    /// Names that were withdrawn.
+    withdrawn: Vec<Observation>,
     /// Smallest sizes that would have been found.
     limits: Vec<DetectionLimit>,
     /// What could not be asked.
@@ -306,7 +343,7 @@ struct Told {
     checks: Vec<Check>,
     findings: Vec<Finding>,
     nearest: Vec<Finding>,
-    unexplained: Vec<Unexplained>,
+    unexplained: Vec<Observation>,
     limits: Vec<DetectionLimit>,
     not_tested: Vec<NotTested>,
 }
@@ -315,7 +352,7 @@ fn concluded(
     searched: &[Searched<'_>],
     tested: Tested,
     audited: Audit,
-    dead: Vec<Unexplained>,
+    dead: Vec<Observation>,
     named: Named,
 ) -> Told {
     let Tested { mut checks, shared } = tested;
@@ -328,9 +365,9 @@ fn concluded(
     } = named;
     let mut unexplained = left_over(&checks, &shared);
     for s in searched {
-        let note = |note: &Note| Unexplained {
-            channel: s.target.name.clone(),
-            what: note.what.clone(),
+        let note = |note: &Note| Observation {
+            place: note.at.map(|(from, to)| [from / PI, to / PI]),
+            ..Observation::of_noise(&s.target.name, note.what.clone())
         };
         unexplained.extend(s.state.notes.iter().map(note));
         unexplained.extend(astray(s));
@@ -344,8 +381,12 @@ fn concluded(
     unexplained.extend(not_normal.filter(|u| !bent(&u.channel, searched, &checks)));
     if let Some(finding) = shared.finding {
         if withdraw::propagate::shared_falls(&finding, &checks) {
-            unexplained.push(withdraw::nearest_of(&finding.channels[0], &finding.what));
+            let channel = finding.channels[0].clone();
             nearest.push(finding);
+            unexplained.push(withdraw::nearest_of(
+                &channel,
+                &nearest[nearest.len() - 1..],
+            ));
         } else {
             findings.push(finding);
         }
@@ -382,22 +423,23 @@ fn bent(name: &str, searched: &[Searched<'_>], checks: &[Check]) -> bool {
 }
 
 /// An axis that moves on a table that turns another one.
-fn astray(s: &Searched<'_>) -> Option<Unexplained> {
-    s.target.astray.then(|| Unexplained {
-        channel: s.target.name.clone(),
-        what: format!(
+fn astray(s: &Searched<'_>) -> Option<Observation> {
+    s.target.astray.then(|| {
+        let what = format!(
             "moves by {:.2} deg/s rms and does not follow the axis that the table turns: it was searched for no cause; where the stand was shaken or tilted, say `base: moving`",
             s.target.motion_rms
-        ),
+        );
+        Observation::of_readings(&s.target.name, what)
     })
 }
 
-fn left_over(checks: &[Check], shared: &Shared) -> Vec<Unexplained> {
+fn left_over(checks: &[Check], shared: &Shared) -> Vec<Observation> {
     let failing = checks.iter().filter(|c| c.fails_after);
     failing
-        .map(|c| Unexplained {
-            channel: c.channel.clone(),
-            what: format!("{}: {}", c.id, c.what),
+        .map(|c| Observation {
+            check: CheckId::of(&c.id).map(|id| (id, c.p_value.unwrap_or(0.0))),
+            follows: c.about.clone(),
+            ..Observation::of_noise(&c.channel, format!("{}: {}", c.id, c.what))
         })
         .chain(shared.left.iter().cloned())
         .collect()

@@ -1,6 +1,7 @@
 //! The diagnosis as it leaves the program: `imu-stand-diagnosis/1`.
 
 mod replicated;
+mod unexplained;
 
 use model::effect::Parameters;
 use std::collections::BTreeMap;
@@ -11,6 +12,7 @@ use serde::{Deserialize, Serialize};
 pub use model::Parameter;
 
 pub use replicated::{Among, LEVEL, Replicated, Worst};
+pub use unexplained::{Consequence, Unexplained};
 
 /// The `format` of a diagnosis.
 pub const DIAGNOSIS_FORMAT: &str = "imu-stand-diagnosis/1";
@@ -121,18 +123,19 @@ pub struct Finding {
     /// which the channel that it follows did not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub effective: bool,
+    /// What it does to the readings and to the integrated angle; `None` where it acts on frames or clocks, or where no
+    /// replicates were asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub consequence: Option<Consequence>,
+    /// Whether it changes an angle or a deviation by more than the threshold, or its consequence is not known.
+    #[serde(default = "unexplained::material")]
+    pub material: bool,
+    /// Place among findings and unexplained entries by consequence, the largest first: 1, 2, ...
+    #[serde(default)]
+    pub rank: usize,
     /// Whether data not used for the fit confirm it; `None` where that was not asked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub confirmed_on_held_out_data: Option<bool>,
-}
-
-/// Structure that no effect of the library explains.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Unexplained {
-    /// The channel.
-    pub channel: String,
-    /// What is seen, and where: band, time span, channel it follows.
-    pub what: String,
 }
 
 /// A cause that this record cannot show.

@@ -1,7 +1,10 @@
 //! Tests: their ids, the levels at which they fail, how often a record asks them, and what one says.
 
-use crate::result::{Check, Finding, NotTested, Unexplained};
+mod observation;
+
+use crate::result::{Check, Finding, NotTested};
 use Asked::{Limit, Named, OfAxis, OfPair, OfRecord};
+pub use observation::{Domain, Observation};
 
 /// One statistic with its chance, and what was seen where.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,6 +159,51 @@ impl PartialEq<CheckId> for String {
 }
 
 impl CheckId {
+    /// The check of a name.
+    #[must_use]
+    pub fn of(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|id| id.as_str() == name)
+    }
+
+    /// What it sees where it fails, for a person; none where it is told by what else fails.
+    #[must_use]
+    pub fn seen_as(self) -> Option<&'static str> {
+        let words = match self {
+            Self::LjungBox => "neighbouring readings depend on each other",
+            Self::BandEnergy => "some frequencies hold another energy than the model's",
+            Self::TimeFrequency => "energy comes and goes at some frequencies",
+            Self::VarianceInTime => "the noise has another size for a while",
+            Self::VarianceRhythm => "the size of the noise swings",
+            Self::VarianceFollows => "the size of the noise follows what was recorded",
+            Self::Kurtosis => "the noise has tails that are not normal",
+            Self::Skewness => "the noise reaches farther to one side",
+            Self::Bicovariance | Self::ThreeReadings | Self::Neighbours => {
+                "readings depend on each other as those of no linear, normal noise do"
+            }
+            Self::Period => "a pattern comes again and again",
+            Self::SlowCycles => "a slow swing is no steady one",
+            Self::ColourFollows => "the spectrum of the noise follows what was recorded",
+            Self::Order => "a tone follows the motor",
+            Self::Leaning => "a tone leans with what was recorded",
+            Self::Couplings => "the rate follows another channel as no cause does",
+            Self::ProcessSpectrum
+            | Self::ProcessLaw
+            | Self::ProcessSteadiness
+            | Self::ProcessLevels
+            | Self::ProcessDwells
+            | Self::ProcessSize
+            | Self::ProcessSource
+            | Self::ProcessRhythm => "a slow process of no known kind",
+            Self::BandSpectrum | Self::BandSteadiness | Self::BandSize | Self::BandEnvelope => {
+                "a band of no known kind"
+            }
+            Self::VarianceLaw => "the size of the noise changes by no known law",
+            Self::FollowerLaw => "the rate follows a channel by no known law",
+            _ => return None,
+        };
+        Some(words)
+    }
+
     /// What the name of a process claims.
     pub const OF_PROCESS: [Self; 7] = [
         Self::ProcessSpectrum,
@@ -202,7 +250,7 @@ impl Worded for Finding {
     }
 }
 
-impl Worded for Unexplained {
+impl Worded for Observation {
     fn text(&mut self) -> &mut String {
         &mut self.what
     }

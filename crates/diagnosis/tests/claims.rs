@@ -125,7 +125,7 @@ fn an_axis_that_another_leaks_into_a_frame_later_is_told() {
         });
         let d = told(&r);
         let late = |u: &diagnosis::result::Unexplained| {
-            u.channel == "gyro_x" && u.what.contains("gyro_z by 1 samples")
+            u.channel == "gyro_x" && u.says("gyro_z by 1 samples")
         };
         let right = named(&d).is_empty() && d.unexplained.iter().any(late);
         right.then_some(()).ok_or_else(|| said(&d))
@@ -215,9 +215,8 @@ fn a_reading_that_is_held_until_the_next_is_far_is_no_stale_sample() {
             held = *v;
         }
         let d = told(&r);
-        let until = |u: &diagnosis::result::Unexplained| {
-            u.channel == "gyro_y" && u.what.contains("held until")
-        };
+        let until =
+            |u: &diagnosis::result::Unexplained| u.channel == "gyro_y" && u.says("held until");
         let right = named(&d).is_empty() && d.unexplained.iter().any(until);
         right.then_some(()).ok_or_else(|| said(&d))
     });
@@ -249,7 +248,7 @@ fn frames_in_which_one_axis_holds_the_reading_of_another_are_told() {
             c.counts = c.lsb.filter(|l| *l == lsb).map(|_| counts.collect());
         }
         let d = told(&r);
-        let holds = |u: &diagnosis::result::Unexplained| u.what.contains("one holds the other's");
+        let holds = |u: &diagnosis::result::Unexplained| u.says("one holds the other's");
         let right = d.unexplained.iter().any(holds);
         right.then_some(()).ok_or_else(|| said(&d))
     });
@@ -276,7 +275,7 @@ fn noise_of_another_slope_is_no_bias_that_comes_back() {
         add(&mut r, "gyro_x", |i| noise[i]);
         let d = told(&r);
         let seen = (d.unexplained.iter())
-            .any(|u| u.channel == "gyro_x" && u.what.contains("falls with the frequency"));
+            .any(|u| u.channel == "gyro_x" && u.says("falls with the frequency"));
         // Flicker noise is its nearest relative.
         let other = named(&d).iter().any(|n| n.0 != "flicker");
         (seen && !other).then_some(()).ok_or_else(|| said(&d))

@@ -69,7 +69,7 @@ fn graded(
 /// sign, or three by their product, none is the first: the others are told as well.
 fn tells(d: &Diagnosis, words: &str) -> bool {
     let mut of_x = d.unexplained.iter().filter(|u| u.channel == "gyro_x");
-    d.findings.is_empty() && of_x.any(|u| u.what.contains(words))
+    d.findings.is_empty() && of_x.any(|u| u.says(words))
 }
 
 #[test]

@@ -3,7 +3,7 @@
 mod made;
 
 use diagnosis::audit::audit;
-use diagnosis::result::Unexplained;
+use diagnosis::test_level::Observation;
 use made::{PLAIN, World, alter, causes, parameter, record, rng};
 use model::record::Record;
 use rand_core::Rng;
@@ -140,7 +140,7 @@ fn a_despiker_that_repeats_readings_is_told_without_the_name_of_a_lost_conversio
         });
         let a = audit(&r);
         let own =
-            |u: &Unexplained| u.channel == "gyro_z" && u.what.contains("repeat the one before");
+            |u: &Observation| u.channel == "gyro_z" && u.what.contains("repeat the one before");
         runs += 1;
         told += usize::from(causes(&a).is_empty() && a.unexplained.iter().any(own));
     }

@@ -98,6 +98,7 @@ fn found(arguments: &Arguments, path: &Path, is_needed: bool) -> Result<Found> {
         hash: Some(hash.clone()),
         no_evidence: arguments.report.is_none(),
         replicates: arguments.replicates.count(),
+        matters: arguments.replicates.matters(),
     };
     let diagnosed = if is_needed {
         diagnosis::diagnose(&record, &options)

@@ -68,9 +68,17 @@ pub struct Replicates {
     /// Hold the record against no simulation
     #[arg(long, conflicts_with = "replicates")]
     no_replicates: bool,
+    /// Change of an angle error or of a deviation, percent, from which on a cause, or what has no name, is material
+    #[arg(long, value_name = "PERCENT", default_value_t = 100.0 * diagnosis::MATTERS, value_parser = positive)]
+    matters: f64,
 }
 
 impl Replicates {
+    /// Relative change that matters.
+    pub fn matters(&self) -> f64 {
+        self.matters / 100.0
+    }
+
     /// How many.
     pub fn count(&self) -> usize {
         if self.no_replicates {

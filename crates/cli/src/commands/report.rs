@@ -57,6 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         hash: Some(hash.clone()),
         no_evidence: false,
         replicates: arguments.replicates.count(),
+        matters: arguments.replicates.matters(),
     };
     let diagnosed = diagnosis::diagnose(&read.record, &options).map_err(super::explain)?;
     let subject = Subject {

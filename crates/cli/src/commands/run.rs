@@ -190,6 +190,7 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
         hash: Some(hash.clone()),
         no_evidence: arguments.report.is_none(),
         replicates: arguments.replicates.count(),
+        matters: arguments.replicates.matters(),
     };
     let found = diagnosis::diagnose(&read.record, &options).map_err(super::explain)?;
     let times = record.host_time_s.as_ref();

@@ -66,13 +66,29 @@ fn left_over(all: &[Unexplained]) -> Markup {
                         @for channel in channels {
                             tr {
                                 td { code { (channel) } }
-                                td { @for left in all.iter().filter(|u| u.channel == channel) { div { (left.what) } } }
+                                td { @for left in all.iter().filter(|u| u.channel == channel) { (entry(left)) } }
                             }
                         }
                     }
                 }
                 p.note {
                     "What to do: record again, twice as long. What comes again belongs to the sensor or the stand."
+                }
+            }
+        }
+    }
+}
+
+/// One entry, what it does, and what was seen of it, folded.
+fn entry(left: &Unexplained) -> Markup {
+    html! {
+        div {
+            (left.what)
+            @if let Some(c) = &left.consequence { ". " (answer::consequence_of(c, left.material)) }
+            @if !left.details.is_empty() {
+                details {
+                    summary { "what was seen" }
+                    ul { @for seen in &left.details { li { (seen) } } }
                 }
             }
         }

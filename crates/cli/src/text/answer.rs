@@ -1,6 +1,6 @@
 //! A finding in sentences for a person: what it is and how large, what it costs to leave it out, what is still open.
 
-use diagnosis::result::{Finding, Parameter};
+use diagnosis::result::{Consequence, Finding, Parameter};
 use model::effects::effect;
 
 use crate::report::plot::{number, tidy};
@@ -54,9 +54,44 @@ fn named(finding: &Finding) -> Vec<(&String, &Parameter)> {
     first.chain(then).take(NAMED).collect()
 }
 
-/// What leaving it out of the simulation costs in the integrated angle; `None` where the diagnosis has no angle for it.
+/// What leaving it out of the simulation costs; `None` where the diagnosis does not tell.
 #[must_use]
 pub fn cost(finding: &Finding) -> Option<String> {
+    match &finding.consequence {
+        Some(consequence) => Some(consequence_of(consequence, finding.material)),
+        None => cost_in_angle(finding),
+    }
+}
+
+/// What something does to the integrated angle and to the readings.
+#[must_use]
+pub fn consequence_of(of: &Consequence, material: bool) -> String {
+    if !material {
+        return "Too small to matter for an angle or a deviation (`--matters`).".to_owned();
+    }
+    let angles: Vec<String> = (of.angle_rms_deg.iter())
+        .map(|(over, v)| format!("{} deg rms over {}", number(*v, ANGLE_DIGITS), spaced(over)))
+        .collect();
+    let share = format!("{} of the variance", percent(of.share_of_variance));
+    match angles.is_empty() {
+        true => format!("It makes {share} of the readings."),
+        false => format!(
+            "It makes an angle error of {}, and {share}.",
+            angles.join(", ")
+        ),
+    }
+}
+
+/// A share in percent, of two digits.
+fn percent(share: f64) -> String {
+    match 100.0 * share {
+        p if p < 0.01 => "less than 0.01 %".to_owned(),
+        p => format!("{} %", number(p, 2)),
+    }
+}
+
+/// The same by the angle errors that its gain states.
+fn cost_in_angle(finding: &Finding) -> Option<String> {
     let angles = &finding.gain.as_ref()?.angle_rms_deg;
     let finite = |pair: &&[f64; 2]| pair.iter().all(|v| v.is_finite());
     let mut horizons: Vec<(&String, &[f64; 2])> =

@@ -3,9 +3,9 @@
 
 use std::fmt::Write;
 
-use diagnosis::result::{DetectionLimit, Diagnosis, Finding};
+use diagnosis::result::{DetectionLimit, Diagnosis, Finding, Unexplained};
 
-use super::item;
+use super::{answer, item};
 use crate::report::plot::{number, tidy};
 
 /// The details of a diagnosis.
@@ -15,6 +15,7 @@ pub fn details(d: &Diagnosis) -> String {
     for finding in &d.findings {
         write_finding(&mut out, finding);
     }
+    write_unexplained(&mut out, &d.unexplained);
     write_replicates(&mut out, d);
     write_checks(&mut out, d);
     if let Some(walks) = slow_noise(d) {
@@ -32,6 +33,25 @@ pub fn details(d: &Diagnosis) -> String {
     }
     write_limits(&mut out, d);
     out
+}
+
+/// What has no name: each entry, and all that was seen of it.
+fn write_unexplained(out: &mut String, all: &[Unexplained]) {
+    if all.is_empty() {
+        return;
+    }
+    let _ = writeln!(out, "\nleft over, without a name");
+    for left in all {
+        let lead = format!("{}. {}: ", left.rank, left.channel);
+        let _ = writeln!(out, "{}", item(&lead, &left.what));
+        if let Some(c) = &left.consequence {
+            let cost = answer::consequence_of(c, left.material);
+            let _ = writeln!(out, "{}", item("", &cost));
+        }
+        for seen in &left.details {
+            let _ = writeln!(out, "{}", item("- ", seen));
+        }
+    }
 }
 
 /// The record among simulations of the model before and after, a line for each channel.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use diagnosis::result::{Diagnosed, Diagnosis, Parameter, Unexplained, Verdict};
+use diagnosis::result::{Diagnosed, Diagnosis, Finding, Parameter, Unexplained, Verdict};
 use model::file::ModelFile;
 
 use super::{answer, item};
@@ -27,7 +27,8 @@ pub fn diagnosis(diagnosed: &Diagnosed) -> String {
         let _ = writeln!(out, "{}", item("note: ", note));
     }
     let _ = writeln!(out, "verdict  {}", verdict(d));
-    for (k, finding) in d.findings.iter().enumerate() {
+    let small = |f: &&Finding| !f.material;
+    for (k, finding) in d.findings.iter().filter(|f| !small(f)).enumerate() {
         let _ = writeln!(out, "\n{:>2}. {}", k + 1, lead(&answer::headline(finding)));
         let lines = [
             answer::cost(finding),
@@ -42,6 +43,10 @@ pub fn diagnosis(diagnosed: &Diagnosed) -> String {
             let _ = writeln!(out, "{}", item("", not));
         }
     }
+    write_small(
+        &mut out,
+        &d.findings.iter().filter(small).collect::<Vec<_>>(),
+    );
     write_unexplained(&mut out, &d.unexplained);
     write_replicates(&mut out, d);
     write_noise(&mut out, diagnosed);
@@ -93,17 +98,47 @@ fn lead(text: &str) -> String {
     item("", text).trim_start().to_owned()
 }
 
-fn write_unexplained(out: &mut String, all: &[Unexplained]) {
+/// Causes that change no angle error and no deviation by much: a line each.
+fn write_small(out: &mut String, all: &[&Finding]) {
     if all.is_empty() {
         return;
     }
+    let _ = writeln!(
+        out,
+        "\nfound, and too small to matter for an angle or a deviation"
+    );
+    for finding in all {
+        let _ = writeln!(out, "{}", item("", &answer::headline(finding)));
+    }
+}
+
+fn write_unexplained(out: &mut String, all: &[Unexplained]) {
+    let (large, small): (Vec<_>, Vec<_>) = all.iter().partition(|u| u.material);
+    if !small.is_empty() {
+        let mut channels: Vec<&str> = small.iter().map(|u| u.channel.as_str()).collect();
+        channels.sort_unstable();
+        channels.dedup();
+        let on = channels.join(", ");
+        let what = format!(
+            "without a name, and too small to matter: {} on {on} (--details)",
+            small.len()
+        );
+        let _ = writeln!(out, "\n{}", item("", &what).trim_start());
+    }
+    if large.is_empty() {
+        return;
+    }
     let _ = writeln!(out, "\nleft over, without a name");
-    for left in all.iter().take(SHOWN) {
+    for left in large.iter().take(SHOWN) {
         let lead = format!("{}: ", left.channel);
         let _ = writeln!(out, "{}", item(&lead, &shortened(&left.what)));
+        if let Some(c) = &left.consequence {
+            let cost = answer::consequence_of(c, left.material);
+            let _ = writeln!(out, "{}", item("", &cost));
+        }
     }
-    if all.len() > SHOWN {
-        let more = all.len() - SHOWN;
+    if large.len() > SHOWN {
+        let more = large.len() - SHOWN;
         let _ = writeln!(
             out,
             "    and {more} more (all of them: --json, or the report)"

@@ -127,7 +127,7 @@ pub fn diagnosed(record: &Record, seed: u64) -> Diagnosis {
         file: "hidden.csv".into(),
         hash: None,
         no_evidence: true,
-        replicates: 0,
+        ..DiagnoseOptions::default()
     };
     diagnosis::diagnose(&read.record, &options)
         .expect("600 s are enough")

@@ -18,9 +18,9 @@ use crate::audit::MOST_TIMES;
 use crate::criticise::residual;
 use crate::fit::channel::{Form, Term};
 use crate::ingest::base_turns::Excursion;
-use crate::result::{Finding, Parameter, Unexplained};
+use crate::result::{Finding, Parameter};
 use crate::search::searched::Searched;
-use crate::test_level::CheckId;
+use crate::test_level::{CheckId, Observation};
 use numerics::tails;
 
 /// Chance below which a claim fails, over everything that it is asked for. It is asked only where an event is named.
@@ -254,7 +254,7 @@ pub(crate) fn hold_outliers(
     kept: &[Finding],
     findings: &mut Vec<Finding>,
     failing: &dyn Fn(CheckId) -> bool,
-) -> Vec<Unexplained> {
+) -> Vec<Observation> {
     // Far readings at a step are told with it.
     let blow = |f: &Finding| kept.iter().filter_map(step_at).any(|at| blow_of(f, at));
     let own = |f: &mut Finding| {
@@ -286,11 +286,9 @@ fn outliers(
     e: &[f64],
     finding: Finding,
     failing: &dyn Fn(CheckId) -> bool,
-) -> (Option<Finding>, Option<Unexplained>) {
-    let told = |why: &str, what: &str| Unexplained {
-        channel: s.target.name.clone(),
-        what: format!("{why}: {what}"),
-    };
+) -> (Option<Finding>, Option<Observation>) {
+    let told =
+        |why: &str, what: &str| Observation::of_noise(&s.target.name, format!("{why}: {what}"));
     if failing(CheckId::Kurtosis) {
         // Single far readings of a noise whose bulk is not normal are its tails.
         return (None, Some(told("noise with tails", &finding.what)));

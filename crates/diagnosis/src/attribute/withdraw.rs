@@ -12,11 +12,13 @@ mod facts;
 pub(crate) mod propagate;
 mod rules;
 
+use model::effects::effect;
+
 use crate::fit::channel;
-use crate::fit::channel::PowerLawFound;
-use crate::result::{Finding, Unexplained};
+use crate::fit::channel::{PowerLawFound, Term};
+use crate::result::Finding;
 use crate::search::searched::Searched;
-use crate::test_level::CheckId;
+use crate::test_level::{CheckId, Observation};
 
 use facts::Facts;
 pub(crate) use facts::Left;
@@ -48,11 +50,34 @@ fn doubted(facts: &Facts<'_>) -> (Vec<Doubt>, bool) {
 }
 
 /// What the library comes nearest to a channel with.
-pub(crate) fn nearest_of(channel: &str, what: &str) -> Unexplained {
-    Unexplained {
-        channel: channel.into(),
-        what: format!("nearest in the library, though checks fail on it: {what}"),
+pub(crate) fn nearest_of(channel: &str, all: &[Finding]) -> Observation {
+    let told: Vec<&str> = all.iter().map(|f| f.what.as_str()).collect();
+    let what = format!(
+        "nearest in the library, though checks fail on it: {}",
+        told.join("; ")
+    );
+    let titles = all.iter().filter_map(|f| effect(&f.cause));
+    Observation {
+        nearest: titles.map(|e| e.docs().title).collect(),
+        ..Observation::of_noise(channel, what)
     }
+}
+
+/// Places of the terms of a channel that have no name: those in doubt, parts of such a band, and combinations of channels.
+fn fallen(s: &Searched<'_>, doubts: &[Doubt]) -> Vec<usize> {
+    let all = || s.state.terms.iter().zip(doubts);
+    let falls = |(term, doubt): &(&Term, &Doubt)| {
+        !term.is_part() && (**doubt != Doubt::No || term.effect.id() == channel::ID)
+    };
+    let bands: Vec<f64> = (all().filter(falls))
+        .filter_map(|(term, _)| term.cluster.map(|c| c.lr))
+        .collect();
+    let of_band = |term: &Term| term.cluster.is_some_and(|c| bands.contains(&c.lr));
+    let places = all().enumerate();
+    places
+        .filter(|(_, pair)| falls(pair) || of_band(pair.0))
+        .map(|(place, _)| place)
+        .collect()
 }
 
 /// Take the doubted names of a channel out of its findings, given as one for each term and then the rest; what follows a
@@ -63,10 +88,11 @@ pub(crate) fn withdraw(
     of_variance: Option<Finding>,
     failing: &dyn Fn(CheckId) -> bool,
     left: &Left,
-) -> (Vec<Finding>, Vec<Finding>, Vec<Unexplained>) {
+) -> (Vec<Finding>, Vec<Finding>, Vec<Observation>) {
     let (terms, variance) = doubted(&Facts::new(s, failing, left));
     let name = s.target.name.as_str();
     let mut unexplained = vec![];
+    let standing = fallen(s, &terms);
     let (mut kept, mut nearest, mut beside) = (vec![], vec![], vec![]);
     for ((finding, doubt), term) in of_terms.into_iter().zip(terms).zip(&s.state.terms) {
         // It is told with the band that it is a part of.
@@ -74,38 +100,32 @@ pub(crate) fn withdraw(
             continue;
         }
         if term.effect.id() == channel::ID {
-            unexplained.push(Unexplained {
-                channel: name.into(),
-                what: format!(
-                    "follows the {}, which no effect of the library does (likelihood ratio {:.0})",
-                    term.follows.as_deref().unwrap_or_default(),
-                    term.lr
-                ),
-            });
+            let of = term.follows.as_deref().unwrap_or_default();
+            let what = format!(
+                "follows the {of}, which no effect of the library does (likelihood ratio {:.0})",
+                term.lr
+            );
+            unexplained.push(Observation::of_noise(name, what).following(of));
         } else {
             match doubt {
                 Doubt::No => kept.push(finding),
                 Doubt::Checks => nearest.push(finding),
                 Doubt::Beside(of) => {
-                    unexplained.push(Unexplained {
-                        channel: name.into(),
-                        what: format!(
-                            "follows {of}, at whose frequency it swings, late or bent as no effect of the library does: {}",
-                            finding.what
-                        ),
-                    });
+                    let what = format!(
+                        "follows {of}, at whose frequency it swings, late or bent as no effect of the library does: {}",
+                        finding.what
+                    );
+                    unexplained.push(Observation::of_noise(name, what).following(&of));
                     beside.push(finding);
                 }
                 Doubt::Remainder(of, share) => {
                     let of = if of == channel::ID { "that" } else { of };
-                    unexplained.push(Unexplained {
-                        channel: name.into(),
-                        what: format!(
-                            "beside {of}, with {:.1} % of what it explains, and as likely a part of it that its shape leaves out: {}",
-                            100.0 * share,
-                            finding.what
-                        ),
-                    });
+                    let what = format!(
+                        "beside {of}, with {:.1} % of what it explains, and as likely a part of it that its shape leaves out: {}",
+                        100.0 * share,
+                        finding.what
+                    );
+                    unexplained.push(Observation::of_noise(name, what));
                     beside.push(finding);
                 }
             }
@@ -116,16 +136,16 @@ pub(crate) fn withdraw(
         other => kept.extend(other),
     }
     if let Some(PowerLawFound { exponent, .. }) = s.state.power_law {
-        unexplained.push(Unexplained {
-            channel: name.into(),
-            what: format!(
-                "noise whose density falls with the frequency as f^-{exponent:.2} explains this at least as well as the processes of the library, for its freedom, and is none of them"
-            ),
-        });
+        let what = format!(
+            "noise whose density falls with the frequency as f^-{exponent:.2} explains this at least as well as the processes of the library, for its freedom, and is none of them"
+        );
+        unexplained.push(Observation::of_noise(name, what));
     }
     if !nearest.is_empty() {
-        let told: Vec<&str> = nearest.iter().map(|f| f.what.as_str()).collect();
-        unexplained.push(nearest_of(name, &told.join("; ")));
+        unexplained.push(nearest_of(name, &nearest));
+    }
+    if let Some(seen) = unexplained.first_mut() {
+        seen.terms = standing;
     }
     nearest.extend(beside);
     (kept, nearest, unexplained)

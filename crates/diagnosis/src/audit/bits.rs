@@ -16,8 +16,8 @@ use model::Parameter;
 use super::stuck::{self, Verdict};
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};
-use crate::result::{Alternative, Finding, Unexplained};
-use crate::test_level::{AUDIT_LEVEL, CheckId};
+use crate::result::{Alternative, Finding};
+use crate::test_level::{AUDIT_LEVEL, CheckId, Observation};
 use numerics::tails;
 use numerics::tails::ONE_SIDED;
 
@@ -287,14 +287,12 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
                     100.0 * s.fraction
                 )
             });
-            audit.not_normal.push(Unexplained {
-                channel: name.into(),
-                what: format!(
-                    "the codes of {name} have shares that no smooth distribution has ({nats:.0} nats; {:.1} sigma at bit {}), and {bit}",
-                    worst.z.abs(),
-                    worst.bit
-                ),
-            });
+            let what = format!(
+                "the codes of {name} have shares that no smooth distribution has ({nats:.0} nats; {:.1} sigma at bit {}), and {bit}",
+                worst.z.abs(),
+                worst.bit
+            );
+            audit.not_normal.push(Observation::of_readings(name, what));
             Shape::Other
         }
     }

@@ -9,8 +9,7 @@ use std::collections::BTreeMap;
 use model::record::Record;
 
 use super::{Audit, Gyro, LEAST_READINGS};
-use crate::result::Unexplained;
-use crate::test_level::{AUDIT_LEVEL, CheckId};
+use crate::test_level::{AUDIT_LEVEL, CheckId, Observation};
 use numerics::order_statistics::robust_sigma;
 use numerics::tails;
 
@@ -293,9 +292,9 @@ fn pair(a: &Gyro<'_>, b: &Gyro<'_>, audit: &mut Audit) {
                 audit.mask(second, row);
             }
         }
-        audit.unexplained.push(Unexplained {
-            channel: second.clone(),
-            what,
-        });
+        let seen = Observation::of_readings(second, what).following(first);
+        audit
+            .unexplained
+            .push(seen.by(CheckId::EqualReadings, chance));
     }
 }

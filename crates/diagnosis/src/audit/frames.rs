@@ -3,8 +3,7 @@
 use model::record::{Axis, Record, flag};
 
 use super::{Audit, Gyro, counted};
-use crate::result::Unexplained;
-use crate::test_level::CheckId;
+use crate::test_level::{CheckId, Observation};
 use numerics::order_statistics::{median, width};
 
 /// Frames before and after a leap of the time that say whether it lasts.
@@ -175,10 +174,8 @@ fn flags(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
             if let Some(c) = audit.checks.last_mut() {
                 c.fails_after = true;
             }
-            audit.unexplained.push(Unexplained {
-                channel: name.into(),
-                what,
-            });
+            let seen = Observation::of_readings(name, what);
+            audit.unexplained.push(seen.by(CheckId::ErrorAlarm, 0.0));
         }
     }
     for (names, rows) in together(all) {

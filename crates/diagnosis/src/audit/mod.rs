@@ -27,8 +27,8 @@ use std::collections::BTreeMap;
 
 use model::record::{Channel, Quantity, Record};
 
-use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter, Unexplained};
-use crate::test_level::{AUDIT_LEVEL, CheckId};
+use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter};
+use crate::test_level::{AUDIT_LEVEL, CheckId, Observation};
 use local::Local;
 
 /// Steps of a converter that lacks a bit, over the noise, up to which the variance of readings is the same at any level: to
@@ -66,9 +66,9 @@ pub struct Audit {
     /// Causes that one channel could not be asked for: channel, cause.
     pub not_asked: Vec<(String, String)>,
     /// What is wrong and has no name in the library.
-    pub unexplained: Vec<Unexplained>,
+    pub unexplained: Vec<Observation>,
     /// Channels whose counts are not normal about their level; a noise that changes makes them so as well.
-    pub not_normal: Vec<Unexplained>,
+    pub not_normal: Vec<Observation>,
     /// Rows before which frames were lost without a gap of the sequence numbers, and how many.
     pub silently_lost: Vec<(usize, u64)>,
     /// Smallest faults that would have been found.
@@ -237,13 +237,12 @@ impl Audit {
 
     /// What the last check has found has no name in the library.
     fn unexplain(&mut self, channel: &str, what: String) {
+        let mut seen = Observation::of_readings(channel, what);
         if let Some(check) = self.checks.last_mut() {
             check.fails_after = true;
+            seen.check = CheckId::of(&check.id).zip(check.p_value.or(Some(0.0)));
         }
-        self.unexplained.push(Unexplained {
-            channel: channel.into(),
-            what,
-        });
+        self.unexplained.push(seen);
     }
 
     /// A check against a plain limit.

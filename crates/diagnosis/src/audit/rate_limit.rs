@@ -111,7 +111,7 @@ mod tests {
             ..Record::default()
         };
         let audit = super::super::audit(&record);
-        let of_slew = |u: &&crate::result::Unexplained| u.what.contains("change by at most");
+        let of_slew = |u: &&crate::test_level::Observation| u.what.contains("change by at most");
         audit.unexplained.iter().filter(of_slew).count()
     }
 

@@ -5,10 +5,10 @@ use model::effect::{Effect, Found, Hypothesis};
 use crate::criticise::process;
 use crate::fit::{prequential, threshold};
 use crate::ingest::types::Grid;
-use crate::result::{Check, DetectionLimit, Finding, Gain, Unexplained, limit, sentence};
+use crate::result::{Check, DetectionLimit, Finding, Gain, limit, sentence};
 use crate::search::searched::Searched;
 use crate::test_level;
-use crate::test_level::{CheckId, OMNIBUS_LEVEL};
+use crate::test_level::{CheckId, OMNIBUS_LEVEL, Observation};
 use numerics::column::{dot, dots_behind};
 use numerics::tails;
 use numerics::tails::ONE_SIDED;
@@ -20,7 +20,7 @@ const LEAST_OF_ALL: f64 = 0.5;
 pub(crate) struct Shared {
     pub checks: Vec<Check>,
     pub finding: Option<Finding>,
-    pub left: Vec<Unexplained>,
+    pub left: Vec<Observation>,
     /// Smallest source that would have been found, by channel.
     pub limits: Vec<DetectionLimit>,
     /// Channels that follow another one some samples later, and the chi-square of that.
@@ -111,10 +111,9 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
             what: claim.what.clone(),
         });
         if doubted {
-            shared.left.push(Unexplained {
-                channel: a.target.name.clone(),
-                what: format!("with {}, {}", b.target.name, claim.what),
-            });
+            let what = format!("with {}, {}", b.target.name, claim.what);
+            let seen = Observation::of_coupling(&a.target.name, what, *r);
+            shared.left.push(seen.by(claim.id, claim.p_value));
         }
     }
     if let (Some(of), true) = (of, positive && straight) {
@@ -183,13 +182,11 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
             what: "correlation of the whitened residuals of two axes".into(),
         });
         if fails && !explained {
-            shared.left.push(Unexplained {
-                channel: a.target.name.clone(),
-                what: format!(
-                    "correlates with {} ({r:.3}) sample by sample",
-                    b.target.name
-                ),
-            });
+            let other = &b.target.name;
+            let what = format!("correlates with {other} ({r:.3}) sample by sample");
+            let seen = Observation::of_coupling(&a.target.name, what, *r);
+            let seen = seen.by(CheckId::CrossCorrelation, *p);
+            shared.left.push(seen.following(other));
         }
     }
     for (i, a) in searched.iter().enumerate() {
@@ -275,9 +272,8 @@ fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
     });
     if fails {
         shared.late.push((second.target.name.clone(), statistic));
-        shared.left.push(Unexplained {
-            channel: second.target.name.clone(),
-            what,
-        });
+        let seen = Observation::of_coupling(&second.target.name, what, r);
+        let seen = seen.by(CheckId::CrossCorrelationLate, p);
+        shared.left.push(seen.following(&first.target.name));
     }
 }

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use model::record::{Channel, Quantity, Record, flag};
 
 use crate::ingest::grid::LEAST_SAMPLES;
-use crate::result::Unexplained;
+use crate::test_level::Observation;
 use model::record::AnalysisError;
 
 /// Readings that are there and, where there are flags, new.
@@ -61,14 +61,15 @@ fn why(record: &Record, channel: &Channel) -> Option<String> {
 ///
 /// # Errors
 /// [`AnalysisError::NeverNew`] where none is left alive because the flags say that nothing is new.
-pub fn left_out(record: &Record) -> Result<(Cow<'_, Record>, Vec<Unexplained>), AnalysisError> {
-    let dead: Vec<Unexplained> = record
+pub fn left_out(record: &Record) -> Result<(Cow<'_, Record>, Vec<Observation>), AnalysisError> {
+    let dead: Vec<Observation> = record
         .all(Quantity::Gyro)
         .filter_map(|c| {
-            why(record, c).map(|what| Unexplained {
-                channel: c.name.clone(),
-                what: format!("{what}; it is left out"),
-            })
+            let why = why(record, c)?;
+            Some(Observation::of_readings(
+                &c.name,
+                format!("{why}; it is left out"),
+            ))
         })
         .collect();
     let gyros = record.all(Quantity::Gyro).count();

@@ -64,6 +64,7 @@ impl Table {
                             low: held().fold(f64::INFINITY, f64::min),
                             high: held().fold(f64::NEG_INFINITY, f64::max),
                             unit: statistics[k].unit.clone(),
+                            with: statistics[k].with.clone(),
                         }
                     }),
                 }
@@ -152,6 +153,7 @@ mod tests {
         let statistics = ["a", "b"].map(|what| Statistic {
             what: what.into(),
             unit: "1".into(),
+            with: None,
         });
         let rows = (0..200).map(|i| {
             let x = f64::from(i) / 200.0;

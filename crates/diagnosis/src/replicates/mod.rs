@@ -4,6 +4,7 @@
 //! of every replicate, and a global envelope test says how often a record of the model strays, anywhere, as far as the
 //! measured one does (docs/replicates.md).
 
+pub(crate) mod consequence;
 mod envelope;
 mod judge;
 mod statistics;

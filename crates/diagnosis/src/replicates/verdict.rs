@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::result::{Check, LEVEL, Replicated, Unexplained, Verdict};
+use crate::result::{Check, LEVEL, Replicated};
+use crate::test_level::Observation;
 
 /// Id of the check, and of the entry where the replicates do not hold the record.
 const ID: &str = "replicates";
@@ -10,20 +11,17 @@ const ID: &str = "replicates";
 /// What follows from the record among its replicates.
 pub(crate) struct Held {
     pub checks: Vec<Check>,
-    pub unexplained: Vec<Unexplained>,
+    pub unexplained: Vec<Observation>,
 }
 
 /// The checks, and what is unexplained by a model of that verdict.
 ///
-/// An extended model has to hold the record in every channel. Of a baseline to which nothing was found the
+/// `adequate` says that nothing was found and nothing is left. An extended model has to hold the record in every channel. Of a baseline to which nothing was found the
 /// whole search has said that it describes the record, at a level of alarms far below that of the replicates: it falls
 /// only where none of `count` replicates strays as far as the record.
-pub(crate) fn held(all: &BTreeMap<String, Replicated>, verdict: Verdict, count: usize) -> Held {
+pub(crate) fn held(all: &BTreeMap<String, Replicated>, adequate: bool, count: usize) -> Held {
     let least = 1.0 / (count + 1) as f64;
-    let limit = match verdict {
-        Verdict::Adequate => least.min(LEVEL),
-        Verdict::Extended | Verdict::Unexplained => LEVEL,
-    };
+    let limit = if adequate { least.min(LEVEL) } else { LEVEL };
     let check = |(name, r): (&String, &Replicated)| Check {
         id: ID.into(),
         about: vec![],
@@ -41,18 +39,21 @@ pub(crate) fn held(all: &BTreeMap<String, Replicated>, verdict: Verdict, count: 
         ),
     };
     let entry = |(name, r): (&String, &Replicated)| {
-        let worse = if r.before.holds() && verdict != Verdict::Adequate {
+        let worse = if r.before.holds() && !adequate {
             "; the baseline model alone holds it: the extended one is worse here"
         } else {
             ""
         };
-        Unexplained {
-            channel: name.clone(),
-            what: format!(
-                "the replicates of the model do not hold the record (chance {}): {}{worse}",
-                chance(r.after.p_value, count),
-                r.after.strays()
-            ),
+        let what = format!(
+            "the replicates of the model do not hold the record (chance {}): {}{worse}",
+            chance(r.after.p_value, count),
+            r.after.strays()
+        );
+        match &r.after.worst.with {
+            Some(other) => {
+                Observation::of_coupling(name, what, r.after.worst.value).following(other)
+            }
+            None => Observation::of_noise(name, what),
         }
     };
     Held {

@@ -14,9 +14,9 @@ use crate::fit::{estimate, prequential, threshold};
 use crate::ingest::types::Grid;
 use crate::report::{detection_limits, figures};
 use crate::result;
-use crate::result::{Alternative, DetectionLimit, Finding, Gain, Unexplained, sentence};
+use crate::result::{Alternative, DetectionLimit, Finding, Gain, sentence};
 use crate::search::searched::Searched;
-use crate::test_level::CheckId;
+use crate::test_level::{CheckId, Observation};
 use numerics::transform::Dct;
 
 pub(crate) fn experiment(of: &dyn Effect, alternatives: &[Alternative]) -> Option<String> {
@@ -258,7 +258,7 @@ pub(crate) fn motion_findings(
     s: &Searched<'_>,
     grid: &Grid,
     failing: &dyn Fn(CheckId) -> bool,
-) -> (Vec<Finding>, Vec<Unexplained>) {
+) -> (Vec<Finding>, Vec<Observation>) {
     let candidates = &mut s.search.candidates.iter();
     let of = candidates.find(|c| matches!(c.hypothesis, Hypothesis::Motion));
     let Some(of) = of.map(|c| c.effect) else {
@@ -290,10 +290,8 @@ pub(crate) fn motion_findings(
             all.push(finding(e.peak, ends.to_vec(), what));
             continue;
         };
-        told.push(Unexplained {
-            channel: name.clone(),
-            what: format!("goes out and comes back {seen}: no turn of the base, for {why}"),
-        });
+        let what = format!("goes out and comes back {seen}: no turn of the base, for {why}");
+        told.push(Observation::of_noise(name, what));
     }
     if s.target.moving && grid.base != Some(Base::Turntable) {
         let peak = peak_rate(&grid.dct, &s.target.y, s.target.white, grid.rate_hz);

@@ -261,7 +261,7 @@ pub(crate) fn size_outliers(findings: &mut [Finding], searched: &[Searched<'_>])
 }
 
 /// The effects of the extended model: the causes, and what stands for the unexplained in it.
-fn effects_of(findings: &[&Finding]) -> Vec<EffectModel> {
+pub(crate) fn effects_of(findings: &[&Finding]) -> Vec<EffectModel> {
     let mut all = vec![];
     for f in findings {
         let Some(e) = effect(&f.cause) else { continue };

@@ -1,7 +1,9 @@
 //! Findings, detection limits and figures.
 
 pub mod detection_limits;
+pub(crate) mod entries;
 pub mod figures;
 pub mod findings;
 pub mod handover;
+pub(crate) mod left_over;
 pub mod untested;

@@ -17,6 +17,9 @@ pub struct Worst {
     pub high: f64,
     /// Unit of the three.
     pub unit: String,
+    /// The other axis, where the statistic is of two: for rules, and in no file.
+    #[serde(skip)]
+    pub with: Option<String>,
 }
 
 /// The record among the replicates of one model.

@@ -1,5 +1,6 @@
 //! A model in a world: what chance has no part in is done, the rest is drawn.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
 
 use rand_core::SeedableRng;
@@ -22,6 +23,16 @@ struct Acting {
 impl Acting {
     fn on(&self, run: &mut Simulation) {
         self.effect.simulate(&self.parameters, &self.axes, run);
+    }
+
+    /// A number of its own: what is drawn for it does not depend on what else a model holds.
+    fn stream(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        (self.effect.id(), &self.axes).hash(&mut hasher);
+        for (name, p) in &self.parameters {
+            (name, p.value.to_bits()).hash(&mut hasher);
+        }
+        hasher.finish()
     }
 
     /// Whether chance has a part in it: it takes random numbers even for two samples in a world at rest.
@@ -52,7 +63,13 @@ pub(super) struct Prepared {
     late: Vec<Acting>,
     /// Slow part of the axes that moved, deg/s.
     read: [Option<Vec<f64>>; 3],
+    /// Seed, where each effect and each axis has random numbers of its own.
+    pub apart: Option<u64>,
 }
+
+/// Numbers of the random walks and the white noise of the axes among the streams, before those of effects.
+const WALKS: u64 = 0;
+const WHITES: u64 = 3;
 
 impl Prepared {
     pub fn new(
@@ -106,6 +123,7 @@ impl Prepared {
             random,
             late,
             read,
+            apart: None,
         };
         prepared.sized();
         Ok(prepared)
@@ -167,20 +185,32 @@ impl Prepared {
         run.host_time.clone_from(&run.device_time);
     }
 
+    /// Random numbers of a stream, where there are some of its own.
+    fn begin(&mut self, stream: u64) {
+        if let Some(seed) = self.apart {
+            let mut hasher = DefaultHasher::new();
+            (seed, stream).hash(&mut hasher);
+            self.run.rng = Xoshiro256PlusPlus::seed_from_u64(hasher.finish());
+        }
+    }
+
     /// Draw what is random, up to the counts.
     pub fn draw(&mut self) {
         let present = self.present;
         self.run.shared.iter_mut().for_each(Vec::clear);
         for axis in (0..3).filter(|a| present[*a]) {
+            self.begin(WALKS + axis as u64);
             wander(&mut self.run, axis, self.walk[axis]);
         }
-        for acting in &self.random {
-            acting.on(&mut self.run);
+        for k in 0..self.random.len() {
+            self.begin(self.random[k].stream());
+            self.random[k].on(&mut self.run);
         }
         if self.random.iter().any(|a| a.effect.stage() == Stage::Noise) {
             self.sized();
         }
         for axis in (0..3).filter(|a| present[*a]) {
+            self.begin(WHITES + axis as u64);
             let mut white = std::mem::take(&mut self.run.white[axis]);
             white.clear();
             let run = &mut self.run;
@@ -204,8 +234,11 @@ impl Prepared {
     }
 
     fn stage(&mut self, at: Stage) {
-        for acting in self.late.iter().filter(|a| a.effect.stage() == at) {
-            acting.on(&mut self.run);
+        for k in 0..self.late.len() {
+            if self.late[k].effect.stage() == at {
+                self.begin(self.late[k].stream());
+                self.late[k].on(&mut self.run);
+            }
         }
     }
 

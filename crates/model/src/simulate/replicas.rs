@@ -68,8 +68,19 @@ impl Replicas {
         })
     }
 
+    /// From now on each effect and each axis has random numbers of its own: replicates of two models by one seed differ
+    /// by what the models differ in.
+    #[must_use]
+    pub fn apart(mut self) -> Self {
+        self.prepared.apart = Some(0);
+        self
+    }
+
     /// Simulates once more, and puts the readings of each channel of the model into `readings`, in its order.
     pub fn draw(&mut self, seed: u64, readings: &mut Vec<Vec<f64>>) {
+        if let Some(apart) = &mut self.prepared.apart {
+            *apart = seed;
+        }
         let run = &mut self.prepared.run;
         run.rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         for (rate, start) in run.rate.iter_mut().zip(&self.rate) {
@@ -158,6 +169,37 @@ mod tests {
         replicas.draw(5, &mut again);
         assert_eq!(first, again);
         assert_ne!(first, other);
+        Ok(())
+    }
+
+    #[test]
+    fn replicas_apart_differ_by_what_their_models_differ_in() -> Tested {
+        let noise: &[_] = &[("sigma", 0.5, "deg/s"), ("correlation_time", 2.0, "s")];
+        let hum: &[_] = &[("bias_instability", 300.0, "deg/h")];
+        let white: &[_] = &[("angle_random_walk", 5.0), ("rate_random_walk", 0.01)];
+        let mut drawn = vec![];
+        for effects in [
+            &[("flicker", hum), ("gauss_markov", noise)][..],
+            &[("flicker", hum)],
+            &[],
+        ] {
+            let model = stand(white, effects);
+            let record = crate::simulate(&stand(white, &[]), 100.0, 20.0, 1)?;
+            let mut readings = vec![];
+            Replicas::new(&model, &record, 20.0, &[])?
+                .apart()
+                .draw(5, &mut readings);
+            drawn.push(readings[0].clone());
+        }
+        let apart = |a: &[f64], b: &[f64]| -> f64 {
+            let square = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            (square / a.len() as f64).sqrt()
+        };
+        // 100 s are 50 correlation times: the size of the process to 10 %, three times that allowed, rounding included.
+        let process = apart(&drawn[0], &drawn[1]);
+        assert!((process - 0.5).abs() < 0.15, "{process}");
+        let hum = apart(&drawn[1], &drawn[2]);
+        assert!(hum > 0.02 && hum < 0.4, "{hum}");
         Ok(())
     }
 

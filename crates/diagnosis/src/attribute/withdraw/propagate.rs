@@ -12,9 +12,9 @@ use super::{Doubt, nearest_of};
 use crate::criticise::residual;
 use crate::fit::channel;
 use crate::fit::channel::{Form, Term};
-use crate::result::{Check, Finding, Unexplained};
+use crate::result::{Check, Finding};
 use crate::search::searched::Searched;
-use crate::test_level::CheckId;
+use crate::test_level::{CheckId, Observation};
 
 /// Share of the noise where a term acts that a fallen process makes, from which on the term may be a piece of it.
 const MADE: f64 = 0.25;
@@ -150,12 +150,12 @@ pub(crate) fn stale(
     s: &Searched<'_>,
     findings: &mut Vec<Finding>,
     failing: &dyn Fn(CheckId) -> bool,
-) -> Vec<Unexplained> {
+) -> Vec<Observation> {
     if !failing(CheckId::Kurtosis) || residual::excess_kurtosis(&s.e) > 0.0 {
         return vec![];
     }
     let name = s.target.name.as_str();
     let own = |f: &mut Finding| f.cause == "stale_samples" && f.channels == [name];
     let fallen = findings.extract_if(.., own);
-    fallen.map(|f| nearest_of(name, &f.what)).collect()
+    fallen.map(|f| nearest_of(name, &[f])).collect()
 }

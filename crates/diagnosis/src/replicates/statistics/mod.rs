@@ -22,6 +22,8 @@ pub(super) struct Statistic {
     pub what: String,
     /// Its unit.
     pub unit: String,
+    /// The other axis, where it is of two.
+    pub with: Option<String>,
 }
 
 impl Statistic {
@@ -29,7 +31,13 @@ impl Statistic {
         Self {
             what: what.into(),
             unit: unit.to_owned(),
+            with: None,
         }
+    }
+
+    fn with(mut self, other: &str) -> Self {
+        self.with = Some(other.to_owned());
+        self
     }
 }
 

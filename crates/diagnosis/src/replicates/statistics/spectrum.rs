@@ -217,11 +217,9 @@ impl Spectrum {
 
     pub fn name_with(&self, other: &str, all: &mut Vec<Statistic>) {
         let top = short(0.5 * self.rate_hz / SLOW as f64);
-        all.push(Statistic::new(format!("correlation with {other}"), "1"));
-        all.push(Statistic::new(
-            format!("correlation with {other} below {top} Hz"),
-            "1",
-        ));
+        let both = format!("correlation with {other}");
+        all.push(Statistic::new(both.as_str(), "1").with(other));
+        all.push(Statistic::new(format!("{both} below {top} Hz"), "1").with(other));
     }
 
     pub fn take_with(&self, one: &Whitened, other: &Whitened, all: &mut Vec<f64>) {

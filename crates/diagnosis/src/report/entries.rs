@@ -1,0 +1,224 @@
+//! What has no name, as entries: what is seen of one thing is one entry, with its place, its size and what it does.
+
+use std::collections::BTreeSet;
+
+use crate::ingest::types::Grid;
+use crate::report::left_over::{Left, left_over};
+use crate::result::{Consequence, Unexplained};
+use crate::search::searched::Searched;
+use crate::test_level::{CheckId, Domain, Observation};
+
+/// Share of the variance that axes have in common from which on it matters: the deviation of their sum or difference is
+/// off by about half of it.
+fn coupling_matters(correlation: f64, matters: f64) -> bool {
+    (1.0 + correlation.abs()).sqrt() - 1.0 > matters
+}
+
+/// The entries of a record. Observations of the noise of one channel are views of one residual, and one entry; so are those
+/// of what an axis has in common with others. A fault of the readings stands for itself.
+pub(crate) fn entries(
+    all: Vec<Observation>,
+    searched: &[Searched<'_>],
+    grid: &Grid,
+    matters: f64,
+) -> Vec<Unexplained> {
+    let mut groups: Vec<Vec<Observation>> = vec![];
+    for seen in all {
+        let together = |group: &&mut Vec<Observation>| {
+            let first = &group[0];
+            seen.domain != Domain::Readings
+                && (first.domain, &first.channel) == (seen.domain, &seen.channel)
+        };
+        match groups.iter_mut().find(together) {
+            Some(group) => group.push(seen),
+            None => groups.push(vec![seen]),
+        }
+    }
+    let entry = |group: Vec<Observation>| {
+        let own = searched.iter().find(|s| s.target.name == group[0].channel);
+        match (group[0].domain, own) {
+            (Domain::Noise, Some(s)) => of_noise(&group, s, grid, matters),
+            (Domain::Coupling, Some(s)) => of_coupling(&group, s, matters),
+            _ => plain(&group),
+        }
+    };
+    groups.into_iter().map(entry).collect()
+}
+
+/// An entry whose consequence nobody knows.
+fn plain(group: &[Observation]) -> Unexplained {
+    let checks: BTreeSet<CheckId> = group.iter().filter_map(|o| o.check).map(|c| c.0).collect();
+    Unexplained {
+        channel: group[0].channel.clone(),
+        what: group[0].what.clone(),
+        details: match group {
+            [_] => vec![],
+            _ => group.iter().map(|o| o.what.clone()).collect(),
+        },
+        follows: group.iter().find_map(|o| o.follows.first().cloned()),
+        checks: checks.into_iter().map(String::from).collect(),
+        material: true,
+        ..Unexplained::default()
+    }
+}
+
+fn of_coupling(group: &[Observation], s: &Searched<'_>, matters: f64) -> Unexplained {
+    let all = group.iter().filter_map(|o| o.correlation);
+    let largest = all.fold(
+        0.0f64,
+        |most, r| if r.abs() > most.abs() { r } else { most },
+    );
+    let with: BTreeSet<&str> = group
+        .iter()
+        .flat_map(|o| &o.follows)
+        .map(String::as_str)
+        .collect();
+    let with: Vec<&str> = with.into_iter().collect();
+    let others = match with.as_slice() {
+        [] => "another axis".to_owned(),
+        some => some.join(" and "),
+    };
+    Unexplained {
+        what: format!(
+            "shares noise with {others} (correlation {largest:+.3}), as no cause found makes it"
+        ),
+        rms: Some((largest.abs() * s.state.solution.white).sqrt()),
+        share_of_variance: Some(largest.abs()),
+        details: group.iter().map(|o| o.what.clone()).collect(),
+        material: coupling_matters(largest, matters),
+        ..plain(group)
+    }
+}
+
+fn of_noise(group: &[Observation], s: &Searched<'_>, grid: &Grid, matters: f64) -> Unexplained {
+    let terms: Vec<usize> = group.iter().flat_map(|o| o.terms.iter().copied()).collect();
+    let Left {
+        rms,
+        share_of_variance,
+        band_hz,
+        span_s,
+        consequence,
+        local_change,
+    } = left_over(s, grid, &terms);
+    let band_hz = stated(group, grid.rate_hz).or(band_hz);
+    let material = consequence.largest_change.max(local_change) > matters;
+    let follows = group.iter().flat_map(|o| &o.follows);
+    let follows: BTreeSet<&String> = follows.filter(|c| **c != s.target.name).collect();
+    let follows: Vec<&String> = follows.into_iter().collect();
+    let entry = Unexplained {
+        rms,
+        share_of_variance,
+        band_hz,
+        span_s,
+        follows: follows.first().map(|c| (*c).clone()),
+        details: group.iter().map(|o| o.what.clone()).collect(),
+        consequence: Some(consequence),
+        material,
+        ..plain(group)
+    };
+    Unexplained {
+        what: sentence(group, &entry, &follows, &s.target.unit),
+        ..entry
+    }
+}
+
+/// The place that an observation states, Hz.
+fn stated(group: &[Observation], rate_hz: f64) -> Option<[f64; 2]> {
+    let place = group.iter().find_map(|o| o.place)?;
+    Some(place.map(|share| 0.5 * rate_hz * share))
+}
+
+/// One sentence: what, where, how large, what comes nearest.
+fn sentence(group: &[Observation], entry: &Unexplained, follows: &[&String], unit: &str) -> String {
+    let checks = group.iter().filter_map(|o| o.check);
+    let lead = checks.min_by(|a, b| a.1.total_cmp(&b.1)).map(|c| c.0);
+    let mut parts = vec![match (lead.and_then(CheckId::seen_as), follows) {
+        (Some(seen), []) => seen.to_owned(),
+        (Some(seen), some) => format!("{seen}, with {}", joined(some)),
+        (None, []) => group[0].what.clone(),
+        (None, some) => format!("follows {} as no cause does", joined(some)),
+    }];
+    if let Some([low, high]) = entry.band_hz {
+        parts.push(format!("{} to {} Hz", digits(low), digits(high)));
+    }
+    if let Some([from, to]) = entry.span_s {
+        parts.push(format!("from {from:.0} to {to:.0} s"));
+    }
+    if let (Some(rms), Some(share)) = (entry.rms, entry.share_of_variance) {
+        parts.push(format!(
+            "{} {unit} rms ({:.1} % of the variance)",
+            digits(rms),
+            100.0 * share
+        ));
+    }
+    let nearest: BTreeSet<&str> = group.iter().flat_map(|o| &o.nearest).copied().collect();
+    if !nearest.is_empty() {
+        let names: Vec<String> = nearest.iter().map(|n| n.to_lowercase()).collect();
+        parts.push(format!("nearest cause: {}", names.join(", ")));
+    }
+    parts.join("; ")
+}
+
+fn joined(names: &[&String]) -> String {
+    let names: Vec<&str> = names.iter().map(|n| n.as_str()).collect();
+    names.join(" and ")
+}
+
+/// Three digits.
+fn digits(v: f64) -> String {
+    if v == 0.0 {
+        return "0".into();
+    }
+    let places = 2 - v.abs().log10().floor() as i32;
+    if places > 6 {
+        return format!("{v:.2e}");
+    }
+    format!("{v:.*}", places.max(0) as usize)
+}
+
+/// Something that has a place in the order.
+pub(crate) trait Ranked {
+    /// What it does, where that is known.
+    fn consequence(&self) -> Option<&Consequence>;
+    /// Whether that matters.
+    fn material(&self) -> bool;
+    /// Takes its place.
+    fn rank(&mut self, place: usize);
+}
+
+impl Ranked for Unexplained {
+    fn consequence(&self) -> Option<&Consequence> {
+        self.consequence.as_ref()
+    }
+    fn material(&self) -> bool {
+        self.material
+    }
+    fn rank(&mut self, place: usize) {
+        self.rank = place;
+    }
+}
+
+impl Ranked for crate::result::Finding {
+    fn consequence(&self) -> Option<&Consequence> {
+        self.consequence.as_ref()
+    }
+    fn material(&self) -> bool {
+        self.material
+    }
+    fn rank(&mut self, place: usize) {
+        self.rank = place;
+    }
+}
+
+/// Gives all their places: what matters first, by how much it changes; what is not known to be small stands before what is.
+pub(crate) fn rank(mut all: Vec<&mut dyn Ranked>) {
+    let size = |r: &dyn Ranked| r.consequence().map_or(0.0, |c| c.largest_change);
+    all.sort_by(|a, b| {
+        let of = |r: &dyn Ranked| (r.material(), size(r));
+        let (a, b) = (of(&**a), of(&**b));
+        b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+    });
+    for (place, r) in all.into_iter().enumerate() {
+        r.rank(place + 1);
+    }
+}

@@ -1,0 +1,73 @@
+//! What has no name, and what a finding or an entry without a name does.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// What something does to a channel.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Consequence {
+    /// Share of the variance of the readings.
+    pub share_of_variance: f64,
+    /// Angle error that it makes by itself, deg rms, by horizon (`10s`, `100s`); horizons longer than a quarter of the
+    /// record are left out.
+    pub angle_rms_deg: BTreeMap<String, f64>,
+    /// Largest change of an angle error over these horizons, or of an Allan deviation at an octave, relative.
+    pub largest_change: f64,
+}
+
+/// Structure that no effect of the library explains: one entry for what is seen of one thing.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Unexplained {
+    /// The channel.
+    pub channel: String,
+    /// What is seen, where, how large, in one sentence.
+    pub what: String,
+    /// Each observation of it, in full.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub details: Vec<String>,
+    /// Its size, in the unit of the channel.
+    #[serde(default)]
+    pub rms: Option<f64>,
+    /// Its share of the variance of the readings.
+    #[serde(default)]
+    pub share_of_variance: Option<f64>,
+    /// Lowest and highest frequency, Hz, where it has such a place.
+    #[serde(default)]
+    pub band_hz: Option<[f64; 2]>,
+    /// Start and end, s from the start of the record, where it lasts for a part of it.
+    #[serde(default)]
+    pub span_s: Option<[f64; 2]>,
+    /// Times of its events, s from the start.
+    #[serde(default)]
+    pub times_s: Vec<f64>,
+    /// The recorded channel that it follows.
+    #[serde(default)]
+    pub follows: Option<String>,
+    /// Ids of the checks that see it.
+    #[serde(default)]
+    pub checks: Vec<String>,
+    /// What it does, where that can be told.
+    #[serde(default)]
+    pub consequence: Option<Consequence>,
+    /// Whether it changes an angle or a deviation by more than the threshold, or its consequence is not known.
+    #[serde(default = "material")]
+    pub material: bool,
+    /// Place among findings and unexplained entries by consequence, the largest first.
+    #[serde(default)]
+    pub rank: usize,
+}
+
+/// Of a file that does not say: nothing tells that it is small.
+pub(super) fn material() -> bool {
+    true
+}
+
+impl Unexplained {
+    /// Whether its sentence, or an observation of it, holds these words.
+    #[must_use]
+    pub fn says(&self, words: &str) -> bool {
+        let all = self.details.iter().chain([&self.what]);
+        all.into_iter().any(|text| text.contains(words))
+    }
+}
