@@ -55,6 +55,43 @@ pub(crate) fn segments(runs: &[Range<usize>], slots: &[u64]) -> Vec<Vec<Range<us
     out
 }
 
+/// Sums over differences of clusters.
+#[derive(Clone, Copy, Debug, Default)]
+struct Summed {
+    squares: f64,
+    inflation: f64,
+    n: usize,
+    possible: usize,
+}
+
+impl Summed {
+    /// The variance is the mean square over `divisor`.
+    fn estimate(
+        self,
+        of: &Gapped,
+        divisor: f64,
+        tau0: f64,
+        m: usize,
+        white_share: f64,
+    ) -> Option<GappedEstimate> {
+        let Self {
+            squares,
+            inflation,
+            n,
+            possible,
+        } = self;
+        of.estimate(
+            squares / divisor,
+            inflation,
+            n,
+            possible,
+            tau0,
+            m,
+            white_share,
+        )
+    }
+}
+
 impl Gapped {
     /// Of the readings in `runs` (rows without a gap between them); `slots` is the place of each row on the grid of
     /// sample times ([`model::record::sampling::Sampling::slots`]).
@@ -127,28 +164,9 @@ impl Gapped {
         stride: usize,
         white_share: f64,
     ) -> Option<GappedEstimate> {
-        let needed = self.needed(m);
-        let (mut squares, mut inflation, mut n, mut possible) = (0.0, 0.0, 0usize, 0usize);
-        for Segment { sums, counts } in &self.segments {
-            let Some(terms) = sums.len().checked_sub(2 * m).filter(|t| *t > 0 && m > 0) else {
-                continue;
-            };
-            possible += terms.div_ceil(stride);
-            for k in (0..terms).step_by(stride) {
-                let first = counts[k + m] - counts[k];
-                let second = counts[k + 2 * m] - counts[k + m];
-                if first < needed || second < needed {
-                    continue;
-                }
-                let (first, second) = (f64::from(first), f64::from(second));
-                let difference =
-                    (sums[k + 2 * m] - sums[k + m]) / second - (sums[k + m] - sums[k]) / first;
-                squares += difference * difference;
-                inflation += 0.5 * m as f64 * (1.0 / first + 1.0 / second);
-                n += 1;
-            }
-        }
-        self.estimate(squares / 2.0, inflation, n, possible, tau0, m, white_share)
+        let white = |[first, second]: [f64; 2]| 0.5 * m as f64 * (1.0 / first + 1.0 / second);
+        self.differences((m, stride), |[first, second]| second - first, white)
+            .estimate(self, 2.0, tau0, m, white_share)
     }
 
     /// Overlapping Hadamard deviation at `m`, by the same rules: (ȳ₃ − 2ȳ₂ + ȳ₁)²/6, the white part divided by the mean of
@@ -176,29 +194,45 @@ impl Gapped {
         stride: usize,
         white_share: f64,
     ) -> Option<GappedEstimate> {
+        let white = |[first, second, third]: [f64; 3]| {
+            m as f64 * (1.0 / first + 4.0 / second + 1.0 / third) / 6.0
+        };
+        let difference = |[first, second, third]: [f64; 3]| third - 2.0 * second + first;
+        self.differences((m, stride), difference, white)
+            .estimate(self, 6.0, tau0, m, white_share)
+    }
+
+    /// Sums over `CLUSTERS` neighbouring clusters of `m` slots, every `stride`-th: of the squared difference of their means,
+    /// and of what so many samples make of the variance of white noise.
+    fn differences<const CLUSTERS: usize>(
+        &self,
+        (m, stride): (usize, usize),
+        difference: impl Fn([f64; CLUSTERS]) -> f64,
+        white: impl Fn([f64; CLUSTERS]) -> f64,
+    ) -> Summed {
         let needed = self.needed(m);
-        let (mut squares, mut inflation, mut n, mut possible) = (0.0, 0.0, 0usize, 0usize);
+        let mut all = Summed::default();
         for Segment { sums, counts } in &self.segments {
-            let Some(terms) = sums.len().checked_sub(3 * m).filter(|t| *t > 0 && m > 0) else {
+            let terms = sums.len().checked_sub(CLUSTERS * m);
+            let Some(terms) = terms.filter(|t| *t > 0 && m > 0) else {
                 continue;
             };
-            possible += terms.div_ceil(stride);
+            all.possible += terms.div_ceil(stride);
             for k in (0..terms).step_by(stride) {
-                let filled: [u32; 3] =
+                let filled: [u32; CLUSTERS] =
                     std::array::from_fn(|i| counts[k + (i + 1) * m] - counts[k + i * m]);
                 if filled.iter().any(|f| *f < needed) {
                     continue;
                 }
-                let mean =
-                    |i: usize| (sums[k + (i + 1) * m] - sums[k + i * m]) / f64::from(filled[i]);
-                let difference = mean(2) - 2.0 * mean(1) + mean(0);
-                squares += difference * difference;
-                let [first, second, third] = filled.map(f64::from);
-                inflation += m as f64 * (1.0 / first + 4.0 / second + 1.0 / third) / 6.0;
-                n += 1;
+                let filled = filled.map(f64::from);
+                let means =
+                    std::array::from_fn(|i| (sums[k + (i + 1) * m] - sums[k + i * m]) / filled[i]);
+                all.squares += difference(means).powi(2);
+                all.inflation += white(filled);
+                all.n += 1;
             }
         }
-        self.estimate(squares / 6.0, inflation, n, possible, tau0, m, white_share)
+        all
     }
 
     /// Samples that a cluster of `m` slots needs.

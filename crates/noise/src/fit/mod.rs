@@ -49,6 +49,28 @@ pub struct Estimated {
     pub high: f64,
 }
 
+impl Estimated {
+    /// A value with the ends of its 95 % interval.
+    fn within(value: f64, low: f64, high: f64) -> Self {
+        Self {
+            value: Some(value),
+            std_error: Some((high - low) / (2.0 * 1.959_964)),
+            low,
+            high,
+        }
+    }
+
+    /// A term that is not established, with its upper limit.
+    fn limit(high: f64) -> Self {
+        Self {
+            value: None,
+            std_error: None,
+            low: 0.0,
+            high,
+        }
+    }
+}
+
 /// A fit of the noise terms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoiseFit {
@@ -169,19 +191,9 @@ pub fn fit(spectrum: &Spectrum) -> NoiseFit {
             let own = profile_interval(spectrum, model, t, &maximum, DROP_90);
             let low = low.min(term.letter(own.0, tau0));
             let high = high.max(term.letter(own.1, tau0));
-            Estimated {
-                value: Some(value),
-                std_error: Some((high - low) / (2.0 * 1.959_964)),
-                low,
-                high,
-            }
+            Estimated::within(value, low, high)
         } else {
-            Estimated {
-                value: None,
-                std_error: None,
-                low: 0.0,
-                high,
-            }
+            Estimated::limit(high)
         }
     });
     let rate_ramp = ramp_interval(
@@ -299,19 +311,9 @@ fn ramp_interval(spectrum: &Spectrum, model: Model, maximum: &Maximum, k_high: f
     };
     let (low, high) = (quantile(0.025), quantile(0.975));
     if model.ramp != Ramp::Absent && low * high > 0.0 {
-        Estimated {
-            value: Some(quantile(0.5)),
-            std_error: Some((high - low) / (2.0 * 1.959_964)),
-            low,
-            high,
-        }
+        Estimated::within(quantile(0.5), low, high)
     } else {
-        Estimated {
-            value: None,
-            std_error: None,
-            low: 0.0,
-            high: high.abs().max(low.abs()),
-        }
+        Estimated::limit(high.abs().max(low.abs()))
     }
 }
 

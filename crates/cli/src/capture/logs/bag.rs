@@ -6,15 +6,12 @@ use std::io::{BufRead, Read as _};
 use super::super::tables::Table;
 use super::super::unpack::{unpack_bzip2, unpack_lz4};
 use super::imu::{Kind, Topics};
-use super::{Bytes, LogError};
+use super::{Bytes, LogError, chunk_of, packed_by};
 
 /// `op` of the records that are read (ROS wiki, Bags/Format/2.0).
 const MESSAGE: u8 = 0x02;
 const CHUNK: u8 = 0x05;
 const CONNECTION: u8 = 0x07;
-
-/// Bytes of a chunk, unpacked, beyond which it is none; `rosbag record` makes them of 768 kB.
-const LARGEST_CHUNK: u64 = 1 << 28;
 
 /// Fields of a record's header.
 struct Fields<'a>(Vec<(&'a [u8], &'a [u8])>);
@@ -118,20 +115,13 @@ impl Reader {
         let cut = || LogError::Damaged("a chunk is too short".to_owned());
         let size = fields.get("size").and_then(|mut b| b.u32());
         let size = u64::from(size.ok_or_else(cut)?);
-        if size > LARGEST_CHUNK {
-            return Err(LogError::Damaged(format!("a chunk of {size} bytes")));
-        }
+        chunk_of(size)?;
         let packing = fields.text("compression").ok_or_else(cut)?;
         let unpacked = match packing.as_str() {
             "none" => packed.to_vec(),
             "bz2" => unpack_bzip2(packed, size)?,
             "lz4" => unpack_lz4(packed, size)?,
-            other => {
-                return Err(LogError::Damaged(format!(
-                    "its chunks are packed by `{}`, and bz2, lz4 and none are read",
-                    other.escape_debug()
-                )));
-            }
+            other => return Err(packed_by(other, "bz2, lz4 and none")),
         };
         let mut records = Bytes::new(&unpacked);
         while !records.is_empty() {

@@ -7,7 +7,7 @@ use std::io::{BufRead, Read as _};
 use super::super::tables::Table;
 use super::super::unpack::{unpack_lz4, unpack_zstd};
 use super::imu::{Kind, Topics};
-use super::{Bytes, LogError};
+use super::{Bytes, LogError, chunk_of, packed_by};
 
 /// Opcodes of the records that are read (MCAP format specification).
 const SCHEMA: u8 = 0x03;
@@ -15,9 +15,6 @@ const CHANNEL: u8 = 0x04;
 const MESSAGE: u8 = 0x05;
 const CHUNK: u8 = 0x06;
 const DATA_END: u8 = 0x0f;
-
-/// Bytes of a chunk, unpacked, beyond which it is none; writers make them of some MB.
-const LARGEST_CHUNK: u64 = 1 << 28;
 
 /// What is known so far.
 #[derive(Default)]
@@ -117,19 +114,12 @@ impl Reader {
             Some((size, packing, bytes.take(length)?))
         };
         let (size, packing, packed) = head().ok_or_else(cut)?;
-        if size > LARGEST_CHUNK {
-            return Err(LogError::Damaged(format!("a chunk of {size} bytes")));
-        }
+        chunk_of(size)?;
         let unpacked = match packing.as_str() {
             "" => packed.to_vec(),
             "zstd" => unpack_zstd(packed, size)?,
             "lz4" => unpack_lz4(packed, size)?,
-            other => {
-                return Err(LogError::Damaged(format!(
-                    "its chunks are packed by `{}`, and zstd, lz4 and none are read",
-                    other.escape_debug()
-                )));
-            }
+            other => return Err(packed_by(other, "zstd, lz4 and none")),
         };
         let mut records = Bytes::new(&unpacked);
         while !records.is_empty() {

@@ -14,6 +14,25 @@ use super::tables::Table;
 
 pub(super) use bytes::Bytes;
 
+/// Bytes of a chunk, unpacked, beyond which it is none; recorders make them of about a megabyte.
+const LARGEST_CHUNK: u64 = 1 << 28;
+
+/// A chunk of so many bytes, unpacked.
+fn chunk_of(size: u64) -> Result<(), LogError> {
+    if size > LARGEST_CHUNK {
+        return Err(LogError::Damaged(format!("a chunk of {size} bytes")));
+    }
+    Ok(())
+}
+
+/// Chunks are packed by something other than what is `known`.
+fn packed_by(other: &str, known: &str) -> LogError {
+    LogError::Damaged(format!(
+        "its chunks are packed by `{}`, and {known} are read",
+        other.escape_debug()
+    ))
+}
+
 /// A kind of log: how it begins, what it is called, and who reads it.
 struct Kind {
     magic: &'static [u8],
