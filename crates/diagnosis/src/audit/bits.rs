@@ -11,7 +11,7 @@
 
 use std::f64::consts::PI;
 
-use model::Parameter;
+use model::{Parameter, effects};
 
 use super::stuck::{self, Verdict};
 use super::{Audit, Gyro, LEAST_READINGS};
@@ -174,7 +174,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     };
     let local = &g.local;
     let name = g.channel.name.as_str();
-    audit.smallest("coarse_lsb", name, "missing_bits", 1.0, "1");
+    audit.smallest(effects::coarse_lsb::ID, name, "missing_bits", 1.0, "1");
     let known: Vec<bool> = (0..counts.len()).map(|i| g.known(i)).collect();
     if let Some(c) = coarse(counts, &known) {
         let chance = 0.5f64.powi(c.changes.min(900) as i32);
@@ -194,7 +194,12 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
         // One bit at 1 throughout is no grid that a converter makes.
         let sticks = c.bits == 1 && c.residue == 1;
         let mut finding = Finding {
-            cause: if sticks { "stuck_bit" } else { "coarse_lsb" }.into(),
+            cause: if sticks {
+                effects::stuck_bit::ID
+            } else {
+                effects::coarse_lsb::ID
+            }
+            .into(),
             channels: vec![name.into()],
             what,
             ..Finding::default()
@@ -208,7 +213,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
             );
             if c.bits == 1 {
                 finding.alternatives.push(Alternative {
-                    cause: "stuck_bit".into(),
+                    cause: effects::stuck_bit::ID.into(),
                     log_odds: 0.0,
                 });
                 finding.experiment = Some("read a register with known odd contents over the same line: a stuck line shows there too".into());
@@ -216,8 +221,12 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
         }
         audit.findings.push(finding);
         let step = f64::from(1u32 << c.bits);
-        audit.lacks_a_bit(name, "coarse_lsb", step, unrounded(local));
-        audit.suppress(&["stuck_bit", "stale_samples"], name, "coarse_lsb");
+        audit.lacks_a_bit(name, effects::coarse_lsb::ID, step, unrounded(local));
+        audit.suppress(
+            &[effects::stuck_bit::ID, effects::stale_samples::ID],
+            name,
+            effects::coarse_lsb::ID,
+        );
         return Shape::Other;
     }
     let sigma = unrounded(local);
@@ -238,7 +247,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     let Some(worst) = tested.iter().max_by(|a, b| a.z.abs().total_cmp(&b.z.abs())) else {
         audit.untested_on(
             name,
-            "stuck_bit",
+            effects::stuck_bit::ID,
             "the noise is less than a count, so the level alone decides the bits",
         );
         return Shape::Unknown;
@@ -246,7 +255,13 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     // A bit that changes the readings by one count leaves nothing but its share of ones.
     let readings = levels.iter().map(|l| l.1).sum::<f64>();
     let reach = (2.0 * stuck::CLEARLY).sqrt() + ONE_SIDED;
-    audit.smallest("stuck_bit", name, "fraction", reach / readings.sqrt(), "1");
+    audit.smallest(
+        effects::stuck_bit::ID,
+        name,
+        "fraction",
+        reach / readings.sqrt(),
+        "1",
+    );
     let chance = (tested.len() as f64 * tails::two_sided(worst.z)).min(1.0);
     let what = format!(
         "bit {} of {name} reads {} more often than normal noise makes it ({:.1} sigma)",
@@ -262,7 +277,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
         Verdict::Rails => Shape::Rails,
         Verdict::Bit(s) => {
             audit.findings.push(Finding {
-                cause: "stuck_bit".into(),
+                cause: effects::stuck_bit::ID.into(),
                 channels: vec![name.into()],
                 parameters: parameters(s.bit, s.value, s.fraction, Some(s.error)),
                 what: format!(
@@ -275,7 +290,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
                 ..Finding::default()
             });
             let step = f64::from(1u32 << (s.bit + 1));
-            audit.lacks_a_bit(name, "stuck_bit", step, sigma);
+            audit.lacks_a_bit(name, effects::stuck_bit::ID, step, sigma);
             Shape::Other
         }
         Verdict::Unlike { nats, nearest } => {

@@ -7,6 +7,7 @@
 //! often which two residues come together. A latch that keeps bits, differences with a set of sizes, a word torn between
 //! two readings and bits that stayed in a shift register show there, without any of them being known.
 
+use model::effects;
 use std::f64::consts::PI;
 
 use rustfft::num_complex::Complex;
@@ -41,7 +42,14 @@ impl<'a> Codes<'a> {
     fn of(g: &'a Gyro<'_>, audit: &Audit) -> Option<Self> {
         let name = g.channel.name.as_str();
         // What these do to a code depends on the level, and that is the same next time.
-        if audit.found(&["coarse_lsb", "stuck_bit", "saturation"], name) {
+        if audit.found(
+            &[
+                effects::coarse_lsb::ID,
+                effects::stuck_bit::ID,
+                effects::saturation::ID,
+            ],
+            name,
+        ) {
             return None;
         }
         let (steps, step) = in_steps(g)?;
@@ -65,7 +73,7 @@ impl<'a> Codes<'a> {
                 .zip(&steps)
                 .map(|(u, v)| *u && v.is_finite())
                 .collect(),
-            repeats: audit.found(&["stale_samples"], name),
+            repeats: audit.found(&[effects::stale_samples::ID], name),
         })
     }
 }

@@ -6,6 +6,7 @@
 use std::borrow::Cow;
 use std::cell::LazyCell;
 
+use model::effects;
 use model::record::{Channel, Quantity, Record, flag};
 
 use super::repeats::{agreement, equal};
@@ -130,7 +131,14 @@ pub(super) fn audit(all: &[Still], at: &[f64], audit: &mut Audit) {
             names.join(", "),
             still.longest
         );
-        let mut finding = counted("stale_samples", names, count, Some(0.0), &times, what);
+        let mut finding = counted(
+            effects::stale_samples::ID,
+            names,
+            count,
+            Some(0.0),
+            &times,
+            what,
+        );
         let runs = super::running(&still.rows, 0.0, at.len());
         finding.parameters.insert("running".into(), runs);
         audit.findings.push(finding);

@@ -1,5 +1,6 @@
 //! Frames: gaps of the sequence numbers, time that passes without a number, readings flagged as not new, alarms.
 
+use model::effects;
 use model::record::{Axis, Record, flag};
 
 use super::{Audit, Gyro, counted};
@@ -95,7 +96,7 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
             let spread = width(&odd, 0.02);
             if spread > IRREGULAR {
                 audit.untested(
-                    "dropped_samples",
+                    effects::dropped_samples::ID,
                     &format!(
                         "the times come at intervals that differ by {:.0} %, so a missing one does not show: record a sequence number or a device time",
                         100.0 * spread
@@ -107,7 +108,7 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
             }
         }
         None if seq.is_none() => audit.untested(
-            "dropped_samples",
+            effects::dropped_samples::ID,
             "the record has neither sequence numbers nor times",
         ),
         None => {}
@@ -117,7 +118,7 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         "{lost} frames are missing: {with_gaps} by the sequence numbers, {} by the time between numbers",
         lost - with_gaps
     );
-    audit.smallest("dropped_samples", "record", "count", 1.0, "1");
+    audit.smallest(effects::dropped_samples::ID, "record", "count", 1.0, "1");
     let fails = audit.limit(
         CheckId::DroppedSamples,
         "record",
@@ -129,7 +130,7 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         events.sort_unstable();
         let times: Vec<f64> = events.iter().map(|e| at[e.0 - 1]).collect();
         audit.findings.push(counted(
-            "dropped_samples",
+            effects::dropped_samples::ID,
             names,
             lost as f64,
             None,
@@ -189,7 +190,7 @@ fn flags(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
         };
         let times: Vec<f64> = rows.iter().map(|i| at[*i]).collect();
         let count = rows.len() as f64;
-        let mut finding = counted("stale_samples", names, count, None, &times, what);
+        let mut finding = counted(effects::stale_samples::ID, names, count, None, &times, what);
         let runs = super::running(&rows, 0.0, flags.len());
         finding.parameters.insert("running".into(), runs);
         audit.findings.push(finding);

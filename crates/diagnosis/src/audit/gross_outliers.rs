@@ -5,6 +5,7 @@
 
 use std::borrow::Cow;
 
+use model::effects;
 use model::record::{Channel, Quantity, Record};
 
 use super::{Audit, LEAST_READINGS, counted};
@@ -75,7 +76,7 @@ pub(super) fn audit(all: &[Wild], record: &Record, at: &[f64], audit: &mut Audit
         audit.limit(CheckId::WildReadings, name, count, 0.0, what.clone());
         let times: Vec<f64> = wild.rows.iter().map(|i| at[*i]).collect();
         let names = vec![name.to_owned()];
-        let finding = counted("outliers", names, count, None, &times, what);
+        let finding = counted(effects::outliers::ID, names, count, None, &times, what);
         audit.findings.push(finding);
     }
 }

@@ -7,6 +7,7 @@
 //! are taken, which nothing bridges; an even noise of a code's width is added first, since what is rounded would
 //! else be exactly 0 more often than its spread says.
 
+use model::effects;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -279,7 +280,7 @@ fn foretold(y: &[f64]) -> Option<Foretold> {
 pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     let name = g.channel.name.as_str();
     // These make the step wider than it is said to be.
-    if audit.found(&["coarse_lsb", "stuck_bit"], name) {
+    if audit.found(&[effects::coarse_lsb::ID, effects::stuck_bit::ID], name) {
         return;
     }
     let Some(usable) = audit.usable.get(name) else {

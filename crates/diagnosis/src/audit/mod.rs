@@ -25,6 +25,7 @@ mod timing;
 
 use std::collections::BTreeMap;
 
+use model::effects;
 use model::record::{Channel, Quantity, Record};
 
 use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter};
@@ -147,7 +148,7 @@ impl Audit {
         }
         self.converter_at_fault(channel, by);
         self.suppress(&["spikes"], channel, by);
-        for cause in ["noise_change", "motor_noise"] {
+        for cause in [effects::noise_change::ID, effects::motor_noise::ID] {
             let why = format!(
                 "with the bit that is missing it steps by {:.1} sigma, so the size of its noise hangs on the level: mend the converter first",
                 step / sigma
@@ -165,11 +166,11 @@ impl Audit {
         let edges = [-bit.value.exp2(), bit.value.exp2() - 1.0];
         for channel in &found.channels {
             self.converter_at_fault(channel, &found.cause);
-            self.suppress(&["outliers"], channel, &found.cause);
+            self.suppress(&[effects::outliers::ID], channel, &found.cause);
             self.findings.retain(|f| {
                 let rail = |name: &str| f.parameters.get(name).map(|p| p.value);
                 let folded = [rail("low"), rail("high")].into_iter().flatten();
-                f.cause != "saturation"
+                f.cause != effects::saturation::ID
                     || f.channels != [channel.as_str()]
                     || !folded.clone().all(|r| edges.contains(&r))
             });
@@ -446,7 +447,11 @@ pub fn audit(record: &Record) -> Audit {
         rounding::audit(g, &mut audit);
     }
     if gyros.iter().any(|g| g.counts.is_none()) {
-        for cause in ["coarse_lsb", "stuck_bit", "saturation"] {
+        for cause in [
+            effects::coarse_lsb::ID,
+            effects::stuck_bit::ID,
+            effects::saturation::ID,
+        ] {
             audit.untested(cause, "the record holds no counts: record what the converter delivers, before any scaling or averaging");
         }
     }

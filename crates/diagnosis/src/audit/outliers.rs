@@ -7,6 +7,7 @@
 use super::{Audit, Gyro, counted};
 use crate::result::Finding;
 use crate::test_level::{AUDIT_LEVEL, CheckId};
+use model::effects;
 use numerics::tails;
 use numerics::tails::ONE_SIDED;
 
@@ -37,7 +38,13 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
         .as_ref()
         .map_or_else(|| g.channel.lsb.unwrap_or(1.0), |_| 1.0);
     let farthest = (limit + ONE_SIDED) * local.sigma.max(0.3 * step) + 0.5 * step;
-    audit.smallest("outliers", name, "size", unit * farthest, &g.channel.unit);
+    audit.smallest(
+        effects::outliers::ID,
+        name,
+        "size",
+        unit * farthest,
+        &g.channel.unit,
+    );
     // Where the noise is within a count, a residual of one or two counts is rounding.
     let z: Vec<f64> = local
         .residual
@@ -72,12 +79,12 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     );
     let fails = audit.check(CheckId::Outliers, name, most, chance, what.clone());
     // A base that is knocked, or noise with heavy tails, makes runs and crowds, no single readings.
-    if !fails || single.is_empty() || audit.is_suppressed("outliers", name) {
+    if !fails || single.is_empty() || audit.is_suppressed(effects::outliers::ID, name) {
         return;
     }
     let times: Vec<f64> = single.iter().map(|i| at[*i]).collect();
     single.iter().for_each(|i| audit.mask(name, *i));
-    let own = |f: &Finding| f.cause == "outliers" && f.channels == [name];
+    let own = |f: &Finding| f.cause == effects::outliers::ID && f.channels == [name];
     let wild = audit.findings.iter().position(own);
     let (mut times, mut what) = (times, what);
     if let Some(wild) = wild.map(|i| audit.findings.remove(i)) {
@@ -87,6 +94,6 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     }
     let count = times.len() as f64;
     let names = vec![name.to_owned()];
-    let finding = counted("outliers", names, count, None, &times, what);
+    let finding = counted(effects::outliers::ID, names, count, None, &times, what);
     audit.findings.push(finding);
 }

@@ -6,6 +6,7 @@
 //! nearby, the spread from the variance about it. So the tails, and the variance that comes and goes with the level, are known
 //! without a model of the record.
 
+use model::effects;
 use model::record::Channel;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -188,7 +189,8 @@ pub(super) fn in_steps(g: &Gyro<'_>) -> Option<(Vec<f64>, f64)> {
 pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     let name = g.channel.name.as_str();
     let coarse = |f: &crate::result::Finding| {
-        ["coarse_lsb", "stuck_bit"].contains(&f.cause.as_str()) && f.channels == [name]
+        [effects::coarse_lsb::ID, effects::stuck_bit::ID].contains(&f.cause.as_str())
+            && f.channels == [name]
     };
     if audit.findings.iter().any(coarse) {
         return;
@@ -234,7 +236,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         let lost = if rounded.sigma < LOST {
             audit.untested_on(
                 name,
-                "noise_change",
+                effects::noise_change::ID,
                 &format!("the noise is below {LOST} steps, so its size hangs on the level: choose a finer range"),
             );
             ", and what changes by less than a step is lost or bent"

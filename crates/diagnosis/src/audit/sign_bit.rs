@@ -7,6 +7,7 @@
 use std::borrow::Cow;
 
 use model::Parameter;
+use model::effects;
 use model::record::{Quantity, Record};
 
 use super::LEAST_READINGS;
@@ -103,7 +104,7 @@ pub fn mend(record: &Record) -> (Cow<'_, Record>, Vec<Finding>) {
         own.counts = Some(right);
         let exact = |name: &str, v: f64| (name.to_owned(), Parameter::exact(v, "1"));
         findings.push(Finding {
-            cause: "stuck_bit".into(),
+            cause: effects::stuck_bit::ID.into(),
             channels: vec![channel.name.clone()],
             what: format!(
                 "bit {bit} of {} reads {value} throughout, though the sign of the readings changes; above their size every bit is the sign, and what follows is of the readings with that bit put right",

@@ -1,6 +1,7 @@
 //! Clocks: how evenly the board samples, and how fast its clock runs against the host's.
 
 use model::Parameter;
+use model::effects;
 use model::record::Record;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -26,8 +27,8 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
     let ticks = record.t_ticks.as_ref().filter(|t| t.len() == rows);
     let (Some(ticks), Some(tick_s)) = (ticks, record.header.tick_s) else {
         let why = "the record holds no device time (t_ticks, and tick_s in its header)";
-        audit.untested("timestamp_jitter", why);
-        audit.untested("clock_rate", why);
+        audit.untested(effects::timestamp_jitter::ID, why);
+        audit.untested(effects::clock_rate::ID, why);
         return;
     };
     if rows < super::LEAST_READINGS {
@@ -69,7 +70,7 @@ fn jitter(record: &Record, device: &[f64], tick_s: f64, names: &[String], audit:
     );
     let relative = (1.5 / single.len() as f64).sqrt();
     let seen = limit * (1.0 + ONE_SIDED * relative);
-    audit.smallest("timestamp_jitter", "record", "sigma", seen, "s");
+    audit.smallest(effects::timestamp_jitter::ID, "record", "sigma", seen, "s");
     if audit.limit(
         CheckId::TimestampJitter,
         "record",
@@ -79,7 +80,7 @@ fn jitter(record: &Record, device: &[f64], tick_s: f64, names: &[String], audit:
     ) {
         let error = sigma * relative;
         audit.findings.push(Finding {
-            cause: "timestamp_jitter".into(),
+            cause: effects::timestamp_jitter::ID.into(),
             channels: names.to_vec(),
             parameters: [("sigma".to_owned(), Parameter::estimated(sigma, error, "s"))].into(),
             what,
@@ -94,27 +95,30 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
         .as_ref()
         .filter(|h| h.len() == device.len());
     let Some(host) = host else {
-        audit.untested("clock_rate", "the record holds no host time (host_time_s)");
+        audit.untested(
+            effects::clock_rate::ID,
+            "the record holds no host time (host_time_s)",
+        );
         return;
     };
     let Some(tolerance) = record.header.tick_tolerance_ppm else {
         audit.untested(
-            "clock_rate",
+            effects::clock_rate::ID,
             "the header does not state the tolerance of the device clock (tick_tolerance_ppm)",
         );
         return;
     };
     if device.last().copied().unwrap_or(0.0) < LEAST_SECONDS {
-        audit.untested("clock_rate", "the record is shorter than 30 s");
+        audit.untested(effects::clock_rate::ID, "the record is shorter than 30 s");
         return;
     }
     let Some(course) = drift::of(device, host, tolerance * 1e-6) else {
-        audit.untested("clock_rate", "too few host times");
+        audit.untested(effects::clock_rate::ID, "too few host times");
         return;
     };
     if let Some((kind, what)) = &course.uneven {
         if *kind == Uneven::Wanders {
-            audit.untested("clock_rate", what);
+            audit.untested(effects::clock_rate::ID, what);
         } else {
             audit.limit(
                 CheckId::ClockCourse,
@@ -153,7 +157,7 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
         let limit = law.inverse_cdf(1.0 - AUDIT_LEVEL);
         let reach = limit * (1.0 + ONE_SIDED * scatter) + ONE_SIDED;
         audit.smallest(
-            "clock_rate",
+            effects::clock_rate::ID,
             "record",
             "ppm",
             tolerance + reach * error,
@@ -162,7 +166,7 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
     }
     if audit.check(CheckId::ClockRate, "record", ppm, chance, what.clone()) {
         audit.findings.push(Finding {
-            cause: "clock_rate".into(),
+            cause: effects::clock_rate::ID.into(),
             channels: names.to_vec(),
             parameters: [("ppm".to_owned(), Parameter::estimated(ppm, error, "ppm"))].into(),
             what,

@@ -10,12 +10,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct AmLine;
 
+/// Its id.
+pub const ID: &str = "am_line";
+
 /// The one instance that the library lists.
 pub static EFFECT: AmLine = AmLine;
 
 impl Effect for AmLine {
     fn id(&self) -> &'static str {
-        "am_line"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -13,12 +13,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct BaseMotion;
 
+/// Its id.
+pub const ID: &str = "base_motion";
+
 /// The one instance that the library lists.
 pub static EFFECT: BaseMotion = BaseMotion;
 
 impl Effect for BaseMotion {
     fn id(&self) -> &'static str {
-        "base_motion"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -10,12 +10,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct BiasStep;
 
+/// Its id.
+pub const ID: &str = "bias_step";
+
 /// The one instance that the library lists.
 pub static EFFECT: BiasStep = BiasStep;
 
 impl Effect for BiasStep {
     fn id(&self) -> &'static str {
-        "bias_step"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -9,12 +9,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct ClockRate;
 
+/// Its id.
+pub const ID: &str = "clock_rate";
+
 /// The one instance that the library lists.
 pub static EFFECT: ClockRate = ClockRate;
 
 impl Effect for ClockRate {
     fn id(&self) -> &'static str {
-        "clock_rate"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -9,12 +9,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct CoarseLsb;
 
+/// Its id.
+pub const ID: &str = "coarse_lsb";
+
 /// The one instance that the library lists.
 pub static EFFECT: CoarseLsb = CoarseLsb;
 
 impl Effect for CoarseLsb {
     fn id(&self) -> &'static str {
-        "coarse_lsb"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

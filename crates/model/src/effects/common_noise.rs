@@ -13,12 +13,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct CommonNoise;
 
+/// Its id.
+pub const ID: &str = "common_noise";
+
 /// The one instance that the library lists.
 pub static EFFECT: CommonNoise = CommonNoise;
 
 impl Effect for CommonNoise {
     fn id(&self) -> &'static str {
-        "common_noise"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -10,12 +10,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct CrossAxis;
 
+/// Its id.
+pub const ID: &str = "cross_axis";
+
 /// The one instance that the library lists.
 pub static EFFECT: CrossAxis = CrossAxis;
 
 impl Effect for CrossAxis {
     fn id(&self) -> &'static str {
-        "cross_axis"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

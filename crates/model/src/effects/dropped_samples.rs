@@ -11,12 +11,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct DroppedSamples;
 
+/// Its id.
+pub const ID: &str = "dropped_samples";
+
 /// The one instance that the library lists.
 pub static EFFECT: DroppedSamples = DroppedSamples;
 
 impl Effect for DroppedSamples {
     fn id(&self) -> &'static str {
-        "dropped_samples"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -12,12 +12,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct Flicker;
 
+/// Its id.
+pub const ID: &str = "flicker";
+
 /// The one instance that the library lists.
 pub static EFFECT: Flicker = Flicker;
 
 impl Effect for Flicker {
     fn id(&self) -> &'static str {
-        "flicker"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -10,12 +10,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct GSensitivity;
 
+/// Its id.
+pub const ID: &str = "g_sensitivity";
+
 /// The one instance that the library lists.
 pub static EFFECT: GSensitivity = GSensitivity;
 
 impl Effect for GSensitivity {
     fn id(&self) -> &'static str {
-        "g_sensitivity"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

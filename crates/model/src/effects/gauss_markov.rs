@@ -12,12 +12,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct GaussMarkov;
 
+/// Its id.
+pub const ID: &str = "gauss_markov";
+
 /// The one instance that the library lists.
 pub static EFFECT: GaussMarkov = GaussMarkov;
 
 impl Effect for GaussMarkov {
     fn id(&self) -> &'static str {
-        "gauss_markov"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -10,12 +10,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct Line;
 
+/// Its id.
+pub const ID: &str = "line";
+
 /// The one instance that the library lists.
 pub static EFFECT: Line = Line;
 
 impl Effect for Line {
     fn id(&self) -> &'static str {
-        "line"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -12,12 +12,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct LowPass;
 
+/// Its id.
+pub const ID: &str = "low_pass";
+
 /// The one instance that the library lists.
 pub static EFFECT: LowPass = LowPass;
 
 impl Effect for LowPass {
     fn id(&self) -> &'static str {
-        "low_pass"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -14,12 +14,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct MotorBias;
 
+/// Its id.
+pub const ID: &str = "motor_bias";
+
 /// The one instance that the library lists.
 pub static EFFECT: MotorBias = MotorBias;
 
 impl Effect for MotorBias {
     fn id(&self) -> &'static str {
-        "motor_bias"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -11,12 +11,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct MotorNoise;
 
+/// Its id.
+pub const ID: &str = "motor_noise";
+
 /// The one instance that the library lists.
 pub static EFFECT: MotorNoise = MotorNoise;
 
 impl Effect for MotorNoise {
     fn id(&self) -> &'static str {
-        "motor_noise"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -15,6 +15,9 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct NarrowBand;
 
+/// Its id.
+pub const ID: &str = "narrow_band";
+
 /// The one instance that the library lists.
 pub static EFFECT: NarrowBand = NarrowBand;
 
@@ -23,7 +26,7 @@ pub(super) const LEAST_SAMPLES: usize = 256;
 
 impl Effect for NarrowBand {
     fn id(&self) -> &'static str {
-        "narrow_band"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -10,12 +10,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct NoiseChange;
 
+/// Its id.
+pub const ID: &str = "noise_change";
+
 /// The one instance that the library lists.
 pub static EFFECT: NoiseChange = NoiseChange;
 
 impl Effect for NoiseChange {
     fn id(&self) -> &'static str {
-        "noise_change"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

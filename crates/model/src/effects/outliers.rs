@@ -11,12 +11,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct Outliers;
 
+/// Its id.
+pub const ID: &str = "outliers";
+
 /// The one instance that the library lists.
 pub static EFFECT: Outliers = Outliers;
 
 impl Effect for Outliers {
     fn id(&self) -> &'static str {
-        "outliers"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

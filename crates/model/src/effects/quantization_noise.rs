@@ -15,6 +15,9 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct QuantizationNoise;
 
+/// Its id.
+pub const ID: &str = "quantization_noise";
+
 /// The one instance that the library lists.
 pub static EFFECT: QuantizationNoise = QuantizationNoise;
 
@@ -23,7 +26,7 @@ const LEAST_SAMPLES: usize = 256;
 
 impl Effect for QuantizationNoise {
     fn id(&self) -> &'static str {
-        "quantization_noise"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

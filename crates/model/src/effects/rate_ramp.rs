@@ -9,12 +9,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct RateRamp;
 
+/// Its id.
+pub const ID: &str = "rate_ramp";
+
 /// The one instance that the library lists.
 pub static EFFECT: RateRamp = RateRamp;
 
 impl Effect for RateRamp {
     fn id(&self) -> &'static str {
-        "rate_ramp"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

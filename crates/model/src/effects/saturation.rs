@@ -9,12 +9,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct Saturation;
 
+/// Its id.
+pub const ID: &str = "saturation";
+
 /// The one instance that the library lists.
 pub static EFFECT: Saturation = Saturation;
 
 impl Effect for Saturation {
     fn id(&self) -> &'static str {
-        "saturation"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

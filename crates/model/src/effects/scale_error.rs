@@ -11,12 +11,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct ScaleError;
 
+/// Its id.
+pub const ID: &str = "scale_error";
+
 /// The one instance that the library lists.
 pub static EFFECT: ScaleError = ScaleError;
 
 impl Effect for ScaleError {
     fn id(&self) -> &'static str {
-        "scale_error"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -11,12 +11,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct StaleSamples;
 
+/// Its id.
+pub const ID: &str = "stale_samples";
+
 /// The one instance that the library lists.
 pub static EFFECT: StaleSamples = StaleSamples;
 
 impl Effect for StaleSamples {
     fn id(&self) -> &'static str {
-        "stale_samples"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

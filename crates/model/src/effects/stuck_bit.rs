@@ -11,12 +11,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct StuckBit;
 
+/// Its id.
+pub const ID: &str = "stuck_bit";
+
 /// The one instance that the library lists.
 pub static EFFECT: StuckBit = StuckBit;
 
 impl Effect for StuckBit {
     fn id(&self) -> &'static str {
-        "stuck_bit"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -10,12 +10,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct SupplySensitivity;
 
+/// Its id.
+pub const ID: &str = "supply_sensitivity";
+
 /// The one instance that the library lists.
 pub static EFFECT: SupplySensitivity = SupplySensitivity;
 
 impl Effect for SupplySensitivity {
     fn id(&self) -> &'static str {
-        "supply_sensitivity"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

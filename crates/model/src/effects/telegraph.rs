@@ -12,12 +12,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct Telegraph;
 
+/// Its id.
+pub const ID: &str = "telegraph";
+
 /// The one instance that the library lists.
 pub static EFFECT: Telegraph = Telegraph;
 
 impl Effect for Telegraph {
     fn id(&self) -> &'static str {
-        "telegraph"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

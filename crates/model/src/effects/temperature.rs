@@ -10,12 +10,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct Temperature;
 
+/// Its id.
+pub const ID: &str = "temperature";
+
 /// The one instance that the library lists.
 pub static EFFECT: Temperature = Temperature;
 
 impl Effect for Temperature {
     fn id(&self) -> &'static str {
-        "temperature"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

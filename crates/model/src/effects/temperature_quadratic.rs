@@ -10,12 +10,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct TemperatureQuadratic;
 
+/// Its id.
+pub const ID: &str = "temperature_quadratic";
+
 /// The one instance that the library lists.
 pub static EFFECT: TemperatureQuadratic = TemperatureQuadratic;
 
 impl Effect for TemperatureQuadratic {
     fn id(&self) -> &'static str {
-        "temperature_quadratic"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -11,12 +11,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct TimestampJitter;
 
+/// Its id.
+pub const ID: &str = "timestamp_jitter";
+
 /// The one instance that the library lists.
 pub static EFFECT: TimestampJitter = TimestampJitter;
 
 impl Effect for TimestampJitter {
     fn id(&self) -> &'static str {
-        "timestamp_jitter"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -15,12 +15,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct WanderingLine;
 
+/// Its id.
+pub const ID: &str = "wandering_line";
+
 /// The one instance that the library lists.
 pub static EFFECT: WanderingLine = WanderingLine;
 
 impl Effect for WanderingLine {
     fn id(&self) -> &'static str {
-        "wandering_line"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {

@@ -12,12 +12,15 @@ use crate::simulate::Simulation;
 /// The effect.
 pub struct WarmUp;
 
+/// Its id.
+pub const ID: &str = "warm_up";
+
 /// The one instance that the library lists.
 pub static EFFECT: WarmUp = WarmUp;
 
 impl Effect for WarmUp {
     fn id(&self) -> &'static str {
-        "warm_up"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
