@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use model::record::{Quantity, Record};
+use model::record::{Channel, Quantity, Record};
 use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -294,13 +294,97 @@ const SHORT_TERM: &str = "short_term_noise";
 /// Relative difference of sample intervals up to which runs have the same.
 const SAME_RATE: f64 = 1e-3;
 
+/// Samples of a run that a comparison needs.
+const RUN_NEEDS: usize = 64;
+
+/// White noise, slow deviation and bias of one run, each with its standard error.
+fn row_of(
+    name: &str,
+    (channel, sampling, phase): (&Channel, &Sampling, &Phase),
+    tau: f64,
+    units: &Units,
+) -> Result<([(f64, f64); 3], Spectrum), AnalysisError> {
+    let short = || AnalysisError::Inconclusive {
+        what: format!("a comparison of runs by {name}"),
+        have: phase.samples() as f64,
+        need: RUN_NEEDS as f64,
+        unit: "samples in a run",
+    };
+    if phase.samples() < RUN_NEEDS {
+        return Err(short());
+    }
+    let runs = sampling.runs_of(&channel.values);
+    let spectrum = Spectrum::with_gaps(&channel.values, &runs, &sampling.slots, sampling.tau0);
+    let n = fit(&spectrum).term(Term::White);
+    let (Some(value), Some(error)) = (n.value, n.std_error) else {
+        return Err(short());
+    };
+    let m = (tau / sampling.tau0).round().max(1.0) as usize;
+    let slow = deviation(phase, Deviation::Oadev, sampling.tau0, m).ok_or_else(short)?;
+    let noise = identify(phase, (m / 4).max(1)).unwrap_or(NoiseType::WhiteRate);
+    let freedom = edf(Deviation::Oadev, noise, m, &phase.run_lengths());
+    let readings: Vec<f64> = runs
+        .iter()
+        .flat_map(|r| channel.values[r.clone()].iter().copied())
+        .collect();
+    let bias = readings.iter().sum::<f64>() / readings.len() as f64;
+    let row = [
+        (
+            value * units.angle_random_walk.factor,
+            error * units.angle_random_walk.factor,
+        ),
+        (
+            slow.deviation * units.reading.factor,
+            slow.deviation * units.reading.factor / (2.0 * freedom).sqrt(),
+        ),
+        (bias * units.reading.factor, 0.0),
+    ];
+    Ok((row, spectrum))
+}
+
+/// One figure of all runs: values and errors, and how far each run is off the median. Sizes are compared as ratios.
+fn figure_of(
+    name: &str,
+    (figure, unit, is_size): (&str, String, bool),
+    of: &[(f64, f64)],
+) -> RunFigure {
+    let values: Vec<f64> = of.iter().map(|r| r.0).collect();
+    let std_errors: Vec<f64> = of.iter().map(|r| r.1).collect();
+    let x: Vec<f64> = values
+        .iter()
+        .map(|v| if is_size { v.ln() } else { *v })
+        .collect();
+    let errors: Vec<f64> = values
+        .iter()
+        .zip(&std_errors)
+        .map(|(v, e)| if is_size { e / v } else { *e })
+        .collect();
+    let (centre, spread) = (median(&x), scatter(&x));
+    let z = x
+        .iter()
+        .zip(&errors)
+        .map(|(x, e)| (x - centre) / spread.max(*e).max(f64::MIN_POSITIVE))
+        .collect();
+    let pooled = if is_size { centre.exp() } else { centre };
+    RunFigure {
+        channel: name.to_owned(),
+        figure: figure.to_owned(),
+        unit,
+        values,
+        std_errors,
+        pooled,
+        spread: if is_size { spread * pooled } else { spread },
+        z,
+        over_runs: None,
+        differ: None,
+    }
+}
+
 fn figures_of(
     records: &[Cow<'_, Record>],
     samplings: &[Sampling],
     name: &str,
 ) -> Result<(Vec<RunFigure>, Vec<Spectrum>), AnalysisError> {
-    let mut spectra = Vec::new();
-    let mut rows: Vec<[(f64, f64); 3]> = Vec::new();
     let channels: Vec<_> = records.iter().filter_map(|r| r.channel(name)).collect();
     let units = Units::of(channels[0].quantity, &channels[0].unit);
     let phases: Vec<Phase> = channels
@@ -314,43 +398,12 @@ fn figures_of(
         .map(|(p, s)| p.longest_run() as f64 * s.tau0)
         .fold(f64::INFINITY, f64::min)
         / 10.0;
+    let mut spectra = Vec::new();
+    let mut rows: Vec<[(f64, f64); 3]> = Vec::new();
     for ((channel, sampling), phase) in channels.iter().zip(samplings).zip(&phases) {
-        let short = || AnalysisError::Inconclusive {
-            what: format!("a comparison of runs by {name}"),
-            have: phase.samples() as f64,
-            need: 64.0,
-            unit: "samples in a run",
-        };
-        if phase.samples() < 64 {
-            return Err(short());
-        }
-        let runs = sampling.runs_of(&channel.values);
-        let spectrum = Spectrum::with_gaps(&channel.values, &runs, &sampling.slots, sampling.tau0);
-        let n = fit(&spectrum).term(Term::White);
+        let (row, spectrum) = row_of(name, (channel, sampling, phase), tau, &units)?;
+        rows.push(row);
         spectra.push(spectrum);
-        let (Some(value), Some(error)) = (n.value, n.std_error) else {
-            return Err(short());
-        };
-        let m = (tau / sampling.tau0).round().max(1.0) as usize;
-        let slow = deviation(phase, Deviation::Oadev, sampling.tau0, m).ok_or_else(short)?;
-        let noise = identify(phase, (m / 4).max(1)).unwrap_or(NoiseType::WhiteRate);
-        let freedom = edf(Deviation::Oadev, noise, m, &phase.run_lengths());
-        let readings: Vec<f64> = runs
-            .iter()
-            .flat_map(|r| channel.values[r.clone()].iter().copied())
-            .collect();
-        let bias = readings.iter().sum::<f64>() / readings.len() as f64;
-        rows.push([
-            (
-                value * units.angle_random_walk.factor,
-                error * units.angle_random_walk.factor,
-            ),
-            (
-                slow.deviation * units.reading.factor,
-                slow.deviation * units.reading.factor / (2.0 * freedom).sqrt(),
-            ),
-            (bias * units.reading.factor, 0.0),
-        ]);
     }
     let titles = [
         (WHITE, units.angle_random_walk.unit, true),
@@ -360,38 +413,9 @@ fn figures_of(
     let figures = titles
         .into_iter()
         .enumerate()
-        .map(|(i, (figure, unit, positive))| {
-            let values: Vec<f64> = rows.iter().map(|r| r[i].0).collect();
-            let std_errors: Vec<f64> = rows.iter().map(|r| r[i].1).collect();
-            // Sizes are compared as ratios.
-            let x: Vec<f64> = values
-                .iter()
-                .map(|v| if positive { v.ln() } else { *v })
-                .collect();
-            let errors: Vec<f64> = values
-                .iter()
-                .zip(&std_errors)
-                .map(|(v, e)| if positive { e / v } else { *e })
-                .collect();
-            let (centre, spread) = (median(&x), scatter(&x));
-            let z = x
-                .iter()
-                .zip(&errors)
-                .map(|(x, e)| (x - centre) / spread.max(*e).max(f64::MIN_POSITIVE))
-                .collect();
-            let pooled = if positive { centre.exp() } else { centre };
-            RunFigure {
-                channel: name.to_owned(),
-                figure: figure.to_owned(),
-                unit,
-                values,
-                std_errors,
-                pooled,
-                spread: if positive { spread * pooled } else { spread },
-                z,
-                over_runs: None,
-                differ: None,
-            }
+        .map(|(i, title)| {
+            let of: Vec<(f64, f64)> = rows.iter().map(|r| r[i]).collect();
+            figure_of(name, title, &of)
         })
         .collect();
     Ok((figures, spectra))
@@ -456,110 +480,4 @@ fn limit(runs: usize, figures: usize, rng: &mut impl Rng) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use model::record::{Axis, Channel};
-
-    fn run(sigma: f64, bias: f64, rng: &mut Xoshiro256PlusPlus) -> Record {
-        let values = (0..2000)
-            .map(|_| {
-                let e: f64 = StandardNormal.sample(rng);
-                bias + sigma * e
-            })
-            .collect();
-        let mut record = Record {
-            channels: vec![Channel {
-                name: "gyro_z".into(),
-                quantity: Quantity::Gyro,
-                axis: Some(Axis::Z),
-                unit: "deg/s".into(),
-                values,
-                counts: None,
-                lsb: None,
-            }],
-            ..Record::default()
-        };
-        record.header.rate_hz = Some(20.0);
-        record
-    }
-
-    fn bias(rng: &mut Xoshiro256PlusPlus) -> f64 {
-        let e: f64 = StandardNormal.sample(rng);
-        0.5 + 0.1 * e
-    }
-
-    #[test]
-    fn equal_runs_are_seldom_called_odd() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
-        let alarms = (0..40)
-            .filter(|_| {
-                let runs: Vec<Record> = (0..12)
-                    .map(|_| {
-                        let b = bias(&mut rng);
-                        run(0.39, b, &mut rng)
-                    })
-                    .collect();
-                !representative(&runs, 1).unwrap().odd.is_empty()
-            })
-            .count();
-        // Binomial(40, 0.05): 9 or more has a chance of 1e-4.
-        assert!(alarms < 9, "{alarms}");
-    }
-
-    #[test]
-    fn a_run_with_twice_the_noise_is_odd_in_that_and_not_chosen() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(12);
-        let runs: Vec<Record> = (0..12)
-            .map(|i| {
-                let b = bias(&mut rng);
-                run(if i == 5 { 0.78 } else { 0.39 }, b, &mut rng)
-            })
-            .collect();
-        let answer = representative(&runs, 1).unwrap();
-        assert!(
-            answer
-                .odd
-                .iter()
-                .any(|o| o.run == 5 && o.figure == "angle_random_walk" && o.z > 0.0),
-            "{answer:?}"
-        );
-        assert_ne!(answer.run, 5);
-        // The others are one noise: N of eleven runs together, 0.39/sqrt(20) deg/sqrt(s), 5.23 deg/sqrt(h).
-        let together = &answer.together[0];
-        assert_eq!(together.runs, 11);
-        let n = &together.parameters.angle_random_walk;
-        assert!(n.low.unwrap() < 5.232 && 5.232 < n.high.unwrap(), "{n:?}");
-        assert!(n.std_error.unwrap() / n.value.unwrap() < 0.012, "{n:?}");
-        let figure = |name: &str| answer.figures.iter().find(|f| f.figure == name).unwrap();
-        let noise = figure("angle_random_walk");
-        assert_eq!(noise.differ, Some(false), "{noise:?}");
-        // Biases scatter by 0.1 deg/s.
-        let bias = figure("bias").over_runs.unwrap();
-        assert!(
-            bias.run_to_run_low < 0.1 && 0.1 < bias.run_to_run_high,
-            "{bias:?}"
-        );
-        assert!(representative(&runs[..3], 1).is_err());
-    }
-
-    #[test]
-    fn one_noisier_run_of_six_is_seen() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(13);
-        let runs: Vec<Record> = (0..6)
-            .map(|i| {
-                let b = bias(&mut rng);
-                run(if i == 2 { 0.55 } else { 0.39 }, b, &mut rng)
-            })
-            .collect();
-        let answer = representative(&runs, 1).unwrap();
-        assert!(
-            answer
-                .odd
-                .iter()
-                .any(|o| o.run == 2 && o.figure == "angle_random_walk")
-                && answer.odd.iter().all(|o| o.run == 2),
-            "{:?}",
-            answer.odd
-        );
-    }
-}
+mod tests;

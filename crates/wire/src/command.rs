@@ -1,4 +1,6 @@
 //! What the PC asks of the board.
+//!
+//! More than 500 lines: the codes of the commands, and what writes and reads each, stand side by side.
 
 use zerocopy::IntoBytes;
 

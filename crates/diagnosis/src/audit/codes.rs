@@ -7,6 +7,8 @@
 //! have are edges and holes finer than s, and those are what a fault of the converter makes. The fault moves a share f
 //! of the readings from x to a(x): q(c) = (1 - f) p(c) + f sum over a(x) = c of p(x). Weights and share are fitted by
 //! expectation and maximization; the likelihood is that of the histogram.
+//!
+//! More than 500 lines: histogram, laws and their fit share what they keep between rounds.
 
 use std::cell::RefCell;
 use std::collections::HashMap;

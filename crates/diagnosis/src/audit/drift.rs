@@ -131,80 +131,91 @@ pub(super) fn of(device: &[f64], host: &[f64], tolerance: f64) -> Option<Course>
         let seen = |slope: f64| earliest(&blocks, slope);
         found = broken(&seen(found.before.slope), &seen(found.after.slope))?;
     }
-    let Broken {
-        k,
-        x,
-        y,
-        before,
-        after,
-        rest,
-    } = found;
-    let whole = Line::through(&x, &y).residuals(&x, &y);
-    let s = robust(&rest).min(robust(&whole));
-    let (one, two) = (cost(&whole, s), cost(&rest, s));
+    let (x, y) = (&found.x, &found.y);
+    let whole = Line::through(x, y).residuals(x, y);
+    let s = robust(&found.rest).min(robust(&whole));
+    let (one, two) = (cost(&whole, s), cost(&found.rest, s));
     let n = x.len() as f64;
-    let sizes: Vec<f64> = whole.iter().map(|r| r.abs()).collect();
-    let far = numerics::order_statistics::quantile(&sizes, 0.9);
-    // What the line is off by may tilt it.
-    let tilt = TILT_OF_BEND * far / length;
     if one < two + BETTER || two > DESCRIBES * n {
         if one > DESCRIBES * n {
-            course.error = course.error.hypot(tilt);
-            if tilt > tolerance {
-                let what = format!(
-                    "host and device clock part by {:.1} ms about the line through them, and by neither one jump nor one change of the rate: only a rate beyond {:.0} ppm would show",
-                    1e3 * far,
-                    1e6 * (tolerance + 4.0 * course.error)
-                );
-                course.uneven = Some((Uneven::Wanders, what));
-            }
+            let sizes: Vec<f64> = whole.iter().map(|r| r.abs()).collect();
+            let far = numerics::order_statistics::quantile(&sizes, 0.9);
+            course.wander(far, length, tolerance);
         }
         return Some(course);
     }
-    let (from, to) = (x[k.saturating_sub(3)], x[(k + 2).min(x.len() - 1)]);
-    let differ = after.slope - before.slope;
-    let errors = [before.error(s), after.error(s)];
-    let meet = (before.level - after.level) / differ;
-    let other = differ.abs() > tolerance && differ.abs() > DIFFER * errors[0].hypot(errors[1]);
-    let middle = 0.5 * (x[k - 1] + x[k]);
-    let height = after.at(middle) - before.at(middle);
-    let jump = TILT_OF_JUMP * height.abs() / length / tolerance;
-    if other && (jump < 1.0 || (from..=to).contains(&meet)) {
-        let ppm = |line: &Line| (1.0 / (1.0 + line.slope) - 1.0) * 1e6;
-        course.told = differ.abs() / tolerance;
-        let what = format!(
-            "the device clock changes its rate against the host's at {meet:.1} s: {:+.1} +- {:.1} ppm before, {:+.1} +- {:.1} ppm after; {:.0} ppm are stated, and no one rate describes it",
-            ppm(&before),
-            1e6 * errors[0],
-            ppm(&after),
-            1e6 * errors[1],
-            1e6 * tolerance
-        );
-        course.uneven = Some((Uneven::Bend, what));
-        return Some(course);
-    }
-    // The common slope of both sides.
-    let of_slope = errors.map(|e| e.powi(-2));
-    course.slope =
-        (of_slope[0] * before.slope + of_slope[1] * after.slope) / (of_slope[0] + of_slope[1]);
-    course.error =
-        (of_slope[0] + of_slope[1])
-            .powf(-0.5)
-            .hypot(if other { 0.5 * differ } else { 0.0 });
-    course.told = jump;
-    if course.told > 1.0 {
-        let at = place(&pairs, from, to, &before, &after);
-        let also = if other {
-            format!("; its rate changes there too, by {:+.0} ppm", 1e6 * differ)
-        } else {
-            String::new()
-        };
-        let what = format!(
-            "the host's clock jumps by {height:+.3} s against the device's at {at:.2} s{also}: a clock that was set, a computer that slept, or a board that stood still without losing a number"
-        );
-        course.uneven = Some((Uneven::Jump, what));
-    }
+    course.part(&found, s, length, tolerance, &pairs);
     Some(course)
+}
+
+impl Course {
+    /// The clocks part by `far`, and by no line or two: what the line is off by may tilt it.
+    fn wander(&mut self, far: f64, length: f64, tolerance: f64) {
+        let tilt = TILT_OF_BEND * far / length;
+        self.error = self.error.hypot(tilt);
+        if tilt > tolerance {
+            let what = format!(
+                "host and device clock part by {:.1} ms about the line through them, and by neither one jump nor one change of the rate: only a rate beyond {:.0} ppm would show",
+                1e3 * far,
+                1e6 * (tolerance + 4.0 * self.error)
+            );
+            self.uneven = Some((Uneven::Wanders, what));
+        }
+    }
+
+    /// The clocks part at a break, where blocks scatter by `s`: by a change of the rate, or a jump.
+    fn part(&mut self, found: &Broken, s: f64, length: f64, tolerance: f64, pairs: &[(f64, f64)]) {
+        let Broken {
+            k,
+            x,
+            before,
+            after,
+            ..
+        } = found;
+        let (from, to) = (x[k.saturating_sub(3)], x[(k + 2).min(x.len() - 1)]);
+        let differ = after.slope - before.slope;
+        let errors = [before.error(s), after.error(s)];
+        let meet = (before.level - after.level) / differ;
+        let other = differ.abs() > tolerance && differ.abs() > DIFFER * errors[0].hypot(errors[1]);
+        let middle = 0.5 * (x[k - 1] + x[*k]);
+        let height = after.at(middle) - before.at(middle);
+        let jump = TILT_OF_JUMP * height.abs() / length / tolerance;
+        if other && (jump < 1.0 || (from..=to).contains(&meet)) {
+            let ppm = |line: &Line| (1.0 / (1.0 + line.slope) - 1.0) * 1e6;
+            self.told = differ.abs() / tolerance;
+            let what = format!(
+                "the device clock changes its rate against the host's at {meet:.1} s: {:+.1} +- {:.1} ppm before, {:+.1} +- {:.1} ppm after; {:.0} ppm are stated, and no one rate describes it",
+                ppm(before),
+                1e6 * errors[0],
+                ppm(after),
+                1e6 * errors[1],
+                1e6 * tolerance
+            );
+            self.uneven = Some((Uneven::Bend, what));
+            return;
+        }
+        // The common slope of both sides.
+        let of_slope = errors.map(|e| e.powi(-2));
+        self.slope =
+            (of_slope[0] * before.slope + of_slope[1] * after.slope) / (of_slope[0] + of_slope[1]);
+        self.error =
+            (of_slope[0] + of_slope[1])
+                .powf(-0.5)
+                .hypot(if other { 0.5 * differ } else { 0.0 });
+        self.told = jump;
+        if self.told > 1.0 {
+            let at = place(pairs, from, to, before, after);
+            let also = if other {
+                format!("; its rate changes there too, by {:+.0} ppm", 1e6 * differ)
+            } else {
+                String::new()
+            };
+            let what = format!(
+                "the host's clock jumps by {height:+.3} s against the device's at {at:.2} s{also}: a clock that was set, a computer that slept, or a board that stood still without losing a number"
+            );
+            self.uneven = Some((Uneven::Jump, what));
+        }
+    }
 }
 
 /// Where the arrivals pass from one line to the other: late ones lie above the first, none below the second.

@@ -6,6 +6,7 @@
 //! levels), which also ends early, is not taken for a rail.
 
 use model::Parameter;
+use model::effects;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::bits::Shape;
@@ -100,6 +101,74 @@ fn end(
     })
 }
 
+/// Both ends of the counts of a gyro.
+struct Ends {
+    low: End,
+    high: End,
+}
+
+impl Ends {
+    /// What is expected and seen at both.
+    fn words(&self, name: &str) -> String {
+        let Self { low, high } = self;
+        format!(
+            "{:.0} readings of {name} are missing above {} counts and {:.0} below {}; {} and {} lie on these codes, where {:.1} and {:.1} are expected",
+            high.beyond,
+            high.code,
+            low.beyond,
+            -low.code,
+            high.pile,
+            low.pile,
+            high.expected,
+            low.expected
+        )
+    }
+
+    /// The finding: the rails that were reached, and the readings clipped.
+    fn finding(&self, name: &str, what: String) -> Finding {
+        let Self { low, high } = self;
+        let clips = [
+            (low.clips(), "low", -low.code, low),
+            (high.clips(), "high", high.code, high),
+        ];
+        let mut finding = Finding {
+            cause: effects::saturation::ID.into(),
+            channels: vec![name.into()],
+            what,
+            ..Finding::default()
+        };
+        let mut clipped = 0.0;
+        for (_, key, code, end) in clips.into_iter().filter(|c| c.0) {
+            finding
+                .parameters
+                .insert(key.into(), Parameter::exact(f64::from(code), "counts"));
+            clipped += (end.pile as f64 - end.expected).max(0.0);
+        }
+        let error = (low.pile + high.pile) as f64;
+        finding.parameters.insert(
+            "clipped".into(),
+            Parameter::estimated(clipped.round(), error.sqrt(), "1"),
+        );
+        // A rail that was not reached is not known: absent, not 0.
+        let unknown = match (low.clips(), high.clips()) {
+            (true, false) => "; the upper rail was not reached, so it is not known",
+            (false, true) => "; the lower rail was not reached, so it is not known",
+            _ => "",
+        };
+        finding.what.push_str(unknown);
+        finding
+    }
+
+    /// The rails, counts; infinite where one was not reached.
+    fn rails(&self) -> [f64; 2] {
+        let rail = |e: &End, sign: i32| e.clips().then(|| f64::from(sign * e.code));
+        [
+            rail(&self.low, -1).unwrap_or(f64::NEG_INFINITY),
+            rail(&self.high, 1).unwrap_or(f64::INFINITY),
+        ]
+    }
+}
+
 pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
     let Some(counts) = g.counts else {
         return;
@@ -124,21 +193,18 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
     let (Some(low), Some(high)) = (low, high) else {
         return;
     };
-    let both = low.beyond + high.beyond;
+    let ends = Ends { low, high };
+    let both = ends.low.beyond + ends.high.beyond;
     let chance = (1.0 + both) * (-both).exp();
-    let piled = low.clips() || high.clips();
-    audit.smallest("saturation", name, "clipped", least_beyond().ceil(), "1");
-    let what = format!(
-        "{:.0} readings of {name} are missing above {} counts and {:.0} below {}; {} and {} lie on these codes, where {:.1} and {:.1} are expected",
-        high.beyond,
-        high.code,
-        low.beyond,
-        -low.code,
-        high.pile,
-        low.pile,
-        high.expected,
-        low.expected
+    let piled = ends.low.clips() || ends.high.clips();
+    audit.smallest(
+        effects::saturation::ID,
+        name,
+        "clipped",
+        least_beyond().ceil(),
+        "1",
     );
+    let what = ends.words(name);
     audit.check(
         CheckId::MissingTail,
         name,
@@ -153,61 +219,32 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
     if !piled {
         return;
     }
-    let clips = [
-        (low.clips(), "low", -low.code, &low),
-        (high.clips(), "high", high.code, &high),
-    ];
-    let mut finding = Finding {
-        cause: "saturation".into(),
-        channels: vec![name.into()],
-        what,
-        ..Finding::default()
-    };
-    let mut clipped = 0.0;
-    for (_, key, code, end) in clips.into_iter().filter(|c| c.0) {
-        finding
-            .parameters
-            .insert(key.into(), Parameter::exact(f64::from(code), "counts"));
-        clipped += (end.pile as f64 - end.expected).max(0.0);
-    }
-    let error = (low.pile + high.pile) as f64;
-    finding.parameters.insert(
-        "clipped".into(),
-        Parameter::estimated(clipped.round(), error.sqrt(), "1"),
-    );
-    // A rail that was not reached is not known: absent, not 0.
-    let unknown = match (low.clips(), high.clips()) {
-        (true, false) => "; the upper rail was not reached, so it is not known",
-        (false, true) => "; the lower rail was not reached, so it is not known",
-        _ => "",
-    };
-    finding.what.push_str(unknown);
-    audit.findings.push(finding);
+    audit.findings.push(ends.finding(name, what));
     audit.suppress(
         &[
-            "stuck_bit",
-            "stale_samples",
-            "kurtosis",
-            "skewness",
+            effects::stuck_bit::ID,
+            effects::stale_samples::ID,
+            CheckId::Kurtosis.as_str(),
+            CheckId::Skewness.as_str(),
             CheckId::ColourFollows.as_str(),
             CheckId::Leaning.as_str(),
         ],
         name,
-        "saturation",
+        effects::saturation::ID,
     );
-    let rail = |e: &End, sign: i32| e.clips().then(|| f64::from(sign * e.code));
-    let rails = [
-        rail(&low, -1).unwrap_or(f64::NEG_INFINITY),
-        rail(&high, 1).unwrap_or(f64::INFINITY),
-    ];
+    let rails = ends.rails();
     let kept = || levels.iter().map(|(l, n)| (left_by(rails, l, sigma), n));
     if swing(kept()) > SWINGS {
         // The noise that is left depends on the level, so it changes with it, and the level itself is bent.
-        audit.converter_at_fault(name, "saturation");
+        audit.converter_at_fault(name, effects::saturation::ID);
         audit.suppress(
-            &["outliers", "process_law", "process_levels"],
+            &[
+                effects::outliers::ID,
+                CheckId::ProcessLaw.as_str(),
+                CheckId::ProcessLevels.as_str(),
+            ],
             name,
-            "saturation",
+            effects::saturation::ID,
         );
     }
 }

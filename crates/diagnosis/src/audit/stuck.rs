@@ -155,6 +155,112 @@ fn left_by(h: &Histogram, laws: &Laws<'_>, fit: &Fit) -> (f64, f64) {
     (0.5 * (sum - free), tails::chi_square(sum, free))
 }
 
+/// A fit with its bit and the value at which that sticks.
+type OfBit = (u32, i32, Fit);
+
+/// Codes, with what is asked of them.
+struct Judged {
+    h: Histogram,
+    /// Spread of a reading about its level.
+    sigma: f64,
+    /// Bits below this one are looked at.
+    bits: u32,
+}
+
+impl Judged {
+    /// The bits that a spread of readings can show, at both values.
+    fn every(&self) -> impl Iterator<Item = (u32, i32)> {
+        let near = (0..self.bits).filter(|b| f64::from(1u32 << b) <= WITHIN * self.sigma);
+        near.flat_map(|bit| [(bit, 0), (bit, 1)])
+    }
+
+    /// Whether a first fit without a fault leaves nothing to look for.
+    fn is_plain(&self, first: &Fit) -> bool {
+        let laws = Laws::new(&self.h, Fault::None, first.spread);
+        let gain = |(bit, value)| laws.gain_of(first, Fault::Bit { bit, value });
+        first.cost < PLAIN
+            && left_by(&self.h, &laws, first).1 > AUDIT_LEVEL
+            && !self.every().any(|b| gain(b) > WORTH_A_LOOK)
+    }
+
+    /// The smooth law without a fault, of a spread.
+    fn sound(&self, spread: f64) -> Fit {
+        Laws::new(&self.h, Fault::None, spread).fit(None, 0.0, true, LAST)
+    }
+
+    /// The best law with rails at the ends.
+    fn railed(&self) -> Option<(Fault, Fit)> {
+        let (low, high) = (self.h.first, self.h.last());
+        [(low, i32::MAX), (i32::MIN, high), (low, high)]
+            .into_iter()
+            .filter_map(|(low, high)| {
+                let fault = Fault::Rails { low, high };
+                let fit = Tries::new(&self.h, fault, self.sigma).best(LAST)?;
+                Some((fault, fit))
+            })
+            .max_by(|a, b| a.1.score().total_cmp(&b.1.score()))
+    }
+
+    /// The bit that describes the codes best.
+    fn nearest(&self) -> Option<OfBit> {
+        let mut all: Vec<(u32, i32, Fit, Tries<'_>)> = (self.every())
+            .filter_map(|(bit, value)| {
+                let mut tries = Tries::new(&self.h, Fault::Bit { bit, value }, self.sigma);
+                Some((bit, value, tries.best(FIRST)?, tries))
+            })
+            .collect();
+        all.sort_by(|a, b| b.2.score().total_cmp(&a.2.score()));
+        all.truncate(BEST);
+        all.into_iter()
+            .filter_map(|(bit, value, fit, mut tries)| {
+                // A bit that folds most of the readings over is far from where a fit begins: with few rounds another
+                // spread may look best than with many, and all go on.
+                tries.around(fit.spread);
+                Some((bit, value, tries.best(LAST)?))
+            })
+            .max_by(|a, b| a.2.score().total_cmp(&b.2.score()))
+    }
+
+    /// The same law, or a wider one: what only a law with edges of its own explains is not explained.
+    fn without_edges(&self, fault: Fault, fit: Fit) -> (Fault, Fit) {
+        if fit.spread >= NATURAL * self.sigma {
+            return (fault, fit);
+        }
+        let wide = SPREADS.iter().filter(|s| **s >= NATURAL);
+        wide.map(|s| (Fault::None, self.sound(s * self.sigma)))
+            .max_by(|a, b| a.1.score().total_cmp(&b.1.score()))
+            .unwrap_or((fault, fit))
+    }
+
+    /// The bit, and whether it holds: of a natural width, with next to nothing left beside it, by scores of the smooth law
+    /// and of shares of the codes of their own.
+    fn stuck(&self, (bit, value, fit): &OfBit, smooth: f64) -> (Stuck, bool) {
+        let laws = Laws::new(
+            &self.h,
+            Fault::Bit {
+                bit: *bit,
+                value: *value,
+            },
+            fit.spread,
+        );
+        let stuck = Stuck {
+            bit: *bit,
+            value: u8::from(*value == 1),
+            fraction: fit.share,
+            error: laws.share_error(fit),
+        };
+        let (rest, chance) = left_by(&self.h, &laws, fit);
+        // A bit adds at most a quarter of its square to the variance.
+        let without_bit =
+            (self.sigma * self.sigma - 0.25 * f64::from(1u32 << bit).powi(2)).max(0.0);
+        let natural = fit.spread >= NATURAL * without_bit.sqrt();
+        let ahead = fit.score() - smooth;
+        let whole = chance > LEAST_CHANCE || rest < LITTLE * ahead;
+        let holds = natural && whole && ahead >= NEARLY_ALL * (self.h.of_its_own() - smooth);
+        (stuck, holds)
+    }
+}
+
 /// Judge codes with the spread `sigma` about their level, bits below `bits`; `alarmed` where something else has shown
 /// already that they are no law.
 pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verdict {
@@ -166,76 +272,29 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
     if !alarmed && h.spread > MOVES * sigma {
         return Verdict::Smooth;
     }
-    let Some(first) = Tries::new(&h, Fault::None, sigma).best(FIRST) else {
+    let of = Judged { h, sigma, bits };
+    let Some(first) = Tries::new(&of.h, Fault::None, sigma).best(FIRST) else {
         return Verdict::Smooth;
     };
-    let laws = Laws::new(&h, Fault::None, first.spread);
-    let every = || {
-        let near = (0..bits).filter(|b| f64::from(1u32 << b) <= WITHIN * sigma);
-        near.flat_map(|bit| [(bit, 0), (bit, 1)])
-    };
-    let looks_stuck = || {
-        every().any(|(bit, value)| laws.gain_of(&first, Fault::Bit { bit, value }) > WORTH_A_LOOK)
-    };
-    if !alarmed
-        && first.cost < PLAIN
-        && left_by(&h, &laws, &first).1 > AUDIT_LEVEL
-        && !looks_stuck()
-    {
+    if !alarmed && of.is_plain(&first) {
         return Verdict::Smooth;
     }
-    let sound = |spread: f64, from: Option<&Fit>| {
-        Laws::new(&h, Fault::None, spread).fit(from, 0.0, true, LAST)
-    };
-    let mut finer = Tries::none(&h, Fault::None);
+    let mut finer = Tries::none(&of.h, Fault::None);
     finer.around(first.spread);
     let plain = finer.best(LAST).unwrap_or(first);
     let smooth = plain.score();
-    let (low, high) = (h.first, h.last());
-    let railed = [(low, i32::MAX), (i32::MIN, high), (low, high)]
-        .into_iter()
-        .filter_map(|(low, high)| {
-            let fault = Fault::Rails { low, high };
-            let fit = Tries::new(&h, fault, sigma).best(LAST)?;
-            Some((fault, fit))
-        })
-        .max_by(|a, b| a.1.score().total_cmp(&b.1.score()));
+    let railed = of.railed();
     let rails = railed
         .as_ref()
         .map_or(f64::NEG_INFINITY, |(_, fit)| fit.score());
-    let mut all: Vec<(u32, i32, Fit, Tries<'_>)> = every()
-        .filter_map(|(bit, value)| {
-            let mut tries = Tries::new(&h, Fault::Bit { bit, value }, sigma);
-            Some((bit, value, tries.best(FIRST)?, tries))
-        })
-        .collect();
-    all.sort_by(|a, b| b.2.score().total_cmp(&a.2.score()));
-    all.truncate(BEST);
-    let nearest = all
-        .into_iter()
-        .filter_map(|(bit, value, fit, mut tries)| {
-            // A bit that folds most of the readings over is far from where a fit begins: with few rounds another spread
-            // may look best than with many, and all go on.
-            tries.around(fit.spread);
-            Some((bit, value, tries.best(LAST)?))
-        })
-        .max_by(|a, b| a.2.score().total_cmp(&b.2.score()));
-    let own = h.of_its_own();
-    let other = smooth.max(rails);
-    let (fault, sound_fit) = railed
+    let nearest = of.nearest();
+    let (fault, sound) = railed
         .filter(|(_, fit)| fit.score() > smooth)
         .unwrap_or((Fault::None, plain));
-    // What only a law with edges of its own explains is not explained.
-    let (fault, sound_fit) = if sound_fit.spread < NATURAL * sigma {
-        let anew = |spread: &f64| (Fault::None, sound(spread * sigma, None));
-        let wide = SPREADS.iter().filter(|s| **s >= NATURAL).map(anew);
-        wide.max_by(|a, b| a.1.score().total_cmp(&b.1.score()))
-            .unwrap_or((fault, sound_fit))
-    } else {
-        (fault, sound_fit)
-    };
-    let (over, chance) = left_by(&h, &Laws::new(&h, fault, sound_fit.spread), &sound_fit);
-    let unlike = chance < AUDIT_LEVEL && over > UNLIKE.max(UNLIKE_BY_READING * h.n);
+    let (fault, sound) = of.without_edges(fault, sound);
+    let laws = Laws::new(&of.h, fault, sound.spread);
+    let (over, chance) = left_by(&of.h, &laws, &sound);
+    let unlike = chance < AUDIT_LEVEL && over > UNLIKE.max(UNLIKE_BY_READING * of.h.n);
     let without = |nearest| {
         if unlike {
             Verdict::Unlike {
@@ -248,24 +307,15 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
             Verdict::Smooth
         }
     };
-    let Some((bit, value, fit)) = nearest else {
+    let Some(nearest) = nearest else {
         return without(None);
     };
+    let fit = &nearest.2;
     // At the same spread too, so that it is the edges that decide and not how many levels a law needs.
-    let gain = (fit.score() - other).min(fit.likelihood - sound(fit.spread, None).likelihood);
-    let laws = Laws::new(&h, Fault::Bit { bit, value }, fit.spread);
-    let stuck = Stuck {
-        bit,
-        value: u8::from(value == 1),
-        fraction: fit.share,
-        error: laws.share_error(&fit),
-    };
-    let (rest, chance) = left_by(&h, &laws, &fit);
-    // A bit adds at most a quarter of its square to the variance.
-    let without_bit = (sigma * sigma - 0.25 * f64::from(1u32 << bit).powi(2)).max(0.0);
-    let natural = fit.spread >= NATURAL * without_bit.sqrt();
-    let whole = chance > LEAST_CHANCE || rest < LITTLE * (fit.score() - smooth);
-    if gain > CLEARLY && natural && whole && fit.score() - smooth >= NEARLY_ALL * (own - smooth) {
+    let gain =
+        (fit.score() - smooth.max(rails)).min(fit.likelihood - of.sound(fit.spread).likelihood);
+    let (stuck, holds) = of.stuck(&nearest, smooth);
+    if gain > CLEARLY && holds {
         Verdict::Bit(stuck)
     } else {
         without((gain > CLEARLY).then_some(stuck))

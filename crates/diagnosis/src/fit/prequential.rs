@@ -8,6 +8,7 @@
 
 use std::rc::Rc;
 
+use model::effect::Peak;
 use statrs::function::gamma::ln_gamma;
 
 use crate::fit::channel::{Form, State};
@@ -120,48 +121,146 @@ fn marginal(panel: &Panel, mixture: &[Mixed], columns: &[usize], walk: f64) -> P
     }
 }
 
+/// A channel with the columns of its terms, cut into blocks.
+struct Blocks<'a> {
+    y: &'a [f64],
+    values: &'a [Vec<Vec<f64>>],
+    rate_hz: f64,
+    ends: Vec<usize>,
+    /// Whether a term has moved before the end of a block.
+    moved: Vec<Vec<bool>>,
+    /// Names and lengths of the windows over which angles are compared, samples.
+    windows: Vec<(&'static str, usize)>,
+}
+
+/// The sum of squares of angles over a window, and their number.
+type Squares = (f64, usize);
+
+impl<'a> Blocks<'a> {
+    fn new(y: &'a [f64], rate_hz: f64, values: &'a [Vec<Vec<f64>>]) -> Self {
+        let ends = ends(y.len());
+        let moved: Vec<Vec<bool>> = (values.iter())
+            .map(|term| {
+                let columns: Vec<Vec<bool>> = term.iter().map(|c| moved(c, &ends)).collect();
+                let by_all = |j: usize| columns.iter().all(|c| c[j]);
+                (0..ends.len()).map(by_all).collect()
+            })
+            .collect();
+        let windows = [("10s", 10.0), ("100s", 100.0)]
+            .iter()
+            .map(|(name, s)| (*name, (s * rate_hz).round() as usize))
+            .filter(|(_, w)| *w >= 2 && 3 * w <= y.len() - ends[0])
+            .collect();
+        Self {
+            y,
+            values,
+            rate_hz,
+            ends,
+            moved,
+            windows,
+        }
+    }
+
+    /// The numbers of the terms that have moved before the end of a block, without one.
+    fn used(&self, skip: Option<usize>, block: usize) -> impl Iterator<Item = usize> {
+        (0..self.values.len()).filter(move |i| Some(*i) != skip && self.moved[*i][block])
+    }
+
+    /// The panel of what lies before the end of a block, with the numbers of the columns of each term.
+    fn panel(&self, peaks: &[Peak], block: usize) -> (Panel, Vec<Vec<usize>>) {
+        let end = self.ends[block];
+        let (dct, bins) = (Dct::new(end), Rc::new(Bins::about(end, peaks)));
+        let shapes = self.values.iter().flatten().map(Vec::as_slice);
+        let beginnings: Vec<&[f64]> = std::iter::once(self.y)
+            .chain(shapes)
+            .map(|c| &c[..end])
+            .collect();
+        let mut numbers = 1..;
+        let columns = (self.values.iter())
+            .map(|term| numbers.by_ref().take(term.len()).collect())
+            .collect();
+        (Panel::of_all(&dct, &bins, &beginnings), columns)
+    }
+
+    /// Add the errors of the angles over a block that what lies before it predicts.
+    fn predict(&self, skip: Option<usize>, block: usize, prefix: &Prefix, squares: &mut [Squares]) {
+        let (end, Some(next)) = (self.ends[block], self.ends.get(block + 1)) else {
+            return;
+        };
+        let shapes: Vec<&Vec<f64>> = self
+            .used(skip, block)
+            .flat_map(|i| &self.values[i])
+            .collect();
+        // A filter has forgotten what lies forty of its memories back; windows may reach beyond the block.
+        let memory = 40.0 * (-0.5 * prefix.log_walk).exp() + 1000.0;
+        let from = end - end.min(memory as usize);
+        let longest = self.windows.iter().map(|w| w.1).max().unwrap_or(0);
+        let to = self.y.len().min(next + longest);
+        let rest: Vec<f64> = (from..to)
+            .map(|i| {
+                self.y[i]
+                    - shapes
+                        .iter()
+                        .zip(&prefix.beta)
+                        .map(|(x, b)| x[i] * b)
+                        .sum::<f64>()
+            })
+            .collect();
+        for ((_, length), squares) in self.windows.iter().zip(squares) {
+            add_angles(
+                &rest,
+                from,
+                prefix.log_walk,
+                (end, *next),
+                *length,
+                self.rate_hz,
+                squares,
+            );
+        }
+    }
+
+    /// The score of a term: the evidence and the errors without it and with all, the last of each.
+    fn score(&self, term: usize, log_m: &[Vec<f64>], squares: &[Vec<Squares>]) -> Score {
+        let full = log_m.len() - 1;
+        let gains: Vec<f64> = (1..=BLOCKS)
+            .map(|j| {
+                let of = |m: usize| log_m[m][j] - log_m[m][j - 1];
+                if self.moved[term][j - 1] {
+                    of(full) - of(term)
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let (nats, std_error) = total(&gains);
+        let rms = |m: usize, w: usize| (squares[m][w].0 / squares[m][w].1.max(1) as f64).sqrt();
+        let angle = (self.windows.iter().enumerate())
+            .map(|(w, (name, _))| (*name, [rms(term, w), rms(full, w)]))
+            .collect();
+        Score {
+            nats,
+            std_error,
+            angle,
+        }
+    }
+}
+
 /// Score each term of a state on a channel; `columns_of(term)` gives its columns in samples.
 #[must_use]
 pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) -> Vec<Score> {
-    let n = y.len();
     let peaks = state.noise.peaks();
-    let ends = ends(n);
-    let moved: Vec<Vec<bool>> = (values.iter())
-        .map(|term| {
-            let columns: Vec<Vec<bool>> = term.iter().map(|c| moved(c, &ends)).collect();
-            let by_all = |j: usize| columns.iter().all(|c| c[j]);
-            (0..ends.len()).map(by_all).collect()
-        })
-        .collect();
+    let blocks = Blocks::new(y, rate_hz, values);
     let models: Vec<Option<usize>> = (0..state.terms.len()).map(Some).chain([None]).collect();
     let mut log_m = vec![vec![]; models.len()];
-    let windows: Vec<(&'static str, usize)> = [("10s", 10.0), ("100s", 100.0)]
-        .iter()
-        .map(|(name, s)| (*name, (s * rate_hz).round() as usize))
-        .filter(|(_, w)| *w >= 2 && 3 * w <= n - ends[0])
-        .collect();
-    let mut squares = vec![vec![(0.0, 0usize); windows.len()]; models.len()];
-    for (j, end) in ends.iter().enumerate() {
-        let (dct, bins) = (Dct::new(*end), Rc::new(Bins::about(*end, &peaks)));
-        let shapes = values.iter().flatten().map(Vec::as_slice);
-        let beginnings: Vec<&[f64]> = std::iter::once(y)
-            .chain(shapes)
-            .map(|c| &c[..*end])
-            .collect();
-        let panel = Panel::of_all(&dct, &bins, &beginnings);
-        let mut numbers = 1..;
-        let columns: Vec<Vec<usize>> = values
-            .iter()
-            .map(|term| numbers.by_ref().take(term.len()).collect())
-            .collect();
+    let mut squares = vec![vec![(0.0, 0usize); blocks.windows.len()]; models.len()];
+    for j in 0..blocks.ends.len() {
+        let (panel, columns) = blocks.panel(&peaks, j);
         // Without a term that is no noise the mixture is that of the whole.
         let whole = mixture(&panel, state, None);
         for (m, skip) in models.iter().enumerate() {
-            let used: Vec<usize> = columns
-                .iter()
-                .enumerate()
-                .filter(|(i, _)| Some(*i) != *skip && moved[*i][j])
-                .flat_map(|(_, c)| c.clone())
+            let used: Vec<usize> = blocks
+                .used(*skip, j)
+                .flat_map(|i| columns[i].clone())
                 .collect();
             let own = skip
                 .filter(|i| state.terms[*i].is_covariance())
@@ -169,68 +268,11 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
             let mixture = own.as_ref().unwrap_or(&whole);
             let prefix = marginal(&panel, mixture, &used, state.noise.log_walk);
             log_m[m].push(prefix.log_m);
-            let Some(next) = ends.get(j + 1) else {
-                continue;
-            };
-            let shapes: Vec<&Vec<f64>> = values
-                .iter()
-                .enumerate()
-                .filter(|(i, _)| Some(*i) != *skip && moved[*i][j])
-                .flat_map(|(_, c)| c)
-                .collect();
-            // A filter has forgotten what lies forty of its memories back; windows may reach beyond the block.
-            let memory = 40.0 * (-0.5 * prefix.log_walk).exp() + 1000.0;
-            let from = end - (*end).min(memory as usize);
-            let longest = windows.iter().map(|w| w.1).max().unwrap_or(0);
-            let to = n.min(next + longest);
-            let rest: Vec<f64> = (from..to)
-                .map(|i| {
-                    y[i] - shapes
-                        .iter()
-                        .zip(&prefix.beta)
-                        .map(|(x, b)| x[i] * b)
-                        .sum::<f64>()
-                })
-                .collect();
-            for (w, (_, length)) in windows.iter().enumerate() {
-                add_angles(
-                    &rest,
-                    from,
-                    prefix.log_walk,
-                    (*end, *next),
-                    *length,
-                    rate_hz,
-                    &mut squares[m][w],
-                );
-            }
+            blocks.predict(*skip, j, &prefix, &mut squares[m]);
         }
     }
-    let full = log_m.len() - 1;
     (0..state.terms.len())
-        .map(|i| {
-            let gains: Vec<f64> = (1..=BLOCKS)
-                .map(|j| {
-                    let of = |m: usize| log_m[m][j] - log_m[m][j - 1];
-                    if moved[i][j - 1] {
-                        of(full) - of(i)
-                    } else {
-                        0.0
-                    }
-                })
-                .collect();
-            let (nats, std_error) = total(&gains);
-            let rms = |m: usize, w: usize| (squares[m][w].0 / squares[m][w].1.max(1) as f64).sqrt();
-            let angle = windows
-                .iter()
-                .enumerate()
-                .map(|(w, (name, _))| (*name, [rms(i, w), rms(full, w)]))
-                .collect();
-            Score {
-                nats,
-                std_error,
-                angle,
-            }
-        })
+        .map(|term| blocks.score(term, &log_m, &squares))
         .collect()
 }
 

@@ -1,6 +1,8 @@
 //! From a record to an even grid: gaps found by the sequence numbers, lost samples filled so that the likelihood cannot
 //! tell, slow channels smoothed, motion of the base noticed.
 
+mod signals;
+
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -16,6 +18,7 @@ use crate::ingest::types::{Grid, Target};
 use crate::ingest::{dequantise, fill, kalman};
 use model::record::AnalysisError;
 use numerics::series::{smallest_step, white_by_differences};
+use signals::{of_gyro, other};
 
 /// Least number of samples of a gyro.
 pub const LEAST_SAMPLES: usize = 600;
@@ -446,64 +449,4 @@ fn white_of(y: &[f64]) -> f64 {
     let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
     let d: Vec<f64> = known.windows(2).map(|w| w[1] - w[0]).collect();
     d.iter().map(|d| d * d).sum::<f64>() / (2.0 * d.len().max(1) as f64)
-}
-
-/// What a gyro reads, to the effects of the others.
-fn of_gyro(c: &Channel, target: &Target) -> Signal {
-    Signal {
-        name: c.name.clone(),
-        quantity: c.quantity,
-        axis: c.axis,
-        unit: c.unit.clone(),
-        values: Arc::clone(&target.y),
-        smooth: Arc::clone(&target.y),
-        lsb: c.lsb,
-        moving: target.moving,
-    }
-}
-
-/// A channel that is no gyro, and the coefficients of what can drive a gyro's bias: motor command, supply, temperatures.
-fn other(
-    c: &Channel,
-    places: &[usize],
-    n: usize,
-    dct: &Dct,
-    bins: &Rc<Bins>,
-) -> (Signal, Option<Rc<Vec<f64>>>) {
-    let read = spread(&c.values, places, n, &[]);
-    let values = Arc::new(interpolated(&read));
-    let is_noisy = matches!(c.quantity, Quantity::Temp | Quantity::Supply);
-    let coefficients = drives(c.quantity).then(|| Rc::new(dct.forward(&values)));
-    let step = || c.lsb.unwrap_or_else(|| smallest_step(few(&c.values)));
-    let smooth = coefficients.as_ref().filter(|_| is_noisy);
-    let smooth = smooth
-        .and_then(|c| dequantise::smoothed(&read, step()).or_else(|| smoothed(c, dct, bins)))
-        .map(Arc::new);
-    let signal = Signal {
-        name: c.name.clone(),
-        quantity: c.quantity,
-        axis: c.axis,
-        unit: c.unit.clone(),
-        smooth: smooth.unwrap_or_else(|| Arc::clone(&values)),
-        values,
-        lsb: c.lsb,
-        moving: false,
-    };
-    (signal, coefficients)
-}
-
-/// The level of a local-level model fitted to readings of these coefficients, every one shrunk by the random walk's share;
-/// none where the readings never change.
-fn smoothed(coefficients: &Rc<Vec<f64>>, dct: &Dct, bins: &Rc<Bins>) -> Option<Vec<f64>> {
-    if coefficients[1..].iter().all(|v| v.abs() < 1e-9) {
-        return None;
-    }
-    let panel = Panel::of(dct, bins, Rc::clone(coefficients));
-    let (noise, _) = panel.fit(&Noise::new(-12.0), &[]);
-    let mut c = coefficients.to_vec();
-    let g = noise.everywhere(bins);
-    for (v, g) in c.iter_mut().zip(g).skip(1) {
-        *v *= 1.0 - 1.0 / g;
-    }
-    Some(dct.inverse(&c))
 }

@@ -51,100 +51,12 @@ impl Sampling {
                 expected: "a positive number of samples per second".into(),
             });
         }
+        let clocks = Clocks::of(record);
         let mut warnings = Vec::new();
-        let device: Option<Vec<f64>> = match (&record.t_ticks, record.header.tick_s) {
-            (Some(ticks), Some(tick_s)) => Some(
-                ticks
-                    .iter()
-                    .map(|t| {
-                        t.wrapping_sub(ticks.first().copied().unwrap_or(0)) as i64 as f64 * tick_s
-                    })
-                    .collect(),
-            ),
-            _ => None,
-        };
-        let device_interval = device.as_deref().and_then(Interval::of);
-        let host_interval = record.host_time_s.as_deref().and_then(Interval::of);
-        let stated = rate_hz
-            .or(record.header.rate_hz.filter(|r| r.is_finite() && *r > 0.0))
-            .map(|r| 1.0 / r);
-        let tau0 = stated
-            .or(device_interval.as_ref().map(|i| i.regular_s))
-            .or(host_interval.as_ref().map(Interval::best_s))
-            .ok_or(AnalysisError::NoRate)?;
-        if let (Some(stated), Some(measured)) = (stated, &device_interval)
-            && (measured.regular_s / stated - 1.0).abs() > 0.01
-        {
-            warnings.push(format!(
-                "the stated interval {stated:.6} s differs from the device's clock, which says {:.6} s: all times here \
-                 follow the stated one",
-                measured.regular_s
-            ));
-        }
-
-        let n = record.len();
-        // Intervals since the row before: 1 where nothing is missing, `None` where the gap's length is not known.
-        let mut steps: Vec<Option<u64>> = vec![Some(1); n];
-        if let Some(seq) = &record.seq {
-            let mut backwards = 0usize;
-            for i in 1..n.min(seq.len()) {
-                match seq[i].checked_sub(seq[i - 1]) {
-                    Some(1) => {}
-                    Some(step) if step > 1 => steps[i] = Some(step),
-                    _ => {
-                        steps[i] = None;
-                        backwards += 1;
-                    }
-                }
-            }
-            if backwards > 0 {
-                warnings.push(format!(
-                    "the sequence number repeats or runs backwards at {backwards} rows: treated as interruptions"
-                ));
-            }
-        }
-        if let (Some(times), Some(interval)) = (&device, &device_interval) {
-            // A jump of the clock that the sequence number does not show is an interruption all the same.
-            jumps(times, interval.regular_s, &mut steps);
-        } else if record.seq.is_none()
-            && let (Some(times), Some(interval)) = (&record.host_time_s, &host_interval)
-        {
-            if interval.bursty() {
-                warnings.push(format!(
-                    "the times come in bursts ({:.0} % of the steps are off the median by more than half of it), so they \
-                     tell arrival, not sampling: rows are taken as evenly spaced at {:.6} s, and gaps cannot be seen",
-                    100.0 * interval.irregular_share,
-                    tau0
-                ));
-            } else {
-                jumps(times, interval.regular_s, &mut steps);
-            }
-        }
-        let mut runs = Vec::new();
-        let mut start = 0;
-        let mut lost = 0;
-        let mut slot = 0u64;
-        let mut slots = Vec::with_capacity(n);
-        for (i, step) in steps.iter().enumerate() {
-            if i > 0 {
-                slot += step.unwrap_or(UNKNOWN_GAP);
-                if *step != Some(1) {
-                    runs.push(start..i);
-                    start = i;
-                    lost += step.unwrap_or(1) - 1;
-                }
-            }
-            slots.push(slot);
-        }
-        let jitter_s = match (&device, &device_interval) {
-            (Some(times), Some(interval)) => jitter(times, interval.regular_s, &runs),
-            _ => match (&record.host_time_s, &host_interval) {
-                (Some(times), Some(interval)) if !interval.bursty() => {
-                    jitter(times, interval.regular_s, &runs)
-                }
-                _ => None,
-            },
-        };
+        let tau0 = clocks.interval(record, rate_hz, &mut warnings)?;
+        let steps = clocks.steps(record, tau0, &mut warnings);
+        let laid = Laid::out(&steps);
+        let jitter_s = clocks.jitter(&laid.runs);
         if let Some(jitter) = jitter_s.filter(|j| *j > JITTER_TOLD * tau0) {
             warnings.push(format!(
                 "the sample times scatter by {jitter:.2e} s rms about an even grid, {:.1} % of the interval: clusters begin and end \
@@ -152,15 +64,16 @@ impl Sampling {
                 100.0 * jitter / tau0
             ));
         }
-        if start < n {
-            runs.push(start..n);
+        let mut runs = laid.runs;
+        if laid.start < record.len() {
+            runs.push(laid.start..record.len());
         }
         Ok(Self {
             tau0,
             runs,
-            slots,
+            slots: laid.slots,
             jitter_s,
-            lost,
+            lost: laid.lost,
             warnings,
         })
     }
@@ -184,6 +97,158 @@ impl Sampling {
             }
         }
         out
+    }
+}
+
+/// The times that a record has, and the intervals between them.
+struct Clocks<'a> {
+    /// Device time since the first row, s.
+    device: Option<Vec<f64>>,
+    device_interval: Option<Interval>,
+    /// Time of the rows, s.
+    host: Option<&'a [f64]>,
+    host_interval: Option<Interval>,
+}
+
+impl<'a> Clocks<'a> {
+    fn of(record: &'a Record) -> Self {
+        let device: Option<Vec<f64>> = match (&record.t_ticks, record.header.tick_s) {
+            (Some(ticks), Some(tick_s)) => {
+                let first = ticks.first().copied().unwrap_or(0);
+                let since = |t: &u64| t.wrapping_sub(first) as i64 as f64 * tick_s;
+                Some(ticks.iter().map(since).collect())
+            }
+            _ => None,
+        };
+        let host = record.host_time_s.as_deref();
+        Self {
+            device_interval: device.as_deref().and_then(Interval::of),
+            device,
+            host,
+            host_interval: host.and_then(Interval::of),
+        }
+    }
+
+    /// The sample interval, s.
+    fn interval(
+        &self,
+        record: &Record,
+        rate_hz: Option<f64>,
+        warnings: &mut Vec<String>,
+    ) -> Result<f64, AnalysisError> {
+        let stated = rate_hz
+            .or(record.header.rate_hz.filter(|r| r.is_finite() && *r > 0.0))
+            .map(|r| 1.0 / r);
+        let tau0 = stated
+            .or(self.device_interval.as_ref().map(|i| i.regular_s))
+            .or(self.host_interval.as_ref().map(Interval::best_s))
+            .ok_or(AnalysisError::NoRate)?;
+        if let (Some(stated), Some(measured)) = (stated, &self.device_interval)
+            && (measured.regular_s / stated - 1.0).abs() > 0.01
+        {
+            warnings.push(format!(
+                "the stated interval {stated:.6} s differs from the device's clock, which says {:.6} s: all times here \
+                 follow the stated one",
+                measured.regular_s
+            ));
+        }
+        Ok(tau0)
+    }
+
+    /// Intervals since the row before: 1 where nothing is missing, `None` where the gap's length is not known.
+    fn steps(&self, record: &Record, tau0: f64, warnings: &mut Vec<String>) -> Vec<Option<u64>> {
+        let mut steps = by_numbers(record, warnings);
+        if let (Some(times), Some(interval)) = (&self.device, &self.device_interval) {
+            // A jump of the clock that the sequence number does not show is an interruption all the same.
+            jumps(times, interval.regular_s, &mut steps);
+        } else if record.seq.is_none()
+            && let (Some(times), Some(interval)) = (self.host, &self.host_interval)
+        {
+            if interval.bursty() {
+                warnings.push(format!(
+                    "the times come in bursts ({:.0} % of the steps are off the median by more than half of it), so they \
+                     tell arrival, not sampling: rows are taken as evenly spaced at {:.6} s, and gaps cannot be seen",
+                    100.0 * interval.irregular_share,
+                    tau0
+                ));
+            } else {
+                jumps(times, interval.regular_s, &mut steps);
+            }
+        }
+        steps
+    }
+
+    /// Scatter of the times about an even grid, s rms.
+    fn jitter(&self, runs: &[Range<usize>]) -> Option<f64> {
+        match (&self.device, &self.device_interval) {
+            (Some(times), Some(interval)) => jitter(times, interval.regular_s, runs),
+            _ => match (self.host, &self.host_interval) {
+                (Some(times), Some(interval)) if !interval.bursty() => {
+                    jitter(times, interval.regular_s, runs)
+                }
+                _ => None,
+            },
+        }
+    }
+}
+
+/// Intervals since the row before, by the sequence numbers.
+fn by_numbers(record: &Record, warnings: &mut Vec<String>) -> Vec<Option<u64>> {
+    let n = record.len();
+    let mut steps: Vec<Option<u64>> = vec![Some(1); n];
+    let Some(seq) = &record.seq else {
+        return steps;
+    };
+    let mut backwards = 0usize;
+    for i in 1..n.min(seq.len()) {
+        match seq[i].checked_sub(seq[i - 1]) {
+            Some(1) => {}
+            Some(step) if step > 1 => steps[i] = Some(step),
+            _ => {
+                steps[i] = None;
+                backwards += 1;
+            }
+        }
+    }
+    if backwards > 0 {
+        warnings.push(format!(
+            "the sequence number repeats or runs backwards at {backwards} rows: treated as interruptions"
+        ));
+    }
+    steps
+}
+
+/// Rows laid out on the grid of sample times.
+struct Laid {
+    /// Runs that a gap ends.
+    runs: Vec<Range<usize>>,
+    /// First row after the last gap.
+    start: usize,
+    slots: Vec<u64>,
+    lost: u64,
+}
+
+impl Laid {
+    fn out(steps: &[Option<u64>]) -> Self {
+        let mut laid = Self {
+            runs: Vec::new(),
+            start: 0,
+            slots: Vec::with_capacity(steps.len()),
+            lost: 0,
+        };
+        let mut slot = 0u64;
+        for (i, step) in steps.iter().enumerate() {
+            if i > 0 {
+                slot += step.unwrap_or(UNKNOWN_GAP);
+                if *step != Some(1) {
+                    laid.runs.push(laid.start..i);
+                    laid.start = i;
+                    laid.lost += step.unwrap_or(1) - 1;
+                }
+            }
+            laid.slots.push(slot);
+        }
+        laid
     }
 }
 

@@ -20,7 +20,134 @@ const TICK_TOLERANCE_PPM: f64 = 100.0;
 /// Time a frame spends on the line, s, and its spread.
 const LATENCY_S: (f64, f64) = (0.018, 0.0005);
 
-/// The record that the host writes.
+/// Names of the axes.
+const NAMES: [&str; 3] = ["x", "y", "z"];
+
+/// Counts of a channel, and what they mean: value = scale (count - zero) + offset.
+struct Counted<'a> {
+    name: String,
+    quantity: Quantity,
+    axis: Option<Axis>,
+    unit: &'a str,
+    counts: Vec<i32>,
+    scale: f64,
+    zero: f64,
+    offset: f64,
+}
+
+impl Counted<'_> {
+    fn channel(self) -> Channel {
+        let value = |c: &i32| self.scale * (f64::from(*c) - self.zero) + self.offset;
+        Channel {
+            values: self.counts.iter().map(value).collect(),
+            name: self.name,
+            quantity: self.quantity,
+            axis: self.axis,
+            unit: self.unit.to_owned(),
+            counts: Some(self.counts),
+            lsb: Some(self.scale),
+        }
+    }
+}
+
+/// A reading in counts, with its noise.
+fn read(rng: &mut impl rand_core::Rng, value: f64, zero: f64, per_unit: f64, noise: f64) -> i32 {
+    let e: f64 = StandardNormal.sample(rng);
+    ((value - zero) * per_unit + noise * e).round() as i32
+}
+
+fn gyro(s: &Simulation, rows: &[usize], axis: Axis, lsb: Option<f64>) -> Channel {
+    let i = axis.index();
+    Counted {
+        name: format!("gyro_{}", NAMES[i]),
+        quantity: Quantity::Gyro,
+        axis: Some(axis),
+        unit: "deg/s",
+        counts: rows.iter().map(|r| s.counts[i][*r]).collect(),
+        scale: lsb.unwrap_or(STEPLESS_DPS),
+        zero: 0.0,
+        offset: 0.0,
+    }
+    .channel()
+}
+
+fn temperature(s: &mut Simulation, rows: &[usize], axis: Axis) -> Channel {
+    let i = axis.index();
+    let per_unit = 1.0 / TEMP_LSB_C;
+    let (truth, rng) = (&s.temperature[i], &mut s.rng);
+    let counts = rows
+        .iter()
+        .map(|r| read(rng, truth[*r], TEMP_ZERO_C, per_unit, SLOW_NOISE_COUNTS))
+        .collect();
+    Counted {
+        name: format!("temp_{}", NAMES[i]),
+        quantity: Quantity::Temp,
+        axis: Some(axis),
+        unit: "degC",
+        counts,
+        scale: TEMP_LSB_C,
+        zero: 0.0,
+        offset: TEMP_ZERO_C,
+    }
+    .channel()
+}
+
+fn supply(s: &mut Simulation, rows: &[usize]) -> Channel {
+    let (truth, rng) = (&s.supply, &mut s.rng);
+    let counts = rows
+        .iter()
+        .map(|r| read(rng, truth[*r], 0.0, 1.0 / SUPPLY_LSB_V, SLOW_NOISE_COUNTS))
+        .collect();
+    Counted {
+        name: "supply".into(),
+        quantity: Quantity::Supply,
+        axis: None,
+        unit: "V",
+        counts,
+        scale: SUPPLY_LSB_V,
+        zero: 0.0,
+        offset: 0.0,
+    }
+    .channel()
+}
+
+fn accelerometer(s: &mut Simulation, rows: &[usize], axis: Axis) -> Channel {
+    let i = axis.index();
+    let noise = ACC_NOISE_G * ACC_PER_G;
+    let (truth, rng) = (&s.acc[i], &mut s.rng);
+    let counts = rows
+        .iter()
+        .map(|r| (ACC_ZERO as i32 + read(rng, truth[*r], 0.0, ACC_PER_G, noise)).clamp(0, 1023))
+        .collect();
+    Counted {
+        name: format!("acc_{}", NAMES[i]),
+        quantity: Quantity::Acc,
+        axis: Some(axis),
+        unit: "m/s^2",
+        counts,
+        scale: STANDARD_GRAVITY / ACC_PER_G,
+        zero: ACC_ZERO,
+        offset: 0.0,
+    }
+    .channel()
+}
+
+fn command(s: &Simulation, rows: &[usize]) -> Channel {
+    let count = |r: &usize| (s.duty[*r] * 255.0).round() as i32;
+    Counted {
+        name: "pwm".into(),
+        quantity: Quantity::Pwm,
+        axis: None,
+        unit: "1",
+        counts: rows.iter().map(count).collect(),
+        scale: 1.0,
+        zero: 0.0,
+        offset: 0.0,
+    }
+    .channel()
+}
+
+/// The record that the host writes. The order of the channels is that of the draws.
 pub(super) fn frames(
     mut s: Simulation,
     model: &ModelFile,
@@ -28,121 +155,14 @@ pub(super) fn frames(
     lsb: [Option<f64>; 3],
 ) -> Record {
     let rows: Vec<usize> = (0..s.samples).filter(|i| s.keep[*i]).collect();
-    let mut channels = vec![];
-    let mut push = |name: String,
-                    quantity,
-                    axis,
-                    unit: &str,
-                    counts: Vec<i32>,
-                    scale: f64,
-                    zero: f64,
-                    offset: f64| {
-        channels.push(Channel {
-            name,
-            quantity,
-            axis,
-            unit: unit.to_owned(),
-            values: counts
-                .iter()
-                .map(|c| scale * (f64::from(*c) - zero) + offset)
-                .collect(),
-            counts: Some(counts),
-            lsb: Some(scale),
-        });
-    };
-    const NAMES: [&str; 3] = ["x", "y", "z"];
-    for axis in Axis::ALL.into_iter().filter(|a| present[a.index()]) {
-        let i = axis.index();
-        let counts = rows.iter().map(|r| s.counts[i][*r]).collect();
-        let name = format!("gyro_{}", NAMES[i]);
-        push(
-            name,
-            Quantity::Gyro,
-            Some(axis),
-            "deg/s",
-            counts,
-            lsb[i].unwrap_or(STEPLESS_DPS),
-            0.0,
-            0.0,
-        );
-    }
-    let mut read = |value: f64, zero: f64, per_unit: f64, noise: f64| -> i32 {
-        let e: f64 = StandardNormal.sample(&mut s.rng);
-        ((value - zero) * per_unit + noise * e).round() as i32
-    };
-    for axis in Axis::ALL {
-        let i = axis.index();
-        let counts = rows
-            .iter()
-            .map(|r| {
-                read(
-                    s.temperature[i][*r],
-                    TEMP_ZERO_C,
-                    1.0 / TEMP_LSB_C,
-                    SLOW_NOISE_COUNTS,
-                )
-            })
-            .collect();
-        push(
-            format!("temp_{}", NAMES[i]),
-            Quantity::Temp,
-            Some(axis),
-            "degC",
-            counts,
-            TEMP_LSB_C,
-            0.0,
-            TEMP_ZERO_C,
-        );
-    }
-    let counts = rows
-        .iter()
-        .map(|r| read(s.supply[*r], 0.0, 1.0 / SUPPLY_LSB_V, SLOW_NOISE_COUNTS))
+    let mut channels: Vec<Channel> = (Axis::ALL.into_iter())
+        .filter(|a| present[a.index()])
+        .map(|a| gyro(&s, &rows, a, lsb[a.index()]))
         .collect();
-    push(
-        "supply".into(),
-        Quantity::Supply,
-        None,
-        "V",
-        counts,
-        SUPPLY_LSB_V,
-        0.0,
-        0.0,
-    );
-    for axis in Axis::ALL {
-        let i = axis.index();
-        let counts = rows
-            .iter()
-            .map(|r| {
-                (ACC_ZERO as i32 + read(s.acc[i][*r], 0.0, ACC_PER_G, ACC_NOISE_G * ACC_PER_G))
-                    .clamp(0, 1023)
-            })
-            .collect();
-        let scale = STANDARD_GRAVITY / ACC_PER_G;
-        push(
-            format!("acc_{}", NAMES[i]),
-            Quantity::Acc,
-            Some(axis),
-            "m/s^2",
-            counts,
-            scale,
-            ACC_ZERO,
-            0.0,
-        );
-    }
-    let counts = rows
-        .iter()
-        .map(|r| (s.duty[*r] * 255.0).round() as i32)
-        .collect();
-    push(
-        "pwm".into(),
-        Quantity::Pwm,
-        None,
-        "1",
-        counts,
-        1.0,
-        0.0,
-        0.0,
-    );
+    channels.extend(Axis::ALL.map(|a| temperature(&mut s, &rows, a)));
+    channels.push(supply(&mut s, &rows));
+    channels.extend(Axis::ALL.map(|a| accelerometer(&mut s, &rows, a)));
+    channels.push(command(&s, &rows));
     let latency = Normal::new(LATENCY_S.0, LATENCY_S.1).ok();
     let host = rows
         .iter()
