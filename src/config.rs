@@ -8,19 +8,22 @@ use zerocopy::little_endian::{I32, U16, U32};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
 /// Bytes of one stored copy.
-pub const STORED_LEN: usize = size_of::<Stored>();
+pub const STORED_LEN: usize = size_of::<Config>();
 /// Where the two copies begin. Address 0 is left alone: a known weak spot when power sags.
 pub const SLOTS: [u16; 2] = [16, 80];
 const _: () = assert!(SLOTS[0] as usize + STORED_LEN <= SLOTS[1] as usize);
 /// Format of a stored copy; another number is not read.
 const FORMAT: u8 = 2;
 
-/// The set-up. The order of its fields is the format of a stored copy, and begins as a hello frame has it.
+/// The set-up, as it lies in the EEPROM.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned,
 )]
 #[repr(C)]
 pub struct Config {
+    format: u8,
+    /// One more than that of the copy that was stored before, wrapping.
+    pub generation: u8,
     /// What the hello frame says; bias in Q16.16 deg/s, scale in Q8.24 deg/s for each count.
     pub set_up: SetUp,
     /// The board's number.
@@ -29,6 +32,8 @@ pub struct Config {
     pub ramp_per_s: U16,
     /// Largest motor command.
     pub max_duty: u8,
+    /// Of all before it, when it was stored.
+    crc: U32,
 }
 
 /// Largest scale, Q8.24 deg/s for each count: 0.25, more than three times that of the widest range. 2^13 counts times it are
@@ -50,6 +55,8 @@ impl Config {
     #[must_use]
     pub const fn new() -> Self {
         Self {
+            format: 0,
+            generation: 0,
             set_up: SetUp {
                 period_ticks: U16::ZERO,
                 baud_divisor: U16::ZERO,
@@ -65,6 +72,7 @@ impl Config {
             board_id: U16::ZERO,
             ramp_per_s: U16::ZERO,
             max_duty: 0,
+            crc: U32::ZERO,
         }
     }
 
@@ -89,6 +97,32 @@ impl Config {
     pub fn set_scale_of_range(&mut self) {
         let range = Range::from_code(self.set_up.gyro_range).unwrap_or_default();
         self.set_up.scale = [I32::new(range.scale_q24()); 3];
+    }
+
+    /// Makes it a copy to be stored.
+    #[inline(always)]
+    pub fn seal(&mut self) {
+        self.format = FORMAT;
+        self.generation = self.generation.wrapping_add(1);
+        let register = self.register(STORED_LEN - size_of::<U32>());
+        self.crc.set(wire::crc::finish(register));
+    }
+
+    /// The CRC's register after the first `len` bytes.
+    #[inline(never)]
+    fn register(&self, len: usize) -> u32 {
+        let mut register = wire::crc::INIT;
+        for &byte in self.as_bytes().iter().take(len) {
+            register = wire::crc::update(register, byte);
+        }
+        register
+    }
+
+    /// Whether it has its CRC, as a stored copy.
+    #[inline(never)]
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.register(STORED_LEN) == wire::crc::RESIDUE && self.format == FORMAT
     }
 
     /// SENS/AVG of the gyros.
@@ -139,66 +173,6 @@ impl Default for Config {
     }
 }
 
-/// A copy as it lies in the EEPROM.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned)]
-#[repr(C)]
-pub struct Stored {
-    format: u8,
-    /// One more than the copy before, wrapping.
-    pub generation: u8,
-    /// The set-up.
-    pub config: Config,
-    crc: U32,
-}
-
-impl Stored {
-    /// Nothing yet.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            format: 0,
-            generation: 0,
-            config: Config::new(),
-            crc: U32::ZERO,
-        }
-    }
-
-    /// Takes `config`, with its CRC.
-    #[inline(never)]
-    pub fn seal(&mut self, generation: u8, config: &Config) {
-        self.format = FORMAT;
-        self.generation = generation;
-        self.config = *config;
-        let register = self.register(STORED_LEN - size_of::<U32>());
-        self.crc.set(wire::crc::finish(register));
-    }
-
-    /// The CRC's register after the first `len` bytes.
-    #[inline(never)]
-    fn register(&self, len: usize) -> u32 {
-        let mut register = wire::crc::INIT;
-        for &byte in self.as_bytes().iter().take(len) {
-            register = wire::crc::update(register, byte);
-        }
-        register
-    }
-
-    /// Whether format, CRC and every field are in order.
-    #[inline(never)]
-    #[must_use]
-    pub fn is_in_order(&self) -> bool {
-        self.register(STORED_LEN) == wire::crc::RESIDUE
-            && self.format == FORMAT
-            && self.config.is_in_order()
-    }
-}
-
-impl Default for Stored {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -207,33 +181,28 @@ mod tests {
     fn what_is_stored_comes_back_and_one_wrong_bit_does_not() {
         let mut config = Config {
             board_id: 7.into(),
+            generation: 8,
             ..Config::default()
         };
         config.set_up.bias = [1, -2, 3].map(I32::new);
-        let mut stored = Stored::new();
-        stored.seal(9, &config);
-        let bytes = stored.as_bytes().to_vec();
-        let read = Stored::read_from_bytes(&bytes).unwrap();
-        assert!(read.is_in_order());
-        assert_eq!((read.config, read.generation), (config, 9));
+        config.seal();
+        let bytes = config.as_bytes().to_vec();
+        let read = Config::read_from_bytes(&bytes).unwrap();
+        assert!(read.is_whole() && read.is_in_order());
+        assert_eq!((read, read.generation), (config, 9));
         for bit in 0..STORED_LEN * 8 {
             let mut bad = bytes.clone();
             bad[bit / 8] ^= 1 << (bit % 8);
-            assert!(
-                !Stored::read_from_bytes(&bad).unwrap().is_in_order(),
-                "bit {bit}"
-            );
+            let read = Config::read_from_bytes(&bad).unwrap();
+            assert!(!read.is_whole(), "bit {bit}");
         }
     }
 
     #[test]
     fn an_erased_eeprom_is_no_configuration() {
         for byte in [0xff, 0] {
-            assert!(
-                !Stored::read_from_bytes(&[byte; STORED_LEN])
-                    .unwrap()
-                    .is_in_order()
-            );
+            let read = Config::read_from_bytes(&[byte; STORED_LEN]).unwrap();
+            assert!(!read.is_whole());
         }
     }
 

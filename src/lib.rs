@@ -13,6 +13,7 @@
 pub mod acquire;
 pub mod bias;
 pub mod config;
+pub mod correction;
 pub mod math;
 pub mod motor;
 pub mod stand;

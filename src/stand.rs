@@ -1,7 +1,7 @@
 //! The board's work below the tick: scaling, framing, counting. What the PC asks for is in [`requests`].
 
 use adis16250::Register;
-use wire::fields::{Health, Reply, Sample};
+use wire::fields::{Corrected, Health, Reply, Sample};
 use wire::{Asked, Fault, RequestDecoder, Status, code, flags, kind, reset_cause};
 use zerocopy::{FromZeros, IntoBytes};
 
@@ -11,6 +11,7 @@ mod store;
 use crate::acquire::{Job, Raw, Task};
 use crate::bias::{BiasNull, Outcome};
 use crate::config::Config;
+use crate::correction::Correction;
 use crate::motor::Motor;
 use store::Store;
 
@@ -81,6 +82,7 @@ const SAMPLE_LEN: u8 = wire::Sample::FRAME_LEN as u8;
 const REPLY_LEN: u8 = wire::Reply::FRAME_LEN as u8;
 const HELLO_LEN: u8 = wire::Hello::FRAME_LEN as u8;
 const HEALTH_LEN: u8 = wire::Health::FRAME_LEN as u8;
+const CORRECTED_LEN: u8 = wire::Corrected::FRAME_LEN as u8;
 /// Samples from one reply to the next, and from one hello or health frame to the next, where the queue has no room for a
 /// sample beside it: 16 samples, 4 replies and a health frame are 1002 bytes, so that samples have four fifths of any line.
 const SAMPLES_PER_REPLY: u8 = 4;
@@ -143,6 +145,9 @@ pub struct Stand {
     store: Store,
     requests: RequestDecoder,
     bias_null: BiasNull,
+    correction: Correction,
+    /// Whether the last sample was in order.
+    in_order: bool,
 }
 
 impl Stand {
@@ -186,6 +191,8 @@ impl Stand {
             store: Store::new(),
             requests: RequestDecoder::new(),
             bias_null: BiasNull::new(),
+            correction: Correction::new(),
+            in_order: false,
         }
     }
 
@@ -202,6 +209,7 @@ impl Stand {
             self.config.set_default();
         }
         self.apply(board);
+        self.correction.on(board);
     }
 
     /// SENS/AVG that the gyros are to have.
@@ -264,10 +272,10 @@ impl Stand {
             seen |= flags::GYRO_MISCONFIGURED;
         }
         seen |= self.supply(silent, raw, &mut sample);
+        self.in_order = seen == flags::IN_ORDER;
         if !self.null.is_none() {
-            let in_order = seen == flags::IN_ORDER;
             seen |= flags::BIAS_NULL;
-            self.step_bias_null(board, in_order, &sample);
+            self.step_bias_null(board, &sample);
         }
         sample.flags.set(seen);
         if self.late != 0 || !board.send(kind::SAMPLE, sample.as_bytes()) {
@@ -287,6 +295,30 @@ impl Stand {
         let busy = board.ticks_since();
         if busy > self.health.tick_busy_max.get() {
             self.health.tick_busy_max.set(busy);
+        }
+    }
+
+    /// The corrected frame of the sample that [`on_sample`](Self::on_sample) had just before. It goes out where the line has room
+    /// for it beside the next sample and a reply, and nothing else is owed: never in place of one of those.
+    #[inline(never)]
+    pub fn correct<B: Board>(&mut self, board: &mut B, raw: &Raw) {
+        if !self.correction.is_ready(board) {
+            return;
+        }
+        let mut corrected = Corrected::new_zeroed();
+        corrected
+            .seq
+            .set(self.health.next_seq.get().wrapping_sub(1));
+        self.correction.step(
+            board,
+            raw,
+            self.motor.output(),
+            &self.config,
+            self.in_order,
+            &mut corrected,
+        );
+        if self.owed == 0 && board.room() >= CORRECTED_LEN + SAMPLE_LEN + REPLY_LEN {
+            board.send(kind::CORRECTED, corrected.as_bytes());
         }
     }
 
@@ -432,11 +464,11 @@ impl Stand {
     }
 
     #[inline(never)]
-    fn step_bias_null<B: Board>(&mut self, board: &mut B, in_order: bool, sample: &Sample) {
+    fn step_bias_null<B: Board>(&mut self, board: &mut B, sample: &Sample) {
         let outcome = if self.motor.is_on() {
             Outcome::Moving
         } else {
-            self.bias_null.take(&sample.gyro, in_order)
+            self.bias_null.take(&sample.gyro, self.in_order)
         };
         let status = match outcome {
             Outcome::GoesOn => return,

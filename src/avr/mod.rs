@@ -64,6 +64,7 @@ fn main() -> ! {
     loop {
         if let Some((raw, missed)) = tick::take() {
             stand.on_sample(&mut board, raw, missed);
+            stand.correct(&mut board, raw);
             ticked = true;
         } else if tick::take_passed() {
             ticked = true;

@@ -5,6 +5,7 @@ use wire::{Asked, Sensor, Status, code};
 
 use super::{Board, Pending, SET, Stand, source};
 use crate::acquire::{Done, Job, Task};
+use crate::correction::Correction;
 use crate::motor::FULL;
 
 /// What becomes of a request at once.
@@ -115,6 +116,9 @@ impl Stand {
                 }
             }
             code::ARM => self.arm(board, asked),
+            code::SET_CORRECTION..=code::GET_CORRECTION => {
+                return self.on_correction(board, asked);
+            }
             code::MOTOR_DUTY => {
                 let duty = asked.i16::<0>();
                 if !(-FULL..=FULL).contains(&duty) {
@@ -271,6 +275,36 @@ impl Stand {
             return Status::BadArgument;
         }
         Status::Ok
+    }
+
+    /// What concerns the correction.
+    #[inline(never)]
+    fn on_correction<B: Board>(&mut self, board: &mut B, asked: &Asked) -> Answer {
+        let what = asked.u8::<0>();
+        // The EEPROM is read at once.
+        if !self.store.is_idle() {
+            return Answer::Now(Status::Busy);
+        }
+        if asked.code == code::CORRECTION {
+            if what == 0 {
+                self.correction.off();
+            } else if !self.correction.on(board) {
+                return Answer::Now(Status::NoConfig);
+            }
+            return Answer::Now(Status::Ok);
+        }
+        let write = asked.code == code::SET_CORRECTION;
+        let row = if write { what } else { asked.u8::<1>() };
+        let Some(place) = self.correction.place(write || what != 0, row) else {
+            return Answer::Now(Status::BadArgument);
+        };
+        if write {
+            self.begin_write(asked, place);
+            return Answer::Later;
+        }
+        self.answer.value.set(self.correction.in_use().into());
+        Correction::read(board, place, &mut self.answer.detail);
+        Answer::Now(Status::Ok)
     }
 
     #[inline(never)]

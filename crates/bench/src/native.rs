@@ -598,6 +598,7 @@ fn life(
             chip.now
         };
         stand.on_sample(board, &raw, 0);
+        stand.correct(board, &raw);
         work(
             chip,
             &mut stand,

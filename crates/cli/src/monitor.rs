@@ -147,7 +147,7 @@ impl View {
                         .collect(),
                 );
             }
-            Frame::Reply(_) => {}
+            Frame::Reply(_) | Frame::Corrected(_) => {}
         }
     }
 

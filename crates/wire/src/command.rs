@@ -23,6 +23,9 @@ pub mod code {
     pub const BIAS_NULL: u8 = 32;
     pub const SET_BIAS: u8 = 33;
     pub const SET_SCALE: u8 = 34;
+    pub const SET_CORRECTION: u8 = 35;
+    pub const CORRECTION: u8 = 36;
+    pub const GET_CORRECTION: u8 = 37;
     pub const MOTOR_DUTY: u8 = 48;
     pub const MOTOR_PROFILE: u8 = 49;
     pub const MOTOR_LIMITS: u8 = 50;
@@ -188,6 +191,26 @@ pub enum Command {
         /// Q8.24 deg/s for each count.
         value: i32,
     },
+    /// Writes a row of the stored correction that is not in use; see [`crate::correction`]. The row behind the last one is the
+    /// CRC, which puts it in use. The reply comes when it is done.
+    SetCorrection {
+        /// Which row.
+        row: u8,
+        /// Its three numbers.
+        values: [i16; 3],
+    },
+    /// Switches the correction off until the next reset, or on: the newest stored one, its filter started anew.
+    Correction {
+        /// On.
+        on: bool,
+    },
+    /// Reads a row of a stored correction: the reply's details. Its value is the copy in use, 1 or 2, or 0 for none.
+    GetCorrection {
+        /// The copy in use, or the other one.
+        other: bool,
+        /// Which row.
+        row: u8,
+    },
     /// Ends a profile and turns the motor at a constant command.
     MotorDuty {
         /// -255 ..= 255.
@@ -287,6 +310,9 @@ impl Command {
             Command::BiasNull { .. } => code::BIAS_NULL,
             Command::SetBias { .. } => code::SET_BIAS,
             Command::SetScale { .. } => code::SET_SCALE,
+            Command::SetCorrection { .. } => code::SET_CORRECTION,
+            Command::Correction { .. } => code::CORRECTION,
+            Command::GetCorrection { .. } => code::GET_CORRECTION,
             Command::MotorDuty { .. } => code::MOTOR_DUTY,
             Command::MotorProfile { .. } => code::MOTOR_PROFILE,
             Command::MotorLimits { .. } => code::MOTOR_LIMITS,
@@ -337,6 +363,12 @@ impl Command {
             Command::SetBias { axis, value } | Command::SetScale { axis, value } => {
                 long(axis, value)
             }
+            Command::SetCorrection { row, values } => {
+                let [[a, b], [c, d], [e, f]] = values.map(i16::to_le_bytes);
+                [row, a, b, c, d, e, f, 0]
+            }
+            Command::Correction { on } => [u8::from(on), 0, 0, 0, 0, 0, 0, 0],
+            Command::GetCorrection { other, row } => [u8::from(other), row, 0, 0, 0, 0, 0, 0],
             Command::MotorDuty { duty } => word(duty.cast_unsigned()),
             Command::MotorProfile {
                 shape,
@@ -391,16 +423,18 @@ impl Asked {
     const fn arguments_len(code: u8) -> Option<u8> {
         Some(match code {
             code::PING..=code::REBOOT | code::STORE_CONFIG..=code::DEFAULT_CONFIG => 0,
-            code::SET_ACC_RANGE | code::SELF_TEST => 1,
+            code::SET_ACC_RANGE | code::SELF_TEST | code::CORRECTION => 1,
             code::SET_BAUD..=code::SET_GYRO
             | code::BIAS_NULL
             | code::MOTOR_DUTY
             | code::ARM
             | code::READ_REGISTER
+            | code::GET_CORRECTION
             | code::SET_BOARD_ID => 2,
             code::SET_RATE | code::MOTOR_LIMITS => 3,
             code::WRITE_REGISTER => 4,
             code::SET_BIAS | code::SET_SCALE => 5,
+            code::SET_CORRECTION => 7,
             code::MOTOR_PROFILE => 8,
             _ => return None,
         })
@@ -428,6 +462,15 @@ impl Asked {
     pub const fn u8<const AT: usize>(&self) -> u8 {
         const { assert!(AT < 8) };
         self.arguments[AT]
+    }
+
+    /// An argument that is 0 or 1.
+    fn yes<const AT: usize>(&self) -> Result<bool, Status> {
+        match self.u8::<AT>() {
+            0 => Ok(false),
+            1 => Ok(true),
+            _ => Err(Status::BadArgument),
+        }
     }
 
     /// An argument of two bytes.
@@ -496,6 +539,17 @@ impl Asked {
             code::SET_SCALE => Command::SetScale {
                 axis: axis()?,
                 value: self.i32::<1>(),
+            },
+            code::SET_CORRECTION => Command::SetCorrection {
+                row: self.u8::<0>(),
+                values: [self.i16::<1>(), self.i16::<3>(), self.i16::<5>()],
+            },
+            code::CORRECTION => Command::Correction {
+                on: self.yes::<0>()?,
+            },
+            code::GET_CORRECTION => Command::GetCorrection {
+                other: self.yes::<0>()?,
+                row: self.u8::<1>(),
             },
             code::MOTOR_DUTY => Command::MotorDuty {
                 duty: self.i16::<0>(),

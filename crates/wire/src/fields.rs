@@ -103,6 +103,19 @@ pub struct Reply {
     pub detail: [I32; 3],
 }
 
+/// Corrected frame: see [`crate::Corrected`].
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned)]
+#[repr(C)]
+#[allow(missing_docs)]
+pub struct Corrected {
+    pub seq: U16,
+    pub rate: [I32; 3],
+    pub bias: [I32; 3],
+    pub known: [U16; 3],
+    pub correction: U16,
+    pub state: u8,
+}
+
 /// Request frame: see [`crate::Request`].
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned)]
 #[repr(C)]
@@ -175,6 +188,32 @@ impl From<&Sample> for crate::Sample {
             pwm: fields.pwm.get(),
             flags: fields.flags.get(),
             rate: fields.rate.map(I32::get),
+        }
+    }
+}
+
+impl From<&crate::Corrected> for Corrected {
+    fn from(corrected: &crate::Corrected) -> Self {
+        Corrected {
+            seq: corrected.seq.into(),
+            rate: corrected.rate.map(I32::new),
+            bias: corrected.bias.map(I32::new),
+            known: corrected.known.map(U16::new),
+            correction: corrected.correction.into(),
+            state: corrected.state,
+        }
+    }
+}
+
+impl From<&Corrected> for crate::Corrected {
+    fn from(fields: &Corrected) -> Self {
+        crate::Corrected {
+            seq: fields.seq.get(),
+            rate: fields.rate.map(I32::get),
+            bias: fields.bias.map(I32::get),
+            known: fields.known.map(U16::get),
+            correction: fields.correction.get(),
+            state: fields.state,
         }
     }
 }

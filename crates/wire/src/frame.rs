@@ -65,6 +65,25 @@ pub mod reset_cause {
     pub const JTAG: u8 = 1 << 4;
 }
 
+/// The bits of [`Corrected::state`].
+pub mod correction_state {
+    /// The coefficients are applied. Where this bit is clear the gyros are set up otherwise than the correction is for: the rates
+    /// mean nothing.
+    pub const APPLIED: u8 = 1 << 0;
+    /// The bias filter has measured at least once since it was started.
+    pub const FILTERED: u8 = 1 << 1;
+    /// The stand has been at rest since the present block of the filter began.
+    pub const AT_REST: u8 = 1 << 2;
+    /// The last block at rest was refused: its mean lay beyond four standard deviations of what the filter expected.
+    pub const REFUSED: u8 = 1 << 3;
+    /// The noise of an axis has left the range that the model allows, a quarter to four times its variance.
+    pub const NOISE_OFF: u8 = 1 << 4;
+    /// A gyro's temperature is outside what the model was fitted on.
+    pub const EXTRAPOLATED: u8 = 1 << 5;
+    /// The sample of this number is not in order, see [`flags`](crate::flags): nor is the corrected rate.
+    pub const NOT_IN_ORDER: u8 = 1 << 6;
+}
+
 /// Hello frame: who the board is and how it is set. Sent at start, on request and whenever the set-up has changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Hello {
@@ -139,6 +158,31 @@ impl Sample {
     pub const FRAME_LEN: usize = Self::LEN + OVERHEAD;
 }
 
+/// Corrected frame: the rates of the sample of the same number, corrected on the board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Corrected {
+    /// Number of the sample that it belongs to, which comes before it.
+    pub seq: u16,
+    /// Corrected rates of x, y, z, Q12.20 deg/s.
+    pub rate: [i32; 3],
+    /// What the bias filter has subtracted in them beside the model's terms, Q12.20 deg/s.
+    pub bias: [i32; 3],
+    /// How sure the filter is of that bias, in 1/256 of a block: its variance is that of the mean of a block at rest, as the
+    /// correction has it, over this; 0: it has measured nothing yet.
+    pub known: [u16; 3],
+    /// Which correction it is: the number under which it was written.
+    pub correction: u16,
+    /// Bits of [`correction_state`].
+    pub state: u8,
+}
+
+impl Corrected {
+    /// Bytes of the payload, version and kind included.
+    pub const LEN: usize = 2 + size_of::<fields::Corrected>();
+    /// Bytes on the line.
+    pub const FRAME_LEN: usize = Self::LEN + OVERHEAD;
+}
+
 /// Reply frame: the one answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reply {
@@ -173,6 +217,8 @@ pub enum Frame {
     Health(Health),
     /// The answer to a request.
     Reply(Reply),
+    /// A sample's rates, corrected on the board.
+    Corrected(Corrected),
 }
 
 impl Frame {
@@ -183,6 +229,7 @@ impl Frame {
             kind::SAMPLE => Some(Sample::LEN),
             kind::HEALTH => Some(Health::LEN),
             kind::REPLY => Some(Reply::LEN),
+            kind::CORRECTED => Some(Corrected::LEN),
             _ => None,
         }
     }
@@ -203,6 +250,9 @@ impl Frame {
                 .ok()?
                 .reply()
                 .map(Frame::Reply),
+            kind::CORRECTED => Some(Frame::Corrected(Corrected::from(
+                fields::Corrected::ref_from_bytes(bytes).ok()?,
+            ))),
             _ => None,
         }
     }
@@ -246,6 +296,11 @@ pub fn encode(frame: &Frame, out: &mut [u8]) -> Result<usize, EncodeError> {
             write_frame(kind::HEALTH, fields::Health::from(health).as_bytes(), out)
         }
         Frame::Reply(reply) => write_frame(kind::REPLY, fields::Reply::from(reply).as_bytes(), out),
+        Frame::Corrected(corrected) => write_frame(
+            kind::CORRECTED,
+            fields::Corrected::from(corrected).as_bytes(),
+            out,
+        ),
     }
 }
 

@@ -31,6 +31,7 @@ extern crate std;
 
 mod cobs;
 mod command;
+pub mod correction;
 pub mod crc;
 mod decode;
 pub mod fields;
@@ -40,7 +41,10 @@ pub mod link;
 
 pub use command::{Asked, Axis, Command, Request, Sensor, Shape, Status, code, encode_request};
 pub use decode::{DecodeError, Decoder, LinkCounts, RequestDecoder, RequestError};
-pub use frame::{EncodeError, Frame, Hello, Reply, Sample, encode, flags, reset_cause};
+pub use frame::{
+    Corrected, EncodeError, Frame, Hello, Reply, Sample, correction_state, encode, flags,
+    reset_cause,
+};
 pub use health::{Fault, FaultCounts, Health};
 
 /// Version of the format that this crate writes and reads; the first byte of every payload.
@@ -59,6 +63,8 @@ pub mod kind {
     pub const HEALTH: u8 = 0x03;
     /// [`Reply`](crate::Reply), board to PC.
     pub const REPLY: u8 = 0x04;
+    /// [`Corrected`](crate::Corrected), board to PC.
+    pub const CORRECTED: u8 = 0x05;
     /// [`Request`](crate::Request), PC to board.
     pub const REQUEST: u8 = 0x10;
 }
@@ -75,4 +81,5 @@ const _: () = assert!(
         && Hello::FRAME_LEN <= MAX_FRAME
         && Sample::FRAME_LEN <= MAX_FRAME
         && Reply::FRAME_LEN <= MAX_FRAME
+        && Corrected::FRAME_LEN <= MAX_FRAME
 );

@@ -61,7 +61,7 @@ impl LinkStats {
             Frame::Sample(sample) => self.sample(sample),
             Frame::Health(health) => self.health(health),
             Frame::Hello(hello) => self.hello(hello),
-            Frame::Reply(_) => 0,
+            Frame::Reply(_) | Frame::Corrected(_) => 0,
         }
     }
 

@@ -42,6 +42,7 @@ SAMPLE = "HI3h3hH3HhH3i"
 HELLO = "3BHBHHIHH5B3i3iB"
 HEALTH = "IHHH36H"
 REPLY = "HBBi3i"
+CORRECTED = "H3i3i3HHB"
 
 vectors = {
     "sample_zero": line(2, SAMPLE, *[0] * 17),
@@ -56,6 +57,10 @@ vectors = {
     "reply_ok": line(4, REPLY, 258, 1, 0, 0, 0, 0, 0),
     "reply_bias_null": line(4, REPLY, 65535, 32, 0, 120, 65536, -65536, 1),
     "reply_moving": line(4, REPLY, 2, 32, 5, 0, 0, 0, 0),
+    "corrected": line(5, CORRECTED, 0x1234, 1048576, -1, 0, -524288, 7, 0, 256, 65535, 0, 0xBEEF, 0x27),
+    "request_set_correction": request(29, 35, "B3h", 17, -32768, 32767, 258),
+    "request_correction": request(30, 36, "B", 1),
+    "request_get_correction": request(31, 37, "BB", 1, 12),
     "request_ping": request(1, 1, ""),
     "request_keep_alive": request(0x0203, 3, ""),
     "request_set_rate": request(7, 16, "HB", 62500, 4),

@@ -2,8 +2,8 @@
 //! with its own CRC and its own stuffing; the fields are written out here once more.
 
 use wire::{
-    Axis, Command, Decoder, Fault, FaultCounts, Frame, Health, Hello, MAX_FRAME, Reply, Request,
-    RequestDecoder, Sample, Sensor, Shape, Status, encode, encode_request,
+    Axis, Command, Corrected, Decoder, Fault, FaultCounts, Frame, Health, Hello, MAX_FRAME, Reply,
+    Request, RequestDecoder, Sample, Sensor, Shape, Status, encode, encode_request,
 };
 
 fn vector(name: &str) -> Vec<u8> {
@@ -142,7 +142,37 @@ fn ref_replies() {
 }
 
 #[test]
+fn ref_corrected() {
+    let corrected = Corrected {
+        seq: 0x1234,
+        rate: [1 << 20, -1, 0],
+        bias: [-(1 << 19), 7, 0],
+        known: [256, 65_535, 0],
+        correction: 0xBEEF,
+        state: 0x27,
+    };
+    frame_is("corrected", Frame::Corrected(corrected));
+}
+
+#[test]
 fn ref_requests() {
+    request_is(
+        "request_set_correction",
+        29,
+        Command::SetCorrection {
+            row: 17,
+            values: [-32_768, 32_767, 258],
+        },
+    );
+    request_is("request_correction", 30, Command::Correction { on: true });
+    request_is(
+        "request_get_correction",
+        31,
+        Command::GetCorrection {
+            other: true,
+            row: 12,
+        },
+    );
     request_is("request_ping", 1, Command::Ping);
     request_is("request_keep_alive", 0x0203, Command::KeepAlive);
     request_is(
@@ -251,6 +281,12 @@ fn the_page_and_the_crate_give_the_same_lengths_counters_and_codes() {
         (2, "sample | board -> PC", Sample::LEN, Sample::FRAME_LEN),
         (3, "health | board -> PC", Health::LEN, Health::FRAME_LEN),
         (4, "reply | board -> PC", Reply::LEN, Reply::FRAME_LEN),
+        (
+            5,
+            "corrected | board -> PC",
+            Corrected::LEN,
+            Corrected::FRAME_LEN,
+        ),
         (
             0x10,
             "request | PC -> board",

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use wire::{
-    Axis, Command, Decoder, Fault, FaultCounts, Frame, Health, Hello, MAX_FRAME, Reply, Request,
-    RequestDecoder, Sample, Sensor, Shape, Status, encode, encode_request,
+    Axis, Command, Corrected, Decoder, Fault, FaultCounts, Frame, Health, Hello, MAX_FRAME, Reply,
+    Request, RequestDecoder, Sample, Sensor, Shape, Status, encode, encode_request,
 };
 
 prop_compose! {
@@ -54,12 +54,22 @@ prop_compose! {
     }
 }
 
+prop_compose! {
+    fn corrected()(
+        (seq, rate, bias, known) in any::<(u16, [i32; 3], [i32; 3], [u16; 3])>(),
+        (correction, state) in any::<(u16, u8)>(),
+    ) -> Corrected {
+        Corrected { seq, rate, bias, known, correction, state }
+    }
+}
+
 fn frame() -> impl Strategy<Value = Frame> {
     prop_oneof![
         sample().prop_map(Frame::Sample),
         hello().prop_map(Frame::Hello),
         health().prop_map(Frame::Health),
         reply().prop_map(Frame::Reply),
+        corrected().prop_map(Frame::Corrected),
     ]
 }
 
@@ -115,6 +125,9 @@ fn command() -> impl Strategy<Value = Command> {
             }
         ),
         any::<u16>().prop_map(|nonce| Command::Arm { nonce }),
+        any::<(u8, [i16; 3])>().prop_map(|(row, values)| Command::SetCorrection { row, values }),
+        any::<bool>().prop_map(|on| Command::Correction { on }),
+        any::<(bool, u8)>().prop_map(|(other, row)| Command::GetCorrection { other, row }),
         any::<(u8, u16)>().prop_map(|(max_duty, ramp_per_s)| Command::MotorLimits {
             max_duty,
             ramp_per_s
@@ -152,6 +165,7 @@ proptest! {
             Frame::Sample(_) => Sample::FRAME_LEN,
             Frame::Health(_) => Health::FRAME_LEN,
             Frame::Reply(_) => Reply::FRAME_LEN,
+            Frame::Corrected(_) => Corrected::FRAME_LEN,
         };
         prop_assert_eq!(line.len(), len, "the length does not depend on the fields");
     }

@@ -207,7 +207,7 @@ impl Link {
                     Frame::Hello(hello) => self.hello = Some(hello),
                     Frame::Health(health) => self.health = Some(health),
                     Frame::Sample(sample) => self.sample = Some(sample),
-                    Frame::Reply(_) => {}
+                    Frame::Reply(_) | Frame::Corrected(_) => {}
                 }
                 self.frames.push_back(frame);
             }

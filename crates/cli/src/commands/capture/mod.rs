@@ -302,7 +302,7 @@ impl<'a> Capture<'a> {
                     Frame::Sample(sample) => self.sample(&sample)?,
                     Frame::Hello(hello) => self.hello(&hello)?,
                     Frame::Reply(reply) => self.replied(reply)?,
-                    Frame::Health(_) => {}
+                    Frame::Health(_) | Frame::Corrected(_) => {}
                 }
             }
             if self.live.is_none() && asked.elapsed() > ASK && !feed.is_gone() {

@@ -63,7 +63,7 @@ pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
                     files.push(next);
                 }
             }
-            Frame::Health(_) | Frame::Reply(_) => {}
+            Frame::Health(_) | Frame::Reply(_) | Frame::Corrected(_) => {}
         }
     }
     live.finish()?;

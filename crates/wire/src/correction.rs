@@ -1,0 +1,561 @@
+//! The correction that a board applies to its rates: its numbers as they are stored, and the same arithmetic in double
+//! precision.
+//!
+//! With `w` = counts times scale, the board computes, in this order,
+//!
+//! ```text
+//! u = w + bias + temperature T + squared T^2 + motor d + magnitude |d| + supply s + sum acc_k a_k
+//! v = u + sum_j matrix_j u_j
+//! rate = v - b
+//! ```
+//!
+//! T being TEMP_OUT behind a low pass of 16 samples, d the motor command, s SUPPLY_OUT and a the ADC counts; b is what
+//! the bias filter has found, a scalar Kalman filter for each axis that measures in blocks of samples in which the stand is at
+//! rest. Every coefficient is what is *added*: that of an effect with its sign turned.
+//!
+//! A stored correction is [`NUMBERS`] 16-bit numbers, little endian, written in rows of three, and the CRC-32C of them. Any
+//! numbers are safe: no sum of products wraps, whatever they are.
+//!
+//! | place | numbers | unit of one |
+//! |---|---|---|
+//! | 0 | format and, above it, generation; number of the correction; n: 2^n samples in a block of the filter, n <= 7 | |
+//! | 3 | SENS/AVG of the gyros that it is for | |
+//! | 4 | lowest and, above it, highest temperature that it holds for, signed bytes | 4 counts of TEMP_OUT |
+//! | 5 | none | |
+//! | 6 | of the gyro x: | |
+//! | | temperature | 2^-20 deg/s for each count |
+//! | | temperature squared | 2^-26 deg/s for each count squared |
+//! | | bias, coarse and fine | 2^-10, 2^-20 deg/s |
+//! | | motor, with the command's sign and by its magnitude | 2^-20 deg/s for each step of 255 |
+//! | | supply | 2^-20 deg/s for each count |
+//! | | acc x, y, z | 2^-20 deg/s for each count |
+//! | 16, 26 | the same of y, of z | |
+//! | 36 | shares of the rates about x, y, z in the rate x; then in y, in z | 2^-18 |
+//! | 45 | of x: variance of the mean of a block at rest, unsigned | 2^-18 (deg/s)^2 |
+//! | | growth of the bias' variance in a block, over that, unsigned | 2^-24 |
+//! | | none | |
+//! | 48, 51 | the same of y, of z | |
+
+/// Numbers of a stored correction.
+pub const NUMBERS: usize = 54;
+/// Rows of three in which they are written; the row behind the last one is their CRC-32C and a 0.
+pub const ROWS: usize = NUMBERS / 3;
+/// Bytes of the numbers; the CRC-32C comes behind.
+pub const NUMBERS_LEN: usize = NUMBERS * 2;
+/// Bytes of a stored correction.
+pub const STORED_LEN: usize = NUMBERS_LEN + 4;
+/// Format of a stored correction, the low byte of its first number. Another one is not read.
+pub const FORMAT: u8 = 1;
+/// Terms of each axis.
+pub const TERMS: usize = 10;
+
+/// Counts of TEMP_OUT in a step of the range of temperatures.
+pub const RANGE_STEP: i16 = 4;
+/// Samples that the low pass of the temperature averages, as a power of two.
+pub const TEMPERATURE_SHIFT: u8 = 4;
+/// Most samples in a block of the bias filter, as a power of two.
+pub const BLOCK_SHIFT_MAX: u8 = 7;
+/// A rate further from the filter's bias than this is no bias, deg/s.
+pub const REST_DPS: i32 = 4;
+/// A block's mean may lie that many standard deviations off what the filter expects, as a power of two: 4 sigma.
+pub const GATE_SHIFT: u8 = 2;
+/// The measured noise follows over 2^5 blocks.
+pub const ADAPT_SHIFT: u8 = 5;
+/// The noise may be a fourth to four times what was told, as a variance and as a power of two.
+pub const NOISE_SHIFT: u8 = 2;
+/// What the filter knows is counted in 1/256 of a block, and is below 2^16 of them: its gain is 1/256 at the least.
+pub const KNOWN_MAX: f64 = 65_535.0 / 256.0;
+
+/// The numbers as they are stored.
+pub type Numbers = [i16; NUMBERS];
+
+const OF_AXES: usize = 6;
+const MATRIX: usize = OF_AXES + 3 * TERMS;
+const FILTER: usize = MATRIX + 9;
+
+/// A correction in physical units. Arrays of three are x, y, z.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Correction {
+    /// Its number, which corrected frames tell.
+    pub number: u16,
+    /// One more than the one before, wrapping.
+    pub generation: u8,
+    /// 2^n samples in a block of the filter.
+    pub block_shift: u8,
+    /// SENS/AVG that it is for.
+    pub sens_avg: u16,
+    /// TEMP_OUT of what it was fitted on, in steps of [`RANGE_STEP`].
+    pub temp_range: [i8; 2],
+    /// deg/s.
+    pub bias: [f64; 3],
+    /// deg/s for each count.
+    pub temperature: [f64; 3],
+    /// deg/s for each count squared.
+    pub temperature_squared: [f64; 3],
+    /// deg/s for each step of the command.
+    pub motor: [f64; 3],
+    /// deg/s for each step of the command's magnitude.
+    pub motor_magnitude: [f64; 3],
+    /// deg/s for each count.
+    pub supply: [f64; 3],
+    /// deg/s for each count: on the rate x, of acc x, y, z; then on y, on z.
+    pub acc: [[f64; 3]; 3],
+    /// 1: in the rate x, of the rates about x, y, z; then in y, in z.
+    pub matrix: [[f64; 3]; 3],
+    /// (deg/s)^2.
+    pub noise: [f64; 3],
+    /// (deg/s)^2.
+    pub walk: [f64; 3],
+}
+
+/// A number that its 16 bits do not hold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutOfRange {
+    /// Its place.
+    pub place: usize,
+    /// The value, in physical units.
+    pub value: f64,
+    /// The largest magnitude that there is room for.
+    pub most: f64,
+}
+
+impl core::fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let (axis, name, unit) = name(self.place);
+        write!(
+            f,
+            "{name} of gyro {axis}: {:.6} {unit} is outside what the board holds, {:.6}",
+            self.value, self.most
+        )
+    }
+}
+
+impl core::error::Error for OutOfRange {}
+
+/// What a number says, for people: axis, name, unit. Empty for the header's.
+#[must_use]
+pub fn name(place: usize) -> (char, &'static str, &'static str) {
+    const OF_AXIS: [(&str, &str); TERMS] = [
+        ("temperature", "deg/s/count"),
+        ("temperature squared", "deg/s/count^2"),
+        ("bias", "deg/s"),
+        ("bias, fine part", "deg/s"),
+        ("motor", "deg/s/step"),
+        ("motor by magnitude", "deg/s/step"),
+        ("supply", "deg/s/count"),
+        ("acc x", "deg/s/count"),
+        ("acc y", "deg/s/count"),
+        ("acc z", "deg/s/count"),
+    ];
+    const SHARES: [(&str, &str); 3] = [
+        ("share of rate x", ""),
+        ("share of rate y", ""),
+        ("share of rate z", ""),
+    ];
+    const OF_FILTER: [(&str, &str); 3] = [
+        ("noise of a block", "(deg/s)^2"),
+        ("walk of the bias in a block, over that", ""),
+        ("none", ""),
+    ];
+    let (from, of): (usize, &[(&str, &str)]) = match place {
+        0..OF_AXES => return (' ', "", ""),
+        OF_AXES..MATRIX => (OF_AXES, &OF_AXIS),
+        MATRIX..FILTER => (MATRIX, &SHARES),
+        FILTER..NUMBERS => (FILTER, &OF_FILTER),
+        _ => return (' ', "", ""),
+    };
+    let at = place - from;
+    let (name, unit) = of[at % of.len()];
+    (char::from(b"xyz"[at / of.len()]), name, unit)
+}
+
+/// What a number is a multiple of; 0 for the header's.
+#[must_use]
+pub const fn step(place: usize) -> f64 {
+    let bits = match place {
+        OF_AXES..MATRIX => match (place - OF_AXES) % TERMS {
+            1 => 26,
+            2 => 10,
+            _ => 20,
+        },
+        MATRIX..FILTER => 18,
+        FILTER..NUMBERS => match (place - FILTER) % 3 {
+            0 => 18,
+            1 => 24,
+            _ => 16,
+        },
+        _ => return 0.0,
+    };
+    1.0 / (1u64 << bits) as f64
+}
+
+/// Whether a number has no sign: the variances.
+const fn is_unsigned(place: usize) -> bool {
+    place >= FILTER && (place - FILTER) % 3 < 2
+}
+
+/// To the nearest, halves away from zero. (`core` has no `round`.)
+fn nearest(x: f64) -> i32 {
+    (if x < 0.0 { x - 0.5 } else { x + 0.5 }) as i32
+}
+
+impl Correction {
+    /// The values in the order of their places, from that of the first axis on; the fine bias is what the coarse one leaves.
+    fn values(&self) -> [f64; NUMBERS] {
+        let mut all = [0.0; NUMBERS];
+        for axis in 0..3 {
+            let bias = self.bias[axis];
+            let coarse_step = step(OF_AXES + 2);
+            let coarse = f64::from(nearest(bias / coarse_step)) * coarse_step;
+            let of_axis = [
+                self.temperature[axis],
+                self.temperature_squared[axis],
+                coarse,
+                bias - coarse,
+                self.motor[axis],
+                self.motor_magnitude[axis],
+                self.supply[axis],
+                self.acc[axis][0],
+                self.acc[axis][1],
+                self.acc[axis][2],
+            ];
+            all[OF_AXES + TERMS * axis..][..TERMS].copy_from_slice(&of_axis);
+            all[MATRIX + 3 * axis..][..3].copy_from_slice(&self.matrix[axis]);
+            let walk = if self.walk[axis] == 0.0 {
+                0.0
+            } else {
+                self.walk[axis] / self.noise[axis]
+            };
+            let of_filter = [self.noise[axis], walk, 0.0];
+            all[FILTER + 3 * axis..][..3].copy_from_slice(&of_filter);
+        }
+        all
+    }
+
+    /// As it is stored.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for the first number that its 16 bits do not hold, or that is none.
+    pub fn numbers(&self) -> Result<Numbers, OutOfRange> {
+        let mut all = [0; NUMBERS];
+        all[..OF_AXES].copy_from_slice(&[
+            i16::from_le_bytes([FORMAT, self.generation]),
+            self.number.cast_signed(),
+            self.block_shift.min(BLOCK_SHIFT_MAX).into(),
+            self.sens_avg.cast_signed(),
+            i16::from_le_bytes(self.temp_range.map(i8::cast_unsigned)),
+            0,
+        ]);
+        for (place, value) in self.values().into_iter().enumerate().skip(OF_AXES) {
+            let unsigned = is_unsigned(place);
+            let largest = if unsigned {
+                u16::MAX.into()
+            } else {
+                i32::from(i16::MAX)
+            };
+            let most = f64::from(largest) * step(place);
+            let least = if unsigned { 0.0 } else { -most };
+            if !(least..=most).contains(&value) {
+                return Err(OutOfRange { place, value, most });
+            }
+            all[place] = nearest(value / step(place)) as u16 as i16;
+        }
+        Ok(all)
+    }
+
+    /// What is stored; `None` for another format.
+    #[must_use]
+    pub fn from_numbers(all: &Numbers) -> Option<Self> {
+        let [format, generation] = all[0].to_le_bytes();
+        if format != FORMAT {
+            return None;
+        }
+        let value = |place: usize| {
+            let number = all[place];
+            let whole = if is_unsigned(place) {
+                f64::from(number.cast_unsigned())
+            } else {
+                f64::from(number)
+            };
+            whole * step(place)
+        };
+        let of_axes = |k: usize| [0, 1, 2].map(|axis| value(OF_AXES + TERMS * axis + k));
+        let of_filter = |k: usize| [0, 1, 2].map(|axis| value(FILTER + 3 * axis + k));
+        let (coarse, fine) = (of_axes(2), of_axes(3));
+        Some(Self {
+            number: all[1].cast_unsigned(),
+            generation,
+            block_shift: all[2].to_le_bytes()[0] & BLOCK_SHIFT_MAX,
+            sens_avg: all[3].cast_unsigned(),
+            temp_range: all[4].to_le_bytes().map(u8::cast_signed),
+            bias: [0, 1, 2].map(|axis| coarse[axis] + fine[axis]),
+            temperature: of_axes(0),
+            temperature_squared: of_axes(1),
+            motor: of_axes(4),
+            motor_magnitude: of_axes(5),
+            supply: of_axes(6),
+            acc: [0, 1, 2].map(|axis| [7, 8, 9].map(|k| value(OF_AXES + TERMS * axis + k))),
+            matrix: [0, 1, 2].map(|axis| [0, 1, 2].map(|j| value(MATRIX + 3 * axis + j))),
+            noise: of_filter(0),
+            walk: [0, 1, 2].map(|axis| value(FILTER + 3 * axis) * value(FILTER + 3 * axis + 1)),
+        })
+    }
+}
+
+/// The bytes of the numbers.
+#[must_use]
+pub fn bytes(all: &Numbers) -> [u8; NUMBERS_LEN] {
+    let mut out = [0; NUMBERS_LEN];
+    for (pair, n) in out.chunks_exact_mut(2).zip(all) {
+        pair.copy_from_slice(&n.to_le_bytes());
+    }
+    out
+}
+
+/// The row that ends a stored correction: its CRC-32C and a 0.
+#[must_use]
+pub fn crc_row(all: &Numbers) -> [i16; 3] {
+    let [a, b, c, d] = crate::crc::crc32c(&bytes(all)).to_le_bytes();
+    [i16::from_le_bytes([a, b]), i16::from_le_bytes([c, d]), 0]
+}
+
+/// A block that lies this much off, over the variance that was told, says no more of the noise.
+pub const REACH: f64 = 127.996;
+
+/// What a sample brings, as the correction sees it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Inputs {
+    /// Counts times scale, deg/s.
+    pub rate: [f64; 3],
+    /// TEMP_OUT.
+    pub temp: [i16; 3],
+    /// SUPPLY_OUT.
+    pub supply: u16,
+    /// ADC counts.
+    pub acc: [u16; 3],
+    /// -255 ..= 255.
+    pub duty: i16,
+    /// Whether the sample is in order.
+    pub in_order: bool,
+}
+
+/// One axis of the bias filter.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Axis {
+    /// TEMP_OUT behind its low pass.
+    pub temp: f64,
+    /// deg/s.
+    pub bias: f64,
+    /// What the filter knows, in blocks: the variance of the bias is that of a block, as it was told, over this.
+    pub known: f64,
+    /// Variance of a block's mean, as it has shown itself, over that which was told.
+    pub noise: f64,
+    sum: f64,
+}
+
+/// The board's arithmetic in double precision.
+#[derive(Clone, Copy, Debug)]
+pub struct Twin {
+    correction: Correction,
+    /// x, y, z.
+    pub axes: [Axis; 3],
+    started: bool,
+    at_rest: bool,
+    in_block: u32,
+}
+
+impl Twin {
+    /// Before the first sample.
+    #[must_use]
+    pub fn new(correction: &Correction) -> Self {
+        let start = Axis {
+            noise: 1.0,
+            ..Axis::default()
+        };
+        Self {
+            correction: *correction,
+            axes: [start; 3],
+            started: false,
+            at_rest: true,
+            in_block: 0,
+        }
+    }
+
+    /// The rates after the model's terms, before the bias filter.
+    fn modelled(&self, inputs: &Inputs) -> [f64; 3] {
+        let c = &self.correction;
+        let duty = f64::from(inputs.duty);
+        let supply = f64::from(inputs.supply);
+        let acc = inputs.acc.map(f64::from);
+        let mut u = [0.0; 3];
+        for (i, u) in u.iter_mut().enumerate() {
+            let t = self.axes[i].temp;
+            *u = inputs.rate[i]
+                + c.bias[i]
+                + t * (c.temperature[i] + t * c.temperature_squared[i])
+                + duty * c.motor[i]
+                + duty.abs() * c.motor_magnitude[i]
+                + supply * c.supply[i]
+                + acc[0] * c.acc[i][0]
+                + acc[1] * c.acc[i][1]
+                + acc[2] * c.acc[i][2];
+        }
+        let mut v = u;
+        for (i, v) in v.iter_mut().enumerate() {
+            *v += u[0] * c.matrix[i][0] + u[1] * c.matrix[i][1] + u[2] * c.matrix[i][2];
+        }
+        v
+    }
+
+    /// The corrected rates of a sample, deg/s.
+    pub fn step(&mut self, inputs: &Inputs) -> [f64; 3] {
+        for (axis, &counts) in self.axes.iter_mut().zip(&inputs.temp) {
+            // Ten bits: -49 to 99 degC.
+            let counts = f64::from((counts << 6) >> 6);
+            if !self.started {
+                axis.temp = counts;
+            }
+            axis.temp += (counts - axis.temp) / f64::from(1u32 << TEMPERATURE_SHIFT);
+        }
+        self.started = true;
+        let v = self.modelled(inputs);
+        self.at_rest &= inputs.in_order && inputs.duty == 0;
+        let mut out = [0.0; 3];
+        for ((out, axis), v) in out.iter_mut().zip(&mut self.axes).zip(v) {
+            let left = v - axis.bias;
+            self.at_rest &= left.abs() < f64::from(REST_DPS);
+            axis.sum += left;
+            *out = left;
+        }
+        self.in_block += 1;
+        if self.in_block == 1 << self.correction.block_shift {
+            self.end_block();
+        }
+        out
+    }
+
+    fn end_block(&mut self) {
+        let len = f64::from(self.in_block);
+        for (i, axis) in self.axes.iter_mut().enumerate() {
+            let (told, c) = (self.correction.noise[i], &self.correction);
+            // P' = P + q with P = R / known.
+            axis.known /= 1.0 + axis.known * c.walk[i] / told;
+            let mean = axis.sum / len;
+            axis.sum = 0.0;
+            let square = (mean * mean / told).min(REACH);
+            let expected = axis.noise + 1.0 / axis.known;
+            if !self.at_rest || square / f64::from(1u32 << (2 * GATE_SHIFT)) > expected {
+                continue;
+            }
+            let measured = 1.0 / axis.noise;
+            axis.known = (axis.known + measured).min(KNOWN_MAX);
+            axis.bias += mean * (measured / axis.known).min(1.0);
+            let step = (square - expected) / f64::from(1u32 << ADAPT_SHIFT);
+            let most = f64::from(1u32 << NOISE_SHIFT);
+            if expected <= REACH {
+                axis.noise = (axis.noise + step).clamp(1.0 / most, most);
+            }
+        }
+        self.at_rest = true;
+        self.in_block = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_stored_is_within_half_a_step_of_what_was_meant() {
+        let meant = Correction {
+            number: 0xBEEF,
+            generation: 7,
+            block_shift: 4,
+            sens_avg: 0x0402,
+            temp_range: [-8, 30],
+            bias: [1.234_567, -31.9, 1e-6],
+            temperature: [0.03, -0.0312, 1e-5],
+            motor: [0.4 / 255.0, -3.9 / 255.0, 0.0],
+            matrix: [[0.01, 0.124, -0.03], [0.0; 3], [-0.02, 0.0, 0.001]],
+            noise: [0.0096, 0.2, 1e-4],
+            walk: [8e-7, 2e-5, 0.0],
+            ..Correction::default()
+        };
+        let read = Correction::from_numbers(&meant.numbers().unwrap()).unwrap();
+        assert_eq!(
+            (
+                read.number,
+                read.generation,
+                read.block_shift,
+                read.sens_avg,
+                read.temp_range
+            ),
+            (0xBEEF, 7, 4, 0x0402, [-8, 30])
+        );
+        let places = read.values().into_iter().zip(meant.values()).enumerate();
+        for (place, (read, meant)) in places.skip(OF_AXES) {
+            let off = (read - meant).abs();
+            assert!(
+                off <= 0.5001 * step(place),
+                "{:?}: {read} {meant}",
+                name(place)
+            );
+        }
+        for axis in 0..3 {
+            assert!((read.bias[axis] - meant.bias[axis]).abs() < 5e-7);
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_by_name() {
+        let too_much = Correction {
+            temperature: [0.0, 0.04, 0.0],
+            ..Correction::default()
+        };
+        let error = too_much.numbers().unwrap_err();
+        assert_eq!(error.place, 16);
+        assert_eq!(
+            std::string::ToString::to_string(&error),
+            "temperature of gyro y: 0.040000 deg/s/count is outside what the board holds, 0.031249"
+        );
+        for bad in [f64::NAN, f64::INFINITY, -1.0, 0.3] {
+            let noise = Correction {
+                noise: [bad; 3],
+                ..Correction::default()
+            };
+            assert!(noise.numbers().is_err(), "{bad}");
+        }
+        let nothing = Correction {
+            bias: [f64::NAN; 3],
+            ..Correction::default()
+        };
+        assert!(nothing.numbers().is_err());
+    }
+
+    #[test]
+    fn the_filter_settles_where_its_equations_say() {
+        // P = q + P R / (P + R) at rest: P before a measurement is q/2 + sqrt(q^2/4 + q R), and R / P behind it what is known.
+        let correction = Correction {
+            noise: [0.01; 3],
+            walk: [1e-6; 3],
+            ..Correction::default()
+        };
+        let mut twin = Twin::new(&correction);
+        let inputs = |n: u32| Inputs {
+            // +-0.1 deg/s about 0.5: the variance that it was told.
+            rate: [if n.is_multiple_of(2) { 0.6 } else { 0.4 }; 3],
+            acc: [512; 3],
+            supply: 2730,
+            in_order: true,
+            ..Inputs::default()
+        };
+        for n in 0..4000 {
+            twin.step(&inputs(n));
+        }
+        let noise = 0.01 * twin.axes[0].noise;
+        let before = 0.5e-6 + (0.25e-12f64 + 1e-6 * noise).sqrt();
+        let after = before * noise / (before + noise);
+        assert!((0.01 / after / twin.axes[0].known - 1.0).abs() < 0.02);
+        assert!((twin.axes[0].bias - 0.5).abs() < 0.01);
+    }
+}
