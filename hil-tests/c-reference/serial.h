@@ -6,7 +6,7 @@
 
 /* A sample, a health frame and the next sample: 190 bytes; three requests. A ring holds one less than it has. */
 #define TX_BYTES 192
-#define RX_BYTES 64
+#define RX_BYTES 36
 
 struct tx {
     volatile uint8_t head;

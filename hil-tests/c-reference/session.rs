@@ -430,11 +430,11 @@ fn deeds() -> Vec<(u64, Deed)> {
     at += 2_000;
     all.push((at, request(next(), Command::ClearCounters)));
     all.push((at + 100, request(next(), Command::Counters)));
-    // Four frames, so that the reply waits behind others in the ring; then the start, which is heard.
+    // Frames of each kind; then the start, which is heard. Apart by more than a report waits for its turn.
     all.push((at + 200, request(next(), Command::Counters)));
-    all.push((at + 201, request(next(), Command::GetHello)));
-    all.push((at + 202, Deed::LastTick));
-    all.push((at + 202, request(next(), Command::Reboot)));
+    all.push((at + 230, request(next(), Command::GetHello)));
+    all.push((at + 260, Deed::LastTick));
+    all.push((at + 260, request(next(), Command::Reboot)));
     at += 1_000;
     all.push((at, Deed::Send(Vec::new())));
     all
@@ -513,6 +513,8 @@ fn chance(seed: u64) -> Vec<(u64, Deed)> {
     ];
     let mut all = vec![(1, Deed::Quiet(seed.is_multiple_of(2)))];
     let mut asked_for_nonce = false;
+    // When the set-up was last stored; at the start nothing is.
+    let mut stored = 0;
     for n in 0..CHANCE_REQUESTS {
         let bits = |salt: u64| spread(seed ^ spread(n << 8 | salt));
         let code = match bits(0) % 16 {
@@ -520,6 +522,26 @@ fn chance(seed: u64) -> Vec<(u64, Deed)> {
             _ => CODES[(bits(1) % CODES.len() as u64) as usize],
         };
         if matches!(code, code::REBOOT | code::SET_RATE | code::SET_BAUD) {
+            continue;
+        }
+        // The reference has no correction.
+        if matches!(code, code::SET_CORRECTION..=code::GET_CORRECTION) {
+            continue;
+        }
+        // The reference writes the set-up as it was when it was asked to, the image tells of one that was changed meanwhile.
+        if n < stored + 20
+            && matches!(
+                code,
+                code::SET_GYRO
+                    | code::SET_ACC_RANGE
+                    | code::BIAS_NULL
+                    | code::SET_BIAS
+                    | code::SET_SCALE
+                    | code::MOTOR_LIMITS
+                    | code::DEFAULT_CONFIG
+                    | code::SET_BOARD_ID
+            )
+        {
             continue;
         }
         // The second's health frame comes at the same moment as this request: with a long answer beside it, a byte that
@@ -535,6 +557,9 @@ fn chance(seed: u64) -> Vec<(u64, Deed)> {
         // A copy takes 0.6 s to write: the last one is to be whole when the EEPROMs are compared.
         if code == code::STORE_CONFIG && n + 20 > CHANCE_REQUESTS {
             continue;
+        }
+        if code == code::STORE_CONFIG {
+            stored = n;
         }
         // Asked for a nonce, the board is given it in the next slot, seven times of eight.
         if asked_for_nonce && bits(3) % 8 != 0 {

@@ -207,3 +207,55 @@ fn a_host_that_asks_for_everything() {
     between_milliseconds(&mut run);
     compare(&run);
 }
+
+/// With a correction in use the image and its logic on the host correct alike, while the stand rests and while it is turned.
+#[test]
+fn a_board_that_corrects() {
+    let mut run = run(Scenario::lively(6), 120.0);
+    let correction = wire::correction::Correction {
+        number: 0x1234,
+        block_shift: 4,
+        sens_avg: 0x0402,
+        temp_range: [-60, 60],
+        bias: [0.3, -0.2, 0.05],
+        temperature: [0.004, -0.002, 0.0],
+        temperature_squared: [1e-5, 0.0, -2e-5],
+        motor: [1e-3, 0.0, -5e-4],
+        motor_magnitude: [0.0, 2e-3, 0.0],
+        supply: [1e-4, 0.0, -2e-4],
+        acc: [[1e-4, 0.0, -1e-4]; 3],
+        matrix: [[0.01, -0.02, 0.03], [0.0, 0.004, 0.0], [-0.01, 0.0, 0.002]],
+        noise: [0.01; 3],
+        walk: [1e-6; 3],
+        ..wire::correction::Correction::default()
+    };
+    let numbers = correction.numbers().expect("they fit");
+    let rows = (0..).zip(numbers.chunks_exact(3)).map(|(row, three)| {
+        let values = [three[0], three[1], three[2]];
+        Command::SetCorrection { row, values }
+    });
+    let seal = Command::SetCorrection {
+        row: wire::correction::ROWS as u8,
+        values: wire::correction::crc_row(&numbers),
+    };
+    let get = |row| Command::GetCorrection { other: false, row };
+    run.requests = (0u16..)
+        .zip(rows.chain([seal, get(0), get(17)]))
+        .map(|(n, command)| at(2.0 + 0.3 * f64::from(n), 1000 + n, command))
+        .collect();
+    run.requests
+        .extend(duty_profile(&[(30.0, 150), (50.0, -200), (70.0, 0)], 80.0));
+    between_milliseconds(&mut run);
+    compare(&run);
+    let (own, ..) = both(&apart(&run));
+    let corrected = own.frames.iter().filter_map(|(_, frame)| match frame {
+        Frame::Corrected(corrected) => Some(*corrected),
+        _ => None,
+    });
+    // From the CRC on, one for each sample.
+    let corrected: Vec<_> = corrected.collect();
+    assert!(corrected.len() > 2200, "{}", corrected.len());
+    assert!(corrected.iter().all(|c| c.correction == 0x1234));
+    let applied = wire::correction_state::APPLIED | wire::correction_state::FILTERED;
+    assert_eq!(corrected[2000].state & applied, applied);
+}

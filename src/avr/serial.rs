@@ -11,8 +11,8 @@ use super::ring::Ring;
 
 /// Room for a sample, a health frame and the next sample: 190 bytes.
 static TX: Ring<192> = Ring::new();
-/// Three requests.
-static RX: Ring<64> = Ring::new();
+/// Nearly two requests: what comes while a sample is taken, at 250 kBd.
+static RX: Ring<36> = Ring::new();
 const UDRE: u8 = 1 << 5;
 const TXC: u8 = 1 << 6;
 const FE: u8 = 1 << 4;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use imu_stand::export::board::BoardCorrection;
 use imu_stand::export::data::{DataError, Table};
 use imu_stand::export::noise::{Consumer, ImuNoise};
 use imu_stand::export::px4::EKF2_RATE_HZ;
@@ -33,6 +34,8 @@ pub enum To {
     Gz,
     /// Noise: the dictionary of an IMU in gnss-ins-sim
     GnssInsSim,
+    /// Of a model file: the correction that the board's firmware applies, number by number
+    Board,
     /// Noise: parameters of PX4's EKF2, and the thermal calibration of its gyro
     Px4,
 }
@@ -76,6 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let consumer = match to {
         To::Csv | To::Npz | To::Parquet => return data(arguments, to),
+        To::Board => return board(arguments),
         To::Kalibr => Consumer::Kalibr,
         To::Vins => Consumer::Vins,
         To::Matlab => Consumer::Matlab,
@@ -84,6 +88,28 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         To::Px4 => Consumer::Px4,
     };
     noise(arguments, consumer)
+}
+
+/// SENS/AVG of the firmware's built-in set-up: 320 deg/s, 2^2 taps; `board correct` takes that of the board.
+const SENS_AVG: u16 = 0x0402;
+
+fn board(arguments: &Arguments) -> Result<()> {
+    Outputs::beside([&arguments.file]).result("--out", arguments.out.as_ref())?;
+    let model = super::read_model(&arguments.file)?;
+    let board = BoardCorrection::of(&model, SENS_AVG).map_err(|error| {
+        miette::miette!(
+            help = "docs/wire-format.md lists what the board holds",
+            "{}: {error}",
+            arguments.file.display()
+        )
+    })?;
+    match &arguments.out {
+        Some(out) => super::write(out, &board.table()),
+        None => {
+            say!("{}", board.table().trim_end());
+            Ok(())
+        }
+    }
 }
 
 fn by_ending(out: &Path) -> Result<To> {

@@ -1,5 +1,6 @@
 //! What others read: noise figures in the units and conventions of filters and simulators, and the data themselves.
 
+pub mod board;
 pub mod causes;
 pub mod data;
 pub mod noise;

@@ -1,6 +1,7 @@
 //! `imu-stand board`: what the board is, how it is set, and setting it.
 
 mod calibrate;
+mod correct;
 pub mod motor;
 mod null;
 mod register;
@@ -62,6 +63,11 @@ enum Action {
         after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 calibrate diagnosis.json --dry-run\n  imu-stand board --port /dev/ttyUSB0 calibrate model.toml --store"
     )]
     Calibrate(calibrate::Arguments),
+    /// Write the correction of a model file to the board, which applies it from then on
+    #[command(
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 correct --model model.toml --dry-run\n  imu-stand board --port /dev/ttyUSB0 correct --model model.toml\n  imu-stand board --port /dev/ttyUSB0 correct --off"
+    )]
+    Correct(correct::Arguments),
     /// Turn the motor for as long as this program runs; Ctrl-C stops it
     #[command(
         after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 motor --duty 100 --seconds 10\n  imu-stand board --port /dev/ttyUSB0 motor --shape sine --amplitude 120 --period-ms 5000"
@@ -115,6 +121,7 @@ impl Session {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let reads = match &arguments.action {
         Action::Calibrate(calibrate) => Some(&calibrate.file),
+        Action::Correct(correct) => correct.model.as_ref(),
         _ => None,
     };
     super::Outputs::beside(reads).result("--json", arguments.json.as_ref())?;
@@ -143,6 +150,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Action::Set(set) => set::run(session, set),
         Action::BiasNull(null) => null::run(session, null),
         Action::Calibrate(calibrate) => calibrate::run(session, calibrate),
+        Action::Correct(correct) => correct::run(session, correct),
         Action::Motor(motor) => motor::run(session, motor),
         Action::Register(register) => register::run(session, register),
         Action::SelfTest(test) => register::self_test(session, test),

@@ -1,0 +1,406 @@
+//! What a model file says, as the correction that the firmware applies: coefficients in the formats of [`wire::correction`].
+//!
+//! A correction takes off what the model adds: temperature (a straight line or a parabola), motor, supply, acceleration, the other
+//! axes and the scale. What is left of the bias is the filter's on the board, a Kalman filter at rest whose gains follow from N
+//! and K. What the board has no term for is said.
+
+use std::fmt::Write as _;
+
+use model::ModelFile;
+use wire::correction::{self, BLOCK_SHIFT_MAX, Correction, NUMBERS, RANGE_STEP, name, step};
+
+/// TEMP_OUT, degC for each count, and its zero (ADIS16250 data sheet).
+const TEMP_LSB_C: f64 = 0.1453;
+const TEMP_ZERO_C: f64 = 25.0;
+/// SUPPLY_OUT, V for each count (ADIS16250 data sheet).
+const SUPPLY_LSB_V: f64 = 1.8315e-3;
+/// ADC counts for each g at 1.5 g: 0.8 V/g at 3.3 V (MMA7260QT data sheet), and for 0 g.
+const ACC_COUNTS_PER_G: f64 = 0.8 / 3.3 * 1024.0;
+const ACC_ZERO: f64 = 512.0;
+const FULL_DUTY: f64 = 255.0;
+/// Over how far each kind of term reaches when its rounding is judged: counts of TEMP_OUT from the middle of the record at least,
+/// steps of the motor, 0.25 V of supply, 1 g, 100 deg/s.
+const REACH_SUPPLY: f64 = 0.25 / SUPPLY_LSB_V;
+const REACH_RATE_DPS: f64 = 100.0;
+/// The rounding of a term may be this share of the error that white noise alone makes of a mean over [`JUDGED_OVER_S`].
+const SHARE_OF_NOISE: f64 = 0.25;
+const JUDGED_OVER_S: f64 = 600.0;
+/// Shortest block of the bias filter, samples as a power of two.
+const SHORTEST_BLOCK: u8 = 4;
+/// Blocks that the filter may remember: its gain is 1/256 at the least.
+const MOST_BLOCKS: f64 = 200.0;
+/// Least growth of the variance in a block, over that of a block: a step of what is stored.
+const LEAST_WALK: f64 = 1.0 / (1 << 24) as f64;
+/// A flicker of instability B has, at 100 s, the deviation of a walk K with K^2 = 3 (0.664 B)^2 / 100 s (IEEE Std 952).
+const FLICKER_AT_S: f64 = 100.0;
+/// Degrees beyond the record's own range that a correction is for.
+const MARGIN_C: f64 = 2.0;
+
+/// A model file as a correction.
+#[derive(Clone, Debug)]
+pub struct BoardCorrection {
+    /// In physical units.
+    pub correction: Correction,
+    /// As it is stored; its generation is set when it is written.
+    pub numbers: correction::Numbers,
+    /// What of the model the board has no term for, and what else is to be known.
+    pub notes: Vec<String>,
+}
+
+/// Why a model is no correction.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BoardError {
+    /// A gyro is missing, or in another unit.
+    #[error("the model has no channel {channel} in deg/s")]
+    NoChannel {
+        /// gyro_x, ...
+        channel: &'static str,
+    },
+    /// N is what the filter's gains come from.
+    #[error("{channel} has no angle_random_walk: the filter's gains follow from it")]
+    NoNoise {
+        /// gyro_x, ...
+        channel: &'static str,
+    },
+    /// Outside the board's numbers.
+    #[error("{0}")]
+    OutOfRange(correction::OutOfRange),
+    /// Its rounding would be seen.
+    #[error(
+        "{what} of gyro {axis}: rounded to the board's step it is off by up to {off:.2e} deg/s, more than the {allowed:.2e} deg/s that the noise allows"
+    )]
+    TooCoarse {
+        /// The coefficient.
+        what: &'static str,
+        /// x, y, z.
+        axis: char,
+        /// deg/s.
+        off: f64,
+        /// deg/s.
+        allowed: f64,
+    },
+}
+
+const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
+
+impl BoardCorrection {
+    /// The correction that a model asks for, on gyros with this SENS/AVG.
+    ///
+    /// # Errors
+    /// [`BoardError`]: a channel or its noise is missing, a number does not fit, or is rounded too coarsely.
+    pub fn of(model: &ModelFile, sens_avg: u16) -> Result<Self, BoardError> {
+        let mut notes = Vec::new();
+        let mut out = Correction {
+            sens_avg,
+            number: number_of(model),
+            ..Correction::default()
+        };
+        let setting = |key: &str, default: f64| *model.excitation.get(key).unwrap_or(&default);
+        let swing = [
+            setting("self_heating_degc", 0.0),
+            setting("drift_degc", 0.0),
+        ];
+        let heater = setting("heater_degc", 0.0);
+        let ambient = setting("ambient_degc", TEMP_ZERO_C);
+        let mean_c = ambient + (swing[0] + swing[1] + heater) / 2.0;
+        let reach_c = (swing[0].abs() + swing[1].abs() + heater.abs()) / 2.0 + MARGIN_C;
+        let in_steps = |c: f64| (c - TEMP_ZERO_C) / TEMP_LSB_C / f64::from(RANGE_STEP);
+        out.temp_range = [
+            in_steps(mean_c - reach_c).floor() as i8,
+            in_steps(mean_c + reach_c).ceil() as i8,
+        ];
+        let mut walks = [0.0; 3];
+        let mut alike = [1.0; 3];
+        let mut density = [0.0; 3];
+        for (axis, channel) in GYROS.into_iter().enumerate() {
+            let found = (model.channels.iter())
+                .find(|c| c.name == channel && c.unit == "deg/s")
+                .ok_or(BoardError::NoChannel { channel })?;
+            let value = |key: &str| found.baseline.get(key).map(|p| p.value);
+            out.bias[axis] = -value("bias").unwrap_or(0.0);
+            let n = value("angle_random_walk").filter(|n| *n > 0.0);
+            density[axis] = (n.ok_or(BoardError::NoNoise { channel })? / 60.0).powi(2);
+            walks[axis] = value("rate_random_walk").unwrap_or(0.0).powi(2);
+        }
+        for effect in &model.effects {
+            let value = |key: &str| effect.parameters.get(key).map_or(0.0, |p| p.value);
+            let mut unknown = false;
+            for (axis, channel) in GYROS.into_iter().enumerate() {
+                if !effect.channels.is_empty() && !effect.channels.iter().any(|c| c == channel) {
+                    continue;
+                }
+                match effect.cause.as_str() {
+                    "temperature" => {
+                        out.temperature[axis] -= value("slope") * TEMP_LSB_C;
+                        out.bias[axis] -= value("slope") * (TEMP_ZERO_C - mean_c);
+                    }
+                    "temperature_quadratic" => {
+                        let reference =
+                            (effect.parameters.get("reference")).map_or(TEMP_ZERO_C, |p| p.value);
+                        let (off, square) = (TEMP_ZERO_C - reference, value("curvature"));
+                        out.temperature_squared[axis] -= square * TEMP_LSB_C.powi(2);
+                        out.temperature[axis] -= (value("slope") + 2.0 * square * off) * TEMP_LSB_C;
+                        out.bias[axis] -= value("slope") * off + square * off.powi(2);
+                    }
+                    "motor_bias" => {
+                        let term = if value("by_magnitude") == 1.0 {
+                            &mut out.motor_magnitude
+                        } else {
+                            &mut out.motor
+                        };
+                        term[axis] -= value("at_full_duty") / FULL_DUTY;
+                    }
+                    "supply_sensitivity" => {
+                        out.supply[axis] -= value("slope") * SUPPLY_LSB_V;
+                        out.bias[axis] += value("slope") * setting("supply_v", 5.0);
+                    }
+                    "g_sensitivity" => {
+                        for (k, key) in ["acc_x", "acc_y", "acc_z"].into_iter().enumerate() {
+                            let per_count = value(key) / ACC_COUNTS_PER_G;
+                            out.acc[axis][k] -= per_count;
+                            out.bias[axis] += per_count * ACC_ZERO;
+                        }
+                    }
+                    "cross_axis" => {
+                        let keys = ["from_gyro_x", "from_gyro_y", "from_gyro_z"];
+                        for (k, key) in keys.into_iter().enumerate() {
+                            out.matrix[axis][k] -= value(key);
+                        }
+                    }
+                    "scale_error" => {
+                        out.matrix[axis][axis] += 1.0 / (1.0 + value("relative")) - 1.0;
+                    }
+                    "gauss_markov" => {
+                        walks[axis] += 2.0 * value("sigma").powi(2)
+                            / value("correlation_time").max(f64::MIN_POSITIVE);
+                    }
+                    "flicker" => {
+                        let level = 0.664 * value("bias_instability") / 3600.0;
+                        walks[axis] += 3.0 * level.powi(2) / FLICKER_AT_S;
+                    }
+                    // Neighbours that are alike: the mean of a block is less sure.
+                    "low_pass" => alike[axis] = 1.0 + 2.0 * value("lag1_correlation"),
+                    _ => unknown = true,
+                }
+            }
+            if unknown {
+                notes.push(format!("{}: the board has no term for it", effect.cause));
+            }
+            if effect.cause == "g_sensitivity" {
+                notes.push("g_sensitivity: for the accelerometer's 1.5 g range".to_owned());
+            }
+        }
+        // The scale comes before the shares of other axes: u there is what was read.
+        let longest = |shift: u8| {
+            (0..3).all(|axis| {
+                let block_s = f64::from(1u32 << shift) / model.rate_hz;
+                let ratio = walks[axis] * block_s / (density[axis] * alike[axis] / block_s);
+                walks[axis] == 0.0 || ratio.sqrt() >= 1.0 / MOST_BLOCKS
+            })
+        };
+        out.block_shift = (SHORTEST_BLOCK..BLOCK_SHIFT_MAX)
+            .find(|shift| longest(*shift))
+            .unwrap_or(BLOCK_SHIFT_MAX);
+        let block_s = f64::from(1u32 << out.block_shift) / model.rate_hz;
+        for axis in 0..3 {
+            out.noise[axis] = density[axis] * alike[axis] / block_s;
+            out.walk[axis] = (walks[axis] * block_s).max(LEAST_WALK * out.noise[axis]);
+        }
+        // What a count of supply or acceleration is worth is rounded before the constant that goes with it is.
+        let numbers = out.numbers().map_err(BoardError::OutOfRange)?;
+        let rounded = Correction::from_numbers(&numbers).unwrap_or(out);
+        for axis in 0..3 {
+            let supply_counts = setting("supply_v", 5.0) / SUPPLY_LSB_V;
+            out.bias[axis] -= (rounded.supply[axis] - out.supply[axis]) * supply_counts;
+            for k in 0..3 {
+                out.bias[axis] -= (rounded.acc[axis][k] - out.acc[axis][k]) * ACC_ZERO;
+            }
+        }
+        let numbers = out.numbers().map_err(BoardError::OutOfRange)?;
+        let rounded = Correction::from_numbers(&numbers).unwrap_or(out);
+        judge(&out, &rounded, &density, reach_c / TEMP_LSB_C)?;
+        Ok(Self {
+            correction: out,
+            numbers,
+            notes,
+        })
+    }
+
+    /// A table for people: each coefficient that is not zero, as it is meant and as it is stored.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut text = format!(
+            "correction {:#06x}, for gyros with SENS/AVG {:#06x}, {:.1} to {:.1} degC; blocks of {} samples\n",
+            self.correction.number,
+            self.correction.sens_avg,
+            degc(self.correction.temp_range[0]),
+            degc(self.correction.temp_range[1]),
+            1u32 << self.correction.block_shift,
+        );
+        for (place, what, unit, value) in values(&self.numbers) {
+            let axis = name(place).0;
+            let _ = writeln!(text, "  {axis}  {what:<40} {value:>14.9} {unit}");
+        }
+        for note in &self.notes {
+            let _ = writeln!(text, "note: {note}");
+        }
+        text
+    }
+}
+
+fn degc(steps: i8) -> f64 {
+    TEMP_ZERO_C + f64::from(steps) * f64::from(RANGE_STEP) * TEMP_LSB_C
+}
+
+/// The coefficients that are not zero: place, name, unit, value.
+pub fn values(
+    numbers: &correction::Numbers,
+) -> impl Iterator<Item = (usize, &'static str, &'static str, f64)> {
+    let numbers = *numbers;
+    (0..NUMBERS).filter_map(move |place| {
+        let (_, what, unit) = name(place);
+        let is_variance = what.starts_with("noise") || what.starts_with("walk");
+        let whole = if is_variance {
+            f64::from(numbers[place].cast_unsigned())
+        } else {
+            f64::from(numbers[place])
+        };
+        let value = whole * step(place);
+        (value != 0.0).then_some((place, what, unit, value))
+    })
+}
+
+/// Whether the rounding of every term is small against what the noise leaves of a mean.
+fn judge(
+    meant: &Correction,
+    rounded: &Correction,
+    density: &[f64; 3],
+    reach_temp: f64,
+) -> Result<(), BoardError> {
+    for (axis, letter) in ['x', 'y', 'z'].into_iter().enumerate() {
+        let allowed = SHARE_OF_NOISE * (density[axis] / JUDGED_OVER_S).sqrt();
+        let of = |a: &[f64; 3], b: &[f64; 3], reach: f64| (a[axis] - b[axis]).abs() * reach;
+        let mut terms = vec![
+            ("bias", of(&meant.bias, &rounded.bias, 1.0)),
+            (
+                "temperature",
+                of(&meant.temperature, &rounded.temperature, reach_temp),
+            ),
+            (
+                "temperature squared",
+                of(
+                    &meant.temperature_squared,
+                    &rounded.temperature_squared,
+                    reach_temp.powi(2),
+                ),
+            ),
+            ("motor", of(&meant.motor, &rounded.motor, FULL_DUTY)),
+            (
+                "motor by magnitude",
+                of(&meant.motor_magnitude, &rounded.motor_magnitude, FULL_DUTY),
+            ),
+            ("supply", of(&meant.supply, &rounded.supply, REACH_SUPPLY)),
+        ];
+        for k in 0..3 {
+            let share = (meant.matrix[axis][k] - rounded.matrix[axis][k]).abs();
+            terms.push(("share of a rate", share * REACH_RATE_DPS));
+            let acc = (meant.acc[axis][k] - rounded.acc[axis][k]).abs();
+            terms.push(("acceleration", acc * ACC_COUNTS_PER_G));
+        }
+        if let Some(&(what, off)) = terms.iter().find(|(_, off)| *off > allowed) {
+            return Err(BoardError::TooCoarse {
+                what,
+                axis: letter,
+                off,
+                allowed,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The number that corrected frames tell: of the model's text, so that another model has another one.
+fn number_of(model: &ModelFile) -> u16 {
+    let crc = wire::crc::crc32c(model.to_toml().as_bytes());
+    ((crc >> 16) as u16) ^ crc as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model(effects: &str) -> ModelFile {
+        let mut text = ModelFile::paper().to_toml();
+        text.push_str(effects);
+        ModelFile::parse(&text).expect("a model")
+    }
+
+    const SENS_AVG: u16 = 0x0402;
+
+    #[test]
+    fn the_papers_stand_is_the_filter_alone() {
+        let board = BoardCorrection::of(&ModelFile::paper(), SENS_AVG).unwrap();
+        let c = board.correction;
+        assert_eq!(
+            (c.temperature, c.motor, c.matrix),
+            ([0.0; 3], [0.0; 3], [[0.0; 3]; 3])
+        );
+        // N^2 over 0.8 s, K^2 times 0.8 s.
+        assert!((c.noise[0] - (5.27f64 / 60.0).powi(2) / 0.8).abs() < 1e-9);
+        assert!((c.walk[0] - 0.0015f64.powi(2) * 0.8).abs() < 1e-12);
+        assert!(board.notes.is_empty());
+    }
+
+    #[test]
+    fn what_a_model_adds_is_taken_off_with_its_sign_turned() {
+        let board = BoardCorrection::of(
+            &model(
+                "[[effect]]\ncause = \"temperature\"\nchannels = [\"gyro_y\"]\nslope = { value = 0.2, unit = \"deg/s/degC\" }\n\
+                 [[effect]]\ncause = \"cross_axis\"\nchannels = [\"gyro_x\"]\nfrom_gyro_z = { value = 0.03, unit = \"1\" }\n\
+                 [[effect]]\ncause = \"line\"\nchannels = [\"gyro_x\"]\nfrequency = { value = 3.0, unit = \"Hz\" }\namplitude = { value = 0.1, unit = \"deg/s\" }\n",
+            ),
+            SENS_AVG,
+        )
+        .unwrap();
+        let c = board.correction;
+        assert!((c.temperature[1] + 0.2 * TEMP_LSB_C).abs() < 1e-12);
+        assert!((c.matrix[0][2] + 0.03).abs() < 1e-12);
+        assert_eq!(board.notes, ["line: the board has no term for it"]);
+        assert!(board.table().contains("temperature"), "{}", board.table());
+    }
+
+    #[test]
+    fn what_does_not_fit_and_what_has_no_noise_is_refused_by_name() {
+        let steep = model(
+            "[[effect]]\ncause = \"temperature\"\nchannels = [\"gyro_z\"]\nslope = { value = 3.0, unit = \"deg/s/degC\" }\n",
+        );
+        let error = BoardCorrection::of(&steep, SENS_AVG).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .starts_with("temperature of gyro z: -0.435900 deg/s/count is outside"),
+            "{error}"
+        );
+        let mut silent = ModelFile::paper();
+        silent.channels[1].baseline.remove("angle_random_walk");
+        let error = BoardCorrection::of(&silent, SENS_AVG).unwrap_err();
+        assert_eq!(error, BoardError::NoNoise { channel: "gyro_y" });
+        // A noise of 1e-4 deg/sqrt(h) would show a rounding of 2^-21 deg/s in the bias.
+        let mut fine = ModelFile::paper();
+        for channel in &mut fine.channels {
+            for key in ["angle_random_walk", "bias"] {
+                if let Some(value) = channel.baseline.get_mut(key) {
+                    value.value = if key == "bias" { 0.123_456_7 } else { 1e-4 };
+                }
+            }
+        }
+        let error = BoardCorrection::of(&fine, SENS_AVG).unwrap_err();
+        assert!(
+            matches!(
+                error,
+                BoardError::TooCoarse { .. } | BoardError::OutOfRange(_)
+            ),
+            "{error}"
+        );
+    }
+}
