@@ -12,7 +12,7 @@ macro_rules! warn {
 
 mod commands;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
 /// Captures, analyzes and criticizes an inertial test stand: what your simulation of the sensor gets wrong, why, and
 /// what the gain is.
@@ -88,6 +88,17 @@ enum Command {
         after_help = "Examples:\n  imu-stand flash --programmer usbasp --dry-run\n  imu-stand flash firmware.hex --programmer stk500v1 --programmer-port /dev/ttyACM0"
     )]
     Flash(commands::flash::Arguments),
+    /// What this computer has of what the program can use, and what to do about the rest.
+    #[command(after_help = "Example:\n  imu-stand doctor")]
+    Doctor(commands::doctor::Arguments),
+    /// Words that a shell completes, on standard output.
+    #[command(
+        after_help = "Examples:\n  imu-stand completions bash > ~/.local/share/bash-completion/completions/imu-stand\n  imu-stand completions zsh > ~/.zfunc/_imu-stand"
+    )]
+    Completions(commands::shell::Completions),
+    /// The manual: a page for the program and one for each command.
+    #[command(after_help = "Example:\n  imu-stand man --out ~/.local/share/man/man1")]
+    Man(commands::shell::Man),
 }
 
 /// Lets the allocator keep what it was given back. A diagnosis makes and drops arrays as long as the record again and again;
@@ -122,13 +133,17 @@ fn main() -> miette::Result<()> {
         Command::Monitor(arguments) => commands::monitor::run(&arguments),
         Command::Board(arguments) => commands::board::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
+        Command::Doctor(arguments) => commands::doctor::run(&arguments),
+        Command::Completions(arguments) => {
+            commands::shell::completions(&arguments, Program::command())
+        }
+        Command::Man(arguments) => commands::shell::man(&arguments, Program::command()),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory as _;
 
     /// A line as a shell takes it: what is in quotes is one word.
     fn words(line: &str) -> Vec<&str> {
@@ -154,6 +169,8 @@ mod tests {
         for example in examples {
             let words = words(example);
             assert!(words.contains(&command.get_name()), "{example}");
+            // Where it is written is the shell's to do.
+            let words = words.into_iter().take_while(|word| *word != ">");
             if let Err(error) = Program::try_parse_from(words) {
                 panic!("{example}: {error}");
             }

@@ -84,7 +84,7 @@ pub struct Arguments {
 }
 
 /// Where `cargo xtask image` puts it.
-const IMAGE: &str = "target/avr/avr-none/firmware/firmware.elf";
+pub const IMAGE: &str = "target/avr/avr-none/firmware/firmware.elf";
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
