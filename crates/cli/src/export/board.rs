@@ -96,22 +96,9 @@ impl BoardCorrection {
             ..Correction::default()
         };
         let setting = |key: &str, default: f64| *model.excitation.get(key).unwrap_or(&default);
-        let swing = [
-            setting("self_heating_degc", 0.0),
-            setting("drift_degc", 0.0),
-        ];
-        let heater = setting("heater_degc", 0.0);
-        let ambient = setting("ambient_degc", TEMP_ZERO_C);
-        let mean_c = ambient + (swing[0] + swing[1] + heater) / 2.0;
-        let reach_c = (swing[0].abs() + swing[1].abs() + heater.abs()) / 2.0 + MARGIN_C;
-        let in_steps = |c: f64| (c - TEMP_ZERO_C) / TEMP_LSB_C / f64::from(RANGE_STEP);
-        out.temp_range = [
-            in_steps(mean_c - reach_c).floor() as i8,
-            in_steps(mean_c + reach_c).ceil() as i8,
-        ];
-        let mut walks = [0.0; 3];
-        let mut alike = [1.0; 3];
-        let mut density = [0.0; 3];
+        let [mean_c, reach_c] = temperatures(model);
+        out.temp_range = temp_range(mean_c, reach_c);
+        let (mut walks, mut alike, mut density) = ([0.0; 3], [1.0; 3], [0.0; 3]);
         for (axis, channel) in GYROS.into_iter().enumerate() {
             let found = (model.channels.iter())
                 .find(|c| c.name == channel && c.unit == "deg/s")
@@ -190,35 +177,10 @@ impl BoardCorrection {
                 notes.push("g_sensitivity: for the accelerometer's 1.5 g range".to_owned());
             }
         }
-        // The scale comes before the shares of other axes: u there is what was read.
-        let longest = |shift: u8| {
-            (0..3).all(|axis| {
-                let block_s = f64::from(1u32 << shift) / model.rate_hz;
-                let ratio = walks[axis] * block_s / (density[axis] * alike[axis] / block_s);
-                walks[axis] == 0.0 || ratio.sqrt() >= 1.0 / MOST_BLOCKS
-            })
-        };
-        out.block_shift = (SHORTEST_BLOCK..BLOCK_SHIFT_MAX)
-            .find(|shift| longest(*shift))
-            .unwrap_or(BLOCK_SHIFT_MAX);
-        let block_s = f64::from(1u32 << out.block_shift) / model.rate_hz;
-        for axis in 0..3 {
-            out.noise[axis] = density[axis] * alike[axis] / block_s;
-            out.walk[axis] = (walks[axis] * block_s).max(LEAST_WALK * out.noise[axis]);
-        }
-        // What a count of supply or acceleration is worth is rounded before the constant that goes with it is.
-        let numbers = out.numbers().map_err(BoardError::OutOfRange)?;
-        let rounded = Correction::from_numbers(&numbers).unwrap_or(out);
-        for axis in 0..3 {
-            let supply_counts = setting("supply_v", 5.0) / SUPPLY_LSB_V;
-            out.bias[axis] -= (rounded.supply[axis] - out.supply[axis]) * supply_counts;
-            for k in 0..3 {
-                out.bias[axis] -= (rounded.acc[axis][k] - out.acc[axis][k]) * ACC_ZERO;
-            }
-        }
-        let numbers = out.numbers().map_err(BoardError::OutOfRange)?;
-        let rounded = Correction::from_numbers(&numbers).unwrap_or(out);
-        judge(&out, &rounded, &density, reach_c / TEMP_LSB_C)?;
+        filter(&mut out, model.rate_hz, [density, alike, walks]);
+        let numbers = rounded(&mut out, setting("supply_v", 5.0))?;
+        let stored = Correction::from_numbers(&numbers).unwrap_or(out);
+        judge(&out, &stored, &density, reach_c / TEMP_LSB_C)?;
         Ok(Self {
             correction: out,
             numbers,
@@ -268,6 +230,58 @@ pub fn values(
         let value = whole * step(place);
         (value != 0.0).then_some((place, what, unit, value))
     })
+}
+
+/// The middle of the record's temperatures and how far they reach from there, with the margin, degC.
+fn temperatures(model: &ModelFile) -> [f64; 2] {
+    let setting = |key: &str, default: f64| *model.excitation.get(key).unwrap_or(&default);
+    let swings = ["self_heating_degc", "drift_degc", "heater_degc"].map(|key| setting(key, 0.0));
+    let mean = setting("ambient_degc", TEMP_ZERO_C) + swings.iter().sum::<f64>() / 2.0;
+    let reach = swings.iter().map(|swing| swing.abs()).sum::<f64>() / 2.0 + MARGIN_C;
+    [mean, reach]
+}
+
+/// As a correction says it.
+fn temp_range(mean_c: f64, reach_c: f64) -> [i8; 2] {
+    let in_steps = |c: f64| (c - TEMP_ZERO_C) / TEMP_LSB_C / f64::from(RANGE_STEP);
+    [
+        in_steps(mean_c - reach_c).floor() as i8,
+        in_steps(mean_c + reach_c).ceil() as i8,
+    ]
+}
+
+/// What the filter is told: the shortest block whose memory it can hold, and the noise in it. By axis N^2, what neighbours that are
+/// alike multiply it by, and K^2 of all that walks.
+fn filter(out: &mut Correction, rate_hz: f64, [density, alike, walks]: [[f64; 3]; 3]) {
+    let holds = |shift: u8| {
+        (0..3).all(|axis| {
+            let block_s = f64::from(1u32 << shift) / rate_hz;
+            let ratio = walks[axis] * block_s / (density[axis] * alike[axis] / block_s);
+            walks[axis] == 0.0 || ratio.sqrt() >= 1.0 / MOST_BLOCKS
+        })
+    };
+    out.block_shift = (SHORTEST_BLOCK..BLOCK_SHIFT_MAX)
+        .find(|shift| holds(*shift))
+        .unwrap_or(BLOCK_SHIFT_MAX);
+    let block_s = f64::from(1u32 << out.block_shift) / rate_hz;
+    for axis in 0..3 {
+        out.noise[axis] = density[axis] * alike[axis] / block_s;
+        out.walk[axis] = (walks[axis] * block_s).max(LEAST_WALK * out.noise[axis]);
+    }
+}
+
+/// As it is stored. What a count of supply or acceleration is worth is rounded before the constant that goes with it is.
+fn rounded(out: &mut Correction, supply_v: f64) -> Result<correction::Numbers, BoardError> {
+    let numbers = out.numbers().map_err(BoardError::OutOfRange)?;
+    let stored = Correction::from_numbers(&numbers).unwrap_or(*out);
+    for axis in 0..3 {
+        let supply_counts = supply_v / SUPPLY_LSB_V;
+        out.bias[axis] -= (stored.supply[axis] - out.supply[axis]) * supply_counts;
+        for k in 0..3 {
+            out.bias[axis] -= (stored.acc[axis][k] - out.acc[axis][k]) * ACC_ZERO;
+        }
+    }
+    out.numbers().map_err(BoardError::OutOfRange)
 }
 
 /// Whether the rounding of every term is small against what the noise leaves of a mean.
