@@ -76,10 +76,16 @@ impl Stand {
         self.world.duty.len()
     }
 
-    /// White variance of a sample, (deg/s)^2, that of rounding to counts included.
+    /// White variance of a sample, (deg/s)^2. The angle random walk of a model includes the rounding to counts.
     #[must_use]
     pub fn white(&self, axis: usize) -> f64 {
-        (self.walk_of_angle[axis] / 60.0).powi(2) * self.rate_hz + LSB * LSB / 12.0
+        (self.walk_of_angle[axis] / 60.0).powi(2) * self.rate_hz
+    }
+
+    /// The same before rounding to counts, which adds a twelfth of a squared count.
+    #[must_use]
+    pub fn white_before_rounding(&self, axis: usize) -> f64 {
+        self.white(axis) - LSB * LSB / 12.0
     }
 
     /// Variance of a step of the random walk, (deg/s)^2.

@@ -164,12 +164,8 @@ pub(super) fn shares(edges: &[f64], mean: f64, sigma: f64) -> Vec<f64> {
 
 /// The codes of an axis, counts: the first, with the share of each in readings without fault.
 pub(super) fn law(stand: &Stand, axis: usize) -> (i32, Vec<f64>) {
-    law_of(
-        stand.bias[axis] / LSB,
-        stand.white(axis).sqrt() / LSB,
-        stand.bias[axis] / LSB,
-        stand.white(axis).sqrt() / LSB,
-    )
+    let (mean, sigma) = mean_and_sigma(stand, axis);
+    law_of(mean, sigma, mean, sigma)
 }
 
 /// The same of a normal law, over the reach of another.
@@ -227,8 +223,10 @@ pub(super) fn steps_of(stand: &Stand, axis: usize, chance: f64, next: &Next) -> 
         .collect()
 }
 
+/// Mean and standard deviation of the readings of an axis before rounding, counts.
 pub(super) fn mean_and_sigma(stand: &Stand, axis: usize) -> (f64, f64) {
-    (stand.bias[axis] / LSB, stand.white(axis).sqrt() / LSB)
+    let sigma = stand.white_before_rounding(axis).sqrt();
+    (stand.bias[axis] / LSB, sigma / LSB)
 }
 
 /// Shares that a normal law of their own mean and variance gives the same codes.
