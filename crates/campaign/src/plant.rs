@@ -173,6 +173,7 @@ fn blank(stand: &Stand) -> Simulation {
         white_sigma: [0.0; 3],
         rounding: [0.0; 3],
         shared: Default::default(),
+        own: [1.0; 3],
         variance: std::array::from_fn(|_| vec![1.0; n]),
         white: Default::default(),
         counts: Default::default(),

@@ -355,7 +355,7 @@ mod tests {
         ];
         let of_motion = ["cross_axis", "scale_error", "base_motion"];
         // A tone that wanders is told of a band by its envelope; what axes share is asked of all of them at once.
-        let not_alone = ["wandering_line", "common_noise"];
+        let not_alone = ["wandering_line", "common_noise", "correlated_noise"];
         let others = [by_audit.as_slice(), &of_motion, &not_alone].concat();
         let searched = EFFECTS.iter().filter(|e| !others.contains(&e.id()));
         let of_search = (3 * searched.count() + 2) as f64 * FALSE_ALARM;

@@ -336,6 +336,8 @@ pub enum Hypothesis {
     WanderingTone,
     /// Noise shared by the gyros.
     Common,
+    /// Noise that pairs of gyros share, each its part.
+    Correlation,
     /// The rate held against the tilt that the accelerometers see.
     Scale,
     /// True rotation of the base.

@@ -108,6 +108,8 @@ pub struct Simulation {
     pub rounding: [f64; 3],
     /// White noise that the axis shares with others, deg/s; empty where it shares none.
     pub shared: [Vec<f64>; 3],
+    /// Part of the white variance of each axis that it shares with no other one by their correlation.
+    pub own: [f64; 3],
     /// White variance over that of the baseline and the shared part.
     pub variance: [Vec<f64>; 3],
     /// White noise, deg/s; empty before the stage [`Stage::Output`].

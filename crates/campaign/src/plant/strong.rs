@@ -33,7 +33,7 @@ const fn row(id: u16, cause: &'static str, how: How) -> Row {
 }
 
 /// The rows, by number. What is asked beyond the usual has its reason in docs/power.md, "Bars".
-pub const STRONG: [Row; 23] = [
+pub const STRONG: [Row; 24] = [
     Row {
         needs: TEMPERATURE,
         ..row(100, "temperature", |_, _, a| size("slope", a.sign))
@@ -122,6 +122,7 @@ pub const STRONG: [Row; 23] = [
         Drawn::Process(values, strength, density)
     }),
     row(122, "quantization_noise", quantization_noise),
+    row(123, "correlated_noise", correlated_noise),
 ];
 
 /// Largest process, deg/s rms: slower ones, which a random walk hides better, would need more for the strength, and what
@@ -331,6 +332,16 @@ fn band(
 fn flicker(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let (b, strength, density) = of_density(stand, asked, LARGEST_RMS, &|b, w| b * b / w);
     Drawn::Process(vec![("bias_instability", b * 3600.0)], strength, density)
+}
+
+/// With another axis the other way about: what goes the same way is common noise.
+fn correlated_noise(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let other = (asked.axis + 1 + draw.of_many(2)) % 3;
+    let with = ["with_gyro_x", "with_gyro_y", "with_gyro_z"][other];
+    let n = stand.samples() as f64;
+    let strength = |r: f64| (-n * (1.0 - r * r).ln()).sqrt();
+    let r = (1.0 - (-asked.wanted.powi(2) / n).exp()).sqrt();
+    Drawn::Known(vec![(with, -r)], strength(r), None)
 }
 
 /// The angle's rounding of standard deviation q, differenced: 2 (q f_s)^2 (1 - cos w) per sample.

@@ -268,6 +268,10 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
     let Some(h) = Histogram::new(codes, FAR * sigma) else {
         return Verdict::Smooth;
     };
+    // Where codes are fewer than once each, no share of any is known.
+    if h.times.len() as f64 > h.n {
+        return Verdict::Smooth;
+    }
     // Where the level moves far it is the share of ones about each level that tells.
     if !alarmed && h.spread > MOVES * sigma {
         return Verdict::Smooth;

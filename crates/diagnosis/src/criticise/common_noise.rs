@@ -1,11 +1,13 @@
 //! What the axes share: correlation of their whitened residuals.
 
-use model::effect::{Effect, Found, Hypothesis};
+use std::collections::{BTreeMap, BTreeSet};
+
+use model::effect::{Effect, Found, Hypothesis, Parameters};
 
 use crate::criticise::process;
 use crate::fit::{prequential, threshold};
 use crate::ingest::types::Grid;
-use crate::result::{Check, DetectionLimit, Finding, Gain, limit, sentence};
+use crate::result::{Check, Consequence, DetectionLimit, Finding, Gain, limit, sentence};
 use crate::search::searched::Searched;
 use crate::test_level;
 use crate::test_level::{CheckId, OMNIBUS_LEVEL, Observation};
@@ -43,6 +45,27 @@ fn error_of_mean(pairs: &[&Pair<'_>], shared: f64, samples: f64) -> f64 {
     (sum / samples).sqrt() / pairs.len() as f64
 }
 
+/// Whether pairs may share one source: their covariances are alike (chi-square of what they scatter by).
+fn alike(pairs: &[&Pair<'_>], samples: f64) -> bool {
+    if pairs.len() < 2 {
+        return true;
+    }
+    let sigma = |s: &Searched<'_>| s.state.solution.white.sqrt();
+    // Of a covariance c of two of standard deviations a and b: error^2 = (a^2 b^2 + c^2) / n.
+    let each = pairs.iter().map(|p| {
+        let size = sigma(p.0) * sigma(p.1);
+        (p.2 * size, size * ((1.0 + p.2 * p.2) / samples).sqrt())
+    });
+    let each: Vec<(f64, f64)> = each.collect();
+    let weights = each.iter().map(|(_, error)| error.powi(-2)).sum::<f64>();
+    let mean = each.iter().map(|(c, e)| c / (e * e)).sum::<f64>() / weights;
+    let statistic = each
+        .iter()
+        .map(|(c, e)| ((c - mean) / e).powi(2))
+        .sum::<f64>();
+    tails::chi_tail(statistic, (pairs.len() - 1) as f64) > test_level::CLAIM_LEVEL
+}
+
 /// Two axes, the correlation of their residuals, its chance and its score.
 type Pair<'a> = (&'a Searched<'a>, &'a Searched<'a>, f64, f64, f64);
 
@@ -78,22 +101,25 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         && tails::normal_tail(joint) < 2.0 * threshold::FALSE_ALARM
         && joint > 0.0
         && pairs.iter().all(|p| p.4 > LEAST_OF_ALL);
-    let fails: Vec<_> = pairs
+    let mut fails: Vec<&Pair<'_>> = pairs
         .iter()
         .filter(|p| together || p.3 < OMNIBUS_LEVEL)
         .collect();
-    let of = searched
-        .iter()
-        .flat_map(|s| &s.search.candidates)
-        .find(|c| matches!(c.hypothesis, Hypothesis::Common))
-        .map(|c| c.effect);
+    if !alike(&fails, free) {
+        fails.retain(|p| p.3 < OMNIBUS_LEVEL);
+    }
+    let effect_of = |asked: fn(&Hypothesis) -> bool| {
+        let mut all = searched.iter().flat_map(|s| &s.search.candidates);
+        all.find(|c| asked(&c.hypothesis)).map(|c| c.effect)
+    };
+    let of = effect_of(|h| matches!(h, Hypothesis::Common));
     if let Some(of) = of.filter(|_| !pairs.is_empty()) {
         shared.limits = smallest(&pairs, of, free);
     }
     // A shared source correlates positively; where more than one pair shows it, all of its pairs are counted.
-    let positive = !fails.is_empty() && fails.iter().all(|p| p.2 > 0.0);
+    let positive = !fails.is_empty() && fails.iter().all(|p| p.2 > 0.0) && alike(&fails, free);
     let mut straight = true;
-    for (a, b, r, ..) in fails.iter().filter(|_| positive) {
+    for (a, b, r, ..) in &fails {
         let samples = (grid.n - first) as f64;
         let claim = process::straight(&a.e, &b.e, -samples * (1.0 - r * r).ln(), fails.len());
         let channel = format!("{}, {}", a.target.name, b.target.name);
@@ -167,6 +193,11 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
             ..Finding::default()
         });
     }
+    if shared.finding.is_none() && straight {
+        let of = effect_of(|h| matches!(h, Hypothesis::Correlation));
+        let failing: Vec<&Pair<'_>> = pairs.iter().filter(|p| p.3 < OMNIBUS_LEVEL).collect();
+        shared.finding = of.and_then(|of| correlated(&failing, of, free));
+    }
     for (a, b, r, p, _) in &pairs {
         let fails = *p < OMNIBUS_LEVEL;
         let explained = shared.finding.is_some();
@@ -198,6 +229,47 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
         }
     }
     shared
+}
+
+/// Noise that some pairs of axes share, each its part: stated on the later axis of each pair.
+fn correlated(pairs: &[&Pair<'_>], of: &dyn Effect, free: f64) -> Option<Finding> {
+    let named = |other: &str| {
+        let with = |name: &&&str| name.strip_prefix("with_") == Some(other);
+        of.parameters().iter().map(|p| &p.name).find(with).copied()
+    };
+    let mut per_channel: BTreeMap<String, Parameters> = BTreeMap::new();
+    for (a, b, r, ..) in pairs {
+        let found = Found {
+            names: vec![named(&a.target.name)?],
+            coefficients: vec![(*r, (1.0 - r * r) / free.sqrt())],
+            ..Found::default()
+        };
+        let own = per_channel.entry(b.target.name.clone()).or_default();
+        own.extend(of.describe(&found));
+    }
+    let (first, parameters) = per_channel.first_key_value()?;
+    let all = pairs
+        .iter()
+        .flat_map(|p| [&p.0.target.name, &p.1.target.name]);
+    let channels: BTreeSet<&String> = all.collect();
+    let log = |p: &&Pair<'_>| -free * (1.0 - p.2 * p.2).ln();
+    let ratio = pairs.iter().map(log).sum::<f64>();
+    let largest = pairs.iter().map(|p| p.2.abs()).fold(0.0, f64::max);
+    Some(Finding {
+        cause: of.id().into(),
+        what: sentence(of.docs().title, first, parameters),
+        channels: channels.into_iter().cloned().collect(),
+        parameters: parameters.clone(),
+        per_channel,
+        likelihood_ratio: Some(ratio),
+        consequence: Some(Consequence::of_correlation(largest)),
+        gain: Some(Gain {
+            delta_bic: Some(ratio - pairs.len() as f64 * free.ln()),
+            ablation_nats: Some(0.5 * ratio),
+            ..Gain::default()
+        }),
+        ..Finding::default()
+    })
 }
 
 /// The size from which on a source that all axes share is found 95 times in 100.

@@ -168,7 +168,7 @@ pub(crate) fn straight(a: &[f64], b: &[f64], lr: f64, pairs: usize) -> Outcome {
             (pairs as f64 * chi_tail(statistic, scores.len() as f64)).min(1.0)
         },
         what: format!(
-            "told as common_noise: one follows the square or the cube of the other by {bent:.1} standard errors, what they share would do so in a straight line"
+            "told as shared noise: one follows the square or the cube of the other by {bent:.1} standard errors, what they share would do so in a straight line"
         ),
     }
 }

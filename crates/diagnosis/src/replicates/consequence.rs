@@ -115,6 +115,10 @@ pub(crate) fn state(
         return;
     };
     for finding in findings {
+        if let Some(known) = &finding.consequence {
+            finding.material = known.largest_change > matters;
+            continue;
+        }
         let Some(stage) = effect(&finding.cause).map(|e| e.stage()) else {
             continue;
         };

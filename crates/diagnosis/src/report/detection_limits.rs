@@ -250,9 +250,11 @@ fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smalle
             parameter: "peak",
             ..Smallest::default()
         }),
-        Hypothesis::WanderingTone | Hypothesis::Common | Hypothesis::Scale | Hypothesis::Audit => {
-            None
-        }
+        Hypothesis::WanderingTone
+        | Hypothesis::Common
+        | Hypothesis::Correlation
+        | Hypothesis::Scale
+        | Hypothesis::Audit => None,
     }
 }
 

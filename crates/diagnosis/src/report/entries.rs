@@ -8,12 +8,6 @@ use crate::result::{Consequence, Unexplained};
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Domain, Observation};
 
-/// Share of the variance that axes have in common from which on it matters: the deviation of their sum or difference is
-/// off by about half of it.
-fn coupling_matters(correlation: f64, matters: f64) -> bool {
-    (1.0 + correlation.abs()).sqrt() - 1.0 > matters
-}
-
 /// The entries of a record. Observations of the noise of one channel are views of one residual, and one entry; so are those
 /// of what an axis has in common with others. A fault of the readings stands for itself.
 pub(crate) fn entries(
@@ -78,6 +72,7 @@ fn of_coupling(group: &[Observation], s: &Searched<'_>, matters: f64) -> Unexpla
         [] => "another axis".to_owned(),
         some => some.join(" and "),
     };
+    let consequence = Consequence::of_correlation(largest);
     Unexplained {
         what: format!(
             "shares noise with {others} (correlation {largest:+.3}), as no cause found makes it"
@@ -85,7 +80,8 @@ fn of_coupling(group: &[Observation], s: &Searched<'_>, matters: f64) -> Unexpla
         rms: Some((largest.abs() * s.state.solution.white).sqrt()),
         share_of_variance: Some(largest.abs()),
         details: group.iter().map(|o| o.what.clone()).collect(),
-        material: coupling_matters(largest, matters),
+        material: consequence.largest_change > matters,
+        consequence: Some(consequence),
         ..plain(group)
     }
 }

@@ -16,6 +16,19 @@ pub struct Consequence {
     pub largest_change: f64,
 }
 
+impl Consequence {
+    /// Of white noise that two axes share: neither is changed by itself; the deviation of their sum, or of their difference,
+    /// is.
+    #[must_use]
+    pub fn of_correlation(r: f64) -> Self {
+        Self {
+            share_of_variance: r.abs(),
+            angle_rms_deg: BTreeMap::new(),
+            largest_change: (1.0 + r.abs()).sqrt() - 1.0,
+        }
+    }
+}
+
 /// Structure that no effect of the library explains: one entry for what is seen of one thing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Unexplained {

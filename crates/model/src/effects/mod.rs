@@ -8,6 +8,7 @@ pub mod bias_step;
 pub mod clock_rate;
 pub mod coarse_lsb;
 pub mod common_noise;
+pub mod correlated_noise;
 pub mod cross_axis;
 pub mod dropped_samples;
 pub mod flicker;
@@ -58,6 +59,7 @@ pub static EFFECTS: &[&dyn Effect] = &[
     &quantization_noise::EFFECT,
     &telegraph::EFFECT,
     &common_noise::EFFECT,
+    &correlated_noise::EFFECT,
     &noise_change::EFFECT,
     &outliers::EFFECT,
     &saturation::EFFECT,

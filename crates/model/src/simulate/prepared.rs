@@ -198,6 +198,7 @@ impl Prepared {
     pub fn draw(&mut self) {
         let present = self.present;
         self.run.shared.iter_mut().for_each(Vec::clear);
+        self.run.own = [1.0; 3];
         for axis in (0..3).filter(|a| present[*a]) {
             self.begin(WALKS + axis as u64);
             wander(&mut self.run, axis, self.walk[axis]);
@@ -314,6 +315,7 @@ fn started(world: World, rate_hz: f64, rng: Xoshiro256PlusPlus) -> Simulation {
         white_sigma: [0.0; 3],
         rounding: [0.0; 3],
         shared: Default::default(),
+        own: [1.0; 3],
         variance: std::array::from_fn(|_| vec![1.0; samples]),
         white: Default::default(),
         counts: Default::default(),

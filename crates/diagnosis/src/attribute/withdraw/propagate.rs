@@ -141,7 +141,13 @@ pub(crate) fn shared_falls(finding: &Finding, checks: &[Check]) -> bool {
             && channels.contains(&c.channel)
             && others.any(|o| c.about.contains(o))
     };
-    checks.iter().any(takes)
+    // What is left on all of them may be one thing that all of them hold.
+    let left = |channel: &String| {
+        let mut own = checks.iter().filter(|c| c.channel == *channel);
+        own.any(|c| c.fails_after)
+    };
+    let each = !finding.per_channel.is_empty();
+    checks.iter().any(takes) || each && channels.iter().all(left)
 }
 
 /// Take the name of stale readings from a channel whose tails are too light: readings that come twice leave their law as it
