@@ -78,8 +78,8 @@ fn a_swept_tone_is_one_entry_with_its_band_and_its_size() {
         let ratio = rms / true_rms;
         assert!((0.8..1.4).contains(&ratio), "seed {seed}: {rms}");
         let [low, high] = entry.band_hz.expect("a place");
-        assert!((2.4..3.6).contains(&low), "seed {seed}: {low}");
-        assert!((4.8..7.0).contains(&high), "seed {seed}: {high}");
+        assert!((2.8..3.2).contains(&low), "seed {seed}: {low}");
+        assert!((5.8..6.3).contains(&high), "seed {seed}: {high}");
         assert!(entry.material && entry.rank == 1, "seed {seed}: {entry:?}");
         assert!(
             entry.checks.len() > 1 && !entry.what.contains('_'),

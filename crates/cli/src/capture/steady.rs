@@ -168,7 +168,13 @@ mod tests {
             joined.contains("20.0000 Hz at the start, 10000.0000 Hz at the end"),
             "{joined}"
         );
-        assert!(joined.contains("row 601 "), "{joined}");
+        // The change is sought by blocks: the row is near row 601, and said to be.
+        let row = joined
+            .split("near row ")
+            .nth(1)
+            .and_then(|t| t.split(' ').next());
+        let row: usize = row.and_then(|t| t.parse().ok()).expect("a row");
+        assert!(row.abs_diff(601) <= 20, "{joined}");
         assert!(at(&|k| 0.1 * 1.006f64.powi(k as i32)).is_some());
         assert_eq!(at(&|_| 0.05), None);
         assert_eq!(at(&|k| if k == 700 { 500.0 } else { 0.05 }), None);

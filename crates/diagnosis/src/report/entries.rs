@@ -96,7 +96,7 @@ fn of_noise(group: &[Observation], s: &Searched<'_>, grid: &Grid, matters: f64) 
         consequence,
         local_change,
     } = left_over(s, grid, &terms);
-    let band_hz = stated(group, grid.rate_hz).or(band_hz);
+    let band_hz = band_hz.or_else(|| stated(group, grid.rate_hz));
     let material = consequence.largest_change.max(local_change) > matters;
     let follows = group.iter().flat_map(|o| &o.follows);
     let follows: BTreeSet<&String> = follows.filter(|c| **c != s.target.name).collect();

@@ -114,7 +114,7 @@ impl Power {
                 excess.iter_mut().zip(energy).for_each(|(x, e)| *x += e / n);
             }
         }
-        let at = place(&excess, &bins.at.omega);
+        let at = place(&above_floor(&excess, &counts), &bins.at.omega);
         Self {
             excess,
             omega: bins.at.omega.clone(),
@@ -131,6 +131,24 @@ impl Power {
             [model + gain * m, record + gain * (m + x)]
         })
     }
+}
+
+/// Power above the median density: the nearest cause has tails over all frequencies, which are no place.
+fn above_floor(power: &[f64], counts: &[f64]) -> Vec<f64> {
+    let density = |(p, m): (&f64, &f64)| if *m > 0.0 { p.abs() / m } else { 0.0 };
+    let mut all: Vec<(f64, f64)> = (power.iter().zip(counts))
+        .map(|pair| (density(pair), *pair.1))
+        .collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * counts.iter().sum::<f64>();
+    let mut sum = 0.0;
+    let median = all.iter().find(|(_, m)| {
+        sum += m;
+        sum >= half
+    });
+    let floor = median.map_or(0.0, |m| m.0);
+    let above = power.iter().zip(counts);
+    above.map(|(p, m)| (p.abs() - floor * m).max(0.0)).collect()
 }
 
 /// Lowest and highest share of half the sample rate between which nine tenths of a power lie, none where there is none.

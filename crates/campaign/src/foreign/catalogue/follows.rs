@@ -74,7 +74,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(492, 11, "axis that is converted late", Signal(|d, s, _| table::converted_late(d, s))).parts(&["motor_bias"]).twin(434),
     row(497, 11, "bias on one branch warming and another cooling", Signal(temperature::branches)).parts(&["temperature"]).twin(304),
     row(498, 11, "scale factor that follows temperature", Signal(table::scale)).needs(T).parts(&["motor_bias"]).twin(306),
-    row(499, 11, "kick by each change of the motor's current", Signal(|d, s, _| motor::kicks(d, s))).twin(378).later("narrow_band"),
+    row(499, 11, "kick by each change of the motor's current", Signal(|d, s, _| motor::kicks(d, s))).twin(378),
     row(500, 11, "misalignment that grows with temperature", Signal(acceleration::misaligned)).parts(&["cross_axis"]).level().twin(369),
     row(501, 11, "correction that overflows at high rates", Signal(|d, s, _| table::overflow(d, s))).parts(&["motor_bias"]).twin(454),
     row(502, 11, "error by the cube of the table's rate", Signal(|d, s, _| table::cubed_rate(d, s))).parts(&["motor_bias"]).twin(468),
