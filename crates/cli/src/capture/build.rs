@@ -1,7 +1,7 @@
 //! From frames to rows.
 
 use model::record::{Axis, Base, Channel, Header, Quantity, Record};
-use wire::{Sample, flags};
+use wire::{Corrected, Sample, flags};
 
 use super::STANDARD_GRAVITY;
 use super::order::unwrap;
@@ -23,6 +23,8 @@ pub struct Calibration {
     pub acc_counts_per_g: f64,
     /// What the base does.
     pub base: Base,
+    /// Whether the board corrects its rates: the capture then has columns for what it makes of them.
+    pub corrected: bool,
 }
 
 impl Default for Calibration {
@@ -37,9 +39,20 @@ impl Default for Calibration {
             acc_zero_counts: 512.0,
             acc_counts_per_g: 1024.0 / 3.3 * 0.8,
             base: Base::Static,
+            corrected: false,
         }
     }
 }
+
+/// Rates of corrected frames are Q12.20: deg/s a count.
+pub(crate) const CORRECTED_LSB_DPS: f64 = 1.0 / (1 << 20) as f64;
+/// Names of the corrected rates' columns.
+pub(crate) const CORRECTED: [&str; 3] = ["corrected_x", "corrected_y", "corrected_z"];
+/// Columns of what else a corrected frame says: the correction's number, and the bits of its state.
+pub(crate) const OF_CORRECTION: [&str; 2] = ["correction", "corrected_state"];
+/// How many rows back a corrected frame's sample is looked for: its frame comes behind that sample, a line that is full
+/// puts no more than replies and reports in between.
+const BEHIND: usize = 8;
 
 /// GYRO_OUT at the 320 deg/s range: deg/s a count (ADIS16250 data sheet).
 const GYRO_LSB_DPS: f64 = 0.073_26;
@@ -48,11 +61,19 @@ pub const TEMP: (f64, f64) = (0.1453, 25.0);
 /// SUPPLY_OUT: V a count (ADIS16250 data sheet).
 pub const SUPPLY_LSB_V: f64 = 1.8315e-3;
 
+/// A sample, when it arrived, s, and what the board made of its rates.
+#[derive(Clone, Debug)]
+pub(super) struct Row {
+    sample: Sample,
+    host_time_s: f64,
+    corrected: Option<Corrected>,
+}
+
 /// Collects frames.
 #[derive(Clone, Debug)]
 pub struct RecordBuilder {
     calibration: Calibration,
-    rows: Vec<(Sample, f64)>,
+    rows: Vec<Row>,
 }
 
 impl RecordBuilder {
@@ -67,7 +88,32 @@ impl RecordBuilder {
 
     /// A frame and when it arrived, s.
     pub fn push(&mut self, sample: &Sample, host_time_s: f64) {
-        self.rows.push((*sample, host_time_s));
+        self.rows.push(Row {
+            sample: *sample,
+            host_time_s,
+            corrected: None,
+        });
+    }
+
+    /// What the board made of the rates of a sample before: goes to its row. From the first one on there are columns for it.
+    pub fn corrected(&mut self, corrected: &Corrected) {
+        self.calibration.corrected = true;
+        let mut behind = self.rows.iter_mut().rev().take(BEHIND);
+        if let Some(row) = behind.find(|row| row.sample.seq == corrected.seq) {
+            row.corrected = Some(*corrected);
+        }
+    }
+
+    /// Takes the last row out where its corrected frame may still come.
+    pub(super) fn take_waiting(&mut self) -> Option<Row> {
+        let waits = |row: &mut Row| row.corrected.is_none();
+        let has_columns = self.calibration.corrected;
+        self.rows.pop_if(|row| has_columns && waits(row))
+    }
+
+    /// Puts it back.
+    pub(super) fn put_back(&mut self, row: Option<Row>) {
+        self.rows.extend(row);
     }
 
     /// The board says how it is set: rate, tick and range are taken from it.
@@ -137,7 +183,13 @@ impl RecordBuilder {
                 entry("supply_lsb_v", SUPPLY_LSB_V),
                 entry("acc_zero_counts", c.acc_zero_counts),
                 entry("acc_counts_per_g", c.acc_counts_per_g),
-            ],
+            ]
+            .into_iter()
+            .chain(
+                c.corrected
+                    .then(|| entry("corrected_lsb_dps", CORRECTED_LSB_DPS)),
+            )
+            .collect(),
         };
         let mut channels = Vec::new();
         let acc = (c.acc_zero_counts, STANDARD_GRAVITY / c.acc_counts_per_g);
@@ -190,15 +242,18 @@ impl RecordBuilder {
                 Some(i32::from(s.pwm))
             }),
         );
+        if c.corrected {
+            channels.extend(self.corrections());
+        }
         let counter = |of: fn(&Sample) -> u64| -> Vec<u64> {
-            self.rows.iter().map(|(sample, _)| of(sample)).collect()
+            self.rows.iter().map(|row| of(&row.sample)).collect()
         };
         Record {
             header,
             seq: Some(unwrap(&counter(|s| s.seq.into()), 1 << 16)),
             t_ticks: Some(unwrap(&counter(|s| s.t_ticks.into()), 1 << 32)),
-            host_time_s: Some(self.rows.iter().map(|(_, time)| *time).collect()),
-            flags: Some(self.rows.iter().map(|(s, _)| s.flags).collect()),
+            host_time_s: Some(self.rows.iter().map(|row| row.host_time_s).collect()),
+            flags: Some(self.rows.iter().map(|row| row.sample.flags).collect()),
             channels,
             notes: Vec::new(),
         }
@@ -216,18 +271,57 @@ impl RecordBuilder {
         let letter = axis
             .map(|axis| ["_x", "_y", "_z"][axis.index()])
             .unwrap_or_default();
-        let counts: Vec<Option<i32>> = self.rows.iter().map(|(sample, _)| count(sample)).collect();
+        let counts: Vec<Option<i32>> = self.rows.iter().map(|row| count(&row.sample)).collect();
         Channel {
-            name: format!("{stem}{letter}"),
-            quantity,
             axis,
-            unit: unit.to_owned(),
-            values: counts
-                .iter()
-                .map(|c| c.map_or(f64::NAN, |c| (f64::from(c) - zero) * lsb))
-                .collect(),
-            counts: Some(counts.iter().map(|c| c.unwrap_or(0)).collect()),
-            lsb: Some(lsb),
+            ..in_counts(
+                &format!("{stem}{letter}"),
+                quantity,
+                unit,
+                (zero, lsb),
+                &counts,
+            )
         }
+    }
+
+    /// What the corrected frames say, as columns.
+    fn corrections(&self) -> impl Iterator<Item = Channel> {
+        let counts = |of: &dyn Fn(&Corrected) -> i32| -> Vec<Option<i32>> {
+            let rows = self.rows.iter();
+            rows.map(|row| row.corrected.as_ref().map(of)).collect()
+        };
+        let rates = [0, 1, 2].map(|axis| {
+            let counts = counts(&|c| c.rate[axis]);
+            let scale = (0.0, CORRECTED_LSB_DPS);
+            in_counts(CORRECTED[axis], Quantity::Other, "deg/s", scale, &counts)
+        });
+        let others = [
+            counts(&|c| i32::from(c.correction)),
+            counts(&|c| i32::from(c.state)),
+        ];
+        let others = (OF_CORRECTION.into_iter().zip(others))
+            .map(|(name, counts)| in_counts(name, Quantity::Other, "1", (0.0, 1.0), &counts));
+        rates.into_iter().chain(others.collect::<Vec<_>>())
+    }
+}
+
+/// A channel of counts that mean (count - zero) lsb; rows without one have no value.
+fn in_counts(
+    name: &str,
+    quantity: Quantity,
+    unit: &str,
+    (zero, lsb): (f64, f64),
+    counts: &[Option<i32>],
+) -> Channel {
+    Channel {
+        name: name.to_owned(),
+        quantity,
+        axis: None,
+        unit: unit.to_owned(),
+        values: (counts.iter())
+            .map(|c| c.map_or(f64::NAN, |c| (f64::from(c) - zero) * lsb))
+            .collect(),
+        counts: Some(counts.iter().map(|c| c.unwrap_or(0)).collect()),
+        lsb: Some(lsb),
     }
 }

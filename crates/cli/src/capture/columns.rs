@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use model::record::Quantity;
 
+use super::build::{CORRECTED, OF_CORRECTION};
 use super::conventions::unit_of;
 use super::error::{brief, brief_list};
 use super::foreign::meaning;
@@ -407,6 +408,15 @@ fn own(
                 )
             }
             (_, Quantity::Pwm) => scaled(0.0, 1.0, "1"),
+            (name, _) if is_capture && CORRECTED.contains(&name) => Role::Measured {
+                quantity,
+                unit: "deg/s".to_owned(),
+                zero: 0.0,
+                scale: lines.scale("corrected_lsb_dps", name)?,
+                counts: false,
+            },
+            // What the board says of its correction is no measurement.
+            (name, _) if is_capture && OF_CORRECTION.contains(&name) => continue,
             (_, Quantity::Other) => {
                 // The format may grow: what is not known is kept as it is, where the file says that it is ours.
                 if !is_capture {

@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use flate2::write::GzEncoder;
-use wire::{Hello, Sample};
+use wire::{Corrected, Hello, Sample};
 
 use super::write::{write_head, write_rows};
 use super::{Calibration, CaptureError, Continuity, Place, RecordBuilder, Restart};
@@ -51,7 +51,8 @@ fn is_gz(path: &Path) -> bool {
     path.extension().is_some_and(|e| e == "gz")
 }
 
-/// A capture under way. Rows are in the file as soon as [`flush`](Self::flush) has returned.
+/// A capture under way. Rows are in the file as soon as [`flush`](Self::flush) has returned, but for the last one where what
+/// the board makes of its rates may still come.
 pub struct Live {
     path: PathBuf,
     sink: Sink,
@@ -198,6 +199,25 @@ impl Live {
         Ok((place, restart))
     }
 
+    /// Adds what the board made of the rates of a sample before. A file that was begun without columns for it leaves it out.
+    pub fn corrected(&mut self, corrected: &Corrected) {
+        if self.has_corrected() {
+            self.builder.corrected(corrected);
+        }
+    }
+
+    /// What the file's counts mean.
+    #[must_use]
+    pub fn calibration(&self) -> &Calibration {
+        self.builder.calibration()
+    }
+
+    /// Whether the file has columns for corrected rates.
+    #[must_use]
+    pub fn has_corrected(&self) -> bool {
+        self.builder.calibration().corrected
+    }
+
     /// Writes down what happened, at its place among the rows.
     ///
     /// # Errors
@@ -212,7 +232,12 @@ impl Live {
     /// # Errors
     /// [`CaptureError::Io`].
     pub fn flush(&mut self) -> Result<(), CaptureError> {
-        self.write_pending()
+        let waiting = self.builder.take_waiting();
+        let place = waiting.is_some().then(|| self.places.pop()).flatten();
+        let written = self.write_pending();
+        self.builder.put_back(waiting);
+        self.places.extend(place);
+        written
             .and_then(|()| self.sink.flush())
             .map_err(io(&self.path))
     }
@@ -234,7 +259,9 @@ impl Live {
     /// # Errors
     /// [`CaptureError::Io`].
     pub fn finish(mut self) -> Result<(), CaptureError> {
-        self.flush()?;
+        self.write_pending()
+            .and_then(|()| self.sink.flush())
+            .map_err(io(&self.path))?;
         match self.sink {
             Sink::Plain(_) => Ok(()),
             Sink::Gz(out) => out
@@ -338,6 +365,12 @@ impl Ends {
             } else if std::mem::take(&mut names) {
                 if !line.starts_with("seq,t_ticks,host_time_s,gyro_x,") {
                     return Err(refuse("its columns are not those of a capture".to_owned()));
+                }
+                if line.contains(",corrected_x,") != now.corrected {
+                    let with = if now.corrected { "has no" } else { "has" };
+                    return Err(refuse(format!(
+                        "the correction on the board was switched since: the file {with} columns for corrected rates"
+                    )));
                 }
             } else {
                 let mut cells = line.split(',');

@@ -5,6 +5,7 @@ mod build;
 mod columns;
 mod continuity;
 mod conventions;
+mod corrected;
 mod error;
 mod foreign;
 mod header;
@@ -29,6 +30,7 @@ mod write;
 
 pub use build::{Calibration, RecordBuilder, SUPPLY_LSB_V, TEMP};
 pub use continuity::{Continuity, Place, Restart};
+pub use corrected::corrected;
 pub use error::CaptureError;
 pub use foreign::ColumnMapping;
 pub use live::Live;

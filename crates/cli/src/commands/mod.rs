@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use clap::Args;
-use imu_stand::capture::{Read, read_from, unpacked};
+use imu_stand::capture::{Read, corrected, read_from, unpacked};
 use imu_stand::link::{DEFAULT_BAUD, Link};
 use imu_stand::text::shell_word;
 use imu_stand::{CaptureError, ColumnMapping, ReadOptions, read_capture};
@@ -54,6 +54,9 @@ pub struct Input {
     /// Which topic of a log (MCAP, ROS bag, ULog) that has several IMUs
     #[arg(long, value_name = "NAME")]
     topic: Option<String>,
+    /// Take the rates that the board has corrected, in place of those that it read
+    #[arg(long)]
+    corrected: bool,
     /// Print nothing but errors
     #[arg(long, short)]
     pub quiet: bool,
@@ -123,6 +126,13 @@ impl Input {
         } else {
             read_capture(path, &options)
         };
+        let read = read.and_then(|read| match self.corrected {
+            true => Ok(Read {
+                record: corrected(read.record)?,
+                ..read
+            }),
+            false => Ok(read),
+        });
         let read = read.map_err(|error| {
             let error = match error {
                 CaptureError::Io { path, source } => return unreadable(&path, &source),

@@ -87,11 +87,15 @@ impl Feed {
         Some(Change::Gone { why })
     }
 
-    /// Asks the board how it is set; the hello frame comes with the others.
+    /// Asks the board whether it corrects its rates, then how it is set; the hello frame comes with the others.
     ///
     /// # Errors
     /// [`LinkError::Gone`].
     pub fn ask(&mut self) -> Result<(), LinkError> {
+        self.link.send(Command::GetCorrection {
+            other: false,
+            row: 0,
+        })?;
         self.link.send(Command::GetHello).map(drop)
     }
 

@@ -16,7 +16,7 @@ use imu_stand::link::{self, Change, Feed, Link};
 use miette::{IntoDiagnostic, Result, WrapErr};
 use model::record::Base;
 use serde::Serialize;
-use wire::{Command, Frame, Hello, Reply, Sample};
+use wire::{Command, Corrected, Frame, Hello, Reply, Sample};
 
 use super::Line;
 use super::board::motor::{Drive, KEEP_ALIVE, RAMP_DOWN};
@@ -63,8 +63,8 @@ pub enum BaseName {
 }
 
 impl Arguments {
-    /// What a board's hello frame says, and what the base does.
-    fn calibration(&self, hello: Option<&Hello>) -> Calibration {
+    /// What a board's hello frame says, what the base does, and whether the board corrects its rates.
+    fn calibration(&self, hello: Option<&Hello>, corrected: bool) -> Calibration {
         let base = match self.base {
             Some(BaseName::Static) => Base::Static,
             Some(BaseName::Moving) => Base::Moving,
@@ -74,6 +74,7 @@ impl Arguments {
         };
         let mut builder = RecordBuilder::new(Calibration {
             base,
+            corrected,
             ..Calibration::default()
         });
         if let Some(hello) = hello {
@@ -137,6 +138,8 @@ struct Capture<'a> {
     motor: Motor,
     /// Samples that wait for the first hello.
     waiting: Vec<(Sample, f64)>,
+    /// Whether the board corrects its rates.
+    corrects: bool,
     restarts_of_board: Option<u16>,
     files: Vec<String>,
     /// Rows of files that are finished.
@@ -213,6 +216,7 @@ impl<'a> Capture<'a> {
             live: None,
             motor: arguments.drive.command().map_or(Motor::Off, Motor::Wanted),
             waiting: Vec::new(),
+            corrects: false,
             restarts_of_board: None,
             files: Vec::new(),
             rows: 0,
@@ -257,6 +261,13 @@ impl<'a> Capture<'a> {
 
     /// A reply: the nonce that arms the motor; to the motor's command it says whether it turns.
     fn replied(&mut self, reply: Reply) -> Result<()> {
+        let asks = Command::GetCorrection {
+            other: false,
+            row: 0,
+        };
+        if reply.command == asks.code() && self.live.is_none() {
+            self.corrects = reply.status == wire::Status::Ok && reply.value != 0;
+        }
         if let Motor::Arming(command, number, _) = self.motor
             && reply.number == number
         {
@@ -302,7 +313,8 @@ impl<'a> Capture<'a> {
                     Frame::Sample(sample) => self.sample(&sample)?,
                     Frame::Hello(hello) => self.hello(&hello)?,
                     Frame::Reply(reply) => self.replied(reply)?,
-                    Frame::Health(_) | Frame::Corrected(_) => {}
+                    Frame::Corrected(corrected) => self.corrected(&corrected)?,
+                    Frame::Health(_) => {}
                 }
             }
             if self.live.is_none() && asked.elapsed() > ASK && !feed.is_gone() {
@@ -426,8 +438,27 @@ impl<'a> Capture<'a> {
         Ok(())
     }
 
+    /// What the board made of a sample's rates. The file gets columns for it where the board said in time that it corrects.
+    fn corrected(&mut self, corrected: &Corrected) -> Result<()> {
+        self.corrects = true;
+        let Some(live) = &mut self.live else {
+            return Ok(());
+        };
+        if live.has_corrected() {
+            live.corrected(corrected);
+            return Ok(());
+        }
+        let calibration = Calibration {
+            corrected: true,
+            ..live.calibration().clone()
+        };
+        self.tell("the board corrects its rates from here on: another file goes on")?;
+        self.close()?;
+        self.open(&calibration, &[])
+    }
+
     fn hello(&mut self, hello: &Hello) -> Result<()> {
-        let calibration = self.arguments.calibration(Some(hello));
+        let calibration = self.arguments.calibration(Some(hello), self.corrects);
         let before = self.restarts_of_board.replace(hello.restarts);
         let Some(live) = &mut self.live else {
             let [major, minor, patch] = hello.firmware;
@@ -489,7 +520,7 @@ impl<'a> Capture<'a> {
         if self.live.is_some() || self.now() - first < HELLO_WITHIN.as_secs_f64() {
             return Ok(());
         }
-        self.open(&self.arguments.calibration(None), &[])?;
+        self.open(&self.arguments.calibration(None, self.corrects), &[])?;
         self.tell(
             "the board has not said how it is set: rate and ranges are assumed to be the built-in ones (20 Hz, 320 deg/s, \
              1.5 g)",

@@ -27,7 +27,8 @@ pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
         Frame::Hello(hello) => Some(*hello),
         _ => None,
     });
-    let mut calibration = arguments.calibration(first.as_ref());
+    let corrects = (frames.iter()).any(|frame| matches!(frame, Frame::Corrected(_)));
+    let mut calibration = arguments.calibration(first.as_ref(), corrects);
     let about = [("replayed_from".to_owned(), super::super::name(path))];
     let mut files = vec![arguments.out.clone()];
     let mut live = Live::create(&arguments.out, &calibration, &about, None)?;
@@ -54,7 +55,7 @@ pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
             }
             Frame::Hello(hello) => {
                 live.hello(hello, restarts.replace(hello.restarts));
-                let now = arguments.calibration(Some(hello));
+                let now = arguments.calibration(Some(hello), corrects);
                 if !live.fits(&now) {
                     calibration = now;
                     let next = free_name(&arguments.out, files.len() + 1);
@@ -63,7 +64,8 @@ pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
                     files.push(next);
                 }
             }
-            Frame::Health(_) | Frame::Reply(_) | Frame::Corrected(_) => {}
+            Frame::Corrected(corrected) => live.corrected(corrected),
+            Frame::Health(_) | Frame::Reply(_) => {}
         }
     }
     live.finish()?;
