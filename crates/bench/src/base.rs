@@ -99,9 +99,9 @@ impl Base {
     /// True rate about each axis, deg/s, without the tones: those go through the sensor's pole in closed form.
     pub fn rate_dps(&self, t: f64) -> [f64; 3] {
         let mut rate = [0.0; 3];
-        if self.part.sway_deg != 0.0 {
+        if let Some(turns) = self.sway(t) {
             let w = TAU / self.part.sway_period_s;
-            rate[0] += self.part.sway_deg * w * (w * t).cos();
+            rate[0] += self.part.sway_deg * w * (TAU * turns).cos();
         }
         for &(axis, time, tilt) in &self.knocks {
             rate[axis] += KNOCK_DPS_PER_DEG * tilt * ring(t - time);
@@ -116,6 +116,12 @@ impl Base {
         rate
     }
 
+    /// How far the sway has got, turns; `None` while there is none.
+    fn sway(&self, t: f64) -> Option<f64> {
+        let since = t - self.part.sway_from_s;
+        (self.part.sway_deg != 0.0 && since >= 0.0).then_some(since / self.part.sway_period_s)
+    }
+
     pub fn tones(&self) -> &[Tone] {
         &self.tones
     }
@@ -124,8 +130,8 @@ impl Base {
     pub fn acceleration(&self, t: f64) -> [f64; 3] {
         let mut tilt = self.part.tilt_deg;
         let mut g = self.floor_g;
-        if self.part.sway_deg != 0.0 {
-            tilt[0] += self.part.sway_deg * (TAU / self.part.sway_period_s * t).sin();
+        if let Some(turns) = self.sway(t) {
+            tilt[0] += self.part.sway_deg * (TAU * turns).sin();
         }
         for &(_, time, angle) in &self.knocks {
             if t >= time {

@@ -193,6 +193,8 @@ pub struct BasePart {
     pub sway_deg: f64,
     /// Period of the sway, s.
     pub sway_period_s: f64,
+    /// When the sway begins, s since power came on; the base rests until then.
+    pub sway_from_s: f64,
 }
 
 /// How a stalled gyro marks its old samples.
@@ -312,6 +314,15 @@ pub enum Fault {
         half_height_dps: f64,
         /// Mean time in each state, s.
         dwell_s: f64,
+    },
+    /// A gyro is mounted askew: it feels a share of the rate about another axis, and the less of its own.
+    Misalignment {
+        /// 0, 1, 2.
+        gyro: usize,
+        /// The axis that it leans towards: 0, 1, 2.
+        from: usize,
+        /// Sine of the angle between its axis and its own, 1.
+        share: f64,
     },
     /// The gyro reacts to acceleration, on a shaking floor.
     GSensitivity {

@@ -30,6 +30,8 @@ pub struct Stand {
     supply: Supply,
     thermal: Thermal,
     base: Base,
+    /// Gyro, the axis that it leans towards, and the sine of the angle.
+    misaligned: Vec<(usize, usize, f64)>,
     common_sigma: f64,
     common: f64,
     common_rng: Xoshiro256PlusPlus,
@@ -52,6 +54,12 @@ impl Stand {
                 scenario.seed,
             )
         });
+        let misaligned = (scenario.faults.iter())
+            .filter_map(|fault| match *fault {
+                Fault::Misalignment { gyro, from, share } => Some((gyro, from, share)),
+                _ => None,
+            })
+            .collect();
         let common_sigma = scenario
             .faults
             .iter()
@@ -67,6 +75,7 @@ impl Stand {
             supply: Supply::new(scenario.supply.clone(), scenario.seed),
             thermal: Thermal::new(scenario.thermal.clone()),
             base,
+            misaligned,
             common_sigma,
             common: 0.0,
             common_rng: Stream::Common.of(scenario.seed),
@@ -116,9 +125,11 @@ impl Stand {
     }
 
     fn stimulus(&self, axis: usize, t: f64) -> Stimulus {
-        let mut rate_dps = self.base.rate_dps(t)[axis];
-        if axis == 2 {
-            rate_dps += self.motor.table_dps();
+        let mut rates = self.base.rate_dps(t);
+        rates[2] += self.motor.table_dps();
+        let mut rate_dps = rates[axis];
+        for &(_, from, share) in self.misaligned.iter().filter(|lean| lean.0 == axis) {
+            rate_dps += share * rates[from] - (1.0 - (1.0 - share * share).sqrt()) * rates[axis];
         }
         Stimulus {
             rate_dps,

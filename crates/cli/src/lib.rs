@@ -2,6 +2,7 @@
 
 pub mod browser;
 pub mod capture;
+pub mod correct;
 pub mod export;
 pub mod link;
 pub mod monitor;

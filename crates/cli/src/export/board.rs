@@ -31,6 +31,11 @@ const SHORTEST_BLOCK: u8 = 4;
 const MOST_BLOCKS: f64 = 200.0;
 /// Least growth of the variance in a block, over that of a block: a step of what is stored.
 const LEAST_WALK: f64 = 1.0 / (1 << 24) as f64;
+/// Most of the same that is stored. It is the square of the filter's gain: 1/16.
+const MOST_WALK: f64 = u16::MAX as f64 / (1 << 24) as f64;
+/// What is nearest to a term that has the sign of the command alone, of one in proportion to it: sum |d| / sum d^2 of commands
+/// that are spread evenly.
+const SIGN_IN_DUTY: f64 = 1.5;
 /// A flicker of instability B has, at 100 s, the deviation of a walk K with K^2 = 3 (0.664 B)^2 / 100 s (IEEE Std 952).
 const FLICKER_AT_S: f64 = 100.0;
 /// Degrees beyond the record's own range that a correction is for.
@@ -135,7 +140,9 @@ impl BoardCorrection {
                         } else {
                             &mut out.motor
                         };
-                        term[axis] -= value("at_full_duty") / FULL_DUTY;
+                        // The board has no term for what it does as soon as it turns: that goes along in proportion.
+                        let at_full = value("at_full_duty") + SIGN_IN_DUTY * value("while_turning");
+                        term[axis] -= at_full / FULL_DUTY;
                     }
                     "supply_sensitivity" => {
                         out.supply[axis] -= value("slope") * SUPPLY_LSB_V;
@@ -173,11 +180,29 @@ impl BoardCorrection {
             if unknown {
                 notes.push(format!("{}: the board has no term for it", effect.cause));
             }
+            for (parameter, what) in [
+                (
+                    "while_turning",
+                    "what sets in as the motor turns is taken off in proportion to the command",
+                ),
+                (
+                    "surge_at_full_duty",
+                    "the surge behind a step of the motor stays: the board has no term for it",
+                ),
+            ] {
+                if effect
+                    .parameters
+                    .get(parameter)
+                    .is_some_and(|p| p.value != 0.0)
+                {
+                    notes.push(format!("{}: {what}", effect.cause));
+                }
+            }
             if effect.cause == "g_sensitivity" {
                 notes.push("g_sensitivity: for the accelerometer's 1.5 g range".to_owned());
             }
         }
-        filter(&mut out, model.rate_hz, [density, alike, walks]);
+        notes.extend(filter(&mut out, model.rate_hz, [density, alike, walks]));
         let numbers = rounded(&mut out, setting("supply_v", 5.0))?;
         let stored = Correction::from_numbers(&numbers).unwrap_or(out);
         judge(&out, &stored, &density, reach_c / TEMP_LSB_C)?;
@@ -252,22 +277,38 @@ fn temp_range(mean_c: f64, reach_c: f64) -> [i8; 2] {
 
 /// What the filter is told: the shortest block whose memory it can hold, and the noise in it. By axis N^2, what neighbours that are
 /// alike multiply it by, and K^2 of all that walks.
-fn filter(out: &mut Correction, rate_hz: f64, [density, alike, walks]: [[f64; 3]; 3]) {
-    let holds = |shift: u8| {
-        (0..3).all(|axis| {
-            let block_s = f64::from(1u32 << shift) / rate_hz;
-            let ratio = walks[axis] * block_s / (density[axis] * alike[axis] / block_s);
-            walks[axis] == 0.0 || ratio.sqrt() >= 1.0 / MOST_BLOCKS
-        })
+fn filter(
+    out: &mut Correction,
+    rate_hz: f64,
+    [density, alike, walks]: [[f64; 3]; 3],
+) -> Vec<String> {
+    // Growth of the variance in a block, over that of its mean: a filter at rest remembers the inverse root of it, in blocks.
+    let growth = |axis: usize, shift: u8| {
+        let block_s = f64::from(1u32 << shift) / rate_hz;
+        walks[axis] * block_s / (density[axis] * alike[axis] / block_s)
     };
-    out.block_shift = (SHORTEST_BLOCK..BLOCK_SHIFT_MAX)
-        .find(|shift| holds(*shift))
-        .unwrap_or(BLOCK_SHIFT_MAX);
+    let all = |shift: u8, is: &dyn Fn(f64) -> bool| (0..3).all(|axis| is(growth(axis, shift)));
+    let holds = |shift: &u8| all(*shift, &|g| g == 0.0 || g.sqrt() >= 1.0 / MOST_BLOCKS);
+    let follows = |shift: &u8| all(*shift, &|g| g <= MOST_WALK);
+    // Axes may walk so differently that no block is right for all: then the fastest can still be followed.
+    let shifts = SHORTEST_BLOCK..=BLOCK_SHIFT_MAX;
+    out.block_shift = (shifts.clone().filter(follows).find(holds))
+        .or_else(|| shifts.rev().find(follows))
+        .unwrap_or(SHORTEST_BLOCK);
     let block_s = f64::from(1u32 << out.block_shift) / rate_hz;
+    let mut notes = Vec::new();
     for axis in 0..3 {
         out.noise[axis] = density[axis] * alike[axis] / block_s;
-        out.walk[axis] = (walks[axis] * block_s).max(LEAST_WALK * out.noise[axis]);
+        let walk = growth(axis, out.block_shift);
+        if walk > MOST_WALK {
+            notes.push(format!(
+                "the bias of {} walks faster than the board's filter can follow",
+                GYROS[axis]
+            ));
+        }
+        out.walk[axis] = walk.clamp(LEAST_WALK, MOST_WALK) * out.noise[axis];
     }
+    notes
 }
 
 /// As it is stored. What a count of supply or acceleration is worth is rounded before the constant that goes with it is.
@@ -363,6 +404,32 @@ mod tests {
         assert!((c.noise[0] - (5.27f64 / 60.0).powi(2) / 0.8).abs() < 1e-9);
         assert!((c.walk[0] - 0.0015f64.powi(2) * 0.8).abs() < 1e-12);
         assert!(board.notes.is_empty());
+    }
+
+    #[test]
+    fn axes_that_walk_at_different_paces_get_the_block_that_follows_the_fastest() {
+        let mut model = ModelFile::paper();
+        for (channel, k) in model.channels.iter_mut().zip([0.0032, 1e-6, 0.0]) {
+            if let Some(walk) = channel.baseline.get_mut("rate_random_walk") {
+                walk.value = k;
+            }
+        }
+        let board = BoardCorrection::of(&model, SENS_AVG).unwrap();
+        let c = board.correction;
+        let growth = c.walk[0] / c.noise[0];
+        let block_s = f64::from(1u32 << c.block_shift) / 20.0;
+        assert!((growth.sqrt() - 0.0032 * block_s / (5.27 / 60.0)).abs() < 1e-6);
+        assert!(board.notes.is_empty());
+        // Beyond what is stored, the fastest that there is.
+        if let Some(walk) = model.channels[0].baseline.get_mut("rate_random_walk") {
+            walk.value = 0.3;
+        }
+        let board = BoardCorrection::of(&model, SENS_AVG).unwrap();
+        assert!(
+            board.notes[0].contains("gyro_x walks faster"),
+            "{:?}",
+            board.notes
+        );
     }
 
     #[test]

@@ -3,12 +3,12 @@
 mod error;
 mod feed;
 mod heard;
+mod port;
 
 use std::collections::VecDeque;
-use std::io::{ErrorKind, Read, Write};
+use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
-use serialport::SerialPort;
 use wire::link::LinkStats;
 use wire::{
     Command, Decoder, Frame, Health, Hello, Reply, Request, Sample, Status, encode_request,
@@ -17,6 +17,8 @@ use wire::{
 pub use error::{LinkError, name, words};
 pub use feed::{Change, Feed};
 pub use heard::Heard;
+pub use port::Port;
+use port::Serial;
 
 /// Speed of the line after a reset, baud.
 pub const DEFAULT_BAUD: u32 = 38_400;
@@ -90,10 +92,12 @@ impl Patience {
     }
 }
 
-/// A board on a serial port.
+/// A board on a line.
 pub struct Link {
     /// `None` while it is gone.
-    port: Option<Box<dyn SerialPort>>,
+    port: Option<Box<dyn Port>>,
+    /// When it was opened first.
+    since: Instant,
     name: String,
     baud: u32,
     decoder: Decoder,
@@ -116,23 +120,35 @@ impl Link {
     /// # Errors
     /// [`LinkError::Open`], which names the ports that there are.
     pub fn open(name: &str, baud: u32) -> Result<Self, LinkError> {
-        let port = open_port(name, baud)?;
+        let since = Instant::now();
+        let port = open_port(name, baud, since)?;
         // Another program may have asked a moment ago: its replies must not look like ours.
         let number = (std::process::id() as u16).wrapping_mul(257);
         Ok(Self {
+            number,
+            since,
+            ..Self::over(Box::new(port), name, baud)
+        })
+    }
+
+    /// A board on a line that is open.
+    #[must_use]
+    pub fn over(port: Box<dyn Port>, name: &str, baud: u32) -> Self {
+        Self {
             port: Some(port),
+            since: Instant::now(),
             name: name.to_owned(),
             baud,
             decoder: Decoder::new(),
             stats: LinkStats::new(),
             bytes: 0,
-            number,
+            number: 0,
             frames: VecDeque::new(),
             buffer: vec![0; 4096],
             hello: None,
             health: None,
             sample: None,
-        })
+        }
     }
 
     /// Opens the port again, after it was gone or to get rid of what waits in its buffers. A frame that was cut in two is
@@ -143,7 +159,8 @@ impl Link {
     pub fn reopen(&mut self) -> Result<(), LinkError> {
         // Closed first: a port may be open once only.
         self.port = None;
-        self.port = Some(open_port(&self.name, self.baud)?);
+        let port = open_port(&self.name, self.baud, self.since)?;
+        self.port = Some(Box::new(port));
         let _cut = self.decoder.push(0);
         Ok(())
     }
@@ -158,6 +175,14 @@ impl Link {
     #[must_use]
     pub fn baud(&self) -> u32 {
         self.baud
+    }
+
+    /// The line's time: that of the last byte where the line brings it, else of this computer. While the port is gone, the
+    /// latter.
+    #[must_use]
+    pub fn now(&self) -> Duration {
+        let of_port = self.port.as_ref().map(|port| port.now());
+        of_port.unwrap_or_else(|| self.since.elapsed())
     }
 
     /// What came so far.
@@ -243,7 +268,7 @@ impl Link {
         let encoded = encode_request(&Request { number, command }, &mut line);
         debug_assert!(encoded.is_ok(), "the buffer has the length of a request");
         let sent = match &mut self.port {
-            Some(port) => port.write_all(&line).and_then(|()| port.flush()),
+            Some(port) => port.write_all(&line),
             None => Err(ErrorKind::NotConnected.into()),
         };
         sent.map_err(|error| self.gone(&error))
@@ -260,10 +285,10 @@ impl Link {
         mut watch: impl FnMut(&Frame),
     ) -> Result<Reply, LinkError> {
         let patience = Patience::of(&command);
-        let (began, before) = (Instant::now(), self.heard());
+        let (began, before) = (self.now(), self.heard());
         let mut number = self.send(command)?;
         let mut tries = 1;
-        let mut sent = Instant::now();
+        let mut sent = self.now();
         loop {
             while let Some(frame) = self.next() {
                 watch(&frame);
@@ -271,14 +296,17 @@ impl Link {
                 if reply.number != number || reply.command != command.code() {
                     continue;
                 }
-                if reply.status != Status::Busy || began.elapsed() > BUSY_FOR {
+                if reply.status != Status::Busy || self.now().saturating_sub(began) > BUSY_FOR {
                     return Ok(reply);
                 }
-                std::thread::sleep(Duration::from_millis(100));
+                let again = self.now() + Duration::from_millis(100);
+                while self.now() < again {
+                    self.read()?;
+                }
                 number = self.send(command)?;
-                sent = Instant::now();
+                sent = self.now();
             }
-            if sent.elapsed() > patience.wait {
+            if self.now().saturating_sub(sent) > patience.wait {
                 if tries >= patience.tries {
                     let heard = self.heard().since(&before);
                     return Err(self.no_reply(&command, patience, heard));
@@ -286,7 +314,7 @@ impl Link {
                 tries += 1;
                 // The same number: the late reply to the last try is as good as one to this.
                 self.send_as(number, command)?;
-                sent = Instant::now();
+                sent = self.now();
             }
             self.read()?;
         }
@@ -379,10 +407,10 @@ impl Link {
 
     /// A frame that a request brings: before its reply, or on a full line after it, as soon as there is room. It may be lost.
     fn wait_for<T>(&mut self, frame: impl Fn(&Self) -> Option<T>) -> Result<Option<T>, LinkError> {
-        let since = Instant::now();
+        let since = self.now();
         loop {
             let found = frame(self);
-            if found.is_some() || since.elapsed() > REPLY_WAIT {
+            if found.is_some() || self.now().saturating_sub(since) > REPLY_WAIT {
                 return Ok(found);
             }
             self.read()?;
@@ -409,8 +437,8 @@ impl Link {
         duration: Duration,
         mut each: impl FnMut(&Frame),
     ) -> Result<(), LinkError> {
-        let end = Instant::now() + duration;
-        while Instant::now() < end {
+        let end = self.now() + duration;
+        while self.now() < end {
             self.read()?;
             while let Some(frame) = self.next() {
                 each(&frame);
@@ -424,13 +452,9 @@ impl Link {
     /// # Errors
     /// [`LinkError::Gone`].
     pub fn set_own_baud(&mut self, baud: u32) -> Result<(), LinkError> {
-        let gone = |error: serialport::Error| LinkError::Gone {
-            port: self.name.clone(),
-            why: error.description,
-        };
         if let Some(port) = &mut self.port {
-            port.set_baud_rate(baud).map_err(gone)?;
-            port.clear(serialport::ClearBuffer::Input).map_err(gone)?;
+            let set = port.set_baud(baud);
+            set.map_err(|error| self.gone(&error))?;
         }
         self.baud = baud;
         self.frames.clear();
@@ -469,7 +493,7 @@ pub fn baud_of(divisor: u16) -> f64 {
 }
 
 /// Opens a port and forgets what had been received before.
-fn open_port(name: &str, baud: u32) -> Result<Box<dyn SerialPort>, LinkError> {
+fn open_port(name: &str, baud: u32, since: Instant) -> Result<Serial, LinkError> {
     let open = |error: serialport::Error| LinkError::Open {
         port: name.to_owned(),
         why: error.description.clone(),
@@ -480,7 +504,7 @@ fn open_port(name: &str, baud: u32) -> Result<Box<dyn SerialPort>, LinkError> {
         .open()
         .map_err(open)?;
     port.clear(serialport::ClearBuffer::Input).map_err(open)?;
-    Ok(port)
+    Ok(Serial { port, since })
 }
 
 /// What to do about a port that does not open.

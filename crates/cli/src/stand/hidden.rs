@@ -59,10 +59,13 @@ pub enum Hidden {
     ScaleError,
     /// The board's crystal is off.
     WrongCrystal,
+    /// Three things at once that a correction takes off: one gyro follows its temperature, one the motor's current, and one
+    /// is mounted askew on a base that sways after a rest. Random draws leave it out.
+    Uncalibrated,
 }
 
 impl Hidden {
-    /// Everything that can be wrong.
+    /// Everything that can be wrong, one thing at a time.
     pub const ALL: [Hidden; 24] = [
         Hidden::Tempco,
         Hidden::TempcoCurved,
@@ -144,6 +147,10 @@ pub(super) fn plant(
             scenario.crystal_ppm = sign * by_ratio(rng, 300.0, 3000.0);
             return None;
         }
+        Hidden::Uncalibrated => {
+            uncalibrated(sizes, [gyro, one_of(rng, 3)], scenario, rng);
+            return None;
+        }
         _ => {}
     }
     let fault = fault(hidden, sizes, gyro, sign, scenario, rng);
@@ -168,6 +175,41 @@ fn plant_scale_error(
     scenario.gyros[0].scale_error = sign * sizes.draw(rng, 0.06, 0.3);
 }
 
+/// When the sway of a stand that is to be calibrated begins, s: behind the rest in which the bias is taken.
+pub const SWAY_FROM_S: f64 = 75.0;
+
+/// A gyro that follows its temperature, one that follows the motor, and one that leans towards x, about which the base sways.
+fn uncalibrated(
+    sizes: Sizes,
+    [by_temperature, by_motor]: [usize; 2],
+    scenario: &mut Scenario,
+    rng: &mut Xoshiro256PlusPlus,
+) {
+    let sign = |rng: &mut Xoshiro256PlusPlus| if one_of(rng, 2) == 0 { -1.0 } else { 1.0 };
+    heat(scenario, rng);
+    let base = &mut scenario.base;
+    base.sway_deg = uniform(rng, 4.0, 10.0);
+    base.sway_period_s = uniform(rng, 4.0, 10.0);
+    base.sway_from_s = SWAY_FROM_S;
+    scenario.faults.extend([
+        Fault::Tempco {
+            gyro: by_temperature,
+            dps_per_c: sign(rng) * sizes.draw(rng, 0.06, 0.15),
+            dps_per_c2: 0.0,
+        },
+        Fault::MotorCoupling {
+            gyro: by_motor,
+            dps_per_amp: sign(rng) * sizes.draw(rng, 0.6, 2.0),
+        },
+        Fault::Misalignment {
+            gyro: 1 + one_of(rng, 2),
+            from: 0,
+            // 1.7 to 5 degrees.
+            share: sign(rng) * sizes.draw(rng, 0.03, 0.09),
+        },
+    ]);
+}
+
 fn fault(
     hidden: Hidden,
     sizes: Sizes,
@@ -178,7 +220,11 @@ fn fault(
 ) -> Option<Fault> {
     let seconds = scenario.seconds;
     let fault = match hidden {
-        Hidden::None | Hidden::Random | Hidden::ScaleError | Hidden::WrongCrystal => return None,
+        Hidden::None
+        | Hidden::Random
+        | Hidden::ScaleError
+        | Hidden::WrongCrystal
+        | Hidden::Uncalibrated => return None,
         Hidden::Tempco => {
             heat(scenario, rng);
             Fault::Tempco {

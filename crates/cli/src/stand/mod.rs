@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 
-use bench::{Run, Scenario, SerialByte, Timeline, duty_profile, uniform};
+use bench::{Run, Scenario, SerialByte, Timeline, duty_profile};
 use model::file::ModelFile;
 use model::record::Record;
 use rand_core::SeedableRng;
@@ -15,12 +15,17 @@ use crate::capture::Calibration;
 
 mod fitted;
 mod hidden;
+mod history;
+mod line;
 pub mod planted;
 
 pub use fitted::{Carried, FittedError};
 pub use hidden::{Hidden, Sizes};
+pub use history::{another_history, course, without_defects, without_errors};
+pub use line::Simulated;
 
 /// What plays the board.
+#[derive(Clone)]
 pub enum Board {
     /// The firmware's logic on the host.
     Native,
@@ -127,13 +132,7 @@ pub fn plan_fitted(
 /// The run of a scenario, the motor spinning free in steps.
 fn driven(scenario: Scenario, rng: &mut Xoshiro256PlusPlus) -> Run {
     let seconds = scenario.seconds;
-    let mut steps = vec![];
-    let mut at = 10.0;
-    while at < seconds - 5.0 {
-        steps.push((at, uniform(rng, -255.0, 256.0) as i16));
-        at += uniform(rng, 8.0, 30.0);
-    }
-    let requests = duty_profile(&steps, seconds);
+    let requests = duty_profile(&history::steps(rng, 10.0, seconds), seconds);
     Run {
         scenario,
         seconds,
@@ -165,6 +164,7 @@ impl<F: FnMut(f64)> Receiver<F> {
                 self.builder.push(&sample, received.time_s);
                 (self.progress)(received.time_s);
             }
+            Some(Ok(Frame::Corrected(corrected))) => self.builder.corrected(&corrected),
             Some(Ok(Frame::Hello(hello))) => self.builder.hello(&hello),
             _ => {}
         }

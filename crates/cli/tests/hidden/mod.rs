@@ -51,6 +51,7 @@ fn causes(hidden: Hidden) -> (&'static [&'static str], &'static [&'static str]) 
         Hidden::Shove => (&["base_motion"], &[]),
         Hidden::ScaleError => (&["scale_error"], &["base_motion"]),
         Hidden::WrongCrystal => (&["clock_rate"], &[]),
+        Hidden::Uncalibrated => (&["temperature", "motor_bias", "cross_axis"], &[]),
     }
 }
 

@@ -1,5 +1,7 @@
 //! `imu-stand run`.
 
+mod correct;
+
 use std::path::PathBuf;
 #[cfg(unix)]
 use std::sync::{
@@ -23,8 +25,8 @@ use model::record::Record;
 use noise::AnalyzeOptions;
 use serde::Serialize;
 
-use super::Replicates;
 use super::outputs::{self, Outputs};
+use super::{Line, Replicates};
 
 /// What `run` takes.
 #[derive(Args)]
@@ -61,6 +63,19 @@ pub struct Arguments {
     /// Seed of the noise: another one for each run of one stand
     #[arg(long, value_name = "SEED")]
     noise_seed: Option<u64>,
+    /// Close the loop: correct the board by what was found, record the same stand again under another history, and compare.
+    /// Beside run.csv it writes run-corrected.csv, the model as run.toml and, of a base that sways, run-sway.csv and
+    /// run-corrected-sway.csv
+    #[arg(long, conflicts_with_all = ["pty", "model", "analysis", "report", "details"])]
+    correct: bool,
+    /// Correct by this model file instead of what was found, to see what it is worth now
+    #[arg(long, value_name = "FILE", requires = "correct")]
+    correct_by: Option<PathBuf>,
+    #[command(
+        flatten,
+        next_help_heading = "Close the loop on a real board, which stands still, with the belt off"
+    )]
+    line: Line,
     /// The capture to write, .csv or .csv.gz
     #[arg(long, default_value = "capture.csv")]
     out: PathBuf,
@@ -88,8 +103,14 @@ pub const IMAGE: &str = "target/avr/avr-none/firmware/firmware.elf";
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let board = board(arguments)?;
+    if arguments.line.is_named() && !arguments.correct {
+        miette::bail!(
+            help = "`imu-stand capture --port` records a real board; `run --correct --port` closes the loop on it",
+            "--port goes with --correct"
+        );
+    }
     if arguments.pty {
+        let board = board(arguments)?;
         if arguments.seconds.is_nan() || arguments.seconds <= 0.0 {
             miette::bail!(
                 help = "write `--seconds 600`",
@@ -115,21 +136,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             "--out: the run is read again from its file, and standard output is none"
         );
     }
+    if arguments.correct {
+        return correct::run(arguments, progress(arguments));
+    }
+    let board = board(arguments)?;
     Outputs::beside(&arguments.model)
         .simulated("--out", Some(&arguments.out))?
         .result("--analysis", arguments.analysis.as_ref())?
         .result("--json", arguments.json.as_ref())?
         .result("--report", arguments.report.as_ref())?;
     let plan = planned(arguments)?;
-    let bar = if arguments.quiet {
-        ProgressBar::hidden()
-    } else {
-        ProgressBar::new(arguments.seconds as u64)
-    };
-    bar.set_style(
-        ProgressStyle::with_template("stand {bar:40} {pos}/{len} s")
-            .unwrap_or(ProgressStyle::default_bar()),
-    );
+    let bar = progress(arguments);
     let (mut record, link) = sample(&board, &plan, |time| bar.set_position(time as u64))?;
     bar.finish_and_clear();
     outputs::mark_simulated(&mut record, "run");
@@ -157,6 +174,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         say!("report: {}", page.display());
     }
     Ok(())
+}
+
+/// How far the stand is.
+fn progress(arguments: &Arguments) -> ProgressBar {
+    let bar = if arguments.quiet {
+        ProgressBar::hidden()
+    } else {
+        ProgressBar::new(arguments.seconds as u64)
+    };
+    let style = ProgressStyle::with_template("stand {bar:40} {pos}/{len} s");
+    bar.with_style(style.unwrap_or(ProgressStyle::default_bar()))
 }
 
 /// What the program says of a run, and what was planted in it: as `--json` writes it.
@@ -218,15 +246,19 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
     Ok(answer)
 }
 
-/// What was asked for: a fault, or the parts of a model file.
-fn planned(arguments: &Arguments) -> Result<Plan> {
-    let seconds = arguments.seconds;
+fn seeds(arguments: &Arguments) -> Seeds {
     let or_all = |seed: Option<u64>| seed.unwrap_or(arguments.seed);
-    let seeds = Seeds {
+    Seeds {
         stand: or_all(arguments.stand_seed),
         fault: or_all(arguments.fault_seed),
         noise: or_all(arguments.noise_seed),
-    };
+    }
+}
+
+/// What was asked for: a fault, or the parts of a model file.
+fn planned(arguments: &Arguments) -> Result<Plan> {
+    let seconds = arguments.seconds;
+    let seeds = seeds(arguments);
     let Some(path) = &arguments.model else {
         return Ok(plan(arguments.hide, Sizes::Visible, seconds, seeds));
     };

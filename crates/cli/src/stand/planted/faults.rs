@@ -103,6 +103,21 @@ fn following(fault: &Fault, run: &Run) -> Option<Planted> {
             ),
             motor::bias_sizes(run, dps_per_amp),
         ),
+        Fault::Misalignment { gyro, from, share } => in_gyro(
+            gyro,
+            "cross_axis",
+            format!(
+                "{} leans towards the axis of {} and feels {} of its rate",
+                GYROS[gyro],
+                GYROS[from],
+                number(share, 3)
+            ),
+            vec![Size::new(
+                ["from_gyro_x", "from_gyro_y", "from_gyro_z"][from],
+                share,
+                "1",
+            )],
+        ),
         Fault::MotorNoise {
             gyro,
             power_per_amp,

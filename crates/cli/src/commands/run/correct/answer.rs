@@ -1,0 +1,316 @@
+//! What the loop says: on the terminal, and as `--json` writes it.
+
+use diagnosis::MATTERS;
+use diagnosis::result::{Diagnosis, Finding};
+use imu_stand::correct::{Change, Judged, Noise, Proposed, Row, SPANS_S};
+use imu_stand::stand::planted::Comparison;
+use model::ModelFile;
+use model::effect::value;
+use serde::Serialize;
+use std::fmt::Write as _;
+
+const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
+/// Steps of the motor's command at full duty.
+const FULL_DUTY: f64 = 255.0;
+/// Causes that the board takes off, with the parameters that it has terms for.
+const CORRECTED: [(&str, &[&str]); 7] = [
+    ("temperature", &["slope"]),
+    ("temperature_quadratic", &["curvature", "slope"]),
+    ("motor_bias", &["at_full_duty"]),
+    ("supply_sensitivity", &["slope"]),
+    ("g_sensitivity", &["acc_x", "acc_y", "acc_z"]),
+    ("cross_axis", &["from_gyro_x", "from_gyro_y", "from_gyro_z"]),
+    ("scale_error", &["relative"]),
+];
+/// Standard errors beyond which a size is not 0 (95 %).
+const NORMAL_95: f64 = 1.96;
+
+/// The correction on the board.
+#[derive(Serialize)]
+struct Written {
+    number: u16,
+    changed: Vec<Change>,
+    notes: Vec<String>,
+}
+
+/// A cause that was corrected on an axis.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cause {
+    cause: String,
+    channel: String,
+}
+
+/// What came of it.
+#[derive(Serialize)]
+pub struct Answer {
+    format: &'static str,
+    correction: Written,
+    /// Angle errors in the second history.
+    angle_errors: Vec<Judged>,
+    /// Corrected is worse than read somewhere, or the board did not apply the correction.
+    worse: bool,
+    corrected: Vec<Cause>,
+    /// Causes that were corrected, and that the second diagnosis names on the same axis all the same, with a size that the
+    /// board has a term for.
+    still_named: Vec<Cause>,
+    /// The same with sizes alone that the board has no term for, as the surge behind a step of the motor.
+    no_term: Vec<Cause>,
+    /// What was planted beside what the first diagnosis found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub planted: Option<Comparison>,
+    first: Vec<Diagnosis>,
+    second: Vec<Diagnosis>,
+}
+
+/// The causes that a model has corrected, by axis.
+fn corrected_causes(model: &ModelFile) -> Vec<Cause> {
+    let effects = model.effects.iter();
+    let those = effects.filter(|e| CORRECTED.iter().any(|(cause, _)| *cause == e.cause));
+    let by_axis = those.flat_map(|effect| {
+        let on =
+            |gyro: &&str| effect.channels.is_empty() || effect.channels.iter().any(|c| c == gyro);
+        GYROS.into_iter().filter(on).map(|channel| Cause {
+            cause: effect.cause.clone(),
+            channel: channel.to_owned(),
+        })
+    });
+    by_axis.collect()
+}
+
+/// What a model says of the noise beside what is corrected.
+pub fn model_noise(model: &ModelFile, proposed: &Proposed) -> [Noise; 3] {
+    let mut all = [Noise::default(), Noise::default(), Noise::default()];
+    for (axis, noise) in all.iter_mut().enumerate() {
+        let channel = model.channels.iter().find(|c| c.name == GYROS[axis]);
+        let of = |key: &str| {
+            let parameter = channel.and_then(|c| c.baseline.get(key));
+            parameter.map_or(0.0, |p| p.value)
+        };
+        noise.block = proposed.board.correction.noise[axis];
+        // N is in deg/sqrt(h).
+        (noise.n, noise.k) = (of("angle_random_walk") / 60.0, of("rate_random_walk"));
+        let here =
+            |channels: &[String]| channels.is_empty() || channels.iter().any(|c| c == GYROS[axis]);
+        for effect in model.effects.iter().filter(|e| here(&e.channels)) {
+            let p = &effect.parameters;
+            let error = |name: &str| p.get(name).and_then(|p| p.std_error).unwrap_or(0.0);
+            let temp = ["temp_x", "temp_y", "temp_z"][axis].to_owned();
+            match effect.cause.as_str() {
+                "gauss_markov" => noise
+                    .wanders
+                    .push((value(p, "sigma"), value(p, "correlation_time"))),
+                "temperature" | "temperature_quadratic" => {
+                    noise.uncertain.push((error("slope"), temp));
+                }
+                "motor_bias" => noise
+                    .uncertain
+                    .push((error("at_full_duty") / FULL_DUTY, "pwm".to_owned())),
+                "supply_sensitivity" => noise.uncertain.push((error("slope"), "supply".to_owned())),
+                "cross_axis" => noise
+                    .uncertain
+                    .extend(GYROS.map(|gyro| (error(&format!("from_{gyro}")), gyro.to_owned()))),
+                _ => {}
+            }
+        }
+    }
+    all
+}
+
+impl Answer {
+    pub fn new(
+        model: &ModelFile,
+        proposed: Proposed,
+        angle_errors: Vec<Judged>,
+        planted: Option<Comparison>,
+        first: Vec<Diagnosis>,
+        second: Vec<Diagnosis>,
+    ) -> Self {
+        let corrected = corrected_causes(model);
+        let (mut still_named, mut no_term) = (Vec::new(), Vec::new());
+        for cause in &corrected {
+            let mut findings = second.iter().flat_map(|d| &d.findings);
+            let same = |f: &&Finding| f.cause == cause.cause && f.channels.contains(&cause.channel);
+            match findings.find(same) {
+                Some(finding) if has_term(finding, &cause.channel) => {
+                    still_named.push(cause.clone());
+                }
+                Some(_) => no_term.push(cause.clone()),
+                None => {}
+            }
+        }
+        let worse = angle_errors.iter().any(|judged| {
+            judged.rows.iter().any(|row| row.worse) || judged.board.applied < 1.0 - MATTERS
+        });
+        Self {
+            format: "imu-stand-loop/1",
+            correction: Written {
+                number: proposed.board.correction.number,
+                changed: proposed.changed,
+                notes: proposed.board.notes,
+            },
+            angle_errors,
+            worse,
+            corrected,
+            still_named,
+            no_term,
+            planted,
+            first,
+            second,
+        }
+    }
+
+    /// For people.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = vec![format!(
+            "correction {:#06x} written, read back, in use; the same stand again under another history",
+            self.correction.number
+        )];
+        lines.extend(
+            self.correction
+                .notes
+                .iter()
+                .map(|note| format!("    note: {note}")),
+        );
+        let spans = SPANS_S.map(|span| format!("{:<30}", format!("{span} s")));
+        lines.push(format!(
+            "angle error, deg rms: read -> corrected (predicted by the model; limit: nothing wrong, same noise)\n    {:<18}{}",
+            "",
+            spans.join("").trim_end()
+        ));
+        for judged in &self.angle_errors {
+            for gyro in GYROS {
+                let cells = SPANS_S.map(|span| {
+                    let mut rows = judged.rows.iter();
+                    let row = rows.find(|row| row.channel == gyro && row.span_s == span);
+                    format!("{:<30}", row.map_or_else(|| "-".to_owned(), cell))
+                });
+                lines.push(format!(
+                    "    {:<18}{}",
+                    format!("{gyro}, {}", judged.what),
+                    cells.join("").trim_end()
+                ));
+            }
+        }
+        lines.extend(self.angle_errors.iter().flat_map(flags));
+        lines.push(self.named());
+        lines
+    }
+
+    /// What the second diagnosis says of what was corrected.
+    fn named(&self) -> String {
+        let list = |causes: &[Cause]| {
+            let words: Vec<String> = (causes.iter())
+                .map(|c| format!("{} on {}", c.cause, c.channel))
+                .collect();
+            words.join(", ")
+        };
+        if self.corrected.is_empty() {
+            return "the first diagnosis found nothing that the board has a term for: the correction is its bias filter"
+                .to_owned();
+        }
+        let mut words = if self.still_named.is_empty() {
+            format!(
+                "diagnosed again, the corrected rates no longer show: {}",
+                list(&self.corrected)
+            )
+        } else {
+            format!(
+                "diagnosed again, the corrected rates still show: {} (corrected: {})",
+                list(&self.still_named),
+                list(&self.corrected)
+            )
+        };
+        if !self.no_term.is_empty() {
+            let _ = write!(
+                words,
+                "; what stays of {} is what the board has no term for",
+                list(&self.no_term)
+            );
+        }
+        words
+    }
+}
+
+/// Whether a finding has a size, other than 0, that the board has a term for.
+fn has_term(finding: &Finding, channel: &str) -> bool {
+    let terms = CORRECTED.iter().find(|(cause, _)| *cause == finding.cause);
+    let own = finding
+        .per_channel
+        .get(channel)
+        .unwrap_or(&finding.parameters);
+    terms.is_none_or(|(_, names)| {
+        names.iter().any(|name| {
+            own.get(*name)
+                .is_some_and(|p| p.value.abs() > NORMAL_95 * p.std_error.unwrap_or(0.0))
+        })
+    })
+}
+
+fn cell(row: &Row) -> String {
+    let limit = row
+        .limit_deg
+        .map_or(String::new(), |limit| format!("; {}", short(limit)));
+    format!(
+        "{} -> {} ({}{limit}){}",
+        short(row.before_deg),
+        short(row.after_deg),
+        short(row.predicted_deg),
+        if row.worse { " !" } else { "" }
+    )
+}
+
+/// Three digits.
+fn short(value: f64) -> String {
+    let digits = if value >= 100.0 {
+        0
+    } else if value >= 10.0 {
+        1
+    } else {
+        2
+    };
+    format!("{value:.digits$}")
+}
+
+/// What is to be looked at.
+fn flags(judged: &Judged) -> Vec<String> {
+    let mut lines = Vec::new();
+    let worse: Vec<String> = (judged.rows.iter().filter(|row| row.worse))
+        .map(|row| format!("{} over {} s", row.channel, row.span_s))
+        .collect();
+    if !worse.is_empty() {
+        lines.push(format!(
+            "! WORSE than the rates as they are read, {}: {}. The model is wrong or stale: `imu-stand board correct --off`, then record and diagnose anew",
+            judged.what,
+            worse.join(", ")
+        ));
+    }
+    let board = &judged.board;
+    let percent = |share: f64| 100.0 * share;
+    if board.applied < 1.0 - MATTERS {
+        lines.push(format!(
+            "the board applied the correction in {:.0} % of {} frames only: the gyros are not set up as it wants them",
+            percent(board.applied),
+            board.frames
+        ));
+    }
+    if board.extrapolated > 0.0 {
+        lines.push(format!(
+            "{}: in {:.1} % of the frames a temperature was outside the range that the model was fitted on",
+            judged.what,
+            percent(board.extrapolated)
+        ));
+    }
+    if judged.what == "at rest" && board.refused > MATTERS {
+        lines.push(format!(
+            "the bias filter refused what it read at rest in {:.0} % of the frames: a slow turn, a step, or a wrong model",
+            percent(board.refused)
+        ));
+    }
+    if judged.what == "at rest" && board.noise_off > MATTERS {
+        lines.push(format!(
+            "in {:.0} % of the frames the noise was far from what the model says",
+            percent(board.noise_off)
+        ));
+    }
+    lines
+}
