@@ -1,4 +1,5 @@
-//! The demo: something is hidden in the simulated stand, the image samples it, and the diagnosis says what it was.
+//! The demo: something is hidden in the simulated stand, the image samples it, and the diagnosis says what it was. Then the board
+//! is corrected by that, and the same stand recorded again.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -19,6 +20,10 @@ const LINES: usize = 12;
 const MOST_COMPARED: usize = 11;
 /// How that part begins.
 const COMPARED: &str = "planted and found";
+/// How what the loop prints after that part begins.
+const CORRECTED: &str = "correction ";
+/// Most lines of it.
+const MOST_CORRECTED: usize = 12;
 
 /// What the demo takes.
 struct Options {
@@ -70,14 +75,10 @@ pub fn demo(root: &Path, arguments: &[String]) -> Result<(), Failure> {
     std::fs::create_dir_all(root.join(folder)).map_err(no_room)?;
     // The capture of an earlier demo, which may be of a version that did not mark it as simulated.
     let _ = std::fs::remove_file(root.join(folder).join("capture.csv"));
-    let mut program = match &options.program {
-        Some(program) => {
-            let mut command = Command::new(program);
-            command.current_dir(root);
-            command
-        }
-        None => built(root, &mut pace)?,
-    };
+    if options.program.is_none() {
+        build(root, &mut pace)?;
+    }
+    let mut program = program(root, &options);
     program.args(["run", "--seconds", "600", "--hide", &options.hide]);
     program.args(["--seed", &options.seed]);
     for (option, file) in [
@@ -100,19 +101,57 @@ pub fn demo(root: &Path, arguments: &[String]) -> Result<(), Failure> {
         println!("{line}");
     }
     println!("(with the figure that convicts it; capture, analysis and diagnosis lie beside it)");
+    corrected(root, &options, &mut pace)
+}
+
+/// The same stand once more: its board corrected by what is found, and a second record held against the first.
+fn corrected(root: &Path, options: &Options, pace: &mut Pace) -> Result<(), Failure> {
+    let folder = Path::new(FOLDER);
+    let mut program = program(root, options);
+    program.args(["run", "--correct", "--no-replicates", "--seconds", "600"]);
+    program.args(["--hide", &options.hide, "--seed", &options.seed]);
+    program.arg("--out").arg(folder.join("loop.csv"));
+    program.arg("--json").arg(folder.join("loop.json"));
+    let mut meter = Silent("the same again, the correction, and 1260 s under another history");
+    let said = watched("the loop", &mut program, &mut meter, pace)?;
+    println!();
+    for line in (said.out.iter())
+        .skip_while(|line| !line.starts_with(CORRECTED))
+        .take(MOST_CORRECTED)
+    {
+        println!("{line}");
+    }
     Ok(())
 }
 
-/// The program, built; cargo knows the target folder, wherever the user has set it.
-fn built(root: &Path, pace: &mut Pace) -> Result<Command, Failure> {
-    const PROGRAM: [&str; 6] = [
-        "--release",
-        "-p",
-        "imu-stand",
-        "--features",
-        "simavr",
-        "--bin=imu-stand",
-    ];
+/// How cargo is told of the program.
+const PROGRAM: [&str; 6] = [
+    "--release",
+    "-p",
+    "imu-stand",
+    "--features",
+    "simavr",
+    "--bin=imu-stand",
+];
+
+/// A call of the program, which is built: cargo knows the target folder, wherever the user has set it.
+fn program(root: &Path, options: &Options) -> Command {
+    match &options.program {
+        Some(program) => {
+            let mut command = Command::new(program);
+            command.current_dir(root);
+            command
+        }
+        None => {
+            let mut run = cargo(root, &["run", "--quiet"]);
+            run.args(PROGRAM).arg("--");
+            run
+        }
+    }
+}
+
+/// Builds the program.
+fn build(root: &Path, pace: &mut Pace) -> Result<(), Failure> {
     let mut build = cargo(root, &["build"]);
     build.args(PROGRAM);
     let from = std::time::Instant::now();
@@ -123,9 +162,7 @@ fn built(root: &Path, pace: &mut Pace) -> Result<Command, Failure> {
         pace,
     )?;
     println!("program: built in {:.0} s", from.elapsed().as_secs_f64());
-    let mut run = cargo(root, &["run", "--quiet"]);
-    run.args(PROGRAM).arg("--");
-    Ok(run)
+    Ok(())
 }
 
 /// The verdict and the finding, then what was planted beside what was found.

@@ -23,8 +23,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   test     sets up what is missing and runs every check and test
   check    the everyday part of it: format, lints, and the tests that are quick
   demo     hides something in the simulated stand, runs the image on it in the simulated ATmega16 for 600 s, captures,
-           diagnoses, and shows what was planted beside what was found; a number after it is the seed, `--hide KIND` hides
-           something else
+           diagnoses, and shows what was planted beside what was found; then corrects the board by that, records the same
+           stand again, and compares; a number after it is the seed, `--hide KIND` hides something else
   campaign measures by rates what the diagnosis can tell, and writes docs/power.md: up to an hour on two cores;
            --quick for minutes, --full for hours, --seed N for a run that was made before, --help for the rest
   answers  --write [DIR] keeps what the engine says of some 400 records of every kind; --compare [DIR] names by record and

@@ -439,9 +439,15 @@ fn objection(lines: &[String]) -> Option<String> {
             return Some(format!("the demo prints `{word}`: {line}"));
         }
     }
-    let compared = |line: &&String| line.contains("planted ") && line.ends_with(": match");
-    if !lines.iter().any(|line| compared(&line)) {
+    let compared = |line: &String| line.contains("planted ") && line.ends_with(": match");
+    if !lines.iter().any(compared) {
         return Some("the demo ends without what was planted beside what was found".to_owned());
+    }
+    if !lines.iter().any(|line| line.starts_with("angle error")) {
+        return Some("the demo ends without what the correction of the board is worth".to_owned());
+    }
+    if let Some(line) = lines.iter().find(|line| line.contains("WORSE")) {
+        return Some(format!("the demo's correction is no gain: {line}"));
     }
     None
 }
@@ -474,9 +480,10 @@ mod tests {
     #[test]
     fn a_demo_that_is_long_complains_or_compares_nothing_is_objected_to() {
         let good = "    temperature on gyro_x, slope: planted 1, found 1 +- 1 deg/s/degC: match";
+        let table = "angle error, deg rms: read -> corrected";
         let lines = |more: &[&str]| -> Vec<String> {
             more.iter()
-                .chain(&[good])
+                .chain(&[good, table])
                 .map(|l| (*l).to_owned())
                 .collect()
         };
@@ -491,6 +498,8 @@ mod tests {
         }
         assert!(objection(&lines(&["a line"; 60])).is_some());
         assert!(objection(&[]).is_some());
+        assert!(objection(&lines(&["! WORSE than"])).is_some());
+        assert!(objection(&lines(&[])[..1]).is_some());
     }
 
     #[test]
