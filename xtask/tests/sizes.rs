@@ -58,8 +58,6 @@ const LONG_FUNCTIONS: &[(&str, &str, &str)] = &[
 const LONG_FILES: &[&str] = &[
     "crates/bench/src/native.rs",
     "crates/bench/src/simavr.rs",
-    "crates/cli/src/capture/propose.rs",
-    "crates/cli/src/capture/read.rs",
     "crates/cli/src/capture/tables.rs",
     "crates/cli/src/commands/capture/mod.rs",
     "crates/cli/src/commands/plan.rs",

@@ -1,0 +1,148 @@
+use super::*;
+
+#[test]
+fn another_spelling_of_a_name_of_ours_is_taken_for_it() {
+    for (name, ours) in [
+        ("temperature", "temp"),
+        ("Temperature_y", "temp_y"),
+        ("gyrox", "gyro_x"),
+        ("GyroZ", "gyro_z"),
+        ("gyroscope_y", "gyro_y"),
+        ("accel_z", "acc_z"),
+        ("t", "time"),
+        ("Supply_Voltage", "supply"),
+    ] {
+        assert_eq!(alias(name).as_deref(), Some(ours), "{name}");
+    }
+    for name in [
+        "temp",
+        "gyro_x",
+        "gyro",
+        "gyro_temp",
+        "ocxo",
+        "x",
+        "voltage",
+    ] {
+        assert_eq!(alias(name), None, "{name}");
+    }
+}
+
+#[test]
+fn a_name_that_misses_ours_by_little_is_told_and_others_are_left_alone() {
+    for (name, ours) in [
+        ("temperature", "temp"),
+        ("temperature_y", "temp_y"),
+        ("gyrox", "gyro_x"),
+        ("gyroscope_z", "gyro_z"),
+        ("accx", "acc_x"),
+        ("accel_z", "acc_z"),
+        ("timestamp", "time"),
+        ("supply_voltage", "supply"),
+        ("motor", "pwm"),
+    ] {
+        assert_eq!(nearest(name).as_deref(), Some(ours), "{name}");
+    }
+    for name in ["ocxo", "laser", "x", "pressure"] {
+        assert_eq!(nearest(name), None, "{name}");
+    }
+}
+
+#[test]
+fn a_proposal_maps_each_axis_to_its_own_column_with_the_headers_units_and_quotes() {
+    let cases = [
+        (
+            "Time (s);Gyroscope x (rad/s);Gyroscope y (rad/s);Gyroscope z (rad/s)",
+            "--columns 'time=Time (s),gyro_x=Gyroscope x (rad/s),gyro_y=Gyroscope y (rad/s),gyro_z=Gyroscope z (rad/s)' \
+             --units gyro=rad/s",
+        ),
+        (
+            "Timestamp (us);Gyroscope X (deg/s);Gyroscope Y (deg/s);Gyroscope Z (deg/s);Accelerometer X (g)",
+            "--columns 'time=Timestamp (us),gyro_x=Gyroscope X (deg/s),gyro_y=Gyroscope Y (deg/s),gyro_z=Gyroscope Z (deg/s),\
+             acc_x=Accelerometer X (g)' --units time=us,gyro=deg/s,acc=g",
+        ),
+        (
+            "timestamp [ns];w_RS_S_x [rad s^-1];w_RS_S_y [rad s^-1];w_RS_S_z [rad s^-1];a_RS_S_z [m s^-2]",
+            "--columns 'time=timestamp [ns],gyro_x=w_RS_S_x [rad s^-1],gyro_y=w_RS_S_y [rad s^-1],\
+             gyro_z=w_RS_S_z [rad s^-1],acc_z=a_RS_S_z [m s^-2]' --units time=ns,gyro=rad/s,acc=m/s2",
+        ),
+        (
+            "time_s;gx_dps;gy_dps;gz_dps;ax_mps2;temp_c",
+            "--columns time=time_s,gyro_x=gx_dps,gyro_y=gy_dps,gyro_z=gz_dps,acc_x=ax_mps2,temp=temp_c --units \
+             gyro=deg/s,acc=m/s2",
+        ),
+        (
+            "time;seconds_elapsed;z;y;x",
+            "--columns time=seconds_elapsed,gyro_x=x,gyro_y=y,gyro_z=z --units gyro=rad/s",
+        ),
+        (
+            "t;GyroX;GyroY;GyroZ;AccX;MagX",
+            "--columns time=t,gyro_x=GyroX,gyro_y=GyroY,gyro_z=GyroZ,acc_x=AccX --units gyro=deg/s,acc=m/s2",
+        ),
+        (
+            "gyr[0];gyr[1];gyr[2];mag[0]",
+            "--columns 'gyro_x=gyr[0],gyro_y=gyr[1],gyro_z=gyr[2]' --units gyro=deg/s",
+        ),
+        (
+            "Zeit (s);Drehrate x (°/s);Drehrate y (°/s)",
+            "--columns 'time=Zeit (s),gyro_x=Drehrate x (°/s),gyro_y=Drehrate y (°/s)' --units gyro=deg/s",
+        ),
+        (
+            "imu0.time;imu0.gx;imu0.gyro.y;imu0.ax",
+            "--columns time=imu0.time,gyro_x=imu0.gx,gyro_y=imu0.gyro.y,acc_x=imu0.ax --units gyro=deg/s,acc=m/s2",
+        ),
+        (
+            "micros;gx;gy",
+            "--columns time=micros,gyro_x=gx,gyro_y=gy --units time=us,gyro=deg/s",
+        ),
+        (
+            "Zeit;gx",
+            "--columns time=Zeit,gyro_x=gx --units gyro=deg/s",
+        ),
+        (
+            "t;xgyro;ygyro;zgyro;xacc",
+            "--columns time=t,gyro_x=xgyro,gyro_y=ygyro,gyro_z=zgyro,acc_x=xacc --units gyro=deg/s,acc=m/s2",
+        ),
+        (
+            "omega1;omega2;omega3",
+            "--columns gyro_x=omega1,gyro_y=omega2,gyro_z=omega3 --units gyro=deg/s",
+        ),
+        (
+            "t;roll;rollrate;pitch_rate;yawRate",
+            "--columns time=t,gyro_x=rollrate,gyro_y=pitch_rate,gyro_z=yawRate --units gyro=deg/s",
+        ),
+        (
+            "r;q;p;throttle",
+            "--columns gyro_x=p,gyro_y=q,gyro_z=r --units gyro=deg/s",
+        ),
+        (
+            "t;rot_x;rot_y",
+            "--columns time=t,gyro_x=rot_x,gyro_y=rot_y --units gyro=deg/s",
+        ),
+        (
+            "t;acc;Gyro's rate",
+            r"--columns 'time=t,gyro_x=Gyro'\''s rate' --units gyro=deg/s",
+        ),
+        ("y", "--columns gyro_y=y --units gyro=deg/s"),
+        ("values", "--columns gyro_x=values --units gyro=deg/s"),
+    ];
+    for (names, expected) in cases {
+        let names: Vec<String> = names.split(';').map(str::to_owned).collect();
+        let (proposed, is_guessed) = proposal(&names, false);
+        assert_eq!(proposed, expected);
+        // A name that says no unit leaves it to be checked.
+        let says = ["/s", " s^", "dps", "seconds_elapsed"]
+            .iter()
+            .any(|unit| names[1 % names.len()].contains(unit));
+        assert_eq!(is_guessed, !says, "{names:?}");
+    }
+    let numbered = |n: usize| proposal(&vec![String::new(); n], true).0;
+    assert_eq!(numbered(1), "--columns gyro_x=1 --units gyro=deg/s");
+    assert_eq!(
+        numbered(3),
+        "--columns gyro_x=1,gyro_y=2,gyro_z=3 --units gyro=deg/s"
+    );
+    assert_eq!(
+        numbered(7),
+        "--columns time=1,gyro_x=2,gyro_y=3,gyro_z=4,acc_x=5,acc_y=6,acc_z=7 --units gyro=deg/s,acc=m/s2"
+    );
+}
