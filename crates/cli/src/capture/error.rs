@@ -204,6 +204,16 @@ pub enum CaptureError {
         /// What to do.
         help: String,
     },
+    /// Columns of several lengths.
+    #[error("the columns have different lengths: {lengths}")]
+    #[diagnostic(
+        code(capture::lengths),
+        help("give each column one number a sample, NaN where there is none")
+    )]
+    Lengths {
+        /// Name and length of each.
+        lengths: String,
+    },
     /// No rows at all.
     #[error("there is no row of data")]
     #[diagnostic(

@@ -2,6 +2,8 @@
 
 mod angle;
 mod build;
+#[cfg(feature = "native")]
+mod codecs;
 mod columns;
 mod continuity;
 mod conventions;
@@ -15,6 +17,7 @@ mod logs;
 mod mapped;
 mod names;
 mod order;
+#[cfg(feature = "native")]
 mod pages;
 mod plausible;
 mod propose;
@@ -22,6 +25,8 @@ mod read;
 mod skipped;
 mod steady;
 mod stream;
+mod table;
+#[cfg(feature = "native")]
 mod tables;
 mod time;
 mod units;
@@ -34,9 +39,10 @@ pub use corrected::corrected;
 pub use error::CaptureError;
 pub use foreign::ColumnMapping;
 pub use live::Live;
-pub use read::{Read, ReadOptions, read_capture, read_from};
+pub use read::{Read, ReadOptions, read_capture, read_columns, read_from};
 pub use stream::unpacked;
-pub use write::{write_capture, write_to};
+pub use table::Table;
+pub use write::{SIMULATED, mark_simulated, write_capture, write_to};
 
 /// Standard gravity, m/s^2 (CGPM 1901): the unit `g` of accelerometers.
 pub const STANDARD_GRAVITY: f64 = 9.806_65;

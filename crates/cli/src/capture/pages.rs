@@ -9,7 +9,7 @@ use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::ColumnChunkMetaData;
 
-use super::unpack;
+use super::{codecs, unpack};
 
 /// Whether a column's pages are read here.
 pub(super) fn is_packed_otherwise(codec: Compression) -> bool {
@@ -215,14 +215,14 @@ fn unpacked(codec: Compression, packed: &[u8], size: usize) -> Result<Vec<u8>> {
     }
     let bytes = size as u64;
     Ok(match codec {
-        Compression::GZIP(_) => unpack::unpack_gzip(packed, bytes)?,
-        Compression::BROTLI(_) => unpack::unpack_brotli(packed, bytes)?,
+        Compression::GZIP(_) => codecs::unpack_gzip(packed, bytes)?,
+        Compression::BROTLI(_) => codecs::unpack_brotli(packed, bytes)?,
         Compression::ZSTD(_) => unpack::unpack_zstd(packed, bytes)?,
-        Compression::LZ4_RAW => unpack::unpack_lz4_block(packed, size)?,
+        Compression::LZ4_RAW => codecs::unpack_lz4_block(packed, size)?,
         // Hadoop's own framing, which old writers left out.
-        Compression::LZ4 => match unpack::unpack_lz4_hadoop(packed, size) {
+        Compression::LZ4 => match codecs::unpack_lz4_hadoop(packed, size) {
             Ok(values) => values,
-            Err(_) => unpack::unpack_lz4_block(packed, size)?,
+            Err(_) => codecs::unpack_lz4_block(packed, size)?,
         },
         other => return Err(bad(&format!("its columns are packed by {other}"))),
     })

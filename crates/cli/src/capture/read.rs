@@ -18,7 +18,9 @@ use super::plausible::doubts;
 use super::skipped::keep_places;
 use super::steady::unsteady;
 use super::stream::{TextLines, io, named, unpacked};
-use super::tables::{Table, read_table};
+use super::table::Table;
+#[cfg(feature = "native")]
+use super::tables::read_table;
 use super::time::Clock;
 use super::{CaptureError, ColumnMapping};
 
@@ -54,6 +56,7 @@ const READ_AT_ONCE: usize = 1 << 16;
 /// # Errors
 /// [`CaptureError`], which says what to do.
 pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureError> {
+    #[cfg(feature = "native")]
     if let Some(table) = read_table(path) {
         no_topics(options)?;
         return from_table(table?, options);
@@ -124,6 +127,24 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
     }
     let odd = std::mem::take(&mut reader.odd);
     finish(header, found, values, options.rate_hz, &skipped, &odd)
+}
+
+/// A record of named columns, as of a file of arrays: by the names and units of `table.about` (`rate_hz`, `unit of gyro_x`,
+/// ...), or by a mapping.
+///
+/// # Errors
+/// [`CaptureError`].
+pub fn read_columns(table: Table, options: &ReadOptions) -> Result<Read, CaptureError> {
+    no_topics(options)?;
+    if (table.columns.windows(2)).any(|pair| pair[0].len() != pair[1].len()) {
+        let lengths = table.names.iter().zip(&table.columns);
+        let lengths = lengths.map(|(name, column)| format!("{} {}", brief(name), column.len()));
+        let lengths: Vec<String> = lengths.collect();
+        return Err(CaptureError::Lengths {
+            lengths: lengths.join(", "),
+        });
+    }
+    from_table(table, options)
 }
 
 /// From the columns of a file of arrays. Without a mapping, names of ours are taken as they are: in the units the file

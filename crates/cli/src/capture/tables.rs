@@ -13,27 +13,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use super::CaptureError;
 use super::error::brief;
 use super::pages::{Pages, is_packed_otherwise};
-
-/// Named columns of one length.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Table {
-    pub names: Vec<String>,
-    pub columns: Vec<Vec<f64>>,
-    /// What else the file says, as `key: value`; a unit as `unit of COLUMN`.
-    pub about: Vec<(String, String)>,
-    /// What a reader of the results has to know.
-    pub notes: Vec<String>,
-}
-
-impl Table {
-    /// Adds a column of a known unit.
-    pub fn add(&mut self, name: &str, unit: &str, values: Vec<f64>) {
-        self.names.push(name.to_owned());
-        self.columns.push(values);
-        self.about
-            .push((format!("unit of {name}"), unit.to_owned()));
-    }
-}
+use super::table::Table;
 
 type Reader = fn(&Path) -> Result<Arrays, String>;
 

@@ -8,6 +8,16 @@ use model::record::{Base, Record};
 
 use super::CaptureError;
 
+/// Key of the header that says which command simulated a capture.
+pub const SIMULATED: &str = "simulated";
+
+/// Marks a record as simulated: what is written of it can be had again.
+pub fn mark_simulated(record: &mut Record, command: &str) {
+    let entries = &mut record.header.entries;
+    entries.retain(|(key, _)| key != SIMULATED);
+    entries.push((SIMULATED.to_owned(), format!("imu-stand {command}")));
+}
+
 /// Writes a record as a capture, `.csv` or `.csv.gz`.
 ///
 /// # Errors

@@ -5,23 +5,14 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use imu_stand::capture::{CaptureError, unpacked, write_capture};
+pub use imu_stand::capture::mark_simulated;
+use imu_stand::capture::{CaptureError, SIMULATED, unpacked, write_capture};
 use miette::{IntoDiagnostic, Result};
 use model::record::Record;
 use serde::Serialize;
 
 /// Stands for standard input or output in place of a file.
 pub const DASH: &str = "-";
-
-/// Key of the header that says which command simulated a capture.
-const SIMULATED: &str = "simulated";
-
-/// Marks a record as simulated: what is written of it can be had again.
-pub fn mark_simulated(record: &mut Record, command: &str) {
-    let entries = &mut record.header.entries;
-    entries.retain(|(key, _)| key != SIMULATED);
-    entries.push((SIMULATED.to_owned(), format!("imu-stand {command}")));
-}
 
 /// Whether a result goes to standard output; what is said to people then goes to standard error.
 static STDOUT_IS_TAKEN: AtomicBool = AtomicBool::new(false);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::io::{BufRead, Read as _};
 
-use super::super::tables::Table;
+use super::super::table::Table;
 use super::super::unpack::{unpack_bzip2, unpack_lz4};
 use super::imu::{Kind, Topics};
 use super::{Bytes, LogError, chunk_of, packed_by};

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::tables::Table;
+use super::super::table::Table;
 use super::{Bytes, LogError, held, since_first};
 
 /// How a message is written.

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::io::{BufRead, Read as _};
 
-use super::super::tables::Table;
+use super::super::table::Table;
 use super::super::unpack::{unpack_lz4, unpack_zstd};
 use super::imu::{Kind, Topics};
 use super::{Bytes, LogError, chunk_of, packed_by};

@@ -10,7 +10,7 @@ mod ulog;
 use std::io::BufRead;
 
 use super::CaptureError;
-use super::tables::Table;
+use super::table::Table;
 
 pub(super) use bytes::Bytes;
 

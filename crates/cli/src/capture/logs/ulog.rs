@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::io::{BufRead, Read as _};
 
-use super::super::tables::Table;
+use super::super::table::Table;
 use super::{Bytes, LogError, held, since_first};
 
 /// A field of a topic.

@@ -76,19 +76,23 @@ fn wish(item: &str) -> Option<Wish> {
 /// The answer to [`Wish::Angle`].
 #[derive(Debug, Serialize)]
 pub struct WantedAngle {
-    within_deg: f64,
-    after_s: f64,
+    /// Half of the 95 % interval that is wanted, deg.
+    pub within_deg: f64,
+    /// So long after the calibration, s.
+    pub after_s: f64,
     /// Still calibration that is long enough; absent where none is.
-    calibration_s: Option<f64>,
-    /// The one that serves best, and half of the 95 % interval of the angle with it, deg.
-    best_calibration_s: f64,
-    best_within_deg: f64,
+    pub calibration_s: Option<f64>,
+    /// The one that serves best, s.
+    pub best_calibration_s: f64,
+    /// Half of the 95 % interval of the angle with it, deg.
+    pub best_within_deg: f64,
     /// Share of simulated stands whose angle is within the promise: the wish, or where no calibration keeps it, the best.
-    checked_share: Option<f64>,
+    pub checked_share: Option<f64>,
 }
 
 impl WantedAngle {
     /// By the noise, in deg/s and s.
+    #[must_use]
     pub fn plan(noise: &KnownNoise, rate_hz: f64, within_deg: f64, after_s: f64) -> Self {
         let plan = calibration_for(noise, rate_hz, after_s, within_deg / Z_95);
         Self {
@@ -129,6 +133,7 @@ impl WantedAngle {
     }
 
     /// For a person.
+    #[must_use]
     pub fn sentence(&self) -> String {
         let wish = format!(
             "angle within {} deg (95 %) {} s after the calibration",

@@ -1,0 +1,457 @@
+//! How long to record for an answer that is missing: `imu-stand-plan/1`.
+
+mod separate;
+mod wish;
+
+use miette::Result;
+use model::ModelFile;
+use model::record::sampling::Sampling;
+use model::record::{Quantity, Record};
+use noise::analyze::misfit_warning;
+use noise::fit::{Spectrum, Term, fit, fit_described};
+use noise::plan::{KnownNoise, Letter, seconds_for};
+use noise::synthetic::Truth;
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::Serialize;
+
+use crate::explain::explain;
+use crate::report::plot::number;
+pub use separate::{Told, lengths};
+pub use wish::{WantedAngle, Wish, Z_95, wishes};
+
+/// Samples that tell anything of the noise.
+const LEAST_SAMPLES: usize = 64;
+/// Most samples that `--check` simulates in all.
+const CHECK_SAMPLES: f64 = 2e8;
+/// Records that are simulated without it, of a term and of an angle, and most samples of them: some seconds.
+const RECORDS: [usize; 2] = [40, 400];
+const SAMPLES: f64 = 1e7;
+/// Share of simulated records that have to keep a promise of 95 %: fewer than 36 of 40 have a chance of 5 %.
+const KEPT: f64 = 0.9;
+/// How much longer a record is tried that does not keep it, and how often.
+const LONGER: f64 = 1.4;
+const TRIES: usize = 6;
+
+/// The plan, as `--json` writes it.
+#[derive(Debug, Serialize)]
+pub struct Plan {
+    /// `imu-stand-plan/1`.
+    pub format: &'static str,
+    /// What is known.
+    pub noise: Noise,
+    /// For each wish about a term.
+    pub want: Vec<Wanted>,
+    /// For each wish about an angle.
+    pub angle: Vec<WantedAngle>,
+    /// Each cause against the other, by excitation.
+    pub separate: Vec<Told>,
+}
+
+/// What is known of the noise, deg/s and s.
+#[derive(Clone, Debug, Serialize)]
+pub struct Noise {
+    /// Where it is known from.
+    pub from: String,
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Angle random walk N, deg/s*sqrt(s).
+    pub n: f64,
+    /// Bias instability B, deg/s.
+    pub b: f64,
+    /// Rate random walk K, deg/s/sqrt(s).
+    pub k: f64,
+    /// Quantization noise Q, deg.
+    pub q: f64,
+    /// Rate ramp R, deg/s^2.
+    pub r: f64,
+    /// What a reader has to know.
+    pub notes: Vec<String>,
+    /// Upper limits of what is not established, in the order of [`Letter::ALL`]; 0 where there is none.
+    #[serde(skip)]
+    pub limits: [f64; 5],
+}
+
+impl Noise {
+    /// With one term as large as it may be, where it is not established.
+    fn at_most(&self, letter: Letter) -> Option<(Self, f64)> {
+        let limit = self.limits[letter as usize];
+        let mut noise = self.clone();
+        *match letter {
+            Letter::N => &mut noise.n,
+            Letter::B => &mut noise.b,
+            Letter::K => &mut noise.k,
+            Letter::Q => &mut noise.q,
+            Letter::R => &mut noise.r,
+        } = limit;
+        (limit > 0.0).then_some((noise, limit))
+    }
+
+    fn truth(&self) -> Truth {
+        Truth {
+            n: self.n,
+            b: self.b,
+            k: self.k,
+            q: self.q,
+            r: self.r,
+        }
+    }
+
+    /// As the plans take it.
+    #[must_use]
+    pub fn known(&self) -> KnownNoise {
+        KnownNoise {
+            angle_random_walk_n: self.n,
+            bias_instability_b: self.b,
+            rate_random_walk_k: self.k,
+            quantization_noise_q: self.q,
+            rate_ramp_r: self.r,
+        }
+    }
+}
+
+/// The answer to [`Wish::Term`].
+#[derive(Debug, Serialize)]
+pub struct Wanted {
+    /// N, B, K, Q or R.
+    pub term: &'static str,
+    /// Half of the 95 % interval, per cent of the size.
+    pub within_percent: f64,
+    /// Long enough by the Fisher information, and by the check where there is one.
+    pub seconds: f64,
+    /// By the Fisher information alone.
+    pub fisher_seconds: f64,
+    /// Where the term is not established: the limit that the plan takes for its size, deg/s and s. A smaller one takes longer.
+    pub if_as_large_as: Option<f64>,
+    /// At a quarter of the rate and at four times it.
+    pub seconds_at: [(f64, f64); 2],
+    /// Share of simulated records of `seconds` whose estimate is within the wanted part of the truth.
+    pub checked_share: Option<f64>,
+    /// The same of `fisher_seconds`.
+    pub fisher_share: Option<f64>,
+}
+
+/// What to plan for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Request<'a> {
+    /// `K within 20 %`, `angle within 2 deg after 600 s`, several separated by commas.
+    pub want: Option<&'a str>,
+    /// Two causes to be told apart, separated by a comma.
+    pub separate: Option<&'a str>,
+    /// Simulated records by which a promise is checked; without it 40 (400 of an angle) where that takes seconds.
+    pub check: Option<usize>,
+    /// Seed of the check.
+    pub seed: u64,
+}
+
+/// Plans.
+///
+/// # Errors
+/// What is wanted of nothing, cannot be understood, or cannot be had; each says what to do.
+pub fn plan(noise: Noise, request: &Request<'_>) -> Result<Plan> {
+    request.check_any()?;
+    let mut plan = Plan {
+        format: "imu-stand-plan/1",
+        noise,
+        want: Vec::new(),
+        angle: Vec::new(),
+        separate: Vec::new(),
+    };
+    for wish in request.want.map_or(Ok(Vec::new()), wishes)? {
+        match wish {
+            Wish::Term {
+                letter,
+                within_percent,
+            } => {
+                let wanted = want(&plan.noise, letter, within_percent, request)?;
+                plan.want.push(wanted);
+            }
+            Wish::Angle {
+                within_deg,
+                after_s,
+            } => {
+                let rate = plan.noise.rate_hz;
+                let mut angle = WantedAngle::plan(&plan.noise.known(), rate, within_deg, after_s);
+                let (records, most) = match request.check {
+                    Some(records) => (records, CHECK_SAMPLES),
+                    None => (RECORDS[1], SAMPLES),
+                };
+                angle.check(plan.noise.truth(), rate, records, most, request.seed);
+                plan.angle.push(angle);
+            }
+        }
+    }
+    if let Some(text) = request.separate {
+        let causes: Vec<&str> = text.split(',').map(str::trim).collect();
+        let [a, b] = causes[..] else {
+            miette::bail!(
+                help = "write `--separate temperature,rate_ramp`",
+                "--separate: `{text}` is not two causes"
+            );
+        };
+        for (cause, rival) in [(a, b), (b, a)] {
+            let known = plan.noise.known();
+            let told = separate::separate(&known, plan.noise.rate_hz, cause, rival)?;
+            plan.separate.extend(told);
+        }
+    }
+    Ok(plan)
+}
+
+impl Request<'_> {
+    /// Refuses a request for nothing.
+    ///
+    /// # Errors
+    /// Where neither is asked for.
+    pub fn check_any(&self) -> Result<()> {
+        if self.want.is_none() && self.separate.is_none() {
+            miette::bail!(
+                help = "write `--want \"K within 20 %\"` or `--separate temperature,rate_ramp`",
+                "nothing to plan for"
+            );
+        }
+        Ok(())
+    }
+}
+
+/// What a model file says of the noise of a gyro: of the one of that name, or of the first.
+///
+/// # Errors
+/// Where it has no such gyro.
+pub fn of_model(
+    model: &ModelFile,
+    from: &str,
+    channel: Option<&str>,
+    rate_hz: Option<f64>,
+) -> Result<Noise> {
+    let wanted = |name: &str| channel.map_or(name.starts_with("gyro"), |c| c == name);
+    let gyro = model
+        .channels
+        .iter()
+        .find(|c| wanted(&c.name))
+        .ok_or_else(|| {
+            let names: Vec<&str> = model.channels.iter().map(|c| c.name.as_str()).collect();
+            miette::miette!(
+                help = "name one of them",
+                "no such gyro in {from}; there are {}",
+                names.join(", ")
+            )
+        })?;
+    let baseline = |key: &str| gyro.baseline.get(key).map_or(0.0, |p| p.value);
+    let b = model
+        .effects
+        .iter()
+        .filter(|e| e.cause == "flicker")
+        .filter(|e| e.channels.is_empty() || e.channels.contains(&gyro.name))
+        .find_map(|e| e.parameters.get("bias_instability"))
+        .map_or(0.0, |p| p.value / 3600.0);
+    let r = model
+        .effects
+        .iter()
+        .filter(|e| e.cause == "rate_ramp")
+        .filter(|e| e.channels.is_empty() || e.channels.contains(&gyro.name))
+        .find_map(|e| e.parameters.get("slope"))
+        .map_or(0.0, |p| p.value);
+    Ok(Noise {
+        from: format!("{from}, {}", gyro.name),
+        rate_hz: rate_hz.unwrap_or(model.rate_hz),
+        n: baseline("angle_random_walk") / 60.0,
+        b,
+        k: baseline("rate_random_walk"),
+        q: baseline("quantization_noise"),
+        r,
+        notes: Vec::new(),
+        limits: [0.0; 5],
+    })
+}
+
+/// What a record tells of the noise of a gyro: of the one of that name, or of the first.
+///
+/// # Errors
+/// Where it has no such gyro, no rate, or too few samples.
+pub fn of_record(
+    record: &Record,
+    from: &str,
+    channel: Option<&str>,
+    rate_hz: Option<f64>,
+    seed: u64,
+) -> Result<Noise> {
+    let gyro = record
+        .channels
+        .iter()
+        .find(|c| match channel {
+            Some(name) => c.name == name,
+            None => c.quantity == Quantity::Gyro,
+        })
+        .ok_or_else(|| {
+            let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
+            miette::miette!(
+                help = "`--channel NAME` names one, `--columns` maps a foreign file",
+                "{} has no such gyro; it has {}",
+                from,
+                names.join(", ")
+            )
+        })?;
+    let sampling = Sampling::of(record, rate_hz).map_err(explain)?;
+    let runs = sampling.runs_of(&gyro.values);
+    let spectrum = Spectrum::with_gaps(&gyro.values, &runs, &sampling.slots, sampling.tau0);
+    let samples: usize = runs.iter().map(ExactSizeIterator::len).sum();
+    if samples < LEAST_SAMPLES {
+        return Err(explain(model::record::AnalysisError::Inconclusive {
+            what: format!("a plan by the noise of {}", gyro.name),
+            have: samples as f64,
+            need: LEAST_SAMPLES as f64,
+            unit: "samples",
+        }));
+    }
+    let longest = runs.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let described = fit_described(&spectrum, longest / 5, &mut rng);
+    let found = &described.fit;
+    let mut notes = Vec::new();
+    notes.extend(misfit_warning(&described, sampling.tau0));
+    let estimates = [
+        found.term(Term::White),
+        found.term(Term::Flicker),
+        found.term(Term::RandomWalk),
+        found.term(Term::Quantization),
+        found.rate_ramp,
+    ];
+    let limits = estimates.map(|e| if e.value.is_none() { e.high } else { 0.0 });
+    let mut value = |name: &str, unit: &str, e: noise::fit::Estimated| {
+        e.value.unwrap_or_else(|| {
+            notes.push(format!(
+                "{name} is not established in this capture: planned as absent, it is {} {unit} at the most",
+                number(e.high, 3)
+            ));
+            0.0
+        })
+    };
+    let white = found.term(Term::White);
+    // No gyro is without it: of what is not known, the worst.
+    let n = white.value.unwrap_or(white.high);
+    let b = value("B", "deg/s", found.term(Term::Flicker));
+    let k = value("K", "deg/s/sqrt(s)", found.term(Term::RandomWalk));
+    let q = value("Q", "deg", found.term(Term::Quantization));
+    let r = value("R", "deg/s/s", found.rate_ramp);
+    if white.value.is_none() {
+        notes.push(format!(
+            "N is not established in this capture: planned at its limit, {} deg/s*sqrt(s)",
+            number(n, 3)
+        ));
+    }
+    Ok(Noise {
+        from: format!("{}, {}", from, gyro.name),
+        rate_hz: 1.0 / sampling.tau0,
+        n,
+        b,
+        k,
+        q,
+        r,
+        notes,
+        limits,
+    })
+}
+
+fn want(
+    noise: &Noise,
+    letter: Letter,
+    within_percent: f64,
+    request: &Request<'_>,
+) -> Result<Wanted> {
+    // A term that is not established is planned for as if it were as large as it may be.
+    let (noise, if_as_large_as) = match noise.at_most(letter) {
+        Some((noise, limit)) => (noise, Some(limit)),
+        None => (noise.clone(), None),
+    };
+    let known = noise.known();
+    if !(0.2..=100.0).contains(&within_percent) {
+        miette::bail!(
+            help = "write for example `--want \"K within 20 %\"`",
+            "--want: {} within {within_percent} % is not to be planned for; 0.2 % to 100 % are",
+            letter.name()
+        );
+    }
+    if letter.size(&known) <= 0.0 {
+        miette::bail!(
+            help = "plan from a longer capture, or write a model file with the size you expect and give it by --model",
+            "how long it takes to measure {} depends on its size, which {} does not tell",
+            letter.name(),
+            noise.from
+        );
+    }
+    let relative = within_percent / 100.0 / Z_95;
+    let at = |rate: f64| seconds_for(&known, rate, letter, relative).map_err(explain);
+    let rate = noise.rate_hz;
+    let fisher_seconds = at(rate)?;
+    let seconds_at = [(rate / 4.0, at(rate / 4.0)?), (rate * 4.0, at(rate * 4.0)?)];
+    let records = request.check.unwrap_or(RECORDS[0]);
+    let samples = |seconds: f64| seconds * rate * records as f64;
+    let is_long = samples(fisher_seconds) > SAMPLES;
+    let most = request.check.map_or(SAMPLES, |_| CHECK_SAMPLES);
+    let (mut seconds, mut fisher_share) = (fisher_seconds, None);
+    let checked_share = if records == 0 || (request.check.is_none() && is_long) {
+        None
+    } else {
+        // The information is what an estimate can reach that knows which terms there are; one that has to find them out
+        // takes longer.
+        let share = |seconds| check(&noise, letter, within_percent, seconds, records, request);
+        let mut kept = share(seconds)?;
+        fisher_share = Some(kept);
+        for _ in 0..TRIES {
+            if kept >= KEPT || samples(LONGER * seconds) > most {
+                break;
+            }
+            seconds *= LONGER;
+            kept = share(seconds)?;
+        }
+        Some(kept)
+    };
+    Ok(Wanted {
+        term: letter.name(),
+        within_percent,
+        seconds,
+        fisher_seconds,
+        if_as_large_as,
+        seconds_at,
+        checked_share,
+        fisher_share,
+    })
+}
+
+fn check(
+    noise: &Noise,
+    letter: Letter,
+    within_percent: f64,
+    seconds: f64,
+    records: usize,
+    request: &Request<'_>,
+) -> Result<f64> {
+    let samples = (seconds * noise.rate_hz).ceil();
+    if samples * records as f64 > CHECK_SAMPLES {
+        miette::bail!(
+            help = "fewer records, or a lower `--rate`",
+            "--check {records}: {records} records of {samples} samples take too long"
+        );
+    }
+    let truth = noise.truth();
+    let samples = samples as usize;
+    let tau0 = 1.0 / noise.rate_hz;
+    let size = letter.size(&noise.known());
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(request.seed);
+    let kept = (0..records)
+        .filter(|_| {
+            let y = truth.record(samples, tau0, &mut rng);
+            let found = fit(&Spectrum::of(&y, std::slice::from_ref(&(0..samples)), tau0));
+            let value = match letter {
+                Letter::N => found.term(Term::White).value,
+                Letter::B => found.term(Term::Flicker).value,
+                Letter::K => found.term(Term::RandomWalk).value,
+                Letter::Q => found.term(Term::Quantization).value,
+                Letter::R => found.rate_ramp.value.map(f64::abs),
+            };
+            value.is_some_and(|v| (v / size - 1.0).abs() <= within_percent / 100.0)
+        })
+        .count();
+    Ok(kept as f64 / records.max(1) as f64)
+}

@@ -1,0 +1,91 @@
+//! Which excitation tells two causes apart.
+
+use std::collections::BTreeMap;
+
+use miette::Result;
+use model::effects::{EFFECTS, effect};
+use noise::discriminate::{PRESETS, separation};
+use noise::plan::KnownNoise;
+use serde::Serialize;
+
+/// Longest record that `--separate` lays out, s.
+const LONGEST_S: f64 = 36.0 * 3600.0;
+
+/// How well one cause is told from another with one excitation.
+#[derive(Debug, Serialize)]
+pub struct Told {
+    /// The one cause.
+    pub cause: String,
+    /// The other, which it is not to be taken for.
+    pub rival: String,
+    /// Whose size is meant.
+    pub parameter: &'static str,
+    /// Of that size.
+    pub unit: &'static str,
+    /// What the stand does meanwhile.
+    pub excitation: &'static str,
+    /// Length in s, smallest size shown, smallest size told apart.
+    pub sizes: Vec<(f64, f64, f64)>,
+    /// Why there are none.
+    pub why: Option<String>,
+}
+
+/// Lengths laid out by `--separate`, s.
+#[must_use]
+pub fn lengths() -> Vec<f64> {
+    std::iter::successors(Some(600.0), |s| Some(s * 3.0))
+        .take_while(|s| *s <= LONGEST_S)
+        .collect()
+}
+
+/// What each excitation of the stand tells `cause` from `rival` by.
+pub(super) fn separate(
+    noise: &KnownNoise,
+    rate_hz: f64,
+    cause: &str,
+    rival: &str,
+) -> Result<Vec<Told>> {
+    let find = |id: &str| {
+        effect(id).ok_or_else(|| {
+            let known: Vec<&str> = EFFECTS.iter().map(|e| e.id()).collect();
+            miette::miette!(
+                help = format!("the causes are {}", known.join(", ")),
+                "--separate: `{id}` is no cause"
+            )
+        })
+    };
+    let (a, b) = (find(cause)?, find(rival)?);
+    let mut out = Vec::new();
+    for preset in PRESETS {
+        let settings: BTreeMap<String, f64> = preset
+            .settings
+            .iter()
+            .map(|(key, value)| ((*key).to_owned(), *value))
+            .collect();
+        let mut told = Told {
+            cause: cause.to_owned(),
+            rival: rival.to_owned(),
+            parameter: "",
+            unit: "",
+            excitation: preset.name,
+            sizes: Vec::new(),
+            why: None,
+        };
+        for seconds in lengths() {
+            match separation(a, b, &settings, noise, rate_hz, seconds) {
+                Ok(found) => {
+                    told.parameter = found.parameter;
+                    told.unit = a
+                        .parameters()
+                        .iter()
+                        .find(|p| p.name == found.parameter)
+                        .map_or("", |p| p.unit);
+                    told.sizes.push((seconds, found.shown, found.told_apart));
+                }
+                Err(why) => told.why = Some(why),
+            }
+        }
+        out.push(told);
+    }
+    Ok(out)
+}
