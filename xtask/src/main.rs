@@ -10,6 +10,7 @@ mod size;
 mod step;
 mod suite;
 mod toolchain;
+mod wheel;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -32,6 +33,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   effects  writes docs/effects.md and its figures from the files of the effects; --check tells whether they are current
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}
   size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt
+  wheel    builds the Python package, target/wheel/dist/*.whl, and tests it in a virtual environment of its own;
+           --dev compiles it as tests are
   compare-peers
            Allan family against allantools (in a venv) and the crate `allan`: speed, memory, agreement; `--long` adds 1e8";
 
@@ -52,6 +55,7 @@ fn main() -> ExitCode {
         Some("answers") => answers::freeze(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("effects") => effects::page(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("size") => size::report(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("wheel") => wheel::wheel(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("compare-peers") => peers::compare(&root, std::env::args().any(|a| a == "--long")),
         _ => {
             eprintln!("{USAGE}");

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use crate::image;
 use crate::step::{Crates, Failure, Pace, Progress, Silent, run, watched};
+use crate::wheel::{self, Profile};
 use crate::{cargo, say_sizes, toolchain};
 
 /// no_std crates, tested each alone as well: a run of the workspace unites features.
@@ -110,6 +111,9 @@ pub fn suite(root: &Path, extent: Extent) -> Result<(), Failure> {
                 Ok(String::new())
             })?;
         }
+        steps.step("Python package", |root| {
+            wheel::tested(root, Profile::Dev, built.program()?)
+        })?;
         steps.step("demo", |root| short_demo(root, &built))?;
     }
     println!("all passed in {:.0} s", start.elapsed().as_secs_f64());
@@ -250,6 +254,16 @@ impl Built {
             built.tests.push(TestProgram { name, file, folder });
         }
         built
+    }
+
+    /// The program.
+    fn program(&self) -> Result<&Path, Failure> {
+        self.program.as_deref().ok_or_else(|| {
+            Failure::new(
+                "the build of the tests made no program `imu-stand`",
+                "`cargo build --workspace` shows why",
+            )
+        })
     }
 
     /// Runs the test programs, one on each core.
@@ -403,10 +417,7 @@ const MOST_LINES: usize = 60;
 fn short_demo(root: &Path, built: &Built) -> Result<String, Failure> {
     let wrong = |what: &str| Failure::new(what, "`cargo xtask demo` shows it");
     let own = std::env::current_exe().map_err(|error| wrong(&format!("the demo: {error}")))?;
-    let program = built
-        .program
-        .as_ref()
-        .ok_or_else(|| wrong("the build of the tests made no program `imu-stand`"))?;
+    let program = built.program()?;
     let mut demo = Command::new(own);
     demo.arg("demo")
         .arg("--program")
