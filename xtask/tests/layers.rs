@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The layers of `crates/diagnosis`, each of which may use those before it.
-const LAYERS: [&str; 14] = [
+const LAYERS: [&str; 15] = [
     "result",
     "test_level",
     "fit",
@@ -18,6 +18,7 @@ const LAYERS: [&str; 14] = [
     "joint",
     "criticise",
     "attribute",
+    "unnamed",
     "report",
     "replicates",
     "pipeline",

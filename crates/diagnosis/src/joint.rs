@@ -25,8 +25,8 @@ const WALKS: u32 = 20;
 /// Largest ln(1 + gamma) of a law.
 const MOST_LAW: f64 = 5.0;
 
-/// The joint estimate of a channel under white noise of variance s2 (1 + gamma shape); none where a process of the channel is
-/// no sum of first-order ones.
+/// The joint estimate of a channel under white noise of variance s2 (1 + gamma shape); none where a process of the channel, a
+/// band among them, is no sum of first-order ones.
 pub(crate) fn estimate(s: &Searched<'_>, shape: &[f64], gamma: f64) -> Option<Joint> {
     let model = Model::of(s, shape)?;
     let start = model.start(&s.state, shape, gamma);
@@ -66,7 +66,8 @@ impl<'a> Model<'a> {
             _ => false,
         };
         let processes: Vec<&Term> = state.terms.iter().filter(|t| t.is_process()).collect();
-        if !processes.iter().all(known) {
+        // A band is no sum of first-order processes.
+        if state.terms.iter().any(Term::is_band) || !processes.iter().all(known) {
             return None;
         }
         let density = filter_of(state).map(|only| only.everywhere(&panel.bins));

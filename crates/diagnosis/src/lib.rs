@@ -21,6 +21,9 @@ mod joint;
 mod criticise;
 
 mod attribute;
+
+mod unnamed;
+
 mod report;
 
 pub mod replicates;

@@ -9,12 +9,11 @@
 //! | [`concluded`] | all of that | the lists of the diagnosis |
 
 mod channel;
+mod handed_over;
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use model::file::FittedOn;
 use model::record::Record;
 
 use crate::attribute::{events, masking, merge, withdraw};
@@ -36,6 +35,7 @@ use crate::result::{
 };
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Observation, all_worded, worded};
+use handed_over::HandedOver;
 use model::record::AnalysisError;
 use model::record::rows;
 
@@ -172,14 +172,13 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     input.notes.append(&mut audited.notes);
     input.file.clone_from(&options.file);
     let mut told = concluded(&searched, tested, audited, dead, named);
-    let fitted_on = || FittedOn {
-        file: options.file.clone(),
-        hash: options.hash.clone(),
-        seconds: input.seconds,
-    };
-    let baseline_model = handover::baseline_model(&searched, &grid, fitted_on());
-    let in_model: Vec<&Finding> = told.findings.iter().chain(&told.nearest).collect();
-    let extended_model = handover::extended_model(&searched, &grid, &in_model, fitted_on());
+    let HandedOver {
+        baseline_model,
+        extended_model,
+        replicates,
+        held,
+        taken_up,
+    } = handed_over::handed_over(&searched, &grid, &told, options);
     for f in &mut told.findings {
         f.material = true;
     }
@@ -188,17 +187,10 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         let (matters, seed) = (options.matters, options.seed);
         replicates::consequence::state(&mut told.findings, &extended_model, &grid, matters, seed);
     }
-    let unnamed = !told.unexplained.is_empty();
-    let replicates = match options.replicates {
-        0 => BTreeMap::new(),
-        count => replicates::judge(&grid, &baseline_model, &extended_model, count, options.seed)
-            .unwrap_or_default(),
-    };
-    let adequate = told.findings.is_empty() && !unnamed;
-    let held = replicates::held(&replicates, adequate, options.replicates);
     let strays = !held.unexplained.is_empty();
     told.checks.extend(held.checks);
     told.unexplained.extend(held.unexplained);
+    told.unexplained.extend(taken_up);
     let mut unexplained = entries(told.unexplained, &searched, &grid, options.matters);
     ranked(&mut told.findings, &mut unexplained);
     // Without replicates nothing says that what is left does not matter.

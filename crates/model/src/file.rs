@@ -22,9 +22,18 @@
 //! cause = "temperature"
 //! channels = ["gyro_z"]
 //! slope = { value = 0.08, std_error = 0.01, unit = "deg/s/degC" }
+//!
+//! [[unnamed]]
+//! domain = "spectrum"
+//! channels = ["gyro_z"]
+//! rms = { value = 0.05, unit = "deg/s" }
+//! center = { values = [3.1, 7.0], unit = "Hz" }
+//! width = { values = [0.4, 2.0], unit = "Hz" }
+//! size = { values = [0.03, 0.04], unit = "deg/s" }
 //! ```
 
 mod parser;
+mod unnamed;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -37,6 +46,7 @@ use crate::effects::effect;
 use crate::excitation::SETTINGS;
 use crate::parameter::Parameter;
 use crate::range::{self, Range};
+use crate::unnamed::Unnamed;
 use parser::Parser;
 
 /// Format line of a model file.
@@ -100,6 +110,8 @@ pub struct ModelFile {
     pub channels: Vec<ChannelModel>,
     /// Effects.
     pub effects: Vec<EffectModel>,
+    /// What has a size and no name.
+    pub unnamed: Vec<Unnamed>,
 }
 
 /// What is wrong with a model file.
@@ -209,6 +221,32 @@ impl ModelFile {
                 channels.join(", ")
             );
             parameters(&mut out, &e.parameters);
+        }
+        for term in &self.unnamed {
+            let channels: Vec<_> = term.channels.iter().map(|c| quoted(c)).collect();
+            let _ = writeln!(
+                out,
+                "\n[[unnamed]]\ndomain = {}\nchannels = [{}]",
+                quoted(term.domain.id()),
+                channels.join(", ")
+            );
+            if let Some(follows) = &term.follows {
+                let _ = writeln!(out, "follows = {}", quoted(follows));
+            }
+            if let Some(refines) = &term.refines {
+                let _ = writeln!(out, "refines = {}", quoted(refines));
+            }
+            parameters(&mut out, &[("rms".to_owned(), term.rms.clone())].into());
+            let specs = term.domain.columns(term.follows.is_some());
+            for (spec, column) in specs.iter().zip(&term.columns) {
+                let _ = writeln!(
+                    out,
+                    "{} = {{ values = {:?}, unit = {} }}",
+                    spec.name,
+                    column.values,
+                    quoted(&column.unit)
+                );
+            }
         }
         out
     }

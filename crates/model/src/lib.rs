@@ -11,6 +11,7 @@ pub mod parameter;
 mod range;
 pub mod record;
 pub mod simulate;
+pub mod unnamed;
 
 pub use file::ModelFile;
 pub use parameter::Parameter;

@@ -30,6 +30,11 @@ pub(crate) const ANY: Range = range(-LARGEST, LARGEST);
 pub(crate) const SIZE: Range = range(0.0, LARGEST);
 /// Of a step of the readings.
 pub(crate) const STEP: Range = range(1e-100, LARGEST);
+/// Of the correlation of two axes, each of which has noise of its own.
+pub(crate) const CORRELATION: Range = range(-0.999, 0.999);
+/// Of moments of a distribution that a noise may have ([`crate::simulate`] has one for each of these).
+pub(crate) const SKEWNESS: Range = range(-3.0, 3.0);
+pub(crate) const EXCESS_KURTOSIS: Range = range(-0.7, 100.0);
 /// Of a sample rate, Hz, and of a time, s, that divides.
 pub(crate) const POSITIVE: Range = range(SHORTEST, LONGEST);
 

@@ -3,6 +3,7 @@
 mod frames;
 mod prepared;
 mod replicas;
+mod unnamed;
 
 pub use replicas::Replicas;
 
@@ -64,6 +65,24 @@ pub enum SimulateError {
         name: String,
         /// Its unit.
         unit: String,
+    },
+    /// An unnamed term follows a channel that the world of a simulation has not.
+    #[error(
+        "nothing in a simulation reads as {name}; a term may follow temp_x, temp_y, temp_z, supply, acc_x, acc_y, acc_z or pwm"
+    )]
+    NothingToFollow {
+        /// The channel.
+        name: String,
+    },
+    /// An axis that shares all of its noise, and more.
+    #[error(
+        "{name} shares white noise with other axes by correlations whose sizes add up to {sum}; that has to be below 1"
+    )]
+    TooCorrelated {
+        /// The axis.
+        name: String,
+        /// The sum.
+        sum: f64,
     },
     /// An effect that the library does not have.
     #[error("no effect {cause}")]

@@ -4,6 +4,7 @@ use model::ModelFile;
 use model::effects::EFFECTS;
 use model::file::EffectModel;
 use model::parameter::Parameter;
+use model::unnamed::{Column, Domain, Unnamed};
 
 fn full() -> ModelFile {
     let mut model = ModelFile::paper();
@@ -19,6 +20,33 @@ fn full() -> ModelFile {
             channels: vec!["gyro_y".into()],
             parameters,
         });
+    }
+    for domain in Domain::ALL {
+        for follows in [None, Some("temp_y".to_owned())] {
+            let over_channel = domain == Domain::Channel;
+            if follows.is_some() != over_channel && domain != Domain::Variance {
+                continue;
+            }
+            let columns = domain.columns(follows.is_some()).iter();
+            let values = match domain {
+                Domain::Cross | Domain::Codes => vec![0.125],
+                _ => vec![0.5, 2.0, 4.0],
+            };
+            let column = |c: &model::unnamed::ColumnSpec| {
+                Column::new(values.clone(), c.unit.unwrap_or("degC"))
+            };
+            model.unnamed.push(Unnamed {
+                domain,
+                channels: match domain {
+                    Domain::Cross => vec!["gyro_x".into(), "gyro_z".into()],
+                    _ => vec!["gyro_y".into()],
+                },
+                follows,
+                refines: (domain == Domain::Spectrum).then(|| "wandering_line".to_owned()),
+                rms: Parameter::estimated(0.25, 0.125, "deg/s"),
+                columns: columns.map(column).collect(),
+            });
+        }
     }
     model
 }
@@ -48,6 +76,71 @@ fn unknown_keys_units_and_effects_are_named_with_their_line() {
     let error = ModelFile::parse(&format!("{text}\n[[effect]]\ncause = \"gremlins\"\n"))
         .expect_err("gremlins");
     assert_eq!(error.line, text.lines().count() + 3, "{error}");
+}
+
+#[test]
+fn what_is_wrong_with_an_unnamed_term_is_named_with_its_line() {
+    let text = ModelFile::paper().to_toml();
+    let rms = "rms = { value = 0.1, unit = \"deg/s\" }\n";
+    let term = |lines: &str| format!("{text}\n[[unnamed]]\nchannels = [\"gyro_x\"]\n{rms}{lines}");
+    let mean = "domain = \"mean\"\nlevel = { values = [1, 2], unit = \"deg/s\" }\n";
+    for (text, what) in [
+        (
+            term("domain = \"soul\"\n"),
+            "unknown domain soul; known are mean",
+        ),
+        (term(""), "needs a domain"),
+        (term(mean), "needs time"),
+        (
+            term(&format!(
+                "{mean}time = {{ values = [0, 1, 2], unit = \"s\" }}\n"
+            )),
+            "level has 2 values; expected 3",
+        ),
+        (
+            term(&format!(
+                "{mean}time = {{ values = [1, 1], unit = \"s\" }}\n"
+            )),
+            "time has to rise",
+        ),
+        (
+            term(&format!(
+                "{mean}time = {{ values = [0, 1], unit = \"h\" }}\n"
+            )),
+            "time is in \"h\"; its unit is \"s\"",
+        ),
+        (
+            term(&format!("{mean}time = {{ values = [], unit = \"s\" }}\n")),
+            "time has 0 values",
+        ),
+        (term(&format!("{mean}phase = 1\n")), "unknown key phase"),
+        (
+            term(&format!("{mean}follows = \"pwm\"\n")),
+            "the domain mean follows no channel",
+        ),
+        (
+            term("domain = \"channel\"\n"),
+            "the domain channel needs follows",
+        ),
+        (
+            term("domain = \"cross\"\ncorrelation = { values = [0.1], unit = \"1\" }\n"),
+            "a term of two axes names 1 channels",
+        ),
+        (
+            term("domain = \"codes\"\nskewness = { values = [9], unit = \"1\" }\n"),
+            "skewness is 9",
+        ),
+        (
+            term("domain = \"spectrum\"\nrefines = \"wandering_line\"\n"),
+            "refines is \"wandering_line\"",
+        ),
+    ] {
+        let error = ModelFile::parse(&text).expect_err(what);
+        assert!(
+            error.what.contains(what) && error.line > 1,
+            "{what}: {error}"
+        );
+    }
 }
 
 #[test]

@@ -81,6 +81,12 @@ pub fn onto(model: &ModelFile, scenario: &mut Scenario) -> Result<Carried, Fitte
             Err(why) => carried.not.push(format!("{told}: {why}")),
         }
     }
+    for term in &model.unnamed {
+        let (domain, channels) = (term.domain.id(), term.channels.join("+"));
+        carried.not.push(format!(
+            "unnamed {domain} on {channels}: the stand has physics for causes with a name"
+        ));
+    }
     Ok(carried)
 }
 

@@ -117,6 +117,14 @@ impl Bins {
         &self.counts
     }
 
+    /// Coefficients in the bin of an angular frequency.
+    pub(crate) fn width_at(&self, omega: f64) -> f64 {
+        let k = (omega * self.n as f64 / PI) as usize;
+        let bin = self.start.partition_point(|start| *start <= k);
+        let last = self.counts.len() - 1;
+        self.counts[bin.saturating_sub(1).min(last)]
+    }
+
     /// Sum of ln g over the coefficients, of g over the bins.
     pub(crate) fn log_det(&self, g: &[f64]) -> f64 {
         sum_of_logs(&self.counts, g)

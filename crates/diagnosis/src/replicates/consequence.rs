@@ -8,6 +8,7 @@ use model::effects::effect;
 use model::file::ModelFile;
 use model::record::Record;
 use model::simulate::Replicas;
+use model::unnamed::Unnamed;
 
 use super::world::{Parts, in_steps, record_of};
 use crate::ingest::types::Grid;
@@ -129,6 +130,11 @@ pub(crate) fn state(
         let own = effects_of(&[finding]);
         let mut model = extended.clone();
         model.effects.retain(|e| !own.contains(e));
+        let details = |u: &Unnamed| {
+            let its_own = |c| finding.channels.contains(c);
+            u.refines.as_ref() == Some(&finding.cause) && u.channels.iter().all(its_own)
+        };
+        model.unnamed.retain(|u| !details(u));
         if model.effects.len() == extended.effects.len() {
             continue;
         }

@@ -16,7 +16,7 @@ use crate::result::{Among, Replicated};
 use model::record::AnalysisError;
 
 /// A record on its grid, ready to be held against models.
-pub(crate) struct Judged<'a> {
+struct Judged<'a> {
     grid: &'a Grid,
     record: Record,
     parts: Parts,
@@ -98,34 +98,64 @@ fn walk_over_white(channel: Option<&ChannelModel>, rate_hz: f64) -> f64 {
     }
 }
 
-/// Holds the record against `count` replicates of the baseline and of the extended model, by channel.
-///
-/// # Errors
-/// Those of the simulation: a channel that it does not know.
-pub(crate) fn judge(
-    grid: &Grid,
-    baseline: &ModelFile,
-    extended: &ModelFile,
+/// A record among `count` replicates of its baseline, to be held against models that extend it.
+pub(crate) struct Judge<'a> {
+    judged: Judged<'a>,
+    baseline: &'a ModelFile,
+    before: Vec<Among>,
     count: usize,
     seed: u64,
-) -> Result<BTreeMap<String, Replicated>, SimulateError> {
-    let mut judged = Judged::new(grid, baseline);
-    let before = judged.among(baseline, count, seed)?;
-    let same = baseline.channels == extended.channels && extended.effects.is_empty();
-    let after = if same {
-        before.clone()
-    } else {
-        judged.among(extended, count, seed)?
-    };
-    let names = grid.targets.iter().map(|t| t.name.clone());
-    let both = before.into_iter().zip(after);
-    Ok(names
-        .zip(both)
-        .map(|(name, (before, after))| (name, Replicated { before, after }))
-        .collect())
 }
 
-/// As [`judge`], of a record that is laid on its grid for that; of no channel where one is not known to the simulation.
+impl<'a> Judge<'a> {
+    /// With the baseline.
+    ///
+    /// # Errors
+    /// Those of the simulation: a channel that it does not know.
+    pub fn new(
+        grid: &'a Grid,
+        baseline: &'a ModelFile,
+        count: usize,
+        seed: u64,
+    ) -> Result<Self, SimulateError> {
+        let mut judged = Judged::new(grid, baseline);
+        let before = judged.among(baseline, count, seed)?;
+        Ok(Self {
+            judged,
+            baseline,
+            before,
+            count,
+            seed,
+        })
+    }
+
+    /// The record among replicates of the baseline and of the extended model, by channel.
+    ///
+    /// # Errors
+    /// Those of the simulation.
+    pub fn of(
+        &mut self,
+        extended: &ModelFile,
+    ) -> Result<BTreeMap<String, Replicated>, SimulateError> {
+        let same = self.baseline.channels == extended.channels
+            && extended.effects.is_empty()
+            && extended.unnamed.is_empty();
+        let after = if same {
+            self.before.clone()
+        } else {
+            self.judged.among(extended, self.count, self.seed)?
+        };
+        let names = self.judged.grid.targets.iter().map(|t| t.name.clone());
+        let both = self.before.iter().cloned().zip(after);
+        Ok(names
+            .zip(both)
+            .map(|(name, (before, after))| (name, Replicated { before, after }))
+            .collect())
+    }
+}
+
+/// Holds a record against `count` replicates of a baseline and of an extended model, by channel; of none where one is not known to
+/// the simulation.
 ///
 /// # Errors
 /// Those of the grid: a record too short, without a rate or a gyro.
@@ -137,5 +167,6 @@ pub fn judge_record(
 ) -> Result<BTreeMap<String, Replicated>, AnalysisError> {
     let grid = lay_out(record, &|_| vec![], seed)?;
     let [baseline, extended] = models;
-    Ok(judge(&grid, baseline, extended, count, seed).unwrap_or_default())
+    let judged = Judge::new(&grid, baseline, count, seed).and_then(|mut j| j.of(extended));
+    Ok(judged.unwrap_or_default())
 }

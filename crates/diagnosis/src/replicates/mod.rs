@@ -11,11 +11,11 @@ mod statistics;
 mod verdict;
 mod world;
 
-pub(crate) use judge::judge;
+pub(crate) use judge::Judge;
 pub use judge::judge_record;
 
 pub use crate::result::LEVEL;
-pub(crate) use verdict::held;
+pub(crate) use verdict::{Held, held, taken_up};
 
 /// Replicates that tell such a chance to a tenth of it: the smallest chance is 1 / (199 + 1).
 pub const REPLICATES: usize = 199;

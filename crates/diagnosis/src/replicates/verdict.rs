@@ -64,6 +64,35 @@ pub(crate) fn held(all: &BTreeMap<String, Replicated>, adequate: bool, count: us
     }
 }
 
+/// What replicates of the model without further terms strayed by, on channels where they hold with them.
+pub(crate) fn taken_up(
+    without: &BTreeMap<String, Replicated>,
+    strayed: Vec<Observation>,
+    held: &Held,
+    count: usize,
+) -> Vec<Observation> {
+    let still = |o: &Observation| held.unexplained.iter().any(|h| h.channel == o.channel);
+    let told = |o: Observation| {
+        let among = without.get(&o.channel).map(|r| &r.after);
+        let what = among.map(|r| {
+            format!(
+                "simulations of the model without the unnamed term differ (chance {}): {}",
+                chance(r.p_value, count),
+                r.strays()
+            )
+        });
+        Observation {
+            what: what.unwrap_or_default(),
+            ..o
+        }
+    };
+    strayed
+        .into_iter()
+        .filter(|o| !still(o))
+        .map(told)
+        .collect()
+}
+
 /// A chance that replicates tell, of which the smallest is that none strays as far.
 fn chance(p: f64, count: usize) -> String {
     let least = 1.0 / (count + 1) as f64;

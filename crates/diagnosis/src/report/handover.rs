@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use model::effect::{Effect, Hypothesis, Parameters, Stage};
 use model::effects::effect;
 use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
+use model::unnamed::Unnamed;
 
 use crate::attribute::events;
 use crate::fit::channel::{Levels, State};
@@ -13,6 +14,7 @@ use crate::ingest::types::Grid;
 use crate::joint::{levels_of, levels_under};
 use crate::result::{Finding, Parameter};
 use crate::search::searched::Searched;
+use crate::unnamed::Fitted;
 
 /// Least part of the white variance that is an axis' own.
 const LEAST_OWN: f64 = 1e-6;
@@ -26,15 +28,35 @@ pub(crate) fn baseline_model(
     model(searched, grid, &|s| baseline(s, grid), fitted_on)
 }
 
-/// The model extended by the findings `named`.
+/// The model extended by the findings `named` and by what has no name.
 pub(crate) fn extended_model(
     searched: &[Searched<'_>],
     grid: &Grid,
     named: &[&Finding],
+    unnamed: &Fitted,
     fitted_on: FittedOn,
 ) -> ModelFile {
     let mut extended = model(searched, grid, &|s| beside(s, named, grid), fitted_on);
     extended.effects = effects_of(named);
+    // A tone that is not handed over has no detail.
+    let known = |t: &&Unnamed| {
+        let of = |cause: &String| extended.effects.iter().any(|e| e.cause == *cause);
+        t.refines.as_ref().is_none_or(of)
+    };
+    extended.unnamed = unnamed.terms.iter().filter(known).cloned().collect();
+    for own in &unnamed.beside {
+        let channel = extended.channels.iter_mut().find(|c| c.name == own.channel);
+        let Some(channel) = channel else { continue };
+        for (name, part) in [
+            ("angle_random_walk", own.white),
+            ("rate_random_walk", own.walk),
+        ] {
+            if let Some(p) = channel.baseline.get_mut(name) {
+                p.value *= part.sqrt();
+                p.std_error = p.std_error.map(|e| e * part.sqrt());
+            }
+        }
+    }
     for (channel, s) in extended.channels.iter_mut().zip(searched) {
         let lost = s.target.lost.len() as f64 / grid.n as f64;
         before_counts(channel, &extended.effects, grid.rate_hz, lost);
@@ -67,6 +89,7 @@ fn model(
         excitation: BTreeMap::new(),
         channels: searched.iter().map(channel).collect(),
         effects: vec![],
+        unnamed: vec![],
     }
 }
 

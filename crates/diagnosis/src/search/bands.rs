@@ -19,6 +19,8 @@ use crate::fit::threshold;
 
 /// Most bands on one channel: a band that is no Lorentzian takes several.
 const MOST_BANDS: usize = 3;
+/// Least half width of a band that is fitted, in bins of the likelihood: over one of these a Lorentzian is its middle to an eighth.
+const RESOLVED: f64 = 1.5;
 /// Narrowest window, coefficients, the ratio of the next to it, and the widest over its centre.
 const NARROWEST: f64 = 4.0;
 const WIDER: f64 = std::f64::consts::SQRT_2;
@@ -177,6 +179,8 @@ impl Search<'_> {
         let spacing = PI / n as f64;
         let fits = [Some(best), broader].into_iter().flatten().filter_map(|w| {
             let (middle, half) = w.peak();
+            // The likelihood does not see what is narrower than its bins.
+            let half = half.max(RESOLVED * self.panel.bins.width_at(middle * spacing));
             let level = g[w.from..w.to].iter().sum::<f64>() / w.width();
             let held = FRAC_2_PI * HALF_WIDTHS.atan();
             let (located, theta) = c.about(&Peak {

@@ -16,14 +16,17 @@ pub struct CorrelatedNoise;
 /// The one instance that the library lists.
 pub static EFFECT: CorrelatedNoise = CorrelatedNoise;
 
+/// Its id.
+pub const ID: &str = "correlated_noise";
+
 /// Its parameters, by the axis that the correlation is with.
-const WITH: [&str; 3] = ["with_gyro_x", "with_gyro_y", "with_gyro_z"];
+pub(crate) const WITH: [&str; 3] = ["with_gyro_x", "with_gyro_y", "with_gyro_z"];
 /// Most of the noise of an axis that may be shared with others: what is left is its own.
 const MOST_SHARED: f64 = 0.999;
 
 impl Effect for CorrelatedNoise {
     fn id(&self) -> &'static str {
-        "correlated_noise"
+        ID
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
@@ -104,7 +107,7 @@ impl Effect for CorrelatedNoise {
 }
 
 /// Gives two axes a source of their own, which makes the correlation r and leaves the size of each as it is.
-fn share(simulation: &mut Simulation, axes: [usize; 2], r: f64) {
+pub(crate) fn share(simulation: &mut Simulation, axes: [usize; 2], r: f64) {
     let most = axes.map(|a| simulation.own[a] - (1.0 - MOST_SHARED));
     let part = r.abs().min(most[0]).min(most[1]).max(0.0);
     let n = simulation.samples;

@@ -3,8 +3,6 @@
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 use std::sync::Arc;
 
-use rand_distr::{Distribution, StandardNormal};
-
 use crate::effect::{
     Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
     Peak, Plot, Rival, Stage, View, parameter, value,
@@ -124,18 +122,9 @@ impl Effect for NarrowBand {
             value(parameters, "rms"),
             value(parameters, "center_frequency"),
         );
-        let kept = (-PI * value(parameters, "bandwidth") / simulation.rate_hz).exp();
-        let driven = rms * (1.0 - kept * kept).max(0.0).sqrt();
-        let (sin, cos) = (TAU * centre / simulation.rate_hz).sin_cos();
+        let width = value(parameters, "bandwidth");
         for &axis in channels {
-            let normal = |s: &mut Simulation| -> f64 { StandardNormal.sample(&mut s.rng) };
-            // Two quadratures that turn into each other, in their stationary state.
-            let mut x = [rms * normal(simulation), rms * normal(simulation)];
-            for i in 0..simulation.samples {
-                simulation.rate[axis][i] += x[0];
-                let turned = [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1]];
-                x = turned.map(|v| kept * v + driven * normal(simulation));
-            }
+            simulation.add_mode(axis, rms, centre, width);
         }
     }
 }
@@ -151,6 +140,9 @@ struct Mode {
 const WIDEST: f64 = 0.5;
 /// Least half width in spacings of the coefficients: what is narrower is a line for the record.
 const NARROWEST: f64 = 1.5;
+/// How many times narrower than where it was seen a band may be: a likelihood over bins that resolve the one does not see much
+/// less.
+const FINER: f64 = 4.0;
 
 impl Mode {
     fn place(&self, theta: &[f64]) -> (f64, f64) {
@@ -186,6 +178,7 @@ impl Covariance for Mode {
         let spacing = PI / samples as f64;
         let ways = [spacing, PI - spacing].map(|w| (w - self.omega) / self.half_width);
         let least = (NARROWEST * spacing / self.half_width).ln();
+        let least = least.max(-FINER.ln());
         let most = (0.5 * WIDEST * self.omega / self.half_width)
             .ln()
             .max(least);

@@ -6,10 +6,10 @@ pub(super) struct Parser<'a> {
     pub(super) text: &'a str,
 }
 
-type Parsed<T> = Result<T, ModelFileError>;
+pub(super) type Parsed<T> = Result<T, ModelFileError>;
 
 impl<'a> Parser<'a> {
-    fn error<T>(&self, at: usize, what: String) -> Parsed<T> {
+    pub(super) fn error<T>(&self, at: usize, what: String) -> Parsed<T> {
         let line = 1 + self
             .text
             .get(..at)
@@ -19,14 +19,18 @@ impl<'a> Parser<'a> {
         Err(ModelFileError { line, what })
     }
 
-    fn table<'t>(&self, value: &'t Spanned<DeValue<'a>>, name: &str) -> Parsed<&'t DeTable<'a>> {
+    pub(super) fn table<'t>(
+        &self,
+        value: &'t Spanned<DeValue<'a>>,
+        name: &str,
+    ) -> Parsed<&'t DeTable<'a>> {
         match value.get_ref() {
             DeValue::Table(table) => Ok(table),
             _ => self.error(value.span().start, format!("{name} has to be a table")),
         }
     }
 
-    fn array<'t>(
+    pub(super) fn array<'t>(
         &self,
         value: &'t Spanned<DeValue<'a>>,
         name: &str,
@@ -37,7 +41,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn string(&self, value: &Spanned<DeValue<'a>>, name: &str) -> Parsed<String> {
+    pub(super) fn string(&self, value: &Spanned<DeValue<'a>>, name: &str) -> Parsed<String> {
         match value.get_ref() {
             DeValue::String(s) => Ok(s.to_string()),
             _ => self.error(
@@ -65,7 +69,12 @@ impl<'a> Parser<'a> {
     }
 
     /// A number of a range.
-    fn ranged(&self, value: &Spanned<DeValue<'a>>, name: &str, range: Range) -> Parsed<f64> {
+    pub(super) fn ranged(
+        &self,
+        value: &Spanned<DeValue<'a>>,
+        name: &str,
+        range: Range,
+    ) -> Parsed<f64> {
         let number = self.number(value, name)?;
         match range.refuses(name, number) {
             None => Ok(number),
@@ -106,10 +115,10 @@ impl<'a> Parser<'a> {
                         }
                     }
                 }
-                "effect" => {}
+                "effect" | "unnamed" => {}
                 other => {
                     return self.error(key.span().start, format!(
-                        "unknown key {other}; known are format, stand, rate_hz, fitted_on, excitation, channel, effect"
+                        "unknown key {other}; known are format, stand, rate_hz, fitted_on, excitation, channel, effect, unnamed"
                     ));
                 }
             }
@@ -138,6 +147,15 @@ impl<'a> Parser<'a> {
                     .push(self.effect(v, &file.channels, file.rate_hz)?);
                 if file.effects.len() > range::MOST_EFFECTS {
                     let what = format!("more than {} effects", range::MOST_EFFECTS);
+                    return self.error(v.span().start, what);
+                }
+            }
+        }
+        if let Some(value) = document.get_ref().get("unnamed") {
+            for v in self.array(value, "unnamed")? {
+                file.unnamed.push(self.unnamed(v, &file)?);
+                if file.unnamed.len() > range::MOST_EFFECTS {
+                    let what = format!("more than {} unnamed terms", range::MOST_EFFECTS);
                     return self.error(v.span().start, what);
                 }
             }
@@ -182,7 +200,7 @@ impl<'a> Parser<'a> {
         Ok(all)
     }
 
-    fn parameter(
+    pub(super) fn parameter(
         &self,
         name: &str,
         value: &Spanned<DeValue<'a>>,

@@ -6,6 +6,7 @@ use std::ops::Range;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::unnamed::{Generic, Random, too_correlated};
 use super::{COUNT_LIMIT, STEPLESS_DPS, SimulateError, Simulation, Stretch, axis_of};
 use crate::effect::{Effect, Parameters, Stage};
 use crate::effects::effect;
@@ -61,6 +62,8 @@ pub(super) struct Prepared {
     random: Vec<Acting>,
     /// Effects on what the sensor puts out, and later.
     late: Vec<Acting>,
+    /// What has no name.
+    unnamed: Generic,
     /// Slow part of the axes that moved, deg/s.
     read: [Option<Vec<f64>>; 3],
     /// Seed, where each effect and each axis has random numbers of its own.
@@ -70,6 +73,7 @@ pub(super) struct Prepared {
 /// Numbers of the random walks and the white noise of the axes among the streams, before those of effects.
 const WALKS: u64 = 0;
 const WHITES: u64 = 3;
+const UNNAMED: u64 = 6;
 
 impl Prepared {
     pub fn new(
@@ -109,6 +113,8 @@ impl Prepared {
         for acting in &once {
             acting.on(&mut run);
         }
+        too_correlated(model)?;
+        let unnamed = Generic::of(model, &mut run)?;
         let steps = lsb.map(|lsb| match lsb {
             Some(lsb) => (lsb, COUNT_LIMIT),
             None => (STEPLESS_DPS, i32::MAX - 1),
@@ -122,6 +128,7 @@ impl Prepared {
             white: Default::default(),
             random,
             late,
+            unnamed,
             read,
             apart: None,
         };
@@ -207,7 +214,13 @@ impl Prepared {
             self.begin(self.random[k].stream());
             self.random[k].on(&mut self.run);
         }
-        if self.random.iter().any(|a| a.effect.stage() == Stage::Noise) {
+        for (k, term) in self.unnamed.random.clone().iter().enumerate() {
+            self.begin(UNNAMED + k as u64);
+            term.on(&mut self.run);
+        }
+        let resized = self.random.iter().any(|a| a.effect.stage() == Stage::Noise)
+            || self.unnamed.random.iter().any(Random::is_noise);
+        if resized {
             self.sized();
         }
         for axis in (0..3).filter(|a| present[*a]) {
@@ -215,7 +228,12 @@ impl Prepared {
             let mut white = std::mem::take(&mut self.run.white[axis]);
             white.clear();
             let run = &mut self.run;
-            white.extend(self.white[axis].iter().map(|sd| sd * run.normal()));
+            let shape = self.unnamed.shapes[axis];
+            let each = self.white[axis].iter().map(|sd| {
+                let z = run.normal();
+                sd * shape.map_or(z, |shape| shape.value(z))
+            });
+            white.extend(each);
             let shared = run.shared[axis].iter().zip(&run.variance[axis]);
             for (white, (shared, v)) in white.iter_mut().zip(shared) {
                 *white += v.sqrt() * shared;
@@ -280,7 +298,16 @@ fn acting(model: &ModelFile, present: [bool; 3]) -> Result<Vec<Acting>, Simulate
             cause: e.cause.clone(),
         })?;
         let names = ["gyro_x", "gyro_y", "gyro_z"].iter().enumerate();
-        let named = |n: &str| e.channels.is_empty() || e.channels.iter().any(|c| c == n);
+        // A term that tells a tone in detail stands for it.
+        let refined = |n: &str| {
+            let of_it = |u: &&crate::unnamed::Unnamed| u.refines.as_ref() == Some(&e.cause);
+            let mut terms = model.unnamed.iter().filter(of_it);
+            terms.any(|u| u.channels.iter().any(|c| c == n))
+        };
+        let named = |n: &str| {
+            let acts = e.channels.is_empty() || e.channels.iter().any(|c| c == n);
+            acts && !refined(n)
+        };
         Ok(Acting {
             effect,
             parameters: e.parameters.clone(),

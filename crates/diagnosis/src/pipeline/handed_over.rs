@@ -1,0 +1,77 @@
+//! The models that are handed over: the baseline, and the extended one with what has no name, held against the record.
+
+use std::collections::BTreeMap;
+
+use model::file::{FittedOn, ModelFile};
+
+use super::{DiagnoseOptions, Told};
+use crate::ingest::types::Grid;
+use crate::replicates::{Held, Judge, held, taken_up};
+use crate::report::handover;
+use crate::result::{Finding, Replicated};
+use crate::search::searched::Searched;
+use crate::test_level::Observation;
+use crate::unnamed::{self, Fitted, Wanted};
+
+/// Models, and the record among their replicates.
+pub(super) struct HandedOver {
+    pub baseline_model: ModelFile,
+    pub extended_model: ModelFile,
+    pub replicates: BTreeMap<String, Replicated>,
+    /// What the replicates say of the extended model.
+    pub held: Held,
+    /// What they said before terms without a name took it up.
+    pub taken_up: Vec<Observation>,
+}
+
+/// Terms without a name are sought where the search left something; and once more, where the replicates of that model do not hold
+/// the record.
+pub(super) fn handed_over(
+    searched: &[Searched<'_>],
+    grid: &Grid,
+    told: &Told,
+    options: &DiagnoseOptions,
+) -> HandedOver {
+    let count = options.replicates;
+    let fitted_on = || FittedOn {
+        file: options.file.clone(),
+        hash: options.hash.clone(),
+        seconds: grid.n as f64 / grid.rate_hz,
+    };
+    let causes: Vec<&Finding> = told.findings.iter().chain(&told.nearest).collect();
+    let baseline_model = handover::baseline_model(searched, grid, fitted_on());
+    let extended = |by: &Fitted| handover::extended_model(searched, grid, &causes, by, fitted_on());
+    let mut wanted = Wanted::of(&told.unexplained);
+    let fitted = unnamed::fit(searched, grid, &wanted, &causes);
+    let mut extended_model = extended(&fitted);
+    let adequate = told.findings.is_empty() && told.unexplained.is_empty();
+    let mut judge = match count {
+        0 => None,
+        count => Judge::new(grid, &baseline_model, count, options.seed).ok(),
+    };
+    let mut among = |model: &ModelFile| {
+        let all = judge.as_mut().map(|j| j.of(model).unwrap_or_default());
+        all.unwrap_or_default()
+    };
+    let mut replicates = among(&extended_model);
+    let mut told = held(&replicates, adequate, count);
+    let mut taken = vec![];
+    told.unexplained.iter().for_each(|o| wanted.add(o));
+    let again = unnamed::fit(searched, grid, &wanted, &causes);
+    if again != fitted {
+        let model = extended(&again);
+        let all = among(&model);
+        let now = held(&all, false, count);
+        if now.unexplained.len() <= told.unexplained.len() {
+            taken = taken_up(&replicates, told.unexplained, &now, count);
+            (extended_model, replicates, told) = (model, all, now);
+        }
+    }
+    HandedOver {
+        baseline_model,
+        extended_model,
+        replicates,
+        held: told,
+        taken_up: taken,
+    }
+}

@@ -1,0 +1,240 @@
+//! What is left of a record as terms of a model: a size and a place in the domain where it lies, in the place of a name.
+//!
+//! Under them a simulation is the record's where nothing can be named. Each is sought only on channels where the search, or the
+//! replicates of the model, left something.
+
+mod spectrum;
+mod white;
+
+use std::collections::BTreeSet;
+
+use model::Parameter;
+use model::effect::{Signal, extremes};
+use model::record::Quantity;
+use model::unnamed::{Column, Domain, Unnamed};
+
+use crate::ingest::types::Grid;
+use crate::result::Finding;
+use crate::search::searched::Searched;
+use crate::test_level::{self, Observation};
+use spectrum::{Bump, Spectrum, as_one, spectrum};
+use white::{White, hz};
+
+/// Channels that terms are sought for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Wanted {
+    /// By themselves.
+    pub channels: BTreeSet<String>,
+    /// With others.
+    pub pairs: BTreeSet<[String; 2]>,
+}
+
+impl Wanted {
+    /// Where something was seen.
+    pub(crate) fn of(seen: &[Observation]) -> Self {
+        let mut all = Self::default();
+        seen.iter().for_each(|o| all.add(o));
+        all
+    }
+
+    /// Adds what one observation is of.
+    pub(crate) fn add(&mut self, seen: &Observation) {
+        match seen.domain {
+            test_level::Domain::Noise => {
+                self.channels.insert(seen.channel.clone());
+            }
+            test_level::Domain::Coupling => {
+                for other in &seen.follows {
+                    let mut pair = [seen.channel.clone(), other.clone()];
+                    pair.sort();
+                    self.pairs.insert(pair);
+                }
+            }
+            test_level::Domain::Readings => {}
+        }
+    }
+}
+
+/// The noise of a channel beside what has no name, over that without it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Beside {
+    pub channel: String,
+    /// Of the white variance.
+    pub white: f64,
+    /// Of the variance of a step of the random walk.
+    pub walk: f64,
+}
+
+/// What was fitted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Fitted {
+    pub terms: Vec<Unnamed>,
+    pub beside: Vec<Beside>,
+}
+
+/// Causes by which axes share noise already.
+const SHARING: [&str; 4] = [
+    model::effects::common_noise::ID,
+    model::effects::correlated_noise::ID,
+    model::effects::cross_axis::ID,
+    model::effects::base_motion::ID,
+];
+
+/// The terms of what is wanted, beside these causes.
+pub(crate) fn fit(
+    searched: &[Searched<'_>],
+    grid: &Grid,
+    wanted: &Wanted,
+    causes: &[&Finding],
+) -> Fitted {
+    let mut all = Fitted::default();
+    let mut whites = vec![];
+    for s in searched.iter().filter(|s| !s.target.moving) {
+        let name = &s.target.name;
+        let alone = wanted.channels.contains(name);
+        let paired = wanted.pairs.iter().any(|p| p.contains(name));
+        let merged = as_one(s);
+        if !alone && !paired && merged.is_empty() {
+            continue;
+        }
+        let own = (alone || !merged.is_empty())
+            .then(|| spectrum(s, &merged))
+            .flatten();
+        let density = match &own {
+            Some(found) => found.density.clone(),
+            None => s.state.noise.over(&s.search.panel.bins),
+        };
+        let white = White::of(s, density);
+        if let Some(found) = &own {
+            all.terms.extend(of_spectrum(s, found, grid.rate_hz));
+            all.beside.push(Beside {
+                channel: name.clone(),
+                white: found.white,
+                walk: found.walk,
+            });
+        }
+        if alone {
+            all.terms.extend(of_white(s, &white, grid.rate_hz));
+            all.terms.extend(of_signals(s, &white, grid));
+        }
+        whites.push((name, s, white));
+    }
+    for pair in &wanted.pairs {
+        let of = |name: &String| whites.iter().find(|w| w.0 == name);
+        let shares = |f: &&&Finding| {
+            let both = pair.iter().all(|c| f.channels.contains(c));
+            both && SHARING.contains(&f.cause.as_str())
+        };
+        let (Some(a), Some(b)) = (of(&pair[0]), of(&pair[1])) else {
+            continue;
+        };
+        if causes.iter().any(|f| shares(&f)) {
+            continue;
+        }
+        if let Some(r) = a.2.shared_with(&b.2) {
+            let sigma = (a.1.state.solution.white * b.1.state.solution.white).powf(0.25);
+            all.terms.push(Unnamed {
+                domain: Domain::Cross,
+                channels: pair.to_vec(),
+                follows: None,
+                refines: None,
+                rms: Parameter::exact(r.abs().sqrt() * sigma, &a.1.target.unit),
+                columns: vec![Column::new(vec![r], "1")],
+            });
+        }
+    }
+    all
+}
+
+fn term(s: &Searched<'_>, domain: Domain, rms: f64, columns: Vec<Column>) -> Unnamed {
+    Unnamed {
+        domain,
+        channels: vec![s.target.name.clone()],
+        follows: None,
+        refines: None,
+        rms: Parameter::exact(rms, &s.target.unit),
+        columns,
+    }
+}
+
+/// The bands of each tone in detail, and what is noise beside them.
+fn of_spectrum(s: &Searched<'_>, found: &Spectrum, rate_hz: f64) -> Vec<Unnamed> {
+    let white = s.state.solution.white;
+    let of = |bumps: &[Bump], refines: Option<&str>| {
+        let column = |unit: &str, of: &dyn Fn(&Bump) -> f64| {
+            Column::new(bumps.iter().map(of).collect(), unit)
+        };
+        let columns = vec![
+            column("Hz", &|b| hz(b.center, rate_hz)),
+            column("Hz", &|b| hz(b.width, rate_hz)),
+            column(&s.target.unit, &|b| (white * b.variance).sqrt()),
+        ];
+        let variance: f64 = bumps.iter().map(|b| white * b.variance).sum();
+        Unnamed {
+            refines: refines.map(str::to_owned),
+            ..term(s, Domain::Spectrum, variance.sqrt(), columns)
+        }
+    };
+    let tones = found.tones.iter().map(|(id, bumps)| of(bumps, Some(id)));
+    let noise = (!found.bumps.is_empty()).then(|| of(&found.bumps, None));
+    tones.chain(noise).collect()
+}
+
+/// What follows the channels that were recorded beside the gyros, straight.
+fn of_signals(s: &Searched<'_>, white: &White<'_>, grid: &Grid) -> Vec<Unnamed> {
+    let axis = |signal: &Signal| signal.axis.is_none() || signal.axis == s.target.axis;
+    let own = grid.signals.iter().filter(|signal| match signal.quantity {
+        Quantity::Temp => axis(signal),
+        Quantity::Supply | Quantity::Acc | Quantity::Pwm => true,
+        _ => false,
+    });
+    let terms = own.filter_map(|signal| {
+        let values: &[f64] = &signal.smooth;
+        let slope = white.slope_over(values)?;
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+        let ends = extremes(values);
+        let levels = ends.map(|v| slope * (v - mean));
+        Some(Unnamed {
+            follows: Some(signal.name.clone()),
+            ..term(
+                s,
+                Domain::Channel,
+                slope.abs() * square.sqrt(),
+                vec![
+                    Column::new(ends.into(), &signal.unit),
+                    Column::new(levels.into(), &s.target.unit),
+                ],
+            )
+        })
+    });
+    terms.collect()
+}
+
+/// The course of the size of the white noise, and the shape of its distribution.
+fn of_white(s: &Searched<'_>, white: &White<'_>, rate_hz: f64) -> Vec<Unnamed> {
+    let sigma = s.state.solution.white.sqrt();
+    let mut all = vec![];
+    if let Some((times, factors)) = white.course(rate_hz) {
+        let n = factors.len() as f64;
+        let square = factors.iter().map(|f| (f - 1.0).powi(2)).sum::<f64>() / n;
+        all.push(term(
+            s,
+            Domain::Variance,
+            sigma * square.sqrt().sqrt(),
+            vec![Column::new(times, "s"), Column::new(factors, "1")],
+        ));
+    }
+    if let Some(shape) = white.shape() {
+        // What of the variance lies elsewhere than a normal distribution has it: by the leading terms of its Hermite series.
+        let square = shape[0].powi(2) / 6.0 + shape[1].powi(2) / 24.0;
+        all.push(term(
+            s,
+            Domain::Codes,
+            sigma * square.sqrt(),
+            shape.map(|v| Column::new(vec![v], "1")).into(),
+        ));
+    }
+    all
+}

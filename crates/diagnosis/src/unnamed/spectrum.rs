@@ -1,0 +1,349 @@
+//! The spectrum of what is left of a channel: bumps beside the noise of its causes.
+//!
+//! The energies of the residual over bins of coefficients are independent multiples of chi-squares. Their mean is a sum of
+//! densities: white noise, through the filter where there is one, and random walk, both free in size; the processes that have a
+//! name, as they are; and bumps of a fixed list, of which those enter one by one that take up most.
+
+use std::f64::consts::PI;
+
+use model::effect::{Hypothesis, Peak};
+
+use crate::fit::channel::Term;
+use crate::fit::likelihood::Noise;
+use crate::search::searched::Searched;
+
+/// Most bumps of a channel.
+const MOST: usize = 16;
+/// Score, the square of a standard normal value of one sign, that a further bump has to reach: one in 20 000 of a hundred that
+/// differ reach it by chance in half a percent of records.
+const LEAST_SCORE: f64 = 15.0;
+/// Bumps in an octave, and their full widths over their centres.
+const AN_OCTAVE: i32 = 6;
+const WIDTHS: [f64; 3] = [0.08, 0.25, 0.7];
+/// Fewest coefficients below the centre of a bump, and in the width of a process at frequency zero.
+const LEAST_COEFFICIENTS: f64 = 12.0;
+/// Widths of its bands to either side in which a tone is sought, most places there, and least share of its time in one.
+const REACH: f64 = 3.0;
+const MOST_PITCHES: f64 = 64.0;
+const LEAST_SHARE: f64 = 1e-3;
+/// Variance of a bump over the white one below which it is none.
+const LEAST_PART: f64 = 1e-9;
+/// Rounds of the fit while bumps are added, and of the last one.
+const ROUNDS: usize = 60;
+const LAST_ROUNDS: usize = 600;
+
+/// One bump: centre and full width at half power, rad per sample, and its variance over the white one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bump {
+    pub center: f64,
+    pub width: f64,
+    pub variance: f64,
+}
+
+/// What describes the noise of a channel better than its causes do.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Spectrum {
+    /// What is added.
+    pub bumps: Vec<Bump>,
+    /// White variance beside it, over that without it.
+    pub white: f64,
+    /// Variance of a step of the random walk beside it, over that without it.
+    pub walk: f64,
+    /// Tones whose band has the shape of several, and these.
+    pub tones: Vec<(&'static str, Vec<Bump>)>,
+    /// Density over the bins, over the white variance of the causes' model.
+    pub density: Vec<f64>,
+}
+
+/// Density of a bump of variance 1 as it is sampled.
+fn lorentzian(center: f64, width: f64, omega: f64) -> f64 {
+    let kept = (-0.5 * width).exp();
+    let about = |w: f64| (1.0 - kept * kept) / (1.0 - 2.0 * kept * w.cos() + kept * kept);
+    0.5 * (about(omega - center) + about(omega + center))
+}
+
+/// Centres and widths that are tried in a record of `n` samples.
+fn places(n: usize) -> Vec<(f64, f64)> {
+    let spacing = PI / n as f64;
+    let mut all = vec![];
+    let mut width = LEAST_COEFFICIENTS * spacing;
+    while width < PI {
+        all.push((0.0, width));
+        width *= 2.0;
+    }
+    let ratio = 2f64.powf(f64::from(AN_OCTAVE).recip());
+    let mut center = LEAST_COEFFICIENTS * spacing;
+    while center < PI {
+        let wide = |by: &f64| (center, center * by);
+        let widths = WIDTHS.iter().map(wide);
+        all.extend(widths.filter(|(_, w)| *w >= 0.25 * LEAST_COEFFICIENTS * spacing));
+        center *= ratio;
+    }
+    all
+}
+
+/// Bands of a channel that overlap and that a model has as one.
+pub(super) struct AsOne {
+    /// The effect.
+    pub id: &'static str,
+    parts: Vec<Bump>,
+}
+
+impl Bump {
+    fn over(&self, omega: &[f64]) -> Vec<f64> {
+        let at = |w: &f64| self.variance * lorentzian(self.center, self.width, *w);
+        omega.iter().map(at).collect()
+    }
+}
+
+impl From<Peak> for Bump {
+    fn from(p: Peak) -> Self {
+        Self {
+            center: p.omega,
+            width: 2.0 * p.half_width,
+            variance: p.variance,
+        }
+    }
+}
+
+/// Bands of a channel that are one tone: a model has one Lorentzian for them.
+pub(super) fn as_one(s: &Searched<'_>) -> Vec<AsOne> {
+    let terms = &s.state.terms;
+    let tone = |t: &&Term| {
+        let hypothesis = &s.search.candidates[t.candidate].hypothesis;
+        !matches!(hypothesis, Hypothesis::Covariance(_))
+    };
+    let first = |t: &&Term| t.cluster.is_some_and(|c| c.place == 0);
+    let all = terms.iter().filter(first).filter(tone).map(|t| {
+        let number = t.cluster.map(|c| c.number);
+        let own = terms
+            .iter()
+            .filter(|o| o.cluster.map(|c| c.number) == number);
+        AsOne {
+            id: t.effect.id(),
+            parts: own.filter_map(Term::peak).map(Bump::from).collect(),
+        }
+    });
+    all.filter(|one| one.parts.len() > 1).collect()
+}
+
+/// The pitches that a tone visits: a comb over its band, which has the shape of any band and no tails of its own.
+fn pitches(parts: &[Bump]) -> Vec<Bump> {
+    let edge = |side: f64, p: &Bump| (p.center + side * REACH * p.width).clamp(0.0, PI);
+    let low = parts.iter().map(|p| edge(-1.0, p)).fold(PI, f64::min);
+    let high = parts.iter().map(|p| edge(1.0, p)).fold(0.0, f64::max);
+    let finest = parts.iter().map(|p| p.width).fold(PI, f64::min);
+    let count = ((high - low) / (0.5 * finest))
+        .ceil()
+        .clamp(1.0, MOST_PITCHES);
+    let apart = (high - low) / count;
+    let variance: f64 = parts.iter().map(|p| p.variance).sum();
+    let center = |k: usize| low + (k as f64 + 0.5) * apart;
+    (0..count as usize)
+        .map(|k| Bump {
+            center: center(k),
+            width: apart,
+            variance: variance / count,
+        })
+        .collect()
+}
+
+/// The sums that a fit runs over.
+struct Fit<'a> {
+    counts: &'a [f64],
+    /// Energy of a coefficient over the white variance.
+    power: Vec<f64>,
+    /// What has a name and stays.
+    named: Vec<f64>,
+    /// White noise, random walk, bumps.
+    shapes: Vec<Vec<f64>>,
+    sizes: Vec<f64>,
+}
+
+impl Fit<'_> {
+    fn density(&self) -> Vec<f64> {
+        let mut sum = self.named.clone();
+        for (shape, size) in self.shapes.iter().zip(&self.sizes) {
+            let each = sum.iter_mut().zip(shape);
+            each.for_each(|(s, v)| *s += size * v);
+        }
+        sum
+    }
+
+    /// Likelihood ratio's derivative by the size of a shape, over its standard deviation.
+    fn score(&self, density: &[f64], shape: &[f64]) -> f64 {
+        let each = self.counts.iter().zip(&self.power).zip(density).zip(shape);
+        let (up, information) = each.fold((0.0, 0.0), |(up, info), (((m, p), s), v)| {
+            let part = v / s;
+            (
+                up + 0.5 * m * (p / s - 1.0) * part,
+                info + 0.5 * m * part * part,
+            )
+        });
+        up / information.sqrt().max(f64::MIN_POSITIVE)
+    }
+
+    /// Sizes climb the likelihood and stay positive.
+    ///
+    /// # Source
+    /// Fevotte, Idier (2011), Algorithms for nonnegative matrix factorization with the beta-divergence, Neural Comput. 23:
+    /// 2421-2456: multiplicative updates of the Itakura-Saito divergence, exponent 1/2, under which it falls.
+    fn climb(&mut self, rounds: usize) {
+        for _ in 0..rounds {
+            let density = self.density();
+            for (shape, size) in self.shapes.iter().zip(&mut self.sizes) {
+                let each = self.counts.iter().zip(&self.power).zip(&density).zip(shape);
+                let (more, less) = each.fold((0.0, 0.0), |(more, less), (((m, p), s), v)| {
+                    let part = m * v / s;
+                    (more + part * p / s, less + part)
+                });
+                if less > 0.0 {
+                    *size *= (more / less).sqrt();
+                }
+            }
+        }
+    }
+}
+
+/// The spectrum of a channel, none where its causes' model describes it. Bands that are one in the model are told by their parts.
+pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
+    let bins = &s.search.panel.bins;
+    let noise = &s.state.noise;
+    let counts = bins.counts();
+    let model = noise.over(bins);
+    let energy = bins.products(&s.u, &s.u);
+    let power = energy.iter().zip(counts).zip(&model);
+    let filters = noise.terms.iter().filter(|t| t.0.filters_white());
+    let still = Noise {
+        log_walk: f64::NEG_INFINITY,
+        terms: filters.cloned().collect(),
+    };
+    let white = still.over(bins);
+    let lambda = noise.log_walk.exp();
+    let walk: Vec<f64> = (bins.at.omega.iter())
+        .map(|w| lambda / (4.0 * (0.5 * w).sin().powi(2)))
+        .collect();
+    let parts = merged.iter().flat_map(|m| &m.parts);
+    let combs: Vec<Vec<Bump>> = merged.iter().map(|m| pitches(&m.parts)).collect();
+    let mut bumps = combs.concat();
+    let of_tones = bumps.len();
+    let mut named: Vec<f64> = (model.iter().zip(&white).zip(&walk))
+        .map(|((g, w), k)| g - w - k)
+        .collect();
+    for part in parts {
+        let shape = part.over(&bins.at.omega);
+        named.iter_mut().zip(shape).for_each(|(n, v)| *n -= v);
+    }
+    let mut shapes = vec![white, walk];
+    let fixed = shapes.len();
+    shapes.extend(bumps.iter().map(|b| b.over(&bins.at.omega)));
+    let mut fit = Fit {
+        counts,
+        power: power.map(|((e, m), g)| e / m * g).collect(),
+        named: named.into_iter().map(|n| n.max(0.0)).collect(),
+        sizes: vec![1.0; shapes.len()],
+        shapes,
+    };
+    let places = places(bins.n);
+    let shapes: Vec<Vec<f64>> = (places.iter())
+        .map(|(center, width)| {
+            let at = |w: &f64| lorentzian(*center, *width, *w);
+            bins.at.omega.iter().map(at).collect()
+        })
+        .collect();
+    let mut chosen: Vec<usize> = vec![];
+    fit.climb(ROUNDS);
+    while chosen.len() < MOST {
+        let density = fit.density();
+        let free = (0..places.len()).filter(|k| !chosen.contains(k));
+        let best = free
+            .map(|k| (k, fit.score(&density, &shapes[k])))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((k, score)) = best.filter(|b| b.1 > 0.0 && b.1 * b.1 > LEAST_SCORE) else {
+            break;
+        };
+        chosen.push(k);
+        bumps.push(Bump {
+            center: places[k].0,
+            width: places[k].1,
+            variance: 1.0,
+        });
+        fit.shapes.push(shapes[k].clone());
+        // As much as its score says, from where it climbs on.
+        let peak = shapes[k].iter().zip(&density).map(|(v, s)| v / s);
+        let most = peak.fold(0.0, f64::max);
+        fit.sizes.push(score.min(1.0) / most.max(f64::MIN_POSITIVE));
+        fit.climb(ROUNDS);
+    }
+    if bumps.is_empty() {
+        return None;
+    }
+    fit.climb(LAST_ROUNDS);
+    for (bump, size) in bumps.iter_mut().zip(&fit.sizes[fixed..]) {
+        bump.variance *= size;
+    }
+    let white = fit.sizes[0];
+    let is_there = |b: &Bump| b.variance > LEAST_PART * white;
+    let mut of_tones = bumps.drain(..of_tones);
+    let tones = (merged.iter().zip(&combs))
+        .map(|(m, comb)| {
+            let own: Vec<Bump> = of_tones.by_ref().take(comb.len()).collect();
+            let in_all: f64 = own.iter().map(|b| b.variance).sum();
+            let visited = own
+                .into_iter()
+                .filter(|b| b.variance > LEAST_SHARE * in_all);
+            (m.id, visited.collect())
+        })
+        .collect();
+    drop(of_tones);
+    bumps.retain(is_there);
+    Some(Spectrum {
+        bumps,
+        white,
+        walk: fit.sizes[1],
+        tones,
+        density: fit.density(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bump_has_the_variance_that_it_states() {
+        let steps = 100_000;
+        for (center, width) in [(0.0, 0.01), (0.3, 0.02), (2.0, 1.4)] {
+            let all = (0..steps).map(|k| {
+                let omega = PI * (f64::from(k) + 0.5) / f64::from(steps);
+                lorentzian(center, width, omega)
+            });
+            let mean = all.sum::<f64>() / f64::from(steps);
+            assert!((mean - 1.0).abs() < 1e-6, "{center} {width}: {mean}");
+        }
+    }
+
+    #[test]
+    fn sizes_climb_to_those_of_the_power() {
+        let shape = |center: f64| -> Vec<f64> {
+            (1..400)
+                .map(|k| lorentzian(center, 0.1, PI * f64::from(k) / 400.0))
+                .collect()
+        };
+        let shapes = vec![vec![1.0; 399], shape(0.5), shape(2.0)];
+        let mut fit = Fit {
+            counts: &[10.0; 399],
+            power: vec![],
+            named: vec![0.2; 399],
+            shapes,
+            sizes: vec![0.7, 0.3, 0.05],
+        };
+        fit.power = fit.density();
+        fit.sizes = vec![1.0, 0.1, 0.1];
+        fit.climb(LAST_ROUNDS);
+        for (size, truth) in fit.sizes.iter().zip([0.7, 0.3, 0.05]) {
+            assert!((size / truth - 1.0).abs() < 0.01, "{size} {truth}");
+        }
+        assert!(fit.score(&fit.density(), &shape(1.2)).abs() < 0.1);
+    }
+}
