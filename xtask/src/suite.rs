@@ -7,6 +7,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use crate::image;
+use crate::page;
 use crate::step::{Crates, Failure, Pace, Progress, Silent, run, watched};
 use crate::wheel::{self, Profile};
 use crate::{cargo, say_sizes, toolchain};
@@ -82,6 +83,10 @@ pub fn suite(root: &Path, extent: Extent) -> Result<(), Failure> {
         )?;
         Ok("no warning".to_owned())
     })?;
+    // Before the tests, which open it.
+    if extent == Extent::All {
+        steps.step("page for a browser", page::page)?;
+    }
     let mut built = Built::default();
     steps.step("build of the tests", |root| {
         built = Built::of(root)?;

@@ -60,7 +60,6 @@ const LONG_FILES: &[&str] = &[
     "crates/bench/src/simavr.rs",
     "crates/cli/src/capture/tables.rs",
     "crates/cli/src/commands/capture/mod.rs",
-    "crates/cli/src/commands/plan.rs",
     "crates/cli/src/export/noise.rs",
     "crates/cli/src/link/mod.rs",
     "crates/cli/src/report/exhibits/views.rs",
