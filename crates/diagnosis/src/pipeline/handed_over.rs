@@ -24,7 +24,10 @@ pub(super) struct HandedOver {
     pub taken_up: Vec<Observation>,
 }
 
-/// Terms without a name are sought where the search left something; and once more, where the replicates of that model do not hold
+/// Times that terms are sought for what the replicates of the model before have shown: each shows what the one before hid.
+const ROUNDS: usize = 3;
+
+/// Terms without a name are sought where the search left something; and again, where the replicates of that model do not hold
 /// the record.
 pub(super) fn handed_over(
     searched: &[Searched<'_>],
@@ -42,7 +45,7 @@ pub(super) fn handed_over(
     let baseline_model = handover::baseline_model(searched, grid, fitted_on());
     let extended = |by: &Fitted| handover::extended_model(searched, grid, &causes, by, fitted_on());
     let mut wanted = Wanted::of(&told.unexplained);
-    let fitted = unnamed::fit(searched, grid, &wanted, &causes);
+    let mut fitted = unnamed::fit(searched, grid, &wanted, &causes);
     let mut extended_model = extended(&fitted);
     let adequate = told.findings.is_empty() && told.unexplained.is_empty();
     let mut judge = match count {
@@ -54,24 +57,28 @@ pub(super) fn handed_over(
         all.unwrap_or_default()
     };
     let mut replicates = among(&extended_model);
-    let mut told = held(&replicates, adequate, count);
-    let mut taken = vec![];
-    told.unexplained.iter().for_each(|o| wanted.add(o));
-    let again = unnamed::fit(searched, grid, &wanted, &causes);
-    if again != fitted {
+    let mut said = held(&replicates, adequate, count);
+    let (first, strayed) = (replicates.clone(), said.unexplained.clone());
+    for _ in 0..ROUNDS {
+        said.unexplained.iter().for_each(|o| wanted.add(o));
+        let again = unnamed::fit(searched, grid, &wanted, &causes);
+        if again == fitted {
+            break;
+        }
         let model = extended(&again);
         let all = among(&model);
         let now = held(&all, false, count);
-        if now.unexplained.len() <= told.unexplained.len() {
-            taken = taken_up(&replicates, told.unexplained, &now, count);
-            (extended_model, replicates, told) = (model, all, now);
+        if now.unexplained.len() > said.unexplained.len() {
+            break;
         }
+        (fitted, extended_model, replicates, said) = (again, model, all, now);
     }
+    let taken_up = taken_up(&first, strayed, &said, count);
     HandedOver {
         baseline_model,
         extended_model,
         replicates,
-        held: told,
-        taken_up: taken,
+        held: said,
+        taken_up,
     }
 }

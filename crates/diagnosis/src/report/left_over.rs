@@ -23,6 +23,8 @@ const LEAST_SAMPLES: usize = 100;
 const FAR: f64 = 4.0;
 /// Share of a power that may lie below, or above, the place that is stated for it.
 const BESIDE: f64 = 0.05;
+/// Share of the band below which what lies in a place is told from what surrounds it.
+const NARROW: f64 = 0.5;
 /// Share of the band, or of the record, from which on a place is none.
 const EVERYWHERE: f64 = 0.8;
 
@@ -114,12 +116,30 @@ impl Power {
                 excess.iter_mut().zip(energy).for_each(|(x, e)| *x += e / n);
             }
         }
-        let at = place(&above_floor(&excess, &counts), &bins.at.omega);
-        Self {
+        let above = above_floor(&excess, &counts);
+        let at = place(&above, &bins.at.omega);
+        let mut power = Self {
             excess,
             omega: bins.at.omega.clone(),
             model,
             at,
+        };
+        if at.is_some_and(|[low, high]| high - low < NARROW) {
+            power.keep(&above);
+        }
+        power
+    }
+
+    /// Keeps of the excess what lies in its place above the floor; the tails of the nearest cause, which took white noise for
+    /// it, are the model's again.
+    fn keep(&mut self, above: &[f64]) {
+        let [low, high] = self.at.unwrap_or([0.0, 1.0]);
+        let inside = |w: f64| (low..=high).contains(&(w / PI));
+        let each = self.excess.iter_mut().zip(&mut self.model).zip(above);
+        for (((x, m), above), w) in each.zip(&self.omega) {
+            let kept = if inside(*w) { above.copysign(*x) } else { 0.0 };
+            *m += *x - kept;
+            *x = kept;
         }
     }
 

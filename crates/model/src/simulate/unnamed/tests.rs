@@ -69,6 +69,8 @@ fn levels_go_from_knot_to_knot_over_time_and_over_what_is_followed() -> Tested {
         0.0,
         term(Domain::Channel, &["gyro_x"], Some("pwm"), over_duty),
     );
+    let mut model = model;
+    model.excitation.insert("motor_duty".into(), 0.8);
     let record = simulate(&model, 200.0, 20.0, 1)?;
     let duty = record.channel("pwm").ok_or("no pwm")?;
     assert!(duty.values.iter().any(|d| d.abs() > 10.0));
