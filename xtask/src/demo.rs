@@ -108,13 +108,17 @@ pub fn demo(root: &Path, arguments: &[String]) -> Result<(), Failure> {
 fn corrected(root: &Path, options: &Options, pace: &mut Pace) -> Result<(), Failure> {
     let folder = Path::new(FOLDER);
     let mut program = program(root, options);
-    program.args(["run", "--correct", "--no-replicates", "--seconds", "600"]);
+    // By the firmware's logic: the image would take as long again for each 600 s.
+    program.args(["run", "--native", "--correct", "--no-replicates"]);
+    program.args(["--seconds", "600"]);
     program.args(["--hide", &options.hide, "--seed", &options.seed]);
     program.arg("--out").arg(folder.join("loop.csv"));
     program.arg("--json").arg(folder.join("loop.json"));
     let mut meter = Silent("the same again, the correction, and 1260 s under another history");
     let said = watched("the loop", &mut program, &mut meter, pace)?;
-    println!();
+    println!(
+        "\nthe loop closed, on the firmware's logic: the board corrected by what its record showed"
+    );
     for line in (said.out.iter())
         .skip_while(|line| !line.starts_with(CORRECTED))
         .take(MOST_CORRECTED)

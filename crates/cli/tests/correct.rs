@@ -3,7 +3,7 @@
 //! wrong.
 //!
 //! A run of the tests makes a few draws. `IMU_STAND_LOOPS` sets how many, `IMU_STAND_SEED` replays them;
-//! `IMU_STAND_LOOPS=100 cargo test --workspace --test correct -- --nocapture` is the campaign of docs/measurements.md.
+//! `IMU_STAND_LOOPS=100 cargo test -p imu-stand --test correct -- --nocapture` is the campaign of docs/measurements.md.
 
 mod common;
 

@@ -31,8 +31,9 @@ const SHORTEST_BLOCK: u8 = 4;
 const MOST_BLOCKS: f64 = 200.0;
 /// Least growth of the variance in a block, over that of a block: a step of what is stored.
 const LEAST_WALK: f64 = 1.0 / (1 << 24) as f64;
-/// Most of the same that is stored. It is the square of the filter's gain: 1/16.
-const MOST_WALK: f64 = u16::MAX as f64 / (1 << 24) as f64;
+/// Most of the same that is stored, a step below the last so that no rounding leads beyond it. It is the square of the filter's
+/// gain: 1/16.
+const MOST_WALK: f64 = (u16::MAX - 1) as f64 / (1 << 24) as f64;
 /// What is nearest to a term that has the sign of the command alone, of one in proportion to it: sum |d| / sum d^2 of commands
 /// that are spread evenly.
 const SIGN_IN_DUTY: f64 = 1.5;
@@ -421,15 +422,16 @@ mod tests {
         assert!((growth.sqrt() - 0.0032 * block_s / (5.27 / 60.0)).abs() < 1e-6);
         assert!(board.notes.is_empty());
         // Beyond what is stored, the fastest that there is.
-        if let Some(walk) = model.channels[0].baseline.get_mut("rate_random_walk") {
-            walk.value = 0.3;
+        for (noise, k) in [(5.27, 0.3), (4.1, 0.02), (5.271, 0.008), (3.777, 0.0071)] {
+            for (key, value) in [("angle_random_walk", noise), ("rate_random_walk", k)] {
+                if let Some(parameter) = model.channels[0].baseline.get_mut(key) {
+                    parameter.value = value;
+                }
+            }
+            let board = BoardCorrection::of(&model, SENS_AVG).unwrap();
+            let note = &board.notes[0];
+            assert!(note.contains("gyro_x walks faster"), "{note}");
         }
-        let board = BoardCorrection::of(&model, SENS_AVG).unwrap();
-        assert!(
-            board.notes[0].contains("gyro_x walks faster"),
-            "{:?}",
-            board.notes
-        );
     }
 
     #[test]

@@ -74,7 +74,11 @@ fn corrected_causes(model: &ModelFile) -> Vec<Cause> {
             channel: channel.to_owned(),
         })
     });
-    by_axis.collect()
+    let mut all: Vec<Cause> = by_axis.collect();
+    // Several terms of one cause on one axis are one cause.
+    all.sort_by(|a, b| (&a.channel, &a.cause).cmp(&(&b.channel, &b.cause)));
+    all.dedup();
+    all
 }
 
 /// What a model says of the noise beside what is corrected.
