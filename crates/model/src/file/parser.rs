@@ -280,6 +280,28 @@ impl<'a> Parser<'a> {
         Ok(channel)
     }
 
+    /// The channels that something acts on.
+    pub(super) fn channels(
+        &self,
+        table: &DeTable<'a>,
+        of: &str,
+        known: &[ChannelModel],
+    ) -> Parsed<Vec<String>> {
+        let mut names = vec![];
+        let Some(v) = table.get("channels") else {
+            return Ok(names);
+        };
+        for name in self.array(v, "channels")? {
+            let text = self.string(name, "channels")?;
+            if !known.iter().any(|c| c.name == text) {
+                let what = format!("{of} names channel {text}, which the file does not have");
+                return self.error(name.span().start, what);
+            }
+            names.push(text);
+        }
+        Ok(names)
+    }
+
     fn effect(
         &self,
         value: &Spanned<DeValue<'a>>,
@@ -303,18 +325,7 @@ impl<'a> Parser<'a> {
             cause: id.clone(),
             ..EffectModel::default()
         };
-        if let Some(v) = table.get("channels") {
-            for name in self.array(v, "channels")? {
-                let text = self.string(name, "channels")?;
-                if !channels.iter().any(|c| c.name == text) {
-                    return self.error(
-                        name.span().start,
-                        format!("effect {id} names channel {text}, which the file does not have"),
-                    );
-                }
-                found.channels.push(text);
-            }
-        }
+        found.channels = self.channels(table, &format!("effect {id}"), channels)?;
         let unit = found
             .channels
             .first()

@@ -1,11 +1,14 @@
 //! Terms without a name, as a model file has them.
 
 use toml::Spanned;
-use toml::de::DeValue;
+use toml::de::{DeTable, DeValue};
 
 use super::parser::{Parsed, Parser};
 use super::*;
 use crate::unnamed::{Column, ColumnSpec, Domain, MOST_KNOTS};
+
+/// Keys that a term of any domain may have.
+const KEYS: [&str; 5] = ["domain", "channels", "follows", "refines", "rms"];
 
 impl<'a> Parser<'a> {
     /// A term that acts on some of the channels of a file, whose effects are known.
@@ -14,36 +17,11 @@ impl<'a> Parser<'a> {
         value: &Spanned<DeValue<'a>>,
         file: &ModelFile,
     ) -> Parsed<Unnamed> {
-        let channels = &file.channels;
         let table = self.table(value, "unnamed")?;
         let at = value.span().start;
-        let Some(id) = table.get("domain") else {
-            return self.error(at, "an unnamed term needs a domain".to_owned());
-        };
-        let text = self.string(id, "domain")?;
-        let Some(domain) = Domain::ALL.into_iter().find(|d| d.id() == text) else {
-            let ids = Domain::ALL.map(Domain::id).join(", ");
-            return self.error(
-                id.span().start,
-                format!("unknown domain {text}; known are {ids}"),
-            );
-        };
-        let mut names = vec![];
-        if let Some(v) = table.get("channels") {
-            for name in self.array(v, "channels")? {
-                let text = self.string(name, "channels")?;
-                if !channels.iter().any(|c| c.name == text) {
-                    return self.error(
-                        name.span().start,
-                        format!(
-                            "an unnamed term names channel {text}, which the file does not have"
-                        ),
-                    );
-                }
-                names.push(text);
-            }
-        }
-        match (domain, names.len()) {
+        let domain = self.domain(table, at)?;
+        let channels = self.channels(table, "an unnamed term", &file.channels)?;
+        match (domain, channels.len()) {
             (Domain::Cross, 2) => {}
             (Domain::Cross, n) => {
                 return self.error(at, format!("a term of two axes names {n} channels"));
@@ -51,96 +29,119 @@ impl<'a> Parser<'a> {
             (_, 0) => return self.error(at, "an unnamed term needs channels".to_owned()),
             _ => {}
         }
-        let follows = match (table.get("follows"), domain.follows()) {
-            (Some(v), None | Some(true)) => Some(self.string(v, "follows")?),
-            (Some(v), Some(false)) => {
-                let what = format!("a term of the domain {text} follows no channel");
-                return self.error(v.span().start, what);
-            }
-            (None, Some(true)) => {
-                return self.error(
-                    at,
-                    format!("a term of the domain {text} needs follows = ..."),
-                );
-            }
-            (None, _) => None,
-        };
-        let refines = match table.get("refines") {
-            None => None,
-            Some(v) => {
-                let cause = self.string(v, "refines")?;
-                let there = |c: &String| {
-                    let acts = |e: &EffectModel| e.channels.is_empty() || e.channels.contains(c);
-                    file.effects.iter().any(|e| e.cause == cause && acts(e))
-                };
-                let tone =
-                    cause == crate::effects::wandering_line::ID && domain == Domain::Spectrum;
-                if !tone || !names.iter().all(there) {
-                    let what = format!(
-                        "refines is {cause:?}; it has to be a wandering_line that the file has on these channels, in a term of the spectrum"
-                    );
-                    return self.error(v.span().start, what);
-                }
-                Some(cause)
-            }
-        };
-        let unit = (channels.iter().find(|c| names.contains(&c.name)))
+        let follows = self.follows(table, domain, at)?;
+        let refines = self.refines(table, domain, &channels, file)?;
+        let unit = (file.channels.iter().find(|c| channels.contains(&c.name)))
             .map_or("deg/s", |c| c.unit.as_str());
         let specs = domain.columns(follows.is_some());
         for (key, _) in table {
             let name: &str = key.get_ref();
-            let known = ["domain", "channels", "follows", "refines", "rms"];
-            if !known.contains(&name) && !specs.iter().any(|s| s.name == name) {
+            if !KEYS.contains(&name) && !specs.iter().any(|s| s.name == name) {
                 let names: Vec<_> = specs.iter().map(|s| s.name).collect();
+                let names = names.join(", ");
                 return self.error(
                     key.span().start,
-                    format!(
-                        "unknown key {name} in an unnamed term; this domain has {}, rms",
-                        names.join(", ")
-                    ),
+                    format!("unknown key {name} in an unnamed term; this domain has {names}, rms"),
                 );
             }
         }
         let Some(rms) = table.get("rms") else {
             return self.error(at, "an unnamed term needs rms, its size".to_owned());
         };
-        let rms = self.parameter("rms", rms, &[unit.to_owned()], range::SIZE)?;
+        Ok(Unnamed {
+            domain,
+            rms: self.parameter("rms", rms, &[unit.to_owned()], range::SIZE)?,
+            columns: self.columns(table, domain, specs, unit, at)?,
+            channels,
+            follows,
+            refines,
+        })
+    }
+
+    fn domain(&self, table: &DeTable<'a>, at: usize) -> Parsed<Domain> {
+        let Some(id) = table.get("domain") else {
+            return self.error(at, "an unnamed term needs a domain".to_owned());
+        };
+        let text = self.string(id, "domain")?;
+        match Domain::ALL.into_iter().find(|d| d.id() == text) {
+            Some(domain) => Ok(domain),
+            None => {
+                let ids = Domain::ALL.map(Domain::id).join(", ");
+                let what = format!("unknown domain {text}; known are {ids}");
+                self.error(id.span().start, what)
+            }
+        }
+    }
+
+    fn follows(&self, table: &DeTable<'a>, domain: Domain, at: usize) -> Parsed<Option<String>> {
+        let id = domain.id();
+        match (table.get("follows"), domain.follows()) {
+            (Some(v), None | Some(true)) => Ok(Some(self.string(v, "follows")?)),
+            (Some(v), Some(false)) => {
+                let what = format!("a term of the domain {id} follows no channel");
+                self.error(v.span().start, what)
+            }
+            (None, Some(true)) => {
+                self.error(at, format!("a term of the domain {id} needs follows = ..."))
+            }
+            (None, _) => Ok(None),
+        }
+    }
+
+    fn refines(
+        &self,
+        table: &DeTable<'a>,
+        domain: Domain,
+        channels: &[String],
+        file: &ModelFile,
+    ) -> Parsed<Option<String>> {
+        let Some(v) = table.get("refines") else {
+            return Ok(None);
+        };
+        let cause = self.string(v, "refines")?;
+        let there = |c: &String| {
+            let acts = |e: &EffectModel| e.channels.is_empty() || e.channels.contains(c);
+            file.effects.iter().any(|e| e.cause == cause && acts(e))
+        };
+        let tone = cause == crate::effects::wandering_line::ID && domain == Domain::Spectrum;
+        if tone && channels.iter().all(there) {
+            return Ok(Some(cause));
+        }
+        let what = format!(
+            "refines is {cause:?}; it has to be a wandering_line that the file has on these channels, in a term of the spectrum"
+        );
+        self.error(v.span().start, what)
+    }
+
+    fn columns(
+        &self,
+        table: &DeTable<'a>,
+        domain: Domain,
+        specs: &[ColumnSpec],
+        unit: &str,
+        at: usize,
+    ) -> Parsed<Vec<Column>> {
         let mut columns: Vec<Column> = vec![];
+        let single = matches!(domain, Domain::Cross | Domain::Codes);
         for spec in specs {
             let Some(v) = table.get(spec.name) else {
-                return self.error(at, format!("an unnamed term of {text} needs {}", spec.name));
+                let what = format!("an unnamed term of {} needs {}", domain.id(), spec.name);
+                return self.error(at, what);
             };
             let column = self.column(v, spec, unit)?;
-            let length = columns
-                .first()
-                .map_or(column.values.len(), |c| c.values.len());
-            let one = domain == Domain::Cross || domain == Domain::Codes;
-            if column.values.len() != length || length == 0 || (one && length != 1) {
-                let expected = if one || length == 0 { 1 } else { length };
-                return self.error(
-                    v.span().start,
-                    format!(
-                        "{} has {} values; expected {expected}{}",
-                        spec.name,
-                        column.values.len(),
-                        if one {
-                            ""
-                        } else {
-                            " as the column before it, and at least one"
-                        }
-                    ),
-                );
+            let count = column.values.len();
+            let expected = match columns.first() {
+                _ if single => 1,
+                Some(first) => first.values.len(),
+                None => count.max(1),
+            };
+            if count != expected {
+                let what = format!("{} has {count} values; expected {expected}", spec.name);
+                return self.error(v.span().start, what);
             }
             columns.push(column);
         }
-        Ok(Unnamed {
-            domain,
-            channels: names,
-            follows,
-            refines,
-            rms,
-            columns,
-        })
+        Ok(columns)
     }
 
     fn column(

@@ -26,12 +26,16 @@ impl Acting {
         self.effect.simulate(&self.parameters, &self.axes, run);
     }
 
-    /// A number of its own: what is drawn for it does not depend on what else a model holds.
+    /// A number of its own: what is drawn for it does not depend on what else a model holds, nor on the last digits of a fit,
+    /// which are another processor's.
     fn stream(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
-        (self.effect.id(), &self.axes).hash(&mut hasher);
+        self.effect.id().hash(&mut hasher);
+        for axis in &self.axes {
+            (*axis as u64).hash(&mut hasher);
+        }
         for (name, p) in &self.parameters {
-            (name, p.value.to_bits()).hash(&mut hasher);
+            (name, format!("{:.2e}", p.value)).hash(&mut hasher);
         }
         hasher.finish()
     }
