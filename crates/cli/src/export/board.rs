@@ -7,6 +7,7 @@
 use std::fmt::Write as _;
 
 use model::ModelFile;
+use model::file::EffectModel;
 use wire::correction::{self, BLOCK_SHIFT_MAX, Correction, NUMBERS, RANGE_STEP, name, step};
 
 /// TEMP_OUT, degC for each count, and its zero (ADIS16250 data sheet).
@@ -181,27 +182,7 @@ impl BoardCorrection {
             if unknown {
                 notes.push(format!("{}: the board has no term for it", effect.cause));
             }
-            for (parameter, what) in [
-                (
-                    "while_turning",
-                    "what sets in as the motor turns is taken off in proportion to the command",
-                ),
-                (
-                    "surge_at_full_duty",
-                    "the surge behind a step of the motor stays: the board has no term for it",
-                ),
-            ] {
-                if effect
-                    .parameters
-                    .get(parameter)
-                    .is_some_and(|p| p.value != 0.0)
-                {
-                    notes.push(format!("{}: {what}", effect.cause));
-                }
-            }
-            if effect.cause == "g_sensitivity" {
-                notes.push("g_sensitivity: for the accelerometer's 1.5 g range".to_owned());
-            }
+            notes.extend(provisos(effect));
         }
         notes.extend(filter(&mut out, model.rate_hz, [density, alike, walks]));
         let numbers = rounded(&mut out, setting("supply_v", 5.0))?;
@@ -234,6 +215,29 @@ impl BoardCorrection {
         }
         text
     }
+}
+
+/// What is to be known of how an effect is taken off.
+fn provisos(effect: &EffectModel) -> Vec<String> {
+    const OF_MOTOR: [(&str, &str); 2] = [
+        (
+            "while_turning",
+            "what sets in as the motor turns is taken off in proportion to the command",
+        ),
+        (
+            "surge_at_full_duty",
+            "the surge behind a step of the motor stays: the board has no term for it",
+        ),
+    ];
+    let has = |name: &str| effect.parameters.get(name).is_some_and(|p| p.value != 0.0);
+    let mut notes: Vec<String> = (OF_MOTOR.iter())
+        .filter(|(name, _)| has(name))
+        .map(|(_, what)| format!("{}: {what}", effect.cause))
+        .collect();
+    if effect.cause == "g_sensitivity" {
+        notes.push("g_sensitivity: for the accelerometer's 1.5 g range".to_owned());
+    }
+    notes
 }
 
 fn degc(steps: i8) -> f64 {

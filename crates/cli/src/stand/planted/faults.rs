@@ -32,6 +32,9 @@ pub(super) fn planted(fault: &Fault, run: &Run, start_s: f64) -> Planted {
         })
 }
 
+/// Parameters of `cross_axis`.
+const FROM: [&str; 3] = ["from_gyro_x", "from_gyro_y", "from_gyro_z"];
+
 /// What follows something that is recorded.
 fn following(fault: &Fault, run: &Run) -> Option<Planted> {
     let scenario = &run.scenario;
@@ -112,11 +115,7 @@ fn following(fault: &Fault, run: &Run) -> Option<Planted> {
                 GYROS[from],
                 number(share, 3)
             ),
-            vec![Size::new(
-                ["from_gyro_x", "from_gyro_y", "from_gyro_z"][from],
-                share,
-                "1",
-            )],
+            vec![Size::new(FROM[from], share, "1")],
         ),
         Fault::MotorNoise {
             gyro,
