@@ -191,7 +191,8 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     told.checks.extend(held.checks);
     told.unexplained.extend(held.unexplained);
     told.unexplained.extend(taken_up);
-    let mut unexplained = entries(told.unexplained, &searched, &grid, options.matters);
+    let terms = &extended_model.unnamed;
+    let mut unexplained = entries(told.unexplained, &searched, &grid, terms, options.matters);
     ranked(&mut told.findings, &mut unexplained);
     // Without replicates nothing says that what is left does not matter.
     let unnamed = unexplained.iter().any(|u| u.material || !judged);

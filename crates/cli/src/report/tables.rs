@@ -85,6 +85,7 @@ fn entry(left: &Unexplained) -> Markup {
         div {
             (left.what)
             @if let Some(c) = &left.consequence { ". " (answer::consequence_of(c, left.material)) }
+            @if let Some(text) = answer::modelled(left) { " " (text) }
             @if !left.details.is_empty() {
                 details {
                     summary { "what was seen" }

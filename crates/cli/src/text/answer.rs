@@ -1,6 +1,6 @@
 //! A finding in sentences for a person: what it is and how large, what it costs to leave it out, what is still open.
 
-use diagnosis::result::{Consequence, Finding, Parameter};
+use diagnosis::result::{Consequence, Finding, Parameter, Unexplained};
 use model::effects::effect;
 
 use crate::report::plot::{number, tidy};
@@ -61,6 +61,21 @@ pub fn cost(finding: &Finding) -> Option<String> {
         Some(consequence) => Some(consequence_of(consequence, finding.material)),
         None => cost_in_angle(finding),
     }
+}
+
+/// How the model has what has no name.
+#[must_use]
+pub fn modelled(left: &Unexplained) -> Option<String> {
+    let each = left.modelled.iter().map(|domain| match domain.as_str() {
+        "mean" => "its course",
+        "channel" => "a slope over what was recorded",
+        "spectrum" => "its spectrum",
+        "variance" => "the course of its size",
+        "cross" => "the correlation",
+        _ => "the shape of its distribution",
+    });
+    let each: Vec<&str> = each.collect();
+    (!each.is_empty()).then(|| format!("The model has it without a name: {}.", each.join(", ")))
 }
 
 /// What something does to the integrated angle and to the readings.

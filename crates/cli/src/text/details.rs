@@ -48,6 +48,9 @@ fn write_unexplained(out: &mut String, all: &[Unexplained]) {
             let cost = answer::consequence_of(c, left.material);
             let _ = writeln!(out, "{}", item("", &cost));
         }
+        if let Some(text) = answer::modelled(left) {
+            let _ = writeln!(out, "{}", item("", &text));
+        }
         for seen in &left.details {
             let _ = writeln!(out, "{}", item("- ", seen));
         }

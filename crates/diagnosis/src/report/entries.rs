@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use model::unnamed::{self, Unnamed};
+
 use crate::ingest::types::Grid;
 use crate::report::left_over::{Left, left_over};
 use crate::result::{Consequence, Unexplained};
@@ -14,6 +16,7 @@ pub(crate) fn entries(
     all: Vec<Observation>,
     searched: &[Searched<'_>],
     grid: &Grid,
+    terms: &[Unnamed],
     matters: f64,
 ) -> Vec<Unexplained> {
     let mut groups: Vec<Vec<Observation>> = vec![];
@@ -30,13 +33,28 @@ pub(crate) fn entries(
     }
     let entry = |group: Vec<Observation>| {
         let own = searched.iter().find(|s| s.target.name == group[0].channel);
-        match (group[0].domain, own) {
+        let told = match (group[0].domain, own) {
             (Domain::Noise, Some(s)) => of_noise(&group, s, grid, matters),
             (Domain::Coupling, Some(s)) => of_coupling(&group, s, matters),
             _ => plain(&group),
+        };
+        Unexplained {
+            modelled: modelled(&group, terms),
+            ..told
         }
     };
     groups.into_iter().map(entry).collect()
+}
+
+/// Domains of the terms of a model that an entry has there.
+fn modelled(group: &[Observation], terms: &[Unnamed]) -> Vec<String> {
+    let shared = group[0].domain == Domain::Coupling;
+    let own = terms.iter().filter(|t| {
+        let of_domain = shared == (t.domain == unnamed::Domain::Cross);
+        of_domain && group[0].domain != Domain::Readings && t.channels.contains(&group[0].channel)
+    });
+    let ids: BTreeSet<&str> = own.map(|t| t.domain.id()).collect();
+    ids.into_iter().map(String::from).collect()
 }
 
 /// An entry whose consequence nobody knows.

@@ -260,7 +260,7 @@ fn added_by_counts(model: &mut ModelFile, channel: &ChannelModel, lost: f64) -> 
     told.then(|| (mean(&with) - mean(&without), factor))
 }
 
-/// Gives far readings their size: the root of the mean square of how far they lie from what the model expects there, less that
+/// Gives far readings their sides and their size: the root of the mean square of how far they lie from what the model expects there, less that
 /// of the noise.
 pub(crate) fn size_outliers(findings: &mut [Finding], searched: &[Searched<'_>]) {
     for f in findings.iter_mut().filter(|f| f.cause == "outliers") {
@@ -280,6 +280,10 @@ pub(crate) fn size_outliers(findings: &mut [Finding], searched: &[Searched<'_>])
         let size = (square - white).max(0.0).sqrt();
         let size = Parameter::estimated(size, (white / count).sqrt(), &s.target.unit);
         f.parameters.insert("size".into(), size);
+        let above = sizes.iter().filter(|v| **v > 0.0).count() as f64 / count;
+        let error = (above * (1.0 - above) / count).sqrt();
+        let above = Parameter::estimated(above, error, "1");
+        f.parameters.insert("upward".into(), above);
     }
 }
 

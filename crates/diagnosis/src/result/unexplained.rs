@@ -60,6 +60,9 @@ pub struct Unexplained {
     /// Ids of the checks that see it.
     #[serde(default)]
     pub checks: Vec<String>,
+    /// Domains of the unnamed terms by which the extended model has it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub modelled: Vec<String>,
     /// What it does, where that can be told.
     #[serde(default)]
     pub consequence: Option<Consequence>,

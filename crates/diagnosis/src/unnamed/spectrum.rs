@@ -14,9 +14,9 @@ use crate::search::searched::Searched;
 
 /// Most bumps of a channel.
 const MOST: usize = 16;
-/// Score, the square of a standard normal value of one sign, that a further bump has to reach: one in 20 000 of a hundred that
-/// differ reach it by chance in half a percent of records.
-const LEAST_SCORE: f64 = 15.0;
+/// Score, the square of a standard normal value of one sign, that a further bump has to reach: bumps are sought where something is
+/// left, and what three standard errors make is in the simulations too.
+const LEAST_SCORE: f64 = 9.0;
 /// Bumps in an octave, and their full widths over their centres.
 const AN_OCTAVE: i32 = 6;
 const WIDTHS: [f64; 3] = [0.08, 0.25, 0.7];

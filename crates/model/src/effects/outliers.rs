@@ -30,6 +30,11 @@ impl Effect for Outliers {
                 "deg/s",
                 "root mean square of their distance from the truth; 10 white sigma where it is left out",
             ),
+            optional(
+                "upward",
+                "1",
+                "share of them that lie above the truth; to either side in turn where it is left out",
+            ),
         ];
         PARAMETERS
     }
@@ -77,9 +82,13 @@ impl Effect for Outliers {
             let size = parameters
                 .get("size")
                 .map_or(10.0 * simulation.white_sigma[axis], |p| p.value);
+            let upward = parameters.get("upward").map_or(0.5, |p| p.value);
+            // Of the first k, the whole number next below k + 1/2 of that share.
+            let above = |k: usize| (k as f64 * upward + 0.5).floor();
             for k in 0..count {
                 let i = at.sample(&mut simulation.rng);
-                simulation.white[axis][i] += if k % 2 == 0 { size } else { -size };
+                let up = above(k + 1) > above(k);
+                simulation.white[axis][i] += if up { size } else { -size };
             }
         }
     }
