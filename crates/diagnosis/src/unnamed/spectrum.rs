@@ -5,11 +5,12 @@
 //! name, as they are; and bumps of a fixed list, of which those enter one by one that take up most.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
-use model::effect::{Hypothesis, Peak};
+use model::effect::{Covariance, Hypothesis, Peak};
 
 use crate::fit::channel::Term;
-use crate::fit::likelihood::Noise;
+use crate::fit::likelihood::{Bins, Noise};
 use crate::search::searched::Searched;
 
 /// Most bumps of a channel.
@@ -26,6 +27,9 @@ const LEAST_COEFFICIENTS: f64 = 12.0;
 const REACH: f64 = 3.0;
 const MOST_PITCHES: f64 = 64.0;
 const LEAST_SHARE: f64 = 1e-3;
+/// Largest part of the white variance that is taken for rounding, and largest correlation before it.
+const MOST_ROUNDING: f64 = 0.5;
+const MOST_CORRELATED: f64 = 0.999;
 /// Variance of a bump over the white one below which it is none.
 const LEAST_PART: f64 = 1e-9;
 /// Rounds of the fit while bumps are added, and of the last one.
@@ -205,6 +209,31 @@ impl Fit<'_> {
     }
 }
 
+/// Density of the white noise through the filters that it goes through, over the bins: a part `rounding` of its variance comes
+/// behind them, and what is filtered has the larger correlation that gives the readings theirs.
+fn filtered(noise: &Noise, bins: &Bins, rounding: f64) -> Vec<f64> {
+    let filters = noise.terms.iter().filter(|t| t.0.filters_white());
+    let before = |(filter, theta): &(Arc<dyn Covariance>, Vec<f64>)| {
+        let mut theta = theta.clone();
+        if let Some(first) = theta.first_mut().filter(|_| rounding > 0.0) {
+            // Its coordinate is the logit of the correlation of neighbours.
+            let correlation = 1.0 / (1.0 + (-*first).exp());
+            let own = (correlation / (1.0 - rounding)).min(MOST_CORRELATED);
+            *first = (own / (1.0 - own)).ln();
+        }
+        (Arc::clone(filter), theta)
+    };
+    let still = Noise {
+        log_walk: f64::NEG_INFINITY,
+        terms: filters.map(before).collect(),
+    };
+    if still.terms.is_empty() {
+        return still.over(bins);
+    }
+    let all = still.over(bins).into_iter();
+    all.map(|g| (1.0 - rounding) * g + rounding).collect()
+}
+
 /// The spectrum of a channel, none where its causes' model describes it. Bands that are one in the model are told by their parts.
 pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
     let bins = &s.search.panel.bins;
@@ -213,12 +242,8 @@ pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
     let model = noise.over(bins);
     let energy = bins.products(&s.u, &s.u);
     let power = energy.iter().zip(counts).zip(&model);
-    let filters = noise.terms.iter().filter(|t| t.0.filters_white());
-    let still = Noise {
-        log_walk: f64::NEG_INFINITY,
-        terms: filters.cloned().collect(),
-    };
-    let white = still.over(bins);
+    let rounding = s.target.step.powi(2) / 12.0 / s.state.solution.white;
+    let white = filtered(noise, bins, 0.0);
     let lambda = noise.log_walk.exp();
     let walk: Vec<f64> = (bins.at.omega.iter())
         .map(|w| lambda / (4.0 * (0.5 * w).sin().powi(2)))
@@ -234,7 +259,7 @@ pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
         let shape = part.over(&bins.at.omega);
         named.iter_mut().zip(shape).for_each(|(n, v)| *n -= v);
     }
-    let mut shapes = vec![white, walk];
+    let mut shapes = vec![filtered(noise, bins, rounding.min(MOST_ROUNDING)), walk];
     let fixed = shapes.len();
     shapes.extend(bumps.iter().map(|b| b.over(&bins.at.omega)));
     let mut fit = Fit {
