@@ -182,7 +182,8 @@ fn blocks(values: &[f64], count: usize) -> Vec<f64> {
 
 /// One figure for each term of a channel.
 pub(crate) fn of_channel(s: &Searched<'_>, grid: &Grid) -> Vec<Evidence> {
-    let named = |t: &&Term| t.effect.id() != crate::fit::channel::ID;
+    // A band is shown once, with all that it is made of.
+    let named = |t: &&Term| t.effect.id() != crate::fit::channel::ID && !t.is_part();
     s.state
         .terms
         .iter()
