@@ -24,8 +24,6 @@ use port::Serial;
 pub const DEFAULT_BAUD: u32 = 38_400;
 /// Crystal of the board, Hz: the speeds that it can have are this over 16 (divisor + 1).
 const CLOCK_HZ: f64 = 16e6;
-/// How long a read waits for the first byte.
-const READ_WAIT: Duration = Duration::from_millis(20);
 /// How long a reply may take: 60 ms of queue at 38400 baud, behind a health and a hello frame.
 const REPLY_WAIT: Duration = Duration::from_millis(700);
 /// How long work on the gyros may take, which is done beside a sample and told with the next: two of them at 1 Hz.
@@ -121,7 +119,7 @@ impl Link {
     /// [`LinkError::Open`], which names the ports that there are.
     pub fn open(name: &str, baud: u32) -> Result<Self, LinkError> {
         let since = Instant::now();
-        let port = open_port(name, baud, since)?;
+        let port = Serial::open(name, baud, since)?;
         // Another program may have asked a moment ago: its replies must not look like ours.
         let number = (std::process::id() as u16).wrapping_mul(257);
         Ok(Self {
@@ -159,7 +157,7 @@ impl Link {
     pub fn reopen(&mut self) -> Result<(), LinkError> {
         // Closed first: a port may be open once only.
         self.port = None;
-        let port = open_port(&self.name, self.baud, self.since)?;
+        let port = Serial::open(&self.name, self.baud, self.since)?;
         self.port = Some(Box::new(port));
         let _cut = self.decoder.push(0);
         Ok(())
@@ -492,79 +490,5 @@ pub fn baud_of(divisor: u16) -> f64 {
     CLOCK_HZ / 16.0 / (f64::from(divisor) + 1.0)
 }
 
-/// Opens a port and forgets what had been received before.
-fn open_port(name: &str, baud: u32, since: Instant) -> Result<Serial, LinkError> {
-    let open = |error: serialport::Error| LinkError::Open {
-        port: name.to_owned(),
-        why: error.description.clone(),
-        help: help_to_open(&error),
-    };
-    let port = serialport::new(name, baud)
-        .timeout(READ_WAIT)
-        .open()
-        .map_err(open)?;
-    port.clear(serialport::ClearBuffer::Input).map_err(open)?;
-    Ok(Serial { port, since })
-}
-
-/// What to do about a port that does not open.
-fn help_to_open(error: &serialport::Error) -> String {
-    let ports = serialport::available_ports().unwrap_or_default();
-    let names: Vec<&str> = ports.iter().map(|port| port.port_name.as_str()).collect();
-    let there = if names.is_empty() {
-        "the system sees no serial port: plug the adapter in".to_owned()
-    } else {
-        format!("ports that there are: {}", names.join(", "))
-    };
-    match error.kind {
-        serialport::ErrorKind::Io(ErrorKind::PermissionDenied) => {
-            "you may not use this port: on Linux join its group (`sudo usermod -aG dialout $USER`) and log in again"
-                .to_owned()
-        }
-        serialport::ErrorKind::NoDevice => {
-            format!("another program may have it open: close it; {there}")
-        }
-        _ => there,
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn speeds_are_those_of_the_data_sheets_table_and_the_marginal_ones_are_refused() {
-        assert_eq!(divisor(38_400), Some(25));
-        assert_eq!(divisor(250_000), Some(3));
-        assert_eq!(divisor(9_600), Some(103));
-        assert_eq!(divisor(115_200), None, "-3.5 %");
-        assert_eq!(divisor(230_400), None, "+8.5 %");
-        assert_eq!(divisor(57_600), None, "+2.1 %");
-        assert!((baud_of(25) - 38_461.5).abs() < 0.1);
-    }
-
-    #[test]
-    fn what_must_not_happen_twice_is_sent_once() {
-        let axis = wire::Axis::X;
-        let write = |address| Command::WriteRegister {
-            gyro: axis,
-            address,
-            value: 0,
-        };
-        for once in [
-            Command::Reboot,
-            Command::ClearCounters,
-            Command::SetBaud { divisor: 3 },
-            Command::BiasNull { samples: 1 },
-            Command::StoreConfig,
-            Command::Arm { nonce: 0 },
-            write(0x3e),
-            write(0x3f),
-        ] {
-            assert_eq!(Patience::of(&once).tries, 1, "{once:?}");
-        }
-        for again in [Command::Ping, Command::KeepAlive, write(0x38)] {
-            assert!(Patience::of(&again).tries > 1, "{again:?}");
-        }
-    }
-}
+mod tests;

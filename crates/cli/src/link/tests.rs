@@ -1,0 +1,37 @@
+use super::*;
+
+#[test]
+fn speeds_are_those_of_the_data_sheets_table_and_the_marginal_ones_are_refused() {
+    assert_eq!(divisor(38_400), Some(25));
+    assert_eq!(divisor(250_000), Some(3));
+    assert_eq!(divisor(9_600), Some(103));
+    assert_eq!(divisor(115_200), None, "-3.5 %");
+    assert_eq!(divisor(230_400), None, "+8.5 %");
+    assert_eq!(divisor(57_600), None, "+2.1 %");
+    assert!((baud_of(25) - 38_461.5).abs() < 0.1);
+}
+
+#[test]
+fn what_must_not_happen_twice_is_sent_once() {
+    let axis = wire::Axis::X;
+    let write = |address| Command::WriteRegister {
+        gyro: axis,
+        address,
+        value: 0,
+    };
+    for once in [
+        Command::Reboot,
+        Command::ClearCounters,
+        Command::SetBaud { divisor: 3 },
+        Command::BiasNull { samples: 1 },
+        Command::StoreConfig,
+        Command::Arm { nonce: 0 },
+        write(0x3e),
+        write(0x3f),
+    ] {
+        assert_eq!(Patience::of(&once).tries, 1, "{once:?}");
+    }
+    for again in [Command::Ping, Command::KeepAlive, write(0x38)] {
+        assert!(Patience::of(&again).tries > 1, "{again:?}");
+    }
+}
