@@ -153,6 +153,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     } = of;
     let search = |t| channel::searched(&grid, t);
     let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(search).collect();
+    let mended: Vec<Finding> = sticking.clone();
     grid.dct.forget();
     let tested = tested(&mut searched, &audited, &grid);
     let first = Named {
@@ -178,7 +179,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         replicates,
         held,
         taken_up,
-    } = handed_over::handed_over(&searched, &grid, &told, options);
+    } = handed_over::handed_over(&searched, &grid, &told, &mended, options);
     for f in &mut told.findings {
         f.material = true;
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use model::file::{FittedOn, ModelFile};
+use model::file::{EffectModel, FittedOn, ModelFile};
 
 use super::{DiagnoseOptions, Told};
 use crate::ingest::types::Grid;
@@ -28,11 +28,12 @@ pub(super) struct HandedOver {
 const ROUNDS: usize = 3;
 
 /// Terms without a name are sought where the search left something; and again, where the replicates of that model do not hold
-/// the record.
+/// the record. Faults that were `mended` before the search are in the model, and not in what was fitted and is compared.
 pub(super) fn handed_over(
     searched: &[Searched<'_>],
     grid: &Grid,
     told: &Told,
+    mended: &[Finding],
     options: &DiagnoseOptions,
 ) -> HandedOver {
     let count = options.replicates;
@@ -43,7 +44,13 @@ pub(super) fn handed_over(
     };
     let causes: Vec<&Finding> = told.findings.iter().chain(&told.nearest).collect();
     let baseline_model = handover::baseline_model(searched, grid, fitted_on());
-    let extended = |by: &Fitted| handover::extended_model(searched, grid, &causes, by, fitted_on());
+    let is_mended = |e: &EffectModel| {
+        let of = |f: &Finding| f.cause == e.cause && f.channels == e.channels;
+        mended.iter().any(of)
+    };
+    let extended = |by: &Fitted| {
+        handover::extended_model(searched, grid, &causes, by, &is_mended, fitted_on())
+    };
     let mut wanted = Wanted::of(&told.unexplained);
     let mut fitted = unnamed::fit(searched, grid, &wanted, &causes);
     let mut extended_model = extended(&fitted);
@@ -53,7 +60,9 @@ pub(super) fn handed_over(
         count => Judge::new(grid, &baseline_model, count, options.seed).ok(),
     };
     let mut among = |model: &ModelFile| {
-        let all = judge.as_mut().map(|j| j.of(model).unwrap_or_default());
+        let mut compared = model.clone();
+        compared.effects.retain(|e| !is_mended(e));
+        let all = judge.as_mut().map(|j| j.of(&compared).unwrap_or_default());
         all.unwrap_or_default()
     };
     let mut replicates = among(&extended_model);

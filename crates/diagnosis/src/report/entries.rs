@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use model::effect::extremes;
 use model::unnamed::{self, Unnamed};
 
 use crate::ingest::types::Grid;
@@ -111,9 +112,16 @@ fn of_noise(group: &[Observation], s: &Searched<'_>, grid: &Grid, matters: f64) 
         share_of_variance,
         band_hz,
         span_s,
-        consequence,
+        mut consequence,
         local_change,
     } = left_over(s, grid, &terms);
+    // A law of the variance that has lost its name stays out of the residual.
+    let nearest = |title: &str| group.iter().any(|o| o.nearest.contains(&title));
+    let law = s.variance.as_ref();
+    if let Some(v) = law.filter(|v| nearest(v.effect.docs().title)) {
+        let largest = extremes(&v.law)[1].max(0.0).sqrt() - 1.0;
+        consequence.largest_change = consequence.largest_change.max(largest);
+    }
     let band_hz = band_hz.or_else(|| stated(group, grid.rate_hz));
     let material = consequence.largest_change.max(local_change) > matters;
     let follows = group.iter().flat_map(|o| &o.follows);

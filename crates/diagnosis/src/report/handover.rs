@@ -28,12 +28,14 @@ pub(crate) fn baseline_model(
     model(searched, grid, &|s| baseline(s, grid), fitted_on)
 }
 
-/// The model extended by the findings `named` and by what has no name.
+/// The model extended by the findings `named` and by what has no name. What was mended before the search adds nothing to what was
+/// fitted.
 pub(crate) fn extended_model(
     searched: &[Searched<'_>],
     grid: &Grid,
     named: &[&Finding],
     unnamed: &Fitted,
+    is_mended: &dyn Fn(&EffectModel) -> bool,
     fitted_on: FittedOn,
 ) -> ModelFile {
     let mut extended = model(searched, grid, &|s| beside(s, named, grid), fitted_on);
@@ -57,9 +59,13 @@ pub(crate) fn extended_model(
             }
         }
     }
+    let read: Vec<EffectModel> = (extended.effects.iter())
+        .filter(|e| !is_mended(e))
+        .cloned()
+        .collect();
     for (channel, s) in extended.channels.iter_mut().zip(searched) {
         let lost = s.target.lost.len() as f64 / grid.n as f64;
-        before_counts(channel, &extended.effects, grid.rate_hz, lost);
+        before_counts(channel, &read, grid.rate_hz, lost);
     }
     extended
 }
