@@ -157,22 +157,19 @@ const METHOD: &str = "\
 ## Method
 
 - **A run** is a simulated stand: 600 s at 20 Hz, three axes; angle random walk 3.6 to 7 deg/sqrt(h), rate random walk 0 (15 % of the
-  axes) or 3e-4 to 7e-3 deg/s/sqrt(s), drawn by axis; temperature, supply, motor command and vibration acting. An effect comes on
-  a random channel.
-- **Strength d'** is the square root of twice the expected log likelihood ratio against white noise and a random walk fitted
-  again. It is computed from the simulated signal or spectral density, not by the engine. Of two effects on one channel each is
-  measured with the other present; two processes on one channel are not drawn.
+  axes) or 3e-4 to 7e-3 deg/s/sqrt(s); temperature, supply, motor command and vibration acting; an effect on a random channel.
+- **Strength d'** is the square root of twice the expected log likelihood ratio against white noise and a random walk fitted again,
+  computed from the simulated signal or spectral density. Of two effects on one channel each is measured with the other present.
 - **The oracle** knows the shape of the effect and makes one test at 1 %. It finds 95 of 100 from d' 4.22 on.
-- **Slow effects** stay below 0.25 deg/s rms (foreign ones 0.28), because a gyro that reads more below 1 Hz may have been turned. Where
-  a foreign effect cannot have d' 25 within that, it is as strong as that allows.
+- **Slow effects** stay below 0.25 deg/s rms (foreign ones 0.28): a gyro that reads more below 1 Hz may have been turned.
 - **Seeds**: thresholds were chosen on seeds below 1000; each campaign draws a fresh one.
-- *Named*: the cause stands in the answer, first or among the alternatives. *Alone*: and nothing else is named or unexplained.
+- *Named*: the cause is in the answer, first or among the alternatives. *Alone*: and nothing else is named or unexplained.
   *Wrong*: a cause is named on that channel that is not there. A part of the truth (a line for a modulated one, a slope for a
   parabola, Gauss-Markov for telegraph noise) is neither.
 - A rate is given as share (hits/runs, 95 % interval of Clopper and Pearson).
 
-Generator and engine share the model of the effects: the rates are an upper bound for unknown sensors. The motor's current, the
-foreign effects, docs/hidden-effect.md and docs/real-data.md do not come from that model.
+Generator and engine share the model of the effects: the rates are an upper bound for unknown sensors. Not from that model are the
+motor's current, the foreign effects, [hidden effects](hidden-effect.md) and [measured records](real-data.md).
 
 ";
 

@@ -152,12 +152,11 @@ pub const SETS: [Set; 14] = [
 
 /// How the sets are written and graded.
 const RULES: &str = "\
-Foreign effects are effects that the library does not have. They were written in sets of which none was diagnosed while it was
+Foreign effects are effects that the library does not have. They were written in sets, none of which was diagnosed while it was
 written. The first grade of a set, before any change of the engine by it, tells what to expect of unknown effects; after a change
 the set counts as seen. Tests hold that no effect of the library explains 95 % of what a foreign effect adds to the likelihood,
 nor, of a signal, two of them together. A library effect that is a true part of a foreign one (the straight line through a bent
-law) counts neither as right nor as wrong. From the tenth set on each effect is compared with the earlier ones; in doubt it counts
-as a near twin. Slow effects were made faster until they had the strength asked within 0.28 deg/s.
+law) counts neither as right nor as wrong. From the tenth set on each effect is compared with the earlier ones (near twins).
 ";
 
 /// The sets as one table.

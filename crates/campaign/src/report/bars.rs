@@ -60,11 +60,10 @@ const BEYOND_REACH: &str = "
 Asked of an AM line from d' 13 on; of telegraph, noise change and scale from 10. Foreign effects without a d' (another law of the
 noise, codes) count as strong; those below d' 25 within 0.28 deg/s rms do not count.
 
-The ratio asked of the smallest sizes cannot be reached where it leaves no room for the search. False alarms of 0.5 % leave a
-chance of about 7e-5 to each of some twenty hypotheses on three axes. A single test at that level finds 95 of 100 from d' 5.6 to 5.8
-on: 1.33 to 1.38 times the oracle's, not 1.3. A line may have any of 12 000 frequencies: d' 7.8, 1.85 instead of 1.7. An AM line is
-one only by its modulation, which holds depth^2 / (2 + depth^2) of its energy: d' 6.9 of the modulation is d' 12 of the line at
-depth 1 and 21 at depth 0.5; depths are drawn from 0.5 to 1.
+Some ratios asked of the smallest sizes cannot be reached. False alarms of 0.5 % leave about 7e-5 to each of some twenty hypotheses on
+three axes; one test at that level finds 95 of 100 from d' 5.6 to 5.8 on: 1.33 to 1.38 times the oracle's, not 1.3. A line may have
+any of 12 000 frequencies: d' 7.8, 1.85 instead of 1.7. The modulation of an AM line holds depth^2 / (2 + depth^2) of its energy:
+d' 6.9 of it is d' 12 of the line at depth 1 and 21 at depth 0.5; depths are drawn from 0.5 to 1.
 ";
 
 /// The sets that the engine owes nothing to, in words.
