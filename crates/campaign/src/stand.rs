@@ -94,6 +94,31 @@ impl Stand {
         self.walk_of_rate[axis].powi(2) / self.rate_hz
     }
 
+    /// So many values as it has samples, by their number.
+    pub(crate) fn series<A>(&self, of: impl FnMut(usize) -> A) -> Vec<A> {
+        (0..self.samples()).map(of).collect()
+    }
+
+    /// A signal that holds each of its levels for a random time, s.
+    pub(crate) fn held(
+        &self,
+        draw: &mut Draw,
+        dwell_s: (f64, f64),
+        level: impl FnMut(&mut Draw) -> f64,
+    ) -> Vec<f64> {
+        held(draw, self.samples(), self.rate_hz, dwell_s, level)
+    }
+
+    /// An Ornstein-Uhlenbeck process of this standard deviation and time constant, s.
+    pub(crate) fn wander(&self, draw: &mut Draw, sigma: f64, tau: f64) -> Vec<f64> {
+        wander(draw, self.samples(), self.rate_hz, sigma, tau)
+    }
+
+    /// Values behind a lag of `tau` s.
+    pub(crate) fn lagged(&self, values: &[f64], tau: f64) -> Vec<f64> {
+        lagged(values, tau, self.rate_hz)
+    }
+
     /// Simulate with these effects.
     ///
     /// # Errors

@@ -3,7 +3,22 @@
 use std::f64::consts::TAU;
 
 use crate::random::Draw;
-use crate::stand::{Stand, held, lagged, wander};
+use crate::stand::Stand;
+
+/// What is made of each value of a series.
+pub(super) fn each<A: Copy, B>(values: &[A], of: impl FnMut(A) -> B) -> Vec<B> {
+    values.iter().copied().map(of).collect()
+}
+
+/// What is made of each value of a series and the one beside it in another.
+pub(super) fn each_pair<A: Copy, B: Copy, C>(
+    values: &[A],
+    others: &[B],
+    mut of: impl FnMut(A, B) -> C,
+) -> Vec<C> {
+    let pairs = values.iter().zip(others);
+    pairs.map(|(value, other)| of(*value, *other)).collect()
+}
 
 /// Least and largest of some values.
 pub(super) fn extremes(values: &[f64]) -> (f64, f64) {
@@ -44,40 +59,32 @@ pub(super) fn shaken(draw: &mut Draw, stand: &mut Stand, pitch: (f64, f64)) -> V
 pub(super) fn ramped(command: &[f64], most_per_s: f64, rate_hz: f64) -> Vec<f64> {
     let most = most_per_s / rate_hz;
     let mut follows = command.first().copied().unwrap_or(0.0);
-    command
-        .iter()
-        .map(|c| {
-            follows += (c - follows).clamp(-most, most);
-            follows
-        })
-        .collect()
+    each(command, |c| {
+        follows += (c - follows).clamp(-most, most);
+        follows
+    })
 }
 
 /// Change since the sample before.
 pub(super) fn changes(series: &[f64]) -> Vec<f64> {
     let mut last = series.first().copied().unwrap_or(0.0);
-    let change = |v: &f64| v - std::mem::replace(&mut last, *v);
-    series.iter().map(change).collect()
+    each(series, |v| v - std::mem::replace(&mut last, v))
 }
 
 /// An axis's temperature from that at which something of it was trimmed, near the middle of its range.
 pub(super) fn from_trim(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
     let temperature = about_mean(&stand.world.temperature[axis]);
     let trimmed = draw.between(-0.1, 0.1) * swing(&temperature);
-    temperature.iter().map(|t| t - trimmed).collect()
+    each(&temperature, |t| t - trimmed)
 }
 
 /// A small heater on the board with a thermostat of short cycles: the temperatures it makes.
 pub(super) fn cycles(draw: &mut Draw, stand: &mut Stand) {
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
-    let (swing, mut on) = (draw.between(4.0, 10.0), draw.chance(0.5));
-    let heater = held(draw, n, rate_hz, (8.0, 30.0), |_| {
-        on = !on;
-        f64::from(u8::from(on))
-    });
-    let warm = lagged(&heater, draw.between(3.0, 9.0), rate_hz);
+    let (swing, on) = (draw.between(4.0, 10.0), draw.chance(0.5));
+    let heater = by_turns(draw, stand, on, (8.0, 30.0), |_| 1.0);
+    let warm = stand.lagged(&heater, draw.between(3.0, 9.0));
     let size = draw.by_ratio(0.02, 0.2);
-    let room = wander(draw, n, rate_hz, size, 200.0);
+    let room = stand.wander(draw, size, 200.0);
     for temperature in &mut stand.world.temperature {
         let (first, gain) = (temperature[0], draw.between(0.95, 1.05));
         for (t, (w, r)) in temperature.iter_mut().zip(warm.iter().zip(&room)) {
@@ -88,23 +95,19 @@ pub(super) fn cycles(draw: &mut Draw, stand: &mut Stand) {
 
 pub(super) fn about_mean(values: &[f64]) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.iter().map(|v| v - mean).collect()
+    each(values, |v| v - mean)
 }
 
 /// A signal of time, s.
 pub(super) fn in_time(stand: &Stand, mut of: impl FnMut(f64) -> f64) -> Vec<f64> {
-    (0..stand.samples())
-        .map(|i| of(i as f64 / stand.rate_hz))
-        .collect()
+    stand.series(|i| of(i as f64 / stand.rate_hz))
 }
 
 /// Commands of a motor that rests in between.
 pub(super) fn with_rests(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let mut turning = draw.chance(0.5);
-    held(draw, stand.samples(), stand.rate_hz, (3.0, 12.0), |d| {
-        turning = !turning;
-        let command = d.sign() * d.between(0.3, 1.0);
-        f64::from(u8::from(turning)) * (command * 255.0).round() / 255.0
+    let turning = draw.chance(0.5);
+    by_turns(draw, stand, turning, (3.0, 12.0), |d| {
+        in_steps(d.sign() * d.between(0.3, 1.0))
     })
 }
 
@@ -117,16 +120,13 @@ pub(super) fn resonating(
     let keep = (-TAU * half_width / rate_hz).exp();
     let (sin, cos) = (TAU * pitch / rate_hz).sin_cos();
     let (mut push, mut moves) = (0.0, 0.0);
-    series
-        .iter()
-        .map(|v| {
-            (push, moves) = (
-                keep * (cos * push - sin * moves) + v,
-                keep * (sin * push + cos * moves),
-            );
-            moves
-        })
-        .collect()
+    each(series, |v| {
+        (push, moves) = (
+            keep * (cos * push - sin * moves) + v,
+            keep * (sin * push + cos * moves),
+        );
+        moves
+    })
 }
 
 /// The acceleration along an axis, without what it is at rest, g.
@@ -137,16 +137,13 @@ pub(super) fn shaking(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// What follows a series, from 0, by many contacts, each after its own play and with its own weight.
 pub(super) fn behind_plays(series: &[f64], contacts: &[(f64, f64)]) -> Vec<f64> {
     let mut held = vec![0.0f64; contacts.len()];
-    series
-        .iter()
-        .map(|a| {
-            let follow = |((play, weight), held): (&(f64, f64), &mut f64)| {
-                *held = held.clamp(a - play, a + play);
-                weight * *held
-            };
-            contacts.iter().zip(&mut held).map(follow).sum()
-        })
-        .collect()
+    each(series, |a| {
+        let follow = |((play, weight), held): (&(f64, f64), &mut f64)| {
+            *held = held.clamp(a - play, a + play);
+            weight * *held
+        };
+        contacts.iter().zip(&mut held).map(follow).sum()
+    })
 }
 
 /// What is left of a series when the straight line in another is taken off.
@@ -159,8 +156,7 @@ pub(super) fn without_line(y: &[f64], x: &[f64]) -> Vec<f64> {
         xx += (x - mx).powi(2);
     }
     let slope = if xx > 0.0 { xy / xx } else { 0.0 };
-    let rest = |(y, x): (&f64, &f64)| y - my - slope * (x - mx);
-    y.iter().zip(x).map(rest).collect()
+    each_pair(y, x, |y, x| y - my - slope * (x - mx))
 }
 
 /// The temperatures that a lamp close by makes, which is switched on and off within seconds.
@@ -170,18 +166,17 @@ pub(super) fn lamp(draw: &mut Draw, stand: &mut Stand) {
 
 /// Those of one that is switched after so long and warms within so long, s.
 pub(super) fn lit(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64), lag_s: (f64, f64)) {
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
     let (room, top) = (draw.between(20.0, 30.0), draw.between(3.0, 10.0));
     let mut on = draw.chance(0.5);
-    let lamp = held(draw, n, rate_hz, dwell_s, |d| {
+    let lamp = stand.held(draw, dwell_s, |d| {
         on = !on;
         room + if on { top * d.between(0.5, 1.0) } else { 0.0 }
     });
-    let heat = lagged(&lamp, draw.by_ratio(lag_s.0, lag_s.1), rate_hz);
+    let heat = stand.lagged(&lamp, draw.by_ratio(lag_s.0, lag_s.1));
     // Three parts on one board: nearly the same temperature.
     stand.world.temperature = std::array::from_fn(|_| {
         let off = draw.between(-0.5, 0.5);
-        heat.iter().map(|t| t + off).collect()
+        each(&heat, |t| t + off)
     });
 }
 
@@ -251,7 +246,7 @@ pub(super) fn shocks(draw: &mut Draw, stand: &mut Stand) -> Vec<(usize, f64)> {
 /// ones, in either sense, and a rest now and then.
 pub(super) fn programme(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64)) {
     const RESTS: f64 = 0.25;
-    stand.world.duty = held(draw, stand.samples(), stand.rate_hz, dwell_s, |d| {
+    stand.world.duty = stand.held(draw, dwell_s, |d| {
         if d.chance(RESTS) {
             0.0
         } else {
@@ -262,7 +257,7 @@ pub(super) fn programme(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64))
 
 /// The table's rate over that at full duty: behind the command by the time that the motor takes to spin up.
 pub(super) fn rate_of_table(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    lagged(&stand.world.duty, draw.by_ratio(0.3, 1.5), stand.rate_hz)
+    stand.lagged(&stand.world.duty, draw.by_ratio(0.3, 1.5))
 }
 
 /// The rate of a table on a programme whose rates last so long, s.
@@ -274,24 +269,21 @@ pub(super) fn turned(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64)) ->
 /// The angle that the table has turned by, rad, where its rate at full duty is so many turns per second.
 pub(super) fn angle_of_table(rate: &[f64], full: f64, rate_hz: f64) -> Vec<f64> {
     let mut angle = 0.0;
-    rate.iter()
-        .map(|r| {
-            angle += TAU * full * r / rate_hz;
-            angle
-        })
-        .collect()
+    each(rate, |r| {
+        angle += TAU * full * r / rate_hz;
+        angle
+    })
 }
 
 /// Vibration along a level axis, told, that swells and fades.
 pub(super) fn swelling(draw: &mut Draw, stand: &mut Stand) -> usize {
     const RAIL_G: f64 = 1.9;
     let (usual, tau) = (draw.by_ratio(0.1, 0.4), draw.by_ratio(10.0, 60.0));
-    let swell = wander(draw, stand.samples(), stand.rate_hz, 0.5, tau);
+    let swell = stand.wander(draw, 0.5, tau);
     let level = draw.of_many(2);
-    stand.world.acc[level] = swell
-        .iter()
-        .map(|s| (usual * s.exp() * draw.normal()).clamp(-RAIL_G, RAIL_G))
-        .collect();
+    stand.world.acc[level] = each(&swell, |s| {
+        (usual * s.exp() * draw.normal()).clamp(-RAIL_G, RAIL_G)
+    });
     level
 }
 
@@ -309,26 +301,85 @@ pub(super) fn events(draw: &mut Draw, stand: &Stand, count: usize) -> Vec<f64> {
 
 /// How large each of them is, of either sign.
 pub(super) fn sizes(draw: &mut Draw, events: &[f64]) -> Vec<f64> {
-    let size = |_: &f64| draw.sign() * draw.between(0.5, 1.5);
-    events.iter().map(size).collect()
+    each(events, |_| draw.sign() * draw.between(0.5, 1.5))
 }
 
 /// What events add, by the time since each of them, s.
 pub(super) fn since(stand: &Stand, events: &[f64], of: impl Fn(usize, f64) -> f64) -> Vec<f64> {
-    (0..stand.samples())
-        .map(|i| {
-            let t = i as f64 / stand.rate_hz;
-            let one = |(k, at): (usize, &f64)| if t < *at { 0.0 } else { of(k, t - at) };
-            events.iter().enumerate().map(one).sum()
-        })
-        .collect()
+    stand.series(|i| {
+        let t = i as f64 / stand.rate_hz;
+        let one = |(k, at): (usize, &f64)| if t < *at { 0.0 } else { of(k, t - at) };
+        events.iter().enumerate().map(one).sum()
+    })
 }
 
 /// How often each reading passes one of so many places of a turn, which lie at equal angles.
 pub(super) fn passes(angle: &[f64], per_turn: f64, first: f64) -> Vec<f64> {
-    let places: Vec<f64> = angle
-        .iter()
-        .map(|a| (a / TAU * per_turn + first).floor())
-        .collect();
-    changes(&places).iter().map(|c| c.abs()).collect()
+    let places: Vec<f64> = each(angle, |a| (a / TAU * per_turn + first).floor());
+    each(&changes(&places), |c| c.abs())
+}
+
+/// 1 where something is so, 0 where it is not.
+pub(super) fn one_if(so: bool) -> f64 {
+    f64::from(u8::from(so))
+}
+
+/// What is on and off by turns, each for a random time, s: of a size each time, and 0 while it is off. It begins other than
+/// `on`.
+pub(super) fn by_turns(
+    draw: &mut Draw,
+    stand: &Stand,
+    mut on: bool,
+    dwell_s: (f64, f64),
+    mut size: impl FnMut(&mut Draw) -> f64,
+) -> Vec<f64> {
+    stand.held(draw, dwell_s, |d| {
+        on = !on;
+        one_if(on) * size(d)
+    })
+}
+
+/// A series of either sign.
+pub(super) fn either_way(draw: &mut Draw, series: &[f64]) -> Vec<f64> {
+    let sign = draw.sign();
+    each(series, |v| sign * v)
+}
+
+/// A tone that begins at a phase, rad, and has these pitches, Hz.
+pub(super) fn tone(mut phase: f64, pitches: &[f64], rate_hz: f64) -> Vec<f64> {
+    each(pitches, |pitch| {
+        phase += TAU * pitch / rate_hz;
+        phase.sin()
+    })
+}
+
+/// How much a temperature changes from so many samples before to so many after.
+pub(super) fn pace(temperature: &[f64], half: usize) -> Vec<f64> {
+    let last = temperature.len() - 1;
+    let change = |i: usize| temperature[(i + half).min(last)] - temperature[i.saturating_sub(half)];
+    (0..=last).map(change).collect()
+}
+
+/// Where each value is between the least, 0, and the largest, 1.
+pub(super) fn within_range(values: &[f64]) -> Vec<f64> {
+    let (low, high) = extremes(values);
+    each(values, |v| (v - low) / (high - low).max(1e-9))
+}
+
+/// Mean square of a series.
+pub(super) fn mean_square(series: &[f64]) -> f64 {
+    series.iter().map(|v| v * v).sum::<f64>() / series.len() as f64
+}
+
+/// A supply, which the stand gets, with loads of many sizes, up to one, V, each for a random time, s.
+pub(super) fn loaded(draw: &mut Draw, stand: &mut Stand, most: f64, dwell_s: (f64, f64)) {
+    let load = stand.held(draw, dwell_s, |d| d.between(0.0, most));
+    let slow = stand.wander(draw, 0.001, 60.0);
+    stand.world.supply = each_pair(&load, &slow, |l, s| 5.0 - l - s);
+}
+
+/// The rate of a table on a programme, whose drive ramps from rate to rate with one acceleration.
+pub(super) fn ramped_table(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    programme(draw, stand, DWELL);
+    ramped(&stand.world.duty, draw.by_ratio(0.15, 0.6), stand.rate_hz)
 }

@@ -3,7 +3,7 @@
 use super::super::act::Change;
 use super::super::known::{Known, REACH, law, law_of};
 use super::super::shape::{Shape, by_energy, coupled, coupled_series, sized};
-use super::super::words::{about_mean, resonating};
+use super::super::words::{about_mean, each, each_pair, resonating};
 use super::Make::Shaped;
 use super::{ForeignEffect, TM, row};
 use crate::random::Draw;
@@ -37,14 +37,10 @@ fn energy_of(stand: &Stand, axis: usize) -> Vec<f64> {
     let ones = vec![1.0; stand.samples()];
     let count = diagnosis::likelihood::Bins::new(stand.samples()).products(&ones, &ones);
     let omega = Meter::new(stand, axis).omega().to_vec();
-    omega
-        .iter()
-        .zip(count)
-        .map(|(w, m)| {
-            let walk = 1.0 / (4.0 * (w / 2.0).sin().powi(2));
-            m * (stand.white(axis) + stand.step(axis) * walk)
-        })
-        .collect()
+    each_pair(&omega, &count, |w, m| {
+        let walk = 1.0 / (4.0 * (w / 2.0).sin().powi(2));
+        m * (stand.white(axis) + stand.step(axis) * walk)
+    })
 }
 
 /// d' of frames of which a share hold another axis's reading, who looks at one against mean and variance refitted, who
@@ -76,8 +72,7 @@ fn of_exchanged(stand: &Stand, axis: usize, other: usize, chance: f64) -> f64 {
 
 /// What an axis has read about its bias, deg/s.
 fn about_bias(counts: &[i32], bias: f64) -> Vec<f64> {
-    let off = |c: &i32| LSB * f64::from(*c) - bias;
-    counts.iter().map(off).collect()
+    each(counts, |c| LSB * f64::from(c) - bias)
 }
 
 /// d' of `n` readings whose gain is exp(turn z) for a z of the normal law: what is left of the logarithms of the variance.
@@ -106,11 +101,7 @@ impl Diode {
     /// it conducts, over what the readings as a whole still spread.
     fn strength(self, own: &[f64], other: &[f64], white: f64) -> f64 {
         let n = own.len() as f64;
-        let with: Vec<f64> = own
-            .iter()
-            .zip(other)
-            .map(|(w, o)| self.of(*w, *o))
-            .collect();
+        let with: Vec<f64> = each_pair(own, other, |w, o| self.of(w, o));
         let variance = |of: &[f64]| {
             let mean = of.iter().sum::<f64>() / n;
             of.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n
@@ -133,9 +124,7 @@ fn of_tail(keep: f64, w: f64) -> f64 {
 /// White readings of an axis about its bias, deg/s.
 fn white_of(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
     let sigma = stand.white(axis).sqrt();
-    (0..stand.samples())
-        .map(|_| sigma * draw.normal())
-        .collect()
+    stand.series(|_| sigma * draw.normal())
 }
 
 /// Nats of a reading that is another axis's, for who holds it for one of its own and, knowing, has it to the count.
@@ -183,7 +172,7 @@ fn other_frames(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Shape {
 fn toggling(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (other, bit) = (other_than(draw, axis), draw.of_many(2));
     let sign = draw.sign();
-    let like: Vec<f64> = (0..stand.samples()).map(|_| 0.5 * draw.sign()).collect();
+    let like: Vec<f64> = stand.series(|_| 0.5 * draw.sign());
     coupled(stand, axis, &like, move |counts, i| {
         sign * (f64::from(counts[other][i] >> bit & 1) - 0.5)
     })
@@ -205,7 +194,7 @@ fn alternating(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 fn product(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (one, other, sign) = ((axis + 1) % 3, (axis + 2) % 3, draw.sign());
     let (a, b) = (white_of(draw, stand, one), white_of(draw, stand, other));
-    let like: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * b).collect();
+    let like: Vec<f64> = each_pair(&a, &b, |a, b| a * b);
     let (first, second) = (stand.bias[one], stand.bias[other]);
     coupled(stand, axis, &like, move |counts, i| {
         let about = |k: usize, middle: f64| LSB * f64::from(counts[k][i]) - middle;
@@ -231,7 +220,7 @@ fn differences(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 fn magnitude(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (other, sign) = (other_than(draw, axis), draw.sign());
     let white = white_of(draw, stand, other);
-    let like = about_mean(&white.iter().map(|v| v.abs()).collect::<Vec<f64>>());
+    let like = about_mean(&each(&white, |v| v.abs()));
     // Of half a normal law, so that the bias of this axis stays.
     let mean = (2.0 / std::f64::consts::PI * stand.white(other)).sqrt();
     let middle = stand.bias[other];
@@ -245,27 +234,22 @@ fn tail(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let other = other_than(draw, axis);
     let (keep, sign) = (draw.between(0.2, 0.85), draw.sign());
     // Of its own noise, not of what the other axis's bias does.
-    let energy: Vec<f64> = Meter::new(stand, axis)
-        .omega()
-        .iter()
-        .zip(energy_of(stand, other))
-        .map(|(w, e)| e * of_tail(keep, *w))
-        .collect();
+    let energy: Vec<f64> = each_pair(
+        Meter::new(stand, axis).omega(),
+        &energy_of(stand, other),
+        |w, e| e * of_tail(keep, w),
+    );
     by_energy(energy, move |share| {
         Change::made(move |counts, draw| {
             let from = &counts[other];
             let mean = from.iter().map(|c| f64::from(*c)).sum::<f64>() / from.len() as f64;
             let mut held = 0.0;
-            counts[axis]
-                .iter()
-                .zip(from)
-                .map(|(own, from)| {
-                    // Within its step the rate is anywhere.
-                    let new = f64::from(*own) + draw.between(-0.5, 0.5) + sign * share * held;
-                    held = keep * held + f64::from(*from) - mean;
-                    new.round() as i32
-                })
-                .collect()
+            each_pair(&counts[axis], from, |own, from| {
+                // Within its step the rate is anywhere.
+                let new = f64::from(own) + draw.between(-0.5, 0.5) + sign * share * held;
+                held = keep * held + f64::from(from) - mean;
+                new.round() as i32
+            })
         })
     })
 }
@@ -290,15 +274,15 @@ fn of_both(
 ) -> Change {
     let (own_bias, bias) = (stand.bias[axis], stand.bias[other]);
     Change::made(move |counts, draw| {
-        about_bias(&counts[other], bias)
-            .iter()
-            .zip(&counts[axis])
-            .map(|(z, own)| {
+        each_pair(
+            &about_bias(&counts[other], bias),
+            &counts[axis],
+            |z, own| {
                 // Within its step the rate is anywhere.
-                let rate = LSB * (f64::from(*own) + draw.between(-0.5, 0.5)) - own_bias;
-                ((own_bias + of(rate, *z)) / LSB).round() as i32
-            })
-            .collect()
+                let rate = LSB * (f64::from(own) + draw.between(-0.5, 0.5)) - own_bias;
+                ((own_bias + of(rate, z)) / LSB).round() as i32
+            },
+        )
     })
 }
 

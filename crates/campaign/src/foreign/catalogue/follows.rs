@@ -23,7 +23,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(323, 2, "temperature times supply", Signal(|_, s, a| temperature::by_supply(s, a))).needs(TMS),
     row(324, 2, "vibration rectified", Signal(|d, s, _| acceleration::rectified(d, s))).needs(TM),
     row(325, 2, "ripple at the speed of the motor", Signal(|d, s, _| motor::ripple(d, s))).needs(TM),
-    row(326, 2, "tone whose pitch follows temperature", Signal(|d, s, a| temperature::tone(d, s, a))).needs(TM),
+    row(326, 2, "tone whose pitch follows temperature", Signal(|d, s, a| temperature::drifting_tone(d, s, a))).needs(TM),
     row(327, 2, "creaks while the temperature moves", Signal(|d, s, a| temperature::creaks(d, s, a))).needs(TM),
     row(337, 3, "teeth of a table over temperature", Signal(|d, s, a| temperature::teeth(d, s, a))).needs(TM),
     row(338, 3, "acceleration that comes late", Signal(|d, s, _| acceleration::late(d, s))).needs(TMV),

@@ -27,7 +27,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(344, 3, "noise with a hole in its spectrum", Shaped(|d, _, _, _| spectrum::hole(d))).needs(TM),
     row(345, 3, "noise that remembers its last size", Shaped(|d, s, _, _| variance::remembering(d, s))).needs(TM),
     row(346, 3, "swing that leaves its square behind", Shaped(|_, _, _, _| memory::square_behind())).needs(TM),
-    row(347, 3, "noise while the temperature moves", More(|d, s, a| variance::pace(d, s, a))).needs(TM),
+    row(347, 3, "noise while the temperature moves", More(|d, s, a| variance::slow_pace(d, s, a))).needs(TM),
     row(348, 3, "hump of noise that moves with temperature", Shaped(|d, s, a, _| processes::hump(d, s, a))).needs(TM),
     row(360, 4, "noise that ends at an edge", Shaped(|d, s, a, _| spectrum::edge(d, s, a))).needs(TM),
     row(361, 4, "noise as large as the acceleration", Shaped(|d, s, _, _| variance::by_acceleration(d, s))).needs(TMV),

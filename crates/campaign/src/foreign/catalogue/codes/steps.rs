@@ -3,6 +3,7 @@
 use super::super::super::act::Change;
 use super::super::super::known::{Known, law, long_run, mean_and_sigma, shares, steps_of};
 use super::super::super::shape::{Shape, sized};
+use super::super::super::words::{each, each_pair};
 use crate::random::Draw;
 use crate::stand::{LSB, Stand};
 
@@ -174,10 +175,8 @@ pub(super) fn steps_of_limit(stand: &Stand, axis: usize, limit: f64) -> Vec<Vec<
     let low = steps_of(stand, axis, 1.0, &slewed(limit as i32));
     let high = steps_of(stand, axis, 1.0, &slewed(limit as i32 + 1));
     let part = limit.fract();
-    let mix = |(l, h): (&f64, &f64)| (1.0 - part) * l + part * h;
-    low.iter()
-        .zip(&high)
-        .map(|(l, h)| l.iter().zip(h).map(mix).collect())
+    let rows = low.iter().zip(&high);
+    rows.map(|(l, h)| each_pair(l, h, |l, h| (1.0 - part) * l + part * h))
         .collect()
 }
 
@@ -190,6 +189,15 @@ pub(super) fn limit_of(steep: f64) -> f64 {
 pub(super) fn mixed(upper: i32, lower: i32) -> i32 {
     let low = (1 << NIBBLE) - 1;
     (upper & !low) | (lower & low)
+}
+
+/// What is known of a channel by the chances of each two readings beside each other, codes from the first on.
+fn of_neighbours(first: i32, mut both: Vec<Vec<f64>>) -> Known {
+    let shares: Vec<f64> = both.iter().map(|row| row.iter().sum()).collect();
+    for (row, share) in both.iter_mut().zip(&shares) {
+        row.iter_mut().for_each(|p| *p /= share.max(1e-300));
+    }
+    Known::steps_of(first, both, shares)
 }
 
 /// Chances from each reading (row) to the next where some have the low nibble of the reading after: the first code, the
@@ -220,11 +228,7 @@ pub(super) fn steps_of_nibble(stand: &Stand, axis: usize, chance: f64) -> Known 
             }
         }
     }
-    let shares: Vec<f64> = both.iter().map(|row| row.iter().sum()).collect();
-    for (row, share) in both.iter_mut().zip(&shares) {
-        row.iter_mut().for_each(|p| *p /= share.max(1e-300));
-    }
-    Known::steps_of(first, both, shares)
+    of_neighbours(first, both)
 }
 
 /// An output that is driven upward and let go downward: where a long cable hangs on it, as it does in some frames, it falls
@@ -289,11 +293,7 @@ pub(super) fn steps_of_gate(stand: &Stand, axis: usize, gate: f64) -> Known {
             }
         }
     }
-    let shares: Vec<f64> = both.iter().map(|row| row.iter().sum()).collect();
-    for (row, share) in both.iter_mut().zip(&shares) {
-        row.iter_mut().for_each(|p| *p /= share.max(1e-300));
-    }
-    Known::steps_of(first, both, shares)
+    of_neighbours(first, both)
 }
 
 /// The gate, counts, by which a despiker is this strong: the narrower, the stronger.
@@ -344,11 +344,10 @@ pub(super) fn limited(stand: &Stand, axis: usize, wanted: f64) -> Shape {
     let at_most = most as i32;
     let change = Change::made(move |counts, _| {
         let mut last = counts[axis][0];
-        let next = |c: &i32| {
-            last = (*c).clamp(last - at_most, last + at_most);
+        each(&counts[axis], |c| {
+            last = (c).clamp(last - at_most, last + at_most);
             last
-        };
-        counts[axis].iter().map(next).collect()
+        })
     });
     Shape::Fixed(known(most), change)
 }
@@ -370,13 +369,11 @@ pub(super) fn play(axis: usize) -> Shape {
             Change::made(move |counts, draw| {
                 let own = &counts[axis];
                 let mut code = own[0];
-                own.iter()
-                    .map(|c| {
-                        // Within its step the rate is anywhere.
-                        code = followed(code, f64::from(*c) + draw.between(-0.5, 0.5), play);
-                        code
-                    })
-                    .collect()
+                each(own, |c| {
+                    // Within its step the rate is anywhere.
+                    code = followed(code, f64::from(c) + draw.between(-0.5, 0.5), play);
+                    code
+                })
             })
         },
     )
@@ -394,12 +391,11 @@ pub(super) fn slew(axis: usize) -> Shape {
             let limit = limit_of(steep);
             Change::made(move |counts, draw| {
                 let mut reading = counts[axis][0];
-                let next = |code: &i32| {
+                each(&counts[axis], |code| {
                     let above = i32::from(draw.chance(limit.fract()));
-                    reading = slewed(limit as i32 + above)(reading, *code);
+                    reading = slewed(limit as i32 + above)(reading, code);
                     reading
-                };
-                counts[axis].iter().map(next).collect()
+                })
             })
         },
     )

@@ -93,21 +93,13 @@ pub(super) fn pipe(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 
 /// Knocks at random on a bench that rings: any sense, many small ones and few large ones.
 pub(super) fn knocks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let rate_hz = stand.rate_hz;
-    let (f, decay) = (draw.by_ratio(0.7, 9.0), draw.by_ratio(0.3, 3.0));
+    let mode = (draw.by_ratio(0.7, 9.0), draw.by_ratio(0.3, 3.0));
     let apart = draw.by_ratio(6.0, 30.0);
     let mut y = vec![0.0; stand.samples()];
     let mut at = apart * draw.exponential();
     while at < stand.seconds {
         let size = draw.sign() * (0.3 + draw.exponential());
-        let first = (at * rate_hz).ceil() as usize;
-        for (k, v) in y.iter_mut().enumerate().skip(first) {
-            let since = k as f64 / rate_hz - at;
-            if since > 10.0 * decay {
-                break;
-            }
-            *v += size * (-since / decay).exp() * (TAU * f * since).sin();
-        }
+        ring(&mut y, stand.rate_hz, (at, size), mode, 10.0);
         at += apart * draw.exponential();
     }
     y
@@ -116,27 +108,16 @@ pub(super) fn knocks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// People pass by on a floor that rings: steps at a pace that is nearly regular, each a short ring, growing until the
 /// walker is next to the bench.
 pub(super) fn footsteps(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let rate_hz = stand.rate_hz;
-    let (f, decay) = (draw.by_ratio(2.5, 8.0), draw.by_ratio(0.08, 0.25));
+    let mode = (draw.by_ratio(2.5, 8.0), draw.by_ratio(0.08, 0.25));
     let mut y = vec![0.0; stand.samples()];
     let mut nearest = draw.between(3.0, 15.0);
     while nearest < stand.seconds + 5.0 {
-        let (pace, takes, heavy) = (
-            draw.between(0.45, 0.65),
-            draw.between(1.5, 5.0),
-            draw.between(0.6, 1.4),
-        );
+        let (pace, takes) = (draw.between(0.45, 0.65), draw.between(1.5, 5.0));
+        let heavy = draw.between(0.6, 1.4);
         let mut at = nearest - 3.0 * takes;
         while at < nearest + 3.0 * takes {
             let size = heavy / (1.0 + ((at - nearest) / takes).powi(2));
-            let first = (at * rate_hz).ceil().max(0.0) as usize;
-            for (k, v) in y.iter_mut().enumerate().skip(first) {
-                let since = k as f64 / rate_hz - at;
-                if since > 6.0 * decay {
-                    break;
-                }
-                *v += size * (-since / decay).exp() * (TAU * f * since).sin();
-            }
+            ring(&mut y, stand.rate_hz, (at, size), mode, 6.0);
             at += pace * (1.0 + 0.04 * draw.normal());
         }
         nearest += 10.0 + 30.0 * draw.exponential();
@@ -208,23 +189,21 @@ pub(super) fn ring_down(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let apart = draw.between(40.0, 120.0);
     let (mut x, mut speed) = (0.0, 0.0);
     let mut left = draw.between(5.0, 40.0);
-    (0..stand.samples())
-        .map(|_| {
-            left -= 1.0 / stand.rate_hz;
-            if left <= 0.0 {
-                speed += w * draw.sign() * draw.between(1.0, 2.5);
-                left = apart * draw.between(0.5, 1.5);
-            }
-            // Half a step of speed, a step of place, half a step of speed.
-            for _ in 0..PARTS {
-                let pull = |x: f64, v: f64| -2.0 * v / decay - w * w * (x + x.powi(3));
-                speed += 0.5 * h * pull(x, speed);
-                x += h * speed;
-                speed += 0.5 * h * pull(x, speed);
-            }
-            x
-        })
-        .collect()
+    stand.series(|_| {
+        left -= 1.0 / stand.rate_hz;
+        if left <= 0.0 {
+            speed += w * draw.sign() * draw.between(1.0, 2.5);
+            left = apart * draw.between(0.5, 1.5);
+        }
+        // Half a step of speed, a step of place, half a step of speed.
+        for _ in 0..PARTS {
+            let pull = |x: f64, v: f64| -2.0 * v / decay - w * w * (x + x.powi(3));
+            speed += 0.5 * h * pull(x, speed);
+            x += h * speed;
+            speed += 0.5 * h * pull(x, speed);
+        }
+        x
+    })
 }
 
 /// Where the axles of a carriage are, of its length: two pairs, of which each is near an end. Those of a pair are 1.8 to 2.6 m
@@ -278,4 +257,16 @@ pub(super) fn bursts_of_ringing(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         at += 15.0 * draw.exponential() + 3.0;
     }
     y
+}
+
+/// Adds the ring, of a pitch, Hz, that decays in so many s, of a knock at a time, s; `end` decays later it is over.
+fn ring(y: &mut [f64], rate_hz: f64, (at, size): (f64, f64), (f, decay): (f64, f64), end: f64) {
+    let first = (at * rate_hz).ceil() as usize;
+    for (k, v) in y.iter_mut().enumerate().skip(first) {
+        let since = k as f64 / rate_hz - at;
+        if since > end * decay {
+            break;
+        }
+        *v += size * (-since / decay).exp() * (TAU * f * since).sin();
+    }
 }

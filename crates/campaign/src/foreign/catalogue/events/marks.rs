@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::super::super::words::{about_mean, events, in_time, since, sizes};
+use super::super::super::words::{about_mean, each, events, in_time, since, sizes};
 use crate::random::Draw;
-use crate::stand::{Stand, lagged};
+use crate::stand::Stand;
 
 /// Shortest and longest avalanche, s.
 pub(super) const AVALANCHES: (f64, f64) = (0.1, 4.0);
@@ -23,9 +23,7 @@ pub(super) fn peaks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         let skirt = |(at, size): &(f64, f64)| size / (1.0 + ((t - at) / width).powi(2));
         all.iter().map(skirt).sum()
     };
-    (0..stand.samples())
-        .map(|i| of(i as f64 / stand.rate_hz))
-        .collect()
+    stand.series(|i| of(i as f64 / stand.rate_hz))
 }
 
 /// A lift, a tram or a lorry passes: iron is a dipole, and its field at the part is that of a dipole on a straight line,
@@ -76,14 +74,11 @@ pub(super) fn door(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         at += open + 2.0 + 12.0 * draw.exponential();
     }
     let mut pressure = 0.0;
-    let all: Vec<f64> = kicks
-        .iter()
-        .map(|k| {
-            pressure = keep * pressure + k;
-            pressure
-        })
-        .collect();
-    lagged(&all, draw.by_ratio(0.05, 0.3), stand.rate_hz)
+    let all: Vec<f64> = each(&kicks, |k| {
+        pressure = keep * pressure + k;
+        pressure
+    });
+    stand.lagged(&all, draw.by_ratio(0.05, 0.3))
 }
 
 /// Somebody works at the stand and touches it now and then: heat goes in, reaches the part through what it is mounted on, and leaves again;
@@ -148,17 +143,15 @@ pub(super) fn pulses(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let apart = decay * draw.by_ratio(4.0, 12.0);
     let keep = (-1.0 / (decay * rate_hz)).exp();
     let (mut y, mut left) = (0.0, apart * draw.exponential());
-    (0..stand.samples())
-        .map(|_| {
-            y *= keep;
-            left -= 1.0 / rate_hz;
-            while left <= 0.0 {
-                y += sign * (0.3 + draw.exponential());
-                left += apart * draw.exponential();
-            }
-            y
-        })
-        .collect()
+    stand.series(|_| {
+        y *= keep;
+        left -= 1.0 / rate_hz;
+        while left <= 0.0 {
+            y += sign * (0.3 + draw.exponential());
+            left += apart * draw.exponential();
+        }
+        y
+    })
 }
 
 /// Discharges that leave charge at the proof mass: each a jump of the bias that leaks away through the oxide.
@@ -204,17 +197,15 @@ pub(super) fn lock(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn jumps_that_relax(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let decay = draw.between(3.0, 15.0);
     let (mut y, mut left) = (0.0, 5.0);
-    (0..stand.samples())
-        .map(|_| {
-            left -= 1.0 / stand.rate_hz;
-            y *= (-1.0 / (decay * stand.rate_hz)).exp();
-            if left <= 0.0 {
-                y += draw.sign() * draw.between(0.5, 1.5);
-                left = 10.0 + 30.0 * draw.exponential();
-            }
-            y
-        })
-        .collect()
+    stand.series(|_| {
+        left -= 1.0 / stand.rate_hz;
+        y *= (-1.0 / (decay * stand.rate_hz)).exp();
+        if left <= 0.0 {
+            y += draw.sign() * draw.between(0.5, 1.5);
+            left = 10.0 + 30.0 * draw.exponential();
+        }
+        y
+    })
 }
 
 /// After it was handled, a mount settles by the logarithm of time.

@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::super::super::words::{
-    Turning, about_mean, behind_plays, cycles, from_trim, resonating, shaken, shaking, shocks,
-    swelling, without_line,
+    Turning, about_mean, behind_plays, cycles, each, each_pair, either_way, from_trim, mean_square,
+    one_if, resonating, shaken, shaking, shocks, swelling, without_line,
 };
 use crate::random::Draw;
-use crate::stand::{Stand, lagged};
+use crate::stand::Stand;
 
 /// Vibration along a slant in spells: the anisoelastic error goes with the mean square over a sample, while the
 /// accelerometers see single aliased values.
@@ -15,27 +15,25 @@ pub(super) fn rectified(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (rms, slant) = (draw.between(0.05, 0.25), draw.between(0.3, 1.2));
     let gain = 1.0 - (-1.0 / (draw.between(0.2, 1.0) * stand.rate_hz)).exp();
     let (mut now, mut goal, mut left) = (0.0, 0.0, draw.between(0.0, 12.0));
-    let size: Vec<f64> = (0..stand.samples())
-        .map(|_| {
-            left -= 1.0 / stand.rate_hz;
-            if left <= 0.0 {
-                goal = if goal == 0.0 {
-                    draw.between(0.4, 1.0)
-                } else {
-                    0.0
-                };
-                left = draw.between(2.0, 12.0);
-            }
-            now += gain * (goal - now);
-            now
-        })
-        .collect();
+    let size: Vec<f64> = stand.series(|_| {
+        left -= 1.0 / stand.rate_hz;
+        if left <= 0.0 {
+            goal = if goal == 0.0 {
+                draw.between(0.4, 1.0)
+            } else {
+                0.0
+            };
+            left = draw.between(2.0, 12.0);
+        }
+        now += gain * (goal - now);
+        now
+    });
     for (i, s) in size.iter().enumerate() {
         let shake = rms * s * draw.normal();
         stand.world.acc[0][i] = shake * slant.cos();
         stand.world.acc[1][i] = shake * slant.sin();
     }
-    size.iter().map(|s| s * s).collect()
+    each(&size, |s| s * s)
 }
 
 /// A capacitor lets through how fast the acceleration changes, and nothing of what it is.
@@ -52,17 +50,16 @@ pub(super) fn change(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn stop(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let shake = shaken(draw, stand, (0.3, 4.0));
     let free = draw.by_ratio(0.05, 0.3);
-    shake.iter().map(|s| (s / free).tanh()).collect()
+    each(&shake, |s| (s / free).tanh())
 }
 
 /// Vibration rectification: what the part makes of a vibration far above its band follows the running mean square, which
 /// the accelerometer shows; its read-out takes a second or more over that mean.
 pub(super) fn vibration_level(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let level = swelling(draw, stand);
-    let square: Vec<f64> = stand.world.acc[level].iter().map(|a| a * a).collect();
-    let runs = lagged(&square, draw.by_ratio(0.3, 2.0), stand.rate_hz);
-    let sign = draw.sign();
-    about_mean(&runs).iter().map(|r| sign * r).collect()
+    let square = each(&stand.world.acc[level], |a| a * a);
+    let runs = stand.lagged(&square, draw.by_ratio(0.3, 2.0));
+    either_way(draw, &about_mean(&runs))
 }
 
 /// A mount that was aligned at one temperature and leans as it warms up: a level axis sees the turning of the table about
@@ -83,18 +80,16 @@ pub(super) fn misaligned(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec
 /// A multiplexer that comes to this gyro first in each frame, from the accelerometer that was last in the frame before: a
 /// share of that sample is still on the capacitor.
 pub(super) fn rest_of_sample(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let force = about_mean(&stand.world.acc[draw.of_many(3)]);
+    let force = shaking(draw, stand);
     let sign = draw.sign();
-    let before = |i: usize| sign * force[i.saturating_sub(1)];
-    (0..force.len()).map(before).collect()
+    stand.series(|i| sign * force[i.saturating_sub(1)])
 }
 
 /// A gyro's sensitivity to acceleration is trimmed away at one temperature, near the middle of its range; what the springs
 /// lose in stiffness by a degree brings it back, with one sign above and the other below.
 pub(super) fn weighed(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
     let temperature = from_trim(draw, stand, axis);
-    let force = about_mean(&stand.world.acc[draw.of_many(3)]);
-    temperature.iter().zip(force).map(|(t, a)| t * a).collect()
+    each_pair(&temperature, &shaking(draw, stand), |t, a| t * a)
 }
 
 /// A hard shock, which the accelerometers show, throws the proof mass at its stop, where it sticks for a while. When it comes
@@ -126,21 +121,14 @@ pub(super) fn stuck(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn anisoelastic(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (sin, cos) = draw.between(0.0, TAU).sin_cos();
     let [x, y, _] = &stand.world.acc;
-    x.iter()
-        .zip(y)
-        .map(|(x, y)| sin * x * y + 0.5 * cos * (x * x - y * y))
-        .collect()
+    each_pair(x, y, |x, y| sin * x * y + 0.5 * cos * (x * x - y * y))
 }
 
 /// A part with play in its mount is held by friction: only what an acceleration has beyond that moves it, and turns it.
 pub(super) fn play(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let force = about_mean(&stand.world.acc[draw.of_many(3)]);
-    let rms = (force.iter().map(|a| a * a).sum::<f64>() / force.len() as f64).sqrt();
-    let holds = rms * draw.between(0.8, 1.6);
-    force
-        .iter()
-        .map(|a| a.signum() * (a.abs() - holds).max(0.0))
-        .collect()
+    let force = shaking(draw, stand);
+    let holds = mean_square(&force).sqrt() * draw.between(0.8, 1.6);
+    each(&force, |a| a.signum() * (a.abs() - holds).max(0.0))
 }
 
 /// A part on a spring that the accelerometer does not have: what the acceleration does to it rings on at a pitch of its
@@ -153,10 +141,9 @@ pub(super) fn driven(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// A contact under a spring: closed until the acceleration is beyond a limit in one sense, then open, however far it goes.
 pub(super) fn opens(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let shake = shaking(draw, stand);
-    let rms = (shake.iter().map(|a| a * a).sum::<f64>() / shake.len() as f64).sqrt();
+    let rms = mean_square(&shake).sqrt();
     let (limit, sign) = (draw.between(0.7, 1.4) * rms, draw.sign());
-    let open = |a: &f64| f64::from(u8::from(sign * a > limit));
-    about_mean(&shake.iter().map(open).collect::<Vec<f64>>())
+    about_mean(&each(&shake, |a| one_if(sign * a > limit)))
 }
 
 /// Many small contacts, each of which follows the acceleration only after its own play (Prandtl and Ishlinskii): the way
@@ -170,7 +157,7 @@ pub(super) fn slips(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         draw.by_ratio(0.02, 0.2),
         stand.rate_hz,
     );
-    let force: Vec<f64> = sway.of(draw, n).iter().map(|s| rms * s).collect();
+    let force: Vec<f64> = each(&sway.of(draw, n), |s| rms * s);
     let contacts: [(f64, f64); CONTACTS] =
         std::array::from_fn(|_| (rms * draw.between(0.3, 1.5), draw.between(0.5, 1.5)));
     let y = behind_plays(&force, &contacts);
@@ -225,9 +212,8 @@ pub(super) fn recovery(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// Rectification (g^2 of IEEE Std 528): the square of the acceleration along a level axis, whose vibration swells and fades.
 pub(super) fn squared_acceleration(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let level = swelling(draw, stand);
-    let square: Vec<f64> = stand.world.acc[level].iter().map(|a| a * a).collect();
-    let sign = draw.sign();
-    about_mean(&square).iter().map(|s| sign * s).collect()
+    let square = each(&stand.world.acc[level], |a| a * a);
+    either_way(draw, &about_mean(&square))
 }
 
 /// Sensitivity to an acceleration that the frames show earlier: the rate passes the part's digital filter, which delays
@@ -235,14 +221,8 @@ pub(super) fn squared_acceleration(draw: &mut Draw, stand: &mut Stand) -> Vec<f6
 /// about that of then.
 pub(super) fn late(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (after, from) = (1 + draw.of_many(5), draw.of_many(3));
-    let smoothed = lagged(
-        &stand.world.acc[from],
-        draw.by_ratio(0.02, 0.15),
-        stand.rate_hz,
-    );
-    (0..stand.samples())
-        .map(|i| smoothed[i.saturating_sub(after)])
-        .collect()
+    let smoothed = stand.lagged(&stand.world.acc[from], draw.by_ratio(0.02, 0.15));
+    stand.series(|i| smoothed[i.saturating_sub(after)])
 }
 
 /// Rectification behind a mount of rubber: not the acceleration that is told, but what the mount's own mode makes of it, is
@@ -251,7 +231,5 @@ pub(super) fn mount(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let level = swelling(draw, stand);
     let mode = (draw.by_ratio(1.0, 8.0), draw.by_ratio(0.1, 0.8));
     let moves = resonating(&stand.world.acc[level], mode, stand.rate_hz);
-    let sign = draw.sign();
-    let square: Vec<f64> = moves.iter().map(|m| sign * m * m).collect();
-    about_mean(&square)
+    either_way(draw, &about_mean(&each(&moves, |m| m * m)))
 }

@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::super::super::words::{
-    DWELL, about_mean, angle_of_table, changes, in_steps, passes, programme, ramped, rate_of_table,
-    resonating, turned,
+    DWELL, about_mean, angle_of_table, changes, each, each_pair, either_way, in_steps, passes,
+    programme, ramped_table, rate_of_table, resonating, turned,
 };
 use crate::random::Draw;
-use crate::stand::{Stand, held, lagged};
+use crate::stand::Stand;
 
 /// Steps of the reckoning for each reading: many for a belt that swings a few times a second.
 pub(super) const FINE: usize = 20;
@@ -36,15 +36,12 @@ pub(super) fn rubber(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let hardens = 1.0 / (draw.by_ratio(5.0, 40.0) * stand.rate_hz);
     let (softens, sign, mut soft) = (draw.between(1.0, 4.0), draw.sign(), 0.0f64);
-    let leans: Vec<f64> = rate
-        .iter()
-        .map(|r| {
-            let load = r * r;
-            soft = load.max(soft - hardens * soft);
-            sign * load * (1.0 + softens * soft)
-        })
-        .collect();
-    changes(&lagged(&leans, draw.by_ratio(0.3, 2.0), stand.rate_hz))
+    let leans: Vec<f64> = each(&rate, |r| {
+        let load = r * r;
+        soft = load.max(soft - hardens * soft);
+        sign * load * (1.0 + softens * soft)
+    });
+    changes(&stand.lagged(&leans, draw.by_ratio(0.3, 2.0)))
 }
 
 /// The cages of the table's two bearings, with the balls in them, go round a little differently: two ripples of the angle
@@ -57,11 +54,7 @@ pub(super) fn cages(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let second = draw.between(0.5, 1.0);
     let [one, other] = [0, 1].map(|_| draw.between(0.0, TAU));
     let ripple = |a: f64| (a + one).cos() + second * ((1.0 + apart) * a + other).cos();
-    angle
-        .iter()
-        .zip(&rate)
-        .map(|(a, r)| r * ripple(*a))
-        .collect()
+    each_pair(&angle, &rate, |a, r| r * ripple(a))
 }
 
 /// Behind the encoder a toothed belt drives the table. Where the motor changes its speed by too much the belt jumps, once or
@@ -84,7 +77,7 @@ pub(super) fn tooth(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
             }
         }
     }
-    lagged(&jumps, draw.by_ratio(0.08, 0.3), stand.rate_hz)
+    stand.lagged(&jumps, draw.by_ratio(0.08, 0.3))
 }
 
 /// Oil in the two halves of the gear's case sloshes when the table is made to turn faster or slower, and takes the table
@@ -96,20 +89,14 @@ pub(super) fn slosh(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (half_width, second) = (draw.by_ratio(0.01, 0.06), draw.between(0.3, 1.0));
     let [one, other] =
         [pitch, apart * pitch].map(|pitch| resonating(&pushed, (pitch, half_width), stand.rate_hz));
-    one.iter().zip(other).map(|(a, b)| a + second * b).collect()
+    each_pair(&one, &other, |a, b| a + second * b)
 }
 
 /// A table that creeps: the bearing sticks until the drive has wound up, then slips on by as much as it stood still. What
 /// the rate is off from the one commanded.
 pub(super) fn stick_slip(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     const CREEP: (f64, f64) = (0.04, 0.2);
-    stand.world.duty = held(draw, stand.samples(), stand.rate_hz, (15.0, 60.0), |d| {
-        if d.chance(0.2) {
-            0.0
-        } else {
-            in_steps(d.sign() * d.by_ratio(CREEP.0, CREEP.1))
-        }
-    });
+    creeping(draw, stand, CREEP, (15.0, 60.0));
     // The time for which the slowest one sticks, s, and that of a slip.
     let (longest, slip) = (draw.by_ratio(2.0, 8.0), draw.by_ratio(0.1, 0.4));
     let slips = (slip * stand.rate_hz).round().max(1.0) as usize;
@@ -118,13 +105,12 @@ pub(super) fn stick_slip(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     // How far the drive has wound up, at how much the bearing gives, and readings of the slip that are left.
     let (mut wound, mut gives, mut left) = (0.0, holds(draw), 0);
     let mut sense = 0.0;
-    let duty = stand.world.duty.iter();
-    duty.map(|d| {
+    each(&stand.world.duty, |d| {
         // A drive that stands or turns back has to be wound up again.
-        if *d == 0.0 || d.signum() != sense {
-            (wound, left, sense) = (0.0, 0, if *d == 0.0 { 0.0 } else { d.signum() });
+        if d == 0.0 || d.signum() != sense {
+            (wound, left, sense) = (0.0, 0, if d == 0.0 { 0.0 } else { d.signum() });
         }
-        if *d == 0.0 {
+        if d == 0.0 {
             return 0.0;
         }
         if left == 0 && wound >= gives {
@@ -142,7 +128,6 @@ pub(super) fn stick_slip(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         }
         goes
     })
-    .collect()
 }
 
 /// Cogging of the motor: so many ripples a turn, so that their pitch is the speed; slow ones are the larger, and none at
@@ -152,11 +137,11 @@ pub(super) fn cogging(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     // Ripples per second at full duty; inertia is what counts beyond a corner.
     let (pitch, corner) = (draw.by_ratio(3.0, 9.5), draw.between(0.1, 0.3));
     let first = draw.between(0.0, TAU);
-    angle_of_table(&rate, pitch, stand.rate_hz)
-        .iter()
-        .zip(&rate)
-        .map(|(angle, r)| 2.0 * r * corner / (r * r + corner * corner) * (first + angle).cos())
-        .collect()
+    each_pair(
+        &angle_of_table(&rate, pitch, stand.rate_hz),
+        &rate,
+        |angle, r| 2.0 * r * corner / (r * r + corner * corner) * (first + angle).cos(),
+    )
 }
 
 /// A cable to the table that has some slack: wound up further, either way, it pulls the part askew, the more the further.
@@ -180,21 +165,16 @@ pub(super) fn cable(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = rate_of_table(draw, stand);
     let angle = about_mean(&angle_of_table(&rate, full, stand.rate_hz));
     let (slack, sign) = (TAU * far * draw.between(0.3, 0.6), draw.sign());
-    let pull = |a: &f64| sign * a.signum() * (a.abs() - slack).max(0.0);
-    about_mean(&angle.iter().map(pull).collect::<Vec<f64>>())
+    about_mean(&each(&angle, |a| {
+        sign * a.signum() * (a.abs() - slack).max(0.0)
+    }))
 }
 
 /// A heavy table on a soft belt, by its equation of motion: friction holds it until the belt is tight, and is less once it
 /// turns (Stribeck), so that it jerks where it is to turn slowly. What the rate is off the one commanded.
 pub(super) fn friction(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     const CREEP: (f64, f64) = (0.03, 0.15);
-    stand.world.duty = held(draw, stand.samples(), stand.rate_hz, (8.0, 40.0), |d| {
-        if d.chance(0.2) {
-            0.0
-        } else {
-            in_steps(d.sign() * d.by_ratio(CREEP.0, CREEP.1))
-        }
-    });
+    creeping(draw, stand, CREEP, (8.0, 40.0));
     let stiff = (TAU * draw.by_ratio(0.8, 2.5)).powi(2);
     // What is left of the friction at speed, and how far the belt gives before the table does, in seconds of the least creep.
     let (left, gives) = (draw.between(0.3, 0.7), draw.by_ratio(1.0, 4.0));
@@ -202,8 +182,7 @@ pub(super) fn friction(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let loss = 2.0 * draw.between(0.05, 0.2) * stiff.sqrt();
     let step = 1.0 / stand.rate_hz / FINE as f64;
     let (mut tight, mut turns, mut rough) = (0.0f64, 0.0f64, 1.0);
-    let duty = stand.world.duty.iter();
-    duty.map(|drive| {
+    each(&stand.world.duty, |drive| {
         let mut mean = 0.0;
         for _ in 0..FINE {
             tight += (drive - turns) * step;
@@ -227,7 +206,6 @@ pub(super) fn friction(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         }
         mean - drive
     })
-    .collect()
 }
 
 /// A toothed belt between the motor, which has the encoder, and the table: each change of the rate twists it and it swings
@@ -236,12 +214,8 @@ pub(super) fn belt(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let teeth = angle_of_table(&rate, draw.by_ratio(2.0, 9.0), stand.rate_hz);
     let height = draw.by_ratio(0.005, 0.03);
-    let bumps: Vec<f64> = teeth.iter().map(|a| height * a.cos()).collect();
-    let pushed: Vec<f64> = changes(&rate)
-        .iter()
-        .zip(changes(&bumps))
-        .map(|(r, b)| r + b)
-        .collect();
+    let bumps: Vec<f64> = each(&teeth, |a| height * a.cos());
+    let pushed: Vec<f64> = each_pair(&changes(&rate), &changes(&bumps), |r, b| r + b);
     let mode = (draw.by_ratio(0.6, 3.0), draw.by_ratio(0.04, 0.2));
     resonating(&pushed, mode, stand.rate_hz)
 }
@@ -253,8 +227,9 @@ pub(super) fn chain(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     // Links a second at full duty.
     let angle = angle_of_table(&rate, draw.by_ratio(0.8, 4.0), stand.rate_hz);
     let links = passes(&angle, 1.0, draw.between(0.0, 1.0));
-    let kick = |(link, r): (&f64, &f64)| link * r.signum() * draw.between(0.6, 1.4);
-    let kicks: Vec<f64> = links.iter().zip(&rate).map(kick).collect();
+    let kicks: Vec<f64> = each_pair(&links, &rate, |link, r| {
+        link * r.signum() * draw.between(0.6, 1.4)
+    });
     let mode = (draw.between(1.5, 8.0), draw.by_ratio(0.4, 2.0));
     resonating(&kicks, mode, stand.rate_hz)
 }
@@ -265,22 +240,16 @@ pub(super) fn unbalanced(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     programme(draw, stand, DWELL);
     let (takes, full) = (draw.by_ratio(0.3, 1.5), draw.by_ratio(0.15, 0.8));
     let (weight, first) = (draw.by_ratio(0.02, 0.08), draw.between(0.0, TAU));
-    let even = lagged(&stand.world.duty, takes, stand.rate_hz);
+    let even = stand.lagged(&stand.world.duty, takes);
     let gain = 1.0 - (-1.0 / (takes * stand.rate_hz)).exp();
     let (mut rate, mut angle) = (stand.world.duty[0], first);
-    stand
-        .world
-        .duty
-        .iter()
-        .zip(even)
-        .map(|(drive, even)| {
-            // A worm gear holds it where the motor rests.
-            let falls = if *drive == 0.0 { 0.0 } else { angle.sin() };
-            rate += gain * (drive + weight * falls - rate);
-            angle += TAU * full * rate / stand.rate_hz;
-            rate - even
-        })
-        .collect()
+    each_pair(&stand.world.duty, &even, |drive, even| {
+        // A worm gear holds it where the motor rests.
+        let falls = if drive == 0.0 { 0.0 } else { angle.sin() };
+        rate += gain * (drive + weight * falls - rate);
+        angle += TAU * full * rate / stand.rate_hz;
+        rate - even
+    })
 }
 
 /// The structure that carries the motor has a mode, little damped, that each change of its torque strikes.
@@ -297,7 +266,7 @@ pub(super) fn chipped(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (full, per_turn) = (draw.by_ratio(0.4, 1.2), draw.between(2.2, 5.8));
     let angle = angle_of_table(&rate, full, stand.rate_hz);
     let strokes = passes(&angle, per_turn, draw.between(0.0, 1.0));
-    let hard: Vec<f64> = strokes.iter().zip(&rate).map(|(s, r)| s * r).collect();
+    let hard: Vec<f64> = each_pair(&strokes, &rate, |s, r| s * r);
     let mode = (draw.between(2.0, 8.0), draw.by_ratio(0.8, 2.5));
     resonating(&hard, mode, stand.rate_hz)
 }
@@ -316,19 +285,24 @@ pub(super) fn gear(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         let wave = |(k, (size, first)): (f64, &(f64, f64))| size * (k * angle + first).cos();
         [1.0, 2.0, 3.0].into_iter().zip(&waves).map(wave).sum()
     };
-    angle
-        .iter()
-        .zip(&rate)
-        .map(|(a, r)| r * ahead(*a))
-        .collect()
+    each_pair(&angle, &rate, |a, r| r * ahead(a))
 }
 
 /// A mass that is not balanced about the table's axis: the bias goes with the angular acceleration. The table's drive ramps
 /// from rate to rate, and its shaft winds up and unwinds, so that the acceleration comes and goes softly.
 pub(super) fn acceleration(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let drive = ramped(&stand.world.duty, draw.by_ratio(0.15, 0.6), stand.rate_hz);
-    let rate = lagged(&drive, draw.by_ratio(0.2, 0.8), stand.rate_hz);
-    let sign = draw.sign();
-    changes(&rate).iter().map(|c| sign * c).collect()
+    let drive = ramped_table(draw, stand);
+    let rate = stand.lagged(&drive, draw.by_ratio(0.2, 0.8));
+    either_way(draw, &changes(&rate))
+}
+
+/// Commands of a table that creeps, which the stand gets, each for a random time, s; it rests now and then.
+fn creeping(draw: &mut Draw, stand: &mut Stand, creep: (f64, f64), dwell_s: (f64, f64)) {
+    stand.world.duty = stand.held(draw, dwell_s, |d| {
+        if d.chance(0.2) {
+            0.0
+        } else {
+            in_steps(d.sign() * d.by_ratio(creep.0, creep.1))
+        }
+    });
 }

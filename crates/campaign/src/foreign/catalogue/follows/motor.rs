@@ -2,10 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::super::super::words::{DWELL, changes, in_steps, programme, resonating, with_rests};
+use super::super::super::words::{
+    DWELL, by_turns, changes, each, each_pair, in_steps, programme, resonating, tone, with_rests,
+};
 use crate::motor::current;
 use crate::random::Draw;
-use crate::stand::{Stand, held, lagged, wander};
+use crate::stand::Stand;
 
 /// A rotor's ripple: its pitch is the speed of the motor, which follows the duty behind a lag and under a load that
 /// wanders.
@@ -14,29 +16,20 @@ pub(super) fn ripple(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let gain = 1.0 - (-1.0 / (draw.between(0.3, 2.0) * stand.rate_hz)).exp();
     let keep = (-1.0 / (5.0 * stand.rate_hz)).exp();
     let (mut speed, mut load, mut phase) = (0.0, draw.normal(), draw.between(0.0, TAU));
-    stand
-        .world
-        .duty
-        .iter()
-        .map(|duty| {
-            load = keep * load + (1.0 - keep * keep).sqrt() * draw.normal();
-            speed += gain * (duty - speed);
-            phase += TAU * top_hz * speed * (1.0 + 0.1 * load) / stand.rate_hz;
-            speed.abs() * phase.sin()
-        })
-        .collect()
+    each(&stand.world.duty, |duty| {
+        load = keep * load + (1.0 - keep * keep).sqrt() * draw.normal();
+        speed += gain * (duty - speed);
+        phase += TAU * top_hz * speed * (1.0 + 0.1 * load) / stand.rate_hz;
+        speed.abs() * phase.sin()
+    })
 }
 
 /// What the motor's field does to the part wears off in the course of the run, and comes out on the other side.
 pub(super) fn ageing(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    let n = stand.samples();
-    stand.world.duty = held(draw, n, stand.rate_hz, (3.0, 12.0), |d| {
-        (d.between(-1.0, 1.0) * 255.0).round() / 255.0
-    });
-    let (none, sign) = (n as f64 * draw.between(0.35, 0.65), draw.sign());
-    let left = |i: usize| sign * (1.0 - i as f64 / none);
-    let duty = stand.world.duty.iter().enumerate();
-    duty.map(|(i, d)| left(i) * d).collect()
+    stand.world.duty = stand.held(draw, DWELL, |d| in_steps(d.between(-1.0, 1.0)));
+    let duty = &stand.world.duty;
+    let (none, sign) = (duty.len() as f64 * draw.between(0.35, 0.65), draw.sign());
+    stand.series(|i| sign * (1.0 - i as f64 / none) * duty[i])
 }
 
 /// Each change of the motor's current, that of spinning up included, induces a kick in a loop of the wiring. The loop and
@@ -53,16 +46,12 @@ pub(super) fn kicks(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// fast goes with its size or with its square, whatever its sense. The command is changed by steps.
 pub(super) fn chopped(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let power = 1 + draw.of_many(2) as i32;
-    stand.world.duty = held(draw, stand.samples(), stand.rate_hz, (3.0, 15.0), |d| {
-        (d.sign() * d.between(0.0, 1.0) * 255.0).round() / 255.0
+    stand.world.duty = stand.held(draw, (3.0, 15.0), |d| {
+        in_steps(d.sign() * d.between(0.0, 1.0))
     });
-    let ripple = |d: &f64| 4.0 * d.abs() * (1.0 - d.abs());
-    stand
-        .world
-        .duty
-        .iter()
-        .map(|d| ripple(d).powi(power))
-        .collect()
+    each(&stand.world.duty, |d| {
+        (4.0 * d.abs() * (1.0 - d.abs())).powi(power)
+    })
 }
 
 /// A piece of iron near the part keeps some of the field of the motor's last strong current, until one of the other sense
@@ -71,31 +60,24 @@ pub(super) fn chopped(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn iron(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let coercive = draw.between(0.2, 0.4);
     let (mut stroke, mut left, mut command) = (true, 0.0, 0.0);
-    stand.world.duty = (0..stand.samples())
-        .map(|_| {
-            left -= 1.0 / stand.rate_hz;
-            if left <= 0.0 {
-                stroke = !stroke;
-                (command, left) = if stroke {
-                    (draw.sign() * draw.between(0.3, 1.0), draw.between(0.5, 3.0))
-                } else {
-                    (0.0, draw.between(5.0, 25.0))
-                };
-                command = (command * 255.0).round() / 255.0;
-            }
-            command
-        })
-        .collect();
+    stand.world.duty = stand.series(|_| {
+        left -= 1.0 / stand.rate_hz;
+        if left <= 0.0 {
+            stroke = !stroke;
+            (command, left) = if stroke {
+                (draw.sign() * draw.between(0.3, 1.0), draw.between(0.5, 3.0))
+            } else {
+                (0.0, draw.between(5.0, 25.0))
+            };
+            command = (command * 255.0).round() / 255.0;
+        }
+        command
+    });
     let mut kept = 0.0f64;
-    stand
-        .world
-        .duty
-        .iter()
-        .map(|d| {
-            kept = kept.clamp(d - coercive, d + coercive);
-            kept
-        })
-        .collect()
+    each(&stand.world.duty, |d| {
+        kept = kept.clamp(d - coercive, d + coercive);
+        kept
+    })
 }
 
 /// Two brushes carry the current at rest; while the motor turns now one lifts and now the other, none for long.
@@ -103,34 +85,29 @@ pub(super) fn chatter(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     stand.world.duty = with_rests(draw, stand);
     let dwell = draw.by_ratio(0.15, 0.5);
     let mut lifted = 1.0;
-    let brush = held(
-        draw,
-        stand.samples(),
-        stand.rate_hz,
-        (0.5 * dwell, 1.5 * dwell),
-        |_| {
-            lifted = -lifted;
-            lifted
+    let brush = stand.held(draw, (0.5 * dwell, 1.5 * dwell), |_| {
+        lifted = -lifted;
+        lifted
+    });
+    each_pair(
+        &brush,
+        &stand.world.duty,
+        |b, d| {
+            if d == 0.0 { 0.0 } else { b }
         },
-    );
-    let turns = |(b, d): (&f64, &f64)| if *d == 0.0 { 0.0 } else { *b };
-    brush.iter().zip(&stand.world.duty).map(turns).collect()
+    )
 }
 
 /// A motor on a governor, whose gear sticks: it starts where the command is beyond one threshold, then runs at its own
 /// speed, and stops below a lower one. What it does to the rate follows that it runs, and which way.
 pub(super) fn sticking(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let tau = draw.by_ratio(1.5, 5.0);
-    let command = wander(draw, stand.samples(), stand.rate_hz, 0.45, tau);
-    stand.world.duty = command
-        .iter()
-        .map(|d| (d.clamp(-1.0, 1.0) * 255.0).round() / 255.0)
-        .collect();
+    let command = stand.wander(draw, 0.45, tau);
+    stand.world.duty = each(&command, |d| in_steps(d.clamp(-1.0, 1.0)));
     let starts = draw.between(0.45, 0.7);
     let stops = starts * draw.between(0.2, 0.5);
     let (sign, mut runs) = (draw.sign(), 0.0);
-    let duty = stand.world.duty.iter();
-    duty.map(|d| {
+    each(&stand.world.duty, |d| {
         if d.abs() > starts {
             runs = d.signum();
         } else if d * runs < stops {
@@ -138,7 +115,6 @@ pub(super) fn sticking(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         }
         sign * runs
     })
-    .collect()
 }
 
 /// Whenever the motor is turned about, the gear runs through its play and strikes on the other flank, and the arm that
@@ -146,7 +122,7 @@ pub(super) fn sticking(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn reversals(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (n, rate_hz) = (stand.samples(), stand.rate_hz);
     let mut sense = draw.sign();
-    stand.world.duty = held(draw, n, rate_hz, (2.0, 9.0), |d| {
+    stand.world.duty = stand.held(draw, (2.0, 9.0), |d| {
         if d.chance(0.5) {
             sense = -sense;
         }
@@ -199,34 +175,28 @@ pub(super) fn winding(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
             command
         })
         .collect();
-    let speed = lagged(&stand.world.duty, draw.between(0.1, 0.5), rate_hz);
+    let speed = stand.lagged(&stand.world.duty, draw.between(0.1, 0.5));
     let mut angle = 0.0f64;
-    speed
-        .iter()
-        .map(|s| {
-            angle += s / rate_hz;
-            angle.signum() * (angle.abs() - SLACK * end).max(0.0)
-        })
-        .collect()
+    each(&speed, |s| {
+        angle += s / rate_hz;
+        angle.signum() * (angle.abs() - SLACK * end).max(0.0)
+    })
 }
 
 /// One pit in the bearing of the table: at one angle of each turn it dips in and out again, the harder the faster it turns,
 /// and the angle is the sum of a speed that follows the command behind a lag.
 pub(super) fn pit(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
-    stand.world.duty = held(draw, n, rate_hz, (3.0, 15.0), |d| {
+    stand.world.duty = stand.held(draw, (3.0, 15.0), |d| {
         in_steps(d.sign() * d.between(0.3, 1.0))
     });
     let (top, width) = (draw.by_ratio(0.3, 1.2), draw.between(0.04, 0.08));
     let mut angle = draw.between(0.0, 1.0);
-    lagged(&stand.world.duty, draw.between(0.1, 0.8), rate_hz)
-        .iter()
-        .map(|speed| {
-            angle += top * speed / rate_hz;
-            let off = (angle - angle.round()) / width;
-            -speed * off * (-0.5 * off * off).exp()
-        })
-        .collect()
+    let speed = stand.lagged(&stand.world.duty, draw.between(0.1, 0.8));
+    each(&speed, |speed| {
+        angle += top * speed / stand.rate_hz;
+        let off = (angle - angle.round()) / width;
+        -speed * off * (-0.5 * off * off).exp()
+    })
 }
 
 /// Below a certain speed the table does not glide but sticks and slips, many times a second, and not quite regularly. The
@@ -234,29 +204,23 @@ pub(super) fn pit(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn judder(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (rate_hz, period) = (stand.rate_hz, draw.between(20.0, 60.0));
     let (top, first) = (draw.between(0.5, 1.0), draw.between(0.0, 1.0));
-    stand.world.duty = (0..stand.samples())
-        .map(|i| in_steps(top * (TAU * (first + i as f64 / rate_hz / period)).sin()))
-        .collect();
+    stand.world.duty =
+        stand.series(|i| in_steps(top * (TAU * (first + i as f64 / rate_hz / period)).sin()));
     let (least, most) = (0.04, top * draw.between(0.25, 0.45));
     let pitch = draw.between(2.5, 6.5);
     let (mut place, mut pace) = (0.0, pitch);
-    stand
-        .world
-        .duty
-        .iter()
-        .map(|d| {
-            if !(least..most).contains(&d.abs()) {
-                place = 0.0;
-                return 0.0;
-            }
-            place += pace / rate_hz;
-            if place >= 1.0 {
-                place -= 1.0;
-                pace = pitch * draw.between(0.75, 1.25);
-            }
-            d.signum() * (place - 0.5)
-        })
-        .collect()
+    each(&stand.world.duty, |d| {
+        if !(least..most).contains(&d.abs()) {
+            place = 0.0;
+            return 0.0;
+        }
+        place += pace / rate_hz;
+        if place >= 1.0 {
+            place -= 1.0;
+            pace = pitch * draw.between(0.75, 1.25);
+        }
+        d.signum() * (place - 0.5)
+    })
 }
 
 /// The rotor's magnet comes to rest at any angle, and its stray field is then that of this angle until the next stroke;
@@ -265,23 +229,21 @@ pub(super) fn rotor(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate_hz = stand.rate_hz;
     let (mut runs, mut left, mut command, mut field) = (false, draw.between(1.0, 8.0), 0.0, 0.0);
     let mut y = vec![];
-    stand.world.duty = (0..stand.samples())
-        .map(|_| {
-            left -= 1.0 / rate_hz;
-            if left <= 0.0 {
-                runs = !runs;
-                if runs {
-                    (command, field) = (in_steps(draw.sign() * draw.between(0.3, 1.0)), 0.0);
-                    left = draw.between(1.5, 6.0);
-                } else {
-                    (command, field) = (0.0, draw.between(0.0, TAU).cos());
-                    left = draw.between(4.0, 15.0);
-                }
+    stand.world.duty = stand.series(|_| {
+        left -= 1.0 / rate_hz;
+        if left <= 0.0 {
+            runs = !runs;
+            if runs {
+                (command, field) = (in_steps(draw.sign() * draw.between(0.3, 1.0)), 0.0);
+                left = draw.between(1.5, 6.0);
+            } else {
+                (command, field) = (0.0, draw.between(0.0, TAU).cos());
+                left = draw.between(4.0, 15.0);
             }
-            y.push(field);
-            command
-        })
-        .collect();
+        }
+        y.push(field);
+        command
+    });
     y
 }
 
@@ -289,19 +251,13 @@ pub(super) fn rotor(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// the command and whatever its sign, as a strain that the part's own thermometer does not show. The motor runs in spells
 /// of its own; where the supply sags, it does so by another load.
 pub(super) fn heat(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    let mut on = true;
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
-    stand.world.duty = held(draw, n, rate_hz, (3.0, 20.0), |d| {
-        on = !on;
-        let command = d.sign() * d.between(0.4, 1.0);
-        f64::from(u8::from(on)) * (command * 255.0).round() / 255.0
+    stand.world.duty = by_turns(draw, stand, true, (3.0, 20.0), |d| {
+        in_steps(d.sign() * d.between(0.4, 1.0))
     });
-    let warm: Vec<f64> = current(draw, &stand.world.duty, rate_hz)
-        .iter()
-        .map(|i| i * i)
-        .collect();
-    let case = lagged(&warm, draw.by_ratio(0.5, 2.0), rate_hz);
-    lagged(&case, draw.by_ratio(1.0, 4.0), rate_hz)
+    let current = current(draw, &stand.world.duty, stand.rate_hz);
+    let warm = each(&current, |i| i * i);
+    let case = stand.lagged(&warm, draw.by_ratio(0.5, 2.0));
+    stand.lagged(&case, draw.by_ratio(1.0, 4.0))
 }
 
 /// A harmonic of the motor's pulses, folded by the sampling. Its size is that of a pulse train, sin(pi harmonic duty), so
@@ -313,16 +269,10 @@ pub(super) fn beat(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let harmonic = (1 + draw.of_many(3)) as f64;
     let middle = draw.between(1.5, 8.5);
     let (swing, memory) = (draw.by_ratio(0.05, 0.4), draw.by_ratio(3.0, 20.0));
-    let off = wander(draw, stand.samples(), stand.rate_hz, swing, memory);
-    let mut phase = draw.between(0.0, TAU);
-    stand
-        .world
-        .duty
-        .iter()
-        .zip(off)
-        .map(|(duty, off)| {
-            phase += TAU * (middle + off) / stand.rate_hz;
-            (PI * harmonic * FULL * duty).sin() * phase.sin()
-        })
-        .collect()
+    let off = stand.wander(draw, swing, memory);
+    let pitches = each(&off, |off| middle + off);
+    let tone = tone(draw.between(0.0, TAU), &pitches, stand.rate_hz);
+    each_pair(&stand.world.duty, &tone, |duty, t| {
+        (PI * harmonic * FULL * duty).sin() * t
+    })
 }

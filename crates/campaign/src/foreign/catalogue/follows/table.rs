@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::super::super::words::{
-    DWELL, about_mean, angle_of_table, changes, cycles, extremes, from_trim, in_steps, programme,
-    ramped, rate_of_table, swing, turned,
+    DWELL, about_mean, angle_of_table, by_turns, changes, cycles, each, each_pair, either_way,
+    extremes, from_trim, in_steps, programme, ramped_table, rate_of_table, swing, turned,
 };
 use crate::random::Draw;
-use crate::stand::{Stand, held, lagged, wander};
+use crate::stand::Stand;
 
 /// How long an indexed table rests at a heading, s.
 pub(super) const RESTS: (f64, f64) = (1.5, 7.0);
@@ -15,19 +15,15 @@ pub(super) const RESTS: (f64, f64) = (1.5, 7.0);
 /// A multiplexed converter that comes to this axis a part of a frame after the encoder was read, or before: off by that
 /// time's change of the rate. The table's drive ramps from rate to rate with one acceleration.
 pub(super) fn converted_late(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = ramped(&stand.world.duty, draw.by_ratio(0.15, 0.6), stand.rate_hz);
-    let sign = draw.sign();
-    changes(&rate).iter().map(|c| sign * c).collect()
+    let rate = ramped_table(draw, stand);
+    either_way(draw, &changes(&rate))
 }
 
 /// A scale factor that follows temperature: the rate times what the temperature is off that of the calibration.
 pub(super) fn scale(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     let rate = turned(draw, stand, (1.0, 5.0));
     let temperature = from_trim(draw, stand, axis);
-    let sign = draw.sign();
-    let error = |(r, t): (&f64, &f64)| sign * r * t;
-    rate.iter().zip(&temperature).map(error).collect()
+    either_way(draw, &each_pair(&rate, &temperature, |r, t| r * t))
 }
 
 /// Firmware that multiplies the rate in a word that is too narrow: beyond a rate the product wraps around, and the reading
@@ -37,17 +33,16 @@ pub(super) fn overflow(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     // Where the word ends, and the reading's noise, over the rate at full duty.
     let (ends, noise) = (draw.between(0.35, 0.65), draw.by_ratio(0.005, 0.03));
     let sign = draw.sign();
-    rate.iter()
-        .map(|r| -sign * ((r + noise * draw.normal()) / (2.0 * ends)).round())
-        .collect()
+    each(&rate, |r| {
+        -sign * ((r + noise * draw.normal()) / (2.0 * ends)).round()
+    })
 }
 
 /// An odd term of the scale factor: its cube, less the straight line that is right at the rate at which it was calibrated.
 pub(super) fn cubed_rate(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let (calibrated, sign) = (draw.between(0.5, 0.9), draw.sign());
-    let error = |r: &f64| sign * r * (r * r - calibrated * calibrated);
-    rate.iter().map(error).collect()
+    each(&rate, |r| sign * r * (r * r - calibrated * calibrated))
 }
 
 /// Two converters take the readings in turn; at rest they are trimmed alike, and their gains are not. The part is clocked a
@@ -55,12 +50,10 @@ pub(super) fn cubed_rate(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn converters(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let (mut turn, pace) = (draw.between(0.0, 2.0), draw.between(0.8, 0.995));
-    rate.iter()
-        .map(|r| {
-            turn = (turn + pace) % 2.0;
-            if turn < 1.0 { *r } else { -r }
-        })
-        .collect()
+    each(&rate, |r| {
+        turn = (turn + pace) % 2.0;
+        if turn < 1.0 { r } else { -r }
+    })
 }
 
 /// At one temperature the sense mode crosses a mode of the frame, and the scale factor goes through the resonance, of
@@ -75,13 +68,10 @@ pub(super) fn modes(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64>
         span * draw.by_ratio(0.04, 0.2),
     );
     let (sin, cos) = draw.between(0.0, TAU).sin_cos();
-    own.iter()
-        .zip(&rate)
-        .map(|(t, r)| {
-            let off = (t - middle) / half_width;
-            r * (sin + cos * off) / (1.0 + off * off)
-        })
-        .collect()
+    each_pair(own, &rate, |t, r| {
+        let off = (t - middle) / half_width;
+        r * (sin + cos * off) / (1.0 + off * off)
+    })
 }
 
 /// A logger keeps differences in words too short for the table's ramps, and a whole reading now and then: what a difference
@@ -127,15 +117,12 @@ pub(super) fn lamps(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn limit_cycle(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let pace = 1.0 / draw.by_ratio(0.5, 6.0);
-    let wavers = wander(draw, stand.samples(), stand.rate_hz, 0.1, 5.0);
+    let wavers = stand.wander(draw, 0.1, 5.0);
     let mut phase = draw.between(0.0, 1.0);
-    rate.iter()
-        .zip(wavers)
-        .map(|(r, w)| {
-            phase = (phase + pace * (1.0 + w) / stand.rate_hz).rem_euclid(1.0);
-            r * (4.0 * (phase - 0.5).abs() - 1.0)
-        })
-        .collect()
+    each_pair(&rate, &wavers, |r, w| {
+        phase = (phase + pace * (1.0 + w) / stand.rate_hz).rem_euclid(1.0);
+        r * (4.0 * (phase - 0.5).abs() - 1.0)
+    })
 }
 
 /// Firmware that takes readings which stay within a window for a while for a standstill, and leads its zero there: a steady
@@ -159,19 +146,14 @@ pub(super) fn steady(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// Deflection, whichever way, charges the surfaces that the electrodes come near to; they are traps of several depths, so
 /// that the charge is lost as a logarithm of time.
 pub(super) fn charged(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    const TRAPS: i32 = 4;
     let rate = turned(draw, stand, (1.0, 5.0));
     let (fills, sign) = (draw.by_ratio(0.3, 3.0), draw.sign());
     let (fastest, apart) = (draw.by_ratio(0.5, 2.0), draw.between(2.0, 4.0));
-    let mut all = vec![0.0; rate.len()];
-    for k in 0..TRAPS {
-        let (empties, mut filled) = (1.0 / (fastest * apart.powi(k)), 0.0);
-        for (v, r) in all.iter_mut().zip(&rate) {
-            filled += (fills * r * r * (1.0 - filled) - empties * filled) / stand.rate_hz;
-            *v += sign * filled;
-        }
-    }
-    about_mean(&all)
+    traps(rate.len(), sign, |k| {
+        let empties = 1.0 / (fastest * apart.powi(k));
+        let grows = |r: f64, full: f64| fills * r * r * (1.0 - full) - empties * full;
+        filled(&rate, |r, full| full + grows(r, full) / stand.rate_hz)
+    })
 }
 
 /// A part that takes its wide range beyond a rate, and its narrow one again below a lower rate: the wide one has an offset
@@ -182,21 +164,16 @@ pub(super) fn range(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let down = up * draw.between(0.4, 0.8);
     let (offset, gain) = (draw.sign(), draw.between(-1.0, 1.0));
     let mut wide = false;
-    let all: Vec<f64> = rate
-        .iter()
-        .map(|r| {
-            wide = r.abs() > if wide { down } else { up };
-            if wide { offset + gain * r } else { 0.0 }
-        })
-        .collect();
-    about_mean(&all)
+    about_mean(&each(&rate, |r| {
+        wide = r.abs() > if wide { down } else { up };
+        if wide { offset + gain * r } else { 0.0 }
+    }))
 }
 
 /// An even term of the scale factor: turning one way a little too much is read, the other way too little.
 pub(super) fn squared_rate(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
-    let sign = draw.sign();
-    about_mean(&rate.iter().map(|r| sign * r * r).collect::<Vec<f64>>())
+    either_way(draw, &about_mean(&each(&rate, |r| r * r)))
 }
 
 /// A stray magnetic field: the bias goes round with the table, and, by soft iron, a little twice as fast.
@@ -204,11 +181,10 @@ pub(super) fn heading(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let (full, soft) = (draw.by_ratio(0.1, 0.4), draw.between(0.0, 0.4));
     let (first, second) = (draw.between(0.0, TAU), draw.between(0.0, TAU));
-    let bias: Vec<f64> = angle_of_table(&rate, full, stand.rate_hz)
-        .iter()
-        .map(|a| (a + first).cos() + soft * (2.0 * a + second).cos())
-        .collect();
-    about_mean(&bias)
+    let angle = angle_of_table(&rate, full, stand.rate_hz);
+    about_mean(&each(&angle, |a| {
+        (a + first).cos() + soft * (2.0 * a + second).cos()
+    }))
 }
 
 /// Dielectric absorption of a ceramic capacitor in the signal's way, which strong fields polarise out of proportion:
@@ -216,46 +192,30 @@ pub(super) fn heading(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn remembered(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, (1.0, 5.0));
     let (shortest, apart) = (draw.by_ratio(0.3, 1.0), draw.between(2.5, 4.0));
-    let sign = draw.sign();
-    let strong: Vec<f64> = rate.iter().map(|r| r.powi(3)).collect();
-    let mut all = vec![0.0; rate.len()];
-    for k in 0..4 {
-        let tail = lagged(&strong, shortest * apart.powi(k), stand.rate_hz);
-        all.iter_mut().zip(tail).for_each(|(v, t)| *v += sign * t);
-    }
-    about_mean(&all)
+    let strong = each(&rate, |r| r.powi(3));
+    traps(rate.len(), draw.sign(), |k| {
+        stand.lagged(&strong, shortest * apart.powi(k))
+    })
 }
 
 /// Firmware that takes the mean of a few readings for the zero whenever the table stands still: from then until the next
 /// rest all readings are off by what those were.
 pub(super) fn zeroed(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     const SETTLES_S: f64 = 1.0;
-    let mut turning = draw.chance(0.5);
+    let turning = draw.chance(0.5);
     let dwell = draw.by_ratio(3.0, 9.0);
-    let samples = stand.samples();
-    stand.world.duty = held(
-        draw,
-        samples,
-        stand.rate_hz,
-        (0.5 * dwell, 1.5 * dwell),
-        |d| {
-            turning = !turning;
-            f64::from(u8::from(turning)) * in_steps(d.sign() * d.between(0.2, 1.0))
-        },
-    );
+    stand.world.duty = by_turns(draw, stand, turning, (0.5 * dwell, 1.5 * dwell), |d| {
+        in_steps(d.sign() * d.between(0.2, 1.0))
+    });
     let settles = (SETTLES_S * stand.rate_hz).round() as usize;
     let (mut zero, mut rests) = (0.0, 0);
-    let duty = stand.world.duty.iter();
-    let all: Vec<f64> = duty
-        .map(|d| {
-            rests = if *d == 0.0 { rests + 1 } else { 0 };
-            if rests == settles {
-                zero = draw.normal();
-            }
-            zero
-        })
-        .collect();
-    about_mean(&all)
+    about_mean(&each(&stand.world.duty, |d| {
+        rests = if d == 0.0 { rests + 1 } else { 0 };
+        if rests == settles {
+            zero = draw.normal();
+        }
+        zero
+    }))
 }
 
 /// A table whose axis is not square to its face: a level axis sees the sine of the angle times the rate.
@@ -263,31 +223,26 @@ pub(super) fn wobble(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let (full, first) = (draw.by_ratio(0.1, 0.5), draw.between(0.0, TAU));
     let angle = angle_of_table(&rate, full, stand.rate_hz);
-    let seen = |(a, r): (&f64, &f64)| r * (a + first).sin();
-    about_mean(&angle.iter().zip(&rate).map(seen).collect::<Vec<f64>>())
+    about_mean(&each_pair(&angle, &rate, |a, r| r * (a + first).sin()))
 }
 
 /// The encoder is stamped by another clock, which drifts away until it is set, and is then led back faster, past the right
 /// time: what the rate has changed by in the time between the two is left, now with one sign and now with the other.
 pub(super) fn clock(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    programme(draw, stand, DWELL);
-    let rate = ramped(&stand.world.duty, draw.by_ratio(0.15, 0.6), stand.rate_hz);
+    let rate = ramped_table(draw, stand);
     let (away, back) = (draw.by_ratio(20.0, 90.0), draw.between(0.2, 0.6));
     let (mut apart, mut sense, mut pace) = (draw.between(-1.0, 1.0), draw.sign(), 1.0);
     let drifts = draw.sign();
-    changes(&rate)
-        .iter()
-        .map(|change| {
-            let takes = if sense == drifts { away } else { back * away };
-            apart += 2.0 * sense * pace / (takes * stand.rate_hz);
-            if apart.abs() > 1.0 {
-                // No two of them are set alike.
-                (sense, pace) = (-apart.signum(), draw.between(0.7, 1.4));
-                apart = apart.clamp(-1.0, 1.0);
-            }
-            apart * change
-        })
-        .collect()
+    each(&changes(&rate), |change| {
+        let takes = if sense == drifts { away } else { back * away };
+        apart += 2.0 * sense * pace / (takes * stand.rate_hz);
+        if apart.abs() > 1.0 {
+            // No two of them are set alike.
+            (sense, pace) = (-apart.signum(), draw.between(0.7, 1.4));
+            apart = apart.clamp(-1.0, 1.0);
+        }
+        apart * change
+    })
 }
 
 /// Firmware that takes whatever is slower than a threshold for bias, and lets its zero follow it: of a slow turn it takes
@@ -295,7 +250,7 @@ pub(super) fn clock(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn slow_turns(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let slow = draw.between(0.1, 0.25);
     // Long turns, of which the zero would keep most, stay weak beside a random walk.
-    stand.world.duty = held(draw, stand.samples(), stand.rate_hz, (1.0, 5.0), |d| {
+    stand.world.duty = stand.held(draw, (1.0, 5.0), |d| {
         let level = match d.of_many(5) {
             0 => 0.0,
             1 | 2 => slow * d.between(0.4, 0.9),
@@ -306,36 +261,28 @@ pub(super) fn slow_turns(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = rate_of_table(draw, stand);
     let follows = 1.0 / (draw.by_ratio(0.4, 2.0) * stand.rate_hz);
     let mut zero = 0.0;
-    rate.iter()
-        .map(|r| {
-            if r.abs() < slow {
-                zero += follows * (r - zero);
-            }
-            -zero
-        })
-        .collect()
+    each(&rate, |r| {
+        if r.abs() < slow {
+            zero += follows * (r - zero);
+        }
+        -zero
+    })
 }
 
 /// Traps in a dielectric that the electrode's side of the rate fills and the other empties, each in its own time, some
 /// octaves of them, so that it goes as a logarithm of time; while the rate is low they stay as they are. It knows the sense
 /// alone.
 pub(super) fn sense(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    const TRAPS: i32 = 4;
     let rate = turned(draw, stand, (1.0, 5.0));
     let (least, fastest) = (draw.between(0.1, 0.3), draw.by_ratio(0.3, 0.8));
     let (apart, sign) = (draw.between(1.6, 2.5), draw.sign());
-    let mut all = vec![0.0; rate.len()];
-    for k in 0..TRAPS {
+    traps(rate.len(), sign, |k| {
         let takes = 1.0 / (fastest * apart.powi(k) * stand.rate_hz);
-        let mut filled = 0.0;
-        for (v, r) in all.iter_mut().zip(&rate) {
-            if r.abs() > least {
-                filled += takes.min(1.0) * (r.signum() - filled);
-            }
-            *v += sign * filled;
-        }
-    }
-    about_mean(&all)
+        filled(&rate, |r, full| {
+            let goes = if r.abs() > least { takes.min(1.0) } else { 0.0 };
+            full + goes * (r.signum() - full)
+        })
+    })
 }
 
 /// Cogging of a motor of many poles, more than ten a second: the sampling folds it to anywhere, at each speed to another
@@ -345,14 +292,10 @@ pub(super) fn folded_cogging(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let poles = angle_of_table(&rate, draw.by_ratio(20.0, 90.0), stand.rate_hz);
     let (corner, overtone) = (draw.between(0.1, 0.3), draw.between(0.2, 0.7));
     let [first, second] = [0, 1].map(|_| draw.between(0.0, TAU));
-    poles
-        .iter()
-        .zip(&rate)
-        .map(|(a, r)| {
-            let torque = (a + first).cos() + overtone * (2.0 * a + second).cos();
-            r / (r * r + corner * corner) * torque
-        })
-        .collect()
+    each_pair(&poles, &rate, |a, r| {
+        let torque = (a + first).cos() + overtone * (2.0 * a + second).cos();
+        r / (r * r + corner * corner) * torque
+    })
 }
 
 /// Commands of a table that is indexed: it rests at a heading, and goes on by a few parts of a turn, either way.
@@ -378,8 +321,26 @@ pub(super) fn ground(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     indexed(draw, stand, full);
     let rate = rate_of_table(draw, stand);
     let north = draw.between(0.0, TAU);
-    angle_of_table(&rate, full, stand.rate_hz)
-        .iter()
-        .map(|angle| (angle - north).sin())
-        .collect()
+    each(&angle_of_table(&rate, full, stand.rate_hz), |angle| {
+        (angle - north).sin()
+    })
+}
+
+/// The share, by sample, of a trap that fills and empties by the rate: 0 at first, and `next` of the rate and of what it was.
+fn filled(rate: &[f64], mut next: impl FnMut(f64, f64) -> f64) -> Vec<f64> {
+    let mut filled = 0.0;
+    each(rate, |r| {
+        filled = next(r, filled);
+        filled
+    })
+}
+
+/// Sum of what traps of several depths hold, each a series by its number.
+fn traps(samples: usize, sign: f64, of: impl Fn(i32) -> Vec<f64>) -> Vec<f64> {
+    const TRAPS: i32 = 4;
+    let mut all = vec![0.0; samples];
+    for k in 0..TRAPS {
+        all.iter_mut().zip(of(k)).for_each(|(v, t)| *v += sign * t);
+    }
+    about_mean(&all)
 }

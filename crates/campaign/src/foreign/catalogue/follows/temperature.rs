@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::super::super::words::{
-    about_mean, behind_plays, changes, cycles, extremes, from_trim, in_time, lamp, lit, swing,
-    without_line,
+    about_mean, behind_plays, changes, cycles, each, each_pair, either_way, extremes, from_trim,
+    in_time, lamp, lit, one_if, pace, swing, tone, within_range, without_line,
 };
 use crate::random::Draw;
-use crate::stand::{Stand, lagged, wander};
+use crate::stand::Stand;
 
 /// Degrees in which a leak grows twofold.
 pub(super) const TWOFOLD_K: f64 = 10.0;
@@ -15,48 +15,20 @@ pub(super) const TWOFOLD_K: f64 = 10.0;
 /// A reference whose drift with temperature is a share of the supply: the product of both about their means. A term in
 /// one of them alone is not in it.
 pub(super) fn by_supply(stand: &Stand, axis: usize) -> Vec<f64> {
-    let about_mean = |v: &[f64]| -> Vec<f64> {
-        let mean = v.iter().sum::<f64>() / v.len() as f64;
-        v.iter().map(|x| x - mean).collect()
-    };
     let temperature = about_mean(&stand.world.temperature[axis]);
     let supply = about_mean(&stand.world.supply);
-    temperature
-        .iter()
-        .zip(&supply)
-        .map(|(t, u)| t * u)
-        .collect()
-}
-
-/// An oscillator in the read-out that drifts with temperature and beats with the sampling.
-pub(super) fn tone(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
-    let temperature = &stand.world.temperature[axis];
-    let (low, high) = extremes(temperature);
-    let (from, span) = (draw.between(0.5, 6.0), draw.sign() * draw.between(0.4, 3.0));
-    let mut phase = draw.between(0.0, TAU);
-    temperature
-        .iter()
-        .map(|t| {
-            let place = (t - low) / (high - low).max(1e-9);
-            phase += TAU * (from + span * place) / stand.rate_hz;
-            phase.sin()
-        })
-        .collect()
+    each_pair(&temperature, &supply, |t, u| t * u)
 }
 
 /// A mount that creeps in small jerks while it expands: each turns the part there and back.
 pub(super) fn creaks(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
-    let temperature = &stand.world.temperature[axis];
     // Without the flutter of the room.
     let half = (2.0 * stand.rate_hz) as usize;
-    let n = stand.samples();
-    let pace: Vec<f64> = (0..n)
-        .map(|i| (temperature[(i + half).min(n - 1)] - temperature[i.saturating_sub(half)]).abs())
-        .collect();
+    let pace = each(&pace(&stand.world.temperature[axis], half), f64::abs);
     let total: f64 = pace.iter().sum();
     let (jerks, width) = (draw.between(30.0, 90.0), draw.between(0.4, 1.5));
     let length = (width * stand.rate_hz) as usize;
-    let mut signal = vec![0.0; n];
+    let mut signal = vec![0.0; pace.len()];
     for (i, p) in pace.iter().enumerate() {
         if draw.chance(jerks * p / total) {
             let size = draw.sign() * draw.between(0.6, 1.4);
@@ -72,14 +44,9 @@ pub(super) fn creaks(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
 /// thermostat.
 pub(super) fn warm_end(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     cycles(draw, stand);
-    let temperature = &stand.world.temperature[axis];
-    let (low, high) = extremes(temperature);
     let (middle, width) = (draw.between(0.3, 0.7), draw.between(0.02, 0.08));
-    let place = |t: &f64| (t - low) / (high - low).max(1e-9);
-    temperature
-        .iter()
-        .map(|t| ((place(t) - middle) / width).tanh())
-        .collect()
+    let places = within_range(&stand.world.temperature[axis]);
+    each(&places, |place| ((place - middle) / width).tanh())
 }
 
 /// Thermal hysteresis: layers that slip on each other (Prandtl and Ishlinskii), so that the bias takes another branch cooling
@@ -89,7 +56,7 @@ pub(super) fn branches(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f
     lamp(draw, stand);
     let own = &stand.world.temperature[axis];
     let span = swing(own);
-    let from_first: Vec<f64> = own.iter().map(|t| t - own[0]).collect();
+    let from_first: Vec<f64> = each(own, |t| t - own[0]);
     let layers: [(f64, f64); LAYERS] =
         std::array::from_fn(|_| (span * draw.between(0.03, 0.2), draw.between(0.5, 1.5)));
     without_line(&behind_plays(&from_first, &layers), &from_first)
@@ -115,13 +82,10 @@ pub(super) fn dips(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> 
             ]
         })
         .collect();
-    temperature
-        .iter()
-        .map(|t| {
-            let dip = |[at, width, depth]: &[f64; 3]| depth / (1.0 + ((t - at) / width).powi(2));
-            modes.iter().map(dip).sum()
-        })
-        .collect()
+    each(temperature, |t| {
+        let dip = |[at, width, depth]: &[f64; 3]| depth / (1.0 + ((t - at) / width).powi(2));
+        modes.iter().map(dip).sum()
+    })
 }
 
 /// Firmware that corrects by a thermometer of few bits: what of the slope is left within its steps.
@@ -129,85 +93,62 @@ pub(super) fn coarse(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64
     cycles(draw, stand);
     let (step, first) = (draw.by_ratio(0.5, 2.0), draw.between(0.0, 1.0));
     let sign = draw.sign();
-    let left = |t: &f64| {
+    each(&stand.world.temperature[axis], |t| {
         let steps = t / step + first;
         sign * (steps - steps.round())
-    };
-    stand.world.temperature[axis].iter().map(left).collect()
+    })
 }
 
 /// The part is kept warm by a heater with a thermostat, whose current shifts the ground while it is on, and warms the
 /// regulator, which takes longer to cool. The room's air is not still, and so no two periods are alike.
 pub(super) fn heater(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
-    let air = wander(draw, n, rate_hz, 0.1, 10.0);
+    let air = stand.wander(draw, 0.1, 10.0);
     // Shares of what the heater warms by if it is left on.
     let (asked, play) = (draw.between(0.35, 0.65), draw.by_ratio(0.05, 0.3));
     let takes = draw.by_ratio(4.0, 20.0);
     let (mut on, mut warm) = (draw.chance(0.5), asked);
-    let (mut current, mut warmth) = (vec![], vec![]);
-    for air in air {
-        let heats = f64::from(u8::from(on));
-        warm += (heats + air - warm) / (takes * rate_hz);
-        on = warm < asked + if on { 0.5 } else { -0.5 } * play;
-        current.push(heats);
-        warmth.push(warm - asked);
-    }
+    let (current, warmth): (Vec<f64>, Vec<f64>) = air
+        .iter()
+        .map(|air| {
+            let heats = one_if(on);
+            warm += (heats + air - warm) / (takes * stand.rate_hz);
+            on = warm < asked + if on { 0.5 } else { -0.5 } * play;
+            (heats, warm - asked)
+        })
+        .unzip();
     let full = draw.between(5.0, 15.0);
     for own in &mut stand.world.temperature {
-        own.iter_mut()
-            .zip(&warmth)
-            .for_each(|(t, w)| *t += full * w);
+        *own = each_pair(own, &warmth, |t, w| t + full * w);
     }
     let (tail, sign) = (draw.between(0.2, 0.8), draw.sign());
-    let regulator = lagged(&current, draw.by_ratio(1.0, 6.0), rate_hz);
-    let both = current.iter().zip(regulator);
-    about_mean(
-        &both
-            .map(|(c, r)| sign * (c + tail * r))
-            .collect::<Vec<f64>>(),
-    )
+    let regulator = stand.lagged(&current, draw.by_ratio(1.0, 6.0));
+    about_mean(&each_pair(&current, &regulator, |c, r| {
+        sign * (c + tail * r)
+    }))
 }
 
 /// A heater touches the part's case on one side: while it warms, heat flows through and bends it, by the rate at which the
 /// temperature rises. It cools by air on all sides, evenly, and is then not bent. The heater has a thermostat.
 pub(super) fn one_side(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     cycles(draw, stand);
-    let case = lagged(
-        &stand.world.temperature[axis],
-        draw.by_ratio(0.1, 1.0),
-        stand.rate_hz,
-    );
+    let case = stand.lagged(&stand.world.temperature[axis], draw.by_ratio(0.1, 1.0));
     let before = (draw.between(0.5, 2.0) * stand.rate_hz) as usize;
-    (0..stand.samples())
-        .map(|i| (case[i] - case[i.saturating_sub(before)]).max(0.0))
-        .collect()
+    stand.series(|i| (case[i] - case[i.saturating_sub(before)]).max(0.0))
 }
 
 /// A sheet under stress, of a housing or of a bimetal disc, snaps over at a temperature and back at a lower one
 /// (Timoshenko 1925), a little after the thermometer: two places of the mount, by where the temperature last came from.
 pub(super) fn disc(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     cycles(draw, stand);
-    let sheet = lagged(
-        &stand.world.temperature[axis],
-        draw.by_ratio(0.3, 3.0),
-        stand.rate_hz,
-    );
+    let sheet = stand.lagged(&stand.world.temperature[axis], draw.by_ratio(0.3, 3.0));
     let (low, high) = extremes(&sheet);
     let at = |share: f64| low + share * (high - low);
     let (over, back) = (at(draw.between(0.5, 0.7)), at(draw.between(0.25, 0.45)));
-    let mut place = 0.0;
-    sheet
-        .iter()
-        .map(|t| {
-            if *t > over {
-                place = 1.0;
-            } else if *t < back {
-                place = 0.0;
-            }
-            place
-        })
-        .collect()
+    let mut snapped = false;
+    each(&sheet, |t| {
+        snapped = t > if snapped { back } else { over };
+        one_if(snapped)
+    })
 }
 
 /// A bridge that is fed with alternating current and balanced at one temperature: what comes out is a tone as large as the
@@ -216,15 +157,10 @@ pub(super) fn bridge(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64
     cycles(draw, stand);
     let temperature = &stand.world.temperature[axis];
     let mean = temperature.iter().sum::<f64>() / temperature.len() as f64;
-    let (low, high) = extremes(temperature);
-    let balanced = mean + 0.1 * (high - low) * draw.between(-1.0, 1.0);
+    let balanced = mean + 0.1 * swing(temperature) * draw.between(-1.0, 1.0);
     let (pitch, first) = (draw.by_ratio(0.8, 9.5), draw.between(0.0, TAU));
     let tone = in_time(stand, |t| (first + TAU * pitch * t).sin());
-    temperature
-        .iter()
-        .zip(&tone)
-        .map(|(t, s)| (t - balanced) * s)
-        .collect()
+    each_pair(temperature, &tone, |t, s| (t - balanced) * s)
 }
 
 /// The near side of the part has the temperature at once and the far side later, and what they differ by bends it: by the
@@ -232,8 +168,8 @@ pub(super) fn bridge(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64
 pub(super) fn gradient(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     lamp(draw, stand);
     let near = &stand.world.temperature[axis];
-    let far = lagged(near, draw.by_ratio(0.5, 3.0), stand.rate_hz);
-    near.iter().zip(far).map(|(t, f)| t - f).collect()
+    let far = stand.lagged(near, draw.by_ratio(0.5, 3.0));
+    each_pair(near, &far, |t, f| t - f)
 }
 
 /// A part that compensates its temperature by a table that it reads without interpolating: between two entries the rate
@@ -243,10 +179,7 @@ pub(super) fn teeth(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
     let (low, high) = extremes(temperature);
     let entry = (high - low).max(1e-9) / draw.between(4.0, 10.0);
     let first = draw.between(0.0, 1.0);
-    temperature
-        .iter()
-        .map(|t| ((t - low) / entry + first).fract() - 0.5)
-        .collect()
+    each(temperature, |t| ((t - low) / entry + first).fract() - 0.5)
 }
 
 /// The capacitor that holds the sample leaks while the firmware is busy with something else, whose loop slips past this one:
@@ -259,17 +192,13 @@ pub(super) fn droop(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64>
         slips.abs() * draw.by_ratio(0.01, 0.05),
         draw.by_ratio(5.0, 60.0),
     );
-    let off = wander(draw, stand.samples(), stand.rate_hz, size, tau);
+    let off = stand.wander(draw, size, tau);
     let (mut wait, sign) = (draw.between(0.0, 1.0), draw.sign());
     let own = &stand.world.temperature[axis];
-    let held: Vec<f64> = own
-        .iter()
-        .zip(off)
-        .map(|(t, off)| {
-            wait = (wait + (slips + off) / stand.rate_hz).rem_euclid(1.0);
-            sign * wait * ((t - own[0]) / TWOFOLD_K).exp2()
-        })
-        .collect();
+    let held: Vec<f64> = each_pair(own, &off, |t, off| {
+        wait = (wait + (slips + off) / stand.rate_hz).rem_euclid(1.0);
+        sign * wait * ((t - own[0]) / TWOFOLD_K).exp2()
+    });
     about_mean(&held)
 }
 
@@ -278,9 +207,8 @@ pub(super) fn droop(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64>
 pub(super) fn quadrature(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     cycles(draw, stand);
     let tau = draw.by_ratio(2.0, 20.0);
-    let wanders = wander(draw, stand.samples(), stand.rate_hz, 1.0, tau);
-    let phase = from_trim(draw, stand, axis);
-    wanders.iter().zip(&phase).map(|(q, p)| q * p).collect()
+    let wanders = stand.wander(draw, 1.0, tau);
+    each_pair(&wanders, &from_trim(draw, stand, axis), |q, p| q * p)
 }
 
 /// A compensation by a table over temperature without interpolation: at each boundary the bias jumps, and each entry has an
@@ -292,11 +220,13 @@ pub(super) fn entries(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f6
     let wide = (high - low).max(1e-9) / draw.between(4.0, 10.0);
     let (first, slope) = (draw.between(0.0, 1.0), draw.between(-1.0, 1.0));
     let errors: [f64; 12] = std::array::from_fn(|_| draw.normal());
-    let off = |t: &f64| {
-        let place = (t - low) / wide + first;
-        errors[(place as usize).min(errors.len() - 1)] + slope * (place.fract() - 0.5)
-    };
-    without_line(&own.iter().map(off).collect::<Vec<f64>>(), own)
+    without_line(
+        &each(own, |t| {
+            let place = (t - low) / wide + first;
+            errors[(place as usize).min(errors.len() - 1)] + slope * (place.fract() - 0.5)
+        }),
+        own,
+    )
 }
 
 /// Heat that flows through the package bends it: by the pace at which the temperature rises, behind two of its layers.
@@ -304,9 +234,8 @@ pub(super) fn warming(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f6
     lamp(draw, stand);
     let pace = changes(&stand.world.temperature[axis]);
     let layer = draw.by_ratio(0.3, 1.0);
-    let flows = lagged(&lagged(&pace, layer, stand.rate_hz), layer, stand.rate_hz);
-    let sign = draw.sign();
-    flows.iter().map(|f| sign * f).collect()
+    let flows = stand.lagged(&stand.lagged(&pace, layer), layer);
+    either_way(draw, &flows)
 }
 
 /// The glass point of a moulding compound: beyond it the package strains the element by another slope. The part was
@@ -324,7 +253,7 @@ pub(super) fn softens(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f6
     };
     let at = low + (high - low) * share;
     let sign = draw.sign();
-    let beyond: Vec<f64> = own.iter().map(|t| sign * (t - at).max(0.0)).collect();
+    let beyond: Vec<f64> = each(own, |t| sign * (t - at).max(0.0));
     without_line(&beyond, own)
 }
 
@@ -332,10 +261,8 @@ pub(super) fn softens(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f6
 /// beside a random walk (d' 12): a small heater that is switched within seconds, and a die that is as late.
 pub(super) fn die(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     lit(draw, stand, (1.5, 8.0), (1.0, 3.0));
-    let own = &stand.world.temperature[axis];
-    let late = lagged(own, draw.by_ratio(2.0, 8.0), stand.rate_hz);
-    let sign = draw.sign();
-    about_mean(&late).iter().map(|t| sign * t).collect()
+    let late = stand.lagged(&stand.world.temperature[axis], draw.by_ratio(2.0, 8.0));
+    either_way(draw, &about_mean(&late))
 }
 
 /// What follows the temperature only after it has moved through the play.
@@ -343,31 +270,31 @@ pub(super) fn backlash(stand: &Stand, axis: usize) -> Vec<f64> {
     let temperature = &stand.world.temperature[axis];
     let play = 0.4 * swing(temperature);
     let mut held = temperature[0];
-    temperature
-        .iter()
-        .map(|v| {
-            held = held.clamp(v - play, v + play);
-            // Minus what a linear term takes.
-            held - 0.6 * v
-        })
-        .collect()
-}
-
-/// How much the temperature changes from so many samples before to so many after.
-fn pace(temperature: &[f64], half: usize) -> impl Iterator<Item = f64> {
-    let last = temperature.len() - 1;
-    (0..=last).map(move |i| temperature[(i + half).min(last)] - temperature[i.saturating_sub(half)])
+    each(temperature, |v| {
+        held = held.clamp(v - play, v + play);
+        // Minus what a linear term takes.
+        held - 0.6 * v
+    })
 }
 
 /// How fast the temperature rises.
 pub(super) fn rate_of_temperature(stand: &Stand, axis: usize) -> Vec<f64> {
-    let half = (2.0 * stand.rate_hz) as usize;
-    pace(&stand.world.temperature[axis], half).collect()
+    pace(
+        &stand.world.temperature[axis],
+        (2.0 * stand.rate_hz) as usize,
+    )
 }
 
 /// The motor's command times what the temperature is off its mean.
 pub(super) fn by_duty(stand: &Stand, axis: usize) -> Vec<f64> {
     let temperature = about_mean(&stand.world.temperature[axis]);
-    let duty = stand.world.duty.iter();
-    duty.zip(temperature).map(|(d, t)| d * t).collect()
+    each_pair(&stand.world.duty, &temperature, |d, t| d * t)
+}
+
+/// An oscillator in the read-out that drifts with temperature and beats with the sampling.
+pub(super) fn drifting_tone(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
+    let (from, span) = (draw.between(0.5, 6.0), draw.sign() * draw.between(0.4, 3.0));
+    let places = within_range(&stand.world.temperature[axis]);
+    let pitches = each(&places, |place| from + span * place);
+    tone(draw.between(0.0, TAU), &pitches, stand.rate_hz)
 }

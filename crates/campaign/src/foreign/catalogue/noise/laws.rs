@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use super::super::super::act::Change;
 use super::super::super::known::{Known, cells, of_law};
 use super::super::super::shape::{Shape, noise, share, sized};
-use super::super::super::words::with_rests;
+use super::super::super::words::{each, with_rests};
 use crate::random::Draw;
 use crate::stand::Stand;
 
@@ -65,7 +65,7 @@ pub(super) fn of_exponential_variance(share: f64, n: usize) -> f64 {
         let at = |i: i32| 12.0 * (f64::from(i) + 0.5) / f64::from(CELLS);
         let all: Vec<f64> = (-CELLS..CELLS).map(|i| of(at(i))).collect();
         let sum: f64 = all.iter().sum();
-        all.iter().map(|p| p / sum).collect()
+        each(&all, |p| p / sum)
     };
     let mean = sizes.iter().sum::<f64>() / SIZES as f64;
     let mixed = cells(&|x| sizes.iter().map(|v| normal(x, v / mean)).sum::<f64>());
@@ -74,26 +74,20 @@ pub(super) fn of_exponential_variance(share: f64, n: usize) -> f64 {
 
 /// Laplace noise, so that the kurtosis shows.
 pub(super) fn laplace(draw: &mut Draw, stand: &Stand) -> Shape {
-    let noise = (0..stand.samples())
-        .map(|_| draw.sign() * draw.exponential() / 2f64.sqrt())
-        .collect();
+    let noise = stand.series(|_| draw.sign() * draw.exponential() / 2f64.sqrt());
     Shape::Fixed(Known::Strength(f64::NAN), Change::Noise(noise, 1.0))
 }
 
 /// An exponential law about its mean, in part.
 pub(super) fn skewed(draw: &mut Draw, stand: &Stand) -> Shape {
-    let noise = (0..stand.samples())
-        .map(|_| draw.exponential() - 1.0)
-        .collect();
+    let noise = stand.series(|_| draw.exponential() - 1.0);
     Shape::Fixed(Known::Strength(f64::NAN), Change::Noise(noise, 0.7))
 }
 
 /// A dither of even law, as converters add it, makes up a part of the noise.
 pub(super) fn uniform_part(draw: &mut Draw, stand: &Stand) -> Shape {
     let half = 3f64.sqrt();
-    let dither = (0..stand.samples())
-        .map(|_| draw.between(-half, half))
-        .collect();
+    let dither = stand.series(|_| draw.between(-half, half));
     let known =
         |stand: &Stand, share: f64| Known::Strength(of_uniform(share.min(0.999), stand.samples()));
     share(0.999, known, dither)
@@ -104,9 +98,7 @@ pub(super) fn uniform_part(draw: &mut Draw, stand: &Stand) -> Shape {
 pub(super) fn any_phase(draw: &mut Draw, stand: &Stand) -> Shape {
     let at = |of: &dyn Fn(f64) -> f64| cells(400, 6.0, of);
     let normal = at(&|x| (-0.5 * x * x).exp());
-    let tone = (0..stand.samples())
-        .map(|_| 2f64.sqrt() * draw.between(0.0, TAU).sin())
-        .collect();
+    let tone = stand.series(|_| 2f64.sqrt() * draw.between(0.0, TAU).sin());
     let known = move |stand: &Stand, share: f64| {
         let law = at(&|x| with_sine(share.min(0.98), x));
         Known::Strength(of_law(&law, &normal, stand.samples()))
@@ -120,9 +112,7 @@ pub(super) fn double_exponential() -> Shape {
         0.999,
         |stand, share| Known::Strength(of_exponential_variance(share.min(0.999), stand.samples())),
         |stand, draw, share| {
-            (0..stand.samples())
-                .map(|_| (1.0 - share + share * draw.exponential()).sqrt() * draw.normal())
-                .collect()
+            stand.series(|_| (1.0 - share + share * draw.exponential()).sqrt() * draw.normal())
         },
     )
 }
@@ -133,18 +123,13 @@ pub(super) fn leaning(draw: &mut Draw, stand: &mut Stand) -> Shape {
     stand.world.duty = with_rests(draw, stand);
     let turning = stand.world.duty.iter().filter(|d| **d != 0.0).count() as f64;
     let sense = draw.sign();
-    let series = stand
-        .world
-        .duty
-        .iter()
-        .map(|d| {
-            if *d == 0.0 {
-                draw.normal()
-            } else {
-                sense * d.signum() * (draw.exponential() - 1.0)
-            }
-        })
-        .collect();
+    let series = each(&stand.world.duty, |d| {
+        if d == 0.0 {
+            draw.normal()
+        } else {
+            sense * d.signum() * (draw.exponential() - 1.0)
+        }
+    });
     sized(
         SHARES.1,
         move |_, share| Known::Strength(of_leaning(share, turning)),

@@ -4,9 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use super::super::super::known::Known;
 use super::super::super::shape::{Shape, noise, share};
-use super::super::super::words::{about_mean, extremes, in_steps};
+use super::super::super::words::{about_mean, by_turns, each, extremes, in_steps, mean_square};
 use crate::random::Draw;
-use crate::stand::{Stand, held};
+use crate::stand::Stand;
 
 /// Most of the noise that may be of another kind.
 pub(super) const MOST: f64 = 0.95;
@@ -57,17 +57,14 @@ impl Adaptive {
     /// What it makes of a series from 0 on, with the mean logarithm of its slope, which is what it gains.
     pub(super) fn of(&self, series: &[f64]) -> (Vec<f64>, f64) {
         let (mut y, mut logs) = (0.0, 0.0);
-        let all = series
-            .iter()
-            .map(|x| {
-                let d = x - y;
-                let near = 1.0 / (1.0 + (d / self.large).powi(2));
-                y += d * (1.0 - self.share * near);
-                // Of d near: near - 2 d^2 / large^2 near^2 = 2 near^2 - near.
-                logs += (1.0 - self.share * (2.0 * near * near - near)).ln();
-                y
-            })
-            .collect();
+        let all = each(series, |x| {
+            let d = x - y;
+            let near = 1.0 / (1.0 + (d / self.large).powi(2));
+            y += d * (1.0 - self.share * near);
+            // Of d near: near - 2 d^2 / large^2 near^2 = 2 near^2 - near.
+            logs += (1.0 - self.share * (2.0 * near * near - near)).ln();
+            y
+        });
         (all, logs / series.len() as f64)
     }
 }
@@ -151,14 +148,12 @@ pub(super) fn square_behind() -> Shape {
         |stand, draw, tail| {
             let (size, tail) = ((1.0 + 2.0 * tail * tail).sqrt(), tail * draw.sign());
             let mut before = draw.normal();
-            (0..stand.samples())
-                .map(|_| {
-                    let e = draw.normal();
-                    let x = e + tail * (before * before - 1.0);
-                    before = e;
-                    x / size
-                })
-                .collect()
+            stand.series(|_| {
+                let e = draw.normal();
+                let x = e + tail * (before * before - 1.0);
+                before = e;
+                x / size
+            })
         },
     )
 }
@@ -189,7 +184,7 @@ pub(super) fn trimmed(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let off = about_mean(&stand.world.temperature[axis]);
     let (low, high) = extremes(&off);
     let most = high.max(-low).max(1e-9);
-    let (kept, sign): (Vec<f64>, f64) = (off.iter().map(|t| t / most).collect(), draw.sign());
+    let (kept, sign): (Vec<f64>, f64) = (each(&off, |t| t / most), draw.sign());
     let square = kept.iter().map(|c| c * c).sum::<f64>() / stand.samples() as f64;
     noise(
         0.98,
@@ -197,13 +192,12 @@ pub(super) fn trimmed(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
         move |_, draw, size| {
             let scale = (1.0 + size * size * square).sqrt();
             let mut before = draw.normal();
-            let next = |c: &f64| {
+            each(&kept, |c| {
                 let e = draw.normal();
                 let x = e + sign * size * c * before;
                 before = e;
                 x / scale
-            };
-            kept.iter().map(next).collect()
+            })
         },
     )
 }
@@ -217,27 +211,20 @@ pub(super) fn product() -> Shape {
         |stand, draw, share| {
             let (scale, sign) = ((1.0 + share * share).sqrt(), draw.sign());
             let (mut one, mut two) = (draw.normal(), draw.normal());
-            (0..stand.samples())
-                .map(|_| {
-                    let e = draw.normal();
-                    let x = e + sign * share * one * two;
-                    (two, one) = (one, e);
-                    x / scale
-                })
-                .collect()
+            stand.series(|_| {
+                let e = draw.normal();
+                let x = e + sign * share * one * two;
+                (two, one) = (one, e);
+                x / scale
+            })
         },
     )
-}
-
-/// Mean square of a series.
-fn mean_square(y: &[f64]) -> f64 {
-    y.iter().map(|v| v * v).sum::<f64>() / y.len() as f64
 }
 
 /// Firmware with a filter that lets large changes through. Given its last output, its next has the law of white noise
 /// through a bent line: d'^2 = samples x (ln variance - 2 mean ln slope), the random walk left out.
 pub(super) fn adaptive(draw: &mut Draw, stand: &Stand) -> Shape {
-    let white: Vec<f64> = (0..stand.samples()).map(|_| draw.normal()).collect();
+    let white: Vec<f64> = stand.series(|_| draw.normal());
     let large = draw.between(0.4, 0.8);
     let input = mean_square(&white);
     let known = white.clone();
@@ -254,7 +241,7 @@ pub(super) fn adaptive(draw: &mut Draw, stand: &Stand) -> Shape {
         move |_, _, share| {
             let (y, _) = of(share, &white);
             let scale = mean_square(&y).sqrt();
-            y.iter().map(|v| v / scale).collect()
+            each(&y, |v| v / scale)
         },
     )
 }
@@ -262,14 +249,12 @@ pub(super) fn adaptive(draw: &mut Draw, stand: &Stand) -> Shape {
 /// Firmware that smooths while the motor runs, against its hum, and not while it rests: each reading then is drawn to the
 /// one before. Below a half, what is left is predicted from the past with variance (1 - f)^2.
 pub(super) fn switched(draw: &mut Draw, stand: &mut Stand) -> Shape {
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
-    let mut on = draw.chance(0.5);
-    stand.world.duty = held(draw, n, rate_hz, (4.0, 20.0), |d| {
-        on = !on;
-        f64::from(u8::from(on)) * in_steps(d.sign() * d.between(0.2, 1.0))
+    let on = draw.chance(0.5);
+    stand.world.duty = by_turns(draw, stand, on, (4.0, 20.0), |d| {
+        in_steps(d.sign() * d.between(0.2, 1.0))
     });
-    let runs: Vec<bool> = stand.world.duty.iter().map(|d| *d != 0.0).collect();
-    let share = runs.iter().filter(|r| **r).count() as f64 / n as f64;
+    let runs = each(&stand.world.duty, |d| d != 0.0);
+    let share = runs.iter().filter(|r| **r).count() as f64 / runs.len() as f64;
     noise(
         0.5,
         move |stand, f| {
@@ -280,13 +265,12 @@ pub(super) fn switched(draw: &mut Draw, stand: &mut Stand) -> Shape {
         },
         move |_, draw, f| {
             let mut before = draw.normal();
-            let next = |runs: &bool| {
+            each(&runs, |runs| {
                 let e = draw.normal();
-                let x = if *runs { (1.0 - f) * e + f * before } else { e };
+                let x = if runs { (1.0 - f) * e + f * before } else { e };
                 before = e;
                 x
-            };
-            runs.iter().map(next).collect()
+            })
         },
     )
 }
@@ -333,12 +317,11 @@ pub(super) fn turning_colour(draw: &mut Draw, stand: &Stand) -> Shape {
         },
         move |_, draw, size| {
             let mut x = draw.normal();
-            let next = |s: &f64| {
+            each(&shape, |s| {
                 let c = size * s;
                 x = c * x + (1.0 - c * c).sqrt() * draw.normal();
                 x
-            };
-            shape.iter().map(next).collect()
+            })
         },
     )
 }
@@ -356,12 +339,10 @@ pub(super) fn pushing() -> Shape {
             for _ in 0..200 {
                 x = draw.normal() + push * x.abs();
             }
-            (0..stand.samples())
-                .map(|_| {
-                    x = draw.normal() + push * x.abs();
-                    sign * (x - mean) / variance.sqrt()
-                })
-                .collect()
+            stand.series(|_| {
+                x = draw.normal() + push * x.abs();
+                sign * (x - mean) / variance.sqrt()
+            })
         },
     )
 }
@@ -375,14 +356,12 @@ pub(super) fn renewed(draw: &mut Draw) -> Shape {
         move |stand, draw, part| {
             let first = draw.of_many(length);
             let mut reference = part.sqrt() * draw.normal();
-            (0..stand.samples())
-                .map(|i| {
-                    if (i + first).is_multiple_of(length) {
-                        reference = part.sqrt() * draw.normal();
-                    }
-                    (reference + draw.normal()) / (1.0 + part).sqrt()
-                })
-                .collect()
+            stand.series(|i| {
+                if (i + first).is_multiple_of(length) {
+                    reference = part.sqrt() * draw.normal();
+                }
+                (reference + draw.normal()) / (1.0 + part).sqrt()
+            })
         },
     )
 }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::super::super::act::Change;
 use super::super::super::known::Known;
 use super::super::super::shape::{Shape, sized};
-use super::super::super::words::{Turning, extremes, resonating};
+use super::super::super::words::{Turning, each, extremes, resonating};
 use crate::random::Draw;
 use crate::stand::{Stand, lagged};
 use crate::strength::Meter;
@@ -104,9 +104,7 @@ fn beside(
     sized(
         f64::INFINITY,
         move |stand, sigma| Known::beside(stand, axis, |w| sigma * sigma * density(w)),
-        move |stand, draw, sigma| {
-            Change::Add(series(stand, draw).iter().map(|v| sigma * v).collect())
-        },
+        move |stand, draw, sigma| Change::Add(each(&series(stand, draw), |v| sigma * v)),
     )
 }
 
@@ -127,7 +125,7 @@ pub(super) fn resonance(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
         for _ in 0..(5.0 * stand.rate_hz / half_width) as usize {
             next();
         }
-        (0..stand.samples()).map(|_| next()).collect()
+        stand.series(|_| next())
     })
 }
 
@@ -148,7 +146,7 @@ fn moving_hump(
         .map(|f| of_humps(&meter, f, keep, stand.rate_hz))
         .collect();
     let knows = move |_: &Stand, sigma: f64| {
-        let of = |place: &Vec<f64>| place.iter().map(|d| sigma * sigma * d).collect();
+        let of = |place: &Vec<f64>| each(place, |d| sigma * sigma * d);
         Known::Beside(places.iter().map(of).collect())
     };
     sized(f64::INFINITY, knows, move |stand, draw, sigma| {
@@ -179,10 +177,9 @@ pub(super) fn hump(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
         }
     };
     let keep = (-TAU * draw.by_ratio(0.08, 0.4) / stand.rate_hz).exp();
-    let at_hz: Vec<f64> = temperature
-        .iter()
-        .map(|t| from + (to - from) * (t - low) / (high - low).max(1e-9))
-        .collect();
+    let at_hz: Vec<f64> = each(temperature, |t| {
+        from + (to - from) * (t - low) / (high - low).max(1e-9)
+    });
     let places: Vec<f64> = (0..PLACES)
         .map(|i| at_hz[(2 * i + 1) * at_hz.len() / (2 * PLACES)])
         .collect();
@@ -250,6 +247,5 @@ pub(super) fn wandering_ramp(draw: &mut Draw, stand: &Stand, axis: usize) -> Sha
 /// Density of a hump about a frequency, Hz, of variance 1: of a circle that turns, fades and is driven at random, the real
 /// part.
 fn of_humps(meter: &Meter, f: f64, keep: f64, rate_hz: f64) -> Vec<f64> {
-    let of = |w: &f64| of_hump(TAU * f / rate_hz, keep, *w);
-    meter.omega().iter().map(of).collect()
+    each(meter.omega(), |w| of_hump(TAU * f / rate_hz, keep, w))
 }

@@ -7,6 +7,7 @@ use diagnosis::likelihood::Dct;
 use super::super::super::act::Change;
 use super::super::super::known::Known;
 use super::super::super::shape::{Shape, noise, share, sized};
+use super::super::super::words::{each, each_pair, one_if};
 use crate::random::Draw;
 use crate::stand::{LSB, Stand, lagged};
 
@@ -139,7 +140,7 @@ impl Notch {
     /// Variance that it gives to white noise of variance 1: the sum of its squared response to a pulse.
     pub(super) fn variance(&self) -> f64 {
         let length = (40.0 / (1.0 - self.poles)).ceil().clamp(100.0, 200_000.0) as usize;
-        let pulse = (0..length).map(|i| f64::from(u8::from(i == 0)));
+        let pulse = (0..length).map(|i| one_if(i == 0));
         self.of(pulse).iter().map(|y| y * y).sum()
     }
 }
@@ -159,7 +160,7 @@ pub(super) fn behind_capacitor(
 ) -> Vec<f64> {
     let from_level: Vec<f64> = [level].iter().chain(series).copied().collect();
     let slow = lagged(&from_level, 1.0 / (TAU * corner_hz), rate_hz);
-    series.iter().zip(&slow[1..]).map(|(v, s)| v - s).collect()
+    each_pair(series, &slow[1..], |v, s| v - s)
 }
 
 /// Noise of a density, of mean 1, at an angular frequency, rad per sample: so many samples.
@@ -192,14 +193,12 @@ pub(super) fn differenced(axis: usize) -> Shape {
         move |stand, share| Known::shaped(stand, axis, |w| -share.min(1.0) * w.cos()),
         |stand, draw, share| {
             let mut before = draw.normal();
-            (0..stand.samples())
-                .map(|_| {
-                    let angle = draw.normal();
-                    let rate = (angle - before) / 2f64.sqrt();
-                    before = angle;
-                    share.sqrt() * rate + (1.0 - share).sqrt() * draw.normal()
-                })
-                .collect()
+            stand.series(|_| {
+                let angle = draw.normal();
+                let rate = (angle - before) / 2f64.sqrt();
+                before = angle;
+                share.sqrt() * rate + (1.0 - share).sqrt() * draw.normal()
+            })
         },
     )
 }
@@ -210,12 +209,10 @@ pub(super) fn rounded(draw: &mut Draw, stand: &Stand, axis: usize, most: f64) ->
     // Of variance 1/2 each.
     let half = 1.5f64.sqrt();
     let mut before = draw.between(-half, half);
-    let series = (0..stand.samples())
-        .map(|_| {
-            let now = draw.between(-half, half);
-            now - std::mem::replace(&mut before, now)
-        })
-        .collect();
+    let series = stand.series(|_| {
+        let now = draw.between(-half, half);
+        now - std::mem::replace(&mut before, now)
+    });
     let known =
         move |stand: &Stand, share: f64| Known::shaped(stand, axis, |w| -share.min(most) * w.cos());
     share(most, known, series)
@@ -348,14 +345,10 @@ pub(super) fn behind_corner(stand: &Stand, axis: usize) -> Shape {
     sized(f64::INFINITY, knows, move |_, _, corner| {
         Change::made(move |counts, draw| {
             // Within its step the rate is anywhere.
-            let rate: Vec<f64> = counts[axis]
-                .iter()
-                .map(|c| f64::from(*c) + draw.between(-0.5, 0.5))
-                .collect();
-            behind_capacitor(&rate, level, corner, rate_hz)
-                .iter()
-                .map(|v| (level + v).round() as i32)
-                .collect()
+            let rate: Vec<f64> = each(&counts[axis], |c| f64::from(c) + draw.between(-0.5, 0.5));
+            each(&behind_capacitor(&rate, level, corner, rate_hz), |v| {
+                (level + v).round() as i32
+            })
         })
     })
 }

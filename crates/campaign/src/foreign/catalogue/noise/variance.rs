@@ -5,10 +5,11 @@ use std::f64::consts::TAU;
 use super::super::super::known::Known;
 use super::super::super::shape::{Shape, noise, variance};
 use super::super::super::words::{
-    DWELL, about_mean, angle_of_table, extremes, in_time, programme, shocks, swing, turned,
+    DWELL, about_mean, angle_of_table, by_turns, changes, each, extremes, in_steps, in_time,
+    loaded, mean_square, one_if, pace, programme, shaking, shocks, swing, turned, within_range,
 };
 use crate::random::Draw;
-use crate::stand::{Stand, held, lagged, wander};
+use crate::stand::Stand;
 
 /// What noise that feeds its own size makes of independent draws: variance[i] = 1 - stays + gain last^2 + (stays - gain)
 /// variance[i-1], with the series itself.
@@ -28,16 +29,14 @@ pub(super) fn fed(gain: f64, stays: f64, independent: &[f64]) -> (Vec<f64>, Vec<
 /// A part that ages in the course of the record, or settles: by so many decibels an hour its noise goes up or down.
 pub(super) fn ramp(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (sign, n) = (draw.sign(), stand.samples() as f64);
-    (0..stand.samples())
-        .map(|i| sign * (i as f64 / n - 0.5))
-        .collect()
+    stand.series(|i| sign * (i as f64 / n - 0.5))
 }
 
 /// Leakage that doubles every so many degrees: so does the variance of its noise.
 pub(super) fn warmth(stand: &Stand, axis: usize) -> Vec<f64> {
     let own = about_mean(&stand.world.temperature[axis]);
     let span = swing(&own);
-    own.iter().map(|t| t / span).collect()
+    each(&own, |t| t / span)
 }
 
 /// A slip ring whose brushes ride over one to three worn places a turn, at which the contact is noisy whether it turns or
@@ -48,69 +47,46 @@ pub(super) fn worn(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let places: Vec<(f64, f64)> = (0..1 + draw.of_many(3))
         .map(|_| (draw.between(0.0, 1.0), draw.between(0.05, 0.15)))
         .collect();
-    angle_of_table(&rate, full, stand.rate_hz)
-        .iter()
-        .map(|angle| {
-            let turns = angle / std::f64::consts::TAU;
-            let on = |(at, wide): &(f64, f64)| (turns - at).rem_euclid(1.0) < *wide;
-            f64::from(u8::from(places.iter().any(on)))
-        })
-        .collect()
+    each(&angle_of_table(&rate, full, stand.rate_hz), |angle| {
+        let turns = angle / std::f64::consts::TAU;
+        let on = |(at, wide): &(f64, f64)| (turns - at).rem_euclid(1.0) < *wide;
+        one_if(places.iter().any(on))
+    })
 }
 
 /// How much of its input's noise a regulator lets through, by sample: the less is left above its output, the less its loop
 /// can hold it down, by a factor e for every few millivolts. The loads are of many sizes.
 pub(super) fn near_end(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
     let most = draw.between(0.05, 0.15);
-    let load = held(draw, n, rate_hz, (3.0, 25.0), |d| d.between(0.0, most));
-    let slow = wander(draw, n, rate_hz, 0.001, 60.0);
-    stand.world.supply = load.iter().zip(slow).map(|(l, s)| 5.0 - l - s).collect();
+    loaded(draw, stand, most, (3.0, 25.0));
     let fold = most * draw.between(0.1, 0.4);
     let supply = &stand.world.supply;
-    let least = supply.iter().copied().fold(f64::INFINITY, f64::min);
-    supply.iter().map(|u| ((least - u) / fold).exp()).collect()
+    let least = extremes(supply).0;
+    each(supply, |u| ((least - u) / fold).exp())
 }
 
 /// Air whistles at an edge of the turning table while its speed is within a band, and shakes the element. A tone that sounds
 /// holds on beyond the band in which it begins.
 pub(super) fn whistle(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     programme(draw, stand, DWELL);
-    let speed = lagged(&stand.world.duty, draw.by_ratio(0.5, 3.0), stand.rate_hz);
+    let speed = stand.lagged(&stand.world.duty, draw.by_ratio(0.5, 3.0));
     let (low, wide) = (draw.between(0.1, 0.4), draw.between(0.1, 0.25));
     let (high, holds) = (low + wide, wide * draw.between(0.2, 0.5));
     let mut on = false;
-    let sounds: Vec<f64> = speed
-        .iter()
-        .map(|s| {
-            let beyond = if on { holds } else { 0.0 };
-            on = (low - beyond..high + beyond).contains(&s.abs());
-            f64::from(u8::from(on))
-        })
-        .collect();
-    lagged(&sounds, draw.by_ratio(0.1, 0.6), stand.rate_hz)
+    let sounds: Vec<f64> = each(&speed, |s| {
+        let beyond = if on { holds } else { 0.0 };
+        on = (low - beyond..high + beyond).contains(&s.abs());
+        one_if(on)
+    });
+    stand.lagged(&sounds, draw.by_ratio(0.1, 0.6))
 }
 
 /// How much is left, by sample, of what the last changes of the motor's command have stirred up: brushes that leave their
 /// seat spark until they have found another, the more the larger the change, whether the motor runs then or not. The
 /// command changes by steps.
 pub(super) fn after_changes(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
-    stand.world.duty = held(draw, n, rate_hz, (6.0, 30.0), |d| {
-        (d.between(-1.0, 1.0) * 255.0).round() / 255.0
-    });
-    let keep = (-1.0 / (draw.by_ratio(0.8, 4.0) * rate_hz)).exp();
-    let (mut left, mut last) = (0.0f64, stand.world.duty[0]);
-    stand
-        .world
-        .duty
-        .iter()
-        .map(|d| {
-            left = keep * left + (d - last).abs();
-            last = *d;
-            left
-        })
-        .collect()
+    stand.world.duty = stand.held(draw, (6.0, 30.0), |d| in_steps(d.between(-1.0, 1.0)));
+    stirred(&stand.world.duty, draw.by_ratio(0.8, 4.0), stand.rate_hz)
 }
 
 /// Noise whose size is exp(size z / 2) for the swing z before it, itself of variance 1: the law of its variance, with the
@@ -157,21 +133,14 @@ pub(super) fn looks(draw: &mut Draw, n: usize) -> Vec<f64> {
 /// Brushes that spark while the current changes: each change of the command by its size, then dying away.
 pub(super) fn sparks(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     programme(draw, stand, (3.0, 15.0));
-    let keep = (-1.0 / (draw.by_ratio(0.4, 2.0) * stand.rate_hz)).exp();
-    let (mut last, mut spark) = (stand.world.duty[0], 0.0f64);
-    let duty = stand.world.duty.iter();
-    duty.map(|d| {
-        spark = keep * spark + (d - std::mem::replace(&mut last, *d)).abs();
-        spark
-    })
-    .collect()
+    stirred(&stand.world.duty, draw.by_ratio(0.4, 2.0), stand.rate_hz)
 }
 
 /// A scale factor that is noisy: the noise grows with the rate. The table is heavy, and follows its motor late.
 pub(super) fn rate_squared(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     programme(draw, stand, DWELL);
-    let rate = lagged(&stand.world.duty, draw.by_ratio(3.0, 12.0), stand.rate_hz);
-    rate.iter().map(|r| r * r).collect()
+    let rate = stand.lagged(&stand.world.duty, draw.by_ratio(3.0, 12.0));
+    each(&rate, |r| r * r)
 }
 
 /// What noise with a memory of its own size makes of independent draws: variance 1 - share + share x last^2, with the
@@ -189,21 +158,6 @@ pub(super) fn remembered(share: f64, independent: &[f64]) -> (Vec<f64>, Vec<f64>
         .unzip()
 }
 
-/// How fast the temperature moves either way, the fastest 1: while parts of unlike expansion rub along each other they
-/// crackle, too fast and too small to tell one jerk from another, and are quiet once it has settled.
-pub(super) fn pace(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
-    let temperature = &stand.world.temperature[axis];
-    let (n, half) = (
-        stand.samples(),
-        (draw.between(1.0, 4.0) * stand.rate_hz) as usize,
-    );
-    let pace: Vec<f64> = (0..n)
-        .map(|i| (temperature[(i + half).min(n - 1)] - temperature[i.saturating_sub(half)]).abs())
-        .collect();
-    let fastest = extremes(&pace).1.max(1e-9);
-    pace.iter().map(|p| p / fastest).collect()
-}
-
 /// A fan coil that blows until its thermostat is content, on one of three steps, and runs up and down within seconds. The
 /// pressure of turbulence goes with the square of the speed, and its variance with the fourth power.
 pub(super) fn fan(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
@@ -211,33 +165,26 @@ pub(super) fn fan(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (period, blows) = (draw.by_ratio(12.0, 80.0), draw.between(0.2, 0.6));
     let runs_up = draw.by_ratio(0.5, 3.0);
     let (mut on, mut left, mut step) = (draw.chance(0.5), 0.0, 1.0);
-    let asked: Vec<f64> = (0..stand.samples())
-        .map(|_| {
-            left -= 1.0 / stand.rate_hz;
-            if left <= 0.0 {
-                (on, step) = (!on, STEPS[draw.of_many(STEPS.len())]);
-                let share = if on { blows } else { 1.0 - blows };
-                left = period * share * draw.between(0.75, 1.25);
-            }
-            f64::from(u8::from(on)) * step
-        })
-        .collect();
-    let speed = lagged(&asked, runs_up, stand.rate_hz);
-    speed.iter().map(|s| s.powi(4)).collect()
+    let asked: Vec<f64> = stand.series(|_| {
+        left -= 1.0 / stand.rate_hz;
+        if left <= 0.0 {
+            (on, step) = (!on, STEPS[draw.of_many(STEPS.len())]);
+            let share = if on { blows } else { 1.0 - blows };
+            left = period * share * draw.between(0.75, 1.25);
+        }
+        one_if(on) * step
+    });
+    let speed = stand.lagged(&asked, runs_up);
+    each(&speed, |s| s.powi(4))
 }
 
 /// Helium that is blown about the stand now and then, as for a leak test, goes through the lid and into the cavity behind
 /// it, and out again: a lag for each. The gas damps the element, and the noise of damping goes with it.
 pub(super) fn gas(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (lid, cavity) = (draw.by_ratio(8.0, 30.0), draw.by_ratio(20.0, 90.0));
-    let mut blown = true;
     // Once a record would be a stretch of more noise.
-    let outside = held(draw, stand.samples(), stand.rate_hz, (15.0, 120.0), |d| {
-        blown = !blown;
-        f64::from(u8::from(blown)) * d.between(0.5, 1.0)
-    });
-    let inside = lagged(&outside, lid, stand.rate_hz);
-    lagged(&inside, cavity, stand.rate_hz)
+    let outside = by_turns(draw, stand, true, (15.0, 120.0), |d| d.between(0.5, 1.0));
+    stand.lagged(&stand.lagged(&outside, lid), cavity)
 }
 
 /// A bus or a radio that is busy for a moment every few seconds, and adds noise as long as it is; its clock is another than
@@ -246,120 +193,97 @@ pub(super) fn bursts(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let period = draw.by_ratio(1.5, 10.0);
     let busy = draw.between(0.06, 0.3);
     let first = draw.between(0.0, 1.0);
-    in_time(stand, |t| {
-        f64::from(u8::from((first + t / period).fract() < busy))
-    })
+    in_time(stand, |t| one_if((first + t / period).fract() < busy))
 }
 
 /// A variance that swings about its mean.
 pub(super) fn swinging(draw: &mut Draw, stand: &Stand) -> Shape {
     let period = draw.between(30.0, 150.0);
     let swing = in_time(stand, |t| (TAU * t / period).sin());
-    variance(move |depth| {
-        let law = |s: &f64| (1.0 + depth.min(0.999) * s).max(1e-3);
-        swing.iter().map(law).collect()
-    })
+    variance(move |depth| each(&swing, |s| (1.0 + depth.min(0.999) * s).max(1e-3)))
 }
 
 /// A variance that grows through the run. The period that is drawn is that of the one that swings.
 pub(super) fn growing(draw: &mut Draw, stand: &Stand) -> Shape {
     draw.between(30.0, 150.0);
     let (seconds, times) = (stand.seconds, in_time(stand, |t| t));
-    variance(move |depth| times.iter().map(|t| 1.0 + depth * t / seconds).collect())
+    variance(move |depth| each(&times, |t| 1.0 + depth * t / seconds))
 }
 
 /// Noise that comes for seconds and rests for longer.
 pub(super) fn spells(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (mut on, mut left) = (false, draw.between(5.0, 40.0));
-    (0..stand.samples())
-        .map(|_| {
-            left -= 1.0 / stand.rate_hz;
-            if left <= 0.0 {
-                on = !on;
-                left = if on {
-                    draw.between(2.0, 10.0)
-                } else {
-                    draw.between(20.0, 60.0)
-                };
-            }
-            f64::from(u8::from(on))
-        })
-        .collect()
+    stand.series(|_| {
+        left -= 1.0 / stand.rate_hz;
+        if left <= 0.0 {
+            on = !on;
+            left = if on {
+                draw.between(2.0, 10.0)
+            } else {
+                draw.between(20.0, 60.0)
+            };
+        }
+        one_if(on)
+    })
 }
 
 /// Where an axis's temperature is between the lowest and the highest of the run. The spell that is drawn is that of noise
 /// in bursts.
 pub(super) fn place_of_temperature(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
     draw.between(5.0, 40.0);
-    let temperature = &stand.world.temperature[axis];
-    let (low, high) = extremes(temperature);
-    temperature
-        .iter()
-        .map(|t| (t - low) / (high - low))
-        .collect()
+    within_range(&stand.world.temperature[axis])
 }
 
 /// A logarithm of the size that wanders.
 pub(super) fn wandering_size(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let keep = (-1.0 / (draw.by_ratio(5.0, 40.0) * stand.rate_hz)).exp();
-    let mut x = draw.normal();
-    (0..stand.samples())
-        .map(|_| {
-            x = keep * x + (1.0 - keep * keep).sqrt() * draw.normal();
-            x
-        })
-        .collect()
+    let tau = draw.by_ratio(5.0, 40.0);
+    stand.wander(draw, 1.0, tau)
 }
 
 /// The same by another pace.
 pub(super) fn random_size(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let tau = draw.by_ratio(0.5, 30.0);
-    wander(draw, stand.samples(), stand.rate_hz, 1.0, tau)
+    stand.wander(draw, 1.0, tau)
 }
 
 /// A read-out that serves something else in between, or converters that take turns: every few samples are noisier.
 pub(super) fn every_few(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let every = 2 + draw.of_many(6);
     let phase = draw.of_many(every);
-    let noisier = |i| f64::from(u8::from(i % every == phase));
-    (0..stand.samples()).map(noisier).collect()
+    stand.series(|i| one_if(i % every == phase))
 }
 
 /// Noise that swells and ebbs with a period.
 pub(super) fn swell(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let swell = TAU / (draw.by_ratio(5.0, 150.0) * stand.rate_hz);
     let first = draw.between(0.0, TAU);
-    let at = |i| (first + swell * f64::from(i)).sin();
-    (0..stand.samples() as u32).map(at).collect()
+    stand.series(|i| (first + swell * i as f64).sin())
 }
 
 /// A gyro reads its rate as a carrier's size; what the carrier leaks into the read-out, its quadrature, is as large as the
 /// acceleration that pushes the two plates apart, and the phase of the demodulator is never quiet: noise whose size is
 /// the acceleration of the same instant.
 pub(super) fn by_acceleration(draw: &mut Draw, stand: &Stand) -> Shape {
-    let force = about_mean(&stand.world.acc[draw.of_many(3)]);
-    let square = force.iter().map(|a| a * a).sum::<f64>() / force.len() as f64;
-    variance(move |size| force.iter().map(|a| 1.0 + size * a * a / square).collect())
+    let force = shaking(draw, stand);
+    let square = mean_square(&force);
+    variance(move |size| each(&force, |a| 1.0 + size * a * a / square))
 }
 
 /// An amplifier that a shock has driven to its stop gives out nothing.
 pub(super) fn silenced(draw: &mut Draw, stand: &mut Stand) -> Shape {
     let blocked = blocked(draw, stand);
-    variance(move |size| blocked.iter().map(|b| 1.0 / (1.0 + size * b)).collect())
+    variance(move |size| each(&blocked, |b| 1.0 / (1.0 + size * b)))
 }
 
 /// A mean of a share of the noise over as many looks as fit.
 pub(super) fn averaged(draw: &mut Draw, stand: &Stand) -> Shape {
     let looks = looks(draw, stand.samples());
-    variance(move |share| {
-        let of = |l: &f64| 1.0 - share.min(1.0) * (1.0 - 1.0 / l);
-        looks.iter().map(of).collect()
-    })
+    variance(move |share| each(&looks, |l| 1.0 - share.min(1.0) * (1.0 - 1.0 / l)))
 }
 
 /// So many independent draws of the normal law.
 fn independent(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    (0..stand.samples()).map(|_| draw.normal()).collect()
+    stand.series(|_| draw.normal())
 }
 
 /// A gain control that is pumped by what it has just passed: the variance of a reading goes with the square of the one
@@ -378,7 +302,7 @@ pub(super) fn remembering(draw: &mut Draw, stand: &Stand) -> Shape {
 /// would be told before its shape.
 fn evened((law, series): (Vec<f64>, Vec<f64>), sign: f64) -> Vec<f64> {
     let mean = law.iter().sum::<f64>() / law.len() as f64;
-    series.iter().map(|x| sign * x / mean.sqrt()).collect()
+    each(&series, |x| sign * x / mean.sqrt())
 }
 
 /// A large swing makes the next ones larger, and the unrest dies down over some tens of readings (GARCH, Bollerslev 1986).
@@ -405,4 +329,23 @@ pub(super) fn one_sided(draw: &mut Draw, stand: &Stand) -> Shape {
         move |_, size| Known::Variance(louder(size, &known).0),
         move |_, _, size| evened(louder(size, &independent), sign),
     )
+}
+
+/// What a jump of the motor's command stirs up, by its size, and what dies away with a time constant, s.
+fn stirred(duty: &[f64], dies_s: f64, rate_hz: f64) -> Vec<f64> {
+    let keep = (-1.0 / (dies_s * rate_hz)).exp();
+    let mut left = 0.0f64;
+    each(&changes(duty), |change| {
+        left = keep * left + change.abs();
+        left
+    })
+}
+
+/// How fast the temperature moves either way, the fastest 1: while parts of unlike expansion rub along each other they
+/// crackle, too fast and too small to tell one jerk from another, and are quiet once it has settled.
+pub(super) fn slow_pace(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
+    let half = (draw.between(1.0, 4.0) * stand.rate_hz) as usize;
+    let pace = each(&pace(&stand.world.temperature[axis], half), f64::abs);
+    let fastest = extremes(&pace).1.max(1e-9);
+    each(&pace, |p| p / fastest)
 }

@@ -2,9 +2,11 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::super::super::words::{about_mean, in_time};
+use super::super::super::words::{
+    about_mean, by_turns, each, each_pair, either_way, in_time, one_if,
+};
 use crate::random::Draw;
-use crate::stand::{Stand, held, lagged};
+use crate::stand::Stand;
 
 /// Primitive polynomials.
 pub(super) const PRIMITIVE: [(u32, u32); 3] = [(5, 2), (6, 1), (7, 1)];
@@ -17,37 +19,29 @@ pub(super) fn stick_and_slip(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let rise = 1.0 / (draw.by_ratio(6.0, 30.0) * stand.rate_hz);
     let mut level = draw.between(0.0, 1.0);
     let mut holds = 1.0;
-    (0..stand.samples())
-        .map(|_| {
-            level += rise;
-            if level > holds {
-                level = 0.0;
-                holds = draw.between(0.6, 1.4);
-            }
-            level
-        })
-        .collect()
+    stand.series(|_| {
+        level += rise;
+        if level > holds {
+            level = 0.0;
+            holds = draw.between(0.6, 1.4);
+        }
+        level
+    })
 }
 
 /// A vessel that is filled through one throat and emptied through another: exponentials between two levels, with one time
 /// constant upward and one downward, which a valve switches whenever it is needed.
 pub(super) fn pressure(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let (n, rate_hz, sign) = (stand.samples(), stand.rate_hz, draw.sign());
+    let sign = draw.sign();
     let (fills, empties) = (draw.by_ratio(0.15, 0.8), draw.by_ratio(1.0, 4.0));
-    let mut open = draw.chance(0.5);
-    let valve = held(draw, n, rate_hz, (1.5, 8.0), |_| {
-        open = !open;
-        f64::from(u8::from(open))
-    });
+    let open = draw.chance(0.5);
+    let valve = by_turns(draw, stand, open, (1.5, 8.0), |_| 1.0);
     let mut level = 0.0;
-    valve
-        .iter()
-        .map(|end| {
-            let tau = if *end > 0.5 { fills } else { empties };
-            level = end + (level - end) * (-1.0 / (tau * rate_hz)).exp();
-            sign * level
-        })
-        .collect()
+    each(&valve, |end| {
+        let tau = if end > 0.5 { fills } else { empties };
+        level = end + (level - end) * (-1.0 / (tau * stand.rate_hz)).exp();
+        sign * level
+    })
 }
 
 /// Two switches on one lamp, each turned over by a clock of its own: it is lit where they differ. The periods have no
@@ -57,13 +51,9 @@ pub(super) fn two_switches(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let fast = slow / draw.between(1.3, 2.9);
     let (one, other) = (draw.between(0.0, 1.0), draw.between(0.0, 1.0));
     let high = |turns: f64| turns.fract() < 0.5;
-    (0..stand.samples())
-        .map(|i| {
-            let t = i as f64 / stand.rate_hz;
-            let lit = high(one + t / slow) != high(other + t / fast);
-            f64::from(u8::from(lit))
-        })
-        .collect()
+    in_time(stand, |t| {
+        one_if(high(one + t / slow) != high(other + t / fast))
+    })
 }
 
 /// A clocked loop with too much gain: each of its levels is 1 - 2 x^2 of the one before, and none comes twice (Ulam and
@@ -71,7 +61,7 @@ pub(super) fn two_switches(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn unsettled(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let clock = draw.by_ratio(0.3, 2.5);
     let mut x = draw.between(-0.9, 0.9);
-    held(draw, stand.samples(), stand.rate_hz, (clock, clock), |_| {
+    stand.held(draw, (clock, clock), |_| {
         x = 1.0 - 2.0 * x * x;
         x
     })
@@ -86,16 +76,14 @@ pub(super) fn hunting(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let per_sample = 1.0 / (period * stand.rate_hz);
     let (mut level, mut rises, mut until) = (draw.between(0.0, 1.0), true, 1.0);
     let sign = draw.sign();
-    let y: Vec<f64> = (0..stand.samples())
-        .map(|_| {
-            level += per_sample * if rises { up } else { down };
-            if rises == (level > until) {
-                rises = !rises;
-                until = f64::from(u8::from(rises)) + noise * draw.normal();
-            }
-            sign * level
-        })
-        .collect();
+    let y: Vec<f64> = stand.series(|_| {
+        level += per_sample * if rises { up } else { down };
+        if rises == (level > until) {
+            rises = !rises;
+            until = one_if(rises) + noise * draw.normal();
+        }
+        sign * level
+    });
     about_mean(&y)
 }
 
@@ -124,7 +112,7 @@ pub(super) fn self_test(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         x if x < 2.0 => -sign,
         _ => 0.0,
     });
-    lagged(&pushed, draw.by_ratio(0.05, 0.3), stand.rate_hz)
+    stand.lagged(&pushed, draw.by_ratio(0.05, 0.3))
 }
 
 /// A converter takes its elements in turn so that none counts more than the others (dynamic element matching): reading by
@@ -135,9 +123,7 @@ pub(super) fn in_turn(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let off: Vec<f64> = (0..count).map(|_| draw.normal()).collect();
     let off = about_mean(&off);
     let first = draw.of_many(count);
-    (0..stand.samples())
-        .map(|i| off[(first + i) % count])
-        .collect()
+    stand.series(|i| off[(first + i) % count])
 }
 
 /// Something else on the same ground, a logger that writes or a radio that calls, draws a short current at every turn of
@@ -146,12 +132,7 @@ pub(super) fn pulse(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (period, width) = (draw.by_ratio(1.5, 8.0), draw.between(1.0, 2.2));
     let first = draw.between(0.0, 1.0);
     let share = width / (period * stand.rate_hz);
-    (0..stand.samples())
-        .map(|i| {
-            let turn = first + i as f64 / stand.rate_hz / period;
-            f64::from(u8::from(turn.fract() < share))
-        })
-        .collect()
+    in_time(stand, |t| one_if((first + t / period).fract() < share))
 }
 
 /// A bus beside the part whose bits are a step up or a step down in their middle (Manchester code), so that it has no
@@ -159,7 +140,7 @@ pub(super) fn pulse(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn message(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let half = draw.by_ratio(0.1, 0.9);
     let (mut level, mut first) = (1.0, false);
-    held(draw, stand.samples(), stand.rate_hz, (half, half), |d| {
+    stand.held(draw, (half, half), |d| {
         first = !first;
         level = if first { d.sign() } else { -level };
         level
@@ -168,33 +149,29 @@ pub(super) fn message(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 
 /// A relaxation oscillator: charged through a resistance, and emptied when it reaches its threshold.
 pub(super) fn charge(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let (rate_hz, period) = (stand.rate_hz, draw.by_ratio(3.0, 60.0));
+    let period = draw.by_ratio(3.0, 60.0);
     let (bend, sign) = (draw.between(0.3, 3.0), draw.sign());
     let first = draw.between(0.0, 1.0);
-    (0..stand.samples())
-        .map(|i| {
-            let place = (first + i as f64 / rate_hz / period).fract();
-            sign * (1.0 - (-bend * place).exp())
-        })
-        .collect()
+    in_time(stand, |t| {
+        let place = (first + t / period).fract();
+        sign * (1.0 - (-bend * place).exp())
+    })
 }
 
 /// Something that is done once in a period, a radio that sends or a valve that moves: a few samples, then nothing.
 pub(super) fn train(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     // Two lines would do where the pulses fill a larger part of their period.
-    let (rate_hz, period) = (stand.rate_hz, draw.by_ratio(4.0, 20.0));
+    let period = draw.by_ratio(4.0, 20.0);
     let (sign, width) = (draw.sign(), draw.between(0.25, 0.5));
     let first = draw.between(0.0, period);
-    (0..stand.samples())
-        .map(|i| {
-            let since = (first + i as f64 / rate_hz) % period;
-            if since < width {
-                sign * (0.5 * TAU * since / width).sin().powi(2)
-            } else {
-                0.0
-            }
-        })
-        .collect()
+    in_time(stand, |t| {
+        let since = (first + t) % period;
+        if since < width {
+            sign * (0.5 * TAU * since / width).sin().powi(2)
+        } else {
+            0.0
+        }
+    })
 }
 
 /// The line on which the frame's number goes out shares a return with the part: it rests where the parity of the number
@@ -212,14 +189,12 @@ pub(super) fn parity(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn slipping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let stays = draw.by_ratio(1.0, 8.0) * stand.rate_hz;
     let mut which = 1.0;
-    (0..stand.samples())
-        .map(|_| {
-            if !draw.chance(1.0 / stays) {
-                which = -which;
-            }
-            which
-        })
-        .collect()
+    stand.series(|_| {
+        if !draw.chance(1.0 / stays) {
+            which = -which;
+        }
+        which
+    })
 }
 
 /// A shift register with feedback, x^order + x^tap + 1 over two elements: bits that look random and come again after
@@ -251,46 +226,36 @@ pub(super) fn dither(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let state = 1 + draw.of_many((1 << polynomial.0) - 1) as u32;
     let (mut register, hold) = (Register::new(polynomial, state), 1 + draw.of_many(2));
     let mut level = 0.0;
-    (0..stand.samples())
-        .map(|i| {
-            if i % hold == 0 {
-                level = if register.next() { 1.0 } else { -1.0 };
-            }
-            level
-        })
-        .collect()
+    stand.series(|i| {
+        if i % hold == 0 {
+            level = if register.next() { 1.0 } else { -1.0 };
+        }
+        level
+    })
 }
 
 /// The sun comes through drifting clouds and warms one side of the part; the other follows through the housing, and what
 /// the two differ by bends it. The thermometer is in the shade.
 pub(super) fn sun(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let mut shines = draw.chance(0.5);
+    let shines = draw.chance(0.5);
     let dwell = draw.by_ratio(4.0, 15.0);
-    let reach = (0.3 * dwell, 1.7 * dwell);
-    let sky = held(draw, stand.samples(), stand.rate_hz, reach, |d| {
-        shines = !shines;
-        f64::from(u8::from(shines)) * d.between(0.4, 1.0)
+    let sky = by_turns(draw, stand, shines, (0.3 * dwell, 1.7 * dwell), |d| {
+        d.between(0.4, 1.0)
     });
     // The edge of a cloud is not sharp.
-    let sky = lagged(&sky, draw.between(0.3, 1.0), stand.rate_hz);
+    let sky = stand.lagged(&sky, draw.between(0.3, 1.0));
     let (near, apart) = (draw.by_ratio(0.8, 2.5), draw.between(2.5, 6.0));
-    let sides = [near, near * apart].map(|tau| lagged(&sky, tau, stand.rate_hz));
-    let sign = draw.sign();
-    let bend: Vec<f64> = sides[0]
-        .iter()
-        .zip(&sides[1])
-        .map(|(n, f)| sign * (n - f))
-        .collect();
-    about_mean(&bend)
+    let [near, far] = [near, near * apart].map(|tau| stand.lagged(&sky, tau));
+    either_way(draw, &about_mean(&each_pair(&near, &far, |n, f| n - f)))
 }
 
 /// What a film has taken up whose face has this humidity: Fick's law, each odd term of the series a lag of its own. At first
 /// it goes as the square root of time, and after the longest lag it is full.
-pub(super) fn taken_up(face: &[f64], longest_s: f64, rate_hz: f64) -> Vec<f64> {
+pub(super) fn taken_up(face: &[f64], longest_s: f64, stand: &Stand) -> Vec<f64> {
     let mut all = vec![0.0; face.len()];
     for k in 0..TERMS {
         let odd = f64::from(2 * k + 1).powi(2);
-        let term = lagged(face, longest_s / odd, rate_hz);
+        let term = stand.lagged(face, longest_s / odd);
         let share = 8.0 / (PI * PI * odd);
         all.iter_mut().zip(term).for_each(|(a, t)| *a += share * t);
     }
@@ -301,15 +266,13 @@ pub(super) fn taken_up(face: &[f64], longest_s: f64, rate_hz: f64) -> Vec<f64> {
 /// turns, which nothing records. A film takes hours and minutes; here it is as thin as it has to be to stand out from a
 /// random walk.
 pub(super) fn moisture(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let mut damp = draw.chance(0.5);
+    let damp = draw.chance(0.5);
     let dwell = draw.by_ratio(4.0, 12.0);
-    let reach = (0.6 * dwell, 1.4 * dwell);
-    let face = held(draw, stand.samples(), stand.rate_hz, reach, |d| {
-        damp = !damp;
-        f64::from(u8::from(damp)) * d.between(0.6, 1.0)
+    let face = by_turns(draw, stand, damp, (0.6 * dwell, 1.4 * dwell), |d| {
+        d.between(0.6, 1.0)
     });
     let longest = dwell * draw.by_ratio(0.7, 3.0);
-    about_mean(&taken_up(&face, longest, stand.rate_hz))
+    about_mean(&taken_up(&face, longest, stand))
 }
 
 /// The air conditioning of the room blows cold until its thermostat is content, then the room warms up again for longer: the
@@ -319,32 +282,24 @@ pub(super) fn draught(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (period, blows) = (draw.by_ratio(20.0, 45.0), draw.between(0.02, 0.08));
     let (mut level, mut cools, sign) = (draw.between(0.0, 1.0), draw.chance(0.5), draw.sign());
     let mut pace = 1.0;
-    let room: Vec<f64> = (0..stand.samples())
-        .map(|_| {
-            let takes = period * if cools { -blows } else { 1.0 - blows };
-            level += pace / (takes * stand.rate_hz);
-            if !(0.0..=1.0).contains(&level) {
-                level = level.clamp(0.0, 1.0);
-                cools = !cools;
-                // The sun, a door: no two of them take quite as long.
-                pace = draw.between(0.85, 1.15);
-            }
-            sign * level
-        })
-        .collect();
-    about_mean(&lagged(&room, draw.by_ratio(0.3, 1.5), stand.rate_hz))
+    let room: Vec<f64> = stand.series(|_| {
+        let takes = period * if cools { -blows } else { 1.0 - blows };
+        level += pace / (takes * stand.rate_hz);
+        if !(0.0..=1.0).contains(&level) {
+            level = level.clamp(0.0, 1.0);
+            cools = !cools;
+            // The sun, a door: no two of them take quite as long.
+            pace = draw.between(0.85, 1.15);
+        }
+        sign * level
+    });
+    about_mean(&stand.lagged(&room, draw.by_ratio(0.3, 1.5)))
 }
 
 /// A level that turns over with a period.
 pub(super) fn square_wave(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let period = draw.between(5.0, 40.0);
-    in_time(stand, |t| {
-        if (t / period).fract() < 0.5 {
-            1.0
-        } else {
-            -1.0
-        }
-    })
+    in_time(stand, |t| 2.0 * one_if((t / period).fract() < 0.5) - 1.0)
 }
 
 /// A level that runs up and falls back.
@@ -356,16 +311,14 @@ pub(super) fn sawtooth(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// A level that is another at random times.
 pub(super) fn jumps(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (mut level, mut left) = (0.0, 0.0);
-    (0..stand.samples())
-        .map(|_| {
-            if left <= 0.0 {
-                level = draw.normal();
-                left = 25.0 * draw.exponential();
-            }
-            left -= 1.0 / stand.rate_hz;
-            level
-        })
-        .collect()
+    stand.series(|_| {
+        if left <= 0.0 {
+            level = draw.normal();
+            left = 25.0 * draw.exponential();
+        }
+        left -= 1.0 / stand.rate_hz;
+        level
+    })
 }
 
 /// A random walk for a part of the run.

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use super::super::super::words::in_time;
+use super::super::super::words::{each, in_time, one_if, tone};
 use crate::random::Draw;
-use crate::stand::{Stand, held, wander};
+use crate::stand::Stand;
 
 /// The first coordinate of the Lorenz system (1963) at its usual parameters: a swing about either of two places.
 pub(super) fn swing_without_period(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
@@ -24,21 +24,19 @@ pub(super) fn swing_without_period(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     for _ in 0..4000 {
         state = step(state, 0.005);
     }
-    (0..stand.samples())
-        .map(|_| {
-            for _ in 0..parts as usize {
-                state = step(state, pace / parts);
-            }
-            state[0]
-        })
-        .collect()
+    stand.series(|_| {
+        for _ in 0..parts as usize {
+            state = step(state, pace / parts);
+        }
+        state[0]
+    })
 }
 
 /// A carrier that turns over by the bits of a message: its phase is one of two, its size is always the same.
 pub(super) fn keyed(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (f, bit) = (draw.by_ratio(0.8, 9.5), draw.by_ratio(0.4, 3.0));
     let first = draw.between(0.0, TAU);
-    let bits = held(draw, stand.samples(), stand.rate_hz, (bit, bit), Draw::sign);
+    let bits = stand.held(draw, (bit, bit), Draw::sign);
     bits.iter()
         .enumerate()
         .map(|(i, b)| b * (first + TAU * f * i as f64 / stand.rate_hz).sin())
@@ -65,17 +63,15 @@ pub(super) fn quenched(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let grows = (1.0 / (growth * stand.rate_hz)).exp();
     let mut size = draw.by_ratio(0.02, 1.0);
     let mut phase = draw.between(0.0, TAU);
-    (0..stand.samples())
-        .map(|_| {
-            size *= grows;
-            phase += TAU * f / stand.rate_hz;
-            if size > 1.0 {
-                size = draw.by_ratio(0.01, 0.1);
-                phase = draw.between(0.0, TAU);
-            }
-            size * phase.sin()
-        })
-        .collect()
+    stand.series(|_| {
+        size *= grows;
+        phase += TAU * f / stand.rate_hz;
+        if size > 1.0 {
+            size = draw.by_ratio(0.01, 0.1);
+            phase = draw.between(0.0, TAU);
+        }
+        size * phase.sin()
+    })
 }
 
 /// A loop that locks one clock to another finds two places to lock in and hops between them, keeping its phase: a tone at
@@ -88,22 +84,18 @@ pub(super) fn hopping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
             break f;
         }
     };
-    let pitches = [
-        (first, draw.by_ratio(4.0, 20.0)),
-        (second, draw.by_ratio(4.0, 20.0)),
-    ];
-    let (mut at, mut left, mut phase) = (draw.of_many(2), 0.0, draw.between(0.0, TAU));
-    (0..stand.samples())
-        .map(|_| {
-            left -= 1.0 / stand.rate_hz;
-            if left <= 0.0 {
-                at = 1 - at;
-                left = pitches[at].1 * draw.exponential();
-            }
-            phase += TAU * pitches[at].0 / stand.rate_hz;
-            phase.sin()
-        })
-        .collect()
+    // Each with the time for which it stays there, s.
+    let places = [first, second].map(|pitch| (pitch, draw.by_ratio(4.0, 20.0)));
+    let (mut at, mut left, phase) = (draw.of_many(2), 0.0, draw.between(0.0, TAU));
+    let pitches = stand.series(|_| {
+        left -= 1.0 / stand.rate_hz;
+        if left <= 0.0 {
+            at = 1 - at;
+            left = places[at].1 * draw.exponential();
+        }
+        places[at].0
+    });
+    tone(phase, &pitches, stand.rate_hz)
 }
 
 /// A fan whose control loop hunts: its pitch sways about the mean with a period, far enough that the tone has many side
@@ -142,40 +134,30 @@ pub(super) fn siren(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 
 /// A rotor that takes the whole record to run up or to run down, evenly in pitch or in its logarithm.
 pub(super) fn sweep(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    let n = stand.samples() as f64;
     let (mut from, mut to) = (draw.between(0.3, 3.0), draw.between(4.0, 9.7));
     if draw.chance(0.5) {
         std::mem::swap(&mut from, &mut to);
     }
     let even = draw.chance(0.5);
-    let mut phase = draw.between(0.0, TAU);
-    (0..n)
-        .map(|i| {
-            let at = i as f64 / n as f64;
-            let f = if even {
-                from + (to - from) * at
-            } else {
-                from * (to / from).powf(at)
-            };
-            phase += TAU * f / rate_hz;
-            phase.sin()
-        })
-        .collect()
+    let pitches = stand.series(|i| {
+        let at = i as f64 / n;
+        if even {
+            from + (to - from) * at
+        } else {
+            from * (to / from).powf(at)
+        }
+    });
+    tone(draw.between(0.0, TAU), &pitches, stand.rate_hz)
 }
 
 /// An oscillator without a crystal: its pitch wanders about its mean.
 pub(super) fn wandering(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
     let pitch = draw.between(1.0, 9.0);
     let (sigma, tau) = (draw.by_ratio(0.05, 0.4), draw.by_ratio(5.0, 60.0));
-    let mut phase = draw.between(0.0, TAU);
-    crate::stand::wander(draw, n, rate_hz, sigma, tau)
-        .iter()
-        .map(|off| {
-            phase += TAU * (pitch + off) / rate_hz;
-            phase.sin()
-        })
-        .collect()
+    let first = draw.between(0.0, TAU);
+    let pitches = each(&stand.wander(draw, sigma, tau), |off| pitch + off);
+    tone(first, &pitches, stand.rate_hz)
 }
 
 /// A machine in the next room that is started and stopped as it is needed: each time with a phase and a load of its own,
@@ -213,40 +195,36 @@ pub(super) fn runs_up(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (up, down) = (draw.between(8.0, 20.0), draw.between(4.0, 10.0));
     let (mut on, mut left, mut speed) = (true, draw.between(15.0, 40.0), 0.0);
     let mut phase = draw.between(0.0, TAU);
-    (0..stand.samples())
-        .map(|_| {
-            left -= 1.0 / rate_hz;
-            if left <= 0.0 {
-                on = !on;
-                left = draw.between(15.0, 40.0);
-            }
-            let (goal, takes) = if on { (runs, up) } else { (0.0, down) };
-            speed += (goal - speed) / takes / rate_hz;
-            phase += TAU * speed / rate_hz;
-            // What turns faster than half the sample rate does not pass the part's filter.
-            if speed > 0.45 * rate_hz {
-                return 0.0;
-            }
-            let x = speed / resonance;
-            let (stiff, lossy) = (1.0 - x * x, 2.0 * damping * x);
-            let late = lossy.atan2(stiff);
-            x * x / stiff.hypot(lossy) * (phase - late).sin() / (1.0 + x.powi(4))
-        })
-        .collect()
+    stand.series(|_| {
+        left -= 1.0 / rate_hz;
+        if left <= 0.0 {
+            on = !on;
+            left = draw.between(15.0, 40.0);
+        }
+        let (goal, takes) = if on { (runs, up) } else { (0.0, down) };
+        speed += (goal - speed) / takes / rate_hz;
+        phase += TAU * speed / rate_hz;
+        // What turns faster than half the sample rate does not pass the part's filter.
+        if speed > 0.45 * rate_hz {
+            return 0.0;
+        }
+        let x = speed / resonance;
+        let (stiff, lossy) = (1.0 - x * x, 2.0 * damping * x);
+        let late = lossy.atan2(stiff);
+        x * x / stiff.hypot(lossy) * (phase - late).sin() / (1.0 + x.powi(4))
+    })
 }
 
 /// A modulator of first order at rest gives out a pattern: what it has summed and not yet given is a sawtooth whose pitch
 /// is its input, all its harmonics folded, and the input is the part's own offset, which wanders.
 pub(super) fn idle_tones(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (size, memory) = (draw.by_ratio(0.003, 0.03), draw.by_ratio(10.0, 60.0));
-    let off = wander(draw, stand.samples(), stand.rate_hz, size, memory);
+    let off = stand.wander(draw, size, memory);
     let (middle, mut sum) = (draw.between(0.05, 0.45), draw.between(0.0, 1.0));
-    off.iter()
-        .map(|o| {
-            sum = (sum + middle + o).rem_euclid(1.0);
-            sum - 0.5
-        })
-        .collect()
+    each(&off, |o| {
+        sum = (sum + middle + o).rem_euclid(1.0);
+        sum - 0.5
+    })
 }
 
 /// Drives of two gyros on one board pull each other (Adler 1946): phase' = detuning - pull sin(phase). Nearly in step, the
@@ -258,17 +236,14 @@ pub(super) fn pulled(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let pull = TAU * draw.by_ratio(0.15, 1.0);
     let (middle, swing) = (draw.between(1.0, 1.3), draw.between(0.1, 0.3));
     let memory = draw.by_ratio(8.0, 40.0);
-    let detuning = wander(draw, stand.samples(), stand.rate_hz, swing, memory);
+    let detuning = stand.wander(draw, swing, memory);
     let mut phase = draw.between(0.0, TAU);
-    detuning
-        .iter()
-        .map(|d| {
-            for _ in 0..PARTS {
-                phase += h * pull * (middle + d - phase.sin());
-            }
-            phase.sin()
-        })
-        .collect()
+    each(&detuning, |d| {
+        for _ in 0..PARTS {
+            phase += h * pull * (middle + d - phase.sin());
+        }
+        phase.sin()
+    })
 }
 
 /// A harmonic of the mains, folded to anywhere in the band: the grid's frequency wanders by some 20 mHz, and the harmonic by
@@ -277,14 +252,9 @@ pub(super) fn hum(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let harmonic = (1 + draw.of_many(7)) as f64;
     let (folded, turns_over) = (draw.between(0.8, 9.2), draw.sign());
     let (sigma, tau) = (draw.by_ratio(0.012, 0.03), draw.by_ratio(20.0, 120.0));
-    let grid = wander(draw, stand.samples(), stand.rate_hz, sigma, tau);
-    let mut phase = draw.between(0.0, TAU);
-    grid.iter()
-        .map(|off| {
-            phase += TAU * (folded + turns_over * harmonic * off) / stand.rate_hz;
-            phase.sin()
-        })
-        .collect()
+    let grid = stand.wander(draw, sigma, tau);
+    let pitches = each(&grid, |off| folded + turns_over * harmonic * off);
+    tone(draw.between(0.0, TAU), &pitches, stand.rate_hz)
 }
 
 /// A tone that glides from pitch to pitch.
@@ -325,6 +295,6 @@ pub(super) fn comes_and_goes(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
             left = draw.between(10.0, 60.0);
         }
         left -= 1.0 / stand.rate_hz;
-        f64::from(u8::from(on)) * (TAU * f * t).sin()
+        one_if(on) * (TAU * f * t).sin()
     })
 }
