@@ -51,18 +51,40 @@ impl<How: Copy> LibraryEffect<How> {
             id,
             label: cause,
             cause,
-            needs: Needs {
-                temperature: false,
-                supply: false,
-                motor: false,
-                vibration: false,
-            },
+            needs: Needs::NONE,
             asked_from: 8.0,
             asked_ratio: 1.3,
             moves: false,
             everywhere: false,
             true_parts: &[],
             how,
+        }
+    }
+
+    const fn needs(self, needs: Needs) -> Self {
+        Self { needs, ..self }
+    }
+
+    /// Asked for from this strength on, and up to so far above the oracle's limit.
+    const fn asked(self, asked_from: f64, asked_ratio: f64) -> Self {
+        Self {
+            asked_from,
+            asked_ratio,
+            ..self
+        }
+    }
+
+    const fn on_a_moving_base(self) -> Self {
+        Self {
+            moves: true,
+            ..self
+        }
+    }
+
+    const fn on_all_channels(self) -> Self {
+        Self {
+            everywhere: true,
+            ..self
         }
     }
 }

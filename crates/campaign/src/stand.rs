@@ -28,6 +28,16 @@ pub struct Needs {
     pub vibration: bool,
 }
 
+impl Needs {
+    /// Nothing beyond what any stand has.
+    pub const NONE: Self = Self {
+        temperature: false,
+        supply: false,
+        motor: false,
+        vibration: false,
+    };
+}
+
 /// A stand: length, noise and world.
 #[derive(Clone)]
 pub struct Stand {
@@ -148,7 +158,7 @@ impl Stand {
     }
 
     /// The world as a record, exact.
-    fn witness(&self) -> Record {
+    pub(crate) fn witness(&self) -> Record {
         let axis = |i: usize| Some(Axis::ALL[i]);
         let channel = |name: &str, quantity, axis, values: Vec<f64>| Channel {
             name: name.to_owned(),

@@ -65,22 +65,15 @@ pub(super) struct ForeignEffect {
     pub level: bool,
 }
 
-/// Nothing beyond what any stand has.
-const NONE: Needs = Needs {
-    temperature: false,
-    supply: false,
-    motor: false,
-    vibration: false,
-};
 /// A temperature that moves.
 const T: Needs = Needs {
     temperature: true,
-    ..NONE
+    ..Needs::NONE
 };
 /// Vibration.
 const V: Needs = Needs {
     vibration: true,
-    ..NONE
+    ..Needs::NONE
 };
 /// A temperature that moves and a motor that is switched.
 const TM: Needs = Needs { motor: true, ..T };
@@ -100,7 +93,7 @@ const fn row(id: u16, set: usize, name: &'static str, make: Make) -> ForeignEffe
         name,
         make,
         strength: Strength::Wanted,
-        needs: NONE,
+        needs: Needs::NONE,
         true_parts: &[],
         twin: None,
         later: None,

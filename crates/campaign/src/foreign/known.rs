@@ -155,6 +155,12 @@ pub(super) fn cells(count: i32, reach: f64, of: &dyn Fn(f64) -> f64) -> Vec<f64>
     all.iter().map(|p| p / sum).collect()
 }
 
+/// Edges of so many codes from the first on, counts, the upper one of the last included, by a converter whose steps are even.
+pub(super) fn even_edges(first: i32, codes: usize) -> Vec<f64> {
+    let edge = |i: usize| f64::from(first) + i as f64 - 0.5;
+    (0..=codes).map(edge).collect()
+}
+
 /// Shares of the codes between these edges, counts, for a normal law.
 pub(super) fn shares(edges: &[f64], mean: f64, sigma: f64) -> Vec<f64> {
     let below = |e: &f64| 0.5 * statrs::function::erf::erfc((mean - e) / sigma / 2f64.sqrt());
@@ -172,7 +178,7 @@ pub(super) fn law(stand: &Stand, axis: usize) -> (i32, Vec<f64>) {
 pub(super) fn law_of(bias: f64, sigma: f64, middle: f64, reach: f64) -> (i32, Vec<f64>) {
     let first = (middle - REACH * reach).floor() as i32;
     let last = (middle + REACH * reach).ceil() as i32;
-    let edges: Vec<f64> = (first..=last + 1).map(|c| f64::from(c) - 0.5).collect();
+    let edges = even_edges(first, (last + 1 - first) as usize);
     (first, shares(&edges, bias, sigma))
 }
 
@@ -238,8 +244,9 @@ pub(super) fn refitted(first: i32, read: &[f64]) -> Vec<f64> {
     };
     let mean: f64 = codes().map(|(c, p)| c * p).sum();
     let square: f64 = codes().map(|(c, p)| (c - mean).powi(2) * p).sum();
-    let edges: Vec<f64> = (0..=read.len())
-        .map(|i| f64::from(first) + i as f64 - 0.5)
-        .collect();
-    shares(&edges, mean, (square - 1.0 / 12.0).max(1e-3).sqrt())
+    shares(
+        &even_edges(first, read.len()),
+        mean,
+        (square - 1.0 / 12.0).max(1e-3).sqrt(),
+    )
 }

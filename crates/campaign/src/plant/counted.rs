@@ -20,14 +20,6 @@ const fn row(id: u16, cause: &'static str, how: How) -> Row {
     Row::new(id, cause, how)
 }
 
-/// One that concerns all channels.
-const fn of_all(id: u16, cause: &'static str, how: How) -> Row {
-    Row {
-        everywhere: true,
-        ..row(id, cause, how)
-    }
-}
-
 /// The rows, by number.
 pub const COUNTED: [Row; 9] = [
     row(200, "base_motion", |d, _, _| {
@@ -53,15 +45,18 @@ pub const COUNTED: [Row; 9] = [
         one(vec![("bit", bit), ("value", value), ("fraction", fraction)])
     }),
     row(205, "stale_samples", stale),
-    of_all(206, "dropped_samples", |d, _, _| {
+    row(206, "dropped_samples", |d, _, _| {
         one(vec![("count", 5.0 + d.of_many(60) as f64)])
-    }),
-    of_all(207, "timestamp_jitter", |d, _, _| {
+    })
+    .on_all_channels(),
+    row(207, "timestamp_jitter", |d, _, _| {
         one(vec![("sigma", d.by_ratio(0.4e-3, 5e-3))])
-    }),
-    of_all(208, "clock_rate", |d, _, _| {
+    })
+    .on_all_channels(),
+    row(208, "clock_rate", |d, _, _| {
         one(vec![("ppm", d.sign() * d.by_ratio(300.0, 3000.0))])
-    }),
+    })
+    .on_all_channels(),
 ];
 
 /// A fault of the row's own channels.

@@ -13,19 +13,21 @@ type Row = LibraryEffect<How>;
 /// The motor's bias by physics: it follows the current of a motor that has to spin up, not the command.
 pub(super) const CURRENT: &str = "motor_bias by current";
 
-const NONE: Needs = Needs {
-    temperature: false,
-    supply: false,
-    motor: false,
-    vibration: false,
-};
 const TEMPERATURE: Needs = Needs {
     temperature: true,
-    ..NONE
+    ..Needs::NONE
+};
+const SUPPLY: Needs = Needs {
+    supply: true,
+    ..Needs::NONE
 };
 const MOTOR: Needs = Needs {
     motor: true,
-    ..NONE
+    ..Needs::NONE
+};
+const VIBRATION: Needs = Needs {
+    vibration: true,
+    ..Needs::NONE
 };
 
 const fn row(id: u16, cause: &'static str, how: How) -> Row {
@@ -33,94 +35,30 @@ const fn row(id: u16, cause: &'static str, how: How) -> Row {
 }
 
 /// The rows, by number. What is asked beyond the usual has its reason in docs/power.md, "Bars".
+#[rustfmt::skip]
 pub const STRONG: [Row; 24] = [
-    Row {
-        needs: TEMPERATURE,
-        ..row(100, "temperature", |_, _, a| size("slope", a.sign))
-    },
-    Row {
-        needs: TEMPERATURE,
-        ..row(101, "temperature_quadratic", parabola)
-    },
+    row(100, "temperature", |_, _, a| size("slope", a.sign)).needs(TEMPERATURE),
+    row(101, "temperature_quadratic", parabola).needs(TEMPERATURE),
     row(102, "warm_up", warm_up),
     row(103, "rate_ramp", |_, _, a| size("slope", a.sign)),
-    Row {
-        asked_ratio: 1.7,
-        ..row(104, "line", line)
-    },
-    Row {
-        asked_from: 13.0,
-        asked_ratio: 2.5,
-        ..row(105, "am_line", am_line)
-    },
-    Row {
-        needs: MOTOR,
-        ..row(106, "motor_bias", motor_bias)
-    },
-    Row {
-        label: CURRENT,
-        needs: MOTOR,
-        ..row(107, "motor_bias", by_current)
-    },
-    Row {
-        needs: MOTOR,
-        ..row(108, "motor_noise", motor_noise)
-    },
-    Row {
-        needs: Needs {
-            vibration: true,
-            ..NONE
-        },
-        ..row(109, "g_sensitivity", g_sensitivity)
-    },
-    Row {
-        needs: Needs {
-            supply: true,
-            ..NONE
-        },
-        ..row(110, "supply_sensitivity", |_, _, a| size("slope", a.sign))
-    },
-    Row {
-        asked_ratio: 1.5,
-        ..row(111, "bias_step", bias_step)
-    },
-    Row {
-        moves: true,
-        ..row(112, "cross_axis", cross_axis)
-    },
-    Row {
-        asked_from: 10.0,
-        asked_ratio: 2.0,
-        moves: true,
-        true_parts: &["base_motion"],
-        ..row(113, "scale_error", scale_error)
-    },
+    row(104, "line", line).asked(8.0, 1.7),
+    row(105, "am_line", am_line).asked(13.0, 2.5),
+    row(106, "motor_bias", motor_bias).needs(MOTOR),
+    Row { label: CURRENT, ..row(107, "motor_bias", by_current).needs(MOTOR) },
+    row(108, "motor_noise", motor_noise).needs(MOTOR),
+    row(109, "g_sensitivity", g_sensitivity).needs(VIBRATION),
+    row(110, "supply_sensitivity", |_, _, a| size("slope", a.sign)).needs(SUPPLY),
+    row(111, "bias_step", bias_step).asked(8.0, 1.5),
+    row(112, "cross_axis", cross_axis).on_a_moving_base(),
+    Row { true_parts: &["base_motion"], ..row(113, "scale_error", scale_error).asked(10.0, 2.0).on_a_moving_base() },
     row(114, "gauss_markov", gauss_markov),
     row(115, "flicker", flicker),
     row(116, "low_pass", low_pass),
-    Row {
-        asked_from: 10.0,
-        asked_ratio: 2.0,
-        ..row(117, "telegraph", telegraph)
-    },
-    Row {
-        everywhere: true,
-        ..row(118, "common_noise", common_noise)
-    },
-    Row {
-        asked_from: 10.0,
-        asked_ratio: 2.0,
-        ..row(119, "noise_change", noise_change)
-    },
-    row(120, "narrow_band", |d, s, a| {
-        let (rms, strength, values, density) = band(d, s, a, "bandwidth");
-        Drawn::Process([vec![("rms", rms)], values].concat(), strength, density)
-    }),
-    row(121, "wandering_line", |d, s, a| {
-        let (rms, strength, values, density) = band(d, s, a, "linewidth");
-        let values = [vec![("amplitude", rms * 2f64.sqrt())], values].concat();
-        Drawn::Process(values, strength, density)
-    }),
+    row(117, "telegraph", telegraph).asked(10.0, 2.0),
+    row(118, "common_noise", common_noise).on_all_channels(),
+    row(119, "noise_change", noise_change).asked(10.0, 2.0),
+    row(120, "narrow_band", narrow_band),
+    row(121, "wandering_line", wandering_line),
     row(122, "quantization_noise", quantization_noise),
     row(123, "correlated_noise", correlated_noise),
 ];
@@ -326,6 +264,17 @@ fn band(
     let (rms, strength, all) = of_density(stand, asked, f64::INFINITY, &density);
     let values = vec![("center_frequency", centre), (wide, width)];
     (rms, strength, values, all)
+}
+
+fn narrow_band(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let (rms, strength, values, density) = band(draw, stand, asked, "bandwidth");
+    Drawn::Process([vec![("rms", rms)], values].concat(), strength, density)
+}
+
+fn wandering_line(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let (rms, strength, values, density) = band(draw, stand, asked, "linewidth");
+    let values = [vec![("amplitude", rms * 2f64.sqrt())], values].concat();
+    Drawn::Process(values, strength, density)
 }
 
 /// Two-sided density B^2 / (2 pi f): B^2 / w per sample.

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use diagnosis::likelihood::{Bins, Dct};
 use model::effect::{Column, Effect, Hypothesis, Signal, View};
 use model::effects::EFFECTS;
-use model::record::{Axis, Base, Quantity};
+use model::record::{Axis, Base};
 use numerics::minimise::nelder_mead;
 
 use crate::stand::{GYROS, LSB, Stand};
@@ -17,38 +17,18 @@ pub(super) const DESCRIBED: f64 = 0.95;
 
 /// The signals of a stand, as an effect sees them, without reading noise.
 fn signals(stand: &Stand) -> Vec<Signal> {
-    let signal = |name: &str, quantity, axis: Option<usize>, values: Vec<f64>| Signal {
-        name: name.to_owned(),
-        quantity,
-        axis: axis.map(|i| Axis::ALL[i]),
-        unit: String::new(),
-        smooth: values.clone().into(),
-        values: values.into(),
+    let seen = stand.witness().channels.into_iter();
+    seen.map(|c| Signal {
+        name: c.name,
+        quantity: c.quantity,
+        axis: c.axis,
+        unit: c.unit,
+        smooth: c.values.clone().into(),
+        values: c.values.into(),
         lsb: None,
         moving: false,
-    };
-    let scaled = |v: &[f64], by: f64| v.iter().map(|x| x * by).collect::<Vec<_>>();
-    let mut all = vec![
-        signal("supply", Quantity::Supply, None, stand.world.supply.clone()),
-        signal("pwm", Quantity::Pwm, None, scaled(&stand.world.duty, 255.0)),
-    ];
-    for (i, letter) in ["x", "y", "z"].iter().enumerate() {
-        let own = stand.world.temperature[i].clone();
-        all.push(signal(
-            &format!("temp_{letter}"),
-            Quantity::Temp,
-            Some(i),
-            own,
-        ));
-        let force = scaled(&stand.world.acc[i], 9.80665);
-        all.push(signal(
-            &format!("acc_{letter}"),
-            Quantity::Acc,
-            Some(i),
-            force,
-        ));
-    }
-    all
+    })
+    .collect()
 }
 
 pub(super) fn hypotheses(effect: &dyn Effect, stand: &Stand, axis: usize) -> Vec<Hypothesis> {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::rc::Rc;
 
 use super::super::super::act::Change;
-use super::super::super::known::{Known, law, mean_and_sigma, shares};
+use super::super::super::known::{Known, even_edges, law, mean_and_sigma, shares};
 use super::super::super::shape::{Shape, edges, sized};
 use crate::random::Draw;
 use crate::stand::{LSB, Stand};
@@ -12,14 +12,18 @@ use crate::stand::{LSB, Stand};
 /// Most that the line of a wavy converter leans: at 1 it would turn back, and codes be missing.
 pub(super) const STEEPEST: f64 = 0.9;
 
+/// First code, and the lower edge of each code within so many of a middle one, counts.
+fn about(middle: i32, reach: i32, edge: impl Fn(i32) -> f64) -> (i32, Vec<f64>) {
+    let first = middle - reach;
+    (first, (first..=middle + reach).map(edge).collect())
+}
+
 /// First code and lower edges, counts, of an amplifier that reads asinh(bend x) / bend of what is x off its middle.
 pub(super) fn of_bend(middle: f64, reach: i32, bend: f64) -> (i32, Vec<f64>) {
-    let first = middle.round() as i32 - reach;
-    let edge = |code: i32| {
+    about(middle.round() as i32, reach, |code| {
         let off = f64::from(code) - 0.5 - middle;
         middle + (bend * off).sinh() / bend
-    };
-    (first, (first..=first + 2 * reach).map(edge).collect())
+    })
 }
 
 /// The major carry: at mid-scale, which lies near the rate at rest, all bits of the converter turn over, and the largest
@@ -43,40 +47,32 @@ pub(super) fn mid_scale(
 /// First code and lower edges, counts, of a stage that does not answer until its input is `zone` counts off zero, and then
 /// answers by what is beyond; zero lies at `middle`.
 pub(super) fn with_zone(middle: i32, reach: i32, zone: f64) -> (i32, Vec<f64>) {
-    let edge = |code: i32| {
-        let off = if code > middle { zone } else { -zone };
-        f64::from(code) - 0.5 + off
-    };
-    let first = middle - reach;
-    (first, (first..=middle + reach).map(edge).collect())
+    about(middle, reach, |code| {
+        f64::from(code) - 0.5 + if code > middle { zone } else { -zone }
+    })
 }
 
 /// Lower edges, counts, of even codes about a middle, of which all rates within `band` read the middle.
 pub(super) fn with_band(middle: i32, reach: i32, band: f64) -> (i32, Vec<f64>) {
-    let first = middle - reach;
-    let edge = |code: i32| {
-        let off = f64::from(code - middle);
-        let even = off - 0.5;
-        f64::from(middle)
-            + if off <= 0.0 {
-                even.min(-band)
-            } else {
-                even.max(band)
-            }
-    };
-    (first, (first..=first + 2 * reach).map(edge).collect())
+    about(middle, reach, |code| {
+        let even = f64::from(code - middle) - 0.5;
+        let edge = if code <= middle {
+            even.min(-band)
+        } else {
+            even.max(band)
+        };
+        f64::from(middle) + edge
+    })
 }
 
 /// Lower edges, counts, of codes about a middle, above which the rate counts `exp(log_ratio / 2)` times, below it the
 /// inverse.
 pub(super) fn of_two_gains(middle: f64, reach: i32, log_ratio: f64) -> (i32, Vec<f64>) {
     let gain = (0.5 * log_ratio).exp();
-    let first = middle.round() as i32 - reach;
-    let edge = |code: i32| {
+    about(middle.round() as i32, reach, |code| {
         let off = f64::from(code) - 0.5 - middle;
         middle + if off > 0.0 { off / gain } else { off * gain }
-    };
-    (first, (first..=first + 2 * reach).map(edge).collect())
+    })
 }
 
 /// Lower edges, counts, of codes about a middle when every other is missing beyond a limit, and three of four beyond twice
@@ -390,7 +386,7 @@ pub(super) fn two_in_one(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (gain, offset) = (draw.between(0.72, 0.91), draw.between(-0.5, 0.5));
     let (first, last) = reach(stand, axis);
     let edges = edges_of(gain, offset, first, last);
-    let even: Vec<f64> = (first..=last).map(|c| f64::from(c) - 0.5).collect();
+    let even = even_edges(first, (last - first) as usize);
     let known = against_even(stand, axis, first, &edges, &even);
     Shape::Fixed(known, Change::Edges(first, edges))
 }

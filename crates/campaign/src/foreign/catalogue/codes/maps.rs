@@ -1,7 +1,7 @@
 //! Codes that are read as others.
 
 use super::super::super::act::Change;
-use super::super::super::known::{Known, law, mean_and_sigma, shares};
+use super::super::super::known::{Known, even_edges, law, mean_and_sigma, shares};
 use super::super::super::shape::{Shape, map};
 use super::edges::zero_of;
 use crate::random::Draw;
@@ -38,9 +38,7 @@ pub(super) fn law_of_gate(stand: &Stand, axis: usize, gate: i32) -> (i32, Vec<f6
     let (mean, sigma) = mean_and_sigma(stand, axis);
     let (first, even) = law(stand, axis);
     let middle = mean.round() as i32;
-    let edges: Vec<f64> = (0..=even.len())
-        .map(|i| f64::from(first) + i as f64 - 0.5)
-        .collect();
+    let edges = even_edges(first, even.len());
     // The mean of two readings.
     let halves = shares(&edges, mean, sigma / 2f64.sqrt());
     let far = |i: usize| (first + i as i32 - middle).abs() > gate;

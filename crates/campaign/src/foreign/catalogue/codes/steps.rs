@@ -1,7 +1,9 @@
 //! Readings that depend on those before or after them.
 
 use super::super::super::act::Change;
-use super::super::super::known::{Known, law, long_run, mean_and_sigma, shares, steps_of};
+use super::super::super::known::{
+    Known, even_edges, law, long_run, mean_and_sigma, shares, steps_of,
+};
 use super::super::super::shape::{Shape, sized};
 use super::super::super::words::{each, each_pair};
 use crate::random::Draw;
@@ -24,11 +26,7 @@ pub(super) fn steps_with_play(stand: &Stand, axis: usize, play: f64) -> Vec<Vec<
     let (mean, sigma) = (stand.bias[axis] / LSB, stand.white(axis).sqrt() / LSB);
     let (first, even) = law(stand, axis);
     // Codes of what is left when the play is taken off, below and above.
-    let edges = |off: f64| -> Vec<f64> {
-        (0..=even.len())
-            .map(|i| f64::from(first) + i as f64 - 0.5 + off)
-            .collect()
-    };
+    let edges = |off: f64| each(&even_edges(first, even.len()), |edge| edge + off);
     let up = shares(&edges(play), mean, sigma);
     let down = shares(&edges(-play), mean, sigma);
     (0..even.len())

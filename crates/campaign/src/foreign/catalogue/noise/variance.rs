@@ -143,21 +143,6 @@ pub(super) fn rate_squared(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     each(&rate, |r| r * r)
 }
 
-/// What noise with a memory of its own size makes of independent draws: variance 1 - share + share x last^2, with the
-/// series itself.
-pub(super) fn remembered(share: f64, independent: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let share = share.min(0.95);
-    let mut last = 1.0;
-    independent
-        .iter()
-        .map(|z| {
-            let variance = 1.0 - share + share * last * last;
-            last = variance.sqrt() * z;
-            (variance, last)
-        })
-        .unzip()
-}
-
 /// A fan coil that blows until its thermostat is content, on one of three steps, and runs up and down within seconds. The
 /// pressure of turbulence goes with the square of the speed, and its variance with the fourth power.
 pub(super) fn fan(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
@@ -291,10 +276,12 @@ fn independent(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn remembering(draw: &mut Draw, stand: &Stand) -> Shape {
     let independent = independent(draw, stand);
     let known = independent.clone();
+    // All that stays of a size is what the last reading gave.
+    let of = |share: f64, independent: &[f64]| fed(share, share.min(0.95), independent);
     noise(
         f64::INFINITY,
-        move |_, share| Known::Variance(remembered(share, &known).0),
-        move |_, _, share| remembered(share, &independent).1,
+        move |_, share| Known::Variance(of(share, &known).0),
+        move |_, _, share| of(share, &independent).1,
     )
 }
 
