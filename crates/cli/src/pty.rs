@@ -8,10 +8,10 @@ use std::os::fd::AsRawFd;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use bench::{Run, SerialByte, Timeline, native_live};
+use bench::{Run, SerialByte};
 use serialport::{SerialPort, TTYPort};
 
-use crate::stand::Board;
+use crate::stand::{Board, Stopped};
 
 /// Why the board cannot be served any longer.
 #[derive(Debug, thiserror::Error)]
@@ -24,9 +24,8 @@ pub enum PtyError {
     #[error("the pseudo-terminal failed")]
     Line(#[source] io::Error),
     /// The image does not load, or stopped.
-    #[cfg(feature = "simavr")]
     #[error(transparent)]
-    Image(#[from] bench::simavr::SimavrError),
+    Image(#[from] Stopped),
 }
 
 /// The board's end of a pseudo-terminal.
@@ -152,15 +151,7 @@ pub fn serve(line: Line, board: &Board, run: &Run, stop: &AtomicBool) -> Result<
             ControlFlow::Continue(())
         }
     };
-    match board {
-        Board::Native => {
-            native_live(run, &Timeline::default(), listen, receive);
-        }
-        #[cfg(feature = "simavr")]
-        Board::Image(image) => {
-            bench::simavr::simavr_live(image, run, listen, receive)?;
-        }
-    }
+    board.live(run, listen, receive)?;
     failure.map_or(Ok(()), |error| Err(PtyError::Line(error)))
 }
 

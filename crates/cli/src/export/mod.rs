@@ -3,5 +3,7 @@
 pub mod board;
 pub mod causes;
 pub mod data;
+mod filters;
 pub mod noise;
 pub mod px4;
+mod simulators;

@@ -9,7 +9,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use bench::{Run, SerialByte, Timeline, native_live};
+use bench::{Run, SerialByte};
 
 use super::Board;
 use crate::link::Port;
@@ -153,14 +153,7 @@ fn play(
             ControlFlow::Continue(())
         }
     };
-    match board {
-        Board::Native => {
-            native_live(run, &Timeline::default(), listen, receive);
-            Ok(())
-        }
-        #[cfg(feature = "simavr")]
-        Board::Image(image) => bench::simavr::simavr_live(image, run, listen, receive)
-            .map(drop)
-            .map_err(|error| error.to_string()),
-    }
+    board
+        .live(run, listen, receive)
+        .map_err(|error| error.to_string())
 }

@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 
-use bench::{Run, Scenario, SerialByte, Timeline, duty_profile};
+use bench::{Run, Scenario, SerialByte, Timeline, duty_profile, native_live};
 use model::file::ModelFile;
 use model::record::Record;
 use rand_core::SeedableRng;
@@ -32,6 +32,37 @@ pub enum Board {
     /// Its image, an ELF file's bytes, on a simulated ATmega16.
     #[cfg(feature = "simavr")]
     Image(Vec<u8>),
+}
+
+/// Why a board stops before its time: its image does not load, or has stopped.
+#[cfg(feature = "simavr")]
+pub type Stopped = bench::simavr::SimavrError;
+/// Why a board stops before its time: what runs on the host never does.
+#[cfg(not(feature = "simavr"))]
+pub type Stopped = std::convert::Infallible;
+
+impl Board {
+    /// Plays a run, which `listen` may send bytes to each simulated millisecond, until it is over or `receive` breaks off.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn live(
+        &self,
+        run: &Run,
+        listen: impl FnMut(f64) -> Vec<u8>,
+        receive: impl FnMut(SerialByte) -> ControlFlow<()>,
+    ) -> Result<(), Stopped> {
+        match self {
+            Board::Native => {
+                native_live(run, &Timeline::default(), listen, receive);
+            }
+            #[cfg(feature = "simavr")]
+            Board::Image(image) => {
+                bench::simavr::simavr_live(image, run, listen, receive)?;
+            }
+        }
+        Ok(())
+    }
 }
 
 /// A run of the simulated stand.

@@ -1,25 +1,29 @@
 //! `imu-stand capture`.
 
+mod files;
+mod motor;
 mod replay;
 
 use std::fs::{File, OpenOptions};
 use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 use clap::{Args, ValueEnum};
 use imu_stand::RecordBuilder;
-use imu_stand::capture::{Calibration, Live, Restart};
-use imu_stand::link::{self, Change, Feed, Link};
+use imu_stand::capture::{Calibration, Live};
+use imu_stand::link::{Change, Feed, Link};
 use miette::{IntoDiagnostic, Result, WrapErr};
 use model::record::Base;
 use serde::Serialize;
-use wire::{Command, Corrected, Frame, Hello, Reply, Sample};
+use wire::{Frame, Hello, Sample};
 
 use super::Line;
-use super::board::motor::{Drive, KEEP_ALIVE, RAMP_DOWN};
+use super::board::motor::Drive;
+use files::{free_name, raw_path};
+use motor::Motor;
 
 /// What `capture` takes.
 #[derive(Args)]
@@ -106,23 +110,6 @@ struct Answer {
     frames_rejected: u32,
     restarts: u64,
     reconnections: u64,
-}
-
-/// What the capture does with the motor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Motor {
-    /// Nothing, or nothing any more.
-    Off,
-    /// It starts as soon as rows are written.
-    Wanted(Command),
-    /// A nonce was asked for under this number; when.
-    Arming(Command, u16, Instant),
-    /// The nonce has come.
-    Armed(Command, u16),
-    /// It was asked for under this number; when.
-    Asked(Command, u16, Instant),
-    /// It turns; when the last keep-alive went out.
-    Alive(Instant),
 }
 
 /// A capture under way: files, clock, and what happened.
@@ -231,68 +218,6 @@ impl<'a> Capture<'a> {
         self.start_s + self.start.elapsed().as_secs_f64()
     }
 
-    /// Starts the motor once the file is open, and keeps it alive. After a restart of the board, or a port that was gone,
-    /// it stays off: nobody may be watching.
-    fn drive(&mut self, feed: &mut Feed) -> Result<()> {
-        match self.motor {
-            Motor::Wanted(command) if self.live.is_some() && !feed.is_gone() => {
-                let number = feed.link.send(Command::Arm { nonce: 0 })?;
-                self.motor = Motor::Arming(command, number, Instant::now());
-            }
-            Motor::Armed(command, nonce) if !feed.is_gone() => {
-                feed.link.send(Command::Arm { nonce })?;
-                let number = feed.link.send(command)?;
-                self.motor = Motor::Asked(command, number, Instant::now());
-            }
-            Motor::Arming(command, _, asked) | Motor::Asked(command, _, asked)
-                if asked.elapsed() > ASK =>
-            {
-                self.motor = Motor::Wanted(command);
-            }
-            Motor::Alive(last) if last.elapsed() >= KEEP_ALIVE && !feed.is_gone() => {
-                // A port that fails here is gone for the reader, too.
-                let _ = feed.link.send(Command::KeepAlive);
-                self.motor = Motor::Alive(Instant::now());
-            }
-            _ => {}
-        }
-        Ok(())
-    }
-
-    /// A reply: the nonce that arms the motor; to the motor's command it says whether it turns.
-    fn replied(&mut self, reply: Reply) -> Result<()> {
-        let asks = Command::GetCorrection {
-            other: false,
-            row: 0,
-        };
-        if reply.command == asks.code() && self.live.is_none() {
-            self.corrects = reply.status == wire::Status::Ok && reply.value != 0;
-        }
-        if let Motor::Arming(command, number, _) = self.motor
-            && reply.number == number
-        {
-            link::done(&Command::Arm { nonce: 0 }, reply)?;
-            self.motor = Motor::Armed(command, reply.value as u16);
-        }
-        if let Motor::Asked(command, number, _) = self.motor
-            && reply.number == number
-            && reply.command == command.code()
-        {
-            link::done(&command, reply)?;
-            self.motor = Motor::Alive(Instant::now());
-            self.tell("the motor is driven")?;
-        }
-        Ok(())
-    }
-
-    fn motor_is_off(&mut self) -> Result<()> {
-        if matches!(self.motor, Motor::Alive(_) | Motor::Asked(..)) {
-            self.motor = Motor::Off;
-            self.tell("the motor stays off from here on")?;
-        }
-        Ok(())
-    }
-
     fn listen(&mut self, feed: &mut Feed, is_over: impl Fn(&Feed) -> bool) -> Result<()> {
         // A port that fails right here is gone for the loop below, which waits for it.
         let _ = feed.ask();
@@ -342,26 +267,6 @@ impl<'a> Capture<'a> {
                 } else if !self.arguments.quiet {
                     eprintln!("{}", self.figures(&feed.link));
                 }
-            }
-        }
-        Ok(())
-    }
-
-    /// Lets the motor run down, at its ramp, and captures that, too.
-    fn halt(&mut self, feed: &mut Feed) -> Result<()> {
-        if !matches!(self.motor, Motor::Alive(_)) {
-            return Ok(());
-        }
-        let began = Instant::now();
-        let mut stood = None;
-        // Asked again and again: a request may be lost. Two samples later than the first at 0 it stands.
-        while began.elapsed() < RAMP_DOWN {
-            feed.link.send(Command::MotorDuty { duty: 0 })?;
-            let until = Instant::now() + Duration::from_millis(300);
-            self.listen(feed, |_| Instant::now() >= until)?;
-            let stands = feed.link.sample.is_some_and(|sample| sample.pwm == 0);
-            if stands && stood.replace(()).is_some() {
-                break;
             }
         }
         Ok(())
@@ -417,206 +322,5 @@ impl<'a> Capture<'a> {
                 ))
             }
         }
-    }
-
-    fn sample(&mut self, sample: &Sample) -> Result<()> {
-        let now = self.now();
-        let Some(live) = &mut self.live else {
-            self.waiting.push((*sample, now));
-            return Ok(());
-        };
-        let (place, restart) = live.push(sample, now)?;
-        self.missing += place.missing;
-        if let Some(Restart { instants, .. }) = restart {
-            self.restarts += 1;
-            self.alert(&format!(
-                "the board has started anew; {} sample instants are without data",
-                instants - 1
-            ));
-            self.motor_is_off()?;
-        }
-        Ok(())
-    }
-
-    /// What the board made of a sample's rates. The file gets columns for it where the board said in time that it corrects.
-    fn corrected(&mut self, corrected: &Corrected) -> Result<()> {
-        self.corrects = true;
-        let Some(live) = &mut self.live else {
-            return Ok(());
-        };
-        if live.has_corrected() {
-            live.corrected(corrected);
-            return Ok(());
-        }
-        let calibration = Calibration {
-            corrected: true,
-            ..live.calibration().clone()
-        };
-        self.tell("the board corrects its rates from here on: another file goes on")?;
-        self.close()?;
-        self.open(&calibration, &[])
-    }
-
-    fn hello(&mut self, hello: &Hello) -> Result<()> {
-        let calibration = self.arguments.calibration(Some(hello), self.corrects);
-        let before = self.restarts_of_board.replace(hello.restarts);
-        let Some(live) = &mut self.live else {
-            let [major, minor, patch] = hello.firmware;
-            let about = [
-                ("firmware".to_owned(), format!("{major}.{minor}.{patch}")),
-                ("board_id".to_owned(), hello.board_id.to_string()),
-            ];
-            return self.open(&calibration, &about);
-        };
-        live.hello(hello, before);
-        if live.fits(&calibration) {
-            return Ok(());
-        }
-        self.tell("the board is set differently from here on: another file goes on")?;
-        self.close()?;
-        self.open(&calibration, &[])
-    }
-
-    /// Opens the file, or the next one, and puts in what has waited for it.
-    fn open(&mut self, calibration: &Calibration, about: &[(String, String)]) -> Result<()> {
-        let out = &self.arguments.out;
-        let resumes = self.files.is_empty() && self.arguments.resume && out.exists();
-        let path = if self.files.is_empty() {
-            out.clone()
-        } else {
-            free_name(out, self.files.len() + 1)
-        };
-        let live = if resumes {
-            let live = Live::resume(&path, calibration)?;
-            let before = live.start_unix_s();
-            self.start_s = self.start_unix_s - before;
-            let waited = &mut self.waiting;
-            waited
-                .iter_mut()
-                .for_each(|(_, time)| *time += self.start_s);
-            (self.start_unix_s, self.rows) = (before, 0);
-            live
-        } else {
-            Live::create(&path, calibration, about, Some(self.start_unix_s))?
-        };
-        self.live = Some(live);
-        self.files.push(super::name(&path));
-        if resumes {
-            self.tell("the capture was resumed")?;
-        }
-        for (sample, time) in std::mem::take(&mut self.waiting) {
-            if let Some(live) = &mut self.live {
-                self.missing += live.push(&sample, time)?.0.missing;
-            }
-        }
-        Ok(())
-    }
-
-    /// A board that cannot hear (one wire only) says how it is set at its start alone.
-    fn give_up_on_hello(&mut self) -> Result<()> {
-        let Some((_, first)) = self.waiting.first() else {
-            return Ok(());
-        };
-        if self.live.is_some() || self.now() - first < HELLO_WITHIN.as_secs_f64() {
-            return Ok(());
-        }
-        self.open(&self.arguments.calibration(None, self.corrects), &[])?;
-        self.tell(
-            "the board has not said how it is set: rate and ranges are assumed to be the built-in ones (20 Hz, 320 deg/s, \
-             1.5 g)",
-        )
-    }
-
-    /// Ends the file.
-    fn close(&mut self) -> Result<()> {
-        let Some(live) = self.live.take() else {
-            return Ok(());
-        };
-        self.rows += live.rows();
-        Ok(live.finish()?)
-    }
-
-    fn finish(&mut self, link: &Link) -> Result<()> {
-        if self.live.is_none() && !self.waiting.is_empty() {
-            // Ended while samples waited for the hello.
-            self.waiting[0].1 -= HELLO_WITHIN.as_secs_f64() + 1.0;
-            self.give_up_on_hello()?;
-        }
-        if self.is_terminal && !self.arguments.quiet {
-            eprintln!();
-        }
-        let heard = link.heard();
-        if self.live.is_none() && self.files.is_empty() {
-            miette::bail!(
-                help = heard.remedy(link.baud()),
-                "no sample arrived on {}; the raw bytes are kept in {}; heard: {heard}",
-                link.name(),
-                raw_path(&self.arguments.out).display()
-            );
-        }
-        let now = self.now();
-        if let Some(live) = &mut self.live {
-            let what = format!("the capture ends; {heard}");
-            live.note(now, &what)?;
-        }
-        self.close()?;
-        let answer = Answer {
-            format: "imu-stand-captured/1",
-            files: self.files.clone(),
-            seconds: now,
-            rows: self.rows,
-            missing: self.missing,
-            lost_by_board: heard.losses.device,
-            lost_by_line: heard.losses.line,
-            lost_unattributed: heard.losses.unattributed,
-            frames_rejected: heard.counts.rejected(),
-            restarts: self.restarts,
-            reconnections: self.reconnections,
-        };
-        if !self.arguments.quiet {
-            say!(
-                "{}: {} samples, {} missing",
-                answer.files.join(", "),
-                answer.rows,
-                answer.missing
-            );
-            say!("line: {heard}");
-        }
-        super::write_json(self.arguments.json.as_ref(), &answer)
-    }
-}
-
-/// The raw bytes' file: run.csv and run.csv.gz have run.raw.
-fn raw_path(out: &Path) -> PathBuf {
-    let plain = if out.extension().is_some_and(|e| e == "gz") {
-        out.with_extension("")
-    } else {
-        out.to_owned()
-    };
-    plain.with_extension("raw")
-}
-
-/// run-2.csv for run.csv.
-fn free_name(out: &Path, number: usize) -> PathBuf {
-    let name = super::name(out);
-    let (stem, ending) = name.split_once('.').unwrap_or((&name, "csv"));
-    (number..)
-        .map(|number| out.with_file_name(format!("{stem}-{number}.{ending}")))
-        .find(|path| !path.exists())
-        .unwrap_or_else(|| out.to_owned())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_go_with_the_capture() {
-        assert_eq!(raw_path(Path::new("a/run.csv.gz")), Path::new("a/run.raw"));
-        assert_eq!(raw_path(Path::new("run.csv")), Path::new("run.raw"));
-        assert_eq!(
-            free_name(Path::new("no-such/run.csv.gz"), 2),
-            Path::new("no-such/run-2.csv.gz")
-        );
     }
 }

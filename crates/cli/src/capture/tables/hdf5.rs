@@ -1,0 +1,71 @@
+//! HDF5, which MATLAB's .mat of version 7.3 is.
+
+use std::path::Path;
+
+use super::{Arrays, open};
+
+/// An array of a group or struct is called `GROUP.ARRAY`.
+pub(super) fn hdf5(path: &Path) -> Result<Arrays, String> {
+    let bad = |error: hdf5_pure::Error| {
+        format!(
+            "it cannot be read as HDF5: {error}. In MATLAB, `save(FILE, '-v7')` writes a version without HDF5"
+        )
+    };
+    let mut out = Arrays::of(&open(path)?)?;
+    let file = hdf5_pure::File::open_streaming(path).map_err(bad)?;
+    let mut too_large = Ok(());
+    hdf5_group(&file.root(), "", 0, &mut out, &mut too_large).map_err(bad)?;
+    too_large.map(|()| out)
+}
+
+/// Groups within groups that are followed.
+const DEEPEST: usize = 16;
+
+fn hdf5_group(
+    group: &hdf5_pure::Group,
+    within: &str,
+    depth: usize,
+    out: &mut Arrays,
+    too_large: &mut Result<(), String>,
+) -> Result<(), hdf5_pure::Error> {
+    use hdf5_pure::DType as D;
+    for name in group.datasets()? {
+        let array = group.dataset(&name)?;
+        let attributes = array.attrs()?;
+        // MATLAB keeps text as numbers and an empty array as its size.
+        let class = attributes.get("MATLAB_class").map(|v| format!("{v:?}"));
+        if class.is_some_and(|c| c.contains("char") || c.contains("cell"))
+            || attributes.contains_key("MATLAB_empty")
+        {
+            continue;
+        }
+        let shape = array.shape()?;
+        if let Err(why) = out.reserve(&format!("{within}{name}"), &shape) {
+            *too_large = Err(why);
+            return Ok(());
+        }
+        let values = match array.dtype()? {
+            D::F64 | D::F32 | D::I8 | D::I16 | D::I32 | D::U8 | D::U16 | D::U32 => {
+                array.read_f64()?
+            }
+            D::I64 => array.read_i64()?.into_iter().map(|v| v as f64).collect(),
+            D::U64 => array.read_u64()?.into_iter().map(|v| v as f64).collect(),
+            _ => continue,
+        };
+        let shape: Vec<usize> = shape.iter().map(|n| *n as usize).collect();
+        out.add(&format!("{within}{name}"), &shape, values, true);
+    }
+    for name in group.groups()? {
+        // What MATLAB keeps for itself begins so.
+        if !name.starts_with('#') && depth < DEEPEST {
+            hdf5_group(
+                &group.group(&name)?,
+                &format!("{within}{name}."),
+                depth + 1,
+                out,
+                too_large,
+            )?;
+        }
+    }
+    Ok(())
+}
