@@ -70,6 +70,24 @@ pub struct GyroChain {
     angle_deg: f64,
 }
 
+/// Whether a fault acts on the signal chain of the gyro of an axis.
+fn acts_in_chain(fault: &Fault, axis: usize) -> bool {
+    match *fault {
+        Fault::Tempco { gyro, .. }
+        | Fault::MotorCoupling { gyro, .. }
+        | Fault::MotorNoise { gyro, .. }
+        | Fault::SupplyCoupling { gyro, .. }
+        | Fault::Knock { gyro, .. }
+        | Fault::WarmUp { gyro, .. }
+        | Fault::Leak { gyro, .. }
+        | Fault::WanderingBias { gyro, .. }
+        | Fault::Trap { gyro, .. }
+        | Fault::GSensitivity { gyro, .. }
+        | Fault::NoisySpell { gyro, .. } => gyro == axis,
+        _ => false,
+    }
+}
+
 impl GyroChain {
     pub(crate) fn new(
         axis: usize,
@@ -80,26 +98,15 @@ impl GyroChain {
     ) -> Self {
         let stated = part.angle_random_walk_deg_sqrt_h / 60.0 * STATED_RATE_HZ.sqrt();
         let density = stated / filter_gain(STATED_POLE_HZ, STATED_PERIOD_S, STATED_FILTER);
-        let mut own = Vec::new();
+        let own: Vec<Fault> = (faults.iter())
+            .filter(|fault| acts_in_chain(fault, axis))
+            .cloned()
+            .collect();
         for fault in faults {
-            match *fault {
-                Fault::SlowFilter { gyro, pole_hz } if gyro == axis => part.pole_hz = pole_hz,
-                Fault::Tempco { gyro, .. }
-                | Fault::MotorCoupling { gyro, .. }
-                | Fault::MotorNoise { gyro, .. }
-                | Fault::SupplyCoupling { gyro, .. }
-                | Fault::Knock { gyro, .. }
-                | Fault::WarmUp { gyro, .. }
-                | Fault::Leak { gyro, .. }
-                | Fault::WanderingBias { gyro, .. }
-                | Fault::Trap { gyro, .. }
-                | Fault::GSensitivity { gyro, .. }
-                | Fault::NoisySpell { gyro, .. }
-                    if gyro == axis =>
-                {
-                    own.push(fault.clone());
-                }
-                _ => {}
+            if let Fault::SlowFilter { gyro, pole_hz } = *fault
+                && gyro == axis
+            {
+                part.pole_hz = pole_hz;
             }
         }
         // Behind a pole the variance of white noise is proportional to the corner.
@@ -335,7 +342,14 @@ impl Gyro {
             glitches: Vec::new(),
             dead: Vec::new(),
         };
-        // Times of events: a stream of their own, away from the chain's.
+        gyro.plan_events(faults, seconds, seed);
+        gyro.glitches.sort_by(|a, b| b.0.total_cmp(&a.0));
+        gyro
+    }
+
+    /// Times of events: of a stream of their own, away from the chain's.
+    fn plan_events(&mut self, faults: &[Fault], seconds: f64, seed: u64) {
+        let axis = self.chain.axis;
         let rng = &mut Stream::GyroFault(0x80 | axis as u8).of(seed);
         for fault in faults {
             match *fault {
@@ -347,7 +361,7 @@ impl Gyro {
                 } if at == axis => {
                     for _ in 0..count {
                         let start = uniform(rng, 1.0, (seconds - length_s).max(1.0));
-                        gyro.stalls.push((start, start + length_s, flags));
+                        self.stalls.push((start, start + length_s, flags));
                     }
                 }
                 Fault::Glitches {
@@ -362,7 +376,7 @@ impl Gyro {
                         } else {
                             1.0
                         };
-                        gyro.glitches
+                        self.glitches
                             .push((time, (sign * height_dps / 0.073_26).round() as i16));
                     }
                 }
@@ -370,20 +384,18 @@ impl Gyro {
                     gyro: at,
                     bit,
                     value,
-                } if at == axis => gyro.adis.stick(bit, value),
+                } if at == axis => self.adis.stick(bit, value),
                 Fault::DeadSpi {
                     gyro: at,
                     start_s,
                     end_s,
                     level,
                 } if at == axis => {
-                    gyro.dead.push((start_s, end_s, level));
+                    self.dead.push((start_s, end_s, level));
                 }
                 _ => {}
             }
         }
-        gyro.glitches.sort_by(|a, b| b.0.total_cmp(&a.0));
-        gyro
     }
 
     /// Time of the next sample, s.

@@ -12,11 +12,11 @@ use std::ops::ControlFlow;
 use std::rc::Rc;
 
 use adis16250::Adis16250;
-use wire::{Request, encode_request, reset_cause};
+use wire::{Request, encode_request};
 
 use self::board::{Chip, GyroSpi, HostBoard, HostSensors, Shared};
 use crate::run::{Cable, with_nonce};
-use crate::{Ending, Run, SerialByte, Stand};
+use crate::{Ending, Run, SerialByte};
 
 pub(crate) const CLOCK_HZ: f64 = 16e6;
 const CYCLES_PER_TICK: u64 = 64;
@@ -100,6 +100,18 @@ struct Incoming<'a> {
 }
 
 impl Incoming<'_> {
+    /// Before the receiver is on, until a cycle and a time, s, bytes are lost.
+    fn lose(&mut self, deaf_until: u64, deaf_until_s: f64) {
+        drop((self.listen)(deaf_until_s));
+        loop {
+            self.begin(deaf_until, 0);
+            match self.queue.front() {
+                Some(&(at, _)) if at < deaf_until => self.queue.pop_front(),
+                _ => break,
+            };
+        }
+    }
+
     /// Puts the next planned request on the line if it begins by `until` and the one before it has been received: what it
     /// says may hang on an answer.
     fn begin(&mut self, until: u64, nonce: u16) {
@@ -142,31 +154,7 @@ pub fn native_live(
 ) -> Ending {
     let hz = CLOCK_HZ * (1.0 + run.scenario.crystal_ppm * 1e-6);
     let end = (run.seconds * hz) as u64;
-    let chip = Rc::new(RefCell::new(Chip {
-        stand: Stand::new(&run.scenario),
-        timeline: timeline.clone(),
-        now: 0,
-        hz,
-        tick: None,
-        holding: None,
-        conversion: None,
-        job: None,
-        eeprom: [0xff; EEPROM_LEN],
-        eeprom_until: 0,
-        divisor: None,
-        next_divisor: None,
-        alive: 0,
-        nonce: 0,
-        period: 12_500,
-        line: VecDeque::new(),
-        line_free: 0,
-        sent: VecDeque::new(),
-        reboot: false,
-        cause: reset_cause::POWER_ON,
-        restarts: 0,
-        last_tick: 0,
-        ticks: 0,
-    }));
+    let chip = Rc::new(RefCell::new(Chip::new(run, timeline, hz)));
     let mut cable = Cable::new(&run.scenario);
     let mut received = Incoming {
         planned: (run.requests.iter())
@@ -203,19 +191,7 @@ pub fn native_live(
         if !board.reboot {
             return Ending::Complete;
         }
-        board.reboot = false;
-        board.now += WATCHDOG_CYCLES;
-        (board.job, board.divisor, board.next_divisor, board.period) = (None, None, None, 12_500);
-        board.alive = 0;
-        board.cause = reset_cause::WATCHDOG;
-        board.restarts = board.restarts.saturating_add(1);
-        // What had not left the transmitter is lost with the reset.
-        let now = board.now - WATCHDOG_CYCLES;
-        board.sent.retain(|&(at, _)| at <= now);
-        board.line.clear();
-        board.line_free = board.now;
-        let t = board.seconds(board.now);
-        board.stand.set_motor(0.0, t);
+        board.restart();
     }
 }
 
@@ -245,17 +221,8 @@ fn life(
     stand.boot(board);
     let misconfigured = firmware::configure_all(&mut sensors, stand.sens_avg());
     stand.started(board, misconfigured);
-    // Before the receiver is on, bytes are lost.
-    let lost_until = chip.borrow().seconds(power + timeline.configure);
-    drop((received.listen)(lost_until));
-    let deaf_until = power + timeline.configure;
-    loop {
-        received.begin(deaf_until, 0);
-        match received.queue.front() {
-            Some(&(at, _)) if at < deaf_until => received.queue.pop_front(),
-            _ => break,
-        };
-    }
+    let configured = chip.borrow().seconds(power + timeline.configure);
+    received.lose(power + timeline.configure, configured);
     chip.borrow_mut().now = start;
     let mut period = chip.borrow().period;
     let mut tick = start;

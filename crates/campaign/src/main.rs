@@ -115,14 +115,7 @@ fn campaign_of(a: Arguments) -> Result<(), Failure> {
         .seed
         .unwrap_or_else(|| std::hash::RandomState::new().build_hasher().finish() >> 16);
     if let (Some(index), Some((family, _))) = (a.run, all.first()) {
-        let (told, d) = campaign::case::describe(seed, *family, index);
-        println!("planted: {told}");
-        for f in &d.findings {
-            println!("named {} on {}: {}", f.cause, f.channels.join("+"), f.what);
-        }
-        for u in &d.unexplained {
-            println!("unexplained on {}: {}", u.channel, u.what);
-        }
+        describe(seed, *family, index);
         return Ok(());
     }
     let program = log::program().map_err(with(Path::new("this program"), WRITABLE))?;
@@ -144,6 +137,18 @@ fn campaign_of(a: Arguments) -> Result<(), Failure> {
     });
     let log = go_on(&a, before, &all, writer)?;
     put(&told(&log), a.out.as_deref())
+}
+
+/// Prints what is planted in one run, and what is found there.
+fn describe(seed: u64, family: campaign::Family, index: u64) {
+    let (told, d) = campaign::case::describe(seed, family, index);
+    println!("planted: {told}");
+    for f in &d.findings {
+        println!("named {} on {}: {}", f.cause, f.channels.join("+"), f.what);
+    }
+    for u in &d.unexplained {
+        println!("unexplained on {}: {}", u.channel, u.what);
+    }
 }
 
 /// What a log of this seed holds already. One that another build made is put aside: its runs would not be the same.

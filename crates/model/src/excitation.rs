@@ -201,37 +201,7 @@ impl World {
             };
             supply.push(get("supply_v") - load - get("supply_motor_v") * d.abs());
         }
-        let sway = |i: usize, shift: f64, part: f64| {
-            let w = std::f64::consts::TAU / get("sway_period_s");
-            let amplitude = part * get("sway_deg");
-            (
-                amplitude * (w * time(i) + shift).sin(),
-                amplitude * w * (w * time(i) + shift).cos(),
-            )
-        };
-        let rms = get("vibration_g");
-        let mut shake = |_| {
-            let e: f64 = StandardNormal.sample(rng);
-            rms * e
-        };
-        let mut acc: [Vec<f64>; 3] =
-            std::array::from_fn(|_| (0..samples).map(&mut shake).collect());
-        let mut motion: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; samples]);
-        let parts = [get("sway_about_x"), get("sway_about_y")];
-        for i in 0..samples {
-            let (roll, roll_rate) = sway(i, 0.0, parts[0]);
-            let (pitch, pitch_rate) = sway(i, 1.0, parts[1]);
-            // Gravity and rates in the axes of the body, turned by the pitch first and then by the roll.
-            let (sin_pitch, cos_pitch) = pitch.to_radians().sin_cos();
-            let (sin_roll, cos_roll) = roll.to_radians().sin_cos();
-            acc[0][i] -= sin_pitch;
-            acc[1][i] += cos_pitch * sin_roll;
-            acc[2][i] += cos_pitch * cos_roll;
-            motion[0][i] = roll_rate;
-            motion[1][i] = pitch_rate * cos_roll;
-            let w = std::f64::consts::TAU / get("turn_period_s");
-            motion[2][i] = get("turn_dps") * (w * time(i)).sin() - pitch_rate * sin_roll;
-        }
+        let (acc, motion) = moved(given, samples, rate_hz, rng);
         Self {
             temperature: std::array::from_fn(|_| temperature.clone()),
             supply,
@@ -240,4 +210,46 @@ impl World {
             motion,
         }
     }
+}
+
+/// Specific force, g, and motion, deg/s, of a stand that sways, turns and is shaken, by its settings.
+fn moved(
+    given: &BTreeMap<String, f64>,
+    samples: usize,
+    rate_hz: f64,
+    rng: &mut Xoshiro256PlusPlus,
+) -> ([Vec<f64>; 3], [Vec<f64>; 3]) {
+    let get = |key| setting_value(given, key);
+    let time = |i: usize| i as f64 / rate_hz;
+    let sway = |i: usize, shift: f64, part: f64| {
+        let w = std::f64::consts::TAU / get("sway_period_s");
+        let amplitude = part * get("sway_deg");
+        (
+            amplitude * (w * time(i) + shift).sin(),
+            amplitude * w * (w * time(i) + shift).cos(),
+        )
+    };
+    let rms = get("vibration_g");
+    let mut shake = |_| {
+        let e: f64 = StandardNormal.sample(rng);
+        rms * e
+    };
+    let mut acc: [Vec<f64>; 3] = std::array::from_fn(|_| (0..samples).map(&mut shake).collect());
+    let mut motion: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; samples]);
+    let parts = [get("sway_about_x"), get("sway_about_y")];
+    for i in 0..samples {
+        let (roll, roll_rate) = sway(i, 0.0, parts[0]);
+        let (pitch, pitch_rate) = sway(i, 1.0, parts[1]);
+        // Gravity and rates in the axes of the body, turned by the pitch first and then by the roll.
+        let (sin_pitch, cos_pitch) = pitch.to_radians().sin_cos();
+        let (sin_roll, cos_roll) = roll.to_radians().sin_cos();
+        acc[0][i] -= sin_pitch;
+        acc[1][i] += cos_pitch * sin_roll;
+        acc[2][i] += cos_pitch * cos_roll;
+        motion[0][i] = roll_rate;
+        motion[1][i] = pitch_rate * cos_roll;
+        let w = std::f64::consts::TAU / get("turn_period_s");
+        motion[2][i] = get("turn_dps") * (w * time(i)).sin() - pitch_rate * sin_roll;
+    }
+    (acc, motion)
 }

@@ -165,7 +165,6 @@ impl ModelFile {
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut out = String::new();
-        let quoted = |s: &str| toml::Value::String(s.to_owned()).to_string();
         let _ = writeln!(
             out,
             "format = {}\nstand = {}\nrate_hz = {:?}",
@@ -186,20 +185,6 @@ impl ModelFile {
                 let _ = writeln!(out, "{key} = {value:?}");
             }
         }
-        let parameters = |out: &mut String, all: &Parameters| {
-            for (name, p) in all.iter().filter(|(_, p)| p.value.is_finite()) {
-                let error = p
-                    .std_error
-                    .filter(|e| e.is_finite())
-                    .map_or(String::new(), |e| format!(", std_error = {e:?}"));
-                let _ = writeln!(
-                    out,
-                    "{name} = {{ value = {:?}{error}, unit = {} }}",
-                    p.value,
-                    quoted(&p.unit)
-                );
-            }
-        };
         for channel in &self.channels {
             let _ = writeln!(
                 out,
@@ -222,32 +207,7 @@ impl ModelFile {
             );
             parameters(&mut out, &e.parameters);
         }
-        for term in &self.unnamed {
-            let channels: Vec<_> = term.channels.iter().map(|c| quoted(c)).collect();
-            let _ = writeln!(
-                out,
-                "\n[[unnamed]]\ndomain = {}\nchannels = [{}]",
-                quoted(term.domain.id()),
-                channels.join(", ")
-            );
-            if let Some(follows) = &term.follows {
-                let _ = writeln!(out, "follows = {}", quoted(follows));
-            }
-            if let Some(refines) = &term.refines {
-                let _ = writeln!(out, "refines = {}", quoted(refines));
-            }
-            parameters(&mut out, &[("rms".to_owned(), term.rms.clone())].into());
-            let specs = term.domain.columns(term.follows.is_some());
-            for (spec, column) in specs.iter().zip(&term.columns) {
-                let _ = writeln!(
-                    out,
-                    "{} = {{ values = {:?}, unit = {} }}",
-                    spec.name,
-                    column.values,
-                    quoted(&column.unit)
-                );
-            }
-        }
+        self.unnamed.iter().for_each(|term| unnamed(&mut out, term));
         out
     }
 }
@@ -260,5 +220,53 @@ pub fn baseline_unit(spec: &str, channel_unit: &str) -> String {
         (_, "deg/sqrt(h)") => format!("{channel_unit}*sqrt(s)"),
         (_, "deg") => format!("{channel_unit}*s"),
         _ => unit_on(spec, channel_unit),
+    }
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+/// Parameters, one a line.
+fn parameters(out: &mut String, all: &Parameters) {
+    for (name, p) in all.iter().filter(|(_, p)| p.value.is_finite()) {
+        let error = p
+            .std_error
+            .filter(|e| e.is_finite())
+            .map_or(String::new(), |e| format!(", std_error = {e:?}"));
+        let _ = writeln!(
+            out,
+            "{name} = {{ value = {:?}{error}, unit = {} }}",
+            p.value,
+            quoted(&p.unit)
+        );
+    }
+}
+
+/// An unnamed term with its columns.
+fn unnamed(out: &mut String, term: &Unnamed) {
+    let channels: Vec<_> = term.channels.iter().map(|c| quoted(c)).collect();
+    let _ = writeln!(
+        out,
+        "\n[[unnamed]]\ndomain = {}\nchannels = [{}]",
+        quoted(term.domain.id()),
+        channels.join(", ")
+    );
+    if let Some(follows) = &term.follows {
+        let _ = writeln!(out, "follows = {}", quoted(follows));
+    }
+    if let Some(refines) = &term.refines {
+        let _ = writeln!(out, "refines = {}", quoted(refines));
+    }
+    parameters(out, &[("rms".to_owned(), term.rms.clone())].into());
+    let specs = term.domain.columns(term.follows.is_some());
+    for (spec, column) in specs.iter().zip(&term.columns) {
+        let _ = writeln!(
+            out,
+            "{} = {{ values = {:?}, unit = {} }}",
+            spec.name,
+            column.values,
+            quoted(&column.unit)
+        );
     }
 }

@@ -9,10 +9,10 @@ use adis16250::Adis16250;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use firmware::{Board, Job, Sensors};
-use wire::{Frame, code};
+use wire::{Frame, code, reset_cause};
 
-use super::{CYCLES_PER_TICK, EEPROM_LEN, Timeline, byte_cycles};
-use crate::{AccSelect, Stand};
+use super::{CYCLES_PER_TICK, EEPROM_LEN, Timeline, WATCHDOG_CYCLES, byte_cycles};
+use crate::{AccSelect, Run, Stand};
 
 /// What the parts of the board share.
 pub(super) struct Chip {
@@ -49,6 +49,52 @@ pub(super) struct Chip {
 }
 
 impl Chip {
+    /// Of a board whose power comes on.
+    pub fn new(run: &Run, timeline: &Timeline, hz: f64) -> Self {
+        Self {
+            stand: Stand::new(&run.scenario),
+            timeline: timeline.clone(),
+            now: 0,
+            hz,
+            tick: None,
+            holding: None,
+            conversion: None,
+            job: None,
+            eeprom: [0xff; EEPROM_LEN],
+            eeprom_until: 0,
+            divisor: None,
+            next_divisor: None,
+            alive: 0,
+            nonce: 0,
+            period: 12_500,
+            line: VecDeque::new(),
+            line_free: 0,
+            sent: VecDeque::new(),
+            reboot: false,
+            cause: reset_cause::POWER_ON,
+            restarts: 0,
+            last_tick: 0,
+            ticks: 0,
+        }
+    }
+
+    /// The watchdog's reset.
+    pub fn restart(&mut self) {
+        self.reboot = false;
+        self.now += WATCHDOG_CYCLES;
+        (self.job, self.divisor, self.next_divisor, self.period) = (None, None, None, 12_500);
+        self.alive = 0;
+        self.cause = reset_cause::WATCHDOG;
+        self.restarts = self.restarts.saturating_add(1);
+        // What had not left the transmitter is lost with the reset.
+        let now = self.now - WATCHDOG_CYCLES;
+        self.sent.retain(|&(at, _)| at <= now);
+        self.line.clear();
+        self.line_free = self.now;
+        let t = self.seconds(self.now);
+        self.stand.set_motor(0.0, t);
+    }
+
     pub fn seconds(&self, cycle: u64) -> f64 {
         cycle as f64 / self.hz
     }

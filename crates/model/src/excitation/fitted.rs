@@ -199,19 +199,7 @@ impl Fit<'_> {
         let rest = off_line(&left);
         if rms(&rest) > TEMP_LSB_C {
             let period = period(&rest, self.block_s());
-            let heater: BTreeMap<String, f64> = [
-                ("heater_degc".to_owned(), 1.0),
-                ("heater_period_s".to_owned(), period),
-                ("ambient_degc".to_owned(), 0.0),
-            ]
-            .into();
-            let world = World::stated(
-                &heater,
-                left.len(),
-                1.0 / self.block_s(),
-                &mut Xoshiro256PlusPlus::seed_from_u64(0),
-            );
-            let [unit, ..] = world.temperature;
+            let unit = self.heater_of(period, left.len());
             let swing = rms(&rest) / rms(&off_line(&unit));
             for (y, u) in left.iter_mut().zip(unit) {
                 *y -= swing * u;
@@ -225,6 +213,24 @@ impl Fit<'_> {
         if rise.abs() > TEMP_LSB_C {
             settings.push(("drift_degc", rise));
         }
+    }
+
+    /// Blocks of the temperature by a heater of that period, s, and of 1 degC.
+    fn heater_of(&self, period: f64, blocks: usize) -> Vec<f64> {
+        let heater: BTreeMap<String, f64> = [
+            ("heater_degc".to_owned(), 1.0),
+            ("heater_period_s".to_owned(), period),
+            ("ambient_degc".to_owned(), 0.0),
+        ]
+        .into();
+        let world = World::stated(
+            &heater,
+            blocks,
+            1.0 / self.block_s(),
+            &mut Xoshiro256PlusPlus::seed_from_u64(0),
+        );
+        let [unit, ..] = world.temperature;
+        unit
     }
 
     /// Mean, the part that follows the motor's duty, and a load for what is left.

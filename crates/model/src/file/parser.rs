@@ -1,6 +1,7 @@
 //! The model file as it is read: every error names its line.
 
 use super::*;
+use crate::effect::{Effect, ParameterSpec};
 
 pub(super) struct Parser<'a> {
     pub(super) text: &'a str,
@@ -101,20 +102,7 @@ impl<'a> Parser<'a> {
                 "rate_hz" => file.rate_hz = self.ranged(value, "rate_hz", range::POSITIVE)?,
                 "fitted_on" => file.fitted_on = Some(self.fitted_on(value)?),
                 "excitation" => file.excitation = self.excitation(value)?,
-                "channel" => {
-                    for v in self.array(value, "channel")? {
-                        let channel = self.channel(v)?;
-                        let at = v.span().start;
-                        if file.channels.iter().any(|c| c.name == channel.name) {
-                            return self.error(at, format!("a second channel {}", channel.name));
-                        }
-                        file.channels.push(channel);
-                        if file.channels.len() > range::MOST_CHANNELS {
-                            return self
-                                .error(at, format!("more than {} channels", range::MOST_CHANNELS));
-                        }
-                    }
-                }
+                "channel" => file.channels = self.all_channels(value)?,
                 "effect" | "unnamed" => {}
                 other => {
                     return self.error(key.span().start, format!(
@@ -123,21 +111,7 @@ impl<'a> Parser<'a> {
                 }
             }
         }
-        match format {
-            Some((f, _)) if f == FORMAT => {}
-            Some((f, at)) => {
-                return self.error(
-                    at,
-                    format!("format is {f:?}, this program reads {FORMAT:?}"),
-                );
-            }
-            None => {
-                return self.error(
-                    0,
-                    format!("no format line; the first one has to be format = {FORMAT:?}"),
-                );
-            }
-        }
+        self.check_format(format)?;
         if file.rate_hz <= 0.0 {
             return self.error(0, "rate_hz is missing or not positive".to_owned());
         }
@@ -239,6 +213,37 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// Whether the file is of the format that is read.
+    fn check_format(&self, format: Option<(String, usize)>) -> Parsed<()> {
+        match format {
+            Some((f, _)) if f == FORMAT => Ok(()),
+            Some((f, at)) => self.error(
+                at,
+                format!("format is {f:?}, this program reads {FORMAT:?}"),
+            ),
+            None => self.error(
+                0,
+                format!("no format line; the first one has to be format = {FORMAT:?}"),
+            ),
+        }
+    }
+
+    fn all_channels(&self, value: &Spanned<DeValue<'a>>) -> Parsed<Vec<ChannelModel>> {
+        let mut channels: Vec<ChannelModel> = vec![];
+        for v in self.array(value, "channel")? {
+            let channel = self.channel(v)?;
+            let at = v.span().start;
+            if channels.iter().any(|c| c.name == channel.name) {
+                return self.error(at, format!("a second channel {}", channel.name));
+            }
+            channels.push(channel);
+            if channels.len() > range::MOST_CHANNELS {
+                return self.error(at, format!("more than {} channels", range::MOST_CHANNELS));
+            }
+        }
+        Ok(channels)
+    }
+
     fn channel(&self, value: &Spanned<DeValue<'a>>) -> Parsed<ChannelModel> {
         let table = self.table(value, "channel")?;
         let mut channel = ChannelModel::default();
@@ -337,16 +342,7 @@ impl<'a> Parser<'a> {
             if matches!(name, "cause" | "channels") {
                 continue;
             }
-            let Some(spec) = known.parameters().iter().find(|p| p.name == name) else {
-                let names: Vec<_> = known.parameters().iter().map(|p| p.name).collect();
-                return self.error(
-                    key.span().start,
-                    format!(
-                        "unknown parameter {name} of {id}; it has {}",
-                        names.join(", ")
-                    ),
-                );
-            };
+            let spec = self.spec_of(known, name, key.span().start)?;
             let units = [if unit == "deg/s" {
                 spec.unit.to_owned()
             } else {
@@ -370,5 +366,23 @@ impl<'a> Parser<'a> {
             );
         }
         Ok(found)
+    }
+
+    /// What is known of a parameter of an effect.
+    fn spec_of(&self, known: &dyn Effect, name: &str, at: usize) -> Parsed<&'static ParameterSpec> {
+        match known.parameters().iter().find(|p| p.name == name) {
+            Some(spec) => Ok(spec),
+            None => {
+                let names: Vec<_> = known.parameters().iter().map(|p| p.name).collect();
+                self.error(
+                    at,
+                    format!(
+                        "unknown parameter {name} of {}; it has {}",
+                        known.id(),
+                        names.join(", ")
+                    ),
+                )
+            }
+        }
     }
 }

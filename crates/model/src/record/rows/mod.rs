@@ -109,6 +109,25 @@ fn mended(record: &Record, keys: &Keys) -> Option<(Vec<Place>, Vec<String>)> {
             )
         });
     }
+    let (all, rivals) = joined(keys, &left, &starts, &mut notes);
+    if let Some(first) = rivals.iter().min() {
+        notes.push(format!(
+            "{} of an instant that another row has, with other readings, the first is row {}: left out",
+            rows_are(rivals.len()),
+            first + 1
+        ));
+    }
+    Some((all, notes))
+}
+
+/// Places of the rows that are left, those of each start of the board behind those of the one before; and rows of an instant that
+/// another one has.
+fn joined(
+    keys: &Keys,
+    left: &[usize],
+    starts: &[usize],
+    notes: &mut Vec<String>,
+) -> (Vec<Place>, Vec<usize>) {
     let mut all: Vec<Place> = vec![];
     let mut rivals = vec![];
     let ends = starts.iter().copied().chain([left.len()]);
@@ -149,14 +168,7 @@ fn mended(record: &Record, keys: &Keys) -> Option<(Vec<Place>, Vec<String>)> {
         }
         from = end;
     }
-    if let Some(first) = rivals.iter().min() {
-        notes.push(format!(
-            "{} of an instant that another row has, with other readings, the first is row {}: left out",
-            rows_are(rivals.len()),
-            first + 1
-        ));
-    }
-    Some((all, notes))
+    (all, rivals)
 }
 
 /// The rows as they come, their times going on, where the host's clock was set back at each of the places `back`.

@@ -158,19 +158,11 @@ pub(super) fn take_from_times(record: &mut Cow<'_, Record>) {
 
 /// Let rate and tick of the header agree with what was measured. Two of three tell where the host's clock is there.
 pub(super) fn check(record: &mut Cow<'_, Record>) {
-    let rows = record.len();
     let Some(tick_s) = record.header.tick_s.filter(|t| t.is_finite() && *t > 0.0) else {
         return;
     };
-    let number: Vec<i64> = match record.seq.as_ref().filter(|s| s.len() == rows) {
-        Some(s) => s.iter().map(|v| *v as i64).collect(),
-        None => (0..rows as i64).collect(),
-    };
-    let ticks = record.t_ticks.as_ref();
-    let ticks: Option<Vec<i64>> = ticks
-        .filter(|t| t.len() == rows && t.iter().all(|v| *v <= LARGEST))
-        .map(|t| t.iter().map(|v| *v as i64).collect());
-    let Some(period) = ticks.and_then(|t| ratio(&t, &number)) else {
+    let number = numbers(record);
+    let Some(period) = ticks_of_a_sample(record, &number) else {
         return;
     };
     let measured = 1.0 / (period * tick_s);
@@ -222,6 +214,25 @@ pub(super) fn check(record: &mut Cow<'_, Record>) {
         entry.1 = value.to_string();
     }
     record.to_mut().notes.push(told);
+}
+
+/// Numbers of the rows: their sequence numbers, or as they come.
+fn numbers(record: &Record) -> Vec<i64> {
+    let rows = record.len();
+    match record.seq.as_ref().filter(|s| s.len() == rows) {
+        Some(s) => s.iter().map(|v| *v as i64).collect(),
+        None => (0..rows as i64).collect(),
+    }
+}
+
+/// Ticks from one number to the next.
+fn ticks_of_a_sample(record: &Record, number: &[i64]) -> Option<f64> {
+    let rows = record.len();
+    let ticks = record.t_ticks.as_ref();
+    let ticks: Option<Vec<i64>> = ticks
+        .filter(|t| t.len() == rows && t.iter().all(|v| *v <= LARGEST))
+        .map(|t| t.iter().map(|v| *v as i64).collect());
+    ratio(&ticks?, number)
 }
 
 #[cfg(test)]
