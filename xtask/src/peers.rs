@@ -1,7 +1,7 @@
 //! `cargo xtask compare-peers`: speed, memory and agreement against allantools (in a venv of its own) and the Rust crate
 //! `allan`, on the same readings in the same run.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::step::{Failure, run};
@@ -95,13 +95,51 @@ fn disagreement(a: &[(usize, f64)], b: &[(usize, f64)]) -> (f64, usize) {
 /// Where Python, its package or the build are missing; where two implementations disagree by more than 1e-6.
 pub fn compare(root: &Path, long: bool) -> Result<(), Failure> {
     let folder = root.join("target/peers");
-    let io = |error: std::io::Error| {
-        Failure::new(
-            &format!("target/peers: {error}"),
-            "make room or rights for it",
-        )
-    };
     std::fs::create_dir_all(&folder).map_err(io)?;
+    let peers = Peers {
+        python: allantools(&folder)?,
+        script: folder.join("peers.py"),
+        ours: root.join("target/release/examples/peers"),
+        folder,
+    };
+    std::fs::write(&peers.script, SCRIPT).map_err(io)?;
+    run(
+        "the build",
+        Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+            .current_dir(root)
+            .args([
+                "build",
+                "--release",
+                "--quiet",
+                "-p",
+                "noise",
+                "--example",
+                "peers",
+                "--target-dir",
+                "target",
+            ]),
+    )?;
+    let worst = peers
+        .against_allantools(long)?
+        .max(peers.against_the_crate()?);
+    if worst > 1e-6 {
+        return Err(Failure::new(
+            &format!("two implementations differ by {worst:.1e}"),
+            "compare the definitions row by row before believing either",
+        ));
+    }
+    Ok(())
+}
+
+fn io(error: std::io::Error) -> Failure {
+    Failure::new(
+        &format!("target/peers: {error}"),
+        "make room or rights for it",
+    )
+}
+
+/// The Python that has allantools, made where there is none.
+fn allantools(folder: &Path) -> Result<PathBuf, Failure> {
     let python = folder.join("venv/bin/python");
     let has_it = Command::new(&python)
         .args(["-c", "import allantools"])
@@ -121,68 +159,99 @@ pub fn compare(root: &Path, long: bool) -> Result<(), Failure> {
             ]),
         )?;
     }
-    let script = folder.join("peers.py");
-    std::fs::write(&script, SCRIPT).map_err(io)?;
-    run(
-        "the build",
-        Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-            .current_dir(root)
-            .args([
-                "build",
-                "--release",
-                "--quiet",
-                "-p",
-                "noise",
-                "--example",
-                "peers",
-                "--target-dir",
-                "target",
-            ]),
-    )?;
-    let ours = root.join("target/release/examples/peers");
-    println!(
-        "one process each; `input` is 8 B a reading; agreement is the largest relative difference of a deviation\n\n\
+    Ok(python)
+}
+
+/// The programs that are compared, and where their readings are.
+struct Peers {
+    folder: PathBuf,
+    python: PathBuf,
+    script: PathBuf,
+    ours: PathBuf,
+}
+
+impl Peers {
+    /// Prints the table against allantools, and that of the passes; returns the largest difference.
+    fn against_allantools(&self, long: bool) -> Result<f64, Failure> {
+        println!(
+            "one process each; `input` is 8 B a reading; agreement is the largest relative difference of a deviation\n\n\
          | deviation, octaves | readings | allantools | imu-stand | times faster | peak memory, allantools | imu-stand \
          (input) | agreement |\n|---|---|---|---|---|---|---|---|"
-    );
-    let mut worst = 0.0f64;
-    let mut passes = Vec::new();
-    for (kind, samples) in ROWS.iter().chain(long.then_some(&LONG)) {
-        let file = folder.join(format!("{samples}.f64"));
-        if !file.exists() {
-            run(
-                "writing the readings",
-                Command::new(&ours)
-                    .arg("write")
-                    .arg(&file)
-                    .arg(samples.to_string()),
-            )?;
-        }
-        let theirs = Outcome::of(
-            "allantools",
-            Command::new(&python).arg(&script).arg(kind).arg(&file),
-        )?;
-        let own = Outcome::of(
-            "imu-stand",
-            Command::new(&ours).args(["run", kind]).arg(&file),
-        )?;
-        let (difference, common) = disagreement(&own.deviations, &theirs.deviations);
-        worst = worst.max(difference);
-        if let Some(pass) = own.pass_seconds {
-            passes.push((*samples, own.seconds, pass));
-        }
-        println!(
-            "| {kind} | {samples:.0e} | {:.4} s | {:.6} s | {:.1} | {:.0} MiB | {:.0} MiB ({:.0}) | {difference:.1e} over \
-             {common} |",
-            theirs.seconds,
-            own.seconds,
-            theirs.seconds / own.seconds,
-            theirs.peak_mib,
-            own.peak_mib,
-            *samples as f64 * 8.0 / 1_048_576.0,
-            samples = *samples as f64,
         );
+        let mut worst = 0.0f64;
+        let mut passes = Vec::new();
+        for (kind, samples) in ROWS.iter().chain(long.then_some(&LONG)) {
+            let file = self.folder.join(format!("{samples}.f64"));
+            if !file.exists() {
+                run(
+                    "writing the readings",
+                    Command::new(&self.ours)
+                        .arg("write")
+                        .arg(&file)
+                        .arg(samples.to_string()),
+                )?;
+            }
+            let theirs = Outcome::of(
+                "allantools",
+                Command::new(&self.python)
+                    .arg(&self.script)
+                    .arg(kind)
+                    .arg(&file),
+            )?;
+            let own = Outcome::of(
+                "imu-stand",
+                Command::new(&self.ours).args(["run", kind]).arg(&file),
+            )?;
+            let (difference, common) = disagreement(&own.deviations, &theirs.deviations);
+            worst = worst.max(difference);
+            if let Some(pass) = own.pass_seconds {
+                passes.push((*samples, own.seconds, pass));
+            }
+            println!(
+                "| {kind} | {samples:.0e} | {:.4} s | {:.6} s | {:.1} | {:.0} MiB | {:.0} MiB ({:.0}) | {difference:.1e} over \
+             {common} |",
+                theirs.seconds,
+                own.seconds,
+                theirs.seconds / own.seconds,
+                theirs.peak_mib,
+                own.peak_mib,
+                *samples as f64 * 8.0 / 1_048_576.0,
+                samples = *samples as f64,
+            );
+        }
+        tell_passes(&passes);
+        Ok(worst)
     }
+
+    /// Prints the table against the crate; returns the largest difference that its definition does not explain.
+    fn against_the_crate(&self) -> Result<f64, Failure> {
+        let mut worst = 0.0f64;
+        println!(
+            "\n| overlapping Allan, 1-2-4 decades | readings | crate allan | imu-stand | times faster | agreement |\n\
+         |---|---|---|---|---|---|"
+        );
+        for samples in [1_000_000usize, 10_000_000] {
+            let file = self.folder.join(format!("{samples}.f64"));
+            let both = Outcome::of("peers", Command::new(&self.ours).arg("crate").arg(&file))?;
+            let (difference, common) = disagreement(&both.deviations, &both.crate_deviations);
+            // The crate leaves out the phase after the last reading: one difference fewer, a change of the order of 1/n.
+            if difference > 10.0 / samples as f64 {
+                worst = worst.max(difference);
+            }
+            println!(
+                "| to 1e5 | {:.0e} | {:.4} s | {:.4} s | {:.1} | {difference:.1e} over {common} |",
+                samples as f64,
+                both.crate_seconds,
+                both.seconds,
+                both.crate_seconds / both.seconds
+            );
+        }
+        Ok(worst)
+    }
+}
+
+/// Prints how this program compares with one plain pass for each octave: readings, its seconds, those of the pass.
+fn tell_passes(passes: &[(usize, f64, f64)]) {
     println!(
         "\n| oadev, octaves | this program, integration included | one plain pass over the readings for each octave | ratio |\n\
          |---|---|---|---|"
@@ -190,35 +259,8 @@ pub fn compare(root: &Path, long: bool) -> Result<(), Failure> {
     for (samples, seconds, pass) in passes {
         println!(
             "| {:.0e} | {seconds:.4} s | {pass:.4} s | {:.2} |",
-            samples as f64,
+            *samples as f64,
             seconds / pass
         );
     }
-    println!(
-        "\n| overlapping Allan, 1-2-4 decades | readings | crate allan | imu-stand | times faster | agreement |\n\
-         |---|---|---|---|---|---|"
-    );
-    for samples in [1_000_000usize, 10_000_000] {
-        let file = folder.join(format!("{samples}.f64"));
-        let both = Outcome::of("peers", Command::new(&ours).arg("crate").arg(&file))?;
-        let (difference, common) = disagreement(&both.deviations, &both.crate_deviations);
-        // The crate leaves out the phase after the last reading: one difference fewer, a change of the order of 1/n.
-        if difference > 10.0 / samples as f64 {
-            worst = worst.max(difference);
-        }
-        println!(
-            "| to 1e5 | {:.0e} | {:.4} s | {:.4} s | {:.1} | {difference:.1e} over {common} |",
-            samples as f64,
-            both.crate_seconds,
-            both.seconds,
-            both.crate_seconds / both.seconds
-        );
-    }
-    if worst > 1e-6 {
-        return Err(Failure::new(
-            &format!("two implementations differ by {worst:.1e}"),
-            "compare the definitions row by row before believing either",
-        ));
-    }
-    Ok(())
 }

@@ -2,15 +2,17 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Mutex;
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::image;
 use crate::page;
-use crate::step::{Crates, Failure, Pace, Progress, Silent, run, watched};
+use crate::step::{Crates, Failure, Pace, Silent, run, watched};
 use crate::wheel::{self, Profile};
 use crate::{cargo, say_sizes, toolchain};
+
+mod programs;
+
+use programs::{TestProgram, side_by_side};
 
 /// no_std crates, tested each alone as well: a run of the workspace unites features.
 const ALONE: &[&str] = &["wire", "adis16250", "mma7260qt"];
@@ -94,34 +96,40 @@ pub fn suite(root: &Path, extent: Extent) -> Result<(), Failure> {
     })?;
     steps.step("tests", |_| built.run(extent))?;
     if extent == Extent::All {
-        steps.step("examples in the documentation", |root| {
-            let mut docs = cargo(root, &["test", "--workspace", "--doc"]);
+        beside_the_tests(&mut steps, &built)?;
+    }
+    println!("all passed in {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+/// What is tested beside the workspace's tests: examples, packages alone, the Python package and the demo.
+fn beside_the_tests(steps: &mut Steps<'_>, built: &Built) -> Result<(), Failure> {
+    steps.step("examples in the documentation", |root| {
+        let mut docs = cargo(root, &["test", "--workspace", "--doc"]);
+        watched(
+            "examples",
+            &mut docs,
+            &mut Crates::default(),
+            &mut Pace::Steady,
+        )?;
+        Ok(String::new())
+    })?;
+    for package in ALONE {
+        steps.step(&format!("{package} alone"), |root| {
+            let mut alone = cargo(root, &["test", "--no-default-features", "-p", package]);
             watched(
-                "examples",
-                &mut docs,
+                package,
+                &mut alone,
                 &mut Crates::default(),
                 &mut Pace::Steady,
             )?;
             Ok(String::new())
         })?;
-        for package in ALONE {
-            steps.step(&format!("{package} alone"), |root| {
-                let mut alone = cargo(root, &["test", "--no-default-features", "-p", package]);
-                watched(
-                    package,
-                    &mut alone,
-                    &mut Crates::default(),
-                    &mut Pace::Steady,
-                )?;
-                Ok(String::new())
-            })?;
-        }
-        steps.step("Python package", |root| {
-            wheel::tested(root, Profile::Dev, built.program()?)
-        })?;
-        steps.step("demo", |root| short_demo(root, &built))?;
     }
-    println!("all passed in {:.0} s", start.elapsed().as_secs_f64());
+    steps.step("Python package", |root| {
+        wheel::tested(root, Profile::Dev, built.program()?)
+    })?;
+    steps.step("demo", |root| short_demo(root, built))?;
     Ok(())
 }
 
@@ -192,16 +200,6 @@ fn image_without_complaint(root: &Path) -> Result<String, Failure> {
         "the build of the image says more than what it compiles",
         "mend what it complains of, above",
     ))
-}
-
-/// A test program.
-#[derive(Clone, Debug)]
-struct TestProgram {
-    /// Package and target.
-    name: String,
-    file: PathBuf,
-    /// Folder of its package, in which cargo would run it.
-    folder: PathBuf,
 }
 
 /// What the build of the tests made.
@@ -318,102 +316,6 @@ fn field<'a>(message: &'a str, name: &str) -> Option<&'a str> {
     message[start..].split('"').next()
 }
 
-/// How a test program ended.
-struct Done {
-    name: String,
-    passed: bool,
-    tests: usize,
-    seconds: f64,
-    said: String,
-}
-
-/// Runs test programs, as many at a time as there are cores, each with one thread; prints what the failed ones said, and
-/// how long the longest took.
-fn side_by_side(tests: &[&TestProgram]) -> Result<Vec<Done>, Failure> {
-    let mut progress = Progress::new("tests", Pace::Steady);
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    let next = Mutex::new(tests.iter());
-    let (send, results) = channel();
-    let mut done: Vec<Done> = Vec::new();
-    let mut broken = None;
-    std::thread::scope(|scope| {
-        for _ in 0..workers {
-            let (send, next) = (send.clone(), &next);
-            scope.spawn(move || {
-                loop {
-                    let test = next.lock().ok().and_then(|mut tests| tests.next());
-                    let Some(test) = test else { return };
-                    if send.send(run_one(test)).is_err() {
-                        return;
-                    }
-                }
-            });
-        }
-        drop(send);
-        loop {
-            match results.recv_timeout(Duration::from_millis(500)) {
-                Ok(Ok(one)) => done.push(one),
-                Ok(Err(failure)) => broken = Some(failure),
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return,
-            }
-            let counted: usize = done.iter().map(|d| d.tests).sum();
-            progress.tick(&format!(
-                "{} of {} programs done, {counted} tests",
-                done.len(),
-                tests.len()
-            ));
-        }
-    });
-    progress.end();
-    if let Some(failure) = broken {
-        return Err(failure);
-    }
-    for failed in done.iter().filter(|d| !d.passed) {
-        eprintln!("---- {}\n{}", failed.name, failed.said);
-    }
-    done.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
-    let longest = done.iter().take(5);
-    let longest: Vec<String> = longest
-        .map(|d| format!("{} {:.0} s", d.name, d.seconds))
-        .collect();
-    println!("   longest: {}", longest.join(", "));
-    Ok(done)
-}
-
-fn run_one(test: &TestProgram) -> Result<Done, Failure> {
-    let from = Instant::now();
-    let output = Command::new(&test.file)
-        .current_dir(&test.folder)
-        .env("CARGO_MANIFEST_DIR", &test.folder)
-        .env("RUST_TEST_THREADS", "1")
-        .output()
-        .map_err(|error| {
-            Failure::new(
-                &format!("{} cannot be started: {error}", test.file.display()),
-                "run it again: another build may have taken it away",
-            )
-        })?;
-    let mut said = String::from_utf8_lossy(&output.stdout).into_owned();
-    said += &String::from_utf8_lossy(&output.stderr);
-    Ok(Done {
-        name: test.name.clone(),
-        passed: output.status.success(),
-        tests: passed(&said),
-        seconds: from.elapsed().as_secs_f64(),
-        said,
-    })
-}
-
-/// Tests that passed, of what a test program says.
-fn passed(said: &str) -> usize {
-    let counts = said.lines().filter_map(|line| {
-        let (before, _) = line.strip_prefix("test result: ")?.split_once(" passed")?;
-        before.split_whitespace().last()?.parse::<usize>().ok()
-    });
-    counts.sum()
-}
-
 /// Most lines that the demo may print, whatever state the machine is in.
 const MOST_LINES: usize = 60;
 
@@ -516,11 +418,5 @@ mod tests {
         assert!(objection(&[]).is_some());
         assert!(objection(&lines(&["! WORSE than"])).is_some());
         assert!(objection(&lines(&[])[..1]).is_some());
-    }
-
-    #[test]
-    fn passed_tests_are_counted() {
-        let said = "test result: ok. 12 passed; 0 failed; 1 ignored\nx\ntest result: FAILED. 3 passed; 1 failed";
-        assert_eq!(passed(said), 15);
     }
 }

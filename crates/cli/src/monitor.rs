@@ -101,6 +101,34 @@ impl Default for View {
     }
 }
 
+impl Snapshot {
+    /// Deviations by cluster time, an axis a column.
+    fn allan_table(&self, out: &mut String) {
+        let _ = writeln!(out, "Allan deviation, deg/h (68 % interval)");
+        let mut taus: Vec<f64> = self.allan.iter().flatten().map(|p| p.tau_s).collect();
+        taus.sort_by(f64::total_cmp);
+        taus.dedup();
+        if taus.is_empty() {
+            let _ = writeln!(out, "  not enough samples yet");
+        }
+        for tau in taus {
+            let _ = write!(out, "  {tau:>9.2} s");
+            for points in &self.allan {
+                let point = points.iter().find(|p| p.tau_s == tau);
+                let cell = point.map_or_else(
+                    || "-".to_owned(),
+                    |p| {
+                        let [low, value, high] = [p.low, p.deviation, p.high].map(|v| v * 3600.0);
+                        format!("{value:.1} ({low:.1} .. {high:.1})")
+                    },
+                );
+                let _ = write!(out, "{cell:>31}");
+            }
+            let _ = writeln!(out);
+        }
+    }
+}
+
 impl View {
     /// Nothing yet.
     #[must_use]
@@ -345,28 +373,7 @@ impl View {
             s.flags.join(", ")
         };
         let _ = writeln!(out, "  {flags}\n");
-        let _ = writeln!(out, "Allan deviation, deg/h (68 % interval)");
-        let mut taus: Vec<f64> = s.allan.iter().flatten().map(|p| p.tau_s).collect();
-        taus.sort_by(f64::total_cmp);
-        taus.dedup();
-        if taus.is_empty() {
-            let _ = writeln!(out, "  not enough samples yet");
-        }
-        for tau in taus {
-            let _ = write!(out, "  {tau:>9.2} s");
-            for points in &s.allan {
-                let point = points.iter().find(|p| p.tau_s == tau);
-                let cell = point.map_or_else(
-                    || "-".to_owned(),
-                    |p| {
-                        let [low, value, high] = [p.low, p.deviation, p.high].map(|v| v * 3600.0);
-                        format!("{value:.1} ({low:.1} .. {high:.1})")
-                    },
-                );
-                let _ = write!(out, "{cell:>31}");
-            }
-            let _ = writeln!(out);
-        }
+        s.allan_table(&mut out);
         let counters = match s.counters.as_deref() {
             None => "not sent yet".to_owned(),
             Some([]) => "all 0".to_owned(),

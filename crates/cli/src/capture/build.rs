@@ -165,9 +165,25 @@ impl RecordBuilder {
     /// The record.
     #[must_use]
     pub fn build(&self) -> Record {
+        let counter = |of: fn(&Sample) -> u64| -> Vec<u64> {
+            self.rows.iter().map(|row| of(&row.sample)).collect()
+        };
+        Record {
+            header: self.header(),
+            seq: Some(unwrap(&counter(|s| s.seq.into()), 1 << 16)),
+            t_ticks: Some(unwrap(&counter(|s| s.t_ticks.into()), 1 << 32)),
+            host_time_s: Some(self.rows.iter().map(|row| row.host_time_s).collect()),
+            flags: Some(self.rows.iter().map(|row| row.sample.flags).collect()),
+            channels: self.channels(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// What the file says at its head.
+    fn header(&self) -> Header {
         let c = &self.calibration;
         let entry = |key: &str, value: f64| (key.to_owned(), format!("{value}"));
-        let header = Header {
+        Header {
             rate_hz: Some(c.rate_hz),
             tick_s: Some(c.tick_s),
             tick_tolerance_ppm: Some(c.tick_tolerance_ppm),
@@ -190,7 +206,12 @@ impl RecordBuilder {
                     .then(|| entry("corrected_lsb_dps", CORRECTED_LSB_DPS)),
             )
             .collect(),
-        };
+        }
+    }
+
+    /// Every channel, in the order of the format.
+    fn channels(&self) -> Vec<Channel> {
+        let c = &self.calibration;
         let mut channels = Vec::new();
         let acc = (c.acc_zero_counts, STANDARD_GRAVITY / c.acc_counts_per_g);
         for axis in Axis::ALL {
@@ -245,18 +266,7 @@ impl RecordBuilder {
         if c.corrected {
             channels.extend(self.corrections());
         }
-        let counter = |of: fn(&Sample) -> u64| -> Vec<u64> {
-            self.rows.iter().map(|row| of(&row.sample)).collect()
-        };
-        Record {
-            header,
-            seq: Some(unwrap(&counter(|s| s.seq.into()), 1 << 16)),
-            t_ticks: Some(unwrap(&counter(|s| s.t_ticks.into()), 1 << 32)),
-            host_time_s: Some(self.rows.iter().map(|row| row.host_time_s).collect()),
-            flags: Some(self.rows.iter().map(|row| row.sample.flags).collect()),
-            channels,
-            notes: Vec::new(),
-        }
+        channels
     }
 
     fn channel(

@@ -69,6 +69,12 @@ pub(super) struct Columns {
 }
 
 impl Columns {
+    /// Whether one of them has the time.
+    fn has_time(&self) -> bool {
+        let is_time = |c: &Column| matches!(c.role, Role::Time { .. });
+        self.columns.iter().any(is_time)
+    }
+
     /// Takes what nobody stated in the usual units, and says so.
     pub fn assume(&mut self, assumed: &[(String, What)]) {
         self.notes.extend(note(assumed));
@@ -245,13 +251,7 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
             "t_ticks" if said.lines.get("tick_s").is_some() => Role::Ticks,
             "flags" => Role::Flags,
             "host_time_s" => Role::Time { scale: 1.0 },
-            name if TIMES.contains(&name)
-                && !has("host_time_s")
-                && !found
-                    .columns
-                    .iter()
-                    .any(|c| matches!(c.role, Role::Time { .. })) =>
-            {
+            name if TIMES.contains(&name) && !has("host_time_s") && !found.has_time() => {
                 time(said, mapping, at, &mut found)?
             }
             _ if quantity == Quantity::Other => {
@@ -276,23 +276,35 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
             is_asked: true,
         });
     }
-    if !counted.is_empty() {
-        let names: Vec<String> = counted.iter().map(|(_, name)| name.clone()).collect();
-        let own = own(said, &names, mapping)?;
-        found.notes.extend(own.notes);
-        found
-            .columns
-            .extend(own.columns.into_iter().map(|c| Column {
-                at: counted[c.at].0,
-                ..c
-            }));
-    }
+    take_counted(&mut found, &counted, said, mapping)?;
     if !found.columns.iter().any(is_inertial) {
         return Err(unknown(said, NONE_OF_OURS.to_owned()));
     }
     found.assume(&assumed);
     found.notes.extend(not_read(&unread, &names));
     Ok(found)
+}
+
+/// Takes columns of counts, by their places and names, as the header's keys scale them.
+fn take_counted(
+    found: &mut Columns,
+    counted: &[(usize, String)],
+    said: &Said<'_>,
+    mapping: &ColumnMapping,
+) -> Result<(), CaptureError> {
+    if counted.is_empty() {
+        return Ok(());
+    }
+    let names: Vec<String> = counted.iter().map(|(_, name)| name.clone()).collect();
+    let own = own(said, &names, mapping)?;
+    found.notes.extend(own.notes);
+    found
+        .columns
+        .extend(own.columns.into_iter().map(|c| Column {
+            at: counted[c.at].0,
+            ..c
+        }));
+    Ok(())
 }
 
 const NONE_OF_OURS: &str = "no column has a name of the stand's captures (gyro_x, acc_x, ...)";
@@ -378,58 +390,15 @@ fn own(
     let missing = missing(&names);
     for (at, name) in names.iter().enumerate() {
         let (quantity, _) = meaning(name);
-        let scaled = |zero, scale, unit: &str| Role::Measured {
-            quantity,
-            unit: unit.to_owned(),
-            zero,
-            scale,
-            counts: true,
-        };
-        let role = match (name.as_str(), quantity) {
-            ("seq", _) => Role::Seq,
-            ("t_ticks", _) => {
-                lines.needed("tick_s", name)?;
-                Role::Ticks
-            }
-            ("host_time_s", _) => Role::Time { scale: 1.0 },
-            ("flags", _) => Role::Flags,
-            (_, Quantity::Gyro) => scaled(0.0, lines.scale("gyro_lsb_dps", name)?, "deg/s"),
-            (_, Quantity::Temp) => {
-                let lsb = lines.scale("temp_lsb_c", name)?;
-                scaled(-lines.needed("temp_zero_c", name)? / lsb, lsb, "degC")
-            }
-            (_, Quantity::Supply) => scaled(0.0, lines.scale("supply_lsb_v", name)?, "V"),
-            (_, Quantity::Acc) => {
-                let per_g = lines.scale("acc_counts_per_g", name)?;
-                scaled(
-                    lines.needed("acc_zero_counts", name)?,
-                    STANDARD_GRAVITY / per_g,
-                    "m/s^2",
-                )
-            }
-            (_, Quantity::Pwm) => scaled(0.0, 1.0, "1"),
-            (name, _) if is_capture && CORRECTED.contains(&name) => Role::Measured {
-                quantity,
-                unit: "deg/s".to_owned(),
-                zero: 0.0,
-                scale: lines.scale("corrected_lsb_dps", name)?,
-                counts: false,
-            },
-            // What the board says of its correction is no measurement.
-            (name, _) if is_capture && OF_CORRECTION.contains(&name) => continue,
-            (_, Quantity::Other) => {
-                // The format may grow: what is not known is kept as it is, where the file says that it is ours.
-                if !is_capture {
-                    unread.push(&theirs[at]);
-                    continue;
-                }
-                if let Some(ours) = meant(name, &missing) {
-                    notes.push(format!(
-                        "column `{}` is none of the format's, so it is a channel of its own that explains nothing: did you \
-                         mean `{ours}`? Then rename it in the line of the names",
-                        brief(name)
-                    ));
-                }
+        // What the board says of its correction is no measurement.
+        if is_capture && OF_CORRECTION.contains(&name.as_str()) {
+            continue;
+        }
+        let role = match role_of(name, lines, is_capture)? {
+            Some(role) => role,
+            // The format may grow: what is not known is kept as it is, where the file says that it is ours.
+            None if is_capture => {
+                notes.extend(misspelt(name, &missing));
                 let unit = mapping.unit(name, What::Channel(quantity)).unwrap_or("1");
                 Role::Measured {
                     quantity,
@@ -438,6 +407,10 @@ fn own(
                     scale: 1.0,
                     counts: false,
                 }
+            }
+            None => {
+                unread.push(&theirs[at]);
+                continue;
             }
         };
         columns.push(Column {
@@ -456,4 +429,58 @@ fn own(
         notes,
         ..Columns::default()
     })
+}
+
+/// What a column of our names is, by the header's keys; `None` for a name that the format does not have.
+fn role_of(name: &str, lines: &Lines, is_capture: bool) -> Result<Option<Role>, CaptureError> {
+    let (quantity, _) = meaning(name);
+    let scaled = |zero, scale, unit: &str| Role::Measured {
+        quantity,
+        unit: unit.to_owned(),
+        zero,
+        scale,
+        counts: true,
+    };
+    Ok(Some(match (name, quantity) {
+        ("seq", _) => Role::Seq,
+        ("t_ticks", _) => {
+            lines.needed("tick_s", name)?;
+            Role::Ticks
+        }
+        ("host_time_s", _) => Role::Time { scale: 1.0 },
+        ("flags", _) => Role::Flags,
+        (_, Quantity::Gyro) => scaled(0.0, lines.scale("gyro_lsb_dps", name)?, "deg/s"),
+        (_, Quantity::Temp) => {
+            let lsb = lines.scale("temp_lsb_c", name)?;
+            scaled(-lines.needed("temp_zero_c", name)? / lsb, lsb, "degC")
+        }
+        (_, Quantity::Supply) => scaled(0.0, lines.scale("supply_lsb_v", name)?, "V"),
+        (_, Quantity::Acc) => {
+            let per_g = lines.scale("acc_counts_per_g", name)?;
+            scaled(
+                lines.needed("acc_zero_counts", name)?,
+                STANDARD_GRAVITY / per_g,
+                "m/s^2",
+            )
+        }
+        (_, Quantity::Pwm) => scaled(0.0, 1.0, "1"),
+        (name, _) if is_capture && CORRECTED.contains(&name) => Role::Measured {
+            quantity,
+            unit: "deg/s".to_owned(),
+            zero: 0.0,
+            scale: lines.scale("corrected_lsb_dps", name)?,
+            counts: false,
+        },
+        (_, Quantity::Other) => return Ok(None),
+    }))
+}
+
+/// What to tell of a column that is none of the format's, where its name is near one that is missing.
+fn misspelt(name: &str, missing: &[&'static str]) -> Option<String> {
+    let ours = meant(name, missing)?;
+    Some(format!(
+        "column `{}` is none of the format's, so it is a channel of its own that explains nothing: did you mean `{ours}`? \
+         Then rename it in the line of the names",
+        brief(name)
+    ))
 }

@@ -103,6 +103,33 @@ impl Continuity {
         self.fresh = true;
     }
 
+    /// The place of the first sample after a start of the board, by the host's clock, in ticks since the last one.
+    fn restarted_at(&self, last: Last, raw: (u16, u32), elapsed: f64) -> ((u64, u64), Restart) {
+        let instants = (elapsed / self.ticks_per_sample as f64).round().max(1.0) as u64;
+        let place = (
+            last.place.0 + instants,
+            last.place.1 + instants * self.ticks_per_sample,
+        );
+        let restart = Restart {
+            instants,
+            seq_offset: place.0.wrapping_sub(u64::from(raw.0)),
+            t_offset: place.1.wrapping_sub(u64::from(raw.1)),
+        };
+        (place, restart)
+    }
+
+    /// The place of a sample that many ticks after the last one.
+    fn gone_on_to(&self, last: Last, raw: (u16, u32), ticks: u64) -> (u64, u64) {
+        let numbers = u64::from(raw.0.wrapping_sub(last.sample.0));
+        // Numbers wrap after 65536 samples; how often, the ticks tell.
+        let by_time = ticks as f64 / self.ticks_per_sample as f64;
+        let turns = ((by_time - numbers as f64) / 65_536.0).round().max(0.0) as u64;
+        (
+            last.place.0 + numbers + turns * 65_536,
+            last.place.1 + ticks,
+        )
+    }
+
     /// Places a sample that arrived at `host_s`.
     pub fn place(&mut self, sample: &Sample, host_s: f64) -> (Place, Option<Restart>) {
         let raw = (sample.seq, sample.t_ticks);
@@ -140,27 +167,10 @@ impl Continuity {
         };
         let is_restart = told || backwards || (self.fresh && disagree);
         let (place, restart) = if is_restart {
-            let instants = (elapsed / self.ticks_per_sample as f64).round().max(1.0) as u64;
-            let place = (
-                last.place.0 + instants,
-                last.place.1 + instants * self.ticks_per_sample,
-            );
-            let restart = Restart {
-                instants,
-                seq_offset: place.0.wrapping_sub(u64::from(raw.0)),
-                t_offset: place.1.wrapping_sub(u64::from(raw.1)),
-            };
+            let (place, restart) = self.restarted_at(last, raw, elapsed);
             (place, Some(restart))
         } else {
-            let numbers = u64::from(raw.0.wrapping_sub(last.sample.0));
-            // Numbers wrap after 65536 samples; how often, the ticks tell.
-            let by_time = ticks as f64 / self.ticks_per_sample as f64;
-            let turns = ((by_time - numbers as f64) / 65_536.0).round().max(0.0) as u64;
-            let place = (
-                last.place.0 + numbers + turns * 65_536,
-                last.place.1 + ticks,
-            );
-            (place, None)
+            (self.gone_on_to(last, raw, ticks), None)
         };
         let missing = (place.0 - last.place.0).saturating_sub(1);
         self.last = Some(Last {

@@ -333,19 +333,7 @@ impl Ends {
                 })
         };
         let start_unix_s = key(START)?;
-        for (name, now) in [
-            ("rate_hz", now.rate_hz),
-            ("tick_s", now.tick_s),
-            ("gyro_lsb_dps", now.gyro_lsb_dps),
-            ("acc_counts_per_g", now.acc_counts_per_g),
-        ] {
-            let then = key(name)?;
-            if (then / now - 1.0).abs() > 1e-9 {
-                return Err(refuse(format!(
-                    "the board is set differently now: `{name}` is {now}, in the file {then}"
-                )));
-            }
-        }
+        is_set_alike(&key, now)?.map_or(Ok(()), |why| Err(refuse(why)))?;
         let mut ends = Ends {
             start_unix_s,
             rows: 0,
@@ -355,11 +343,8 @@ impl Ends {
         let mut names = true;
         for line in text.lines() {
             if let Some(offsets) = line.strip_prefix(OFFSETS) {
-                let parsed = offsets.split_once(" t_ticks ").and_then(|(seq, ticks)| {
-                    Some((seq.parse::<i64>().ok()?, ticks.parse::<i64>().ok()?))
-                });
-                let (seq, ticks) =
-                    parsed.ok_or_else(|| refuse(format!("its line `{line}` cannot be read")))?;
+                let (seq, ticks) = offsets_of(offsets)
+                    .ok_or_else(|| refuse(format!("its line `{line}` cannot be read")))?;
                 ends.offsets = (seq as u64, ticks as u64);
             } else if line.starts_with('#') || line.is_empty() {
             } else if std::mem::take(&mut names) {
@@ -373,15 +358,7 @@ impl Ends {
                     )));
                 }
             } else {
-                let mut cells = line.split(',');
-                let mut cell = || cells.next();
-                let row = (|| {
-                    Some((
-                        cell()?.parse().ok()?,
-                        cell()?.parse().ok()?,
-                        cell()?.parse().ok()?,
-                    ))
-                })();
+                let row = row_of(line);
                 ends.last =
                     Some(row.ok_or_else(|| refuse(format!("its row `{line}` cannot be read")))?);
                 ends.rows += 1;
@@ -392,4 +369,42 @@ impl Ends {
         }
         Ok(ends)
     }
+}
+
+/// Why a file cannot go on with a board that is set so; `None` where it can.
+fn is_set_alike(
+    key: &dyn Fn(&str) -> Result<f64, CaptureError>,
+    now: &Calibration,
+) -> Result<Option<String>, CaptureError> {
+    for (name, now) in [
+        ("rate_hz", now.rate_hz),
+        ("tick_s", now.tick_s),
+        ("gyro_lsb_dps", now.gyro_lsb_dps),
+        ("acc_counts_per_g", now.acc_counts_per_g),
+    ] {
+        let then = key(name)?;
+        if (then / now - 1.0).abs() > 1e-9 {
+            return Ok(Some(format!(
+                "the board is set differently now: `{name}` is {now}, in the file {then}"
+            )));
+        }
+    }
+    Ok(None)
+}
+
+/// The first cells of a row: number, ticks and host time.
+fn row_of(line: &str) -> Option<(u64, u64, f64)> {
+    let mut cells = line.split(',');
+    let mut cell = || cells.next();
+    Some((
+        cell()?.parse().ok()?,
+        cell()?.parse().ok()?,
+        cell()?.parse().ok()?,
+    ))
+}
+
+/// Offsets of the numbers and of the ticks.
+fn offsets_of(text: &str) -> Option<(i64, i64)> {
+    let (seq, ticks) = text.split_once(" t_ticks ")?;
+    Some((seq.parse().ok()?, ticks.parse().ok()?))
 }

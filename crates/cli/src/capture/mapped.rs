@@ -137,16 +137,7 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
             return Err(unknown(said, format!("there is no column `{theirs}`")));
         };
         if let Some(other) = found.columns.iter().find(|c: &&Column| c.at == at) {
-            return Err(CaptureError::Option {
-                option: "--columns",
-                why: format!(
-                    "the column `{}` is given to {} and to {given}",
-                    brief(&said.names[at]),
-                    other.name
-                ),
-                help: "one column is one channel: leave one of the two out, or name its own column"
-                    .to_owned(),
-            });
+            return Err(given_twice(&said.names[at], &other.name, given));
         }
         let is_taken = |name: &str| mapping.columns.iter().any(|(other, _)| other == name);
         let alias = alias(given).filter(|name| !is_taken(name));
@@ -172,14 +163,7 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
                 if unit.is_none() {
                     assumed.push((name.to_owned(), what));
                 }
-                if what == What::Channel(Quantity::Other)
-                    && let Some(nearest) = nearest(name)
-                {
-                    found.notes.push(format!(
-                        "`{name}` is no name of this program's, so the column is a channel of its own that explains nothing: did \
-                         you mean {nearest}? (time, gyro_x .. gyro_z, acc_x .. acc_z, temp or temp_x .. temp_z, supply, pwm)"
-                    ));
-                }
+                found.notes.extend(unknown_name(name, what));
                 measured(at, name, meaning(name).0, unit)?.role
             }
         };
@@ -192,4 +176,28 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
     }
     found.assume(&assumed);
     Ok(found)
+}
+
+fn given_twice(column: &str, one: &str, other: &str) -> CaptureError {
+    CaptureError::Option {
+        option: "--columns",
+        why: format!(
+            "the column `{}` is given to {one} and to {other}",
+            brief(column)
+        ),
+        help: "one column is one channel: leave one of the two out, or name its own column"
+            .to_owned(),
+    }
+}
+
+/// What to tell of a channel whose name is none of ours, but near one.
+fn unknown_name(name: &str, what: What) -> Option<String> {
+    if what != What::Channel(Quantity::Other) {
+        return None;
+    }
+    let nearest = nearest(name)?;
+    Some(format!(
+        "`{name}` is no name of this program's, so the column is a channel of its own that explains nothing: did you mean \
+         {nearest}? (time, gyro_x .. gyro_z, acc_x .. acc_z, temp or temp_x .. temp_z, supply, pwm)"
+    ))
 }

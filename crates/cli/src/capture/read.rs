@@ -329,31 +329,14 @@ fn finish(
     if cells.first().is_none_or(Vec::is_empty) {
         return Err(CaptureError::Empty);
     }
-    for (column, times) in found.columns.iter().zip(&mut cells) {
-        let Role::Time { scale } = column.role else {
-            continue;
-        };
-        let turns = unwrap_times(times, scale);
-        if turns > 0 {
-            found.notes.push(format!(
-                "the time begins again ({turns} x), as a counter of 32 bits does: taken to go on"
-            ));
-        }
-        check_varies(times)?;
-    }
+    times_that_go_on(&mut found, &mut cells)?;
     let mut record = Record {
         header,
         notes: found.notes.clone(),
         ..Record::default()
     };
     for (k, (column, values)) in found.columns.into_iter().zip(cells).enumerate() {
-        let why = match odd.get(k).and_then(Option::as_ref) {
-            Some((line, text)) => Some(format!("holds text (line {line}: `{}`)", brief(text))),
-            None if !column.is_asked && values.iter().all(|v| v.is_nan()) => {
-                Some("holds no number".to_owned())
-            }
-            None => None,
-        };
+        let why = unread(&column, &values, odd.get(k).and_then(Option::as_ref));
         match why {
             Some(why) => record.notes.push(format!(
                 "column `{}` {why}, and nothing needs it: it is not read",
@@ -385,6 +368,34 @@ fn finish(
         record,
         skipped: skipped.len(),
     })
+}
+
+/// Times that a counter has begun again go on.
+fn times_that_go_on(found: &mut Columns, cells: &mut [Vec<f64>]) -> Result<(), CaptureError> {
+    for (column, times) in found.columns.iter().zip(cells) {
+        let Role::Time { scale } = column.role else {
+            continue;
+        };
+        let turns = unwrap_times(times, scale);
+        if turns > 0 {
+            found.notes.push(format!(
+                "the time begins again ({turns} x), as a counter of 32 bits does: taken to go on"
+            ));
+        }
+        check_varies(times)?;
+    }
+    Ok(())
+}
+
+/// Why a column that nothing needs is not read: it holds text, first in this line, or no number.
+fn unread(column: &Column, values: &[f64], text: Option<&(u64, String)>) -> Option<String> {
+    match text {
+        Some((line, text)) => Some(format!("holds text (line {line}: `{}`)", brief(text))),
+        None if !column.is_asked && values.iter().all(|v| v.is_nan()) => {
+            Some("holds no number".to_owned())
+        }
+        None => None,
+    }
 }
 
 /// One thermometer of others' data is that of all gyros, whichever axis its name has: a name of one axis would leave the

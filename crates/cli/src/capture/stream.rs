@@ -39,69 +39,56 @@ pub fn unpacked<'a>(mut input: impl BufRead + 'a) -> Result<Box<dyn BufRead + 'a
     Ok(Box::new(input))
 }
 
+const FILE: &str = "name it as a file of its own: such a file is read from its end, and neither from a pipe nor packed";
+const UNPACK: &str = "unpack it first; gzip, Zstandard and bzip2 are read as they are";
+const UTF_8: &str = "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)";
+/// How files begin that are no text to be read, what they are, and what is to be done.
+const NO_TEXT: [(&[u8], &str, &str); 15] = [
+    (b"\xff\xfe\0\0", "UTF-32", UTF_8),
+    (b"\0\0\xfe\xff", "UTF-32", UTF_8),
+    (b"\xff\xfe", "UTF-16", UTF_8),
+    (b"\xfe\xff", "UTF-16", UTF_8),
+    (
+        b"PK\x03\x04",
+        "a ZIP archive, as spreadsheets and NPZ are",
+        "save the sheet as CSV; an NPZ has the ending .npz",
+    ),
+    (b"PAR1", "Parquet", FILE),
+    (b"\x89HDF", "HDF5", FILE),
+    (b"\x93NUMPY", "a NumPy array", FILE),
+    (b"MATLAB", "a .mat file", FILE),
+    (b"\xfd7zXZ", "xz", UNPACK),
+    (
+        b"SQLite format 3",
+        "SQLite, as a rosbag2 of the ending .db3 is",
+        "make an MCAP of it, which is read: `mcap convert FILE.db3 FILE.mcap`, or `ros2 bag convert`",
+    ),
+    (
+        b"\xa3\x95",
+        "a log of ArduPilot",
+        "make a CSV of it: `mavlogdump.py --types IMU --format csv LOG.BIN > imu.csv`, and map GyrX in rad/s, AccX in m/s2, \
+         TimeUS in us",
+    ),
+    (
+        b"H Product:Blackbox",
+        "a Blackbox log of Betaflight or INAV",
+        "make a CSV of it: `blackbox_decode LOG`",
+    ),
+    (
+        b"ARROW1",
+        "Arrow, as Feather is",
+        "make a Parquet file of it: `pandas.read_feather(FILE).to_parquet(OTHER)`",
+    ),
+    (
+        b"\xd0\xcf\x11\xe0",
+        "an old spreadsheet",
+        "save the sheet as CSV",
+    ),
+];
+
 /// What a file is that is no text, by how it begins, and what to do.
 fn no_text(start: &[u8]) -> Option<(&'static str, &'static str)> {
-    const FILE: &str = "name it as a file of its own: such a file is read from its end, and neither from a pipe nor packed";
-    const UNPACK: &str = "unpack it first; gzip, Zstandard and bzip2 are read as they are";
-    let known: [(&[u8], _, _); 15] = [
-        (
-            b"\xff\xfe\0\0",
-            "UTF-32",
-            "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)",
-        ),
-        (
-            b"\0\0\xfe\xff",
-            "UTF-32",
-            "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)",
-        ),
-        (
-            b"\xff\xfe",
-            "UTF-16",
-            "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)",
-        ),
-        (
-            b"\xfe\xff",
-            "UTF-16",
-            "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)",
-        ),
-        (
-            b"PK\x03\x04",
-            "a ZIP archive, as spreadsheets and NPZ are",
-            "save the sheet as CSV; an NPZ has the ending .npz",
-        ),
-        (b"PAR1", "Parquet", FILE),
-        (b"\x89HDF", "HDF5", FILE),
-        (b"\x93NUMPY", "a NumPy array", FILE),
-        (b"MATLAB", "a .mat file", FILE),
-        (b"\xfd7zXZ", "xz", UNPACK),
-        (
-            b"SQLite format 3",
-            "SQLite, as a rosbag2 of the ending .db3 is",
-            "make an MCAP of it, which is read: `mcap convert FILE.db3 FILE.mcap`, or `ros2 bag convert`",
-        ),
-        (
-            b"\xa3\x95",
-            "a log of ArduPilot",
-            "make a CSV of it: `mavlogdump.py --types IMU --format csv LOG.BIN > imu.csv`, and map GyrX in rad/s, AccX in m/s2, \
-             TimeUS in us",
-        ),
-        (
-            b"H Product:Blackbox",
-            "a Blackbox log of Betaflight or INAV",
-            "make a CSV of it: `blackbox_decode LOG`",
-        ),
-        (
-            b"ARROW1",
-            "Arrow, as Feather is",
-            "make a Parquet file of it: `pandas.read_feather(FILE).to_parquet(OTHER)`",
-        ),
-        (
-            b"\xd0\xcf\x11\xe0",
-            "an old spreadsheet",
-            "save the sheet as CSV",
-        ),
-    ];
-    if let Some((_, what, help)) = known.iter().find(|(magic, ..)| start.starts_with(magic)) {
+    if let Some((_, what, help)) = NO_TEXT.iter().find(|(magic, ..)| start.starts_with(magic)) {
         return Some((what, help));
     }
     const AS_CSV: &str =

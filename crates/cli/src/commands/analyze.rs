@@ -58,6 +58,40 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn print(analysis: &Analysis) {
+    head(analysis);
+    // Gyros first: they are what the stand is for.
+    let gyros =
+        |is: bool| move |(name, _): &(&String, &ChannelAnalysis)| name.starts_with("gyro") == is;
+    let all = || analysis.channels.iter();
+    for note in &analysis.input.notes {
+        say!("{}", text::item("note: ", note));
+    }
+    let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (name, channel) in all().filter(gyros(true)).chain(all().filter(gyros(false))) {
+        of_channel(name, channel, &analysis.input.notes);
+        for note in &channel.paper.notes {
+            match notes.iter_mut().find(|(known, _)| known == note) {
+                Some((_, channels)) => channels.push(name),
+                None => notes.push((note, vec![name])),
+            }
+        }
+        deviations(channel);
+    }
+    point_to_diagnosis(analysis);
+    attitude(analysis);
+    if !notes.is_empty() {
+        say!("\non the paper's procedure");
+    }
+    for (note, channels) in notes {
+        say!(
+            "{}",
+            text::item(&format!("{}: ", channels.join(", ")), note)
+        );
+    }
+}
+
+/// What was analyzed, and how the figures are to be read.
+fn head(analysis: &Analysis) {
     let input = &analysis.input;
     let losses = match (input.gaps, input.lost_samples) {
         (0, _) => "no gaps".to_owned(),
@@ -73,82 +107,76 @@ fn print(analysis: &Analysis) {
     say!(
         "in brackets 95 % intervals, two-sided; `at most` is the upper end of such an interval that begins at 0"
     );
-    // Gyros first: they are what the stand is for.
-    let gyros =
-        |is: bool| move |(name, _): &(&String, &ChannelAnalysis)| name.starts_with("gyro") == is;
-    let all = || analysis.channels.iter();
-    for note in &analysis.input.notes {
-        say!("{}", text::item("note: ", note));
+}
+
+/// Parameters, warnings and the paper's figures of a channel, and its angle. What is of the whole record stands above.
+fn of_channel(name: &str, channel: &ChannelAnalysis, of_record: &[String]) {
+    say!("{name}");
+    let known = channel.parameters.angle_random_walk.high.is_some();
+    parameters(
+        &channel.parameters,
+        channel.parameters_hold_from_s.is_some() || !known,
+    );
+    let is_told = |w: &&String| !of_record.contains(*w);
+    for warning in channel.warnings.iter().filter(is_told) {
+        say!("{}", text::item("warning: ", warning));
     }
-    let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (name, channel) in all().filter(gyros(true)).chain(all().filter(gyros(false))) {
-        say!("{name}");
-        let known = channel.parameters.angle_random_walk.high.is_some();
-        parameters(
-            &channel.parameters,
-            channel.parameters_hold_from_s.is_some() || !known,
+    say!("  by the paper's procedure");
+    interval(
+        walk_of_the_integral(&channel.parameters),
+        &channel.paper.angle_random_walk,
+    );
+    interval(
+        "in-run bias stability",
+        &channel.paper.in_run_bias_stability,
+    );
+    if let Some(last) = channel.angle.as_ref().and_then(|a| a.points.last())
+        && let Some(angle) = &channel.angle
+    {
+        say!(
+            "  angle {} s after {} s of calibration: {} {}, expected {} +- {}",
+            number(last.t_s, 4),
+            number(angle.calibration_s, 3),
+            number(last.angle, 3),
+            angle.unit,
+            number(last.expected, 3),
+            number(last.sigma, 3)
         );
-        // What is of the whole record stands above.
-        let is_told = |w: &&String| !analysis.input.notes.contains(*w);
-        for warning in channel.warnings.iter().filter(is_told) {
-            say!("{}", text::item("warning: ", warning));
-        }
-        say!("  by the paper's procedure");
-        interval(
-            walk_of_the_integral(&channel.parameters),
-            &channel.paper.angle_random_walk,
+    }
+}
+
+/// Tables of the deviations of a channel.
+fn deviations(channel: &ChannelAnalysis) {
+    for (deviation, points) in &channel.deviations {
+        // A time deviation has the unit of the integral.
+        let unit = if *deviation == Deviation::Tdev {
+            channel.parameters.quantization_noise.unit.as_str()
+        } else {
+            channel.unit.as_str()
+        };
+        say!(
+            "  {:<16} {:>9} {:>12}   {:<26} {:>8}  noise there",
+            format!("{}, {unit}", deviation.name()),
+            "tau, s",
+            "deviation",
+            "95 % interval",
+            "edf"
         );
-        interval(
-            "in-run bias stability",
-            &channel.paper.in_run_bias_stability,
-        );
-        for note in &channel.paper.notes {
-            match notes.iter_mut().find(|(known, _)| known == note) {
-                Some((_, channels)) => channels.push(name),
-                None => notes.push((note, vec![name])),
-            }
-        }
-        if let Some(last) = channel.angle.as_ref().and_then(|a| a.points.last())
-            && let Some(angle) = &channel.angle
-        {
+        for point in points {
             say!(
-                "  angle {} s after {} s of calibration: {} {}, expected {} +- {}",
-                number(last.t_s, 4),
-                number(angle.calibration_s, 3),
-                number(last.angle, 3),
-                angle.unit,
-                number(last.expected, 3),
-                number(last.sigma, 3)
+                "    {:>24} {:>12}   {:<26} {:>8}  {}",
+                number(point.tau_s, 4),
+                number(point.deviation, 4),
+                format!("{} .. {}", number(point.low, 4), number(point.high, 4)),
+                number(point.edf, 3),
+                noise(point.noise_alpha)
             );
         }
-        for (deviation, points) in &channel.deviations {
-            // A time deviation has the unit of the integral.
-            let unit = if *deviation == Deviation::Tdev {
-                channel.parameters.quantization_noise.unit.as_str()
-            } else {
-                channel.unit.as_str()
-            };
-            say!(
-                "  {:<16} {:>9} {:>12}   {:<26} {:>8}  noise there",
-                format!("{}, {unit}", deviation.name()),
-                "tau, s",
-                "deviation",
-                "95 % interval",
-                "edf"
-            );
-            for point in points {
-                say!(
-                    "    {:>24} {:>12}   {:<26} {:>8}  {}",
-                    number(point.tau_s, 4),
-                    number(point.deviation, 4),
-                    format!("{} .. {}", number(point.low, 4), number(point.high, 4)),
-                    number(point.edf, 3),
-                    noise(point.noise_alpha)
-                );
-            }
-        }
     }
-    point_to_diagnosis(analysis);
+}
+
+/// Where the three gyros together have turned to.
+fn attitude(analysis: &Analysis) {
     if let Some(attitude) = &analysis.attitude
         && let Some(last) = attitude.points.last()
     {
@@ -161,15 +189,6 @@ fn print(analysis: &Analysis) {
                 " (the fits predict {} rms of a stand at rest)",
                 number(p, 3)
             ))
-        );
-    }
-    if !notes.is_empty() {
-        say!("\non the paper's procedure");
-    }
-    for (note, channels) in notes {
-        say!(
-            "{}",
-            text::item(&format!("{}: ", channels.join(", ")), note)
         );
     }
 }

@@ -166,6 +166,11 @@ fn print_want(plan: &Plan, is_unchecked: bool) {
             }
         }
     }
+    print_lengths(plan);
+}
+
+/// What records of some lengths tell.
+fn print_lengths(plan: &Plan) {
     say!("what a record of a given length tells (half of the 95 % interval):");
     let mut lengths = vec![600.0, 3600.0, 8.0 * 3600.0, 24.0 * 3600.0];
     lengths.extend(plan.want.iter().map(|w| w.seconds));

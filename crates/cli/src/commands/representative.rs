@@ -106,6 +106,12 @@ fn print(files: &[String], found: &Representative) {
             text::item(&format!("not {}: ", files[odd.run]), &what)
         );
     }
+    over_runs(found);
+    together(found);
+}
+
+/// Each figure over the runs, and from run to run.
+fn over_runs(found: &Representative) {
     say!("over the runs that do not stand out (95 %):");
     for figure in &found.figures {
         let Some(pooled) = figure.over_runs else {
@@ -135,6 +141,10 @@ fn print(files: &[String], found: &Representative) {
             }
         );
     }
+}
+
+/// Noise of the runs together.
+fn together(found: &Representative) {
     if found.together.is_empty() {
         say!("the sample rates differ: no noise parameters of the runs together");
     }

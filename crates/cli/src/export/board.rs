@@ -10,6 +10,10 @@ use model::ModelFile;
 use model::file::EffectModel;
 use wire::correction::{self, BLOCK_SHIFT_MAX, Correction, NUMBERS, RANGE_STEP, name, step};
 
+mod terms;
+
+use terms::Sum;
+
 /// TEMP_OUT, degC for each count, and its zero (ADIS16250 data sheet).
 const TEMP_LSB_C: f64 = 0.1453;
 const TEMP_ZERO_C: f64 = 25.0;
@@ -96,96 +100,41 @@ impl BoardCorrection {
     /// # Errors
     /// [`BoardError`]: a channel or its noise is missing, a number does not fit, or is rounded too coarsely.
     pub fn of(model: &ModelFile, sens_avg: u16) -> Result<Self, BoardError> {
-        let mut notes = Vec::new();
-        let mut out = Correction {
-            sens_avg,
-            number: number_of(model),
-            ..Correction::default()
-        };
-        let setting = |key: &str, default: f64| *model.excitation.get(key).unwrap_or(&default);
         let [mean_c, reach_c] = temperatures(model);
-        out.temp_range = temp_range(mean_c, reach_c);
-        let (mut walks, mut alike, mut density) = ([0.0; 3], [1.0; 3], [0.0; 3]);
-        for (axis, channel) in GYROS.into_iter().enumerate() {
-            let found = (model.channels.iter())
-                .find(|c| c.name == channel && c.unit == "deg/s")
-                .ok_or(BoardError::NoChannel { channel })?;
-            let value = |key: &str| found.baseline.get(key).map(|p| p.value);
-            out.bias[axis] = -value("bias").unwrap_or(0.0);
-            let n = value("angle_random_walk").filter(|n| *n > 0.0);
-            density[axis] = (n.ok_or(BoardError::NoNoise { channel })? / 60.0).powi(2);
-            walks[axis] = value("rate_random_walk").unwrap_or(0.0).powi(2);
-        }
+        let supply_v = *model.excitation.get("supply_v").unwrap_or(&5.0);
+        let mut sum = Sum {
+            out: Correction {
+                sens_avg,
+                number: number_of(model),
+                temp_range: temp_range(mean_c, reach_c),
+                ..Correction::default()
+            },
+            walks: [0.0; 3],
+            alike: [1.0; 3],
+            mean_c,
+            supply_v,
+        };
+        let density = sum.baseline(model)?;
+        let mut notes = Vec::new();
         for effect in &model.effects {
-            let value = |key: &str| effect.parameters.get(key).map_or(0.0, |p| p.value);
-            let mut unknown = false;
-            for (axis, channel) in GYROS.into_iter().enumerate() {
-                if !effect.channels.is_empty() && !effect.channels.iter().any(|c| c == channel) {
-                    continue;
-                }
-                match effect.cause.as_str() {
-                    "temperature" => {
-                        out.temperature[axis] -= value("slope") * TEMP_LSB_C;
-                        out.bias[axis] -= value("slope") * (TEMP_ZERO_C - mean_c);
-                    }
-                    "temperature_quadratic" => {
-                        let reference =
-                            (effect.parameters.get("reference")).map_or(TEMP_ZERO_C, |p| p.value);
-                        let (off, square) = (TEMP_ZERO_C - reference, value("curvature"));
-                        out.temperature_squared[axis] -= square * TEMP_LSB_C.powi(2);
-                        out.temperature[axis] -= (value("slope") + 2.0 * square * off) * TEMP_LSB_C;
-                        out.bias[axis] -= value("slope") * off + square * off.powi(2);
-                    }
-                    "motor_bias" => {
-                        let term = if value("by_magnitude") == 1.0 {
-                            &mut out.motor_magnitude
-                        } else {
-                            &mut out.motor
-                        };
-                        // The board has no term for what it does as soon as it turns: that goes along in proportion.
-                        let at_full = value("at_full_duty") + SIGN_IN_DUTY * value("while_turning");
-                        term[axis] -= at_full / FULL_DUTY;
-                    }
-                    "supply_sensitivity" => {
-                        out.supply[axis] -= value("slope") * SUPPLY_LSB_V;
-                        out.bias[axis] += value("slope") * setting("supply_v", 5.0);
-                    }
-                    "g_sensitivity" => {
-                        for (k, key) in ["acc_x", "acc_y", "acc_z"].into_iter().enumerate() {
-                            let per_count = value(key) / ACC_COUNTS_PER_G;
-                            out.acc[axis][k] -= per_count;
-                            out.bias[axis] += per_count * ACC_ZERO;
-                        }
-                    }
-                    "cross_axis" => {
-                        let keys = ["from_gyro_x", "from_gyro_y", "from_gyro_z"];
-                        for (k, key) in keys.into_iter().enumerate() {
-                            out.matrix[axis][k] -= value(key);
-                        }
-                    }
-                    "scale_error" => {
-                        out.matrix[axis][axis] += 1.0 / (1.0 + value("relative")) - 1.0;
-                    }
-                    "gauss_markov" => {
-                        walks[axis] += 2.0 * value("sigma").powi(2)
-                            / value("correlation_time").max(f64::MIN_POSITIVE);
-                    }
-                    "flicker" => {
-                        let level = 0.664 * value("bias_instability") / 3600.0;
-                        walks[axis] += 3.0 * level.powi(2) / FLICKER_AT_S;
-                    }
-                    // Neighbours that are alike: the mean of a block is less sure.
-                    "low_pass" => alike[axis] = 1.0 + 2.0 * value("lag1_correlation"),
-                    _ => unknown = true,
-                }
-            }
-            if unknown {
+            let acts_on = |channel: &str| {
+                effect.channels.is_empty() || effect.channels.iter().any(|c| c == channel)
+            };
+            let axes = (0..3).filter(|axis| acts_on(GYROS[*axis]));
+            let known: Vec<bool> = axes.map(|axis| sum.take(effect, axis)).collect();
+            if known.contains(&false) {
                 notes.push(format!("{}: the board has no term for it", effect.cause));
             }
             notes.extend(provisos(effect));
         }
+        let Sum {
+            mut out,
+            walks,
+            alike,
+            ..
+        } = sum;
         notes.extend(filter(&mut out, model.rate_hz, [density, alike, walks]));
-        let numbers = rounded(&mut out, setting("supply_v", 5.0))?;
+        let numbers = rounded(&mut out, supply_v)?;
         let stored = Correction::from_numbers(&numbers).unwrap_or(out);
         judge(&out, &stored, &density, reach_c / TEMP_LSB_C)?;
         Ok(Self {

@@ -53,19 +53,24 @@ impl ImuNoise {
                     remarks.join("; ")
                 );
             }
-            let slopes = axes.iter().map(|axis| self.temperature_slope(&axis.name));
-            let slopes: Vec<f64> = slopes.collect();
-            if slopes.iter().any(|slope| *slope != 0.0) {
-                let slopes: Vec<String> = slopes.iter().map(|s| format!("{s:.6e}")).collect();
-                let _ = writeln!(
-                    out,
-                    "    'TemperatureBias', [{}], ... % {unit}/degC from 25 degC on; imu.Temperature sets the temperature",
-                    slopes.join(" ")
-                );
-            }
+            self.temperature_bias(axes, unit, &mut out);
             out.push_str("    'NoiseType', 'single-sided');\n");
         }
         out
+    }
+
+    /// The slopes in temperature, where there are any.
+    fn temperature_bias(&self, axes: &[AxisNoise], unit: &str, out: &mut String) {
+        let slopes = axes.iter().map(|axis| self.temperature_slope(&axis.name));
+        let slopes: Vec<f64> = slopes.collect();
+        if slopes.iter().any(|slope| *slope != 0.0) {
+            let slopes: Vec<String> = slopes.iter().map(|s| format!("{s:.6e}")).collect();
+            let _ = writeln!(
+                out,
+                "    'TemperatureBias', [{}], ... % {unit}/degC from 25 degC on; imu.Temperature sets the temperature",
+                slopes.join(" ")
+            );
+        }
     }
 
     /// White noise for one rate; the bias is a first-order process that looks like K over any run.

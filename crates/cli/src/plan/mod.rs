@@ -6,7 +6,7 @@ mod wish;
 use miette::Result;
 use model::ModelFile;
 use model::record::sampling::Sampling;
-use model::record::{Quantity, Record};
+use model::record::{Channel, Quantity, Record};
 use noise::analyze::misfit_warning;
 use noise::fit::{Spectrum, Term, fit, fit_described};
 use noise::plan::{KnownNoise, Letter, seconds_for};
@@ -265,18 +265,9 @@ pub fn of_model(
     })
 }
 
-/// What a record tells of the noise of a gyro: of the one of that name, or of the first.
-///
-/// # Errors
-/// Where it has no such gyro, no rate, or too few samples.
-pub fn of_record(
-    record: &Record,
-    from: &str,
-    channel: Option<&str>,
-    rate_hz: Option<f64>,
-    seed: u64,
-) -> Result<Noise> {
-    let gyro = record
+/// The gyro of that name, or the first one.
+fn gyro_of<'a>(record: &'a Record, from: &str, channel: Option<&str>) -> Result<&'a Channel> {
+    record
         .channels
         .iter()
         .find(|c| match channel {
@@ -291,7 +282,21 @@ pub fn of_record(
                 from,
                 names.join(", ")
             )
-        })?;
+        })
+}
+
+/// What a record tells of the noise of a gyro: of the one of that name, or of the first.
+///
+/// # Errors
+/// Where it has no such gyro, no rate, or too few samples.
+pub fn of_record(
+    record: &Record,
+    from: &str,
+    channel: Option<&str>,
+    rate_hz: Option<f64>,
+    seed: u64,
+) -> Result<Noise> {
+    let gyro = gyro_of(record, from, channel)?;
     let sampling = Sampling::of(record, rate_hz).map_err(explain)?;
     let runs = sampling.runs_of(&gyro.values);
     let spectrum = Spectrum::with_gaps(&gyro.values, &runs, &sampling.slots, sampling.tau0);
@@ -353,6 +358,26 @@ pub fn of_record(
     })
 }
 
+/// The length, s, from `seconds` on, in steps, of which enough records keep to what is wanted, or the longest that is not too
+/// long; with the share that does at the first length, and at this one. The information is what an estimate can reach that knows
+/// which terms there are; one that has to find them out takes longer.
+fn long_enough(
+    mut seconds: f64,
+    is_too_long: impl Fn(f64) -> bool,
+    kept: impl Fn(f64) -> Result<f64>,
+) -> Result<(f64, [f64; 2])> {
+    let first = kept(seconds)?;
+    let mut last = first;
+    for _ in 0..TRIES {
+        if last >= KEPT || is_too_long(LONGER * seconds) {
+            break;
+        }
+        seconds *= LONGER;
+        last = kept(seconds)?;
+    }
+    Ok((seconds, [first, last]))
+}
+
 fn want(
     noise: &Noise,
     letter: Letter,
@@ -393,19 +418,11 @@ fn want(
     let checked_share = if records == 0 || (request.check.is_none() && is_long) {
         None
     } else {
-        // The information is what an estimate can reach that knows which terms there are; one that has to find them out
-        // takes longer.
-        let share = |seconds| check(&noise, letter, within_percent, seconds, records, request);
-        let mut kept = share(seconds)?;
-        fisher_share = Some(kept);
-        for _ in 0..TRIES {
-            if kept >= KEPT || samples(LONGER * seconds) > most {
-                break;
-            }
-            seconds *= LONGER;
-            kept = share(seconds)?;
-        }
-        Some(kept)
+        let kept = |seconds| check(&noise, letter, within_percent, seconds, records, request);
+        let [first, last];
+        (seconds, [first, last]) = long_enough(seconds, |s| samples(s) > most, kept)?;
+        fisher_share = Some(first);
+        Some(last)
     };
     Ok(Wanted {
         term: letter.name(),

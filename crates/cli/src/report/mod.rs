@@ -173,34 +173,29 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
             replicates::against(&own, &all_after[index]),
         ];
         let at = places.abscissae(&measured.values);
-        out.push((said(&channel.name), view.figures(&own, &at, &against)?));
+        let figures = view.figures(&own, &at, &against)?;
+        out.push((said(&channel.name), channel.name.as_str(), figures));
     }
+    out.sort_by_key(|(said, ..)| !said);
+    Ok(folded(out))
+}
+
+/// Figures of channels, by name, each to be opened; those of which something is said are open.
+fn folded(all: Vec<(bool, &str, Markup)>) -> Vec<Markup> {
     // Where nothing is said of any channel, the first is as good as another.
-    let all_quiet = out.iter().all(|(said, _)| !said);
-    out.sort_by_key(|(said, _)| !said);
-    let names: Vec<_> = {
-        let mut names: Vec<_> = after
-            .channels
-            .iter()
-            .filter(|c| record.channel(&c.name).is_some())
-            .map(|c| c.name.clone())
-            .collect();
-        names.sort_by_key(|name| !said(name));
-        names
-    };
-    Ok(out
-        .into_iter()
-        .zip(names)
+    let all_quiet = all.iter().all(|(said, ..)| !said);
+    let open = |k: usize, said: bool| said || (all_quiet && k == 0);
+    all.into_iter()
         .enumerate()
-        .map(|(k, ((said, figures), name))| {
+        .map(|(k, (said, name, figures))| {
             html! {
-                details open[said || (all_quiet && k == 0)] {
+                details open[open(k, said)] {
                     summary { code { (name) } }
                     (figures)
                 }
             }
         })
-        .collect())
+        .collect()
 }
 
 /// One channel, measured and simulated.

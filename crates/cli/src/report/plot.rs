@@ -188,6 +188,17 @@ impl Figure {
         x.is_finite() && y.is_finite() && (!self.log_x || x > 0.0) && (!self.log_y || y > 0.0)
     }
 
+    /// Along the upper edge of a band and back along the lower one.
+    fn outline(&self, points: &[(f64, f64, f64)]) -> Vec<(f64, f64)> {
+        let edge = |upper: bool| {
+            let at = move |(x, low, high): &(f64, f64, f64)| (*x, if upper { *high } else { *low });
+            points.iter().map(at).filter(|p| self.drawable(*p))
+        };
+        let mut outline: Vec<_> = edge(true).collect();
+        outline.extend(edge(false).collect::<Vec<_>>().into_iter().rev());
+        outline
+    }
+
     fn draw<'a>(
         &self,
         area: &DrawingArea<SVGBackend<'a>, Shift>,
@@ -233,17 +244,9 @@ impl Figure {
                     chart.draw_series(dots)?;
                 }
                 Layer::Band(points) => {
-                    let edge = |upper: bool| {
-                        points
-                            .iter()
-                            .map(move |(x, low, high)| (*x, if upper { *high } else { *low }))
-                            .filter(|p| self.drawable(*p))
-                            .map(place)
-                    };
-                    let mut outline: Vec<_> = edge(true).collect();
-                    outline.extend(edge(false).collect::<Vec<_>>().into_iter().rev());
+                    let outline = self.outline(points).into_iter().map(place);
                     chart.draw_series(std::iter::once(Polygon::new(
-                        outline,
+                        outline.collect::<Vec<_>>(),
                         colour.mix(0.22).filled(),
                     )))?;
                 }

@@ -94,102 +94,19 @@ pub fn onto(model: &ModelFile, scenario: &mut Scenario) -> Result<Carried, Fitte
 fn put(effect: &EffectModel, axes: &[usize], scenario: &mut Scenario) -> Result<(), &'static str> {
     let p = &effect.parameters;
     let v = |name: &str| value(p, name);
-    let each = |make: &dyn Fn(usize) -> Fault, scenario: &mut Scenario| {
-        scenario.faults.extend(axes.iter().map(|a| make(*a)));
+    let cause = effect.cause.as_str();
+    let of = |gyro: usize| {
+        following(cause, p, gyro)
+            .or_else(|| in_time(cause, p, gyro))
+            .or_else(|| in_the_output(cause, p, gyro))
     };
-    match effect.cause.as_str() {
-        "temperature" => each(
-            &|gyro| Fault::Tempco {
-                gyro,
-                dps_per_c: v("slope"),
-                dps_per_c2: 0.0,
-            },
-            scenario,
-        ),
-        "temperature_quadratic" => {
-            // About 25 degC, wherever the file has its reference.
-            let away = p.get("reference").map_or(25.0, |r| r.value) - 25.0;
-            each(
-                &|gyro| Fault::Tempco {
-                    gyro,
-                    dps_per_c: v("slope") - 2.0 * v("curvature") * away,
-                    dps_per_c2: v("curvature"),
-                },
-                scenario,
-            );
-        }
-        "supply_sensitivity" => each(
-            &|gyro| Fault::SupplyCoupling {
-                gyro,
-                dps_per_volt: v("slope"),
-            },
-            scenario,
-        ),
-        "warm_up" => each(
-            &|gyro| Fault::WarmUp {
-                gyro,
-                amplitude_dps: v("amplitude"),
-                tau_s: v("time_constant"),
-            },
-            scenario,
-        ),
-        "rate_ramp" => each(
-            &|gyro| Fault::Leak {
-                gyro,
-                dps_per_s: v("slope"),
-            },
-            scenario,
-        ),
-        "bias_step" => each(
-            &|gyro| Fault::Knock {
-                gyro,
-                time_s: v("time"),
-                step_dps: v("height"),
-                tilt_deg: 0.0,
-            },
-            scenario,
-        ),
-        "gauss_markov" => each(
-            &|gyro| Fault::WanderingBias {
-                gyro,
-                sigma_dps: v("sigma"),
-                tau_s: v("correlation_time"),
-            },
-            scenario,
-        ),
-        "telegraph" => each(
-            &|gyro| Fault::Trap {
-                gyro,
-                half_height_dps: v("half_height"),
-                dwell_s: v("dwell_time"),
-            },
-            scenario,
-        ),
-        "g_sensitivity" => each(
-            &|gyro| Fault::GSensitivity {
-                gyro,
-                dps_per_g: [v("acc_x"), v("acc_y"), v("acc_z")],
-            },
-            scenario,
-        ),
-        "noise_change" if v("variance_increase") >= 0.0 => each(
-            &|gyro| Fault::NoisySpell {
-                gyro,
-                start_s: v("start"),
-                end_s: v("end"),
-                power: v("variance_increase"),
-            },
-            scenario,
-        ),
-        "line" => each(
-            &|axis| Fault::Vibration {
-                axis,
-                frequency_hz: v("frequency"),
-                amplitude_dps: v("amplitude"),
-                linear_g: 0.0,
-            },
-            scenario,
-        ),
+    // Whether there is one does not hang on the gyro.
+    if of(0).is_some() {
+        let faults = axes.iter().filter_map(|gyro| of(*gyro));
+        scenario.faults.extend(faults);
+        return Ok(());
+    }
+    match cause {
         "scale_error" => {
             for axis in axes {
                 scenario.gyros[*axis].scale_error = v("relative");
@@ -199,14 +116,6 @@ fn put(effect: &EffectModel, axes: &[usize], scenario: &mut Scenario) -> Result<
         "dropped_samples" => scenario.faults.push(Fault::LossyLine {
             count: v("count").round().max(0.0) as usize,
         }),
-        "stuck_bit" if v("fraction") >= 1.0 => each(
-            &|gyro| Fault::StuckBit {
-                gyro,
-                bit: v("bit") as u8,
-                value: v("value") != 0.0,
-            },
-            scenario,
-        ),
         "motor_bias" => return motor(p, axes, scenario),
         _ => {
             return Err(
@@ -215,6 +124,94 @@ fn put(effect: &EffectModel, axes: &[usize], scenario: &mut Scenario) -> Result<
         }
     }
     Ok(())
+}
+
+/// A bias that follows what the stand records.
+fn following(cause: &str, p: &Parameters, gyro: usize) -> Option<Fault> {
+    let v = |name: &str| value(p, name);
+    Some(match cause {
+        "temperature" => Fault::Tempco {
+            gyro,
+            dps_per_c: v("slope"),
+            dps_per_c2: 0.0,
+        },
+        "temperature_quadratic" => {
+            // About 25 degC, wherever the file has its reference.
+            let away = p.get("reference").map_or(25.0, |r| r.value) - 25.0;
+            Fault::Tempco {
+                gyro,
+                dps_per_c: v("slope") - 2.0 * v("curvature") * away,
+                dps_per_c2: v("curvature"),
+            }
+        }
+        "supply_sensitivity" => Fault::SupplyCoupling {
+            gyro,
+            dps_per_volt: v("slope"),
+        },
+        "g_sensitivity" => Fault::GSensitivity {
+            gyro,
+            dps_per_g: [v("acc_x"), v("acc_y"), v("acc_z")],
+        },
+        _ => return None,
+    })
+}
+
+/// What happens at a time, or with time.
+fn in_time(cause: &str, p: &Parameters, gyro: usize) -> Option<Fault> {
+    let v = |name: &str| value(p, name);
+    Some(match cause {
+        "warm_up" => Fault::WarmUp {
+            gyro,
+            amplitude_dps: v("amplitude"),
+            tau_s: v("time_constant"),
+        },
+        "rate_ramp" => Fault::Leak {
+            gyro,
+            dps_per_s: v("slope"),
+        },
+        "bias_step" => Fault::Knock {
+            gyro,
+            time_s: v("time"),
+            step_dps: v("height"),
+            tilt_deg: 0.0,
+        },
+        "noise_change" if v("variance_increase") >= 0.0 => Fault::NoisySpell {
+            gyro,
+            start_s: v("start"),
+            end_s: v("end"),
+            power: v("variance_increase"),
+        },
+        _ => return None,
+    })
+}
+
+/// Processes, tones and bits.
+fn in_the_output(cause: &str, p: &Parameters, gyro: usize) -> Option<Fault> {
+    let v = |name: &str| value(p, name);
+    Some(match cause {
+        "gauss_markov" => Fault::WanderingBias {
+            gyro,
+            sigma_dps: v("sigma"),
+            tau_s: v("correlation_time"),
+        },
+        "telegraph" => Fault::Trap {
+            gyro,
+            half_height_dps: v("half_height"),
+            dwell_s: v("dwell_time"),
+        },
+        "line" => Fault::Vibration {
+            axis: gyro,
+            frequency_hz: v("frequency"),
+            amplitude_dps: v("amplitude"),
+            linear_g: 0.0,
+        },
+        "stuck_bit" if v("fraction") >= 1.0 => Fault::StuckBit {
+            gyro,
+            bit: v("bit") as u8,
+            value: v("value") != 0.0,
+        },
+        _ => return None,
+    })
 }
 
 /// A motor whose current is the one that was fitted, coupled into gyros.

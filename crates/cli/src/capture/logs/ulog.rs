@@ -144,12 +144,8 @@ impl Reader {
         let _ = layout.row(data, rows);
     }
 
-    /// The columns of the topic that is asked for, or of the one that the flight filters use.
-    fn table(mut self, wanted: Option<&str>) -> Result<Table, LogError> {
-        let called = |(name, instance): &(String, u8)| match instance {
-            0 => name.clone(),
-            n => format!("{name}:{n}"),
-        };
+    /// The topic that is read, the one wanted or the best, and what there is, in words.
+    fn chosen(&self, wanted: Option<&str>) -> Result<((String, u8), Vec<String>), LogError> {
         let rank = |(name, instance): &(String, u8)| {
             let source = self
                 .layouts
@@ -176,7 +172,7 @@ impl Reader {
         let chosen = match wanted {
             _ if found.is_empty() => {
                 let mut names: Vec<String> =
-                    self.subscribed.into_values().map(|(n, _)| n).collect();
+                    self.subscribed.values().map(|(n, _)| n.clone()).collect();
                 names.sort();
                 names.dedup();
                 return Err(LogError::NoImu(names));
@@ -191,6 +187,12 @@ impl Reader {
                 (*key).clone()
             }
         };
+        Ok((chosen, topics))
+    }
+
+    /// The columns of the topic that is asked for, or of the one that the flight filters use.
+    fn table(mut self, wanted: Option<&str>) -> Result<Table, LogError> {
+        let (chosen, topics) = self.chosen(wanted)?;
         let mut notes = vec![format!(
             "topic {}: rates in rad/s and accelerations in m/s^2 by its definition",
             called(&chosen)
@@ -379,5 +381,13 @@ fn whole(kind: &str, bytes: &[u8]) -> Option<i64> {
         "int32_t" => b.i32().map(i64::from),
         "uint64_t" | "int64_t" => b.u64().map(|n| n as i64),
         _ => None,
+    }
+}
+
+/// A topic's name, with the number of its instance where there are others before it.
+fn called((name, instance): &(String, u8)) -> String {
+    match instance {
+        0 => name.clone(),
+        n => format!("{name}:{n}"),
     }
 }

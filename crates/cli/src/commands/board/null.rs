@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use imu_stand::link::{Link, LinkError, done};
+use imu_stand::link::{Heard, Link, LinkError, done};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Result;
 use serde::Serialize;
@@ -129,6 +129,12 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     if session.quiet {
         return Ok(());
     }
+    show(&answer);
+    Ok(())
+}
+
+/// The biases, and how sure they are.
+fn show(answer: &Answer) {
     say!("         bias deg/s   +- (if the noise is white)   before");
     for (k, axis) in ["x", "y", "z"].iter().enumerate() {
         let error = answer.std_error_if_white_dps[k]
@@ -144,15 +150,14 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
             "standard error, the largest of the three, with what the gyros' filter does to the noise: {error:.5} deg/s"
         );
     }
-    if reply.is_none() {
+    if answer.reply_lost {
         say!("the reply was lost; the biases are those of the board's hello frame");
     }
-    if arguments.store {
+    if answer.stored {
         say!("stored");
     } else {
         say!("until the next reset; `imu-stand board store` keeps it");
     }
-    Ok(())
 }
 
 /// Asks, and follows the samples' flag until the reply comes. `None` where the board has ended and no reply came.
@@ -201,29 +206,14 @@ fn measure(
                 return Ok((None, seen));
             }
             if tries == TRIES {
-                let heard = link.heard().since(&began);
-                return Err(LinkError::NoReply {
-                    command: "bias null",
-                    tries,
-                    wait_ms: (f64::from(patience) / rate * 1e3) as u128,
-                    help: heard.remedy(link.baud()),
-                    heard: Box::new(heard),
-                }
-                .into());
+                return Err(no_reply(link, &began, tries, patience, rate).into());
             }
             tries += 1;
             seen.without = 0;
             number = link.send(command)?;
         }
         if counted.elapsed() > STUCK && heard.elapsed() < SILENCE {
-            return Err(LinkError::NotAsAsked {
-                what: format!(
-                    "the board measures, but for {} s no sample was in order: a gyro is silent or repeats itself",
-                    STUCK.as_secs()
-                ),
-                help: "`imu-stand board health` names the gyro; `imu-stand board reboot` ends the measurement".to_owned(),
-            }
-            .into());
+            return Err(stuck().into());
         }
         if heard.elapsed() > SILENCE {
             let heard = link.heard().since(&began);
@@ -234,6 +224,29 @@ fn measure(
             }
             .into());
         }
+    }
+}
+
+fn no_reply(link: &Link, began: &Heard, tries: u32, patience: u32, rate: f64) -> LinkError {
+    let heard = link.heard().since(began);
+    LinkError::NoReply {
+        command: "bias null",
+        tries,
+        wait_ms: (f64::from(patience) / rate * 1e3) as u128,
+        help: heard.remedy(link.baud()),
+        heard: Box::new(heard),
+    }
+}
+
+fn stuck() -> LinkError {
+    LinkError::NotAsAsked {
+        what: format!(
+            "the board measures, but for {} s no sample was in order: a gyro is silent or repeats itself",
+            STUCK.as_secs()
+        ),
+        help:
+            "`imu-stand board health` names the gyro; `imu-stand board reboot` ends the measurement"
+                .to_owned(),
     }
 }
 

@@ -145,33 +145,36 @@ fn meaning(register: Part, bits: u16) -> String {
             let range = range.map_or_else(|| "unknown".to_owned(), |dps| format!("{dps} deg/s"));
             format!("range {range}, {} taps a stage", 1 << (bits & 7))
         }
-        Part::Status => {
-            let names = [
-                (9, "alarm 2"),
-                (8, "alarm 1"),
-                (5, "self-test failed"),
-                (4, "beyond range"),
-                (3, "SPI failure"),
-                (2, "flash not written"),
-                (1, "supply above 5.25 V"),
-                (0, "supply below 4.75 V"),
-            ];
-            let set: Vec<&str> = names
-                .iter()
-                .filter(|(bit, _)| bits >> bit & 1 != 0)
-                .map(|(_, name)| *name)
-                .collect();
-            if set.is_empty() {
-                "in order".to_owned()
-            } else {
-                set.join(", ")
-            }
-        }
+        Part::Status => alarms(bits),
         _ => match register.default_value() {
             Some(value) if value == bits => "as delivered".to_owned(),
             Some(value) => format!("delivered as {value:#06x}"),
             None => String::new(),
         },
+    }
+}
+
+/// The bits of STATUS that are set, by name.
+fn alarms(bits: u16) -> String {
+    let names = [
+        (9, "alarm 2"),
+        (8, "alarm 1"),
+        (5, "self-test failed"),
+        (4, "beyond range"),
+        (3, "SPI failure"),
+        (2, "flash not written"),
+        (1, "supply above 5.25 V"),
+        (0, "supply below 4.75 V"),
+    ];
+    let set: Vec<&str> = names
+        .iter()
+        .filter(|(bit, _)| bits >> bit & 1 != 0)
+        .map(|(_, name)| *name)
+        .collect();
+    if set.is_empty() {
+        "in order".to_owned()
+    } else {
+        set.join(", ")
     }
 }
 

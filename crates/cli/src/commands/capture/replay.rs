@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use imu_stand::capture::Live;
+use imu_stand::capture::{Calibration, Live};
 use miette::{IntoDiagnostic, Result, WrapErr};
 use wire::link::LinkStats;
 use wire::{Decoder, Frame};
@@ -11,17 +11,7 @@ use super::{Answer, Arguments, free_name};
 
 /// Makes a capture of raw bytes. They carry no time of arrival: host times are the device's, from the first sample on.
 pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
-    let bytes = std::fs::read(path)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot read {}", path.display()))?;
-    let (mut decoder, mut stats) = (Decoder::new(), LinkStats::new());
-    let mut frames = Vec::new();
-    for byte in bytes {
-        if let Some(Ok(frame)) = decoder.push(byte) {
-            stats.push(&frame);
-            frames.push(frame);
-        }
-    }
+    let (frames, decoder, stats) = decoded(path)?;
     // The set-up of the first samples is that of the first hello, wherever it stands.
     let first = frames.iter().find_map(|frame| match frame {
         Frame::Hello(hello) => Some(*hello),
@@ -43,13 +33,7 @@ pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
     for frame in &frames {
         match frame {
             Frame::Sample(sample) => {
-                let forward = last.map_or(0, |last| sample.t_ticks.wrapping_sub(last));
-                time += if forward > u32::MAX / 2 {
-                    1.0 / calibration.rate_hz
-                } else {
-                    f64::from(forward) * calibration.tick_s
-                };
-                last = Some(sample.t_ticks);
+                time += since(last.replace(sample.t_ticks), sample.t_ticks, &calibration);
                 missing += live.push(sample, time)?.0.missing;
                 rows += 1;
             }
@@ -99,4 +83,30 @@ pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
         );
     }
     super::super::write_json(arguments.json.as_ref(), &answer)
+}
+
+/// The frames of a file, with what was wrong on the line and lost.
+fn decoded(path: &Path) -> Result<(Vec<Frame>, Decoder, LinkStats)> {
+    let bytes = std::fs::read(path)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+    let (mut decoder, mut stats) = (Decoder::new(), LinkStats::new());
+    let mut frames = Vec::new();
+    for byte in bytes {
+        if let Some(Ok(frame)) = decoder.push(byte) {
+            stats.push(&frame);
+            frames.push(frame);
+        }
+    }
+    Ok((frames, decoder, stats))
+}
+
+/// Time from one sample to the next, s; where the ticks go back, that of a sample.
+fn since(last: Option<u32>, ticks: u32, calibration: &Calibration) -> f64 {
+    let forward = last.map_or(0, |last| ticks.wrapping_sub(last));
+    if forward > u32::MAX / 2 {
+        1.0 / calibration.rate_hz
+    } else {
+        f64::from(forward) * calibration.tick_s
+    }
 }

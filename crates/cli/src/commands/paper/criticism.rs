@@ -4,6 +4,7 @@ use diagnosis::{DiagnoseOptions, diagnose};
 use miette::Result;
 use model::file::EffectModel;
 use model::parameter::Parameter;
+use model::record::Record;
 use noise::allan::Phase;
 use noise::analyze::{Analysis, ChannelAnalysis};
 use noise::paper_model::{PaperStand, Reading, STATED_FLAT_DEG_H, STATED_SECONDS, Slow};
@@ -295,6 +296,28 @@ pub struct LooksAlike {
     pub(super) pair: [Vec<f64>; 2],
 }
 
+/// Standard deviation of some readings, and how far the largest is from the least.
+fn rms_and_range(y: &[f64]) -> (f64, f64) {
+    let mean = y.iter().sum::<f64>() / y.len() as f64;
+    let square = y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / y.len() as f64;
+    let (low, high) = y
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(*v), h.max(*v))
+        });
+    (square.sqrt(), high - low)
+}
+
+/// What a diagnosis says of a record: its causes, and what it finds unexplained.
+fn told(record: &Record, options: &DiagnoseOptions) -> Result<Vec<String>> {
+    let found = diagnose(record, options)
+        .map_err(super::super::explain)?
+        .diagnosis;
+    let other = found.unexplained.iter().map(|_| "unexplained".to_owned());
+    let named = found.findings.iter().map(|f| f.cause.clone());
+    Ok(named.chain(other).collect())
+}
+
 /// Pairs of a stand whose bias follows its temperature, and the simulation by the paper's model.
 pub fn looks_alike(draws: u32, seed: u64, stand: &PaperStand) -> Result<LooksAlike> {
     let plain = super::model_of(stand, "gyro_z", Some(super::LSB_DPS));
@@ -324,16 +347,7 @@ pub fn looks_alike(draws: u32, seed: u64, stand: &PaperStand) -> Result<LooksAli
                 .map(|c| c.values.clone())
                 .unwrap_or_default()
         });
-        let [a, b] = [&readings[0], &readings[1]].map(|y| {
-            let mean = y.iter().sum::<f64>() / y.len() as f64;
-            let square = y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / y.len() as f64;
-            let ends = y
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                    (l.min(*v), h.max(*v))
-                });
-            (square.sqrt(), ends.1 - ends.0)
-        });
+        let [a, b] = [0, 1].map(|k| rms_and_range(&readings[k]));
         rms.push(a.0 / b.0);
         ranges.push(a.1 / b.1);
         pair.get_or_insert(readings);
@@ -341,18 +355,7 @@ pub fn looks_alike(draws: u32, seed: u64, stand: &PaperStand) -> Result<LooksAli
             seed,
             ..DiagnoseOptions::default()
         };
-        let causes = |record| -> Result<Vec<String>> {
-            let found = diagnose(record, &options)
-                .map_err(super::super::explain)?
-                .diagnosis;
-            let other = found.unexplained.iter().map(|_| "unexplained".to_owned());
-            Ok(found
-                .findings
-                .iter()
-                .map(|f| f.cause.clone())
-                .chain(other)
-                .collect())
-        };
+        let causes = |record| told(record, &options);
         let found = causes(&real)?;
         named += u32::from(found.iter().any(|c| c == "temperature"));
         adequate += u32::from(found.is_empty());

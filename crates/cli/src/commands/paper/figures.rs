@@ -176,30 +176,11 @@ fn angle(subject: &Subject<'_>, values: &[f64]) -> Result<Figure> {
 }
 
 fn allan(subject: &Subject<'_>, with_hypotheses: bool) -> Figure {
-    let points: Vec<_> = subject.found.deviations.values().flatten().collect();
-    let mut layers = Vec::new();
-    if !with_hypotheses {
-        layers.push(Drawn::new(
-            "95 % interval",
-            AFTER,
-            Layer::Band(
-                points
-                    .iter()
-                    .map(|p| (p.tau_s, 3600.0 * p.low, 3600.0 * p.high))
-                    .collect(),
-            ),
-        ));
-        layers.push(Drawn::new(
-            "overlapping Allan deviation of the record",
-            MEASURED,
-            Layer::Line(
-                points
-                    .iter()
-                    .map(|p| (p.tau_s, 3600.0 * p.deviation))
-                    .collect(),
-            ),
-        ));
-    }
+    let mut layers = if with_hypotheses {
+        vec![]
+    } else {
+        measured(subject)
+    };
     layers.push(Drawn::new(
         "the paper's line, 5.27 deg/sqrt(h) and slope -1/2, continued",
         BEFORE,
@@ -215,24 +196,7 @@ fn allan(subject: &Subject<'_>, with_hypotheses: bool) -> Figure {
         Layer::Line(vec![(10.0, STATED_FLAT_DEG_H), (100.0, STATED_FLAT_DEG_H)]),
     ));
     if with_hypotheses {
-        for (hypothesis, colour) in subject
-            .hypotheses
-            .iter()
-            .filter(|h| h.stand.slow != Slow::Nothing)
-            .zip([AFTER, AFTER, MEASURED, MEASURED])
-        {
-            let curve = TauGrid::Log(10)
-                .factors(2000)
-                .into_iter()
-                .map(|m| {
-                    (
-                        m as f64 * hypothesis.stand.tau0,
-                        3600.0 * hypothesis.stand.deviation(m),
-                    )
-                })
-                .collect();
-            layers.push(Drawn::new(&hypothesis.name, colour, Layer::Line(curve)));
-        }
+        layers.extend(curves(subject));
     }
     Figure {
         x_label: "cluster time, s".to_owned(),
@@ -244,6 +208,57 @@ fn allan(subject: &Subject<'_>, with_hypotheses: bool) -> Figure {
         layers,
         ..Figure::default()
     }
+}
+
+/// The deviation of the record, in its interval.
+fn measured(subject: &Subject<'_>) -> Vec<Drawn> {
+    let points: Vec<_> = subject.found.deviations.values().flatten().collect();
+    vec![
+        Drawn::new(
+            "95 % interval",
+            AFTER,
+            Layer::Band(
+                points
+                    .iter()
+                    .map(|p| (p.tau_s, 3600.0 * p.low, 3600.0 * p.high))
+                    .collect(),
+            ),
+        ),
+        Drawn::new(
+            "overlapping Allan deviation of the record",
+            MEASURED,
+            Layer::Line(
+                points
+                    .iter()
+                    .map(|p| (p.tau_s, 3600.0 * p.deviation))
+                    .collect(),
+            ),
+        ),
+    ]
+}
+
+/// What the hypotheses expect.
+fn curves(subject: &Subject<'_>) -> Vec<Drawn> {
+    let mut layers = vec![];
+    for (hypothesis, colour) in subject
+        .hypotheses
+        .iter()
+        .filter(|h| h.stand.slow != Slow::Nothing)
+        .zip([AFTER, AFTER, MEASURED, MEASURED])
+    {
+        let curve = TauGrid::Log(10)
+            .factors(2000)
+            .into_iter()
+            .map(|m| {
+                (
+                    m as f64 * hypothesis.stand.tau0,
+                    3600.0 * hypothesis.stand.deviation(m),
+                )
+            })
+            .collect();
+        layers.push(Drawn::new(&hypothesis.name, colour, Layer::Line(curve)));
+    }
+    layers
 }
 
 fn page(subject: &Subject<'_>, drawn: &[Markup], out: &Path) -> Markup {

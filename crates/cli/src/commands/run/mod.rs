@@ -24,6 +24,7 @@ use miette::Result;
 use model::record::Record;
 use noise::AnalyzeOptions;
 use serde::Serialize;
+use wire::LinkCounts;
 
 use super::outputs::{self, Outputs};
 use super::{Line, Replicates};
@@ -156,11 +157,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.quiet {
         return Ok(());
     }
+    show(arguments, &record, &link, &found);
+    Ok(())
+}
+
+/// What was recorded, found and planted.
+fn show(arguments: &Arguments, record: &Record, link: &LinkCounts, found: &Answer) {
     say!(
         "{}: {} samples, {}",
         arguments.out.display(),
         record.len(),
-        text::link(&link)
+        text::link(link)
     );
     say!("{}", found.screen.trim_end());
     if arguments.details {
@@ -173,7 +180,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(page) = &arguments.report {
         say!("report: {}", page.display());
     }
-    Ok(())
 }
 
 /// How far the stand is.

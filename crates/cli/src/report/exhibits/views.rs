@@ -6,7 +6,7 @@ use diagnosis::likelihood::Dct;
 use model::effect::Plot;
 use model::record::{Channel, Record};
 
-use crate::report::plot::{self, AFTER, BEFORE, Drawn, Figure, Layer, MEASURED};
+use crate::report::plot::{self, BEFORE, Drawn, Figure, Layer, MEASURED};
 
 /// Blocks of time behind a figure against a channel, s.
 const BLOCK_S: f64 = 5.0;
@@ -21,6 +21,10 @@ const TILT_S: f64 = 60.0;
 const AROUND_S: f64 = 1.2;
 /// Bits of a count that noise fills.
 const BITS: u32 = 8;
+
+mod sketches;
+
+use sketches::{Sketch, sketch};
 
 type Points = Vec<(f64, f64)>;
 /// A record's series, or what the record lacks.
@@ -47,146 +51,15 @@ pub(in crate::report) fn figure(
     channel: &str,
     pair: &Pair<'_>,
 ) -> Result<Figure, String> {
-    let Pair { with, without, .. } = *pair;
-    let unit = named(with, channel)?.unit.clone();
-    let rate = format!("rate of {channel}, {unit}");
-    let of = |name: &str| -> Result<String, String> {
-        Ok(match named(with, name)?.unit.as_str() {
-            "1" => format!("{name}, counts"),
-            unit => format!("{name}, {unit}"),
-        })
-    };
-    let time = || "time, s".to_owned();
-    let mut log = false;
-    let mut dots = true;
-    let mut y_range = None;
-    let mut extra = None;
-    let series: Box<dyn Fn(&Record) -> Drawing>;
-    let (x_label, y_label);
-    match plot {
-        Plot::RateInTime { block_s } => {
-            (x_label, y_label) = (time(), rate);
-            // Many blocks are a curve.
-            dots = block_s >= BLOCK_S;
-            series = Box::new(move |r| {
-                let own = blocks(r, named(r, channel)?, block_s);
-                Ok(blocks_of_time(r, block_s).into_iter().zip(own).collect())
-            });
-        }
-        Plot::RateAgainst(other) => {
-            (x_label, y_label) = (of(other)?, rate);
-            series = Box::new(move |r| {
-                let x = blocks(r, named(r, other)?, BLOCK_S);
-                Ok(x.into_iter()
-                    .zip(blocks(r, named(r, channel)?, BLOCK_S))
-                    .collect())
-            });
-        }
-        Plot::RateByValue(other) => {
-            (x_label, y_label) = (of(other)?, rate);
-            series = Box::new(move |r| by_value(named(r, other)?, named(r, channel)?));
-        }
-        Plot::PowerInTime => {
-            (x_label, y_label) = (time(), format!("mean square of the noise, ({unit})^2"));
-            series = Box::new(move |r| {
-                let power = power(r, named(r, channel)?);
-                Ok(blocks_of_time(r, BLOCK_S).into_iter().zip(power).collect())
-            });
-        }
-        Plot::PowerAgainst(other) => {
-            (x_label, y_label) = (of(other)?, format!("mean square of the noise, ({unit})^2"));
-            series = Box::new(move |r| {
-                let x = blocks(r, named(r, other)?, BLOCK_S);
-                Ok(x.into_iter().zip(power(r, named(r, channel)?)).collect())
-            });
-        }
-        Plot::Spectrum => {
-            (x_label, y_label) = (
-                "frequency, Hz".into(),
-                format!("one-sided density, ({unit})^2/Hz"),
-            );
-            (log, dots) = (true, false);
-            series = Box::new(move |r| Ok(spectrum(named(r, channel)?, rate_hz(r)?)));
-        }
-        Plot::Lines { from_hz, to_hz } => {
-            (x_label, y_label) = ("frequency, Hz".into(), format!("amplitude, {unit}"));
-            dots = false;
-            series = Box::new(move |r| Ok(lines(named(r, channel)?, rate_hz(r)?, from_hz, to_hz)));
-        }
-        Plot::AxisAgainst(other) => {
-            (x_label, y_label) = (rate, format!("rate of {other}, {unit}"));
-            series = Box::new(move |r| {
-                let (x, y) = (&named(r, channel)?.values, &named(r, other)?.values);
-                let step = (x.len() / POINTS).max(1);
-                Ok(x.iter()
-                    .copied()
-                    .zip(y.iter().copied())
-                    .step_by(step)
-                    .collect())
-            });
-        }
-        Plot::Tilt => {
-            x_label = format!("tilt by integrating {channel}, deg");
-            y_label = "tilt by the accelerometers, deg".into();
-            series = Box::new(move |r| tilt(r, named(r, channel)?));
-        }
-        Plot::Around => {
-            (x_label, y_label) = (time(), rate);
-            let most_changed = || -> Result<usize, String> {
-                Ok(most_changed(
-                    named(with, channel)?,
-                    named(without, channel)?,
-                ))
-            };
-            let middle = pair.at.map_or_else(most_changed, Ok)?;
-            extra = Some(Drawn {
-                label: None,
-                colour: MEASURED,
-                layer: Layer::Line(around(with, named(with, channel)?, middle)?),
-            });
-            series = Box::new(move |r| around(r, named(r, channel)?, middle));
-        }
-        Plot::Histogram => {
-            (x_label, y_label) = (format!("{channel}, counts"), "samples".into());
-            let normal = normal_curve(counts(named(without, channel)?)?);
-            extra = Some(Drawn::new("normal law", AFTER, Layer::Line(normal)));
-            series = Box::new(move |r| Ok(histogram(counts(named(r, channel)?)?)));
-        }
-        Plot::Bits => {
-            (x_label, y_label) = (format!("bit of {channel}"), "share of ones".into());
-            y_range = Some(-0.04..1.04);
-            series = Box::new(move |r| Ok(ones(counts(named(r, channel)?)?)));
-        }
-        Plot::Gaps => {
-            (x_label, y_label) = (time(), "frames missing".into());
-            dots = false;
-            series = Box::new(gaps);
-        }
-        Plot::DeviceTime => {
-            (x_label, y_label) = (time(), "device time minus its line, ms".into());
-            series = Box::new(|r| {
-                let device = device_s(r)?;
-                let straight = beyond_line(&device);
-                let step = (device.len() / POINTS).max(1);
-                let rows = device.iter().zip(&straight).step_by(step);
-                Ok(rows.map(|(t, late)| (*t, 1e3 * late)).collect())
-            });
-        }
-        Plot::HostTime => {
-            (x_label, y_label) = (time(), "host time minus device time, ms".into());
-            dots = false;
-            series = Box::new(|r| {
-                let device = device_s(r)?;
-                let host = r.host_time_s.as_ref().ok_or("host times")?;
-                let ms: Vec<f64> = host
-                    .iter()
-                    .zip(&device)
-                    .map(|(h, d)| 1e3 * (h - d))
-                    .collect();
-                Ok(plot::envelope(&device, &ms, POINTS))
-            });
-        }
-    }
+    let Sketch {
+        x_label,
+        y_label,
+        log,
+        dots,
+        y_range,
+        extra,
+        series,
+    } = sketch(plot, channel, pair)?;
     let layer = |points| {
         if dots {
             Layer::Points(points)
@@ -194,7 +67,7 @@ pub(in crate::report) fn figure(
             Layer::Line(points)
         }
     };
-    let (changed, plain) = (series(with)?, series(without)?);
+    let (changed, plain) = (series(pair.with)?, series(pair.without)?);
     let mut layers = vec![];
     if changed != plain {
         layers.push(Drawn::new(pair.labels[1], BEFORE, layer(plain)));

@@ -1,0 +1,102 @@
+//! What a board has terms for, from a model's channels and effects.
+
+use model::ModelFile;
+use model::file::EffectModel;
+use wire::correction::Correction;
+
+use super::{
+    ACC_COUNTS_PER_G, ACC_ZERO, BoardError, FLICKER_AT_S, FULL_DUTY, GYROS, SIGN_IN_DUTY,
+    SUPPLY_LSB_V, TEMP_LSB_C, TEMP_ZERO_C,
+};
+
+/// The terms of a model's effects, summed axis by axis.
+pub(super) struct Sum {
+    pub(super) out: Correction,
+    /// Squares of the random walks.
+    pub(super) walks: [f64; 3],
+    /// How much less sure a mean is for neighbours that are alike.
+    pub(super) alike: [f64; 3],
+    /// Mean temperature, degC.
+    pub(super) mean_c: f64,
+    /// Supply, V.
+    pub(super) supply_v: f64,
+}
+
+impl Sum {
+    /// Bias and random walk of each gyro; returns the densities of their noise.
+    pub(super) fn baseline(&mut self, model: &ModelFile) -> Result<[f64; 3], BoardError> {
+        let mut density = [0.0; 3];
+        for (axis, channel) in GYROS.into_iter().enumerate() {
+            let found = (model.channels.iter())
+                .find(|c| c.name == channel && c.unit == "deg/s")
+                .ok_or(BoardError::NoChannel { channel })?;
+            let value = |key: &str| found.baseline.get(key).map(|p| p.value);
+            self.out.bias[axis] = -value("bias").unwrap_or(0.0);
+            let n = value("angle_random_walk").filter(|n| *n > 0.0);
+            density[axis] = (n.ok_or(BoardError::NoNoise { channel })? / 60.0).powi(2);
+            self.walks[axis] = value("rate_random_walk").unwrap_or(0.0).powi(2);
+        }
+        Ok(density)
+    }
+
+    /// An effect on a gyro; whether the board has a term for it.
+    pub(super) fn take(&mut self, effect: &EffectModel, axis: usize) -> bool {
+        let value = |key: &str| effect.parameters.get(key).map_or(0.0, |p| p.value);
+        match effect.cause.as_str() {
+            "temperature" => {
+                self.out.temperature[axis] -= value("slope") * TEMP_LSB_C;
+                self.out.bias[axis] -= value("slope") * (TEMP_ZERO_C - self.mean_c);
+            }
+            "temperature_quadratic" => {
+                let reference =
+                    (effect.parameters.get("reference")).map_or(TEMP_ZERO_C, |p| p.value);
+                let (off, square) = (TEMP_ZERO_C - reference, value("curvature"));
+                self.out.temperature_squared[axis] -= square * TEMP_LSB_C.powi(2);
+                self.out.temperature[axis] -= (value("slope") + 2.0 * square * off) * TEMP_LSB_C;
+                self.out.bias[axis] -= value("slope") * off + square * off.powi(2);
+            }
+            "motor_bias" => {
+                let term = if value("by_magnitude") == 1.0 {
+                    &mut self.out.motor_magnitude
+                } else {
+                    &mut self.out.motor
+                };
+                // The board has no term for what it does as soon as it turns: that goes along in proportion.
+                let at_full = value("at_full_duty") + SIGN_IN_DUTY * value("while_turning");
+                term[axis] -= at_full / FULL_DUTY;
+            }
+            "supply_sensitivity" => {
+                self.out.supply[axis] -= value("slope") * SUPPLY_LSB_V;
+                self.out.bias[axis] += value("slope") * self.supply_v;
+            }
+            "g_sensitivity" => {
+                for (k, key) in ["acc_x", "acc_y", "acc_z"].into_iter().enumerate() {
+                    let per_count = value(key) / ACC_COUNTS_PER_G;
+                    self.out.acc[axis][k] -= per_count;
+                    self.out.bias[axis] += per_count * ACC_ZERO;
+                }
+            }
+            "cross_axis" => {
+                let keys = ["from_gyro_x", "from_gyro_y", "from_gyro_z"];
+                for (k, key) in keys.into_iter().enumerate() {
+                    self.out.matrix[axis][k] -= value(key);
+                }
+            }
+            "scale_error" => {
+                self.out.matrix[axis][axis] += 1.0 / (1.0 + value("relative")) - 1.0;
+            }
+            "gauss_markov" => {
+                self.walks[axis] +=
+                    2.0 * value("sigma").powi(2) / value("correlation_time").max(f64::MIN_POSITIVE);
+            }
+            "flicker" => {
+                let level = 0.664 * value("bias_instability") / 3600.0;
+                self.walks[axis] += 3.0 * level.powi(2) / FLICKER_AT_S;
+            }
+            // Neighbours that are alike: the mean of a block is less sure.
+            "low_pass" => self.alike[axis] = 1.0 + 2.0 * value("lag1_correlation"),
+            _ => return false,
+        }
+        true
+    }
+}

@@ -1,0 +1,126 @@
+//! Test programs, run side by side.
+
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::Mutex;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use crate::step::{Failure, Pace, Progress};
+
+/// A test program.
+#[derive(Clone, Debug)]
+pub struct TestProgram {
+    /// Package and target.
+    pub name: String,
+    pub file: PathBuf,
+    /// Folder of its package, in which cargo would run it.
+    pub folder: PathBuf,
+}
+
+/// How a test program ended.
+pub struct Done {
+    pub name: String,
+    pub passed: bool,
+    pub tests: usize,
+    pub seconds: f64,
+    pub said: String,
+}
+
+/// Runs test programs, as many at a time as there are cores, each with one thread; prints what the failed ones said, and
+/// how long the longest took.
+pub fn side_by_side(tests: &[&TestProgram]) -> Result<Vec<Done>, Failure> {
+    let mut progress = Progress::new("tests", Pace::Steady);
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    let next = Mutex::new(tests.iter());
+    let (send, results) = channel();
+    let mut done: Vec<Done> = Vec::new();
+    let mut broken = None;
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            let (send, next) = (send.clone(), &next);
+            scope.spawn(move || {
+                loop {
+                    let test = next.lock().ok().and_then(|mut tests| tests.next());
+                    let Some(test) = test else { return };
+                    if send.send(run_one(test)).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(send);
+        loop {
+            match results.recv_timeout(Duration::from_millis(500)) {
+                Ok(Ok(one)) => done.push(one),
+                Ok(Err(failure)) => broken = Some(failure),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            let counted: usize = done.iter().map(|d| d.tests).sum();
+            progress.tick(&format!(
+                "{} of {} programs done, {counted} tests",
+                done.len(),
+                tests.len()
+            ));
+        }
+    });
+    progress.end();
+    if let Some(failure) = broken {
+        return Err(failure);
+    }
+    for failed in done.iter().filter(|d| !d.passed) {
+        eprintln!("---- {}\n{}", failed.name, failed.said);
+    }
+    done.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
+    let longest = done.iter().take(5);
+    let longest: Vec<String> = longest
+        .map(|d| format!("{} {:.0} s", d.name, d.seconds))
+        .collect();
+    println!("   longest: {}", longest.join(", "));
+    Ok(done)
+}
+
+fn run_one(test: &TestProgram) -> Result<Done, Failure> {
+    let from = Instant::now();
+    let output = Command::new(&test.file)
+        .current_dir(&test.folder)
+        .env("CARGO_MANIFEST_DIR", &test.folder)
+        .env("RUST_TEST_THREADS", "1")
+        .output()
+        .map_err(|error| {
+            Failure::new(
+                &format!("{} cannot be started: {error}", test.file.display()),
+                "run it again: another build may have taken it away",
+            )
+        })?;
+    let mut said = String::from_utf8_lossy(&output.stdout).into_owned();
+    said += &String::from_utf8_lossy(&output.stderr);
+    Ok(Done {
+        name: test.name.clone(),
+        passed: output.status.success(),
+        tests: passed(&said),
+        seconds: from.elapsed().as_secs_f64(),
+        said,
+    })
+}
+
+/// Tests that passed, of what a test program says.
+fn passed(said: &str) -> usize {
+    let counts = said.lines().filter_map(|line| {
+        let (before, _) = line.strip_prefix("test result: ")?.split_once(" passed")?;
+        before.split_whitespace().last()?.parse::<usize>().ok()
+    });
+    counts.sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passed_tests_are_counted() {
+        let said = "test result: ok. 12 passed; 0 failed; 1 ignored\nx\ntest result: FAILED. 3 passed; 1 failed";
+        assert_eq!(passed(said), 15);
+    }
+}
