@@ -383,3 +383,18 @@ pub(super) fn ramped_table(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     programme(draw, stand, DWELL);
     ramped(&stand.world.duty, draw.by_ratio(0.15, 0.6), stand.rate_hz)
 }
+
+/// What is one thing after another, each for a while: `next` tells, by what it was, what comes and for how long, s.
+pub(super) fn in_spells<A: Copy>(
+    stand: &Stand,
+    (mut now, mut left): (A, f64),
+    mut next: impl FnMut(A) -> (A, f64),
+) -> Vec<A> {
+    stand.series(|_| {
+        left -= 1.0 / stand.rate_hz;
+        if left <= 0.0 {
+            (now, left) = next(now);
+        }
+        now
+    })
+}

@@ -3,7 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use super::super::super::words::{
-    DWELL, by_turns, changes, each, each_pair, in_steps, programme, resonating, tone, with_rests,
+    DWELL, by_turns, changes, each, each_pair, in_spells, in_steps, programme, resonating, tone,
+    with_rests,
 };
 use crate::motor::current;
 use crate::random::Draw;
@@ -59,20 +60,15 @@ pub(super) fn chopped(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// strokes.
 pub(super) fn iron(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let coercive = draw.between(0.2, 0.4);
-    let (mut stroke, mut left, mut command) = (true, 0.0, 0.0);
-    stand.world.duty = stand.series(|_| {
-        left -= 1.0 / stand.rate_hz;
-        if left <= 0.0 {
-            stroke = !stroke;
-            (command, left) = if stroke {
-                (draw.sign() * draw.between(0.3, 1.0), draw.between(0.5, 3.0))
-            } else {
-                (0.0, draw.between(5.0, 25.0))
-            };
-            command = (command * 255.0).round() / 255.0;
+    let strokes = in_spells(stand, ((true, 0.0), 0.0), |(stroke, _)| {
+        if stroke {
+            ((false, 0.0), draw.between(5.0, 25.0))
+        } else {
+            let command = in_steps(draw.sign() * draw.between(0.3, 1.0));
+            ((true, command), draw.between(0.5, 3.0))
         }
-        command
     });
+    stand.world.duty = each(&strokes, |(_, command)| command);
     let mut kept = 0.0f64;
     each(&stand.world.duty, |d| {
         kept = kept.clamp(d - coercive, d + coercive);
@@ -226,25 +222,19 @@ pub(super) fn judder(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// The rotor's magnet comes to rest at any angle, and its stray field is then that of this angle until the next stroke;
 /// while it turns, the field turns too and leaves nothing.
 pub(super) fn rotor(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    let rate_hz = stand.rate_hz;
-    let (mut runs, mut left, mut command, mut field) = (false, draw.between(1.0, 8.0), 0.0, 0.0);
-    let mut y = vec![];
-    stand.world.duty = stand.series(|_| {
-        left -= 1.0 / rate_hz;
-        if left <= 0.0 {
-            runs = !runs;
-            if runs {
-                (command, field) = (in_steps(draw.sign() * draw.between(0.3, 1.0)), 0.0);
-                left = draw.between(1.5, 6.0);
-            } else {
-                (command, field) = (0.0, draw.between(0.0, TAU).cos());
-                left = draw.between(4.0, 15.0);
-            }
+    // Whether it runs, its command, and the field that it has come to rest with.
+    let rests = ((false, 0.0, 0.0), draw.between(1.0, 8.0));
+    let spells = in_spells(stand, rests, |(runs, ..)| {
+        if runs {
+            let field = draw.between(0.0, TAU).cos();
+            ((false, 0.0, field), draw.between(4.0, 15.0))
+        } else {
+            let command = in_steps(draw.sign() * draw.between(0.3, 1.0));
+            ((true, command, 0.0), draw.between(1.5, 6.0))
         }
-        y.push(field);
-        command
     });
-    y
+    stand.world.duty = each(&spells, |(_, command, _)| command);
+    each(&spells, |(.., field)| field)
 }
 
 /// The heat of the motor's driver, current squared, reaches the part through the driver's case and the board, seconds after

@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 use super::super::super::known::Known;
 use super::super::super::shape::{Shape, noise, variance};
 use super::super::super::words::{
-    DWELL, about_mean, angle_of_table, by_turns, changes, each, extremes, in_steps, in_time,
-    loaded, mean_square, one_if, pace, programme, shaking, shocks, swing, turned, within_range,
+    DWELL, about_mean, angle_of_table, by_turns, changes, each, extremes, in_spells, in_steps,
+    in_time, loaded, mean_square, one_if, pace, programme, shaking, shocks, swing, turned,
+    within_range,
 };
 use crate::random::Draw;
 use crate::stand::Stand;
@@ -149,18 +150,14 @@ pub(super) fn fan(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     const STEPS: [f64; 3] = [0.6, 0.8, 1.0];
     let (period, blows) = (draw.by_ratio(12.0, 80.0), draw.between(0.2, 0.6));
     let runs_up = draw.by_ratio(0.5, 3.0);
-    let (mut on, mut left, mut step) = (draw.chance(0.5), 0.0, 1.0);
-    let asked: Vec<f64> = stand.series(|_| {
-        left -= 1.0 / stand.rate_hz;
-        if left <= 0.0 {
-            (on, step) = (!on, STEPS[draw.of_many(STEPS.len())]);
-            let share = if on { blows } else { 1.0 - blows };
-            left = period * share * draw.between(0.75, 1.25);
-        }
-        one_if(on) * step
+    let first = (draw.chance(0.5), 1.0);
+    let asked = in_spells(stand, (first, 0.0), |(on, _)| {
+        let step = STEPS[draw.of_many(STEPS.len())];
+        let share = if on { 1.0 - blows } else { blows };
+        ((!on, step), period * share * draw.between(0.75, 1.25))
     });
-    let speed = stand.lagged(&asked, runs_up);
-    each(&speed, |s| s.powi(4))
+    let asked = each(&asked, |(on, step)| one_if(on) * step);
+    each(&stand.lagged(&asked, runs_up), |s| s.powi(4))
 }
 
 /// Helium that is blown about the stand now and then, as for a leak test, goes through the lid and into the cavity behind
@@ -197,19 +194,15 @@ pub(super) fn growing(draw: &mut Draw, stand: &Stand) -> Shape {
 
 /// Noise that comes for seconds and rests for longer.
 pub(super) fn spells(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let (mut on, mut left) = (false, draw.between(5.0, 40.0));
-    stand.series(|_| {
-        left -= 1.0 / stand.rate_hz;
-        if left <= 0.0 {
-            on = !on;
-            left = if on {
-                draw.between(2.0, 10.0)
-            } else {
-                draw.between(20.0, 60.0)
-            };
+    let rests = (false, draw.between(5.0, 40.0));
+    let on = in_spells(stand, rests, |on| {
+        if on {
+            (false, draw.between(20.0, 60.0))
+        } else {
+            (true, draw.between(2.0, 10.0))
         }
-        one_if(on)
-    })
+    });
+    each(&on, one_if)
 }
 
 /// Where an axis's temperature is between the lowest and the highest of the run. The spell that is drawn is that of noise

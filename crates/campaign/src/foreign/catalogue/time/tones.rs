@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::super::super::words::{each, in_time, one_if, tone};
+use super::super::super::words::{each, in_spells, in_time, one_if, tone};
 use crate::random::Draw;
 use crate::stand::Stand;
 
@@ -86,16 +86,11 @@ pub(super) fn hopping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     };
     // Each with the time for which it stays there, s.
     let places = [first, second].map(|pitch| (pitch, draw.by_ratio(4.0, 20.0)));
-    let (mut at, mut left, phase) = (draw.of_many(2), 0.0, draw.between(0.0, TAU));
-    let pitches = stand.series(|_| {
-        left -= 1.0 / stand.rate_hz;
-        if left <= 0.0 {
-            at = 1 - at;
-            left = places[at].1 * draw.exponential();
-        }
-        places[at].0
+    let (at, phase) = (draw.of_many(2), draw.between(0.0, TAU));
+    let at = in_spells(stand, (at, 0.0), |at| {
+        (1 - at, places[1 - at].1 * draw.exponential())
     });
-    tone(phase, &pitches, stand.rate_hz)
+    tone(phase, &each(&at, |at| places[at].0), stand.rate_hz)
 }
 
 /// A fan whose control loop hunts: its pitch sways about the mean with a period, far enough that the tone has many side
