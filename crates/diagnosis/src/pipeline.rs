@@ -23,6 +23,7 @@ use crate::criticise::cross_axis::couplings;
 use crate::fit::channel::Note;
 use crate::ingest::dead;
 use crate::ingest::grid::lay_out;
+use crate::ingest::lattice;
 use crate::ingest::types::Grid;
 use crate::replicates;
 use crate::report::entries::{Ranked, entries, rank};
@@ -113,7 +114,8 @@ fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisErro
     let record = &*rows::in_order(&record);
     let record = &*rows::longest_part(record);
     let (alive, dead) = dead::left_out(record)?;
-    let (mended, sticking) = sign_bit::mend(&alive);
+    let counted = lattice::counted(&alive);
+    let (mended, sticking) = sign_bit::mend(&counted);
     let record = &*mended;
     let mut audited = audit(record);
     audited.findings = all_worded(audited.findings);

@@ -193,7 +193,7 @@ impl CheckId {
             | Self::ProcessDwells
             | Self::ProcessSize
             | Self::ProcessSource
-            | Self::ProcessRhythm => "a slow process of no known kind",
+            | Self::ProcessRhythm => "a coloured noise of no known kind",
             Self::BandSpectrum | Self::BandSteadiness | Self::BandSize | Self::BandEnvelope => {
                 "a band of no known kind"
             }

@@ -2,6 +2,7 @@
 //! wanders. Graded by rate; `IMU_STAND_SEED` draws other records and `IMU_STAND_RUNS` more of them.
 
 use diagnosis::audit::{Audit, audit};
+use diagnosis::{DiagnoseOptions, diagnose};
 use model::record::{Axis, Channel, Header, Quantity, Record};
 use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -59,9 +60,14 @@ impl Draw {
     }
 }
 
+const LSB: f64 = 0.073_26;
+
 fn told(counts: Vec<i32>) -> Audit {
-    const LSB: f64 = 0.073_26;
-    audit(&Record {
+    audit(&of_counts(counts))
+}
+
+fn of_counts(counts: Vec<i32>) -> Record {
+    Record {
         header: Header {
             rate_hz: Some(20.0),
             ..Header::default()
@@ -76,7 +82,7 @@ fn told(counts: Vec<i32>) -> Audit {
             lsb: Some(LSB),
         }],
         ..Record::default()
-    })
+    }
 }
 
 fn names(a: &Audit) -> Vec<&str> {
@@ -160,4 +166,53 @@ fn noise_of_any_smooth_shape_is_no_fault_of_the_converter() {
     }
     // 1 in 1000 is asked; three in 60 come by chance 3e-5 of the time at that rate.
     assert!(alarms <= 2 + runs / 500, "{alarms} of {runs}");
+}
+
+/// What is said of the converter of a record.
+fn of_converter(record: &Record) -> Vec<(String, Vec<(String, f64)>)> {
+    let d = diagnose(record, &DiagnoseOptions::default()).expect("an answer");
+    let values = |f: &diagnosis::result::Finding| {
+        let each = f.parameters.iter().map(|(k, p)| (k.clone(), p.value));
+        each.collect()
+    };
+    let findings = d.diagnosis.findings.iter();
+    findings.map(|f| (f.cause.clone(), values(f))).collect()
+}
+
+#[test]
+fn a_file_in_degrees_says_of_the_converter_what_its_counts_say() {
+    for run in 0..6 {
+        let mut draw = Draw::new(4, run);
+        let (clean, sigma) = draw.counts();
+        let mean = clean.iter().map(|c| f64::from(*c)).sum::<f64>() / N as f64;
+        let rail = (mean + 1.5 * sigma) as i32;
+        let faulty: [Vec<i32>; 2] = [
+            clean.iter().map(|c| c | 2).collect(),
+            clean.iter().map(|c| (*c).min(rail)).collect(),
+        ];
+        for (counts, fault) in faulty.into_iter().zip(["stuck_bit", "saturation"]) {
+            let by_counts = of_counts(counts);
+            let mut printed = by_counts.clone();
+            let x = &mut printed.channels[0];
+            (x.counts, x.lsb) = (None, None);
+            x.values
+                .iter_mut()
+                .for_each(|v| *v = (*v * 1e4).round() / 1e4);
+            let found = of_converter(&printed);
+            assert!(
+                found.iter().any(|f| f.0 == fault),
+                "{run}: {fault}, {found:?}"
+            );
+            let (wanted, mut off) = (of_converter(&by_counts), 0.0f64);
+            assert_eq!(wanted.len(), found.len(), "{run}: {wanted:?} {found:?}");
+            for (w, f) in wanted.iter().zip(&found) {
+                assert_eq!((&w.0, w.1.len()), (&f.0, f.1.len()));
+                let each = w.1.iter().zip(&f.1);
+                off = each.fold(off, |a, (w, f)| {
+                    a.max((w.1 - f.1).abs() / w.1.abs().max(1.0))
+                });
+            }
+            assert!(off < 0.01, "{run}: {wanted:?} {found:?}");
+        }
+    }
 }

@@ -143,3 +143,31 @@ fn an_extended_model_is_called_so_only_where_its_replicates_hold_the_record() {
         assert!(check.fails_before && check.fails_after != holds);
     }
 }
+
+#[test]
+fn a_bit_that_was_put_right_is_in_the_model_and_not_in_the_noise() {
+    const BIT: i32 = 1 << 9;
+    for seed in 60..62 {
+        let truth = stand(0.001);
+        let mut record = record(&truth, 600.0, seed);
+        let x = &mut record.channels[0];
+        let (lsb, counts) = (x.lsb.expect("a step"), x.counts.as_mut().expect("counts"));
+        for (count, value) in counts.iter_mut().zip(&mut x.values) {
+            *value += lsb * f64::from((*count | BIT) - *count);
+            *count |= BIT;
+        }
+        let options = DiagnoseOptions {
+            replicates: REPLICATES,
+            ..DiagnoseOptions::default()
+        };
+        let found = diagnose(&record, &options).expect("long enough");
+        let of = found.diagnosis;
+        assert_eq!(of.verdict, Verdict::Extended, "{:?}", of.unexplained);
+        let causes: Vec<&str> = of.findings.iter().map(|f| f.cause.as_str()).collect();
+        assert_eq!(causes, ["stuck_bit"]);
+        let n = |m: &ModelFile| m.channels[0].baseline["angle_random_walk"].value;
+        let ratio = n(&found.extended_model) / n(&truth);
+        // 12 000 readings tell N within 0.65 %.
+        assert!((0.97..1.03).contains(&ratio), "{ratio}");
+    }
+}

@@ -87,6 +87,13 @@ pub fn consequence_of(of: &Consequence, material: bool) -> String {
     let angles: Vec<String> = (of.angle_rms_deg.iter())
         .map(|(over, v)| format!("{} deg rms over {}", number(*v, ANGLE_DIGITS), spaced(over)))
         .collect();
+    // A noise that changes its size adds nothing of its own that could be told apart.
+    if of.share_of_variance <= 0.0 && of.angle_rms_deg.values().all(|v| *v <= 0.0) {
+        return format!(
+            "It changes an angle error or a deviation by up to {}.",
+            percent(of.largest_change)
+        );
+    }
     let share = format!("{} of the variance", percent(of.share_of_variance));
     match angles.is_empty() {
         true => format!("It makes {share} of the readings."),

@@ -452,7 +452,7 @@ pub fn audit(record: &Record) -> Audit {
             effects::stuck_bit::ID,
             effects::saturation::ID,
         ] {
-            audit.untested(cause, "the record holds no counts: record what the converter delivers, before any scaling or averaging");
+            audit.untested(cause, "the record holds no counts, and its readings are no multiples of one step: record what the converter delivers, before any scaling, offset or averaging");
         }
     }
     repeats::audit(record, &gyros, &at, &mut audit);

@@ -7,5 +7,6 @@ pub mod dequantise;
 pub mod fill;
 pub mod grid;
 pub mod kalman;
+pub mod lattice;
 pub mod motion;
 pub mod types;

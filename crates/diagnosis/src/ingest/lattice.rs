@@ -1,0 +1,143 @@
+//! Counts of readings that come without them: a file in deg/s whose readings are multiples of a step holds what the
+//! converter delivered, times a scale.
+
+use std::borrow::Cow;
+
+use model::record::{Quantity, Record};
+use numerics::order_statistics::robust_sigma;
+use numerics::series::smallest_step;
+
+/// Distance of a reading from its multiple, steps, up to which it is that multiple printed with few digits: a step of
+/// 0.07 deg/s printed to 0.001 leaves 0.007.
+const NEAR: f64 = 0.05;
+/// Steps in the spread of the readings from which on a grid is that of a number's last digit. No audit of counts looks at
+/// more than eight bits within it.
+const FINE: f64 = 256.0;
+/// Largest count: converters of 20 bits are the finest of inertial sensors in use.
+const LARGEST: f64 = 524_288.0;
+
+/// The record with the counts of gyros whose readings are multiples of a step.
+#[must_use]
+pub fn counted(record: &Record) -> Cow<'_, Record> {
+    let mut whole = Cow::Borrowed(record);
+    for (i, channel) in record.channels.iter().enumerate() {
+        if channel.quantity != Quantity::Gyro || channel.counts.is_some() {
+            continue;
+        }
+        if let Some((step, counts)) = multiples(&channel.values) {
+            let own = &mut whole.to_mut().channels[i];
+            own.lsb = Some(step);
+            own.counts = Some(counts);
+        }
+    }
+    whole
+}
+
+/// The step of readings, and the multiple that each is, 0 where there is no reading. None where they are no multiples of
+/// one, or of one that is too fine to tell. Those of a grid whose zero is no reading had an offset taken off, and their bits
+/// are not known.
+fn multiples(values: &[f64]) -> Option<(f64, Vec<i32>)> {
+    let guess = smallest_step(values);
+    let mut levels: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    levels.sort_unstable_by(f64::total_cmp);
+    let sigma = robust_sigma(&levels);
+    if guess <= 0.0 || guess * FINE < sigma {
+        return None;
+    }
+    levels.dedup_by(|a, b| (*a - *b).abs() < 0.5 * guess);
+    // The smallest distance of two printed readings is a step and twice their last digit: distances of a few steps tell it
+    // better, and all of them best.
+    let mut step = guess;
+    for reach in [8.0, 64.0, f64::INFINITY] {
+        step = refined(&levels, step, reach)?;
+    }
+    let code = |v: f64| (v / step).round();
+    let holds = |v: &f64| code(*v).abs() < LARGEST && (v / step - code(*v)).abs() < NEAR;
+    levels.iter().all(holds).then(|| {
+        let of = |v: &f64| if v.is_finite() { code(*v) as i32 } else { 0 };
+        (step, values.iter().map(of).collect())
+    })
+}
+
+/// Least squares of the distances between neighbours of up to `reach` steps, by how many steps they are; all of them in one
+/// line where the reach is infinite. None where there are none.
+fn refined(levels: &[f64], step: f64, reach: f64) -> Option<f64> {
+    let steps = |w: &[f64]| ((w[1] - w[0]) / step).round();
+    let near = levels.windows(2).filter(|w| steps(w) <= reach);
+    let [mut products, mut squares] = [0.0; 2];
+    if reach.is_finite() {
+        for w in near {
+            products += steps(w) * (w[1] - w[0]);
+            squares += steps(w).powi(2);
+        }
+    } else {
+        // Through zero: a multiple of the step is what a reading is.
+        for v in levels {
+            let code = (v / step).round();
+            products += code * v;
+            squares += code * code;
+        }
+    }
+    (squares > 0.0).then(|| products / squares)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    /// Codes of a noisy level.
+    fn codes(sigma: f64, level: f64) -> Vec<i32> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+        let mut one = || {
+            let z: f64 = StandardNormal.sample(&mut rng);
+            (level + sigma * z).round() as i32
+        };
+        (0..4000).map(|_| one()).collect()
+    }
+
+    fn printed(codes: &[i32], step: f64, digits: i32) -> Vec<f64> {
+        let place = 10f64.powi(digits);
+        let print = |c: &i32| (f64::from(*c) * step * place).round() / place;
+        codes.iter().map(print).collect()
+    }
+
+    #[test]
+    fn codes_come_back_from_what_was_printed() {
+        for (sigma, level) in [(0.6, 3.2), (5.0, -41.0), (40.0, 812.0)] {
+            let codes = codes(sigma, level);
+            for (step, digits) in [(0.07326, 4), (0.05, 2), (1.0 / 131.0, 6), (0.0175, 9)] {
+                let values = printed(&codes, step, digits);
+                let (found, back) = multiples(&values).expect("a grid");
+                assert!((found / step - 1.0).abs() < 1e-3, "{found} for {step}");
+                assert_eq!(back, codes, "step {step} to {digits} digits at {level}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_lost_reading_has_no_code_and_a_far_one_its_own() {
+        let mut values = printed(&codes(3.0, 0.0), 0.05, 2);
+        (values[7], values[9]) = (f64::NAN, 327.65);
+        let (_, back) = multiples(&values).expect("a grid");
+        assert_eq!((back[7], back[9]), (0, 6553));
+    }
+
+    #[test]
+    fn readings_off_a_grid_of_their_own_or_too_fine_have_no_codes() {
+        let of = codes(5.0, 0.0);
+        let shifted: Vec<f64> = of.iter().map(|c| f64::from(*c) * 0.05 + 0.02).collect();
+        assert!(multiples(&shifted).is_none(), "an offset was taken off");
+        let bent: Vec<f64> = of.iter().map(|c| (0.1 * f64::from(*c)).sinh()).collect();
+        assert!(multiples(&bent).is_none(), "no two steps are alike");
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+        let noise: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut rng)).collect();
+        assert!(multiples(&noise).is_none(), "no grid");
+        assert!(multiples(&printed(&of, 1.0, 0)[..1]).is_none());
+        let digits: Vec<f64> = noise.iter().map(|v| (v * 1e4f64).round() / 1e4).collect();
+        assert!(multiples(&digits).is_none(), "the last digit of a number");
+    }
+}
