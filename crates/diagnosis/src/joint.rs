@@ -11,6 +11,7 @@ mod climb;
 mod filter;
 
 use model::effect::Found;
+use model::record::rows::Bursts;
 
 use crate::fit::channel::{Form, Joint, Levels, State, Term};
 use crate::fit::estimate;
@@ -26,9 +27,15 @@ const WALKS: u32 = 20;
 const MOST_LAW: f64 = 5.0;
 
 /// The joint estimate of a channel under white noise of variance s2 (1 + gamma shape); none where a process of the channel, a
-/// band among them, is no sum of first-order ones.
-pub(crate) fn estimate(s: &Searched<'_>, shape: &[f64], gamma: f64) -> Option<Joint> {
-    let model = Model::of(s, shape)?;
+/// band among them, is no sum of first-order ones. Of `bursts` that were laid end to end the walk goes on between them.
+pub(crate) fn estimate(
+    s: &Searched<'_>,
+    shape: &[f64],
+    gamma: f64,
+    bursts: Option<&Bursts>,
+) -> Option<Joint> {
+    let spans = bursts.map(|b| b.spans(shape.len()));
+    let model = Model::of(s, shape, spans.as_deref())?;
     let start = model.start(&s.state, shape, gamma);
     let value = |x: &[f64]| {
         let (normal, log_det) = model.series.through(&model.point(x));
@@ -36,7 +43,9 @@ pub(crate) fn estimate(s: &Searched<'_>, shape: &[f64], gamma: f64) -> Option<Jo
         (solution.log_likelihood, solution.white.ln())
     };
     let peak = climb(&value, &start, &model.steps(), &model.bounds());
-    let (levels, coordinates) = model.told(&peak);
+    let (mut levels, coordinates) = model.told(&peak);
+    // The walk of a channel is that of bursts end to end, until its model is told.
+    levels.log_walk += bursts.map_or(0.0, |b| (b.period_s / b.length_s).ln());
     let found = model.found(s, &peak, levels.white, &coordinates);
     let top = filter::top(shape);
     let last = peak.x.len() - 1;
@@ -58,7 +67,7 @@ struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    fn of(s: &'a Searched<'_>, shape: &'a [f64]) -> Option<Self> {
+    fn of(s: &'a Searched<'_>, shape: &'a [f64], spans: Option<&'a [f64]>) -> Option<Self> {
         let (panel, state) = (&s.search.panel, &s.state);
         let samples = panel.bins.n;
         let known = |t: &&Term| match &t.form {
@@ -81,7 +90,7 @@ impl<'a> Model<'a> {
             c
         }));
         Some(Self {
-            series: Series::new(columns, shape, &s.target.lost),
+            series: Series::new(columns, shape, &s.target.lost, spans),
             processes,
             samples,
             slow: slow.unwrap_or(1.0),

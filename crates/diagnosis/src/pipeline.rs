@@ -38,7 +38,7 @@ use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Observation, all_worded, worded};
 use handed_over::HandedOver;
 use model::record::AnalysisError;
-use model::record::rows;
+use model::record::rows::{self, Bursts};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, PartialEq)]
@@ -112,7 +112,11 @@ struct Prepared {
 
 fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisError> {
     let record = &*rows::in_order(&record);
-    let record = &*rows::longest_part(record);
+    let (record, bursts) = match rows::end_to_end(record) {
+        Some((joined, bursts)) => (Cow::Owned(joined), Some(bursts)),
+        None => (rows::longest_part(record), None),
+    };
+    let record = &*record;
     let (alive, dead) = dead::left_out(record)?;
     let counted = lattice::counted(&alive);
     let (mended, sticking) = sign_bit::mend(&counted);
@@ -127,7 +131,8 @@ fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisErro
         audited.put_right(f);
     }
     let record = &*masking::renumbered(record, &audited);
-    let grid = lay_out(record, &|name| audited.masked(name), seed)?;
+    let mut grid = lay_out(record, &|name| audited.masked(name), seed)?;
+    grid.bursts = bursts;
     let input = Input {
         file: String::new(),
         seconds: grid.n as f64 / grid.rate_hz,
@@ -176,8 +181,8 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     input.file.clone_from(&options.file);
     let mut told = concluded(&searched, tested, audited, dead, named);
     let HandedOver {
-        baseline_model,
-        extended_model,
+        mut baseline_model,
+        mut extended_model,
         replicates,
         held,
         taken_up,
@@ -197,6 +202,11 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     let terms = &extended_model.unnamed;
     let mut unexplained = entries(told.unexplained, &searched, &grid, terms, options.matters);
     ranked(&mut told.findings, &mut unexplained);
+    if let Some(bursts) = &grid.bursts {
+        bursts.part(&mut baseline_model);
+        bursts.part(&mut extended_model);
+        as_they_passed(&mut told.findings, &mut unexplained, bursts);
+    }
     // Without replicates nothing says that what is left does not matter.
     let unnamed = unexplained.iter().any(|u| u.material || !judged);
     let verdict = match (strays || unnamed, told.findings.is_empty()) {
@@ -223,6 +233,19 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         evidence: (searched.iter().filter(|_| !options.no_evidence))
             .flat_map(|s| figures::of_channel(s, &grid))
             .collect(),
+    }
+}
+
+/// Times of what was found in bursts laid end to end.
+fn as_they_passed(findings: &mut [Finding], unexplained: &mut [Unexplained], bursts: &Bursts) {
+    let of = |t: &mut f64| *t = bursts.time(*t);
+    findings
+        .iter_mut()
+        .flat_map(|f| &mut f.times_s)
+        .for_each(of);
+    for entry in unexplained {
+        entry.times_s.iter_mut().for_each(of);
+        entry.span_s.iter_mut().flatten().for_each(of);
     }
 }
 

@@ -85,6 +85,49 @@ fn record(file: &str, rate_hz: f64, rows: std::ops::Range<usize>, by: usize) -> 
     }
 }
 
+/// The bursts of a thermal chamber, with their times.
+fn bursts() -> Record {
+    let file = "pan_tvac_bursts_50hz.csv.gz";
+    let (names, columns) = read(file);
+    let time = names.iter().position(|n| n == "time_s").expect("times");
+    Record {
+        host_time_s: Some(columns[time].clone()),
+        header: Header::default(),
+        ..record(file, 50.0, 0..usize::MAX, 1)
+    }
+}
+
+#[test]
+fn ref_lsm6dsm_the_bursts_of_a_thermal_chamber_have_two_slopes_and_a_silent_axis() {
+    let d = told("bursts", &bursts());
+    // Least squares on block means, and their halves, as those who published the record have them.
+    let known = [
+        ("gyro_x", Some((0.0298, [0.0327, 0.0295]))),
+        ("gyro_y", Some((-0.0141, [-0.0142, -0.0134]))),
+        ("gyro_z", None),
+    ];
+    for (channel, known) in known {
+        let mut own = d.findings.iter().filter(|f| f.channels == [channel]);
+        let found = own.find(|f| f.cause == "temperature");
+        let Some((slope, halves)) = known else {
+            assert!(found.is_none(), "{channel}: {found:?}");
+            continue;
+        };
+        let p = &found.expect(channel).parameters["slope"];
+        let within = 1.96 * p.std_error.expect("an error");
+        println!(
+            "{channel}: {:.4} +- {within:.4} (95 %), least squares {slope}",
+            p.value
+        );
+        for other in [slope, halves[0], halves[1]] {
+            assert!(
+                (p.value - other).abs() <= within,
+                "{channel}: {p:?}, {other}"
+            );
+        }
+    }
+}
+
 fn told(of: &str, record: &Record) -> Diagnosis {
     let d = diagnose(record, &DiagnoseOptions::default())
         .expect("a diagnosis")

@@ -9,8 +9,8 @@ mod tables;
 
 use diagnosis::result::{Diagnosed, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use model::record::Record;
 use model::record::sampling::Sampling;
+use model::record::{Record, rows};
 
 use plot::{AFTER, BEFORE, Drawn, Figure, Layer, MEASURED, number};
 use replicates::{Against, Places};
@@ -58,8 +58,25 @@ pub enum ReportError {
 /// [`ReportError`].
 pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
     let diagnosis = &subject.diagnosed.diagnosis;
-    let channels = channels(subject)?;
-    let convicting = convict::figures(subject)?;
+    let joined = rows::end_to_end(&rows::in_order(subject.record));
+    let joined = joined.map(|(record, bursts)| {
+        let mut diagnosed = subject.diagnosed.clone();
+        bursts.join(&mut diagnosed.baseline_model);
+        bursts.join(&mut diagnosed.extended_model);
+        (record, bursts.rate_hz, diagnosed)
+    });
+    // Figures of bursts show them end to end, as they were diagnosed.
+    let drawn = match &joined {
+        Some((record, rate_hz, diagnosed)) => Subject {
+            record,
+            rate_hz: Some(*rate_hz),
+            diagnosed,
+            ..*subject
+        },
+        None => *subject,
+    };
+    let channels = channels(&drawn)?;
+    let convicting = convict::figures(&drawn)?;
     let title = format!("{}: {}", diagnosis.input.file, headline(subject.diagnosed));
     let page = html! {
         (DOCTYPE)

@@ -130,6 +130,7 @@ pub fn lay_out(
         n: layout.n,
         dct: layout.dct,
         bins: layout.bins,
+        bursts: None,
         base: record.header.base,
         targets,
         signals,

@@ -4,6 +4,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::Signal;
+use model::record::rows::Bursts;
 use model::record::{Axis, Base};
 
 use crate::fit::likelihood::{Bins, Dct, Noise};
@@ -55,6 +56,8 @@ pub struct Grid {
     pub dct: Dct,
     /// Its bins.
     pub bins: Rc<Bins>,
+    /// Where the bursts lie that were laid end to end; none of a record of one piece.
+    pub bursts: Option<Bursts>,
     /// What the base did.
     pub base: Option<Base>,
     /// The gyros.

@@ -6,13 +6,10 @@ use crate::fit::likelihood::Normal;
 /// Variance of the walk before the first reading, over the white one: as good as flat.
 const FLAT: f64 = 1e8;
 
-/// Largest value of a law's shape.
+/// Largest value of a law's shape; 1 where there is no law.
 pub(super) fn top(shape: &[f64]) -> f64 {
-    shape
-        .iter()
-        .copied()
-        .fold(0.0, f64::max)
-        .max(f64::MIN_POSITIVE)
+    let top = shape.iter().copied().fold(0.0, f64::max);
+    if top > 0.0 { top } else { 1.0 }
 }
 
 /// Shape of the noise in units of the white variance at the law's zero.
@@ -33,6 +30,8 @@ pub(super) struct Series<'a> {
     /// What a law adds, 1 at its top.
     shape: &'a [f64],
     top: f64,
+    /// Samples from the one before to each, where time passed that has no place.
+    spans: Option<&'a [f64]>,
     /// Whether a sample was read.
     read: Vec<bool>,
     /// Samples that were.
@@ -40,11 +39,12 @@ pub(super) struct Series<'a> {
 }
 
 impl<'a> Series<'a> {
-    /// The data first, then the columns; `lost` samples were not read.
+    /// The data first, then the columns; `lost` samples were not read; `spans` as [`Series::spans`].
     pub(super) fn new(
         columns: impl Iterator<Item = Vec<f64>>,
         shape: &'a [f64],
         lost: &[usize],
+        spans: Option<&'a [f64]>,
     ) -> Self {
         let columns: Vec<Vec<f64>> = columns.collect();
         let (width, n) = (columns.len(), shape.len());
@@ -64,6 +64,7 @@ impl<'a> Series<'a> {
             width,
             shape,
             top: top(shape),
+            spans,
             read,
             count,
         }
@@ -94,12 +95,13 @@ impl<'a> Series<'a> {
         let (mut logs, mut product) = (0.0, 1.0f64);
         let mut begun = false;
         let rows = self.values.chunks_exact(w).zip(self.shape).zip(&self.read);
-        for ((row, shape), read) in rows {
+        for (i, ((row, shape), read)) in rows.enumerate() {
+            let span = self.spans.map_or(1.0, |s| s[i]);
             if begun || !at.poles.is_empty() {
                 predict(
                     &mut p,
                     &mut state,
-                    step * f64::from(u8::from(begun)),
+                    step * span * f64::from(u8::from(begun)),
                     &at.poles,
                     w,
                 );

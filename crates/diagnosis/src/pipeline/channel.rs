@@ -36,7 +36,7 @@ fn laid_out<'a>(grid: &'a Grid, target: &'a Target) -> Search<'a> {
         moving: target.moving,
         signals: &grid.signals,
     };
-    let mut search = Search::new(panel, view);
+    let mut search = Search::new(panel, view, grid.bursts.is_some());
     search.read = 1.0 - target.lost.len() as f64 / grid.n as f64;
     search
 }
@@ -100,18 +100,19 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     if !target.moving {
         s.variance = variance_law::best(&s);
     }
-    estimate_under_law(&mut s);
+    estimate_under_law(&mut s, grid);
+    estimate_over_time(&mut s, grid);
     s.checks = channel_checks(&s, before);
     s
 }
 
 /// Everything that was found, estimated anew under the law of the variance where there is one, and the residual by it.
-fn estimate_under_law(s: &mut Searched<'_>) {
+fn estimate_under_law(s: &mut Searched<'_>, grid: &Grid) {
     let Some(mut v) = s.variance.take() else {
         return;
     };
     variance_law::settle(s, &mut v, &s.e);
-    s.joint = joint::estimate(s, &v.shape, v.found.coefficients[0].0);
+    s.joint = joint::estimate(s, &v.shape, v.found.coefficients[0].0, grid.bursts.as_ref());
     if let Some(joint) = &s.joint {
         s.found.clone_from(&joint.found);
         v.found.coefficients = vec![joint.law];
@@ -119,6 +120,19 @@ fn estimate_under_law(s: &mut Searched<'_>) {
     }
     s.e.iter_mut().zip(&v.law).for_each(|(e, v)| *e /= v.sqrt());
     s.variance = Some(v);
+}
+
+/// Everything that was found in bursts laid end to end, estimated anew by the time that passed between them: a slope over a
+/// course that goes on there is known as well as the walk lets it be.
+fn estimate_over_time(s: &mut Searched<'_>, grid: &Grid) {
+    if s.variance.is_some() || grid.bursts.is_none() {
+        return;
+    }
+    let no_law = vec![0.0; grid.n];
+    s.joint = joint::estimate(s, &no_law, 0.0, grid.bursts.as_ref());
+    if let Some(joint) = &s.joint {
+        s.found.clone_from(&joint.found);
+    }
 }
 
 /// All checks of a channel, those of the residual `before` the extension beside those after it.

@@ -157,6 +157,9 @@ fn sentence(group: &[Observation], entry: &Unexplained, follows: &[&String], uni
     let mut parts = vec![match (lead.and_then(CheckId::seen_as), follows) {
         (Some(seen), []) => seen.to_owned(),
         (Some(seen), some) => format!("{seen}, with {}", joined(some)),
+        (None, []) if group.iter().any(|o| !o.nearest.is_empty()) => {
+            "noise that no cause of the library fits".to_owned()
+        }
         (None, []) => group[0].what.clone(),
         (None, some) => format!("follows {} as no cause does", joined(some)),
     }];

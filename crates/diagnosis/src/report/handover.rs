@@ -110,6 +110,7 @@ fn beside(s: &Searched<'_>, named: &[&Finding], grid: &Grid) -> Parameters {
     let law = s.variance.as_ref();
     let law = law.filter(|v| named.iter().filter(on_it).any(|f| f.cause == v.effect.id()));
     let mut levels = match (law, &s.joint) {
+        (None, Some(joint)) if s.variance.is_none() => joint.levels,
         (None, _) => levels_of(s, &s.state),
         (Some(_), Some(joint)) => joint.levels,
         (Some(v), None) => levels_under(s, &v.shape, v.found.coefficients[0].0),

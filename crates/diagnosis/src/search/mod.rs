@@ -17,7 +17,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use model::effect::{Effect, Hypothesis, View};
+use model::effect::{Effect, Hypothesis, VarianceLaw, View};
 use model::effects::EFFECTS;
 use model::record::Quantity;
 
@@ -99,7 +99,7 @@ pub fn peak_of_white(y: &[f64]) -> f64 {
         moving: false,
         signals: &[],
     };
-    let search = Search::new(Panel::of(&dct, &bins, coefficients), view);
+    let search = Search::new(Panel::of(&dct, &bins, coefficients), view, false);
     let state = search.baseline(&Noise::new(-9.0));
     let best = search.candidates.iter().enumerate().filter_map(|(i, c)| {
         let Hypothesis::Covariance(c) = &c.hypothesis else {
@@ -140,10 +140,37 @@ fn channels_of(hypothesis: &Hypothesis) -> Vec<String> {
     names.map(str::to_owned).collect()
 }
 
+/// Why a course of time is not sought in bursts.
+const IN_BURSTS: &str =
+    "the record comes in bursts, and says nothing of the time between: record in one piece";
+
+/// Whether bursts laid end to end tell of it: what follows a recorded channel, what is faster than a burst, and what axes
+/// or counts have. Courses of time and tones break off at every burst, and a slow process has no time of its own.
+fn told_by_bursts(hypothesis: &Hypothesis, samples: usize) -> bool {
+    match hypothesis {
+        Hypothesis::Regression(r) => r.follows.is_some(),
+        Hypothesis::Covariance(c) => {
+            let start = c.starts(samples).into_iter().next();
+            !c.is_peak() && start.is_some_and(|s| c.poles(&s, samples).is_none())
+        }
+        Hypothesis::Variance(law) => matches!(law, VarianceLaw::Shape { .. }),
+        Hypothesis::Shaped(_)
+        | Hypothesis::Step
+        | Hypothesis::Line
+        | Hypothesis::SideBands
+        | Hypothesis::TwoLevel
+        | Hypothesis::WanderingTone
+        | Hypothesis::Motion => false,
+        Hypothesis::Common | Hypothesis::Correlation | Hypothesis::Scale | Hypothesis::Audit => {
+            true
+        }
+    }
+}
+
 impl<'a> Search<'a> {
-    /// Lay out all hypotheses for a channel.
+    /// Lay out all hypotheses for a channel; of one in `bursts` that are laid end to end those that such a record can tell of.
     #[must_use]
-    pub fn new(panel: Panel, view: View<'a>) -> Self {
+    pub fn new(panel: Panel, view: View<'a>, bursts: bool) -> Self {
         let mut candidates = vec![];
         let mut not_tested = vec![];
         // What follows a thermometer of this axis is no column of another one.
@@ -155,13 +182,20 @@ impl<'a> Search<'a> {
             thermometers.any(|s| of.contains(&s.name))
         };
         for effect in EFFECTS {
-            let hypotheses = match effect.hypotheses(&view) {
+            let mut hypotheses = match effect.hypotheses(&view) {
                 Err(why) => {
                     not_tested.push((effect.id(), why));
                     continue;
                 }
                 Ok(hypotheses) => hypotheses,
             };
+            if bursts {
+                hypotheses.retain(|h| told_by_bursts(h, view.samples));
+                if hypotheses.is_empty() {
+                    not_tested.push((effect.id(), IN_BURSTS.to_owned()));
+                    continue;
+                }
+            }
             let siblings = hypotheses.len();
             for mut hypothesis in hypotheses {
                 let of = channels_of(&hypothesis);

@@ -5,6 +5,7 @@
 //! go back mean rows out of order where they fill places in time that are free, and a board that started anew where the
 //! places are taken, or where the host's clock goes on over them.
 
+mod bursts;
 mod keys;
 mod parts;
 mod rate;
@@ -16,6 +17,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use crate::record::Record;
 
+pub use bursts::{Bursts, end_to_end};
 use keys::Keys;
 pub use parts::longest_part;
 pub use rate::by_times;

@@ -80,7 +80,7 @@ fn lasting(t: &[i64], period: f64) -> Vec<f64> {
 }
 
 /// Intervals from the row before to each row.
-fn steps(record: &Record) -> Option<Vec<f64>> {
+pub(super) fn steps(record: &Record) -> Option<Vec<f64>> {
     let rows = record.len();
     let counter = |c: &Option<Vec<u64>>| {
         c.as_ref()
