@@ -63,6 +63,10 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
         let mut diagnosed = subject.diagnosed.clone();
         bursts.join(&mut diagnosed.baseline_model);
         bursts.join(&mut diagnosed.extended_model);
+        let findings = &mut diagnosed.diagnosis.findings;
+        for t in findings.iter_mut().flat_map(|f| &mut f.times_s) {
+            *t = bursts.joined(*t);
+        }
         (record, bursts.rate_hz, diagnosed)
     });
     // Figures of bursts show them end to end, as they were diagnosed.

@@ -37,6 +37,16 @@ pub struct Bursts {
 }
 
 impl Bursts {
+    /// The instant of a time as it passed, as if nothing lay between the bursts; both s from the start.
+    #[must_use]
+    pub fn joined(&self, time_s: f64) -> f64 {
+        let burst = self
+            .at_s
+            .partition_point(|at| *at <= time_s + 0.5 / self.rate_hz);
+        let burst = burst.saturating_sub(1);
+        self.starts[burst] as f64 / self.rate_hz + time_s - self.at_s[burst]
+    }
+
     /// Makes the random walk of a model that of bursts end to end, which adds in the length of one what it adds in the period.
     pub fn join(&self, model: &mut ModelFile) {
         walk(model, (self.period_s / self.length_s).sqrt());
@@ -198,6 +208,10 @@ mod tests {
         assert!((bursts.length_s - 2.0).abs() < 1e-9 && (bursts.period_s - 60.0).abs() < 0.1);
         // A quarter of a second into the fourth burst.
         assert!((bursts.time(6.25) - 180.25).abs() < 0.1);
+        for t in [0.0, 1.98, 2.0, 6.25, 23.98] {
+            let back = bursts.joined(bursts.time(t));
+            assert!((back - t).abs() < 1e-9, "{t}: {back}");
+        }
     }
 
     #[test]
