@@ -23,9 +23,17 @@ pub fn headline(finding: &Finding) -> String {
         .map(|(name, p)| format!("{} {}", name.replace('_', " "), with_interval(p)))
         .collect();
     let place = finding.channels.join(", ");
+    let effective = match finding.effective {
+        true => "; effective for this excitation, a static test gives more",
+        false => "",
+    };
     match sizes.is_empty() {
         true => format!("{place}: {title} ({})", finding.cause),
-        false => format!("{place}: {title} ({}), {}", finding.cause, sizes.join("; ")),
+        false => format!(
+            "{place}: {title} ({}), {}{effective}",
+            finding.cause,
+            sizes.join("; ")
+        ),
     }
 }
 

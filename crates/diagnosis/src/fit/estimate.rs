@@ -6,6 +6,8 @@ use crate::fit::channel::{Form, State};
 use crate::fit::likelihood::scoring;
 use crate::fit::likelihood::{Noise, Panel, invert, least_walk};
 
+/// Standard deviation of an instant between two readings, in their distance.
+const BETWEEN: f64 = 0.288_675_134_594_812_9;
 /// Points of the random walk that coefficients are averaged over.
 const WALKS: u32 = 28;
 
@@ -266,7 +268,10 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
             };
             match &t.form {
                 Form::Columns => {}
-                Form::Step(at, error) => found.location.push((at / rate_hz, error / rate_hz)),
+                // It came at any instant between two readings.
+                Form::Step(at, error) => found
+                    .location
+                    .push(((at - 0.5) / rate_hz, error.hypot(BETWEEN) / rate_hz)),
                 Form::Line(omega) => found
                     .location
                     .push(frequency(*omega, own[0].0.hypot(own[1].0))),

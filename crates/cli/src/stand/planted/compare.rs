@@ -12,7 +12,8 @@ use crate::text::{measured, rounded_as};
 const NORMAL_95: f64 = 1.96;
 /// What is called a match.
 pub const RULE: &str = "a match: the diagnosis names the cause on the channel where it was planted, and what was planted lies within \
-     1.96 standard errors (95 %) of what was found";
+     1.96 standard errors (95 %) of what was found; a size that is effective for one excitation has the sign of what was planted \
+     and is no larger";
 
 /// Whether the diagnosis names what was planted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -39,6 +40,9 @@ pub struct ComparedSize {
     pub found: Option<f64>,
     /// Standard error of what was found; `None` where it is a count.
     pub std_error: Option<f64>,
+    /// Whether what was found is effective for this excitation: it has the sign of what was planted, and a part of its size.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub effective: bool,
     /// What was planted lies in the interval of what was found; `None` where nothing was found.
     pub matches: Option<bool>,
 }
@@ -153,7 +157,9 @@ fn sized(size: &Size, planted: &Planted, found: Option<&Finding>) -> ComparedSiz
         _ => size.value,
     };
     let stated: Option<&Parameter> = parameters.and_then(|all| all.get(size.parameter));
+    let effective = found.is_some_and(|finding| finding.effective);
     ComparedSize {
+        effective,
         parameter: size.parameter,
         unit: size.unit,
         planted: value,
@@ -161,7 +167,8 @@ fn sized(size: &Size, planted: &Planted, found: Option<&Finding>) -> ComparedSiz
         std_error: stated.and_then(|p| p.std_error),
         matches: stated.map(|p| {
             let interval = NORMAL_95 * p.std_error.unwrap_or(0.0) + size.within;
-            (p.value - value).abs() <= interval
+            let is_part = effective && p.value * value > 0.0 && p.value.abs() <= value.abs();
+            is_part || (p.value - value).abs() <= interval
         }),
     }
 }
@@ -238,7 +245,12 @@ impl Compared {
             let _ = write!(line, "{unit}, {name}");
             return line;
         };
-        let _ = write!(line, ", found {}{unit}: ", measured(found, size.std_error));
+        let found_as = match size.effective {
+            true => "effective for this excitation",
+            false => "found",
+        };
+        let found_is = measured(found, size.std_error);
+        let _ = write!(line, ", {found_as} {found_is}{unit}: ");
         let apart = (found - size.planted).abs();
         line += &match (size.matches, size.std_error) {
             (Some(true), _) => "match".to_owned(),

@@ -246,7 +246,7 @@ fn process(fault: &Fault, scenario: &Scenario) -> Option<Planted> {
             ),
             vec![Size::new(
                 "lag1_correlation",
-                lag1_correlation(pole_hz),
+                lag1_correlation(pole_hz, scenario.gyros[gyro].angle_random_walk_deg_sqrt_h),
                 "1",
             )],
         ),

@@ -11,6 +11,9 @@ pub(super) const RATE_HZ: f64 = 20.0;
 const CLOCK_HZ: f64 = 256.0;
 /// Taps of its filter after power-on: two boxcars of 2^2 (ADIS16250 data sheet, SENS/AVG).
 const FILTER: u32 = 2;
+/// Its analog pole, Hz, and the unit of its readings, deg/s, after power-on (ADIS16250 data sheet).
+const STATED_POLE_HZ: f64 = 50.0;
+const LSB_DPS: f64 = 0.073_26;
 /// Time in which the noise on the shared reference decays, s (`bench::Fault::CommonNoise`).
 const COMMON_TAU_S: f64 = 15e-3;
 /// Clock periods after which nothing is left of a pulse through a pole of 50 Hz: e^-30.
@@ -33,10 +36,15 @@ pub(super) fn tone_gain(frequency_hz: f64, pole_hz: f64) -> f64 {
     of_filter.abs() / (frequency_hz / pole_hz).hypot(1.0)
 }
 
-/// Correlation of neighbouring samples of white noise behind a pole.
-pub(super) fn lag1_correlation(pole_hz: f64) -> f64 {
-    let at = |lag_s: f64| covariance(&bartlett(FILTER), lag_s, 1.0 / (TAU * pole_hz));
-    at(1.0 / RATE_HZ) / at(0.0)
+/// Correlation of neighbouring readings of a gyro whose noise goes through this pole in place of the stated one; `random_walk` is
+/// its angle random walk behind the stated one, deg/sqrt(h). What rounding adds to a reading, no other one has.
+pub(super) fn lag1_correlation(pole_hz: f64, random_walk: f64) -> f64 {
+    let at = |lag_s: f64, pole_hz: f64| {
+        covariance(&bartlett(FILTER), lag_s, 1.0 / (TAU * pole_hz)) * pole_hz
+    };
+    // Behind a pole the variance of white noise is proportional to the corner.
+    let variance = (random_walk / 60.0).powi(2) * RATE_HZ / at(0.0, STATED_POLE_HZ);
+    variance * at(1.0 / RATE_HZ, pole_hz) / (variance * at(0.0, pole_hz) + LSB_DPS.powi(2) / 12.0)
 }
 
 /// Standard deviation that the samples of several gyros have in common, of noise on their reference with `sigma`.
@@ -96,10 +104,14 @@ mod tests {
 
     #[test]
     fn white_noise_behind_the_stated_pole_is_hardly_alike_and_behind_a_slow_one_it_is() {
-        assert!(lag1_correlation(50.0) < 1e-3);
+        assert!(lag1_correlation(50.0, 4.2) < 1e-3);
         // Far below the filter's band the pole alone is left: exp(-2 pi f / 20 Hz).
         let alone = (-TAU * 0.05 / RATE_HZ).exp();
-        assert!((lag1_correlation(0.05) - alone).abs() < 0.01);
+        assert!((lag1_correlation(0.05, 1e6) - alone).abs() < 0.01);
+        // 4.2 deg/sqrt(h), 0.313 deg/s behind the stated pole, are 0.058 deg/s behind one a hundred times as slow, which alone makes
+        // 0.874; rounding adds 0.021 deg/s.
+        let rounded = lag1_correlation(0.5, 4.2);
+        assert!((0.76..0.78).contains(&rounded), "{rounded}");
     }
 
     #[test]
