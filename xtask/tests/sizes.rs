@@ -28,7 +28,6 @@ const LONG_FUNCTIONS: &[(&str, &str, &str)] = &[
         "fault",
         "one arm for each thing that is hidden",
     ),
-    ("crates/diagnosis/src/audit/bits.rs", "audit", "to be split"),
     (
         "crates/diagnosis/src/criticise/common_noise.rs",
         "common",

@@ -168,111 +168,33 @@ pub(super) enum Shape {
     Other,
 }
 
+/// Bits that never change, and one whose share of ones normal noise does not make.
 pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     let Some(counts) = g.counts else {
         return Shape::Unknown;
     };
-    let local = &g.local;
     let name = g.channel.name.as_str();
     audit.smallest(effects::coarse_lsb::ID, name, "missing_bits", 1.0, "1");
     let known: Vec<bool> = (0..counts.len()).map(|i| g.known(i)).collect();
     if let Some(c) = coarse(counts, &known) {
-        let chance = 0.5f64.powi(c.changes.min(900) as i32);
-        let what = format!(
-            "the {} lowest bits of {name} never change: its step is {} counts ({} changes, all of whole steps)",
-            c.bits,
-            1 << c.bits,
-            c.changes
-        );
-        audit.check(
-            CheckId::LowBits,
-            name,
-            f64::from(c.bits),
-            chance,
-            what.clone(),
-        );
-        // One bit at 1 throughout is no grid that a converter makes.
-        let sticks = c.bits == 1 && c.residue == 1;
-        let mut finding = Finding {
-            cause: if sticks {
-                effects::stuck_bit::ID
-            } else {
-                effects::coarse_lsb::ID
-            }
-            .into(),
-            channels: vec![name.into()],
-            what,
-            ..Finding::default()
-        };
-        if sticks {
-            finding.parameters = parameters(0, 1, 1.0, None);
-        } else {
-            finding.parameters.insert(
-                "missing_bits".into(),
-                Parameter::exact(f64::from(c.bits), "1"),
-            );
-            if c.bits == 1 {
-                finding.alternatives.push(Alternative {
-                    cause: effects::stuck_bit::ID.into(),
-                    log_odds: 0.0,
-                });
-                finding.experiment = Some("read a register with known odd contents over the same line: a stuck line shows there too".into());
-            }
-        }
-        audit.findings.push(finding);
-        let step = f64::from(1u32 << c.bits);
-        audit.lacks_a_bit(name, effects::coarse_lsb::ID, step, unrounded(local));
-        audit.suppress(
-            &[effects::stuck_bit::ID, effects::stale_samples::ID],
-            name,
-            effects::coarse_lsb::ID,
-        );
+        tell_coarse(&c, name, unrounded(&g.local), audit);
         return Shape::Other;
     }
-    let sigma = unrounded(local);
     if known.iter().filter(|k| **k).count() < LEAST_READINGS {
         return Shape::Unknown;
     }
-    let levels = Levels::new(&local.level, &known);
-    // How often each bit is 1.
-    let ones = |bit: u32| {
-        let own = counts.iter().zip(&known).filter(|(_, k)| **k);
-        own.map(|(c, _)| u64::from(((c >> bit) & 1) as u32))
-            .sum::<u64>() as f64
-    };
-    let tested: Vec<Share> = (0..BITS)
-        .filter(|b| sigma >= LEAST_SIGMA && f64::from(1u32 << b) <= WITHIN_SIGMA * sigma)
-        .filter_map(|b| share(ones(b), &levels, b, sigma))
+    let codes: Vec<i32> = counts
+        .iter()
+        .zip(&known)
+        .filter(|(_, k)| **k)
+        .map(|(c, _)| *c)
         .collect();
-    let Some(worst) = tested.iter().max_by(|a, b| a.z.abs().total_cmp(&b.z.abs())) else {
-        audit.untested_on(
-            name,
-            effects::stuck_bit::ID,
-            "the noise is less than a count, so the level alone decides the bits",
-        );
+    let sigma = unrounded(&g.local);
+    let levels = Levels::new(&g.local.level, &known);
+    let Some(worst) = worst_share(&codes, &levels, sigma, name, audit) else {
         return Shape::Unknown;
     };
-    // A bit that changes the readings by one count leaves nothing but its share of ones.
-    let readings = levels.iter().map(|l| l.1).sum::<f64>();
-    let reach = (2.0 * stuck::CLEARLY).sqrt() + ONE_SIDED;
-    audit.smallest(
-        effects::stuck_bit::ID,
-        name,
-        "fraction",
-        reach / readings.sqrt(),
-        "1",
-    );
-    let chance = (tested.len() as f64 * tails::two_sided(worst.z)).min(1.0);
-    let what = format!(
-        "bit {} of {name} reads {} more often than normal noise makes it ({:.1} sigma)",
-        worst.bit,
-        worst.value,
-        worst.z.abs()
-    );
-    let alarmed = audit.check(CheckId::BitShare, name, worst.z, chance, what);
-    let own = counts.iter().zip(&known).filter(|(_, k)| **k);
-    let codes: Vec<i32> = own.map(|(c, _)| *c).collect();
-    match stuck::judge(&codes, sigma, BITS, alarmed) {
+    match stuck::judge(&codes, sigma, BITS, worst.alarmed) {
         Verdict::Smooth => Shape::Sound,
         Verdict::Rails => Shape::Rails,
         Verdict::Bit(s) => {
@@ -304,13 +226,115 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
             });
             let what = format!(
                 "the codes of {name} have shares that no smooth distribution has ({nats:.0} nats; {:.1} sigma at bit {}), and {bit}",
-                worst.z.abs(),
-                worst.bit
+                worst.share.z.abs(),
+                worst.share.bit
             );
             audit.not_normal.push(Observation::of_readings(name, what));
             Shape::Other
         }
     }
+}
+
+/// States the coarse grid of a channel: what it is taken for, and that its noise lacks those bits.
+fn tell_coarse(c: &Coarse, name: &str, sigma: f64, audit: &mut Audit) {
+    let chance = 0.5f64.powi(c.changes.min(900) as i32);
+    let what = format!(
+        "the {} lowest bits of {name} never change: its step is {} counts ({} changes, all of whole steps)",
+        c.bits,
+        1 << c.bits,
+        c.changes
+    );
+    audit.check(
+        CheckId::LowBits,
+        name,
+        f64::from(c.bits),
+        chance,
+        what.clone(),
+    );
+    let mut finding = Finding {
+        cause: effects::coarse_lsb::ID.into(),
+        channels: vec![name.into()],
+        what,
+        ..Finding::default()
+    };
+    // One bit at 1 throughout is no grid that a converter makes.
+    if c.bits == 1 && c.residue == 1 {
+        finding.cause = effects::stuck_bit::ID.into();
+        finding.parameters = parameters(0, 1, 1.0, None);
+    } else {
+        finding.parameters.insert(
+            "missing_bits".into(),
+            Parameter::exact(f64::from(c.bits), "1"),
+        );
+        if c.bits == 1 {
+            finding.alternatives.push(Alternative {
+                cause: effects::stuck_bit::ID.into(),
+                log_odds: 0.0,
+            });
+            finding.experiment = Some("read a register with known odd contents over the same line: a stuck line shows there too".into());
+        }
+    }
+    audit.findings.push(finding);
+    let step = f64::from(1u32 << c.bits);
+    audit.lacks_a_bit(name, effects::coarse_lsb::ID, step, sigma);
+    audit.suppress(
+        &[effects::stuck_bit::ID, effects::stale_samples::ID],
+        name,
+        effects::coarse_lsb::ID,
+    );
+}
+
+/// The bit whose share of ones is farthest from the expected one.
+struct Worst {
+    share: Share,
+    /// Whether that is more than chance makes.
+    alarmed: bool,
+}
+
+/// Tests the share of ones of each bit that the noise decides; none where the level alone decides them all.
+fn worst_share(
+    codes: &[i32],
+    levels: &Levels,
+    sigma: f64,
+    name: &str,
+    audit: &mut Audit,
+) -> Option<Worst> {
+    let ones = |bit: u32| codes.iter().filter(|c| (*c >> bit) & 1 == 1).count() as f64;
+    let tested: Vec<Share> = (0..BITS)
+        .filter(|b| sigma >= LEAST_SIGMA && f64::from(1u32 << b) <= WITHIN_SIGMA * sigma)
+        .filter_map(|b| share(ones(b), levels, b, sigma))
+        .collect();
+    let bits = tested.len() as f64;
+    let farthest = tested
+        .into_iter()
+        .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()));
+    let Some(share) = farthest else {
+        audit.untested_on(
+            name,
+            effects::stuck_bit::ID,
+            "the noise is less than a count, so the level alone decides the bits",
+        );
+        return None;
+    };
+    // A bit that changes the readings by one count leaves nothing but its share of ones.
+    let readings = levels.iter().map(|l| l.1).sum::<f64>();
+    let reach = (2.0 * stuck::CLEARLY).sqrt() + ONE_SIDED;
+    audit.smallest(
+        effects::stuck_bit::ID,
+        name,
+        "fraction",
+        reach / readings.sqrt(),
+        "1",
+    );
+    let chance = (bits * tails::two_sided(share.z)).min(1.0);
+    let what = format!(
+        "bit {} of {name} reads {} more often than normal noise makes it ({:.1} sigma)",
+        share.bit,
+        share.value,
+        share.z.abs()
+    );
+    let alarmed = audit.check(CheckId::BitShare, name, share.z, chance, what);
+    Some(Worst { share, alarmed })
 }
 
 fn parameters(bit: u32, value: u8, fraction: f64, error: Option<f64>) -> model::effect::Parameters {
