@@ -1,0 +1,3 @@
+//! Cargo considers the dependencies of a build script only where there is one.
+
+fn main() {}
