@@ -72,11 +72,21 @@ pub const SETTINGS: &[Setting] = &[
         0.0,
         "sag of the supply at full duty of the motor",
     ),
-    setting("motor_duty", 0.0, "largest duty of the motor, 0..1"),
+    setting("motor_duty", 0.0, "duty of the motor while it turns, 0..1"),
     setting(
         "motor_period_s",
         80.0,
-        "period of its profile: forward, off, back, off",
+        "period of its profile: off, forward, off, back",
+    ),
+    setting(
+        "motor_on",
+        0.5,
+        "part of the time that the motor turns, 0..1",
+    ),
+    setting(
+        "motor_forward",
+        0.5,
+        "part of that in which it turns forward, 0..1",
     ),
     setting(
         "vibration_g",
@@ -168,6 +178,10 @@ impl World {
         let seconds = samples as f64 / rate_hz;
         let time = |i: usize| i as f64 / rate_hz;
         let on = |t: f64, period: f64| (t / period).rem_euclid(1.0) < 0.5;
+        let motor = MotorProfile {
+            on: get("motor_on"),
+            forward: get("motor_forward"),
+        };
         let mut heater = 0.0;
         let mut temperature = Vec::with_capacity(samples);
         let mut duty = Vec::with_capacity(samples);
@@ -187,12 +201,7 @@ impl World {
                     + get("drift_degc") * t / seconds
                     + heater,
             );
-            let d = match (t / get("motor_period_s")).rem_euclid(1.0) * 4.0 {
-                phase if phase < 1.0 => 0.0,
-                phase if phase < 2.0 => get("motor_duty"),
-                phase if phase < 3.0 => 0.0,
-                _ => -get("motor_duty"),
-            };
+            let d = get("motor_duty") * motor.turns(t / get("motor_period_s"));
             duty.push((d * 255.0).round() / 255.0);
             let load = if on(t, get("supply_load_period_s")) {
                 0.0
@@ -208,6 +217,30 @@ impl World {
             duty,
             acc,
             motion,
+        }
+    }
+}
+
+/// When the motor turns, and which way: a rest, forward, a rest as long, back.
+struct MotorProfile {
+    /// Part of the time that it turns.
+    on: f64,
+    /// Part of that in which it turns forward.
+    forward: f64,
+}
+
+impl MotorProfile {
+    /// 1 while the motor turns forward, -1 while it turns back, 0 while it rests; `periods` since the start.
+    fn turns(&self, periods: f64) -> f64 {
+        let phase = periods.rem_euclid(1.0);
+        let rest = (1.0 - self.on) / 2.0;
+        let forward = self.on * self.forward;
+        if (rest..rest + forward).contains(&phase) {
+            1.0
+        } else if phase >= 2.0 * rest + forward {
+            -1.0
+        } else {
+            0.0
         }
     }
 }

@@ -67,7 +67,7 @@ impl Range {
 /// Of a setting of the excitation. Periods and time constants divide.
 pub(crate) fn of_setting(key: &str) -> Range {
     match key {
-        "motor_duty" => range(0.0, 1.0),
+        "motor_duty" | "motor_on" | "motor_forward" => range(0.0, 1.0),
         "vibration_g" => SIZE,
         key if key.ends_with("_s") => POSITIVE,
         _ => ANY,

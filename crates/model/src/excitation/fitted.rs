@@ -269,18 +269,26 @@ impl Fit<'_> {
         duty.iter().any(|d| *d != 0.0).then_some(duty)
     }
 
-    /// Largest duty, and the period of a profile that switches the motor on as often.
+    /// A profile of on and off whose mean, mean size and mean square are the record's: what follows the duty, its size or its
+    /// square is then as large. It switches on as often.
     fn motor(&self, settings: &mut Settings) {
         let Some(duty) = self.duty() else { return };
-        let largest = duty.iter().fold(0.0f64, |m, d| m.max(d.abs()));
-        let starts = duty
+        let size: Vec<f64> = duty.iter().map(|d| d.abs()).collect();
+        let (mean_size, mean_square) = (mean(&size), mean(&squares(&duty)));
+        let level = mean_square / mean_size;
+        let (on, forward) = (mean_size / level, (1.0 + mean(&duty) / mean_size) / 2.0);
+        let starts = size
             .windows(2)
-            .filter(|w| w[0].abs() < largest / 2.0 && w[1].abs() >= largest / 2.0)
+            .filter(|w| w[0] < level / 2.0 && w[1] >= level / 2.0)
             .count();
         // A column of others' may count otherwise.
-        settings.push(("motor_duty", largest.min(1.0)));
-        // The profile has two starts in a period.
-        let period = 2.0 * self.seconds() / starts.max(1) as f64;
+        settings.push(("motor_duty", level.min(1.0)));
+        settings.push(("motor_on", on));
+        settings.push(("motor_forward", forward));
+        // The profile has a start in a period for each way that the motor turns.
+        let ways = [forward > 0.0, forward < 1.0].map(usize::from);
+        let starts_a_period = ways.iter().sum::<usize>() as f64;
+        let period = starts_a_period * self.seconds() / starts.max(1) as f64;
         settings.push(("motor_period_s", period));
     }
 
@@ -384,6 +392,10 @@ pub(super) fn rms(y: &[f64]) -> f64 {
     (dot(y, y) / y.len().max(1) as f64).sqrt()
 }
 
+fn squares(y: &[f64]) -> Vec<f64> {
+    y.iter().map(|v| v * v).collect()
+}
+
 fn centred(y: &[f64]) -> Vec<f64> {
     let mean = mean(y);
     y.iter().map(|v| v - mean).collect()
@@ -446,13 +458,19 @@ mod tests {
 
     #[test]
     fn a_world_is_found_again_in_size_and_pace() -> Result<(), Box<dyn std::error::Error>> {
-        let worlds: [&[(&str, f64)]; 6] = [
+        let worlds: [&[(&str, f64)]; 7] = [
             &[("self_heating_degc", 9.0), ("ambient_degc", 18.0)],
             &[("heater_degc", 6.0), ("heater_period_s", 200.0)],
             &[
                 ("motor_duty", 0.8),
                 ("motor_period_s", 75.0),
                 ("supply_motor_v", 0.1),
+            ],
+            &[
+                ("motor_duty", 0.6),
+                ("motor_period_s", 50.0),
+                ("motor_on", 0.3),
+                ("motor_forward", 0.7),
             ],
             &[("supply_load_v", 0.06), ("vibration_g", 0.1)],
             &[("turn_dps", 12.0), ("turn_period_s", 40.0)],
@@ -471,6 +489,33 @@ mod tests {
             }
         }
         Ok(())
+    }
+
+    #[test]
+    fn a_motor_of_any_duties_is_one_of_as_much_mean_size_and_square() {
+        // Duties of a triangle that rests between, mostly forward.
+        let duty = |k: usize| match k % 700 {
+            of @ 0..300 => of as f64 / 300.0,
+            of @ 400..500 => -(of as f64 - 400.0) / 200.0,
+            _ => 0.0,
+        };
+        let mut record = crate::simulate(&ModelFile::paper(), 600.0, 20.0, 5).unwrap();
+        let mut pwm = |c: &mut Channel| {
+            let own = c.values.iter_mut().enumerate();
+            own.for_each(|(k, v)| *v = (255.0 * duty(k)).round());
+        };
+        let mut channels = record.channels.iter_mut();
+        pwm(channels.find(|c| c.quantity == Quantity::Pwm).unwrap());
+        let simulated = crate::simulate(&ModelFile::paper().excited_like(&record), 600.0, 20.0, 6);
+        let moments = |record: &Record| {
+            let duty = &record.all(Quantity::Pwm).next().unwrap().values;
+            let size: Vec<f64> = duty.iter().map(|d| d.abs()).collect();
+            [mean(duty), mean(&size), mean(&squares(duty)).sqrt()]
+        };
+        let (own, made) = (moments(&record), moments(&simulated.unwrap()));
+        for (own, made) in own.into_iter().zip(made) {
+            assert!((made / own - 1.0).abs() < 0.05, "{own} {made}");
+        }
     }
 
     #[test]

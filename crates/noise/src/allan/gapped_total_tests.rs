@@ -142,7 +142,8 @@ fn losses_leave_them_unbiased_and_their_freedom_as_stated() {
             ),
         ] {
             for (name, lose) in losses {
-                let records = if kind == Deviation::Mtotdev { 40 } else { 100 };
+                let takes_long = matches!(kind, Deviation::Mtotdev | Deviation::Theoh);
+                let records = if takes_long { 40 } else { 100 };
                 let (mut whole, mut gapped) = (Vec::new(), Vec::new());
                 let (mut left, mut possible) = (0, 0);
                 for _ in 0..records {
