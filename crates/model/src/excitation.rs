@@ -3,7 +3,7 @@
 mod fitted;
 mod moved;
 
-pub(crate) use moved::{moved_like, slow};
+pub(crate) use moved::{fast, moved_like, slow};
 
 use std::collections::BTreeMap;
 

@@ -66,13 +66,24 @@ impl<'a> Judged<'a> {
             self.grid.rate_hz,
             &self.parts.stretches,
         )?;
+        // A motion that is replayed is no property of the model: its channel is compared in what is faster.
+        let compared = |replicas: &Replicas, readings: &mut [Vec<f64>]| {
+            for (k, values) in readings.iter_mut().enumerate() {
+                if replicas.replays(k) {
+                    let parts = values.chunks_mut(self.parts.length);
+                    parts.for_each(|part| replicas.without_replayed(part));
+                }
+            }
+        };
         let mut readings: Vec<Vec<f64>> = self.measured.iter().map(|m| m.values.clone()).collect();
+        compared(&replicas, &mut readings);
         let mut rows = vec![self.battery.of(&readings)];
         for k in 0..count as u64 {
             replicas.draw(seed.wrapping_add(k), &mut readings);
             for (values, measured) in readings.iter_mut().zip(&self.measured) {
                 bridge(values, &measured.lost);
             }
+            compared(&replicas, &mut readings);
             rows.push(self.battery.of(&readings));
         }
         let table = Table {

@@ -500,7 +500,7 @@ mod tests {
             _ => 0.0,
         };
         let mut record = crate::simulate(&ModelFile::paper(), 600.0, 20.0, 5).unwrap();
-        let mut pwm = |c: &mut Channel| {
+        let pwm = |c: &mut Channel| {
             let own = c.values.iter_mut().enumerate();
             own.for_each(|(k, v)| *v = (255.0 * duty(k)).round());
         };

@@ -81,6 +81,27 @@ pub(crate) fn slow(values: &[f64], rate_hz: f64) -> Vec<f64> {
     once.iter().zip(twice).map(|(a, b)| 2.0 * a - b).collect()
 }
 
+/// The rest of a noise beside the [`slow`] part of another of the same spectrum: a filter whose gain squared is 1 less that of
+/// the slow part, so that both together have the spectrum of either. With u = 1 - B the slow part has the gain 1 - u^2, and this
+/// one u (2 - u^2)^1/2, the root by a parabola in u^2 that is within 0.1 % from 0 to 1.
+pub(crate) fn fast(values: &[f64], rate_hz: f64) -> Vec<f64> {
+    const ROOT: [f64; 3] = [1.414_21, -0.343_67, -0.070_54];
+    let half = (BLOCK_S * rate_hz / 3.0) as usize;
+    let without = |x: &[f64]| -> Vec<f64> {
+        let smooth = means(&means(x, half), half);
+        x.iter().zip(smooth).map(|(x, s)| x - s).collect()
+    };
+    let mut power = without(values);
+    let mut rest = vec![0.0; values.len()];
+    for (k, by) in ROOT.into_iter().enumerate() {
+        if k > 0 {
+            power = without(&without(&power));
+        }
+        rest.iter_mut().zip(&power).for_each(|(r, p)| *r += by * p);
+    }
+    rest
+}
+
 /// Means over `half` samples to either side, fewer at the ends.
 fn means(values: &[f64], half: usize) -> Vec<f64> {
     let mut sum = 0.0;
@@ -168,6 +189,17 @@ mod tests {
         );
         let ratio = rms(&fast_made) / rms(&fast_read);
         assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+        // Both parts together have the noise of either, at whatever pace.
+        let [read, made] = [&record, &again].map(|r| {
+            let x = &r.channel("gyro_x").unwrap().values;
+            [1, 2, 4, 8, 16].map(|half| {
+                let smooth = means(x, half);
+                rms(&x.iter().zip(smooth).map(|(x, s)| x - s).collect::<Vec<_>>())
+            })
+        });
+        for (read, made) in read.into_iter().zip(made) {
+            assert!((made / read - 1.0).abs() < 0.03, "{read} {made}");
+        }
         // Where one part passes into the other, and there alone, some of what was read stays.
         let product: f64 = fast_read.iter().zip(&fast_made).map(|(a, b)| a * b).sum();
         let shared = product / 12_000.0 / rms(&fast_read) / rms(&fast_made);

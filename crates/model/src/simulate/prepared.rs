@@ -10,7 +10,7 @@ use super::unnamed::{Generic, Random, too_correlated};
 use super::{COUNT_LIMIT, STEPLESS_DPS, SimulateError, Simulation, Stretch, axis_of};
 use crate::effect::{Effect, Parameters, Stage};
 use crate::effects::effect;
-use crate::excitation::{World, slow};
+use crate::excitation::{World, fast};
 use crate::file::ModelFile;
 use crate::record::flag;
 
@@ -69,7 +69,7 @@ pub(super) struct Prepared {
     /// What has no name.
     unnamed: Generic,
     /// Slow part of the axes that moved, deg/s.
-    read: [Option<Vec<f64>>; 3],
+    pub(super) read: [Option<Vec<f64>>; 3],
     /// Seed, where each effect and each axis has random numbers of its own.
     pub apart: Option<u64>,
 }
@@ -267,7 +267,11 @@ impl Prepared {
 
     fn count(&mut self, axis: usize) {
         let run = &mut self.run;
-        let scale = run.scale[axis];
+        // Where the motion is the one that was read, it is in there.
+        let scale = match self.read[axis] {
+            Some(_) => 0.0,
+            None => run.scale[axis],
+        };
         for ((rate, moves), white) in run.rate[axis]
             .iter_mut()
             .zip(&run.motion[axis])
@@ -278,11 +282,12 @@ impl Prepared {
         if let Some(read) = &self.read[axis] {
             for stretch in &run.stretches {
                 let samples = stretch.samples.clone();
-                let own = slow(&run.rate[axis][samples.clone()], run.rate_hz);
-                let moved = run.rate[axis][samples.clone()]
-                    .iter_mut()
-                    .zip(own.iter().zip(&read[samples]));
-                moved.for_each(|(w, (own, read))| *w += read - own);
+                let own = fast(&run.rate[axis][samples.clone()], run.rate_hz);
+                let moved = run.rate[axis][samples.clone()].iter_mut();
+                let parts = own.iter().zip(&read[samples]);
+                moved
+                    .zip(parts)
+                    .for_each(|(w, (own, read))| *w = read + own);
             }
         }
         let (unit, limit) = self.steps[axis];

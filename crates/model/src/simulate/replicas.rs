@@ -7,6 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::prepared::Prepared;
 use super::{SimulateError, world_of};
+use crate::excitation::slow;
 use crate::file::ModelFile;
 use crate::record::Record;
 
@@ -74,6 +75,19 @@ impl Replicas {
     pub fn apart(mut self) -> Self {
         self.prepared.apart = Some(0);
         self
+    }
+
+    /// Whether the slow part of a channel of the model, by its place, is the record's own: its base moved.
+    #[must_use]
+    pub fn replays(&self, channel: usize) -> bool {
+        let axis = self.axes.get(channel);
+        axis.is_some_and(|axis| self.prepared.read[*axis].is_some())
+    }
+
+    /// Takes the slow part off readings, one stretch of them: what is left of a replayed channel is what is new in it.
+    pub fn without_replayed(&self, readings: &mut [f64]) {
+        let replayed = slow(readings, self.prepared.run.rate_hz);
+        readings.iter_mut().zip(replayed).for_each(|(v, s)| *v -= s);
     }
 
     /// Simulates once more, and puts the readings of each channel of the model into `readings`, in its order.
