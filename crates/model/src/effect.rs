@@ -265,6 +265,10 @@ pub trait Covariance: Send + Sync {
     fn filters_white(&self) -> bool {
         false
     }
+    /// Whether its noise is Gaussian; else its own simulation says what its distribution is.
+    fn is_normal(&self) -> bool {
+        true
+    }
     /// Parameters that say which of the effect's processes it is.
     fn fixed(&self) -> Vec<(&'static str, f64, &'static str)> {
         vec![]
@@ -282,6 +286,10 @@ pub trait Covariance: Send + Sync {
     /// there: of a term that stands at one frequency, which has to be sought in the data.
     fn about(&self, _peak: &Peak) -> Option<(Arc<dyn Covariance>, Vec<f64>)> {
         None
+    }
+    /// Other shapes of such a term at the same place, with the same coordinates.
+    fn variants(&self) -> Vec<Arc<dyn Covariance>> {
+        vec![]
     }
     /// Whether it is such a term.
     fn is_peak(&self) -> bool {

@@ -1,6 +1,8 @@
 //! What the numbers of a model file may be. A file is written by people and programs, and read where a motor turns: what no
 //! stand has is refused before anything acts on it.
 
+use crate::unnamed::{EXCESS_KURTOSIS_LIMITS, SKEWNESS_LIMITS};
+
 /// Least and greatest value, both included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Range {
@@ -33,8 +35,9 @@ pub(crate) const STEP: Range = range(1e-100, LARGEST);
 /// Of the correlation of two axes, each of which has noise of its own.
 pub(crate) const CORRELATION: Range = range(-0.999, 0.999);
 /// Of moments of a distribution that a noise may have ([`crate::simulate`] has one for each of these).
-pub(crate) const SKEWNESS: Range = range(-3.0, 3.0);
-pub(crate) const EXCESS_KURTOSIS: Range = range(-0.7, 100.0);
+pub(crate) const SKEWNESS: Range = range(SKEWNESS_LIMITS[0], SKEWNESS_LIMITS[1]);
+pub(crate) const EXCESS_KURTOSIS: Range =
+    range(EXCESS_KURTOSIS_LIMITS[0], EXCESS_KURTOSIS_LIMITS[1]);
 /// Of a sample rate, Hz, and of a time, s, that divides.
 pub(crate) const POSITIVE: Range = range(SHORTEST, LONGEST);
 
@@ -82,7 +85,7 @@ pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
         ("bit" | "missing_bits", _) => whole(0.0, HIGHEST_BIT),
         ("value" | "by_magnitude" | "triangular" | "silent", _) => whole(0.0, 1.0),
         ("fraction" | "upward", _) => range(0.0, 1.0),
-        ("lag1_correlation", _) => range(-1.0, 1.0),
+        ("lag1_correlation" | "skew", _) => range(-1.0, 1.0),
         ("variance_increase" | "variance_increase_at_full_duty", _) => range(-1.0, LARGEST),
         ("dwell_time", _) => range(1.0 / (SWITCHES_A_SAMPLE * rate_hz), LONGEST),
         ("time_constant" | "correlation_time" | "surge_time", _) => POSITIVE,

@@ -13,6 +13,11 @@
 use crate::parameter::Parameter;
 use crate::range::{self, Range};
 
+/// Least and greatest skewness that a simulation has a distribution for.
+pub const SKEWNESS_LIMITS: [f64; 2] = [-3.0, 3.0];
+/// The same of the excess kurtosis.
+pub const EXCESS_KURTOSIS_LIMITS: [f64; 2] = [-0.7, 100.0];
+
 /// Knots or bumps of one term: no fit asks for more.
 pub(crate) const MOST_KNOTS: usize = 10_000;
 

@@ -86,12 +86,11 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<Outcome> {
                 ]
             } else {
                 [
-                    CheckId::ProcessSpectrum,
-                    CheckId::ProcessLaw,
-                    CheckId::ProcessSteadiness,
-                    CheckId::ProcessSize,
+                    Some(CheckId::ProcessSpectrum),
+                    Some(CheckId::ProcessLaw).filter(|_| term.is_normal()),
+                    Some(CheckId::ProcessSteadiness),
+                    Some(CheckId::ProcessSize),
                 ]
-                .map(Some)
             },
             least: term.cluster.map_or(0.0, |c| LEFT * c.lr),
             more: if term.is_band() { MORE } else { 1.0 },

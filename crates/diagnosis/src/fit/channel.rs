@@ -143,6 +143,11 @@ impl Term {
         matches!(self.form, Form::Covariance(..))
     }
 
+    /// Whether the noise that it is, if it is one, is Gaussian.
+    pub(crate) fn is_normal(&self) -> bool {
+        !matches!(&self.form, Form::Covariance(c, _) if !c.is_normal())
+    }
+
     pub(crate) fn has_no_name(&self) -> bool {
         self.effect.id() == ID
     }
@@ -189,6 +194,11 @@ pub struct State {
 }
 
 impl State {
+    /// Whether all of its noise is Gaussian.
+    pub(crate) fn is_normal(&self) -> bool {
+        self.terms.iter().all(Term::is_normal)
+    }
+
     /// All columns in use, term by term.
     #[must_use]
     pub fn columns(&self) -> Vec<usize> {

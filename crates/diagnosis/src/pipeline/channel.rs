@@ -135,6 +135,9 @@ fn estimate_over_time(s: &mut Searched<'_>, grid: &Grid) {
     }
 }
 
+/// Checks of a normal distribution. Of a noise that has another one by its name, the replicates say whether it is that.
+const OF_NORMAL: [CheckId; 2] = [CheckId::Kurtosis, CheckId::Neighbours];
+
 /// All checks of a channel, those of the residual `before` the extension beside those after it.
 fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
     let after = if s.state.terms.is_empty() && s.variance.is_none() {
@@ -142,6 +145,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
     } else {
         residual::all(&s.u, &s.e, s.search.view.rate_hz, s.step())
     };
+    let normal = s.state.is_normal();
     let rhythm = after
         .iter()
         .find(|c| c.id == CheckId::VarianceRhythm)
@@ -158,7 +162,10 @@ fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
             threshold: OMNIBUS_LEVEL,
             fails_before: b.p_value < OMNIBUS_LEVEL,
             // A base that moves is told as an input; what it leaves in the residual is no riddle.
-            fails_after: a.p_value < OMNIBUS_LEVEL && !s.target.moving && !s.search.view.sways(),
+            fails_after: a.p_value < OMNIBUS_LEVEL
+                && !s.target.moving
+                && !s.search.view.sways()
+                && (normal || !OF_NORMAL.contains(&a.id)),
             what: if a.p_value < OMNIBUS_LEVEL {
                 a.what
             } else {

@@ -201,6 +201,15 @@ const TIMES: usize = 8;
 /// noise and level `channel` has come of, by simulations with them and without, of the same random numbers. What the audit
 /// took out, a part `lost` of the readings, was not fitted.
 fn before_counts(channel: &mut ChannelModel, effects: &[EffectModel], rate_hz: f64, lost: f64) {
+    // Bits that are cut off take half of the coarse step, less that of the fine one.
+    let own = effects
+        .iter()
+        .filter(|e| e.channels.contains(&channel.name));
+    let coarser = own.filter_map(|e| Some(effect(&e.cause)?.coarsens(&e.parameters)));
+    let cut = 0.5 * (coarser.product::<f64>() - 1.0) * channel.lsb.unwrap_or(0.0);
+    if let Some(bias) = channel.baseline.get_mut("bias") {
+        bias.value += cut;
+    }
     let faults = effects.iter().filter(|e| {
         let on_counts = |known: &&dyn Effect| {
             known.stage() == Stage::Counts && known.coarsens(&e.parameters) == 1.0

@@ -106,11 +106,15 @@ impl<'a> White<'a> {
         let own = 1.0 - (step * step / (12.0 * white)).min(0.9);
         let rounding = step.powi(4) / (120.0 * white * white);
         let third = told(0, third) / (of_third * own.powf(1.5));
+        let [least, most] = model::unnamed::SKEWNESS_LIMITS;
+        let third = third.clamp(least, most);
         let fourth = told(1, fourth);
         let fourth = if fourth == 0.0 {
             0.0
         } else {
-            (fourth / of_fourth + rounding) / (own * own)
+            let of_white = (fourth / of_fourth + rounding) / (own * own);
+            let [least, most] = model::unnamed::EXCESS_KURTOSIS_LIMITS;
+            of_white.clamp(least, most)
         };
         Some([third, fourth])
     }

@@ -116,6 +116,11 @@ impl Covariance for Difference {
         1
     }
 
+    /// Errors of rounding are uniform.
+    fn is_normal(&self) -> bool {
+        false
+    }
+
     fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
         let size = theta[0].exp();
         at.cosine.iter().map(|c| size * (1.0 - c)).collect()
