@@ -234,13 +234,37 @@ pub(crate) fn of_bands(
     }
 }
 
+/// How far the coordinates of a term of the noise scatter over its variants, each as likely as the record makes it: a shape that
+/// the record does not tell is part of their error. Nothing of a term without variants.
+fn over_variants(panel: &Panel, state: &State, place: usize) -> Vec<f64> {
+    let Some((own, theta)) = state.noise.terms.get(place) else {
+        return vec![];
+    };
+    let mut weight = 1.0;
+    let mut squares = vec![0.0; theta.len()];
+    for variant in own.variants() {
+        let mut noise = state.noise.clone();
+        noise.terms[place].0 = variant;
+        let (noise, solution) = panel.fit(&noise, &state.columns());
+        let w = (solution.log_likelihood - state.solution.log_likelihood).exp();
+        if !w.is_finite() {
+            continue;
+        }
+        weight += w;
+        let off = noise.terms[place].1.iter().zip(theta);
+        let sums = squares.iter_mut().zip(off);
+        sums.for_each(|(sum, (v, own))| *sum += w * (v - own).powi(2));
+    }
+    squares.iter().map(|s| (s / weight).sqrt()).collect()
+}
+
 /// What was found for each term of a state.
 #[must_use]
 pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Found> {
     let beta = coefficients(panel, state);
     let errors = noise_errors(panel, state);
     let n = panel.bins.n as f64;
-    let (mut column, mut coordinate) = (0, 1);
+    let (mut column, mut coordinate, mut place) = (0, 1, 0);
     let g = |omega: f64| state.noise.at(omega);
     state
         .terms
@@ -294,9 +318,15 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
                 Form::Covariance(c, theta) => {
                     let wider = t.wider.iter().copied().chain(std::iter::repeat(1.0));
                     let own = theta.iter().zip(&errors[coordinate..]).zip(wider);
-                    let own: Vec<(f64, f64)> = own.map(|((v, e), by)| (*v, e * by)).collect();
+                    let mut own: Vec<(f64, f64)> = own.map(|((v, e), by)| (*v, e * by)).collect();
+                    if t.wider.is_empty() {
+                        let scatter = over_variants(panel, state, place);
+                        let both = own.iter_mut().zip(scatter);
+                        both.for_each(|((_, error), by)| *error = error.hypot(by));
+                    }
                     found.coefficients = c.described(&own);
                     coordinate += theta.len();
+                    place += 1;
                 }
             }
             if let Some(stated) = &t.stated {

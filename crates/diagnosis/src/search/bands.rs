@@ -17,6 +17,9 @@ use crate::fit::likelihood::{Bins, Noise};
 use crate::fit::scan::residual;
 use crate::fit::threshold;
 
+/// Nats by which another shape of a peak has to be ahead of the plain one: 95 % of a plain one's shapes are not, by the chi-square
+/// of the one degree that they differ by.
+const LIKELIER: f64 = 1.92;
 /// Most bands on one channel: a band that is no Lorentzian takes several.
 const MOST_BANDS: usize = 3;
 /// Least half width of a band that is fitted, in bins of the likelihood: over one of these a Lorentzian is its middle to an eighth.
@@ -177,6 +180,13 @@ impl Search<'_> {
         let best = most(&|_| true)?;
         let broader = most(&|w| w.width() >= BROADER * best.width());
         let spacing = PI / n as f64;
+        let fitted = |of: Arc<dyn Covariance>, from: Vec<f64>| {
+            let mut noise = state.noise.clone();
+            noise.terms.push((Arc::clone(&of), from));
+            let (noise, solution) = self.panel.fit(&noise, &own);
+            let theta = noise.terms.last().map(|t| t.1.clone())?;
+            Some((of, theta, solution.log_likelihood))
+        };
         let fits = [Some(best), broader].into_iter().flatten().filter_map(|w| {
             let (middle, half) = w.peak();
             // The likelihood does not see what is narrower than its bins.
@@ -188,13 +198,14 @@ impl Search<'_> {
                 half_width: half * spacing,
                 variance: (w.energy - 1.0) * level * w.width() / n as f64 / held,
             })?;
-            let mut noise = state.noise.clone();
-            noise.terms.push((Arc::clone(&located), theta));
-            let (noise, solution) = self.panel.fit(&noise, &own);
-            let theta = noise.terms.last().map(|t| t.1.clone())?;
-            Some((located, theta, solution.log_likelihood))
+            fitted(located, theta)
         });
-        let (located, theta, l) = fits.max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let plain = fits.max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let variants = plain.0.variants().into_iter();
+        let variants = variants.filter_map(|v| fitted(v, plain.1.clone()));
+        let other = variants.max_by(|a, b| a.2.total_cmp(&b.2));
+        let clearly = other.filter(|o| o.2 > plain.2 + LIKELIER);
+        let (located, theta, l) = clearly.unwrap_or(plain);
         let form = Form::Covariance(located, theta);
         let limit = threshold::peak(n);
         let mut term = Term::new(self.candidates[i].effect, i, form, limit);

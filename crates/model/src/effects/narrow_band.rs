@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::effect::{
     Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
-    Peak, Plot, Rival, Stage, View, parameter, value,
+    Peak, Plot, Rival, Stage, View, optional, parameter, value,
 };
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
@@ -40,6 +40,11 @@ impl Effect for NarrowBand {
                 "Hz",
                 "full width of its spectrum at half power",
             ),
+            optional(
+                "skew",
+                "1",
+                "1 where the rate is what a driven mode is displaced by, -1 where it is its velocity; 0, left out, is a Lorentzian peak, as high on either side",
+            ),
         ];
         PARAMETERS
     }
@@ -47,9 +52,9 @@ impl Effect for NarrowBand {
     fn docs(&self) -> Docs {
         Docs {
             title: "Narrow band",
-            physics: "Autocorrelation rms^2 exp(-pi bandwidth |t|) cos(2 pi center_frequency t), a Lorentzian peak of the spectrum: a mode of the structure or of the sensor that noise drives (a fan, a shaking floor, a bearing); its quality factor is center_frequency / bandwidth.",
+            physics: "A mode of the structure or of the sensor that noise drives (a fan, a shaking floor, a bearing): autocorrelation rms^2 exp(-d |t|) (cos w t + skew (d / w) sin w |t|) with w = 2 pi center_frequency and d = pi bandwidth; its quality factor is center_frequency / bandwidth. By its displacement (skew 1) the slow side of the peak is higher, by its velocity (-1) the fast side; of a narrow one no record tells.",
             excitation: "Nothing; some ten times 1 / bandwidth.",
-            test: "Energy of the whitened residual over all centres and widths, then all noise refitted by maximum likelihood; the envelope tells it from a tone whose pitch wanders.",
+            test: "Energy of the whitened residual over all centres and widths, then all noise refitted by maximum likelihood, with the skew that is clearly likelier; the envelope tells it from a tone whose pitch wanders.",
             remedy: "Stiffen or damp the mode at this frequency, or filter the band; until then simulate it as a second-order process.",
             figure: "Spectrum of the rate with the model before and after: a peak that is wider than a line.",
             example: Example::new(
@@ -85,6 +90,7 @@ impl Effect for NarrowBand {
         Ok(vec![Hypothesis::Covariance(Arc::new(Mode {
             omega: FRAC_PI_4,
             half_width: FRAC_PI_4 / 20.0,
+            skew: 0.0,
         }))])
     }
 
@@ -96,7 +102,9 @@ impl Effect for NarrowBand {
         let rms = found.white_sigma * (a / 2.0).exp();
         let hz = found.rate_hz / TAU;
         let width = 2.0 * half.exp() * hz;
-        [
+        let fixed = found.fixed.iter();
+        let fixed = fixed.map(|f| (f.0.to_owned(), Parameter::exact(f.1, f.2)));
+        let sizes = [
             (
                 "rms".to_owned(),
                 Parameter::estimated(rms, rms * a_error / 2.0, &found.unit),
@@ -109,8 +117,8 @@ impl Effect for NarrowBand {
                 "bandwidth".to_owned(),
                 Parameter::estimated(width, width * half_error, "Hz"),
             ),
-        ]
-        .into()
+        ];
+        fixed.chain(sizes).collect()
     }
 
     fn stage(&self) -> Stage {
@@ -122,9 +130,17 @@ impl Effect for NarrowBand {
             value(parameters, "rms"),
             value(parameters, "center_frequency"),
         );
-        let width = value(parameters, "bandwidth");
+        let (width, skew) = (value(parameters, "bandwidth"), value(parameters, "skew"));
         for &axis in channels {
-            simulation.add_mode(axis, rms, centre, width);
+            if skew == 0.0 {
+                simulation.add_mode(axis, rms, centre, width);
+            } else {
+                simulation.add_resonator(
+                    axis,
+                    rms,
+                    &Resonator::new(centre, width, skew, simulation.rate_hz),
+                );
+            }
         }
     }
 }
@@ -134,6 +150,8 @@ impl Effect for NarrowBand {
 struct Mode {
     omega: f64,
     half_width: f64,
+    /// Of the sine in the autocovariance, in units of that of the mode's displacement.
+    skew: f64,
 }
 
 /// Widest band over its centre: what is wider is no narrow one.
@@ -143,6 +161,11 @@ const NARROWEST: f64 = 1.5;
 /// How many times narrower than where it was seen a band may be: a likelihood over bins that resolve the one does not see much
 /// less.
 const FINER: f64 = 4.0;
+
+/// The part of the sine in the autocovariance of a mode, per sample: that of its displacement is decay over frequency.
+fn sine_part(skew: f64, decay: f64, turn: f64) -> f64 {
+    skew * decay / turn
+}
 
 impl Mode {
     fn place(&self, theta: &[f64]) -> (f64, f64) {
@@ -158,18 +181,30 @@ impl Covariance for Mode {
         3
     }
 
-    /// The autocovariance v p^|k| cos(omega k), sampled: half a one-pole density either side of its centre.
+    fn fixed(&self) -> Vec<(&'static str, f64, &'static str)> {
+        if self.skew == 0.0 {
+            return vec![];
+        }
+        vec![("skew", self.skew, "1")]
+    }
+
+    /// The autocovariance v p^|k| (cos(omega k) + s sin(omega |k|)), sampled: half a one-pole density either side of its
+    /// centre, and what the sine leans them by.
     fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
         let (omega, half) = self.place(theta);
         let (p, lost) = ((-half).exp(), -(-half).exp_m1());
         let (top, least) = (theta[0].exp() * lost * (1.0 + p), lost * lost);
         let middle = omega.cos();
+        let s = sine_part(self.skew, half, omega);
+        let leaning = 2.0 * theta[0].exp() * s * p * omega.sin();
         at.cosine
             .iter()
             .map(|c| {
                 // Of a = 1 - cos(w - omega) and b = 1 - cos(w + omega): their sum and their product.
                 let (sum, product) = (2.0 - 2.0 * c * middle, (c - middle).powi(2));
-                top * (least + p * sum) / (least * (least + 2.0 * p * sum) + 4.0 * p * p * product)
+                let over = least * (least + 2.0 * p * sum) + 4.0 * p * p * product;
+                let lean = least * c + 2.0 * p * (c - middle);
+                (top * (least + p * sum) + leaning * lean) / over
             })
             .collect()
     }
@@ -195,10 +230,19 @@ impl Covariance for Mode {
             half_width,
             variance,
         } = *peak;
-        Some((
-            Arc::new(Self { omega, half_width }),
-            vec![variance.ln(), 0.0, 0.0],
-        ))
+        let mode = Self {
+            omega,
+            half_width,
+            skew: self.skew,
+        };
+        Some((Arc::new(mode), vec![variance.ln(), 0.0, 0.0]))
+    }
+
+    fn variants(&self) -> Vec<Arc<dyn Covariance>> {
+        let all = [-1.0, 0.0, 1.0].into_iter();
+        let others = all.filter(|skew| *skew != self.skew);
+        let variant = |skew| Arc::new(Self { skew, ..*self }) as Arc<dyn Covariance>;
+        others.map(variant).collect()
     }
 
     fn is_peak(&self) -> bool {
@@ -230,6 +274,64 @@ impl Covariance for Mode {
     }
 }
 
+/// A sampled mode of autocovariance rms^2 p^|k| (cos(w k) + s sin(w |k|)), as the one process of two poles and a zero that has
+/// it: y(k) = 2 p cos(w) y(k - 1) - p^2 y(k - 2) + e(k) + zero e(k - 1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Resonator {
+    /// Factors of the two readings before.
+    before: [f64; 2],
+    zero: f64,
+    /// Standard deviation of e in units of the rms.
+    driven: f64,
+    /// Correlation of neighbours.
+    neighbours: f64,
+}
+
+impl Resonator {
+    /// Of centre and full width at half power, Hz, at a sample rate.
+    pub(crate) fn new(center: f64, width: f64, skew: f64, rate_hz: f64) -> Self {
+        let (decay, turn) = (PI * width / rate_hz, TAU * center / rate_hz);
+        let p = (-decay).exp();
+        let (sin, cos) = turn.sin_cos();
+        let s = sine_part(skew, decay, turn);
+        // (1 + zero^2 + 2 zero cos w) driven^2 is the numerator of the density, a + b cos w.
+        let a = (1.0 - p * p) * (1.0 + p * p) - 4.0 * s * p * p * cos * sin;
+        let b = 2.0 * p * (s * sin * (1.0 + p * p) - cos * (1.0 - p * p));
+        let zero = b / (a + (a * a - b * b).max(0.0).sqrt());
+        Self {
+            before: [2.0 * p * cos, -p * p],
+            zero,
+            driven: (a / (1.0 + zero * zero)).max(0.0).sqrt(),
+            neighbours: p * (cos + s * sin),
+        }
+    }
+}
+
+impl Simulation {
+    /// Adds to the rate of an axis a mode of that standard deviation, deg/s, in its stationary state. Where a stretch is left
+    /// out it begins anew.
+    fn add_resonator(&mut self, axis: usize, size: f64, of: &Resonator) {
+        let mut rates = std::mem::take(&mut self.rate[axis]);
+        for k in 0..self.stretches.len() {
+            // The two readings before and what drove the last one, which is all of it that the one before does not hold.
+            let (older, driven) = (self.normal(), of.driven * self.normal());
+            let rest = 1.0 - of.neighbours.powi(2) - of.driven.powi(2);
+            let last = of.neighbours * older + driven + rest.max(0.0).sqrt() * self.normal();
+            let (mut y, mut e) = ([last, older], driven);
+            for rate in &mut rates[self.stretches[k].samples.clone()] {
+                *rate += size * y[0];
+                let next = of.driven * self.normal();
+                y = [
+                    of.before[0] * y[0] + of.before[1] * y[1] + next + of.zero * e,
+                    y[0],
+                ];
+                e = next;
+            }
+        }
+        self.rate[axis] = rates;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -239,6 +341,7 @@ mod tests {
         let mode = Mode {
             omega: 0.8,
             half_width: 0.05,
+            skew: 0.0,
         };
         let theta = [0.7, 0.3, -0.2];
         let (omega, half) = mode.place(&theta);
@@ -247,14 +350,37 @@ mod tests {
             cosine: frequencies.iter().map(|w| w.cos()).collect(),
             omega: frequencies.clone(),
         };
-        for (w, d) in frequencies.iter().zip(mode.density(&theta, &at)) {
-            let lag = |k: i32| {
-                (-half * f64::from(k)).exp()
-                    * (omega * f64::from(k)).cos()
-                    * (w * f64::from(k)).cos()
+        for skew in [-1.0, 0.0, 1.0] {
+            let mode = Mode { skew, ..mode };
+            for (w, d) in frequencies.iter().zip(mode.density(&theta, &at)) {
+                let lag = |k: i32| {
+                    let (sin, cos) = (omega * f64::from(k)).sin_cos();
+                    (-half * f64::from(k)).exp()
+                        * (cos + skew * half / omega * sin)
+                        * (w * f64::from(k)).cos()
+                };
+                let sum = 1.0 + 2.0 * (1..2000).map(lag).sum::<f64>();
+                assert!((d / (0.7f64.exp() * sum) - 1.0).abs() < 1e-9, "{w} {skew}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_resonator_has_its_autocovariance() {
+        for (center, width, skew) in [(1.2, 0.8, 1.0), (3.0, 1.0, -1.0), (7.5, 0.4, 1.0)] {
+            let of = Resonator::new(center, width, skew, 20.0);
+            let (decay, turn) = (PI * width / 20.0, TAU * center / 20.0);
+            let lag = |k: f64| {
+                (-decay * k).exp() * ((turn * k).cos() + skew * decay / turn * (turn * k).sin())
             };
-            let sum = 1.0 + 2.0 * (1..2000).map(lag).sum::<f64>();
-            assert!((d / (0.7f64.exp() * sum) - 1.0).abs() < 1e-9, "{w}");
+            assert!((of.neighbours - lag(1.0)).abs() < 1e-12);
+            // Yule and Walker: r(0) and r(1) by what drives it, further ones by the poles.
+            let q = of.driven.powi(2);
+            let [a, b] = of.before;
+            let own = a * lag(1.0) + b * lag(2.0) + q * (1.0 + of.zero * (a + of.zero));
+            assert!((own - 1.0).abs() < 1e-9, "{own}");
+            assert!((a * lag(0.0) + b * lag(1.0) + of.zero * q - lag(1.0)).abs() < 1e-9);
+            assert!((a * lag(1.0) + b * lag(0.0) - lag(2.0)).abs() < 1e-9);
         }
     }
 
@@ -263,6 +389,7 @@ mod tests {
         let mode = Mode {
             omega: 0.8,
             half_width: 0.05,
+            skew: 0.0,
         };
         let told = mode.described(&[(0.7, 0.1), (2.0, 0.5), (0.1, 0.2)]);
         assert_eq!(told[0], (0.7, 0.1));
