@@ -6,13 +6,16 @@ use std::process::Command;
 use crate::step::{Crates, Failure, Pace, Silent, run, watched};
 use crate::{cargo, toolchain};
 
-/// What builds the wheel and what its tests need; allantools is what deviations are compared with, so it is fixed.
+/// What builds the wheel and what its tests need; allantools is what deviations are compared with, so it is fixed. Dask maps
+/// over the captures of a fleet.
 const PACKAGES: &[&str] = &[
     "maturin>=1.9,<2",
     "numpy",
     "pandas",
     "pytest",
     "allantools==2024.6",
+    "dask[dataframe]",
+    "distributed",
 ];
 
 /// What Debian and Ubuntu call Python and its virtual environments.
@@ -135,7 +138,10 @@ fn environment(root: &Path) -> Result<PathBuf, Failure> {
         import.args(["-c", &format!("import {module}")]);
         import.output().is_ok_and(|output| output.status.success())
     };
-    if !has(&python, "maturin, numpy, pandas, pytest, allantools") {
+    if !has(
+        &python,
+        "maturin, numpy, pandas, pytest, allantools, dask.dataframe, distributed",
+    ) {
         // Debian's python3 has no ensurepip without python3-venv.
         if !has(Path::new("python3"), "venv, ensurepip") {
             toolchain::install("Python, for the wheel", DEBIAN)?;
