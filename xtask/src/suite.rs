@@ -20,7 +20,6 @@ const ALONE: &[&str] = &["wire", "adis16250", "mma7260qt"];
 /// Test programs of a minute or two that the everyday check runs as well. They are started first of all, so that none is left
 /// for the end, when one core would wait for it.
 const FIRST: &[&str] = &[
-    "campaign campaign",
     "diagnosis diagnosis",
     "noise noise",
     "imu-stand capture",
@@ -31,6 +30,7 @@ const FIRST: &[&str] = &[
 /// are started next, and the everyday check leaves them out.
 const LONG: &[&str] = &[
     "campaign sample",
+    "campaign campaign",
     "imu-stand hidden_effect",
     "hil-tests hidden",
     "diagnosis closed_loop",
@@ -45,6 +45,12 @@ const LONG: &[&str] = &[
     "diagnosis events",
     "diagnosis couplings",
     "diagnosis kin",
+    "diagnosis audit",
+    "imu-stand plan",
+    "imu-stand tutorial",
+    "imu-stand correct",
+    "hil-tests corrected",
+    "noise analyze",
 ];
 
 /// How much is run.
