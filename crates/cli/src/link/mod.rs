@@ -3,6 +3,7 @@
 mod error;
 mod feed;
 mod heard;
+mod motor;
 mod port;
 
 use std::collections::VecDeque;
@@ -17,6 +18,7 @@ use wire::{
 pub use error::{LinkError, name, words};
 pub use feed::{Change, Feed};
 pub use heard::Heard;
+pub use motor::{KEEP_ALIVE, Motor};
 pub use port::Port;
 use port::Serial;
 
@@ -102,7 +104,10 @@ pub struct Link {
     stats: LinkStats,
     bytes: u64,
     number: u16,
-    frames: VecDeque<Frame>,
+    /// Frames, and how many bytes had come by the end of each.
+    frames: VecDeque<(Frame, u64)>,
+    /// Bytes by the end of the frame that was taken last.
+    taken: u64,
     buffer: Vec<u8>,
     /// The last hello frame.
     pub hello: Option<Hello>,
@@ -142,6 +147,7 @@ impl Link {
             bytes: 0,
             number: 0,
             frames: VecDeque::new(),
+            taken: 0,
             buffer: vec![0; 4096],
             hello: None,
             health: None,
@@ -160,6 +166,7 @@ impl Link {
         let port = Serial::open(&self.name, self.baud, self.since)?;
         self.port = Some(Box::new(port));
         let _cut = self.decoder.push(0);
+        self.stats.interrupted();
         Ok(())
     }
 
@@ -221,9 +228,9 @@ impl Link {
             }
             Err(error) => return Err(self.gone(&error)),
         };
-        self.bytes += count as u64;
         let bytes = self.buffer.get(..count).unwrap_or_default();
         for &byte in bytes {
+            self.bytes += 1;
             if let Some(Ok(frame)) = self.decoder.push(byte) {
                 self.stats.push(&frame);
                 match frame {
@@ -232,7 +239,7 @@ impl Link {
                     Frame::Sample(sample) => self.sample = Some(sample),
                     Frame::Reply(_) | Frame::Corrected(_) => {}
                 }
-                self.frames.push_back(frame);
+                self.frames.push_back((frame, self.bytes));
             }
         }
         Ok(bytes)
@@ -241,7 +248,15 @@ impl Link {
     /// The next frame that was read.
     #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> Option<Frame> {
-        self.frames.pop_front()
+        let (frame, end) = self.frames.pop_front()?;
+        self.taken = end;
+        Some(frame)
+    }
+
+    /// How many bytes had come by the end of the frame that [`next`](Self::next) gave last.
+    #[must_use]
+    pub fn taken(&self) -> u64 {
+        self.taken
     }
 
     fn gone(&self, error: &std::io::Error) -> LinkError {
