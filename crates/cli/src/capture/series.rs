@@ -5,7 +5,7 @@
 
 use std::cmp::Ordering;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Chain, Cursor, Read};
+use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use super::ends::{START, number_of, value_of};
@@ -183,7 +183,7 @@ pub fn joined(folder: &Path) -> Result<(impl BufRead + use<>, Vec<PathBuf>), Cap
 struct Joined {
     paths: std::vec::IntoIter<PathBuf>,
     is_first: bool,
-    text: Option<Chain<Cursor<Vec<u8>>, Box<dyn BufRead>>>,
+    text: Option<Box<dyn BufRead>>,
 }
 
 impl Read for Joined {
@@ -210,7 +210,7 @@ impl Read for Joined {
                 // A part that was cut off in its last row ends without its line's end.
                 head = vec![b'\n'];
             }
-            self.text = Some(Cursor::new(head).chain(text));
+            self.text = Some(Box::new(Cursor::new(head).chain(text)));
         }
     }
 }
