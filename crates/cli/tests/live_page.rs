@@ -207,6 +207,7 @@ const motor = () => Number((part('figures').textContent.match(/motor (-?\d+)/) |
   seen.figures = part('figures').textContent;
   seen.rows = part('rows').innerText;
   seen.curves = [...document.querySelectorAll('#allan path:not(.grid)')].length;
+  seen.filled = [...document.querySelectorAll('svg path:not(.band)')].filter((p) => getComputedStyle(p).fill !== 'none').length;
   seen.rates = [...document.querySelectorAll('#rates path:not(.grid)')].length;
   seen.wide = document.documentElement.scrollWidth - document.documentElement.clientWidth;
   part('motor').click();
@@ -341,6 +342,7 @@ fn the_page_shows_what_is_measured_and_turns_the_motor_after_a_question() {
         (&Value::from(6), &Value::from(3)),
         "{seen}"
     );
+    assert_eq!(seen["filled"], 0, "a curve is a line: {seen}");
     assert!(seen["wide"].as_i64().unwrap() <= 0, "{seen}");
     assert!(
         text("question").contains("Turn the motor at 60 of 255?"),

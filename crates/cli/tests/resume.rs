@@ -309,6 +309,44 @@ fn a_full_disk_loses_nothing() {
     });
 }
 
+#[test]
+fn a_file_that_began_as_the_board_was_set_anew_is_healed_from_its_own_raw_bytes() {
+    for (rotate, second, raw) in [
+        (&[][..], "run-2.csv", "run.raw"),
+        (&["--rotate", "7d"][..], "run-0002.csv", "run-0002.raw"),
+    ] {
+        let board = Board::start();
+        let folder = folder(&format!("resume_set_{}", second.len()));
+        let out = folder.join("run.csv");
+        let child = Running::start(capture(&board, &out, rotate));
+        let first = folder.join(if rotate.is_empty() {
+            "run.csv"
+        } else {
+            "run-0001.csv"
+        });
+        wait_until("a first file", || size(&first) > 2_000);
+        board.send_aside(wire::Command::SetRate {
+            period_ticks: 6_250,
+            periods_per_sample: 1,
+        });
+        board.send_aside(wire::Command::GetHello);
+        let (second, raw) = (folder.join(second), folder.join(raw));
+        wait_until("a second file", || size(&second) > 4_000);
+        child.kill();
+        tear_rows(&second, 20);
+        let more = [&["--resume", "--seconds", "2"], rotate].concat();
+        assert_success(&Running::start(capture(&board, &out, &more)).output());
+        let record = record(&second);
+        assert_eq!(record.header.rate_hz, Some(40.0));
+        // Its rows are the raw bytes' samples from its first one on.
+        let all = samples(&fs::read(&raw).unwrap());
+        let from = all.len() - record.len();
+        assert_holds(&record, &all[from..]);
+        assert_eq!(from == 0, !rotate.is_empty(), "{from}");
+        assert!(holes(&record).len() <= 1);
+    }
+}
+
 /// The files of a rotated capture.
 fn parts(folder: &Path, ending: &str) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder)

@@ -19,8 +19,10 @@ use super::{Calibration, CaptureError, RecordBuilder};
 const NEAR_THE_END: u64 = 1 << 24;
 
 /// What was put in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Healed {
+    /// Where the capture's raw bytes are.
+    pub raw: PathBuf,
     /// Rows.
     pub rows: u64,
     /// Sample instants between them that have none.
@@ -59,6 +61,7 @@ pub fn heal(path: &Path, raw: &Path) -> std::result::Result<Healed, CaptureError
     let behind = behind(&raw, from, &ends, &calibration).map_err(io(&raw))?;
     let is_sample = |frame: &Frame| matches!(frame, Frame::Sample(_));
     let mut healed = Healed {
+        raw: raw.clone(),
         found: behind.is_some(),
         ..Healed::default()
     };

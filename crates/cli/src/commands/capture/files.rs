@@ -144,6 +144,9 @@ impl Capture<'_> {
         } else {
             let (path, part) = self.next_name();
             let is_first = self.files.is_empty();
+            if self.arguments.rotate.is_some() && !is_first {
+                self.raw.next(&raw_path(&path))?;
+            }
             // Samples that have waited for the first file are in the raw bytes of this run.
             let raw_from = if is_first {
                 self.raw.began()

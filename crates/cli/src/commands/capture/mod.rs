@@ -217,6 +217,8 @@ fn first_name(arguments: &Arguments) -> PathBuf {
 struct Resumed {
     path: PathBuf,
     part: u64,
+    /// Where its raw bytes are.
+    raw: PathBuf,
     /// Rows that were put in.
     put_in: u64,
 }
@@ -243,6 +245,7 @@ fn healed(arguments: &Arguments) -> Result<Option<Resumed>> {
     Ok(Some(Resumed {
         path,
         part,
+        raw: healed.raw,
         put_in: healed.rows,
     }))
 }
@@ -257,11 +260,10 @@ fn unix_s() -> f64 {
 impl<'a> Capture<'a> {
     fn start(arguments: &'a Arguments, resumed: Option<Resumed>) -> Result<Self> {
         let raw = match &resumed {
-            // A file that began as the board was set anew has its raw bytes with those before it.
-            Some(resumed) => Some(raw_path(&resumed.path)).filter(|raw| raw.exists()),
-            None => Some(raw_path(&first_name(arguments))),
+            Some(resumed) => resumed.raw.clone(),
+            None => raw_path(&first_name(arguments)),
         };
-        let raw = Raw::open(&raw.unwrap_or_else(|| raw_path(&arguments.out)))?;
+        let raw = Raw::open(&raw)?;
         let put_in = resumed.as_ref().map_or(0, |resumed| resumed.put_in);
         Ok(Self {
             arguments,
