@@ -235,9 +235,9 @@ const motor = () => Number((part('figures').textContent.match(/motor (-?\d+)/) |
   seen.requests = performance.getEntriesByType('resource').map((r) => new URL(r.name).host).filter((h) => h !== location.host);
   const shown = document.createElement('p');
   shown.textContent = 'SAID' + JSON.stringify({ ...seen, wrong }) + 'SAID';
-  document.body.replaceChildren(shown);
   stream.close();
-  hold.contentDocument.close();
+  // With the frame that goes on loading the page has loaded.
+  document.body.replaceChildren(shown);
 })();
 </script></body>"#;
 

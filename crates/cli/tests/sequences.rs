@@ -282,6 +282,33 @@ fn a_heater_cycle_tells_the_slope_and_takes_no_curvature_that_is_none() {
         }
     }
     assert!(held >= 12, "{held} of {all}");
+    // On the board it takes off what was planted, over all temperatures that were measured and no others.
+    let mut scenario = Scenario::quiet(9);
+    (scenario.thermal.heater_c, scenario.thermal.heater_period_s) = (12.0, 900.0);
+    scenario.gyros[1].tempco_dps_c = 0.15;
+    let biased = scenario.gyros[1].turn_on_bias_dps;
+    let outcome = heater(&mut link(scenario), Heater { seconds: 900.0 }, &mut |_| {});
+    let outcome = outcome.expect("it is done");
+    let board = BoardCorrection::of(&merged(None, &outcome), 0x0402);
+    let board = board.expect("a correction").correction;
+    let [low, high] = outcome.temperatures.expect("a range");
+    for celsius in [low, (low + high) / 2.0, high] {
+        let counts = (celsius - 25.0) / 0.1453;
+        let taken_off = board.bias[1]
+            + board.temperature[1] * counts
+            + board.temperature_squared[1] * counts * counts;
+        let planted = biased + 0.15 * (celsius - 25.0);
+        assert!(
+            (taken_off + planted).abs() < 0.3,
+            "{celsius}: {taken_off} {planted}"
+        );
+    }
+    let step = 0.1453 * f64::from(wire::correction::RANGE_STEP);
+    let [from, to] = board.temp_range.map(|steps| 25.0 + f64::from(steps) * step);
+    assert!(
+        from <= low && to >= high && to - from < high - low + 8.0,
+        "{from} {to} {low} {high}"
+    );
     let cold = heater(
         &mut link(Scenario::quiet(1)),
         Heater { seconds: 60.0 },

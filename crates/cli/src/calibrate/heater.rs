@@ -134,10 +134,18 @@ fn outcome(
         refused,
         effects: Vec::new(),
         baseline: [None, None, None],
+        temperatures: None,
         rate_hz: c.rate_hz,
         lsb_dps: c.gyro_lsb_dps,
     };
     let t: Vec<f64> = points.iter().map(|p| p.t).collect();
+    // One middle for all: that of the temperatures that the correction is for.
+    let all = points.iter().flat_map(|p| p.temp);
+    let [lowest, highest] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
+        [l.min(v), h.max(v)]
+    });
+    let reference = (lowest + highest) / 2.0;
+    out.temperatures = Some([lowest, highest]);
     for (k, axis) in AXES.iter().enumerate() {
         let temp: Vec<f64> = points.iter().map(|p| p.temp[k]).collect();
         let low = temp.iter().copied().fold(f64::INFINITY, f64::min);
@@ -152,7 +160,6 @@ fn outcome(
                 help: "a stronger heater, or longer: `--seconds 1800`".to_owned(),
             });
         }
-        let reference = temp.iter().sum::<f64>() / temp.len() as f64;
         let y: Vec<f64> = points.iter().map(|p| p.gyro[k]).collect();
         let noise: Vec<f64> = points.iter().map(|p| variance[k] / p.count).collect();
         let along: Vec<f64> = temp.iter().map(|t| t - reference).collect();

@@ -401,6 +401,16 @@ fn gyro(k: usize, taken: &[Taken], acc: &Accelerometer, variance: f64) -> Option
     fit(&y, &t, &vec![variance; y.len()], &columns)
 }
 
+/// Between which temperatures it was.
+fn range_of(taken: &[Taken]) -> [f64; 2] {
+    let all = taken
+        .iter()
+        .flat_map(|t| t.blocks.iter().flat_map(|b| b.temp));
+    all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+        [low.min(v), high.max(v)]
+    })
+}
+
 fn outcome(taken: &[Taken], c: &Calibration, refused: Vec<String>) -> Outcome {
     let acc = accelerometer(taken, c);
     let runs: Vec<&[Block]> = taken.iter().map(|t| &t.blocks[..]).collect();
@@ -417,6 +427,7 @@ fn outcome(taken: &[Taken], c: &Calibration, refused: Vec<String>) -> Outcome {
         refused,
         effects: Vec::new(),
         baseline: [None, None, None],
+        temperatures: Some(range_of(taken)),
         rate_hz: c.rate_hz,
         lsb_dps: c.gyro_lsb_dps,
     };

@@ -297,6 +297,7 @@ fn outcome(record: &Record) -> Result<Outcome, SequenceError> {
         refused: Vec::new(),
         effects: Vec::new(),
         baseline: [None, None, None],
+        temperatures: None,
         rate_hz: record.header.rate_hz.unwrap_or(20.0),
         lsb_dps: 0.073_26,
     };
