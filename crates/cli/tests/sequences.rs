@@ -112,6 +112,22 @@ fn six_positions_tell_accelerometers_and_g_sensitivity() {
 }
 
 #[test]
+fn a_floor_that_shakes_widens_the_intervals_and_stops_nothing() {
+    for seed in 1..=4 {
+        let mut scenario = Scenario::lively(seed);
+        scenario.base.floor_g_rms = 0.08;
+        scenario.base.poses = sides(45.0, 45.0, 0.1);
+        scenario.gyros[2].g_sensitivity_dps_g = [0.0, 0.4, 0.0];
+        let outcome = six_position(&mut link(scenario), HOW, &mut |_| {}).expect("it is done");
+        let size = found(&outcome, "gyro_z", "g-sensitivity along y");
+        assert!(off(size, 0.4).abs() < 4.0, "{seed}: {size:?}");
+        let zero = found(&outcome, "acc_x", "zero");
+        // 0.08 g of 10 Hz and less are 20 counts: a quarter of a count over 30 s and two sides, at the least.
+        assert!((0.2..3.0).contains(&zero.std_error.unwrap()), "{zero:?}");
+    }
+}
+
+#[test]
 fn a_side_that_is_not_still_not_flat_or_not_new_is_refused() {
     let mut scenario = Scenario::quiet(3);
     let mut poses = sides(45.0, 45.0, 0.05);

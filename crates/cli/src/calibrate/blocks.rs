@@ -7,7 +7,7 @@ use crate::capture::{Calibration, TEMP};
 /// Length of a block, s, and readings in it at the least.
 const LENGTH_S: f64 = 1.0;
 const LEAST: usize = 8;
-/// What the accelerometers' means of two blocks may differ by on a stand that does not move, g; a twentieth of a face's tilt that
+/// What the accelerometers' means of two blocks may differ by beside what the floor shakes, g; a twentieth of a face's tilt that
 /// would matter.
 const STEADY_G: f64 = 0.02;
 /// What neighbouring readings of an accelerometer may scatter by, g rms: more than a floor that shakes, less than a hand.
@@ -30,6 +30,9 @@ pub struct Block {
     pub acc: [f64; 3],
     /// Spread of the readings about them, counts rms.
     pub acc_rms: [f64; 3],
+    /// Squares of the standard errors of these means if readings are independent, counts^2: on a floor that shakes they are not
+    /// small.
+    pub acc_variance: [f64; 3],
     /// degC.
     pub temp: [f64; 3],
 }
@@ -88,6 +91,7 @@ impl Blocks {
             gyro_rms: gyro.map(|m| m.1.sqrt()),
             acc: acc.map(|m| m.0),
             acc_rms: acc.map(|m| m.1.sqrt()),
+            acc_variance: acc.map(|m| m.1 / n),
             temp: [0, 1, 2].map(|k| moments(&|s| f64::from(s.temp[k]) * TEMP.0 + TEMP.1).0),
         })
     }
@@ -99,7 +103,8 @@ pub fn moved(before: &Block, now: &Block, c: &Calibration) -> Option<String> {
     for k in 0..3 {
         let axis = ["x", "y", "z"][k];
         let tilt = (now.acc[k] - before.acc[k]).abs() / c.acc_counts_per_g;
-        if tilt > STEADY_G {
+        let shaken = (before.acc_variance[k] + now.acc_variance[k]).sqrt() / c.acc_counts_per_g;
+        if tilt > STEADY_G + 4.0 * shaken {
             return Some(format!("acc_{axis} moved by {tilt:.3} g within a second"));
         }
         if now.acc_rms[k] > QUIET_G * c.acc_counts_per_g {

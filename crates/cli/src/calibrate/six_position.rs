@@ -35,7 +35,8 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// the sides stay independent.
 const ALONG_G: f64 = 0.8;
 const ACROSS_G: f64 = 0.45;
-/// What the accelerometers' means of the first and the last third of a recording may differ by, g: a stand that settles.
+/// What the accelerometers' means of the first and the last third of a recording may differ by beside what the floor shakes, g: a
+/// stand that settles.
 const SETTLED_G: f64 = 0.01;
 /// Blocks of a side at the least.
 const LEAST: usize = 5;
@@ -253,15 +254,18 @@ fn unusable(block: &Block, c: &Calibration, left: &[Side]) -> Option<String> {
     }
 }
 
-/// Whether it crept while it was recorded.
+/// Whether it crept while it was recorded, by more than the floor shakes.
 fn drifted(blocks: &[Block], c: &Calibration) -> Option<String> {
     let third = blocks.len() / 3;
     (0..3).find_map(|k| {
-        let mean =
-            |part: &[Block]| part.iter().map(|b| b.acc[k]).sum::<f64>() / part.len().max(1) as f64;
-        let apart = mean(&blocks[blocks.len() - third..]) - mean(&blocks[..third]);
-        let g = apart.abs() / c.acc_counts_per_g;
-        (g > SETTLED_G).then(|| format!("acc_{} crept by {g:.3} g meanwhile", AXES[k]))
+        let n = third.max(1) as f64;
+        let mean = |part: &[Block]| part.iter().map(|b| b.acc[k]).sum::<f64>() / n;
+        let variance = |part: &[Block]| part.iter().map(|b| b.acc_variance[k]).sum::<f64>() / n / n;
+        let (first, last) = (&blocks[..third], &blocks[blocks.len() - third..]);
+        let g = (mean(last) - mean(first)).abs() / c.acc_counts_per_g;
+        let shaken = (variance(first) + variance(last)).sqrt() / c.acc_counts_per_g;
+        (g > SETTLED_G + 4.0 * shaken)
+            .then(|| format!("acc_{} crept by {g:.3} g meanwhile", AXES[k]))
     })
 }
 
