@@ -201,7 +201,9 @@ fn what_was_sent_while_nobody_listened_is_nobodys_loss() {
     let _lost = board.tick(None);
     push(&mut link, board.tick(None));
     link.interrupted();
-    (0..35).for_each(|_| drop(board.tick(None)));
+    for _ in 0..35 {
+        let _unheard = board.tick(None);
+    }
     (0..60).for_each(|_| push(&mut link, board.tick(None)));
     let losses = link.losses();
     assert_eq!((losses.line, losses.device), (0, 0), "{losses:?}");

@@ -67,9 +67,9 @@ fn widened(model: &mut ModelFile, [low, high]: [f64; 2], is_new: bool) {
         }
         reach = now;
     }
-    SWINGS
-        .iter()
-        .for_each(|key| drop(model.excitation.remove(*key)));
+    for key in SWINGS {
+        model.excitation.remove(key);
+    }
     let mut set = |key: &str, value| model.excitation.insert(key.to_owned(), value);
     set("ambient_degc", middle - reach);
     set("heater_degc", 2.0 * reach);
