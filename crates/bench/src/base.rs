@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::pose;
 use crate::random::{Stream, standard_normal, uniform};
 use crate::scenario::{BasePart, Fault, STANDARD_GRAVITY};
 
@@ -96,9 +97,13 @@ impl Base {
         }
     }
 
-    /// True rate about each axis, deg/s, without the tones: those go through the sensor's pole in closed form.
-    pub fn rate_dps(&self, t: f64) -> [f64; 3] {
-        let mut rate = [0.0; 3];
+    /// True rate about each axis, deg/s, without the tones: those go through the sensor's pole in closed form. The table has
+    /// turned by `azimuth`, rad.
+    pub fn rate_dps(&self, t: f64, azimuth: f64) -> [f64; 3] {
+        let mut rate = match self.part.poses.is_empty() {
+            true => [0.0; 3],
+            false => pose::on_table(pose::at(&self.part.poses, t).1, azimuth),
+        };
         if let Some(turns) = self.sway(t) {
             let w = TAU / self.part.sway_period_s;
             rate[0] += self.part.sway_deg * w * (TAU * turns).cos();
@@ -126,8 +131,8 @@ impl Base {
         &self.tones
     }
 
-    /// Specific force along each axis, m/s^2.
-    pub fn acceleration(&self, t: f64) -> [f64; 3] {
+    /// Specific force along each axis, m/s^2, on a table that has turned by `azimuth`, rad.
+    pub fn acceleration(&self, t: f64, azimuth: f64) -> [f64; 3] {
         let mut tilt = self.part.tilt_deg;
         let mut g = self.floor_g;
         if let Some(turns) = self.sway(t) {
@@ -145,10 +150,14 @@ impl Base {
                 *axis += value;
             }
         }
-        let (about_x, about_y) = (tilt[0].to_radians(), tilt[1].to_radians());
-        g[0] += -about_y.sin() * about_x.cos();
-        g[1] += about_x.sin();
-        g[2] += about_y.cos() * about_x.cos();
+        let (sin_x, cos_x) = tilt[0].to_radians().sin_cos();
+        let (sin_y, cos_y) = tilt[1].to_radians().sin_cos();
+        // The tilt is the sensor's on its table: gravity on a stand that lies upright is the same whatever the azimuth.
+        let up = pose::on_table(pose::at(&self.part.poses, t).0, azimuth);
+        let (across, above) = (cos_x * up[1] + sin_x * up[2], cos_x * up[2] - sin_x * up[1]);
+        g[0] += cos_y * up[0] - sin_y * above;
+        g[1] += across;
+        g[2] += sin_y * up[0] + cos_y * above;
         g.map(|value| value * STANDARD_GRAVITY)
     }
 }

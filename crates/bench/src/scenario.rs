@@ -1,5 +1,6 @@
 //! What stands on the table: the parts with their errors, the environment, and what is wrong with them.
 
+use crate::pose::Pose;
 use crate::random::{Stream, standard_normal, uniform};
 
 /// Standard gravity, m/s^2.
@@ -195,6 +196,8 @@ pub struct BasePart {
     pub sway_period_s: f64,
     /// When the sway begins, s since power came on; the base rests until then.
     pub sway_from_s: f64,
+    /// How somebody turns the stand over, in order.
+    pub poses: Vec<Pose>,
 }
 
 /// How a stalled gyro marks its old samples.

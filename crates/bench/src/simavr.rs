@@ -5,6 +5,7 @@
 //! direction at PD6.
 
 mod error;
+mod vcd;
 mod world;
 
 use std::collections::VecDeque;
@@ -14,6 +15,7 @@ use atmega16_sim::{LoadError, Mcu, ResetCause, Stop};
 use wire::{Request, encode_request};
 
 pub use self::error::{Died, SimavrError};
+pub use self::vcd::Vcd;
 use self::world::World;
 use crate::native::{CLOCK_HZ, Instants, Timeline};
 use crate::run::{Cable, with_nonce};
@@ -55,6 +57,18 @@ pub enum Event {
     Motor {
         /// Signed by the direction pin.
         duty: f64,
+    },
+    /// OC2 puts out other pulses.
+    Pulse {
+        /// Share of the time for which it is high, 0..=1.
+        high: f64,
+        /// Pulses a second; 0 for a steady level.
+        hz: f64,
+    },
+    /// A byte has left at TXD, the end of its stop bit now.
+    Uart {
+        /// The byte.
+        byte: u8,
     },
 }
 
@@ -309,6 +323,34 @@ pub fn simavr_live(
         simulated.send(&bytes);
     }
     Ok(Ending::Complete)
+}
+
+/// As [`simavr`], and the traces of the pins from `from` to `to`, s.
+///
+/// # Errors
+/// As [`simavr`].
+pub fn simavr_traced(
+    image: &[u8],
+    run: &Run,
+    [from, to]: [f64; 2],
+    mut receive: impl FnMut(SerialByte) -> ControlFlow<()>,
+) -> Result<Vcd, SimavrError> {
+    let hz = CLOCK_HZ * (1.0 + run.scenario.crystal_ppm * 1e-6);
+    let probe = Vcd::new((from * hz) as u64, (to * hz) as u64, hz);
+    let mut simulated = Simulated::new(image, &run.scenario, probe)?;
+    simulated.request(&run.requests);
+    let mut millisecond = 0u64;
+    loop {
+        let bit = simulated.mcu().uart_bit_cycles();
+        simulated.probe_mut().set_bit_cycles(bit);
+        millisecond += 1;
+        let t = (millisecond as f64 * 1e-3).min(run.seconds);
+        let is_over = simulated.probe().is_over(simulated.mcu().cycle());
+        let t = if is_over { run.seconds } else { t };
+        if simulated.run_until(t, &mut receive)? == Ending::Stopped || t >= run.seconds {
+            return Ok(simulated.probe().clone());
+        }
+    }
 }
 
 /// Notes when the image does what in each tick.

@@ -36,6 +36,8 @@ pub struct Stand {
     common: f64,
     common_rng: Xoshiro256PlusPlus,
     duty: f64,
+    /// How far the table has turned, rad.
+    azimuth: f64,
     steps: u64,
 }
 
@@ -80,6 +82,7 @@ impl Stand {
             common: 0.0,
             common_rng: Stream::Common.of(scenario.seed),
             duty: 0.0,
+            azimuth: 0.0,
             steps: 0,
         }
     }
@@ -112,7 +115,8 @@ impl Stand {
         self.motor.step(self.duty, dt);
         self.supply.step(t, dt, self.motor.current_a());
         self.base.step(dt);
-        self.acc.step(self.base.acceleration(t), dt);
+        self.azimuth += (dt * self.motor.table_dps()).to_radians();
+        self.acc.step(self.base.acceleration(t, self.azimuth), dt);
         if self.steps.is_multiple_of(THERMAL_STEPS) {
             self.thermal.step(t, dt * THERMAL_STEPS as f64);
         }
@@ -125,7 +129,7 @@ impl Stand {
     }
 
     fn stimulus(&self, axis: usize, t: f64) -> Stimulus {
-        let mut rates = self.base.rate_dps(t);
+        let mut rates = self.base.rate_dps(t, self.azimuth);
         rates[2] += self.motor.table_dps();
         let mut rate_dps = rates[axis];
         for &(_, from, share) in self.misaligned.iter().filter(|lean| lean.0 == axis) {
@@ -136,7 +140,10 @@ impl Stand {
             die_c: self.thermal.die_c()[axis],
             supply_v: self.supply.volts(),
             motor_a: self.motor.current_a(),
-            acc_g: self.base.acceleration(t).map(|a| a / STANDARD_GRAVITY),
+            acc_g: self
+                .base
+                .acceleration(t, self.azimuth)
+                .map(|a| a / STANDARD_GRAVITY),
             common_dps: self.common_sigma * self.common,
         }
     }

@@ -170,6 +170,22 @@ impl Browser {
         self.open(command, page, &folder)
     }
 
+    /// The same of a page that this computer serves.
+    ///
+    /// # Errors
+    /// [`BrowserError`].
+    pub fn dom_of(&self, address: &str, beside: &Path) -> Result<(String, String), BrowserError> {
+        let folder = Folder::beside(beside)?;
+        let mut command = self.command(&folder.0.join("profile"));
+        command.args([
+            "--dump-dom",
+            "--enable-logging=stderr",
+            "--window-size=1400,900",
+            address,
+        ]);
+        self.ended(command, &folder)
+    }
+
     fn failed(&self, why: &str) -> BrowserError {
         BrowserError::Failed {
             path: self.path.clone(),
@@ -185,18 +201,30 @@ impl Browser {
         folder: &Folder,
     ) -> Result<(String, String), BrowserError> {
         let file = folder.0.join("report.html");
+        let written = std::fs::File::create(&file).and_then(|mut f| f.write_all(page.as_bytes()));
+        written.map_err(|source| BrowserError::Io {
+            path: file.clone(),
+            source,
+        })?;
+        command.arg(&file);
+        self.ended(command, folder)
+    }
+
+    /// Runs it, and waits until it has ended: what it printed, both ways.
+    fn ended(
+        &self,
+        mut command: Command,
+        folder: &Folder,
+    ) -> Result<(String, String), BrowserError> {
         let out = [folder.0.join("out"), folder.0.join("err")];
         let io = |path: &Path| {
             let path = path.to_owned();
             move |source| BrowserError::Io { path, source }
         };
-        let written = std::fs::File::create(&file).and_then(|mut f| f.write_all(page.as_bytes()));
-        written.map_err(io(&file))?;
         // Into files: a pipe that nobody empties would stop it.
         let stdout = std::fs::File::create(&out[0]).map_err(io(&out[0]))?;
         let stderr = std::fs::File::create(&out[1]).map_err(io(&out[1]))?;
         let child = command
-            .arg(&file)
             .stdout(stdout)
             .stderr(stderr)
             .spawn()

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "native")]
 pub mod browser;
+#[cfg(feature = "native")]
+pub mod calibrate;
 pub mod capture;
 #[cfg(feature = "native")]
 pub mod correct;

@@ -57,7 +57,7 @@ enum Command {
     Report(commands::report::Arguments),
     /// The simulated stand with something hidden in it: capture, analysis, diagnosis in one go.
     #[command(
-        after_help = "Examples:\n  imu-stand run --native --hide random --seed 7 --out run.csv --report report.html\n  imu-stand run --native --hide none --stand-seed 3 --noise-seed 2 --out run2.csv"
+        after_help = "Examples:\n  imu-stand run --native --hide random --seed 7 --out run.csv --report report.html\n  imu-stand run --native --hide none --stand-seed 3 --noise-seed 2 --out run2.csv\n  imu-stand run --native --pty --hide none --pose 40:+x,80:-x,120:+y,160:-y,200:-z\n  imu-stand run --hide none --seconds 60 --vcd traces.vcd --vcd-span 0,2"
     )]
     Run(commands::run::Arguments),
     /// A capture straight from a model file.
@@ -67,7 +67,7 @@ enum Command {
     Simulate(commands::simulate::Arguments),
     /// A capture from the board's serial port.
     #[command(
-        after_help = "Examples:\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv.gz --seconds 600\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv.gz --resume\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv --shape sine --amplitude 120 --period-ms 8000\n  imu-stand capture --replay run.raw --out again.csv"
+        after_help = "Examples:\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv.gz --seconds 600\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv.gz --resume\n  imu-stand capture --port /dev/ttyUSB0 --out year/run.csv.gz --rotate 24h\n  imu-stand capture --port /dev/ttyUSB0 --out run.csv --shape sine --amplitude 120 --period-ms 8000\n  imu-stand capture --replay run.raw --out again.csv"
     )]
     Capture(commands::capture::Arguments),
     /// The data for other programs, or N, B, K in the units and conventions of filters and simulators.
@@ -75,8 +75,10 @@ enum Command {
         after_help = "Examples:\n  imu-stand export run.csv --out run.parquet\n  imu-stand export run.csv --to kalibr --out imu.yaml"
     )]
     Export(commands::export::Arguments),
-    /// A live view: rates, temperatures, supply, what is lost, the board's counters, Allan deviations as they grow.
-    #[command(after_help = "Example:\n  imu-stand monitor --port /dev/ttyUSB0")]
+    /// A live view on a terminal or in a browser: rates, temperatures, supply, what is lost, Allan deviations as they grow.
+    #[command(
+        after_help = "Examples:\n  imu-stand monitor --port /dev/ttyUSB0\n  imu-stand monitor --port /dev/ttyUSB0 --web\n  imu-stand monitor --port /dev/ttyUSB0 --quiet --seconds 60 --json view.json"
+    )]
     Monitor(commands::monitor::Arguments),
     /// Read and set the board's configuration over the line.
     #[command(
@@ -181,7 +183,11 @@ mod tests {
     fn every_command_has_an_example_and_every_example_is_understood() {
         for command in Program::command().get_subcommands() {
             check(command);
-            command.get_subcommands().for_each(check);
+            for action in command.get_subcommands() {
+                check(action);
+                let explained = |of: &&clap::Command| of.get_after_help().is_some();
+                action.get_subcommands().filter(explained).for_each(check);
+            }
         }
     }
 

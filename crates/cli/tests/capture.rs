@@ -290,22 +290,32 @@ fn a_capture_that_was_killed_is_resumed_where_it_was_cut() {
 }
 
 #[test]
-fn a_board_that_is_set_anew_gets_another_file_and_a_resumption_is_refused() {
+fn a_board_that_is_set_anew_gets_another_file_and_only_the_last_one_is_gone_on_with() {
     let board = Board::start();
     let folder = folder("capture_set");
     let out = folder.join("run.csv");
     let child = start(&board, &out, &[]);
     wait_for_rows(&out, 20);
-    board.send_aside(wire::Command::SetRate {
-        period_ticks: 6_250,
-        periods_per_sample: 1,
-    });
-    board.send_aside(wire::Command::GetHello);
+    let set_rate = |period_ticks| {
+        board.send_aside(wire::Command::SetRate {
+            period_ticks,
+            periods_per_sample: 1,
+        });
+        board.send_aside(wire::Command::GetHello);
+    };
+    set_rate(6_250);
     let second = folder.join("run-2.csv");
     wait_for_rows(&second, 40);
     end(child);
     assert_eq!(record(&out).header.rate_hz, Some(20.0));
     assert_eq!(record(&second).header.rate_hz, Some(40.0));
+    let (before, first) = (record(&second).len(), record(&out).len());
+    assert_success(&ended(start(&board, &out, &["--resume", "--seconds", "2"])));
+    assert!(record(&second).len() > before + 20);
+    assert_eq!(record(&out).len(), first);
+    // Nor into a file of another rate.
+    set_rate(12_500);
+    wait(0.5);
     let refused = ended(start(&board, &out, &["--resume"]));
     assert_refused(&refused, &["set differently", "rate_hz"]);
 }
@@ -345,7 +355,7 @@ fn a_monitor_shows_what_the_board_sends_and_writes_its_last_view() {
     ]);
     let said = assert_success(&done);
     assert!(
-        said.contains("Allan deviation, deg/h") && said.contains("0 missing"),
+        said.contains("Allan deviation, deg/s, with 95 % intervals") && said.contains("0 missing"),
         "{said}"
     );
     let view = json(&out);

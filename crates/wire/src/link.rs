@@ -74,6 +74,14 @@ impl LinkStats {
         }
     }
 
+    /// The line was not listened to until now: what was sent meanwhile is nobody's loss, and is not counted here.
+    pub fn interrupted(&mut self) {
+        self.losses.unattributed += self.missing;
+        self.missing = 0;
+        self.expected = None;
+        self.bracket = None;
+    }
+
     fn sample(&mut self, sample: &Sample) -> u16 {
         // Time that runs backwards by more than the numbers do is a start whose hello frame was lost.
         let backwards = |last: u32| sample.t_ticks.wrapping_sub(last) > u32::MAX / 2;

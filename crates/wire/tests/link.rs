@@ -185,3 +185,32 @@ fn a_sample_that_comes_twice_is_not_a_gap_of_65535() {
         }
     );
 }
+
+#[test]
+fn what_was_sent_while_nobody_listened_is_nobodys_loss() {
+    let mut board = Board::default();
+    let mut link = LinkStats::new();
+    let push = |link: &mut LinkStats, (sample, health): (Option<Frame>, Option<Frame>)| {
+        [sample, health].iter().flatten().for_each(|frame| {
+            link.push(frame);
+        });
+    };
+    link.push(&board.hello());
+    (0..40).for_each(|_| push(&mut link, board.tick(None)));
+    // One is lost on the line, which no health frame brackets before the port is gone.
+    let _lost = board.tick(None);
+    push(&mut link, board.tick(None));
+    link.interrupted();
+    for _ in 0..35 {
+        let _unheard = board.tick(None);
+    }
+    (0..60).for_each(|_| push(&mut link, board.tick(None)));
+    let losses = link.losses();
+    assert_eq!((losses.line, losses.device), (0, 0), "{losses:?}");
+    assert_eq!(losses.unattributed, 1, "{losses:?}");
+    assert_eq!(losses.received, 101);
+    // From then on losses are charged as ever.
+    let _lost = board.tick(None);
+    (0..25).for_each(|_| push(&mut link, board.tick(None)));
+    assert_eq!(link.losses().line, 1);
+}

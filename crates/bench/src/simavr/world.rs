@@ -161,6 +161,7 @@ impl<P: Probe> Board for World<P> {
     }
 
     fn uart_byte(&mut self, at: u64, byte: u8) {
+        self.probe.event(at, Event::Uart { byte });
         self.sent.push_back((at, byte));
         if let Some(Ok(Frame::Reply(reply))) = self.decoder.push(byte)
             && reply.command == code::ARM
@@ -194,6 +195,8 @@ impl<P: Probe> Board for World<P> {
 
     fn motor_changed(&mut self, at: u64, motor: &Pwm) {
         self.pwm = *motor;
+        let (high, hz) = (motor.high, motor.hz);
+        self.probe.event(at, Event::Pulse { high, hz });
         self.turn(at);
     }
 

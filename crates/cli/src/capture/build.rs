@@ -150,6 +150,11 @@ impl RecordBuilder {
         self.rows.clear();
     }
 
+    /// Forgets the oldest rows.
+    pub fn forget(&mut self, rows: usize) {
+        self.rows.drain(..rows.min(self.rows.len()));
+    }
+
     /// Rows so far.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -4,6 +4,8 @@
 
 use wire::{Hello, Sample};
 
+use super::ends::LastRow;
+
 /// A reset whose hello frame was lost shows as a clock that disagrees with the PC's by more than this, s ...
 const CLOCKS_AGREE_S: f64 = 2.0;
 /// ... or by more than this share of the time between: a crystal is better by a factor of ten.
@@ -84,6 +86,22 @@ impl Continuity {
         });
         self.fresh = true;
         self
+    }
+
+    /// What is added to the board's own numbers and ticks by now, and where the last sample was put; `None` before the first.
+    pub(super) fn at(&self) -> Option<((u64, u64), LastRow)> {
+        let last = self.last?;
+        let offsets = (
+            last.place.0.wrapping_sub(u64::from(last.sample.0)),
+            last.place.1.wrapping_sub(u64::from(last.sample.1)),
+        );
+        let row = LastRow {
+            seq: last.place.0,
+            t_ticks: last.place.1,
+            host_s: last.host_s,
+            counts: String::new(),
+        };
+        Some((offsets, row))
     }
 
     /// A hello frame: `before` is the count of restarts in the last one.

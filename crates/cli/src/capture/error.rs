@@ -179,6 +179,21 @@ pub enum CaptureError {
         /// Why.
         why: String,
     },
+    /// A folder whose captures are not the parts of one.
+    #[error("{}: {why}", path.display())]
+    #[diagnostic(
+        code(capture::parts),
+        help(
+            "name one of its captures; of a folder the parts of one capture are joined (`capture --rotate`), and `diagnose` and \
+             `representative` take any captures in it one by one"
+        )
+    )]
+    Parts {
+        /// The folder.
+        path: PathBuf,
+        /// Why not.
+        why: String,
+    },
     /// A file of arrays that cannot be read.
     #[error("{}: {why}", path.display())]
     #[diagnostic(

@@ -1,19 +1,15 @@
 //! A capture that is written while it runs, and can be resumed.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, BufWriter, Read, Write};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use flate2::write::GzEncoder;
 use wire::{Corrected, Hello, Sample};
 
+use super::ends::{BEFORE, Ends, LastRow, OFFSETS, START, complete_lines, is_gz};
 use super::write::{write_head, write_rows};
 use super::{Calibration, CaptureError, Continuity, Place, RecordBuilder, Restart};
-
-/// Key of the header: when the capture began, s since 1970 (UTC).
-const START: &str = "start_unix_s";
-/// Begins a line that says what was added to the board's own numbers and ticks from there on.
-const OFFSETS: &str = "# offsets: seq ";
 
 enum Sink {
     Plain(BufWriter<File>),
@@ -45,10 +41,6 @@ impl Write for Sink {
             Sink::Gz(out) => out.flush().and_then(|()| out.get_mut().flush()),
         }
     }
-}
-
-fn is_gz(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e == "gz")
 }
 
 /// A capture under way. Rows are in the file as soon as [`flush`](Self::flush) has returned, but for the last one where what
@@ -107,7 +99,7 @@ impl Live {
     /// # Errors
     /// [`CaptureError::Resume`] where it is none, or where the board is set differently now; [`CaptureError::Io`].
     pub fn resume(path: &Path, calibration: &Calibration) -> Result<Self, CaptureError> {
-        let complete = complete_lines(path).map_err(io(path))?;
+        let (complete, _) = complete_lines(path).map_err(io(path))?;
         let ends = Ends::of(path, &complete, calibration)?;
         let sink = if is_gz(path) {
             // What was cut off in the middle of a compressed block cannot be appended to: it is written anew.
@@ -128,8 +120,8 @@ impl Live {
             Sink::new(file, path)
         };
         let mut follow = follow(calibration);
-        if let Some((seq, t_ticks, host_s)) = ends.last {
-            follow = follow.after(seq, t_ticks, host_s, ends.offsets);
+        if let Some(last) = &ends.last {
+            follow = follow.after(last.seq, last.t_ticks, last.host_s, ends.offsets);
         }
         Ok(Self {
             path: path.to_owned(),
@@ -140,6 +132,52 @@ impl Live {
             start_unix_s: ends.start_unix_s,
             rows: ends.rows,
         })
+    }
+
+    /// Ends this file and begins the next one of the same capture: numbers, ticks and host times go on in it, and `about`
+    /// goes into its header.
+    ///
+    /// # Errors
+    /// As [`create`](Self::create) and [`finish`](Self::finish).
+    pub fn next_part(
+        mut self,
+        path: &Path,
+        about: &[(String, String)],
+    ) -> Result<Self, CaptureError> {
+        let calibration = self.builder.calibration().clone();
+        let mut next = Self::create(path, &calibration, about, Some(self.start_unix_s))?;
+        // The old one is whole before the new one gets rows.
+        self.write_pending().map_err(io(&self.path))?;
+        if let Some((offsets, last)) = self.follow.at() {
+            let (seq, ticks) = (offsets.0 as i64, offsets.1 as i64);
+            let LastRow {
+                seq: last_seq,
+                t_ticks,
+                host_s,
+                ..
+            } = last;
+            writeln!(
+                next.sink,
+                "{OFFSETS}{seq} t_ticks {ticks}\n{BEFORE}{last_seq},{t_ticks},{host_s:.6}"
+            )
+            .and_then(|()| next.sink.flush())
+            .map_err(io(path))?;
+        }
+        next.follow = self.follow.clone();
+        self.finish()?;
+        Ok(next)
+    }
+
+    /// Host time of the last row, s; 0 before the first.
+    #[must_use]
+    pub fn last_host_s(&self) -> f64 {
+        self.follow.at().map_or(0.0, |(_, last)| last.host_s)
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// The zero of the host times, s since 1970.
@@ -272,7 +310,7 @@ impl Live {
     }
 }
 
-fn io(path: &Path) -> impl Fn(std::io::Error) -> CaptureError {
+pub(super) fn io(path: &Path) -> impl Fn(std::io::Error) -> CaptureError {
     let path = path.to_owned();
     move |source| CaptureError::Io {
         path: path.clone(),
@@ -283,128 +321,4 @@ fn io(path: &Path) -> impl Fn(std::io::Error) -> CaptureError {
 fn follow(calibration: &Calibration) -> Continuity {
     let ticks = (1.0 / calibration.rate_hz / calibration.tick_s).round();
     Continuity::new(calibration.tick_s, ticks as u64)
-}
-
-/// The lines of a file up to where it was cut off.
-fn complete_lines(path: &Path) -> std::io::Result<String> {
-    let file = BufReader::new(File::open(path)?);
-    let mut input: Box<dyn BufRead> = if is_gz(path) {
-        Box::new(BufReader::new(flate2::bufread::MultiGzDecoder::new(file)))
-    } else {
-        Box::new(file)
-    };
-    let mut bytes = Vec::new();
-    match input.read_to_end(&mut bytes) {
-        Ok(_) => {}
-        // A block that was not finished: what came before it is there.
-        Err(error) if is_gz(path) && error.kind() == std::io::ErrorKind::UnexpectedEof => {}
-        Err(error) => return Err(error),
-    }
-    let end = bytes.iter().rposition(|byte| *byte == b'\n');
-    bytes.truncate(end.map_or(0, |at| at + 1));
-    String::from_utf8(bytes).map_err(std::io::Error::other)
-}
-
-/// How a file ends.
-struct Ends {
-    start_unix_s: f64,
-    rows: u64,
-    last: Option<(u64, u64, f64)>,
-    offsets: (u64, u64),
-}
-
-impl Ends {
-    fn of(path: &Path, text: &str, now: &Calibration) -> Result<Self, CaptureError> {
-        let refuse = |why: String| CaptureError::Resume {
-            path: path.to_owned(),
-            why,
-        };
-        let key = |key: &str| {
-            let value = text
-                .lines()
-                .filter_map(|line| line.strip_prefix("# ")?.split_once(": "))
-                .find(|(name, _)| *name == key);
-            value
-                .and_then(|(_, value)| value.trim().parse::<f64>().ok())
-                .ok_or_else(|| {
-                    refuse(format!(
-                        "its header has no `{key}`: it is no capture of a board"
-                    ))
-                })
-        };
-        let start_unix_s = key(START)?;
-        is_set_alike(&key, now)?.map_or(Ok(()), |why| Err(refuse(why)))?;
-        let mut ends = Ends {
-            start_unix_s,
-            rows: 0,
-            last: None,
-            offsets: (0, 0),
-        };
-        let mut names = true;
-        for line in text.lines() {
-            if let Some(offsets) = line.strip_prefix(OFFSETS) {
-                let (seq, ticks) = offsets_of(offsets)
-                    .ok_or_else(|| refuse(format!("its line `{line}` cannot be read")))?;
-                ends.offsets = (seq as u64, ticks as u64);
-            } else if line.starts_with('#') || line.is_empty() {
-            } else if std::mem::take(&mut names) {
-                if !line.starts_with("seq,t_ticks,host_time_s,gyro_x,") {
-                    return Err(refuse("its columns are not those of a capture".to_owned()));
-                }
-                if line.contains(",corrected_x,") != now.corrected {
-                    let with = if now.corrected { "has no" } else { "has" };
-                    return Err(refuse(format!(
-                        "the correction on the board was switched since: the file {with} columns for corrected rates"
-                    )));
-                }
-            } else {
-                let row = row_of(line);
-                ends.last =
-                    Some(row.ok_or_else(|| refuse(format!("its row `{line}` cannot be read")))?);
-                ends.rows += 1;
-            }
-        }
-        if names {
-            return Err(refuse("it ends before its column names".to_owned()));
-        }
-        Ok(ends)
-    }
-}
-
-/// Why a file cannot go on with a board that is set so; `None` where it can.
-fn is_set_alike(
-    key: &dyn Fn(&str) -> Result<f64, CaptureError>,
-    now: &Calibration,
-) -> Result<Option<String>, CaptureError> {
-    for (name, now) in [
-        ("rate_hz", now.rate_hz),
-        ("tick_s", now.tick_s),
-        ("gyro_lsb_dps", now.gyro_lsb_dps),
-        ("acc_counts_per_g", now.acc_counts_per_g),
-    ] {
-        let then = key(name)?;
-        if (then / now - 1.0).abs() > 1e-9 {
-            return Ok(Some(format!(
-                "the board is set differently now: `{name}` is {now}, in the file {then}"
-            )));
-        }
-    }
-    Ok(None)
-}
-
-/// The first cells of a row: number, ticks and host time.
-fn row_of(line: &str) -> Option<(u64, u64, f64)> {
-    let mut cells = line.split(',');
-    let mut cell = || cells.next();
-    Some((
-        cell()?.parse().ok()?,
-        cell()?.parse().ok()?,
-        cell()?.parse().ok()?,
-    ))
-}
-
-/// Offsets of the numbers and of the ticks.
-fn offsets_of(text: &str) -> Option<(i64, i64)> {
-    let (seq, ticks) = text.split_once(" t_ticks ")?;
-    Some((seq.parse().ok()?, ticks.parse().ok()?))
 }

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use clap::Args;
-use imu_stand::capture::{Read, corrected, read_from, unpacked};
+use imu_stand::capture::{Read, corrected, joined, read_from, unpacked};
 use imu_stand::link::{DEFAULT_BAUD, Link};
 use imu_stand::{CaptureError, ColumnMapping, ReadOptions, read_capture};
 use miette::{IntoDiagnostic, Result, WrapErr};
@@ -113,7 +113,9 @@ impl Input {
             skip_bad: self.skip_bad,
             topic: self.topic.clone(),
         };
-        let read = if path.as_os_str() == outputs::DASH {
+        let read = if path.is_dir() {
+            joined(path).and_then(|(text, _)| read_from(text, &options))
+        } else if path.as_os_str() == outputs::DASH {
             unpacked(stdin()?).map_or_else(
                 |source| {
                     let path = PathBuf::from(STDIN);
@@ -141,6 +143,7 @@ impl Input {
                 CaptureError::CutOff { .. }
                     | CaptureError::Damaged { .. }
                     | CaptureError::Table { .. }
+                    | CaptureError::Parts { .. }
             );
             let report = miette::Report::new(error);
             if says_which {
@@ -277,10 +280,16 @@ pub fn digest(path: &Path) -> Result<String> {
         hash.update(stdin()?);
         return Ok(format!("sha256:{:x}", hash.finalize()));
     }
-    let mut file = std::fs::File::open(path)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("{}", path.display()))?;
-    std::io::copy(&mut file, &mut hash).into_diagnostic()?;
+    let files = match path.is_dir() {
+        true => joined(path)?.1,
+        false => vec![path.to_owned()],
+    };
+    for path in files {
+        let mut file = std::fs::File::open(&path)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("{}", path.display()))?;
+        std::io::copy(&mut file, &mut hash).into_diagnostic()?;
+    }
     Ok(format!("sha256:{:x}", hash.finalize()))
 }
 

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use imu_stand::plan::{Noise, Plan, Request, Told, Z_95, lengths, of_model, of_record, plan};
+use imu_stand::plan::{
+    Noise, Plan, Request, SEQUENCES, Told, Z_95, lengths, of_model, of_record, plan,
+};
 use imu_stand::report::plot::{number, tidy};
 use imu_stand::text;
 use miette::Result;
@@ -241,6 +243,22 @@ fn print_separate(separate: &[Told]) {
         {
             say!("    record: {}", best.excitation);
         }
+    }
+    let sequence = separate.iter().find_map(|told| {
+        let name = told.sequence?;
+        SEQUENCES.iter().find(|sequence| sequence.name == name)
+    });
+    if let Some(sequence) = sequence {
+        say!(
+            "{}",
+            text::item(
+                "    ",
+                &format!(
+                    "or `imu-stand board calibrate {}` ({}): it moves what the one of them follows and not what the other does",
+                    sequence.name, sequence.what
+                )
+            )
+        );
     }
     say!(
         "least sizes that can work: a random walk refitted under each hypothesis takes a part of d"

@@ -7,10 +7,8 @@ use wire::{Command, Corrected, Frame, LinkCounts, Reply};
 
 use crate::RecordBuilder;
 use crate::capture::Calibration;
-use crate::link::{Link, LinkError, done};
+use crate::link::{KEEP_ALIVE, Link, LinkError, done};
 
-/// From keep-alive to keep-alive: three fit into the 200 ms that the board waits.
-const KEEP_ALIVE: Duration = Duration::from_millis(60);
 /// After how long an answer that arms the motor is asked for again: as long as [`Link`] waits for a reply.
 const ASK_AGAIN: Duration = Duration::from_millis(700);
 

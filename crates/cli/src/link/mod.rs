@@ -3,6 +3,8 @@
 mod error;
 mod feed;
 mod heard;
+mod motor;
+mod patience;
 mod port;
 
 use std::collections::VecDeque;
@@ -17,6 +19,9 @@ use wire::{
 pub use error::{LinkError, name, words};
 pub use feed::{Change, Feed};
 pub use heard::Heard;
+pub use motor::{KEEP_ALIVE, Motor};
+pub use patience::Patience;
+use patience::{REPLY_WAIT, TRIES};
 pub use port::Port;
 use port::Serial;
 
@@ -24,71 +29,8 @@ use port::Serial;
 pub const DEFAULT_BAUD: u32 = 38_400;
 /// Crystal of the board, Hz: the speeds that it can have are this over 16 (divisor + 1).
 const CLOCK_HZ: f64 = 16e6;
-/// How long a reply may take: 60 ms of queue at 38400 baud, behind a health and a hello frame.
-const REPLY_WAIT: Duration = Duration::from_millis(700);
-/// How long work on the gyros may take, which is done beside a sample and told with the next: two of them at 1 Hz.
-const GYRO_WAIT: Duration = Duration::from_millis(2_700);
-/// Setting the gyros up is one such work for each, beside three samples that follow one another.
-const SET_GYRO_WAIT: Duration = Duration::from_millis(5_500);
-/// A self-test is four such works, and 40 ms.
-const SELF_TEST_WAIT: Duration = Duration::from_secs(11);
-/// How often a command that may be repeated is sent.
-const TRIES: u32 = 3;
 /// How long a board may say that it is busy: with a self-test, at the most.
 const BUSY_FOR: Duration = Duration::from_secs(12);
-
-/// How long a reply is waited for, and how often the request may be sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Patience {
-    /// For each try.
-    pub wait: Duration,
-    /// Tries; 1 where a second one could do harm.
-    pub tries: u32,
-}
-
-impl Patience {
-    /// What is right for a command. A lost reply looks like a lost request, so what must not happen twice is sent once:
-    ///
-    /// | command | why not twice |
-    /// |---|---|
-    /// | reboot | the second one hits the board as it starts |
-    /// | clear counters | clears what was counted since the first, unseen |
-    /// | set baud | the board has left the old speed |
-    /// | bias null, self-test | measures anew, or is refused as busy |
-    /// | store set-up | overwrites the other copy too: then both are the same |
-    /// | motor profile | begins anew |
-    /// | arm | a nonce is good for once |
-    /// | write register COMMAND | a reset or a flash update, again |
-    #[must_use]
-    pub fn of(command: &Command) -> Self {
-        let once = |wait| Patience { wait, tries: 1 };
-        match command {
-            Command::Reboot | Command::ClearCounters | Command::SetBaud { .. } => once(REPLY_WAIT),
-            // 42 bytes of 8.5 ms; where a byte takes twice that, still.
-            Command::StoreConfig => once(Duration::from_secs(2)),
-            Command::SelfTest { .. } => once(SELF_TEST_WAIT),
-            Command::BiasNull { .. } => once(Duration::from_secs(3)),
-            Command::MotorProfile { .. } | Command::Arm { .. } => once(REPLY_WAIT),
-            Command::SetGyro { .. } => Patience {
-                wait: SET_GYRO_WAIT,
-                tries: TRIES,
-            },
-            Command::WriteRegister { address, .. }
-                if *address & !1 == adis16250::Register::Command.address() =>
-            {
-                once(GYRO_WAIT)
-            }
-            Command::ReadRegister { .. } | Command::WriteRegister { .. } => Patience {
-                wait: GYRO_WAIT,
-                tries: TRIES,
-            },
-            _ => Patience {
-                wait: REPLY_WAIT,
-                tries: TRIES,
-            },
-        }
-    }
-}
 
 /// A board on a line.
 pub struct Link {
@@ -102,7 +44,10 @@ pub struct Link {
     stats: LinkStats,
     bytes: u64,
     number: u16,
-    frames: VecDeque<Frame>,
+    /// Frames, and how many bytes had come by the end of each.
+    frames: VecDeque<(Frame, u64)>,
+    /// Bytes by the end of the frame that was taken last.
+    taken: u64,
     buffer: Vec<u8>,
     /// The last hello frame.
     pub hello: Option<Hello>,
@@ -142,6 +87,7 @@ impl Link {
             bytes: 0,
             number: 0,
             frames: VecDeque::new(),
+            taken: 0,
             buffer: vec![0; 4096],
             hello: None,
             health: None,
@@ -160,6 +106,7 @@ impl Link {
         let port = Serial::open(&self.name, self.baud, self.since)?;
         self.port = Some(Box::new(port));
         let _cut = self.decoder.push(0);
+        self.stats.interrupted();
         Ok(())
     }
 
@@ -221,9 +168,9 @@ impl Link {
             }
             Err(error) => return Err(self.gone(&error)),
         };
-        self.bytes += count as u64;
         let bytes = self.buffer.get(..count).unwrap_or_default();
         for &byte in bytes {
+            self.bytes += 1;
             if let Some(Ok(frame)) = self.decoder.push(byte) {
                 self.stats.push(&frame);
                 match frame {
@@ -232,7 +179,7 @@ impl Link {
                     Frame::Sample(sample) => self.sample = Some(sample),
                     Frame::Reply(_) | Frame::Corrected(_) => {}
                 }
-                self.frames.push_back(frame);
+                self.frames.push_back((frame, self.bytes));
             }
         }
         Ok(bytes)
@@ -241,7 +188,15 @@ impl Link {
     /// The next frame that was read.
     #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> Option<Frame> {
-        self.frames.pop_front()
+        let (frame, end) = self.frames.pop_front()?;
+        self.taken = end;
+        Some(frame)
+    }
+
+    /// How many bytes had come by the end of the frame that [`next`](Self::next) gave last.
+    #[must_use]
+    pub fn taken(&self) -> u64 {
+        self.taken
     }
 
     fn gone(&self, error: &std::io::Error) -> LinkError {

@@ -1,6 +1,7 @@
 //! How long to record for an answer that is missing: `imu-stand-plan/1`.
 
 mod separate;
+mod sequences;
 mod wish;
 
 use miette::Result;
@@ -18,6 +19,7 @@ use serde::Serialize;
 use crate::explain::explain;
 use crate::report::plot::number;
 pub use separate::{Told, lengths};
+pub use sequences::{SEQUENCES, Sequence, tells_apart};
 pub use wish::{WantedAngle, Wish, Z_95, wishes};
 
 /// Samples that tell anything of the noise.

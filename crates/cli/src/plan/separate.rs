@@ -8,6 +8,8 @@ use noise::discriminate::{PRESETS, separation};
 use noise::plan::KnownNoise;
 use serde::Serialize;
 
+use super::sequences::tells_apart;
+
 /// Longest record that `--separate` lays out, s.
 const LONGEST_S: f64 = 36.0 * 3600.0;
 
@@ -28,6 +30,8 @@ pub struct Told {
     pub sizes: Vec<(f64, f64, f64)>,
     /// Why there are none.
     pub why: Option<String>,
+    /// The calibration sequence that tells them apart, of `imu-stand board calibrate`.
+    pub sequence: Option<&'static str>,
 }
 
 /// Lengths laid out by `--separate`, s.
@@ -70,6 +74,7 @@ pub(super) fn separate(
             excitation: preset.name,
             sizes: Vec::new(),
             why: None,
+            sequence: tells_apart(cause, rival).map(|sequence| sequence.name),
         };
         for seconds in lengths() {
             match separation(a, b, &settings, noise, rate_hz, seconds) {

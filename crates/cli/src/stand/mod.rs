@@ -230,3 +230,20 @@ pub fn run_image(
     bench::simavr::simavr(image, &plan.run, |byte| receiver.push(byte))?;
     Ok(receiver.finish())
 }
+
+/// As [`run_image`], and the traces of the board's pins within a span of the run, s, as a value change dump.
+///
+/// # Errors
+/// As [`run_image`].
+#[cfg(feature = "simavr")]
+pub fn run_image_traced(
+    plan: &Plan,
+    image: &[u8],
+    span: [f64; 2],
+    progress: impl FnMut(f64),
+) -> Result<(Record, LinkCounts, String), bench::simavr::SimavrError> {
+    let mut receiver = Receiver::new(progress);
+    let vcd = bench::simavr::simavr_traced(image, &plan.run, span, |byte| receiver.push(byte))?;
+    let (record, counts) = receiver.finish();
+    Ok((record, counts, vcd.text()))
+}

@@ -17,9 +17,13 @@ use super::show::{Q16, Q24, gyro_range_dps};
 
 /// What `calibrate` takes.
 #[derive(Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct Arguments {
+    #[command(subcommand)]
+    pub(super) sequence: Option<super::sequence::Sequence>,
     /// A diagnosis (`diagnose --json`) or a model file (`diagnose --model-out`)
-    pub(super) file: PathBuf,
+    #[arg(required = true)]
+    pub(super) file: Option<PathBuf>,
     /// Say what would be written, and write nothing; needs no board
     #[arg(long)]
     pub dry_run: bool,
@@ -29,6 +33,26 @@ pub struct Arguments {
     /// Write it although the bias is not established, or looks like a rotation
     #[arg(long)]
     force: bool,
+}
+
+impl Arguments {
+    /// The file that is read.
+    pub(super) fn reads(&self) -> Option<&PathBuf> {
+        match &self.sequence {
+            Some(sequence) => sequence.reads(),
+            None => self.file.as_ref(),
+        }
+    }
+
+    /// The file that is written to the board; without a sequence there is one.
+    fn file(&self) -> Result<&PathBuf> {
+        self.file.as_ref().ok_or_else(|| {
+            miette::miette!(
+                help = "write `board calibrate diagnosis.json`, or name a sequence: six-position, turns, heater",
+                "no file to calibrate by"
+            )
+        })
+    }
 }
 
 /// What a file says of one gyro.
@@ -237,7 +261,7 @@ fn describe(calibration: &Calibration, notes: &[String]) {
 
 /// Says what would be written; needs no board.
 pub fn dry_run(arguments: &Arguments, quiet: bool, json: Option<&PathBuf>) -> Result<()> {
-    let (calibration, mut notes) = load(&arguments.file)?;
+    let (calibration, mut notes) = load(arguments.file()?)?;
     notes.extend(doubts(&calibration));
     if !quiet {
         describe(&calibration, &notes);
@@ -245,7 +269,7 @@ pub fn dry_run(arguments: &Arguments, quiet: bool, json: Option<&PathBuf>) -> Re
     }
     let answer = Answer {
         format: "imu-stand-calibration/1",
-        from: super::super::name(&arguments.file),
+        from: super::super::name(arguments.file()?),
         calibration: &calibration,
         notes: &notes,
         written: vec![],
@@ -293,7 +317,7 @@ fn commands(calibration: &Calibration, hello: &Hello) -> Result<Vec<(usize, Comm
 }
 
 pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
-    let (calibration, notes) = load(&arguments.file)?;
+    let (calibration, notes) = load(arguments.file()?)?;
     let doubts = doubts(&calibration);
     if !doubts.is_empty() && !arguments.force && !arguments.dry_run {
         miette::bail!(
@@ -342,7 +366,7 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     }
     let answer = Answer {
         format: "imu-stand-calibration/1",
-        from: super::super::name(&arguments.file),
+        from: super::super::name(arguments.file()?),
         calibration: &calibration,
         notes: &notes,
         written,

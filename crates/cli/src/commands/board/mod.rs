@@ -1,10 +1,12 @@
 //! `imu-stand board`: what the board is, how it is set, and setting it.
 
+mod bring_up;
 mod calibrate;
 mod correct;
 pub mod motor;
 mod null;
 mod register;
+mod sequence;
 mod set;
 mod show;
 
@@ -58,11 +60,19 @@ enum Action {
         after_help = "Example:\n  imu-stand board --port /dev/ttyUSB0 bias-null --samples 1200 --store"
     )]
     BiasNull(null::Arguments),
-    /// Write bias and scale of a diagnosis (JSON) or of a model file (TOML) to the board
+    /// Write bias and scale of a diagnosis (JSON) or of a model file (TOML) to the board, or go through a calibration sequence
     #[command(
-        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 calibrate diagnosis.json --dry-run\n  imu-stand board --port /dev/ttyUSB0 calibrate model.toml --store"
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 calibrate diagnosis.json --dry-run\n  imu-stand board --port /dev/ttyUSB0 calibrate model.toml --store\n  imu-stand board --port /dev/ttyUSB0 calibrate six-position --model model.toml --out calibrated.toml"
     )]
     Calibrate(calibrate::Arguments),
+    /// Walk a new board, check what can be checked, and write one page of it
+    ///
+    /// Fuses (where a programmer is named), supply, registers, sample period, self-test, the sign of each gyro by hand, each of
+    /// the six sides, and what is left to be seen on a scope. Nothing has to be typed: it waits for what it asks for.
+    #[command(
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 bring-up --programmer usbasp --out bring-up.md\n  imu-stand board --port /dev/ttyUSB0 bring-up --no-hand"
+    )]
+    BringUp(bring_up::Arguments),
     /// Write the correction of a model file to the board, which applies it from then on
     #[command(
         after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 correct --model model.toml --dry-run\n  imu-stand board --port /dev/ttyUSB0 correct --model model.toml\n  imu-stand board --port /dev/ttyUSB0 correct --off"
@@ -120,13 +130,21 @@ impl Session {
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let reads = match &arguments.action {
-        Action::Calibrate(calibrate) => Some(&calibrate.file),
+        Action::Calibrate(calibrate) => calibrate.reads(),
         Action::Correct(correct) => correct.model.as_ref(),
         _ => None,
     };
-    super::Outputs::beside(reads).result("--json", arguments.json.as_ref())?;
+    let outputs = super::Outputs::beside(reads).result("--json", arguments.json.as_ref())?;
+    if let Action::Calibrate(calibrate) = &arguments.action
+        && let Some(sequence) = &calibrate.sequence
+    {
+        outputs.result("--out", Some(sequence.out()))?;
+    } else if let Action::BringUp(bring_up) = &arguments.action {
+        outputs.result("--out", Some(bring_up.out()))?;
+    }
     if let Action::Calibrate(calibrate) = &arguments.action
         && calibrate.dry_run
+        && calibrate.sequence.is_none()
         && !arguments.line.is_named()
     {
         return calibrate::dry_run(calibrate, arguments.quiet, arguments.json.as_ref());
@@ -149,7 +167,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Action::Get(get) => show::get(session, get),
         Action::Set(set) => set::run(session, set),
         Action::BiasNull(null) => null::run(session, null),
-        Action::Calibrate(calibrate) => calibrate::run(session, calibrate),
+        Action::Calibrate(calibrate) => match &calibrate.sequence {
+            Some(sequence) => sequence::run(session, sequence),
+            None => calibrate::run(session, calibrate),
+        },
+        Action::BringUp(bring_up) => bring_up::run(session, bring_up),
         Action::Correct(correct) => correct::run(session, correct),
         Action::Motor(motor) => motor::run(session, motor),
         Action::Register(register) => register::run(session, register),

@@ -5,15 +5,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use imu_stand::link::{Link, LinkError};
+use imu_stand::link::{KEEP_ALIVE, Link, LinkError};
 use miette::{IntoDiagnostic, Result};
 use serde::Serialize;
 use wire::{Command, Frame, Shape, Status};
 
 use super::Session;
 
-/// From keep-alive to keep-alive: three fit into the 200 ms that the board waits.
-pub const KEEP_ALIVE: Duration = Duration::from_millis(60);
 /// The board answers each; without an answer for so long it has stopped the motor on its own.
 const DEAF: Duration = Duration::from_secs(1);
 /// How long a ramp down may take.

@@ -1,11 +1,13 @@
 //! `imu-stand capture`.
 
 mod files;
+mod losses;
 mod motor;
+mod raw;
 mod replay;
+mod rotate;
 
-use std::fs::{File, OpenOptions};
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,8 +15,8 @@ use std::time::{Duration, Instant, SystemTime};
 
 use clap::{Args, ValueEnum};
 use imu_stand::RecordBuilder;
-use imu_stand::capture::{Calibration, Live};
-use imu_stand::link::{Change, Feed, Link};
+use imu_stand::capture::{Calibration, DIGITS, Live, heal, last_part, part_name, raw_path};
+use imu_stand::link::{Change, Feed, Link, Motor};
 use miette::{IntoDiagnostic, Result, WrapErr};
 use model::record::Base;
 use serde::Serialize;
@@ -22,8 +24,9 @@ use wire::{Frame, Hello, Sample};
 
 use super::Line;
 use super::board::motor::Drive;
-use files::{free_name, raw_path};
-use motor::Motor;
+use losses::{Apart, Holes, Lost};
+use raw::Raw;
+use rotate::Rotate;
 
 /// What `capture` takes.
 #[derive(Args)]
@@ -36,16 +39,21 @@ pub struct Arguments {
     /// How long, s; without it until Ctrl-C
     #[arg(long)]
     seconds: Option<f64>,
-    /// Go on with the file where it ends; the time between is a gap in it
+    /// Go on with the file where it ends. First what had arrived and was not written is put in from the raw bytes; the time
+    /// between is a gap
     #[arg(long)]
     resume: bool,
+    /// Go on in another file (run-0001.csv, run-0002.csv, ... for run.csv, each with its header and its raw bytes) after a
+    /// time or at a size: 24h, 7d, 100MB
+    #[arg(long, value_name = "TIME|SIZE", value_parser = rotate::parse)]
+    rotate: Option<Rotate>,
     /// What the base under the stand does; turntable where the motor is driven, else static
     #[arg(long, value_enum)]
     base: Option<BaseName>,
     #[command(flatten, next_help_heading = "Motor, driven while the capture runs")]
     drive: Drive,
     /// Decode the raw bytes of an earlier capture again, instead of a port
-    #[arg(long, value_name = "RAW", conflicts_with_all = ["port", "baud", "seconds", "resume"])]
+    #[arg(long, value_name = "RAW", conflicts_with_all = ["port", "baud", "seconds", "resume", "rotate"])]
     replay: Option<PathBuf>,
     /// Write what was captured and lost as JSON
     #[arg(long, value_name = "FILE")]
@@ -107,6 +115,10 @@ struct Answer {
     lost_by_board: u64,
     lost_by_line: u64,
     lost_unattributed: u64,
+    #[serde(flatten)]
+    apart: Lost,
+    /// Rows that had arrived before a resumption and were not written.
+    put_in_from_raw: u64,
     frames_rejected: u32,
     restarts: u64,
     reconnections: u64,
@@ -115,13 +127,24 @@ struct Answer {
 /// A capture under way: files, clock, and what happened.
 struct Capture<'a> {
     arguments: &'a Arguments,
-    raw: File,
+    raw: Raw,
     is_terminal: bool,
     start: Instant,
     /// What `start` is in the file's host time, s.
     start_s: f64,
     start_unix_s: f64,
     live: Option<Live>,
+    /// The file to go on with, and which of its capture it is.
+    resumes: Option<(PathBuf, u64)>,
+    /// Which file of the capture is open.
+    part: u64,
+    /// When its last row came, s, and how long it was when that was last looked at.
+    last_s: f64,
+    size: u64,
+    /// What the board says of itself, for headers.
+    board: Vec<(String, String)>,
+    /// Whether the board is to be asked for its set-up.
+    asks: bool,
     motor: Motor,
     /// Samples that wait for the first hello.
     waiting: Vec<(Sample, f64)>,
@@ -132,6 +155,8 @@ struct Capture<'a> {
     /// Rows of files that are finished.
     rows: u64,
     missing: u64,
+    holes: Holes,
+    put_in: u64,
     restarts: u64,
     reconnections: u64,
 }
@@ -149,20 +174,23 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let own = [arguments.out.clone(), raw_path(&arguments.out)];
     super::Outputs::beside(own.iter().chain(&arguments.replay))
         .result("--json", arguments.json.as_ref())?;
-    if arguments.out.exists() && !arguments.resume {
-        return Err(imu_stand::CaptureError::Exists {
-            path: arguments.out.clone(),
-        }
-        .into());
+    let first = first_name(arguments);
+    if first.exists() && !arguments.resume {
+        return Err(imu_stand::CaptureError::Exists { path: first }.into());
     }
     if let Some(raw) = &arguments.replay {
         return replay::replay(arguments, raw);
     }
+    // Before the port is opened: what is there is made whole, with a board or without.
+    let resumed = match arguments.resume {
+        true => healed(arguments)?,
+        false => None,
+    };
     let mut feed = Feed::new(arguments.line.open()?);
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).into_diagnostic()?;
-    let mut capture = Capture::start(arguments)?;
+    let mut capture = Capture::start(arguments, resumed)?;
     let began = Instant::now();
     let is_over = |_: &Feed| {
         stop.load(Ordering::Relaxed)
@@ -177,6 +205,51 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     listened.and(finished)
 }
 
+/// The first file of a capture that begins.
+fn first_name(arguments: &Arguments) -> PathBuf {
+    match arguments.rotate {
+        Some(_) if !arguments.out.exists() => part_name(&arguments.out, 1, DIGITS),
+        _ => arguments.out.clone(),
+    }
+}
+
+/// A capture that is gone on with.
+struct Resumed {
+    path: PathBuf,
+    part: u64,
+    /// Where its raw bytes are.
+    raw: PathBuf,
+    /// Rows that were put in.
+    put_in: u64,
+}
+
+/// Makes the last file of the capture whole from its raw bytes; `None` where there is no file yet.
+fn healed(arguments: &Arguments) -> Result<Option<Resumed>> {
+    let Some((path, part)) = last_part(&arguments.out)? else {
+        return Ok(None);
+    };
+    let healed = heal(&path, &raw_path(&arguments.out))?;
+    let name = super::name(&path);
+    if healed.rows > 0 && !arguments.quiet {
+        eprintln!(
+            "{name}: {} rows that had arrived were not written; they are put in from the raw bytes",
+            healed.rows
+        );
+    }
+    if healed.left > 0 {
+        warn!(
+            "{name}: {} samples of after the board was set anew are in its raw bytes alone: `capture --replay`",
+            healed.left
+        );
+    }
+    Ok(Some(Resumed {
+        path,
+        part,
+        raw: healed.raw,
+        put_in: healed.rows,
+    }))
+}
+
 /// Seconds since 1970.
 fn unix_s() -> f64 {
     SystemTime::now()
@@ -185,14 +258,13 @@ fn unix_s() -> f64 {
 }
 
 impl<'a> Capture<'a> {
-    fn start(arguments: &'a Arguments) -> Result<Self> {
-        let raw_path = raw_path(&arguments.out);
-        let raw = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&raw_path)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("cannot write {}", raw_path.display()))?;
+    fn start(arguments: &'a Arguments, resumed: Option<Resumed>) -> Result<Self> {
+        let raw = match &resumed {
+            Some(resumed) => resumed.raw.clone(),
+            None => raw_path(&first_name(arguments)),
+        };
+        let raw = Raw::open(&raw)?;
+        let put_in = resumed.as_ref().map_or(0, |resumed| resumed.put_in);
         Ok(Self {
             arguments,
             raw,
@@ -201,6 +273,12 @@ impl<'a> Capture<'a> {
             start_s: 0.0,
             start_unix_s: unix_s(),
             live: None,
+            resumes: resumed.map(|resumed| (resumed.path, resumed.part)),
+            part: 1,
+            last_s: 0.0,
+            size: 0,
+            board: Vec::new(),
+            asks: false,
             motor: arguments.drive.command().map_or(Motor::Off, Motor::Wanted),
             waiting: Vec::new(),
             corrects: false,
@@ -208,6 +286,8 @@ impl<'a> Capture<'a> {
             files: Vec::new(),
             rows: 0,
             missing: 0,
+            holes: Holes::default(),
+            put_in,
             restarts: 0,
             reconnections: 0,
         })
@@ -225,25 +305,19 @@ impl<'a> Capture<'a> {
         while !is_over(feed) {
             let mut written = Ok(());
             let raw = &mut self.raw;
-            let change = feed.poll(|bytes| written = raw.write_all(bytes));
+            let change = feed.poll(|bytes| written = raw.write(bytes));
             written
                 .into_diagnostic()
                 .wrap_err("cannot write the raw bytes: is the disk full?")?;
             if let Some(change) = change {
                 self.changed(&change)?;
             }
-            while let Some(frame) = feed.link.next() {
+            if self.take_frames(feed)? {
                 heard = Instant::now();
-                match frame {
-                    Frame::Sample(sample) => self.sample(&sample)?,
-                    Frame::Hello(hello) => self.hello(&hello)?,
-                    Frame::Reply(reply) => self.replied(reply)?,
-                    Frame::Corrected(corrected) => self.corrected(&corrected)?,
-                    Frame::Health(_) => {}
-                }
             }
-            if self.live.is_none() && asked.elapsed() > ASK && !feed.is_gone() {
-                asked = Instant::now();
+            let is_unknown = self.live.is_none() && asked.elapsed() > ASK;
+            if (is_unknown || self.asks) && !feed.is_gone() {
+                (asked, self.asks) = (Instant::now(), false);
                 let _ = feed.ask();
             }
             self.give_up_on_hello()?;
@@ -258,16 +332,40 @@ impl<'a> Capture<'a> {
             }
             if shown.elapsed() > SHOW {
                 shown = Instant::now();
-                if let Some(live) = &mut self.live {
-                    live.flush()?;
-                }
-                if !self.arguments.quiet && self.is_terminal {
-                    // One line that changes.
-                    eprint!("\r{}\x1b[K", self.figures(&feed.link));
-                } else if !self.arguments.quiet {
-                    eprintln!("{}", self.figures(&feed.link));
-                }
+                self.show(&feed.link)?;
             }
+        }
+        Ok(())
+    }
+
+    /// Takes the frames that have been read; whether there were any.
+    fn take_frames(&mut self, feed: &mut Feed) -> Result<bool> {
+        let mut any = false;
+        while let Some(frame) = feed.link.next() {
+            any = true;
+            match frame {
+                Frame::Sample(sample) => self.sample(&sample)?,
+                Frame::Hello(hello) => self.hello(&hello)?,
+                Frame::Reply(reply) => self.replied(reply)?,
+                Frame::Corrected(corrected) => self.corrected(&corrected)?,
+                Frame::Health(_) => {}
+            }
+            self.raw.taken(feed.link.taken());
+        }
+        Ok(any)
+    }
+
+    /// Writes what has come, and shows it.
+    fn show(&mut self, link: &Link) -> Result<()> {
+        if let Some(live) = &mut self.live {
+            live.flush()?;
+            self.size = live.path().metadata().map_or(0, |file| file.len());
+        }
+        if !self.arguments.quiet && self.is_terminal {
+            // One line that changes.
+            eprint!("\r{}\x1b[K", self.figures(link));
+        } else if !self.arguments.quiet {
+            eprintln!("{}", self.figures(link));
         }
         Ok(())
     }
@@ -315,6 +413,7 @@ impl<'a> Capture<'a> {
                 self.reconnections += 1;
                 if let Some(live) = &mut self.live {
                     live.reconnected();
+                    self.holes.next = Apart::PortGone;
                 }
                 self.tell(&format!(
                     "the port is back after {:.1} s",

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use imu_stand::capture::{Calibration, Live};
+use imu_stand::capture::{Live, free_name, since};
 use miette::{IntoDiagnostic, Result, WrapErr};
 use wire::link::LinkStats;
 use wire::{Decoder, Frame};
 
-use super::{Answer, Arguments, free_name};
+use super::{Answer, Arguments, Lost};
 
 /// Makes a capture of raw bytes. They carry no time of arrival: host times are the device's, from the first sample on.
 pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
@@ -42,7 +42,7 @@ pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
                 let now = arguments.calibration(Some(hello), corrects);
                 if !live.fits(&now) {
                     calibration = now;
-                    let next = free_name(&arguments.out, files.len() + 1);
+                    let (next, _) = free_name(&arguments.out, files.len() as u64 + 1, 0);
                     std::mem::replace(&mut live, Live::create(&next, &calibration, &about, None)?)
                         .finish()?;
                     files.push(next);
@@ -71,6 +71,8 @@ pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
         lost_by_board: losses.device,
         lost_by_line: losses.line,
         lost_unattributed: losses.unattributed,
+        apart: Lost::default(),
+        put_in_from_raw: 0,
         frames_rejected: decoder.counts().rejected(),
         restarts: losses.restarts,
         reconnections: 0,
@@ -99,14 +101,4 @@ fn decoded(path: &Path) -> Result<(Vec<Frame>, Decoder, LinkStats)> {
         }
     }
     Ok((frames, decoder, stats))
-}
-
-/// Time from one sample to the next, s; where the ticks go back, that of a sample.
-fn since(last: Option<u32>, ticks: u32, calibration: &Calibration) -> f64 {
-    let forward = last.map_or(0, |last| ticks.wrapping_sub(last));
-    if forward > u32::MAX / 2 {
-        1.0 / calibration.rate_hz
-    } else {
-        f64::from(forward) * calibration.tick_s
-    }
 }

@@ -10,7 +10,8 @@ use clap::Args;
 use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::Serialize;
 
-use avrdude::{Programmer, parse_fuses, read_fuses, remedy, write_flash};
+pub use avrdude::Programmer;
+use avrdude::{parse_fuses, read_fuses, remedy, write_flash};
 use fuses::{Deviation, Fuses};
 
 /// What `flash` takes.
@@ -293,6 +294,20 @@ fn read(programmer: &Programmer) -> Result<Fuses> {
         );
     };
     Ok(Fuses { low, high, lock })
+}
+
+/// The fuses of a board as a person reads them, and what is wrong with them or could be better; whether that must be put right.
+pub fn fuses(programmer: &Programmer) -> Result<(String, Vec<(String, bool)>)> {
+    let fuses = read(programmer)?;
+    let found = format!(
+        "low {:#04x}, high {:#04x}, lock bits {:#04x}",
+        fuses.low, fuses.high, fuses.lock
+    );
+    let deviations = fuses.deviations();
+    let told = deviations
+        .iter()
+        .map(|d| (format!("{}: {}", d.fuse, d.means), d.fails));
+    Ok((found, told.collect()))
 }
 
 /// Calls avrdude; its standard output, or its words as an error.

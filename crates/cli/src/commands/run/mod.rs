@@ -1,6 +1,7 @@
 //! `imu-stand run`.
 
 mod correct;
+mod pose;
 
 use std::path::PathBuf;
 #[cfg(unix)]
@@ -42,6 +43,20 @@ pub struct Arguments {
     /// is captured or analyzed here. The stand is as --hide says, and nobody drives its motor
     #[arg(long, conflicts_with_all = ["out", "analysis", "json", "report"])]
     pty: bool,
+    /// With --pty: how somebody turns the stand over, as times, s, and what points up: `40:+x,80:-x,120:0.1,0,1`. Each turn
+    /// takes 2 s
+    #[arg(long, value_name = "TIME:UP,...", requires = "pty", value_parser = pose::parse)]
+    pose: Option<pose::Poses>,
+    /// With --pty: the belt is on, and the table makes so many turns for each turn of the motor; a real one some 0.004
+    #[arg(long, value_name = "RATIO", requires = "pty", default_value_t = 0.0)]
+    belt: f64,
+    /// Write the traces of the board's pins as a value change dump, to lay beside a logic analyser; needs the image, not
+    /// --native
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["native", "pty", "correct"])]
+    vcd: Option<PathBuf>,
+    /// Which part of the run is traced, s from power-on: FROM,TO
+    #[arg(long, value_name = "FROM,TO", requires = "vcd", default_value = "0,2", value_parser = span)]
+    vcd_span: Span,
     /// What to hide in the stand
     #[arg(long, value_enum, default_value_t = Hidden::Random)]
     hide: Hidden,
@@ -99,6 +114,31 @@ pub struct Arguments {
     quiet: bool,
 }
 
+/// A part of a run, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span(f64, f64);
+
+/// Longest part that is traced, s: a hundred megabytes.
+const LONGEST_TRACE_S: f64 = 60.0;
+
+/// `0,2`.
+fn span(text: &str) -> std::result::Result<Span, String> {
+    let ends = text.split_once(',').and_then(|(from, to)| {
+        Some((
+            from.trim().parse::<f64>().ok()?,
+            to.trim().parse::<f64>().ok()?,
+        ))
+    });
+    match ends {
+        Some((from, to)) if from >= 0.0 && from < to && to - from <= LONGEST_TRACE_S => {
+            Ok(Span(from, to))
+        }
+        _ => Err(format!(
+            "takes two times of which the second is later, {LONGEST_TRACE_S} s apart at the most: 0,2"
+        )),
+    }
+}
+
 /// Where `cargo xtask image` puts it.
 pub const IMAGE: &str = "target/avr/avr-none/firmware/firmware.elf";
 
@@ -145,10 +185,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .simulated("--out", Some(&arguments.out))?
         .result("--analysis", arguments.analysis.as_ref())?
         .result("--json", arguments.json.as_ref())?
-        .result("--report", arguments.report.as_ref())?;
+        .result("--report", arguments.report.as_ref())?
+        .result("--vcd", arguments.vcd.as_ref())?;
     let plan = planned(arguments)?;
     let bar = progress(arguments);
-    let (mut record, link) = sample(&board, &plan, |time| bar.set_position(time as u64))?;
+    let (mut record, link) = sample(arguments, &board, &plan, |time| {
+        bar.set_position(time as u64)
+    })?;
     bar.finish_and_clear();
     outputs::mark_simulated(&mut record, "run");
     outputs::write_record(&arguments.out, &record)?;
@@ -288,6 +331,13 @@ fn serve(board: Board, arguments: &Arguments) -> Result<()> {
     let mut plan = planned(arguments)?;
     // Whoever opens the port drives the motor.
     plan.run.requests.clear();
+    let scenario = &mut plan.run.scenario;
+    scenario.base.poses = arguments
+        .pose
+        .iter()
+        .flat_map(|poses| poses.0.clone())
+        .collect();
+    scenario.motor.table_ratio = arguments.belt;
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).into_diagnostic()?;
@@ -333,16 +383,26 @@ fn board(arguments: &Arguments) -> Result<Board> {
 }
 
 fn sample(
+    arguments: &Arguments,
     board: &Board,
     plan: &Plan,
     progress: impl FnMut(f64),
 ) -> Result<(Record, wire::LinkCounts)> {
+    // Without the simulated ATmega16 there is no image, and clap has refused the two options that want one.
+    let _ = arguments;
     match board {
         Board::Native => Ok(run_native(plan, progress)),
         #[cfg(feature = "simavr")]
-        Board::Image(image) => {
-            imu_stand::stand::run_image(plan, image, progress).map_err(image_error)
-        }
+        Board::Image(image) => match &arguments.vcd {
+            None => imu_stand::stand::run_image(plan, image, progress).map_err(image_error),
+            Some(path) => {
+                let Span(from, to) = arguments.vcd_span;
+                let traced = imu_stand::stand::run_image_traced(plan, image, [from, to], progress);
+                let (record, link, text) = traced.map_err(image_error)?;
+                super::write(path, &text)?;
+                Ok((record, link))
+            }
+        },
     }
 }
 

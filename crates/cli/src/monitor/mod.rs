@@ -1,8 +1,11 @@
 //! What a live view shows: the last second of every channel, what was lost, the board's counters, and Allan deviations
 //! that grow with the run at constant memory.
 
+mod control;
+mod page;
+mod screen;
+
 use std::collections::VecDeque;
-use std::fmt::Write;
 
 use noise::allan::{Deviation, Streaming};
 use noise::edf::{NoiseType, chi_square_interval, edf};
@@ -13,10 +16,13 @@ use crate::RecordBuilder;
 use crate::capture::{Calibration, Continuity, STANDARD_GRAVITY, SUPPLY_LSB_V, TEMP};
 use crate::link::Heard;
 
+pub use control::{Action, Control};
+pub use screen::{About, Axes, Key, Screen};
+
 /// Longest averaging time, as a power of two of samples: 2^17 at 20 Hz are 1.8 h, and 4 MB for each gyro.
 const OCTAVES: u32 = 17;
-/// Confidence of the intervals.
-const CONFIDENCE: f64 = 0.683;
+/// Confidence of the intervals, as everywhere.
+const CONFIDENCE: f64 = 0.95;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A deviation so far.
@@ -26,9 +32,9 @@ pub struct Point {
     pub tau_s: f64,
     /// deg/s.
     pub deviation: f64,
-    /// Of the 68.3 % interval, deg/s.
+    /// Of the 95 % interval, deg/s.
     pub low: f64,
-    /// Of the 68.3 % interval, deg/s.
+    /// Of the 95 % interval, deg/s.
     pub high: f64,
 }
 
@@ -54,8 +60,18 @@ pub struct Snapshot {
     pub samples: u64,
     /// Sample instants without one.
     pub missing: u64,
+    /// Samples that the board lost, by its own counters.
+    pub lost_by_board: u64,
+    /// Samples that the line lost.
+    pub lost_by_line: u64,
+    /// Frames that were rejected.
+    pub rejected: u32,
     /// Restarts of the board.
     pub restarts: u64,
+    /// Largest distance of two neighbouring sampling instants of the last second from their period, by the board's clock, s.
+    pub sampling_jitter_s: Option<f64>,
+    /// Spread of the times of arrival about the board's, over the last second, s.
+    pub arrival_jitter_s: Option<f64>,
     /// Hz, as the board says.
     pub rate_hz: f64,
     /// The board's clock against this computer's, ppm; null before a minute has passed.
@@ -86,7 +102,8 @@ pub struct View {
     runs: Vec<usize>,
     /// First reading of each gyro: taken out, so that sums stay small.
     zero: Option<[i16; 3]>,
-    recent: VecDeque<Sample>,
+    /// With their times of arrival, s.
+    recent: VecDeque<(Sample, f64)>,
     samples: u64,
     missing: u64,
     restarts: u64,
@@ -98,34 +115,6 @@ pub struct View {
 impl Default for View {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-impl Snapshot {
-    /// Deviations by cluster time, an axis a column.
-    fn allan_table(&self, out: &mut String) {
-        let _ = writeln!(out, "Allan deviation, deg/h (68 % interval)");
-        let mut taus: Vec<f64> = self.allan.iter().flatten().map(|p| p.tau_s).collect();
-        taus.sort_by(f64::total_cmp);
-        taus.dedup();
-        if taus.is_empty() {
-            let _ = writeln!(out, "  not enough samples yet");
-        }
-        for tau in taus {
-            let _ = write!(out, "  {tau:>9.2} s");
-            for points in &self.allan {
-                let point = points.iter().find(|p| p.tau_s == tau);
-                let cell = point.map_or_else(
-                    || "-".to_owned(),
-                    |p| {
-                        let [low, value, high] = [p.low, p.deviation, p.high].map(|v| v * 3600.0);
-                        format!("{value:.1} ({low:.1} .. {high:.1})")
-                    },
-                );
-                let _ = write!(out, "{cell:>31}");
-            }
-            let _ = writeln!(out);
-        }
     }
 }
 
@@ -153,8 +142,20 @@ impl View {
 
     /// The board, as it says.
     #[must_use]
-    pub fn hello(&self) -> Option<&Hello> {
-        self.hello.as_ref()
+    pub fn board(&self) -> String {
+        self.hello.map_or_else(
+            || "board that has not said who it is".to_owned(),
+            |h| {
+                let [major, minor, patch] = h.firmware;
+                format!("board {}, firmware {major}.{minor}.{patch}", h.board_id)
+            },
+        )
+    }
+
+    /// Restarts of the board so far.
+    #[must_use]
+    pub fn restarts(&self) -> u64 {
+        self.restarts
     }
 
     /// The line was opened anew.
@@ -220,30 +221,66 @@ impl View {
                 *run += 1;
             }
         }
-        self.recent.push_back(*sample);
+        self.recent.push_back((*sample, host_s));
         let second = self.calibration.rate_hz.ceil().max(1.0) as usize;
         while self.recent.len() > second {
             self.recent.pop_front();
         }
     }
 
-    /// What there is to show.
+    /// The largest step between two neighbouring sampling instants beside the period, s, and the spread of the times of
+    /// arrival about the board's, s.
+    fn jitter(&self) -> (Option<f64>, Option<f64>) {
+        let c = &self.calibration;
+        let pairs = self.recent.iter().zip(self.recent.iter().skip(1));
+        let steps = pairs.filter(|((a, _), (b, _))| b.seq.wrapping_sub(a.seq) == 1);
+        let apart = steps.map(|((a, _), (b, _))| {
+            let ticks = b.t_ticks.wrapping_sub(a.t_ticks);
+            (f64::from(ticks) * c.tick_s - 1.0 / c.rate_hz).abs()
+        });
+        let sampling = apart.max_by(f64::total_cmp);
+        let Some((first, _)) = self.recent.front() else {
+            return (sampling, None);
+        };
+        let late = |(sample, host_s): &(Sample, f64)| {
+            host_s - f64::from(sample.t_ticks.wrapping_sub(first.t_ticks)) * c.tick_s
+        };
+        let n = self.recent.len() as f64;
+        let mean = self.recent.iter().map(late).sum::<f64>() / n;
+        let squares: f64 = self
+            .recent
+            .iter()
+            .map(|row| (late(row) - mean).powi(2))
+            .sum();
+        let arrival = (n > 2.0).then(|| (squares / n).sqrt());
+        (sampling, arrival)
+    }
+
+    /// What there is to show; `heard` is what the line says of its losses.
     #[must_use]
-    pub fn snapshot(&self) -> Snapshot {
+    pub fn snapshot(&self, heard: &Heard) -> Snapshot {
         let c = &self.calibration;
         let n = self.recent.len() as f64;
         let some = |value: f64| (n > 0.0).then_some(value);
-        let mean = |of: &dyn Fn(&Sample) -> f64| some(self.recent.iter().map(of).sum::<f64>() / n);
+        let mean = |of: &dyn Fn(&Sample) -> f64| {
+            some(self.recent.iter().map(|(s, _)| of(s)).sum::<f64>() / n)
+        };
         let elapsed = self
             .first
             .zip(self.last)
             .map(|(first, last)| ((last.0 - first.0) as f64 * c.tick_s, last.1 - first.1));
+        let (sampling_jitter_s, arrival_jitter_s) = self.jitter();
         Snapshot {
             format: "imu-stand-monitor/1",
             seconds: elapsed.map_or(0.0, |(device, _)| device),
             samples: self.samples,
             missing: self.missing,
+            lost_by_board: heard.losses.device,
+            lost_by_line: heard.losses.line,
+            rejected: heard.counts.rejected(),
             restarts: self.restarts,
+            sampling_jitter_s,
+            arrival_jitter_s,
             rate_hz: c.rate_hz,
             // Host times jitter by a frame's length; over a minute that is some 100 ppm.
             clock_ppm: elapsed
@@ -265,7 +302,7 @@ impl View {
                 })
             }),
             supply_v: mean(&|s| f64::from(s.supply) * SUPPLY_LSB_V),
-            pwm: self.recent.back().map(|s| s.pwm),
+            pwm: self.recent.back().map(|(s, _)| s.pwm),
             flags: self.flags(),
             allan: [0, 1, 2].map(|k| self.points(k)),
             counters: self.counters.clone(),
@@ -273,8 +310,8 @@ impl View {
     }
 
     fn flags(&self) -> Vec<&'static str> {
-        let any = self.recent.iter().fold(0, |all, s| all | s.flags);
-        let all = self.recent.iter().fold(u16::MAX, |all, s| all & s.flags);
+        let any = self.recent.iter().fold(0, |all, (s, _)| all | s.flags);
+        let all = (self.recent.iter()).fold(u16::MAX, |all, (s, _)| all & s.flags);
         let stale = [
             (flags::NEW_X, "gyro x repeats itself"),
             (flags::NEW_Y, "gyro y repeats itself"),
@@ -311,7 +348,9 @@ impl View {
                 }
                 _ => 0.0,
             };
-            let free = edf(Deviation::Oadev, NoiseType::nearest(alpha), e.m, &self.runs);
+            let known = |kind| edf(Deviation::Oadev, kind, e.m, &self.runs);
+            // Two uncertain points may lie as steeply as those of a noise that would be known far better than this one is.
+            let free = known(NoiseType::nearest(alpha)).min(known(NoiseType::WhiteRate));
             // Below that an interval spans a factor of three: no figure to show.
             if free < 3.0 {
                 continue;
@@ -324,66 +363,6 @@ impl View {
                 high,
             });
         }
-        out
-    }
-
-    /// A page of a terminal.
-    #[must_use]
-    pub fn page(&self, port: &str, heard: &Heard) -> String {
-        let s = self.snapshot();
-        let mut out = String::new();
-        let number = |value: Option<f64>, width: usize, digits: usize| match value {
-            Some(value) => format!("{value:>width$.digits$}"),
-            None => format!("{:>width$}", "-"),
-        };
-        let board = self.hello.map_or_else(
-            || "board that has not said who it is".to_owned(),
-            |h| {
-                let [major, minor, patch] = h.firmware;
-                format!("board {}, firmware {major}.{minor}.{patch}", h.board_id)
-            },
-        );
-        let _ = writeln!(out, "{board}, on {port}");
-        let clock = s
-            .clock_ppm
-            .map_or_else(String::new, |ppm| format!(", its clock {ppm:+.0} ppm"));
-        let _ = writeln!(
-            out,
-            "{:.0} s at {:.4} Hz{clock}: {} samples, {} missing, {} restarts",
-            s.seconds, s.rate_hz, s.samples, s.missing, s.restarts
-        );
-        let _ = writeln!(out, "line: {heard}\n");
-        let _ = writeln!(out, "last second    deg/s       rms    degC      m/s^2");
-        for (k, axis) in AXES.iter().enumerate() {
-            let gyro = &s.gyros[k];
-            let _ = writeln!(
-                out,
-                "  {axis}       {} {} {} {}",
-                number(gyro.mean_dps, 11, 4),
-                number(gyro.rms_dps, 9, 4),
-                number(gyro.temp_c, 7, 2),
-                number(s.acc_mps2[k], 10, 3)
-            );
-        }
-        let pwm = s.pwm.map_or_else(|| "-".to_owned(), |pwm| pwm.to_string());
-        let _ = writeln!(out, "  supply {} V   motor {pwm}", number(s.supply_v, 6, 3));
-        let flags = if s.flags.is_empty() {
-            "in order".to_owned()
-        } else {
-            s.flags.join(", ")
-        };
-        let _ = writeln!(out, "  {flags}\n");
-        s.allan_table(&mut out);
-        let counters = match s.counters.as_deref() {
-            None => "not sent yet".to_owned(),
-            Some([]) => "all 0".to_owned(),
-            Some(counters) => counters
-                .iter()
-                .map(|(name, count)| format!("{name} {count}"))
-                .collect::<Vec<_>>()
-                .join(", "),
-        };
-        let _ = writeln!(out, "\nboard's counters: {counters}");
         out
     }
 }
@@ -421,7 +400,7 @@ mod tests {
         for k in 0..100 {
             view.push(&Frame::Sample(sample(k)), f64::from(k) * 0.05);
         }
-        let s = view.snapshot();
+        let s = view.snapshot(&Heard::default());
         assert_eq!((s.samples, s.missing, s.restarts), (100, 0, 0));
         let lsb = 0.073_26;
         assert!((s.gyros[0].mean_dps.unwrap() - 10.0 * lsb).abs() < 1e-9);
@@ -432,10 +411,38 @@ mod tests {
         // Alternating +-1 count: the deviation at one sample is 2 / sqrt 2 counts, at two samples 0.
         assert!((s.allan[0][0].deviation - 2.0 * lsb / 2f64.sqrt()).abs() < 1e-9);
         assert_eq!(s.allan[0][1].deviation, 0.0);
-        let page = view.page("P", &Heard::default());
+        assert!(s.sampling_jitter_s.unwrap() < 1e-9, "every 12500 ticks");
+        assert!(s.arrival_jitter_s.unwrap() < 1e-9);
+        let page = s.page("P", &view.board());
         assert!(
             page.contains("in order") && page.contains("not sent yet"),
             "{page}"
+        );
+        assert!(
+            page.lines().all(|line| line.chars().count() <= 80),
+            "{page}"
+        );
+    }
+
+    #[test]
+    fn jitter_of_the_sampling_instant_and_of_the_arrival_are_told_apart() {
+        let mut view = View::new();
+        for k in 0..40 {
+            let mut sample = sample(k);
+            if k == 30 {
+                // 25 ticks late: 100 us.
+                sample.t_ticks += 25;
+            }
+            // Every second frame arrives 4 ms late.
+            let late = if k % 2 == 0 { 0.004 } else { 0.0 };
+            view.push(&Frame::Sample(sample), f64::from(k) * 0.05 + late);
+        }
+        let s = view.snapshot(&Heard::default());
+        assert!((s.sampling_jitter_s.unwrap() - 1e-4).abs() < 1e-9);
+        assert!(
+            (s.arrival_jitter_s.unwrap() - 2e-3).abs() < 1e-5,
+            "{:?}",
+            s.arrival_jitter_s
         );
     }
 
@@ -453,7 +460,7 @@ mod tests {
             }
             view.push(&Frame::Sample(sample), f64::from(k) * 0.05);
         }
-        let s = view.snapshot();
+        let s = view.snapshot(&Heard::default());
         assert_eq!(s.missing, 10);
         assert!(
             s.allan[0].iter().all(|point| point.deviation < 0.2),
