@@ -85,7 +85,7 @@ pub(crate) fn slow(values: &[f64], rate_hz: f64) -> Vec<f64> {
 /// the slow part, so that both together have the spectrum of either. With u = 1 - B the slow part has the gain 1 - u^2, and this
 /// one u (2 - u^2)^1/2, the root by a parabola in u^2 that is within 0.1 % from 0 to 1.
 pub(crate) fn fast(values: &[f64], rate_hz: f64) -> Vec<f64> {
-    const ROOT: [f64; 3] = [1.414_21, -0.343_67, -0.070_54];
+    const ROOT: [f64; 3] = [std::f64::consts::SQRT_2, -0.343_67, -0.070_54];
     let half = (BLOCK_S * rate_hz / 3.0) as usize;
     let without = |x: &[f64]| -> Vec<f64> {
         let smooth = means(&means(x, half), half);
