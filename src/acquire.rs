@@ -214,7 +214,6 @@ fn frame<S: Sensors>(sensors: &mut S, axis: u8, command: Command, stall_us: u8) 
 }
 
 /// Reads the job's register, after writing it where that is asked for. The value is 0 but for [`Status::Ok`].
-#[inline(never)]
 fn reach<S: Sensors>(sensors: &mut S, job: &Job, stall_us: u8) -> (Status, u16) {
     let (axis, address) = (job.axis, job.address & !1);
     let [low, high] = job.value.to_le_bytes();
@@ -261,34 +260,39 @@ pub fn configure<S: Sensors>(sensors: &mut S, axis: u8, sens_avg: u16) -> u8 {
     let bit = 1u8.wrapping_shl(axis.into());
     let mut stall_us = SLOW_STALL_US;
     sensors.slow(true);
-    for (register, value) in [
-        (Register::SmplPrd, FASTEST),
-        (Register::SensAvg, sens_avg),
-        (Register::GyroOff, 0),
-        (Register::AlmCtrl, 0),
-        (Register::MscCtrl, 0),
-    ] {
-        let job = Job {
-            task: Task::Write,
-            axis,
-            address: register.address(),
-            value,
-        };
+    let mut job = Job {
+        task: Task::Write,
+        axis,
+        address: Register::SmplPrd.address(),
+        value: FASTEST,
+    };
+    loop {
         // A gyro that does not answer has no value.
-        if reach(sensors, &job, stall_us) != (Status::Ok, value) {
+        if reach(sensors, &job, stall_us) != (Status::Ok, job.value) {
             return bit;
         }
         // From here on it has its fastest sample period.
         sensors.slow(false);
         stall_us = FAST_STALL_US;
+        job.value = 0;
+        const SENS_AVG: u8 = Register::SensAvg.address();
+        const GYRO_OFF: u8 = Register::GyroOff.address();
+        const ALM_CTRL: u8 = Register::AlmCtrl.address();
+        const MSC_CTRL: u8 = Register::MscCtrl.address();
+        job.address = match job.address {
+            SENS_AVG => GYRO_OFF,
+            GYRO_OFF => ALM_CTRL,
+            ALM_CTRL => MSC_CTRL,
+            MSC_CTRL => break,
+            _ => {
+                job.value = sens_avg;
+                SENS_AVG
+            }
+        };
     }
-    let scale = Job {
-        task: Task::Read,
-        axis,
-        address: Register::GyroScale.address(),
-        value: 0,
-    };
-    if reach(sensors, &scale, stall_us).1 & 0x0fff != FACTORY_SCALE {
+    job.task = Task::Read;
+    job.address = Register::GyroScale.address();
+    if reach(sensors, &job, stall_us).1 & 0x0fff != FACTORY_SCALE {
         return bit << 3;
     }
     0

@@ -3,17 +3,21 @@
 //! A gyro's Bartlett filter and its 50 Hz pole make neighbouring samples alike, so that neither the spread of single samples
 //! nor their steps tell the error of their mean. The sums of blocks do, when a block is much longer than the filter: with
 //! d = S(j+1) - S(j) over the sums S of k blocks of b samples each, the standard error of the mean of n = k b samples is
-//! sqrt(sum d^2 / (2 (k - 1) k b^2)) (von Neumann, Ann. Math. Stat. 12, 1941, on batch means). A drift does not count as noise.
+//! sqrt(pi)/2 (sum |d| / (k - 1)) / (b sqrt(k)), as the mean magnitude of a normal deviate is sqrt(2/pi) of its sigma, and d has
+//! twice the variance of S (batch means; the mean magnitude in place of the root of the squares needs neither squares nor
+//! their root, and is 8 % less sure). A drift does not count as noise.
 
 use zerocopy::little_endian::I16;
 
-use crate::math::{divide, root, scaled};
+use crate::math::{divide, root, times};
 
 /// Largest spread (max - min) of a rate at rest, counts: eight times the 5.4 counts rms that a gyro has at 20 Hz
 /// (ARW 5.27 deg/sqrt(h)) is exceeded by a still stand once in many thousand runs; a turning one exceeds it at once.
 const SPREAD_AT_REST: i16 = 60;
 /// Largest mean rate that can be a bias, counts: 5 deg/s. What is more is a rotation.
-const LARGEST_BIAS: u32 = 68;
+const LARGEST_BIAS: u16 = 68;
+/// The first reading of one is no further than the spread from that.
+const FIRST_MOST: u16 = LARGEST_BIAS + SPREAD_AT_REST as u16 - 1;
 /// Fewest blocks: with eight the standard error is itself known to a quarter.
 const MIN_BLOCKS: u16 = 8;
 /// Most samples: sums of counts hold in 32 bits, with room.
@@ -25,7 +29,6 @@ const PATIENCE: u8 = 16;
 const BLOCK_TICKS: u32 = 7_813;
 
 /// Samples in a block, for a filter of 2^m taps (m <= 6) and a period of the sample timer in ticks: 1 ..= 513.
-#[inline(never)]
 fn block_len(filter: u8, period_ticks: u16) -> u16 {
     // Shifted in a loop, as the AVR has no other.
     let mut ticks = BLOCK_TICKS;
@@ -76,7 +79,7 @@ impl BiasNull {
             lost: 0,
             axes: [AxisSum {
                 sum: 0,
-                squares: 0,
+                steps: 0,
                 first: 0,
                 part: 0,
                 last: 0,
@@ -88,7 +91,7 @@ impl BiasNull {
 
     /// Begins one over so many samples of gyros with this filter at this period; false for fewer than eight blocks, or
     /// more than [`MAX_SAMPLES`].
-    #[inline(never)]
+    #[inline(always)]
     pub fn begin(&mut self, samples: u16, filter: u8, period_ticks: u16) -> bool {
         *self = Self::new();
         self.wanted = samples;
@@ -98,7 +101,6 @@ impl BiasNull {
 
     /// Takes a sample, counts, if it is in order: a gyro that is silent, stale or in error would be averaged as if it were at
     /// rest.
-    #[inline(never)]
     pub fn take(&mut self, rates: &[I16; 3], in_order: bool) -> Outcome {
         if !in_order {
             self.lost = self.lost.wrapping_add(1);
@@ -133,40 +135,46 @@ impl BiasNull {
         }
     }
 
-    /// Mean rate of an axis, Q16.16 deg/s, by a scale in Q8.24 deg/s for each count, and its standard error in the same
-    /// unit. `None` for a stand that turns.
-    #[must_use]
-    #[inline(never)]
-    pub fn mean_and_error(&self, axis: u8, scale: i32) -> Option<(i32, i32)> {
-        let sum = self.axes.get(axis as usize)?;
-        let mean = sum.mean(self.have, scale)?;
-        Some((mean, self.error(sum.squares, scale)))
+    /// What was found of each axis.
+    pub fn axes(&self) -> impl Iterator<Item = &AxisSum> {
+        self.axes.iter()
     }
 
-    /// sqrt(2 squares) / (b (2 k - 1)) counts times the scale: as the head of this file has it, where k (k - 1) is
-    /// (k - 1/2)^2, which is off by 0.2 % for eight blocks, and a block that is not whole counts for nothing.
+    /// Mean rate of an axis, Q16.16 deg/s, by a scale in Q8.24 deg/s for each count; [`TURNS`] for a stand that turns.
+    #[must_use]
     #[inline(never)]
-    fn error(&self, squares: u32, scale: i32) -> i32 {
-        /// Bits behind the point.
-        const POINT: u8 = 10;
-        let (mut twice, mut place) = (squares.saturating_add(squares), 0u8);
-        // As many significant bits as there are, up to the point.
-        while twice >> 30 == 0 && place < POINT {
-            twice <<= 2;
-            place = place.wrapping_add(1);
+    pub fn mean(&self, sum: &AxisSum, scale: i32) -> i32 {
+        // Of offsets that are above -60, so that the division needs no sign; |sum| <= 60 * 16384 < 2^20.
+        let lowest = u32::from(self.have).wrapping_mul(SPREAD_AT_REST as u32);
+        let above = sum.sum.cast_unsigned().wrapping_add(lowest);
+        let mean_q8 = (sum.first.wrapping_sub(SPREAD_AT_REST) << 8)
+            .wrapping_add(divide(above << 8, self.have) as i16);
+        if sum.first.unsigned_abs() > FIRST_MOST || mean_q8.unsigned_abs() >= LARGEST_BIAS << 8 {
+            return TURNS;
         }
-        let mut root = u32::from(root(twice));
-        while place < POINT {
-            root <<= 1;
-            place = place.wrapping_add(1);
-        }
-        // Blocks differ by 60 b at the most: 60 / sqrt(2 (k - 1)) counts, which 16 bits hold.
-        let halves = self.blocks.wrapping_add(self.blocks).wrapping_sub(1);
-        let error = divide(root, self.block.wrapping_mul(halves)) as u16;
-        // Q10 counts times Q24 is Q34, of which `scaled` keeps 18.
-        scaled(error, scale) >> 2
+        // Q24 times Q8.
+        times(scale, mean_q8)
+    }
+
+    /// Its standard error in the same unit: as the head of this file has it, times the scale.
+    #[must_use]
+    pub fn error(&self, sum: &AxisSum, scale: i32) -> i32 {
+        /// sqrt(pi)/2 in Q10.
+        const OF_MAGNITUDE: u32 = 907;
+        // Blocks differ by 60 b at the most: the sum is below 2^20, the quotient below 69 in Q10.
+        let steps = sum.steps.wrapping_mul(OF_MAGNITUDE);
+        let samples = self.block.wrapping_mul(self.blocks.wrapping_sub(1));
+        let step = divide(steps, samples);
+        // sqrt(k) in Q8.
+        let root = root(u32::from(self.blocks) << 16);
+        // Below 69 / sqrt(8) = 24 counts; Q24 times Q10 is Q34, of which 18 are kept.
+        let error = divide(step << 8, root) as i16;
+        times(scale, error) >> 2
     }
 }
+
+/// In place of a mean: no bias is that large.
+pub const TURNS: i32 = i32::MIN;
 
 impl Default for BiasNull {
     fn default() -> Self {
@@ -176,10 +184,10 @@ impl Default for BiasNull {
 
 /// Sums of one axis. Everything is counted from the first reading, so that it stays small.
 #[derive(Clone, Copy, Debug)]
-struct AxisSum {
+pub struct AxisSum {
     sum: i32,
-    /// Sum of the squared steps from block to block; saturates.
-    squares: u32,
+    /// Sum of the magnitudes of the steps from block to block.
+    steps: u32,
     first: i16,
     /// Sum of the block under way, and of the one before; at most 60 * 513.
     part: i16,
@@ -191,7 +199,6 @@ struct AxisSum {
 // Out of line, so that the compiler reaches an axis by pointer: in line it makes an address for each field anew.
 impl AxisSum {
     /// Takes a reading, counts; whether the spread is one at rest.
-    #[inline(never)]
     fn take(&mut self, value: i16, first: bool) -> bool {
         if first {
             self.first = value;
@@ -214,34 +221,9 @@ impl AxisSum {
         if !first {
             // Blocks differ by the spread in each of their samples at the most.
             let step = self.part.wrapping_sub(self.last).unsigned_abs();
-            let square = u32::from(step).wrapping_mul(step.into());
-            let sum = self.squares.wrapping_add(square);
-            self.squares = if sum < square { u32::MAX } else { sum };
+            self.steps = self.steps.wrapping_add(step.into());
         }
         (self.last, self.part) = (self.part, 0);
-    }
-
-    /// The mean; `None` where it is a rotation.
-    #[inline(never)]
-    fn mean(&self, have: u16, scale: i32) -> Option<i32> {
-        // |sum| <= 60 * 16384 < 2^20.
-        let part = divide(self.sum.unsigned_abs() << 8, have).cast_signed();
-        let part = if self.sum < 0 {
-            part.wrapping_neg()
-        } else {
-            part
-        };
-        let mean_q8 = (i32::from(self.first) << 8).wrapping_add(part);
-        let magnitude = mean_q8.unsigned_abs();
-        if magnitude >= LARGEST_BIAS << 8 {
-            return None;
-        }
-        let mean = scaled(magnitude as u16, scale);
-        Some(if mean_q8 < 0 {
-            mean.wrapping_neg()
-        } else {
-            mean
-        })
     }
 }
 
@@ -252,6 +234,14 @@ mod tests {
     /// One count for each 1/256: the mean in Q8 counts comes out as it is in Q16.
     const UNIT: i32 = 1 << 24;
     const AT_20_HZ: u16 = 12_500;
+
+    impl BiasNull {
+        fn mean_and_error(&self, axis: usize, scale: i32) -> Option<(i32, i32)> {
+            let sum = &self.axes[axis];
+            let mean = self.mean(sum, scale);
+            (mean != TURNS).then(|| (mean, self.error(sum, scale)))
+        }
+    }
 
     fn begun(samples: u16, filter: u8, period_ticks: u16) -> BiasNull {
         let mut null = BiasNull::new();
@@ -280,8 +270,9 @@ mod tests {
         );
         let (mean, error) = null.mean_and_error(0, UNIT).expect("it rests");
         assert_eq!(mean, -4 << 16);
-        // Steps of 2: variance 2, of the mean of eight 1/4.
-        assert!((error - 32_768).abs() < 160, "{error}");
+        // Steps of 2, the root of eight.
+        let of = |step: f64| std::f64::consts::PI.sqrt() / 2.0 * step / 8f64.sqrt() * 65_536.0;
+        assert!((f64::from(error) / of(2.0) - 1.0).abs() < 0.005, "{error}");
         // At the default filter a block has three samples: eight sums that step by 2, and a sample that is in none.
         let mut null = begun(25, 2, AT_20_HZ);
         take(
@@ -296,11 +287,9 @@ mod tests {
         );
         let (mean, error) = null.mean_and_error(0, UNIT).expect("it rests");
         assert_eq!(mean, -4 << 16);
-        // 7 * 2^2 / (2 * 7 * 8 * 3^2)
-        let expected = (28.0f64 / 1008.0).sqrt() * 65_536.0;
         assert!(
-            (f64::from(error) / expected - 1.0).abs() < 0.005,
-            "{error} {expected}"
+            (f64::from(error) / of(2.0 / 3.0) - 1.0).abs() < 0.005,
+            "{error}"
         );
     }
 
@@ -421,14 +410,16 @@ mod tests {
     }
 
     #[test]
-    fn a_drift_across_the_largest_blocks_saturates_and_does_not_wrap() {
+    fn a_drift_across_the_largest_blocks_does_not_wrap() {
         let mut null = begun(MAX_SAMPLES, 6, 976);
-        // From end to end of the spread with each block.
+        // From end to end of the spread with each of 31 blocks.
         let counts = (0..MAX_SAMPLES).map(|n| if n / 513 % 2 == 0 { -30 } else { 30 });
         assert_eq!(take(&mut null, counts), Outcome::Done);
         let (_, error) = null.mean_and_error(0, UNIT).expect("it rests");
-        // The squares saturate at 2^31 and more: sqrt(2^32) / (513 * 61) counts.
-        let least = 65_536.0 / (513.0 * 61.0) * 65_536.0;
-        assert!(f64::from(error) > 0.99 * least, "{error} {least}");
+        let expected = std::f64::consts::PI.sqrt() / 2.0 * 60.0 / 31f64.sqrt() * 65_536.0;
+        assert!(
+            (f64::from(error) / expected - 1.0).abs() < 0.003,
+            "{error} {expected}"
+        );
     }
 }

@@ -9,26 +9,34 @@
 //! |---|---|
 //! | rates, biases | Q12.20 deg/s |
 //! | what they depend on | Q16.16, whole counts but for the temperature behind its low pass |
+//! | squares of rates at rest | Q16 (deg/s)^2 |
 //! | what the filter knows | Q8.8 blocks |
 //! | noise over what was told | Q8 |
 //!
-//! Bounds, deg/s: a rate below 1024 at the input; the terms add 32 + 16 + 128 + 16 + 128 + 96 at the most, whatever the
-//! coefficients are, and the matrix 3/8 of the sum: below 2048, which Q12.20 holds.
+//! Bounds, deg/s: a rate below 1024 at the input, which a scale below 1/8 deg/s for each count makes (a larger one wraps; no part
+//! has it); the terms add 32 + 16 + 128 + 16 + 128 + 96 at the most, whatever the coefficients are, the matrix 3/8 of the sum, the
+//! surge 16: below 2048, which Q12.20 holds.
+
+use core::cell::Cell;
 
 use wire::correction::{
-    ADAPT_SHIFT, BLOCK_SHIFT_MAX, FORMAT, GATE_SHIFT, NOISE_SHIFT, REST_DPS, ROWS, STORED_LEN,
-    TEMPERATURE_SHIFT,
+    ADAPT_SHIFT, BLOCK_SHIFT_MAX, GATE_SHIFT, LONGEST_TICKS, NOISE_SHIFT, REST_DPS, ROWS,
+    STORED_LEN, TEMPERATURE_SHIFT,
 };
 use wire::correction_state::{
-    APPLIED, AT_REST, EXTRAPOLATED, FILTERED, NOISE_OFF, NOT_IN_ORDER, REFUSED,
+    APPLIED, AT_REST, EXTRAPOLATED, FILTERED, NOISE_OFF, NOT_IN_ORDER, REFUSED, YAW_FREE,
 };
 use wire::fields::Corrected;
-use zerocopy::little_endian::I32;
+use wire::kind;
+use zerocopy::IntoBytes;
+use zerocopy::little_endian::{I32, U16};
 
 use crate::acquire::Raw;
+use crate::attitude;
 use crate::config::Config;
-use crate::math::divide;
+use crate::math::{divide, mul, product, shifted, times, upper};
 use crate::stand::Board;
+use crate::stand::store::newest;
 
 /// Where the two copies begin in the EEPROM, behind those of the set-up.
 pub const COPIES: [u16; 2] = [144, 272];
@@ -39,13 +47,10 @@ const _: () = assert!(
 );
 /// Rest ends here, upper half of Q12.20 deg/s.
 const REST: i16 = (REST_DPS << 4) as i16;
-/// A scale of 1/8 deg/s for each count makes a rate of 1024 deg/s, Q8.24: larger ones lose their upper bits.
-const SCALE_MASK: i32 = (1 << 21) - 1;
-/// A bit of the state beside those of [`wire::correction_state`]: the low pass of the temperature has begun.
-const WARM: u8 = 1 << 7;
-
 /// The square of a block's mean is taken for this at the most, over the variance that was told, Q8: [`wire::correction::REACH`].
 const SQUARE_MAX: u32 = 0x7fff;
+/// Variance of a bias that is not known, over that which was told of a block: Q8.
+const EXPECTED_MOST: u32 = 0xffff - (NOISE_TOLD << NOISE_SHIFT) as u32;
 /// Half a step of what the noise follows by.
 const HALF: i16 = 1 << (ADAPT_SHIFT - 1);
 
@@ -58,29 +63,40 @@ pub struct Correction {
     /// Bits of [`wire::correction_state`] that outlast a sample; 0: the filter has not been started.
     state: u8,
     /// Samples until the block ends.
-    left: u16,
+    left: u8,
+    sum: Sum,
     axes: [Axis; 3],
+    /// Of the squares of what is left of all three rates in a block, Q16.
+    squares: u32,
+    /// What the motor has turned to, steps in Q16.
+    speed: i32,
+    /// When the sample before was, timer ticks.
+    t_ticks: u16,
+    /// As it goes out, and whether it waits for room.
+    frame: Corrected,
+    waits: bool,
 }
 
-#[derive(Clone, Copy)]
 struct Axis {
     /// Behind its low pass, Q10.22.
     temp: i32,
-    bias: i32,
-    /// The variance of the bias is that of a block, as it was told, over this: Q8.8.
-    known: u16,
+    /// With the model's terms, before the other axes' shares.
+    rate: i32,
+    /// Of what is left of the rates of a block: below 4 deg/s in each of 128 at rest.
+    sum: Cell<i32>,
     /// The variance of a block, over that which was told, less 1: Q8.
     noise: i16,
-    /// Of what is left of the rates of a block at rest: below 4 deg/s in each of 256.
-    sum: i32,
+    /// The block before was at rest, and not refused.
+    trusted: bool,
 }
 
+#[allow(clippy::declare_interior_mutable_const)]
 const AXIS: Axis = Axis {
     temp: 0,
-    bias: 0,
-    known: 0,
+    rate: 0,
+    sum: Cell::new(0),
     noise: 0,
-    sum: 0,
+    trusted: false,
 };
 
 /// 1 in Q8.
@@ -88,76 +104,46 @@ const NOISE_TOLD: i16 = 1 << 8;
 const NOISE_LEAST: i16 = (NOISE_TOLD >> NOISE_SHIFT) - NOISE_TOLD;
 const NOISE_MOST: i16 = (NOISE_TOLD << NOISE_SHIFT) - NOISE_TOLD;
 
-/// Where the next number is read from.
-struct Reader<'a, B> {
-    board: &'a mut B,
+/// Bytes of three numbers, as each axis has them in the matrix and for the filter.
+const OF_AXIS: u16 = 6;
+
+/// Where those of the filter begin.
+const OF_FILTER: u16 = 90;
+const _: () = assert!(OF_FILTER as usize + 3 * OF_AXIS as usize == wire::correction::NUMBERS_LEN);
+
+/// A sum of what is weighed by the stored numbers, in their order.
+struct Sum {
+    /// Where the next number is read from.
     at: u16,
+    total: i32,
 }
 
-impl<B: Board> Reader<'_, B> {
+impl Sum {
     #[inline(never)]
-    fn next(&mut self) -> i16 {
-        let low = self.board.eeprom_read(self.at);
-        let high = self.board.eeprom_read(self.at.wrapping_add(1));
-        self.at = self.at.wrapping_add(2);
-        i16::from_le_bytes([low, high])
+    fn next<B: Board>(&mut self, board: &mut B) -> i16 {
+        let low = self.byte(board);
+        i16::from_le_bytes([low, self.byte(board)])
     }
 
-    /// Adds `x` times the next number to `to`.
     #[inline(never)]
-    fn add(&mut self, x: i32, to: &mut i32) {
-        add_times(to, x, self.next());
+    fn byte<B: Board>(&mut self, board: &mut B) -> u8 {
+        let at = self.at;
+        self.at = at.wrapping_add(1);
+        board.eeprom_read(at)
     }
-}
 
-/// `x y / 2^16`, rounded down.
-#[inline(never)]
-fn times(x: i32, y: i16) -> i32 {
-    let high = i32::from((x >> 16) as i16).wrapping_mul(y.into());
-    let low = i32::from(x as u16).wrapping_mul(y.into()) >> 16;
-    high.wrapping_add(low)
-}
-
-/// Adds `x y / 2^16`.
-#[inline(never)]
-fn add_times(to: &mut i32, x: i32, y: i16) {
-    *to = to.wrapping_add(times(x, y));
-}
-
-/// `x / 2^n`, rounded down. (The AVR shifts in a loop, or unrolled in ten times the flash.)
-#[inline(never)]
-fn shifted(mut x: i32, n: u8) -> i32 {
-    for _ in 0..core::hint::black_box(n) {
-        x >>= 1;
+    /// Adds `x`, Q16, times the next number.
+    #[inline(never)]
+    fn weigh<B: Board>(&mut self, board: &mut B, x: i32) {
+        let more = times(x, self.next(board));
+        self.total = self.total.wrapping_add(more);
     }
-    x
-}
 
-/// `x y` of what has no sign.
-#[inline(never)]
-fn wide(x: u16, y: u16) -> u32 {
-    u32::from(x).wrapping_mul(y.into())
-}
-
-/// `x y / 2^16` of what has no sign.
-#[inline(never)]
-fn upper(x: u16, y: u16) -> u16 {
-    (wide(x, y) >> 16) as u16
-}
-
-/// `x y`.
-#[inline(never)]
-fn product(x: i16, y: i16) -> i32 {
-    i32::from(x).wrapping_mul(y.into())
-}
-
-/// The square of a temperature, Q10.22 counts: Q22.10.
-#[inline(always)]
-fn square(t: i32) -> i32 {
-    // By its whole counts: Q6; by the rest in 15 bits: Q21.
-    let whole = times(t, (t >> 16) as i16 >> 6);
-    let rest = times(t, ((t >> 7) as u16 & 0x7fff).cast_signed());
-    (whole << 4).wrapping_add(shifted(rest, 11))
+    /// Adds `x` times the next number.
+    #[inline(never)]
+    fn count<B: Board>(&mut self, board: &mut B, x: i16) {
+        self.weigh(board, i32::from(x) << 16);
+    }
 }
 
 impl Correction {
@@ -169,7 +155,21 @@ impl Correction {
             newest: 0,
             state: 0,
             left: 0,
-            axes: [AXIS; 3],
+            sum: Sum { at: 0, total: 0 },
+            axes: [const { AXIS }; 3],
+            squares: 0,
+            speed: 0,
+            t_ticks: 0,
+            frame: Corrected {
+                seq: U16::ZERO,
+                rate: [I32::ZERO; 3],
+                bias: [I32::ZERO; 3],
+                known: [U16::ZERO; 3],
+                correction: U16::ZERO,
+                state: 0,
+                attitude: [I32::ZERO; 4],
+            },
+            waits: false,
         }
     }
 
@@ -200,54 +200,58 @@ impl Correction {
     #[inline(never)]
     pub fn on<B: Board>(&mut self, board: &mut B) -> bool {
         *self = Self::new();
-        let (mut generation, mut copy, mut number) = (0, COPIES[0], 1);
-        while number <= 2 {
-            let its = board.eeprom_read(copy.wrapping_add(1));
-            // Generations wrap: the newer one is ahead by less than half the circle.
-            if is_whole(board, copy, STORED_LEN as u8)
-                && board.eeprom_read(copy) == FORMAT
-                && (self.at == 0 || its.wrapping_sub(generation) < 128)
-            {
-                (self.at, self.newest, generation) = (copy, number, its);
-            }
-            copy = COPIES[1];
-            number = number.wrapping_add(1);
+        self.newest = newest(board, COPIES[0], COPIES[1]) & 3;
+        if let Some(at) = self.place(false, 0).filter(|_| self.newest != 0) {
+            self.at = at;
         }
         self.at != 0
     }
 
     /// The three numbers there.
     #[inline(always)]
-    pub fn read<B: Board>(board: &mut B, place: u16, into: &mut [I32; 3]) {
-        let mut reader = Reader { board, at: place };
+    pub fn read<B: Board>(&mut self, board: &mut B, place: u16, into: &mut [I32; 3]) {
+        self.sum.at = place;
         for number in into {
-            number.set(reader.next().into());
+            number.set(self.sum.next(board).into());
         }
     }
 
-    /// Whether a sample is corrected: one is in use, and can be read.
-    pub fn is_ready<B: Board>(&self, board: &mut B) -> bool {
-        self.at != 0 && board.eeprom_is_ready()
+    /// Whether a sample is corrected: one is in use, and can be read. The frame of the one before waits no longer.
+    pub fn is_ready<B: Board>(&mut self, board: &mut B) -> bool {
+        self.waits = self.at != 0 && board.eeprom_is_ready();
+        self.waits
     }
 
-    /// Corrects a sample; says all of the frame but number and time.
+    /// Whether a frame waits for room.
+    #[must_use]
+    pub fn waits(&self) -> bool {
+        self.waits
+    }
+
+    /// Sends it.
+    pub fn tell<B: Board>(&mut self, board: &mut B) {
+        self.waits = !board.send(kind::CORRECTED, self.frame.as_bytes());
+    }
+
+    /// Corrects the sample of this number; [`end`](Self::end) comes before, [`turn`](Self::turn) behind it.
     #[inline(always)]
     pub fn step<B: Board>(
         &mut self,
         board: &mut B,
         raw: &Raw,
+        seq: u16,
         duty: i16,
         config: &Config,
         in_order: bool,
-        out: &mut Corrected,
     ) {
-        let mut reader = Reader {
-            board,
-            at: self.at.wrapping_add(2),
-        };
-        out.correction.set(reader.next().cast_unsigned());
-        let shift = reader.next() as u8 & BLOCK_SHIFT_MAX;
-        if reader.next().cast_unsigned() != config.sens_avg() {
+        self.sum.at = self.at.wrapping_add(2);
+        self.frame.seq.set(seq);
+        self.frame
+            .correction
+            .set(self.sum.next(board).cast_unsigned());
+        let shift = self.sum.next(board) as u8 & BLOCK_SHIFT_MAX;
+        self.frame.state = 0;
+        if self.sum.next(board).cast_unsigned() != config.sens_avg() {
             return;
         }
         if self.left == 0 {
@@ -255,112 +259,149 @@ impl Correction {
             self.state |= APPLIED | AT_REST;
         }
         if !in_order {
-            out.state = NOT_IN_ORDER;
+            self.frame.state = NOT_IN_ORDER;
             self.state &= !AT_REST;
         }
         if duty != 0 {
             self.state &= !AT_REST;
         }
-        let mut rates = [0; 3];
-        let range = reader.next().to_le_bytes().map(u8::cast_signed);
-        reader.at = reader.at.wrapping_add(2);
-        self.model(&mut reader, raw, duty, config, &mut rates);
-        self.rest(&mut reader, &rates, range, out);
-        out.state |= self.state & !WARM;
+        let range = self.sum.next(board).to_le_bytes().map(u8::cast_signed);
+        let ahead = self.drive(board, duty);
+        self.model(board, raw, duty, config);
+        self.rest(board, ahead, range);
+        self.frame.state |= self.state;
         self.left = self.left.wrapping_sub(1);
-        if self.left == 0 {
-            self.end_block(&mut reader, shift);
-        }
+    }
+
+    /// How far the command is ahead of the motor, which follows it by the part that the next number tells, Q15.
+    #[inline(always)]
+    fn drive<B: Board>(&mut self, board: &mut B, duty: i16) -> i32 {
+        let ahead = (i32::from(duty) << 16).wrapping_sub(self.speed);
+        self.sum.total = self.speed;
+        self.sum.weigh(board, ahead << 1);
+        self.speed = self.sum.total;
+        ahead
     }
 
     /// The model's terms for each axis.
-    #[inline(never)]
-    fn model<B: Board>(
-        &mut self,
-        reader: &mut Reader<'_, B>,
-        raw: &Raw,
-        duty: i16,
-        config: &Config,
-        rates: &mut [i32; 3],
-    ) {
-        let starts = self.state & WARM == 0;
-        let [x, y, z] = raw.acc;
-        let by = [
-            1 << 10,
-            1,
-            duty,
-            duty.wrapping_abs(),
-            raw.supply[0].unsigned_12().cast_signed(),
-            x.cast_signed(),
-            y.cast_signed(),
-            z.cast_signed(),
-        ];
-        for ((((axis, rate), temp), word), scale) in (self.axes.iter_mut())
-            .zip(rates)
+    fn model<B: Board>(&mut self, board: &mut B, raw: &Raw, duty: i16, config: &Config) {
+        let starts = self.state & YAW_FREE == 0;
+        let sum = &mut self.sum;
+        for (((axis, temp), word), scale) in (self.axes.iter_mut())
             .zip(&raw.temp)
             .zip(&raw.gyro)
             .zip(&config.set_up.scale)
         {
             // Ten bits.
             axis.warm((temp.bits() << 6).cast_signed(), starts);
-            // Q8.24 << 8 times counts is Q16.16; of the scale 29 bits, so that nothing wraps.
-            *rate = times((scale.get() & SCALE_MASK) << 8, word.signed_14()) << 4;
-            reader.add(axis.temp >> 6, rate);
-            reader.add(square(axis.temp), rate);
-            for by in by {
-                *rate = rate.wrapping_add(product(by, reader.next()));
+            // Q24 times counts is Q16. A scale beyond 1/8 deg/s for each count makes rates that wrap, which no part has.
+            sum.total = times(scale.get() << 8, word.signed_14()) << 4;
+            sum.weigh(board, shifted(axis.temp, 6));
+            // Its square, Q22.10.
+            sum.weigh(board, shifted(mul(axis.temp, axis.temp), 2));
+            sum.count(board, 1 << 10);
+            sum.count(board, 1);
+            sum.count(board, duty);
+            sum.count(board, duty.wrapping_abs());
+            sum.count(board, raw.supply[0].unsigned_12().cast_signed());
+            for acc in &raw.acc {
+                sum.count(board, acc.cast_signed());
             }
+            axis.rate = sum.total;
         }
-        self.state |= WARM;
     }
 
-    /// The shares of the other axes, and the filter's bias; what is left is told, and summed up unless it is too much for a stand
-    /// at rest.
+    /// The shares of the other axes, what the motor does until it has spun up, and the filter's bias; what is left is told, and
+    /// summed up unless it is too much for a stand at rest.
     #[inline(always)]
-    fn rest<B: Board>(
-        &mut self,
-        reader: &mut Reader<'_, B>,
-        rates: &[i32; 3],
-        [lowest, highest]: [i8; 2],
-        out: &mut Corrected,
-    ) {
-        for ((axis, &rate), to) in self.axes.iter_mut().zip(rates).zip(&mut out.rate) {
-            let mut left = rate.wrapping_sub(axis.bias);
-            for &share in rates {
-                reader.add(share >> 2, &mut left);
+    fn rest<B: Board>(&mut self, board: &mut B, ahead: i32, [lowest, highest]: [i8; 2]) {
+        let sum = &mut self.sum;
+        for ((axis, to), bias) in (self.axes.iter())
+            .zip(&mut self.frame.rate)
+            .zip(&self.frame.bias)
+        {
+            sum.total = axis.rate.wrapping_sub(bias.get());
+            for share in &self.axes {
+                sum.weigh(board, shifted(share.rate, 2));
             }
+            // Behind the shares of all axes is what the filter has of each: noise and walk, for the end of the block, and this.
+            sum.at = sum.at.wrapping_add(OF_AXIS * 2 + 4);
+            sum.weigh(board, ahead);
+            sum.at = sum.at.wrapping_sub(OF_AXIS * 3);
+            let left = sum.total;
+            to.set(left);
             if (-REST..REST).contains(&((left >> 16) as i16)) {
-                axis.sum = axis.sum.wrapping_add(left);
+                axis.sum.set(axis.sum.get().wrapping_add(left));
+                self.squares = self.squares.wrapping_add(square(left));
             } else {
                 self.state &= !AT_REST;
             }
-            to.set(left);
-        }
-        for ((axis, bias), known) in self.axes.iter().zip(&mut out.bias).zip(&mut out.known) {
-            bias.set(axis.bias);
-            known.set(axis.known);
             let temp = (axis.temp >> 24) as i8;
             if temp < lowest || temp > highest {
-                out.state |= EXTRAPOLATED;
+                self.frame.state |= EXTRAPOLATED;
             }
         }
     }
 
-    /// A block has ended: one step of the filter. `reader` is at its numbers.
-    #[inline(always)]
-    fn end_block<B: Board>(&mut self, reader: &mut Reader<'_, B>, shift: u8) {
-        let rested = self.state & AT_REST != 0;
-        self.state &= FILTERED | WARM;
-        for axis in &mut self.axes {
-            let told = reader.next().cast_unsigned();
-            let walk = reader.next().cast_unsigned();
+    /// The attitude behind the corrected sample: begins anew where the sample before is too long ago, or there is none.
+    #[inline(never)]
+    pub fn turn(&mut self, raw: &Raw) {
+        let now = raw.t_ticks as u16;
+        let ticks = now.wrapping_sub(core::mem::replace(&mut self.t_ticks, now));
+        if self.state & YAW_FREE == 0 || ticks > LONGEST_TICKS {
+            self.state |= YAW_FREE;
+            self.frame.state &= !YAW_FREE;
+            attitude::begin(&mut self.frame.attitude);
+        } else if self.frame.state & APPLIED != 0 {
+            let acc = (self.frame.state & AT_REST != 0).then_some(&raw.acc);
+            attitude::step(&mut self.frame.attitude, &self.frame.rate, ticks, acc);
+        }
+    }
+
+    /// Before a sample: where a block has ended with the one before, one step of the filter.
+    pub fn end<B: Board>(&mut self, board: &mut B) {
+        if self.left != 0 || self.state & APPLIED == 0 {
+            return;
+        }
+        let sum = &mut self.sum;
+        sum.at = self.at.wrapping_add(4);
+        let shift = sum.next(board) as u8 & BLOCK_SHIFT_MAX;
+        sum.at = self.at.wrapping_add(OF_FILTER);
+        // The mean square of what is left about its own means, over what it is by what was told: above four times that it is
+        // no rest.
+        let mut spread = shifted(self.squares.cast_signed(), shift);
+        let mut told = 0u16;
+        for axis in &self.axes {
+            let mean = shifted(axis.sum.get(), shift);
+            axis.sum.set(mean);
+            spread = spread.wrapping_sub(square(mean).cast_signed());
+            // A fourth, so that three have room.
+            told = told.wrapping_add(sum.next(board).cast_unsigned() >> 2);
+            sum.at = sum.at.wrapping_add(4);
+        }
+        self.squares = 0;
+        let mut rested = self.state & AT_REST != 0;
+        self.state &= FILTERED | YAW_FREE;
+        if rested && shifted(spread, shift.wrapping_add(2)) > i32::from(told) {
+            self.state |= NOISE_OFF;
+            rested = false;
+        }
+        sum.at = sum.at.wrapping_sub(OF_AXIS * 3);
+        for ((axis, bias), known) in (self.axes.iter_mut())
+            .zip(&mut self.frame.bias)
+            .zip(&mut self.frame.known)
+        {
+            let told = sum.next(board).cast_unsigned();
+            let walk = sum.next(board).cast_unsigned();
+            sum.at = sum.at.wrapping_add(2);
             // P' = P + q with P = R / known, to the first order of known q / R.
-            let lost = upper(upper(axis.known, walk), axis.known);
-            axis.known = axis.known.wrapping_sub(lost);
-            let _none = reader.next();
-            let mean = shifted(core::mem::take(&mut axis.sum), shift);
+            let lost = upper(upper(known.get(), walk), known.get());
+            known.set(known.get().wrapping_sub(lost));
+            let mean = axis.sum.take();
             if rested {
-                self.state |= axis.measure(mean, told);
+                self.state |= axis.measure(mean, told, bias, known);
+            } else {
+                axis.trusted = false;
             }
         }
     }
@@ -372,19 +413,14 @@ impl Default for Correction {
     }
 }
 
-/// Whether what lies there ends with its CRC.
+/// The square of a rate below 4 deg/s, Q12.20: Q16, of it to the nearest 2^-8.
 #[inline(never)]
-pub(crate) fn is_whole<B: Board>(board: &mut B, mut at: u16, len: u8) -> bool {
-    let mut register = wire::crc::INIT;
-    for _ in 0..len {
-        register = wire::crc::update(register, board.eeprom_read(at));
-        at = at.wrapping_add(1);
-    }
-    register == wire::crc::RESIDUE
+fn square(x: i32) -> u32 {
+    let coarse = times(x, 1 << 4) as i16;
+    product(coarse, coarse).cast_unsigned()
 }
 
-#[inline(never)]
-fn block_len(shift: u8) -> u16 {
+fn block_len(shift: u8) -> u8 {
     let mut len = 1;
     for _ in 0..shift {
         len <<= 1;
@@ -406,25 +442,32 @@ impl Axis {
 
     /// A measurement of the scalar Kalman filter, by the mean of a block; what it has to say of it as bits of the state.
     #[inline(always)]
-    fn measure(&mut self, mean: i32, told: u16) -> u8 {
+    fn measure(&mut self, mean: i32, told: u16, bias: &mut I32, known: &mut U16) -> u8 {
         // Q13, whose square is Q26; over Q18 that is Q8.
-        let coarse = shifted(mean, 7).unsigned_abs() as u16;
-        let square = divide(wide(coarse, coarse), told).min(SQUARE_MAX) as u16;
+        let coarse = shifted(mean, 7) as i16;
+        let square = divide(product(coarse, coarse).cast_unsigned(), told).min(SQUARE_MAX) as u16;
         let noise = NOISE_TOLD.wrapping_add(self.noise).cast_unsigned();
-        let expected = (divide(1 << 16, self.known) as u16).saturating_add(noise);
-        if square >> (2 * GATE_SHIFT) > expected {
+        // 1 / known, where there is any; the sum has 16 bits.
+        let expected = (divide(EXPECTED_MOST, known.get() | 1) as u16).wrapping_add(noise);
+        let before = self.trusted;
+        self.trusted = square >> (2 * GATE_SHIFT) <= expected;
+        if !self.trusted {
             return REFUSED;
         }
+        if !before {
+            return 0;
+        }
         let measured = divide(1 << 16, noise) as u16;
-        self.known = self.known.saturating_add(measured);
-        let gain = divide(u32::from(measured) << 14, self.known) as i16;
-        add_times(&mut self.bias, mean << 2, gain);
+        let now = known.get().saturating_add(measured);
+        known.set(now);
+        let gain = divide(u32::from(measured) << 14, now) as i16;
+        bias.set(bias.get().wrapping_add(times(mean << 2, gain)));
         if expected > SQUARE_MAX as u16 {
             // It knew nothing yet.
             return FILTERED;
         }
         // Towards what was seen, between a fourth and four times what was told.
-        let beyond = (square.cast_signed()).saturating_sub_unsigned(expected);
+        let beyond = square.wrapping_sub(expected).cast_signed();
         let noise = (self.noise).wrapping_add(beyond.wrapping_add(HALF) >> ADAPT_SHIFT);
         self.noise = noise.clamp(NOISE_LEAST, NOISE_MOST);
         if self.noise == noise {

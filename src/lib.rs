@@ -11,6 +11,7 @@
 #![cfg_attr(target_arch = "avr", deny(unsafe_code), feature(asm_experimental_arch))]
 
 pub mod acquire;
+mod attitude;
 pub mod bias;
 pub mod config;
 pub mod correction;

@@ -48,6 +48,185 @@ pub fn divide(x: u32, n: u16) -> u32 {
     u32::from(high) << 16 | u32::from(low)
 }
 
+/// `x / 2^n`, rounded down; `n` below 32.
+#[cfg(not(target_arch = "avr"))]
+#[must_use]
+pub fn shifted(x: i32, n: u8) -> i32 {
+    x >> n
+}
+
+/// `x / 2^n`, rounded down; `n` below 32. Bit by bit, as the AVR has it: the compiler unrolls the loop.
+#[cfg(target_arch = "avr")]
+#[inline(never)]
+#[allow(unsafe_code)]
+#[must_use]
+pub fn shifted(x: i32, n: u8) -> i32 {
+    let (mut low, mut high) = (x as u16, (x >> 16) as u16);
+    // SAFETY: registers and flags alone.
+    unsafe {
+        core::arch::asm!(
+            "rjmp 3f",
+            "2:",
+            "asr {high:h}",
+            "ror {high:l}",
+            "ror {low:h}",
+            "ror {low:l}",
+            "3:",
+            "subi {n}, 1",
+            "brcc 2b",
+            n = inout(reg_upper) n => _,
+            low = inout(reg_pair) low,
+            high = inout(reg_pair) high,
+            options(pure, nomem, nostack),
+        );
+    }
+    (u32::from(high) << 16 | u32::from(low)).cast_signed()
+}
+
+/// `x y`.
+#[inline(never)]
+#[must_use]
+pub fn product(x: i16, y: i16) -> i32 {
+    i32::from(x).wrapping_mul(y.into())
+}
+
+/// `x y / 2^16` of what has no sign, rounded down.
+#[must_use]
+pub fn upper(x: u16, y: u16) -> u16 {
+    (u32::from(x).wrapping_mul(y.into()) >> 16) as u16
+}
+
+/// `x y / 2^16`, to the nearest.
+#[cfg(not(target_arch = "avr"))]
+#[must_use]
+pub fn times(x: i32, y: i16) -> i32 {
+    let low = i32::from(x as u16).wrapping_mul(y.into());
+    product((x >> 16) as i16, y).wrapping_add(low.wrapping_add(1 << 15) >> 16)
+}
+
+/// `x y / 2^16`, to the nearest. Byte by byte: the compiler's 32-bit products take three times as long.
+#[cfg(target_arch = "avr")]
+#[inline(never)]
+#[allow(unsafe_code)]
+#[must_use]
+pub fn times(x: i32, y: i16) -> i32 {
+    let (mut low, mut high) = (x as u16, (x >> 16) as u16);
+    // SAFETY: registers and flags alone; r1 is zero again at the end.
+    unsafe {
+        core::arch::asm!(
+            // x is r25 .. r22, y is r21, r20; as in `mul`.
+            "clr r31",
+            "mul r22, r20",
+            "mov r30, r1",
+            "clr r26",
+            "clr r27",
+            "mul r22, r21", "add r30, r0", "adc r26, r1", "adc r27, r31",
+            "mul r23, r20", "add r30, r0", "adc r26, r1", "adc r27, r31",
+            "clr r18",
+            "mul r23, r21", "add r26, r0", "adc r27, r1", "adc r18, r31",
+            "mul r24, r20", "add r26, r0", "adc r27, r1", "adc r18, r31",
+            "clr r19",
+            "mul r24, r21", "add r27, r0", "adc r18, r1", "adc r19, r31",
+            "mul r25, r20", "add r27, r0", "adc r18, r1", "adc r19, r31",
+            "mul r25, r21", "add r18, r0", "adc r19, r1",
+            "sbrs r25, 7",
+            "rjmp 2f",
+            "sub r18, r20", "sbc r19, r21",
+            "2:",
+            "sbrs r21, 7",
+            "rjmp 3f",
+            "sub r26, r22", "sbc r27, r23", "sbc r18, r24", "sbc r19, r25",
+            "3:",
+            "lsl r30",
+            "adc r26, r31", "adc r27, r31", "adc r18, r31", "adc r19, r31",
+            "movw r22, r26",
+            "movw r24, r18",
+            "clr r1",
+            in("r21r20") y,
+            inout("r23r22") low,
+            inout("r25r24") high,
+            out("r19r18") _,
+            out("X") _,
+            out("Z") _,
+            options(pure, nomem, nostack),
+        );
+    }
+    (u32::from(high) << 16 | u32::from(low)).cast_signed()
+}
+
+/// `x y / 2^32`, to the nearest.
+#[cfg(not(target_arch = "avr"))]
+#[must_use]
+pub fn mul(x: i32, y: i32) -> i32 {
+    let exact = i64::from(x).wrapping_mul(y.into());
+    (exact.wrapping_add(1 << 31) >> 32) as i32
+}
+
+/// `x y / 2^32`, to the nearest. Column by column of their bytes, without signs; then each factor is taken off that the sign of the
+/// other one stands for. The compiler's 64-bit product takes ten times as long.
+#[cfg(target_arch = "avr")]
+#[inline(never)]
+#[allow(unsafe_code)]
+#[must_use]
+pub fn mul(x: i32, y: i32) -> i32 {
+    let (mut low, mut high) = (x as u16, (x >> 16) as u16);
+    // SAFETY: registers and flags alone; r1 is zero again at the end.
+    unsafe {
+        core::arch::asm!(
+            // x is r25 .. r22, y is r21 .. r18. Of each column a byte stays, and two go on to the next.
+            "clr r31",
+            "mul r22, r18",
+            "mov r27, r1",
+            "clr r26",
+            "clr r30",
+            "mul r22, r19", "add r27, r0", "adc r26, r1", "adc r30, r31",
+            "mul r23, r18", "add r27, r0", "adc r26, r1", "adc r30, r31",
+            "clr r27",
+            "mul r22, r20", "add r26, r0", "adc r30, r1", "adc r27, r31",
+            "mul r23, r19", "add r26, r0", "adc r30, r1", "adc r27, r31",
+            "mul r24, r18", "add r26, r0", "adc r30, r1", "adc r27, r31",
+            "clr r26",
+            "mul r22, r21", "add r30, r0", "adc r27, r1", "adc r26, r31",
+            "mul r23, r20", "add r30, r0", "adc r27, r1", "adc r26, r31",
+            "mul r24, r19", "add r30, r0", "adc r27, r1", "adc r26, r31",
+            "mul r25, r18", "add r30, r0", "adc r27, r1", "adc r26, r31",
+            "clr r14",
+            "mul r23, r21", "add r27, r0", "adc r26, r1", "adc r14, r31",
+            "mul r24, r20", "add r27, r0", "adc r26, r1", "adc r14, r31",
+            "mul r25, r19", "add r27, r0", "adc r26, r1", "adc r14, r31",
+            "clr r15",
+            "mul r24, r21", "add r26, r0", "adc r14, r1", "adc r15, r31",
+            "mul r25, r20", "add r26, r0", "adc r14, r1", "adc r15, r31",
+            "mul r25, r21", "add r14, r0", "adc r15, r1",
+            // r15, r14, r26, r27 from the top.
+            "sbrs r25, 7",
+            "rjmp 2f",
+            "sub r27, r18", "sbc r26, r19", "sbc r14, r20", "sbc r15, r21",
+            "2:",
+            "sbrs r21, 7",
+            "rjmp 3f",
+            "sub r27, r22", "sbc r26, r23", "sbc r14, r24", "sbc r15, r25",
+            "3:",
+            // The highest bit of what is below rounds.
+            "lsl r30",
+            "adc r27, r31", "adc r26, r31", "adc r14, r31", "adc r15, r31",
+            "mov r22, r27",
+            "mov r23, r26",
+            "movw r24, r14",
+            "clr r1",
+            in("r19r18") y as u16,
+            in("r21r20") (y >> 16) as u16,
+            inout("r23r22") low,
+            inout("r25r24") high,
+            out("r15r14") _,
+            out("X") _,
+            out("Z") _,
+            options(pure, nomem, nostack),
+        );
+    }
+    (u32::from(high) << 16 | u32::from(low)).cast_signed()
+}
+
 /// The root of `x`, rounded down.
 #[inline(never)]
 #[must_use]
@@ -61,18 +240,6 @@ pub fn root(x: u32) -> u16 {
         bit >>= 1;
     }
     root
-}
-
-/// Counts with `f` fractional bits times a Q8.24 scale: the product with `f + 8` fractional bits, rounded down in
-/// magnitude. It holds up to 65535 counts and a scale below 0.5.
-#[inline(never)]
-#[must_use]
-pub fn scaled(counts: u16, scale_q24: i32) -> i32 {
-    let counts = u32::from(counts);
-    let scale = scale_q24.cast_unsigned();
-    let high = counts.wrapping_mul(scale >> 16);
-    let low = counts.wrapping_mul(scale & 0xffff) >> 16;
-    high.wrapping_add(low).cast_signed()
 }
 
 #[cfg(test)]
@@ -91,11 +258,19 @@ mod tests {
     }
 
     #[test]
-    fn a_product_with_a_scale_is_exact_to_its_last_bit() {
-        let scale = adis16250::Range::Dps320.scale_q24();
-        for counts in [0, 1, 68 << 8, u16::MAX] {
-            let exact = (i64::from(counts) * i64::from(scale)) >> 16;
-            assert!((i64::from(scaled(counts, scale)) - exact).abs() <= 1);
+    fn products_are_to_the_nearest() {
+        let mut x = 1u32;
+        let mut next = || {
+            x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            x.cast_signed()
+        };
+        for _ in 0..200_000 {
+            let (a, b) = (next(), next());
+            let y = (b >> 16) as i16;
+            let exact = i64::from(a) * i64::from(y);
+            assert_eq!(i64::from(times(a, y)), (exact + (1 << 15)) >> 16, "{a} {y}");
+            let exact = i64::from(a) * i64::from(b);
+            assert_eq!(i64::from(mul(a, b)), (exact + (1 << 31)) >> 32, "{a} {b}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The motor's command: never faster than its limits, never a jump. That it is off unless the PC is there is the board's
 //! part (see [`Board::keep_alive`](crate::Board::keep_alive)).
 
-use crate::math::divide;
+use crate::math::{divide, times, upper};
 
 /// The motor turns no longer than this without a word from the PC, ms.
 pub const KEEP_ALIVE_MS: u8 = 200;
@@ -70,7 +70,7 @@ impl Motor {
         self.cut();
         self.max_duty = max_duty.into();
         // steps/s -> Q6 steps/ms: * 64 / 1000, which is 4194 / 2^16 to 8e-5; at least the smallest there is.
-        self.ramp_q6 = (u32::from(ramp_per_s).wrapping_mul(4_194) >> 16).max(1) as i16;
+        self.ramp_q6 = upper(ramp_per_s, 4_194).max(1).cast_signed();
     }
 
     /// New command, which ends a profile; what is beyond the limit is cut to it. Returns the command that holds.
@@ -89,7 +89,6 @@ impl Motor {
 
     /// New profile about `offset`, `cycles` periods of `period_ms` long (0: endless); false, and nothing changed, when
     /// there is no such shape or an argument is out of range.
-    #[inline(never)]
     pub fn profile(
         &mut self,
         shape: u8,
@@ -115,7 +114,6 @@ impl Motor {
     }
 
     /// A millisecond of the profile.
-    #[inline(never)]
     fn step_profile(&mut self) {
         // -1 .. 1 in Q14 over the period.
         let part = ((self.phase >> 16) as u16).cast_signed();
@@ -133,10 +131,8 @@ impl Motor {
             }
             _ => sine_q14(part),
         };
-        let swing = i32::from(self.amplitude)
-            .wrapping_mul(height.into())
-            .wrapping_add(1 << 13)
-            >> 14;
+        // Q14.
+        let swing = times(i32::from(self.amplitude << 2), height);
         self.aim(self.offset.wrapping_add(swing as i16));
         let (phase, ended) = self.phase.overflowing_add(self.phase_per_ms);
         self.phase = phase;
@@ -161,7 +157,7 @@ impl Motor {
         self.turns()
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn turns(&self) -> bool {
         self.output_q6 != 0 || self.target != 0 || self.shape != shape::STOP
     }

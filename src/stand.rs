@@ -1,17 +1,19 @@
 //! The board's work below the tick: scaling, framing, counting. What the PC asks for is in [`requests`].
 
 use adis16250::Register;
-use wire::fields::{Corrected, Health, Reply, Sample};
+use fixed::types::I16F16;
+use wire::fields::{Health, Reply, Sample};
 use wire::{Asked, Fault, RequestDecoder, Status, code, flags, kind, reset_cause};
 use zerocopy::{FromZeros, IntoBytes};
 
 mod requests;
-mod store;
+pub(crate) mod store;
 
 use crate::acquire::{Job, Raw, Task};
-use crate::bias::{BiasNull, Outcome};
+use crate::bias::{BiasNull, Outcome, TURNS};
 use crate::config::Config;
 use crate::correction::Correction;
+use crate::math::times;
 use crate::motor::Motor;
 use store::Store;
 
@@ -132,8 +134,10 @@ pub struct Stand {
     millisecond: u16,
     /// [`HELLO`], [`HEALTH`], [`CLEAR`]: to be sent as soon as there is room.
     owed: u8,
-    /// What has been owed since a sample ago: it goes before samples, or a line too slow for the rate would carry nothing else.
+    /// What has been owed for a sample's time: it goes before samples, or a line too slow for the rate would carry nothing else.
     late: u8,
+    /// What was owed at the last sample.
+    waited: u8,
     /// Samples sent since the last reply, and since the last hello or health frame; they saturate.
     since_reply: u8,
     since_report: u8,
@@ -170,6 +174,7 @@ impl Stand {
             millisecond: 0,
             owed: 0,
             late: 0,
+            waited: 0,
             since_reply: 0,
             since_report: 0,
             motor: Motor::new(),
@@ -227,6 +232,7 @@ impl Stand {
     }
 
     /// Counts what has been lost outside.
+    #[inline(never)]
     pub fn count(&mut self, fault: Fault, times: u8) {
         self.health.count(fault, 0, times.into());
     }
@@ -237,6 +243,7 @@ impl Stand {
     }
 
     /// The next sequence number; `times` of them are spent.
+    #[inline(never)]
     fn take_seq(&mut self, times: u8) -> u16 {
         let seq = self.health.next_seq.get();
         self.health.next_seq.set(seq.wrapping_add(times.into()));
@@ -285,10 +292,11 @@ impl Stand {
             self.since_report = self.since_report.saturating_add(1);
         }
         self.late = if self.since_report >= SAMPLES_PER_REPORT {
-            self.owed
+            self.owed & self.waited
         } else {
             0
         };
+        self.waited = self.owed;
         if !matches!(raw.done.task, Task::None) {
             self.job_done(board, raw.done);
         }
@@ -298,33 +306,32 @@ impl Stand {
         }
     }
 
-    /// The corrected frame of the sample that [`on_sample`](Self::on_sample) had just before. It goes out where the line has room
-    /// for it beside the next sample and a reply, and nothing else is owed: never in place of one of those.
-    #[inline(never)]
+    /// Corrects the sample that [`on_sample`](Self::on_sample) had just before. Its frame goes out with a millisecond, as soon as
+    /// the line has room for it beside the next one and a reply, and nothing else is owed; one that has not until the next sample is dropped.
+    #[inline(always)]
     pub fn correct<B: Board>(&mut self, board: &mut B, raw: &Raw) {
-        if !self.correction.is_ready(board) {
-            return;
+        if self.correction.is_ready(board) {
+            // One behind the other, so that the stack has to hold one of them.
+            self.correction.end(board);
+            self.correct_rates(board, raw);
+            self.correction.turn(raw);
         }
-        let mut corrected = Corrected::new_zeroed();
-        corrected
-            .seq
-            .set(self.health.next_seq.get().wrapping_sub(1));
+    }
+
+    #[inline(never)]
+    fn correct_rates<B: Board>(&mut self, board: &mut B, raw: &Raw) {
         self.correction.step(
             board,
             raw,
+            self.health.next_seq.get().wrapping_sub(1),
             self.motor.output(),
             &self.config,
             self.in_order,
-            &mut corrected,
         );
-        if self.owed == 0 && board.room() >= CORRECTED_LEN + SAMPLE_LEN + REPLY_LEN {
-            board.send(kind::CORRECTED, corrected.as_bytes());
-        }
     }
 
     /// A gyro that answers again may have lost its set-up with its power; one that raises its error or alarm bit, bit per
     /// axis in `errors`, keeps it up until its STATUS is read.
-    #[inline(never)]
     fn look_after_gyros<B: Board>(&mut self, board: &mut B, silent: u8, errors: u8) {
         let back = self.silent & !silent;
         self.silent = silent;
@@ -390,7 +397,6 @@ impl Stand {
     }
 
     /// One gyro's part of the sample; its flags. `bit` is the one of the axis.
-    #[inline(never)]
     fn gyro(&mut self, axis: u8, bit: u8, raw: &Raw, sample: &mut Sample) -> u16 {
         let at = axis as usize;
         if at >= 3 {
@@ -408,11 +414,11 @@ impl Stand {
         }
         sample.gyro[at].set(word.signed_14());
         sample.temp[at].set(raw.temp[at].signed_12());
-        let rate = fixed::types::I16F16::from_bits(
-            word.rate().dps_q16(self.config.set_up.scale[at].get()),
-        );
-        let bias = fixed::types::I16F16::from_bits(self.config.set_up.bias[at].get());
-        sample.rate[at].set(rate.saturating_sub(bias).to_bits());
+        // Q24 times counts; scale and bias are bounded so that nothing wraps.
+        let scale = self.config.set_up.scale[at].get();
+        let rate = I16F16::from_bits(times(scale << 8, word.signed_14()));
+        let bias = I16F16::from_bits(self.config.set_up.bias[at].get());
+        sample.rate[at].set(rate.wrapping_sub(bias).to_bits());
         let mut seen = 0;
         if word.is_new() {
             seen = flags::NEW_X * u16::from(bit);
@@ -426,7 +432,6 @@ impl Stand {
         seen
     }
 
-    #[inline(never)]
     fn accelerometer(&mut self, axis: u8, bit: u8, raw: &Raw, sample: &mut Sample) -> u16 {
         let at = axis as usize;
         if at >= 3 {
@@ -463,7 +468,6 @@ impl Stand {
         0
     }
 
-    #[inline(never)]
     fn step_bias_null<B: Board>(&mut self, board: &mut B, sample: &Sample) {
         let outcome = if self.motor.is_on() {
             Outcome::Moving
@@ -493,16 +497,19 @@ impl Stand {
     }
 
     /// The means become the biases; false, and nothing changed, when the stand turns.
-    #[inline(never)]
     fn take_biases(&mut self) -> bool {
         let mut largest = 0;
-        for axis in 0..3 {
-            let scale = self.config.set_up.scale[axis as usize].get();
-            let Some((mean, error)) = self.bias_null.mean_and_error(axis, scale) else {
+        for ((sum, scale), mean) in (self.bias_null.axes())
+            .zip(&self.config.set_up.scale)
+            .zip(&mut self.answer.detail)
+        {
+            let scale = scale.get();
+            let found = self.bias_null.mean(sum, scale);
+            if found == TURNS {
                 return false;
-            };
-            self.answer.detail[axis as usize].set(mean);
-            largest = error.max(largest);
+            }
+            mean.set(found);
+            largest = self.bias_null.error(sum, scale).max(largest);
         }
         self.answer.value.set(largest);
         self.config.set_up.bias = self.answer.detail;
@@ -559,6 +566,9 @@ impl Stand {
         }
         if self.owed != 0 {
             self.tell(board, 0);
+        } else if self.correction.waits() && board.room() >= CORRECTED_LEN + SAMPLE_LEN + REPLY_LEN
+        {
+            self.correction.tell(board);
         }
     }
 
@@ -584,11 +594,10 @@ impl Stand {
         self.answer.zero();
     }
 
-    /// Whether a hello or health frame of this length has its turn: soon after another one there has to be room for a sample
-    /// beside it.
-    #[inline(never)]
+    /// Whether a hello or health frame of this length has its turn: unless it is late there has to be room for a sample beside
+    /// it.
     fn may_report<B: Board>(&self, board: &B, len: u8) -> bool {
-        let beside = if self.since_report >= SAMPLES_PER_REPORT {
+        let beside = if self.late != 0 {
             REPLY_LEN
         } else {
             REPLY_LEN + SAMPLE_LEN
@@ -676,3 +685,6 @@ impl From<&Asked> for Pending {
 }
 
 const _: () = assert!(code::PING != 0, "0 stands for no request");
+
+#[cfg(test)]
+mod tests;

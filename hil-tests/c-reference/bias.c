@@ -21,7 +21,7 @@ static uint16_t wanted, have, block, in_block, blocks;
 static uint8_t lost;
 static struct axis_sum {
     int32_t sum;      /* of the offsets from the first reading */
-    uint32_t squares; /* of the steps from block to block; saturates */
+    uint32_t steps;   /* of their magnitudes, from block to block */
     int16_t first, part, last;
     int8_t low, high;
 } sums[3];
@@ -54,11 +54,8 @@ static bool take(struct axis_sum *axis, int16_t value)
 
 static void end_block(struct axis_sum *axis)
 {
-    if (blocks) {
-        uint16_t step = (uint16_t)abs(axis->part - axis->last);
-        if (__builtin_add_overflow(axis->squares, (uint32_t)step * step, &axis->squares))
-            axis->squares = UINT32_MAX;
-    }
+    if (blocks)
+        axis->steps += (uint16_t)abs(axis->part - axis->last);
     axis->last = axis->part;
     axis->part = 0;
 }
@@ -84,29 +81,22 @@ enum bias_outcome bias_take(const int16_t gyro[3], bool in_order)
     return !resting ? BIAS_MOVING : have >= wanted ? BIAS_DONE : BIAS_GOES_ON;
 }
 
-/* sqrt(2 squares) / (b (2 k - 1)) counts, Q10, times the scale: Q16.16. */
-static int32_t error_of(uint32_t squares, int32_t scale)
+/* sqrt(pi)/2 in Q10 times the mean magnitude of the steps over b sqrt(k): counts in Q10, times the scale: Q16.16. */
+static int32_t error_of(uint32_t steps, int32_t scale)
 {
-    uint32_t twice = squares;
-    uint8_t place = 0;
-    if (__builtin_add_overflow(twice, twice, &twice))
-        twice = UINT32_MAX;
-    for (; twice >> 30 == 0 && place < 10; place++)
-        twice <<= 2;
-    uint32_t error = (uint32_t)root(twice) << (10 - place);
-    return scaled((uint16_t)(error / (uint16_t)(block * (2 * blocks - 1))), scale) >> 2;
+    uint32_t step = steps * 907 / (uint16_t)(block * (blocks - 1));
+    return times(scale, (int16_t)((step << 8) / root((uint32_t)blocks << 16))) >> 2;
 }
 
 bool bias_mean(uint8_t axis, int32_t scale, int32_t *mean, int32_t *error)
 {
     const struct axis_sum *sum = &sums[axis];
-    int32_t part = (int32_t)(((uint32_t)labs(sum->sum) << 8) / have);
-    int32_t mean_q8 = ((int32_t)sum->first << 8) + (sum->sum < 0 ? -part : part);
-    uint32_t magnitude = (uint32_t)labs(mean_q8);
-    if (magnitude >= (uint32_t)LARGEST_BIAS << 8)
+    /* Of offsets above -60: nothing has a sign. */
+    uint32_t above = (uint32_t)sum->sum + (uint32_t)have * SPREAD_AT_REST;
+    int16_t mean_q8 = (int16_t)(((uint16_t)(sum->first - SPREAD_AT_REST) << 8) + (uint16_t)((above << 8) / have));
+    if (abs(sum->first) >= LARGEST_BIAS + SPREAD_AT_REST || abs(mean_q8) >= LARGEST_BIAS << 8)
         return false;
-    int32_t value = scaled((uint16_t)magnitude, scale);
-    *mean = mean_q8 < 0 ? -value : value;
-    *error = error_of(sum->squares, scale);
+    *mean = times(scale, mean_q8);
+    *error = error_of(sum->steps, scale);
     return true;
 }

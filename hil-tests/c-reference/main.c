@@ -48,6 +48,7 @@ int main(void)
         const struct raw *raw = tick_take(&missed);
         if (raw) {
             stand_on_sample(raw, missed);
+            stand_correct(raw);
             ticked = true;
         } else if (tick_take_passed()) {
             ticked = true;

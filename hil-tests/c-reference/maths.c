@@ -1,9 +1,20 @@
 #include "maths.h"
 
-int32_t scaled(uint16_t counts, int32_t scale_q24)
+int32_t __attribute__((noinline)) times(int32_t x, int16_t y)
 {
-    uint16_t high = (uint16_t)((uint32_t)scale_q24 >> 16), low = (uint16_t)scale_q24;
-    return (int32_t)((uint32_t)counts * high + ((uint32_t)counts * low >> 16));
+    int32_t low = (int32_t)(uint16_t)x * y;
+    int32_t high = (int32_t)(int16_t)(x >> 16) * y;
+    return (int32_t)((uint32_t)high + (uint32_t)((low + 0x8000) >> 16));
+}
+
+int32_t __attribute__((noinline)) mul(int32_t x, int32_t y)
+{
+    return (int32_t)(((int64_t)x * y + 0x80000000LL) >> 32);
+}
+
+uint16_t upper(uint16_t x, uint16_t y)
+{
+    return (uint16_t)((uint32_t)x * y >> 16);
 }
 
 uint16_t root(uint32_t x)

@@ -2,7 +2,11 @@
 
 #include <stdint.h>
 
-/* Counts with f fractional bits times a Q8.24 scale below 0.5: the product with f + 8 fractional bits. */
-int32_t scaled(uint16_t counts, int32_t scale_q24);
+/* x y / 2^16, to the nearest. */
+int32_t times(int32_t x, int16_t y);
+/* x y / 2^32, to the nearest. */
+int32_t mul(int32_t x, int32_t y);
+/* x y / 2^16, rounded down. */
+uint16_t upper(uint16_t x, uint16_t y);
 /* The square root, rounded down. */
 uint16_t root(uint32_t x);

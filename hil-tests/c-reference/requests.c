@@ -2,6 +2,7 @@
 
 #include "bias.h"
 #include "board.h"
+#include "correction.h"
 #include "gyro.h"
 #include "motor.h"
 #include "serial.h"
@@ -32,12 +33,14 @@ static uint8_t arguments_of(uint8_t code)
         return 0;
     case CODE_SET_ACC_RANGE:
     case CODE_SELF_TEST:
+    case CODE_CORRECTION:
         return 1;
     case CODE_SET_BAUD ... CODE_SET_GYRO:
     case CODE_BIAS_NULL:
     case CODE_MOTOR_DUTY:
     case CODE_ARM:
     case CODE_READ_REGISTER:
+    case CODE_GET_CORRECTION:
     case CODE_SET_BOARD_ID:
         return 2;
     case CODE_SET_RATE:
@@ -47,6 +50,8 @@ static uint8_t arguments_of(uint8_t code)
         return 4;
     case CODE_SET_BIAS ... CODE_SET_SCALE:
         return 5;
+    case CODE_SET_CORRECTION:
+        return 7;
     case CODE_MOTOR_PROFILE:
         return 8;
     default:
@@ -122,6 +127,33 @@ static uint8_t arm(uint16_t said)
         tick_keep_alive();
     else
         return STATUS_BAD_ARGUMENT;
+    return STATUS_OK;
+}
+
+/* What concerns the correction. */
+static uint8_t on_correction(const struct request *request)
+{
+    /* The EEPROM is read at once. */
+    if (!store_is_idle())
+        return STATUS_BUSY;
+    if (request->command == CODE_CORRECTION) {
+        if (request->u8 == 0)
+            correction_off();
+        else if (!correction_on())
+            return STATUS_NO_CONFIG;
+        return STATUS_OK;
+    }
+    bool write = request->command == CODE_SET_CORRECTION;
+    uint16_t place =
+        write ? correction_place(true, request->row.row) : correction_place(request->place.other, request->place.row);
+    if (place == 0)
+        return STATUS_BAD_ARGUMENT;
+    if (write) {
+        store_begin_row(place, request->row.bytes);
+        return pend(&storing, request);
+    }
+    stand_answer.value = correction_in_use();
+    correction_read(place, stand_answer.detail);
     return STATUS_OK;
 }
 
@@ -213,6 +245,8 @@ static uint8_t carry_out(const struct request *request)
         set_up_changes();
         set_up->scale[request->axis.axis] = request->axis.value;
         return changed();
+    case CODE_SET_CORRECTION ... CODE_GET_CORRECTION:
+        return on_correction(request);
     case CODE_MOTOR_DUTY:
         if (request->i16 < -MOTOR_FULL || request->i16 > MOTOR_FULL)
             return STATUS_BAD_ARGUMENT;
@@ -262,7 +296,7 @@ static uint8_t carry_out(const struct request *request)
     }
 }
 
-void stand_on_request(const struct request *request)
+void __attribute__((noinline)) stand_on_request(const struct request *request)
 {
     uint8_t status = STATUS_OK, used = arguments_of(request->command);
     if (used == 0xff) {

@@ -5,8 +5,10 @@
 
 #include "bias.h"
 #include "board.h"
+#include "correction.h"
 #include "frame.h"
 #include "gyro.h"
+#include "maths.h"
 #include "motor.h"
 #include "serial.h"
 #include "store.h"
@@ -34,9 +36,11 @@ uint8_t stand_misconfigured;
 static struct health health;
 static uint8_t silent; /* bit per axis: not answering at the last sample */
 static uint8_t owed;   /* to the host, as soon as there is room */
-static uint8_t late;   /* of it, what has been owed since a sample ago */
+static uint8_t late;   /* of it, what has been owed for a sample's time */
+static uint8_t waited; /* what was owed at the last sample */
 static uint8_t since_reply, since_report; /* samples sent since then; they saturate */
 static uint8_t cleared; /* bit per axis: its STATUS has been read in this second */
+static bool in_order;  /* the last sample was */
 static bool unset;     /* the gyros have to be set up (anew) */
 
 void stand_count(uint8_t fault, uint8_t times)
@@ -67,12 +71,12 @@ bool stand_listens(void)
 static bool may_report(uint8_t length)
 {
     length += ON_LINE(struct reply);
-    if (since_report < SAMPLES_PER_REPORT)
+    if (!late)
         length += ON_LINE(struct sample);
     return serial_room() >= length;
 }
 
-void stand_tell(uint8_t more)
+void __attribute__((noinline)) stand_tell(uint8_t more)
 {
     owed |= more;
     if (owed & OWED_HELLO && may_report(ON_LINE(struct hello))) {
@@ -158,6 +162,7 @@ void stand_boot(void)
     if (!store_load())
         config_set_default();
     stand_apply();
+    correction_on();
 }
 
 void stand_started(uint8_t wrong)
@@ -166,16 +171,6 @@ void stand_started(uint8_t wrong)
     stand_setting = SET;
     stand_note_configured(7, wrong);
     stand_tell(OWED_HELLO);
-}
-
-/* Q16.16 deg/s: counts times scale, less bias. */
-static int32_t rate_of(int16_t counts, int32_t scale_q24, int32_t bias)
-{
-    int32_t rate = counts * (scale_q24 >> 8) + ((int32_t)counts * (uint8_t)scale_q24 >> 8);
-    int32_t result;
-    if (__builtin_sub_overflow(rate, bias, &result))
-        result = rate < 0 ? INT32_MIN : INT32_MAX;
-    return result;
 }
 
 /* One gyro's part of the sample; its flags. */
@@ -198,7 +193,7 @@ static uint16_t take_gyro(uint8_t axis, const struct raw *raw, struct sample *sa
     int16_t counts = (int16_t)(word << 2) >> 2;
     sample->gyro[axis] = counts;
     sample->temp[axis] = (int16_t)(raw->temp[axis] << 4) >> 4;
-    sample->rate[axis] = rate_of(counts, config.set_up.scale[axis], config.set_up.bias[axis]);
+    sample->rate[axis] = times(config.set_up.scale[axis] << 8, counts) - config.set_up.bias[axis];
     uint16_t flags = 0;
     if (word & 0x8000)
         flags = FLAG_NEW_X << axis;
@@ -307,7 +302,7 @@ static bool take_biases(void)
     return true;
 }
 
-static void step_bias_null(bool in_order, const struct sample *sample)
+static void step_bias_null(const struct sample *sample)
 {
     switch (motor_is_on() ? BIAS_MOVING : bias_take(sample->gyro, in_order)) {
     case BIAS_GOES_ON:
@@ -324,7 +319,7 @@ static void step_bias_null(bool in_order, const struct sample *sample)
     }
 }
 
-void stand_on_sample(const struct raw *raw, uint8_t missed)
+void __attribute__((noinline)) stand_on_sample(const struct raw *raw, uint8_t missed)
 {
     struct sample sample;
     memset(&sample, 0, sizeof sample);
@@ -350,10 +345,10 @@ void stand_on_sample(const struct raw *raw, uint8_t missed)
     if ((stand_misconfigured & ~silent_now) || stand_setting != SET)
         flags |= FLAG_GYRO_MISCONFIGURED;
     flags |= take_supply(raw, &sample);
+    in_order = flags == FLAGS_IN_ORDER;
     if (stand_null.code) {
-        bool in_order = flags == FLAGS_IN_ORDER;
         flags |= FLAG_BIAS_NULL;
-        step_bias_null(in_order, &sample);
+        step_bias_null(&sample);
     }
     sample.flags = flags;
     /* What has been owed since a sample ago goes before samples. */
@@ -365,14 +360,21 @@ void stand_on_sample(const struct raw *raw, uint8_t missed)
         if (since_report != UINT8_MAX)
             since_report++;
     }
-    late = since_report >= SAMPLES_PER_REPORT ? owed : 0;
+    late = since_report >= SAMPLES_PER_REPORT ? owed & waited : 0;
+    waited = owed;
     requests_on_sample();
     uint16_t busy = tick_since();
     if (busy > health.tick_busy_max)
         health.tick_busy_max = busy;
 }
 
-void stand_on_millisecond(void)
+void stand_correct(const struct raw *raw)
+{
+    if (correction_is_ready())
+        correction_step(raw, health.next_seq - 1, motor_output(), in_order);
+}
+
+void __attribute__((noinline)) stand_on_millisecond(void)
 {
     static uint16_t millisecond;
     stand_miss_host();
@@ -390,4 +392,6 @@ void stand_on_millisecond(void)
     }
     if (owed)
         stand_tell(0);
+    else if (correction_waits() && serial_room() >= ON_LINE(struct corrected) + ON_LINE(struct sample) + ON_LINE(struct reply))
+        correction_tell();
 }

@@ -12,6 +12,8 @@ void stand_boot(void);
 /* What gyro_configure_all returned at start; says hello. */
 void stand_started(uint8_t misconfigured);
 void stand_on_sample(const struct raw *raw, uint8_t missed);
+/* Corrects the sample before, where a correction is in use. */
+void stand_correct(const struct raw *raw);
 void stand_on_millisecond(void);
 void stand_on_request(const struct request *request);
 /* Whether there is room for the reply that the next received byte may bring: until then the bytes wait, so that no request

@@ -1,8 +1,10 @@
 #include "store.h"
 
 #include <avr/io.h>
+#include <string.h>
 #include <util/atomic.h>
 
+#include "correction.h"
 #include "frame.h"
 #include "gyro.h"
 #include "motor.h"
@@ -34,8 +36,10 @@ _Static_assert(sizeof(struct stored) == 45, "the format of a stored copy");
 
 struct config config;
 static struct stored copy;
-static bool storing;
+static bool storing, is_row;
 static uint8_t at, generation, newest;
+static uint16_t place;
+static uint8_t row[6];
 
 void config_set_scale_of_range(void)
 {
@@ -96,11 +100,16 @@ bool config_bias_in_order(int32_t bias)
     return high < BIAS_BOUND_HIGH && high >= -BIAS_BOUND_HIGH;
 }
 
-static uint8_t eeprom_read(uint16_t address)
+uint8_t eeprom_read(uint16_t address)
 {
     EEAR = address;
     EECR |= _BV(EERE);
     return EEDR;
+}
+
+bool eeprom_is_ready(void)
+{
+    return !(EECR & _BV(EEWE));
 }
 
 static void eeprom_write(uint16_t address, uint8_t byte)
@@ -121,38 +130,58 @@ static bool copy_is_in_order(void)
         if (!config_scale_in_order(set_up->scale[axis]) || !config_bias_in_order(set_up->bias[axis]))
             return false;
     }
-    return crc_update(CRC_INIT, &copy, sizeof copy) == CRC_RESIDUE && copy.format == FORMAT &&
-           config_gyro_in_order(set_up->gyro_range, set_up->gyro_filter) && set_up->acc_range <= 3 &&
+    return config_gyro_in_order(set_up->gyro_range, set_up->gyro_filter) && set_up->acc_range <= 3 &&
            set_up->gyro_sample_period == GYRO_FASTEST &&
            config_rate_in_order(set_up->period_ticks, set_up->periods_per_sample) &&
            config_baud_in_order(set_up->baud_divisor);
 }
 
+enum found { ERASED, SPOILT, WHOLE };
+
+/* Looks at a copy of the set-up or, behind those, of a correction. */
+static enum found look(uint16_t address)
+{
+    bool is_config = address < CORRECTION_FIRST;
+    uint8_t left = is_config ? sizeof copy : CORRECTION_BYTES, format = eeprom_read(address), all = 0xff;
+    uint32_t crc = CRC_INIT;
+    for (; left; left--) {
+        uint8_t byte = eeprom_read(address++);
+        crc = crc_update_byte(crc, byte);
+        all &= byte;
+    }
+    if (crc == CRC_RESIDUE && format == (is_config ? FORMAT : CORRECTION_FORMAT))
+        return WHOLE;
+    return all == 0xff ? ERASED : SPOILT;
+}
+
+uint8_t store_newest(uint16_t first, uint16_t second)
+{
+    enum found one = look(first), two = look(second);
+    uint8_t found = (one == SPOILT ? 4 : 0) + (two == SPOILT ? 4 : 0);
+    /* Generations, behind the format, wrap: the newer one is ahead by less than half the circle. */
+    if (two == WHOLE && (one != WHOLE || (uint8_t)(eeprom_read(second + 1) - eeprom_read(first + 1)) < 128))
+        return found + 2;
+    return one == WHOLE ? found + 1 : found;
+}
+
 bool store_load(void)
 {
-    bool found = false;
-    for (uint8_t place = 0; place < 2; place++) {
-        uint8_t all = 0xff;
-        uint16_t address = SLOT(place);
-        for (uint8_t *to = (uint8_t *)&copy; to < (uint8_t *)(&copy + 1); to++, address++) {
-            *to = eeprom_read(address);
-            all &= *to;
-        }
-        if (!copy_is_in_order()) {
-            if (all != 0xff) /* an erased one is not spoilt */
-                stand_count(FAULT_CONFIG_INVALID, 1);
-            continue;
-        }
-        /* Generations wrap: the newer one is ahead by less than half the circle. */
-        if (!found || (uint8_t)(copy.generation - generation) < 128) {
-            found = true;
-            config = copy.config;
-            config.set_up.config_source = SOURCE_STORED + place;
-            generation = copy.generation;
-            newest = place;
-        }
+    uint8_t found = store_newest(SLOT(0), SLOT(1)), number = found & 3;
+    stand_count(FAULT_CONFIG_INVALID, found >> 2);
+    if (number == 0)
+        return false;
+    uint16_t address = SLOT(number - 1);
+    for (uint8_t *to = (uint8_t *)&copy; to < (uint8_t *)(&copy + 1); to++)
+        *to = eeprom_read(address++);
+    if (!copy_is_in_order()) {
+        stand_count(FAULT_CONFIG_INVALID, 1);
+        return false;
     }
-    return found;
+    config = copy.config;
+    config.set_up.config_source = SOURCE_STORED + number - 1;
+    generation = copy.generation;
+    newest = number - 1;
+    return true;
 }
 
 bool store_is_idle(void)
@@ -165,35 +194,55 @@ bool store_begin(void)
     if (storing)
         return false;
     storing = true;
+    is_row = false;
     at = 0;
+    place = SLOT(newest ^ 1);
     copy.format = FORMAT;
-    copy.generation = (uint8_t)(generation + 1);
+    copy.generation = ++generation;
     copy.config = config;
     copy.crc = ~crc_update(CRC_INIT, &copy, sizeof copy - sizeof copy.crc);
     return true;
 }
 
+void store_begin_row(uint16_t to, const uint8_t bytes[6])
+{
+    storing = is_row = true;
+    at = 0;
+    place = to;
+    memcpy(row, bytes, sizeof row);
+}
+
+static bool stored(void)
+{
+    if (!is_row) {
+        uint8_t to = newest ^ 1;
+        if ((store_newest(SLOT(0), SLOT(1)) & 3) != to + 1)
+            return false;
+        newest = to;
+        config.set_up.config_source = SOURCE_STORED + to;
+        return true;
+    }
+    for (uint8_t i = 0; i < sizeof row; i++) {
+        if (eeprom_read(place + i) != row[i])
+            return false;
+    }
+    /* With the row of its CRC the copy is whole, and in use from then on. */
+    return place != correction_place(true, CORRECTION_ROWS) ||
+           (correction_on() && place == correction_place(false, CORRECTION_ROWS));
+}
+
 uint8_t store_step(void)
 {
-    if (!storing || (EECR & _BV(EEWE)))
+    if (!storing || !eeprom_is_ready())
         return STORE_GOES_ON;
-    uint8_t place = newest ^ 1;
-    uint16_t address = SLOT(place);
-    const uint8_t *bytes = (const uint8_t *)&copy;
-    if (at < sizeof copy) {
-        eeprom_write(address + at, bytes[at]);
+    if (at < (is_row ? sizeof row : sizeof copy)) {
+        eeprom_write(place + at, is_row ? row[at] : ((const uint8_t *)&copy)[at]);
         at++;
         return STORE_GOES_ON;
     }
     storing = false;
-    for (uint8_t left = sizeof copy; left; left--) {
-        if (eeprom_read(address++) != *bytes++) {
-            stand_count(FAULT_CONFIG_NOT_STORED, 1);
-            return STATUS_NOT_STORED;
-        }
-    }
-    generation = copy.generation;
-    newest = place;
-    config.set_up.config_source = SOURCE_STORED + place;
-    return STATUS_OK;
+    if (stored())
+        return STATUS_OK;
+    stand_count(FAULT_CONFIG_NOT_STORED, 1);
+    return STATUS_NOT_STORED;
 }

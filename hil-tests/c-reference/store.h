@@ -27,12 +27,19 @@ bool config_gyro_in_order(uint8_t range, uint8_t filter);
 bool config_scale_in_order(int32_t scale);
 bool config_bias_in_order(int32_t bias);
 
-/* Whether no copy is being written. */
+uint8_t eeprom_read(uint16_t address);
+bool eeprom_is_ready(void);
+/* Which of two copies is the newest that is whole: 1, 2, or 0 for neither; four more for each that is spoilt. */
+uint8_t store_newest(uint16_t first, uint16_t second);
+
+/* Whether nothing is being written. */
 bool store_is_idle(void);
 /* Takes the newer of the two copies that are in order; false when neither is. Not while one is written. */
 bool store_load(void);
-/* Starts to write the set-up; false while a copy is under way. */
+/* Starts to write the set-up; false while something is under way. */
 bool store_begin(void);
+/* Starts to write a row of a correction; not while something is under way. */
+void store_begin_row(uint16_t place, const uint8_t bytes[6]);
 /* A millisecond has passed: STATUS_OK or STATUS_NOT_STORED when that was the end, else STORE_GOES_ON. */
 #define STORE_GOES_ON 0xff
 uint8_t store_step(void);

@@ -5,7 +5,7 @@
 
 #define WIRE_VERSION 1
 
-enum kind { KIND_HELLO = 1, KIND_SAMPLE = 2, KIND_HEALTH = 3, KIND_REPLY = 4, KIND_REQUEST = 16 };
+enum kind { KIND_HELLO = 1, KIND_SAMPLE = 2, KIND_HEALTH = 3, KIND_REPLY = 4, KIND_CORRECTED = 5, KIND_REQUEST = 16 };
 
 enum {
     FLAG_NEW_X = 1 << 0,
@@ -18,6 +18,18 @@ enum {
     FLAG_ACC_NOT_CONVERTED = 1 << 12,
     FLAG_GYRO_MISCONFIGURED = 1 << 13,
     FLAGS_IN_ORDER = 7,
+};
+
+/* Bits of a corrected frame's state. */
+enum state {
+    STATE_APPLIED = 1 << 0,
+    STATE_FILTERED = 1 << 1,
+    STATE_AT_REST = 1 << 2,
+    STATE_REFUSED = 1 << 3,
+    STATE_NOISE_OFF = 1 << 4,
+    STATE_EXTRAPOLATED = 1 << 5,
+    STATE_NOT_IN_ORDER = 1 << 6,
+    STATE_YAW_FREE = 1 << 7,
 };
 
 enum code {
@@ -34,6 +46,9 @@ enum code {
     CODE_BIAS_NULL = 32,
     CODE_SET_BIAS = 33,
     CODE_SET_SCALE = 34,
+    CODE_SET_CORRECTION = 35,
+    CODE_CORRECTION = 36,
+    CODE_GET_CORRECTION = 37,
     CODE_MOTOR_DUTY = 48,
     CODE_MOTOR_PROFILE = 49,
     CODE_MOTOR_LIMITS = 50,
@@ -151,6 +166,17 @@ struct reply {
     int32_t detail[3];
 };
 
+struct corrected {
+    struct header header;
+    uint16_t seq;
+    int32_t rate[3];
+    int32_t bias[3];
+    uint16_t known[3];
+    uint16_t correction;
+    uint8_t state;
+    int32_t attitude[4];
+};
+
 struct request {
     struct header header;
     uint16_t number;
@@ -172,6 +198,14 @@ struct request {
             uint8_t axis;
             int32_t value;
         } axis;
+        struct {
+            uint8_t row;
+            uint8_t bytes[6];
+        } row;
+        struct {
+            uint8_t other;
+            uint8_t row;
+        } place;
         struct {
             uint8_t shape;
             int16_t amplitude;
@@ -195,4 +229,5 @@ _Static_assert(sizeof(struct sample) == 44, "docs/wire-format.md");
 _Static_assert(sizeof(struct hello) == 50, "docs/wire-format.md");
 _Static_assert(sizeof(struct health) == 84, "docs/wire-format.md");
 _Static_assert(sizeof(struct reply) == 22, "docs/wire-format.md");
+_Static_assert(sizeof(struct corrected) == 53, "docs/wire-format.md");
 _Static_assert(sizeof(struct request) == 13, "docs/wire-format.md");

@@ -17,19 +17,42 @@ const TICK: u64 = CLOCK_HZ as u64 / 20;
 /// End of SRAM + 1.
 const RAM_END: u16 = 0x460;
 
+/// Cycles awake in [`TICKS`] ticks, from the middle of one pause to the middle of another, so many half ticks after the first.
+fn awake(
+    mcu: &mut Mcu,
+    script: &mut session::Script,
+    first: u64,
+    half_ticks: u64,
+) -> Result<u64, String> {
+    session::run(mcu, script, first + half_ticks * TICK / 2)?;
+    let (from, slept) = (mcu.cycle(), mcu.slept());
+    session::run(mcu, script, first + (2 * TICKS + half_ticks) * TICK / 2)?;
+    Ok((mcu.cycle() - from) - (mcu.slept() - slept))
+}
+
 fn measure(path: &str) -> Result<(), String> {
     let elf = std::fs::read(path).map_err(|error| format!("{path}: {error}"))?;
     let mcu = || Mcu::new(&elf).map_err(|error| format!("{path}: {error}"));
 
-    let mut quiet = mcu()?;
     let mut script = session::Script::default();
     script.quiet = true;
+    let mut quiet = mcu()?;
     let first = session::start(&mut quiet, &mut script)?;
-    // From the middle of one pause to the middle of another.
-    session::run(&mut quiet, &mut script, first + 9 * TICK / 2)?;
-    let (from, slept) = (quiet.cycle(), quiet.slept());
-    session::run(&mut quiet, &mut script, first + (2 * TICKS + 9) * TICK / 2)?;
-    let awake = (quiet.cycle() - from) - (quiet.slept() - slept);
+    let awake = awake(&mut quiet, &mut script, first, 9)?;
+    let mut script = session::Script::default();
+    script.quiet = true;
+    let mut correcting = mcu()?;
+    let first = session::start_corrected(&mut correcting, &mut script)?;
+    let corrected = self::awake(&mut correcting, &mut script, first, 201)?;
+    let frames = session::frames(&script.line);
+    if frames
+        .iter()
+        .filter(|frame| frame.contains("Corrected("))
+        .count()
+        < TICKS as usize
+    {
+        return Err("it does not correct each sample".to_owned());
+    }
 
     let mut busy = mcu()?;
     busy.watch_stack();
@@ -38,8 +61,9 @@ fn measure(path: &str) -> Result<(), String> {
         .min_stack_pointer()
         .ok_or("no stack pointer was seen")?;
     println!(
-        "image={path} cycles={} stack={} jitter={} busy_ticks={}",
+        "image={path} cycles={} corrected={} stack={} jitter={} busy_ticks={}",
         awake / TICKS,
+        (corrected - awake) / TICKS,
         RAM_END - 1 - lowest,
         session::jitter(&script),
         session::busy_max(&script),

@@ -11,7 +11,7 @@ use hil_tests::{image, seed};
 #[path = "../c-reference/session.rs"]
 mod session;
 
-/// Builds the C reference as its README says.
+/// Builds the C reference as its README says, by `AVR_GCC` where it is set.
 fn reference() -> Vec<u8> {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("c-reference");
     // Tests run side by side: each builds its own.
@@ -20,7 +20,7 @@ fn reference() -> Vec<u8> {
     let elf = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("reference-{number}.elf"));
     let run = Process::new("sh")
         .current_dir(&source)
-        .args(["-c", "exec avr-gcc @flags *.c -o \"$0\""])
+        .args(["-c", "exec \"${AVR_GCC:-avr-gcc}\" @flags *.c -o \"$0\""])
         .arg(&elf)
         .output()
         .expect("a shell runs");
@@ -58,10 +58,22 @@ fn it_sends_byte_for_byte_what_the_rust_image_sends() {
     };
     let until = slow(&of_c);
     assert_same(&of_rust[..until], &of_c[..until]);
-    for kind in ["Hello {", "Sample(", "Health {", "Reply {"] {
+    // What a health frame of the fast part has seen hangs on when it had room: those before and behind it.
+    let fast = |frames: &[String]| {
+        let mut rates = (frames.iter().enumerate())
+            .filter(|(_, frame)| frame.contains("command: 16, status: Ok"))
+            .map(|(n, _)| n);
+        (rates.next(), rates.next())
+    };
+    for kind in ["Hello {", "Sample(", "Health {", "Reply {", "Corrected("] {
         let of_kind = |frames: &[String]| -> Vec<String> {
-            let found = frames.iter().filter(|frame| frame.contains(kind));
-            found.cloned().collect()
+            let (Some(begin), Some(end)) = fast(frames) else {
+                panic!("the rate is set and set back");
+            };
+            let found = frames.iter().enumerate().filter(|(n, frame)| {
+                frame.contains(kind) && (kind != "Health {" || *n < begin || *n > end)
+            });
+            found.map(|(_, frame)| frame.clone()).collect()
         };
         let (of_rust, of_c) = (of_kind(&of_rust), of_kind(&of_c));
         assert!(!of_c.is_empty(), "{kind}");

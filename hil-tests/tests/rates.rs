@@ -3,7 +3,7 @@
 use bench::Scenario;
 use bench::simavr::{NoProbe, Simulated};
 use hil_tests::{Heard, at, image, run};
-use wire::{Command, Fault, Sample, Status};
+use wire::{Command, Fault, Sample, Status, correction_state};
 
 /// Ticks of 4 us; a byte at divisor 3 takes 40 us.
 const FASTEST: u16 = 976;
@@ -78,6 +78,64 @@ fn at_256_hz_and_250_kbd_nothing_is_lost_in_ten_minutes() {
         begun.elapsed().as_secs_f64()
     );
     assert!(samples as f64 > (seconds - 2.0) * 256.0);
+}
+
+/// The correction, its filter and the attitude at the fastest rate: no tick is lost, nor any sample; of the corrected frames
+/// those that the line still carries.
+#[test]
+fn at_256_hz_a_correction_in_use_costs_no_sample() {
+    let seconds = 60.0;
+    let run = run(Scenario::lively(6), seconds);
+    let mut simulated = Simulated::new(&image(), &run.scenario, NoProbe).expect("an image");
+    let correction = wire::correction::Correction {
+        block_shift: 7,
+        sens_avg: 0x0402,
+        temp_range: [-60, 60],
+        noise: [0.02; 3],
+        walk: [1e-7; 3],
+        ..wire::correction::Correction::default()
+    };
+    let numbers = correction.numbers().expect("they fit");
+    let rows = (numbers.chunks_exact(3).map(|row| [row[0], row[1], row[2]]))
+        .chain([wire::correction::crc_row(&numbers)]);
+    let mut requests: Vec<_> = (0u8..)
+        .zip(rows)
+        .map(|(row, values)| {
+            let when = 0.5 + 0.1 * f64::from(row);
+            at(when, row.into(), Command::SetCorrection { row, values })
+        })
+        .collect();
+    let rate = Command::SetRate {
+        period_ticks: FASTEST,
+        periods_per_sample: 1,
+    };
+    requests.extend([
+        at(2.8, 101, Command::SetBaud { divisor: 3 }),
+        at(3.0, 102, rate),
+    ]);
+    simulated.request(&requests);
+    let mut heard = Heard::default();
+    simulated
+        .run_until(seconds, &mut |byte| heard.push(byte))
+        .expect("it runs");
+    let samples = assert_whole(&heard, FASTEST.into());
+    let corrected: Vec<_> = (heard.frames.iter())
+        .filter_map(|(_, frame)| match frame {
+            wire::Frame::Corrected(corrected) => Some(*corrected),
+            _ => None,
+        })
+        .collect();
+    println!(
+        "{samples} samples, {} corrected frames; the longest tick's work {:.3} ms",
+        corrected.len(),
+        f64::from(heard.last_health().tick_busy_max) * 4e-3
+    );
+    // Samples take 12.8 of 25 KB/s and a corrected frame 59 B: 206 of 256 have room.
+    assert!(corrected.len() * 10 > samples * 7, "{}", corrected.len());
+    let last = corrected.last().expect("there are some");
+    let wanted =
+        correction_state::APPLIED | correction_state::FILTERED | correction_state::YAW_FREE;
+    assert_eq!(last.state & wanted, wanted);
 }
 
 #[test]

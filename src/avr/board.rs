@@ -102,7 +102,6 @@ impl Board for AvrBoard {
         serial::send(kind, fields)
     }
 
-    #[inline(never)]
     fn set_motor(&mut self, duty: i16) {
         // SAFETY: timer 2 and port D's upper pins are the motor's.
         let (timer, port) = unsafe { (&*TC2::ptr(), &*PORTD::ptr()) };

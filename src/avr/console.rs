@@ -2,7 +2,6 @@
 //! so that the frame after it is intact. No frame begins with 0x3F: the longest request is shorter.
 
 use firmware::{Board, VERSION};
-use ufmt::{uWrite, uwrite};
 
 use super::{board::AvrBoard, serial};
 
@@ -46,24 +45,21 @@ fn answer(board: &mut AvrBoard) {
 /// Five numbers of at most four hexadecimal digits with a letter and a blank each, and the delimiter.
 const LONGEST: u8 = 31;
 
+/// The letter, the number in hexadecimal digits without zeros before it, and a blank.
 #[inline(never)]
-fn number(letter: u8, value: u16) {
+fn number(letter: u8, mut value: u16) {
     serial::say(letter);
-    let Ok(()) = uwrite!(&mut Line, "{:x}", value);
-    serial::say(b' ');
-}
-
-/// The line, straight.
-struct Line;
-
-impl uWrite for Line {
-    type Error = core::convert::Infallible;
-
-    #[inline(never)]
-    fn write_str(&mut self, digits: &str) -> Result<(), core::convert::Infallible> {
-        for &digit in digits.as_bytes() {
-            serial::say(digit);
-        }
-        Ok(())
+    let mut left = 4u8;
+    while left > 1 && value & 0xf000 == 0 {
+        value <<= 4;
+        left = left.wrapping_sub(1);
     }
+    while left > 0 {
+        let digit = (value >> 12) as u8;
+        let to_letter = if digit > 9 { b'a' - b'9' - 1 } else { 0 };
+        serial::say(digit.wrapping_add(b'0').wrapping_add(to_letter));
+        value <<= 4;
+        left = left.wrapping_sub(1);
+    }
+    serial::say(b' ');
 }

@@ -155,7 +155,6 @@ impl DelayNs for Delay {
         }
     }
 
-    #[inline(never)]
     fn delay_ms(&mut self, ms: u32) {
         for _ in 0..ms as u16 {
             self.delay_us(1_000);

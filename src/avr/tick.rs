@@ -141,7 +141,6 @@ pub fn set_period(ticks: u16, every: u8) {
 }
 
 /// Posts a job for the slot after the next sample; false while one waits.
-#[inline(never)]
 pub fn post(job: Job) -> bool {
     interrupt::free(|_| {
         // SAFETY: interrupts are off.
@@ -155,7 +154,6 @@ pub fn post(job: Job) -> bool {
 }
 
 /// Timer ticks since the tick.
-#[inline(never)]
 pub fn ticks_since() -> u16 {
     interrupt::free(|_| timer1().tcnt1.read().bits())
 }

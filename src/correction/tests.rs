@@ -1,9 +1,11 @@
 use adis16250::Word;
-use wire::correction::{self, Inputs, NUMBERS, Numbers, Twin};
+use wire::correction::{self, FORMAT, Inputs, NUMBERS, Numbers, Twin};
 use zerocopy::FromZeros;
 
 use super::*;
 use crate::acquire::Job;
+
+mod attitude;
 
 /// An EEPROM, and nothing else.
 struct Eeprom([u8; 512]);
@@ -150,10 +152,11 @@ impl OnBoard {
     }
 
     fn step_of(&mut self, raw: &Raw, duty: i16, config: &Config, in_order: bool) -> Corrected {
-        let mut out = Corrected::new_zeroed();
         let board = &mut self.board;
-        (self.correction).step(board, raw, duty, config, in_order, &mut out);
-        out
+        self.correction.end(board);
+        (self.correction).step(board, raw, 0, duty, config, in_order);
+        self.correction.turn(raw);
+        self.correction.frame
     }
 }
 
@@ -165,6 +168,7 @@ fn inputs(raw: &Raw, duty: i16) -> Inputs {
         supply: raw.supply[0].unsigned_12(),
         acc: raw.acc,
         duty,
+        t_ticks: raw.t_ticks,
         in_order: true,
     }
 }
@@ -292,7 +296,6 @@ fn gyros_set_up_otherwise_are_not_corrected_and_it_is_said() {
     config.set_up.gyro_filter = 3;
     let out = board.step_of(&raw, 0, &config, true);
     assert_eq!((out.state, out.correction.get()), (0, 77));
-    assert_eq!(out.rate, [I32::ZERO; 3]);
     let out = board.step_of(&raw, 0, &Config::default(), false);
     assert_eq!(out.state & (APPLIED | NOT_IN_ORDER), APPLIED | NOT_IN_ORDER);
     assert_eq!(out.state & AT_REST, 0);
@@ -355,7 +358,10 @@ fn a_steady_turn_and_a_driven_motor_are_no_rest_and_a_wrong_noise_shows() {
     // Block means of the variance that it was told: 16 samples of 0.4 deg/s.
     let rested = run(0.3, 0.4, 0, 400);
     assert!((bias(&rested) - 0.3).abs() < 0.03, "{}", bias(&rested));
-    assert_eq!(rested.state, APPLIED | FILTERED | AT_REST | EXTRAPOLATED);
+    assert_eq!(
+        rested.state,
+        APPLIED | FILTERED | AT_REST | EXTRAPOLATED | YAW_FREE
+    );
     let sigma = (0.01 / (f64::from(rested.known[0].get()) / 256.0)).sqrt();
     assert!((0.004..0.02).contains(&sigma), "{sigma}");
     let turning = run(2.0, 0.4, 0, 50);
@@ -368,4 +374,101 @@ fn a_steady_turn_and_a_driven_motor_are_no_rest_and_a_wrong_noise_shows() {
     // Nine times the variance that it was told.
     run(0.3, 1.2, 0, 1200);
     assert!(noise_off > 16 * 60, "{noise_off}");
+}
+
+/// A correction that changes nothing, of gyros with this noise: the attitude alone.
+fn plain(noise: f64) -> correction::Correction {
+    correction::Correction {
+        block_shift: 4,
+        sens_avg: SENS_AVG,
+        temp_range: [-25, 25],
+        noise: [noise; 3],
+        walk: [1e-9; 3],
+        ..correction::Correction::default()
+    }
+}
+
+/// Motor steps with a surge that dies away with 0.2 s: what is left is what the noise of a reading leaves.
+#[test]
+fn the_surge_behind_a_step_of_the_motor_is_taken_off() {
+    let surge = 2.0 / 255.0;
+    let meant = correction::Correction {
+        follow: 1.0 - (-0.05f64 / 0.2).exp(),
+        surge: [-surge, 0.0, surge / 2.0],
+        ..plain(0.0096)
+    };
+    let numbers = meant.numbers().unwrap();
+    let mut board = OnBoard::with(0, &numbers);
+    let mut twin = Twin::new(&correction::Correction::from_numbers(&numbers).unwrap());
+    let (mut speed, mut worst, mut left, mut read) = (0.0, 0.0f64, 0.0f64, 0.0f64);
+    for n in 0..4_000u32 {
+        let duty = [0i16, 200, -255, 90, 0][n as usize / 100 % 5];
+        let ahead = f64::from(duty) - speed;
+        speed += (1.0 - (-0.05f64 / 0.2).exp()) * ahead;
+        let rate = [surge, 0.0, -surge / 2.0].map(|surge| in_counts(surge * ahead));
+        let raw = Raw {
+            t_ticks: n * 12_500,
+            ..raw(rate, [0; 3], 2730, [512, 512, 760])
+        };
+        let biases = twin.axes.map(|axis| axis.bias);
+        let (got, frame) = board.step(&raw, duty);
+        let wanted = twin.step(&inputs(&raw, duty));
+        for axis in 0..3 {
+            let off = f64::from(frame.bias[axis].get()) / Q20 - biases[axis];
+            worst = worst.max((got[axis] + off - wanted[axis]).abs());
+        }
+        left = left.max(got[0].abs());
+        read = read.max(f64::from(rate[0]).abs() * scale());
+    }
+    println!("twin {worst:.1e}, left {left:.3} of {read:.3} deg/s");
+    assert!(worst < 1e-4, "{worst}");
+    assert!(left < 0.06 && read > 3.0, "{left} {read}");
+}
+
+/// A sway below 4 deg/s with the motor off: about x, and a hundredth of it about the others. Slow or fast, the filter learns
+/// nothing of it, and what it has learned at rest stays.
+#[test]
+fn a_sway_is_no_rest() {
+    for (dps, period_s, shift) in [
+        (3.5, 8.0, 4),
+        (3.5, 3.0, 4),
+        (3.8, 20.0, 4),
+        (3.5, 4.0, 6),
+        (2.5, 6.0, 7),
+    ] {
+        let meant = correction::Correction {
+            block_shift: shift,
+            noise: [0.16 / f64::from(1 << shift); 3],
+            ..plain(0.0)
+        };
+        let mut board = OnBoard::with(0, &meant.numbers().unwrap());
+        let mut random = Random(5);
+        let mut run = |dps: f64, seconds: u32| {
+            let mut learned = 0;
+            let mut last = Corrected::new_zeroed();
+            for n in 0..20 * seconds {
+                let turn = dps * (std::f64::consts::TAU * f64::from(n) / 20.0 / period_s).sin();
+                let rate = [turn, 0.01 * turn, -0.01 * turn]
+                    .map(|turn| in_counts(0.3 + turn + 0.4 * random.normal()));
+                let bias = last.bias[0].get();
+                last = board.step(&raw(rate, [0; 3], 2730, [512; 3]), 0).1;
+                learned += u32::from(last.bias[0].get() != bias);
+            }
+            (learned, f64::from(last.bias[0].get()) / Q20)
+        };
+        let (learned, rested) = run(0.0, 300);
+        let blocks = 6_000 >> shift;
+        assert!(
+            learned + 2 + blocks / 50 >= blocks,
+            "{learned} of {blocks} blocks at rest"
+        );
+        let (learned, swayed) = run(dps, 600);
+        println!(
+            "{dps} deg/s, {period_s} s, blocks of {}: {learned} of {} learned, {rested:.4} -> {swayed:.4}",
+            1 << shift,
+            12_000 >> shift
+        );
+        assert!(learned <= 2 + (12_000 >> shift) / 50, "{learned}");
+        assert!((swayed - rested).abs() < 0.01, "{rested} {swayed}");
+    }
 }

@@ -5,7 +5,6 @@ use wire::{Asked, Sensor, Status, code};
 
 use super::{Board, Pending, SET, Stand, source};
 use crate::acquire::{Done, Job, Task};
-use crate::correction::Correction;
 use crate::motor::FULL;
 
 /// What becomes of a request at once.
@@ -50,7 +49,6 @@ impl SelfTest {
 }
 
 impl Stand {
-    #[inline(never)]
     pub(super) fn on_request<B: Board>(&mut self, board: &mut B, asked: &Asked) {
         let answer = match asked.refusal() {
             Some(status) => Answer::Now(status),
@@ -278,7 +276,7 @@ impl Stand {
     }
 
     /// What concerns the correction.
-    #[inline(never)]
+    #[inline(always)]
     fn on_correction<B: Board>(&mut self, board: &mut B, asked: &Asked) -> Answer {
         let what = asked.u8::<0>();
         // The EEPROM is read at once.
@@ -303,7 +301,7 @@ impl Stand {
             return Answer::Later;
         }
         self.answer.value.set(self.correction.in_use().into());
-        Correction::read(board, place, &mut self.answer.detail);
+        self.correction.read(board, place, &mut self.answer.detail);
         Answer::Now(Status::Ok)
     }
 
@@ -316,7 +314,6 @@ impl Stand {
     }
 
     /// Posts work whose end answers the request.
-    #[inline(never)]
     fn post<B: Board>(&mut self, board: &mut B, asked: &Asked, job: Job) -> Answer {
         if self.job.is_none() && board.post(job) {
             self.job = asked.into();
@@ -327,7 +324,6 @@ impl Stand {
     }
 
     /// Work on the gyros has ended.
-    #[inline(never)]
     pub(super) fn job_done<B: Board>(&mut self, board: &mut B, done: Done) {
         let (value, mut status) = (done.value, done.status);
         if matches!(done.task, Task::Configure) {
@@ -365,7 +361,6 @@ impl Stand {
     }
 
     /// The jobs of the self-test are posted from the millisecond, where a slot is free.
-    #[inline(never)]
     fn begin_self_test(&mut self, asked: &Asked) -> Answer {
         let sensor = asked.u8::<0>();
         if sensor == Sensor::Accelerometer as u8 {
@@ -388,7 +383,6 @@ impl Stand {
         }
     }
 
-    #[inline(never)]
     pub(super) fn step_self_test<B: Board>(&mut self, board: &mut B) {
         let test = &mut self.self_test;
         test.wait_ms = test.wait_ms.wrapping_sub(1);
@@ -413,7 +407,6 @@ impl Stand {
     }
 
     /// A job of the self-test has ended; the status of the test, when that was the last.
-    #[inline(never)]
     fn next_self_test(&mut self, value: u16, status: Status) -> Option<Status> {
         let test = &mut self.self_test;
         test.wait_ms = 1;

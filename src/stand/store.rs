@@ -1,13 +1,13 @@
 //! What is kept in the EEPROM: two copies of the set-up and two of the correction, written a byte at a time while everything else
 //! goes on. The copy that is not in use is written, so a cut at any byte leaves the other.
 
-use wire::correction::ROWS;
+use wire::correction::{self, ROWS};
 use wire::{Asked, Fault, Status};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
 use super::{Board, Pending, Stand, source};
-use crate::config::{Config, SLOTS, STORED_LEN};
-use crate::correction::is_whole;
+use crate::config::{Config, FORMAT, SLOTS, STORED_LEN};
+use crate::correction::COPIES;
 
 /// What is on its way to the EEPROM, and what is known of the set-up's copies there.
 pub(super) struct Store {
@@ -82,7 +82,6 @@ impl Stand {
     }
 
     /// A byte more of what is under way, when the EEPROM is ready; after the last one, the reply.
-    #[inline(never)]
     pub(super) fn step_store<B: Board>(&mut self, board: &mut B) {
         if !board.eeprom_is_ready() {
             return;
@@ -95,21 +94,24 @@ impl Stand {
             return;
         }
         let mut stored = true;
-        for &byte in bytes {
-            stored &= board.eeprom_read(place) == byte;
-            place = place.wrapping_add(1);
-        }
-        let place = self.store.place;
-        if !self.store.is_row {
-            stored = is_whole(board, place, STORED_LEN as u8);
-            if stored {
-                self.store.newest ^= 1;
-                self.config.set_up.config_source = source::STORED.wrapping_add(self.store.newest);
+        if self.store.is_row {
+            for &byte in bytes {
+                stored &= board.eeprom_read(place) == byte;
+                place = place.wrapping_add(1);
             }
-        } else if self.correction.place(true, ROWS as u8) == Some(place) {
-            // With the row of its CRC the copy is whole, and in use from then on.
-            stored &= self.correction.on(board)
-                && self.correction.place(false, ROWS as u8) == Some(place);
+            let place = self.store.place;
+            if self.correction.place(true, ROWS as u8) == Some(place) {
+                // With the row of its CRC the copy is whole, and in use from then on.
+                stored &= self.correction.on(board)
+                    && self.correction.place(false, ROWS as u8) == Some(place);
+            }
+        } else {
+            let to = self.store.newest ^ 1;
+            stored = newest(board, SLOTS[0], SLOTS[1]) & 3 == to.wrapping_add(1);
+            if stored {
+                self.store.newest = to;
+                self.config.set_up.config_source = source::STORED.wrapping_add(to);
+            }
         }
         let status = if stored {
             Status::Ok
@@ -121,33 +123,93 @@ impl Stand {
         self.reply(board, asked, status);
     }
 
-    /// Takes the newer of the two stored copies that are in order; false when neither is. Not while one is written.
+    /// Takes the newer of the two stored copies that are whole; false, and nothing changed, where none is or its fields are not in
+    /// order. Not while one is written.
+    #[inline(never)]
     pub(super) fn load<B: Board>(&mut self, board: &mut B) -> bool {
-        let mut found = false;
-        for place in 0..2 {
-            let was = self.config;
-            let mut all = 0xff;
-            for (byte, address) in (self.config.as_mut_bytes().iter_mut()).zip(Store::slot(place)..)
-            {
-                *byte = board.eeprom_read(address);
-                all &= *byte;
-            }
-            let in_order = self.config.is_whole() && self.config.is_in_order();
-            // Generations wrap: the newer one is ahead by less than half the circle.
-            if in_order && (!found || self.config.generation.wrapping_sub(was.generation) < 128) {
-                found = true;
-                self.config.set_up.config_source = source::STORED.wrapping_add(place);
-                self.store.newest = place;
-                continue;
-            }
-            self.config = was;
-            // An erased one is not spoilt.
-            if !in_order && all != 0xff {
-                self.record(Fault::ConfigInvalid, 0);
-            }
+        let found = newest(board, SLOTS[0], SLOTS[1]);
+        self.health
+            .count(Fault::ConfigInvalid, 0, (found >> 2).into());
+        let number = found & 3;
+        if number == 0 {
+            return false;
         }
-        found
+        let was = self.config;
+        let place = number.wrapping_sub(1);
+        let mut at = Store::slot(place);
+        for byte in self.config.as_mut_bytes() {
+            *byte = board.eeprom_read(at);
+            at = at.wrapping_add(1);
+        }
+        if !self.config.is_in_order() {
+            self.config = was;
+            self.record(Fault::ConfigInvalid, 0);
+            return false;
+        }
+        self.store.newest = place;
+        self.config.set_up.config_source = source::STORED.wrapping_add(place);
+        true
     }
+}
+
+/// What lies where a copy belongs.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Copy {
+    Erased,
+    Spoilt,
+    Whole,
+}
+
+/// Looks at a copy of the set-up or, behind those, of a correction: it begins with its format and ends with its CRC.
+#[inline(never)]
+fn look<B: Board>(board: &mut B, copy: u16) -> Copy {
+    let (mut left, format) = if copy < COPIES[0] {
+        (STORED_LEN as u8, FORMAT)
+    } else {
+        (correction::STORED_LEN as u8, correction::FORMAT)
+    };
+    let (mut register, mut all, mut at) = (wire::crc::INIT, 0xff, copy);
+    while left > 0 {
+        let byte = board.eeprom_read(at);
+        register = wire::crc::update(register, byte);
+        all &= byte;
+        at = at.wrapping_add(1);
+        left = left.wrapping_sub(1);
+    }
+    if register == wire::crc::RESIDUE && board.eeprom_read(copy) == format {
+        return Copy::Whole;
+    }
+    if all == 0xff {
+        Copy::Erased
+    } else {
+        Copy::Spoilt
+    }
+}
+
+/// Which of two copies is the newest that is whole: 1, 2, or 0 for neither; four more for each that is spoilt.
+#[inline(never)]
+pub(crate) fn newest<B: Board>(board: &mut B, first: u16, second: u16) -> u8 {
+    let (one, two) = (look(board, first), look(board, second));
+    let mut found = 0;
+    if one == Copy::Spoilt {
+        found = 4;
+    }
+    if two == Copy::Spoilt {
+        found += 4;
+    }
+    // Generations, behind the format, wrap: the newer one is ahead by less than half the circle.
+    if two == Copy::Whole
+        && (one != Copy::Whole
+            || board
+                .eeprom_read(second.wrapping_add(1))
+                .wrapping_sub(board.eeprom_read(first.wrapping_add(1)))
+                < 128)
+    {
+        found += 2;
+    } else if one == Copy::Whole {
+        found += 1;
+    }
+    found
 }
 
 const _: () = assert!(STORED_LEN < 256, "a byte counts them");

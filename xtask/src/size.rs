@@ -24,7 +24,7 @@ struct Goal {
 }
 
 const FLASH: Goal = Goal {
-    ratio: Some(1.1),
+    ratio: Some(1.05),
     // 16 KiB less 512 B for a boot loader.
     most: Some(15_872),
 };
@@ -48,7 +48,7 @@ impl Goal {
         let mut goals = Vec::new();
         let mut met = true;
         if let Some(most) = self.ratio {
-            goals.push(format!("<= {most:.1} x C"));
+            goals.push(format!("<= {most:.2} x C"));
             met &= ratio <= most;
         }
         if let Some(most) = self.most {
@@ -71,6 +71,8 @@ impl Goal {
 struct Cost {
     /// Cycles awake for each tick at 20 Hz.
     cycles: u32,
+    /// What a correction in use adds to them, at rest.
+    corrected: u32,
     /// From the tick until its sample is queued, timer ticks, the longest of a busy session.
     busy_ticks: u32,
     /// Deepest stack of that session, bytes.
@@ -124,7 +126,7 @@ pub fn report(root: &Path, arguments: &[String]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Builds the C reference as its README says.
+/// Builds the C reference as its README says, by `AVR_GCC` where it is set.
 fn build_reference(root: &Path) -> Result<PathBuf, Failure> {
     let folder = root.join("hil-tests/c-reference");
     let elf = root.join("target/avr/reference.elf");
@@ -144,7 +146,8 @@ fn build_reference(root: &Path) -> Result<PathBuf, Failure> {
     // LTO lays the code out in this order.
     sources.sort();
     let elf_from_folder = std::path::absolute(&elf).map_err(no_folder)?;
-    let mut gcc = Command::new("avr-gcc");
+    // Another release, or a script that adds options.
+    let mut gcc = Command::new(std::env::var_os("AVR_GCC").unwrap_or_else(|| "avr-gcc".into()));
     gcc.current_dir(&folder)
         .arg("@flags")
         .args(sources)
@@ -186,6 +189,7 @@ fn measure(root: &Path, images: &[&Path; 2]) -> Result<[Cost; 2], String> {
         };
         Ok::<_, String>(Cost {
             cycles: value("cycles")?,
+            corrected: value("corrected")?,
             busy_ticks: value("busy_ticks")?,
             stack: value("stack")?,
             jitter: value("jitter")?,
@@ -220,6 +224,12 @@ fn table(sizes: &[Sizes; 2], costs: Option<[Cost; 2]>) -> String {
             "cycles a sample at 20 Hz, all that is awake",
             of_rust.cycles,
             of_c.cycles,
+            &CYCLES,
+        );
+        row(
+            "what a correction in use adds to them",
+            of_rust.corrected,
+            of_c.corrected,
             &CYCLES,
         );
         row(
@@ -368,14 +378,14 @@ mod tests {
 
     #[test]
     fn a_goal_of_two_parts_is_met_by_both() {
-        assert_eq!(FLASH.verdict(12_000, 11_000), "<= 1.1 x C, <= 15872 met");
+        assert_eq!(FLASH.verdict(11_500, 11_000), "<= 1.05 x C, <= 15872 met");
         assert_eq!(
-            FLASH.verdict(12_200, 11_000),
-            "<= 1.1 x C, <= 15872 NOT MET"
+            FLASH.verdict(11_600, 11_000),
+            "<= 1.05 x C, <= 15872 NOT MET"
         );
         assert_eq!(
-            FLASH.verdict(15_873, 15_000),
-            "<= 1.1 x C, <= 15872 NOT MET"
+            FLASH.verdict(15_873, 15_500),
+            "<= 1.05 x C, <= 15872 NOT MET"
         );
     }
 }

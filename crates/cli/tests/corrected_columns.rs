@@ -31,6 +31,7 @@ fn of(seq: u16) -> Corrected {
         known: [0; 3],
         correction: 0xbeef,
         state: correction_state::APPLIED,
+        attitude: Some([1 << 30, -5, 0, 1 << 29]),
     }
 }
 
@@ -49,12 +50,12 @@ fn columns_are_added_where_corrected_frames_arrive_and_nothing_where_not() {
     // To its own row, behind which another sample may have come.
     builder.corrected(&of(2));
     let with = text(&builder);
-    let names = "pwm,corrected_x,corrected_y,corrected_z,correction,corrected_state,flags";
+    let names = "pwm,corrected_x,corrected_y,corrected_z,correction,corrected_state,attitude_w,attitude_x,attitude_y,attitude_z,flags";
     assert!(with.contains(names), "{with}");
     let rows: Vec<&str> = with.lines().filter(|l| !l.starts_with('#')).collect();
-    assert!(rows[2].ends_with(",0,,,,,,7"), "{}", rows[2]);
+    assert!(rows[2].ends_with(",0,,,,,,,,,,7"), "{}", rows[2]);
     assert!(
-        rows[3].ends_with(",0,1048576,-524288,3,48879,1,7"),
+        rows[3].ends_with(",0,1048576,-524288,3,48879,1,1073741824,-5,0,536870912,7"),
         "{}",
         rows[3]
     );
@@ -68,6 +69,15 @@ fn columns_are_added_where_corrected_frames_arrive_and_nothing_where_not() {
         record.channel("corrected_state").is_none(),
         "no measurement"
     );
+    // Of a firmware that has no attitude.
+    let mut builder = RecordBuilder::new(Calibration::default());
+    builder.push(&sample(0), 0.0);
+    builder.corrected(&Corrected {
+        attitude: None,
+        ..of(0)
+    });
+    let plainer = text(&builder);
+    assert!(plainer.contains(",48879,1,,,,,7"), "{plainer}");
     // Rows without a frame are told, and nothing else is.
     let [note] = record.notes.as_slice() else {
         panic!("{:?}", record.notes)

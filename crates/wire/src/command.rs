@@ -405,22 +405,16 @@ impl Command {
     }
 }
 
-/// An undamaged request, as it came: what the board works from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Asked {
-    /// Chosen by the PC, comes back in the reply.
-    pub number: u16,
-    /// One of [`code`], if the command exists.
-    pub code: u8,
-    /// The argument bytes.
-    pub arguments: [u8; 8],
-}
+/// How many argument bytes each command has.
+mod arguments {
+    use super::code;
 
-impl Asked {
-    /// How many argument bytes the command has; `None` where no command has the code.
-    #[must_use]
-    #[cfg_attr(target_arch = "avr", inline(never))]
-    const fn arguments_len(code: u8) -> Option<u8> {
+    /// Codes that are looked up: those of the commands, to a whole byte of the table.
+    const CODES: u8 = code::SET_BOARD_ID + 1;
+    const _: () = assert!(CODES.is_multiple_of(2));
+
+    /// As the table of docs/wire-format.md has them.
+    const fn written(code: u8) -> Option<u8> {
         Some(match code {
             code::PING..=code::REBOOT | code::STORE_CONFIG..=code::DEFAULT_CONFIG => 0,
             code::SET_ACC_RANGE | code::SELF_TEST | code::CORRECTION => 1,
@@ -440,12 +434,75 @@ impl Asked {
         })
     }
 
+    /// Four bits for each code, two in a byte: one more than the command has bytes of arguments, 0 where there is no command.
+    /// Of the AVR's flash: elsewhere it would be copied to SRAM.
+    #[cfg_attr(
+        target_arch = "avr",
+        allow(unsafe_code),
+        unsafe(link_section = ".progmem.data")
+    )]
+    static TABLE: [u8; CODES as usize / 2] = {
+        let mut table = [0; CODES as usize / 2];
+        let mut code = 0;
+        while code < CODES {
+            if let Some(len) = written(code) {
+                table[code as usize / 2] |= (len + 1) << (code % 2 * 4);
+            }
+            code += 1;
+        }
+        table
+    };
+
+    /// A byte of the table; `at` is in it.
+    #[cfg(not(target_arch = "avr"))]
+    fn byte(at: u8) -> u8 {
+        TABLE.get(usize::from(at)).copied().unwrap_or(0)
+    }
+
+    /// A byte of the table; `at` is in it.
+    #[cfg(target_arch = "avr")]
+    #[allow(unsafe_code)]
+    fn byte(at: u8) -> u8 {
+        let place = core::ptr::addr_of!(TABLE)
+            .cast::<u8>()
+            .wrapping_add(at as usize);
+        let found: u8;
+        // SAFETY: reads a byte of the flash.
+        unsafe {
+            core::arch::asm!("lpm {}, Z", out(reg) found, in("Z") place, options(pure, readonly, nostack));
+        }
+        found
+    }
+
+    /// `None` where no command has the code.
+    pub(super) fn len(code: u8) -> Option<u8> {
+        if code >= CODES {
+            return None;
+        }
+        let both = byte(code >> 1);
+        let one_more = if code & 1 == 0 { both & 15 } else { both >> 4 };
+        one_more.checked_sub(1)
+    }
+}
+
+/// An undamaged request, as it came: what the board works from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    /// Chosen by the PC, comes back in the reply.
+    pub number: u16,
+    /// One of [`code`], if the command exists.
+    pub code: u8,
+    /// The argument bytes.
+    pub arguments: [u8; 8],
+}
+
+impl Asked {
     /// Why the request is refused, whatever its arguments mean: the command does not exist, or bytes that it does not
     /// use are not 0 (they may come to mean something).
     #[must_use]
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn refusal(&self) -> Option<Status> {
-        let Some(used) = Self::arguments_len(self.code) else {
+        let Some(used) = arguments::len(self.code) else {
             return Some(Status::UnknownCommand);
         };
         for (&byte, place) in self.arguments.iter().zip(0u8..) {

@@ -6,12 +6,17 @@
 //! ```text
 //! u = w + bias + temperature T + squared T^2 + motor d + magnitude |d| + supply s + sum acc_k a_k
 //! v = u + sum_j matrix_j u_j
-//! rate = v - b
+//! rate = v + surge (d - m) - b
 //! ```
 //!
-//! T being TEMP_OUT behind a low pass of 16 samples, d the motor command, s SUPPLY_OUT and a the ADC counts; b is what
-//! the bias filter has found, a scalar Kalman filter for each axis that measures in blocks of samples in which the stand is at
-//! rest. Every coefficient is what is *added*: that of an effect with its sign turned.
+//! T being TEMP_OUT behind a low pass of 16 samples, d the motor command, m what the motor has turned to, m <- m + follow (d - m)
+//! after each sample, s SUPPLY_OUT and a the ADC counts; b is what the bias filter has found, a scalar Kalman filter for each axis
+//! that measures in blocks of samples in which the stand is at rest. Every coefficient is what is *added*: that of an effect with
+//! its sign turned.
+//!
+//! The rates turn a quaternion q, which turns the body's axes into those in which it began. While the stand is at rest, what the
+//! accelerometer reads leads the tilt of q to where that is up, at a 66th of the way for each sample at 1.5 g. Nothing leads its
+//! yaw.
 //!
 //! A stored correction is [`NUMBERS`] 16-bit numbers, little endian, written in rows of three, and the CRC-32C of them. Any
 //! numbers are safe: no sum of products wraps, whatever they are.
@@ -21,7 +26,7 @@
 //! | 0 | format and, above it, generation; number of the correction; n: 2^n samples in a block of the filter, n <= 7 | |
 //! | 3 | SENS/AVG of the gyros that it is for | |
 //! | 4 | lowest and, above it, highest temperature that it holds for, signed bytes | 4 counts of TEMP_OUT |
-//! | 5 | none | |
+//! | 5 | follow: the part by which the motor comes nearer to its command in a sample | 2^-15 |
 //! | 6 | of the gyro x: | |
 //! | | temperature | 2^-20 deg/s for each count |
 //! | | temperature squared | 2^-26 deg/s for each count squared |
@@ -33,7 +38,7 @@
 //! | 36 | shares of the rates about x, y, z in the rate x; then in y, in z | 2^-18 |
 //! | 45 | of x: variance of the mean of a block at rest, unsigned | 2^-18 (deg/s)^2 |
 //! | | growth of the bias' variance in a block, over that, unsigned | 2^-24 |
-//! | | none | |
+//! | | surge | 2^-20 deg/s for each step of 255 |
 //! | 48, 51 | the same of y, of z | |
 
 /// Numbers of a stored correction.
@@ -51,6 +56,11 @@ pub const TERMS: usize = 10;
 
 /// Counts of TEMP_OUT in a step of the range of temperatures.
 pub const RANGE_STEP: i16 = 4;
+/// ADC counts of the accelerometer at 0 g, as the attitude takes them: half of AREF.
+pub const ACC_ZERO: i16 = 512;
+/// The attitude is followed over samples that are this many ticks of 4 us apart at the most: 100 ms, in which a gyro turns by less
+/// than the radian that its arithmetic is for.
+pub const LONGEST_TICKS: u16 = 25_000;
 /// Samples that the low pass of the temperature averages, as a power of two.
 pub const TEMPERATURE_SHIFT: u8 = 4;
 /// Most samples in a block of the bias filter, as a power of two.
@@ -69,6 +79,8 @@ pub const KNOWN_MAX: f64 = 65_535.0 / 256.0;
 /// The numbers as they are stored.
 pub type Numbers = [i16; NUMBERS];
 
+/// Unit of `follow`.
+const FOLLOW_STEP: f64 = 1.0 / (1 << 15) as f64;
 const OF_AXES: usize = 6;
 const MATRIX: usize = OF_AXES + 3 * TERMS;
 const FILTER: usize = MATRIX + 9;
@@ -106,6 +118,10 @@ pub struct Correction {
     pub noise: [f64; 3],
     /// (deg/s)^2.
     pub walk: [f64; 3],
+    /// 1: of what the command is ahead of the motor, in a sample.
+    pub follow: f64,
+    /// deg/s for each step that the command is ahead.
+    pub surge: [f64; 3],
 }
 
 /// A number that its 16 bits do not hold.
@@ -155,7 +171,7 @@ pub fn name(place: usize) -> (char, &'static str, &'static str) {
     const OF_FILTER: [(&str, &str); 3] = [
         ("noise of a block", "(deg/s)^2"),
         ("walk of the bias in a block, over that", ""),
-        ("none", ""),
+        ("motor, while it spins up", "deg/s/step"),
     ];
     let (from, of): (usize, &[(&str, &str)]) = match place {
         0..OF_AXES => return (' ', "", ""),
@@ -182,7 +198,7 @@ pub const fn step(place: usize) -> f64 {
         FILTER..NUMBERS => match (place - FILTER) % 3 {
             0 => 18,
             1 => 24,
-            _ => 16,
+            _ => 20,
         },
         _ => return 0.0,
     };
@@ -226,7 +242,7 @@ impl Correction {
             } else {
                 self.walk[axis] / self.noise[axis]
             };
-            let of_filter = [self.noise[axis], walk, 0.0];
+            let of_filter = [self.noise[axis], walk, self.surge[axis]];
             all[FILTER + 3 * axis..][..3].copy_from_slice(&of_filter);
         }
         all
@@ -244,7 +260,7 @@ impl Correction {
             self.block_shift.min(BLOCK_SHIFT_MAX).into(),
             self.sens_avg.cast_signed(),
             i16::from_le_bytes(self.temp_range.map(i8::cast_unsigned)),
-            0,
+            nearest(self.follow.clamp(0.0, 1.0) / FOLLOW_STEP).min(i16::MAX.into()) as i16,
         ]);
         for (place, value) in self.values().into_iter().enumerate().skip(OF_AXES) {
             let unsigned = is_unsigned(place);
@@ -298,6 +314,8 @@ impl Correction {
             matrix: [0, 1, 2].map(|axis| [0, 1, 2].map(|j| value(MATRIX + 3 * axis + j))),
             noise: of_filter(0),
             walk: [0, 1, 2].map(|axis| value(FILTER + 3 * axis) * value(FILTER + 3 * axis + 1)),
+            follow: f64::from(all[5]) * FOLLOW_STEP,
+            surge: of_filter(2),
         })
     }
 }
@@ -322,144 +340,9 @@ pub fn crc_row(all: &Numbers) -> [i16; 3] {
 /// A block that lies this much off, over the variance that was told, says no more of the noise.
 pub const REACH: f64 = 127.996;
 
-/// What a sample brings, as the correction sees it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Inputs {
-    /// Counts times scale, deg/s.
-    pub rate: [f64; 3],
-    /// TEMP_OUT.
-    pub temp: [i16; 3],
-    /// SUPPLY_OUT.
-    pub supply: u16,
-    /// ADC counts.
-    pub acc: [u16; 3],
-    /// -255 ..= 255.
-    pub duty: i16,
-    /// Whether the sample is in order.
-    pub in_order: bool,
-}
+mod twin;
 
-/// One axis of the bias filter.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Axis {
-    /// TEMP_OUT behind its low pass.
-    pub temp: f64,
-    /// deg/s.
-    pub bias: f64,
-    /// What the filter knows, in blocks: the variance of the bias is that of a block, as it was told, over this.
-    pub known: f64,
-    /// Variance of a block's mean, as it has shown itself, over that which was told.
-    pub noise: f64,
-    sum: f64,
-}
-
-/// The board's arithmetic in double precision.
-#[derive(Clone, Copy, Debug)]
-pub struct Twin {
-    correction: Correction,
-    /// x, y, z.
-    pub axes: [Axis; 3],
-    started: bool,
-    at_rest: bool,
-    in_block: u32,
-}
-
-impl Twin {
-    /// Before the first sample.
-    #[must_use]
-    pub fn new(correction: &Correction) -> Self {
-        let start = Axis {
-            noise: 1.0,
-            ..Axis::default()
-        };
-        Self {
-            correction: *correction,
-            axes: [start; 3],
-            started: false,
-            at_rest: true,
-            in_block: 0,
-        }
-    }
-
-    /// The rates after the model's terms, before the bias filter.
-    fn modelled(&self, inputs: &Inputs) -> [f64; 3] {
-        let c = &self.correction;
-        let duty = f64::from(inputs.duty);
-        let supply = f64::from(inputs.supply);
-        let acc = inputs.acc.map(f64::from);
-        let mut u = [0.0; 3];
-        for (i, u) in u.iter_mut().enumerate() {
-            let t = self.axes[i].temp;
-            *u = inputs.rate[i]
-                + c.bias[i]
-                + t * (c.temperature[i] + t * c.temperature_squared[i])
-                + duty * c.motor[i]
-                + duty.abs() * c.motor_magnitude[i]
-                + supply * c.supply[i]
-                + acc[0] * c.acc[i][0]
-                + acc[1] * c.acc[i][1]
-                + acc[2] * c.acc[i][2];
-        }
-        let mut v = u;
-        for (i, v) in v.iter_mut().enumerate() {
-            *v += u[0] * c.matrix[i][0] + u[1] * c.matrix[i][1] + u[2] * c.matrix[i][2];
-        }
-        v
-    }
-
-    /// The corrected rates of a sample, deg/s.
-    pub fn step(&mut self, inputs: &Inputs) -> [f64; 3] {
-        for (axis, &counts) in self.axes.iter_mut().zip(&inputs.temp) {
-            // Ten bits: -49 to 99 degC.
-            let counts = f64::from((counts << 6) >> 6);
-            if !self.started {
-                axis.temp = counts;
-            }
-            axis.temp += (counts - axis.temp) / f64::from(1u32 << TEMPERATURE_SHIFT);
-        }
-        self.started = true;
-        let v = self.modelled(inputs);
-        self.at_rest &= inputs.in_order && inputs.duty == 0;
-        let mut out = [0.0; 3];
-        for ((out, axis), v) in out.iter_mut().zip(&mut self.axes).zip(v) {
-            let left = v - axis.bias;
-            self.at_rest &= left.abs() < f64::from(REST_DPS);
-            axis.sum += left;
-            *out = left;
-        }
-        self.in_block += 1;
-        if self.in_block == 1 << self.correction.block_shift {
-            self.end_block();
-        }
-        out
-    }
-
-    fn end_block(&mut self) {
-        let len = f64::from(self.in_block);
-        for (i, axis) in self.axes.iter_mut().enumerate() {
-            let (told, c) = (self.correction.noise[i], &self.correction);
-            // P' = P + q with P = R / known.
-            axis.known /= 1.0 + axis.known * c.walk[i] / told;
-            let mean = axis.sum / len;
-            axis.sum = 0.0;
-            let square = (mean * mean / told).min(REACH);
-            let expected = axis.noise + 1.0 / axis.known;
-            if !self.at_rest || square / f64::from(1u32 << (2 * GATE_SHIFT)) > expected {
-                continue;
-            }
-            let measured = 1.0 / axis.noise;
-            axis.known = (axis.known + measured).min(KNOWN_MAX);
-            axis.bias += mean * (measured / axis.known).min(1.0);
-            let step = (square - expected) / f64::from(1u32 << ADAPT_SHIFT);
-            let most = f64::from(1u32 << NOISE_SHIFT);
-            if expected <= REACH {
-                axis.noise = (axis.noise + step).clamp(1.0 / most, most);
-            }
-        }
-        self.at_rest = true;
-        self.in_block = 0;
-    }
-}
+pub use twin::{Axis, Inputs, Twin};
 
 #[cfg(test)]
 mod tests;

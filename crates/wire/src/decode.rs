@@ -161,10 +161,10 @@ fn frame_of(payload: &[u8]) -> Result<Frame, DecodeError> {
     if version != VERSION {
         return Err(DecodeError::UnknownVersion(version));
     }
-    match Frame::payload_len(kind_byte) {
+    match Frame::is_of_length(kind_byte, payload.len()) {
         None => Err(DecodeError::UnknownKind(kind_byte)),
-        Some(len) if len != payload.len() => Err(DecodeError::BadLength),
-        Some(_) => Frame::read(kind_byte, fields).ok_or(DecodeError::UnknownValue),
+        Some(false) => Err(DecodeError::BadLength),
+        Some(true) => Frame::read(kind_byte, fields).ok_or(DecodeError::UnknownValue),
     }
 }
 

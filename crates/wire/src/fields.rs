@@ -114,6 +114,12 @@ pub struct Corrected {
     pub known: [U16; 3],
     pub correction: U16,
     pub state: u8,
+    pub attitude: [I32; 4],
+}
+
+impl Corrected {
+    /// Bytes of the fields without the attitude: a board of before it ends a frame there.
+    pub(crate) const WITHOUT_ATTITUDE: usize = size_of::<Self>() - size_of::<[I32; 4]>();
 }
 
 /// Request frame: see [`crate::Request`].
@@ -201,6 +207,7 @@ impl From<&crate::Corrected> for Corrected {
             known: corrected.known.map(U16::new),
             correction: corrected.correction.into(),
             state: corrected.state,
+            attitude: corrected.attitude.unwrap_or_default().map(I32::new),
         }
     }
 }
@@ -214,6 +221,7 @@ impl From<&Corrected> for crate::Corrected {
             known: fields.known.map(U16::get),
             correction: fields.correction.get(),
             state: fields.state,
+            attitude: Some(fields.attitude.map(I32::get)),
         }
     }
 }

@@ -82,6 +82,9 @@ pub mod correction_state {
     pub const EXTRAPOLATED: u8 = 1 << 5;
     /// The sample of this number is not in order, see [`flags`](crate::flags): nor is the corrected rate.
     pub const NOT_IN_ORDER: u8 = 1 << 6;
+    /// The attitude is followed. Its tilt is held by the accelerometer at rest; its yaw is from where it began and by the rates
+    /// alone: nothing on the board is a reference for it.
+    pub const YAW_FREE: u8 = 1 << 7;
 }
 
 /// Hello frame: who the board is and how it is set. Sent at start, on request and whenever the set-up has changed.
@@ -174,10 +177,15 @@ pub struct Corrected {
     pub correction: u16,
     /// Bits of [`correction_state`].
     pub state: u8,
+    /// Attitude after this sample, a quaternion w, x, y, z in Q2.30: turns the body's axes into those in which it began, z up.
+    /// `None` of a firmware that has none, whose frames are shorter.
+    pub attitude: Option<[i32; 4]>,
 }
 
 impl Corrected {
-    /// Bytes of the payload, version and kind included.
+    /// Bytes of the payload without an attitude, version and kind included.
+    pub const SHORT_LEN: usize = 2 + fields::Corrected::WITHOUT_ATTITUDE;
+    /// Bytes of the payload with one.
     pub const LEN: usize = 2 + size_of::<fields::Corrected>();
     /// Bytes on the line.
     pub const FRAME_LEN: usize = Self::LEN + OVERHEAD;
@@ -222,14 +230,14 @@ pub enum Frame {
 }
 
 impl Frame {
-    /// Bytes of a payload of this kind; `None` where no frame from the board has it.
-    pub(crate) const fn payload_len(kind_byte: u8) -> Option<usize> {
+    /// Whether a payload of this kind may be that long; `None` where no frame from the board has the kind.
+    pub(crate) const fn is_of_length(kind_byte: u8, len: usize) -> Option<bool> {
         match kind_byte {
-            kind::HELLO => Some(Hello::LEN),
-            kind::SAMPLE => Some(Sample::LEN),
-            kind::HEALTH => Some(Health::LEN),
-            kind::REPLY => Some(Reply::LEN),
-            kind::CORRECTED => Some(Corrected::LEN),
+            kind::HELLO => Some(len == Hello::LEN),
+            kind::SAMPLE => Some(len == Sample::LEN),
+            kind::HEALTH => Some(len == Health::LEN),
+            kind::REPLY => Some(len == Reply::LEN),
+            kind::CORRECTED => Some(len == Corrected::LEN || len == Corrected::SHORT_LEN),
             _ => None,
         }
     }
@@ -250,9 +258,15 @@ impl Frame {
                 .ok()?
                 .reply()
                 .map(Frame::Reply),
-            kind::CORRECTED => Some(Frame::Corrected(Corrected::from(
-                fields::Corrected::ref_from_bytes(bytes).ok()?,
-            ))),
+            kind::CORRECTED => {
+                let mut all = [0; size_of::<fields::Corrected>()];
+                all.get_mut(..bytes.len())?.copy_from_slice(bytes);
+                let mut corrected = Corrected::from(fields::Corrected::ref_from_bytes(&all).ok()?);
+                if bytes.len() == fields::Corrected::WITHOUT_ATTITUDE {
+                    corrected.attitude = None;
+                }
+                Some(Frame::Corrected(corrected))
+            }
             _ => None,
         }
     }
@@ -296,11 +310,19 @@ pub fn encode(frame: &Frame, out: &mut [u8]) -> Result<usize, EncodeError> {
             write_frame(kind::HEALTH, fields::Health::from(health).as_bytes(), out)
         }
         Frame::Reply(reply) => write_frame(kind::REPLY, fields::Reply::from(reply).as_bytes(), out),
-        Frame::Corrected(corrected) => write_frame(
-            kind::CORRECTED,
-            fields::Corrected::from(corrected).as_bytes(),
-            out,
-        ),
+        Frame::Corrected(corrected) => {
+            let fields = fields::Corrected::from(corrected);
+            let len = match corrected.attitude {
+                Some(_) => size_of::<fields::Corrected>(),
+                None => fields::Corrected::WITHOUT_ATTITUDE,
+            };
+            // It is no longer than the fields.
+            write_frame(
+                kind::CORRECTED,
+                fields.as_bytes().get(..len).unwrap_or(&[]),
+                out,
+            )
+        }
     }
 }
 

@@ -58,6 +58,8 @@ vectors = {
     "reply_bias_null": line(4, REPLY, 65535, 32, 0, 120, 65536, -65536, 1),
     "reply_moving": line(4, REPLY, 2, 32, 5, 0, 0, 0, 0),
     "corrected": line(5, CORRECTED, 0x1234, 1048576, -1, 0, -524288, 7, 0, 256, 65535, 0, 0xBEEF, 0x27),
+    "corrected_attitude": line(5, CORRECTED + "4i", 0x1234, 1048576, -1, 0, -524288, 7, 0, 256, 65535, 0, 0xBEEF, 0xA7,
+                               1 << 30, -1, 0x01020304, -(1 << 31)),
     "request_set_correction": request(29, 35, "B3h", 17, -32768, 32767, 258),
     "request_correction": request(30, 36, "B", 1),
     "request_get_correction": request(31, 37, "BB", 1, 12),

@@ -150,8 +150,16 @@ fn ref_corrected() {
         known: [256, 65_535, 0],
         correction: 0xBEEF,
         state: 0x27,
+        attitude: None,
     };
+    // Of a board without an attitude.
     frame_is("corrected", Frame::Corrected(corrected));
+    let corrected = Corrected {
+        state: 0xA7,
+        attitude: Some([1 << 30, -1, 0x0102_0304, i32::MIN]),
+        ..corrected
+    };
+    frame_is("corrected_attitude", Frame::Corrected(corrected));
 }
 
 #[test]
@@ -286,6 +294,12 @@ fn the_page_and_the_crate_give_the_same_lengths_counters_and_codes() {
             "corrected | board -> PC",
             Corrected::LEN,
             Corrected::FRAME_LEN,
+        ),
+        (
+            5,
+            "corrected, without an attitude | board -> PC",
+            Corrected::SHORT_LEN,
+            Corrected::SHORT_LEN + wire::OVERHEAD,
         ),
         (
             0x10,

@@ -57,9 +57,9 @@ prop_compose! {
 prop_compose! {
     fn corrected()(
         (seq, rate, bias, known) in any::<(u16, [i32; 3], [i32; 3], [u16; 3])>(),
-        (correction, state) in any::<(u16, u8)>(),
+        (correction, state, attitude) in any::<(u16, u8, Option<[i32; 4]>)>(),
     ) -> Corrected {
-        Corrected { seq, rate, bias, known, correction, state }
+        Corrected { seq, rate, bias, known, correction, state, attitude }
     }
 }
 
@@ -165,6 +165,7 @@ proptest! {
             Frame::Sample(_) => Sample::FRAME_LEN,
             Frame::Health(_) => Health::FRAME_LEN,
             Frame::Reply(_) => Reply::FRAME_LEN,
+            Frame::Corrected(Corrected { attitude: None, .. }) => Corrected::SHORT_LEN + wire::OVERHEAD,
             Frame::Corrected(_) => Corrected::FRAME_LEN,
         };
         prop_assert_eq!(line.len(), len, "the length does not depend on the fields");

@@ -3,6 +3,7 @@
 use bench::scenario::{MotorPart, SupplyPart, ThermalPart};
 use bench::{Motor, Scenario, Stand, Supply, Thermal, bartlett, register};
 
+mod data_sheet;
 mod faults;
 mod registers;
 

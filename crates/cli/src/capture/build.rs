@@ -48,8 +48,17 @@ impl Default for Calibration {
 pub(crate) const CORRECTED_LSB_DPS: f64 = 1.0 / (1 << 20) as f64;
 /// Names of the corrected rates' columns.
 pub(crate) const CORRECTED: [&str; 3] = ["corrected_x", "corrected_y", "corrected_z"];
-/// Columns of what else a corrected frame says: the correction's number, and the bits of its state.
-pub(crate) const OF_CORRECTION: [&str; 2] = ["correction", "corrected_state"];
+/// Columns of what else a corrected frame says: the correction's number, the bits of its state, and the attitude, a quaternion.
+pub(crate) const OF_CORRECTION: [&str; 6] = [
+    "correction",
+    "corrected_state",
+    "attitude_w",
+    "attitude_x",
+    "attitude_y",
+    "attitude_z",
+];
+/// Parts of the quaternion are Q2.30.
+pub(crate) const ATTITUDE_LSB: f64 = 1.0 / (1 << 30) as f64;
 /// How many rows back a corrected frame's sample is looked for: its frame comes behind that sample, a line that is full
 /// puts no more than replies and reports in between.
 const BEHIND: usize = 8;
@@ -207,8 +216,14 @@ impl RecordBuilder {
             ]
             .into_iter()
             .chain(
-                c.corrected
-                    .then(|| entry("corrected_lsb_dps", CORRECTED_LSB_DPS)),
+                (c.corrected.then(|| {
+                    [
+                        entry("corrected_lsb_dps", CORRECTED_LSB_DPS),
+                        entry("attitude_lsb", ATTITUDE_LSB),
+                    ]
+                }))
+                .into_iter()
+                .flatten(),
             )
             .collect(),
         }
@@ -310,12 +325,22 @@ impl RecordBuilder {
             let scale = (0.0, CORRECTED_LSB_DPS);
             in_counts(CORRECTED[axis], Quantity::Other, "deg/s", scale, &counts)
         });
+        // A firmware without an attitude leaves its cells empty.
+        let attitude = [0, 1, 2, 3].map(|part: usize| {
+            let rows = self.rows.iter();
+            let of = |row: &Row| row.corrected.as_ref()?.attitude.map(|q| q[part]);
+            rows.map(of).collect()
+        });
         let others = [
             counts(&|c| i32::from(c.correction)),
             counts(&|c| i32::from(c.state)),
         ];
-        let others = (OF_CORRECTION.into_iter().zip(others))
-            .map(|(name, counts)| in_counts(name, Quantity::Other, "1", (0.0, 1.0), &counts));
+        let lsb = [1.0, 1.0].into_iter().chain([ATTITUDE_LSB; 4]);
+        let others = (OF_CORRECTION.into_iter().zip(lsb))
+            .zip(others.into_iter().chain(attitude))
+            .map(|((name, lsb), counts)| {
+                in_counts(name, Quantity::Other, "1", (0.0, lsb), &counts)
+            });
         rates.into_iter().chain(others.collect::<Vec<_>>())
     }
 }

@@ -110,6 +110,12 @@ impl Ends {
                         "the correction on the board was switched since: the file {with} columns for corrected rates"
                     )));
                 }
+                if now.corrected && !line.contains(",attitude_w,") {
+                    return Err(refuse(
+                        "it is of an earlier version, which had no columns for the attitude"
+                            .to_owned(),
+                    ));
+                }
             } else {
                 let row = row_of(line);
                 ends.last =

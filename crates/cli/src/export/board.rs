@@ -113,6 +113,8 @@ impl BoardCorrection {
             alike: [1.0; 3],
             mean_c,
             supply_v,
+            rate_hz: model.rate_hz,
+            surge: 0.0,
         };
         let density = sum.baseline(model)?;
         let mut notes = Vec::new();
@@ -168,21 +170,14 @@ impl BoardCorrection {
 
 /// What is to be known of how an effect is taken off.
 fn provisos(effect: &EffectModel) -> Vec<String> {
-    const OF_MOTOR: [(&str, &str); 2] = [
-        (
-            "while_turning",
-            "what sets in as the motor turns is taken off in proportion to the command",
-        ),
-        (
-            "surge_at_full_duty",
-            "the surge behind a step of the motor stays: the board has no term for it",
-        ),
-    ];
-    let has = |name: &str| effect.parameters.get(name).is_some_and(|p| p.value != 0.0);
-    let mut notes: Vec<String> = (OF_MOTOR.iter())
-        .filter(|(name, _)| has(name))
-        .map(|(_, what)| format!("{}: {what}", effect.cause))
-        .collect();
+    let turning = effect.parameters.get("while_turning");
+    let mut notes = Vec::new();
+    if turning.is_some_and(|p| p.value != 0.0) {
+        notes.push(format!(
+            "{}: what sets in as the motor turns is taken off in proportion to the command",
+            effect.cause
+        ));
+    }
     if effect.cause == "g_sensitivity" {
         notes.push("g_sensitivity: for the accelerometer's 1.5 g range".to_owned());
     }
@@ -309,6 +304,8 @@ fn judge(
                 of(&meant.motor_magnitude, &rounded.motor_magnitude, FULL_DUTY),
             ),
             ("supply", of(&meant.supply, &rounded.supply, REACH_SUPPLY)),
+            // It lasts for a small part of the time, and at full duty at the most.
+            ("surge", of(&meant.surge, &rounded.surge, FULL_DUTY)),
         ];
         for k in 0..3 {
             let share = (meant.matrix[axis][k] - rounded.matrix[axis][k]).abs();
@@ -403,6 +400,30 @@ mod tests {
         assert!((c.matrix[0][2] + 0.03).abs() < 1e-12);
         assert_eq!(board.notes, ["line: the board has no term for it"]);
         assert!(board.table().contains("temperature"), "{}", board.table());
+    }
+
+    #[test]
+    fn the_surge_behind_a_step_of_the_motor_is_the_models_sample_by_sample() {
+        let board = BoardCorrection::of(
+            &model(
+                "[[effect]]\ncause = \"motor_bias\"\nchannels = [\"gyro_z\"]\nat_full_duty = { value = 0.5, unit = \"deg/s\" }\n\
+                 surge_at_full_duty = { value = 1.5, unit = \"deg/s\" }\nsurge_time = { value = 0.2, unit = \"s\" }\n",
+            ),
+            SENS_AVG,
+        )
+        .unwrap();
+        // A step to full duty at 20 Hz: the means over each sample of 1.5 exp(-t / 0.2 s).
+        let (c, mut speed) = (board.correction, 0.0);
+        for n in 0..20 {
+            let at = |t: f64| -1.5 * 0.2 / 0.05 * (-t / 0.2).exp();
+            let mean = at(0.05 * f64::from(n + 1)) - at(0.05 * f64::from(n));
+            let ahead = 255.0 - speed;
+            assert!((c.surge[2] * ahead + mean).abs() < 1e-9, "{n}");
+            speed += c.follow * ahead;
+        }
+        assert_eq!((c.surge[0], board.notes.len()), (0.0, 0));
+        let stored = Correction::from_numbers(&board.numbers).unwrap();
+        assert!((stored.follow - c.follow).abs() < 2e-5);
     }
 
     #[test]

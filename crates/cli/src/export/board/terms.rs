@@ -20,6 +20,10 @@ pub(super) struct Sum {
     pub(super) mean_c: f64,
     /// Supply, V.
     pub(super) supply_v: f64,
+    /// Samples a second.
+    pub(super) rate_hz: f64,
+    /// The largest surge so far, whose time all axes share.
+    pub(super) surge: f64,
 }
 
 impl Sum {
@@ -37,6 +41,20 @@ impl Sum {
             self.walks[axis] = value("rate_random_walk").unwrap_or(0.0).powi(2);
         }
         Ok(density)
+    }
+
+    /// What a motor does until it has spun up, as the model has it: of what the command is ahead of a speed that follows it with
+    /// this time constant, the mean over a sample. The motor has one time; that of the largest surge counts.
+    fn surge(&mut self, axis: usize, at_full: f64, time_s: f64) {
+        if at_full == 0.0 || time_s <= 0.0 {
+            return;
+        }
+        let samples = time_s * self.rate_hz;
+        let follow = 1.0 - (-1.0 / samples).exp();
+        self.out.surge[axis] -= at_full * samples * follow / FULL_DUTY;
+        if at_full.abs() > self.surge {
+            (self.surge, self.out.follow) = (at_full.abs(), follow);
+        }
     }
 
     /// An effect on a gyro; whether the board has a term for it.
@@ -64,6 +82,7 @@ impl Sum {
                 // The board has no term for what it does as soon as it turns: that goes along in proportion.
                 let at_full = value("at_full_duty") + SIGN_IN_DUTY * value("while_turning");
                 term[axis] -= at_full / FULL_DUTY;
+                self.surge(axis, value("surge_at_full_duty"), value("surge_time"));
             }
             "supply_sensitivity" => {
                 self.out.supply[axis] -= value("slope") * SUPPLY_LSB_V;
