@@ -27,7 +27,7 @@ use crate::ingest::types::Grid;
 use crate::replicates;
 use crate::report::entries::{Ranked, entries, rank};
 use crate::report::findings::{motion_findings, scale_finding, term_findings, variance_finding};
-use crate::report::{detection_limits, figures, handover};
+use crate::report::{detection_limits, figures, gain, handover};
 use crate::result::{
     Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, Input, NotTested,
     Unexplained, Verdict,
@@ -179,6 +179,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     input.notes.append(&mut audited.notes);
     input.file.clone_from(&options.file);
     let mut told = concluded(&searched, tested, audited, dead, named);
+    gain::complete(&mut told.findings, &searched, &grid, &mended);
     let HandedOver {
         mut baseline_model,
         mut extended_model,
