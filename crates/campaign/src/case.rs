@@ -8,13 +8,14 @@ use model::file::EffectModel;
 use model::record::Record;
 use serde::{Deserialize, Serialize};
 
+use crate::clean::KINDS;
+use crate::company::{self, STRUCTURES};
 use crate::foreign::{self, FOREIGN, Foreign, add, foreign};
 use crate::plant::{
-    BY_COUNT, BY_STRENGTH, COUNTED, STRONG, Truth, as_effect, plant, plant_counted, strong,
+    BY_COUNT, BY_STRENGTH, COUNTED, STRONG, Truth, as_effect, plant, plant_counted,
 };
 use crate::random::Draw;
 use crate::stand::{GYROS, Needs, Stand};
-use crate::strength::Meter;
 
 /// Families of runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -23,12 +24,18 @@ pub enum Family {
     Clean,
     /// Nothing is wrong; other rates and lengths.
     Elsewhere,
+    /// Nothing is wrong; another kind of record, by its place in [`KINDS`].
+    CleanOf(usize),
     /// One effect, by its place in [`BY_STRENGTH`].
     One(usize),
     /// One effect that is counted, by its place in [`BY_COUNT`].
     Counted(usize),
     /// Two effects.
     Pair,
+    /// Two or three effects on one axis.
+    OneAxis,
+    /// One effect on an axis with a structure of another kind, by its place in [`STRUCTURES`].
+    Beside(usize),
     /// An effect that the library does not have, by its place in [`FOREIGN`].
     Foreign(usize),
 }
@@ -41,6 +48,9 @@ impl Family {
             Self::Clean => 1,
             Self::Elsewhere => 2,
             Self::Pair => 3,
+            Self::OneAxis => 4,
+            Self::CleanOf(i) => u64::from(KINDS[i].id),
+            Self::Beside(i) => u64::from(STRUCTURES[i].id),
             Self::One(i) => u64::from(STRONG[i].id),
             Self::Counted(i) => u64::from(COUNTED[i].id),
             Self::Foreign(i) => foreign::number(i),
@@ -54,6 +64,9 @@ impl Family {
             Self::Clean => "nothing",
             Self::Elsewhere => "nothing, other rates",
             Self::Pair => "two",
+            Self::OneAxis => "two or three on one axis",
+            Self::CleanOf(i) => KINDS[i].label,
+            Self::Beside(i) => STRUCTURES[i].label,
             Self::One(i) => BY_STRENGTH[i],
             Self::Counted(i) => BY_COUNT[i],
             Self::Foreign(i) => FOREIGN[i],
@@ -220,7 +233,7 @@ struct Planted {
 fn needed(family: Family) -> Needs {
     match family {
         Family::One(i) => STRONG[i].needs,
-        Family::Pair => Needs {
+        Family::Pair | Family::OneAxis | Family::Beside(_) => Needs {
             temperature: true,
             supply: true,
             motor: true,
@@ -237,13 +250,15 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
     let mut allowed: Vec<&'static str> = vec![];
     let (rate_hz, seconds) = match family {
         Family::Elsewhere => ELSEWHERE[index as usize % ELSEWHERE.len()],
+        Family::CleanOf(i) => KINDS[i].extent(draw),
         _ => (20.0, 600.0),
     };
     let mut stand = Stand::draw(draw, seconds, rate_hz, needed(family));
     let mut axis = draw.of_many(3);
-    let mut unknown = None;
+    let (mut unknown, mut added) = (None, None);
     match family {
         Family::Clean | Family::Elsewhere => {}
+        Family::CleanOf(i) => KINDS[i].set_up(draw, &mut stand),
         Family::One(i) => {
             let row = &STRONG[i];
             let axis = if row.moves { axis.min(1) } else { axis };
@@ -252,7 +267,13 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
             allowed.extend(row.true_parts);
         }
         Family::Counted(i) => truths.push(plant_counted(draw, &stand, i, axis)),
-        Family::Pair => pair(draw, &mut stand, &mut truths),
+        Family::Pair => company::two(draw, &mut stand, &mut truths),
+        Family::OneAxis => company::on_one_axis(draw, &mut stand, &mut truths),
+        Family::Beside(i) => {
+            let kind = &STRUCTURES[i];
+            allowed.extend(kind.allowed);
+            added = company::beside_a_structure(draw, &mut stand, kind, axis, &mut truths).added;
+        }
         Family::Foreign(i) => {
             let wanted = draw.by_ratio(25.0, 40.0);
             axis = foreign::on_axis(i, axis);
@@ -260,8 +281,15 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
             unknown = Some(foreign(draw, &mut stand, i, axis, wanted));
         }
     }
+    let mut record = recorded(draw, &stand, &truths, unknown.as_ref().map(|f| (axis, f)));
+    if let Some(signal) = added {
+        add(&mut record, GYROS[axis], &signal, draw);
+    }
+    if let Family::CleanOf(i) = family {
+        KINDS[i].cut(&mut record, axis);
+    }
     Planted {
-        record: recorded(draw, &stand, &truths, unknown.as_ref().map(|f| (axis, f))),
+        record,
         truths,
         allowed,
         walks: stand.walk_of_rate,
@@ -408,60 +436,5 @@ pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
         walks,
         strength: strange,
         seconds,
-    }
-}
-
-/// Whether of two effects on one channel one is a part of the other: a parabola holds a line.
-fn holds_the_other(truths: &[Truth]) -> bool {
-    let both = |one, other| {
-        let has = |cause| truths.iter().any(|t| t.cause == cause);
-        has(one) && has(other)
-    };
-    both("temperature", "temperature_quadratic") || both("line", "am_line")
-}
-
-/// How strong an effect is beside another on its channel. What two processes leave of each other is not worked out.
-fn beside(meter: &Meter, one: &Truth, other: &Truth) -> f64 {
-    match (&one.signal, &other.signal, &other.density) {
-        (Some(x), Some(y), _) => {
-            meter.of_signal(&meter.energy(&meter.beyond(x, std::slice::from_ref(y))))
-        }
-        (Some(s), _, Some(d)) => meter.over(d).of_signal(&meter.energy(s)),
-        (None, None, Some(_)) if one.density.is_some() => 0.0,
-        _ => one.strength,
-    }
-}
-
-/// Two effects, each as strong as asked beside the other.
-fn pair(draw: &mut Draw, stand: &mut Stand, truths: &mut Vec<Truth>) {
-    // Those that need a moving base exclude most others.
-    let fit: Vec<_> = STRONG.iter().filter(|row| !row.moves).collect();
-    loop {
-        truths.clear();
-        let rows = [0, 1].map(|_| fit[draw.of_many(fit.len())]);
-        if rows[0].cause == rows[1].cause {
-            continue;
-        }
-        for row in rows {
-            let axis = draw.of_many(3);
-            let wanted = draw.by_ratio(1.1 * row.asked_from, 2.2 * row.asked_from);
-            truths.push(plant(draw, stand, row.label, axis, wanted));
-        }
-        if truths[0].channel == truths[1].channel {
-            if holds_the_other(truths) {
-                continue;
-            }
-            let own = GYROS.iter().position(|g| *g == truths[0].channel);
-            let meter = Meter::new(stand, own.unwrap_or(0));
-            let [one, other] = [0, 1].map(|i: usize| beside(&meter, &truths[i], &truths[1 - i]));
-            truths[0].strength = one;
-            truths[1].strength = other;
-        }
-        if truths
-            .iter()
-            .all(|t| t.strength >= strong(t.label).asked_from)
-        {
-            return;
-        }
     }
 }

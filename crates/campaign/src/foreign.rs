@@ -56,6 +56,12 @@ pub fn has_twin(place: usize) -> bool {
     EFFECTS[place].twin.is_some()
 }
 
+/// Whether the library has got the cause of one since, by its place in [`FOREIGN`]: it is foreign no longer.
+#[must_use]
+pub fn is_known_since(place: usize) -> bool {
+    EFFECTS[place].later.is_some()
+}
+
 /// The environment that one needs, by its place in [`FOREIGN`].
 #[must_use]
 pub fn needs(place: usize) -> Needs {

@@ -5,6 +5,8 @@
 //! refitted. It is computed here from the simulated signals and densities, not asked of the engine.
 
 pub mod case;
+pub mod clean;
+pub mod company;
 pub mod foreign;
 pub mod log;
 pub mod motor;
@@ -26,12 +28,18 @@ pub struct Size {
     pub clean: u64,
     /// Clean runs at other rates and lengths.
     pub elsewhere: u64,
+    /// Clean runs of each other kind of record.
+    pub clean_of: u64,
     /// Runs for each cause with a strength.
     pub one: u64,
     /// Runs for each cause that is counted.
     pub counted: u64,
     /// Runs with two effects.
     pub pairs: u64,
+    /// Runs with two or three effects on one axis.
+    pub one_axis: u64,
+    /// Runs with an effect beside each structure.
+    pub beside: u64,
     /// Runs for each foreign effect.
     pub foreign: u64,
 }
@@ -43,9 +51,12 @@ impl Size {
         Self {
             clean: n,
             elsewhere: n,
+            clean_of: n,
             one: n,
             counted: n,
             pairs: n,
+            one_axis: n,
+            beside: n,
             foreign: n,
         }
     }
@@ -57,10 +68,13 @@ pub const MINUTES: f64 = 58.0;
 pub const QUICK: Size = Size {
     clean: 300,
     elsewhere: 12,
+    clean_of: 60,
     one: 26,
     counted: 8,
     pairs: 80,
-    foreign: 6,
+    one_axis: 60,
+    beside: 15,
+    foreign: 3,
 };
 /// At most an hour on two cores. 2200 clean runs with four alarms show the bar of 0.5 %; about half of the 100 of each
 /// cause are as strong as the bar asks, so that its bound is that of 1000 runs for all causes together and of 50 for
@@ -68,18 +82,24 @@ pub const QUICK: Size = Size {
 pub const DEFAULT: Size = Size {
     clean: 2200,
     elsewhere: 60,
+    clean_of: 400,
     one: 100,
     counted: 40,
     pairs: 300,
+    one_axis: 200,
+    beside: 60,
     foreign: 20,
 };
 /// Hours.
 pub const FULL: Size = Size {
     clean: 10_000,
     elsewhere: 600,
+    clean_of: 4000,
     one: 800,
     counted: 200,
     pairs: 3000,
+    one_axis: 2000,
+    beside: 600,
     foreign: 150,
 };
 
@@ -89,7 +109,10 @@ fn families(size: Size) -> Vec<(Family, u64)> {
         (Family::Clean, size.clean),
         (Family::Elsewhere, size.elsewhere),
         (Family::Pair, size.pairs),
+        (Family::OneAxis, size.one_axis),
     ];
+    families.extend((0..clean::KINDS.len()).map(|i| (Family::CleanOf(i), size.clean_of)));
+    families.extend((0..company::STRUCTURES.len()).map(|i| (Family::Beside(i), size.beside)));
     families.extend((0..plant::BY_STRENGTH.len()).map(|i| (Family::One(i), size.one)));
     families.extend((0..plant::BY_COUNT.len()).map(|i| (Family::Counted(i), size.counted)));
     families.extend((0..foreign::FOREIGN.len()).map(|i| (Family::Foreign(i), size.foreign)));

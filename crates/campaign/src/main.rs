@@ -146,6 +146,17 @@ fn describe(seed: u64, family: campaign::Family, index: u64) {
     for f in &d.findings {
         println!("named {} on {}: {}", f.cause, f.channels.join("+"), f.what);
     }
+    for c in d
+        .checks
+        .iter()
+        .filter(|c| c.fails_after || c.threshold > 1e-4)
+    {
+        let p = c.p_value.unwrap_or(f64::NAN);
+        println!(
+            "{} on {}: {:.3}, chance {p:.1e}",
+            c.id, c.channel, c.statistic
+        );
+    }
     for u in &d.unexplained {
         println!("unexplained on {}: {}", u.channel, u.what);
     }

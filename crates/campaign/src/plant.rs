@@ -89,6 +89,9 @@ impl<How: Copy> LibraryEffect<How> {
     }
 }
 
+/// A row whose strength is a d'.
+pub type StrongRow = LibraryEffect<strong::How>;
+
 /// Rows of the tables whose strength is a d'.
 pub const BY_STRENGTH: [&str; STRONG.len()] = labels(&STRONG);
 /// Rows of what is counted, at sizes that are certain to show.
@@ -109,7 +112,7 @@ const fn labels<How, const N: usize>(rows: &[LibraryEffect<How>; N]) -> [&'stati
 /// # Panics
 /// For a label that none of [`BY_STRENGTH`] is.
 #[must_use]
-pub fn strong(label: &str) -> &'static LibraryEffect<strong::How> {
+pub fn strong(label: &str) -> &'static StrongRow {
     let own = STRONG.iter().find(|row| row.label == label);
     own.unwrap_or_else(|| panic!("{label} has no strength"))
 }
@@ -327,6 +330,28 @@ pub fn plant_counted(draw: &mut Draw, stand: &Stand, place: usize, axis: usize) 
         channel: channel(axis, everywhere || row.everywhere),
         strength: f64::NAN,
         parameters: parameters_of(row.cause, &values),
+        signal: None,
+        density: None,
+    }
+}
+
+/// Wild readings on an axis: how many, and how far off in standard deviations of the white noise, even in the logarithm.
+#[must_use]
+pub fn plant_outliers(
+    draw: &mut Draw,
+    stand: &Stand,
+    axis: usize,
+    many: (f64, f64),
+    far: (f64, f64),
+) -> Truth {
+    let count = draw.by_ratio(many.0, many.1 + 1.0).floor();
+    let size = stand.white(axis).sqrt() * draw.by_ratio(far.0, far.1);
+    Truth {
+        label: "outliers",
+        cause: "outliers",
+        channel: channel(axis, false),
+        strength: f64::NAN,
+        parameters: parameters_of("outliers", &[("count", count), ("size", size)]),
         signal: None,
         density: None,
     }

@@ -9,6 +9,7 @@ use crate::plant::{BY_COUNT, BY_STRENGTH, asked_from, strong as row_of};
 use crate::tally::{ORACLE, Rate, d95, oracle};
 
 mod bars;
+mod company;
 
 /// Whether a run says something that a summary hides.
 #[must_use]
@@ -145,7 +146,7 @@ pub fn page(all: &[Outcome], command: &str, date: &str, seconds: f64, planned: u
     causes(&mut out, all);
     curves(&mut out, all);
     counted(&mut out, all);
-    pairs(&mut out, all);
+    company::tables(&mut out, all);
     foreign(&mut out, all);
     intervals(&mut out, all);
     confusion(&mut out, all);
@@ -202,9 +203,18 @@ fn clean(out: &mut String, all: &[Outcome]) {
             percent(Rate::of(of.map(|o| !o.quiet())))
         );
     }
+    for (i, kind) in crate::clean::KINDS.iter().enumerate() {
+        let of = all.iter().filter(|o| o.family == Family::CleanOf(i));
+        let label = kind.label.trim_start_matches("nothing, ");
+        let _ = writeln!(
+            out,
+            "| any, {label} | {} |",
+            percent(Rate::of(of.map(|o| !o.quiet())))
+        );
+    }
     let said: BTreeMap<String, usize> = all
         .iter()
-        .filter(|o| matches!(o.family, Family::Clean | Family::Elsewhere))
+        .filter(|o| o.truths.is_empty() && !matches!(o.family, Family::Foreign(_)))
         .flat_map(|o| o.wrong.iter().chain(&o.unexplained))
         .fold(BTreeMap::new(), |mut by, s| {
             let short = s
@@ -304,7 +314,7 @@ fn curves(out: &mut String, all: &[Outcome]) {
 fn counted(out: &mut String, all: &[Outcome]) {
     let _ = writeln!(
         out,
-        "\n## Faults of frames, counts and base\n\nOutliers of 8.5..30 sigma, rails at 2..2.6 sigma, 1..3 missing bits, bits stuck in 15..100 % of the samples, 15..75 repeats,\n5..65 lost frames, jitter 0.4..5 ms, clocks 300..3000 ppm off, motion of 1.5..20 deg/s.\n\n| fault | named | alone |\n|---|---|---|"
+        "\n## Faults of frames, counts and base\n\n1..8 outliers of 8.5..30 sigma (small: 3..40 of 6..8.5), rails at 2..2.6 sigma, 1..3 missing bits, bits stuck in 15..100 % of the samples, 15..75 repeats,\n5..65 lost frames, jitter 0.4..5 ms, clocks 300..3000 ppm off, motion of 1.5..20 deg/s.\n\n| fault | named | alone |\n|---|---|---|"
     );
     for (i, label) in BY_COUNT.iter().enumerate() {
         let own: Vec<&Outcome> = all
@@ -316,29 +326,6 @@ fn counted(out: &mut String, all: &[Outcome]) {
             "| {label} | {} | {} |",
             percent(Rate::of(own.iter().map(|o| o.truths[0].2 != Hit::Missed))),
             percent(Rate::of(own.iter().map(|o| o.right()))),
-        );
-    }
-}
-
-fn pairs(out: &mut String, all: &[Outcome]) {
-    let _ = writeln!(
-        out,
-        "\n## Two effects\n\n| effect, beside any other | named | runs wholly right |\n|---|---|---|"
-    );
-    for label in BY_STRENGTH {
-        let own: Vec<&Outcome> = all
-            .iter()
-            .filter(|o| o.family == Family::Pair && o.truths.iter().any(|t| t.0 == label))
-            .collect();
-        if own.is_empty() {
-            continue;
-        }
-        let hits = own.iter().flat_map(|o| &o.truths).filter(|t| t.0 == label);
-        let _ = writeln!(
-            out,
-            "| {label} | {} | {} |",
-            percent(Rate::of(hits.map(|t| t.2 != Hit::Missed))),
-            percent(Rate::of(own.iter().map(|o| o.right())))
         );
     }
 }

@@ -51,6 +51,8 @@ pub struct Stand {
     pub walk_of_rate: [f64; 3],
     /// Constant bias by axis, deg/s.
     pub bias: [f64; 3],
+    /// Step of the readings by axis, deg/s.
+    pub lsb: [f64; 3],
     /// Temperature, supply, duty, specific force; motion comes by the model file's excitation.
     pub world: World,
     /// Settings of the excitation: sway, turn.
@@ -75,6 +77,7 @@ impl Stand {
             walk_of_angle: std::array::from_fn(|_| draw.between(3.6, 7.0)),
             walk_of_rate: std::array::from_fn(|_| walk(draw)),
             bias: std::array::from_fn(|_| draw.between(-1.0, 1.0)),
+            lsb: [LSB; 3],
             world: world(draw, samples, rate_hz, needs),
             excitation: vec![],
         }
@@ -95,7 +98,7 @@ impl Stand {
     /// The same before rounding to counts, which adds a twelfth of a squared count.
     #[must_use]
     pub fn white_before_rounding(&self, axis: usize) -> f64 {
-        self.white(axis) - LSB * LSB / 12.0
+        self.white(axis) - self.lsb[axis].powi(2) / 12.0
     }
 
     /// Variance of a step of the random walk, (deg/s)^2.
@@ -137,6 +140,7 @@ impl Stand {
         let mut model = ModelFile::paper();
         model.rate_hz = self.rate_hz;
         for (i, channel) in model.channels.iter_mut().enumerate() {
+            channel.lsb = Some(self.lsb[i]);
             for (name, value) in [
                 ("angle_random_walk", self.walk_of_angle[i]),
                 ("rate_random_walk", self.walk_of_rate[i]),

@@ -108,6 +108,19 @@ impl Meter {
         other
     }
 
+    /// Coefficients of each bin.
+    #[must_use]
+    pub fn counts(&self) -> &[f64] {
+        &self.length.count
+    }
+
+    /// What a process adds to the variance of each coefficient, as it stands out where another process adds `by`.
+    #[must_use]
+    pub fn screened(&self, density: &[f64], by: &[f64]) -> Vec<f64> {
+        let parts = density.iter().zip(by).zip(&self.clean);
+        parts.map(|((d, b), v)| d * v / (v + b)).collect()
+    }
+
     /// Energy of a signal in each bin.
     #[must_use]
     pub fn energy(&self, signal: &[f64]) -> Vec<f64> {

@@ -12,9 +12,12 @@ use campaign::{Family, Hit, Outcome, Size, cases, report, run_all};
 const SAMPLE: Size = Size {
     clean: 60,
     elsewhere: 6,
+    clean_of: 8,
     one: 6,
     counted: 2,
     pairs: 12,
+    one_axis: 8,
+    beside: 4,
     foreign: 1,
 };
 /// Of the foreign effects, whose rates `cargo xtask campaign` grades and this test does not: one in so many is drawn, others

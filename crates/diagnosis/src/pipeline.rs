@@ -21,13 +21,14 @@ use crate::audit::{Audit, audit, sign_bit};
 use crate::criticise::common_noise::{Shared, common};
 use crate::criticise::cross_axis::couplings;
 use crate::ingest::dead;
-use crate::ingest::grid::lay_out;
+use crate::ingest::grid::{lay_out, spike_limit};
 use crate::ingest::lattice;
 use crate::ingest::types::Grid;
+use crate::ingest::wild;
 use crate::replicates;
 use crate::report::entries::{Ranked, entries, rank};
 use crate::report::findings::{motion_findings, scale_finding, term_findings, variance_finding};
-use crate::report::{detection_limits, figures, handover};
+use crate::report::{detection_limits, figures, gain, handover};
 use crate::result::{
     Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, Input, NotTested,
     Unexplained, Verdict,
@@ -151,12 +152,13 @@ fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisErro
 
 fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     let Prepared {
-        grid,
+        mut grid,
         mut audited,
         sticking,
         dead,
         mut input,
     } = of;
+    set_aside_wild(&mut grid, &audited);
     let search = |t| channel::searched(&grid, t);
     let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(search).collect();
     let mended: Vec<Finding> = sticking.clone();
@@ -179,6 +181,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     input.notes.append(&mut audited.notes);
     input.file.clone_from(&options.file);
     let mut told = concluded(&searched, tested, audited, dead, named);
+    gain::complete(&mut told.findings, &searched, &grid, &mended);
     let HandedOver {
         mut baseline_model,
         mut extended_model,
@@ -232,6 +235,38 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         evidence: (searched.iter().filter(|_| !options.no_evidence))
             .flat_map(|s| figures::of_channel(s, &grid))
             .collect(),
+    }
+}
+
+/// Sets aside wild readings that are too many rather than too far off, where a first search shows that nothing else makes them.
+fn set_aside_wild(grid: &mut Grid, audited: &Audit) {
+    let single = spike_limit(grid.n);
+    for i in 0..grid.targets.len() {
+        let target = &grid.targets[i];
+        let by_counts = ["outliers", "spikes"];
+        let told = by_counts
+            .iter()
+            .any(|id| audited.is_suppressed(id, &target.name));
+        if target.moving || told || !wild::suspected(grid, i) {
+            continue;
+        }
+        let s = channel::searched(grid, target);
+        let (white, data) = (
+            s.state.solution.white.sqrt(),
+            s.search.panel.dct.inverse(&s.search.panel.column(0)),
+        );
+        let law = |i: usize| s.variance.as_ref().map_or(1.0, |v| v.law[i].sqrt());
+        let known: Vec<f64> = (target.aside.iter())
+            .map(|(at, given)| s.e[*at] + (given - data[*at]) / (white * law(*at)))
+            .collect();
+        let mut e = s.e.clone();
+        target.lost.iter().for_each(|at| e[*at] = 0.0);
+        let Some(limit) = wild::found(&e, &known, single) else {
+            continue;
+        };
+        let places: Vec<usize> = (0..e.len()).filter(|at| e[*at].abs() >= limit).collect();
+        drop(s);
+        wild::set_aside(grid, i, &places, limit);
     }
 }
 

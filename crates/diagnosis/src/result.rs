@@ -73,7 +73,7 @@ pub struct Alternative {
 pub struct Gain {
     /// Prequential log score on data not used for the fit, extended minus baseline, nats.
     pub held_out_log_score_nats: Option<f64>,
-    /// Its standard error, nats.
+    /// Its standard error, nats: that of the model with the finding.
     pub std_error: Option<f64>,
     /// BIC of the baseline minus BIC with this finding (positive: better).
     pub delta_bic: Option<f64>,
@@ -101,8 +101,11 @@ pub struct Finding {
     pub alternatives: Vec<Alternative>,
     /// What to record in order to decide between them.
     pub experiment: Option<String>,
-    /// What it gains; `None` for faults of frames and counts, which are masked, not modelled.
+    /// What it gains.
     pub gain: Option<Gain>,
+    /// Why the log score of its gain has no number, where it has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_gain: Option<String>,
     /// One sentence for a person.
     #[serde(default)]
     pub what: String,

@@ -116,6 +116,7 @@ checks! {
     BandSteadiness "band_steadiness" CLAIM_LEVEL, Named;
     BandSize "band_size" CLAIM_LEVEL, Named;
     BandEnvelope "band_envelope" CLAIM_LEVEL, Named;
+    BandSource "band_source" CLAIM_LEVEL, Named;
     VarianceLaw "variance_law" CLAIM_LEVEL, Named;
     FollowerLaw "follower_law" CLAIM_LEVEL, Named;
     CommonNoiseLaw "common_noise_law" CLAIM_LEVEL, Named;
@@ -194,9 +195,11 @@ impl CheckId {
             | Self::ProcessSize
             | Self::ProcessSource
             | Self::ProcessRhythm => "a coloured noise of no known kind",
-            Self::BandSpectrum | Self::BandSteadiness | Self::BandSize | Self::BandEnvelope => {
-                "a band of no known kind"
-            }
+            Self::BandSpectrum
+            | Self::BandSteadiness
+            | Self::BandSize
+            | Self::BandEnvelope
+            | Self::BandSource => "a band of no known kind",
             Self::VarianceLaw => "the size of the noise changes by no known law",
             Self::FollowerLaw => "the rate follows a channel by no known law",
             _ => return None,
@@ -215,11 +218,12 @@ impl CheckId {
         Self::ProcessSource,
     ];
     /// The same of what stands at one frequency.
-    pub const OF_BAND: [Self; 4] = [
+    pub const OF_BAND: [Self; 5] = [
         Self::BandSpectrum,
         Self::BandSteadiness,
         Self::BandSize,
         Self::BandEnvelope,
+        Self::BandSource,
     ];
     /// The checks of short-time spectra.
     pub const OF_SHORT_TIME: [Self; 3] = [Self::ColourFollows, Self::Order, Self::Leaning];

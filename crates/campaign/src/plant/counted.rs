@@ -21,7 +21,7 @@ const fn row(id: u16, cause: &'static str, how: How) -> Row {
 }
 
 /// The rows, by number.
-pub const COUNTED: [Row; 9] = [
+pub const COUNTED: [Row; 10] = [
     row(200, "base_motion", |d, _, _| {
         let peak = d.by_ratio(1.5, 20.0);
         one(vec![("peak", peak), ("frequency", d.between(0.05, 0.5))])
@@ -57,6 +57,14 @@ pub const COUNTED: [Row; 9] = [
         one(vec![("ppm", d.sign() * d.by_ratio(300.0, 3000.0))])
     })
     .on_all_channels(),
+    Row {
+        label: "outliers, small",
+        ..row(230, "outliers", |d, s, a| {
+            let count = d.by_ratio(3.0, 41.0).floor();
+            let size = s.white(a).sqrt() * d.by_ratio(6.0, 8.5);
+            one(vec![("count", count), ("size", size)])
+        })
+    },
 ];
 
 /// A fault of the row's own channels.

@@ -201,6 +201,9 @@ fn write_finding(out: &mut String, finding: &Finding) {
             .map_or_else(String::new, |e| format!(" +- {e:.1}"));
         let _ = writeln!(out, "    held-out gain            {nats:.1}{error} nats");
     }
+    if let Some(why) = &finding.no_gain {
+        let _ = writeln!(out, "{}", item("no held-out gain: ", why));
+    }
     if let Some(bic) = gain.delta_bic {
         let _ = writeln!(out, "    delta BIC                {bic:.1}");
     }

@@ -302,7 +302,8 @@ fn outliers(
     let before = wild.len();
     // What was found explains them: they are its largest.
     if !s.state.terms.is_empty() {
-        let limit = crate::ingest::grid::spike_limit(e.len());
+        let single = || crate::ingest::grid::spike_limit(e.len());
+        let limit = s.target.wild_from.unwrap_or_else(single);
         wild.retain(|w| w.size.abs() > limit);
     }
     let (apart, why) = unlike(s, e, &wild, failing);

@@ -5,7 +5,7 @@ use model::effects::effect;
 
 use crate::attribute::events::{BLOW_S, blow_of, step_at};
 use crate::ingest::types::Grid;
-use crate::result::{Finding, Parameter};
+use crate::result::{Finding, Gain, Parameter};
 
 /// Far readings while the base turns are its motion.
 pub(crate) fn turning(mut findings: Vec<Finding>, grid: &Grid) -> Vec<Finding> {
@@ -79,6 +79,18 @@ pub(crate) fn loud(mut findings: Vec<Finding>) -> Vec<Finding> {
     findings
 }
 
+/// Adds what another part of a finding gains.
+fn add_gain(finding: &mut Finding, other: Option<Gain>) {
+    if let (Some(a), Some(b)) = (&mut finding.gain, other) {
+        a.held_out_log_score_nats = a
+            .held_out_log_score_nats
+            .zip(b.held_out_log_score_nats)
+            .map(|(x, y)| x + y);
+        a.std_error = a.std_error.zip(b.std_error).map(|(x, y)| x.hypot(y));
+        a.delta_bic = a.delta_bic.zip(b.delta_bic).map(|(x, y)| x + y);
+    }
+}
+
 /// One finding for one event on several channels, and for one cause on one channel by several terms.
 pub(crate) fn joined(findings: Vec<Finding>) -> Vec<Finding> {
     let mut all: Vec<Finding> = vec![];
@@ -93,6 +105,7 @@ pub(crate) fn joined(findings: Vec<Finding>) -> Vec<Finding> {
             other.effective |= f.effective;
             other.likelihood_ratio =
                 Some(other.likelihood_ratio.unwrap_or(0.0) + f.likelihood_ratio.unwrap_or(0.0));
+            add_gain(other, f.gain);
             other.what = format!("{}; {}", other.what, f.what);
             continue;
         }
@@ -116,14 +129,7 @@ pub(crate) fn joined(findings: Vec<Finding>) -> Vec<Finding> {
             other.channels.extend(f.channels);
             other.likelihood_ratio =
                 Some(other.likelihood_ratio.unwrap_or(0.0) + f.likelihood_ratio.unwrap_or(0.0));
-            if let (Some(a), Some(b)) = (&mut other.gain, f.gain) {
-                a.held_out_log_score_nats = a
-                    .held_out_log_score_nats
-                    .zip(b.held_out_log_score_nats)
-                    .map(|(x, y)| x + y);
-                a.std_error = a.std_error.zip(b.std_error).map(|(x, y)| x.hypot(y));
-                a.delta_bic = a.delta_bic.zip(b.delta_bic).map(|(x, y)| x + y);
-            }
+            add_gain(other, f.gain);
             other.what = format!("{}; {}", other.what, f.what);
             continue;
         }

@@ -255,6 +255,14 @@ fn correlated(pairs: &[&Pair<'_>], of: &dyn Effect, free: f64) -> Option<Finding
     let log = |p: &&Pair<'_>| -free * (1.0 - p.2 * p.2).ln();
     let ratio = pairs.iter().map(log).sum::<f64>();
     let largest = pairs.iter().map(|p| p.2.abs()).fold(0.0, f64::max);
+    let mut axes: Vec<(&str, &[f64])> = vec![];
+    for s in pairs.iter().flat_map(|p| [p.0, p.1]) {
+        if axes.iter().all(|a| a.0 != s.target.name) {
+            axes.push((&s.target.name, &s.e));
+        }
+    }
+    let axes: Vec<&[f64]> = axes.into_iter().map(|a| a.1).collect();
+    let (nats, std_error) = prequential::of_correlation(&axes);
     Some(Finding {
         cause: of.id().into(),
         what: sentence(of.docs().title, first, parameters),
@@ -263,7 +271,10 @@ fn correlated(pairs: &[&Pair<'_>], of: &dyn Effect, free: f64) -> Option<Finding
         per_channel,
         likelihood_ratio: Some(ratio),
         consequence: Some(Consequence::of_correlation(largest)),
+        confirmed_on_held_out_data: Some(nats > 0.0),
         gain: Some(Gain {
+            held_out_log_score_nats: Some(nats),
+            std_error: Some(std_error),
             delta_bic: Some(ratio - pairs.len() as f64 * free.ln()),
             ablation_nats: Some(0.5 * ratio),
             ..Gain::default()

@@ -4,6 +4,7 @@ use model::effect::Signal;
 use model::record::{Axis, Quantity};
 
 use crate::fit::likelihood::Dct;
+use crate::fit::prequential;
 use crate::ingest::types::{Grid, Target};
 
 /// Band in which a sway is sought, Hz.
@@ -18,6 +19,8 @@ pub struct Scale {
     pub relative: f64,
     /// Standard error.
     pub std_error: f64,
+    /// What knowing it gains on the part of the record that it was not taken from, nats, with the standard error.
+    pub gain: (f64, f64),
 }
 
 /// Regress the tilt rate on the rate, in a band around the sway.
@@ -103,9 +106,36 @@ pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
     let slope = tw / signal;
     let rest = (tt - tw * tw / ww).max(0.0) / band.len().max(2) as f64;
     let error = (rest / signal).sqrt();
+    let in_band = |c: &[f64]| {
+        let mut kept = vec![0.0; n];
+        kept[band.clone()].copy_from_slice(&c[band.clone()]);
+        dct.inverse(&kept)
+    };
+    let gain = held_out(&in_band(&t), &in_band(&w), rest, slope.signum());
     // The rate carries the scale: tilt rate = rate / (1 + relative).
     Ok(Scale {
         relative: 1.0 / slope.abs() - 1.0,
         std_error: error / (slope * slope),
+        gain,
     })
+}
+
+/// What it gains to know the slope of the tilt rate over the rate, both in the band of the sway, on the part that is held out:
+/// marginal likelihoods under a flat slope, less those under the slope `stated`; `rest` is the mean energy of a coefficient
+/// beside it.
+fn held_out(tilt: &[f64], rate: &[f64], rest: f64, stated: f64) -> (f64, f64) {
+    let known = |upto: usize| {
+        let pairs = tilt[..upto].iter().zip(&rate[..upto]);
+        let (tw, ww) = pairs.fold((0.0, 0.0), |(tw, ww), (t, w)| (tw + t * w, ww + w * w));
+        let lr = (tw / ww - stated).powi(2) * ww / rest;
+        (0.5 * lr - 0.5 * f64::ln(ww), lr, ww)
+    };
+    let n = tilt.len();
+    let from = prequential::held_from(n);
+    let (before, all) = (known(from), known(n));
+    let held = 1.0 - before.2 / all.2;
+    (
+        all.0 - before.0,
+        (held * (all.1 - 1.0).max(0.0) + held).sqrt(),
+    )
 }

@@ -3,8 +3,13 @@
 //! Prequential Bayes score: the marginal likelihood m of the first n_j samples (mean and coefficients flat, white
 //! variance by Jeffreys, in closed form; random walk and sizes of stationary terms mixed over a grid), and for each of
 //! twelve blocks ln m(1..n_j) - ln m(1..n_{j-1}) of the extended model minus the same of the model without the term.
+//! Its standard error is the one that the extended model itself implies, by the variance of a log likelihood ratio.
+//! The spread of the twelve blocks is none: a step gains in one of them, and what is learned before is common to all.
 //! A regressor that has not moved yet (a step before its time) has no coefficient: it is left out, and the blocks
 //! until it has moved count nothing.
+
+mod events;
+mod laws;
 
 use std::rc::Rc;
 
@@ -12,8 +17,9 @@ use model::effect::Peak;
 use statrs::function::gamma::ln_gamma;
 
 use crate::fit::channel::{Form, State};
-use crate::fit::likelihood::{Bins, Dct, Noise, Panel, least_walk};
-use numerics::log_product::LogProduct;
+use crate::fit::likelihood::{Bins, Dct, Noise, Panel, Solution, least_walk};
+pub(crate) use events::{of_events, of_outliers};
+pub use laws::{of_correlation, of_variance};
 
 /// Blocks, and the part of the record before the first.
 const BLOCKS: usize = 12;
@@ -31,7 +37,7 @@ const MOVED: f64 = 1e-3;
 pub struct Score {
     /// Extended minus reduced, nats, on all blocks.
     pub nats: f64,
-    /// Its standard error from the spread of the blocks.
+    /// Its standard error.
     pub std_error: f64,
     /// rms angle error, deg, (reduced, extended), over 10 s and 100 s, where the held-out part has three such windows.
     pub angle: Vec<(&'static str, [f64; 2])>,
@@ -42,11 +48,13 @@ fn log_sum(values: &[f64]) -> f64 {
     top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln()
 }
 
-/// A prefix of the record under one model: ln m, the coefficients and the random walk that fit it best.
+/// A prefix of the record under one model: ln m, and the coefficients, the random walk and the variance of a coefficient by
+/// bin of what fits it best.
 struct Prefix {
     log_m: f64,
     beta: Vec<f64>,
     log_walk: f64,
+    variance: Vec<f64>,
 }
 
 /// A noise of the mixture: its random walk, 1/g and the sum of ln g.
@@ -105,19 +113,29 @@ fn marginal(panel: &Panel, mixture: &[Mixed], columns: &[usize], walk: f64) -> P
     let free = ((panel.bins.n - 1) as f64 - columns.len() as f64) / 2.0;
     let constant = ln_gamma(free);
     let mut all = vec![];
-    let mut best = (f64::NEG_INFINITY, vec![], walk);
-    for (log_walk, weight, log_det) in mixture {
-        let s = panel.solve_weighted(weight, *log_det, columns);
+    let mut best: (f64, Option<(Solution, &Mixed)>) = (f64::NEG_INFINITY, None);
+    for mixed in mixture {
+        let s = panel.solve_weighted(&mixed.1, mixed.2, columns);
         let log_m = constant - free * s.rss.ln() - 0.5 * (s.log_det_noise + s.log_det_normal);
         if log_m > best.0 {
-            best = (log_m, s.beta, *log_walk);
+            best = (log_m, Some((s, mixed)));
         }
         all.push(log_m);
     }
-    Prefix {
-        log_m: log_sum(&all) - (all.len() as f64).ln(),
-        beta: best.1,
-        log_walk: best.2,
+    let log_m = log_sum(&all) - (all.len() as f64).ln();
+    match best.1 {
+        Some((s, (log_walk, weight, _))) => Prefix {
+            log_m,
+            log_walk: *log_walk,
+            variance: weight.iter().map(|w| s.white / w).collect(),
+            beta: s.beta,
+        },
+        None => Prefix {
+            log_m,
+            log_walk: walk,
+            variance: vec![],
+            beta: vec![],
+        },
     }
 }
 
@@ -146,11 +164,7 @@ impl<'a> Blocks<'a> {
                 (0..ends.len()).map(by_all).collect()
             })
             .collect();
-        let windows = [("10s", 10.0), ("100s", 100.0)]
-            .iter()
-            .map(|(name, s)| (*name, (s * rate_hz).round() as usize))
-            .filter(|(_, w)| *w >= 2 && 3 * w <= y.len() - ends[0])
-            .collect();
+        let windows = windows(y.len(), rate_hz);
         Self {
             y,
             values,
@@ -210,7 +224,7 @@ impl<'a> Blocks<'a> {
             add_angles(
                 &rest,
                 from,
-                prefix.log_walk,
+                (prefix.log_walk, &|_| 1.0),
                 (end, *next),
                 *length,
                 self.rate_hz,
@@ -219,8 +233,53 @@ impl<'a> Blocks<'a> {
         }
     }
 
+    /// Variance of what a term gains on the blocks where the model that holds it is true: `whole` is the whole record under
+    /// that model, `without` the same under the model without the term. With variances v1 and v0 of a coefficient with it
+    /// and without, and s what the term adds to its mean, the log likelihood ratio of one has the variance
+    /// (v1 / v0 - 1)^2 / 2 + s^2 v1 / v0^2.
+    fn variance_of_gain(
+        &self,
+        term: usize,
+        panel: &Panel,
+        columns: &[Vec<usize>],
+        whole: &Prefix,
+        without: &Prefix,
+    ) -> f64 {
+        let held = 1.0 - BEFORE;
+        let own = &columns[term];
+        let ratios = whole.variance.iter().zip(&without.variance);
+        let terms = ratios.zip(panel.bins.counts());
+        let noise: f64 = terms.map(|((a, b), m)| m * (a / b - 1.0).powi(2)).sum();
+        let learned = held * (0.5 * noise + own.len().max(1) as f64);
+        if own.is_empty() {
+            return learned;
+        }
+        let last = self.ends.len() - 1;
+        let before = self.used(None, last).take_while(|i| *i < term);
+        let first: usize = before.map(|i| columns[i].len()).sum();
+        let Some(beta) = whole.beta.get(first..first + own.len()) else {
+            return f64::NAN;
+        };
+        // The term's signal weighed in time: where in the record it is told.
+        let mut c = vec![0.0; panel.bins.n];
+        panel.add_columns(&mut c, 0, own, beta);
+        let weights = whole.variance.iter().zip(&without.variance);
+        let weights: Vec<f64> = weights.map(|(a, b)| a.sqrt() / b).collect();
+        let weights = panel.bins.spread(&weights);
+        c.iter_mut().zip(&weights).for_each(|(c, w)| *c *= w);
+        let told = panel.dct.inverse(&c);
+        let energy: f64 = told[self.ends[0]..].iter().map(|v| v * v).sum();
+        energy + learned
+    }
+
     /// The score of a term: the evidence and the errors without it and with all, the last of each.
-    fn score(&self, term: usize, log_m: &[Vec<f64>], squares: &[Vec<Squares>]) -> Score {
+    fn score(
+        &self,
+        term: usize,
+        log_m: &[Vec<f64>],
+        squares: &[Vec<Squares>],
+        std_error: f64,
+    ) -> Score {
         let full = log_m.len() - 1;
         let gains: Vec<f64> = (1..=BLOCKS)
             .map(|j| {
@@ -232,7 +291,7 @@ impl<'a> Blocks<'a> {
                 }
             })
             .collect();
-        let (nats, std_error) = total(&gains);
+        let nats = gains.iter().sum();
         let rms = |m: usize, w: usize| (squares[m][w].0 / squares[m][w].1.max(1) as f64).sqrt();
         let angle = (self.windows.iter().enumerate())
             .map(|(w, (name, _))| (*name, [rms(term, w), rms(full, w)]))
@@ -253,10 +312,12 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
     let models: Vec<Option<usize>> = (0..state.terms.len()).map(Some).chain([None]).collect();
     let mut log_m = vec![vec![]; models.len()];
     let mut squares = vec![vec![(0.0, 0usize); blocks.windows.len()]; models.len()];
+    let mut errors = vec![f64::NAN; state.terms.len()];
     for j in 0..blocks.ends.len() {
         let (panel, columns) = blocks.panel(&peaks, j);
         // Without a term that is no noise the mixture is that of the whole.
         let whole = mixture(&panel, state, None);
+        let mut prefixes = vec![];
         for (m, skip) in models.iter().enumerate() {
             let used: Vec<usize> = blocks
                 .used(*skip, j)
@@ -269,11 +330,26 @@ pub fn scores(y: &[f64], rate_hz: f64, state: &State, values: &[Vec<Vec<f64>>]) 
             let prefix = marginal(&panel, mixture, &used, state.noise.log_walk);
             log_m[m].push(prefix.log_m);
             blocks.predict(*skip, j, &prefix, &mut squares[m]);
+            prefixes.push(prefix);
+        }
+        if j + 1 == blocks.ends.len() {
+            let (full, reduced) = (&prefixes[state.terms.len()], &prefixes);
+            for (term, error) in errors.iter_mut().enumerate() {
+                let of = &reduced[term];
+                *error = blocks
+                    .variance_of_gain(term, &panel, &columns, full, of)
+                    .sqrt();
+            }
         }
     }
     (0..state.terms.len())
-        .map(|term| blocks.score(term, &log_m, &squares))
+        .map(|term| blocks.score(term, &log_m, &squares, errors[term]))
         .collect()
+}
+
+/// The sample from which on a record is held out.
+pub(crate) fn held_from(n: usize) -> usize {
+    ends(n)[0]
 }
 
 /// Ends of the blocks, the end of what lies before them first.
@@ -282,98 +358,6 @@ fn ends(n: usize) -> Vec<usize> {
     (0..=BLOCKS)
         .map(|j| (share(j) * n as f64).round() as usize)
         .collect()
-}
-
-/// Sum over the blocks, with its standard error from their spread.
-fn total(gains: &[f64]) -> (f64, f64) {
-    let nats: f64 = gains.iter().sum();
-    let count = gains.len() as f64;
-    let mean = nats / count;
-    let spread = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    (nats, (spread * count).sqrt())
-}
-
-/// Least share of a record that shows a law of the variance at more than half its height, for it to have a size.
-const SHOWN: f64 = 2e-3;
-/// Largest ratio of variances that is asked, as ln.
-const MOST_RATIO: f64 = 6.0;
-
-/// What a law of the variance gains on data that its size has not seen, nats, and the standard error. `e` is the whitened
-/// residual without the law, `law` its shape in time, which is that of the whole record, as the time of a step is.
-#[must_use]
-pub fn of_variance(e: &[f64], law: &[f64]) -> (f64, f64) {
-    let low = law.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = law.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let height: Vec<f64> = law.iter().map(|v| (v - low) / (high - low)).collect();
-    let ends = ends(e.len());
-    let gains: Vec<f64> = ends
-        .windows(2)
-        .map(|w| {
-            let (seen, of) = (&e[..w[0]], &height[..w[0]]);
-            let shown = of.iter().filter(|h| **h > 0.5).count() as f64;
-            let (all, count) = (e.len() as f64, seen.len() as f64);
-            if shown < SHOWN * all || shown > count - SHOWN * all {
-                return 0.0;
-            }
-            // The larger over the smaller variance, and the smaller one by the likelihood.
-            let at = |ratio: f64| {
-                let rise = ratio.exp_m1();
-                move |h: f64| 1.0 + rise * h
-            };
-            let energy = |ratio: f64| -> f64 {
-                let (parts, at) = (seen.iter().zip(of), at(ratio));
-                parts.map(|(e, h)| e * e / at(*h)).sum::<f64>() / count
-            };
-            let minus_l = |ratio: f64| {
-                let (mut product, at) = (LogProduct::default(), at(ratio));
-                of.iter().for_each(|h| product.multiply(at(*h)));
-                0.5 * (product.ln() + count * energy(ratio).ln())
-            };
-            let ratio = numerics::minimise::golden(&minus_l, -MOST_RATIO, MOST_RATIO, 30);
-            let (plain, least, at) = (energy(0.0), energy(ratio), at(ratio));
-            let nats = |e: f64, v: f64| -0.5 * (v.ln() + e * e / v);
-            let next = e[w[0]..w[1]].iter().zip(&height[w[0]..w[1]]);
-            next.map(|(e, h)| nats(*e, least * at(*h)) - nats(*e, plain))
-                .sum()
-        })
-        .collect();
-    total(&gains)
-}
-
-/// What knowing that channels share noise gains on data that the correlation was not taken from, nats, and the standard
-/// error: each block under the correlations of all that lies before it.
-#[must_use]
-pub fn of_correlation(channels: &[&[f64]]) -> (f64, f64) {
-    let Some(n) = channels.iter().map(|c| c.len()).min() else {
-        return (0.0, 0.0);
-    };
-    let gains: Vec<f64> = ends(n)
-        .windows(2)
-        .map(|w| {
-            let rms =
-                |c: &&[f64]| (c[..w[0]].iter().map(|v| v * v).sum::<f64>() / w[0] as f64).sqrt();
-            let scale: Vec<f64> = channels.iter().map(rms).collect();
-            let moment = |i: usize, j: usize, from: usize, to: usize| -> f64 {
-                let both = channels[i][from..to].iter().zip(&channels[j][from..to]);
-                both.map(|(a, b)| a * b).sum::<f64>() / (scale[i] * scale[j])
-            };
-            let matrix = |of: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
-                let row = |i| (0..channels.len()).map(|j| of(i, j)).collect();
-                (0..channels.len()).map(row).collect()
-            };
-            let before = matrix(&|i, j| moment(i, j, 0, w[0]) / w[0] as f64);
-            let (inverse, log_det) = crate::fit::likelihood::invert(&before);
-            let inside = matrix(&|i, j| moment(i, j, w[0], w[1]));
-            let mut square = 0.0;
-            for (i, row) in inside.iter().enumerate() {
-                for (j, v) in row.iter().enumerate() {
-                    square += v * (inverse[i][j] - f64::from(u8::from(i == j)));
-                }
-            }
-            -0.5 * ((w[1] - w[0]) as f64 * log_det + square)
-        })
-        .collect();
-    total(&gains)
 }
 
 /// Whether a regressor has moved before each of the ascending `ends`.
@@ -395,11 +379,42 @@ fn moved(column: &[f64], ends: &[usize]) -> Vec<bool> {
     before.iter().map(|v| *v > MOVED * whole).collect()
 }
 
-/// Angle errors of windows that start in `span`, the filter's level held from their start; `rest` begins at `from`.
+/// Horizons of the angles that leave room for three windows in the held-out part of `n` samples: name, samples.
+pub(crate) fn windows(n: usize, rate_hz: f64) -> Vec<(&'static str, usize)> {
+    let held = n - ends(n)[0];
+    [("10s", 10.0), ("100s", 100.0)]
+        .iter()
+        .map(|(name, s)| (*name, (s * rate_hz).round() as usize))
+        .filter(|(_, w)| *w >= 2 && 3 * w <= held)
+        .collect()
+}
+
+/// Rms angle error, deg, by horizon, over the held-out part of what is left of a channel beside its causes: the level of a
+/// filter that knows the random walk, and the variance of each reading over the mean one where a `law` is given, is held
+/// from the start of each window.
+pub(crate) fn angles(
+    rest: &[f64],
+    log_walk: f64,
+    law: Option<&[f64]>,
+    rate_hz: f64,
+) -> Vec<(&'static str, f64)> {
+    let n = rest.len();
+    let each = windows(n, rate_hz).into_iter().map(|(name, length)| {
+        let mut sum = (0.0, 0);
+        let noise = |i: usize| law.map_or(1.0, |v| v[i]);
+        let span = (ends(n)[0], n);
+        add_angles(rest, 0, (log_walk, &noise), span, length, rate_hz, &mut sum);
+        (name, (sum.0 / sum.1.max(1) as f64).sqrt())
+    });
+    each.collect()
+}
+
+/// Angle errors of windows that start in `span`, the filter's level held from their start; `rest` begins at `from`. `noise`
+/// is the variance of a reading over the one that the random walk is held against.
 fn add_angles(
     rest: &[f64],
     from: usize,
-    log_walk: f64,
+    (log_walk, noise): (f64, &dyn Fn(usize) -> f64),
     span: (usize, usize),
     length: usize,
     rate_hz: f64,
@@ -416,62 +431,8 @@ fn add_angles(
             sum.1 += 1;
         }
         p += lambda;
-        let gain = p / (p + 1.0);
+        let gain = p / (p + noise(i));
         level += gain * (v - level);
         p *= 1.0 - gain;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use rand_core::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_xoshiro::Xoshiro256PlusPlus;
-
-    use super::*;
-
-    fn white(n: usize, seed: u64) -> Vec<f64> {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
-    }
-
-    #[test]
-    fn a_law_of_the_variance_gains_what_it_is_worth_and_costs_where_there_is_none() {
-        let law: Vec<f64> = (0..12_000)
-            .map(|i| if i / 600 % 2 == 0 { 1.0 } else { 2.0 })
-            .collect();
-        let e: Vec<f64> = white(12_000, 1)
-            .iter()
-            .zip(&law)
-            .map(|(e, v)| e * f64::sqrt(*v))
-            .collect();
-        // A reading tells ln(mean) - mean ln of the variances over two: (ln 1.5 - ln 2 / 2) / 2 = 0.0294 nats, of 7200.
-        let (nats, error) = of_variance(&e, &law);
-        assert!(
-            (nats - 212.0).abs() < 5.0 * error && error < 40.0,
-            "{nats} {error}"
-        );
-        let costs: f64 = (0..20)
-            .map(|s| of_variance(&white(12_000, s + 10), &law).0)
-            .sum();
-        assert!((-40.0..5.0).contains(&costs), "{costs}");
-    }
-
-    #[test]
-    fn shared_noise_gains_what_it_is_worth_and_costs_where_there_is_none() {
-        let shared = white(12_000, 2);
-        let with = |seed: u64| -> Vec<f64> {
-            let own = white(12_000, seed);
-            own.iter().zip(&shared).map(|(a, b)| a + 0.5 * b).collect()
-        };
-        let (x, y) = (with(3), with(4));
-        // Correlation 0.25 / 1.25: -ln(1 - 0.04) / 2 nats of 7200 readings.
-        let (nats, error) = of_correlation(&[&x, &y]);
-        assert!(
-            (nats - 147.0).abs() < 5.0 * error && error < 40.0,
-            "{nats} {error}"
-        );
-        let (x, y) = (white(12_000, 5), white(12_000, 6));
-        assert!(of_correlation(&[&x, &y]).0 < 3.0);
     }
 }

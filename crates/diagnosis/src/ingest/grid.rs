@@ -338,6 +338,7 @@ impl<'a> Layout<'a> {
             lost,
             spikes,
             aside,
+            wild_from: None,
             excursions: own.to_vec(),
             motion_rms,
             moving: motion_rms > MOTION_RMS,

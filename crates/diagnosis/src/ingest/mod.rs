@@ -10,3 +10,4 @@ pub mod kalman;
 pub mod lattice;
 pub mod motion;
 pub mod types;
+pub(crate) mod wild;

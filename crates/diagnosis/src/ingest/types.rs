@@ -32,6 +32,8 @@ pub struct Target {
     pub spikes: Vec<usize>,
     /// Places whose reading is not believed, and what was read there.
     pub aside: Vec<(usize, f64)>,
+    /// Standard deviations from which on a reading is wild, where many tell that; else that of a single one.
+    pub wild_from: Option<f64>,
     /// Turns of the base that it felt, taken out of `y` as lost readings are.
     pub excursions: Vec<Excursion>,
     /// Excess rms in the band of base motion, deg/s.

@@ -1,5 +1,7 @@
 //! Findings out of what was estimated: one for each cause, with its rivals, its experiment and its gain.
 
+use std::collections::BTreeMap;
+
 use model::effect::{Effect, Found, Hypothesis};
 use model::effects::effect;
 use model::record::Base;
@@ -309,6 +311,23 @@ pub(crate) struct Scaled {
     pub limit: Option<DetectionLimit>,
 }
 
+/// Rms angle error of a turn by a scale that is off by each of `off`, with the white noise: before and after.
+fn turned(s: &Searched<'_>, grid: &Grid, off: [f64; 2]) -> BTreeMap<String, [f64; 2]> {
+    let y = &s.target.y;
+    let from = prequential::held_from(y.len());
+    let each = prequential::windows(y.len(), grid.rate_hz).into_iter();
+    each.map(|(key, length)| {
+        let turns = y[from..].chunks_exact(length);
+        let angle = |part: &[f64]| part.iter().sum::<f64>() / grid.rate_hz;
+        let count = turns.len().max(1) as f64;
+        let square = turns.map(|part| angle(part).powi(2)).sum::<f64>() / count;
+        let noise = s.target.white * length as f64 / grid.rate_hz.powi(2);
+        let error = |off: f64| (off * off * square + noise).sqrt();
+        (key.to_owned(), off.map(error))
+    })
+    .collect()
+}
+
 /// The scale factor, where the base sways and the accelerometers see it; or why not.
 pub(crate) fn scale_finding(
     s: &Searched<'_>,
@@ -352,10 +371,14 @@ pub(crate) fn scale_finding(
         parameters,
         likelihood_ratio: Some(lr),
         gain: Some(Gain {
+            held_out_log_score_nats: Some(found.gain.0),
+            std_error: Some(found.gain.1),
             delta_bic: Some(lr - (grid.n as f64).ln()),
             ablation_nats: Some(lr / 2.0),
+            angle_rms_deg: turned(s, grid, [found.relative, found.std_error]),
             ..Gain::default()
         }),
+        confirmed_on_held_out_data: Some(found.gain.0 > 0.0),
         ..Finding::default()
     };
     Ok(Scaled {

@@ -4,6 +4,7 @@ pub mod detection_limits;
 pub(crate) mod entries;
 pub mod figures;
 pub mod findings;
+pub mod gain;
 pub mod handover;
 pub(crate) mod left_over;
 pub mod untested;

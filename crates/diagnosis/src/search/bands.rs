@@ -11,7 +11,7 @@ use std::sync::Arc;
 use model::effect::{Covariance, Hypothesis, Peak};
 
 use super::envelope::{Band, Seen};
-use super::{Search, envelope};
+use super::{Search, band_source, envelope};
 use crate::fit::channel::{Cluster, Form, State, Term};
 use crate::fit::likelihood::{Bins, Noise};
 use crate::fit::scan::residual;
@@ -239,7 +239,8 @@ impl Search<'_> {
             .position(|c| matches!(c.hypothesis, Hypothesis::WanderingTone));
         let Some(tone) = tone else { return };
         for (number, cluster) in Self::clusters(state).into_iter().enumerate() {
-            let seen = self.envelope(state, &cluster);
+            let band = self.band(state, &cluster);
+            let seen = (band.as_ref()).and_then(|(band, from)| Seen::new(band, *from as u64));
             let others = state.terms.iter().enumerate();
             let others = others.filter(|(i, _)| !cluster.contains(i));
             let rest = self.refit(
@@ -264,6 +265,10 @@ impl Search<'_> {
                 }
                 if place == 0 {
                     t.claims.push(seen.claim(t.effect.id()));
+                    let source = band.as_ref().and_then(|(band, _)| {
+                        band_source::claim(band, self.view.signals, t.effect.id())
+                    });
+                    t.claims.extend(source);
                 }
             }
             // Of several the one tone has no coordinates of its own.
@@ -288,8 +293,8 @@ impl Search<'_> {
         noise
     }
 
-    /// What the envelope of some bands together is like.
-    fn envelope(&self, state: &State, cluster: &[usize]) -> Option<Seen> {
+    /// Some bands together, and their first coefficient.
+    fn band(&self, state: &State, cluster: &[usize]) -> Option<(Band, usize)> {
         let n = self.panel.bins.n;
         let to_k = n as f64 / PI;
         let ends = cluster
@@ -314,6 +319,6 @@ impl Search<'_> {
             coefficients: whole.collect(),
             density: all.iter().zip(&beside).map(|(a, b)| a / b - 1.0).collect(),
         };
-        Seen::new(&band, from as u64)
+        Some((band, from))
     }
 }

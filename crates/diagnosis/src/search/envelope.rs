@@ -32,19 +32,39 @@ const OVERSAMPLED: usize = 4;
 /// a little heavier, is no other cause.
 const TOLERATED: f64 = 0.1;
 
-/// Mean square of the squared envelope over its squared mean; `band` holds neighbouring DCT-II coefficients.
-fn swing(band: &[f64]) -> f64 {
+/// The complex envelope of neighbouring DCT-II coefficients, in as many values over the record as show it, turning by the
+/// first of them.
+pub(super) fn envelope_of(band: &[f64]) -> Vec<Complex<f64>> {
     // Coefficient k turns by k pi over the record, which is half of what the transform spans.
     let length = (2 * OVERSAMPLED * band.len()).next_power_of_two();
     let mut z = vec![Complex::default(); length];
     z.iter_mut().zip(band).for_each(|(z, c)| z.re = *c);
     FftPlanner::new().plan_fft_inverse(length).process(&mut z);
-    let record = &z[..length / 2];
-    let mean = |k| {
-        let all = record.iter().map(|z| z.norm_sqr().powi(k));
-        all.sum::<f64>() / record.len() as f64
-    };
-    mean(2) / mean(1).powi(2)
+    z.truncate(length / 2);
+    z
+}
+
+/// The same of the logarithm of each statistic: a relative variance v of the squared envelope beside chance moves the second
+/// moment by v and the third by 3 v.
+const ROOM: [f64; STATISTICS] = [TOLERATED, 3.0 * TOLERATED, TOLERATED];
+
+/// Statistics of an envelope: the mean square of its square over its squared mean; the same of the third power; and the
+/// geometric mean of its square over the mean, which what comes and goes makes small.
+const STATISTICS: usize = 3;
+type Statistics = [f64; STATISTICS];
+
+/// Least part of its mean that a squared envelope counts as.
+const FLOOR: f64 = 1e-3;
+
+/// Those of neighbouring DCT-II coefficients.
+fn swing(band: &[f64]) -> Statistics {
+    let record = envelope_of(band);
+    let count = record.len() as f64;
+    let squares = || record.iter().map(Complex::norm_sqr);
+    let mean = squares().sum::<f64>() / count;
+    let power = |k| squares().map(|v| (v / mean).powi(k)).sum::<f64>() / count;
+    let logs = squares().map(|v| (v / mean).max(FLOOR).ln()).sum::<f64>() / count;
+    [power(2), power(3), logs.exp()]
 }
 
 /// A band as it is seen: neighbouring coefficients over the noise beside it, and its density there over that.
@@ -57,13 +77,13 @@ pub(super) struct Band {
 pub(super) struct Seen {
     /// ln of how much likelier it is of a steady tone than of noise.
     pub odds: f64,
-    ratio: f64,
-    /// Mean and spread of the ratio of a steady tone and of noise.
-    of: [(f64, f64); 2],
+    statistics: Statistics,
+    /// Middle and spread of the logarithm of each statistic, of a steady tone and of noise.
+    of: [[(f64, f64); STATISTICS]; 2],
 }
 
 /// Coefficients less what the noise beside the band has of them.
-fn kept(coefficients: &[f64], density: &[f64]) -> Vec<f64> {
+pub(super) fn kept(coefficients: &[f64], density: &[f64]) -> Vec<f64> {
     let both = coefficients.iter().zip(density);
     both.map(|(c, d)| c * d / (1.0 + d)).collect()
 }
@@ -72,13 +92,15 @@ fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// Middle and spread of the logarithm of what `run` makes.
-fn spread_of(mut run: impl FnMut() -> f64) -> (f64, f64) {
-    let all: Vec<f64> = (0..RUNS).map(|_| run().ln()).collect();
+/// Middle and spread of the logarithms of what `run` makes.
+fn spread_of(mut run: impl FnMut() -> Statistics) -> [(f64, f64); STATISTICS] {
+    let all: Vec<Statistics> = (0..RUNS).map(|_| run().map(f64::ln)).collect();
     let count = all.len() as f64;
-    let mean = all.iter().sum::<f64>() / count;
-    let variance = all.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    (mean, variance.sqrt())
+    std::array::from_fn(|i| {
+        let mean = all.iter().map(|v| v[i]).sum::<f64>() / count;
+        let variance = all.iter().map(|v| (v[i] - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        (mean, variance.sqrt())
+    })
 }
 
 /// A tone of variance 1 whose phase wanders: its coefficients, the band in their middle and `half` of them wide either side of
@@ -129,30 +151,41 @@ impl Seen {
                 .map(|c| size * c + normal(&mut rng));
             swing(&kept(&own.collect::<Vec<_>>(), &lorentzian))
         });
-        let ratio = swing(&kept(&band.coefficients, &band.density));
-        let of = [steady, noise].map(|(mean, spread)| (mean, spread / fewer));
+        let statistics = swing(&kept(&band.coefficients, &band.density));
+        let of = [steady, noise].map(|all| all.map(|(mean, spread)| (mean, spread / fewer)));
         let likely = |(mean, spread): (f64, f64)| {
             let spread = spread.hypot(TOLERATED);
-            -0.5 * ((ratio.ln() - mean) / spread).powi(2) - spread.ln()
+            -0.5 * ((statistics[0].ln() - mean) / spread).powi(2) - spread.ln()
         };
-        let odds = likely(of[0]) - likely(of[1]);
-        odds.is_finite().then_some(Self { odds, ratio, of })
+        let odds = likely(of[0][0]) - likely(of[1][0]);
+        odds.is_finite().then_some(Self {
+            odds,
+            statistics,
+            of,
+        })
     }
 
     /// What the name claims of the envelope.
     pub(super) fn claim(&self, named: &str) -> Outcome {
-        let (mean, spread) = self.of[usize::from(self.odds <= 0.0)];
-        let off = self.ratio.ln() - mean;
-        let z = off / spread.hypot(TOLERATED);
-        let [steady, noise] = self.of.map(|(mean, _)| mean.exp());
+        let own = &self.of[usize::from(self.odds <= 0.0)];
+        let chances = self
+            .statistics
+            .iter()
+            .zip(own)
+            .zip(ROOM)
+            .map(|((v, (mean, spread)), room)| normal_tail((v.ln() - mean) / spread.hypot(room)));
+        let least = chances.fold(1.0, f64::min);
+        let [steady, noise] = self.of.map(|all| all[0].0.exp());
         Outcome {
             id: CheckId::BandEnvelope,
             about: vec![],
-            statistic: self.ratio,
-            p_value: normal_tail(z),
+            statistic: self.statistics[0],
+            p_value: (least * STATISTICS as f64).min(1.0),
             what: format!(
-                "told as {named}: the mean square of its squared envelope over its squared mean is {:.2}; of a steady tone it would be {steady:.2}, of noise {noise:.2}",
-                self.ratio
+                "told as {named}: the mean square of its squared envelope over its squared mean is {:.2}; of a steady tone it would be {steady:.2}, of noise {noise:.2}; its geometric over its arithmetic mean {:.2} instead of {:.2}",
+                self.statistics[0],
+                self.statistics[2],
+                own[2].0.exp()
             ),
         }
     }

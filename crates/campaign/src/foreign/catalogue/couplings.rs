@@ -21,7 +21,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(426, 7, "tail of another axis", Shaped(|d, s, a, _| tail(d, s, a))).needs(TM),
     row(444, 8, "changes of another axis", Shaped(|d, s, a, _| differences(d, s, a))).needs(TM),
     row(445, 8, "magnitude of another axis", Shaped(|d, s, a, _| magnitude(d, s, a))).needs(TM),
-    row(461, 9, "another axis through a resonance", Shaped(|d, s, a, _| resonance(d, s, a))).needs(TM),
+    row(461, 9, "another axis through a resonance", Shaped(|d, s, a, _| resonance(d, s, a))).needs(TM).parts(&["narrow_band"]),
     row(462, 9, "gain that another axis turns", Shaped(|d, s, a, w| gain(d, s, a, w))).needs(TM),
     row(463, 9, "diode between two axes", Shaped(|d, s, a, _| diode(d, s, a))).needs(TM).parts(&["cross_axis"]),
     row(515, 12, "axis that reads its neighbour for a while", Shaped(neighbour)).parts(&["noise_change"]).twin(367),

@@ -1,6 +1,6 @@
 //! What is known of a channel when its names are weighed: which tests failed, what is left where, what follows what.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use model::effect::Signal;
@@ -37,6 +37,13 @@ const SAME_SWING: f64 = 1.5;
 /// Standard errors beyond which readings come again more often than by chance, and within which a correlation is none.
 const COMES_AGAIN: f64 = 5.0;
 const NO_FILTER: f64 = 3.3;
+/// Share of what tells a term that has the shape of an echo, up to which the echo is another thing.
+const OF_ECHO: f64 = 0.4;
+/// Half widths about the centre of a band that hold what it explains, and the share of that which a follower has there, from
+/// which on the band may be what its shape leaves.
+const BAND_REACH: f64 = 3.0;
+const OF_BAND: f64 = 0.5;
+
 /// What is left on a channel.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Left {
@@ -72,6 +79,8 @@ pub(super) struct Facts<'a> {
     followed: Vec<(&'static str, f64)>,
     /// A recorded channel at whose frequency a line of the model swings.
     swing: Option<String>,
+    /// The lag of an echo, samples, where correlation is left at that one.
+    echo: Option<usize>,
 }
 
 /// Whether an angular frequency, rad per sample, lies in a place.
@@ -121,6 +130,7 @@ impl<'a> Facts<'a> {
             bent: 0.0,
             followed: followers(s, &g),
             swing: s.state.terms.iter().find_map(|t| swings_as(s, t)),
+            echo: residual::echo(&s.e),
             g,
         };
         facts.bent = (left.late + bent(s, failing)) * facts.shown();
@@ -253,6 +263,45 @@ impl<'a> Facts<'a> {
         }
     }
 
+    /// Whether correlation is left that a term may be a part of: all of it but an echo, a correlation at one lag, whose shape
+    /// is not the term's.
+    pub(super) fn correlated(&self, t: &Term, own: &[f64]) -> bool {
+        self.fails(CheckId::LjungBox)
+            && self.echo.is_none_or(|lag| {
+                let information = self.information(t, own);
+                let omega = &self.s.search.panel.bins.at.omega;
+                shared_with_ripple(&information, &self.counts, omega, lag) > OF_ECHO
+            })
+    }
+
+    /// Whether correlation is left that is no echo.
+    pub(super) fn correlated_otherwise(&self) -> bool {
+        self.fails(CheckId::LjungBox) && self.echo.is_none()
+    }
+
+    /// Whether a band explains no more than a follower of a recorded channel has at its place: late or bent, that leaves as
+    /// much. The follower, and the share of what it explains.
+    pub(super) fn beside_follower(&self, t: &Term) -> Option<(&'static str, f64)> {
+        let peak = t.peak()?;
+        let lr = t.cluster.map_or(t.lr, |c| c.lr);
+        let panel = &self.s.search.panel;
+        let inside = |w: f64| (w - peak.omega).abs() < BAND_REACH * peak.half_width;
+        let mut found: BTreeMap<&'static str, f64> = BTreeMap::new();
+        for (o, own) in self.s.state.parts() {
+            if self.s.search.followed(o).is_none() {
+                continue;
+            }
+            let information = self.information(o, own);
+            let there = information.iter().zip(&panel.bins.at.omega);
+            let there = there.filter(|(_, w)| inside(**w)).map(|(i, _)| i);
+            *found.entry(o.effect.id()).or_default() +=
+                there.sum::<f64>() / self.s.state.solution.white;
+        }
+        let most = found.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let all = self.followed.iter().find(|f| f.0 == most.0)?.1;
+        (most.1 > OF_BAND * lr).then_some((most.0, lr / all))
+    }
+
     /// Whether readings that are those before make neighbours correlate.
     pub(super) fn by_repeats(&self) -> bool {
         by_repeats(self.s)
@@ -262,6 +311,25 @@ impl<'a> Facts<'a> {
     pub(super) fn variance_everywhere(&self) -> bool {
         let n = self.s.search.panel.bins.n as f64;
         everywhere(self.s, &|k| self.within(k as f64 * PI / n))
+    }
+}
+
+/// Share of the information of a density that an echo at a lag has too: of its part of the variance by bin, what the ripple
+/// cos(w lag) holds.
+fn shared_with_ripple(information: &[f64], counts: &[f64], omega: &[f64], lag: usize) -> f64 {
+    // Deviations of ln variance by the square root of what they tell.
+    let deviations = information.iter().zip(counts);
+    let deviations: Vec<f64> = deviations.map(|(i, m)| (i / m).max(0.0).sqrt()).collect();
+    let ripple: Vec<f64> = omega.iter().map(|w| (w * lag as f64).cos()).collect();
+    let product = |a: &[f64], b: &[f64]| -> f64 {
+        let terms = a.iter().zip(b).zip(counts);
+        terms.map(|((a, b), m)| a * b * m).sum()
+    };
+    let all = product(&deviations, &deviations) * product(&ripple, &ripple);
+    if all > 0.0 {
+        product(&deviations, &ripple).powi(2) / all
+    } else {
+        1.0
     }
 }
 

@@ -7,6 +7,7 @@ use super::facts::{Facts, LEFT, generic};
 use crate::features;
 use crate::fit::channel::{Form, ID, Term};
 use crate::test_level::{CheckId, DEPARTURE};
+use model::effect::Peak;
 
 /// Likelihood ratio beyond its threshold from which on a term is no makeshift for what is left elsewhere.
 const WIDE: f64 = 25.0;
@@ -135,12 +136,12 @@ const TERMS: &[Rule] = &[
     Rule {
         name: "correlation that is left, nowhere else",
         of: stationary,
-        holds: |f, _| f.fails(CheckId::LjungBox) && f.places.is_empty(),
+        holds: |f, t| f.places.is_empty() && f.correlated(t.term, t.own),
     },
     Rule {
         name: "a filter leaves no correlation",
         of: filter,
-        holds: |f, _| f.fails(CheckId::LjungBox),
+        holds: |f, t| f.correlated(t.term, t.own),
     },
     Rule {
         name: "codes or interpolation make neighbours alike",
@@ -204,14 +205,28 @@ fn unlike(f: &Facts<'_>) -> bool {
     CheckId::OF_PROCESS.into_iter().any(|id| f.fails(id))
 }
 
+/// Largest width at half power over the centre: a mode of a lower quality factor than 3 is hardly one, and what wanders, bent
+/// by what a random walk takes up, has such a peak.
+const NARROW: f64 = 1.0 / 3.0;
+
+/// Whether a peak is no narrow one.
+fn wide(peak: &Peak) -> bool {
+    2.0 * peak.half_width > NARROW * peak.omega
+}
+
 /// Why the name of a term is not given, by itself.
 pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
     // What stands at one frequency answers for what is left there, and for its own claims.
     if t.term.is_band() {
         let lr = t.term.cluster.map_or(t.term.lr, |c| c.lr);
         let falls = CheckId::OF_BAND.into_iter().any(|id| f.fails(id))
-            || f.left_where_it_acts(t.term, t.own, lr);
-        return if falls { Doubt::Checks } else { Doubt::No };
+            || f.left_where_it_acts(t.term, t.own, lr)
+            || t.term.peak().is_some_and(|p| wide(&p));
+        return match f.beside_follower(t.term) {
+            _ if falls => Doubt::Checks,
+            Some((id, share)) => Doubt::Remainder(id, share),
+            None => Doubt::No,
+        };
     }
     if let Some(name) = f.swings_beside(t.term) {
         return Doubt::Beside(name);
@@ -238,11 +253,10 @@ const OF_VARIANCE: [CheckId; 6] = [
 
 /// Whether the name of a law of the variance is withdrawn, by itself.
 pub(super) fn variance_withdrawn(f: &Facts<'_>) -> bool {
-    let elsewhere = [CheckId::LjungBox, CheckId::TimeFrequency];
     OF_VARIANCE.into_iter().any(|id| f.fails(id))
         || f.without_place()
         || if f.places.is_empty() {
-            elsewhere.into_iter().any(|id| f.fails(id))
+            f.correlated_otherwise() || f.fails(CheckId::TimeFrequency)
         } else {
             !f.variance_everywhere()
         }

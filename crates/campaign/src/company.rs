@@ -1,0 +1,340 @@
+//! Effects in company: two in a run, two or three on one axis, and one on an axis that has a structure of another kind.
+//! The strength of each is that beside the others.
+
+use std::f64::consts::TAU;
+
+use crate::plant::{STRONG, StrongRow as Row, Truth, plant, plant_outliers, strong};
+use crate::random::Draw;
+use crate::stand::{GYROS, Stand};
+use crate::strength::Meter;
+
+/// Rows that can stand beside others: those that need a moving base exclude most.
+fn rows(keep: impl Fn(&Row) -> bool) -> Vec<&'static Row> {
+    STRONG.iter().filter(|r| !r.moves && keep(r)).collect()
+}
+
+/// Whether of two effects on one channel one is a part of the other: a parabola holds a line.
+fn holds_the_other(truths: &[Truth]) -> bool {
+    let both = |one, other| {
+        let has = |cause| truths.iter().any(|t| t.cause == cause);
+        has(one) && has(other)
+    };
+    both("temperature", "temperature_quadratic") || both("line", "am_line")
+}
+
+/// How strong an effect is beside others on its channel. What two processes leave of each other is not worked out: 0.
+fn beside(meter: &Meter, one: &Truth, others: &[&Truth]) -> f64 {
+    let signals: Vec<Vec<f64>> = others.iter().filter_map(|t| t.signal.clone()).collect();
+    let densities = || others.iter().filter_map(|t| t.density.as_deref());
+    match (&one.signal, &one.density) {
+        (Some(signal), _) => {
+            let meter = densities().fold(meter.clone(), |m, d| m.over(d));
+            if signals.is_empty() {
+                meter.of_signal(&meter.energy(signal))
+            } else {
+                meter.of_signal(&meter.energy(&meter.beyond(signal, &signals)))
+            }
+        }
+        (None, Some(_)) if densities().next().is_some() => 0.0,
+        _ => one.strength,
+    }
+}
+
+/// Gives each effect its strength beside those on the same channel.
+fn among_each_other(stand: &Stand, truths: &mut [Truth]) {
+    let strengths: Vec<f64> = (0..truths.len())
+        .map(|i| {
+            let one = &truths[i];
+            let others = truths.iter().enumerate();
+            let same = others.filter(|(j, t)| *j != i && t.channel == one.channel);
+            let others: Vec<&Truth> = same.map(|(_, t)| t).collect();
+            let axis = GYROS.iter().position(|g| *g == one.channel);
+            match axis {
+                Some(axis) if !others.is_empty() => beside(&Meter::new(stand, axis), one, &others),
+                _ => one.strength,
+            }
+        })
+        .collect();
+    for (truth, strength) in truths.iter_mut().zip(strengths) {
+        truth.strength = strength;
+    }
+}
+
+fn as_asked(truths: &[Truth]) -> bool {
+    let asked = |t: &Truth| t.strength >= strong(t.label).asked_from;
+    truths.iter().all(asked)
+}
+
+/// A strength that is asked to be named, with some room for what others take off.
+fn wanted(draw: &mut Draw, row: &Row) -> f64 {
+    draw.by_ratio(1.1 * row.asked_from, 2.2 * row.asked_from)
+}
+
+/// Two effects, each as strong as asked beside the other.
+pub(crate) fn two(draw: &mut Draw, stand: &mut Stand, truths: &mut Vec<Truth>) {
+    let fit = rows(|_| true);
+    loop {
+        truths.clear();
+        let rows = [0, 1].map(|_| fit[draw.of_many(fit.len())]);
+        if rows[0].cause == rows[1].cause {
+            continue;
+        }
+        for row in rows {
+            let axis = draw.of_many(3);
+            let wanted = wanted(draw, row);
+            truths.push(plant(draw, stand, row.label, axis, wanted));
+        }
+        let same = truths[0].channel == truths[1].channel;
+        if same && holds_the_other(truths) {
+            continue;
+        }
+        among_each_other(stand, truths);
+        if as_asked(truths) {
+            return;
+        }
+    }
+}
+
+/// Two or three effects on one axis, each as strong as asked beside the others.
+pub(crate) fn on_one_axis(draw: &mut Draw, stand: &mut Stand, truths: &mut Vec<Truth>) {
+    let fit = rows(|r| !r.everywhere);
+    let count = 2 + draw.of_many(2);
+    loop {
+        truths.clear();
+        let axis = draw.of_many(3);
+        for _ in 0..count {
+            let row = fit[draw.of_many(fit.len())];
+            let wanted = wanted(draw, row);
+            truths.push(plant(draw, stand, row.label, axis, wanted));
+        }
+        let twice = (1..count).any(|i| truths[..i].iter().any(|t| t.cause == truths[i].cause));
+        if twice || holds_the_other(truths) {
+            continue;
+        }
+        among_each_other(stand, truths);
+        if as_asked(truths) {
+            return;
+        }
+    }
+}
+
+/// What an axis has beside an effect.
+pub(crate) struct Structure {
+    /// Where the library has it.
+    truth: Option<Truth>,
+    /// Variance that it adds to the coefficients, by bin.
+    density: Option<Vec<f64>>,
+    /// Signal that is added to the readings.
+    pub added: Option<Vec<f64>>,
+}
+
+impl Structure {
+    fn of(truth: Truth) -> Self {
+        Self {
+            density: truth.density.clone(),
+            truth: Some(truth),
+            added: None,
+        }
+    }
+}
+
+/// A kind of structure: a row of the tables.
+#[derive(Clone, Copy)]
+pub struct StructureKind {
+    /// Number of its family: all draws hang on it, so it never changes.
+    pub id: u16,
+    /// The row of the tables.
+    pub label: &'static str,
+    /// Causes that may be named for it.
+    pub allowed: &'static [&'static str],
+    how: fn(&mut Draw, &mut Stand, usize) -> Structure,
+    /// Rows that are planted beside it, any where empty, and their strength in units of the one asked.
+    beside: &'static [&'static str],
+    wanted: (f64, f64),
+}
+
+const fn structure(
+    id: u16,
+    label: &'static str,
+    allowed: &'static [&'static str],
+    how: fn(&mut Draw, &mut Stand, usize) -> Structure,
+) -> StructureKind {
+    StructureKind {
+        id,
+        label,
+        allowed,
+        how,
+        beside: &[],
+        wanted: (1.1, 2.2),
+    }
+}
+
+/// The kinds. The last one is what was measured on gyro z of an ADIS16405: a vibration of a third of the variance whose pitch
+/// wanders over a fifth of its centre, and beside it what was planted there.
+pub const STRUCTURES: [StructureKind; 5] = [
+    structure(20, "beside a line", &[], line),
+    structure(
+        21,
+        "beside a band",
+        &["narrow_band", "wandering_line"],
+        band,
+    ),
+    structure(22, "beside outliers", &[], outliers),
+    structure(23, "beside an echo", &[], echo),
+    StructureKind {
+        beside: &[
+            "line",
+            "rate_ramp",
+            "bias_step",
+            "noise_change",
+            "telegraph",
+            "temperature",
+        ],
+        wanted: (1.3, 1.5),
+        ..structure(
+            24,
+            "beside a vibration that wanders",
+            &["narrow_band", "wandering_line"],
+            vibration,
+        )
+    },
+];
+
+/// Strengths of a line or a band that an effect is planted beside.
+const LOUD: (f64, f64) = (15.0, 40.0);
+
+fn line(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
+    let wanted = draw.by_ratio(LOUD.0, LOUD.1);
+    Structure::of(plant(draw, stand, "line", axis, wanted))
+}
+
+fn band(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
+    let wanted = draw.by_ratio(LOUD.0, LOUD.1);
+    let label = ["narrow_band", "wandering_line"][draw.of_many(2)];
+    Structure::of(plant(draw, stand, label, axis, wanted))
+}
+
+fn outliers(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
+    Structure::of(plant_outliers(draw, stand, axis, (3.0, 40.0), (5.0, 7.5)))
+}
+
+/// Noise that comes again after 2 to 40 samples, so strong that the correlation there has a d' of 10 to 20.
+fn echo(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
+    let n = stand.samples();
+    let lag = draw.by_ratio(2.0, 41.0) as usize;
+    let rho = draw.by_ratio(10.0, 20.0) / (n as f64).sqrt();
+    // Of white noise of variance s^2 and c times a noise and itself a lag before: rho = c^2 / (s^2 + 2 c^2).
+    let square = rho * stand.white(axis) / (1.0 - 2.0 * rho);
+    let own: Vec<f64> = (0..n + lag).map(|_| draw.normal()).collect();
+    let signal = (0..n).map(|i| square.sqrt() * (own[i] + own[i + lag]));
+    let meter = Meter::new(stand, axis);
+    let density = (meter.omega().iter()).map(|w| 2.0 * square * (1.0 + (w * lag as f64).cos()));
+    Structure {
+        truth: None,
+        added: Some(signal.collect()),
+        density: Some(density.collect()),
+    }
+}
+
+/// A mode that noise drives, whose pitch wanders: 0.35 of the variance, about 0.2 of the sample rate, over half a tenth of that.
+fn vibration(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
+    let rate_hz = stand.rate_hz;
+    let centre = draw.between(0.15, 0.25) * rate_hz;
+    let slow = draw.between(5.0, 20.0);
+    let pitch = stand.wander(draw, 0.05 * centre, slow);
+    let half_width = 0.02 * centre;
+    let keep = (-TAU * half_width / rate_hz).exp();
+    let step = (1.0 - keep * keep).sqrt();
+    let (mut x, mut y) = (draw.normal(), draw.normal());
+    let rms = (0.35 / 0.65 * stand.white(axis)).sqrt();
+    let signal: Vec<f64> = pitch
+        .iter()
+        .map(|p| {
+            let (s, c) = (TAU * (centre + p) / rate_hz).sin_cos();
+            (x, y) = (
+                keep * (c * x - s * y) + step * draw.normal(),
+                keep * (s * x + c * y) + step * draw.normal(),
+            );
+            rms * x
+        })
+        .collect();
+    let meter = Meter::new(stand, axis);
+    let count = meter.counts();
+    // What it has by bin is its periodogram, smoothed over so many bins that its scatter does not count.
+    let density = smoothed(&meter.energy(&signal), count);
+    Structure {
+        truth: None,
+        added: Some(signal),
+        density: Some(density),
+    }
+}
+
+/// Energy for each coefficient over bins of some hundred coefficients.
+fn smoothed(energy: &[f64], count: &[f64]) -> Vec<f64> {
+    const OVER: f64 = 100.0;
+    (0..energy.len())
+        .map(|b| {
+            let (mut from, mut to, mut sum, mut number) = (b, b + 1, energy[b], count[b]);
+            while number < OVER && (from > 0 || to < energy.len()) {
+                if from > 0 {
+                    from -= 1;
+                    sum += energy[from];
+                    number += count[from];
+                }
+                if to < energy.len() {
+                    sum += energy[to];
+                    number += count[to];
+                    to += 1;
+                }
+            }
+            sum / number
+        })
+        .collect()
+}
+
+/// One effect on an axis that has a structure of this kind, as strong as asked beside it. What is planted stands first.
+pub(crate) fn beside_a_structure(
+    draw: &mut Draw,
+    stand: &mut Stand,
+    kind: &StructureKind,
+    axis: usize,
+    truths: &mut Vec<Truth>,
+) -> Structure {
+    let found = (kind.how)(draw, stand, axis);
+    let taken = found.truth.as_ref().map(|t| t.cause);
+    let fit = rows(|r| {
+        let asked = kind.beside.is_empty() || kind.beside.contains(&r.label);
+        let is_it = Some(r.cause) == taken || kind.allowed.contains(&r.cause);
+        asked && !is_it && !r.everywhere && !(taken == Some("line") && r.cause == "am_line")
+    });
+    loop {
+        let row = fit[draw.of_many(fit.len())];
+        let wanted = row.asked_from * draw.by_ratio(kind.wanted.0, kind.wanted.1);
+        let mut truth = plant(draw, stand, row.label, axis, wanted);
+        truth.strength = beside_structure(&Meter::new(stand, axis), &truth, &found);
+        if truth.strength >= row.asked_from {
+            truths.push(truth);
+            truths.extend(found.truth.clone());
+            return found;
+        }
+    }
+}
+
+/// How strong an effect is beside a structure. Of a process counts what stands out over the structure's density.
+fn beside_structure(meter: &Meter, one: &Truth, structure: &Structure) -> f64 {
+    match (&one.density, &structure.density) {
+        (Some(own), Some(other)) => meter.of_density(&meter.screened(own, other)),
+        (None, Some(other)) if one.signal.is_some() => {
+            let meter = meter.over(other);
+            let signal = one.signal.as_deref().unwrap_or(&[]);
+            meter.of_signal(&meter.energy(signal))
+        }
+        _ => structure.truth.as_ref().map_or(one.strength, |t| {
+            if t.signal.is_some() {
+                beside(meter, one, &[t])
+            } else {
+                one.strength
+            }
+        }),
+    }
+}

@@ -1,0 +1,181 @@
+//! Whether the pitch or the size of a band follows what was recorded.
+//!
+//! A mode that noise drives and a tone whose pitch wanders know nothing of temperature, supply and command. The band alone, on
+//! the half line of frequencies, is a complex envelope z: |z|^2 is its size, and the imaginary part of z(t+1) z*(t), turned back
+//! by the mean pitch, its pitch. Both are regressed on each recorded course, on its square, and for a command on what rings
+//! after each change of it. The scatter of a coefficient is that of the residual at the frequencies where the course moves.
+
+use std::f64::consts::PI;
+
+use model::effect::Signal;
+use model::record::Quantity;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::envelope::{Band, REACH, envelope_of, kept};
+use crate::test_level::{CheckId, Outcome};
+use numerics::column::dot;
+
+/// Frequencies either side over which the energy of a residual is averaged.
+const SMOOTHED: usize = 6;
+/// Degrees of freedom of such a mean: two for each frequency.
+const DEGREES: f64 = 2.0 * (2.0 * SMOOTHED as f64 + 1.0);
+/// Least part of the energy of pitch or size that has to follow: it is otherwise off by a seventh at most.
+const FOLLOWED: f64 = 0.02;
+/// Fewest values of the envelope.
+const LEAST: usize = 64;
+
+/// Means of a course in `cells` parts of the record.
+fn in_cells(values: &[f64], cells: usize) -> Vec<f64> {
+    let n = values.len();
+    let part = |i: usize| {
+        let (from, to) = (i * n / cells, ((i + 1) * n / cells).max(i * n / cells + 1));
+        values[from..to.min(n)].iter().sum::<f64>() / (to.min(n) - from).max(1) as f64
+    };
+    (0..cells).map(part).collect()
+}
+
+/// Without its mean and what others have of it.
+fn beyond(mut own: Vec<f64>, others: &[&[f64]]) -> Vec<f64> {
+    let mean = own.iter().sum::<f64>() / own.len() as f64;
+    own.iter_mut().for_each(|v| *v -= mean);
+    for o in others {
+        let share = dot(&own, o) / dot(o, o).max(f64::MIN_POSITIVE);
+        own.iter_mut().zip(*o).for_each(|(v, o)| *v -= share * o);
+    }
+    own
+}
+
+/// What rings for a while after each change of a course, by the part of it that is left in the next cell.
+fn rung(course: &[f64], keep: f64) -> Vec<f64> {
+    let mut level = 0.0;
+    let changes = course.windows(2).map(|w| (w[1] - w[0]).abs());
+    std::iter::once(0.0)
+        .chain(changes)
+        .map(|change| {
+            level = keep * level + change;
+            level
+        })
+        .collect()
+}
+
+/// Energies of a series by frequency.
+fn energies(series: &[f64]) -> Vec<f64> {
+    let mut z: Vec<Complex<f64>> = series.iter().map(|v| Complex::new(*v, 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(z.len()).process(&mut z);
+    z.iter().map(Complex::norm_sqr).collect()
+}
+
+/// Chance that a series follows a course as well, and the part of its energy that does.
+fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
+    let (all, own) = (dot(series, series), dot(course, course));
+    if all <= 0.0 || own <= 1e-12 * all.min(1.0) {
+        return None;
+    }
+    let slope = dot(series, course) / own;
+    let residual: Vec<f64> = series
+        .iter()
+        .zip(course)
+        .map(|(s, c)| s - slope * c)
+        .collect();
+    let (of_course, of_rest) = (energies(course), energies(&residual));
+    let n = of_rest.len();
+    // Without frequency 0, which both lack.
+    let about = |k: usize| {
+        let near = (1..=2 * SMOOTHED + 1).map(|j| of_rest[((k + n + j - SMOOTHED - 1) % n).max(1)]);
+        near.sum::<f64>() / (2 * SMOOTHED + 1) as f64
+    };
+    let variance = (1..n).map(|k| of_course[k] * about(k)).sum::<f64>() / (n * n) as f64;
+    let t = slope * own / variance.sqrt();
+    let law = StudentsT::new(0.0, 1.0, DEGREES).ok()?;
+    Some((2.0 * law.sf(t.abs()), slope * slope * own / all))
+}
+
+/// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded.
+pub(super) fn claim(band: &Band, signals: &[Signal], named: &str) -> Option<Outcome> {
+    let z = envelope_of(&kept(&band.coefficients, &band.density));
+    let cells = z.len();
+    if cells < LEAST {
+        return None;
+    }
+    let turn: Complex<f64> = z.windows(2).map(|w| w[1] * w[0].conj()).sum();
+    let back = turn.conj() / turn.norm().max(f64::MIN_POSITIVE);
+    let pitch = z.windows(2).map(|w| (w[1] * w[0].conj() * back).im);
+    let pitch = beyond(pitch.chain([0.0]).collect(), &[]);
+    let size = beyond(z.iter().map(Complex::norm_sqr).collect(), &[]);
+    let top = band.density.iter().copied().fold(0.0, f64::max);
+    let half = band.density.iter().sum::<f64>() / (2.0 * REACH.atan() * top);
+    let keep = (-2.0 * PI * half / cells as f64).exp();
+    let slow = [Quantity::Temp, Quantity::Supply, Quantity::Pwm];
+    let mut asked = 0;
+    let mut least: Option<(f64, String, &'static str)> = None;
+    for s in signals.iter().filter(|s| slow.contains(&s.quantity)) {
+        let plain = in_cells(&s.smooth, cells);
+        let first = beyond(plain.clone(), &[]);
+        let square = beyond(first.iter().map(|v| v * v).collect(), &[&first]);
+        let mut courses = vec![first, square];
+        if s.quantity == Quantity::Pwm {
+            courses.push(beyond(rung(&plain, keep), &[]));
+        }
+        for course in &courses {
+            for (what, series) in [("pitch", &pitch), ("size", &size)] {
+                let Some((p, part)) = chance(series, course) else {
+                    continue;
+                };
+                asked += 1;
+                let told = part > FOLLOWED && least.as_ref().is_none_or(|l| p < l.0);
+                if told {
+                    least = Some((p, s.name.clone(), what));
+                }
+            }
+        }
+    }
+    let (p, name, what) = least?;
+    Some(Outcome {
+        id: CheckId::BandSource,
+        about: vec![],
+        statistic: p,
+        p_value: (p * f64::from(asked)).min(1.0),
+        what: format!("told as {named}: its {what} follows {name}"),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    fn slow(rng: &mut Xoshiro256PlusPlus, n: usize, tau: f64) -> Vec<f64> {
+        let keep = (-1.0 / tau).exp();
+        let mut x = 0.0;
+        (0..n)
+            .map(|_| {
+                let e: f64 = StandardNormal.sample(rng);
+                x = keep * x + (1.0 - keep * keep).sqrt() * e;
+                x
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_series_follows_a_course_that_it_holds_and_no_other_as_slow_one() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+        let (n, mut low, mut seen) = (600, 0, 0);
+        for _ in 0..400 {
+            let course = beyond(slow(&mut rng, n, 40.0), &[]);
+            let series = beyond(slow(&mut rng, n, 8.0), &[]);
+            let (p, _) = chance(&series, &course).expect("both move");
+            low += usize::from(p < 0.01);
+            let with: Vec<f64> = series.iter().zip(&course).map(|(s, c)| s + c).collect();
+            let (p, part) = chance(&with, &course).expect("both move");
+            seen += usize::from(p < 1e-3 && part > FOLLOWED);
+        }
+        // 4 of 400 are expected at 1 %.
+        assert!(low <= 14, "{low}");
+        assert!(seen > 300, "{seen}");
+    }
+}
