@@ -266,6 +266,21 @@ pub enum Fault {
         /// Lasting change of the tilt, deg.
         tilt_deg: f64,
     },
+    /// Somebody knocks the bench: the stand rings about an axis and along all three, and is at rest again. Nothing stays.
+    Bump {
+        /// Body axis about which it rings.
+        axis: usize,
+        /// s.
+        time_s: f64,
+        /// Rate at the blow, deg/s.
+        peak_dps: f64,
+        /// Acceleration that goes with it, g peak along z, and a part of it along x and y.
+        linear_g: f64,
+        /// Hz.
+        frequency_hz: f64,
+        /// Time in which it falls to 1/e, s.
+        decay_s: f64,
+    },
     /// A gyro's sample clock stalls again and again: the output register is not refreshed.
     Stall {
         /// 0, 1, 2.

@@ -59,6 +59,8 @@ pub enum Hidden {
     ScaleError,
     /// The board's crystal is off.
     WrongCrystal,
+    /// The bench is knocked: the stand rings, and nothing stays.
+    Bump,
     /// Three things at once that a correction takes off: one gyro follows its temperature, one the motor's current, and one
     /// is mounted askew on a base that sways after a rest. Random draws leave it out.
     Uncalibrated,
@@ -66,7 +68,7 @@ pub enum Hidden {
 
 impl Hidden {
     /// Everything that can be wrong, one thing at a time.
-    pub const ALL: [Hidden; 24] = [
+    pub const ALL: [Hidden; 25] = [
         Hidden::Tempco,
         Hidden::TempcoCurved,
         Hidden::MotorCoupling,
@@ -91,6 +93,7 @@ impl Hidden {
         Hidden::Shove,
         Hidden::ScaleError,
         Hidden::WrongCrystal,
+        Hidden::Bump,
     ];
 }
 
@@ -268,6 +271,15 @@ fn fault(
             time_s: seconds * uniform(rng, 0.25, 0.75),
             step_dps: sign * sizes.draw(rng, 0.3, 0.8),
             tilt_deg: uniform(rng, 0.0, 1.0),
+        },
+        // Slow enough for 20 readings a second, and over within a second.
+        Hidden::Bump => Fault::Bump {
+            axis: gyro,
+            time_s: seconds * uniform(rng, 0.05, 0.95),
+            peak_dps: sign * sizes.draw(rng, 3.0, 10.0),
+            linear_g: uniform(rng, 0.02, 0.2),
+            frequency_hz: uniform(rng, 1.0, 8.0),
+            decay_s: by_ratio(rng, 0.1, 0.3),
         },
         Hidden::Stall => Fault::Stall {
             gyro,

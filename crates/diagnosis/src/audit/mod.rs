@@ -76,6 +76,8 @@ pub struct Audit {
     pub limits: Vec<DetectionLimit>,
     /// What a reader has to know of the readings, and is no fault.
     pub notes: Vec<String>,
+    /// Rows of single readings that the noise cannot have made, by channel.
+    pub singles: BTreeMap<String, Vec<usize>>,
     /// Steps, counts, of channels whose converter lacks a bit.
     steps: BTreeMap<String, f64>,
     /// Channels whose noise is hardly larger than their step.

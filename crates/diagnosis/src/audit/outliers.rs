@@ -84,6 +84,7 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     }
     let times: Vec<f64> = single.iter().map(|i| at[*i]).collect();
     single.iter().for_each(|i| audit.mask(name, *i));
+    audit.singles.insert(name.to_owned(), single);
     let own = |f: &Finding| f.cause == effects::outliers::ID && f.channels == [name];
     let wild = audit.findings.iter().position(own);
     let (mut times, mut what) = (times, what);

@@ -57,6 +57,11 @@ fn places(record: &Record) -> (Vec<usize>, usize) {
     (seq.iter().map(|s| (s - seq[0]) as usize).collect(), span)
 }
 
+/// Place of every row of a record on its grid.
+pub(crate) fn places_of_rows(record: &Record) -> Vec<usize> {
+    places(record).0
+}
+
 fn spread(values: &[f64], places: &[usize], n: usize, masked: &[usize]) -> Vec<f64> {
     let mut grid = vec![f64::NAN; n];
     for (v, p) in values.iter().zip(places).filter(|(v, _)| v.abs() < LARGEST) {

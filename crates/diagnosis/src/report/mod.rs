@@ -6,4 +6,5 @@ pub mod figures;
 pub mod findings;
 pub mod handover;
 pub(crate) mod left_over;
+pub(crate) mod shocks;
 pub mod untested;

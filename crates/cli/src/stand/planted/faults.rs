@@ -156,6 +156,26 @@ fn in_time(fault: &Fault, start_s: f64) -> Option<Planted> {
                 Size::at("time", time_s - start_s),
             ],
         ),
+        Fault::Bump {
+            axis,
+            time_s,
+            peak_dps,
+            frequency_hz,
+            decay_s,
+            ..
+        } => in_gyro(
+            axis,
+            "shock",
+            format!(
+                "the bench is knocked: the stand rings about {} at {} Hz from {} deg/s on, and is at rest after {} s",
+                &GYROS[axis][5..],
+                number(frequency_hz, 3),
+                number(peak_dps.abs(), 3),
+                number(3.0 * decay_s, 2)
+            ),
+            // How large a reading of it is hangs on the instant of the reading.
+            vec![Size::at("time", time_s - start_s)],
+        ),
         Fault::WarmUp {
             gyro,
             amplitude_dps,
