@@ -8,6 +8,7 @@
 //! | [`name_channel`] | a channel, its checks | findings, and names withdrawn |
 //! | [`concluded`] | all of that | the lists of the diagnosis |
 
+mod banks;
 mod channel;
 mod concluded;
 mod handed_over;
@@ -33,6 +34,7 @@ use crate::result::{
 };
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Observation, all_worded, worded};
+pub use banks::diagnose_channels;
 use concluded::{Told, concluded};
 use handed_over::HandedOver;
 use model::record::AnalysisError;

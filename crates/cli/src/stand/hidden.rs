@@ -61,6 +61,10 @@ pub enum Hidden {
     WrongCrystal,
     /// The bench is knocked: the stand rings, and nothing stays.
     Bump,
+    /// The zero of an accelerometer follows its temperature. Random draws leave it out, for it is in no gyro.
+    AccTempco,
+    /// The converter's reference follows the supply, and the accelerometers are not ratiometric. Random draws leave it out.
+    AccReference,
     /// Three things at once that a correction takes off: one gyro follows its temperature, one the motor's current, and one
     /// is mounted askew on a base that sways after a rest. Random draws leave it out.
     Uncalibrated,
@@ -150,6 +154,22 @@ pub(super) fn plant(
             scenario.crystal_ppm = sign * by_ratio(rng, 300.0, 3000.0);
             return None;
         }
+        Hidden::AccTempco => {
+            heat(scenario, rng);
+            quiet_floor(scenario);
+            scenario.faults.push(Fault::AccTempco {
+                axis: gyro,
+                g_per_c: sign * sizes.draw(rng, 1e-3, 2e-3),
+                scale_per_c: 0.0,
+            });
+            return None;
+        }
+        Hidden::AccReference => {
+            quiet_floor(scenario);
+            let share = sizes.draw(rng, 0.05, 0.2);
+            scenario.faults.push(Fault::AccReference { share });
+            return None;
+        }
         Hidden::Uncalibrated => {
             uncalibrated(sizes, [gyro, one_of(rng, 3)], scenario, rng);
             return None;
@@ -227,6 +247,8 @@ fn fault(
         | Hidden::Random
         | Hidden::ScaleError
         | Hidden::WrongCrystal
+        | Hidden::AccTempco
+        | Hidden::AccReference
         | Hidden::Uncalibrated => return None,
         Hidden::Tempco => {
             heat(scenario, rng);
@@ -277,7 +299,7 @@ fn fault(
             axis: gyro,
             time_s: seconds * uniform(rng, 0.05, 0.95),
             peak_dps: sign * sizes.draw(rng, 3.0, 10.0),
-            linear_g: uniform(rng, 0.02, 0.2),
+            linear_g: uniform(rng, 0.1, 0.5),
             frequency_hz: uniform(rng, 1.0, 8.0),
             decay_s: by_ratio(rng, 0.1, 0.3),
         },
@@ -379,6 +401,11 @@ fn fault(
         }
     };
     Some(fault)
+}
+
+/// A floor that shakes as elsewhere hides what the part does: by some 40 mg, against 8 mg of its noise.
+fn quiet_floor(scenario: &mut Scenario) {
+    scenario.base.floor_g_rms = 0.0;
 }
 
 /// A slope in temperature needs a swing: the heater cycles.

@@ -52,6 +52,8 @@ fn causes(hidden: Hidden) -> (&'static [&'static str], &'static [&'static str]) 
         Hidden::ScaleError => (&["scale_error"], &["base_motion"]),
         Hidden::WrongCrystal => (&["clock_rate"], &[]),
         Hidden::Bump => (&["shock"], &[]),
+        Hidden::AccTempco => (&["temperature"], &[]),
+        Hidden::AccReference => (&["supply_sensitivity"], &[]),
         Hidden::Uncalibrated => (&["temperature", "motor_bias", "cross_axis"], &[]),
     }
 }

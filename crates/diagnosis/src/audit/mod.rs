@@ -29,7 +29,7 @@ use model::effects;
 use model::record::{Channel, Quantity, Record};
 
 use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter};
-use crate::test_level::{AUDIT_LEVEL, CheckId, Observation};
+use crate::test_level::{CheckId, Observation, audit_level};
 use local::Local;
 
 /// Steps of a converter that lacks a bit, over the noise, up to which the variance of readings is the same at any level: to
@@ -216,14 +216,14 @@ impl Audit {
         p_value: f64,
         what: String,
     ) -> bool {
-        let fails = p_value < AUDIT_LEVEL;
+        let fails = p_value < audit_level();
         self.checks.push(Check {
             id: id.into(),
             about: vec![],
             channel: channel.into(),
             statistic,
             p_value: Some(p_value),
-            threshold: AUDIT_LEVEL,
+            threshold: audit_level(),
             fails_before: fails,
             fails_after: false,
             what,

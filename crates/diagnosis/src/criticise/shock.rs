@@ -12,7 +12,7 @@ use model::effects::shock::LONGEST_S;
 
 use crate::fit::likelihood::{Bins, Dct};
 use crate::fit::scan::residual;
-use crate::fit::threshold::{self, FALSE_ALARM};
+use crate::fit::threshold;
 use crate::ingest::blows::{Blow, FELT_SINGLE, Shape, least};
 use crate::search::searched::Searched;
 use crate::test_level::CLAIM_LEVEL;
@@ -232,7 +232,7 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
     }
     let lr: f64 = piece.sizes(&columns, &felt).iter().map(|s| s.lr).sum();
     let n = searched[0].search.panel.bins.n;
-    let wanted = least(FALSE_ALARM, n, sizes, searched.len())[felt.len() - 1];
+    let wanted = least(threshold::false_alarm(), n, sizes, searched.len())[felt.len() - 1];
     let one = one_reading(&piece, blow, &felt);
     let single = lr - one.iter().sum::<f64>() < COURSE;
     // One far reading of one channel is its own, whatever the noise of the others does then.

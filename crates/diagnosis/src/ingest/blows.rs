@@ -12,7 +12,7 @@ use std::ops::Range;
 use model::effects::shock::LONGEST_S;
 
 use crate::fit::likelihood::{Bins, Dct};
-use crate::fit::threshold::{self, FALSE_ALARM};
+use crate::fit::threshold;
 use crate::ingest::types::Target;
 use numerics::order_statistics::{median, robust_sigma};
 
@@ -230,7 +230,7 @@ pub(crate) fn blows(
         all.clone().filter(|changed| *changed).count() * 2 > all.count()
     };
     let shapes = Shape::all(rate_hz);
-    let mut places = standing_out(&whitened, &shapes, FALSE_ALARM);
+    let mut places = standing_out(&whitened, &shapes, threshold::false_alarm());
     places.sort_by(|a, b| b.excess.total_cmp(&a.excess));
     let (mut found, mut seen) = (vec![], vec![]);
     let mut beside = 0;
@@ -280,7 +280,7 @@ fn felt(whitened: &[Vec<f64>], place: Place, shape: Shape) -> Vec<(f64, usize)> 
     let mut energies = (whitened.iter().enumerate())
         .map(|(k, e)| (shape.energies(&e[place.at..end.min(n)])[0], k))
         .collect();
-    let least = least(FALSE_ALARM, n, shape.sizes(), whitened.len());
+    let least = least(threshold::false_alarm(), n, shape.sizes(), whitened.len());
     let sum = Sum {
         sizes: shape.sizes(),
         least: &least,

@@ -446,7 +446,7 @@ fn spikes(
 /// Distance in sigma that one of `n` samples reaches once in 10^5 records.
 pub(crate) fn spike_limit(n: usize) -> f64 {
     let tail = |z: f64| {
-        (n as f64 * numerics::tails::normal_tail(z)).ln() - crate::test_level::OMNIBUS_LEVEL.ln()
+        (n as f64 * numerics::tails::normal_tail(z)).ln() - crate::test_level::omnibus_level().ln()
     };
     numerics::minimise::golden(&|z| tail(z).abs(), 4.0, 12.0, 40)
 }

@@ -266,7 +266,7 @@ fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smalle
 fn of_blow(s: &Searched<'_>) -> Option<Smallest> {
     const LENGTH_S: f64 = 0.25;
     let channels = s.search.view.all(Quantity::Gyro).count().max(1);
-    let least = blows::least(threshold::FALSE_ALARM, s.search.panel.bins.n, 1, channels);
+    let least = blows::least(threshold::false_alarm(), s.search.panel.bins.n, 1, channels);
     let peak = shock::peak_of(s, LENGTH_S, strength_for(*least.first()?))?;
     Some(Smallest {
         coefficients: vec![peak],
