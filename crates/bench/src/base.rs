@@ -17,6 +17,32 @@ const KNOCK_TAU_S: f64 = 0.06;
 const KNOCK_DPS_PER_DEG: f64 = 4.0;
 const KNOCK_G_PER_DEG: f64 = 0.2;
 
+/// Parts of a bump's acceleration along x, y and z: the bench gives way downwards most.
+const BUMP: [f64; 3] = [0.5, 0.3, 1.0];
+
+/// The stand rings after a blow at the bench, which gives it a speed at once.
+#[derive(Clone, Copy, Debug)]
+struct Bump {
+    axis: usize,
+    time_s: f64,
+    peak_dps: f64,
+    linear_g: f64,
+    frequency_hz: f64,
+    decay_s: f64,
+}
+
+impl Bump {
+    /// Of size 1 at the blow; none before it.
+    fn ring(&self, t: f64) -> f64 {
+        let since = t - self.time_s;
+        if since < 0.0 {
+            0.0
+        } else {
+            (-since / self.decay_s).exp() * (TAU * self.frequency_hz * since).cos()
+        }
+    }
+}
+
 /// One sine that both the gyros and the accelerometer see.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tone {
@@ -34,6 +60,7 @@ pub(crate) struct Base {
     tones: Vec<Tone>,
     knocks: Vec<(usize, f64, f64)>,
     shoves: Vec<(usize, f64, f64, f64)>,
+    bumps: Vec<Bump>,
     rng: Xoshiro256PlusPlus,
     floor_g: [f64; 3],
 }
@@ -46,6 +73,7 @@ impl Base {
             tones: Vec::new(),
             knocks: Vec::new(),
             shoves: Vec::new(),
+            bumps: Vec::new(),
             rng: rng.clone(),
             floor_g: [0.0; 3],
         };
@@ -72,6 +100,21 @@ impl Base {
                     tilt_deg,
                     ..
                 } => base.knocks.push((gyro, time_s, tilt_deg)),
+                Fault::Bump {
+                    axis,
+                    time_s,
+                    peak_dps,
+                    linear_g,
+                    frequency_hz,
+                    decay_s,
+                } => base.bumps.push(Bump {
+                    axis,
+                    time_s,
+                    peak_dps,
+                    linear_g,
+                    frequency_hz,
+                    decay_s,
+                }),
                 Fault::Shove {
                     axis,
                     time_s,
@@ -111,6 +154,9 @@ impl Base {
         for &(axis, time, tilt) in &self.knocks {
             rate[axis] += KNOCK_DPS_PER_DEG * tilt * ring(t - time);
         }
+        for bump in &self.bumps {
+            rate[bump.axis] += bump.peak_dps * bump.ring(t);
+        }
         for &(axis, time, peak, length) in &self.shoves {
             let turn = (t - time) / length;
             if (0.0..1.0).contains(&turn) {
@@ -143,6 +189,12 @@ impl Base {
                 tilt[1] += angle;
                 g[2] += KNOCK_G_PER_DEG * angle * ring(t - time);
             }
+        }
+        for bump in &self.bumps {
+            let ring = bump.linear_g * bump.ring(t);
+            g.iter_mut()
+                .zip(BUMP)
+                .for_each(|(g, part)| *g += part * ring);
         }
         for tone in &self.tones {
             let value = tone.linear_g * (TAU * (tone.frequency_hz * t + tone.phase)).sin();

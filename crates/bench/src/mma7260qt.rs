@@ -1,4 +1,5 @@
-//! The MMA7260QT at its pins: V = clamp(VDD/2 (1 + e0) + S (1 + es) a + n, 0.25, VDD - 0.25).
+//! The MMA7260QT at its pins: V = clamp(VDD/3.3 (1.65 + e0 + S (1 + es + ks dT) (a + kz dT + n)), 0.25, VDD - 0.25). Zero and
+//! sensitivity go with the supply; a converter whose reference is that supply does not see it.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -18,6 +19,10 @@ pub struct AccSelect {
 
 /// Output filter, X, Y and Z, Hz.
 const POLES_HZ: [f64; 3] = [350.0, 350.0, 150.0];
+/// Time in which the package follows the board, s: a small one like the gyros'.
+const PACKAGE_S: f64 = 30.0;
+/// Temperature at which the part is what it is stated to be, degC.
+const STATED_C: f64 = 25.0;
 /// Sleep to 90 % of the output, s.
 const ENABLE_S: f64 = 0.5e-3;
 
@@ -30,6 +35,7 @@ pub struct Mma7260Qt {
     awake_since_s: f64,
     noise_g: [f64; 3],
     filtered: [f64; 3],
+    package_c: Option<f64>,
 }
 
 impl Mma7260Qt {
@@ -47,7 +53,14 @@ impl Mma7260Qt {
             awake_since_s: 0.0,
             noise_g: [0.0; 3],
             filtered: [0.0; 3],
+            package_c: None,
         }
+    }
+
+    /// The board beneath it has this temperature, degC, for `dt` s.
+    pub fn warm(&mut self, board_c: f64, dt: f64) {
+        let before = self.package_c.unwrap_or(board_c);
+        self.package_c = Some(board_c + (before - board_c) * (-dt / PACKAGE_S).exp());
     }
 
     /// Typical sensitivity at 3.3 V for g-Select2, g-Select1 as bits 1 and 0, V/g.
@@ -91,8 +104,11 @@ impl Mma7260Qt {
         }
         let ratio = vdd / 3.3;
         let range = u8::from(self.select.select2) << 1 | u8::from(self.select.select1);
-        let sensitivity = Self::sensitivity_v_g(range) * (1.0 + self.part.scale_error[axis]);
-        let g = self.filtered[axis] + self.noise_g[axis];
+        let warm = self.package_c.map_or(0.0, |c| c - STATED_C);
+        let error = self.part.scale_error[axis] + self.part.scale_tempco[axis] * warm;
+        let sensitivity = Self::sensitivity_v_g(range) * (1.0 + error);
+        let shift = self.part.zero_g_tempco_g[axis] * warm;
+        let g = self.filtered[axis] + self.noise_g[axis] + shift;
         let volts = (1.65 + self.part.zero_g_error_v[axis] + sensitivity * g) * ratio;
         volts.clamp(0.25, vdd - 0.25)
     }

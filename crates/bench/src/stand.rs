@@ -19,6 +19,8 @@ const STEP_OFFSET_S: f64 = 0.5e-3;
 const COMMON_TAU_S: f64 = 15e-3;
 /// The accelerometer's regulator, V.
 const VDD_V: f64 = 3.3;
+/// The rail that it and the gyros hang on, as it should be, V.
+const RAIL_V: f64 = 5.0;
 
 /// Three gyros, an accelerometer and a motor in their world. Times are seconds since power came on; they must not
 /// decrease.
@@ -32,6 +34,8 @@ pub struct Stand {
     base: Base,
     /// Gyro, the axis that it leans towards, and the sine of the angle.
     misaligned: Vec<(usize, usize, f64)>,
+    /// V of the converter's reference for each V of the 5-V rail.
+    reference_share: f64,
     common_sigma: f64,
     common: f64,
     common_rng: Xoshiro256PlusPlus,
@@ -70,14 +74,30 @@ impl Stand {
                 _ => 0.0,
             })
             .sum();
+        let (mut acc, mut reference_share) = (scenario.acc.clone(), 0.0);
+        for fault in &scenario.faults {
+            match *fault {
+                Fault::AccTempco {
+                    axis,
+                    g_per_c,
+                    scale_per_c,
+                } => {
+                    acc.zero_g_tempco_g[axis] += g_per_c;
+                    acc.scale_tempco[axis] += scale_per_c;
+                }
+                Fault::AccReference { share } => reference_share += share,
+                _ => {}
+            }
+        }
         Stand {
             gyros,
-            acc: Mma7260Qt::new(scenario.acc.clone(), scenario.seed),
+            acc: Mma7260Qt::new(acc, scenario.seed),
             motor: Motor::new(scenario.motor.clone()),
             supply: Supply::new(scenario.supply.clone(), scenario.seed),
             thermal: Thermal::new(scenario.thermal.clone()),
             base,
             misaligned,
+            reference_share,
             common_sigma,
             common: 0.0,
             common_rng: Stream::Common.of(scenario.seed),
@@ -118,7 +138,9 @@ impl Stand {
         self.azimuth += (dt * self.motor.table_dps()).to_radians();
         self.acc.step(self.base.acceleration(t, self.azimuth), dt);
         if self.steps.is_multiple_of(THERMAL_STEPS) {
-            self.thermal.step(t, dt * THERMAL_STEPS as f64);
+            let dt = dt * THERMAL_STEPS as f64;
+            self.thermal.step(t, dt);
+            self.acc.warm(self.thermal.board_c(), dt);
         }
         if self.common_sigma > 0.0 {
             let keep = (-dt / COMMON_TAU_S).exp();
@@ -181,13 +203,15 @@ impl Stand {
     /// The converter's reference, tied to the accelerometer's supply, V.
     #[must_use]
     pub fn aref_volts(&self) -> f64 {
-        VDD_V
+        VDD_V + self.reference_share * (self.supply.volts() - RAIL_V)
     }
 
     /// What a 10-bit converter reads of an accelerometer axis at `t` s: floor(1024 V / AREF).
     pub fn acc_counts(&mut self, axis: usize, t: f64) -> u16 {
         let volts = self.acc_volts(axis, t);
-        (volts / VDD_V * 1024.0).floor().clamp(0.0, 1023.0) as u16
+        (volts / self.aref_volts() * 1024.0)
+            .floor()
+            .clamp(0.0, 1023.0) as u16
     }
 
     /// The accelerometer's pins change at `t` s.

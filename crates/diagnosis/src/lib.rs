@@ -35,4 +35,4 @@ pub use ingest::kalman;
 pub use search::peak_of_white;
 pub use two_level::compare;
 
-pub use pipeline::{DiagnoseOptions, MATTERS, diagnose, diagnose_owned};
+pub use pipeline::{DiagnoseOptions, MATTERS, diagnose, diagnose_channels, diagnose_owned};

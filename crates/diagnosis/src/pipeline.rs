@@ -2,43 +2,46 @@
 //!
 //! | step | takes | gives |
 //! |---|---|---|
-//! | [`prepared`] | a record | its grid, what the audits saw in counts and frames |
+//! | [`prepared`] | a record | its grid, what the audits saw in counts and frames, where it may have been knocked |
 //! | [`channel::searched`] | a channel of the grid | its model, residual and checks |
 //! | [`tested`] | all channels | checks of one by the others, what axes share |
 //! | [`name_channel`] | a channel, its checks | findings, and names withdrawn |
 //! | [`concluded`] | all of that | the lists of the diagnosis |
 
+mod banks;
 mod channel;
 mod concluded;
 mod handed_over;
+mod prepared;
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use model::record::Record;
 
 use crate::attribute::{events, masking, merge, withdraw};
-use crate::audit::{Audit, audit, sign_bit};
+use crate::audit::Audit;
 use crate::criticise::common_noise::{Shared, common};
 use crate::criticise::cross_axis::couplings;
-use crate::ingest::dead;
-use crate::ingest::grid::{lay_out, spike_limit};
-use crate::ingest::lattice;
+use crate::ingest::grid::spike_limit;
 use crate::ingest::types::Grid;
 use crate::ingest::wild;
 use crate::replicates;
 use crate::report::entries::{Ranked, entries, rank};
 use crate::report::findings::{motion_findings, scale_finding, term_findings, variance_finding};
-use crate::report::{detection_limits, figures, gain, handover};
+use crate::report::{detection_limits, figures, gain, handover, shocks};
 use crate::result::{
-    Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, Input, NotTested,
-    Unexplained, Verdict,
+    Check, DIAGNOSIS_FORMAT, DetectionLimit, Diagnosed, Diagnosis, Finding, NotTested, Unexplained,
+    Verdict,
 };
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Observation, all_worded, worded};
+pub use banks::diagnose_channels;
 use concluded::{Told, concluded};
 use handed_over::HandedOver;
 use model::record::AnalysisError;
-use model::record::rows::{self, Bursts};
+use model::record::rows::Bursts;
+use prepared::{Prepared, prepared};
 
 /// Options of [`diagnose`].
 #[derive(Clone, Debug, PartialEq)]
@@ -101,108 +104,66 @@ pub fn diagnose_owned(
     ))
 }
 
-/// What the search needs of a record, and what was seen of it before.
-struct Prepared {
-    grid: Grid,
-    audited: Audit,
-    sticking: Vec<Finding>,
-    dead: Vec<Observation>,
-    input: Input,
-}
-
-fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisError> {
-    let record = &*rows::in_order(&record);
-    let (record, bursts) = match rows::end_to_end(record) {
-        Some((joined, bursts)) => (Cow::Owned(joined), Some(bursts)),
-        None => (rows::longest_part(record), None),
+fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
+    set_aside_wild(&mut of.grid, &of.audited);
+    let search = |t| channel::searched(&of.grid, t);
+    let mut searched: Vec<Searched<'_>> = of.grid.targets.iter().map(search).collect();
+    of.grid.dct.forget();
+    let tested = tested(&mut searched, &of.audited, &of.grid);
+    let shocks = match held(&searched, &tested, &of) {
+        Ok(shocks) => shocks,
+        Err(borne_out) => {
+            drop(searched);
+            return diagnosed(of.with_those(&borne_out), options);
+        }
     };
-    let record = &*record;
-    let (alive, dead) = dead::left_out(record)?;
-    let counted = lattice::counted(&alive);
-    let (mended, sticking) = sign_bit::mend(&counted);
-    let record = &*mended;
-    let mut audited = audit(record);
-    audited.findings = all_worded(audited.findings);
-    audited.checks = all_worded(audited.checks);
-    audited.unexplained = all_worded(audited.unexplained);
-    audited.not_tested = all_worded(audited.not_tested);
-    // Put right by the sign, but for the readings that lay beyond the bit.
-    for f in &sticking {
-        audited.put_right(f);
-    }
-    let record = &*masking::renumbered(record, &audited);
-    let mut grid = lay_out(record, &|name| audited.masked(name), seed)?;
-    grid.bursts = bursts;
-    let input = Input {
-        file: String::new(),
-        seconds: grid.n as f64 / grid.rate_hz,
-        rate_hz: grid.rate_hz,
-        samples: record.len(),
-        channels: record.channels.iter().map(|c| c.name.clone()).collect(),
-        notes: record.notes.clone(),
-    };
-    Ok(Prepared {
-        grid,
-        audited,
-        sticking,
-        dead,
-        input,
-    })
-}
-
-fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     let Prepared {
-        mut grid,
+        ref grid,
         mut audited,
         sticking,
         dead,
         mut input,
+        blows,
+        ..
     } = of;
-    set_aside_wild(&mut grid, &audited);
-    let search = |t| channel::searched(&grid, t);
-    let mut searched: Vec<Searched<'_>> = grid.targets.iter().map(search).collect();
     let mended: Vec<Finding> = sticking.clone();
-    grid.dct.forget();
-    let tested = tested(&mut searched, &audited, &grid);
+    let knocked: Vec<Range<usize>> = blows.into_iter().map(|b| b.readings).collect();
+    let far = masking::findings(&audited, &searched, grid);
+    let findings = [all_worded(sticking), all_worded(far)].concat();
+    let mut findings = merge::turning(findings, &knocked, grid);
+    findings.extend(all_worded(shocks));
     let first = Named {
-        findings: merge::turning(
-            [
-                all_worded(sticking),
-                all_worded(masking::findings(&audited, &searched, &grid)),
-            ]
-            .concat(),
-            &grid,
-        ),
+        findings,
         limits: std::mem::take(&mut audited.limits),
         ..Named::default()
     };
-    let name = |named, s| name_channel(named, s, &tested, &audited, &grid, options.seed);
+    let name = |named, s| name_channel(named, s, &tested, &audited, grid, options.seed);
     let named = searched.iter().fold(first, name);
     input.notes.append(&mut audited.notes);
     input.file.clone_from(&options.file);
     let mut told = concluded(&searched, tested, audited, dead, named);
-    gain::complete(&mut told.findings, &searched, &grid, &mended);
+    gain::complete(&mut told.findings, &searched, grid, &mended);
     let HandedOver {
         mut baseline_model,
         mut extended_model,
         replicates,
         held,
         taken_up,
-    } = handed_over::handed_over(&searched, &grid, &told, &mended, options);
+    } = handed_over::handed_over(&searched, grid, &told, &mended, options);
     for f in &mut told.findings {
         f.material = true;
     }
     let judged = options.replicates > 0;
     if judged {
         let (matters, seed) = (options.matters, options.seed);
-        replicates::consequence::state(&mut told.findings, &extended_model, &grid, matters, seed);
+        replicates::consequence::state(&mut told.findings, &extended_model, grid, matters, seed);
     }
     let strays = !held.unexplained.is_empty();
     told.checks.extend(held.checks);
     told.unexplained.extend(held.unexplained);
     told.unexplained.extend(taken_up);
     let terms = &extended_model.unnamed;
-    let mut unexplained = entries(told.unexplained, &searched, &grid, terms, options.matters);
+    let mut unexplained = entries(told.unexplained, &searched, grid, terms, options.matters);
     ranked(&mut told.findings, &mut unexplained);
     if let Some(bursts) = &grid.bursts {
         bursts.part(&mut baseline_model);
@@ -233,7 +194,7 @@ fn diagnosed(of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         baseline_model,
         extended_model,
         evidence: (searched.iter().filter(|_| !options.no_evidence))
-            .flat_map(|s| figures::of_channel(s, &grid))
+            .flat_map(|s| figures::of_channel(s, grid))
             .collect(),
     }
 }
@@ -268,6 +229,27 @@ fn set_aside_wild(grid: &mut Grid, audited: &Audit) {
         drop(s);
         wild::set_aside(grid, i, &places, limit);
     }
+}
+
+/// The shocks, where the final model bears out each of the blows that were left out of the readings.
+///
+/// # Errors
+/// Which of them it does.
+fn held(
+    searched: &[Searched<'_>],
+    tested: &Tested,
+    of: &Prepared,
+) -> Result<Vec<Finding>, Vec<bool>> {
+    let all: Vec<&Searched<'_>> = searched.iter().collect();
+    let failing = |channel: &str, id: CheckId| {
+        let mut checks = tested.checks.iter();
+        checks.any(|c| c.channel == channel && c.id == id && c.fails_after)
+    };
+    let shocks = shocks::findings(&all, &of.blows, &of.grid, &failing);
+    if shocks.iter().all(Option::is_some) {
+        return Ok(shocks.into_iter().flatten().collect());
+    }
+    Err(shocks.iter().map(Option::is_some).collect())
 }
 
 /// Times of what was found in bursts laid end to end.

@@ -350,6 +350,8 @@ pub enum Hypothesis {
     Scale,
     /// True rotation of the base.
     Motion,
+    /// A short event in the mean, sought on all channels at once.
+    Blow,
     /// Counted in the audit of frames and counts.
     Audit,
 }

@@ -58,7 +58,7 @@ pub enum SimulateError {
     },
     /// A channel that is no gyro axis.
     #[error(
-        "channel {name}: only gyro_x, gyro_y and gyro_z in deg/s can be simulated, this one is in {unit}"
+        "channel {name}: only gyro_x, gyro_y and gyro_z in deg/s, and acc_x, acc_y and acc_z, can be simulated, this one is in {unit}"
     )]
     NotAGyro {
         /// Its name.
@@ -309,17 +309,47 @@ pub(crate) fn held(values: &[f64], scale: f64) -> Option<Vec<f64>> {
     Some(each.collect())
 }
 
-fn axis_of(channel: &ChannelModel) -> Result<usize, SimulateError> {
-    let axis = ["gyro_x", "gyro_y", "gyro_z"]
+/// Sensors of one kind on three axes: a run is simulated for one bank at a time.
+pub(crate) const BANKS: [[&str; 3]; 2] =
+    [["gyro_x", "gyro_y", "gyro_z"], ["acc_x", "acc_y", "acc_z"]];
+
+/// The axis of a channel of that name.
+pub(crate) fn axis_named(name: &str) -> Option<usize> {
+    BANKS
         .iter()
-        .position(|n| *n == channel.name);
-    match axis {
-        Some(axis) if channel.unit == "deg/s" => Ok(axis),
+        .find_map(|names| names.iter().position(|n| *n == name))
+}
+
+fn axis_of(channel: &ChannelModel) -> Result<usize, SimulateError> {
+    let is_gyro = BANKS[0].contains(&channel.name.as_str());
+    match axis_named(&channel.name) {
+        Some(axis) if !is_gyro || channel.unit == "deg/s" => Ok(axis),
         _ => Err(SimulateError::NotAGyro {
             name: channel.name.clone(),
             unit: channel.unit.clone(),
         }),
     }
+}
+
+/// White standard deviation of a reading for a random walk of the angle, or of the velocity, of the unit that the channel's has.
+fn white_of(unit: &str, walk: f64, rate_hz: f64) -> f64 {
+    // deg/sqrt(h) -> deg/s at one sample: N sqrt(rate), N in deg/s/sqrt(Hz); any other unit U in U/sqrt(Hz).
+    let per_root_hertz = if unit == "deg/s" { walk / 60.0 } else { walk };
+    per_root_hertz * rate_hz.sqrt()
+}
+
+/// What of a model concerns a bank. An effect that names no channel is the gyros', and that of the frames.
+fn bank_of(model: &ModelFile, names: [&str; 3]) -> ModelFile {
+    let own = |c: &String| names.contains(&c.as_str());
+    let mut bank = model.clone();
+    bank.channels.retain(|c| own(&c.name));
+    bank.effects.retain_mut(|e| {
+        let of_all = e.channels.is_empty() && names == BANKS[0];
+        e.channels.retain(own);
+        of_all || !e.channels.is_empty()
+    });
+    bank.unnamed.retain(|u| u.channels.iter().all(own));
+    bank
 }
 
 /// A run in a world; of the axes whose slow part was `read`, deg/s, that is the run's.
@@ -330,9 +360,48 @@ fn run(
     rate_hz: f64,
     rng: Xoshiro256PlusPlus,
 ) -> Result<Record, SimulateError> {
-    let mut prepared = Prepared::new(model, world, read, rate_hz, rng)?;
+    let others = |c: &ChannelModel| !BANKS.iter().flatten().any(|n| *n == c.name);
+    if let Some(unknown) = model.channels.iter().find(|c| others(c)) {
+        axis_of(unknown)?;
+    }
+    let [gyros, accelerometers] = BANKS.map(|names| bank_of(model, names));
+    let felt = (!accelerometers.channels.is_empty())
+        .then(|| felt(&accelerometers, world.clone(), rate_hz, rng.clone()));
+    let mut prepared = Prepared::new(&gyros, world, read, rate_hz, rng)?;
     prepared.clocks();
     prepared.draw();
     prepared.frames();
-    Ok(frames(prepared.run, model, prepared.present, prepared.lsb))
+    let mut record = frames(prepared.run, model, prepared.present, prepared.lsb);
+    if let Some(felt) = felt {
+        frames::put(&mut record, felt?);
+    }
+    Ok(record)
+}
+
+/// A channel that is simulated: its name, its readings and their unit.
+type Simulated = (String, Vec<i32>, f64, String);
+
+/// What the accelerometers of a model read: their bias holds the part of gravity that they feel.
+fn felt(
+    model: &ModelFile,
+    world: World,
+    rate_hz: f64,
+    mut rng: Xoshiro256PlusPlus,
+) -> Result<Vec<Simulated>, SimulateError> {
+    // Random numbers that the gyros do not have.
+    rng.long_jump();
+    let mut prepared = Prepared::new(model, world, Default::default(), rate_hz, rng)?;
+    prepared.clocks();
+    prepared.draw();
+    let each = model.channels.iter().map(|c| {
+        let axis = axis_of(c)?;
+        let counts = std::mem::take(&mut prepared.run.counts[axis]);
+        Ok((
+            c.name.clone(),
+            counts,
+            prepared.steps[axis].0,
+            c.unit.clone(),
+        ))
+    });
+    each.collect()
 }

@@ -36,7 +36,7 @@ const fn row(id: u16, cause: &'static str, how: How) -> Row {
 
 /// The rows, by number. What is asked beyond the usual has its reason in docs/power.md, "Bars".
 #[rustfmt::skip]
-pub const STRONG: [Row; 24] = [
+pub const STRONG: [Row; 25] = [
     row(100, "temperature", |_, _, a| size("slope", a.sign)).needs(TEMPERATURE),
     row(101, "temperature_quadratic", parabola).needs(TEMPERATURE),
     row(102, "warm_up", warm_up),
@@ -61,6 +61,7 @@ pub const STRONG: [Row; 24] = [
     row(121, "wandering_line", wandering_line),
     row(122, "quantization_noise", quantization_noise),
     row(123, "correlated_noise", correlated_noise),
+    row(124, "shock", shock).asked(8.0, 1.7),
 ];
 
 /// Largest process, deg/s rms: slower ones, which a random walk hides better, would need more for the strength, and what
@@ -163,6 +164,21 @@ fn g_sensitivity(draw: &mut Draw, _: &mut Stand, asked: Asked) -> Drawn {
 fn bias_step(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let at = stand.seconds * draw.between(0.1, 0.9);
     shape(vec![("time", at)], ("height", asked.sign))
+}
+
+/// A half sine or a ring that several readings see: one alone is as well a disturbed word.
+fn shock(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let mut values = vec![
+        ("time", stand.seconds * draw.between(0.05, 0.95)),
+        ("duration", draw.by_ratio(4.0 / stand.rate_hz, 0.9)),
+    ];
+    let mut sign = asked.sign;
+    if draw.chance(0.5) {
+        values.push(("frequency", stand.rate_hz * draw.between(0.05, 0.45)));
+        values.push(("phase", draw.between(-3.1, 3.1)));
+        sign = 1.0;
+    }
+    shape(values, ("peak", sign))
 }
 
 fn cross_axis(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {

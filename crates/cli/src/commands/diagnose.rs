@@ -26,6 +26,9 @@ pub struct Arguments {
     /// Seed of whatever is random
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Only these channels, accelerometers at rest too: gyro_x,acc_z,...
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    channels: Option<Vec<String>>,
     /// Write the result as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -100,7 +103,9 @@ fn found(arguments: &Arguments, path: &Path, is_needed: bool) -> Result<Found> {
         replicates: arguments.replicates.count(),
         matters: arguments.replicates.matters(),
     };
-    let diagnosed = if is_needed {
+    let diagnosed = if let Some(channels) = &arguments.channels {
+        diagnosis::diagnose_channels(&record, channels, &options)
+    } else if is_needed {
         diagnosis::diagnose(&record, &options)
     } else {
         diagnosis::diagnose_owned(std::mem::take(&mut record), &options)

@@ -175,6 +175,15 @@ fn in_time(cause: &str, p: &Parameters, gyro: usize) -> Option<Fault> {
             step_dps: v("height"),
             tilt_deg: 0.0,
         },
+        // A ring of that pitch and length, as the bench has it: from its largest rate on.
+        "shock" if p.contains_key("frequency") => Fault::Bump {
+            axis: gyro,
+            time_s: v("time"),
+            peak_dps: v("peak"),
+            linear_g: 0.0,
+            frequency_hz: v("frequency"),
+            decay_s: v("duration") / 3.0,
+        },
         "noise_change" if v("variance_increase") >= 0.0 => Fault::NoisySpell {
             gyro,
             start_s: v("start"),

@@ -59,6 +59,12 @@ pub enum Hidden {
     ScaleError,
     /// The board's crystal is off.
     WrongCrystal,
+    /// The bench is knocked: the stand rings, and nothing stays.
+    Bump,
+    /// The zero of an accelerometer follows its temperature. Random draws leave it out, for it is in no gyro.
+    AccTempco,
+    /// The converter's reference follows the supply, and the accelerometers are not ratiometric. Random draws leave it out.
+    AccReference,
     /// Three things at once that a correction takes off: one gyro follows its temperature, one the motor's current, and one
     /// is mounted askew on a base that sways after a rest. Random draws leave it out.
     Uncalibrated,
@@ -66,7 +72,7 @@ pub enum Hidden {
 
 impl Hidden {
     /// Everything that can be wrong, one thing at a time.
-    pub const ALL: [Hidden; 24] = [
+    pub const ALL: [Hidden; 25] = [
         Hidden::Tempco,
         Hidden::TempcoCurved,
         Hidden::MotorCoupling,
@@ -91,6 +97,7 @@ impl Hidden {
         Hidden::Shove,
         Hidden::ScaleError,
         Hidden::WrongCrystal,
+        Hidden::Bump,
     ];
 }
 
@@ -145,6 +152,22 @@ pub(super) fn plant(
         }
         Hidden::WrongCrystal => {
             scenario.crystal_ppm = sign * by_ratio(rng, 300.0, 3000.0);
+            return None;
+        }
+        Hidden::AccTempco => {
+            heat(scenario, rng);
+            quiet_floor(scenario);
+            scenario.faults.push(Fault::AccTempco {
+                axis: gyro,
+                g_per_c: sign * sizes.draw(rng, 1e-3, 2e-3),
+                scale_per_c: 0.0,
+            });
+            return None;
+        }
+        Hidden::AccReference => {
+            quiet_floor(scenario);
+            let share = sizes.draw(rng, 0.05, 0.2);
+            scenario.faults.push(Fault::AccReference { share });
             return None;
         }
         Hidden::Uncalibrated => {
@@ -224,6 +247,8 @@ fn fault(
         | Hidden::Random
         | Hidden::ScaleError
         | Hidden::WrongCrystal
+        | Hidden::AccTempco
+        | Hidden::AccReference
         | Hidden::Uncalibrated => return None,
         Hidden::Tempco => {
             heat(scenario, rng);
@@ -268,6 +293,15 @@ fn fault(
             time_s: seconds * uniform(rng, 0.25, 0.75),
             step_dps: sign * sizes.draw(rng, 0.3, 0.8),
             tilt_deg: uniform(rng, 0.0, 1.0),
+        },
+        // Slow enough for 20 readings a second, and over within a second.
+        Hidden::Bump => Fault::Bump {
+            axis: gyro,
+            time_s: seconds * uniform(rng, 0.05, 0.95),
+            peak_dps: sign * sizes.draw(rng, 3.0, 10.0),
+            linear_g: uniform(rng, 0.1, 0.5),
+            frequency_hz: uniform(rng, 1.0, 8.0),
+            decay_s: by_ratio(rng, 0.1, 0.3),
         },
         Hidden::Stall => Fault::Stall {
             gyro,
@@ -367,6 +401,11 @@ fn fault(
         }
     };
     Some(fault)
+}
+
+/// A floor that shakes as elsewhere hides what the part does: by some 40 mg, against 8 mg of its noise.
+fn quiet_floor(scenario: &mut Scenario) {
+    scenario.base.floor_g_rms = 0.0;
 }
 
 /// A slope in temperature needs a swing: the heater cycles.

@@ -80,7 +80,7 @@ fn moving(faults: &[Fault]) -> Vec<Fault> {
             step_dps: 0.0,
             tilt_deg,
         }),
-        Fault::Vibration { .. } | Fault::Shove { .. } => Some(fault.clone()),
+        Fault::Vibration { .. } | Fault::Shove { .. } | Fault::Bump { .. } => Some(fault.clone()),
         _ => None,
     });
     moves.collect()

@@ -33,7 +33,7 @@ fn causes(hidden: Hidden) -> (&'static [&'static str], &'static [&'static str]) 
         Hidden::SupplyCoupling => (&["supply_sensitivity"], &[]),
         Hidden::Vibration => (&["line"], &[]),
         // The blow itself, two samples of it, is one that the base moved.
-        Hidden::Knock => (&["bias_step"], &["outliers", "base_motion"]),
+        Hidden::Knock => (&["bias_step"], &["shock", "outliers", "base_motion"]),
         Hidden::Stall | Hidden::SilentStall | Hidden::DeadSpi => (&["stale_samples"], &[]),
         Hidden::WarmUp => (&["warm_up"], &[]),
         Hidden::Leak => (&["rate_ramp"], &[]),
@@ -51,6 +51,9 @@ fn causes(hidden: Hidden) -> (&'static [&'static str], &'static [&'static str]) 
         Hidden::Shove => (&["base_motion"], &[]),
         Hidden::ScaleError => (&["scale_error"], &["base_motion"]),
         Hidden::WrongCrystal => (&["clock_rate"], &[]),
+        Hidden::Bump => (&["shock"], &[]),
+        Hidden::AccTempco => (&["temperature"], &[]),
+        Hidden::AccReference => (&["supply_sensitivity"], &[]),
         Hidden::Uncalibrated => (&["temperature", "motor_bias", "cross_axis"], &[]),
     }
 }

@@ -87,6 +87,7 @@ pub fn strength(plan: &Plan, hidden: Hidden) -> Strength {
         | Hidden::SupplyCoupling
         | Hidden::Vibration
         | Hidden::Knock
+        | Hidden::Bump
         | Hidden::WarmUp
         | Hidden::Leak => of(of_difference(plan, axis, &[]), 8.0),
         // Beyond a straight line.
@@ -175,6 +176,7 @@ fn enlarged(plan: &Plan) -> Plan {
                 ..
             }
             | Fault::Knock { step_dps: size, .. }
+            | Fault::Bump { peak_dps: size, .. }
             | Fault::WarmUp {
                 amplitude_dps: size,
                 ..

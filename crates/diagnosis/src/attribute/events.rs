@@ -10,6 +10,7 @@
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use model::effect::Signal;
 use model::record::Quantity;
@@ -383,6 +384,32 @@ fn unlike(
     (vec![], None)
 }
 
+/// Whether something of that energy that happens in some readings goes on before them or after.
+fn goes_on(s: &Searched<'_>, readings: &Range<usize>, energy: f64) -> bool {
+    let residual = Residual::new(s, &s.e, 0);
+    let beside = |at: usize, after: bool| {
+        let scores = residual.beside(at, after);
+        let most = scores.iter().map(|s| s.0 - s.1).fold(0.0, f64::max);
+        most > WOBBLE * energy && residual.chance(std::iter::once(&scores)) < LEAST_CHANCE
+    };
+    beside(readings.start, false) || beside(readings.end.saturating_sub(1), true)
+}
+
+/// Whether a blow of that likelihood ratio is a part of something longer on a channel.
+pub(crate) fn is_part_of_more(s: &Searched<'_>, readings: &Range<usize>, lr: f64) -> bool {
+    let n = s.e.len();
+    let near = |e: &Excursion| {
+        let turn = e.with_margin(n);
+        turn.start < readings.end + readings.len() && readings.start < turn.end + readings.len()
+    };
+    s.target.excursions.iter().any(near) || goes_on(s, readings, lr)
+}
+
+/// Whether the noise of a channel is none whose far readings are known.
+pub(crate) fn lawless(failing: &dyn Fn(CheckId) -> bool) -> bool {
+    failing(CheckId::Kurtosis) || LAWS.into_iter().any(failing)
+}
+
 /// Why a turn of the base is not borne out by what a channel does otherwise; nothing where it is.
 pub(crate) fn no_turn(
     s: &Searched<'_>,
@@ -390,14 +417,8 @@ pub(crate) fn no_turn(
     failing: &dyn Fn(CheckId) -> bool,
 ) -> Option<&'static str> {
     let around = turn.with_margin(s.e.len());
-    let residual = Residual::new(s, &s.e, 0);
     let energy = 0.5 * turn.peak.0.powi(2) * turn.samples.len() as f64 / s.state.solution.white;
-    let goes_on = |at: usize, after: bool| {
-        let scores = residual.beside(at, after);
-        let most = scores.iter().map(|s| s.0 - s.1).fold(0.0, f64::max);
-        most > WOBBLE * energy && residual.chance(std::iter::once(&scores)) < LEAST_CHANCE
-    };
-    if goes_on(around.start, false) || goes_on(around.end.saturating_sub(1), true) {
+    if goes_on(s, &around, energy) {
         return Some("it goes on beside");
     }
     let step = |f: &Form| matches!(f, Form::Step(at, _) if around.contains(&(*at as usize)));

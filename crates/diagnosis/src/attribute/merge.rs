@@ -1,20 +1,27 @@
 //! What belongs together is one finding: far readings within a turn, at a step, in a louder stretch; one event on several
 //! channels; several terms of one cause.
 
+use std::ops::Range;
+
 use model::effects::effect;
 
 use crate::attribute::events::{BLOW_S, blow_of, step_at};
 use crate::ingest::types::Grid;
 use crate::result::{Finding, Gain, Parameter};
 
-/// Far readings while the base turns are its motion.
-pub(crate) fn turning(mut findings: Vec<Finding>, grid: &Grid) -> Vec<Finding> {
+/// Far readings while the base turns, or is knocked, are its motion.
+pub(crate) fn turning(
+    mut findings: Vec<Finding>,
+    knocked: &[Range<usize>],
+    grid: &Grid,
+) -> Vec<Finding> {
     let n = grid.n;
     let turns: Vec<_> = (grid.targets.iter())
         .flat_map(|t| t.excursions.iter().map(|e| e.with_margin(n)))
+        .chain(knocked.iter().cloned())
         .collect();
     let within = |t: &f64| {
-        let i = (t * grid.rate_hz) as usize;
+        let i = (t * grid.rate_hz).round() as usize;
         turns.iter().any(|turn| turn.contains(&i))
     };
     findings.retain_mut(|f| {

@@ -17,7 +17,7 @@ use super::stuck::{self, Verdict};
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};
 use crate::result::{Alternative, Finding};
-use crate::test_level::{AUDIT_LEVEL, CheckId, Observation};
+use crate::test_level::{CheckId, Observation, audit_level};
 use numerics::tails;
 use numerics::tails::ONE_SIDED;
 
@@ -64,7 +64,7 @@ fn coarse(counts: &[i32], known: &[bool]) -> Option<Coarse> {
         let even = changes.iter().filter(|e| **e).count() as u64;
         let trials = changes.len() as u64;
         if (even as f64) < ON_GRID * trials as f64
-            || tails::hits_at_least(even, trials, 0.5) > AUDIT_LEVEL
+            || tails::hits_at_least(even, trials, 0.5) > audit_level()
         {
             break;
         }

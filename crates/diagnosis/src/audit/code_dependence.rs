@@ -15,7 +15,7 @@ use rustfft::{Fft, FftPlanner};
 
 use super::rounding::in_steps;
 use super::{Audit, Gyro, LEAST_READINGS};
-use crate::test_level::{AUDIT_LEVEL, CheckId, MOST, RECORD};
+use crate::test_level::{CheckId, MOST, RECORD, audit_level};
 use numerics::tails;
 
 /// Residues of a code that are told apart.
@@ -225,7 +225,7 @@ pub(super) fn audit<'a>(gyros: &'a [Gyro<'a>], audit: &mut Audit) {
         let id = CheckId::FineCodes;
         let fails = audit.check(id, own.name, common.statistic, chance, what.clone());
         audit.about(other.as_slice());
-        if fails && chance < AUDIT_LEVEL {
+        if fails && chance < audit_level() {
             audit.unexplain(own.name, what);
         }
     }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use model::record::Record;
 
 use super::{Audit, Gyro, LEAST_READINGS};
-use crate::test_level::{AUDIT_LEVEL, CheckId, Observation};
+use crate::test_level::{CheckId, Observation, audit_level};
 use numerics::order_statistics::robust_sigma;
 use numerics::tails;
 
@@ -145,7 +145,7 @@ fn longest(x: &[i32], y: &[i32]) -> Option<Run> {
     let most = runs.first()?.0;
     let ln_chance = |length: usize, share: f64| length as f64 * (NARROWER * share).min(1.0).ln();
     let own = largest_share(&[x]).max(largest_share(&[y]));
-    if ln_chance(most, own) > (AUDIT_LEVEL / d.len() as f64).ln() {
+    if ln_chance(most, own) > (audit_level() / d.len() as f64).ln() {
         return None;
     }
     let weighed = runs.into_iter().take(MOST_RUNS).map(|(length, first)| {
@@ -279,7 +279,7 @@ fn pair(a: &Gyro<'_>, b: &Gyro<'_>, audit: &mut Audit) {
     };
     let fails = audit.check(CheckId::EqualReadings, second, same, chance, what.clone());
     audit.about(&[first, second]);
-    if fails && chance < AUDIT_LEVEL {
+    if fails && chance < audit_level() {
         let copies: Vec<usize> = rows
             .into_iter()
             .zip(&d)

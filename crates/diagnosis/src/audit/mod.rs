@@ -29,7 +29,7 @@ use model::effects;
 use model::record::{Channel, Quantity, Record};
 
 use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter};
-use crate::test_level::{AUDIT_LEVEL, CheckId, Observation};
+use crate::test_level::{CheckId, Observation, audit_level};
 use local::Local;
 
 /// Steps of a converter that lacks a bit, over the noise, up to which the variance of readings is the same at any level: to
@@ -76,6 +76,8 @@ pub struct Audit {
     pub limits: Vec<DetectionLimit>,
     /// What a reader has to know of the readings, and is no fault.
     pub notes: Vec<String>,
+    /// Rows of single readings that the noise cannot have made, by channel.
+    pub singles: BTreeMap<String, Vec<usize>>,
     /// Steps, counts, of channels whose converter lacks a bit.
     steps: BTreeMap<String, f64>,
     /// Channels whose noise is hardly larger than their step.
@@ -214,14 +216,14 @@ impl Audit {
         p_value: f64,
         what: String,
     ) -> bool {
-        let fails = p_value < AUDIT_LEVEL;
+        let fails = p_value < audit_level();
         self.checks.push(Check {
             id: id.into(),
             about: vec![],
             channel: channel.into(),
             statistic,
             p_value: Some(p_value),
-            threshold: AUDIT_LEVEL,
+            threshold: audit_level(),
             fails_before: fails,
             fails_after: false,
             what,

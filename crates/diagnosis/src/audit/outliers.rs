@@ -6,7 +6,7 @@
 
 use super::{Audit, Gyro, counted};
 use crate::result::Finding;
-use crate::test_level::{AUDIT_LEVEL, CheckId};
+use crate::test_level::{CheckId, audit_level};
 use model::effects;
 use numerics::tails;
 use numerics::tails::ONE_SIDED;
@@ -32,7 +32,7 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     if n < super::LEAST_READINGS || local.sigma <= 0.0 {
         return;
     }
-    let limit = tails::farthest(n, AUDIT_LEVEL) * if local.bent { MOVING } else { 1.0 };
+    let limit = tails::farthest(n, audit_level()) * if local.bent { MOVING } else { 1.0 };
     let unit = g
         .of_readings
         .as_ref()
@@ -84,6 +84,7 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     }
     let times: Vec<f64> = single.iter().map(|i| at[*i]).collect();
     single.iter().for_each(|i| audit.mask(name, *i));
+    audit.singles.insert(name.to_owned(), single);
     let own = |f: &Finding| f.cause == effects::outliers::ID && f.channels == [name];
     let wild = audit.findings.iter().position(own);
     let (mut times, mut what) = (times, what);

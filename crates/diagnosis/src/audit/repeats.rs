@@ -14,7 +14,7 @@ use model::record::Record;
 
 use super::{Audit, Gyro, LEAST_READINGS, counted};
 use crate::fit::likelihood::invert;
-use crate::test_level::{AUDIT_LEVEL, CheckId};
+use crate::test_level::{CheckId, audit_level};
 use near::{NOT_HELD, beside, near};
 use numerics::order_statistics::robust_sigma;
 use numerics::series::smallest_step;
@@ -297,7 +297,7 @@ impl<'a> Readings<'a> {
         let names: Vec<String> = self.gyros.iter().map(|g| g.channel.name.clone()).collect();
         if several {
             let mut counts = mean as u64..self.rows as u64;
-            if let Some(enough) = counts.find(|k| tails::at_least(*k, mean) < AUDIT_LEVEL) {
+            if let Some(enough) = counts.find(|k| tails::at_least(*k, mean) < audit_level()) {
                 let by_chance = (expected - ONE_SIDED * expected.sqrt()).max(0.0);
                 let planted = (enough as f64 - by_chance).ceil();
                 for name in &names {
@@ -355,7 +355,7 @@ impl<'a> Readings<'a> {
         let excess = own.len() as f64 - expected;
         let cause = effects::stale_samples::ID;
         if self.columns.len() == 1 {
-            let reach = tails::farthest(1, 2.0 * AUDIT_LEVEL) + ONE_SIDED;
+            let reach = tails::farthest(1, 2.0 * audit_level()) + ONE_SIDED;
             let planted = (reach * error.max(1.0)).max(EXCESS * expected).ceil();
             audit.smallest(cause, name, "count", planted, "1");
         }
@@ -363,7 +363,7 @@ impl<'a> Readings<'a> {
         let relative = excess > EXCESS * expected;
         let weighed = if relative && !suppressed { chance } else { 1.0 };
         let fails = audit.check(CheckId::RepeatedReadings, name, z, weighed, what.clone());
-        if !fails || chance >= AUDIT_LEVEL {
+        if !fails || chance >= audit_level() {
             return;
         }
         if let Some(why) = self.no_repeats(values, step, &own, expected) {

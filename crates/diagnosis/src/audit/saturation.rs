@@ -13,7 +13,7 @@ use super::bits::Shape;
 use super::{Audit, Gyro};
 use crate::audit::local::Levels;
 use crate::result::Finding;
-use crate::test_level::{AUDIT_LEVEL, CheckId};
+use crate::test_level::{CheckId, audit_level};
 use numerics::tails;
 
 /// Chance of the pile on the last code that light tails may have.
@@ -58,7 +58,7 @@ fn swing(values: impl Iterator<Item = (f64, f64)>) -> f64 {
 
 /// Readings that have to be missing beyond one of both ends: the chance of so many is exp(-them).
 fn least_beyond() -> f64 {
-    (2.0 / AUDIT_LEVEL).ln()
+    (2.0 / audit_level()).ln()
 }
 
 /// One end.
@@ -210,7 +210,7 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
         name,
         both,
         if piled {
-            chance.min(AUDIT_LEVEL / 2.0)
+            chance.min(audit_level() / 2.0)
         } else {
             1.0
         },

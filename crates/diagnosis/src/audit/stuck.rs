@@ -6,7 +6,7 @@
 //! nothing here explains is not passed over ([`Verdict::Unlike`]).
 
 use super::codes::{Course, Fault, Fit, Histogram, Laws};
-use crate::test_level::AUDIT_LEVEL;
+use crate::test_level::audit_level;
 use numerics::tails;
 
 /// Spreads of a reading that are tried, over what was measured: bits that stick widen it more than they narrow it.
@@ -179,7 +179,7 @@ impl Judged {
         let laws = Laws::new(&self.h, Fault::None, first.spread);
         let gain = |(bit, value)| laws.gain_of(first, Fault::Bit { bit, value });
         first.cost < PLAIN
-            && left_by(&self.h, &laws, first).1 > AUDIT_LEVEL
+            && left_by(&self.h, &laws, first).1 > audit_level()
             && !self.every().any(|b| gain(b) > WORTH_A_LOOK)
     }
 
@@ -298,7 +298,7 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
     let (fault, sound) = of.without_edges(fault, sound);
     let laws = Laws::new(&of.h, fault, sound.spread);
     let (over, chance) = left_by(&of.h, &laws, &sound);
-    let unlike = chance < AUDIT_LEVEL && over > UNLIKE.max(UNLIKE_BY_READING * of.h.n);
+    let unlike = chance < audit_level() && over > UNLIKE.max(UNLIKE_BY_READING * of.h.n);
     let without = |nearest| {
         if unlike {
             Verdict::Unlike {

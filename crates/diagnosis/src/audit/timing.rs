@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::drift::{self, Uneven};
 use super::{Audit, Gyro};
 use crate::result::Finding;
-use crate::test_level::{AUDIT_LEVEL, CheckId};
+use crate::test_level::{CheckId, audit_level};
 use numerics::order_statistics::{median, width};
 use numerics::tails;
 use numerics::tails::ONE_SIDED;
@@ -154,7 +154,7 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
     if let Some(law) = law {
         // The scatter itself is known to 1.17 / sqrt(blocks) of it, here and in the run that would show the fault.
         let scatter = 1.17 * (2.0 / drift::BLOCKS as f64).sqrt();
-        let limit = law.inverse_cdf(1.0 - AUDIT_LEVEL);
+        let limit = law.inverse_cdf(1.0 - audit_level());
         let reach = limit * (1.0 + ONE_SIDED * scatter) + ONE_SIDED;
         audit.smallest(
             effects::clock_rate::ID,

@@ -10,7 +10,7 @@ use crate::ingest::types::Grid;
 use crate::result::{Check, Consequence, DetectionLimit, Finding, Gain, limit, sentence};
 use crate::search::searched::Searched;
 use crate::test_level;
-use crate::test_level::{CheckId, OMNIBUS_LEVEL, Observation};
+use crate::test_level::{CheckId, Observation, omnibus_level};
 use numerics::column::{dot, dots_behind};
 use numerics::tails;
 use numerics::tails::ONE_SIDED;
@@ -98,15 +98,15 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
     // A source that all axes share shows in all pairs: their sum tells it from d' 1.7 times smaller on than any one pair.
     let joint = pairs.iter().map(|p| p.4).sum::<f64>() / (pairs.len().max(1) as f64).sqrt();
     let together = pairs.len() > 1
-        && tails::normal_tail(joint) < 2.0 * threshold::FALSE_ALARM
+        && tails::normal_tail(joint) < 2.0 * threshold::false_alarm()
         && joint > 0.0
         && pairs.iter().all(|p| p.4 > LEAST_OF_ALL);
     let mut fails: Vec<&Pair<'_>> = pairs
         .iter()
-        .filter(|p| together || p.3 < OMNIBUS_LEVEL)
+        .filter(|p| together || p.3 < omnibus_level())
         .collect();
     if !alike(&fails, free) {
-        fails.retain(|p| p.3 < OMNIBUS_LEVEL);
+        fails.retain(|p| p.3 < omnibus_level());
     }
     let effect_of = |asked: fn(&Hypothesis) -> bool| {
         let mut all = searched.iter().flat_map(|s| &s.search.candidates);
@@ -195,11 +195,11 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
     }
     if shared.finding.is_none() && straight {
         let of = effect_of(|h| matches!(h, Hypothesis::Correlation));
-        let failing: Vec<&Pair<'_>> = pairs.iter().filter(|p| p.3 < OMNIBUS_LEVEL).collect();
+        let failing: Vec<&Pair<'_>> = pairs.iter().filter(|p| p.3 < omnibus_level()).collect();
         shared.finding = of.and_then(|of| correlated(&failing, of, free));
     }
     for (a, b, r, p, _) in &pairs {
-        let fails = *p < OMNIBUS_LEVEL;
+        let fails = *p < omnibus_level();
         let explained = shared.finding.is_some();
         shared.checks.push(Check {
             id: CheckId::CrossCorrelation.into(),
@@ -207,7 +207,7 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
             channel: format!("{}, {}", a.target.name, b.target.name),
             statistic: *r,
             p_value: Some(*p),
-            threshold: OMNIBUS_LEVEL,
+            threshold: omnibus_level(),
             fails_before: fails,
             fails_after: fails && !explained,
             what: "correlation of the whitened residuals of two axes".into(),
@@ -292,9 +292,9 @@ fn smallest(pairs: &[Pair<'_>], of: &dyn Effect, samples: f64) -> Vec<DetectionL
     let weakest = pairs.iter().map(z).fold(f64::INFINITY, f64::min);
     let reach = |chance: f64| numerics::tails::farthest(1, chance) + ONE_SIDED;
     let variance = if pairs.len() > 1 {
-        (reach(2.0 * threshold::FALSE_ALARM) / joint).max((LEAST_OF_ALL + ONE_SIDED) / weakest)
+        (reach(2.0 * threshold::false_alarm()) / joint).max((LEAST_OF_ALL + ONE_SIDED) / weakest)
     } else {
-        reach(OMNIBUS_LEVEL) / joint
+        reach(omnibus_level()) / joint
     };
     let mut names: Vec<&str> = vec![];
     for s in pairs.iter().flat_map(|p| [p.0, p.1]) {
@@ -342,13 +342,13 @@ fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
         "follows {} by {lag} samples ({r:+.3} of its residual)",
         first.target.name
     );
-    let fails = p < OMNIBUS_LEVEL;
+    let fails = p < omnibus_level();
     shared.checks.push(Check {
         id: CheckId::CrossCorrelationLate.into(), about: vec![],
         channel: format!("{}, {}", a.target.name, b.target.name),
         statistic,
         p_value: Some(p),
-        threshold: OMNIBUS_LEVEL,
+        threshold: omnibus_level(),
         fails_before: fails,
         fails_after: fails,
         what: format!("correlation of the whitened residuals of two axes over {LATE} samples either way: {} {what}", second.target.name),

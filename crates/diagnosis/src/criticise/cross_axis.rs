@@ -7,7 +7,7 @@ use model::record::Quantity;
 use crate::ingest::types::Grid;
 use crate::result::Check;
 use crate::search::searched::Searched;
-use crate::test_level::{CheckId, MOST, OMNIBUS_LEVEL};
+use crate::test_level::{CheckId, MOST, omnibus_level};
 use numerics::column::{dot, sum_of, sums_of_products};
 use numerics::tails;
 
@@ -145,7 +145,7 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
     let mut tell = |id: CheckId, channel: &str, what: &str, most: Option<(f64, &Source, f64)>| {
         let Some((z, of, p)) = most else { return };
         let share = z / (samples as f64).sqrt();
-        let fails = p < OMNIBUS_LEVEL;
+        let fails = p < omnibus_level();
         let what = format!("{what} {} ({share:+.3} of it)", of.what);
         found.push(Check {
             id: id.into(),
@@ -153,7 +153,7 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
             channel: channel.into(),
             statistic: z,
             p_value: Some(p),
-            threshold: OMNIBUS_LEVEL,
+            threshold: omnibus_level(),
             fails_before: fails,
             fails_after: fails,
             what: if fails {

@@ -7,5 +7,6 @@ pub mod process;
 pub mod random_walk;
 pub mod residual;
 pub mod scale;
+pub(crate) mod shock;
 pub mod short_time;
 pub mod variance_law;

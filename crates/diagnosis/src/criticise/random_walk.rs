@@ -12,7 +12,7 @@ use crate::fit::likelihood::{Noise, least_walk};
 use crate::fit::scan::residual;
 use crate::result::Check;
 use crate::search::searched::Searched;
-use crate::test_level::{CheckId, OMNIBUS_LEVEL};
+use crate::test_level::{CheckId, omnibus_level};
 use numerics::log_product::LogProduct;
 use numerics::minimise::golden;
 use numerics::tails::chi_tail;
@@ -163,14 +163,14 @@ pub(crate) fn check(s: &Searched<'_>) -> Option<Check> {
         "; no temperature was recorded, and one that goes up and down moves a bias like that"
     };
     let p_value = chance(lr);
-    let fails = p_value < OMNIBUS_LEVEL;
+    let fails = p_value < omnibus_level();
     Some(Check {
         id: CheckId::SlowCycles.into(),
         about: vec![],
         channel: target.name.clone(),
         statistic: lr,
         p_value: Some(p_value),
-        threshold: OMNIBUS_LEVEL,
+        threshold: omnibus_level(),
         fails_before: fails,
         fails_after: fails,
         what: format!(
@@ -188,6 +188,7 @@ mod tests {
 
     use super::*;
     use crate::fit::likelihood::{Bins, Dct};
+    use crate::test_level::OMNIBUS_LEVEL;
 
     /// Energies of one record of white noise of 1, a walk and a `signal` of these coefficients.
     fn record(log_walk: f64, signal: &[f64], rng: &mut Xoshiro256PlusPlus) -> Vec<Bin> {

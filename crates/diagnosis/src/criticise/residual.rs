@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, Gamma};
 
-use crate::test_level::{CheckId, OMNIBUS_LEVEL, Outcome, RECORD};
+use crate::test_level::{CheckId, Outcome, RECORD, omnibus_level};
 use numerics::column::{dot, sum_of};
 use numerics::tails::{chi_tail, kurtosis_score, normal_tail};
 
@@ -234,7 +234,7 @@ pub(crate) fn failing_bands(u: &[f64]) -> impl Iterator<Item = Place> {
     let n = u.len() as f64;
     let fails = all_bands(u)
         .into_iter()
-        .filter(|b| b.chance < OMNIBUS_LEVEL);
+        .filter(|b| b.chance < omnibus_level());
     fails.map(move |b| Place {
         from: b.from as f64 / n,
         to: b.to as f64 / n,
@@ -251,7 +251,7 @@ pub(crate) fn unsteady(e: &[f64]) -> Vec<Place> {
         let size = tiles.length as f64 / count as f64;
         for t in 0..count {
             let sum: f64 = tiles.of.iter().map(|s| s[t].0).sum();
-            if tiles.chance(sum, tiles.of.len()) * (count as f64) < OMNIBUS_LEVEL {
+            if tiles.chance(sum, tiles.of.len()) * (count as f64) < omnibus_level() {
                 // Half a nat for each energy that is known is what noise gains too.
                 let gained = tiles.of.iter().map(|s| nats(s[t].1, size) - 0.5);
                 all.push(Place {

@@ -18,7 +18,7 @@ use crate::fit::likelihood::{Dct, Noise};
 use crate::result::Check;
 use crate::search::searched::Searched;
 use crate::test_level;
-use crate::test_level::{CheckId, MOST, OMNIBUS_LEVEL, Outcome};
+use crate::test_level::{CheckId, MOST, Outcome, omnibus_level};
 use numerics::tails::{chi_tail, errors_of_sum, normal_tail};
 use numerics::wide;
 use spectra::{Spectra, mean};
@@ -430,7 +430,7 @@ pub(crate) fn checks(s: &Searched<'_>) -> impl Iterator<Item = Check> {
     let threshold = if process || s.variance.is_some() {
         test_level::CLAIM_LEVEL
     } else {
-        OMNIBUS_LEVEL
+        omnibus_level()
     };
     let channel = s.target.name.clone();
     outcomes(s).into_iter().map(move |o| {

@@ -6,14 +6,21 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::test_level::part_of;
+
 /// Chance of a false alarm of one hypothesis on one clean channel.
 /// The sum of all is the promise of `test_level`.
 pub const FALSE_ALARM: f64 = 6.5e-5;
+/// [`FALSE_ALARM`], shared with the other bank of a record.
+pub(crate) fn false_alarm() -> f64 {
+    part_of(FALSE_ALARM)
+}
+
 /// Refitting the random walk widens the null distribution of slow regressors by this factor.
 pub(crate) const WIDENED: f64 = 1.12;
 
 fn quantile(degrees: usize, places: f64) -> f64 {
-    tail(degrees, FALSE_ALARM / places)
+    tail(degrees, false_alarm() / places)
 }
 
 /// Where the tail of chi-square falls below a chance.

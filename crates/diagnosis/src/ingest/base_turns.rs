@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use crate::fit::threshold;
-use crate::test_level::OMNIBUS_LEVEL;
+use crate::test_level::omnibus_level;
 use numerics::column::dot;
 use numerics::series::white_by_differences;
 use numerics::wide;
@@ -157,7 +157,7 @@ fn places(y: &[f64], white: f64, rate_hz: f64) -> (Vec<Place>, f64) {
     let basis = basis(WINDOW, REST as f64, (REST + BLOCKS) as f64);
     let blocks = lengths(rate_hz);
     let looks: usize = blocks.iter().map(|b| y.len() / b).sum();
-    let limit = threshold::tail(SHAPES, OMNIBUS_LEVEL / looks.max(1) as f64);
+    let limit = threshold::tail(SHAPES, omnibus_level() / looks.max(1) as f64);
     // A rate of a third of the least peak, all the time of a turn.
     let least = BLOCKS as f64 * (LEAST_PEAK / 3.0).powi(2);
     let mut places = vec![];

@@ -57,6 +57,11 @@ fn places(record: &Record) -> (Vec<usize>, usize) {
     (seq.iter().map(|s| (s - seq[0]) as usize).collect(), span)
 }
 
+/// Place of every row of a record on its grid.
+pub(crate) fn places_of_rows(record: &Record) -> Vec<usize> {
+    places(record).0
+}
+
 fn spread(values: &[f64], places: &[usize], n: usize, masked: &[usize]) -> Vec<f64> {
     let mut grid = vec![f64::NAN; n];
     for (v, p) in values.iter().zip(places).filter(|(v, _)| v.abs() < LARGEST) {
@@ -442,7 +447,7 @@ fn spikes(
 /// Distance in sigma that one of `n` samples reaches once in 10^5 records.
 pub(crate) fn spike_limit(n: usize) -> f64 {
     let tail = |z: f64| {
-        (n as f64 * numerics::tails::normal_tail(z)).ln() - crate::test_level::OMNIBUS_LEVEL.ln()
+        (n as f64 * numerics::tails::normal_tail(z)).ln() - crate::test_level::omnibus_level().ln()
     };
     numerics::minimise::golden(&|z| tail(z).abs(), 4.0, 12.0, 40)
 }

@@ -1,6 +1,7 @@
 //! From a record to an even grid of readings that are believed.
 
 pub mod base_turns;
+pub(crate) mod blows;
 pub mod conditional_draw;
 pub mod dead;
 pub mod dequantise;

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use model::effect::Signal;
+use model::effects::shock::LONGEST_S;
 use model::record::Quantity;
 
 use crate::fit::likelihood::Dct;
@@ -112,6 +113,8 @@ pub(crate) fn take_off(c: &mut [f64], drivers: &[Vec<f64>], band: Range<usize>) 
 /// Turns of a base at rest that a gyro felt, without those of which what drives its bias makes up most.
 pub(crate) fn felt(y: &[f64], others: &[Signal], rate_hz: f64, dct: &Dct) -> Vec<Excursion> {
     let mut found = excursions(y, rate_hz);
+    // What is over sooner is a blow; the ends of a half sine may be found a third too far apart.
+    found.retain(|e| e.samples.len() as f64 >= 4.0 / 3.0 * LONGEST_S * rate_hz);
     let drivers = others.iter().filter(|s| drives(s.quantity));
     if found.is_empty() || drivers.clone().next().is_none() {
         return found;

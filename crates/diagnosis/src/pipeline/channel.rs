@@ -14,7 +14,7 @@ use crate::report::detection_limits;
 use crate::result::Check;
 use crate::search::searched::Searched;
 use crate::search::{Search, bands, impute};
-use crate::test_level::{CLAIM_LEVEL, CheckId, OMNIBUS_LEVEL, Outcome, all_worded, worded};
+use crate::test_level::{CLAIM_LEVEL, CheckId, Outcome, all_worded, omnibus_level, worded};
 use crate::two_level::compare;
 
 /// The search of a channel, its hypotheses laid out.
@@ -159,14 +159,14 @@ fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
             channel: s.target.name.clone(),
             statistic: b.statistic,
             p_value: Some(b.p_value),
-            threshold: OMNIBUS_LEVEL,
-            fails_before: b.p_value < OMNIBUS_LEVEL,
+            threshold: omnibus_level(),
+            fails_before: b.p_value < omnibus_level(),
             // A base that moves is told as an input; what it leaves in the residual is no riddle.
-            fails_after: a.p_value < OMNIBUS_LEVEL
+            fails_after: a.p_value < omnibus_level()
                 && !s.target.moving
                 && !s.search.view.sways()
                 && (normal || !OF_NORMAL.contains(&a.id)),
-            what: if a.p_value < OMNIBUS_LEVEL {
+            what: if a.p_value < omnibus_level() {
                 a.what
             } else {
                 b.what

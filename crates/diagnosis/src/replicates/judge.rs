@@ -98,9 +98,11 @@ impl<'a> Judged<'a> {
 fn walk_over_white(channel: Option<&ChannelModel>, rate_hz: f64) -> f64 {
     let Some(channel) = channel else { return 0.0 };
     let value = |name: &str| channel.baseline.get(name).map_or(0.0, |p| p.value);
+    // deg/sqrt(h), or the channel's unit by the root of a hertz.
+    let hours = if channel.unit == "deg/s" { 60.0 } else { 1.0 };
     let (walk, white) = (
         value("rate_random_walk") / rate_hz.sqrt(),
-        value("angle_random_walk") / 60.0 * rate_hz.sqrt(),
+        value("angle_random_walk") / hours * rate_hz.sqrt(),
     );
     if white > 0.0 {
         (walk / white).powi(2)

@@ -11,11 +11,14 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Found, Hypothesis, Regression, Shape, VarianceLaw};
 use model::effects::EFFECTS;
+use model::record::Quantity;
 
+use crate::criticise::shock;
 use crate::fit::channel::Form;
 use crate::fit::likelihood::{Noise, Panel, least_walk};
 use crate::fit::{channel, scan, threshold};
 use crate::ingest::base_turns::MOTION_RMS;
+use crate::ingest::blows;
 use crate::result::{DetectionLimit, Finding, limit};
 use crate::search::Candidate;
 use crate::search::searched::Searched;
@@ -250,12 +253,28 @@ fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smalle
             parameter: "peak",
             ..Smallest::default()
         }),
+        Hypothesis::Blow => of_blow(s),
         Hypothesis::WanderingTone
         | Hypothesis::Common
         | Hypothesis::Correlation
         | Hypothesis::Scale
         | Hypothesis::Audit => None,
     }
+}
+
+/// Of a half sine of this length, s, that one channel feels.
+fn of_blow(s: &Searched<'_>) -> Option<Smallest> {
+    const LENGTH_S: f64 = 0.25;
+    let channels = s.search.view.all(Quantity::Gyro).count().max(1);
+    let least = blows::least(threshold::false_alarm(), s.search.panel.bins.n, 1, channels);
+    let peak = shock::peak_of(s, LENGTH_S, strength_for(*least.first()?))?;
+    Some(Smallest {
+        coefficients: vec![peak],
+        location: vec![0.0, LENGTH_S],
+        parameter: "peak",
+        at: vec!["duration"],
+        ..Smallest::default()
+    })
 }
 
 /// Of the last column of a regression.

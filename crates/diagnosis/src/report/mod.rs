@@ -7,4 +7,5 @@ pub mod findings;
 pub mod gain;
 pub mod handover;
 pub(crate) mod left_over;
+pub(crate) mod shocks;
 pub mod untested;

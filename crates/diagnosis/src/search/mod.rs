@@ -161,7 +161,8 @@ fn told_by_bursts(hypothesis: &Hypothesis, samples: usize) -> bool {
         | Hypothesis::SideBands
         | Hypothesis::TwoLevel
         | Hypothesis::WanderingTone
-        | Hypothesis::Motion => false,
+        | Hypothesis::Motion
+        | Hypothesis::Blow => false,
         Hypothesis::Common | Hypothesis::Correlation | Hypothesis::Scale | Hypothesis::Audit => {
             true
         }

@@ -20,7 +20,14 @@ pub static EFFECT: CorrelatedNoise = CorrelatedNoise;
 pub const ID: &str = "correlated_noise";
 
 /// Its parameters, by the axis that the correlation is with.
-pub(crate) const WITH: [&str; 3] = ["with_gyro_x", "with_gyro_y", "with_gyro_z"];
+pub(crate) const WITH: [&str; 6] = [
+    "with_gyro_x",
+    "with_gyro_y",
+    "with_gyro_z",
+    "with_acc_x",
+    "with_acc_y",
+    "with_acc_z",
+];
 /// Most of the noise of an axis that may be shared with others: what is left is its own.
 const MOST_SHARED: f64 = 0.999;
 
@@ -46,6 +53,9 @@ impl Effect for CorrelatedNoise {
                 "1",
                 "correlation of the white noise with that of gyro_z",
             ),
+            optional(WITH[3], "1", "of an accelerometer, with that of acc_x"),
+            optional(WITH[4], "1", "of an accelerometer, with that of acc_y"),
+            optional(WITH[5], "1", "of an accelerometer, with that of acc_z"),
         ];
         PARAMETERS
     }
@@ -96,7 +106,8 @@ impl Effect for CorrelatedNoise {
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         for &axis in channels {
-            for (other, name) in WITH.iter().enumerate() {
+            for (k, name) in WITH.iter().enumerate() {
+                let other = k % 3;
                 let r = parameters.get(*name).map_or(0.0, |p| p.value);
                 if r != 0.0 && other != axis {
                     share(simulation, [axis, other], r);

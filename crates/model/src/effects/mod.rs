@@ -25,6 +25,7 @@ pub mod quantization_noise;
 pub mod rate_ramp;
 pub mod saturation;
 pub mod scale_error;
+pub mod shock;
 pub mod stale_samples;
 pub mod stuck_bit;
 pub mod supply_sensitivity;
@@ -61,6 +62,7 @@ pub static EFFECTS: &[&dyn Effect] = &[
     &common_noise::EFFECT,
     &correlated_noise::EFFECT,
     &noise_change::EFFECT,
+    &shock::EFFECT,
     &outliers::EFFECT,
     &saturation::EFFECT,
     &coarse_lsb::EFFECT,

@@ -3,7 +3,8 @@
 use rand_distr::{Distribution, Normal, StandardNormal};
 
 use super::{
-    ACC_NOISE_G, ACC_PER_G, STANDARD_GRAVITY, STEPLESS_DPS, SUPPLY_LSB_V, Simulation, TEMP_LSB_C,
+    ACC_NOISE_G, ACC_PER_G, STANDARD_GRAVITY, STEPLESS_DPS, SUPPLY_LSB_V, Simulated, Simulation,
+    TEMP_LSB_C,
 };
 use crate::file::ModelFile;
 use crate::record::{Axis, Base, Channel, Header, Quantity, Record};
@@ -130,6 +131,30 @@ fn accelerometer(s: &mut Simulation, rows: &[usize], axis: Axis) -> Channel {
         offset: 0.0,
     }
     .channel()
+}
+
+/// Puts simulated accelerometers in the place of the stand's.
+pub(super) fn put(record: &mut Record, channels: Vec<Simulated>) {
+    let rows: Vec<usize> = match &record.seq {
+        Some(seq) => seq.iter().map(|s| *s as usize).collect(),
+        None => (0..record.len()).collect(),
+    };
+    for (name, counts, step, unit) in channels {
+        let scale = if unit == "g" {
+            step * STANDARD_GRAVITY
+        } else {
+            step
+        };
+        let Some(own) = record.channels.iter_mut().find(|c| c.name == name) else {
+            continue;
+        };
+        let counts: Vec<i32> = rows.iter().map(|r| counts[*r]).collect();
+        own.values = counts.iter().map(|c| scale * f64::from(*c)).collect();
+        // A file holds what the converter has read: those of a step of its own are no counts of it.
+        let same = own.lsb.is_some_and(|lsb| (scale / lsb - 1.0).abs() < 1e-6);
+        own.counts = same.then(|| counts.iter().map(|c| c + ACC_ZERO as i32).collect());
+        own.lsb = Some(scale);
+    }
 }
 
 fn command(s: &Simulation, rows: &[usize]) -> Channel {

@@ -7,7 +7,9 @@ use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::unnamed::{Generic, Random, too_correlated};
-use super::{COUNT_LIMIT, STEPLESS_DPS, SimulateError, Simulation, Stretch, axis_of};
+use super::{
+    BANKS, COUNT_LIMIT, STEPLESS_DPS, SimulateError, Simulation, Stretch, axis_of, white_of,
+};
 use crate::effect::{Effect, Parameters, Stage};
 use crate::effects::effect;
 use crate::excitation::{World, fast};
@@ -94,8 +96,7 @@ impl Prepared {
             let get = |name: &str| channel.baseline.get(name).map_or(0.0, |p| p.value);
             present[axis] = true;
             lsb[axis] = channel.lsb;
-            // deg/sqrt(h) -> deg/s at one sample: N sqrt(rate), N in deg/s/sqrt(Hz).
-            run.white_sigma[axis] = get("angle_random_walk") / 60.0 * rate_hz.sqrt();
+            run.white_sigma[axis] = white_of(&channel.unit, get("angle_random_walk"), rate_hz);
             walk[axis] = get("rate_random_walk") / rate_hz.sqrt();
             run.rate[axis].fill(get("bias"));
         }
@@ -306,7 +307,14 @@ fn acting(model: &ModelFile, present: [bool; 3]) -> Result<Vec<Acting>, Simulate
         let effect = effect(&e.cause).ok_or_else(|| SimulateError::NoEffect {
             cause: e.cause.clone(),
         })?;
-        let names = ["gyro_x", "gyro_y", "gyro_z"].iter().enumerate();
+        let of = |names: &&[&str; 3]| {
+            model
+                .channels
+                .iter()
+                .any(|c| names.contains(&c.name.as_str()))
+        };
+        let bank = BANKS.iter().find(of).unwrap_or(&BANKS[0]);
+        let names = bank.iter().enumerate();
         // A term that tells a tone in detail stands for it.
         let refined = |n: &str| {
             let of_it = |u: &&crate::unnamed::Unnamed| u.refines.as_ref() == Some(&e.cause);

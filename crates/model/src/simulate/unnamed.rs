@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use rand_core::Rng;
 
-use super::{STANDARD_GRAVITY, SimulateError, Simulation, Stretch};
+use super::{STANDARD_GRAVITY, SimulateError, Simulation, Stretch, axis_named};
 use crate::effects::correlated_noise;
 use crate::file::ModelFile;
 use crate::unnamed::{Domain, Unnamed, between};
@@ -15,8 +15,6 @@ mod distribution;
 /// Widths of each place that a visit of a tone lasts at least, as times 1 / width; and the longest round over all places, s.
 const VISIT: f64 = 10.0;
 const LONGEST_ROUND_S: f64 = 100.0;
-/// Names of the axes that a simulation has.
-const AXES: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 
 /// What chance has a part in.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,7 +76,7 @@ impl Generic {
         let mut all = Self::default();
         for term in &model.unnamed {
             let axes: Vec<usize> = (term.channels.iter())
-                .filter_map(|c| AXES.iter().position(|a| a == c))
+                .filter_map(|c| axis_named(c))
                 .collect();
             match term.domain {
                 Domain::Mean | Domain::Channel => {
@@ -146,17 +144,18 @@ pub(super) fn too_correlated(model: &ModelFile) -> Result<(), SimulateError> {
             sums[axis] += r.abs();
         }
     };
-    let axis = |name: &str| AXES.iter().position(|a| *a == name);
+    let axis = |name: &str| axis_named(name);
     for e in model
         .effects
         .iter()
         .filter(|e| e.cause == correlated_noise::ID)
     {
         let named: Vec<Option<usize>> = match &*e.channels {
-            [] => (0..AXES.len()).map(Some).collect(),
+            [] => (0..3).map(Some).collect(),
             some => some.iter().map(|c| axis(c)).collect(),
         };
-        for (other, with) in correlated_noise::WITH.iter().enumerate() {
+        for (k, with) in correlated_noise::WITH.iter().enumerate() {
+            let other = k % 3;
             let r = e.parameters.get(*with).map_or(0.0, |p| p.value);
             for own in named.iter().filter(|own| **own != Some(other)) {
                 add(*own, r);
@@ -168,10 +167,12 @@ pub(super) fn too_correlated(model: &ModelFile) -> Result<(), SimulateError> {
         let r = term.values(0).first().copied().unwrap_or(0.0);
         term.channels.iter().for_each(|c| add(axis(c), r));
     }
-    let most = (0..AXES.len()).max_by(|a, b| sums[*a].total_cmp(&sums[*b]));
+    let most = (0..3).max_by(|a, b| sums[*a].total_cmp(&sums[*b]));
     match most {
         Some(axis) if sums[axis] >= 1.0 => Err(SimulateError::TooCorrelated {
-            name: AXES[axis].to_owned(),
+            name: (model.channels.iter())
+                .find(|c| axis_named(&c.name) == Some(axis))
+                .map_or_else(String::new, |c| c.name.clone()),
             sum: sums[axis],
         }),
         _ => Ok(()),

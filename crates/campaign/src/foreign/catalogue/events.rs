@@ -26,7 +26,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(451, 9, "iron that crackles", Signal(|d, s, _| marks::crackle(d, s))).needs(TM),
     row(452, 9, "knocks that a long pipe draws apart", Signal(|d, s, _| knocks::pipe(d, s))).needs(TM),
     row(478, 10, "charge that jumps and leaks away", Signal(|d, s, _| marks::charge(d, s))).twin(320),
-    row(479, 10, "shocks that ring and recover in part", Signal(|d, s, _| knocks::lasting_shocks(d, s))).parts(&["bias_step"]).twin(414),
+    row(479, 10, "shocks that ring and recover in part", Signal(|d, s, _| knocks::lasting_shocks(d, s))).parts(&["bias_step", "shock"]).twin(414),
     row(480, 10, "creep by the logarithm of time", Signal(|d, s, _| marks::jolts(d, s))).twin(314),
     row(489, 11, "lorries that sway the ground", Signal(|d, s, _| knocks::lorries(d, s))).parts(&["base_motion"]).twin(413),
     row(525, 12, "drive loop that loses its lock", Signal(|d, s, _| marks::lock(d, s))).twin(320),

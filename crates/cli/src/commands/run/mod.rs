@@ -15,7 +15,9 @@ use diagnosis::DiagnoseOptions;
 use diagnosis::result::Diagnosis;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
-use imu_stand::stand::planted::{Comparison, RULE, compare, planted};
+use imu_stand::stand::planted::{
+    ACCELEROMETERS, Comparison, GYROS, Planted, RULE, compare, planted,
+};
 use imu_stand::stand::{Board, Hidden, Plan, Seeds, Sizes, plan, plan_fitted, run_native};
 use imu_stand::text;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -269,10 +271,17 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
         replicates: arguments.replicates.count(),
         matters: arguments.replicates.matters(),
     };
-    let found = diagnosis::diagnose(&read.record, &options).map_err(super::explain)?;
     let times = record.host_time_s.as_ref();
     let start_s = times.and_then(|times| times.first()).map_or(0.0, |t| *t);
-    let comparison = compare(&planted(&plan.run, start_s), &found.diagnosis);
+    let hidden = planted(&plan.run, start_s);
+    let found = if felt_by_accelerometers(&hidden) {
+        let all = GYROS.into_iter().chain(ACCELEROMETERS).map(str::to_owned);
+        diagnosis::diagnose_channels(&read.record, &all.collect::<Vec<_>>(), &options)
+    } else {
+        diagnosis::diagnose(&read.record, &options)
+    };
+    let found = found.map_err(super::explain)?;
+    let comparison = compare(&hidden, &found.diagnosis);
     if let Some(page) = &arguments.report {
         let hidden = format!("{}\n({RULE}.)", comparison.lines().join("\n"));
         let subject = Subject {
@@ -293,6 +302,12 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
     };
     super::write_json(arguments.json.as_ref(), &answer)?;
     Ok(answer)
+}
+
+/// Whether what is planted shows in the accelerometers, which are diagnosed then.
+fn felt_by_accelerometers(hidden: &[Planted]) -> bool {
+    let felt = |p: &Planted| p.cause == "shock" || p.channels.iter().any(|c| c.starts_with("acc"));
+    hidden.iter().any(felt)
 }
 
 fn seeds(arguments: &Arguments) -> Seeds {

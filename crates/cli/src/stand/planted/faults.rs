@@ -3,7 +3,7 @@
 use bench::{Fault, Run, Scenario};
 
 use super::sampled::{RATE_HZ, folded, lag1_correlation, shared_sigma, tone_gain};
-use super::{GYROS, Planted, Size, motor};
+use super::{ACCELEROMETERS, GYROS, Planted, Size, motor};
 use crate::report::plot::number;
 
 /// In one gyro, with sizes to compare.
@@ -18,8 +18,17 @@ fn in_gyro(gyro: usize, cause: &'static str, what: String, sizes: Vec<Size>) -> 
 }
 
 /// A fault of the bench, as the diagnosis would state it.
-pub(super) fn planted(fault: &Fault, run: &Run, start_s: f64) -> Planted {
+pub(super) fn planted(fault: &Fault, run: &Run, start_s: f64) -> Vec<Planted> {
+    match *fault {
+        Fault::AccReference { share } => by_reference(share, &run.scenario).into(),
+        _ => vec![one(fault, run, start_s)],
+    }
+}
+
+fn one(fault: &Fault, run: &Run, start_s: f64) -> Planted {
     following(fault, run)
+        .or_else(|| in_accelerometers(fault))
+        .or_else(|| knocked(fault, start_s))
         .or_else(|| in_time(fault, start_s))
         .or_else(|| process(fault, &run.scenario))
         .or_else(|| in_the_readings(fault))
@@ -32,6 +41,38 @@ pub(super) fn planted(fault: &Fault, run: &Run, start_s: f64) -> Planted {
         })
 }
 
+/// Standard gravity, m/s^2.
+const STANDARD_GRAVITY: f64 = 9.806_65;
+/// Supply of the accelerometer, V, and its sensitivity there, V/g (MMA7260QT data sheet).
+const ACC_SUPPLY_V: f64 = 3.3;
+const ACC_V_PER_G: f64 = 0.8;
+
+/// What accelerometers make of a reference that takes a share of what the rail changes by: V / reference falls by as much as the
+/// reference rises, in proportion to the voltage of the axis, which is that of zero and of the part of gravity that it feels.
+fn by_reference(share: f64, scenario: &Scenario) -> [Planted; 3] {
+    let [about_x, about_y] = scenario.base.tilt_deg.map(f64::to_radians);
+    let felt = [
+        -about_y.sin() * about_x.cos(),
+        about_x.sin(),
+        about_y.cos() * about_x.cos(),
+    ];
+    std::array::from_fn(|axis| {
+        let volts = 0.5 * ACC_SUPPLY_V + ACC_V_PER_G * felt[axis];
+        let slope = -share * volts / ACC_SUPPLY_V / ACC_V_PER_G * STANDARD_GRAVITY;
+        Planted {
+            what: format!(
+                "the converter's reference takes {} of what the 5-V rail changes by, and {} goes against it",
+                number(share, 3),
+                ACCELEROMETERS[axis]
+            ),
+            cause: "supply_sensitivity",
+            channels: vec![ACCELEROMETERS[axis]],
+            // Zero and sensitivity of a part are off by some percent, and the rail is no small change.
+            sizes: vec![Size::new("slope", slope, "m/s^2/V").within(0.05 * slope.abs())],
+            name_alone: "",
+        }
+    })
+}
 /// Parameters of `cross_axis`.
 const FROM: [&str; 3] = ["from_gyro_x", "from_gyro_y", "from_gyro_z"];
 
@@ -135,8 +176,31 @@ fn following(fault: &Fault, run: &Run) -> Option<Planted> {
     Some(planted)
 }
 
-/// What happens at a time, or with time.
-fn in_time(fault: &Fault, start_s: f64) -> Option<Planted> {
+/// What is in the accelerometers.
+fn in_accelerometers(fault: &Fault) -> Option<Planted> {
+    let planted = match *fault {
+        Fault::AccTempco { axis, g_per_c, .. } => Planted {
+            what: format!(
+                "the zero of {} follows the temperature of its package, {} mg/degC",
+                ACCELEROMETERS[axis],
+                number(1e3 * g_per_c, 3)
+            ),
+            cause: "temperature",
+            channels: vec![ACCELEROMETERS[axis]],
+            // The gyros' thermometers follow the board a little sooner or later than its package.
+            sizes: vec![
+                Size::new("slope", g_per_c * STANDARD_GRAVITY, "m/s^2/degC")
+                    .within(0.05 * (g_per_c * STANDARD_GRAVITY).abs()),
+            ],
+            name_alone: "",
+        },
+        _ => return None,
+    };
+    Some(planted)
+}
+
+/// Blows at the mount and the bench.
+fn knocked(fault: &Fault, start_s: f64) -> Option<Planted> {
     let planted = match *fault {
         Fault::Knock {
             gyro,
@@ -156,6 +220,34 @@ fn in_time(fault: &Fault, start_s: f64) -> Option<Planted> {
                 Size::at("time", time_s - start_s),
             ],
         ),
+        Fault::Bump {
+            axis,
+            time_s,
+            peak_dps,
+            frequency_hz,
+            decay_s,
+            ..
+        } => in_gyro(
+            axis,
+            "shock",
+            format!(
+                "the bench is knocked: the stand rings about {} at {} Hz from {} deg/s on, and is at rest after {} s",
+                &GYROS[axis][5..],
+                number(frequency_hz, 3),
+                number(peak_dps.abs(), 3),
+                number(3.0 * decay_s, 2)
+            ),
+            // How large a reading of it is hangs on the instant of the reading.
+            vec![Size::at("time", time_s - start_s)],
+        ),
+        _ => return None,
+    };
+    Some(planted)
+}
+
+/// What happens at a time, or with time.
+fn in_time(fault: &Fault, start_s: f64) -> Option<Planted> {
+    let planted = match *fault {
         Fault::WarmUp {
             gyro,
             amplitude_dps,

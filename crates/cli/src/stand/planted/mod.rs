@@ -17,6 +17,8 @@ use sampled::RATE_HZ;
 
 /// The gyros of the stand, in their order.
 pub const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
+/// Its accelerometers.
+pub const ACCELEROMETERS: [&str; 3] = ["acc_x", "acc_y", "acc_z"];
 /// Scale errors from here on are planted, 1: five times what the stand's sound parts scatter by (0.004).
 const SCALE_PLANTED: f64 = 0.02;
 /// Half of the interval between two samples, s: nearer no time in a record can be told.
@@ -79,7 +81,7 @@ pub fn planted(run: &Run, start_s: f64) -> Vec<Planted> {
     let mut all: Vec<Planted> = scenario
         .faults
         .iter()
-        .map(|fault| faults::planted(fault, run, start_s))
+        .flat_map(|fault| faults::planted(fault, run, start_s))
         .collect();
     all.extend(in_parts(scenario));
     all

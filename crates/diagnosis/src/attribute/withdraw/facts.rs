@@ -11,7 +11,7 @@ use crate::criticise::follower_shape;
 use crate::criticise::residual::{self, Place, Repeats};
 use crate::fit::channel::{Form, ID, Term};
 use crate::search::searched::Searched;
-use crate::test_level::{CheckId, OMNIBUS_LEVEL, Outcome, RECORD};
+use crate::test_level::{CheckId, Outcome, RECORD, omnibus_level};
 
 /// Share of a term's energy in bands that fail, from which on the failure is the term's.
 const SHARE: f64 = 0.25;
@@ -126,7 +126,7 @@ impl<'a> Facts<'a> {
             places,
             crowds,
             unsteady,
-            repeats: residual::repeats(&s.e).filter(|r| r.chance < OMNIBUS_LEVEL),
+            repeats: residual::repeats(&s.e).filter(|r| r.chance < omnibus_level()),
             bent: 0.0,
             followed: followers(s, &g),
             swing: s.state.terms.iter().find_map(|t| swings_as(s, t)),

@@ -8,6 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
+use crate::test_level::OMNIBUS_LEVEL;
 
 const N: usize = 12_000;
 const RATE_HZ: f64 = 20.0;

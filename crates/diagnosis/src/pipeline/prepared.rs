@@ -1,0 +1,143 @@
+//! A record before the search: audited, on its grid, and without the readings in which the base may have been knocked.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use model::record::rows;
+use model::record::{AnalysisError, Base, Record};
+
+use crate::attribute::masking;
+use crate::audit::{Audit, audit, sign_bit};
+use crate::ingest::blows::{Blow, blows};
+use crate::ingest::dead;
+use crate::ingest::grid::{lay_out, places_of_rows};
+use crate::ingest::lattice;
+use crate::ingest::types::{Grid, Target};
+use crate::result::{Finding, Input};
+use crate::test_level::{Observation, all_worded};
+
+/// What the search needs of a record, and what was seen of it before.
+pub(super) struct Prepared {
+    pub grid: Grid,
+    pub audited: Audit,
+    pub sticking: Vec<Finding>,
+    pub dead: Vec<Observation>,
+    pub input: Input,
+    /// Where the base may have been knocked: those readings are lost on the grid.
+    pub blows: Vec<Blow>,
+    /// What the grid was laid out of, where there are blows.
+    again: Option<Again>,
+}
+
+/// A record and the seed of its grid.
+struct Again {
+    record: Record,
+    seed: u64,
+}
+
+pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisError> {
+    let record = &*rows::in_order(&record);
+    let (record, bursts) = match rows::end_to_end(record) {
+        Some((joined, bursts)) => (Cow::Owned(joined), Some(bursts)),
+        None => (rows::longest_part(record), None),
+    };
+    let record = &*record;
+    let (alive, dead) = dead::left_out(record)?;
+    let counted = lattice::counted(&alive);
+    let (mended, sticking) = sign_bit::mend(&counted);
+    let record = &*mended;
+    let mut audited = audit(record);
+    audited.findings = all_worded(audited.findings);
+    audited.checks = all_worded(audited.checks);
+    audited.unexplained = all_worded(audited.unexplained);
+    audited.not_tested = all_worded(audited.not_tested);
+    // Put right by the sign, but for the readings that lay beyond the bit.
+    for f in &sticking {
+        audited.put_right(f);
+    }
+    let record = &*masking::renumbered(record, &audited);
+    let mut grid = lay_out(record, &|name| audited.masked(name), seed)?;
+    let blows = match bursts {
+        // What breaks off and begins anew at each of them is no blow.
+        Some(_) => vec![],
+        None => knocked(record, &grid, &audited),
+    };
+    grid.bursts = bursts;
+    let input = Input {
+        file: String::new(),
+        seconds: grid.n as f64 / grid.rate_hz,
+        rate_hz: grid.rate_hz,
+        samples: record.len(),
+        channels: record.channels.iter().map(|c| c.name.clone()).collect(),
+        notes: record.notes.clone(),
+    };
+    let mut prepared = Prepared {
+        grid,
+        audited,
+        sticking,
+        dead,
+        input,
+        blows: vec![],
+        again: None,
+    };
+    if !blows.is_empty() {
+        let record = record.clone();
+        prepared.again = Some(Again { record, seed });
+        prepared.leave_out(blows);
+    }
+    Ok(prepared)
+}
+
+/// Where a base at rest may have been knocked.
+fn knocked(record: &Record, grid: &Grid, audited: &Audit) -> Vec<Blow> {
+    if matches!(grid.base, Some(Base::Moving | Base::Turntable)) {
+        return vec![];
+    }
+    let places = places_of_rows(record);
+    // Single far readings may be pieces of a blow; what else is not believed was never measured.
+    let read = |target: &Target| {
+        let mut y = target.y.to_vec();
+        let rows = audited.singles.get(&target.name);
+        let singles: Vec<usize> = rows.into_iter().flatten().map(|r| places[*r]).collect();
+        let back = (target.aside.iter())
+            .filter(|(at, _)| singles.contains(at) || target.spikes.contains(at));
+        back.for_each(|(at, v)| y[*at] = *v);
+        y
+    };
+    let targets: Vec<&Target> = grid.targets.iter().collect();
+    blows(&targets, &read, (&grid.dct, &grid.bins), grid.rate_hz)
+}
+
+impl Prepared {
+    /// The same with only those blows left out that were `borne_out`.
+    pub fn with_those(mut self, borne_out: &[bool]) -> Self {
+        let mut keep = borne_out.iter();
+        let mut blows = std::mem::take(&mut self.blows);
+        blows.retain(|_| keep.next().is_some_and(|k| *k));
+        self.leave_out(blows);
+        self
+    }
+
+    /// Lays the record out without the readings of blows, where there are enough others.
+    fn leave_out(&mut self, blows: Vec<Blow>) {
+        let Some(Again { record, seed }) = &self.again else {
+            return;
+        };
+        let places = places_of_rows(record);
+        let of = |r: &Range<usize>| -> Vec<usize> {
+            (0..places.len())
+                .filter(|i| r.contains(&places[*i]))
+                .collect()
+        };
+        let knocked: Vec<usize> = blows.iter().flat_map(|b| of(&b.readings)).collect();
+        let masked = |name: &str| {
+            let mut rows = [self.audited.masked(name), knocked.clone()].concat();
+            rows.sort_unstable();
+            rows.dedup();
+            rows
+        };
+        if let Ok(grid) = lay_out(record, &masked, *seed) {
+            (self.grid, self.blows) = (grid, blows);
+        }
+    }
+}

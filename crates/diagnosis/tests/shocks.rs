@@ -1,0 +1,351 @@
+//! Shocks hidden in simulated runs of the paper's stand: their shape, place, size and axes are drawn, and what is told of them
+//! is graded by rate. What is like a shock and none has another name, or none. `IMU_STAND_SEED` takes other draws.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+use diagnosis::result::Diagnosis;
+use diagnosis::{DiagnoseOptions, diagnose};
+use model::ModelFile;
+use model::record::{Channel, Record};
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
+const RATE_HZ: f64 = 20.0;
+const SECONDS: f64 = 600.0;
+/// Noise of a reading of the paper's gyro, deg/s: 5.27 deg/sqrt(h) at 20 Hz.
+const SIGMA: f64 = 0.393;
+
+fn draws(of: u64) -> Xoshiro256PlusPlus {
+    let seed = std::env::var("IMU_STAND_SEED");
+    let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_124);
+    println!("seed {seed}");
+    Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(1000) + of)
+}
+
+fn between(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
+    Uniform::new(low, high).map_or(low, |u| u.sample(rng))
+}
+
+fn by_ratio(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
+    between(rng, low.ln(), high.ln()).exp()
+}
+
+/// Adds a signal to a channel, and rounds to its counts as the converter does.
+fn add(record: &mut Record, name: &str, of: impl Fn(f64) -> f64) {
+    let own = |c: &&mut Channel| c.name == name;
+    let channel = record.channels.iter_mut().find(own).expect("a channel");
+    let lsb = channel.lsb.expect("counts");
+    let counts = channel.counts.as_mut().expect("counts");
+    for (i, (v, c)) in channel.values.iter_mut().zip(counts).enumerate() {
+        *c += (of(i as f64 / RATE_HZ) / lsb).round() as i32;
+        *v = f64::from(*c) * lsb;
+    }
+}
+
+fn told(record: &Record) -> Diagnosis {
+    let options = DiagnoseOptions {
+        no_evidence: true,
+        ..DiagnoseOptions::default()
+    };
+    diagnose(record, &options).expect("a diagnosis").diagnosis
+}
+
+/// A stand of other noise each time.
+fn stand(rng: &mut Xoshiro256PlusPlus) -> Record {
+    let mut model = ModelFile::paper();
+    for channel in &mut model.channels {
+        let walk = by_ratio(rng, 3e-4, 7e-3);
+        for (name, value) in [
+            ("rate_random_walk", walk),
+            ("bias", between(rng, -1.0, 1.0)),
+        ] {
+            channel.baseline.get_mut(name).expect("the paper's").value = value;
+        }
+    }
+    let seed = between(rng, 0.0, 1e9) as u64;
+    model::simulate(&model, SECONDS, RATE_HZ, seed).expect("a run")
+}
+
+/// A shape by the time since the shock, and how long it goes on, s.
+type Shape = (&'static str, Box<dyn Fn(f64) -> f64>, f64);
+
+/// Shapes as others make them: half sines, decaying sines, single readings.
+fn shape(kind: usize, rng: &mut Xoshiro256PlusPlus) -> Shape {
+    match kind {
+        0 => {
+            let lasts = by_ratio(rng, 0.16, 0.8);
+            let half = move |t: f64| {
+                if t < lasts {
+                    (PI * t / lasts).sin()
+                } else {
+                    0.0
+                }
+            };
+            ("half sine", Box::new(half), lasts)
+        }
+        1 => {
+            let (hz, fades) = (by_ratio(rng, 0.8, 9.0), by_ratio(rng, 0.08, 0.3));
+            let ring = move |t: f64| (-t / fades).exp() * (TAU * hz * t).sin();
+            ("decaying sine", Box::new(ring), 5.0 * fades)
+        }
+        _ => {
+            let one = |t: f64| f64::from(u8::from(t < 1.0 / RATE_HZ));
+            ("one reading", Box::new(one), 1.0 / RATE_HZ)
+        }
+    }
+}
+
+/// A shock in a record: its name, the axes, and the largest reading on each.
+struct Planted {
+    what: String,
+    peaks: BTreeMap<&'static str, f64>,
+    at: Range<f64>,
+}
+
+/// Plants a shock of that strength, over the noise of all axes that feel it.
+fn plant(
+    record: &mut Record,
+    kind: usize,
+    two: bool,
+    wanted: f64,
+    rng: &mut Xoshiro256PlusPlus,
+) -> Planted {
+    let (what, shape, lasts) = shape(kind, rng);
+    let at = between(rng, 0.05, 0.95) * SECONDS;
+    let first = between(rng, 0.0, 3.0) as usize;
+    let share = between(rng, 0.5, 1.0);
+    let sign = |rng: &mut Xoshiro256PlusPlus| {
+        if between(rng, 0.0, 1.0) < 0.5 {
+            1.0
+        } else {
+            -1.0
+        }
+    };
+    let mut sizes = vec![(first, sign(rng))];
+    if two {
+        sizes.push(((first + 1) % 3, share * sign(rng)));
+    }
+    let since = |t: f64| if t >= at { shape(t - at) } else { 0.0 };
+    let read: Vec<f64> = (0..(SECONDS * RATE_HZ) as usize)
+        .map(|i| since(i as f64 / RATE_HZ))
+        .collect();
+    let energy: f64 = read.iter().map(|v| v * v).sum();
+    let all: f64 = sizes.iter().map(|s| s.1 * s.1).sum();
+    let size = wanted * SIGMA / (energy * all).sqrt();
+    let largest = read
+        .iter()
+        .fold(0.0f64, |m, v| if v.abs() > m.abs() { *v } else { m });
+    let mut peaks = BTreeMap::new();
+    for (axis, by) in sizes {
+        add(record, GYROS[axis], |t| size * by * since(t));
+        peaks.insert(GYROS[axis], size * by * largest);
+    }
+    Planted {
+        what: format!("{what} on {:?} at {at:.2} s, d' {wanted:.1}", peaks.keys()),
+        peaks,
+        at: at..at + lasts,
+    }
+}
+
+fn said(d: &Diagnosis) -> String {
+    let found = d.findings.iter().map(|f| {
+        format!(
+            "{} on {:?} {:?}",
+            f.cause,
+            f.channels,
+            f.parameters.get("time").map(|p| p.value)
+        )
+    });
+    let left = d
+        .unexplained
+        .iter()
+        .map(|u| format!("unexplained {}: {}", u.channel, u.what));
+    found.chain(left).collect::<Vec<_>>().join("; ")
+}
+
+/// At most this chance that a rate as asked gives so few hits.
+fn asked(what: &str, hits: u64, of: u64, rate: f64) {
+    println!("{what}: {hits} of {of}");
+    let chance = 1.0 - numerics::tails::hits_at_least(hits + 1, of, rate);
+    assert!(chance > 1e-3, "{what}: {hits} of {of}, less than {rate}");
+}
+
+#[test]
+fn a_shock_is_named_alone_and_its_sizes_hold() {
+    const RUNS: u64 = 120;
+    let rng = &mut draws(1);
+    let (mut named, mut alone, mut inside, mut sizes) = (0, 0, 0, 0);
+    let (mut times, mut at) = (0, 0);
+    for run in 0..RUNS {
+        let mut record = stand(rng);
+        // One reading of one channel alone is as well a disturbed word.
+        let (kind, two) =
+            [(0, false), (1, false), (0, true), (1, true), (2, true)][run as usize % 5];
+        let wanted = by_ratio(rng, 8.0, 24.0);
+        let planted = plant(&mut record, kind, two, wanted, rng);
+        let d = told(&record);
+        let own = d.findings.iter().find(|f| f.cause == "shock");
+        named += u64::from(own.is_some());
+        let right = own.is_some() && d.findings.len() == 1 && d.unexplained.is_empty();
+        alone += u64::from(right);
+        if !right {
+            println!("{}: {}", planted.what, said(&d));
+        }
+        let Some(f) = own else { continue };
+        for (axis, peak) in &planted.peaks {
+            let of = f.per_channel.get(*axis);
+            let of = of.or_else(|| {
+                f.channels
+                    .iter()
+                    .any(|c| c == axis)
+                    .then_some(&f.parameters)
+            });
+            let Some(p) = of.and_then(|p| p.get("peak")) else {
+                continue;
+            };
+            let error = p.std_error.expect("an error");
+            // The sign of a ring is in its phase.
+            let rings = f.parameters.contains_key("frequency");
+            let peak = if rings { peak.abs() } else { *peak };
+            let off = (p.value - peak) / error;
+            sizes += 1;
+            inside += u64::from(off.abs() < 1.96);
+            if off.abs() >= 1.96 {
+                println!(
+                    "{} {axis}: {:.3} +- {error:.3}, planted {peak:.3}",
+                    planted.what, p.value
+                );
+            }
+        }
+        let begin = &f.parameters["time"];
+        at += 1;
+        times += u64::from(
+            (begin.value - planted.at.start).abs()
+                < 1.96 * begin.std_error.unwrap_or(0.0) + 0.5 / RATE_HZ,
+        );
+    }
+    println!("begin within its interval and half a reading: {times} of {at}");
+    asked("named", named, RUNS, 0.98);
+    asked("alone", alone, RUNS, 0.98);
+    asked(
+        "largest readings within their intervals",
+        inside,
+        sizes,
+        0.93,
+    );
+}
+
+#[test]
+fn a_clean_record_has_none() {
+    const RUNS: u64 = 60;
+    let rng = &mut draws(2);
+    let quiet = (0..RUNS).filter(|_| {
+        let d = told(&stand(rng));
+        let quiet = d.findings.is_empty() && d.unexplained.is_empty();
+        if !quiet {
+            println!("{}", said(&d));
+        }
+        quiet
+    });
+    asked("silent", quiet.count() as u64, RUNS, 0.995);
+}
+
+/// A record in which something is that is no shock.
+fn without_a_shock(
+    what: &str,
+    of: u64,
+    mut change: impl FnMut(&mut Record, &mut Xoshiro256PlusPlus),
+) {
+    const RUNS: u64 = 16;
+    let rng = &mut draws(of);
+    let none = (0..RUNS).filter(|_| {
+        let mut record = stand(rng);
+        change(&mut record, rng);
+        let d = told(&record);
+        let none = d.findings.iter().all(|f| f.cause != "shock");
+        if !none {
+            println!("{what}: {}", said(&d));
+        }
+        none
+    });
+    asked(what, none.count() as u64, RUNS, 0.99);
+}
+
+#[test]
+fn a_step_a_far_reading_and_a_turn_are_no_shocks() {
+    without_a_shock("a step", 3, |record, rng| {
+        let (at, height) = (between(rng, 60.0, 540.0), by_ratio(rng, 0.5, 3.0));
+        add(record, "gyro_x", |t| if t >= at { height } else { 0.0 });
+    });
+    without_a_shock("single far readings", 4, |record, rng| {
+        for _ in 0..5 {
+            let at = between(rng, 0.0, SECONDS);
+            let size = by_ratio(rng, 7.0, 40.0) * SIGMA;
+            add(record, "gyro_y", |t| {
+                if (0.0..1.0 / RATE_HZ).contains(&(t - at)) {
+                    size
+                } else {
+                    0.0
+                }
+            });
+        }
+    });
+    without_a_shock("a turn", 5, |record, rng| {
+        let (at, lasts, peak) = (
+            between(rng, 60.0, 500.0),
+            between(rng, 2.0, 15.0),
+            by_ratio(rng, 2.0, 20.0),
+        );
+        add(record, "gyro_z", |t| {
+            let part = (t - at) / lasts;
+            if (0.0..1.0).contains(&part) {
+                peak * (TAU * part).sin()
+            } else {
+                0.0
+            }
+        });
+    });
+}
+
+#[test]
+fn noise_with_tails_a_loud_stretch_and_levels_are_no_shocks() {
+    without_a_shock("noise with tails", 6, |record, rng| {
+        let tails: Vec<f64> = (0..12_000)
+            .map(|_| {
+                let (e, z): (f64, f64) = (Exp1.sample(rng), StandardNormal.sample(rng));
+                0.8 * SIGMA * e * z
+            })
+            .collect();
+        add(record, "gyro_x", |t| tails[(t * RATE_HZ).round() as usize]);
+    });
+    without_a_shock("a loud stretch", 7, |record, rng| {
+        let (at, lasts) = (between(rng, 60.0, 400.0), between(rng, 3.0, 60.0));
+        let more: Vec<f64> = (0..12_000).map(|_| StandardNormal.sample(rng)).collect();
+        add(record, "gyro_x", |t| {
+            let within = (0.0..lasts).contains(&(t - at));
+            if within {
+                2.5 * SIGMA * more[(t * RATE_HZ).round() as usize]
+            } else {
+                0.0
+            }
+        });
+    });
+    without_a_shock("two levels", 8, |record, rng| {
+        let (mut level, mut left, dwell) = (0.3, 0.0, by_ratio(rng, 2.0, 20.0));
+        let levels: Vec<f64> = (0..12_000)
+            .map(|_| {
+                left -= 1.0 / RATE_HZ;
+                if left <= 0.0 {
+                    let e: f64 = Exp1.sample(rng);
+                    (level, left) = (-level, dwell * e);
+                }
+                level
+            })
+            .collect();
+        add(record, "gyro_y", |t| levels[(t * RATE_HZ).round() as usize]);
+    });
+}
