@@ -57,6 +57,7 @@ fn noise(plan: &Plan, samples: usize) -> Stand {
         walk_of_angle: std::array::from_fn(|i| parts[i].angle_random_walk_deg_sqrt_h),
         walk_of_rate: std::array::from_fn(|i| parts[i].rate_random_walk),
         bias: [0.0; 3],
+        lsb: [campaign::stand::LSB; 3],
         world: World {
             duty: vec![0.0; samples],
             ..World::default()
