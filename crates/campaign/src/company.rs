@@ -305,7 +305,8 @@ pub(crate) fn beside_a_structure(
     let fit = rows(|r| {
         let asked = kind.beside.is_empty() || kind.beside.contains(&r.label);
         let is_it = Some(r.cause) == taken || kind.allowed.contains(&r.cause);
-        asked && !is_it && !r.everywhere && !(taken == Some("line") && r.cause == "am_line")
+        let holds_it = taken == Some("line") && r.cause == "am_line";
+        asked && !(is_it || holds_it || r.everywhere)
     });
     loop {
         let row = fit[draw.of_many(fit.len())];
