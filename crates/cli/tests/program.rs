@@ -625,7 +625,7 @@ fn what_cannot_be_read_is_said_once_and_a_cut_file_by_its_name() {
     assert_eq!(said.matches("No such file").count(), 1, "{said}");
     let is_folder = run(&["analyze", folder.to_str().unwrap()]);
     let said = String::from_utf8_lossy(&is_folder.stderr);
-    assert!(said.contains("name a file in it"), "{said}");
+    assert!(said.contains("name one of its captures"), "{said}");
     // What has nothing to read is not told to record for longer, nor planned by.
     let (none, few) = (folder.join("none.csv"), folder.join("few.csv"));
     std::fs::write(&none, format!("t,gx\n{}", "0,\n".repeat(700))).unwrap();

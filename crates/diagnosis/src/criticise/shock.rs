@@ -13,7 +13,7 @@ use model::effects::shock::LONGEST_S;
 use crate::fit::likelihood::{Bins, Dct};
 use crate::fit::scan::residual;
 use crate::fit::threshold;
-use crate::ingest::blows::{Blow, FELT_SINGLE, Shape, least};
+use crate::ingest::blows::{Blow, Shape, least};
 use crate::search::searched::Searched;
 use crate::test_level::CLAIM_LEVEL;
 use grids::{Known, coordinates, half_sines, rings};
@@ -235,10 +235,11 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
     let wanted = least(threshold::false_alarm(), n, sizes, searched.len())[felt.len() - 1];
     let one = one_reading(&piece, blow, &felt);
     let single = lr - one.iter().sum::<f64>() < COURSE;
-    // One far reading of one channel is its own, whatever the noise of the others does then.
-    let at_once = one
-        .iter()
-        .filter(|lr| **lr > threshold::tail(1, FELT_SINGLE));
+    // One far reading of one channel is its own, whatever the noise of the others does then: the more such readings there are,
+    // the sooner one of another channel meets one of them by chance.
+    let meetings = far_readings(blow, searched) * (searched.len() - 1).max(1);
+    let by_chance = threshold::tail(1, threshold::false_alarm() / meetings as f64);
+    let at_once = one.iter().filter(|lr| **lr > by_chance);
     if lr < wanted || single && at_once.count() < 2 {
         return None;
     }
@@ -259,6 +260,13 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
         felt: felt.iter().map(of).collect(),
         single,
     })
+}
+
+/// Single far readings of a record, that of a blow counted once.
+fn far_readings(blow: &Blow, searched: &[&Searched<'_>]) -> usize {
+    let aside = searched.iter().flat_map(|s| &s.target.aside);
+    let others = aside.filter(|(place, _)| !blow.readings.contains(place));
+    1 + others.count()
 }
 
 /// What the one reading explains on each channel that explains most of all of them.

@@ -28,7 +28,7 @@ const PITCH: f64 = 1.2;
 /// Chance, where it is given, that a channel feels one by its noise: of a shape of several readings, and of a single one, of
 /// which another channel has a fault of its own now and then.
 const FELT: f64 = 1e-2;
-pub(crate) const FELT_SINGLE: f64 = 1e-3;
+const FELT_SINGLE: f64 = 1e-3;
 /// Likelihood ratio by which a shape has to be better than a single reading, where one channel alone feels it.
 const NO_SINGLE: f64 = 12.0;
 /// Most blows in a record, and most places that nearly stand out beside them, with the likelihood ratio that "nearly" allows:

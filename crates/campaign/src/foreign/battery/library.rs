@@ -2,9 +2,10 @@
 //! it would not be foreign.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use diagnosis::likelihood::{Bins, Dct};
-use model::effect::{Column, Effect, Hypothesis, Signal, View};
+use model::effect::{Column, Covariance, Effect, Hypothesis, Peak, Signal, View};
 use model::effects::EFFECTS;
 use model::record::{Axis, Base};
 use numerics::minimise::nelder_mead;
@@ -186,15 +187,15 @@ pub(super) fn of_process(
         let Hypothesis::Covariance(process) = h else {
             continue;
         };
-        let bounds = process.bounds(stand.samples());
-        let white = f64::from(u8::from(!process.filters_white()));
-        let value = |x: &[f64]| {
-            let inside = |(v, (low, high)): (&f64, &(f64, f64))| v.clamp(*low, *high);
-            let theta: Vec<f64> = x[1..].iter().zip(&bounds).map(inside).collect();
-            let density = process.density(&theta, &bins.at);
-            minus_two_l(x[0].min(6.0).exp(), &|b| white + density[b])
-        };
-        for start in process.starts(stand.samples()) {
+        for (process, start) in placed(&process, expected, &count, &bins, stand.samples()) {
+            let bounds = process.bounds(stand.samples());
+            let white = f64::from(u8::from(!process.filters_white()));
+            let value = |x: &[f64]| {
+                let inside = |(v, (low, high)): (&f64, &(f64, f64))| v.clamp(*low, *high);
+                let theta: Vec<f64> = x[1..].iter().zip(&bounds).map(inside).collect();
+                let density = process.density(&theta, &bins.at);
+                minus_two_l(x[0].min(6.0).exp(), &|b| white + density[b])
+            };
             for log_walk in [-16.0, -8.0] {
                 let from = [vec![log_walk], start.clone()].concat();
                 let steps = vec![1.0; from.len()];
@@ -204,6 +205,39 @@ pub(super) fn of_process(
         }
     }
     (baseline - best) / (baseline - truth)
+}
+
+/// A process with each place that its search starts from: a peak where the expected spectrum is highest, narrow and wide, and of each
+/// of its shapes.
+fn placed(
+    process: &Arc<dyn Covariance>,
+    expected: &[f64],
+    count: &[f64],
+    bins: &Bins,
+    samples: usize,
+) -> Vec<(Arc<dyn Covariance>, Vec<f64>)> {
+    if !process.is_peak() {
+        let starts = process.starts(samples).into_iter();
+        return starts.map(|start| (Arc::clone(process), start)).collect();
+    }
+    let slowest = bins.at.omega.iter().position(|w| *w > 0.02).unwrap_or(0);
+    let height = |b: &usize| expected[*b] / count[*b];
+    let highest = (slowest..count.len()).max_by(|a, b| height(a).total_cmp(&height(b)));
+    let Some(at) = highest else { return vec![] };
+    let widths = [0.003, 0.03, 0.1];
+    let located = widths.into_iter().filter_map(|half_width| {
+        process.about(&Peak {
+            omega: bins.at.omega[at],
+            half_width,
+            variance: (height(&at) * half_width).max(1e-4),
+        })
+    });
+    located
+        .flat_map(|(of, start)| {
+            let shapes = [vec![Arc::clone(&of)], of.variants()].concat();
+            shapes.into_iter().map(move |shape| (shape, start.clone()))
+        })
+        .collect()
 }
 
 /// Minus twice the log likelihood of a spectrum under itself.
