@@ -170,8 +170,9 @@ fn hold_foreign(kind: &str) {
         let described = drawn.described(kind == "couplings");
         assert!(!described.is_empty(), "nothing to hold {}", effect.name);
         let by_later = |id: &str| effect.later.is_some_and(|later| id.contains(later));
-        // A tone that wanders is asked of no signal here: it has no columns and no density of its own.
-        let asked = described.iter().any(|(id, _)| by_later(id));
+        // A tone that wanders has neither columns nor a density to be weighed by: it describes nothing here.
+        let weighed = |(id, share): &(String, f64)| effect.later == Some(id) && *share > 0.0;
+        let asked = described.iter().any(weighed);
         let (later, mut wrong): (Vec<_>, Vec<_>) = described
             .into_iter()
             .filter(|(_, share)| *share >= DESCRIBED || share.is_nan())

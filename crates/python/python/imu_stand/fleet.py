@@ -82,10 +82,13 @@ def _of_channel(capture, name: str, result: dict, bias: dict) -> dict:
     model = result["extended"].get(name) or result["baseline"].get(name) or {}
     held = (result.get("replicates") or {}).get(name) or {}
     chance = lambda when: math.nan if when not in held else float(held[when]["p_value"])
-    # Angles of different causes are taken for independent.
-    angle = lambda span: math.sqrt(
-        sum(float(((f.get("consequence") or {}).get("angle_rms_deg") or {}).get(span) or 0.0) ** 2 for f in own)
-    )
+
+    def angle(span: str) -> float:
+        """Angles of different causes are taken for independent; NaN where none of them is known."""
+        all_of = [((f.get("consequence") or {}).get("angle_rms_deg") or {}).get(span) for f in own]
+        known = [float(a) for a in all_of if a is not None]
+        return math.sqrt(sum(a * a for a in known)) if known or not own else math.nan
+
     told = [
         {
             "cause": f["cause"],

@@ -5,7 +5,7 @@ use model::effect::{Hypothesis, VarianceLaw};
 use model::effects::EFFECTS;
 
 use super::super::known::{of_law, of_steps, refitted};
-use super::library::{best_process, hypotheses, spectrum};
+use super::library::{Kind, best_process, hypotheses, spectrum};
 use crate::stand::Stand;
 use crate::strength::{Meter, of_variance};
 
@@ -88,7 +88,7 @@ pub(super) fn of_processes(
         density[b] = own;
         expected[b] = (expected[b] + count[b] * own).max(1e-9 * expected[b]);
     }
-    let (id, share) = best_process(stand, axis, &expected);
+    let (id, share) = best_process(stand, axis, &expected, Kind::Noise);
     // Of what changes through the run a process has the mean spectrum alone.
     let of_mean = Meter::new(stand, axis).of_density(&density).powi(2);
     (id, share * of_mean / gain)

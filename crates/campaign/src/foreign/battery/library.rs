@@ -151,6 +151,15 @@ fn strongest_line(stand: &Stand, axis: usize, signal: &[f64]) -> [Vec<f64>; 2] {
         .expect("there are tries")
 }
 
+/// What an expected spectrum is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// A noise.
+    Noise,
+    /// A signal: a mode that noise drives may have its spectrum, and has another envelope. No peak is placed in it.
+    Signal,
+}
+
 /// Share of the gain of an expected spectrum that the best process of an effect describes, random walk and white noise
 /// refitted. `truth` is minus twice the log likelihood of what there is.
 pub(super) fn of_process(
@@ -159,6 +168,7 @@ pub(super) fn of_process(
     expected: &[f64],
     truth: f64,
     effect: &dyn Effect,
+    kind: Kind,
 ) -> f64 {
     let bins = Bins::new(stand.samples());
     let ones = vec![1.0; stand.samples()];
@@ -187,7 +197,14 @@ pub(super) fn of_process(
         let Hypothesis::Covariance(process) = h else {
             continue;
         };
-        for (process, start) in placed(&process, expected, &count, &bins, stand.samples()) {
+        let samples = stand.samples();
+        let starts = if process.is_peak() && kind == Kind::Noise {
+            placed(&process, expected, &count, &bins)
+        } else {
+            let starts = process.starts(samples).into_iter();
+            starts.map(|s| (Arc::clone(&process), s)).collect()
+        };
+        for (process, start) in starts {
             let bounds = process.bounds(stand.samples());
             let white = f64::from(u8::from(!process.filters_white()));
             let value = |x: &[f64]| {
@@ -207,19 +224,14 @@ pub(super) fn of_process(
     (baseline - best) / (baseline - truth)
 }
 
-/// A process with each place that its search starts from: a peak where the expected spectrum is highest, narrow and wide, and of each
-/// of its shapes.
+/// A peak with each place that its search starts from: where the expected spectrum is highest, narrow and wide, and of each of its
+/// shapes.
 fn placed(
     process: &Arc<dyn Covariance>,
     expected: &[f64],
     count: &[f64],
     bins: &Bins,
-    samples: usize,
 ) -> Vec<(Arc<dyn Covariance>, Vec<f64>)> {
-    if !process.is_peak() {
-        let starts = process.starts(samples).into_iter();
-        return starts.map(|start| (Arc::clone(process), start)).collect();
-    }
     let slowest = bins.at.omega.iter().position(|w| *w > 0.02).unwrap_or(0);
     let height = |b: &usize| expected[*b] / count[*b];
     let highest = (slowest..count.len()).max_by(|a, b| height(a).total_cmp(&height(b)));
@@ -283,7 +295,10 @@ pub(super) fn of_all(stand: &Stand, axis: usize, signal: &[f64]) -> Vec<(&'stati
             let described = columns(*effect, stand, axis)
                 .iter()
                 .map(|set| 1.0 - meter.of_signal(&left(set)).powi(2) / whole)
-                .fold(of_process(stand, axis, &expected, own, *effect), f64::max);
+                .fold(
+                    of_process(stand, axis, &expected, own, *effect, Kind::Signal),
+                    f64::max,
+                );
             (effect.id(), described)
         })
         .collect();
@@ -349,7 +364,7 @@ pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> OfTwo {
         if turn == 0 {
             // Beside the first a process may take more than a second regression.
             let expected = spectrum(stand, axis, &|_| 1.0, &meter.energy(&rest));
-            let (id, process) = best_process(stand, axis, &expected);
+            let (id, process) = best_process(stand, axis, &expected, Kind::Signal);
             with_process = (id, 1.0 - gain(&rest) / whole * (1.0 - process));
         }
     }
@@ -361,11 +376,16 @@ pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> OfTwo {
 }
 
 /// The process of the library that describes most of an expected spectrum, with the share of its gain.
-pub(super) fn best_process(stand: &Stand, axis: usize, expected: &[f64]) -> (&'static str, f64) {
+pub(super) fn best_process(
+    stand: &Stand,
+    axis: usize,
+    expected: &[f64],
+    kind: Kind,
+) -> (&'static str, f64) {
     let own = saturated(stand, expected);
     EFFECTS
         .iter()
-        .map(|e| (e.id(), of_process(stand, axis, expected, own, *e)))
+        .map(|e| (e.id(), of_process(stand, axis, expected, own, *e, kind)))
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .expect("the library has processes")
 }
