@@ -398,14 +398,19 @@ fn a_sticking_bit_is_named() {
 #[test]
 fn uneven_sampling_is_measured() {
     let mut rng = rng(67);
-    let mut r = record(PLAIN, &mut rng);
-    let late = Normal::new(0.0, 100.0).unwrap();
-    for t in r.t_ticks.as_mut().unwrap() {
-        *t = t.saturating_add_signed(late.sample(&mut rng) as i64);
+    // A fiftieth of the period, and a quarter of it, of which one step in twenty is off by half a period.
+    for ticks in [100.0, 3_125.0] {
+        let mut r = record(PLAIN, &mut rng);
+        let late = Normal::new(0.0, ticks).unwrap();
+        for t in r.t_ticks.as_mut().unwrap() {
+            *t = t.saturating_add_signed(late.sample(&mut rng) as i64);
+        }
+        let a = audit(&r);
+        assert_eq!(causes(&a), ["timestamp_jitter gyro_x,gyro_y,gyro_z"]);
+        let sigma = parameter(&a, "sigma");
+        let truth = 4e-6 * ticks;
+        assert!((sigma - truth).abs() < 0.05 * truth, "{sigma}, {truth}");
     }
-    let a = audit(&r);
-    assert_eq!(causes(&a), ["timestamp_jitter gyro_x,gyro_y,gyro_z"]);
-    assert!((parameter(&a, "sigma") - 400e-6).abs() < 20e-6);
 }
 
 #[test]

@@ -50,10 +50,10 @@ fn jitter(record: &Record, device: &[f64], tick_s: f64, names: &[String], audit:
         .map(|i| device[i] - device[i - 1])
         .collect();
     let period = median(&single);
-    // Lost frames are another matter.
+    // Lost frames are another matter: their numbers tell of them, or else a step that is off by half.
     let single: Vec<f64> = single
         .into_iter()
-        .filter(|d| (d - period).abs() < 0.5 * period)
+        .filter(|d| seq.is_some() || (d - period).abs() < 0.5 * period)
         .collect();
     if single.len() < 100 {
         return;

@@ -276,8 +276,8 @@ fn added_by_counts(model: &mut ModelFile, channel: &ChannelModel, lost: f64) -> 
     told.then(|| (mean(&with) - mean(&without), factor))
 }
 
-/// Gives far readings their sides and their size: the root of the mean square of how far they lie from what the model expects there, less that
-/// of the noise.
+/// Gives far readings their sides, their size (the root of the mean square of how far they lie from what the model expects
+/// there) and its spread, both less what the noise adds.
 pub(crate) fn size_outliers(findings: &mut [Finding], searched: &[Searched<'_>]) {
     for f in findings.iter_mut().filter(|f| f.cause == "outliers") {
         let own = searched
@@ -290,17 +290,37 @@ pub(crate) fn size_outliers(findings: &mut [Finding], searched: &[Searched<'_>])
         if sizes.is_empty() {
             continue;
         }
-        let count = sizes.len() as f64;
-        let square = sizes.iter().map(|v| v * v).sum::<f64>() / count;
-        let white = s.state.solution.white;
-        let size = (square - white).max(0.0).sqrt();
-        let size = Parameter::estimated(size, (white / count).sqrt(), &s.target.unit);
-        f.parameters.insert("size".into(), size);
-        let above = sizes.iter().filter(|v| **v > 0.0).count() as f64 / count;
-        let error = (above * (1.0 - above) / count).sqrt();
-        let above = Parameter::estimated(above, error, "1");
-        f.parameters.insert("upward".into(), above);
+        let unit = &s.target.unit;
+        f.parameters
+            .extend(far_readings(&sizes, s.state.solution.white, unit));
     }
+}
+
+/// The parameters of readings that lie `sizes` off in white noise of variance `white`.
+fn far_readings(sizes: &[f64], white: f64, unit: &str) -> Parameters {
+    let count = sizes.len() as f64;
+    let mean = |of: &dyn Fn(f64) -> f64| sizes.iter().map(|v| of(*v)).sum::<f64>() / count;
+    let square = mean(&|v| v * v);
+    let size = (square - white).max(0.0).sqrt();
+    let above = mean(&|v| f64::from(u8::from(v > 0.0)));
+    let side_error = (above * (1.0 - above) / count).sqrt();
+    let named = |name: &str, value, error, unit: &str| {
+        (name.to_owned(), Parameter::estimated(value, error, unit))
+    };
+    let mut parameters: Parameters = [named("upward", above, side_error, "1")].into();
+    let mut size_error = (white / count).sqrt();
+    let free = count - 1.0;
+    if free > 0.0 {
+        // The distances of others of the kind vary by the spread and by the noise.
+        let about = mean(&|v| v.abs());
+        let variance = mean(&|v| (v.abs() - about).powi(2)) * count / free;
+        size_error = size_error.max((variance / count).sqrt());
+        let spread = (variance - white).max(0.0).sqrt().min(size);
+        let error = (variance.max(white) / (2.0 * free)).sqrt();
+        parameters.extend([named("spread", spread, error, unit)]);
+    }
+    parameters.extend([named("size", size, size_error, unit)]);
+    parameters
 }
 
 /// The effects of the extended model: the causes, and what stands for the unexplained in it.

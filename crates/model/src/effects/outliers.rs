@@ -1,6 +1,6 @@
 //! Single samples far off.
 
-use rand_distr::{Distribution, Uniform};
+use rand_distr::{Distribution, Gamma, Uniform};
 
 use crate::effect::{
     Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
@@ -34,6 +34,11 @@ impl Effect for Outliers {
                 "upward",
                 "1",
                 "share of them that lie above the truth; to either side in turn where it is left out",
+            ),
+            optional(
+                "spread",
+                "deg/s",
+                "standard deviation of their distances; all lie equally far where it is left out",
             ),
         ];
         PARAMETERS
@@ -83,13 +88,51 @@ impl Effect for Outliers {
                 .get("size")
                 .map_or(10.0 * simulation.white_sigma[axis], |p| p.value);
             let upward = parameters.get("upward").map_or(0.5, |p| p.value);
+            let spread = parameters.get("spread").map_or(0.0, |p| p.value);
+            let distances = distances(size, spread);
             // Of the first k, the whole number next below k + 1/2 of that share.
             let above = |k: usize| (k as f64 * upward + 0.5).floor();
             for k in 0..count {
                 let i = at.sample(&mut simulation.rng);
                 let up = above(k + 1) > above(k);
-                simulation.white[axis][i] += if up { size } else { -size };
+                let far = (distances.as_ref()).map_or(size, |d| d.sample(&mut simulation.rng));
+                simulation.white[axis][i] += if up { far } else { -far };
             }
         }
+    }
+}
+
+/// The law of distances of root mean square `size` and standard deviation `spread`: a gamma law, which has no value below
+/// zero. None where all are the same, or no law of distances has such a spread.
+fn distances(size: f64, spread: f64) -> Option<Gamma<f64>> {
+    let mean = (size * size - spread * spread).sqrt();
+    Gamma::new((mean / spread).powi(2), spread * spread / mean).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_core::SeedableRng;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    #[test]
+    fn distances_have_the_size_and_the_spread_that_are_given() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+        let law = distances(5.0, 1.5).expect("a law");
+        let drawn: Vec<f64> = (0..40_000).map(|_| law.sample(&mut rng)).collect();
+        let count = drawn.len() as f64;
+        let mean = drawn.iter().sum::<f64>() / count;
+        let square = drawn.iter().map(|d| d * d).sum::<f64>() / count;
+        // Five standard errors: of a mean square of kurtosis below 4, and of a spread.
+        assert!((square.sqrt() - 5.0).abs() < 0.04, "{}", square.sqrt());
+        let spread = (square - mean * mean).sqrt();
+        assert!((spread - 1.5).abs() < 0.03, "{spread}");
+    }
+
+    #[test]
+    fn without_a_spread_all_lie_equally_far() {
+        assert!(distances(5.0, 0.0).is_none());
+        assert!(distances(5.0, 6.0).is_none());
     }
 }
