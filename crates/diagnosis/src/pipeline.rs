@@ -8,6 +8,7 @@
 //! | [`name_channel`] | a channel, its checks | findings, and names withdrawn |
 //! | [`concluded`] | all of that | the lists of the diagnosis |
 
+mod at_rest;
 mod banks;
 mod channel;
 mod concluded;
@@ -105,6 +106,7 @@ pub fn diagnose_owned(
 }
 
 fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
+    let at_rest = at_rest::believed(&mut of.grid);
     set_aside_wild(&mut of.grid, &of.audited);
     let search = |t| channel::searched(&of.grid, t);
     let mut searched: Vec<Searched<'_>> = of.grid.targets.iter().map(search).collect();
@@ -142,6 +144,7 @@ fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     input.notes.append(&mut audited.notes);
     input.file.clone_from(&options.file);
     let mut told = concluded(&searched, tested, audited, dead, named);
+    at_rest::with_motion(&mut told.findings, &at_rest);
     gain::complete(&mut told.findings, &searched, grid, &mended);
     let HandedOver {
         mut baseline_model,

@@ -257,3 +257,83 @@ fn a_shove_keeps_its_name_with_a_little_wobble_or_without() {
         });
     }
 }
+
+/// Rates that wander through filters of one pole each, deg/s rms.
+fn wander(draw: &mut Draw, rms: f64, times_s: &[f64]) -> Vec<f64> {
+    let mut rates: Vec<f64> = (0..SAMPLES).map(|_| draw.normal()).collect();
+    for time_s in times_s {
+        let fades = (-1.0 / (time_s * RATE_HZ)).exp();
+        let mut last = 0.0;
+        for v in &mut rates {
+            last = fades * last + *v;
+            *v = last;
+        }
+    }
+    let square = rates.iter().map(|v| v * v).sum::<f64>() / SAMPLES as f64;
+    rates.iter_mut().for_each(|v| *v *= rms / square.sqrt());
+    rates
+}
+
+/// Whether the axis has this cause alone.
+fn of_the_sensor(d: &Diagnosis, cause: &str) -> Result<(), String> {
+    let own = d.findings.iter();
+    let own = own.filter(|f| f.channels.iter().any(|c| c == "gyro_x"));
+    let causes: Vec<&str> = own.map(|f| f.cause.as_str()).collect();
+    if causes == [cause] {
+        return Ok(());
+    }
+    said(d)
+}
+
+#[test]
+fn a_jump_that_a_base_might_make_has_its_motion_for_a_rival() {
+    let mut added = vec![0.0; SAMPLES];
+    added[5_000..].fill(8.0);
+    let d = told(172, None, &added);
+    let rivals: Vec<&str> = (d.findings.iter())
+        .filter(|f| f.cause == "bias_step")
+        .flat_map(|f| f.alternatives.iter().map(|a| a.cause.as_str()))
+        .collect();
+    assert_eq!(rivals, ["base_motion"], "{:?}", said(&d));
+}
+
+#[test]
+fn what_jumps_or_has_no_slope_on_a_base_at_rest_is_the_sensors_however_large() {
+    graded("a large jump", 168, |seed, draw| {
+        let at = draw.between(1000.0, 11_000.0) as usize;
+        let height = draw.sign() * draw.by_ratio(1.0, 10.0);
+        let mut added = vec![0.0; SAMPLES];
+        added[at..].fill(height);
+        of_the_sensor(&told(seed, None, &added), "bias_step")
+    });
+    graded("a large process of one pole", 169, |seed, draw| {
+        let (rms, time_s) = (draw.by_ratio(0.5, 2.0), draw.by_ratio(0.7, 5.0));
+        let added = wander(draw, rms, &[time_s]);
+        of_the_sensor(&told(seed, None, &added), "gauss_markov")
+    });
+}
+
+#[test]
+fn what_turns_with_a_slope_is_the_base_whatever_its_operator_says() {
+    let moved = |d: &Diagnosis| match named(d) == ["base_motion"] {
+        true => Ok(()),
+        false => said(d),
+    };
+    graded("a base that wanders", 170, |seed, draw| {
+        let times_s = [draw.by_ratio(0.5, 4.0), draw.by_ratio(0.15, 0.8)];
+        let rms = draw.by_ratio(0.8, 4.0);
+        let added = wander(draw, rms, &times_s);
+        moved(&told(seed, None, &added))
+    });
+    graded("a base that is turned on and on", 171, |seed, draw| {
+        let (rate, ramp_s) = (draw.by_ratio(2.0, 8.0), draw.between(0.3, 1.5));
+        let (turns_s, rests_s) = (draw.between(10.0, 40.0), draw.between(5.0, 40.0));
+        let added: Vec<f64> = (0..SAMPLES)
+            .map(|i| {
+                let t = (i as f64 / RATE_HZ) % (turns_s + rests_s);
+                rate * (t / ramp_s).min((turns_s - t) / ramp_s).clamp(0.0, 1.0)
+            })
+            .collect();
+        moved(&told(seed, None, &added))
+    });
+}

@@ -24,11 +24,12 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use imu_stand::capture::{Read, corrected, joined, read_from, unpacked};
 use imu_stand::link::{DEFAULT_BAUD, Link};
 use imu_stand::{CaptureError, ColumnMapping, ReadOptions, read_capture};
 use miette::{IntoDiagnostic, Result, WrapErr};
+use model::record::Base;
 use sha2::{Digest, Sha256};
 
 pub use imu_stand::explain::explain;
@@ -52,12 +53,36 @@ pub struct Input {
     /// Which topic of a log (MCAP, ROS bag, ULog) that has several IMUs
     #[arg(long, value_name = "NAME")]
     topic: Option<String>,
+    /// What the base under the sensor did, where the file does not say or is wrong
+    #[arg(long, value_enum)]
+    base: Option<BaseName>,
     /// Take the rates that the board has corrected, in place of those that it read
     #[arg(long)]
     corrected: bool,
     /// Print nothing but errors
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// What the base does, as people write it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BaseName {
+    /// At rest, the table too
+    Static,
+    /// Moved by something else than our motor
+    Moving,
+    /// Our motor turns the table
+    Turntable,
+}
+
+impl From<BaseName> for Base {
+    fn from(name: BaseName) -> Self {
+        match name {
+            BaseName::Static => Self::Static,
+            BaseName::Moving => Self::Moving,
+            BaseName::Turntable => Self::Turntable,
+        }
+    }
 }
 
 /// Simulations that the record is held against; the same for every command that diagnoses.
@@ -133,7 +158,7 @@ impl Input {
             }),
             false => Ok(read),
         });
-        let read = read.map_err(|error| {
+        let mut read = read.map_err(|error| {
             let error = match error {
                 CaptureError::Io { path, source } => return unreadable(&path, &source),
                 error => error,
@@ -158,6 +183,9 @@ impl Input {
                 report.wrap_err(format!("cannot read {name}"))
             }
         })?;
+        if let Some(base) = self.base {
+            read.record.header.base = Some(base.into());
+        }
         if read.skipped > 0 {
             warn!(
                 "{}: rows that cannot be read and are left out: {}",

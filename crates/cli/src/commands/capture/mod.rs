@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use imu_stand::RecordBuilder;
 use imu_stand::capture::{Calibration, DIGITS, Live, heal, last_part, part_name, raw_path};
 use imu_stand::link::{Change, Feed, Link, Motor};
@@ -22,8 +22,8 @@ use model::record::Base;
 use serde::Serialize;
 use wire::{Frame, Hello, Sample};
 
-use super::Line;
 use super::board::motor::Drive;
+use super::{BaseName, Line};
 use losses::{Apart, Holes, Lost};
 use raw::Raw;
 use rotate::Rotate;
@@ -63,24 +63,11 @@ pub struct Arguments {
     quiet: bool,
 }
 
-/// What the base does, as people write it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum BaseName {
-    /// At rest, the table too
-    Static,
-    /// Moved by something else than our motor
-    Moving,
-    /// Our motor turns the table
-    Turntable,
-}
-
 impl Arguments {
     /// What a board's hello frame says, what the base does, and whether the board corrects its rates.
     fn calibration(&self, hello: Option<&Hello>, corrected: bool) -> Calibration {
         let base = match self.base {
-            Some(BaseName::Static) => Base::Static,
-            Some(BaseName::Moving) => Base::Moving,
-            Some(BaseName::Turntable) => Base::Turntable,
+            Some(base) => base.into(),
             None if self.drive.command().is_some() => Base::Turntable,
             None => Base::Static,
         };
