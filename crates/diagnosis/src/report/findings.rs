@@ -298,12 +298,7 @@ pub(crate) fn motion_findings(
     if s.target.moving && grid.base != Some(Base::Turntable) {
         let peak = peak_rate(&grid.dct, &s.target.y, s.target.white, grid.rate_hz);
         let rms = s.target.motion_rms;
-        let unsaid = match grid.base {
-            None => "; where it was at rest, say so (`--base static`), and the sensor is searched",
-            _ => "",
-        };
-        let what =
-            format!("moves about {name}: {rms:.2} deg/s rms between 0.02 and 0.6 Hz{unsaid}");
+        let what = format!("moves about {name}: {rms:.2} deg/s rms between 0.02 and 0.6 Hz");
         all.push(finding(peak, vec![], what));
     }
     (all, told)

@@ -48,7 +48,7 @@ impl Effect for BaseMotion {
             physics: "True rotation of the base: no error of the sensor. It is reported as an input, and slow causes of that axis are not tested; a turn of seconds is left out on all axes, and the rest is searched.",
             excitation: "Motion.",
             test: "Excess rms between 0.02 and 0.6 Hz above 0.3 deg/s, more than any bias of this class of part can wander, unless the record says that the base was at rest (`base: static`) and noise, jumps and processes without a slope describe it to the last test; or, in a record at rest, rates of more than 1 deg/s that come smoothly and are gone within 30 s.",
-            remedy: "Put the stand on a base that does not move, or record the motion with a reference and feed it to the simulation as an input.",
+            remedy: "Put the stand on a base that does not move, or record the motion with a reference and feed it to the simulation as an input. Where the base stood still, say so: --base static.",
             figure: "The rate in time blocks.",
             example: Example::new(
                 Plot::RateInTime { block_s: 2.0 },
