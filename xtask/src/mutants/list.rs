@@ -13,7 +13,12 @@ const PACKAGES: [(&str, &str); 5] = [
     ("bench", "crates/bench/"),
 ];
 /// What the host does not compile, or only with the simulated chip.
-const NOT_HERE: [&str; 4] = ["src/main.rs", "src/avr/**", "crates/bench/src/simavr.rs", "crates/bench/src/simavr/**"];
+const NOT_HERE: [&str; 4] = [
+    "src/main.rs",
+    "src/avr/**",
+    "crates/bench/src/simavr.rs",
+    "crates/bench/src/simavr/**",
+];
 
 /// A change of one file.
 #[derive(Clone, Debug, PartialEq, Eq)]

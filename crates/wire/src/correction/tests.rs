@@ -11,6 +11,7 @@ fn what_is_stored_is_within_half_a_step_of_what_was_meant() {
         bias: [1.234_567, -31.9, 1e-6],
         temperature: [0.03, -0.0312, 1e-5],
         motor: [0.4 / 255.0, -3.9 / 255.0, 0.0],
+        motor_turning: [0.25, -3.9, 0.0],
         matrix: [[0.01, 0.124, -0.03], [0.0; 3], [-0.02, 0.0, 0.001]],
         noise: [0.0096, 0.2, 1e-4],
         walk: [8e-7, 2e-5, 0.0],
@@ -48,7 +49,7 @@ fn what_does_not_fit_is_refused_by_name() {
         ..Correction::default()
     };
     let error = too_much.numbers().unwrap_err();
-    assert_eq!(error.place, 16);
+    assert_eq!(error.place, 17);
     assert_eq!(
         std::string::ToString::to_string(&error),
         "temperature of gyro y: 0.040000 deg/s/count is outside what the board holds, 0.031249"
