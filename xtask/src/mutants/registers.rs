@@ -2,14 +2,10 @@
 //! of `hil-tests` that is there to notice it.
 
 use std::path::Path;
-use std::time::Duration;
 
 use super::tree::Tree;
 use crate::image;
 use crate::step::{Failure, Pace};
-
-/// Longest time of a test program with an image that it does not end with.
-const PATIENCE: Duration = Duration::from_secs(600);
 
 /// A fault to be planted.
 struct Planted {
@@ -137,7 +133,10 @@ pub fn hunt(root: &Path, word: Option<&str>) -> Result<(), Failure> {
         let by = tree.changed(
             one.file,
             |text| (text.matches(one.was).count() == 1).then(|| text.replace(one.was, one.becomes)),
-            || noticed(root, &tree, one.test),
+            || {
+                let built = image::build(tree.root(), &mut Pace::Rarer(0))?;
+                tree.test_image(&built.elf, one.test)
+            },
         )?;
         match by {
             Some(by) => {
@@ -158,18 +157,6 @@ pub fn hunt(root: &Path, word: Option<&str>) -> Result<(), Failure> {
         &format!("not noticed: {}", survived.join("; ")),
         "write the test that each of them asks for",
     ))
-}
-
-/// Builds the image of the changed tree; the test that fails on it.
-fn noticed(root: &Path, tree: &Tree, test: &str) -> Result<Option<String>, Failure> {
-    let elf = image::build(tree.root(), &mut Pace::Rarer(0))?.elf;
-    let mut command = crate::cargo(
-        root,
-        &["test", "--quiet", "-p", "hil-tests", "--test", test],
-    );
-    command.env("IMU_STAND_IMAGE", elf);
-    let ended = tree.watch(&mut command, PATIENCE)?;
-    Ok((!ended.passed).then_some(ended.by))
 }
 
 #[cfg(test)]

@@ -161,9 +161,7 @@ impl Loop<'_> {
         drop(link);
         self.write(&mut taken, 1, mark)?;
         let known = match &scenarios {
-            Some((board, _, two)) => {
-                Some(self.known(board, &second, two, &model, seeds.stand)?)
-            }
+            Some((board, _, two)) => Some(self.known(board, &second, two, &model, seeds.stand)?),
             None => None,
         };
         let noise = model_noise(&model, &proposed);
