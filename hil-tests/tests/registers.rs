@@ -114,17 +114,23 @@ fn the_line_takes_another_speed_behind_the_last_stop_bit() {
     let mut simulated = Simulated::new(&image(), &scenario, NoProbe).expect("an image");
     let rng = &mut generator(seed());
     let mut heard = Heard::default();
-    let (mut t, mut asked) = (1.0, 0);
+    let (mut t, mut asked) = (1.0, 0u16);
+    // From 3 860 to 250 000 Bd; 259 has a high byte.
+    let divisors = [25, 12, 3, 259];
     while t < 16.0 {
         simulated
             .run_until(t, &mut |byte| heard.push(byte))
             .expect("it runs");
+        if let Some(before) = asked.checked_sub(1) {
+            let divisor = divisors[usize::from(before % 4)];
+            let bit = 16 * (u64::from(divisor) + 1);
+            assert_eq!(simulated.mcu().uart_bit_cycles(), bit, "divisor {divisor}");
+        }
         // What goes out then is a reply, or a reply behind a health frame.
         if asked % 2 == 1 {
             simulated.request(&[at(t, 100 + asked, Command::Counters)]);
         }
-        // From 3 860 to 250 000 Bd; 259 has a high byte.
-        let divisor = [25, 12, 3, 259][usize::from(asked % 4)];
+        let divisor = divisors[usize::from(asked % 4)];
         simulated.request(&[at(t, asked, Command::SetBaud { divisor })]);
         asked += 1;
         t += bench::uniform(rng, 0.5, 0.6);

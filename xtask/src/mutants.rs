@@ -77,7 +77,7 @@ pub fn hunt(root: &Path, arguments: &[String]) -> Result<(), Failure> {
     let seed = (asked.seed).unwrap_or_else(|| clock.map_or(0, |time| time.as_secs()));
     let drawn = draw(all.clone(), seed, asked.count.unwrap_or(COUNT));
     println!("--seed {seed}: {} of {} mutants", drawn.len(), all.len());
-    let tree = Tree::copy(root)?;
+    let tree = Tree::copy(root, "code")?;
     let mut packages: Vec<&str> = drawn.iter().map(|mutant| mutant.package).collect();
     packages.sort_unstable();
     packages.dedup();

@@ -70,11 +70,12 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// Copies what git knows or would take, as it lies in the working tree.
-    pub fn copy(root: &Path) -> Result<Self, Failure> {
+    /// Copies what git knows or would take, as it lies in the working tree, to a folder of this name: two runs that go on at the
+    /// same time need two.
+    pub fn copy(root: &Path, name: &str) -> Result<Self, Failure> {
         let tree = Self {
             origin: root.to_owned(),
-            root: root.join("target/mutants/tree"),
+            root: root.join("target/mutants").join(name),
             target: root.join("target/mutants/build"),
         };
         let output = Command::new("git")
@@ -172,6 +173,13 @@ impl Tree {
     /// The test of a program of `hil-tests`, as it is in the working tree, that fails with an image.
     pub fn test_image(&self, elf: &Path, program: &str) -> Result<Option<String>, Failure> {
         let arguments = ["test", "--quiet", "-p", "hil-tests", "--test", program];
+        let mut build = crate::cargo(&self.origin, &arguments);
+        if !self.watch(build.arg("--no-run"), DEADLINE)?.passed {
+            return Err(Failure::new(
+                &format!("hil-tests/tests/{program}.rs does not compile"),
+                "a test that is no program notices nothing: mend it first",
+            ));
+        }
         let mut command = crate::cargo(&self.origin, &arguments);
         command.env("IMU_STAND_IMAGE", elf);
         let ended = self.watch(&mut command, PATIENCE)?;
@@ -195,7 +203,7 @@ impl Tree {
 
     /// Runs tests until they end, or are taken to hang.
     fn watch(&self, command: &mut Command, patience: Duration) -> Result<Ended, Failure> {
-        let log = self.target.with_extension("log");
+        let log = self.root.with_extension("log");
         let file = std::fs::File::create(&log).and_then(|file| Ok((file.try_clone()?, file)));
         let (out, err) = file.map_err(|error| {
             Failure::new(&format!("{}: {error}", log.display()), "make room for it")
