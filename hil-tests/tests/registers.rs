@@ -147,6 +147,37 @@ fn the_line_takes_another_speed_behind_the_last_stop_bit() {
     }
 }
 
+/// Bursts of eight bytes at 500 kBd: the ring never fills, but a tick keeps the receiver waiting for longer than its two bytes last.
+#[test]
+fn bytes_that_the_receiver_itself_loses_are_counted() {
+    let mut scenario = Scenario::quiet(9);
+    scenario.seconds = 4.0;
+    let mut simulated = Simulated::new(&image(), &scenario, NoProbe).expect("an image");
+    let rate = Command::SetRate {
+        period_ticks: 976,
+        periods_per_sample: 1,
+    };
+    simulated.request(&[
+        at(1.0, 1, Command::SetBaud { divisor: 1 }),
+        at(1.5, 2, rate),
+    ]);
+    let mut heard = Heard::default();
+    let mut t = 2.0;
+    while t < 3.5 {
+        simulated
+            .run_until(t, &mut |byte| heard.push(byte))
+            .expect("it runs");
+        simulated.send(&[0, 1, 2, 3, 4, 5, 6, 0]);
+        // Through all phases of the tick.
+        t += 0.003_1;
+    }
+    simulated
+        .run_until(5.0, &mut |byte| heard.push(byte))
+        .expect("it runs");
+    assert_eq!(heard.replies().count(), 2);
+    assert!(heard.last_health().faults.get(Fault::RxOverrun) > 5);
+}
+
 #[test]
 fn a_bus_that_was_lost_costs_one_frame_is_told_and_is_taken_back() {
     let scenario = Scenario::quiet(7);

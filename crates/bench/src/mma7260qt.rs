@@ -236,8 +236,8 @@ mod tests {
             before = g[2];
         }
         // 350e-6 g/sqrt(Hz) over (pi / 2) of the pole.
-        for (square, pole) in squares.into_iter().zip([350.0, 350.0, 150.0]) {
-            let rms = 350e-6 * (std::f64::consts::FRAC_PI_2 * pole as f64).sqrt();
+        for (square, pole) in squares.into_iter().zip([350.0f64, 350.0, 150.0]) {
+            let rms = 350e-6 * (std::f64::consts::FRAC_PI_2 * pole).sqrt();
             assert!(
                 (square.sqrt() / rms - 1.0).abs() < 0.04,
                 "{} {rms}",

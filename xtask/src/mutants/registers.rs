@@ -106,7 +106,7 @@ const TABLE: &[Planted] = &[
         "reset_cause & POWER_ON != 0", "reset_cause & POWER_ON == 0"),
     planted("a byte without a stop bit is not counted", [SERIAL, "faults"],
         "status & FE != 0", "status & FE == 0xff"),
-    planted("the receiver's overrun is not counted", [SERIAL, "faults"],
+    planted("the receiver's overrun is not counted", [SERIAL, "registers"],
         "status & DOR != 0 || full", "full"),
     planted("the guard is 8 us", [TICK, "timing"],
         "GUARD_TICKS: u16 = 16", "GUARD_TICKS: u16 = 2"),

@@ -21,7 +21,6 @@ fn what_is_stored_is_within_half_a_step_of_what_was_meant() {
         matrix: [[0.01, 0.124, -0.03], [0.0; 3], [-0.02, 0.0, 0.001]],
         noise: [0.0096, 0.2, 1e-4],
         walk: [8e-7, 2e-5, 0.0],
-        ..Correction::default()
     };
     let read = Correction::from_numbers(&meant.numbers().unwrap()).unwrap();
     assert_eq!(
