@@ -20,6 +20,8 @@ struct Frames {
     of_x: Vec<(u64, u64)>,
     /// Input and time.
     held: Vec<(u8, u64)>,
+    /// Cycles of each byte to or from a gyro.
+    bytes: Vec<u64>,
 }
 
 impl Probe for Frames {
@@ -31,18 +33,19 @@ impl Probe for Frames {
                     *end = at;
                 }
             }
+            Event::Spi { cycles, .. } => self.bytes.push(cycles),
             Event::Adc { channel } => self.held.push((channel, at)),
             _ => {}
         }
     }
 }
 
-/// The start of the board, to its first samples.
+/// The start of the board and its first samples.
 fn started() -> Simulated<Frames> {
     let scenario = Scenario::quiet(5);
     let mut simulated = Simulated::new(&image(), &scenario, Frames::default()).expect("an image");
     simulated
-        .run_until(1.0, &mut |_| std::ops::ControlFlow::Continue(()))
+        .run_until(2.0, &mut |_| std::ops::ControlFlow::Continue(()))
         .expect("it runs");
     simulated
 }
@@ -75,6 +78,14 @@ fn a_gyro_whose_pace_is_not_known_yet_has_100_us_and_then_what_the_data_sheet_as
         "{:?}",
         &gaps[..4]
     );
+    // At 1 MHz, which a gyro of any pace stands; the next register at 2 MHz.
+    let bytes = &simulated.probe().bytes;
+    assert!(
+        bytes[..8].iter().all(|cycles| *cycles == 8 * US),
+        "{:?}",
+        &bytes[..8]
+    );
+    assert_eq!(bytes[8], 4 * US);
     // The other registers: 30 us between frames, 40 us from begin to begin.
     let set_up = 22;
     for (gap, two) in gaps[4..set_up - 1].iter().zip(frames[4..].windows(2)) {
