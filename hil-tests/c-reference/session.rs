@@ -457,9 +457,10 @@ fn correction(generation: i16, number: i16) -> wire::correction::Numbers {
         7_000,
     ]);
     // Noise of a block of which the quiet stand's is a part, and a walk.
+    let filter = wire::correction::NUMBERS - 9;
     for axis in 0..3 {
-        all[45 + 3 * axis] = 20_000;
-        all[46 + 3 * axis] = 300;
+        all[filter + 3 * axis] = 20_000;
+        all[filter + 1 + 3 * axis] = 300;
     }
     all
 }
@@ -484,18 +485,21 @@ pub fn start_corrected(mcu: &mut Mcu, script: &mut Script) -> Result<u64, String
     Ok(first)
 }
 
+/// The row of the CRC.
+const LAST: u8 = wire::correction::ROWS as u8;
+
 /// Writes corrections, spoils one, switches, and has them work at rest and with the motor.
 fn correct(all: &mut Vec<(u64, Deed)>, from: u64, next: &mut dyn FnMut() -> u16) -> u64 {
     let mut at = from;
     let mut ask = |at: u64, command: Command| all.push((at, request(next(), command)));
-    // As from the start, whatever was stored; none is there to be switched on, and there is no row 19.
+    // As from the start, whatever was stored; none is there to be switched on, and no row is behind that of the CRC.
     ask(at, Command::DefaultConfig);
     ask(at + 500, Command::Correction { on: true });
     ask(
         at + 550,
         Command::GetCorrection {
             other: true,
-            row: 19,
+            row: LAST + 1,
         },
     );
     at += 600;
@@ -517,7 +521,7 @@ fn correct(all: &mut Vec<(u64, Deed)>, from: u64, next: &mut dyn FnMut() -> u16)
             ask(
                 at,
                 Command::SetCorrection {
-                    row: 18,
+                    row: LAST,
                     values: wrong,
                 },
             );
@@ -525,15 +529,16 @@ fn correct(all: &mut Vec<(u64, Deed)>, from: u64, next: &mut dyn FnMut() -> u16)
             at += 250;
         }
         crc[2] = 0;
+        // The first one works again meanwhile: off the tick, so that the answer and the frame of a sample do not race.
         ask(
-            at,
+            at + 38,
             Command::SetCorrection {
-                row: 18,
+                row: LAST,
                 values: crc,
             },
         );
         at += 500;
-        for (other, row) in [(false, 0), (false, 17), (true, 5)] {
+        for (other, row) in [(false, 0), (false, LAST - 1), (true, 5)] {
             ask(at, Command::GetCorrection { other, row });
             at += 50;
         }
