@@ -83,6 +83,9 @@ pub struct Gain {
     pub allan_misfit_after: Option<f64>,
     /// rms error of the integrated angle, deg, [before, after], by horizon (`10s`, `100s`).
     pub angle_rms_deg: BTreeMap<String, [f64; 2]>,
+    /// rms error of the velocity that an accelerometer is integrated to, m/s, [before, after], by horizon.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub velocity_rms_mps: BTreeMap<String, [f64; 2]>,
     /// Log likelihood lost when this finding alone is removed from the final model, nats.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ablation_nats: Option<f64>,

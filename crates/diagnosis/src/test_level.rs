@@ -216,7 +216,7 @@ impl CheckId {
             Self::ColourFollows => "the spectrum of the noise follows what was recorded",
             Self::Order => "a tone follows the motor",
             Self::Leaning => "a tone leans with what was recorded",
-            Self::Couplings => "the rate follows another channel as no cause does",
+            Self::Couplings => "it follows another channel as no cause does",
             Self::ProcessSpectrum
             | Self::ProcessLaw
             | Self::ProcessSteadiness
@@ -231,7 +231,7 @@ impl CheckId {
             | Self::BandEnvelope
             | Self::BandSource => "a band of no known kind",
             Self::VarianceLaw => "the size of the noise changes by no known law",
-            Self::FollowerLaw => "the rate follows a channel by no known law",
+            Self::FollowerLaw => "it follows a channel by no known law",
             _ => return None,
         };
         Some(words)

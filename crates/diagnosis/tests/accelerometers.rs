@@ -248,3 +248,41 @@ fn a_name_that_is_no_sensor_is_refused_and_one_kind_alone_is_diagnosed() {
         names(&["acc_x", "gyro_y"])
     );
 }
+
+#[test]
+fn what_an_acceleration_costs_is_told_as_a_velocity() {
+    let mut rng = draws(4);
+    let mut record = stand(&mut rng);
+    let n = (SECONDS * RATE_HZ) as usize;
+    // 0.1 m/s^2 for half of the time, at a period of 60 s: from the middle of one half to that of the next 3 m/s come together.
+    let loaded = |i: usize| (i as f64 / RATE_HZ) % 60.0 < 30.0;
+    let supply = record.channels.iter_mut().find(|c| c.name == "supply");
+    let supply = supply.expect("recorded");
+    supply.counts = None;
+    supply.values = (0..n).map(|i| if loaded(i) { 4.8 } else { 5.0 }).collect();
+    let of = |i: usize| if loaded(i) { 0.05 } else { -0.05 };
+    add(&mut record, "acc_y", of, &mut rng);
+    let d = told(&record, 19);
+    let found = d.findings.iter().find(|f| f.cause == "supply_sensitivity");
+    let found = found.unwrap_or_else(|| panic!("{}", said(&d)));
+    assert_eq!(found.channels, ["acc_y"]);
+    let does = found.consequence.as_ref().expect("replicates tell it");
+    assert!(does.angle_rms_deg.is_empty());
+    // Over 10 s 0.5 m/s, less where the load switches in between; a whole number of periods and 40 s make as much as 40 s do.
+    let over = |seconds: f64| -> f64 {
+        let m = (seconds * RATE_HZ) as usize;
+        let sums = (0..n - m).map(|i| (i..i + m).map(of).sum::<f64>() / RATE_HZ);
+        (sums.map(|v| v * v).sum::<f64>() / (n - m) as f64).sqrt()
+    };
+    for (key, seconds) in [("10s", 10.0), ("100s", 100.0)] {
+        let ratio = does.velocity_rms_mps[key] / over(seconds);
+        // The slope is known to a hundredth.
+        assert!((ratio - 1.0).abs() < 0.05, "{key}: {ratio}");
+    }
+    let entries = d
+        .unexplained
+        .iter()
+        .filter(|u| u.channel.starts_with("acc"));
+    let angles = entries.filter_map(|u| u.consequence.as_ref());
+    assert!(angles.map(|c| &c.angle_rms_deg).all(|a| a.is_empty()));
+}

@@ -7,6 +7,7 @@ pub mod effect;
 pub mod effects;
 pub mod excitation;
 pub mod file;
+pub mod integral;
 pub mod parameter;
 mod range;
 pub mod record;

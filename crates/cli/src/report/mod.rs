@@ -254,7 +254,7 @@ impl View<'_> {
                 figure {
                     (self.angle(own, at, against)?)
                     figcaption {
-                        b { "Angle by integration" } ", less the mean of the first " (number(at.calibration_s, 2))
+                        b { (capitalised(model::integral::of(self.unit).0)) " by integration" } ", less the mean of the first " (number(at.calibration_s, 2))
                         " s. Bands hold 95 % of the replicates at each instant."
                     }
                 }
@@ -383,13 +383,10 @@ impl View<'_> {
             MEASURED,
             Layer::Line(points.collect()),
         ));
-        let unit = self
-            .unit
-            .strip_suffix("/s")
-            .map_or_else(|| format!("{} s", self.unit), str::to_owned);
+        let (integral, unit) = model::integral::of(self.unit);
         let figure = Figure {
             x_label: "time since the calibration, s".into(),
-            y_label: format!("angle, {unit}"),
+            y_label: format!("{integral}, {unit}"),
             width: plot::HALF,
             height: 380,
             layers,
@@ -397,6 +394,11 @@ impl View<'_> {
         };
         drawing(&figure)
     }
+}
+
+fn capitalised(word: &str) -> String {
+    let first = word.chars().next().into_iter().flat_map(char::to_uppercase);
+    first.chain(word.chars().skip(1)).collect()
 }
 
 /// A figure with its legend above it.

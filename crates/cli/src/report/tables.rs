@@ -188,7 +188,7 @@ fn gain(subject: &Subject<'_>) -> Markup {
                     thead { tr {
                         th { "cause" } th { "channels" } th.number { "held-out log score, nats" }
                         th.number { "\u{394} BIC" } th.number { "Allan misfit, before \u{2192} after" }
-                        th.number { "angle error, deg rms, before \u{2192} after" }
+                        th.number { "error by integration, rms, before \u{2192} after" }
                     } }
                     tbody { @for (found, gain) in gained { tr {
                         td { (found.cause.replace('_', " ")) }
@@ -201,7 +201,10 @@ fn gain(subject: &Subject<'_>) -> Markup {
                         td.number { (or_dash(gain.allan_misfit_before)) " \u{2192} " (or_dash(gain.allan_misfit_after)) }
                         td.number {
                             @for (over, [before, after]) in &gain.angle_rms_deg {
-                                div { (over) ": " (number(*before, 3)) " \u{2192} " (number(*after, 3)) }
+                                div { (over) ": " (number(*before, 3)) " \u{2192} " (number(*after, 3)) " deg" }
+                            }
+                            @for (over, [before, after]) in &gain.velocity_rms_mps {
+                                div { (over) ": " (number(*before, 3)) " \u{2192} " (number(*after, 3)) " m/s" }
                             }
                         }
                     } } }
@@ -241,7 +244,7 @@ pub(super) fn noise(subject: &Subject<'_>) -> Markup {
                         @for name in channel.baseline.keys() {
                             tr {
                                 td { code { (channel.name) } }
-                                td { (name.replace('_', " ")) }
+                                td { (baseline_name(name, &channel.unit)) }
                                 td.number { (of(&diagnosed.baseline_model, &channel.name, name).unwrap_or_else(dash)) }
                                 td.number { (of(&diagnosed.extended_model, &channel.name, name).unwrap_or_else(dash)) }
                             }
@@ -251,6 +254,16 @@ pub(super) fn noise(subject: &Subject<'_>) -> Markup {
             } }
         }
     }
+}
+
+/// What a parameter of the noise is called: the keys are a gyro's.
+fn baseline_name(key: &str, unit: &str) -> String {
+    let of = match (key, model::integral::of(unit).0) {
+        ("angle_random_walk", "velocity") => "velocity_random_walk",
+        ("rate_random_walk", "velocity") => "acceleration_random_walk",
+        _ => key,
+    };
+    of.replace('_', " ")
 }
 
 /// The checks that fail, and all of them folded.

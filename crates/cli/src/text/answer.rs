@@ -89,25 +89,35 @@ pub fn modelled(left: &Unexplained) -> Option<String> {
 /// What something does to the integrated angle and to the readings.
 #[must_use]
 pub fn consequence_of(of: &Consequence, material: bool) -> String {
+    let (what, unit, by_horizon) = match of.velocity_rms_mps.is_empty() {
+        true => ("an angle", "deg", &of.angle_rms_deg),
+        false => ("a velocity", "m/s", &of.velocity_rms_mps),
+    };
     if !material {
-        return "Too small to matter for an angle or a deviation (`--matters`).".to_owned();
+        return format!("Too small to matter for {what} or a deviation (`--matters`).");
     }
-    let angles: Vec<String> = (of.angle_rms_deg.iter())
-        .map(|(over, v)| format!("{} deg rms over {}", number(*v, ANGLE_DIGITS), spaced(over)))
+    let errors: Vec<String> = (by_horizon.iter())
+        .map(|(over, v)| {
+            format!(
+                "{} {unit} rms over {}",
+                number(*v, ANGLE_DIGITS),
+                spaced(over)
+            )
+        })
         .collect();
     // A noise that changes its size adds nothing of its own that could be told apart.
-    if of.share_of_variance <= 0.0 && of.angle_rms_deg.values().all(|v| *v <= 0.0) {
+    if of.share_of_variance <= 0.0 && by_horizon.values().all(|v| *v <= 0.0) {
         return format!(
-            "It changes an angle error or a deviation by up to {}.",
+            "It changes {what} error or a deviation by up to {}.",
             percent(of.largest_change)
         );
     }
     let share = format!("{} of the variance", percent(of.share_of_variance));
-    match angles.is_empty() {
+    match errors.is_empty() {
         true => format!("It makes {share} of the readings."),
         false => format!(
-            "It makes an angle error of {}, and {share}.",
-            angles.join(", ")
+            "It makes {what} error of {}, and {share}.",
+            errors.join(", ")
         ),
     }
 }
@@ -122,7 +132,11 @@ fn percent(share: f64) -> String {
 
 /// The same by the angle errors that its gain states.
 fn cost_in_angle(finding: &Finding) -> Option<String> {
-    let angles = &finding.gain.as_ref()?.angle_rms_deg;
+    let gain = finding.gain.as_ref()?;
+    let (what, unit, angles) = match gain.velocity_rms_mps.is_empty() {
+        true => ("angle", "deg", &gain.angle_rms_deg),
+        false => ("velocity", "m/s", &gain.velocity_rms_mps),
+    };
     let finite = |pair: &&[f64; 2]| pair.iter().all(|v| v.is_finite());
     let mut horizons: Vec<(&String, &[f64; 2])> =
         angles.iter().filter(|(_, pair)| finite(pair)).collect();
@@ -139,7 +153,7 @@ fn cost_in_angle(finding: &Finding) -> Option<String> {
             .map(|(over, _)| spaced(over))
             .collect();
         return Some(format!(
-            "Left out, it changes the integrated angle by less than 5 % over {}.",
+            "Left out, it changes the integrated {what} by less than 5 % over {}.",
             seconds.join(" and ")
         ));
     }
@@ -147,7 +161,7 @@ fn cost_in_angle(finding: &Finding) -> Option<String> {
         .iter()
         .map(|(over, [before, after])| {
             format!(
-                "{} deg rms after {} instead of {}",
+                "{} {unit} rms after {} instead of {}",
                 number(*before, ANGLE_DIGITS),
                 spaced(over),
                 number(*after, ANGLE_DIGITS)
@@ -155,7 +169,7 @@ fn cost_in_angle(finding: &Finding) -> Option<String> {
         })
         .collect();
     Some(format!(
-        "Left out, the integrated angle is off by {}.",
+        "Left out, the integrated {what} is off by {}.",
         each.join(", ")
     ))
 }

@@ -207,13 +207,19 @@ fn write_finding(out: &mut String, finding: &Finding) {
     if let Some(bic) = gain.delta_bic {
         let _ = writeln!(out, "    delta BIC                {bic:.1}");
     }
-    for (over, [before, after]) in &gain.angle_rms_deg {
-        let _ = writeln!(
-            out,
-            "    angle error over {over:<7} {} -> {} deg rms",
-            number(*before, 3),
-            number(*after, 3)
-        );
+    for (what, unit, all) in [
+        ("angle", "deg", &gain.angle_rms_deg),
+        ("velocity", "m/s", &gain.velocity_rms_mps),
+    ] {
+        for (over, [before, after]) in all {
+            let lead = format!("{what} error over {over}");
+            let _ = writeln!(
+                out,
+                "    {lead:<24} {} -> {} {unit} rms",
+                number(*before, 3),
+                number(*after, 3)
+            );
+        }
     }
     if finding.confirmed_on_held_out_data == Some(false) {
         let _ = writeln!(

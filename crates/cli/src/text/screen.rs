@@ -98,15 +98,12 @@ fn lead(text: &str) -> String {
     item("", text).trim_start().to_owned()
 }
 
-/// Causes that change no angle error and no deviation by much: a line each.
+/// Causes that change no angle or velocity error and no deviation by much: a line each.
 fn write_small(out: &mut String, all: &[&Finding]) {
     if all.is_empty() {
         return;
     }
-    let _ = writeln!(
-        out,
-        "\nfound, and too small to matter for an angle or a deviation"
-    );
+    let _ = writeln!(out, "\nfound, and too small to matter (`--matters`)");
     for finding in all {
         let _ = writeln!(out, "{}", item("", &answer::headline(finding)));
     }

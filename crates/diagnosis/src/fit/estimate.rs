@@ -337,9 +337,13 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
         .collect()
 }
 
-/// Values of a shape's coordinate that it is averaged over, and how far they reach in its logarithm.
+/// Values of a shape's coordinate to either side that it is averaged over, and how far they reach in its logarithm: so many
+/// standard errors at a known random walk, within limits, of which the lower is what the search leaves open.
 const SHAPES: i32 = 12;
-const REACH: f64 = 1.2;
+const REACH_ERRORS: f64 = 10.0;
+const REACH: [f64; 2] = [0.06, 1.2];
+/// Step over which the curvature of the likelihood is told, in the logarithm.
+const CURVED_OVER: f64 = 0.03;
 
 /// A shape's coordinate and the coefficients of its columns, averaged over both the coordinate (flat in its logarithm,
 /// within `bounds`) and the random walk: where a slow shape and a slow walk take each other's part, errors at fixed
@@ -359,9 +363,24 @@ fn shaped(
     let width = panel.width();
     let grid = shape.grid();
     let (low, high) = (grid[0].ln(), grid[grid.len() - 1].ln());
+    let density = state.noise.over(&panel.bins);
+    let likelihood = |x: f64| {
+        let values = shape.columns(x.exp()).into_iter().map(|c| c.values);
+        let added = panel.add_all(values);
+        let l = panel.solve(&density, &[added, others.clone()].concat());
+        panel.truncate(width);
+        l.log_likelihood
+    };
+    let [below, here, above] = [-1.0, 0.0, 1.0].map(|k| likelihood(at.ln() + k * CURVED_OVER));
+    let information = (2.0 * here - below - above) / CURVED_OVER.powi(2);
+    let reach = if information > 0.0 {
+        (REACH_ERRORS / information.sqrt()).clamp(REACH[0], REACH[1])
+    } else {
+        REACH[1]
+    };
     let mut all: Vec<(f64, f64, crate::fit::likelihood::Solution)> = vec![];
     for i in -SHAPES..=SHAPES {
-        let x = at.ln() + REACH * f64::from(i) / f64::from(SHAPES);
+        let x = at.ln() + reach * f64::from(i) / f64::from(SHAPES);
         if x < low - 0.7 || x > high + 0.7 {
             continue;
         }

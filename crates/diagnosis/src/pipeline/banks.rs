@@ -10,10 +10,12 @@ use model::effects::{
     am_line, base_motion, bias_step, common_noise, correlated_noise, gauss_markov, line, low_pass,
     narrow_band, noise_change, rate_ramp, shock, wandering_line,
 };
+use model::file::ModelFile;
+use model::integral;
 use model::record::{AnalysisError, Base, Channel, Quantity, Record};
 
 use super::{DiagnoseOptions, diagnose, ranked};
-use crate::result::{Alternative, Diagnosed, Finding, Verdict};
+use crate::result::{Alternative, Consequence, Diagnosed, Diagnosis, Finding, Verdict};
 use crate::test_level::with_part;
 
 /// What an accelerometer at rest may show because the base does it.
@@ -143,17 +145,37 @@ fn of_accelerometers(mut of: Diagnosed) -> Diagnosed {
             f.experiment.get_or_insert_with(|| DECOUPLED.to_owned());
         }
     }
-    // Integrated it is a velocity, and no angle.
-    for f in d.findings.iter_mut() {
-        f.gain.iter_mut().for_each(|g| g.angle_rms_deg.clear());
-        f.consequence
-            .iter_mut()
-            .for_each(|c| c.angle_rms_deg.clear());
-    }
+    as_velocity(d, &of.baseline_model);
     let asked = |cause: &String| !NOT_OF_ACCELEROMETERS.contains(&cause.as_str());
     d.not_tested.retain(|n| asked(&n.cause));
     d.detection_limits.retain(|l| asked(&l.cause));
     of
+}
+
+/// Integrated an acceleration is a velocity, and no angle: what was told by horizon, in m/s where the channel is in m/s^2.
+fn as_velocity(d: &mut Diagnosis, of: &ModelFile) {
+    let in_si = |channel: Option<&String>| {
+        let own = of.channels.iter().find(|c| Some(&c.name) == channel);
+        own.is_some_and(|c| integral::of(&c.unit).1 == "m/s")
+    };
+    let moved = |of: &mut Consequence, known: bool| {
+        let all = std::mem::take(&mut of.angle_rms_deg);
+        of.velocity_rms_mps
+            .extend(all.into_iter().filter(|_| known));
+    };
+    for f in &mut d.findings {
+        let known = in_si(f.channels.first());
+        if let Some(gain) = &mut f.gain {
+            let all = std::mem::take(&mut gain.angle_rms_deg);
+            gain.velocity_rms_mps
+                .extend(all.into_iter().filter(|_| known));
+        }
+        f.consequence.iter_mut().for_each(|c| moved(c, known));
+    }
+    for u in &mut d.unexplained {
+        let known = in_si(Some(&u.channel));
+        u.consequence.iter_mut().for_each(|c| moved(c, known));
+    }
 }
 
 /// Both diagnoses in one.

@@ -68,8 +68,10 @@ pub(super) fn handed_over(
     let mut replicates = among(&extended_model);
     let mut said = held(&replicates, adequate, count);
     let (first, strayed) = (replicates.clone(), said.unexplained.clone());
+    // What strays the more for a round may be what it had hidden, which the next takes up: the best of them is handed over.
+    let mut strays = said.unexplained.clone();
     for _ in 0..ROUNDS {
-        said.unexplained.iter().for_each(|o| wanted.add(o));
+        strays.iter().for_each(|o| wanted.add(o));
         let again = unnamed::fit(searched, grid, &wanted, &causes);
         if again == fitted {
             break;
@@ -77,10 +79,11 @@ pub(super) fn handed_over(
         let model = extended(&again);
         let all = among(&model);
         let now = held(&all, false, count);
-        if now.unexplained.len() > said.unexplained.len() {
-            break;
+        strays.clone_from(&now.unexplained);
+        if now.unexplained.len() <= said.unexplained.len() {
+            (extended_model, replicates, said) = (model, all, now);
         }
-        (fitted, extended_model, replicates, said) = (again, model, all, now);
+        fitted = again;
     }
     let taken_up = taken_up(&first, strayed, &said, count);
     HandedOver {

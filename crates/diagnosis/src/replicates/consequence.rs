@@ -205,6 +205,7 @@ fn compare(
         angle_rms_deg: angles
             .map(|((key, _), square)| (key.to_owned(), (square.abs() / draws).sqrt()))
             .collect::<BTreeMap<_, _>>(),
+        velocity_rms_mps: BTreeMap::new(),
         largest_change: largest,
     }
 }

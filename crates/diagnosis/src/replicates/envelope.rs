@@ -154,6 +154,7 @@ mod tests {
             what: what.into(),
             unit: "1".into(),
             with: None,
+            slow: false,
         });
         let rows = (0..200).map(|i| {
             let x = f64::from(i) / 200.0;

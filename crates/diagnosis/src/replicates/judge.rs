@@ -86,6 +86,13 @@ impl<'a> Judged<'a> {
             compared(&replicas, &mut readings);
             rows.push(self.battery.of(&readings));
         }
+        for (k, own) in self.battery.channels.iter().enumerate() {
+            let slow = |i: &usize| self.battery.statistics[*i].slow;
+            for i in own.clone().filter(|_| replicas.replays(k)).filter(slow) {
+                // No number tells nothing.
+                rows.iter_mut().for_each(|row| row[i] = f64::NAN);
+            }
+        }
         let table = Table {
             rows,
             channels: self.battery.channels.clone(),

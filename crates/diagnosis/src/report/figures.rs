@@ -215,7 +215,7 @@ fn of_term(s: &Searched<'_>, grid: &Grid, term: &Term) -> Evidence {
         title: format!("{}: {}", s.target.name, term.effect.docs().title),
         channel: s.target.name.clone(),
         x_label: "time, s".into(),
-        y_label: format!("rate, {unit}"),
+        y_label: format!("{}, {unit}", model::integral::reading(unit)),
         log_x: false,
         log_y: false,
         series: vec![],

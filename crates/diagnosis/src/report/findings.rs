@@ -142,6 +142,7 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
                         })
                         .collect(),
                     ablation_nats: Some(lr / 2.0),
+                    ..Gain::default()
                 }),
                 what: what + told,
                 effective,

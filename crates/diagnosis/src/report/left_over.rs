@@ -235,9 +235,7 @@ pub(super) fn left_over(s: &Searched<'_>, grid: &Grid, terms: &[usize]) -> Left 
         }
         let both = power.through(|w| angle_gain(w, m, 1.0 / rate_hz));
         largest_change = largest_change.max(change(both));
-        if s.target.unit == "deg/s" {
-            angles.insert(key.to_owned(), (both[1] - both[0]).abs().sqrt());
-        }
+        angles.insert(key.to_owned(), (both[1] - both[0]).abs().sqrt());
     }
     let (span_s, local_change) = in_time(&s.e, rate_hz);
     let band = power.at.filter(|[low, high]| high - low < EVERYWHERE);
@@ -249,6 +247,7 @@ pub(super) fn left_over(s: &Searched<'_>, grid: &Grid, terms: &[usize]) -> Left 
         consequence: Consequence {
             share_of_variance: share,
             angle_rms_deg: angles,
+            velocity_rms_mps: BTreeMap::new(),
             largest_change,
         },
         local_change,

@@ -12,7 +12,10 @@ pub struct Consequence {
     /// Angle error that it makes by itself, deg rms, by horizon (`10s`, `100s`); horizons longer than a quarter of the
     /// record are left out.
     pub angle_rms_deg: BTreeMap<String, f64>,
-    /// Largest change of an angle error over these horizons, or of an Allan deviation at an octave, relative.
+    /// Velocity error that it makes by itself on an accelerometer, m/s rms, by the same horizons.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub velocity_rms_mps: BTreeMap<String, f64>,
+    /// Largest change of an angle or velocity error over these horizons, or of an Allan deviation at an octave, relative.
     pub largest_change: f64,
 }
 
@@ -24,6 +27,7 @@ impl Consequence {
         Self {
             share_of_variance: r.abs(),
             angle_rms_deg: BTreeMap::new(),
+            velocity_rms_mps: BTreeMap::new(),
             largest_change: (1.0 + r.abs()).sqrt() - 1.0,
         }
     }

@@ -93,7 +93,8 @@ pub(crate) fn fit(
         let name = &s.target.name;
         let alone = wanted.channels.contains(name);
         let paired = wanted.pairs.iter().any(|p| p.contains(name));
-        let merged = as_one(s);
+        // Of one band only where something is left.
+        let merged = as_one(s, if alone { 1 } else { 2 });
         if !alone && !paired && merged.is_empty() {
             continue;
         }

@@ -120,13 +120,14 @@ class Diagnosis(dict):
                 + f" {p['unit'] if p['unit'] != '1' else ''}"
                 for name, p in finding["parameters"].items()
             ]
-            cost = (finding.get("consequence") or {}).get("angle_rms_deg", {})
+            does = finding.get("consequence") or {}
+            cost = [(does.get(key, {}), unit) for key, unit in (("angle_rms_deg", "deg"), ("velocity_rms_mps", "m/s"))]
             rows.append(
                 (
                     finding["cause"],
                     ", ".join(finding["channels"]),
                     "; ".join(sizes),
-                    ", ".join(f"{number(value, 2)} deg after {horizon}" for horizon, value in cost.items()),
+                    ", ".join(f"{number(value, 2)} {unit} after {horizon}" for by, unit in cost for horizon, value in by.items()),
                     finding["what"],
                 )
             )

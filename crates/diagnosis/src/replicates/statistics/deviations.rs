@@ -43,22 +43,18 @@ impl Deviations {
     pub fn name(&self, unit: &str, all: &mut Vec<Statistic>) {
         for m in &self.clusters {
             let tau = *m as f64 * self.tau0;
-            all.push(Statistic::new(
-                format!("Allan deviation at {} s", short(tau)),
-                unit,
-            ));
+            let what = format!("Allan deviation at {} s", short(tau));
+            // Its band ends at about half a cycle in tau.
+            all.push(Statistic::new(what, unit).below(0.5 / tau));
         }
-        let angle = unit
-            .strip_suffix("/s")
-            .map_or_else(|| format!("{unit}*s"), str::to_owned);
+        let (integral, its_unit) = model::integral::of(unit);
         for (t, _) in &self.angles {
-            all.push(Statistic::new(
-                format!("change of the angle over {t} s"),
-                &angle,
-            ));
+            let what = format!("change of the {integral} over {t} s");
+            all.push(Statistic::new(what, &its_unit).below(0.5 / t));
         }
         if self.stretches >= LEAST_STRETCHES {
-            all.push(Statistic::new("deviation from stretch to stretch", unit));
+            let what = "deviation from stretch to stretch";
+            all.push(Statistic::new(what, unit).below(0.0));
         }
     }
 

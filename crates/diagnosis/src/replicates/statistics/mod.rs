@@ -24,7 +24,12 @@ pub(super) struct Statistic {
     pub unit: String,
     /// The other axis, where it is of two.
     pub with: Option<String>,
+    /// Whether it is of what is slower than [`REPLAYED_HZ`].
+    pub slow: bool,
 }
+
+/// Below it the readings of an axis that moved are the record's own in every replicate, Hz: nothing new is told there.
+pub(super) const REPLAYED_HZ: f64 = 1.0;
 
 impl Statistic {
     fn new(what: impl Into<String>, unit: &str) -> Self {
@@ -32,7 +37,14 @@ impl Statistic {
             what: what.into(),
             unit: unit.to_owned(),
             with: None,
+            slow: false,
         }
+    }
+
+    /// Of what is slower than so many Hz.
+    fn below(mut self, hz: f64) -> Self {
+        self.slow = hz <= REPLAYED_HZ;
+        self
     }
 
     fn with(mut self, other: &str) -> Self {
@@ -94,7 +106,7 @@ impl Battery {
         for (subject, of) in subjects.iter().zip(&of) {
             let from = statistics.len();
             let unit = subject.unit.as_str();
-            statistics.push(Statistic::new("mean", unit));
+            statistics.push(Statistic::new("mean", unit).below(0.0));
             statistics.push(Statistic::new("rms about the mean", unit));
             deviations.name(unit, &mut statistics);
             spectrum.name(unit, &mut statistics);

@@ -93,10 +93,9 @@ impl Spectrum {
         let hz = |k: usize| short(0.5 * self.rate_hz * k as f64 / self.length as f64);
         for edge in self.edges.windows(2) {
             let from = if edge[0] > 1 { hz(edge[0]) } else { "0".into() };
-            all.push(Statistic::new(
-                format!("rms from {from} to {} Hz", hz(edge[1])),
-                unit,
-            ));
+            let top = 0.5 * self.rate_hz * edge[1] as f64 / self.length as f64;
+            let what = format!("rms from {from} to {} Hz", hz(edge[1]));
+            all.push(Statistic::new(what, unit).below(top));
         }
         all.push(Statistic::new("amplitude of the strongest line", unit));
         for lag in 1..=LAGS {
