@@ -13,6 +13,11 @@ static volatile uint8_t lost_overrun, lost_framing;
 static uint16_t waiting_divisor;
 static bool waiting;
 
+void serial_start(void)
+{
+    UCSRB = _BV(RXCIE) | _BV(RXEN) | _BV(TXEN);
+}
+
 void serial_set_baud(uint16_t divisor)
 {
     /* UBRRH and UCSRC share an address; URSEL says which. */
@@ -23,9 +28,8 @@ void serial_set_baud(uint16_t divisor)
 
 void serial_set_baud_later(uint16_t divisor)
 {
-    if (UCSRB == 0) { /* off since the reset */
+    if (!waiting && UBRRL == 0) {
         serial_set_baud(divisor);
-        UCSRB = _BV(RXCIE) | _BV(RXEN) | _BV(TXEN);
         UDR = 0; /* ends a frame that power went in the middle of */
         return;
     }
@@ -44,11 +48,6 @@ void serial_work(void)
         serial_set_baud(waiting_divisor);
         waiting = false;
     }
-}
-
-bool serial_is_to_change(void)
-{
-    return waiting;
 }
 
 bool serial_has_received(void)

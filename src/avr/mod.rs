@@ -45,6 +45,7 @@ static mut STAND: Stand = Stand::new();
 fn main() -> ! {
     board::paint_stack();
     let mut board = board::AvrBoard::start();
+    serial::start();
     // SAFETY: interrupts are off; from their start on the sensors are the tick's.
     let sensors = unsafe { sensors::start() };
     // SAFETY: the one reference to it.
@@ -90,7 +91,7 @@ fn main() -> ! {
             asm::wdr();
             (ticked, passed) = (false, false);
         }
-        serial::work();
+        board.work();
         tick::sleep_until_work(!serial::has_received() || stand.listens(&board));
     }
 }

@@ -4,13 +4,15 @@ mod answers;
 mod campaign;
 mod demo;
 mod effects;
+mod fuzz;
 mod image;
-mod mutants;
 mod page;
 mod peers;
 mod size;
+mod soak;
 mod step;
 mod suite;
+mod supply;
 mod toolchain;
 mod wheel;
 
@@ -35,11 +37,14 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   effects  writes docs/effects.md and its figures from the files of the effects; --check tells whether they are current
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}
   size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt
-  mutants  plants small faults in drivers, wire, firmware and bench, one at a time, and says which of them no test notices;
-           --seed N and --count N draw, --write keeps docs/mutants.txt, --registers plants those that only the image has
   page     builds the page that runs the engine in a browser: target/page/index.html
   wheel    builds the Python package, target/wheel/dist/*.whl, and tests it in a virtual environment of its own;
            --dev compiles it as tests are
+  soak     30 days of the board's time through its logic, 24 h through its image, 24 h of a live capture on a bad line;
+           --quick for minutes, --hours N, --minutes N, --seed N, --only logic, image or line
+  fuzz     any bytes in everything that is read: --minutes N for each target, --target NAME, --seed N, --stable
+  supply   licences, sources and duplicates of the dependencies (cargo-deny), the oldest Rust that compiles them, and what is in the
+           program (target/sbom/imu-stand.cdx.json, CycloneDX); --advisories asks the advisory database as well
   compare-peers
            Allan family against allantools (in a venv) and the crate `allan`: speed, memory, agreement; `--long` adds 1e8";
 
@@ -60,7 +65,9 @@ fn main() -> ExitCode {
         Some("answers") => answers::freeze(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("effects") => effects::page(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("size") => size::report(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
-        Some("mutants") => mutants::hunt(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("soak") => soak::soak(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("fuzz") => fuzz::fuzz(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("supply") => supply::supply(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("page") => page::page(&root).map(|said| println!("{said}")),
         Some("wheel") => wheel::wheel(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("compare-peers") => peers::compare(&root, std::env::args().any(|a| a == "--long")),

@@ -36,6 +36,8 @@ const LONG: &[&str] = &[
     "diagnosis closed_loop",
     "diagnosis limits",
     "diagnosis claims",
+    "imu-stand soak",
+    "hil-tests soak",
     "hil-tests rates",
     "hil-tests timing",
     "hil-tests same",

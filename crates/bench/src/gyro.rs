@@ -443,6 +443,3 @@ impl Gyro {
         })
     }
 }
-
-#[cfg(test)]
-mod tests;

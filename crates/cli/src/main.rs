@@ -195,4 +195,99 @@ mod tests {
     fn the_arguments_of_no_command_contradict_each_other() {
         Program::command().debug_assert();
     }
+
+    /// All options and commands, and values for them that are right, nearly right, or nothing of the kind.
+    fn vocabulary(command: &clap::Command, words: &mut Vec<String>) {
+        words.push(command.get_name().to_owned());
+        for argument in command.get_arguments() {
+            words.extend(argument.get_long().map(|long| format!("--{long}")));
+            words.extend(argument.get_short().map(|short| format!("-{short}")));
+            let values = argument.get_possible_values();
+            words.extend(values.iter().map(|value| value.get_name().to_owned()));
+            words.extend(
+                argument
+                    .get_default_values()
+                    .iter()
+                    .map(|v| v.to_string_lossy().into_owned()),
+            );
+        }
+        for inner in command.get_subcommands() {
+            vocabulary(inner, words);
+        }
+    }
+
+    /// `IMU_STAND_FUZZ_SECONDS` and `IMU_STAND_SEED` set how long and with which seed: `cargo xtask fuzz --target arguments`.
+    #[test]
+    fn any_words_are_arguments_or_are_refused_in_words() {
+        use rand_core::{Rng as _, SeedableRng as _};
+        const VALUES: [&str; 24] = [
+            "",
+            "-",
+            "--",
+            "=",
+            "1",
+            "-1",
+            "0",
+            "1e999",
+            "nan",
+            "inf",
+            "9223372036854775808",
+            "run.csv",
+            "24h",
+            "100MB",
+            "-5kB",
+            "time=t,gyro_x=",
+            "gyro=deg/s,,",
+            "40:+x,80:0,0,0",
+            "K within 20 %",
+            "0,2",
+            "\u{1b}[2J",
+            "\u{202e}x",
+            "../../etc/passwd",
+            "gyro_x,gyro_x",
+        ];
+        let set = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
+        let seconds: f64 = set("IMU_STAND_FUZZ_SECONDS").unwrap_or(2.0);
+        let seed = set("IMU_STAND_SEED").unwrap_or(1.0) as u64;
+        let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut below = |n: usize| ((u128::from(rng.next_u64()) * n as u128) >> 64) as usize;
+        let mut words: Vec<String> = VALUES.map(str::to_owned).to_vec();
+        vocabulary(&Program::command(), &mut words);
+        let commands: Vec<String> = (Program::command().get_subcommands())
+            .map(|command| command.get_name().to_owned())
+            .collect();
+        let (begin, mut count, mut understood) = (std::time::Instant::now(), 0u64, 0u64);
+        while begin.elapsed().as_secs_f64() < seconds {
+            let mut line = vec![
+                "imu-stand".to_owned(),
+                commands[below(commands.len())].clone(),
+            ];
+            for _ in 0..below(8) {
+                let mut word = words[below(words.len())].clone();
+                if below(5) == 0 {
+                    word = format!("{word}={}", words[below(words.len())]);
+                }
+                if below(8) == 0 {
+                    let at = below(word.chars().count() + 1);
+                    word = word
+                        .chars()
+                        .take(at)
+                        .chain(['\u{7f}'])
+                        .chain(word.chars().skip(at))
+                        .collect();
+                }
+                line.push(word);
+            }
+            count += 1;
+            match Program::try_parse_from(&line) {
+                Ok(_) => understood += 1,
+                Err(error) => assert!(!error.to_string().is_empty(), "{line:?}"),
+            }
+        }
+        println!(
+            "arguments: {count} lines, {:.0} a second, {understood} understood; seed {seed}",
+            count as f64 / begin.elapsed().as_secs_f64()
+        );
+        assert!(understood > 0);
+    }
 }

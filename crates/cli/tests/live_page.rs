@@ -242,7 +242,7 @@ const motor = () => Number((part('figures').textContent.match(/motor (-?\d+)/) |
 </script></body>"#;
 
 /// Passes a connection on; the page with the person in it.
-fn pass(browser: &TcpStream, from: u16, to: u16) -> std::io::Result<()> {
+fn pass(browser: &TcpStream, from: u16, to: u16, record: &str) -> std::io::Result<()> {
     let (from, to) = (format!("127.0.0.1:{from}"), format!("127.0.0.1:{to}"));
     let mut reader = BufReader::new(browser);
     let (mut head, mut length) = (String::new(), 0);
@@ -271,14 +271,19 @@ fn pass(browser: &TcpStream, from: u16, to: u16) -> std::io::Result<()> {
     server.write_all(head.as_bytes())?;
     server.write_all(&body)?;
     let mut out = browser;
-    if !head.starts_with("GET / ") {
+    let person = match &head {
+        head if head.starts_with("GET / ") => PERSON.to_owned(),
+        head if head.starts_with("GET /engine ") => with_record(record),
+        _ => String::new(),
+    };
+    if person.is_empty() {
         std::io::copy(&mut server, &mut out)?;
         return Ok(());
     }
     let mut page = String::new();
     server.read_to_string(&mut page)?;
     let (head, page) = page.split_once("\r\n\r\n").expect("a page");
-    let page = page.replace("</body>", PERSON);
+    let page = page.replace("</body>", &person);
     let head: Vec<&str> = head
         .lines()
         .filter(|l| !l.starts_with("Content-Length"))
@@ -289,6 +294,103 @@ fn pass(browser: &TcpStream, from: u16, to: u16) -> std::io::Result<()> {
         head.join("\r\n"),
         page.len()
     )
+}
+
+/// Hands the page that runs the engine a record, as the page of the monitor does, and writes down what it says.
+fn with_record(record: &str) -> String {
+    let record = serde_json::to_string(record).expect("text");
+    let script = r#"<script>
+const hold = document.createElement('iframe');
+document.body.append(hold);
+hold.contentDocument.open();
+const wrong = [];
+addEventListener('error', (event) => wrong.push(`script: ${event.message}`));
+addEventListener('securitypolicyviolation', (event) => wrong.push(`asks for ${event.blockedURI}`));
+const noted = (what) => {
+  const shown = document.createElement('p');
+  const requests = performance.getEntriesByType('resource').map((r) => r.name).filter((n) => !n.startsWith('blob:'));
+  shown.textContent = 'SAID' + JSON.stringify({ ...what, wrong, requests }) + 'SAID';
+  document.body.replaceChildren(shown);
+};
+addEventListener('failed', ({ detail }) => noted({ failed: detail }));
+addEventListener('finished', ({ detail }) => noted({ report: detail.html.length, what: detail.what, file: file.name }));
+setTimeout(() => noted({ slow: part('said').textContent, shown: part('failed').textContent }), 100000);
+window.opener = window;
+const bytes = new TextEncoder().encode(RECORD).buffer;
+postMessage({ name: 'record.csv', bytes }, location.origin);
+</script></body>"#;
+    script.replace("RECORD", &record)
+}
+
+/// Passes connections on to the monitor; its own port.
+fn between(monitor: &Monitor, record: &str) -> u16 {
+    let listener = TcpListener::bind(("127.0.0.1", 0)).expect("a port");
+    let (own, port) = (listener.local_addr().expect("a port").port(), monitor.port);
+    let record = record.to_owned();
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            let record = record.clone();
+            std::thread::spawn(move || pass(&stream, own, port, &record));
+        }
+    });
+    own
+}
+
+/// What a page wrote down.
+fn answer_of(dom: &str, console: &str) -> Value {
+    let said = dom
+        .split("SAID")
+        .nth(1)
+        .unwrap_or_else(|| panic!("no answer: {console}\n{dom:.3000}"));
+    let said = said
+        .replace("&lt;", "<")
+        .replace("&gt;", ">")
+        .replace("&nbsp;", "\u{a0}")
+        .replace("&amp;", "&");
+    serde_json::from_str(&said).expect("JSON")
+}
+
+#[test]
+fn the_page_of_the_engine_is_served_with_what_was_recorded_or_says_how_to_build_it() {
+    let board = Board::start();
+    let monitor = Monitor::start(&board);
+    let host = format!("127.0.0.1:{}", monitor.port);
+    let get = |path: &str, host: &str| {
+        monitor.ask(&format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n"))
+    };
+    assert_eq!(get("/engine", "evil.example").0, "403");
+    let (status, text) = get("/engine", &host);
+    if status == "404" {
+        assert!(text.contains("cargo xtask page"), "{text}");
+        assert!(std::env::var_os("CI").is_none(), "in CI: {text}");
+        eprintln!("NOT TESTED: {text}");
+        return;
+    }
+    assert_eq!(status, "200");
+    let Ok(browser) = Browser::find() else {
+        assert!(std::env::var_os("CI").is_none(), "in CI: no browser");
+        eprintln!("NOT TESTED: no browser; `apt-get install chromium`, and again");
+        return;
+    };
+    // The least that a diagnosis takes is 600; the simulated board falls behind on a busy computer.
+    for _ in 0..90 {
+        if monitor.snapshot()["samples"].as_u64().unwrap() > 640 {
+            break;
+        }
+        std::thread::sleep(Duration::from_secs(1));
+    }
+    let path = format!("/record.csv?token={}", monitor.token);
+    let (status, record) = get(&path, &host);
+    assert_eq!(status, "200");
+    let own = between(&monitor, &record);
+    let beside = folder("engine_page").join("page");
+    let address = format!("http://127.0.0.1:{own}/engine");
+    let (dom, console) = browser.dom_of(&address, &beside).expect("it shows a page");
+    let seen = answer_of(&dom, &console);
+    assert_eq!(seen["wrong"], serde_json::json!([]), "{seen}\n{console}");
+    assert_eq!(seen["requests"], serde_json::json!([]), "{seen}");
+    assert_eq!(seen["file"], "record.csv", "{seen}");
+    assert!(seen["report"].as_u64().unwrap_or(0) > 10_000, "{seen}");
 }
 
 #[test]
@@ -303,26 +405,11 @@ fn the_page_shows_what_is_measured_and_turns_the_motor_after_a_question() {
     };
     let board = Board::start();
     let monitor = Monitor::start(&board);
-    let listener = TcpListener::bind(("127.0.0.1", 0)).expect("a port");
-    let (own, port) = (listener.local_addr().expect("a port").port(), monitor.port);
-    std::thread::spawn(move || {
-        for stream in listener.incoming().flatten() {
-            std::thread::spawn(move || pass(&stream, own, port));
-        }
-    });
+    let own = between(&monitor, "");
     let address = format!("http://127.0.0.1:{own}/#{}", monitor.token);
     let beside = folder("live_page").join("page");
     let (dom, console) = browser.dom_of(&address, &beside).expect("it shows a page");
-    let said = dom
-        .split("SAID")
-        .nth(1)
-        .unwrap_or_else(|| panic!("no answer: {console}\n{dom:.3000}"));
-    let said = said
-        .replace("&lt;", "<")
-        .replace("&gt;", ">")
-        .replace("&nbsp;", "\u{a0}")
-        .replace("&amp;", "&");
-    let seen: Value = serde_json::from_str(&said).expect("JSON");
+    let seen = answer_of(&dom, &console);
     assert_eq!(seen["wrong"], serde_json::json!([]), "{seen}\n{console}");
     let complaints: Vec<&str> = console
         .lines()

@@ -130,7 +130,7 @@ fn what_a_killed_capture_had_received_is_in_the_file_after_resume() {
             tear_rows(&out, 12);
         }
         let mut bytes = fs::read(&raw).unwrap();
-        bytes.truncate(bytes.len() - 3);
+        bytes.extend([0x30, 0x01, 0x02]);
         fs::write(&raw, &bytes).unwrap();
         let before = samples(&bytes);
         // Without a board, too.
@@ -151,7 +151,8 @@ fn what_a_killed_capture_had_received_is_in_the_file_after_resume() {
             );
         }
         assert_holds(&record(&out), &before);
-        // And on.
+        // And on, when some samples have passed unheard.
+        std::thread::sleep(Duration::from_secs(1));
         let more = [
             "--resume",
             "--seconds",
@@ -233,13 +234,11 @@ fn run_for(board: &Board, out: &Path, seconds: &str) -> std::process::Output {
     Running::start(capture(board, out, &["--seconds", seconds])).output()
 }
 
-/// Captures until the disk says no, makes room, goes on: all of the raw bytes' samples are rows.
+/// A capture that ends while the disk has no room, and goes on when there is: all of the raw bytes' samples are rows.
 fn full(out: &Path, first: std::process::Output, again: impl FnOnce() -> std::process::Output) {
-    let refused = assert_refused(&first, &[]);
+    let refused = assert_refused(&first, &["kept in memory", "are lost", "--resume"]);
     assert!(
-        refused.contains("full")
-            || refused.contains("cannot be read or written")
-            || refused.contains("large"),
+        refused.contains("No space") || refused.contains("File too large"),
         "{refused}"
     );
     let before = samples(&fs::read(out.with_extension("raw")).unwrap()).len();
@@ -259,7 +258,7 @@ fn a_file_that_may_not_grow_loses_nothing() {
     let out = folder.join("run.csv");
     // Blocks of 1024 bytes; a write over it fails with EFBIG, as one on a full disk does with ENOSPC.
     let script = "trap '' XFSZ; ulimit -f 8; exec \"$@\"";
-    let inner = capture(&board, &out, &["--quiet"]);
+    let inner = capture(&board, &out, &["--quiet", "--seconds", "12"]);
     let mut limited = Command::new("bash");
     limited
         .args(["-c", script, "bash"])
@@ -269,6 +268,39 @@ fn a_file_that_may_not_grow_loses_nothing() {
     full(&out, first, || {
         Running::start(capture(&board, &out, &["--resume", "--seconds", "2"])).output()
     });
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_that_is_full_for_a_while_leaves_no_hole() {
+    for name in ["run.csv", "run.csv.gz"] {
+        let board = Board::start();
+        let folder = folder(&format!("resume_room_{}", name.len()));
+        let (out, raw) = (folder.join(name), folder.join("run.raw"));
+        let child = Running::start(common::unkilled_by_limits(&capture(
+            &board,
+            &out,
+            &["--quiet", "--seconds", "9"],
+        )));
+        wait_until("samples", || size(&raw) > 2_000);
+        let id = child.0.as_ref().unwrap().id();
+        common::limit_files(id, Some(size(&raw) + 500));
+        std::thread::sleep(Duration::from_secs(4));
+        let then = size(&raw);
+        common::limit_files(id, None);
+        let done = child.output();
+        let said = assert_success(&done);
+        assert!(
+            said.contains("kept in memory")
+                && said.contains("what had waited in memory is written"),
+            "{said}"
+        );
+        let all = samples(&fs::read(&raw).unwrap());
+        assert!(size(&raw) > then + 1_000, "{} {then}", size(&raw));
+        let record = record(&out);
+        assert_holds(&record, &all);
+        assert!(holes(&record).is_empty(), "{:?}", holes(&record));
+    }
 }
 
 /// A file system of 64 KiB, where this user may mount one.
@@ -302,7 +334,8 @@ fn a_full_disk_loses_nothing() {
     let (out, ballast) = (disk.0.join("run.csv"), disk.0.join("ballast"));
     // Room for some seconds.
     fs::write(&ballast, vec![1; 48 << 10]).unwrap();
-    let first = Running::start(capture(&board, &out, &["--quiet"])).output();
+    let first = capture(&board, &out, &["--quiet", "--seconds", "15"]);
+    let first = Running::start(first).output();
     full(&out, first, || {
         fs::remove_file(&ballast).unwrap();
         Running::start(capture(&board, &out, &["--resume", "--seconds", "2"])).output()

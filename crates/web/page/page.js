@@ -89,3 +89,10 @@ addEventListener('drop', (event) => {
   part('drop').classList.remove('over');
   if (event.dataTransfer.files.length) { file = event.dataTransfer.files[0]; start(); }
 });
+// `imu-stand monitor --web` has this page at /engine and opens it with what was recorded so far.
+addEventListener('message', (event) => {
+  if (!opener || event.source !== opener || event.origin !== location.origin || !(event.data?.bytes instanceof ArrayBuffer)) return;
+  file = new File([event.data.bytes], String(event.data.name));
+  start();
+});
+if (opener && location.protocol.startsWith('http')) opener.postMessage('ready', location.origin);

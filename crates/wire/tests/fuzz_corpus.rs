@@ -1,4 +1,6 @@
 //! The fuzz targets' checks over their corpora and over mutations of them, on stable.
+//!
+//! `IMU_STAND_FUZZ_SECONDS` is how long for each, in place of half a million inputs, and `IMU_STAND_SEED` the seed.
 
 #[path = "common/fuzzing.rs"]
 mod fuzzing;
@@ -21,13 +23,18 @@ fn corpus(target: &str) -> Vec<Vec<u8>> {
 }
 
 fn mutations(target: &str, check: fn(&[u8])) {
-    const COUNT: u32 = 500_000;
+    const COUNT: u64 = 500_000;
     let corpus = corpus(target);
     corpus.iter().for_each(|line| check(line));
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+    let set = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
+    let seconds: Option<f64> = set("IMU_STAND_FUZZ_SECONDS");
+    let seed = set("IMU_STAND_SEED").unwrap_or(11.0) as u64;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut below = |n: usize| (((rng.next_u64() >> 32) * n as u64) >> 32) as usize;
     let mut line = Vec::new();
-    for _ in 0..COUNT {
+    let (begin, mut count) = (std::time::Instant::now(), 0u64);
+    while seconds.map_or(count < COUNT, |most| begin.elapsed().as_secs_f64() < most) {
+        count += 1;
         line.clear();
         line.extend(&corpus[below(corpus.len())]);
         for _ in 0..=below(4) {
@@ -45,6 +52,10 @@ fn mutations(target: &str, check: fn(&[u8])) {
         line.truncate(1000);
         check(&line);
     }
+    println!(
+        "{target}: {count} inputs, {:.0} a second; seed {seed}",
+        count as f64 / begin.elapsed().as_secs_f64()
+    );
 }
 
 #[test]

@@ -247,9 +247,7 @@ impl Board for HostBoard {
         let len = wire::fields::encode(kind, fields, &mut frame);
         let frame = &frame[..len];
         let chip = &mut *self.0.borrow_mut();
-        // A line that is to change its speed has to fall idle first.
-        let waits = chip.next_divisor.is_some() && kind != wire::kind::REPLY;
-        if waits || chip.room() < wire::fields::room_for(kind, fields.len()) {
+        if chip.room() < wire::fields::room_for(kind, fields.len()) {
             return false;
         }
         let mut decoder = wire::Decoder::new();
@@ -344,7 +342,10 @@ impl Board for HostBoard {
     }
 
     fn reboot(&mut self) {
-        self.0.borrow_mut().reboot = true;
+        let chip = &mut *self.0.borrow_mut();
+        // The image waits until the transmitter is empty.
+        chip.now = chip.now.max(chip.line_free);
+        chip.reboot = true;
     }
 
     fn reset_cause(&self) -> u8 {

@@ -5,7 +5,6 @@ use bench::{Motor, Scenario, Stand, Supply, Thermal, bartlett, register};
 
 mod data_sheet;
 mod faults;
-mod part;
 mod registers;
 
 const LSB: f64 = 0.073_26;

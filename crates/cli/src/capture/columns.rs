@@ -119,6 +119,12 @@ pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Column
             None => by_our_names(said, mapping)?,
         }
     };
+    if !mapping.columns.is_empty() && !found.columns.iter().any(is_measured) {
+        return Err(unknown(
+            said,
+            "`--columns` names nothing that was measured".to_owned(),
+        ));
+    }
     let names = found.columns.iter().map(|c| c.name.as_str());
     mapping.check_units(names)?;
     let mut often: BTreeMap<&String, usize> = BTreeMap::new();
@@ -184,6 +190,10 @@ pub(super) fn unknown(said: &Said<'_>, why: String) -> CaptureError {
         },
         example,
     }
+}
+
+fn is_measured(column: &Column) -> bool {
+    matches!(column.role, Role::Measured { .. })
 }
 
 fn is_inertial(column: &Column) -> bool {

@@ -83,7 +83,12 @@ fn put_in(
     healed: &mut Healed,
 ) -> std::result::Result<(), CaptureError> {
     let mut live = Live::resume(path, calibration)?;
-    let mut host_s = ends.last.as_ref().map_or(0.0, |last| last.host_s);
+    let begun_s = ends.last.as_ref().map_or(0.0, |last| last.host_s);
+    // Where the last row had come late, as on a busy computer, the board's clock runs ahead of the arrival of the next ones: none
+    // came later than the last of the raw bytes was written.
+    let written_s = raw_written(raw).map_or(f64::INFINITY, |at| at - ends.start_unix_s);
+    let latest_s = written_s.max(begun_s);
+    let mut host_s = begun_s;
     let mut ticks = ends.last.as_ref().map(|last| raw_ticks(last, ends));
     live.note(
         host_s,
@@ -97,7 +102,8 @@ fn put_in(
     for frame in &behind.frames {
         match frame {
             Frame::Sample(sample) if is_set_alike => {
-                host_s += since(ticks.replace(sample.t_ticks), sample.t_ticks, calibration);
+                let since_s = since(ticks.replace(sample.t_ticks), sample.t_ticks, calibration);
+                host_s = (host_s + since_s).min(latest_s);
                 let (place, _) = live.push(sample, host_s)?;
                 healed.rows += 1;
                 healed.missing += place.missing;
@@ -114,6 +120,13 @@ fn put_in(
         }
     }
     live.finish()
+}
+
+/// When a file was written to last, s since 1970; `None` where the system does not say.
+fn raw_written(path: &Path) -> Option<f64> {
+    let at = path.metadata().and_then(|file| file.modified()).ok()?;
+    let since = at.duration_since(std::time::UNIX_EPOCH).ok()?;
+    Some(since.as_secs_f64())
 }
 
 /// Time from one sample to the next, s; where the ticks go back, that of a sample.

@@ -1,7 +1,7 @@
 //! A capture that is written while it runs, and can be resumed.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use flate2::write::GzEncoder;
@@ -9,16 +9,16 @@ use wire::{Corrected, Hello, Sample};
 
 use super::ends::{BEFORE, Ends, LastRow, OFFSETS, START, complete_lines, is_gz};
 use super::write::{write_head, write_rows};
-use super::{Calibration, CaptureError, Continuity, Place, RecordBuilder, Restart};
+use super::{Calibration, CaptureError, Continuity, Held, Place, RecordBuilder, Restart};
 
 enum Sink {
-    Plain(BufWriter<File>),
-    Gz(GzEncoder<BufWriter<File>>),
+    Plain(Held),
+    Gz(GzEncoder<Held>),
 }
 
 impl Sink {
     fn new(file: File, path: &Path) -> Self {
-        let file = BufWriter::new(file);
+        let file = Held::new(file);
         if is_gz(path) {
             Sink::Gz(GzEncoder::new(file, flate2::Compression::default()))
         } else {
@@ -80,9 +80,11 @@ impl Live {
         head.header.entries.extend(start);
         head.header.entries.extend_from_slice(about);
         let mut sink = Sink::new(file, path);
-        write_head(&mut sink, &head)
-            .and_then(|()| sink.flush())
-            .map_err(io(path))?;
+        if let Err(error) = write_head(&mut sink, &head).and_then(|()| sink.flush()) {
+            // Half a header is no file to go on with. That it cannot be removed either adds nothing.
+            let _ = std::fs::remove_file(path);
+            return Err(io(path)(error));
+        }
         Ok(Self {
             path: path.to_owned(),
             sink,
@@ -103,13 +105,13 @@ impl Live {
         let ends = Ends::of(path, &complete, calibration)?;
         let sink = if is_gz(path) {
             // What was cut off in the middle of a compressed block cannot be appended to: it is written anew.
-            let old = path.with_extension("gz.old");
-            std::fs::rename(path, &old).map_err(io(&old))?;
-            let mut sink = Sink::new(File::create(path).map_err(io(path))?, path);
+            // The old file stays until the new one is on the disk.
+            let new = path.with_extension("gz.new");
+            let mut sink = Sink::new(File::create(&new).map_err(io(&new))?, path);
             sink.write_all(complete.as_bytes())
                 .and_then(|()| sink.flush())
-                .map_err(io(path))?;
-            std::fs::remove_file(&old).map_err(io(&old))?;
+                .and_then(|()| std::fs::rename(&new, path))
+                .map_err(io(&new))?;
             sink
         } else {
             let file = OpenOptions::new()
@@ -265,7 +267,8 @@ impl Live {
         writeln!(self.sink, "# event at {host_s:.3} s: {what}").map_err(io(&self.path))
     }
 
-    /// Sees to it that all rows are in the file.
+    /// Sees to it that all rows are in the file. Where the disk has no room they wait in memory, in their order, and this may
+    /// be tried again.
     ///
     /// # Errors
     /// [`CaptureError::Io`].
@@ -295,7 +298,7 @@ impl Live {
     /// Ends the file.
     ///
     /// # Errors
-    /// [`CaptureError::Io`].
+    /// [`CaptureError::Io`]: what was not in the file by then is lost.
     pub fn finish(mut self) -> Result<(), CaptureError> {
         self.write_pending()
             .and_then(|()| self.sink.flush())

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use super::CaptureError;
 use super::error::brief;
+use super::guard::guarded;
 use super::table::Table;
 
 mod hdf5;
@@ -50,12 +51,10 @@ fn reader(path: &Path) -> Option<Reader> {
 pub(crate) fn read_table(path: &Path) -> Option<Result<Table, CaptureError>> {
     let read = reader(path)?;
     Some(
-        read(path)
-            .and_then(Arrays::table)
-            .map_err(|why| CaptureError::Table {
-                path: path.to_owned(),
-                why,
-            }),
+        guarded(|| read(path).and_then(Arrays::table)).map_err(|why| CaptureError::Table {
+            path: path.to_owned(),
+            why,
+        }),
     )
 }
 
@@ -83,6 +82,11 @@ impl Arrays {
         })
     }
 
+    /// No more than so many bytes are in the file.
+    fn limit(&mut self, bytes: u64) {
+        self.room = self.room.min(bytes);
+    }
+
     /// Takes room for an array before it is read; an error where there is none.
     fn reserve(&mut self, name: &str, shape: &[u64]) -> Result<(), String> {
         let size = (shape.iter()).try_fold(NUMBER, |size, n| size.checked_mul(*n));
@@ -95,7 +99,8 @@ impl Arrays {
                 let shape: Vec<String> = shape.iter().map(u64::to_string).collect();
                 Err(format!(
                     "array `{}` of {} numbers, and what is read before it, would take more than {} GiB beyond the length of the \
-                     file; write the columns that are needed, or a part of the rows, to a file of their own",
+                     file, or than the file can hold; write the columns that are needed, or a part of the rows, to a file of \
+                     their own",
                     brief(name),
                     shape.join(" x "),
                     ROOM >> 30

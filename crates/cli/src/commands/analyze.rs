@@ -104,9 +104,7 @@ fn head(analysis: &Analysis) {
         tidy(input.rate_hz, 6),
         input.samples
     );
-    say!(
-        "in brackets 95 % intervals, two-sided; `at most` is the upper end of such an interval that begins at 0"
-    );
+    say!("in brackets: 95 % intervals; edf: independent values behind a deviation");
 }
 
 /// Parameters, warnings and the paper's figures of a channel, and its angle. What is of the whole record stands above.
@@ -155,7 +153,7 @@ fn deviations(channel: &ChannelAnalysis) {
             channel.unit.as_str()
         };
         say!(
-            "  {:<16} {:>9} {:>12}   {:<26} {:>8}  noise there",
+            "  {:<15}{:>6} {:>10}  {:<21} {:>6}  noise there",
             format!("{}, {unit}", deviation.name()),
             "tau, s",
             "deviation",
@@ -164,7 +162,7 @@ fn deviations(channel: &ChannelAnalysis) {
         );
         for point in points {
             say!(
-                "    {:>24} {:>12}   {:<26} {:>8}  {}",
+                "  {:>21} {:>10}  {:<21} {:>6}  {}",
                 number(point.tau_s, 4),
                 number(point.deviation, 4),
                 format!("{} .. {}", number(point.low, 4), number(point.high, 4)),
@@ -182,7 +180,7 @@ fn attitude(analysis: &Analysis) {
     {
         let [w, x, y, z] = last.quaternion;
         say!(
-            "attitude of the three gyros after {} s: {} deg from the start{}, quaternion ({w:.6}, {x:.6}, {y:.6}, {z:.6})",
+            "attitude of the three gyros after {} s: {} deg from the start{}\n  quaternion ({w:.6}, {x:.6}, {y:.6}, {z:.6})",
             number(last.t_s, 4),
             number(last.angle_deg, 3),
             last.predicted_deg.map_or_else(String::new, |p| format!(

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use wire::Command;
+use wire::correction::ROWS;
 
 /// How long a reply may take: 60 ms of queue at 38400 baud, behind a health and a hello frame.
 pub(super) const REPLY_WAIT: Duration = Duration::from_millis(700);
@@ -34,6 +35,7 @@ impl Patience {
     /// | set baud | the board has left the old speed |
     /// | bias null, self-test | measures anew, or is refused as busy |
     /// | store set-up | overwrites the other copy too: then both are the same |
+    /// | CRC of a correction | spoils the other copy, as this one is in use by then |
     /// | motor profile | begins anew |
     /// | arm | a nonce is good for once |
     /// | write register COMMAND | a reset or a flash update, again |
@@ -47,6 +49,7 @@ impl Patience {
             Command::SelfTest { .. } => once(SELF_TEST_WAIT),
             Command::BiasNull { .. } => once(Duration::from_secs(3)),
             Command::MotorProfile { .. } | Command::Arm { .. } => once(REPLY_WAIT),
+            Command::SetCorrection { row, .. } if usize::from(*row) == ROWS => once(REPLY_WAIT),
             Command::SetGyro { .. } => Patience {
                 wait: SET_GYRO_WAIT,
                 tries: TRIES,

@@ -19,7 +19,12 @@ fn what_must_not_happen_twice_is_sent_once() {
         address,
         value: 0,
     };
+    let row = |row| Command::SetCorrection {
+        row,
+        values: [0; 3],
+    };
     for once in [
+        row(wire::correction::ROWS as u8),
         Command::Reboot,
         Command::ClearCounters,
         Command::SetBaud { divisor: 3 },
@@ -31,7 +36,7 @@ fn what_must_not_happen_twice_is_sent_once() {
     ] {
         assert_eq!(Patience::of(&once).tries, 1, "{once:?}");
     }
-    for again in [Command::Ping, Command::KeepAlive, write(0x38)] {
+    for again in [Command::Ping, Command::KeepAlive, write(0x38), row(0)] {
         assert!(Patience::of(&again).tries > 1, "{again:?}");
     }
 }

@@ -40,6 +40,38 @@ pub fn program_alone(arguments: &[&str]) -> Command {
     command
 }
 
+/// The command, in which a write over the limit of a file's size fails with EFBIG, as one on a full disk does with ENOSPC,
+/// where it would kill it by default.
+pub fn unkilled_by_limits(command: &Command) -> Command {
+    let mut shell = Command::new("bash");
+    shell
+        .args(["-c", "trap '' XFSZ; exec \"$@\"", "bash"])
+        .arg(command.get_program())
+        .args(command.get_args())
+        .env_remove("IMU_STAND_PORT");
+    shell
+}
+
+/// Sets how large the files of a process may grow.
+#[cfg(target_os = "linux")]
+pub fn limit_files(process: u32, bytes: Option<u64>) {
+    let most = bytes.unwrap_or(libc::RLIM_INFINITY);
+    let limit = libc::rlimit {
+        rlim_cur: most,
+        rlim_max: libc::RLIM_INFINITY,
+    };
+    // SAFETY: the limit lives through the call, and what it was is not asked for.
+    let done = unsafe {
+        libc::prlimit(
+            process as libc::pid_t,
+            libc::RLIMIT_FSIZE,
+            &raw const limit,
+            std::ptr::null_mut(),
+        )
+    };
+    assert_eq!(done, 0, "{}", std::io::Error::last_os_error());
+}
+
 /// What it printed, both ways, on one line: errors are wrapped to the width of a terminal.
 pub fn said(output: &Output) -> String {
     let both =
@@ -92,6 +124,38 @@ pub struct Swallow {
     pub requests: Vec<u8>,
     /// Sample frames with these sequence numbers.
     pub samples: Vec<u16>,
+    /// Frames at random: a byte flipped, a byte lost, the whole frame lost.
+    pub damage: Option<Damage>,
+}
+
+/// Damage at random, the same at each run of a seed.
+#[derive(Clone, Debug)]
+pub struct Damage {
+    /// Draws it.
+    pub rng: rand_xoshiro::Xoshiro256PlusPlus,
+    /// One frame in so many.
+    pub one_in: u64,
+}
+
+impl Damage {
+    /// A number below `n`.
+    fn below(&mut self, n: u64) -> u64 {
+        ((u128::from(rand_core::Rng::next_u64(&mut self.rng)) * u128::from(n)) >> 64) as u64
+    }
+
+    /// Damages a frame, or leaves it as it is; whether it is intact.
+    pub fn pass(&mut self, frame: &mut Vec<u8>) -> bool {
+        if self.below(self.one_in) > 0 {
+            return true;
+        }
+        let at = self.below(frame.len() as u64) as usize;
+        match self.below(3) {
+            0 => frame[at] ^= 1 << self.below(8),
+            1 => drop(frame.remove(at)),
+            _ => frame.clear(),
+        }
+        false
+    }
 }
 
 /// Both ends of the line; `None` while it is unplugged.
@@ -106,6 +170,8 @@ pub struct Board {
     aside: Arc<Mutex<Vec<u8>>>,
     /// Samples that were sent while nothing was plugged in.
     unheard: Arc<AtomicU64>,
+    /// Samples whose frames went onto the line whole, in their order: number and ticks.
+    intact: Arc<Mutex<Vec<(u16, u32)>>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -127,14 +193,15 @@ impl Board {
             ends: Arc::default(),
             aside: Arc::default(),
             unheard: Arc::default(),
+            intact: Arc::default(),
             stop: Arc::clone(&stop),
             thread: None,
         };
         board.plug();
         let (ends, aside) = (Arc::clone(&board.ends), Arc::clone(&board.aside));
-        let unheard = Arc::clone(&board.unheard);
+        let (unheard, intact) = (Arc::clone(&board.unheard), Arc::clone(&board.intact));
         board.thread = Some(std::thread::spawn(move || {
-            serve(&ends, &aside, &unheard, scenario, swallow, &stop);
+            serve(&ends, &aside, &unheard, &intact, scenario, swallow, &stop);
         }));
         board
     }
@@ -159,6 +226,11 @@ impl Board {
     /// Samples that it sent while the cable was out.
     pub fn unheard(&self) -> u64 {
         self.unheard.load(Ordering::Relaxed)
+    }
+
+    /// Samples whose frames went onto the line whole, in their order: number and ticks.
+    pub fn intact(&self) -> Vec<(u16, u32)> {
+        self.intact.lock().unwrap().clone()
     }
 
     /// Sends the board a command without the program's knowledge.
@@ -201,6 +273,7 @@ fn serve(
     ends: &Ends,
     aside: &Mutex<Vec<u8>>,
     unheard: &AtomicU64,
+    intact: &Mutex<Vec<(u16, u32)>>,
     scenario: Scenario,
     swallow: Swallow,
     stop: &AtomicBool,
@@ -247,10 +320,14 @@ fn serve(
                 Some(Ok(Frame::Sample(sample))) => swallow.samples.contains(&sample.seq),
                 _ => false,
             };
+            let is_whole = swallow.damage.as_mut().is_none_or(|d| d.pass(&mut frame));
             match (lost, &mut *ends.lock().unwrap()) {
                 // A line that nobody reads overflows.
                 (false, Some((master, _))) => {
-                    let _ = master.write_all(&frame);
+                    let is_sent = master.write_all(&frame).is_ok();
+                    if let (true, true, Some(Ok(Frame::Sample(s)))) = (is_sent, is_whole, decoded) {
+                        intact.lock().unwrap().push((s.seq, s.t_ticks));
+                    }
                 }
                 (false, None) if matches!(decoded, Some(Ok(Frame::Sample(_)))) => {
                     unheard.fetch_add(1, Ordering::Relaxed);

@@ -11,12 +11,29 @@ pub(super) fn hdf5(path: &Path) -> Result<Arrays, String> {
             "it cannot be read as HDF5: {error}. In MATLAB, `save(FILE, '-v7')` writes a version without HDF5"
         )
     };
-    let mut out = Arrays::of(&open(path)?)?;
-    let file = hdf5_pure::File::open_streaming(path).map_err(bad)?;
+    let opened = open(path)?;
+    let mut out = Arrays::of(&opened)?;
+    // An array of which nothing is stored claims any size, and is read as that many fill values.
+    let length = opened.metadata().map_err(|error| error.to_string())?.len();
+    out.limit(length.saturating_mul(PACKS));
+    // What a chunk claims to take in the file is believed where the file is read piece by piece, up to 4 GiB.
+    let file = if length <= WHOLE {
+        let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
+        hdf5_pure::File::from_bytes(bytes)
+    } else {
+        hdf5_pure::File::open_streaming(path)
+    };
+    let file = file.map_err(bad)?;
     let mut too_large = Ok(());
     hdf5_group(&file.root(), "", 0, &mut out, &mut too_large).map_err(bad)?;
     too_large.map(|()| out)
 }
+
+/// A byte of deflate stands for 1032 at the most (RFC 1951: 258 by two bits); other filters do no better on readings.
+const PACKS: u64 = 1032;
+
+/// Bytes of a file that is read at once.
+const WHOLE: u64 = 1 << 30;
 
 /// Groups within groups that are followed.
 const DEEPEST: usize = 16;

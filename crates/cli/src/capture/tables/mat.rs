@@ -44,8 +44,10 @@ pub(super) fn mat(path: &Path) -> Result<Arrays, String> {
 }
 
 /// Bytes that the packed elements of a .mat of version 5 to 7 unpack to, up to where they are too many; the file stands behind
-/// its first ten bytes before and after. An element has its kind and length before it, 4 bytes each, and kind 15 is packed.
+/// its first ten bytes before and after. An element has its kind and length before it, 4 bytes each: kind 14 is an array, kind 15
+/// a packed one. Others, and what does not unpack, are refused here: the library would print its view of them and go on.
 fn unpacked_mat(file: &mut File) -> Result<u64, String> {
+    const ARRAY: u32 = 14;
     const PACKED: u32 = 15;
     let wrong = |error: std::io::Error| error.to_string();
     let mut bytes = BufReader::new(&mut *file);
@@ -65,8 +67,13 @@ fn unpacked_mat(file: &mut File) -> Result<u64, String> {
             let mut element = bytes.by_ref().take(length.into());
             if kind == PACKED {
                 let unpacked = flate2::read::ZlibDecoder::new(&mut element).take(ROOM);
-                // Damage is for who reads it to tell.
-                size += std::io::copy(&mut { unpacked }, &mut std::io::sink()).unwrap_or(0);
+                size += std::io::copy(&mut { unpacked }, &mut std::io::sink())
+                    .map_err(|error| format!("a packed array of it is damaged: {error}"))?;
+            } else if kind != ARRAY {
+                return Err(format!(
+                    "it is damaged, or no .mat of version 5 to 7: an element of kind {kind} stands where an array has {ARRAY} or \
+                     {PACKED}"
+                ));
             }
             if size >= ROOM {
                 size = u64::MAX;

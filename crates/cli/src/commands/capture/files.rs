@@ -51,6 +51,10 @@ impl Capture<'_> {
 
     /// Whether another file is to begin.
     fn is_due(&self, now: f64) -> bool {
+        // What waits for room goes where it was read.
+        if self.room.is_short() {
+            return false;
+        }
         let rotate = self.arguments.rotate;
         rotate.is_some_and(|rotate| rotate.is_due(self.last_s, now, self.size))
     }
@@ -229,7 +233,8 @@ impl Capture<'_> {
             let what = format!("the capture ends; {heard}");
             live.note(now, &what)?;
         }
-        self.close()?;
+        let held = self.end_of_room();
+        held.and(self.close())?;
         let answer = Answer {
             format: "imu-stand-captured/1",
             files: self.files.clone(),

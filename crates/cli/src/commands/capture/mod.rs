@@ -5,6 +5,7 @@ mod losses;
 mod motor;
 mod raw;
 mod replay;
+mod room;
 mod rotate;
 
 use std::io::IsTerminal;
@@ -17,7 +18,7 @@ use clap::Args;
 use imu_stand::RecordBuilder;
 use imu_stand::capture::{Calibration, DIGITS, Live, heal, last_part, part_name, raw_path};
 use imu_stand::link::{Change, Feed, Link, Motor};
-use miette::{IntoDiagnostic, Result, WrapErr};
+use miette::{IntoDiagnostic, Result};
 use model::record::Base;
 use serde::Serialize;
 use wire::{Frame, Hello, Sample};
@@ -26,6 +27,7 @@ use super::board::motor::Drive;
 use super::{BaseName, Line};
 use losses::{Apart, Holes, Lost};
 use raw::Raw;
+use room::Room;
 use rotate::Rotate;
 
 /// What `capture` takes.
@@ -115,6 +117,7 @@ struct Answer {
 struct Capture<'a> {
     arguments: &'a Arguments,
     raw: Raw,
+    room: Room,
     is_terminal: bool,
     start: Instant,
     /// What `start` is in the file's host time, s.
@@ -255,6 +258,7 @@ impl<'a> Capture<'a> {
         Ok(Self {
             arguments,
             raw,
+            room: Room::default(),
             is_terminal: std::io::stderr().is_terminal(),
             start: Instant::now(),
             start_s: 0.0,
@@ -293,9 +297,9 @@ impl<'a> Capture<'a> {
             let mut written = Ok(());
             let raw = &mut self.raw;
             let change = feed.poll(|bytes| written = raw.write(bytes));
-            written
-                .into_diagnostic()
-                .wrap_err("cannot write the raw bytes: is the disk full?")?;
+            if let Err(error) = written {
+                self.short_of_room(&error);
+            }
             if let Some(change) = change {
                 self.changed(&change)?;
             }
@@ -344,8 +348,8 @@ impl<'a> Capture<'a> {
 
     /// Writes what has come, and shows it.
     fn show(&mut self, link: &Link) -> Result<()> {
-        if let Some(live) = &mut self.live {
-            live.flush()?;
+        self.flush()?;
+        if let Some(live) = &self.live {
             self.size = live.path().metadata().map_or(0, |file| file.len());
         }
         if !self.arguments.quiet && self.is_terminal {

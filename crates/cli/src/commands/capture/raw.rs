@@ -4,6 +4,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
+use imu_stand::capture::Held;
 use miette::{IntoDiagnostic, Result, WrapErr};
 
 /// Bytes of which it may not be known yet where their frame ends; a line of noise has no ends.
@@ -12,8 +13,8 @@ const RECENT: usize = 1 << 16;
 /// A file of them.
 pub(super) struct Raw {
     path: PathBuf,
-    file: File,
-    /// Its length, and what it was when this run began.
+    file: Held,
+    /// Its length when nothing waits, and what it was when this run began.
     length: u64,
     began: u64,
     /// Bytes that this run has read.
@@ -46,7 +47,7 @@ impl Raw {
         let (file, length) = opened.wrap_err_with(|| format!("cannot write {}", path.display()))?;
         Ok(Self {
             path: path.to_owned(),
-            file,
+            file: Held::new(file),
             length,
             began: length,
             read: 0,
@@ -74,15 +75,26 @@ impl Raw {
         self.length.saturating_sub(self.recent.len() as u64)
     }
 
-    /// Adds what was read.
+    /// Adds what was read. Where the disk has no room it waits in memory, and [`flush`](Self::flush) tries again.
     pub fn write(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        // It takes every byte.
         self.file.write_all(bytes)?;
         self.length += bytes.len() as u64;
         self.read += bytes.len() as u64;
         self.recent.extend_from_slice(bytes);
         let over = self.recent.len().saturating_sub(RECENT);
         self.recent.drain(..over);
-        Ok(())
+        self.file.flush()
+    }
+
+    /// Tries to write what waits.
+    pub fn flush(&mut self) -> std::io::Result<()> {
+        self.file.flush()
+    }
+
+    /// How many bytes wait for room.
+    pub fn waiting(&self) -> usize {
+        self.file.waiting()
     }
 
     /// The frames that end within so many bytes of this run were taken.
@@ -93,19 +105,20 @@ impl Raw {
     }
 
     /// Goes on in another file, from the frame on that was not taken yet: the bytes of both, one after the other, are those of
-    /// the line.
+    /// the line. Where a step fails, this file stays as it is.
     pub fn next(&mut self, path: &Path) -> Result<()> {
         let offset = self.offset();
-        let moved = open(path).and_then(|(mut file, began)| {
+        let moved = self.file.flush().and_then(|()| {
+            let (mut file, began) = open(path)?;
             file.write_all(&self.recent)?;
-            self.file.set_len(offset)?;
+            self.file.file().set_len(offset)?;
             Ok((file, began))
         });
         let (file, began) = moved
             .into_diagnostic()
             .wrap_err_with(|| format!("cannot write {}", path.display()))?;
         self.length = began + self.recent.len() as u64;
-        (self.file, self.began) = (file, began);
+        (self.file, self.began) = (Held::new(file), began);
         self.path = path.to_owned();
         Ok(())
     }

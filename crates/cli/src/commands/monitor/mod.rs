@@ -1,5 +1,6 @@
 //! `imu-stand monitor`: lines, a screen of the terminal, or a page in a browser.
 
+mod engine;
 mod guard;
 mod http;
 mod terminal;

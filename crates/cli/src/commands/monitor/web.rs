@@ -16,6 +16,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use wire::Frame;
 
+use super::engine;
 use super::guard::{For, Guard, Refused};
 use super::http::{Request, answer, events};
 
@@ -185,7 +186,7 @@ impl Shared {
             return answer(stream, "400 Bad Request", TEXT, "", b"no request");
         };
         let purpose = match &*request.path {
-            "/" => For::Page,
+            "/" | "/engine" => For::Page,
             "/act" | "/watched" | "/diagnose" => For::Acting,
             _ => For::Looking,
         };
@@ -202,6 +203,11 @@ impl Shared {
         }
         match &*request.path {
             "/" => answer(stream, "200 OK", HTML, POLICY, PAGE.as_bytes()),
+            // Its own policy, in its head, allows no connection.
+            "/engine" => match engine::page() {
+                Ok(page) => answer(stream, "200 OK", HTML, "", &page),
+                Err(why) => answer(stream, "404 Not Found", TEXT, "", why.as_bytes()),
+            },
             "/events" => self.events(stream),
             "/record.csv" => {
                 let record = lock(&self.record).build();

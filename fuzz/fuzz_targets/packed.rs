@@ -1,0 +1,7 @@
+//! Any bytes as `packed`: what is checked is in crates/cli/tests/fuzz/targets.rs.
+#![no_main]
+
+#[path = "../../crates/cli/tests/fuzz/targets.rs"]
+mod targets;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| targets::check("packed", bytes));
