@@ -3,9 +3,11 @@
 //! A mode that noise drives and a tone whose pitch wanders know nothing of temperature, supply and command. The band alone, on
 //! the half line of frequencies, is a complex envelope z: |z|^2 is its size, and the imaginary part of z(t+1) z*(t), turned back
 //! by the mean pitch, its pitch. Both are regressed on each recorded course, on its square, and for a command on what rings
-//! after each change of it. The scatter of a coefficient is that of the residual at the frequencies where the course moves.
+//! after each change of it; and on the size and the pitch of each other band, which are another thing's. The scatter of a coefficient
+//! is that of the residual at the frequencies where the course moves.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use model::effect::Signal;
 use model::record::Quantity;
@@ -13,6 +15,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::envelope::law::pitch;
 use super::envelope::{Band, REACH, envelope_of, kept};
 use crate::test_level::{CheckId, Outcome};
 use numerics::column::dot;
@@ -92,42 +95,74 @@ fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
     Some((2.0 * law.sf(t.abs()), slope * slope * own / all))
 }
 
-/// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded.
-pub(super) fn claim(band: &Band, signals: &[Signal], named: &str) -> Option<Outcome> {
-    let z = envelope_of(&kept(&band.coefficients, &band.density));
-    let cells = z.len();
-    if cells < LEAST {
-        return None;
+/// How a band moves.
+pub(super) struct Moves {
+    /// The first of its coefficients and the end.
+    places: Range<usize>,
+    /// Its pitch and its size in time, without their means.
+    pitch: Vec<f64>,
+    size: Vec<f64>,
+    /// What is left of a ring in the next cell.
+    keep: f64,
+}
+
+impl Moves {
+    /// Of a band whose first coefficient is at `from`; `None` where it is too short.
+    pub(super) fn of(band: &Band, from: usize) -> Option<Self> {
+        let mut planner = FftPlanner::new();
+        let z = envelope_of(&kept(&band.coefficients, &band.density), &mut planner);
+        if z.len() < LEAST {
+            return None;
+        }
+        let top = band.density.iter().copied().fold(0.0, f64::max);
+        let half = band.density.iter().sum::<f64>() / (2.0 * REACH.atan() * top);
+        Some(Self {
+            places: from..from + band.density.len(),
+            pitch: beyond(pitch(&z), &[]),
+            size: beyond(z.iter().map(Complex::norm_sqr).collect(), &[]),
+            keep: (-2.0 * PI * half / z.len() as f64).exp(),
+        })
     }
-    let turn: Complex<f64> = z.windows(2).map(|w| w[1] * w[0].conj()).sum();
-    let back = turn.conj() / turn.norm().max(f64::MIN_POSITIVE);
-    let pitch = z.windows(2).map(|w| (w[1] * w[0].conj() * back).im);
-    let pitch = beyond(pitch.chain([0.0]).collect(), &[]);
-    let size = beyond(z.iter().map(Complex::norm_sqr).collect(), &[]);
-    let top = band.density.iter().copied().fold(0.0, f64::max);
-    let half = band.density.iter().sum::<f64>() / (2.0 * REACH.atan() * top);
-    let keep = (-2.0 * PI * half / cells as f64).exp();
+
+    fn apart(&self, other: &Self) -> bool {
+        self.places.end <= other.places.start || other.places.end <= self.places.start
+    }
+}
+
+/// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded, and no other band.
+pub(super) fn claim(
+    own: &Moves,
+    others: &[&Moves],
+    signals: &[Signal],
+    named: &str,
+) -> Option<Outcome> {
+    let cells = own.size.len();
     let slow = [Quantity::Temp, Quantity::Supply, Quantity::Pwm];
-    let mut asked = 0;
-    let mut least: Option<(f64, String, &'static str)> = None;
+    let mut all: Vec<(&str, Vec<f64>)> = vec![];
     for s in signals.iter().filter(|s| slow.contains(&s.quantity)) {
         let plain = in_cells(&s.smooth, cells);
         let first = beyond(plain.clone(), &[]);
         let square = beyond(first.iter().map(|v| v * v).collect(), &[&first]);
-        let mut courses = vec![first, square];
+        all.extend([(s.name.as_str(), first), (&s.name, square)]);
         if s.quantity == Quantity::Pwm {
-            courses.push(beyond(rung(&plain, keep), &[]));
+            all.push((&s.name, beyond(rung(&plain, own.keep), &[])));
         }
-        for course in &courses {
-            for (what, series) in [("pitch", &pitch), ("size", &size)] {
-                let Some((p, part)) = chance(series, course) else {
-                    continue;
-                };
-                asked += 1;
-                let told = part > FOLLOWED && least.as_ref().is_none_or(|l| p < l.0);
-                if told {
-                    least = Some((p, s.name.clone(), what));
-                }
+    }
+    for o in others.iter().filter(|o| own.apart(o)) {
+        let course = |values: &[f64]| beyond(in_cells(values, cells), &[]);
+        all.push(("the pitch of another band", course(&o.pitch)));
+        all.push(("the size of another band", course(&o.size)));
+    }
+    let mut asked = 0;
+    let mut least: Option<(f64, &str, &'static str)> = None;
+    for (name, course) in &all {
+        for (what, series) in [("pitch", &own.pitch), ("size", &own.size)] {
+            let Some((p, part)) = chance(series, course) else {
+                continue;
+            };
+            asked += 1;
+            if part > FOLLOWED && least.as_ref().is_none_or(|l| p < l.0) {
+                least = Some((p, name, what));
             }
         }
     }
