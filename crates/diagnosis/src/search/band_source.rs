@@ -3,8 +3,7 @@
 //! A mode that noise drives and a tone whose pitch wanders know nothing of temperature, supply and command. The band alone, on
 //! the half line of frequencies, is a complex envelope z: |z|^2 is its size, and the imaginary part of z(t+1) z*(t), turned back
 //! by the mean pitch, its pitch. Both are regressed on each recorded course, on its square, and for a command on what rings
-//! after each change of it; and on the size and the pitch of each other band, which are another thing's. The scatter of a coefficient
-//! is that of the residual at the frequencies where the course moves.
+//! after each change of it. The scatter of a coefficient is that of the residual at the frequencies where the course moves.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -30,7 +29,7 @@ const FOLLOWED: f64 = 0.02;
 const LEAST: usize = 64;
 
 /// Means of a course in `cells` parts of the record.
-fn in_cells(values: &[f64], cells: usize) -> Vec<f64> {
+pub(super) fn in_cells(values: &[f64], cells: usize) -> Vec<f64> {
     let n = values.len();
     let part = |i: usize| {
         let (from, to) = (i * n / cells, ((i + 1) * n / cells).max(i * n / cells + 1));
@@ -40,7 +39,7 @@ fn in_cells(values: &[f64], cells: usize) -> Vec<f64> {
 }
 
 /// Without its mean and what others have of it.
-fn beyond(mut own: Vec<f64>, others: &[&[f64]]) -> Vec<f64> {
+pub(super) fn beyond(mut own: Vec<f64>, others: &[&[f64]]) -> Vec<f64> {
     let mean = own.iter().sum::<f64>() / own.len() as f64;
     own.iter_mut().for_each(|v| *v -= mean);
     for o in others {
@@ -71,7 +70,7 @@ fn energies(series: &[f64]) -> Vec<f64> {
 }
 
 /// Chance that a series follows a course as well, and the part of its energy that does.
-fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
+pub(super) fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
     let (all, own) = (dot(series, series), dot(course, course));
     if all <= 0.0 || own <= 1e-12 * all.min(1.0) {
         return None;
@@ -98,12 +97,13 @@ fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
 /// How a band moves.
 pub(super) struct Moves {
     /// The first of its coefficients and the end.
-    places: Range<usize>,
+    pub(super) places: Range<usize>,
+    /// Half its width, coefficients.
+    pub(super) half: f64,
+    pub(super) envelope: Vec<Complex<f64>>,
     /// Its pitch and its size in time, without their means.
-    pitch: Vec<f64>,
-    size: Vec<f64>,
-    /// What is left of a ring in the next cell.
-    keep: f64,
+    pub(super) pitch: Vec<f64>,
+    pub(super) size: Vec<f64>,
 }
 
 impl Moves {
@@ -118,25 +118,29 @@ impl Moves {
         let half = band.density.iter().sum::<f64>() / (2.0 * REACH.atan() * top);
         Some(Self {
             places: from..from + band.density.len(),
+            half,
             pitch: beyond(pitch(&z), &[]),
             size: beyond(z.iter().map(Complex::norm_sqr).collect(), &[]),
-            keep: (-2.0 * PI * half / z.len() as f64).exp(),
+            envelope: z,
         })
     }
 
-    fn apart(&self, other: &Self) -> bool {
+    /// Its middle, coefficients.
+    pub(super) fn middle(&self) -> f64 {
+        0.5 * (self.places.start + self.places.end) as f64
+    }
+
+    /// Whether no coefficient is of both.
+    pub(super) fn apart(&self, other: &Self) -> bool {
         self.places.end <= other.places.start || other.places.end <= self.places.start
     }
 }
 
-/// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded, and no other band.
-pub(super) fn claim(
-    own: &Moves,
-    others: &[&Moves],
-    signals: &[Signal],
-    named: &str,
-) -> Option<Outcome> {
+/// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded.
+pub(super) fn claim(own: &Moves, signals: &[Signal], named: &str) -> Option<Outcome> {
     let cells = own.size.len();
+    // What is left of a ring in the next cell.
+    let keep = (-2.0 * PI * own.half / cells as f64).exp();
     let slow = [Quantity::Temp, Quantity::Supply, Quantity::Pwm];
     let mut all: Vec<(&str, Vec<f64>)> = vec![];
     for s in signals.iter().filter(|s| slow.contains(&s.quantity)) {
@@ -145,13 +149,8 @@ pub(super) fn claim(
         let square = beyond(first.iter().map(|v| v * v).collect(), &[&first]);
         all.extend([(s.name.as_str(), first), (&s.name, square)]);
         if s.quantity == Quantity::Pwm {
-            all.push((&s.name, beyond(rung(&plain, own.keep), &[])));
+            all.push((&s.name, beyond(rung(&plain, keep), &[])));
         }
-    }
-    for o in others.iter().filter(|o| own.apart(o)) {
-        let course = |values: &[f64]| beyond(in_cells(values, cells), &[]);
-        all.push(("the pitch of another band", course(&o.pitch)));
-        all.push(("the size of another band", course(&o.size)));
     }
     let mut asked = 0;
     let mut least: Option<(f64, &str, &'static str)> = None;

@@ -12,7 +12,7 @@ use model::effect::{Covariance, Hypothesis, Peak};
 
 use super::band_source::{self, Moves};
 use super::envelope::{Band, Seen};
-use super::{Search, envelope};
+use super::{Search, band_alone, envelope};
 use crate::fit::channel::{Cluster, Form, State, Term};
 use crate::fit::likelihood::{Bins, Noise};
 use crate::fit::scan::residual;
@@ -273,10 +273,13 @@ impl Search<'_> {
                     t.claims.push(seen.claim(t.effect.id()));
                     let others = moves.iter().enumerate().filter(|(k, _)| *k != number);
                     let others: Vec<&Moves> = others.filter_map(|(_, m)| m.as_ref()).collect();
-                    let source = moves[number].as_ref().and_then(|own| {
-                        band_source::claim(own, &others, self.view.signals, t.effect.id())
-                    });
-                    t.claims.extend(source);
+                    let source = moves[number]
+                        .as_ref()
+                        .and_then(|own| band_source::claim(own, self.view.signals, t.effect.id()));
+                    let alone = moves[number]
+                        .as_ref()
+                        .and_then(|own| band_alone::claim(own, &others, t.effect.id()));
+                    t.claims.extend(source.into_iter().chain(alone));
                 }
             }
             // Of several the one tone has no coordinates of its own.
