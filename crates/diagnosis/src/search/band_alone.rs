@@ -48,7 +48,8 @@ fn locked(a: &Moves, b: &Moves, (j, k): (i32, i32)) -> Option<f64> {
 pub(super) fn claim(own: &Moves, others: &[&Moves], named: &str) -> Option<Outcome> {
     let cells = own.size.len();
     let mut all: Vec<(f64, &'static str)> = vec![];
-    for o in others.iter().filter(|o| own.apart(o)) {
+    // Bands that overlap are one cluster, and asked together.
+    for o in others {
         let course = |values: &[f64]| beyond(in_cells(values, cells), &[]);
         let alike = [
             (

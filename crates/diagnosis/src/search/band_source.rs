@@ -129,11 +129,6 @@ impl Moves {
     pub(super) fn middle(&self) -> f64 {
         0.5 * (self.places.start + self.places.end) as f64
     }
-
-    /// Whether no coefficient is of both.
-    pub(super) fn apart(&self, other: &Self) -> bool {
-        self.places.end <= other.places.start || other.places.end <= self.places.start
-    }
 }
 
 /// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded.

@@ -212,9 +212,11 @@ fn unlike(f: &Facts<'_>) -> bool {
 /// by what a random walk takes up, has such a peak.
 const NARROW: f64 = 1.0 / 3.0;
 
-/// Whether a peak is no narrow one, or has no second side: its half power lies beyond half the sample rate.
+/// Whether a peak is no narrow one, or is not seen to have two sides: a fifth of its height, two half widths from its middle, lies
+/// beyond half the sample rate.
 fn wide(peak: &Peak) -> bool {
-    2.0 * peak.half_width > NARROW * peak.omega || peak.omega + peak.half_width > PI
+    let width = 2.0 * peak.half_width;
+    width > NARROW * peak.omega || peak.omega + width > PI
 }
 
 /// Whether a channel has more bands than separate causes make: they are one structure.

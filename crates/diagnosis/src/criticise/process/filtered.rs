@@ -7,9 +7,9 @@ use numerics::tails::{chi_tail, kurtosis_score};
 
 /// Whitened coefficients behind a filter, in time over the standard deviations that they have there, and how such values correlate.
 pub(super) struct Filtered {
-    values: Vec<f64>,
+    pub(super) values: Vec<f64>,
     /// Sums of the second to fourth power of the correlation over all lags.
-    sums: [f64; 3],
+    pub(super) sums: [f64; 3],
 }
 
 impl Filtered {
