@@ -232,3 +232,61 @@ pub(super) fn wider(mode: &Arc<dyn Covariance>, peak: &Peak, level: f64) -> Vec<
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNT: usize = 12_000;
+    /// Half width of the band, coefficients, and the variance of the noise beside it.
+    const HALF: f64 = 60.0;
+    const LEVEL: f64 = 0.25;
+
+    /// A tone whose phase makes these steps, in a little noise, as the band that its Lorentzian says.
+    fn band(rng: &mut Xoshiro256PlusPlus, step: fn(&mut Xoshiro256PlusPlus) -> f64) -> Band {
+        let mut phase = 0.0;
+        let samples = (0..COUNT).map(|_| {
+            phase += 0.4 * PI + step(rng);
+            phase.cos() + LEVEL.sqrt() * normal(rng)
+        });
+        let c = Dct::new(COUNT).forward(&samples.collect::<Vec<_>>());
+        let middle = 0.4 * COUNT as f64;
+        let (from, to) = (middle - REACH * HALF, middle + REACH * HALF);
+        let top = 0.5 * COUNT as f64 / (PI * HALF) / LEVEL;
+        let places = || from as usize..to as usize;
+        Band {
+            coefficients: places().map(|k| c[k] / LEVEL.sqrt()).collect(),
+            density: (places())
+                .map(|k| top / (1.0 + ((k as f64 - middle) / HALF).powi(2)))
+                .collect(),
+        }
+    }
+
+    /// A phase that walks: its variance grows by twice the half width, rad per sample.
+    fn walks(rng: &mut Xoshiro256PlusPlus) -> f64 {
+        (2.0 * PI * HALF / COUNT as f64).sqrt() * normal(rng)
+    }
+
+    /// The same spectrum by half turns at random.
+    fn turns_over(rng: &mut Xoshiro256PlusPlus) -> f64 {
+        let chance = 0.5 * PI * HALF / COUNT as f64;
+        let turns = Uniform::new(0.0, 1.0).is_ok_and(|u| u.sample(rng) < chance);
+        if turns { PI } else { 0.0 }
+    }
+
+    #[test]
+    fn a_phase_that_walks_has_its_name_and_one_that_turns_over_has_none() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(23);
+        let mut fails = |step| {
+            let of = (0..20).filter(|seed| {
+                let seen = Seen::new(&band(&mut rng, step), *seed).expect("a band");
+                seen.claim("").p_value < CheckId::BandEnvelope.level()
+            });
+            of.count()
+        };
+        let (walking, turning) = (fails(walks), fails(turns_over));
+        // 0.2 of 20 are expected by chance.
+        assert!(walking <= 2, "{walking}");
+        assert!(turning >= 18, "{turning}");
+    }
+}
