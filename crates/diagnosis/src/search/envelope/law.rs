@@ -35,8 +35,6 @@ const UNEVEN: f64 = 0.03;
 const FLOOR: f64 = 1e-3;
 /// Frequencies either side that are the neighbourhood of a line, without it and the next ones.
 const BESIDE: usize = 24;
-/// Least part of the energy of a series that its line has to hold: size or pitch are off by a seventh of their swing.
-const HELD: f64 = 0.02;
 /// Fewest values of the shortest series by octave.
 const LEAST: usize = 16;
 
@@ -136,6 +134,20 @@ impl Portrait {
     }
 }
 
+/// Of the cube root of a chi-square of [`SIZES`] degrees of freedom (Wilson and Hilferty, 1931): 3^(1/3) (1 - 2/27), and
+/// 3^(1/3) (2/27)^(1/2).
+const DISTANCE: Spread = Spread {
+    middle: 1.3354,
+    spread: 0.3925,
+};
+
+/// Of the largest of six standard normal values, as many as there are statistics (Harter, 1961): what is tolerated makes the
+/// scores of simulations smaller.
+const LARGEST: Spread = Spread {
+    middle: 1.267,
+    spread: 0.645,
+};
+
 /// Middle and spread.
 #[derive(Clone, Copy, Debug)]
 struct Spread {
@@ -219,13 +231,18 @@ impl Law {
             largest: (0.0, 1.0),
         };
         let distances: Vec<f64> = runs.iter().map(|r| law.distance(r, fewer)).collect();
-        law.distance = Spread::of(distances.iter().copied());
+        let own = Spread::of(distances.iter().copied());
+        // What is tolerated is none of chance: simulations lie nearer together than what they may be off by.
+        law.distance = Spread {
+            middle: own.middle.max(DISTANCE.middle),
+            spread: own.spread.max(DISTANCE.spread),
+        };
         let highest: Vec<f64> = (runs.iter())
             .map(|r| law.farthest(r, fewer, fewer).0)
             .collect();
-        let Spread { middle, spread } = Spread::of(highest.iter().copied());
-        let scale = spread * 6f64.sqrt() / PI;
-        law.largest = (middle - EULER * scale, scale);
+        let own = Spread::of(highest.iter().copied());
+        let scale = own.spread.max(LARGEST.spread) * 6f64.sqrt() / PI;
+        law.largest = (own.middle.max(LARGEST.middle) - EULER * scale, scale);
         law
     }
 
@@ -242,7 +259,13 @@ impl Law {
         let sizes = (self.distance(seen, drawn) - self.distance.middle) / self.distance.spread;
         let mut all = vec![(sizes, 0)];
         for (k, (l, s)) in seen.lines.iter().zip(&self.lines).enumerate() {
-            if l.share > HELD {
+            // Of a real series both sides of the spectrum; of the size that is in proportion to the mean.
+            let held = match k {
+                0 => 2.0 * l.share * (seen.size[0].exp() - 1.0),
+                1 => 2.0 * l.share,
+                _ => l.share,
+            };
+            if held > TOLERATED {
                 all.push(((l.nats - s.middle) / s.spread.max(f64::MIN_POSITIVE), 1 + k));
             }
         }
