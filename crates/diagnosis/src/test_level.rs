@@ -27,6 +27,9 @@ pub struct Outcome {
 pub const OMNIBUS_LEVEL: f64 = 1e-5;
 /// Chance below which a claim fails. It is weighed only where a process is named, not on every record.
 pub(crate) const CLAIM_LEVEL: f64 = 1e-3;
+/// The same of what the envelope of a band claims: a narrow one has few independent values, and ten times as many of the names that
+/// are not true would pass at [`CLAIM_LEVEL`].
+pub(crate) const ENVELOPE_LEVEL: f64 = 1e-3;
 /// Chance of a false alarm of one audit on one channel.
 pub const AUDIT_LEVEL: f64 = 2e-5;
 thread_local! {
@@ -145,8 +148,9 @@ checks! {
     BandSpectrum "band_spectrum" CLAIM_LEVEL, Named;
     BandSteadiness "band_steadiness" CLAIM_LEVEL, Named;
     BandSize "band_size" CLAIM_LEVEL, Named;
-    BandEnvelope "band_envelope" CLAIM_LEVEL, Named;
+    BandEnvelope "band_envelope" ENVELOPE_LEVEL, Named;
     BandSource "band_source" CLAIM_LEVEL, Named;
+    BandAlone "band_alone" ENVELOPE_LEVEL, Named;
     VarianceLaw "variance_law" CLAIM_LEVEL, Named;
     FollowerLaw "follower_law" CLAIM_LEVEL, Named;
     CommonNoiseLaw "common_noise_law" CLAIM_LEVEL, Named;
@@ -229,7 +233,8 @@ impl CheckId {
             | Self::BandSteadiness
             | Self::BandSize
             | Self::BandEnvelope
-            | Self::BandSource => "a band of no known kind",
+            | Self::BandSource
+            | Self::BandAlone => "a band of no known kind",
             Self::VarianceLaw => "the size of the noise changes by no known law",
             Self::FollowerLaw => "it follows a channel by no known law",
             _ => return None,
@@ -248,12 +253,13 @@ impl CheckId {
         Self::ProcessSource,
     ];
     /// The same of what stands at one frequency.
-    pub const OF_BAND: [Self; 5] = [
+    pub const OF_BAND: [Self; 6] = [
         Self::BandSpectrum,
         Self::BandSteadiness,
         Self::BandSize,
         Self::BandEnvelope,
         Self::BandSource,
+        Self::BandAlone,
     ];
     /// The checks of short-time spectra.
     pub const OF_SHORT_TIME: [Self; 3] = [Self::ColourFollows, Self::Order, Self::Leaning];

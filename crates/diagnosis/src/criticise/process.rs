@@ -15,6 +15,7 @@
 //! * Source: what it knows nothing of, by its mean (`source`).
 //! * Size: the same energy against temperature, supply and command and their squares, which it knows nothing of.
 
+mod filtered;
 pub(crate) mod independence;
 
 use std::f64::consts::PI;
@@ -27,8 +28,9 @@ use crate::fit::likelihood::{Bins, Noise, Panel};
 use crate::search::Search;
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, DEPARTURE, Outcome};
+use filtered::Filtered;
 use numerics::column::dot;
-use numerics::tails::{chi_tail, errors_of_sum, kurtosis_score, normal_tail};
+use numerics::tails::{chi_tail, errors_of_sum, normal_tail};
 
 /// Part of what a band explains that its shape may leave: it is off by a fifth of its size. No mode of a real structure is
 /// a Lorentzian to the last.
@@ -48,17 +50,31 @@ const LEAST_OF_COURSE: f64 = 4.0 * LEAST;
 const DEPTH: f64 = 0.2;
 /// Energy of a column over that of what it was made of, below which it is rounding.
 const ROUNDING: f64 = 1e-9;
+/// Least variance over its mean that a law gives.
+const LEAST_SIZE: f64 = 0.05;
 /// Step of a numerical derivative.
 const STEP: f64 = 1e-3;
 
-/// What the processes among the terms of a state claim, each claim with its chance.
-pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<Outcome> {
+/// What the processes among the terms of a state claim, each claim with its chance; the white noise may follow a `law` of the
+/// variance, that of the whole residual.
+pub(crate) fn of_processes(
+    search: &Search<'_>,
+    state: &State,
+    law: Option<&[f64]>,
+) -> Vec<Outcome> {
     let mut all: Vec<Outcome> = state.terms.iter().flat_map(|t| t.claims.clone()).collect();
     if state.noise.terms.is_empty() {
         return all;
     }
     let (u, _) = whitened_by_spectrum(&search.panel, state);
     let covariances: Vec<&Term> = state.terms.iter().filter(|t| t.is_covariance()).collect();
+    let filters = covariances.iter().zip(&state.noise.terms);
+    let white = Noise {
+        log_walk: f64::NEG_INFINITY,
+        terms: (filters.filter(|(t, _)| t.is_filter()))
+            .map(|(_, t)| t.clone())
+            .collect(),
+    };
     for term in &covariances {
         // A filter is no process of its own, and a part of a band is asked with it.
         if term.is_filter() || term.is_part() {
@@ -95,6 +111,8 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<Outcome> {
             least: term.cluster.map_or(0.0, |c| LEFT * c.lr),
             more: if term.is_band() { MORE } else { 1.0 },
             view: &search.view,
+            law,
+            white: &white,
             alone: Noise {
                 log_walk: f64::NEG_INFINITY,
                 terms: own.collect(),
@@ -186,6 +204,9 @@ struct Process<'a> {
     /// Independent values that its energies rest on, over those that others do.
     more: f64,
     view: &'a View<'a>,
+    /// Law of the variance of the whole residual, and the white noise, which follows it.
+    law: Option<&'a [f64]>,
+    white: &'a Noise,
     /// Its noise beside a white one of variance 1.
     alone: Noise,
 }
@@ -315,6 +336,22 @@ impl Process<'_> {
         Some(self.outcome(self.claims[0]?, statistic, p_value, what))
     }
 
+    /// Standard deviations in time of what passes a filter, whose mean square is 1: of what the law of the variance changes, the
+    /// white noise, other bands have another part than the whole residual has.
+    fn sizes(&self, filter: &[f64], g: &[f64]) -> Option<Vec<f64>> {
+        let law = self.law?;
+        let white = self.white.everywhere(&self.panel.bins);
+        let part = |weight: &dyn Fn(usize) -> f64| {
+            let finite = (0..g.len()).filter(|k| g[*k].is_finite());
+            let sums = finite.map(|k| (weight(k) * white[k] / g[k], weight(k)));
+            let (own, all) = sums.fold((0.0, 0.0), |s, t| (s.0 + t.0, s.1 + t.1));
+            own / all
+        };
+        let by = part(&|k| filter[k] * filter[k]) / part(&|_| 1.0);
+        let size = |v: &f64| (1.0 + by * (v - 1.0)).max(LEAST_SIZE).sqrt();
+        Some(law.iter().map(size).collect())
+    }
+
     /// Whether it is Gaussian, and there all the time.
     fn in_time(&self) -> Vec<Outcome> {
         let bins = &self.panel.bins;
@@ -322,11 +359,11 @@ impl Process<'_> {
         let share: Vec<f64> = (self.alone.everywhere(bins).iter().zip(&g))
             .map(|(a, g)| if g.is_finite() { (a - 1.0) / g } else { 0.0 })
             .collect();
-        let drive = Filtered::new(self.panel, self.u, &share);
+        let drive = Filtered::new(self.panel, self.u, &share, self.sizes(&share, &g));
         let filter: Vec<f64> = (share.iter().zip(&g))
             .map(|(f, g)| if g.is_finite() { f * g.sqrt() } else { 0.0 })
             .collect();
-        let level = Filtered::new(self.panel, self.u, &filter);
+        let level = Filtered::new(self.panel, self.u, &filter, self.sizes(&filter, &g));
         let mut worst: Option<(f64, f64, String)> = None;
         let moments = [("what drives it", &drive), ("its level", &level)]
             .into_iter()
@@ -375,92 +412,6 @@ impl Process<'_> {
             about: vec![(*name).to_owned()],
             ..outcome
         })
-    }
-}
-
-/// Whitened coefficients behind a filter, in time, and how such values correlate.
-struct Filtered {
-    values: Vec<f64>,
-    /// Sums of the second to fourth power of the correlation over all lags.
-    sums: [f64; 3],
-}
-
-impl Filtered {
-    fn new(panel: &Panel, u: &[f64], filter: &[f64]) -> Self {
-        let passed: Vec<f64> = u.iter().zip(filter).map(|(u, f)| u * f).collect();
-        let power: Vec<f64> = filter.iter().map(|f| f * f).collect();
-        let total: f64 = power.iter().sum();
-        // The inverse transform gives the correlation at the middles between lags: twice their sum is that over all lags.
-        let scale = (u.len() as f64 / 2.0).sqrt() / total;
-        let correlation = panel.dct.inverse(&power);
-        let sums = [2, 3, 4].map(|k| {
-            let all = correlation.iter().map(|r| (r * scale).powi(k));
-            2.0 * all.sum::<f64>()
-        });
-        Self {
-            values: panel.dct.inverse(&passed),
-            sums,
-        }
-    }
-
-    /// Skewness and kurtosis over their standard errors; NaN where too few independent values stand behind.
-    fn moments(&self) -> [(&'static str, f64); 2] {
-        let n = self.values.len() as f64;
-        let mean = |k| self.values.iter().map(|v| v.powi(k)).sum::<f64>() / n;
-        let variance = mean(2);
-        let independent = |sum: f64| Some(n / sum.max(1.0)).filter(|n| *n > LEAST);
-        // The third Hermite moment: the mean that lies beside zero is taken off.
-        let third = mean(3) / variance.powf(1.5) - 3.0 * mean(1) / variance.sqrt();
-        let skewness = independent(self.sums[1]).map_or(f64::NAN, |n| third * (n / 6.0).sqrt());
-        let fourth = mean(4) / (variance * variance);
-        let kurtosis = independent(self.sums[2]).map_or(f64::NAN, |n| kurtosis_score(fourth, n));
-        [("skewness", skewness), ("kurtosis", kurtosis)]
-    }
-
-    /// Sum of the squared deviations of the energies in stretches, its chance, the stretch that is farthest off and its
-    /// energy over the mean.
-    fn steadiness(&self, more: f64) -> Option<(f64, f64, usize, f64)> {
-        let length = self.values.len() / STRETCHES;
-        if (length as f64) < more * LEAST * self.sums[0] {
-            return None;
-        }
-        let energies: Vec<f64> = self
-            .values
-            .chunks_exact(length)
-            .take(STRETCHES)
-            .map(|c| c.iter().map(|v| v * v).sum::<f64>() / length as f64)
-            .collect();
-        let mean = energies.iter().sum::<f64>() / STRETCHES as f64;
-        let variance = 2.0 * self.sums[0] / length as f64;
-        let off = |e: &f64| (e / mean - 1.0).powi(2) / variance;
-        let statistic: f64 = energies.iter().map(off).sum();
-        let worst =
-            (0..STRETCHES).max_by(|a, b| off(&energies[*a]).total_cmp(&off(&energies[*b])))?;
-        let chance = chi_tail(statistic, STRETCHES as f64 - 1.0);
-        Some((statistic, chance, worst, energies[worst] / mean))
-    }
-
-    /// Chi-square of two degrees of the energy against a course and its square, and the part of the energy, rms, that
-    /// follows them. `None` where too few independent values stand behind.
-    fn follows(&self, course: &[f64], more: f64) -> Option<(f64, f64)> {
-        let n = self.values.len() as f64;
-        if n < more * LEAST_OF_COURSE * self.sums[0] {
-            return None;
-        }
-        let energy = self.values.iter().map(|v| v * v).sum::<f64>() / n;
-        let [first, square, _] = powers(course);
-        // What is left of a course that rests, or of the square of one of two levels, is rounding.
-        let score = |c: &[f64], of: &[f64], power: i32| {
-            let raw: f64 = of.iter().map(|v| v.powi(2 * power)).sum();
-            if dot(c, c) < ROUNDING * raw {
-                return 0.0;
-            }
-            let more = self.values.iter().map(|v| v * v / energy - 1.0);
-            more.zip(c).map(|(m, c)| m * c).sum::<f64>() / dot(c, c).sqrt()
-        };
-        let scores = score(&first, course, 1).powi(2) + score(&square, &first, 2).powi(2);
-        let follows = (scores / (2.0 * self.sums[0]), (scores / n).sqrt());
-        Some(follows)
     }
 }
 

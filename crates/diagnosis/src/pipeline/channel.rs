@@ -14,7 +14,7 @@ use crate::report::detection_limits;
 use crate::result::Check;
 use crate::search::searched::Searched;
 use crate::search::{Search, bands, impute};
-use crate::test_level::{CLAIM_LEVEL, CheckId, Outcome, all_worded, omnibus_level, worded};
+use crate::test_level::{CheckId, Outcome, all_worded, omnibus_level, worded};
 use crate::two_level::compare;
 
 /// The search of a channel, its hypotheses laid out.
@@ -182,7 +182,8 @@ fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
 /// What the names on a channel claim; `rhythm` is the check for a rhythm of the variance.
 fn claims(s: &Searched<'_>, rhythm: Option<&Outcome>) -> Vec<Check> {
     // Before a process was named nothing was claimed of it.
-    let claims = process::of_processes(&s.search, &s.state);
+    let law = s.variance.as_ref().map(|v| v.law.as_slice());
+    let claims = process::of_processes(&s.search, &s.state, law);
     let stationary = rhythm.and_then(|r| process::stationary(s, r));
     let claims = claims.into_iter().chain(stationary);
     let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());
@@ -194,9 +195,9 @@ fn claims(s: &Searched<'_>, rhythm: Option<&Outcome>) -> Vec<Check> {
         channel: s.target.name.clone(),
         statistic: c.statistic,
         p_value: Some(c.p_value),
-        threshold: CLAIM_LEVEL,
+        threshold: c.id.level(),
         fails_before: false,
-        fails_after: c.p_value < CLAIM_LEVEL,
+        fails_after: c.p_value < c.id.level(),
         what: c.what,
     })
     .collect()

@@ -6,6 +6,7 @@
 //! after each change of it. The scatter of a coefficient is that of the residual at the frequencies where the course moves.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use model::effect::Signal;
 use model::record::Quantity;
@@ -13,6 +14,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::envelope::law::pitch;
 use super::envelope::{Band, REACH, envelope_of, kept};
 use crate::test_level::{CheckId, Outcome};
 use numerics::column::dot;
@@ -27,7 +29,7 @@ const FOLLOWED: f64 = 0.02;
 const LEAST: usize = 64;
 
 /// Means of a course in `cells` parts of the record.
-fn in_cells(values: &[f64], cells: usize) -> Vec<f64> {
+pub(super) fn in_cells(values: &[f64], cells: usize) -> Vec<f64> {
     let n = values.len();
     let part = |i: usize| {
         let (from, to) = (i * n / cells, ((i + 1) * n / cells).max(i * n / cells + 1));
@@ -37,7 +39,7 @@ fn in_cells(values: &[f64], cells: usize) -> Vec<f64> {
 }
 
 /// Without its mean and what others have of it.
-fn beyond(mut own: Vec<f64>, others: &[&[f64]]) -> Vec<f64> {
+pub(super) fn beyond(mut own: Vec<f64>, others: &[&[f64]]) -> Vec<f64> {
     let mean = own.iter().sum::<f64>() / own.len() as f64;
     own.iter_mut().for_each(|v| *v -= mean);
     for o in others {
@@ -68,7 +70,7 @@ fn energies(series: &[f64]) -> Vec<f64> {
 }
 
 /// Chance that a series follows a course as well, and the part of its energy that does.
-fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
+pub(super) fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
     let (all, own) = (dot(series, series), dot(course, course));
     if all <= 0.0 || own <= 1e-12 * all.min(1.0) {
         return None;
@@ -92,42 +94,69 @@ fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
     Some((2.0 * law.sf(t.abs()), slope * slope * own / all))
 }
 
-/// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded.
-pub(super) fn claim(band: &Band, signals: &[Signal], named: &str) -> Option<Outcome> {
-    let z = envelope_of(&kept(&band.coefficients, &band.density));
-    let cells = z.len();
-    if cells < LEAST {
-        return None;
+/// How a band moves.
+pub(super) struct Moves {
+    /// The first of its coefficients and the end.
+    pub(super) places: Range<usize>,
+    /// Half its width, coefficients.
+    pub(super) half: f64,
+    pub(super) envelope: Vec<Complex<f64>>,
+    /// Its pitch and its size in time, without their means.
+    pub(super) pitch: Vec<f64>,
+    pub(super) size: Vec<f64>,
+}
+
+impl Moves {
+    /// Of a band whose first coefficient is at `from`; `None` where it is too short.
+    pub(super) fn of(band: &Band, from: usize) -> Option<Self> {
+        let mut planner = FftPlanner::new();
+        let z = envelope_of(&kept(&band.coefficients, &band.density), &mut planner);
+        if z.len() < LEAST {
+            return None;
+        }
+        let top = band.density.iter().copied().fold(0.0, f64::max);
+        let half = band.density.iter().sum::<f64>() / (2.0 * REACH.atan() * top);
+        Some(Self {
+            places: from..from + band.density.len(),
+            half,
+            pitch: beyond(pitch(&z), &[]),
+            size: beyond(z.iter().map(Complex::norm_sqr).collect(), &[]),
+            envelope: z,
+        })
     }
-    let turn: Complex<f64> = z.windows(2).map(|w| w[1] * w[0].conj()).sum();
-    let back = turn.conj() / turn.norm().max(f64::MIN_POSITIVE);
-    let pitch = z.windows(2).map(|w| (w[1] * w[0].conj() * back).im);
-    let pitch = beyond(pitch.chain([0.0]).collect(), &[]);
-    let size = beyond(z.iter().map(Complex::norm_sqr).collect(), &[]);
-    let top = band.density.iter().copied().fold(0.0, f64::max);
-    let half = band.density.iter().sum::<f64>() / (2.0 * REACH.atan() * top);
-    let keep = (-2.0 * PI * half / cells as f64).exp();
+
+    /// Its middle, coefficients.
+    pub(super) fn middle(&self) -> f64 {
+        0.5 * (self.places.start + self.places.end) as f64
+    }
+}
+
+/// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded.
+pub(super) fn claim(own: &Moves, signals: &[Signal], named: &str) -> Option<Outcome> {
+    let cells = own.size.len();
+    // What is left of a ring in the next cell.
+    let keep = (-2.0 * PI * own.half / cells as f64).exp();
     let slow = [Quantity::Temp, Quantity::Supply, Quantity::Pwm];
-    let mut asked = 0;
-    let mut least: Option<(f64, String, &'static str)> = None;
+    let mut all: Vec<(&str, Vec<f64>)> = vec![];
     for s in signals.iter().filter(|s| slow.contains(&s.quantity)) {
         let plain = in_cells(&s.smooth, cells);
         let first = beyond(plain.clone(), &[]);
         let square = beyond(first.iter().map(|v| v * v).collect(), &[&first]);
-        let mut courses = vec![first, square];
+        all.extend([(s.name.as_str(), first), (&s.name, square)]);
         if s.quantity == Quantity::Pwm {
-            courses.push(beyond(rung(&plain, keep), &[]));
+            all.push((&s.name, beyond(rung(&plain, keep), &[])));
         }
-        for course in &courses {
-            for (what, series) in [("pitch", &pitch), ("size", &size)] {
-                let Some((p, part)) = chance(series, course) else {
-                    continue;
-                };
-                asked += 1;
-                let told = part > FOLLOWED && least.as_ref().is_none_or(|l| p < l.0);
-                if told {
-                    least = Some((p, s.name.clone(), what));
-                }
+    }
+    let mut asked = 0;
+    let mut least: Option<(f64, &str, &'static str)> = None;
+    for (name, course) in &all {
+        for (what, series) in [("pitch", &own.pitch), ("size", &own.size)] {
+            let Some((p, part)) = chance(series, course) else {
+                continue;
+            };
+            asked += 1;
+            if part > FOLLOWED && least.as_ref().is_none_or(|l| p < l.0) {
+                least = Some((p, name, what));
             }
         }
     }

@@ -10,8 +10,9 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Hypothesis, Peak};
 
+use super::band_source::{self, Moves};
 use super::envelope::{Band, Seen};
-use super::{Search, band_source, envelope};
+use super::{Search, band_alone, envelope};
 use crate::fit::channel::{Cluster, Form, State, Term};
 use crate::fit::likelihood::{Bins, Noise};
 use crate::fit::scan::residual;
@@ -238,8 +239,13 @@ impl Search<'_> {
         let tone = (self.candidates.iter())
             .position(|c| matches!(c.hypothesis, Hypothesis::WanderingTone));
         let Some(tone) = tone else { return };
-        for (number, cluster) in Self::clusters(state).into_iter().enumerate() {
-            let band = self.band(state, &cluster);
+        let clusters = Self::clusters(state);
+        let bands: Vec<Option<(Band, usize)>> =
+            clusters.iter().map(|c| self.band(state, c)).collect();
+        let moves: Vec<Option<Moves>> = (bands.iter())
+            .map(|b| b.as_ref().and_then(|(band, from)| Moves::of(band, *from)))
+            .collect();
+        for (number, (cluster, band)) in clusters.into_iter().zip(&bands).enumerate() {
             let seen = (band.as_ref()).and_then(|(band, from)| Seen::new(band, *from as u64));
             let others = state.terms.iter().enumerate();
             let others = others.filter(|(i, _)| !cluster.contains(i));
@@ -265,10 +271,15 @@ impl Search<'_> {
                 }
                 if place == 0 {
                     t.claims.push(seen.claim(t.effect.id()));
-                    let source = band.as_ref().and_then(|(band, _)| {
-                        band_source::claim(band, self.view.signals, t.effect.id())
-                    });
-                    t.claims.extend(source);
+                    let others = moves.iter().enumerate().filter(|(k, _)| *k != number);
+                    let others: Vec<&Moves> = others.filter_map(|(_, m)| m.as_ref()).collect();
+                    let source = moves[number]
+                        .as_ref()
+                        .and_then(|own| band_source::claim(own, self.view.signals, t.effect.id()));
+                    let alone = moves[number]
+                        .as_ref()
+                        .and_then(|own| band_alone::claim(own, &others, t.effect.id()));
+                    t.claims.extend(source.into_iter().chain(alone));
                 }
             }
             // Of several the one tone has no coordinates of its own.

@@ -3,7 +3,10 @@
 //! Of a tone A cos(phase) whose phase alone wanders, the square of the envelope is A^2 all the time; of a Gaussian
 //! process it is exponential. The mean of its square over the square of its mean is 1 of the one and 2 of the other, of
 //! many independent values without other noise. What it is of as many as there are, beside the noise that there is, is
-//! simulated for both.
+//! simulated for both, and the nearer one gives the name. Whether the band is what that name says, all that `law` asks of its
+//! envelope tells.
+
+pub(crate) mod law;
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -17,14 +20,14 @@ use rustfft::num_complex::Complex;
 
 use crate::fit::likelihood::{Dct, invert};
 use crate::test_level::{CheckId, Outcome};
-use numerics::tails::normal_tail;
+use law::{Law, Portrait};
 
 /// Nats within which the name stays open.
 pub(super) const OPEN: f64 = 3.0;
 /// Half widths either side of a band that belong to it: 0.9 of its energy.
 pub(super) const REACH: f64 = 6.0;
 /// Simulations of either kind, and the most coefficients of one.
-const RUNS: usize = 64;
+const RUNS: usize = 96;
 const MOST: usize = 2048;
 /// Values of the envelope for each coefficient of the band.
 const OVERSAMPLED: usize = 4;
@@ -34,37 +37,14 @@ const TOLERATED: f64 = 0.1;
 
 /// The complex envelope of neighbouring DCT-II coefficients, in as many values over the record as show it, turning by the
 /// first of them.
-pub(super) fn envelope_of(band: &[f64]) -> Vec<Complex<f64>> {
+pub(super) fn envelope_of(band: &[f64], planner: &mut FftPlanner<f64>) -> Vec<Complex<f64>> {
     // Coefficient k turns by k pi over the record, which is half of what the transform spans.
     let length = (2 * OVERSAMPLED * band.len()).next_power_of_two();
     let mut z = vec![Complex::default(); length];
     z.iter_mut().zip(band).for_each(|(z, c)| z.re = *c);
-    FftPlanner::new().plan_fft_inverse(length).process(&mut z);
+    planner.plan_fft_inverse(length).process(&mut z);
     z.truncate(length / 2);
     z
-}
-
-/// The same of the logarithm of each statistic: a relative variance v of the squared envelope beside chance moves the second
-/// moment by v and the third by 3 v.
-const ROOM: [f64; STATISTICS] = [TOLERATED, 3.0 * TOLERATED, TOLERATED];
-
-/// Statistics of an envelope: the mean square of its square over its squared mean; the same of the third power; and the
-/// geometric mean of its square over the mean, which what comes and goes makes small.
-const STATISTICS: usize = 3;
-type Statistics = [f64; STATISTICS];
-
-/// Least part of its mean that a squared envelope counts as.
-const FLOOR: f64 = 1e-3;
-
-/// Those of neighbouring DCT-II coefficients.
-fn swing(band: &[f64]) -> Statistics {
-    let record = envelope_of(band);
-    let count = record.len() as f64;
-    let squares = || record.iter().map(Complex::norm_sqr);
-    let mean = squares().sum::<f64>() / count;
-    let power = |k| squares().map(|v| (v / mean).powi(k)).sum::<f64>() / count;
-    let logs = squares().map(|v| (v / mean).max(FLOOR).ln()).sum::<f64>() / count;
-    [power(2), power(3), logs.exp()]
 }
 
 /// A band as it is seen: neighbouring coefficients over the noise beside it, and its density there over that.
@@ -77,9 +57,11 @@ pub(super) struct Band {
 pub(super) struct Seen {
     /// ln of how much likelier it is of a steady tone than of noise.
     pub odds: f64,
-    statistics: Statistics,
-    /// Middle and spread of the logarithm of each statistic, of a steady tone and of noise.
-    of: [[(f64, f64); STATISTICS]; 2],
+    portrait: Portrait,
+    /// What a steady tone gives, and noise.
+    laws: [Law; 2],
+    /// How much farther what they give scatters than what is of the record.
+    fewer: f64,
 }
 
 /// Coefficients less what the noise beside the band has of them.
@@ -90,17 +72,6 @@ pub(super) fn kept(coefficients: &[f64], density: &[f64]) -> Vec<f64> {
 
 fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
     StandardNormal.sample(rng)
-}
-
-/// Middle and spread of the logarithms of what `run` makes.
-fn spread_of(mut run: impl FnMut() -> Statistics) -> [(f64, f64); STATISTICS] {
-    let all: Vec<Statistics> = (0..RUNS).map(|_| run().map(f64::ln)).collect();
-    let count = all.len() as f64;
-    std::array::from_fn(|i| {
-        let mean = all.iter().map(|v| v[i]).sum::<f64>() / count;
-        let variance = all.iter().map(|v| (v[i] - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        (mean, variance.sqrt())
-    })
 }
 
 /// A tone of variance 1 whose phase wanders: its coefficients, the band in their middle and `half` of them wide either side of
@@ -127,14 +98,21 @@ impl Seen {
         // reach is 2 / pi atan(REACH) of it.
         let half = band.density.iter().sum::<f64>() / (2.0 * REACH.atan() * top);
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut planner = FftPlanner::new();
+        let mut portrait = |c: &[f64], d: &[f64]| {
+            let z = envelope_of(&kept(c, d), &mut planner);
+            Portrait::of(&z, &mut planner)
+        };
         // A shorter record has fewer values of the same kind.
         let stride = count.div_ceil(MOST);
         let fewer = (stride as f64).sqrt();
         let thinned: Vec<f64> = band.density.iter().copied().step_by(stride).collect();
-        let noise = spread_of(|| {
-            let own = thinned.iter().map(|d| (1.0 + d).sqrt() * normal(&mut rng));
-            swing(&kept(&own.collect::<Vec<_>>(), &thinned))
-        });
+        let noise: Vec<Portrait> = (0..RUNS)
+            .map(|_| {
+                let own = thinned.iter().map(|d| (1.0 + d).sqrt() * normal(&mut rng));
+                portrait(&own.collect::<Vec<_>>(), &thinned)
+            })
+            .collect();
         let half = half / stride as f64;
         let reach = ((2.0 * REACH * half) as usize).clamp(8, 2 * MOST);
         let length = (2 * reach).next_power_of_two();
@@ -144,48 +122,42 @@ impl Seen {
         let lorentzian: Vec<f64> = (from..from + reach)
             .map(|k| top / (1.0 + ((k as f64 - 0.5 * length as f64) / half).powi(2)))
             .collect();
-        let steady = spread_of(|| {
-            let c = tone(&dct, length, half, &mut rng);
-            let own = c[from..from + reach]
-                .iter()
-                .map(|c| size * c + normal(&mut rng));
-            swing(&kept(&own.collect::<Vec<_>>(), &lorentzian))
-        });
-        let statistics = swing(&kept(&band.coefficients, &band.density));
-        let of = [steady, noise].map(|all| all.map(|(mean, spread)| (mean, spread / fewer)));
+        let steady: Vec<Portrait> = (0..RUNS)
+            .map(|_| {
+                let c = tone(&dct, length, half, &mut rng);
+                let of_band = &c[from..from + reach];
+                let own = of_band.iter().map(|c| size * c + normal(&mut rng));
+                portrait(&own.collect::<Vec<_>>(), &lorentzian)
+            })
+            .collect();
+        let portrait = portrait(&band.coefficients, &band.density);
+        let laws = [Law::of(&steady, fewer, false), Law::of(&noise, fewer, true)];
         let likely = |(mean, spread): (f64, f64)| {
             let spread = spread.hypot(TOLERATED);
-            -0.5 * ((statistics[0].ln() - mean) / spread).powi(2) - spread.ln()
+            -0.5 * ((portrait.size[0] - mean) / spread).powi(2) - spread.ln()
         };
-        let odds = likely(of[0][0]) - likely(of[1][0]);
+        let odds = likely(laws[0].second) - likely(laws[1].second);
         odds.is_finite().then_some(Self {
             odds,
-            statistics,
-            of,
+            portrait,
+            laws,
+            fewer,
         })
     }
 
     /// What the name claims of the envelope.
     pub(super) fn claim(&self, named: &str) -> Outcome {
-        let own = &self.of[usize::from(self.odds <= 0.0)];
-        let chances = self
-            .statistics
-            .iter()
-            .zip(own)
-            .zip(ROOM)
-            .map(|((v, (mean, spread)), room)| normal_tail((v.ln() - mean) / spread.hypot(room)));
-        let least = chances.fold(1.0, f64::min);
-        let [steady, noise] = self.of.map(|all| all[0].0.exp());
+        let own = &self.laws[usize::from(self.odds <= 0.0)];
+        let (p_value, off) = own.chance(&self.portrait, self.fewer);
+        let [second, _, geometric] = self.portrait.size.map(f64::exp);
+        let [steady, noise] = [0, 1].map(|k| self.laws[k].second.0.exp());
         Outcome {
             id: CheckId::BandEnvelope,
             about: vec![],
-            statistic: self.statistics[0],
-            p_value: (least * STATISTICS as f64).min(1.0),
+            statistic: second,
+            p_value,
             what: format!(
-                "told as {named}: the mean square of its squared envelope over its squared mean is {:.2}; of a steady tone it would be {steady:.2}, of noise {noise:.2}; its geometric over its arithmetic mean {:.2} instead of {:.2}",
-                self.statistics[0],
-                self.statistics[2],
-                own[2].0.exp()
+                "told as {named}: the mean square of its squared envelope over its squared mean is {second:.2}; of a steady tone it would be {steady:.2}, of noise {noise:.2}; its geometric over its arithmetic mean {geometric:.2}; farthest from the simulations of its law: {off}"
             ),
         }
     }
@@ -259,4 +231,62 @@ pub(super) fn wider(mode: &Arc<dyn Covariance>, peak: &Peak, level: f64) -> Vec<
             (variance / inverse[i][i]).sqrt()
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNT: usize = 12_000;
+    /// Half width of the band, coefficients, and the variance of the noise beside it.
+    const HALF: f64 = 60.0;
+    const LEVEL: f64 = 0.25;
+
+    /// A tone whose phase makes these steps, in a little noise, as the band that its Lorentzian says.
+    fn band(rng: &mut Xoshiro256PlusPlus, step: fn(&mut Xoshiro256PlusPlus) -> f64) -> Band {
+        let mut phase = 0.0;
+        let samples = (0..COUNT).map(|_| {
+            phase += 0.4 * PI + step(rng);
+            phase.cos() + LEVEL.sqrt() * normal(rng)
+        });
+        let c = Dct::new(COUNT).forward(&samples.collect::<Vec<_>>());
+        let middle = 0.4 * COUNT as f64;
+        let (from, to) = (middle - REACH * HALF, middle + REACH * HALF);
+        let top = 0.5 * COUNT as f64 / (PI * HALF) / LEVEL;
+        let places = || from as usize..to as usize;
+        Band {
+            coefficients: places().map(|k| c[k] / LEVEL.sqrt()).collect(),
+            density: (places())
+                .map(|k| top / (1.0 + ((k as f64 - middle) / HALF).powi(2)))
+                .collect(),
+        }
+    }
+
+    /// A phase that walks: its variance grows by twice the half width, rad per sample.
+    fn walks(rng: &mut Xoshiro256PlusPlus) -> f64 {
+        (2.0 * PI * HALF / COUNT as f64).sqrt() * normal(rng)
+    }
+
+    /// The same spectrum by half turns at random.
+    fn turns_over(rng: &mut Xoshiro256PlusPlus) -> f64 {
+        let chance = 0.5 * PI * HALF / COUNT as f64;
+        let turns = Uniform::new(0.0, 1.0).is_ok_and(|u| u.sample(rng) < chance);
+        if turns { PI } else { 0.0 }
+    }
+
+    #[test]
+    fn a_phase_that_walks_has_its_name_and_one_that_turns_over_has_none() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(23);
+        let mut fails = |step| {
+            let of = (0..20).filter(|seed| {
+                let seen = Seen::new(&band(&mut rng, step), *seed).expect("a band");
+                seen.claim("").p_value < CheckId::BandEnvelope.level()
+            });
+            of.count()
+        };
+        let (walking, turning) = (fails(walks), fails(turns_over));
+        // 0.2 of 20 are expected by chance.
+        assert!(walking <= 2, "{walking}");
+        assert!(turning >= 18, "{turning}");
+    }
 }

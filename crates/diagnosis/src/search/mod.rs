@@ -2,6 +2,7 @@
 //! walk refitted, the best one joins, covariance terms are challenged by what they may have swallowed, and what the
 //! others make superfluous is dropped. The search knows hypotheses, not effects.
 
+mod band_alone;
 mod band_source;
 pub(crate) mod bands;
 pub(crate) mod envelope;

@@ -54,7 +54,7 @@ impl Effect for NarrowBand {
             title: "Narrow band",
             physics: "A mode of the structure or of the sensor that noise drives (a fan, a shaking floor, a bearing): autocorrelation rms^2 exp(-d |t|) (cos w t + skew (d / w) sin w |t|) with w = 2 pi center_frequency and d = pi bandwidth; its quality factor is center_frequency / bandwidth. By its displacement (skew 1) the slow side of the peak is higher, by its velocity (-1) the fast side; of a narrow one no record tells.",
             excitation: "Nothing; some ten times 1 / bandwidth.",
-            test: "Energy of the whitened residual over all centres and widths, then all noise refitted by maximum likelihood, with the skew that is clearly likelier; the envelope tells it from a tone whose pitch wanders.",
+            test: "Energy of the whitened residual over all centres and widths, then all noise refitted by maximum likelihood, with the skew that is clearly likelier; the envelope tells it from a tone whose pitch wanders, and has to be as simulations of the noise make it.",
             remedy: "Stiffen or damp the mode at this frequency, or filter the band; until then simulate it as a second-order process.",
             figure: "Spectrum of the rate with the model before and after: a peak that is wider than a line.",
             example: Example::new(

@@ -48,7 +48,7 @@ impl Effect for WanderingLine {
             title: "Wandering line",
             physics: "b(t) = amplitude cos(2 pi center_frequency t + phase), the phase a random walk: its variance grows by 2 pi linewidth in a second, and the spectrum is a Lorentzian peak of that full width at half power (the line of a free-running oscillator). A motor or a fan whose speed drifts, a clock that is not locked.",
             excitation: "Nothing; some ten times 1 / linewidth.",
-            test: "As for the narrow band; the mean square of the squared envelope over its squared mean is 1 of a steady tone and 2 of noise.",
+            test: "As for the narrow band; the mean square of the squared envelope over its squared mean is 1 of a steady tone and 2 of noise; simulations of the tone then have its sizes, and no line in the spectrum of size, pitch or square.",
             remedy: "Find the rotor or oscillator that runs free at this frequency and lock, isolate or filter it with the whole band in which it wanders.",
             figure: "Spectrum of the rate with the model before and after: a peak that is wider than a line.",
             example: Example::new(

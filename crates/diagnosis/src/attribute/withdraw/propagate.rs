@@ -7,7 +7,7 @@
 
 use std::collections::BTreeSet;
 
-use super::facts::{Facts, LEFT, generic};
+use super::facts::{Facts, LEFT, REMAINDER_PROCESS, generic};
 use super::{Doubt, nearest_of};
 use crate::criticise::residual;
 use crate::fit::channel;
@@ -59,12 +59,15 @@ impl Kin<'_> {
         })
     }
 
-    /// Whether a process explains less than what follows a recorded channel beside it by no law of the library.
+    /// Whether noise explains less than what follows a recorded channel beside it by no law of the library, or no more than what
+    /// the shape of a fallen process leaves.
     fn beside_larger(&self, t: &Term, doubts: &[Doubt]) -> bool {
         let mut terms = self.facts.s.state.terms.iter().zip(doubts);
         let larger = |(o, d): (&Term, &Doubt)| {
             let follows = o.effect.id() == channel::ID || *d != Doubt::No && !generic(o);
-            follows && o.lr > t.lr
+            let process = *d != Doubt::No && o.is_covariance() && !o.is_filter();
+            let all = o.cluster.map_or(o.lr, |c| c.lr);
+            follows && o.lr > t.lr || process && REMAINDER_PROCESS * all > t.lr
         };
         t.is_covariance() && terms.any(larger)
     }

@@ -2,10 +2,13 @@
 //!
 //! A row says what it is asked of and what it looks for. Any row that holds withdraws the name; the rows do not know each other.
 
+use std::f64::consts::PI;
+
 use super::Doubt;
 use super::facts::{Facts, LEFT, generic};
 use crate::features;
 use crate::fit::channel::{Form, ID, Term};
+use crate::search::MOST_ALIKE;
 use crate::test_level::{CheckId, DEPARTURE};
 use model::effect::Peak;
 
@@ -209,9 +212,21 @@ fn unlike(f: &Facts<'_>) -> bool {
 /// by what a random walk takes up, has such a peak.
 const NARROW: f64 = 1.0 / 3.0;
 
-/// Whether a peak is no narrow one.
+/// Whether a peak is no narrow one, or is not seen to have two sides: a fifth of its height, two half widths from its middle, lies
+/// beyond half the sample rate.
 fn wide(peak: &Peak) -> bool {
-    2.0 * peak.half_width > NARROW * peak.omega
+    let width = 2.0 * peak.half_width;
+    width > NARROW * peak.omega || peak.omega + width > PI
+}
+
+/// Whether a channel has more bands than separate causes make: they are one structure.
+fn crowded(f: &Facts<'_>) -> bool {
+    let bands =
+        f.s.state
+            .terms
+            .iter()
+            .filter(|t| t.is_band() && !t.is_part());
+    bands.count() > MOST_ALIKE
 }
 
 /// Why the name of a term is not given, by itself.
@@ -221,7 +236,8 @@ pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
         let lr = t.term.cluster.map_or(t.term.lr, |c| c.lr);
         let falls = CheckId::OF_BAND.into_iter().any(|id| f.fails(id))
             || f.left_where_it_acts(t.term, t.own, lr)
-            || t.term.peak().is_some_and(|p| wide(&p));
+            || t.term.peak().is_some_and(|p| wide(&p))
+            || crowded(f);
         return match f.beside_follower(t.term) {
             _ if falls => Doubt::Checks,
             Some((id, share)) => Doubt::Remainder(id, share),

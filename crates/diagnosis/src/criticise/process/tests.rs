@@ -18,7 +18,7 @@ fn filtered(seed: u64) -> Filtered {
     let filter: Vec<f64> = (0..n)
         .map(|k| 1.0 / (1.0 + (PI * k as f64 / n as f64 * 3.0).powi(2)))
         .collect();
-    Filtered::new(&panel, &u, &filter)
+    Filtered::new(&panel, &u, &filter, None)
 }
 
 #[test]
