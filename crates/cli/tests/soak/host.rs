@@ -3,23 +3,24 @@
 //!
 //! Shared by crates/cli/tests/soak.rs (the firmware's logic) and hil-tests/tests/soak.rs (its image).
 
+mod bad_line;
+
 use std::cell::RefCell;
-use std::collections::VecDeque;
-use std::io::{BufRead as _, BufReader, ErrorKind};
+use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use bench::Scenario;
 use imu_stand::RecordBuilder;
 use imu_stand::capture::{Calibration, Live};
-use imu_stand::link::{Link, LinkError, Port};
+use imu_stand::link::{Link, LinkError};
 use imu_stand::monitor::View;
 use imu_stand::stand::{Board, Simulated};
-use rand_core::{Rng as _, SeedableRng as _};
-use rand_xoshiro::Xoshiro256PlusPlus;
 use wire::correction::{self, NUMBERS, ROWS};
-use wire::{Axis, Command, Decoder, Fault, Frame, Sample};
+use wire::{Axis, Command, Fault, Frame, Sample};
+
+use bad_line::{Line, Truth};
 
 /// How long and how.
 pub struct Soak {
@@ -40,91 +41,10 @@ const CORRECTIONS: f64 = 260.0;
 const PARTS: u64 = 30;
 /// Files after which the board is reset. Its counters begin anew with each, so they are left alone from then on.
 const RESETS: u64 = 6;
-/// One frame in so many is damaged on its way to the host.
-const DAMAGED: u64 = 2_000;
 /// Growth of the process, bytes, from a tenth of the run to its end. What grew with time would have grown ninefold by then.
 const GROWTH: u64 = 4 << 20;
 /// A simulated board starts within this, s.
 const START_S: f64 = 1.0;
-
-/// What the line knows: the truth, and what it did to it.
-#[derive(Default)]
-struct Truth {
-    /// Samples on the line, not yet looked for at the host's end.
-    samples: VecDeque<Sample>,
-    /// Frames to the host that were damaged, samples among them or not.
-    damaged: u64,
-    /// Damage the next request.
-    damages_request: bool,
-}
-
-/// A line that damages.
-struct Line {
-    inner: Simulated,
-    witness: Decoder,
-    rng: Xoshiro256PlusPlus,
-    truth: Rc<RefCell<Truth>>,
-}
-
-impl Line {
-    fn below(&mut self, n: usize) -> usize {
-        ((u128::from(self.rng.next_u64()) * n as u128) >> 64) as usize
-    }
-}
-
-impl Port for Line {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        let count = self.inner.read(buffer)?;
-        for &byte in &buffer[..count] {
-            if let Some(Ok(Frame::Sample(sample))) = self.witness.push(byte) {
-                self.truth.borrow_mut().samples.push_back(sample);
-            }
-        }
-        if self.below(DAMAGED as usize) > 0 {
-            return Ok(count);
-        }
-        self.truth.borrow_mut().damaged += 1;
-        let at = self.below(count);
-        match self.below(3) {
-            0 => buffer[at] ^= 1 << self.below(8),
-            1 => {
-                buffer.copy_within(at + 1..count, at);
-                return self.left(count - 1);
-            }
-            _ => return self.left(0),
-        }
-        Ok(count)
-    }
-
-    fn write_all(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        if !std::mem::take(&mut self.truth.borrow_mut().damages_request) {
-            return self.inner.write_all(bytes);
-        }
-        let mut bytes = bytes.to_vec();
-        // Not its end: the next one would be lost with it.
-        let at = self.below(bytes.len() - 1);
-        bytes[at] ^= 0x80 | 1 << self.below(7);
-        self.inner.write_all(&bytes)
-    }
-
-    fn set_baud(&mut self, baud: u32) -> std::io::Result<()> {
-        self.inner.set_baud(baud)
-    }
-
-    fn now(&self) -> Duration {
-        self.inner.now()
-    }
-}
-
-impl Line {
-    /// 0 bytes would be the end of the line.
-    fn left(&self, count: usize) -> std::io::Result<usize> {
-        match count {
-            0 => Err(ErrorKind::TimedOut.into()),
-            count => Ok(count),
-        }
-    }
-}
 
 /// What the host has seen so far.
 #[derive(Default)]
@@ -387,12 +307,8 @@ fn correct(link: &mut Link, host: &mut Host, number: u64) {
 /// Runs it to its end, and says what was seen.
 pub fn soak(board: Board, plan: &Soak) {
     let truth = Rc::new(RefCell::new(Truth::default()));
-    let line = Line {
-        inner: Simulated::start(board, Scenario::quiet(plan.seed)),
-        witness: Decoder::new(),
-        rng: Xoshiro256PlusPlus::seed_from_u64(plan.seed),
-        truth: Rc::clone(&truth),
-    };
+    let stand = Simulated::start(board, Scenario::quiet(plan.seed));
+    let line = Line::new(stand, plan.seed, Rc::clone(&truth));
     let mut link = Link::over(Box::new(line), "the simulated board", 38_400);
     let mut host = Host {
         truth,
