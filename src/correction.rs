@@ -14,10 +14,8 @@
 //! | noise over what was told | Q8 |
 //!
 //! Bounds, deg/s: a rate below 1024 at the input, which a scale below 1/8 deg/s for each count makes (a larger one wraps; no part
-//! has it); the terms add 32 + 16 + 128 + 16 + 128 + 96 at the most, whatever the coefficients are, the matrix 3/8 of the sum, the
+//! has it); the terms add 32 + 16 + 128 + 16 + 4 + 128 + 96 at the most, whatever the coefficients are, the matrix 3/8 of the sum, the
 //! surge 16: below 2048, which Q12.20 holds.
-
-use core::cell::Cell;
 
 use wire::correction::{
     ADAPT_SHIFT, BLOCK_SHIFT_MAX, GATE_SHIFT, LONGEST_TICKS, NOISE_SHIFT, REST_DPS, ROWS,
@@ -65,6 +63,13 @@ pub struct Correction {
     /// Samples until the block ends.
     left: u8,
     sum: Sum,
+    /// Of each axis, in arrays of their own: a stride that is no power of two is a product on the AVR.
+    /// TEMP_OUT behind its low pass, Q10.22.
+    temp: [i32; 3],
+    /// Rates with the model's terms, before the other axes' shares.
+    rate: [i32; 3],
+    /// Of what is left of the rates of a block: below 4 deg/s in each of 128 at rest.
+    left_over: [i32; 3],
     axes: [Axis; 3],
     /// Of the squares of what is left of all three rates in a block, Q16.
     squares: u32,
@@ -77,27 +82,13 @@ pub struct Correction {
     waits: bool,
 }
 
+#[derive(Clone, Copy)]
 struct Axis {
-    /// Behind its low pass, Q10.22.
-    temp: i32,
-    /// With the model's terms, before the other axes' shares.
-    rate: i32,
-    /// Of what is left of the rates of a block: below 4 deg/s in each of 128 at rest.
-    sum: Cell<i32>,
     /// The variance of a block, over that which was told, less 1: Q8.
     noise: i16,
     /// The block before was at rest, and not refused.
     trusted: bool,
 }
-
-#[allow(clippy::declare_interior_mutable_const)]
-const AXIS: Axis = Axis {
-    temp: 0,
-    rate: 0,
-    sum: Cell::new(0),
-    noise: 0,
-    trusted: false,
-};
 
 /// 1 in Q8.
 const NOISE_TOLD: i16 = 1 << 8;
@@ -108,7 +99,7 @@ const NOISE_MOST: i16 = (NOISE_TOLD << NOISE_SHIFT) - NOISE_TOLD;
 const OF_AXIS: u16 = 6;
 
 /// Where those of the filter begin.
-const OF_FILTER: u16 = 90;
+const OF_FILTER: u16 = 96;
 const _: () = assert!(OF_FILTER as usize + 3 * OF_AXIS as usize == wire::correction::NUMBERS_LEN);
 
 /// A sum of what is weighed by the stored numbers, in their order.
@@ -156,7 +147,13 @@ impl Correction {
             state: 0,
             left: 0,
             sum: Sum { at: 0, total: 0 },
-            axes: [const { AXIS }; 3],
+            temp: [0; 3],
+            rate: [0; 3],
+            left_over: [0; 3],
+            axes: [Axis {
+                noise: 0,
+                trusted: false,
+            }; 3],
             squares: 0,
             speed: 0,
             t_ticks: 0,
@@ -286,28 +283,42 @@ impl Correction {
     /// The model's terms for each axis.
     fn model<B: Board>(&mut self, board: &mut B, raw: &Raw, duty: i16, config: &Config) {
         let starts = self.state & YAW_FREE == 0;
+        let [acc_x, acc_y, acc_z] = raw.acc.map(u16::cast_signed);
+        let turning = match duty {
+            0 => 0,
+            1.. => 1 << 7,
+            _ => -(1 << 7),
+        };
+        // What the numbers behind those of the temperature weigh, the same for all axes.
+        let shared = [
+            1 << 10,
+            1,
+            duty,
+            duty.wrapping_abs(),
+            turning,
+            raw.supply[0].unsigned_12().cast_signed(),
+            acc_x,
+            acc_y,
+            acc_z,
+        ];
         let sum = &mut self.sum;
-        for (((axis, temp), word), scale) in (self.axes.iter_mut())
+        for ((((temp, counts), rate), word), scale) in (self.temp.iter_mut())
             .zip(&raw.temp)
+            .zip(&mut self.rate)
             .zip(&raw.gyro)
             .zip(&config.set_up.scale)
         {
             // Ten bits.
-            axis.warm((temp.bits() << 6).cast_signed(), starts);
+            warm(temp, (counts.bits() << 6).cast_signed(), starts);
             // Q24 times counts is Q16. A scale beyond 1/8 deg/s for each count makes rates that wrap, which no part has.
             sum.total = times(scale.get() << 8, word.signed_14()) << 4;
-            sum.weigh(board, shifted(axis.temp, 6));
+            sum.weigh(board, shifted(*temp, 6));
             // Its square, Q22.10.
-            sum.weigh(board, shifted(mul(axis.temp, axis.temp), 2));
-            sum.count(board, 1 << 10);
-            sum.count(board, 1);
-            sum.count(board, duty);
-            sum.count(board, duty.wrapping_abs());
-            sum.count(board, raw.supply[0].unsigned_12().cast_signed());
-            for acc in &raw.acc {
-                sum.count(board, acc.cast_signed());
+            sum.weigh(board, shifted(mul(*temp, *temp), 2));
+            for &x in &shared {
+                sum.count(board, x);
             }
-            axis.rate = sum.total;
+            *rate = sum.total;
         }
     }
 
@@ -316,13 +327,15 @@ impl Correction {
     #[inline(always)]
     fn rest<B: Board>(&mut self, board: &mut B, ahead: i32, [lowest, highest]: [i8; 2]) {
         let sum = &mut self.sum;
-        for ((axis, to), bias) in (self.axes.iter())
+        for ((((rate, temp), left_over), to), bias) in (self.rate.iter())
+            .zip(&self.temp)
+            .zip(&mut self.left_over)
             .zip(&mut self.frame.rate)
             .zip(&self.frame.bias)
         {
-            sum.total = axis.rate.wrapping_sub(bias.get());
-            for share in &self.axes {
-                sum.weigh(board, shifted(share.rate, 2));
+            sum.total = rate.wrapping_sub(bias.get());
+            for &share in &self.rate {
+                sum.weigh(board, shifted(share, 2));
             }
             // Behind the shares of all axes is what the filter has of each: noise and walk, for the end of the block, and this.
             sum.at = sum.at.wrapping_add(OF_AXIS * 2 + 4);
@@ -331,12 +344,12 @@ impl Correction {
             let left = sum.total;
             to.set(left);
             if (-REST..REST).contains(&((left >> 16) as i16)) {
-                axis.sum.set(axis.sum.get().wrapping_add(left));
+                *left_over = left_over.wrapping_add(left);
                 self.squares = self.squares.wrapping_add(square(left));
             } else {
                 self.state &= !AT_REST;
             }
-            let temp = (axis.temp >> 24) as i8;
+            let temp = (*temp >> 24) as i8;
             if temp < lowest || temp > highest {
                 self.frame.state |= EXTRAPOLATED;
             }
@@ -371,9 +384,9 @@ impl Correction {
         // no rest.
         let mut spread = shifted(self.squares.cast_signed(), shift);
         let mut told = 0u16;
-        for axis in &self.axes {
-            let mean = shifted(axis.sum.get(), shift);
-            axis.sum.set(mean);
+        for left_over in &mut self.left_over {
+            let mean = shifted(*left_over, shift);
+            *left_over = mean;
             spread = spread.wrapping_sub(square(mean).cast_signed());
             // A fourth, so that three have room.
             told = told.wrapping_add(sum.next(board).cast_unsigned() >> 2);
@@ -387,7 +400,8 @@ impl Correction {
             rested = false;
         }
         sum.at = sum.at.wrapping_sub(OF_AXIS * 3);
-        for ((axis, bias), known) in (self.axes.iter_mut())
+        for (((axis, mean), bias), known) in (self.axes.iter_mut())
+            .zip(&mut self.left_over)
             .zip(&mut self.frame.bias)
             .zip(&mut self.frame.known)
         {
@@ -397,7 +411,7 @@ impl Correction {
             // P' = P + q with P = R / known, to the first order of known q / R.
             let lost = upper(upper(known.get(), walk), known.get());
             known.set(known.get().wrapping_sub(lost));
-            let mean = axis.sum.take();
+            let mean = core::mem::take(mean);
             if rested {
                 self.state |= axis.measure(mean, told, bias, known);
             } else {
@@ -428,18 +442,18 @@ fn block_len(shift: u8) -> u8 {
     len
 }
 
-impl Axis {
-    /// The low pass of the temperature.
-    #[inline(always)]
-    fn warm(&mut self, counts_q6: i16, starts: bool) {
-        let temp = i32::from(counts_q6) << 16;
-        if starts {
-            self.temp = temp;
-        }
-        let change = shifted(temp.wrapping_sub(self.temp), TEMPERATURE_SHIFT);
-        self.temp = self.temp.wrapping_add(change);
+/// The low pass of the temperature.
+#[inline(always)]
+fn warm(temp: &mut i32, counts_q6: i16, starts: bool) {
+    let now = i32::from(counts_q6) << 16;
+    if starts {
+        *temp = now;
     }
+    let change = shifted(now.wrapping_sub(*temp), TEMPERATURE_SHIFT);
+    *temp = temp.wrapping_add(change);
+}
 
+impl Axis {
     /// A measurement of the scalar Kalman filter, by the mean of a block; what it has to say of it as bits of the state.
     #[inline(always)]
     fn measure(&mut self, mean: i32, told: u16, bias: &mut I32, known: &mut U16) -> u8 {

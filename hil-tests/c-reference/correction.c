@@ -26,7 +26,7 @@
 #define LONGEST_TICKS 25000
 /* Bytes of three numbers, as each axis has them in the matrix and for the filter; where those of the filter begin. */
 #define OF_AXIS 6
-#define OF_FILTER 90
+#define OF_FILTER 96
 
 static struct {
     uint16_t at;    /* of the copy in use; 0: none, or off */
@@ -133,6 +133,7 @@ static void model(const struct raw *raw, int16_t duty)
         count(1);
         count(duty);
         count((int16_t)abs(duty));
+        count(duty > 0 ? 1 << 7 : duty < 0 ? -(1 << 7) : 0);
         count((int16_t)(raw->supply[0] & 0x0fff));
         for (uint8_t k = 0; k < 3; k++)
             count((int16_t)raw->acc[k]);

@@ -7,9 +7,9 @@
 #include "sensors.h"
 #include "wire.h"
 
-#define CORRECTION_FORMAT 1
-#define CORRECTION_BYTES 112
-#define CORRECTION_ROWS 18
+#define CORRECTION_FORMAT 2
+#define CORRECTION_BYTES 118
+#define CORRECTION_ROWS 19
 /* Where the two copies begin, behind those of the set-up. */
 #define CORRECTION_FIRST 144
 #define CORRECTION_SECOND 272

@@ -39,6 +39,8 @@ bool frame_send(uint8_t kind, void *payload, uint8_t length)
     uint8_t left = (uint8_t)(length + CRC_BYTES);
     /* Only a reply may fill the ring: any other frame leaves room for one. */
     uint8_t spare = kind == KIND_REPLY ? 0 : sizeof(struct reply) + CRC_BYTES + CODE_AND_END;
+    if (kind != KIND_REPLY && serial_is_to_change())
+        return false;
     if (serial_room() < left + CODE_AND_END + spare)
         return false;
     /* Into the ring at once: the interrupt does not see it before the head moves. */

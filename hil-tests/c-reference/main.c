@@ -37,7 +37,6 @@ int main(void)
     /* Which of the two clocks have moved since the watchdog was fed. */
     bool ticked = false, passed = false;
     board_start();
-    serial_start();
     sensors_start();
     stand_boot();
     stand_started(gyro_configure_all(config_sens_avg()));

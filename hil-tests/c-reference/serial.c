@@ -13,11 +13,6 @@ static volatile uint8_t lost_overrun, lost_framing;
 static uint16_t waiting_divisor;
 static bool waiting;
 
-void serial_start(void)
-{
-    UCSRB = _BV(RXCIE) | _BV(RXEN) | _BV(TXEN);
-}
-
 void serial_set_baud(uint16_t divisor)
 {
     /* UBRRH and UCSRC share an address; URSEL says which. */
@@ -28,8 +23,9 @@ void serial_set_baud(uint16_t divisor)
 
 void serial_set_baud_later(uint16_t divisor)
 {
-    if (!waiting && UBRRL == 0) {
+    if (UCSRB == 0) { /* off since the reset */
         serial_set_baud(divisor);
+        UCSRB = _BV(RXCIE) | _BV(RXEN) | _BV(TXEN);
         UDR = 0; /* ends a frame that power went in the middle of */
         return;
     }
@@ -48,6 +44,11 @@ void serial_work(void)
         serial_set_baud(waiting_divisor);
         waiting = false;
     }
+}
+
+bool serial_is_to_change(void)
+{
+    return waiting;
 }
 
 bool serial_has_received(void)

@@ -15,12 +15,14 @@ struct tx {
 };
 extern struct tx serial_tx;
 
-void serial_start(void);
 void serial_set_baud(uint16_t divisor);
-/* Sets it once all that is queued has gone out; at once where no divisor has been set since the reset. */
+/* Sets it once all that is queued has gone out; at once, and switches the USART on, where it is off since the reset. */
 void serial_set_baud_later(uint16_t divisor);
 /* Sets the divisor that waits, if the line is idle. */
 void serial_work(void);
+
+/* Whether a divisor waits: frames but replies wait too, or a line that is too slow for them would never fall idle. */
+bool serial_is_to_change(void);
 
 /* Whether the last byte has left the shift register. */
 bool serial_is_idle(void);

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What one instruction does to the flow; addresses are those of words.
-enum Flow {
+pub(crate) enum Flow {
     /// To the next instruction.
     On,
     /// To the next one or the one after it.
@@ -20,13 +20,13 @@ enum Flow {
     Indirect,
 }
 
-fn word(flash: &[u8], at: usize) -> u16 {
+pub(crate) fn word(flash: &[u8], at: usize) -> u16 {
     let byte = |at: usize| flash.get(at).copied().unwrap_or(0xff);
     u16::from_le_bytes([byte(2 * at), byte(2 * at + 1)])
 }
 
 /// Length of the instruction, words, and what it does to the flow (instruction set manual).
-fn decode(flash: &[u8], at: usize) -> (usize, Flow) {
+pub(crate) fn decode(flash: &[u8], at: usize) -> (usize, Flow) {
     let code = word(flash, at);
     let near = |bits: u32| {
         // Sign extended; from the next word.

@@ -1,6 +1,7 @@
 //! The real image on a simulated ATmega16, or on a real board: what the tests share.
 
 pub mod calls;
+pub mod guarded;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -222,6 +222,7 @@ fn a_board_that_corrects() {
         temperature_squared: [1e-5, 0.0, -2e-5],
         motor: [1e-3, 0.0, -5e-4],
         motor_magnitude: [0.0, 2e-3, 0.0],
+        motor_turning: [0.2, 0.0, -0.03],
         supply: [1e-4, 0.0, -2e-4],
         acc: [[1e-4, 0.0, -1e-4]; 3],
         matrix: [[0.01, -0.02, 0.03], [0.0, 0.004, 0.0], [-0.01, 0.0, 0.002]],

@@ -33,8 +33,6 @@ unsafe extern "C" {
 static mut RESTARTS: u16 = 0;
 /// Why it started.
 static mut RESET_CAUSE: u8 = 0;
-/// 1 + a divisor that waits for the line to be idle, which has 12 bits; 0: none.
-static mut BAUD: u16 = 0;
 
 /// Fills the free stack with [`PAINT`], so that its depth can be read off later.
 #[inline(always)]
@@ -85,16 +83,6 @@ impl AvrBoard {
         unsafe { RESET_CAUSE = reset_cause };
         Self(())
     }
-
-    /// What has to wait for the line to be idle.
-    pub fn work(&mut self) {
-        // SAFETY: the main loop's alone.
-        let waits = unsafe { BAUD };
-        if waits != 0 && serial::is_idle() {
-            serial::set_baud(waits.wrapping_sub(1));
-            unsafe { BAUD = 0 };
-        }
-    }
 }
 
 impl Board for AvrBoard {
@@ -143,15 +131,8 @@ impl Board for AvrBoard {
         tick::set_period(ticks, every);
     }
 
-    #[inline(never)]
     fn set_baud(&mut self, divisor: u16) {
-        // SAFETY: as in `work`.
-        if unsafe { BAUD } == 0 && serial::is_unset() {
-            serial::set_baud(divisor);
-            serial::delimit();
-        } else {
-            unsafe { BAUD = divisor.wrapping_add(1) };
-        }
+        serial::set_baud(divisor);
     }
 
     #[inline(never)]

@@ -45,7 +45,6 @@ static mut STAND: Stand = Stand::new();
 fn main() -> ! {
     board::paint_stack();
     let mut board = board::AvrBoard::start();
-    serial::start();
     // SAFETY: interrupts are off; from their start on the sensors are the tick's.
     let sensors = unsafe { sensors::start() };
     // SAFETY: the one reference to it.
@@ -91,7 +90,7 @@ fn main() -> ! {
             asm::wdr();
             (ticked, passed) = (false, false);
         }
-        board.work();
+        serial::work();
         tick::sleep_until_work(!serial::has_received() || stand.listens(&board));
     }
 }

@@ -23,6 +23,9 @@ const RXEN_TXEN: u8 = 1 << 4 | 1 << 3;
 /// URSEL, 8 data bits, no parity, 1 stop bit.
 const UCSRC_8N1: u8 = 1 << 7 | 3 << 1;
 
+/// 1 + a divisor that waits for the line to be idle, which has 12 bits; 0: none.
+static mut NEXT: u16 = 0;
+
 /// Losses that the interrupts saw: overrun, framing.
 static mut LOST: [u8; 2] = [0; 2];
 
@@ -31,19 +34,40 @@ fn usart() -> &'static avr_device::atmega16::usart::RegisterBlock {
     unsafe { &*USART::ptr() }
 }
 
-/// Switches the USART on; the interrupts wait for the global enable.
-pub fn start() {
-    usart().ucsrb.write(|w| bits!(w, RXCIE | RXEN_TXEN));
-}
-
 /// The next received byte.
 pub fn received() -> Option<u8> {
     RX.pop()
 }
 
-/// Sets the divisor. Order as on silicon: UBRRH (URSEL = 0), UBRRL, UCSRC.
+/// Sets the divisor as soon as the line is idle. After a reset at once, and switches the USART on; its interrupts wait for the
+/// global enable. The first byte is a delimiter: power may have gone in the middle of a frame, and this ends what the host has
+/// of it.
 #[inline(never)]
 pub fn set_baud(divisor: u16) {
+    if usart().ucsrb.read().bits() != 0 {
+        // SAFETY: the main loop's alone.
+        unsafe { NEXT = divisor.wrapping_add(1) };
+        return;
+    }
+    set_divisor(divisor);
+    usart().ucsrb.write(|w| bits!(w, RXCIE | RXEN_TXEN));
+    usart().udr.write(|w| bits!(w, 0));
+}
+
+/// What has to wait for the line to be idle.
+pub fn work() {
+    // SAFETY: as above.
+    let next = unsafe { NEXT };
+    if next != 0 && is_idle() {
+        set_divisor(next.wrapping_sub(1));
+        // SAFETY: as above.
+        unsafe { NEXT = 0 };
+    }
+}
+
+/// Order as on silicon: UBRRH (URSEL = 0), UBRRL, UCSRC.
+#[inline(never)]
+fn set_divisor(divisor: u16) {
     usart()
         .ubrrh()
         .write(|w| bits!(w, (divisor >> 8) as u8 & 0x0f));
@@ -51,26 +75,18 @@ pub fn set_baud(divisor: u16) {
     usart().ucsrc().write(|w| bits!(w, UCSRC_8N1));
 }
 
-/// Sends a delimiter past the queue, which has to be empty: power may have gone in the middle of a frame, and this ends what
-/// the host has of it.
-pub fn delimit() {
-    usart().udr.write(|w| bits!(w, 0));
-}
-
-/// Whether no divisor has been set since the reset.
-pub fn is_unset() -> bool {
-    usart().ubrrl.read().bits() == 0
-}
-
 /// Whether bytes wait in the receive ring.
 pub fn has_received() -> bool {
     !RX.is_empty()
 }
 
-/// Queues a frame, or nothing where there is less room than [`room_for`] says. It is framed where it lies in the ring.
+/// Queues a frame, or nothing where there is less room than [`room_for`] says. It is framed where it lies in the ring. While a
+/// divisor waits there are replies alone: a line that is too slow for its frames would never fall idle.
 #[inline(never)]
 pub fn send(kind: u8, fields: &[u8]) -> bool {
-    if usize::from(room()) < room_for(kind, fields.len()) {
+    // SAFETY: the main loop's alone.
+    let waits = kind != wire::kind::REPLY && unsafe { NEXT } != 0;
+    if waits || usize::from(room()) < room_for(kind, fields.len()) {
         return false;
     }
     let len = encode_by(kind, fields, |at, byte| TX.put(at, byte));
@@ -98,7 +114,7 @@ fn begin() {
 }
 
 /// Whether the last byte has left the shift register.
-pub fn is_idle() -> bool {
+fn is_idle() -> bool {
     TX.is_empty() && usart().ucsra.read().bits() & (UDRE | TXC) == UDRE | TXC
 }
 

@@ -3,11 +3,17 @@ use wire::{Command, Decoder, Frame, Request, Sample, encode_request};
 
 use super::*;
 
+mod asked;
+
 /// What the stand has asked the board for, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Deed {
     Motor(i16),
     Reboot,
+    Period(u16, u8),
+    Baud(u16),
+    AccRange(u8),
+    Job(Job),
 }
 
 /// A board that remembers, and whose EEPROM has a cell that does not keep what is written.
@@ -18,6 +24,13 @@ struct Board {
     worn: Option<u16>,
     alive: bool,
     cause: u8,
+    /// Bytes that the queue takes, and the largest frame's that it still takes.
+    room: u8,
+    takes: usize,
+    /// Whether the slot for a job is free.
+    free: bool,
+    since: u16,
+    stack: u16,
 }
 
 impl Board {
@@ -29,6 +42,11 @@ impl Board {
             worn: None,
             alive: false,
             cause: reset_cause::POWER_ON,
+            room: 191,
+            takes: 191,
+            free: true,
+            since: 0,
+            stack: 99,
         }
     }
 }
@@ -37,6 +55,9 @@ impl super::Board for Board {
     fn send(&mut self, kind: u8, fields: &[u8]) -> bool {
         let mut line = [0; wire::MAX_FRAME];
         let len = wire::fields::encode(kind, fields, &mut line);
+        if len > self.takes {
+            return false;
+        }
         let mut decoder = Decoder::new();
         let frames = line[..len].iter().filter_map(|byte| decoder.push(*byte));
         self.frames
@@ -44,7 +65,7 @@ impl super::Board for Board {
         true
     }
     fn room(&self) -> u8 {
-        191
+        self.room
     }
     fn set_motor(&mut self, duty: i16) {
         self.deeds.push(Deed::Motor(duty));
@@ -55,11 +76,20 @@ impl super::Board for Board {
     fn host_is_there(&self) -> bool {
         self.alive
     }
-    fn set_period(&mut self, _: u16, _: u8) {}
-    fn set_baud(&mut self, _: u16) {}
-    fn set_acc_range(&mut self, _: u8) {}
-    fn post(&mut self, _: Job) -> bool {
-        true
+    fn set_period(&mut self, ticks: u16, every: u8) {
+        self.deeds.push(Deed::Period(ticks, every));
+    }
+    fn set_baud(&mut self, divisor: u16) {
+        self.deeds.push(Deed::Baud(divisor));
+    }
+    fn set_acc_range(&mut self, range: u8) {
+        self.deeds.push(Deed::AccRange(range));
+    }
+    fn post(&mut self, job: Job) -> bool {
+        if self.free {
+            self.deeds.push(Deed::Job(job));
+        }
+        self.free
     }
     fn eeprom_read(&mut self, address: u16) -> u8 {
         self.eeprom[usize::from(address)]
@@ -82,10 +112,10 @@ impl super::Board for Board {
         0
     }
     fn stack_free(&self) -> u16 {
-        99
+        self.stack
     }
     fn ticks_since(&self) -> u16 {
-        0
+        self.since
     }
 }
 

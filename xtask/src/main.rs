@@ -6,6 +6,7 @@ mod demo;
 mod effects;
 mod fuzz;
 mod image;
+mod mutants;
 mod page;
 mod peers;
 mod size;
@@ -37,6 +38,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   effects  writes docs/effects.md and its figures from the files of the effects; --check tells whether they are current
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}
   size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt
+  mutants  plants small faults in drivers, wire, firmware and bench, one at a time, and says which of them no test notices;
+           --seed N and --count N draw, --write keeps docs/mutants.txt, --registers plants those that only the image has
   page     builds the page that runs the engine in a browser: target/page/index.html
   wheel    builds the Python package, target/wheel/dist/*.whl, and tests it in a virtual environment of its own;
            --dev compiles it as tests are
@@ -68,6 +71,7 @@ fn main() -> ExitCode {
         Some("soak") => soak::soak(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("fuzz") => fuzz::fuzz(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("supply") => supply::supply(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("mutants") => mutants::hunt(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("page") => page::page(&root).map(|said| println!("{said}")),
         Some("wheel") => wheel::wheel(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("compare-peers") => peers::compare(&root, std::env::args().any(|a| a == "--long")),

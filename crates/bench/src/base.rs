@@ -222,3 +222,207 @@ fn ring(since: f64) -> f64 {
         (-since / KNOCK_TAU_S).exp() * (TAU * KNOCK_HZ * since).sin()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part() -> BasePart {
+        BasePart {
+            tilt_deg: [0.0; 2],
+            floor_g_rms: 0.0,
+            sway_deg: 0.0,
+            sway_period_s: 10.0,
+            sway_from_s: 0.0,
+            poses: Vec::new(),
+        }
+    }
+
+    fn base(part: BasePart, fault: Fault) -> Base {
+        Base::new(part, &[fault], 7)
+    }
+
+    fn near(got: f64, wanted: f64) {
+        assert!((got - wanted).abs() < 1e-9, "{got}, not {wanted}");
+    }
+
+    const G: f64 = STANDARD_GRAVITY;
+
+    #[test]
+    fn a_sway_turns_about_x_and_tips_gravity_with_it() {
+        let sways = BasePart {
+            sway_deg: 3.0,
+            sway_period_s: 8.0,
+            sway_from_s: 5.0,
+            ..part()
+        };
+        let base = Base::new(sways, &[], 7);
+        assert_eq!(base.rate_dps(4.9, 0.0), [0.0; 3]);
+        // 3 deg sin(2 pi t / 8 s): its rate is the derivative.
+        near(base.rate_dps(5.0, 0.0)[0], 3.0 * TAU / 8.0);
+        near(base.rate_dps(6.0, 0.0)[0], 3.0 * TAU / 8.0 * 0.5f64.sqrt());
+        near(base.rate_dps(9.0, 0.0)[0], -3.0 * TAU / 8.0);
+        let (sin, cos) = 3f64.to_radians().sin_cos();
+        let acceleration = base.acceleration(7.0, 0.0);
+        near(acceleration[1], sin * G);
+        near(acceleration[2], cos * G);
+        near(acceleration[0], 0.0);
+    }
+
+    #[test]
+    fn a_tilt_about_both_axes_is_one_behind_the_other() {
+        let tilted = BasePart {
+            tilt_deg: [10.0, 20.0],
+            ..part()
+        };
+        let acceleration = Base::new(tilted, &[], 7).acceleration(0.0, 0.0);
+        let (sx, cx) = 10f64.to_radians().sin_cos();
+        let (sy, cy) = 20f64.to_radians().sin_cos();
+        near(acceleration[0], -sy * cx * G);
+        near(acceleration[1], sx * G);
+        near(acceleration[2], cy * cx * G);
+        // A table that lies on its side, and has turned by a quarter.
+        let lies = BasePart {
+            poses: vec![pose::Pose {
+                at_s: 0.0,
+                turn_s: 1.0,
+                up: [1.0, 0.0, 0.0],
+            }],
+            tilt_deg: [10.0, 0.0],
+            ..part()
+        };
+        let acceleration = Base::new(lies, &[], 7).acceleration(2.0, std::f64::consts::FRAC_PI_2);
+        // Up points along -y of the table, and the sensor leans about x.
+        near(acceleration[1], -cx * G);
+        near(acceleration[2], sx * G);
+        near(acceleration[0], 0.0);
+    }
+
+    #[test]
+    fn a_knock_rings_at_18_hz_and_leaves_its_tilt() {
+        let base = base(
+            part(),
+            Fault::Knock {
+                gyro: 2,
+                time_s: 4.0,
+                step_dps: 0.5,
+                tilt_deg: 1.5,
+            },
+        );
+        assert_eq!(base.rate_dps(3.99, 0.0), [0.0; 3]);
+        // A quarter of the first period.
+        let quarter = 0.25 / 18.0;
+        let damped = (-quarter / 0.06f64).exp();
+        near(base.rate_dps(4.0 + quarter, 0.0)[2], 4.0 * 1.5 * damped);
+        near(base.rate_dps(4.0 + quarter, 0.0)[0], 0.0);
+        let (sin, cos) = 1.5f64.to_radians().sin_cos();
+        let acceleration = base.acceleration(4.0 + quarter, 0.0);
+        near(acceleration[0], -sin * G);
+        near(acceleration[2], (cos + 0.2 * 1.5 * damped) * G);
+        near(base.acceleration(3.9, 0.0)[2], G);
+        near(base.acceleration(4.0, 0.0)[0], -sin * G);
+    }
+
+    #[test]
+    fn a_bump_gives_a_speed_at_once_and_rings_with_its_own_frequency_and_decay() {
+        let base = base(
+            part(),
+            Fault::Bump {
+                axis: 1,
+                time_s: 2.0,
+                peak_dps: 3.0,
+                linear_g: 0.4,
+                frequency_hz: 12.0,
+                decay_s: 0.3,
+            },
+        );
+        near(base.rate_dps(1.999, 0.0)[1], 0.0);
+        near(base.rate_dps(2.0, 0.0)[1], 3.0);
+        // An eighth of a period later, and three periods later.
+        let eighth = 0.125 / 12.0;
+        let ring = (-eighth / 0.3f64).exp() * 0.5f64.sqrt();
+        near(base.rate_dps(2.0 + eighth, 0.0)[1], 3.0 * ring);
+        near(base.rate_dps(2.25, 0.0)[1], 3.0 * (-0.25 / 0.3f64).exp());
+        let acceleration = base.acceleration(2.0 + eighth, 0.0);
+        for (axis, part) in [0.5, 0.3, 1.0].into_iter().enumerate() {
+            let gravity = if axis == 2 { G } else { 0.0 };
+            near(acceleration[axis] - gravity, part * 0.4 * ring * G);
+        }
+    }
+
+    #[test]
+    fn a_shove_goes_there_and_back_within_its_length() {
+        let base = base(
+            part(),
+            Fault::Shove {
+                axis: 0,
+                time_s: 10.0,
+                peak_dps: 5.0,
+                length_s: 4.0,
+            },
+        );
+        for (t, rate) in [
+            (9.9, 0.0),
+            (11.0, 5.0),
+            (12.0, 0.0),
+            (13.0, -5.0),
+            (14.1, 0.0),
+        ] {
+            near(base.rate_dps(t, 0.0)[0], rate);
+        }
+    }
+
+    #[test]
+    fn a_vibration_is_felt_by_all_three_outputs_of_the_accelerometer() {
+        let base = base(
+            part(),
+            Fault::Vibration {
+                axis: 2,
+                frequency_hz: 30.0,
+                amplitude_dps: 1.0,
+                linear_g: 0.05,
+            },
+        );
+        let tone = base.tones()[0];
+        assert_eq!(
+            (tone.axis, tone.frequency_hz, tone.amplitude_dps),
+            (2, 30.0, 1.0)
+        );
+        // A quarter of a turn behind its zero.
+        let t = (1.25 - tone.phase) / 30.0;
+        for (axis, gravity) in [0.0, 0.0, G].into_iter().enumerate() {
+            near(base.acceleration(t, 0.0)[axis] - gravity, 0.05 * G);
+        }
+        near(base.rate_dps(t, 0.0)[2], 0.0);
+    }
+
+    #[test]
+    fn the_floor_has_its_rms_and_its_corner() {
+        let shaken = BasePart {
+            floor_g_rms: 0.01,
+            ..part()
+        };
+        let mut base = Base::new(shaken, &[], 7);
+        let (dt, n) = (1e-3, 200_000);
+        let (mut squares, mut products, mut before) = ([0.0; 3], 0.0, 0.0);
+        for _ in 0..n {
+            base.step(dt);
+            let a = base.acceleration(0.0, 0.0);
+            for (sum, value) in squares.iter_mut().zip([a[0], a[1], a[2] - G]) {
+                *sum += (value / G).powi(2) / f64::from(n);
+            }
+            products += a[0] / G * before / f64::from(n);
+            before = a[0] / G;
+        }
+        // 200 s of a corner of 10 Hz are some 6000 independent values: 1.3 % rms of the rms.
+        for square in squares {
+            assert!(
+                (square.sqrt() / 0.01 - 1.0).abs() < 0.06,
+                "{}",
+                square.sqrt()
+            );
+        }
+        let corner = -(products / squares[0]).ln() / (TAU * dt);
+        assert!((corner / 10.0 - 1.0).abs() < 0.1, "{corner} Hz");
+    }
+}

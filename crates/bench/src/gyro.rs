@@ -443,3 +443,6 @@ impl Gyro {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

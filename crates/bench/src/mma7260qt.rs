@@ -113,3 +113,138 @@ impl Mma7260Qt {
         volts.clamp(0.25, vdd - 0.25)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn silent() -> AccPart {
+        AccPart {
+            noise_density_g: 0.0,
+            ..AccPart::default()
+        }
+    }
+
+    /// Under a specific force, g, for long enough.
+    fn under(part: AccPart, g: [f64; 3]) -> Mma7260Qt {
+        let mut acc = Mma7260Qt::new(part, 3);
+        (0..100).for_each(|_| acc.step(g.map(|g| g * STANDARD_GRAVITY), 1e-3));
+        acc
+    }
+
+    fn near(got: f64, wanted: f64) {
+        assert!((got - wanted).abs() < 1e-9, "{got}, not {wanted}");
+    }
+
+    #[test]
+    fn zero_sensitivity_supply_and_temperature_are_in_the_volts() {
+        let part = AccPart {
+            zero_g_error_v: [0.05, -0.02, 0.0],
+            scale_error: [0.03, 0.0, -0.05],
+            zero_g_tempco_g: [2e-3, 0.0, -1e-3],
+            scale_tempco: [1e-4, -2e-4, 0.0],
+            ..silent()
+        };
+        let mut acc = under(part, [0.5, -0.25, 1.0]);
+        // At 25 degC.
+        near(acc.volts(0, 3.3, 1.0), 1.65 + 0.05 + 0.8 * 1.03 * 0.5);
+        near(acc.volts(1, 3.3, 1.0), 1.65 - 0.02 - 0.8 * 0.25);
+        near(acc.volts(2, 3.3, 1.0), 1.65 + 0.8 * 0.95);
+        // In proportion to the supply.
+        near(acc.volts(1, 3.0, 1.0), (1.65 - 0.02 - 0.2) * 3.0 / 3.3);
+        // Warm.
+        acc.warm(45.0, 1.0);
+        near(
+            acc.volts(0, 3.3, 1.0),
+            1.65 + 0.05 + 0.8 * (1.03 + 1e-4 * 20.0) * (0.5 + 2e-3 * 20.0),
+        );
+        near(
+            acc.volts(1, 3.3, 1.0),
+            1.65 - 0.02 - 0.8 * (1.0 - 2e-4 * 20.0) * 0.25,
+        );
+        near(
+            acc.volts(2, 3.3, 1.0),
+            1.65 + 0.8 * 0.95 * (1.0 - 1e-3 * 20.0),
+        );
+    }
+
+    #[test]
+    fn the_package_follows_the_board_within_30_s() {
+        let part = AccPart {
+            zero_g_tempco_g: [1e-2, 0.0, 0.0],
+            ..silent()
+        };
+        let mut acc = under(part, [0.0; 3]);
+        acc.warm(25.0, 1.0);
+        (0..60).for_each(|_| acc.warm(35.0, 0.5));
+        let expected = 10.0 * (1.0 - (-1f64).exp());
+        near((acc.volts(0, 3.3, 1.0) - 1.65) / 0.8 / 1e-2, expected);
+    }
+
+    #[test]
+    fn outputs_end_a_quarter_volt_from_either_rail_and_ranges_have_their_sensitivity() {
+        let mut acc = under(silent(), [5.0, -5.0, 0.4]);
+        near(acc.volts(0, 3.3, 1.0), 3.05);
+        near(acc.volts(1, 3.3, 1.0), 0.25);
+        for (range, sensitivity) in [(0u8, 0.8), (1, 0.6), (2, 0.3), (3, 0.2)] {
+            let pins = AccSelect {
+                select1: range & 1 != 0,
+                select2: range & 2 != 0,
+                awake: true,
+            };
+            acc.set_pins(pins, 2.0);
+            near(acc.volts(2, 3.3, 2.0), 1.65 + 0.4 * sensitivity);
+        }
+    }
+
+    #[test]
+    fn asleep_it_puts_out_nothing_and_wakes_within_half_a_millisecond() {
+        let mut acc = under(silent(), [0.0; 3]);
+        let pins = |awake| AccSelect {
+            select1: false,
+            select2: false,
+            awake,
+        };
+        acc.set_pins(pins(false), 2.0);
+        near(acc.volts(0, 3.3, 2.1), 0.0);
+        acc.set_pins(pins(true), 3.0);
+        near(acc.volts(0, 3.3, 3.0 + 0.4e-3), 0.0);
+        near(acc.volts(0, 3.3, 3.0 + 0.6e-3), 1.65);
+        // Awake already: no pause.
+        acc.set_pins(pins(true), 4.0);
+        near(acc.volts(0, 3.3, 4.0), 1.65);
+    }
+
+    #[test]
+    fn each_output_has_its_pole_and_its_noise() {
+        let mut acc = Mma7260Qt::new(silent(), 3);
+        acc.step([STANDARD_GRAVITY; 3], 1e-3);
+        for (axis, pole) in [350.0, 350.0, 150.0].into_iter().enumerate() {
+            let rise = 1.0 - (-std::f64::consts::TAU * pole * 1e-3f64).exp();
+            near((acc.volts(axis, 3.3, 1.0) - 1.65) / 0.8, rise);
+        }
+        let mut acc = Mma7260Qt::new(AccPart::default(), 3);
+        let n = 20_000;
+        let (mut squares, mut products, mut before) = ([0.0; 3], 0.0, 0.0);
+        for _ in 0..n {
+            acc.step([0.0; 3], 1e-3);
+            let g = [0, 1, 2].map(|axis| (acc.volts(axis, 3.3, 1.0) - 1.65) / 0.8);
+            for (sum, g) in squares.iter_mut().zip(g) {
+                *sum += g * g / f64::from(n);
+            }
+            products += g[2] * before / f64::from(n);
+            before = g[2];
+        }
+        // 350e-6 g/sqrt(Hz) over (pi / 2) of the pole.
+        for (square, pole) in squares.into_iter().zip([350.0f64, 350.0, 150.0]) {
+            let rms = 350e-6 * (std::f64::consts::FRAC_PI_2 * pole).sqrt();
+            assert!(
+                (square.sqrt() / rms - 1.0).abs() < 0.04,
+                "{} {rms}",
+                square.sqrt()
+            );
+        }
+        let alike = (-std::f64::consts::TAU * 150.0 * 1e-3f64).exp();
+        assert!((products / squares[2] - alike).abs() < 0.03, "{products}");
+    }
+}

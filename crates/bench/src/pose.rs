@@ -125,6 +125,11 @@ mod tests {
 
     #[test]
     fn a_table_that_turns_carries_gravity_round() {
+        // 0.5 at 0.6435 rad, seen from 0.4 rad further on.
+        let [x, y, z] = on_table([0.4, 0.3, 0.9], 0.4);
+        let angle = 0.75f64.atan() - 0.4;
+        assert!((x - 0.5 * angle.cos()).abs() < 1e-12, "{x}");
+        assert!((y - 0.5 * angle.sin()).abs() < 1e-12 && z == 0.9, "{y} {z}");
         let quarter = on_table([0.1, 0.0, 0.9], FRAC_PI_2);
         assert!(
             (quarter[1] + 0.1).abs() < 1e-12 && quarter[0].abs() < 1e-12,

@@ -188,3 +188,31 @@ fn stalls_glitches_dead_lines_and_lost_bytes_show_as_what_they_are() {
     let heard = hear(&lossy);
     assert!((1..=5).contains(&heard.bad), "{} damaged frames", heard.bad);
 }
+
+#[test]
+fn a_register_that_reads_as_written_is_ok_and_one_that_does_not_is_told() {
+    let mut run = run(Scenario::quiet(4), 3.0);
+    let write = |number, address, value| bench::TimedRequest {
+        at_us: 1_000_000 + u64::from(number) * 300_000,
+        request: wire::Request {
+            number,
+            command: Command::WriteRegister {
+                gyro: wire::Axis::Y,
+                address,
+                value,
+            },
+        },
+    };
+    // SENS/AVG as it is, and GYRO_OFF, which has twelve bits.
+    run.requests = vec![write(1, 0x38, 0x0402), write(2, 0x14, 0xffff)];
+    let replies = hear(&run).replies();
+    let told: Vec<_> = replies
+        .iter()
+        .map(|r| (r.number, r.status, r.value))
+        .collect();
+    let wanted = [
+        (1, wire::Status::Ok, 0x0402),
+        (2, wire::Status::ReadBackWrong, 0x0fff),
+    ];
+    assert_eq!(told, wanted);
+}

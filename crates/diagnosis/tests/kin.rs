@@ -4,8 +4,10 @@ mod graded;
 
 use std::f64::consts::TAU;
 
-use graded::{add, graded, named, record, said, told, values};
+use graded::{add, graded, graded_over, named, record, said, told, values};
+use model::file::EffectModel;
 use model::record::{Quantity, Record};
+use model::{ModelFile, Parameter};
 use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -202,5 +204,22 @@ fn a_large_slope_in_temperature_keeps_its_name_beside_what_is_unexplained() {
         right
             .then_some(())
             .ok_or_else(|| format!("{slope} {period} {half}: {}", said(&d)))
+    });
+}
+
+/// A process of one pole without white noise beside it is white noise through that filter, and has a parameter more.
+#[test]
+fn a_filter_of_one_pole_is_no_process_in_the_place_of_the_noise() {
+    let mut model = ModelFile::paper();
+    model.effects.push(EffectModel {
+        cause: "low_pass".into(),
+        channels: vec!["gyro_y".into()],
+        parameters: [("lag1_correlation".to_owned(), Parameter::exact(0.4, "1"))].into(),
+    });
+    graded_over((40, 39), "a filter of one pole", |run, _| {
+        let r = model::simulate(&model, 600.0, 20.0, 7700 + run).expect("a run");
+        let d = told(&r);
+        let right = named(&d) == [("low_pass", "gyro_y")];
+        right.then_some(()).ok_or_else(|| said(&d))
     });
 }

@@ -398,6 +398,11 @@ pub trait Effect: Send + Sync {
     fn extends(&self) -> Option<&'static str> {
         None
     }
+    /// The effect with one parameter less that this one is at the end of its range: beside it, where both would do, this one
+    /// has to be worth the parameter.
+    fn ends_in(&self) -> Option<&'static str> {
+        None
+    }
     /// The parameter that this one is at most a part of, either way, and the part, where the channel's noise is not filtered.
     fn at_most(&self, _parameter: &str) -> Option<(&'static str, f64)> {
         None

@@ -4,7 +4,7 @@
 //! With `w` = counts times scale, the board computes, in this order,
 //!
 //! ```text
-//! u = w + bias + temperature T + squared T^2 + motor d + magnitude |d| + supply s + sum acc_k a_k
+//! u = w + bias + temperature T + squared T^2 + motor d + magnitude |d| + turning sign(d) + supply s + sum acc_k a_k
 //! v = u + sum_j matrix_j u_j
 //! rate = v + surge (d - m) - b
 //! ```
@@ -32,17 +32,18 @@
 //! | | temperature squared | 2^-26 deg/s for each count squared |
 //! | | bias, coarse and fine | 2^-10, 2^-20 deg/s |
 //! | | motor, with the command's sign and by its magnitude | 2^-20 deg/s for each step of 255 |
+//! | | motor, as soon as it turns, with the command's sign | 2^-13 deg/s |
 //! | | supply | 2^-20 deg/s for each count |
 //! | | acc x, y, z | 2^-20 deg/s for each count |
-//! | 16, 26 | the same of y, of z | |
-//! | 36 | shares of the rates about x, y, z in the rate x; then in y, in z | 2^-18 |
-//! | 45 | of x: variance of the mean of a block at rest, unsigned | 2^-18 (deg/s)^2 |
+//! | 17, 28 | the same of y, of z | |
+//! | 39 | shares of the rates about x, y, z in the rate x; then in y, in z | 2^-18 |
+//! | 48 | of x: variance of the mean of a block at rest, unsigned | 2^-18 (deg/s)^2 |
 //! | | growth of the bias' variance in a block, over that, unsigned | 2^-24 |
 //! | | surge | 2^-20 deg/s for each step of 255 |
-//! | 48, 51 | the same of y, of z | |
+//! | 51, 54 | the same of y, of z | |
 
 /// Numbers of a stored correction.
-pub const NUMBERS: usize = 54;
+pub const NUMBERS: usize = 57;
 /// Rows of three in which they are written; the row behind the last one is their CRC-32C and a 0.
 pub const ROWS: usize = NUMBERS / 3;
 /// Bytes of the numbers; the CRC-32C comes behind.
@@ -50,9 +51,9 @@ pub const NUMBERS_LEN: usize = NUMBERS * 2;
 /// Bytes of a stored correction.
 pub const STORED_LEN: usize = NUMBERS_LEN + 4;
 /// Format of a stored correction, the low byte of its first number. Another one is not read.
-pub const FORMAT: u8 = 1;
+pub const FORMAT: u8 = 2;
 /// Terms of each axis.
-pub const TERMS: usize = 10;
+pub const TERMS: usize = 11;
 
 /// Counts of TEMP_OUT in a step of the range of temperatures.
 pub const RANGE_STEP: i16 = 4;
@@ -108,6 +109,8 @@ pub struct Correction {
     pub motor: [f64; 3],
     /// deg/s for each step of the command's magnitude.
     pub motor_magnitude: [f64; 3],
+    /// deg/s, with the command's sign, whatever its magnitude: what friction takes.
+    pub motor_turning: [f64; 3],
     /// deg/s for each count.
     pub supply: [f64; 3],
     /// deg/s for each count: on the rate x, of acc x, y, z; then on y, on z.
@@ -158,6 +161,7 @@ pub fn name(place: usize) -> (char, &'static str, &'static str) {
         ("bias, fine part", "deg/s"),
         ("motor", "deg/s/step"),
         ("motor by magnitude", "deg/s/step"),
+        ("motor as it turns", "deg/s"),
         ("supply", "deg/s/count"),
         ("acc x", "deg/s/count"),
         ("acc y", "deg/s/count"),
@@ -192,6 +196,7 @@ pub const fn step(place: usize) -> f64 {
         OF_AXES..MATRIX => match (place - OF_AXES) % TERMS {
             1 => 26,
             2 => 10,
+            6 => 13,
             _ => 20,
         },
         MATRIX..FILTER => 18,
@@ -230,6 +235,7 @@ impl Correction {
                 bias - coarse,
                 self.motor[axis],
                 self.motor_magnitude[axis],
+                self.motor_turning[axis],
                 self.supply[axis],
                 self.acc[axis][0],
                 self.acc[axis][1],
@@ -309,8 +315,9 @@ impl Correction {
             temperature_squared: of_axes(1),
             motor: of_axes(4),
             motor_magnitude: of_axes(5),
-            supply: of_axes(6),
-            acc: [0, 1, 2].map(|axis| [7, 8, 9].map(|k| value(OF_AXES + TERMS * axis + k))),
+            motor_turning: of_axes(6),
+            supply: of_axes(7),
+            acc: [0, 1, 2].map(|axis| [8, 9, 10].map(|k| value(OF_AXES + TERMS * axis + k))),
             matrix: [0, 1, 2].map(|axis| [0, 1, 2].map(|j| value(MATRIX + 3 * axis + j))),
             noise: of_filter(0),
             walk: [0, 1, 2].map(|axis| value(FILTER + 3 * axis) * value(FILTER + 3 * axis + 1)),

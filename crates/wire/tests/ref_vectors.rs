@@ -331,3 +331,41 @@ fn the_page_and_the_crate_give_the_same_lengths_counters_and_codes() {
         }
     }
 }
+
+#[test]
+fn flags_have_the_bits_of_the_page() {
+    use wire::{correction_state as state, flags};
+    let bits = [
+        flags::new_data(0),
+        flags::new_data(1),
+        flags::new_data(2),
+        flags::error(0),
+        flags::error(1),
+        flags::error(2),
+        flags::GYRO_NOT_ANSWERING,
+        flags::ACC_AT_RAIL,
+        flags::TICK_OVERRUN,
+        flags::BIAS_NULL,
+        1 << 10,
+        flags::SUPPLY_OUT_OF_RANGE,
+        flags::ACC_NOT_CONVERTED,
+        flags::GYRO_MISCONFIGURED,
+    ];
+    for (bit, flag) in bits.into_iter().enumerate() {
+        assert_eq!(flag, 1 << bit, "{bit}");
+    }
+    assert_eq!(flags::IN_ORDER, 7);
+    let states = [
+        state::APPLIED,
+        state::FILTERED,
+        state::AT_REST,
+        state::REFUSED,
+        state::NOISE_OFF,
+        state::EXTRAPOLATED,
+        state::NOT_IN_ORDER,
+        state::YAW_FREE,
+    ];
+    for (bit, flag) in states.into_iter().enumerate() {
+        assert_eq!(flag, 1 << bit, "{bit}");
+    }
+}

@@ -247,7 +247,9 @@ impl Board for HostBoard {
         let len = wire::fields::encode(kind, fields, &mut frame);
         let frame = &frame[..len];
         let chip = &mut *self.0.borrow_mut();
-        if chip.room() < wire::fields::room_for(kind, fields.len()) {
+        // A line that is to change its speed has to fall idle first.
+        let waits = chip.next_divisor.is_some() && kind != wire::kind::REPLY;
+        if waits || chip.room() < wire::fields::room_for(kind, fields.len()) {
             return false;
         }
         let mut decoder = wire::Decoder::new();

@@ -101,3 +101,31 @@ fn a_slope_over_the_temperature_has_its_sign_and_size() {
         );
     }
 }
+
+#[test]
+fn a_quiet_stands_accelerometer_has_zeros_within_its_part() {
+    let zeros: Vec<f64> = (0..200)
+        .flat_map(|seed| bench::Scenario::quiet(seed).acc.zero_g_error_v)
+        .collect();
+    let rms = (zeros.iter().map(|v| v * v).sum::<f64>() / zeros.len() as f64).sqrt();
+    // 600 draws: 3 % rms.
+    assert!((rms / 0.03 - 1.0).abs() < 0.1, "{rms} V");
+}
+
+#[test]
+fn a_reference_that_follows_the_rail_does_so_by_its_share() {
+    let mut scenario = bench::Scenario::quiet(3).with(bench::Fault::AccReference { share: 0.4 });
+    scenario.supply = bench::scenario::SupplyPart {
+        open_v: 5.05,
+        wander_v: 0.0,
+        load_step_v: 0.0,
+        ..scenario.supply
+    };
+    let mut stand = bench::Stand::new(&scenario);
+    stand.advance(1.0);
+    assert!(
+        (stand.aref_volts() - (3.3 + 0.4 * 0.05)).abs() < 1e-9,
+        "{}",
+        stand.aref_volts()
+    );
+}

@@ -5,6 +5,7 @@ use bench::{Motor, Scenario, Stand, Supply, Thermal, bartlett, register};
 
 mod data_sheet;
 mod faults;
+mod part;
 mod registers;
 
 const LSB: f64 = 0.073_26;

@@ -39,9 +39,6 @@ const LEAST_WALK: f64 = 1.0 / (1 << 24) as f64;
 /// Most of the same that is stored, a step below the last so that no rounding leads beyond it. It is the square of the filter's
 /// gain: 1/16.
 const MOST_WALK: f64 = (u16::MAX - 1) as f64 / (1 << 24) as f64;
-/// What is nearest to a term that has the sign of the command alone, of one in proportion to it: sum |d| / sum d^2 of commands
-/// that are spread evenly.
-const SIGN_IN_DUTY: f64 = 1.5;
 /// A flicker of instability B has, at 100 s, the deviation of a walk K with K^2 = 3 (0.664 B)^2 / 100 s (IEEE Std 952).
 const FLICKER_AT_S: f64 = 100.0;
 /// Degrees beyond the record's own range that a correction is for.
@@ -170,14 +167,7 @@ impl BoardCorrection {
 
 /// What is to be known of how an effect is taken off.
 fn provisos(effect: &EffectModel) -> Vec<String> {
-    let turning = effect.parameters.get("while_turning");
     let mut notes = Vec::new();
-    if turning.is_some_and(|p| p.value != 0.0) {
-        notes.push(format!(
-            "{}: what sets in as the motor turns is taken off in proportion to the command",
-            effect.cause
-        ));
-    }
     if effect.cause == "g_sensitivity" {
         notes.push("g_sensitivity: for the accelerometer's 1.5 g range".to_owned());
     }
@@ -302,6 +292,10 @@ fn judge(
             (
                 "motor by magnitude",
                 of(&meant.motor_magnitude, &rounded.motor_magnitude, FULL_DUTY),
+            ),
+            (
+                "motor as it turns",
+                of(&meant.motor_turning, &rounded.motor_turning, 1.0),
             ),
             ("supply", of(&meant.supply, &rounded.supply, REACH_SUPPLY)),
             // It lasts for a small part of the time, and at full duty at the most.

@@ -201,7 +201,7 @@ impl Search<'_> {
     }
 
     /// Put every other effect that would do as well in the place of a term beside it. One that does better, for the noise
-    /// of the gyro that it follows, takes the place.
+    /// of the gyro that it follows or for the parameter that it needs less, takes the place.
     pub(super) fn find_rivals(&self, state: &mut State) {
         for i in 0..state.terms.len() {
             if state.terms[i].stated.is_some() {
@@ -229,7 +229,15 @@ impl Search<'_> {
                 {
                     continue;
                 }
-                let odds = (offer.score() + lost - score) / 2.0;
+                // A parameter that is not needed costs ln n (Schwarz).
+                let fewer = state.terms[i].effect.ends_in() == Some(offer.effect.id());
+                let saved = if fewer {
+                    let more = offer.threshold - state.terms[i].threshold;
+                    (self.panel.bins.n as f64).ln() + more
+                } else {
+                    0.0
+                };
+                let odds = (offer.score() + lost + saved - score) / 2.0;
                 match alternatives
                     .iter_mut()
                     .find(|a| a.0.id() == offer.effect.id())
@@ -237,7 +245,7 @@ impl Search<'_> {
                     Some(a) => a.1 = a.1.max(odds),
                     None => alternatives.push((offer.effect, odds)),
                 }
-                if lost > 0.0 && odds > better.as_ref().map_or(0.0, |b| b.1) {
+                if (lost > 0.0 || fewer) && odds > better.as_ref().map_or(0.0, |b| b.1) {
                     better = Some((offer, odds));
                 }
             }

@@ -293,4 +293,98 @@ mod tests {
         );
         let _ = Scale::ratiometric(Range::G6, 0).micro_g(0xFFFF);
     }
+
+    #[test]
+    fn scales_are_those_of_the_data_sheets_sensitivities() {
+        for (range, full) in [
+            (Range::G1_5, 4_125_000.0),
+            (Range::G2, 5_500_000.0),
+            (Range::G4, 11_000_000.0),
+            (Range::G6, 16_500_000.0),
+        ] {
+            for bits in [1u8, 8, 10, 12, 16, 20] {
+                let scale = Scale::ratiometric(range, bits);
+                let counts = f64::from(1u32 << bits.min(16));
+                assert_eq!(f64::from(scale.zero_q4()), counts / 2.0 * 16.0, "{bits}");
+                let exact = full / counts * 16.0;
+                let off = f64::from(scale.micro_g_per_count_q4()) - exact;
+                assert!(off.abs() <= 0.5, "{range:?} {bits}: {off}");
+            }
+        }
+        assert_eq!(Scale::ratiometric(Range::G2, 0).zero_q4(), 0);
+    }
+
+    #[test]
+    fn another_reference_is_to_the_nearest_and_what_is_none_is_refused() {
+        for (supply, reference, bits) in
+            [(3_300, 2_560, 10), (3_000, 5_000, 12), (3_600, 3_300, 16)]
+        {
+            let scale = Scale::with_reference(Range::G4, supply, reference, bits).expect("a scale");
+            let (s, r, full) = (
+                f64::from(supply),
+                f64::from(reference),
+                f64::from(1u32 << bits),
+            );
+            let zero = s / 2.0 / r * full * 16.0;
+            let micro = r / full / (300.0 * s / 3_300.0) * 1e6 * 16.0;
+            assert!((f64::from(scale.zero_q4()) - zero).abs() <= 0.5, "{zero}");
+            assert!(
+                (f64::from(scale.micro_g_per_count_q4()) - micro).abs() <= 0.5,
+                "{micro}"
+            );
+        }
+        for (supply, reference, bits) in [
+            (0, 1, 10),
+            (1, 0, 10),
+            (1, 1, 0),
+            (1, 1, 17),
+            (65_535, 1, 16),
+            (1, 65_535, 1),
+        ] {
+            let scale = Scale::with_reference(Range::G4, supply, reference, bits);
+            assert_eq!(scale, None, "{supply} {reference} {bits}");
+        }
+        assert!(Scale::with_reference(Range::G4, 1, 1, 16).is_some());
+    }
+
+    #[test]
+    fn a_flip_has_its_bounds_and_limits_are_met_to_the_count() {
+        assert_eq!(Scale::from_flip(100, 100), None);
+        assert_eq!(Scale::from_flip(0x0100_0000, 1), None);
+        assert!(Scale::from_flip(0x00ff_ffff, 1).is_some());
+        let flip = Scale::from_flip(760 * 16, 264 * 16).expect("a flip");
+        assert_eq!(flip.zero_q4(), 512 * 16);
+        // 2 g over 496 counts.
+        assert!((f64::from(flip.micro_g_per_count_q4()) - 2e6 / 496.0 * 16.0).abs() <= 0.5);
+        let typical = Scale::ratiometric(Range::G1_5, 10);
+        let with = |zero_q4: i32, scale: f64| Scale {
+            zero_q4: typical.zero_q4 + zero_q4,
+            micro_g_per_count_q4: (f64::from(typical.micro_g_per_count_q4) * scale).round() as i32,
+        };
+        // A tenth of 512 counts; a sensitivity within 7.5 %.
+        for (zero, scale, within) in [
+            (819, 1.0, true),
+            (-819, 1.0, true),
+            (820, 1.0, false),
+            (-820, 1.0, false),
+            (0, 1.0 / 0.926, true),
+            (0, 1.0 / 0.924, false),
+            (0, 1.0 / 1.074, true),
+            (0, 1.0 / 1.076, false),
+        ] {
+            let part = with(zero, scale);
+            assert_eq!(
+                part.is_within_limits(Range::G1_5, 10),
+                within,
+                "{zero} {scale}"
+            );
+            assert_eq!(part.range(10), within.then_some(Range::G1_5));
+        }
+        // In sixteenths of a count.
+        let off = with(8, 1.0);
+        let exact = (600.0 - 512.5) * f64::from(off.micro_g_per_count_q4) / 16.0;
+        assert!((f64::from(off.micro_g(600)) - exact).abs() <= 1.0);
+        let exact = (400.0 - 512.5) * f64::from(off.micro_g_per_count_q4) / 16.0;
+        assert!((f64::from(off.micro_g(400)) - exact).abs() <= 1.0);
+    }
 }

@@ -76,6 +76,11 @@ impl Effect for GaussMarkov {
         Ok(vec![Hypothesis::Covariance(Arc::new(Process))])
     }
 
+    /// Without white noise beside it, it is white noise through a filter of one pole.
+    fn ends_in(&self) -> Option<&'static str> {
+        Some(super::low_pass::ID)
+    }
+
     fn describe(&self, found: &Found) -> Parameters {
         let [(a, a_error), (t, t_error), ..] = found.coefficients[..] else {
             return Parameters::new();

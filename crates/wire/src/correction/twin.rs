@@ -96,6 +96,7 @@ impl Twin {
                 + t * (c.temperature[i] + t * c.temperature_squared[i])
                 + duty * c.motor[i]
                 + duty.abs() * c.motor_magnitude[i]
+                + f64::from(inputs.duty.signum()) * c.motor_turning[i]
                 + supply * c.supply[i]
                 + acc[0] * c.acc[i][0]
                 + acc[1] * c.acc[i][1]

@@ -5,8 +5,8 @@ use model::file::EffectModel;
 use wire::correction::Correction;
 
 use super::{
-    ACC_COUNTS_PER_G, ACC_ZERO, BoardError, FLICKER_AT_S, FULL_DUTY, GYROS, SIGN_IN_DUTY,
-    SUPPLY_LSB_V, TEMP_LSB_C, TEMP_ZERO_C,
+    ACC_COUNTS_PER_G, ACC_ZERO, BoardError, FLICKER_AT_S, FULL_DUTY, GYROS, SUPPLY_LSB_V,
+    TEMP_LSB_C, TEMP_ZERO_C,
 };
 
 /// The terms of a model's effects, summed axis by axis.
@@ -79,9 +79,8 @@ impl Sum {
                 } else {
                     &mut self.out.motor
                 };
-                // The board has no term for what it does as soon as it turns: that goes along in proportion.
-                let at_full = value("at_full_duty") + SIGN_IN_DUTY * value("while_turning");
-                term[axis] -= at_full / FULL_DUTY;
+                term[axis] -= value("at_full_duty") / FULL_DUTY;
+                self.out.motor_turning[axis] -= value("while_turning");
                 self.surge(axis, value("surge_at_full_duty"), value("surge_time"));
             }
             "supply_sensitivity" => {

@@ -16,7 +16,10 @@ const FULL_DUTY: f64 = 255.0;
 const CORRECTED: [(&str, &[&str]); 7] = [
     ("temperature", &["slope"]),
     ("temperature_quadratic", &["curvature", "slope"]),
-    ("motor_bias", &["at_full_duty", "surge_at_full_duty"]),
+    (
+        "motor_bias",
+        &["at_full_duty", "surge_at_full_duty", "while_turning"],
+    ),
     ("supply_sensitivity", &["slope"]),
     ("g_sensitivity", &["acc_x", "acc_y", "acc_z"]),
     ("cross_axis", &["from_gyro_x", "from_gyro_y", "from_gyro_z"]),
@@ -53,7 +56,7 @@ pub struct Answer {
     /// Causes that were corrected, and that the second diagnosis names on the same axis all the same, with a size that the
     /// board has a term for.
     still_named: Vec<Cause>,
-    /// The same with sizes alone that the board has no term for, as what sets in as the motor turns.
+    /// The same with sizes alone that the board has no term for.
     no_term: Vec<Cause>,
     /// What was planted beside what the first diagnosis found.
     #[serde(skip_serializing_if = "Option::is_none")]

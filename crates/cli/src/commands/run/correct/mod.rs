@@ -161,7 +161,7 @@ impl Loop<'_> {
         drop(link);
         self.write(&mut taken, 1, mark)?;
         let known = match &scenarios {
-            Some((_, _, two)) => Some(self.known(&second, two, &model, seeds.stand)?),
+            Some((board, _, two)) => Some(self.known(board, &second, two, &model, seeds.stand)?),
             None => None,
         };
         let noise = model_noise(&model, &proposed);
@@ -256,13 +256,15 @@ impl Loop<'_> {
     /// base moves, the true rates.
     fn known(
         &self,
+        board: &Board,
         planned: &Planned,
         scenario: &bench::Scenario,
         model: &ModelFile,
         stand: u64,
     ) -> Result<Known> {
         let sound = without_defects(scenario, stand);
-        let mut link = simulated(&Board::Native, sound.clone());
+        // On the same board: another one samples at other instants, which is another noise.
+        let mut link = simulated(board, sound.clone());
         Proposed::of(&mut link, &perfect(model, &sound))?
             .map_err(|error| miette::miette!("the noise of the stand itself: {error}"))?
             .write(&mut link)?;
