@@ -7,7 +7,7 @@ use std::process::Command;
 use crate::step::{Crates, Failure, Pace, Silent, watched};
 use crate::{build_image, cargo, toolchain};
 
-/// What is hidden where nobody says what, and the seed: the run of the README, with a figure that convicts.
+/// What is hidden where nobody says what, and the seed: the run of the README, with a figure that shows it.
 const HIDE: &str = "tempco";
 const SEED: &str = "5";
 /// Where its files go, from the root, so that the command in the report can be typed again.
@@ -100,7 +100,7 @@ pub fn demo(root: &Path, arguments: &[String]) -> Result<(), Failure> {
     for line in abridged(&said.out) {
         println!("{line}");
     }
-    println!("(with the figure that convicts it; capture, analysis and diagnosis lie beside it)");
+    println!("(with a figure of the cause; capture, analysis and diagnosis lie beside it)");
     corrected(root, &options, &mut pace)
 }
 

@@ -414,6 +414,11 @@ fn names_that_say_what_they_are_and_in_which_unit_need_no_mapping() {
             "{notes}"
         );
     }
+    // What is not read of it is said.
+    let text = "stamp [ns],gx_dps,Q\n0,0.1,25\n50000000,0.2,25\n100000000,0.1,25\n";
+    let notes = read(text.as_bytes(), "", "").expect("a table");
+    let notes = notes.record.notes.join("; ");
+    assert!(notes.contains("not read: `Q`"), "{notes}");
     // A unit given goes before a convention, and one that nobody says is asked for.
     let text = table("t (s),gx,gy\n", ",", ".", 1.0, 1.0);
     is_the_table(&read(text.as_bytes(), "", "gyro=deg/s").expect("the unit is said"));

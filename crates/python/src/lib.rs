@@ -238,11 +238,13 @@ impl Diagnosis {
     }
 }
 
-/// Diagnoses a record.
+/// Diagnoses a record; its gyros, or the channels that are named.
 #[pyfunction]
+#[pyo3(signature = (capture, channels, seed, replicates, matters))]
 fn diagnose(
     py: Python<'_>,
     capture: Py<Capture>,
+    channels: Option<Vec<String>>,
     seed: u64,
     replicates: usize,
     matters: f64,
@@ -256,7 +258,10 @@ fn diagnose(
         replicates,
         matters,
     };
-    let diagnosed = py.detach(|| diagnosis::diagnose(&given.record, &options));
+    let diagnosed = py.detach(|| match &channels {
+        Some(channels) => diagnosis::diagnose_channels(&given.record, channels, &options),
+        None => diagnosis::diagnose(&given.record, &options),
+    });
     let diagnosed = diagnosed.map_err(|error| reported(explain(error)))?;
     Ok(Diagnosis {
         capture,

@@ -72,14 +72,25 @@ def test_a_record_is_a_mapping_of_arrays_that_cannot_be_written_to(tmp_path):
     np.testing.assert_array_equal(same["gyro_x"], run["gyro_x"])
 
 
+def test_channels_that_are_named_are_diagnosed_and_no_others():
+    data = {"gyro_x": white(2400), "gyro_y": white(2400), "acc_x": white(2400)}
+    units = {"gyro": "deg/s", "acc": "m/s2"}
+    both = imu_stand.diagnose(data, RATE, units=units, channels=["gyro_x", "acc_x"], replicates=0)
+    assert set(both["baseline"]) == {"gyro_x", "acc_x"}
+    with pytest.raises(imu_stand.Error, match="acc_z"):
+        imu_stand.diagnose(data, RATE, units=units, channels=["acc_z"])
+
+
 def test_a_diagnosis_shows_itself_and_its_model_simulates():
     n = 6000
     temperature = 20 + 8 * (1 - np.exp(-np.arange(n) / 1200))
     data = {"gyro_x": white(n) - 0.2 * temperature, "temp": temperature}
     diagnosis = imu_stand.diagnose(data, RATE, units={"gyro": "deg/s", "temp": "degC"}, name="<b>")
     assert diagnosis["format"] == "imu-stand-diagnosis/1" and diagnosis["verdict"] == "extended"
-    assert "verdict  extended" in str(diagnosis)
+    # What a shell is told, of options of the command, is not said here; a size stands once, with its interval of 95 %.
+    assert "verdict  extended" in str(diagnosis) and "--details" not in str(diagnosis)
     html = diagnosis._repr_html_()
+    assert "+-" not in html and "warm_up" in html
     assert "temperature" in html and "deg/s/degC" in html and "<b>:" not in html and "&lt;b&gt;" in html
     report = diagnosis.report_html()
     assert report.startswith("<!DOCTYPE html>") and "Bias follows temperature" in report
@@ -94,6 +105,7 @@ def test_a_diagnosis_shows_itself_and_its_model_simulates():
 def test_analysis_and_plan_show_themselves():
     analysis = imu_stand.analyze(white(), RATE)
     assert "deg/sqrt(h)" in analysis._repr_html_()
+    assert "gyro_x  N " in str(analysis) and str(analysis).count("\n") < 20
     plan = imu_stand.plan("K within 20 %, angle within 5 deg after 60 s", separate="temperature,rate_ramp", check=0)
     assert "K within 20 %" in plan._repr_html_() and "temperature against rate_ramp" in plan._repr_html_()
 

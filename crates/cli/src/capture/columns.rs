@@ -10,7 +10,7 @@ use super::error::{brief, brief_list};
 use super::foreign::meaning;
 use super::header::Lines;
 use super::mapped::{beside_ours, by_known_names, mapped};
-use super::names::{TIMES, meant, missing, not_read, respelt};
+use super::names::{TIMES, left, meant, missing, not_read, respelt};
 use super::propose::proposal;
 use super::units::{COUNTS, What, convert, in_brackets, known, usual};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
@@ -114,6 +114,8 @@ pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Column
             Some(mapping) => {
                 let mut found = mapped(said, &mapping)?;
                 found.notes.push(taken(said, &mapping, &found));
+                let is_read = |at: usize| found.columns.iter().any(|c| c.at == at);
+                found.notes.extend(left(said.names, &is_read));
                 found
             }
             None => by_our_names(said, mapping)?,
@@ -184,7 +186,8 @@ pub(super) fn unknown(said: &Said<'_>, why: String) -> CaptureError {
         why,
         columns: brief_list(said.names),
         hint: if is_guessed {
-            " and see that the units are right, which the file does not say (phones and ROS log rad/s)"
+            " and see that the units are right, which the file does not say (phones and ROS log rad/s; `freq=NAME` and \
+             `--units freq=1` for `analyze` of what is no gyro)"
         } else {
             ""
         },

@@ -142,6 +142,24 @@ pub(super) fn not_read(unread: &[&String], names: &[String]) -> Option<String> {
     })
 }
 
+/// Names that a note lists of a log of others, which has dozens.
+const LEFT_LISTED: usize = 5;
+
+/// Says which columns are not read where the names of the others say what they are.
+pub(super) fn left(names: &[String], is_read: &dyn Fn(usize) -> bool) -> Option<String> {
+    let names = names.iter().enumerate().filter(|(at, _)| !is_read(*at));
+    let names: Vec<String> = names.map(|(_, n)| format!("`{}`", brief(n))).collect();
+    let more = match names.len().saturating_sub(LEFT_LISTED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let listed = names.iter().take(LEFT_LISTED).cloned().collect::<Vec<_>>();
+    (!names.is_empty()).then(|| {
+        let listed = listed.join(", ");
+        format!("not read: {listed}{more}; `--columns` maps them, too")
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -29,6 +29,9 @@ pub struct Arguments {
     /// Only these channels: gyro_x,acc_z,...
     #[arg(long, value_delimiter = ',')]
     channels: Option<Vec<String>>,
+    /// Print what is to be said against the paper's two figures, too
+    #[arg(long)]
+    paper: bool,
     /// Seed of the replicates behind intervals
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -52,12 +55,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let analysis = noise::analyze(&read.record, &options).map_err(super::explain)?;
     super::write_json(arguments.json.as_ref(), &analysis)?;
     if !arguments.input.quiet {
-        print(&analysis);
+        print(&analysis, arguments.paper);
     }
     Ok(())
 }
 
-fn print(analysis: &Analysis) {
+fn print(analysis: &Analysis, with_paper: bool) {
     head(analysis);
     // Gyros first: they are what the stand is for.
     let gyros =
@@ -79,8 +82,13 @@ fn print(analysis: &Analysis) {
     }
     point_to_diagnosis(analysis);
     attitude(analysis);
-    if !notes.is_empty() {
-        say!("\non the paper's procedure");
+    match (notes.len(), with_paper) {
+        (0, _) => return,
+        (count, false) => {
+            say!("\n--paper: {count} notes on the paper's procedure");
+            return;
+        }
+        (_, true) => say!("\non the paper's procedure"),
     }
     for (note, channels) in notes {
         say!(
@@ -180,7 +188,7 @@ fn attitude(analysis: &Analysis) {
     {
         let [w, x, y, z] = last.quaternion;
         say!(
-            "attitude of the three gyros after {} s: {} deg from the start{}\n  quaternion ({w:.6}, {x:.6}, {y:.6}, {z:.6})",
+            "\nattitude of the three gyros after {} s: {} deg from the start{}\n  quaternion ({w:.6}, {x:.6}, {y:.6}, {z:.6})",
             number(last.t_s, 4),
             number(last.angle_deg, 3),
             last.predicted_deg.map_or_else(String::new, |p| format!(
@@ -203,14 +211,20 @@ fn point_to_diagnosis(analysis: &Analysis) {
     };
     let others = names(&is_other);
     if !others.is_empty() {
-        let what = "its curve is not that of the terms; `imu-stand diagnose` says what is in it";
-        say!("{}", text::item(&format!("{others}: "), what));
+        let what = "the terms do not describe the curve: `imu-stand diagnose` says what is in it";
+        say!(
+            "\n{}",
+            text::item(&format!("{others}: "), what).trim_start()
+        );
     }
     let rising = names(&|c| !is_other(c) && may_have_causes(c));
     if !rising.is_empty() {
-        let what = "the slow part stands under K or R, and causes (temperature, supply, motor) may be in it; `imu-stand \
-                    diagnose` tells, and `export` takes its result";
-        say!("{}", text::item(&format!("{rising}: "), what));
+        let what = "K or R is established, and a cause (temperature, supply, motor) may be behind it: `imu-stand diagnose` \
+                    looks for one, and `export` takes its result";
+        say!(
+            "\n{}",
+            text::item(&format!("{rising}: "), what).trim_start()
+        );
     }
 }
 

@@ -130,8 +130,9 @@ fn alone(arguments: &Arguments, path: &Path) -> Result<()> {
     }
     if !arguments.input.quiet {
         say!("{}", text::diagnosis(&diagnosed).trim_end());
-        if arguments.details {
-            say!("{}", text::details(&diagnosed.diagnosis).trim_end());
+        match arguments.details {
+            true => say!("{}", text::details(&diagnosed.diagnosis).trim_end()),
+            false => say!("{}", text::MORE),
         }
     }
     if let Some(page) = &arguments.report {

@@ -215,7 +215,8 @@ fn noise(arguments: &Arguments, consumer: Consumer) -> Result<()> {
     Ok(())
 }
 
-/// What the files say: of the gyros a diagnosis or model where there is one, of the rest the capture or analysis.
+/// What the files say: of its channels a diagnosis or model where there is one, of accelerometers that it lacks the capture or
+/// analysis.
 fn imu_noise(arguments: &Arguments) -> Result<ImuNoise> {
     let first = export_source::recognise(&arguments.file)?;
     let Some(beside) = &arguments.beside else {
@@ -233,6 +234,10 @@ fn imu_noise(arguments: &Arguments) -> Result<ImuNoise> {
         ),
     };
     let mut noise = of_one(arguments, after.0, after.1, None)?;
+    // Those of a diagnosis are without its causes, so they count before those of an analysis.
+    if !noise.acc.is_empty() {
+        return Ok(noise);
+    }
     let others = of_one(arguments, rest.0, rest.1, Some("acc"))?;
     noise.acc = others.acc;
     noise.remarks.extend(others.remarks);

@@ -85,15 +85,15 @@ impl From<BaseName> for Base {
     }
 }
 
-/// Simulations that the record is held against; the same for every command that diagnoses.
+/// Simulations that the record is compared with; the same for every command that diagnoses.
 #[derive(Args)]
 pub struct Replicates {
-    /// Simulations of the model before and after that the record is held against: a model that does not hold it is not
+    /// Simulations of the model before and after that the record is compared with: where they differ, the model is not
     /// called extended
     #[arg(long, value_name = "N", default_value_t = diagnosis::replicates::REPLICATES,
         value_parser = enough_replicates)]
     replicates: usize,
-    /// Hold the record against no simulation
+    /// Compare the record with no simulation
     #[arg(long, conflicts_with = "replicates")]
     no_replicates: bool,
     /// Change of an angle error or of a deviation, percent, from which on a cause, or what has no name, is material

@@ -60,11 +60,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     request.check_any()?;
     let noise = noise(arguments)?;
     let quiet = arguments.input.quiet;
-    if !quiet {
-        print_noise(&noise);
-    }
     let plan = plan(noise, &request)?;
+    super::write_json(arguments.json.as_ref(), &plan)?;
     if !quiet {
+        print_noise(&plan.noise);
         for angle in &plan.angle {
             say!("{}", angle.sentence());
         }
@@ -75,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             print_separate(&plan.separate);
         }
     }
-    super::write_json(arguments.json.as_ref(), &plan)
+    Ok(())
 }
 
 fn print_noise(noise: &Noise) {
@@ -173,7 +172,7 @@ fn print_want(plan: &Plan, is_unchecked: bool) {
 
 /// What records of some lengths tell.
 fn print_lengths(plan: &Plan) {
-    say!("what a record of a given length tells (half of the 95 % interval):");
+    say!("half of the 95 % interval, by the length of the record:");
     let mut lengths = vec![600.0, 3600.0, 8.0 * 3600.0, 24.0 * 3600.0];
     lengths.extend(plan.want.iter().map(|w| w.seconds));
     lengths.sort_by(f64::total_cmp);
@@ -206,34 +205,25 @@ fn print_separate(separate: &[Told]) {
             continue;
         };
         say!(
-            "{cause} against {rival}: smallest {} that shows / that is not taken for {rival}, {} (d = {TOLD_APART})",
+            "{cause} against {rival}: smallest {}, {}, by the length of the record",
             told.parameter,
             told.unit
         );
-        let lengths: String = lengths()
-            .into_iter()
-            .map(|s| format!("{:<20}", duration(s)))
-            .collect();
-        say!("    {:<62}{}", "excitation", lengths.trim_end());
+        row("", lengths().into_iter().map(duration));
         for told in direction {
+            say!("  {}", told.excitation);
             if told.sizes.is_empty() {
                 let why = told.why.as_deref().unwrap_or("nothing moves");
-                say!("    {:<62}{why}", told.excitation);
+                say!("    {why}");
                 continue;
             }
-            let sizes: String = told
-                .sizes
-                .iter()
-                .map(|(_, shown, apart)| {
-                    let apart = if apart.is_finite() {
-                        format!("{apart:.2e}")
-                    } else {
-                        "never".to_owned()
-                    };
-                    format!("{:<20}", format!("{shown:.2e} / {apart}"))
-                })
-                .collect();
-            say!("    {:<62}{}", told.excitation, sizes.trim_end());
+            let size = |size: f64| match size.is_finite() {
+                true => format!("{size:.2e}"),
+                false => "never".to_owned(),
+            };
+            row("is seen", told.sizes.iter().map(|(_, s, _)| size(*s)));
+            let apart = format!("is no {rival}");
+            row(&apart, told.sizes.iter().map(|(_, _, s)| size(*s)));
         }
         let first = |t: &&Told| t.sizes.first().map_or(f64::INFINITY, |s| s.2);
         if let Some(best) = direction
@@ -241,7 +231,7 @@ fn print_separate(separate: &[Told]) {
             .min_by(|a, b| first(a).total_cmp(&first(b)))
             .filter(|t| first(t).is_finite())
         {
-            say!("    record: {}", best.excitation);
+            say!("  the best of these: {}", best.excitation);
         }
     }
     let sequence = separate.iter().find_map(|told| {
@@ -261,6 +251,12 @@ fn print_separate(separate: &[Told]) {
         );
     }
     say!(
-        "least sizes that can work: a random walk refitted under each hypothesis takes a part of d"
+        "sizes are {TOLD_APART} standard errors; a random walk fitted beside it takes a part of that"
     );
+}
+
+/// A row of a table of sizes, its name and a cell for each length of the record.
+fn row(name: &str, cells: impl Iterator<Item = String>) {
+    let cells: String = cells.map(|cell| format!("  {cell:>8}")).collect();
+    say!("    {name:<24}{cells}");
 }

@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Print the report as PDF, too; needs Chromium, Chrome or Edge
     #[arg(long, value_name = "FILE")]
     pdf: Option<PathBuf>,
-    /// Write the figures that convict as SVG files, too, into this folder
+    /// Write the figure of each cause as SVG, too, into this folder
     #[arg(long, value_name = "FOLDER")]
     figures: Option<PathBuf>,
 }
@@ -88,7 +88,7 @@ fn write_figures(folder: &Path, diagnosed: &Diagnosed, quiet: bool) -> Result<()
         .into_diagnostic()
         .wrap_err_with(|| folder.display().to_string())?;
     if figures.is_empty() && !quiet {
-        say!("no figure: nothing was found that one could convict");
+        say!("no figure: no cause was found that one could show");
     }
     for (name, svg) in figures {
         let path = folder.join(name);

@@ -73,15 +73,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let found = noise::representative(&records, arguments.seed).map_err(super::explain)?;
     let files: Vec<String> = captures.iter().map(|p| super::name(p)).collect();
-    if !arguments.input.quiet {
-        print(&files, &found);
-    }
     let answer = Answer {
         format: "imu-stand-representative/1",
         files,
         found: &found,
     };
-    super::write_json(arguments.json.as_ref(), &answer)
+    super::write_json(arguments.json.as_ref(), &answer)?;
+    if !arguments.input.quiet {
+        print(&answer.files, &found);
+    }
+    Ok(())
 }
 
 fn print(files: &[String], found: &Representative) {
@@ -123,10 +124,9 @@ fn over_runs(found: &Representative) {
         } else {
             (100.0, "%")
         };
-        say!(
-            "    {:<10} {:<18} {} ({} .. {}) {}, run to run {} ({} .. {}) {unit}{}",
-            figure.channel,
-            figure.figure.replace('_', " "),
+        let lead = format!("{}, {}: ", figure.channel, figure.figure.replace('_', " "));
+        let size = format!(
+            "{} ({} .. {}) {}; from run to run {} ({} .. {}) {unit}{}",
             number(pooled.mean, 4),
             number(pooled.mean_low, 4),
             number(pooled.mean_high, 4),
@@ -135,11 +135,12 @@ fn over_runs(found: &Representative) {
             number(factor * pooled.run_to_run_low, 3),
             number(factor * pooled.run_to_run_high, 3),
             match figure.differ {
-                Some(true) => ": the runs differ",
-                Some(false) => ": no more than their errors",
+                Some(true) => ", the runs differ",
+                Some(false) => ", no more than their errors",
                 None => "",
             }
         );
+        say!("{}", text::item(&lead, &size));
     }
 }
 
@@ -150,7 +151,7 @@ fn together(found: &Representative) {
     }
     for together in &found.together {
         say!(
-            "  {}: noise of {} runs together",
+            "\n{}: noise of {} runs together",
             together.channel,
             together.runs
         );

@@ -6,6 +6,7 @@ use diagnosis::result::{Diagnosis, Parameter};
 use model::ModelFile;
 
 use super::noise::{AxisNoise, Consumer, DEG, Figure, ImuNoise, ROOT_HOUR, noted};
+use crate::text::answer;
 
 /// Parameters by name.
 type Parameters = BTreeMap<String, Parameter>;
@@ -37,6 +38,7 @@ impl Cause {
     fn held_by(&self, consumer: Consumer, imu: &ImuNoise) -> Option<&'static str> {
         match (consumer, self.cause.as_str()) {
             (Consumer::Matlab, "temperature") => Some("TemperatureBias"),
+            _ if !self.channel.starts_with("gyro") => None,
             (Consumer::Matlab, "flicker") => Some("BiasInstability"),
             (Consumer::Px4, "temperature" | "temperature_quadratic") => Some("TC_G0_X*"),
             (Consumer::Gz, "gauss_markov") => {
@@ -51,38 +53,22 @@ impl Cause {
         }
     }
 
-    /// `gyro_y: temperature, slope 0.131 +- 0.006 deg/s/degC`, with the half width of a 95 % interval.
+    /// `gyro_y: temperature, slope 0.131 deg/s/degC (95 %: 0.125 to 0.137)`, without what only says which law it is.
     fn sentence(&self) -> String {
         let size = |(name, p): (&String, &Parameter)| {
-            let error = p.std_error.map_or_else(String::new, |error| {
-                format!(" +- {}", short(NORMAL_975 * error))
-            });
-            let unit = if p.unit == "1" { "" } else { p.unit.as_str() };
-            let text = format!(
-                "{} {}{error} {unit}",
-                name.replace('_', " "),
-                short(p.value)
-            );
-            text.trim_end().to_owned()
+            format!(", {} {}", name.replace('_', " "), answer::with_interval(p))
         };
-        let sizes: Vec<String> = self.parameters.iter().map(size).collect();
+        let sizes =
+            (self.parameters.iter()).filter(|(name, p)| !answer::is_switch(&self.cause, name, p));
+        let sizes: String = sizes.map(size).collect();
         let rivals = if self.rivals.is_empty() {
             String::new()
         } else {
             format!(" (or: {})", self.rivals.join(", "))
         };
-        let sizes = if sizes.is_empty() {
-            String::new()
-        } else {
-            format!(", {}", sizes.join(", "))
-        };
+        let sizes = sizes.replace('\u{a0}', " ");
         format!("{}: {}{rivals}{sizes}", self.channel, self.cause)
     }
-}
-
-/// A number for a person, with four digits.
-fn short(value: f64) -> String {
-    crate::report::plot::number(value, 4)
 }
 
 /// A bias that comes back: what a consumer with one first-order process for the bias can be given in place of a walk.
@@ -98,7 +84,8 @@ impl ImuNoise {
     /// From a model file: N and K of its channels, and its effects.
     #[must_use]
     pub fn of_model(model: &ModelFile) -> Self {
-        let channels = || model.channels.iter().filter(|c| c.unit == "deg/s");
+        let channels =
+            || (model.channels.iter()).filter(|c| ["deg/s", "m/s^2"].contains(&c.unit.as_str()));
         let noise = channels().map(|c| (c.name.as_str(), &c.baseline));
         let causes = model.effects.iter().flat_map(|effect| {
             let is_on = |name: &str| {
@@ -175,28 +162,26 @@ impl ImuNoise {
     ) -> Self {
         let axis = |(name, parameters): (&str, &Parameters)| AxisNoise {
             name: name.to_owned(),
-            white: figure(
-                parameters.get("angle_random_walk"),
-                "deg/sqrt(h)",
-                DEG / ROOT_HOUR,
-            ),
+            white: figure(parameters.get("angle_random_walk"), &WHITE),
             flicker: (causes.iter())
                 .find(|c| c.cause == "flicker" && c.channel == name)
                 .map_or(Figure::Unknown, |c| {
-                    figure(c.parameters.get("bias_instability"), "deg/h", DEG / 3600.0)
+                    figure(c.parameters.get("bias_instability"), &FLICKER)
                 }),
-            walk: figure(parameters.get("rate_random_walk"), "deg/s/sqrt(s)", DEG),
+            walk: figure(parameters.get("rate_random_walk"), &WALK),
         };
-        let gyro = noise
-            .filter(|(name, _)| name.starts_with("gyro"))
+        let (gyro, rest): (Vec<_>, Vec<_>) = noise
             .map(axis)
+            .partition(|axis| axis.name.starts_with("gyro"));
+        let acc = (rest.into_iter())
+            .filter(|axis| axis.name.starts_with("acc"))
             .collect();
         Self {
             file,
             seconds,
             rate_hz,
             gyro,
-            acc: Vec::new(),
+            acc,
             remarks: Vec::new(),
             causes,
             is_after_causes: true,
@@ -218,13 +203,17 @@ impl ImuNoise {
         })
     }
 
-    /// Change of a gyro's bias per degree, rad/s/K: of a cause that is linear in the temperature; 0 without one.
+    /// Change of a bias per degree, rad/s/K or m/s^2/K: of a cause that is linear in the temperature; 0 without one.
     pub(super) fn temperature_slope(&self, channel: &str) -> f64 {
+        let slope = |c: &Cause| {
+            let of_gyro = c.value("slope", "deg/s/degC").map(|slope| slope * DEG);
+            of_gyro.or_else(|| c.value("slope", "m/s^2/degC"))
+        };
         (self.causes.iter())
             .filter(|c| c.cause == "temperature" && c.channel == channel)
-            .filter_map(|c| c.value("slope", "deg/s/degC"))
-            .sum::<f64>()
-            * DEG
+            .filter_map(slope)
+            // The sum of nothing is -0 in Rust, and would be written so.
+            .fold(0.0, |sum, slope| sum + slope)
     }
 
     /// The lines on causes that stand above the numbers: each with the parameter that holds it, or as not held.
@@ -247,9 +236,21 @@ impl ImuNoise {
     }
 }
 
-/// A fitted parameter in SI: known where it is above 0 by its 95 % interval, else at most that interval's end.
-fn figure(parameter: Option<&Parameter>, unit: &str, to_si: f64) -> Figure {
-    let Some(p) = parameter.filter(|p| p.unit == unit && p.value.is_finite()) else {
+/// Units of N and what makes SI of them: of a gyro, of an accelerometer.
+const WHITE: [(&str, f64); 2] = [("deg/sqrt(h)", DEG / ROOT_HOUR), ("m/s^2*sqrt(s)", 1.0)];
+/// Units of K.
+const WALK: [(&str, f64); 2] = [("deg/s/sqrt(s)", DEG), ("m/s^2/sqrt(s)", 1.0)];
+/// Unit of B, of a gyro.
+const FLICKER: [(&str, f64); 1] = [("deg/h", DEG / 3600.0)];
+
+/// A fitted parameter in SI: known where it is above 0 by its 95 % interval, else at most that interval's end. In a unit that is
+/// not among `units` nothing is known.
+fn figure(parameter: Option<&Parameter>, units: &[(&str, f64)]) -> Figure {
+    let known = parameter.and_then(|p| {
+        let (_, to_si) = units.iter().find(|(unit, _)| *unit == p.unit)?;
+        p.value.is_finite().then_some((p, to_si))
+    });
+    let Some((p, to_si)) = known else {
         return Figure::Unknown;
     };
     let half = NORMAL_975 * p.std_error.unwrap_or(0.0);
@@ -275,11 +276,14 @@ mod tests {
             std_error,
             unit: "deg/s/sqrt(s)".to_owned(),
         };
-        let of = |value, error| figure(Some(&p(value, error)), "deg/s/sqrt(s)", 1.0);
+        let of = |value, error| figure(Some(&p(value, error)), &[("deg/s/sqrt(s)", 1.0)]);
         assert_eq!(of(1.0, Some(0.5)), Figure::Known(1.0));
         assert_eq!(of(1.0, None), Figure::Known(1.0));
         assert_eq!(of(0.0, None), Figure::Unknown);
-        assert_eq!(figure(Some(&p(1.0, None)), "deg", 1.0), Figure::Unknown);
+        assert_eq!(
+            figure(Some(&p(1.0, None)), &[("deg", 1.0)]),
+            Figure::Unknown
+        );
         let Figure::AtMost(limit) = of(1e-5, Some(3.2e-4)) else {
             panic!("a limit");
         };

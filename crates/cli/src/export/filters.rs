@@ -13,14 +13,15 @@ impl ImuNoise {
              # One number for all axes: their root mean square. What is not established stands at its 95 % limit.\n\
              # What no random walk describes (flicker, temperature, vibration) is not in these numbers: `imu-stand diagnose`.\n",
         );
-        for (axes, name, unit) in [
-            (&self.acc, "accelerometer", "m/s^2"),
-            (&self.gyro, "gyroscope", "rad/s"),
+        for (axes, name, [unit, per_second]) in [
+            (&self.acc, "accelerometer", ["m/s^2", "m/s^3"]),
+            (&self.gyro, "gyroscope", ["rad/s", "rad/s^2"]),
         ] {
             if axes.is_empty() {
                 let _ = writeln!(
                     out,
-                    "# no {name} in the record; Kalibr wants both:\n# {name}_noise_density: \n# {name}_random_walk: "
+                    "# {}\n# Kalibr wants both:\n# {name}_noise_density:\n# {name}_random_walk:",
+                    self.absent(name)
                 );
                 continue;
             }
@@ -49,7 +50,7 @@ impl ImuNoise {
             );
             let _ = writeln!(
                 out,
-                "{name}_random_walk: {}  # {unit}/s/sqrt(Hz)",
+                "{name}_random_walk: {}  # {per_second}/sqrt(Hz)",
                 float(walk)
             );
         }
@@ -66,9 +67,12 @@ impl ImuNoise {
             "# For {rate_hz} Hz and no other rate. VINS adds dt^2/2 * n^2 to a variance at each step, and dt^2 * w^2 to that of \
              the\n# bias; so n = N sqrt(2 rate), w = K sqrt(rate). What is not established stands at its 95 % limit."
         );
-        for (axes, name, unit) in [(&self.acc, "acc", "m/s^2"), (&self.gyro, "gyr", "rad/s")] {
+        for (axes, name, sensor, [unit, per_second]) in [
+            (&self.acc, "acc", "accelerometer", ["m/s^2", "m/s^3"]),
+            (&self.gyro, "gyr", "gyroscope", ["rad/s", "rad/s^2"]),
+        ] {
             if axes.is_empty() {
-                let _ = writeln!(out, "# {name}_n, {name}_w: not in the record");
+                let _ = writeln!(out, "# {name}_n, {name}_w: {}", self.absent(sensor));
                 continue;
             }
             let white = rms(axes.iter().map(|axis| axis.white.expected()));
@@ -76,7 +80,7 @@ impl ImuNoise {
             let n = white * (2.0 * rate_hz).sqrt();
             let w = walk * rate_hz.sqrt();
             let _ = writeln!(out, "{name}_n: {}  # {unit}", float(n));
-            let _ = writeln!(out, "{name}_w: {}  # {unit}/s", float(w));
+            let _ = writeln!(out, "{name}_w: {}  # {per_second}", float(w));
         }
         out
     }

@@ -183,6 +183,17 @@ impl ImuNoise {
         }
     }
 
+    /// Why a kind of sensor is missing, and what adds it.
+    pub(super) fn absent(&self, name: &str) -> String {
+        if !self.is_after_causes {
+            return format!("no {name} in the record");
+        }
+        format!(
+            "no {name} in the diagnosis or model; `imu-stand diagnose --channels gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z` of a \
+             record at rest fits both, and a capture beside it (`imu-stand export model.toml run.csv`) gives what is missing"
+        )
+    }
+
     /// Where the numbers come from, what they leave out, and the causes, in lines of comments.
     pub(super) fn origin(&self, comment: &str, consumer: Consumer) -> String {
         let mut out = format!(

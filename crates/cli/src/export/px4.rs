@@ -25,12 +25,22 @@ impl ImuNoise {
              # Vibration in flight is not in a record at rest: PX4's defaults are larger for its sake.\n\
              # vehicle component name value type"
         );
-        for (axes, noise, walk) in [
-            (&self.gyro, "EKF2_GYR_NOISE", "EKF2_GYR_B_NOISE"),
-            (&self.acc, "EKF2_ACC_NOISE", "EKF2_ACC_B_NOISE"),
+        for (axes, sensor, noise, walk) in [
+            (
+                &self.gyro,
+                "gyroscope",
+                "EKF2_GYR_NOISE",
+                "EKF2_GYR_B_NOISE",
+            ),
+            (
+                &self.acc,
+                "accelerometer",
+                "EKF2_ACC_NOISE",
+                "EKF2_ACC_B_NOISE",
+            ),
         ] {
             if axes.is_empty() {
-                let _ = writeln!(out, "# {noise}, {walk}: not in the record");
+                let _ = writeln!(out, "# {noise}, {walk}: {}", self.absent(sensor));
                 continue;
             }
             let white = rms(axes.iter().map(|axis| axis.white.expected()));

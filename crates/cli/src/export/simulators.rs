@@ -22,7 +22,7 @@ impl ImuNoise {
             (&self.acc, "Accelerometer", "accelparams"),
         ] {
             if axes.is_empty() {
-                let _ = writeln!(out, "% no {of} in the record");
+                let _ = writeln!(out, "% {}", self.absent(&of.to_lowercase()));
                 continue;
             }
             let unit = if of == "Gyroscope" { "rad/s" } else { "m/s^2" };

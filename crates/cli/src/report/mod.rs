@@ -7,7 +7,7 @@ pub mod replicates;
 pub mod standalone;
 mod tables;
 
-use diagnosis::result::{Diagnosed, Verdict};
+use diagnosis::result::{Diagnosed, Finding, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use model::record::sampling::Sampling;
 use model::record::{Record, rows};
@@ -95,7 +95,7 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
                 (tables::verdict(subject, &headline(subject.diagnosed)))
                 @if !convicting.is_empty() {
                     section {
-                        h2 { "What convicts each cause" }
+                        h2 { "The evidence for each cause" }
                         @for figure in &convicting { (figure) }
                     }
                 }
@@ -128,17 +128,30 @@ fn headline(diagnosed: &Diagnosed) -> String {
     match (d.verdict, d.findings.as_slice()) {
         (Verdict::Adequate, _) => "the model describes this run".into(),
         (Verdict::Extended, [one]) => crate::text::answer::headline(one),
-        (Verdict::Extended, all) => {
-            format!("the simulation lacks {} causes", all.len())
-        }
+        (Verdict::Extended, all) => several(all),
         (Verdict::Unexplained, []) => "something is left that no known cause explains".into(),
         (Verdict::Unexplained, all) => format!(
-            "{} found, and something is left that no known cause explains",
-            match all.len() {
-                1 => "1 cause".to_owned(),
-                n => format!("{n} causes"),
-            }
+            "{}; and something is left that no known cause explains",
+            several(all)
         ),
+    }
+}
+
+/// Causes that a banner names; the cards below it have them all.
+const NAMED: usize = 3;
+
+/// What was found and where, the largest first; how many there are where none of them matters.
+fn several(all: &[Finding]) -> String {
+    let name = |f: &Finding| {
+        let title = crate::text::answer::title(&f.cause);
+        format!("{title} on {}", f.channels.join(", "))
+    };
+    let material = all.iter().filter(|f| f.material);
+    let named: Vec<String> = material.take(NAMED).map(name).collect();
+    match (named.len(), all.len() - named.len()) {
+        (0, _) => format!("the simulation lacks {}", crate::text::causes(all)),
+        (_, 0) => named.join("; "),
+        (_, more) => format!("{}; and {more} more", named.join("; ")),
     }
 }
 

@@ -22,10 +22,10 @@ pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
                 (d.input.file) " \u{b7} " (number(d.input.seconds, 3)) " s at " (format!("{:.3}", d.input.rate_hz))
                 " Hz \u{b7} " (d.input.samples) " samples"
             }
+            h1 { span.word { (word) } " " (headline) }
             @for note in &d.input.notes {
                 p.warning { "Note: " (note) "." }
             }
-            h1 { span.word { (word) } " " (headline) }
             @if d.findings.is_empty() && d.unexplained.is_empty() {
                 p.lead {
                     "White noise, a random walk and a constant bias describe every channel, and no cause of the library "
@@ -87,7 +87,7 @@ fn entry(left: &Unexplained) -> Markup {
             @if let Some(c) = &left.consequence { ". " (answer::consequence_of(c, left.material)) }
             @if let Some(text) = answer::modelled(left) { " " (text) }
             @if !left.details.is_empty() {
-                details {
+                details.fold {
                     summary { "what was seen" }
                     ul { @for seen in &left.details { li { (seen) } } }
                 }
@@ -123,7 +123,7 @@ pub(super) fn replicates(subject: &Subject<'_>) -> Markup {
             }
             p {
                 "The chance that a record of the model strays as far from its simulations as this one, in any of its "
-                "statistics and channels. Up to 0.05 the model does not hold the record."
+                "statistics and channels. Up to 0.05 the record is not one of the model."
             }
         }
     }
@@ -132,12 +132,12 @@ pub(super) fn replicates(subject: &Subject<'_>) -> Markup {
 fn finding(found: &Finding) -> Markup {
     html! {
         article {
-            h2 { (found.cause.replace('_', " ")) small { " on " (found.channels.join(", ")) } }
+            h2 { (answer::title(&found.cause)) small { " on " (found.channels.join(", ")) ", " code { (found.cause) } } }
             @if let Some(cost) = answer::cost(found) { p { (cost) } }
             @if let Some(remedy) = answer::remedy(found) { p { (remedy) } }
             table.plain {
                 tbody {
-                    @for (name, parameter) in &found.parameters {
+                    @for (name, parameter) in found.parameters.iter().filter(|(n, p)| !answer::is_switch(&found.cause, n, p)) {
                         tr { th { (name.replace('_', " ")) } td.number { (answer::with_interval(parameter)) } }
                     }
                 }

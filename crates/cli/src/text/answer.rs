@@ -14,10 +14,24 @@ const MATTERS: f64 = 0.05;
 /// Digits of an angle error.
 const ANGLE_DIGITS: usize = 2;
 
+/// What a cause is called in a headline.
+#[must_use]
+pub fn title(cause: &str) -> &str {
+    effect(cause).map_or(cause, |e| e.docs().title)
+}
+
+/// Whether a parameter only says which law it is (`triangular`, `by_magnitude`), and is no size.
+#[must_use]
+pub fn is_switch(cause: &str, name: &str, p: &Parameter) -> bool {
+    let specs = effect(cause).map_or(&[][..], |e| e.parameters());
+    let is_optional = specs.iter().any(|s| s.name == name && !s.required);
+    is_optional && p.unit == "1" && p.std_error.is_none()
+}
+
 /// What the cause is, where it acts, and its size with 95 % intervals.
 #[must_use]
 pub fn headline(finding: &Finding) -> String {
-    let title = effect(&finding.cause).map_or(finding.cause.as_str(), |e| e.docs().title);
+    let title = title(&finding.cause);
     let sizes: Vec<String> = named(finding)
         .into_iter()
         .map(|(name, p)| format!("{} {}", name.replace('_', " "), with_interval(p)))

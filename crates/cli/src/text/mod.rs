@@ -5,7 +5,7 @@ mod details;
 mod screen;
 
 pub use details::{details, held_at, measured, rounded_as};
-pub use screen::diagnosis;
+pub use screen::{MORE, causes, diagnosis};
 
 /// Columns of a terminal that text is wrapped to.
 const WIDTH: usize = 80;

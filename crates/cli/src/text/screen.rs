@@ -12,6 +12,9 @@ const SHOWN: usize = 4;
 /// Words of such an entry.
 const WORDS: usize = 28;
 
+/// What the commands print below it where the details are not asked for.
+pub const MORE: &str = "--details: gains, failing checks, why not tested, the smallest sizes found";
+
 /// A diagnosis, verdict first.
 #[must_use]
 pub fn diagnosis(diagnosed: &Diagnosed) -> String {
@@ -74,22 +77,35 @@ fn write_replicates(out: &mut String, d: &Diagnosis) {
 }
 
 fn verdict(d: &Diagnosis) -> String {
-    let causes = |n: usize| match n {
-        1 => "1 cause".to_owned(),
-        n => format!("{n} causes"),
-    };
     match (d.verdict, d.findings.len()) {
         (Verdict::Adequate, _) => {
             "adequate: white noise, random walk and a constant bias describe this record".into()
         }
-        (Verdict::Extended, n) => format!("extended: the simulation lacks {}", causes(n)),
+        (Verdict::Extended, _) => {
+            format!("extended: the simulation lacks {}", causes(&d.findings))
+        }
         (Verdict::Unexplained, 0) => {
             "unexplained: the record has structure that no known cause explains".into()
         }
-        (Verdict::Unexplained, n) => format!(
+        (Verdict::Unexplained, _) => format!(
             "unexplained: the simulation lacks {}, and something is left that no known cause explains",
-            causes(n)
+            causes(&d.findings)
         ),
+    }
+}
+
+/// How many causes there are, as the screen lists them: `2 causes, and 1 too small to matter`.
+#[must_use]
+pub fn causes(found: &[Finding]) -> String {
+    let material = found.iter().filter(|f| f.material).count();
+    let count = |n: usize| match n {
+        1 => "1 cause".to_owned(),
+        n => format!("{n} causes"),
+    };
+    match (material, found.len() - material) {
+        (n, 0) => count(n),
+        (0, small) => format!("{}, too small to matter", count(small)),
+        (n, small) => format!("{}, and {small} too small to matter", count(n)),
     }
 }
 
@@ -214,8 +230,4 @@ fn write_rest(out: &mut String, d: &Diagnosis) {
             item("not tested: ", &causes.join(", ")).trim_start()
         );
     }
-    let _ = writeln!(
-        out,
-        "--details: gains, failing checks, why not tested, the smallest sizes found"
-    );
 }

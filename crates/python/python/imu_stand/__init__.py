@@ -130,6 +130,7 @@ def diagnose(
     columns=None,
     units=None,
     base=None,
+    channels=None,
     seed=0,
     replicates=_engine.REPLICATES,
     matters=100 * _engine.MATTERS,
@@ -148,10 +149,12 @@ def diagnose(
         As in `read`.
     base : {"static", "moving", "turntable"}, optional
         What the base under the sensor did.
+    channels : sequence of str, optional
+        Only these, accelerometers at rest too: ``["gyro_x", "acc_x"]``. Without it all gyros.
     seed : int
         Of whatever is random.
     replicates : int
-        Simulations of each model that the record is held against; 0 for none, else 19 at least.
+        Simulations of each model that the record is compared with; 0 for none, else 19 at least.
     matters : float
         Change of an angle or a deviation, per cent, from which on a cause is ``material``.
     name : str
@@ -174,7 +177,8 @@ def diagnose(
     if not matters > 0:
         raise Error("matters: it has to be above 0, in per cent")
     capture = given(data, rate, columns, units, name, base)
-    engine = _engine.diagnose(capture, seed, replicates, matters / 100)
+    named = None if channels is None else [str(name) for name in channels]
+    engine = _engine.diagnose(capture, named, seed, replicates, matters / 100)
     result = loaded(Diagnosis, engine.json())
     result._keep(engine)
     return result

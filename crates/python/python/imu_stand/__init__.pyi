@@ -67,6 +67,7 @@ def diagnose(
     columns: Pairs = None,
     units: Pairs = None,
     base: Union[Literal["static", "moving", "turntable"], None] = None,
+    channels: Union[Sequence[str], None] = None,
     seed: int = 0,
     replicates: int = ...,
     matters: float = ...,

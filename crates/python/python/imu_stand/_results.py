@@ -53,7 +53,8 @@ class Analysis(dict):
         points = self["channels"][channel]["deviations"][deviation]
         return {key: np.array([p[key] for p in points]) for key in ("tau_s", "deviation", "low", "high", "edf", "n")}
 
-    def _repr_html_(self) -> str:
+    def _rows(self) -> list:
+        """Channel, letter and interval of every parameter."""
         letters = {
             "angle_random_walk": "N",
             "bias_instability": "B",
@@ -66,16 +67,29 @@ class Analysis(dict):
             fits = channel.get("parameters_hold_from_s") is not None
             for key, letter in letters.items():
                 rows.append((name, letter, interval(channel["parameters"][key]) + ("" if fits else " ?")))
+        return rows
+
+    def _notes(self) -> list:
+        """What a reader of the parameters has to know."""
         notes = self["input"].get("notes", []) + [
             f"{name}: {warning}" for name, channel in self["channels"].items() for warning in channel["warnings"]
         ]
         doubt = any(c.get("parameters_hold_from_s") is None for c in self["channels"].values())
         if doubt:
             notes = ["?: the terms do not describe this channel; `diagnose` says what is in it", *notes]
+        return notes
+
+    def __str__(self) -> str:
+        of = self["input"]
+        lines = [f"{of['file']}: {number(of['seconds'], 6)} s at {number(of['rate_hz'], 6)} Hz, {of['samples']} samples"]
+        lines += [f"    {name}  {letter} {size}" for name, letter, size in self._rows()]
+        return "\n".join(lines + self._notes())
+
+    def _repr_html_(self) -> str:
         return (
             head("Analysis of", self["input"])
-            + table(("channel", "", "95 %"), rows)
-            + "".join(f"<p>{escape(note)}</p>" for note in notes)
+            + table(("channel", "", "95 %"), self._rows())
+            + "".join(f"<p>{escape(note)}</p>" for note in self._notes())
         )
 
 
@@ -128,13 +142,13 @@ class Diagnosis(dict):
                     ", ".join(finding["channels"]),
                     "; ".join(sizes),
                     ", ".join(f"{number(value, 2)} {unit} after {horizon}" for by, unit in cost for horizon, value in by.items()),
-                    finding["what"],
+                    " or ".join(a["cause"] for a in finding["alternatives"]) or "-",
                 )
             )
         left = [f"{entry['channel']}: {entry['what']}" for entry in self["unexplained"]]
         return (
             head(f"Diagnosis: {self['verdict']}.", self["input"])
-            + (table(("cause", "channels", "size, 95 %", "angle error", "what"), rows) if rows else "<p>No cause.</p>")
+            + (table(("cause", "channels", "size, 95 %", "angle or velocity error", "may also be"), rows) if rows else "<p>No cause.</p>")
             + "".join(f"<p>No name for: {escape(entry)}</p>" for entry in left)
         )
 

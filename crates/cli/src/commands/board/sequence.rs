@@ -165,7 +165,7 @@ pub fn run(session: &mut Session, sequence: &Sequence) -> Result<()> {
 }
 
 fn show(outcome: &Outcome) {
-    say!("what can be told now, with 95 % intervals");
+    say!("what the sequence found, with 95 % intervals");
     for found in &outcome.identified {
         let half = found.size.std_error.map_or(f64::NAN, |error| 1.96 * error);
         say!(

@@ -215,8 +215,9 @@ fn show(arguments: &Arguments, record: &Record, link: &LinkCounts, found: &Answe
         text::link(link)
     );
     say!("{}", found.screen.trim_end());
-    if arguments.details {
-        say!("{}", text::details(&found.diagnosis).trim_end());
+    match arguments.details {
+        true => say!("{}", text::details(&found.diagnosis).trim_end()),
+        false => say!("{}", text::MORE),
     }
     let lines = found.comparison.lines();
     say!("\nplanted and found\n{}", text::item("", RULE));
