@@ -67,15 +67,33 @@ fn caption(effect: &dyn Effect) -> String {
     format!("*Simulated: {} on {on}{world}.*", parameters.join(", "))
 }
 
+/// Two causes that may look the same, each pair once, and what to record to tell them apart: as rows of a table.
+fn rivals(out: &mut String) {
+    out.push_str(
+        "\n## Telling two causes apart\n\nWhat to record where a diagnosis says that a record leaves both open.\n\n\
+         | this | or that | record |\n|---|---|---|\n",
+    );
+    let mut known: Vec<[&str; 2]> = Vec::new();
+    for e in EFFECTS {
+        for r in e.rivals() {
+            let mut pair = [e.id(), r.cause];
+            pair.sort_unstable();
+            if !known.contains(&pair) {
+                known.push(pair);
+                let _ = writeln!(out, "| `{}` | `{}` | {} |", e.id(), r.cause, r.experiment);
+            }
+        }
+    }
+}
+
 /// The text of docs/effects.md.
 #[must_use]
 pub fn effects_markdown() -> String {
     let mut out = String::from(
         "# The effects\n\n\
-         Made of `crates/model/src/effects/`, one file each, by `cargo xtask effects` (`--check` compares). A further effect is one \
-         more file there and two lines in `mod.rs`.\n\
-         Each figure is a simulated run of the paper's stand, {SECONDS} s at {RATE} Hz with seed {SEED}, beside the same \
-         run without the effect.\n",
+         Made of `crates/model/src/effects/`, a file for each, by `cargo xtask effects`; how a cause is tested stands there \
+         (`Docs::test`). Each figure is a simulated run of the paper's stand, {SECONDS} s at {RATE} Hz with seed {SEED}, \
+         beside the same run without the effect.\n",
     );
     for (key, value) in [
         ("{SECONDS}", EXAMPLE_SECONDS.to_string()),
@@ -103,19 +121,15 @@ pub fn effects_markdown() -> String {
         }
         let _ = write!(
             out,
-            "- Needs: {}\n- Test: {}\n- Figure: {}\n- What to do: {}\n",
-            docs.excitation, docs.test, docs.figure, docs.remedy
-        );
-        for r in e.rivals() {
-            let _ = writeln!(out, "- Not `{}`? {}.", r.cause, r.experiment);
-        }
-        let _ = write!(
-            out,
-            "\n![{}](figures/effects/{}.svg)\n\n{}\n",
+            "- Needs: {}\n- What to do: {}\n\n![{}](figures/effects/{}.svg)\n\n{} {}\n",
+            docs.excitation,
+            docs.remedy,
             docs.title,
             e.id(),
+            docs.figure,
             caption(*e)
         );
     }
+    rivals(&mut out);
     out
 }
