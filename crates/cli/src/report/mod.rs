@@ -131,7 +131,7 @@ fn headline(diagnosed: &Diagnosed) -> String {
         (Verdict::Extended, all) => several(all),
         (Verdict::Unexplained, []) => "something is left that no known cause explains".into(),
         (Verdict::Unexplained, all) => format!(
-            "{}; and something is left that no known cause explains",
+            "{}; something is left that no known cause explains",
             several(all)
         ),
     }

@@ -88,7 +88,7 @@ fn verdict(d: &Diagnosis) -> String {
             "unexplained: the record has structure that no known cause explains".into()
         }
         (Verdict::Unexplained, _) => format!(
-            "unexplained: the simulation lacks {}, and something is left that no known cause explains",
+            "unexplained: the simulation lacks {}; something is left that no known cause explains",
             causes(&d.findings)
         ),
     }
