@@ -165,3 +165,43 @@ fn a_capture_is_not_written_to_a_name_that_promises_another_form() {
         assert!(!folder.join(name).exists(), "{line}");
     }
 }
+
+#[test]
+fn a_folder_that_is_not_there_is_named_before_anything_is_done() {
+    let folder = folder("nowhere");
+    for line in [
+        "capture --port none --out data/run.csv.gz --rotate 24h",
+        "simulate --seconds 60 --out data/run.csv",
+        "diagnose run.csv --json data/d.json",
+    ] {
+        let output = run(&folder, line);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{line}: {said}");
+        assert!(
+            said.contains("data is no folder") && said.contains("make it first"),
+            "{line}: {said}"
+        );
+    }
+}
+
+#[test]
+fn a_reader_that_has_had_enough_costs_no_file() {
+    let folder = folder("enough");
+    let lines = [
+        "plan --separate temperature,rate_ramp --json out.json",
+        "analyze run.csv --json out.json",
+    ];
+    for line in lines {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_imu-stand"))
+            .args(line.split_whitespace())
+            .current_dir(&folder)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        drop(child.stdout.take());
+        assert!(child.wait().expect("it ends").success(), "{line}");
+        let written = std::fs::read_to_string(folder.join("out.json")).expect(line);
+        assert!(written.trim_end().ends_with('}'), "{line}");
+        std::fs::remove_file(folder.join("out.json")).expect("a file");
+    }
+}

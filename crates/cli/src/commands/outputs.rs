@@ -38,6 +38,19 @@ const DATA: [&str; 16] = [
 /// Endings that promise another form of table than the text that a capture is.
 const OTHER_TABLES: [&str; 7] = ["npz", "npy", "parquet", "pq", "mat", "h5", "hdf5"];
 
+/// Refuses an output in a folder that is not there.
+pub fn has_folder(option: &str, path: &Path) -> Result<()> {
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+    match folder.filter(|folder| !folder.is_dir()) {
+        None => Ok(()),
+        Some(folder) => miette::bail!(
+            help = "make it first, or name another file",
+            "{option}: {} is no folder",
+            folder.display()
+        ),
+    }
+}
+
 /// Refuses to write a capture, which is CSV, to a file whose name says that it is something else.
 pub fn named_as_text(option: &str, path: &Path) -> Result<()> {
     let ending = path.extension().and_then(|ending| ending.to_str());
@@ -124,14 +137,7 @@ impl Outputs {
                 ),
             }
         }
-        let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
-        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-            miette::bail!(
-                help = "make it first, or name another file",
-                "{option}: {} is no folder",
-                folder.display()
-            );
-        }
+        has_folder(option, path)?;
         self.taken.push((option, path.clone()));
         // Devices and pipes lose nothing.
         Ok(path.is_file().then_some(path))

@@ -161,6 +161,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         );
     }
     super::outputs::named_as_text("--out", &arguments.out)?;
+    super::outputs::has_folder("--out", &arguments.out)?;
     let own = [arguments.out.clone(), raw_path(&arguments.out)];
     super::Outputs::beside(own.iter().chain(&arguments.replay))
         .result("--json", arguments.json.as_ref())?;
