@@ -16,4 +16,5 @@ pub mod unnamed;
 
 pub use file::ModelFile;
 pub use parameter::Parameter;
+pub use range::bounds;
 pub use simulate::{Replicas, simulate, simulate_in_the_world_of};

@@ -77,6 +77,14 @@ pub(crate) fn of_setting(key: &str) -> Range {
     }
 }
 
+/// Least and greatest value that a parameter of an effect may have, by its name and unit: where an interval about an
+/// estimate ends, too.
+#[must_use]
+pub fn bounds(name: &str, unit: &str) -> [f64; 2] {
+    let Range { least, most, .. } = of_parameter(name, unit, f64::INFINITY);
+    [least, most]
+}
+
 /// Of a parameter of an effect by its name and unit, on a stand of that rate.
 pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
     match (name, unit) {

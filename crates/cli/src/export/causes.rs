@@ -56,7 +56,7 @@ impl Cause {
     /// `gyro_y: temperature, slope 0.131 deg/s/degC (95 %: 0.125 to 0.137)`, without what only says which law it is.
     fn sentence(&self) -> String {
         let size = |(name, p): (&String, &Parameter)| {
-            format!(", {} {}", name.replace('_', " "), answer::with_interval(p))
+            format!(", {} {}", name.replace('_', " "), answer::size(name, p))
         };
         let sizes =
             (self.parameters.iter()).filter(|(name, p)| !answer::is_switch(&self.cause, name, p));

@@ -138,7 +138,7 @@ fn finding(found: &Finding) -> Markup {
             table.plain {
                 tbody {
                     @for (name, parameter) in found.parameters.iter().filter(|(n, p)| !answer::is_switch(&found.cause, n, p)) {
-                        tr { th { (name.replace('_', " ")) } td.number { (answer::with_interval(parameter)) } }
+                        tr { th { (name.replace('_', " ")) } td.number { (answer::size(name, parameter)) } }
                     }
                 }
             }

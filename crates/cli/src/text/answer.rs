@@ -34,7 +34,7 @@ pub fn headline(finding: &Finding) -> String {
     let title = title(&finding.cause);
     let sizes: Vec<String> = named(finding)
         .into_iter()
-        .map(|(name, p)| format!("{} {}", name.replace('_', " "), with_interval(p)))
+        .map(|(name, p)| format!("{} {}", name.replace('_', " "), size(name, p)))
         .collect();
     let place = finding.channels.join(", ");
     let effective = match finding.effective {
@@ -226,9 +226,19 @@ fn ended(text: &str) -> &str {
     text.trim_end_matches('.')
 }
 
+/// A parameter of an effect with its 95 % interval, which ends where the parameter does (a share at 1), and unit.
+#[must_use]
+pub fn size(name: &str, p: &Parameter) -> String {
+    between(p, model::bounds(name, &p.unit))
+}
+
 /// A value with its 95 % interval and unit.
 #[must_use]
 pub fn with_interval(p: &Parameter) -> String {
+    between(p, [f64::NEG_INFINITY, f64::INFINITY])
+}
+
+fn between(p: &Parameter, [least, most]: [f64; 2]) -> String {
     let unit = match p.unit.as_str() {
         "1" => String::new(),
         unit => format!(" {unit}"),
@@ -244,8 +254,8 @@ pub fn with_interval(p: &Parameter) -> String {
     format!(
         "{}{unit} (95\u{a0}%: {} to {})",
         show(p.value),
-        show(p.value - half),
-        show(p.value + half)
+        show((p.value - half).max(least)),
+        show((p.value + half).min(most))
     )
 }
 
@@ -297,6 +307,20 @@ mod tests {
                 .collect(),
             ..Finding::default()
         }
+    }
+
+    #[test]
+    fn an_interval_ends_where_its_parameter_does() {
+        let f = finding(
+            "stuck_bit",
+            &[
+                ("fraction", 1.0, Some(0.000_66), "1"),
+                ("spread", 0.0, Some(0.0077), "deg/s"),
+            ],
+        );
+        let of = |name: &str| size(name, &f.parameters[name]).replace('\u{a0}', " ");
+        assert_eq!(of("fraction"), "1.0000 (95 %: 0.9987 to 1.0000)");
+        assert_eq!(of("spread"), "0.000 deg/s (95 %: 0.000 to 0.015)");
     }
 
     #[test]
