@@ -105,7 +105,7 @@ def test_a_diagnosis_shows_itself_and_its_model_simulates():
 def test_analysis_and_plan_show_themselves():
     analysis = imu_stand.analyze(white(), RATE)
     assert "deg/sqrt(h)" in analysis._repr_html_()
-    assert "gyro_x  N " in str(analysis) and str(analysis).count("\n") < 20
+    assert "gyro_x  N " in str(analysis) and str(analysis).count("\n") < 20 and "--" not in str(analysis)
     plan = imu_stand.plan("K within 20 %, angle within 5 deg after 60 s", separate="temperature,rate_ramp", check=0)
     assert "K within 20 %" in plan._repr_html_() and "temperature against rate_ramp" in plan._repr_html_()
 

@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from . import _engine
+from ._given import in_python
 
 
 def loaded(kind, text: str):
@@ -70,14 +71,14 @@ class Analysis(dict):
         return rows
 
     def _notes(self) -> list:
-        """What a reader of the parameters has to know."""
+        """What a reader of the parameters has to know, in arguments of Python."""
         notes = self["input"].get("notes", []) + [
             f"{name}: {warning}" for name, channel in self["channels"].items() for warning in channel["warnings"]
         ]
         doubt = any(c.get("parameters_hold_from_s") is None for c in self["channels"].values())
         if doubt:
             notes = ["?: the terms do not describe this channel; `diagnose` says what is in it", *notes]
-        return notes
+        return [in_python(note) for note in notes]
 
     def __str__(self) -> str:
         of = self["input"]
