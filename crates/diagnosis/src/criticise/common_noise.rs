@@ -3,11 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use model::effect::{Effect, Found, Hypothesis, Parameters};
+use model::effects::{common_noise, correlated_noise};
 
 use crate::criticise::process;
 use crate::fit::{prequential, threshold};
 use crate::ingest::types::Grid;
-use crate::result::{Check, Consequence, DetectionLimit, Finding, Gain, limit, sentence};
+use crate::result::{
+    Alternative, Check, Consequence, DetectionLimit, Finding, Gain, limit, sentence,
+};
 use crate::search::searched::Searched;
 use crate::test_level;
 use crate::test_level::{CheckId, Observation, omnibus_level};
@@ -19,6 +22,7 @@ use numerics::tails::ONE_SIDED;
 const LEAST_OF_ALL: f64 = 0.5;
 
 /// What the axes share.
+#[derive(Default)]
 pub(crate) struct Shared {
     pub checks: Vec<Check>,
     pub finding: Option<Finding>,
@@ -31,195 +35,143 @@ pub(crate) struct Shared {
 
 /// Standard error of the mean covariance of some pairs of axes that share a source of variance `shared`: estimates of
 /// two pairs with an axis in common hang together by its variance and the source.
-fn error_of_mean(pairs: &[&Pair<'_>], shared: f64, samples: f64) -> f64 {
+fn error_of_mean(pairs: &[Pair<'_>], shared: f64, samples: f64) -> f64 {
     let variance = |s: &Searched<'_>| s.state.solution.white;
     let same = |a: &Searched<'_>, b: &Searched<'_>| a.target.name == b.target.name;
     // Of jointly normal values, cov(ab, cd) = E[ac] E[bd] + E[ad] E[bc].
     let product = |a, b| if same(a, b) { variance(a) } else { shared };
     let mut sum = 0.0;
-    for (a, b, ..) in pairs {
-        for (c, d, ..) in pairs {
+    let axes = || pairs.iter().map(|p| (p.first, p.second));
+    for (a, b) in axes() {
+        for (c, d) in axes() {
             sum += product(a, c) * product(b, d) + product(a, d) * product(b, c);
         }
     }
     (sum / samples).sqrt() / pairs.len() as f64
 }
 
-/// Whether pairs may share one source: their covariances are alike (chi-square of what they scatter by).
-fn alike(pairs: &[&Pair<'_>], samples: f64) -> bool {
-    if pairs.len() < 2 {
-        return true;
-    }
-    let sigma = |s: &Searched<'_>| s.state.solution.white.sqrt();
-    // Of a covariance c of two of standard deviations a and b: error^2 = (a^2 b^2 + c^2) / n.
-    let each = pairs.iter().map(|p| {
-        let size = sigma(p.0) * sigma(p.1);
-        (p.2 * size, size * ((1.0 + p.2 * p.2) / samples).sqrt())
-    });
-    let each: Vec<(f64, f64)> = each.collect();
-    let weights = each.iter().map(|(_, error)| error.powi(-2)).sum::<f64>();
-    let mean = each.iter().map(|(c, e)| c / (e * e)).sum::<f64>() / weights;
-    let statistic = each
-        .iter()
-        .map(|(c, e)| ((c - mean) / e).powi(2))
-        .sum::<f64>();
-    tails::chi_tail(statistic, (pairs.len() - 1) as f64) > test_level::CLAIM_LEVEL
+/// Two axes and what their whitened residuals share.
+struct Pair<'a> {
+    first: &'a Searched<'a>,
+    second: &'a Searched<'a>,
+    /// Correlation of the residuals.
+    correlation: f64,
+    /// The same by its standard error, and the chance of more.
+    z: f64,
+    p_value: f64,
 }
 
-/// Two axes, the correlation of their residuals, its chance and its score.
-type Pair<'a> = (&'a Searched<'a>, &'a Searched<'a>, f64, f64, f64);
+impl Pair<'_> {
+    /// Covariance of the white noises, (unit of the channels)^2.
+    fn covariance(&self) -> f64 {
+        let sigma = |s: &Searched<'_>| s.state.solution.white.sqrt();
+        self.correlation * sigma(self.first) * sigma(self.second)
+    }
 
-/// Correlation of the whitened residuals, axis by axis.
-pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
-    let mut shared = Shared {
-        checks: vec![],
-        finding: None,
-        left: vec![],
-        limits: vec![],
-        late: vec![],
-    };
-    let mut pairs: Vec<Pair<'_>> = vec![];
-    let first = grid.n / 50;
-    let read = searched.iter().map(|s| s.told().1).fold(1.0, f64::min);
-    let free = read * (grid.n - first) as f64;
+    fn names(&self) -> [&String; 2] {
+        [&self.first.target.name, &self.second.target.name]
+    }
+
+    fn fails(&self) -> bool {
+        self.p_value < omnibus_level()
+    }
+}
+
+/// How axes share their noise.
+enum Sharing<'a, 'p> {
+    /// One source, the same on every axis that is compared: all pairs have one covariance.
+    Common(&'p [Pair<'a>]),
+    /// Pairs with correlations of their own.
+    Correlated(Vec<&'p Pair<'a>>),
+}
+
+/// Pairs of axes that do not move, by samples from `first` on that tell as much as `free` independent ones.
+fn pairs_of<'a>(searched: &'a [Searched<'a>], first: usize, free: f64) -> Vec<Pair<'a>> {
+    let mut pairs = vec![];
     for (i, a) in searched.iter().enumerate() {
         for b in &searched[i + 1..] {
             if a.target.moving || b.target.moving {
                 continue;
             }
             let (x, y) = (&a.told().0[first..], &b.told().0[first..]);
-            let (ab, aa, bb) = (dot(x, y), dot(x, x), dot(y, y));
-            let r = ab / (aa * bb).sqrt();
-            let z = r.clamp(-0.999_999, 0.999_999).atanh() * (free - 3.0).sqrt();
-            let p = tails::normal_tail(z);
-            pairs.push((a, b, r, p, z));
+            let correlation = dot(x, y) / (dot(x, x) * dot(y, y)).sqrt();
+            let z = correlation.clamp(-0.999_999, 0.999_999).atanh() * (free - 3.0).sqrt();
+            pairs.push(Pair {
+                first: a,
+                second: b,
+                correlation,
+                z,
+                p_value: tails::normal_tail(z),
+            });
         }
     }
-    // A source that all axes share shows in all pairs: their sum tells it from d' 1.7 times smaller on than any one pair.
-    let joint = pairs.iter().map(|p| p.4).sum::<f64>() / (pairs.len().max(1) as f64).sqrt();
+    pairs
+}
+
+/// Whether pairs may have one covariance: chi-square of what theirs scatter by.
+fn alike(pairs: &[Pair<'_>], samples: f64) -> bool {
+    // Of a covariance c of two of standard deviations a and b: error^2 = (a^2 b^2 + c^2) / n.
+    let error = |p: &Pair<'_>| {
+        let white = |s: &Searched<'_>| s.state.solution.white;
+        (white(p.first) * white(p.second) * (1.0 + p.correlation.powi(2)) / samples).sqrt()
+    };
+    let each: Vec<(f64, f64)> = pairs.iter().map(|p| (p.covariance(), error(p))).collect();
+    let weights = each.iter().map(|(_, error)| error.powi(-2)).sum::<f64>();
+    let mean = each.iter().map(|(c, e)| c / (e * e)).sum::<f64>() / weights;
+    let scatter = each.iter().map(|(c, e)| ((c - mean) / e).powi(2));
+    let statistic = scatter.sum::<f64>();
+    pairs.len() < 2
+        || tails::chi_tail(statistic, (pairs.len() - 1) as f64) > test_level::CLAIM_LEVEL
+}
+
+/// How the pairs share, `None` where they do not. A source that all axes share shows in all pairs: their sum tells it from
+/// d' 1.7 times smaller on than any one pair.
+fn sharing<'a, 'p>(pairs: &'p [Pair<'a>], free: f64) -> Option<Sharing<'a, 'p>> {
+    let failing: Vec<&Pair<'a>> = pairs.iter().filter(|p| p.fails()).collect();
+    let joint = pairs.iter().map(|p| p.z).sum::<f64>() / (pairs.len().max(1) as f64).sqrt();
     let together = pairs.len() > 1
         && tails::normal_tail(joint) < 2.0 * threshold::false_alarm()
-        && joint > 0.0
-        && pairs.iter().all(|p| p.4 > LEAST_OF_ALL);
-    let mut fails: Vec<&Pair<'_>> = pairs
-        .iter()
-        .filter(|p| together || p.3 < omnibus_level())
-        .collect();
-    if !alike(&fails, free) {
-        fails.retain(|p| p.3 < omnibus_level());
+        && pairs.iter().all(|p| p.z > LEAST_OF_ALL);
+    if (together || !failing.is_empty()) && joint > 0.0 && alike(pairs, free) {
+        return Some(Sharing::Common(pairs));
     }
+    (!failing.is_empty()).then_some(Sharing::Correlated(failing))
+}
+
+/// Correlation of the whitened residuals, axis by axis.
+pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
+    let first = grid.n / 50;
+    let read = searched.iter().map(|s| s.told().1).fold(1.0, f64::min);
+    let free = read * (grid.n - first) as f64;
+    let pairs = pairs_of(searched, first, free);
     let effect_of = |asked: fn(&Hypothesis) -> bool| {
         let mut all = searched.iter().flat_map(|s| &s.search.candidates);
         all.find(|c| asked(&c.hypothesis)).map(|c| c.effect)
     };
-    let of = effect_of(|h| matches!(h, Hypothesis::Common));
-    if let Some(of) = of.filter(|_| !pairs.is_empty()) {
+    let one_source = effect_of(|h| matches!(h, Hypothesis::Common));
+    let by_pair = effect_of(|h| matches!(h, Hypothesis::Correlation));
+    let mut shared = Shared::default();
+    if let Some(of) = one_source.filter(|_| !pairs.is_empty()) {
         shared.limits = smallest(&pairs, of, free);
     }
-    // A shared source correlates positively; where more than one pair shows it, all of its pairs are counted.
-    let positive = !fails.is_empty() && fails.iter().all(|p| p.2 > 0.0) && alike(&fails, free);
+    let sharing = sharing(&pairs, free);
+    let told: Vec<&Pair<'_>> = match &sharing {
+        Some(Sharing::Common(all)) => all.iter().collect(),
+        Some(Sharing::Correlated(some)) => some.clone(),
+        None => vec![],
+    };
     let mut straight = true;
-    for (a, b, r, ..) in &fails {
-        let samples = (grid.n - first) as f64;
-        let claim = process::straight(&a.e, &b.e, -samples * (1.0 - r * r).ln(), fails.len());
-        let channel = format!("{}, {}", a.target.name, b.target.name);
-        let doubted = claim.p_value < test_level::CLAIM_LEVEL;
-        straight &= !doubted;
-        shared.checks.push(Check {
-            id: claim.id.into(),
-            about: vec![],
-            channel,
-            statistic: claim.statistic,
-            p_value: Some(claim.p_value),
-            threshold: test_level::CLAIM_LEVEL,
-            fails_before: false,
-            fails_after: doubted,
-            what: claim.what.clone(),
-        });
-        if doubted {
-            let what = format!("with {}, {}", b.target.name, claim.what);
-            let seen = Observation::of_coupling(&a.target.name, what, *r);
-            shared.left.push(seen.by(claim.id, claim.p_value));
-        }
+    for p in &told {
+        straight &= in_a_straight_line(p, told.len(), (grid.n - first) as f64, &mut shared);
     }
-    if let (Some(of), true) = (of, positive && straight) {
-        let names: Vec<String> = searched
-            .iter()
-            .map(|s| s.target.name.clone())
-            .filter(|n| {
-                fails
-                    .iter()
-                    .any(|p| p.0.target.name == *n || p.1.target.name == *n)
-            })
-            .collect();
-        let sigma = |s: &Searched<'_>| s.state.solution.white.sqrt();
-        let shares: Vec<f64> = fails
-            .iter()
-            .map(|p| p.2 * sigma(p.0) * sigma(p.1))
-            .collect();
-        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
-        let error = error_of_mean(&fails, mean, free);
-        let found = Found {
-            unit: searched[0].target.unit.clone(),
-            coefficients: vec![(mean.sqrt(), error / (2.0 * mean.sqrt()))],
-            ..Found::default()
+    if straight {
+        shared.finding = match sharing {
+            Some(Sharing::Common(all)) => one_source.map(|of| one(all, of, free, read, grid)),
+            Some(Sharing::Correlated(some)) => by_pair.and_then(|of| correlated(&some, of, free)),
+            None => None,
         };
-        let parameters = of.describe(&found);
-        let of_all: Vec<&[f64]> = searched
-            .iter()
-            .filter(|s| names.contains(&s.target.name))
-            .map(|s| s.e.as_slice())
-            .collect();
-        let (nats, std_error) = prequential::of_correlation(&of_all);
-        let ratio = fails
-            .iter()
-            .map(|p| -(read * grid.n as f64) * (1.0 - p.2 * p.2).ln())
-            .sum::<f64>();
-        shared.finding = Some(Finding {
-            cause: of.id().into(),
-            what: sentence(of.docs().title, &names.join(", "), &parameters),
-            channels: names,
-            parameters,
-            likelihood_ratio: Some(ratio),
-            confirmed_on_held_out_data: Some(nats > 0.0),
-            gain: Some(Gain {
-                held_out_log_score_nats: Some(nats),
-                std_error: Some(std_error),
-                // One size for all of them.
-                delta_bic: Some(ratio - (grid.n as f64).ln()),
-                ablation_nats: Some(0.5 * ratio),
-                ..Gain::default()
-            }),
-            ..Finding::default()
-        });
     }
-    if shared.finding.is_none() && straight {
-        let of = effect_of(|h| matches!(h, Hypothesis::Correlation));
-        let failing: Vec<&Pair<'_>> = pairs.iter().filter(|p| p.3 < omnibus_level()).collect();
-        shared.finding = of.and_then(|of| correlated(&failing, of, free));
-    }
-    for (a, b, r, p, _) in &pairs {
-        let fails = *p < omnibus_level();
-        let explained = shared.finding.is_some();
-        shared.checks.push(Check {
-            id: CheckId::CrossCorrelation.into(),
-            about: vec![],
-            channel: format!("{}, {}", a.target.name, b.target.name),
-            statistic: *r,
-            p_value: Some(*p),
-            threshold: omnibus_level(),
-            fails_before: fails,
-            fails_after: fails && !explained,
-            what: "correlation of the whitened residuals of two axes".into(),
-        });
-        if fails && !explained {
-            let other = &b.target.name;
-            let what = format!("correlates with {other} ({r:.3}) sample by sample");
-            let seen = Observation::of_coupling(&a.target.name, what, *r);
-            let seen = seen.by(CheckId::CrossCorrelation, *p);
-            shared.left.push(seen.following(other));
-        }
-    }
+    pairs.iter().for_each(|p| correlation_check(p, &mut shared));
     for (i, a) in searched.iter().enumerate() {
         for b in &searched[i + 1..] {
             let still = !(a.target.moving || b.target.moving || a.search.view.sways());
@@ -231,6 +183,120 @@ pub(crate) fn common<'a>(searched: &'a [Searched<'a>], grid: &Grid) -> Shared {
     shared
 }
 
+/// Whether one axis follows the other in a straight line, as those that share a source do, by a check of its own.
+fn in_a_straight_line(p: &Pair<'_>, pairs: usize, samples: f64, shared: &mut Shared) -> bool {
+    let [name, other] = p.names();
+    let ratio = -samples * (1.0 - p.correlation * p.correlation).ln();
+    let claim = process::straight(&p.first.e, &p.second.e, ratio, pairs);
+    let doubted = claim.p_value < test_level::CLAIM_LEVEL;
+    shared.checks.push(Check {
+        id: claim.id.into(),
+        about: vec![],
+        channel: format!("{name}, {other}"),
+        statistic: claim.statistic,
+        p_value: Some(claim.p_value),
+        threshold: test_level::CLAIM_LEVEL,
+        fails_before: false,
+        fails_after: doubted,
+        what: claim.what.clone(),
+    });
+    if doubted {
+        let what = format!("with {other}, {}", claim.what);
+        let seen = Observation::of_coupling(name, what, p.correlation);
+        shared.left.push(seen.by(claim.id, claim.p_value));
+    }
+    !doubted
+}
+
+/// The check of a pair, and what is left of it where nothing is named.
+fn correlation_check(p: &Pair<'_>, shared: &mut Shared) {
+    let [name, other] = p.names();
+    let left = p.fails() && shared.finding.is_none();
+    shared.checks.push(Check {
+        id: CheckId::CrossCorrelation.into(),
+        about: vec![],
+        channel: format!("{name}, {other}"),
+        statistic: p.correlation,
+        p_value: Some(p.p_value),
+        threshold: omnibus_level(),
+        fails_before: p.fails(),
+        fails_after: left,
+        what: "correlation of the whitened residuals of two axes".into(),
+    });
+    if left {
+        let r = p.correlation;
+        let what = format!("correlates with {other} ({r:.3}) sample by sample");
+        let seen = Observation::of_coupling(name, what, r);
+        let seen = seen.by(CheckId::CrossCorrelation, p.p_value);
+        shared.left.push(seen.following(other));
+    }
+}
+
+/// What a finding says where two axes alone share, with no third one that could tell: one source and a correlation are then
+/// the same thing.
+fn or(mut finding: Finding, of: &dyn Effect, other: &'static str) -> Finding {
+    finding.alternatives = vec![Alternative {
+        cause: other.into(),
+        log_odds: 0.0,
+    }];
+    let stated = of.rivals().iter().find(|r| r.cause == other);
+    finding.experiment = stated.map(|r| r.experiment.to_owned());
+    finding
+}
+
+/// One source of all axes.
+fn one(pairs: &[Pair<'_>], of: &dyn Effect, free: f64, read: f64, grid: &Grid) -> Finding {
+    let mean = pairs.iter().map(Pair::covariance).sum::<f64>() / pairs.len() as f64;
+    let error = error_of_mean(pairs, mean, free);
+    let found = Found {
+        unit: pairs[0].first.target.unit.clone(),
+        coefficients: vec![(mean.sqrt(), error / (2.0 * mean.sqrt()))],
+        ..Found::default()
+    };
+    let parameters = of.describe(&found);
+    let axes = axes_of(pairs);
+    let names: Vec<String> = axes.iter().map(|s| s.target.name.clone()).collect();
+    let residuals: Vec<&[f64]> = axes.iter().map(|s| s.e.as_slice()).collect();
+    let (nats, std_error) = prequential::of_correlation(&residuals);
+    let log = |p: &Pair<'_>| -(read * grid.n as f64) * (1.0 - p.correlation * p.correlation).ln();
+    let ratio = pairs.iter().map(log).sum::<f64>();
+    let finding = Finding {
+        cause: of.id().into(),
+        what: sentence(of.docs().title, &names.join(", "), &parameters),
+        channels: names,
+        parameters,
+        likelihood_ratio: Some(ratio),
+        confirmed_on_held_out_data: Some(nats > 0.0),
+        gain: Some(Gain {
+            held_out_log_score_nats: Some(nats),
+            std_error: Some(std_error),
+            // One size for all of them.
+            delta_bic: Some(ratio - (grid.n as f64).ln()),
+            ablation_nats: Some(0.5 * ratio),
+            ..Gain::default()
+        }),
+        ..Finding::default()
+    };
+    if pairs.len() == 1 {
+        return or(finding, of, correlated_noise::ID);
+    }
+    finding
+}
+
+/// The axes of some pairs, each once, in order.
+fn axes_of<'a, 'p>(pairs: impl IntoIterator<Item = &'p Pair<'a>>) -> Vec<&'a Searched<'a>>
+where
+    'a: 'p,
+{
+    let mut axes: Vec<&Searched<'_>> = vec![];
+    for s in pairs.into_iter().flat_map(|p| [p.first, p.second]) {
+        if axes.iter().all(|a| a.target.name != s.target.name) {
+            axes.push(s);
+        }
+    }
+    axes
+}
+
 /// Noise that some pairs of axes share, each its part: stated on the later axis of each pair.
 fn correlated(pairs: &[&Pair<'_>], of: &dyn Effect, free: f64) -> Option<Finding> {
     let named = |other: &str| {
@@ -238,37 +304,31 @@ fn correlated(pairs: &[&Pair<'_>], of: &dyn Effect, free: f64) -> Option<Finding
         of.parameters().iter().map(|p| &p.name).find(with).copied()
     };
     let mut per_channel: BTreeMap<String, Parameters> = BTreeMap::new();
-    for (a, b, r, ..) in pairs {
+    for p in pairs {
+        let ([name, other], r) = (p.names(), p.correlation);
         let found = Found {
-            names: vec![named(&a.target.name)?],
-            coefficients: vec![(*r, (1.0 - r * r) / free.sqrt())],
+            names: vec![named(name)?],
+            coefficients: vec![(r, (1.0 - r * r) / free.sqrt())],
             ..Found::default()
         };
-        let own = per_channel.entry(b.target.name.clone()).or_default();
+        let own = per_channel.entry(other.clone()).or_default();
         own.extend(of.describe(&found));
     }
     let (first, parameters) = per_channel.first_key_value()?;
-    let all = pairs
-        .iter()
-        .flat_map(|p| [&p.0.target.name, &p.1.target.name]);
-    let channels: BTreeSet<&String> = all.collect();
-    let log = |p: &&Pair<'_>| -free * (1.0 - p.2 * p.2).ln();
+    let log = |p: &&Pair<'_>| -free * (1.0 - p.correlation * p.correlation).ln();
     let ratio = pairs.iter().map(log).sum::<f64>();
-    let largest = pairs.iter().map(|p| p.2.abs()).fold(0.0, f64::max);
-    let mut axes: Vec<(&str, &[f64])> = vec![];
-    for s in pairs.iter().flat_map(|p| [p.0, p.1]) {
-        if axes.iter().all(|a| a.0 != s.target.name) {
-            axes.push((&s.target.name, &s.e));
-        }
-    }
-    let axes: Vec<&[f64]> = axes.into_iter().map(|a| a.1).collect();
-    let (nats, std_error) = prequential::of_correlation(&axes);
-    Some(Finding {
+    let sizes = pairs.iter().map(|p| p.correlation.abs());
+    let largest = sizes.fold(0.0, f64::max);
+    let axes = axes_of(pairs.iter().copied());
+    let residuals: Vec<&[f64]> = axes.iter().map(|s| s.e.as_slice()).collect();
+    let (nats, std_error) = prequential::of_correlation(&residuals);
+    let channels: BTreeSet<String> = axes.iter().map(|s| s.target.name.clone()).collect();
+    let finding = Finding {
         cause: of.id().into(),
         what: sentence(of.docs().title, first, parameters),
-        channels: channels.into_iter().cloned().collect(),
+        channels: channels.into_iter().collect(),
         parameters: parameters.clone(),
-        per_channel,
+        per_channel: per_channel.clone(),
         likelihood_ratio: Some(ratio),
         consequence: Some(Consequence::of_correlation(largest)),
         confirmed_on_held_out_data: Some(nats > 0.0),
@@ -280,13 +340,21 @@ fn correlated(pairs: &[&Pair<'_>], of: &dyn Effect, free: f64) -> Option<Finding
             ..Gain::default()
         }),
         ..Finding::default()
+    };
+    let open = pairs.len() == 1 && pairs[0].correlation > 0.0;
+    Some(if open {
+        or(finding, of, common_noise::ID)
+    } else {
+        finding
     })
 }
 
 /// The size from which on a source that all axes share is found 95 times in 100.
 fn smallest(pairs: &[Pair<'_>], of: &dyn Effect, samples: f64) -> Vec<DetectionLimit> {
     // z of each pair by the variance of the source.
-    let z = |p: &Pair<'_>| (samples / (p.0.state.solution.white * p.1.state.solution.white)).sqrt();
+    let z = |p: &Pair<'_>| {
+        (samples / (p.first.state.solution.white * p.second.state.solution.white)).sqrt()
+    };
     let count = pairs.len() as f64;
     let joint = pairs.iter().map(z).sum::<f64>() / count.sqrt();
     let weakest = pairs.iter().map(z).fold(f64::INFINITY, f64::min);
@@ -296,20 +364,14 @@ fn smallest(pairs: &[Pair<'_>], of: &dyn Effect, samples: f64) -> Vec<DetectionL
     } else {
         reach(omnibus_level()) / joint
     };
-    let mut names: Vec<&str> = vec![];
-    for s in pairs.iter().flat_map(|p| [p.0, p.1]) {
-        if !names.contains(&s.target.name.as_str()) {
-            names.push(&s.target.name);
-        }
-    }
     let found = Found {
-        unit: pairs[0].0.target.unit.clone(),
+        unit: pairs[0].first.target.unit.clone(),
         coefficients: vec![(variance.sqrt(), f64::NAN)],
         ..Found::default()
     };
     let described = of.describe(&found);
-    let each = names.iter();
-    each.filter_map(|name| limit(of.id(), name, &described, "sigma", &[]))
+    let each = axes_of(pairs).into_iter();
+    each.filter_map(|s| limit(of.id(), &s.target.name, &described, "sigma", &[]))
         .collect()
 }
 

@@ -55,6 +55,10 @@ impl Effect for CommonNoise {
                 cause: "supply_sensitivity",
                 experiment: "a battery in place of the supply",
             },
+            Rival {
+                cause: "correlated_noise",
+                experiment: "a third axis: a source of all axes correlates with each of them",
+            },
         ];
         RIVALS
     }
