@@ -30,6 +30,9 @@ const MARGIN: f64 = 4.0;
 const LEAST_SWITCHES: f64 = 3.0;
 /// Nats within which the answer stays open.
 const OPEN: f64 = 3.0;
+/// Half height over the standard deviation of a block from which on a block tells its level without doubt: shorter ones do as
+/// well, and fewer of them hold a switch.
+const PLAIN: f64 = 4.0;
 /// Longest block of a short record, s, and most blocks.
 const BLOCK_S: f64 = 0.2;
 const MOST_BLOCKS: usize = 6000;
@@ -185,10 +188,8 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     }
     let mut state = state;
     if contest.wandering {
-        let claim = levels_claim(
-            field.cox(two, &x, other, Side::Gaussian),
-            "a Gaussian process",
-        );
+        let z = field.cox(two, &x, other, Side::Gaussian);
+        let claim = levels_claim(z, Side::Gaussian);
         for t in state.terms.iter_mut().filter(|t| contested(t)) {
             t.claims.push(claim.clone());
         }
@@ -370,6 +371,10 @@ impl<'a> Field<'a> {
     ) -> State {
         let mut settled = rival;
         let without = settled.terms.len();
+        let shortened = self.shortened(&mut x);
+        if shortened {
+            (two, x) = again(&self.blocks, &x);
+        }
         let block_s = self.length as f64 / self.search.view.rate_hz;
         let at_random =
             |blocks: &[f64], x: &Coordinates| dwell_times::at_random(blocks, x, block_s);
@@ -378,10 +383,13 @@ impl<'a> Field<'a> {
         if !switches.as_ref().is_some_and(|s| s.p_value < CLAIM_LEVEL) {
             settled = steps::beside(self.search, settled, &mut self.rest, self.length, &x);
         }
-        if settled.terms.len() > without {
+        let stepped = settled.terms.len() > without;
+        if stepped {
             self.blocks = means(&self.rest[self.first..], self.length, MOST_BLOCKS);
             (two, x) = again(&self.blocks, &x);
             switches = at_random(&self.blocks, &x);
+        }
+        if shortened || stepped {
             other = gaussian(&self.panel(), self.processes(&settled), &[]);
         }
         if many_ahead(&self.blocks, &x) > MARGIN {
@@ -390,13 +398,14 @@ impl<'a> Field<'a> {
                 at: None,
             });
         }
-        settled.level = self.level(&x).map(Rc::new);
+        let filtered = settled.terms.iter().any(Term::is_filter);
+        settled.level = self.level(&x, filtered).map(Rc::new);
         let stated = self.stated(&x, block_s);
         if let Some(t) = settled.terms.get_mut(without - 1) {
             t.stated = Some(stated);
             t.lr = 2.0 * (ahead - MARGIN) + t.threshold;
             let z = self.cox(two, &x, other, Side::TwoLevels);
-            t.claims.push(levels_claim(z, "two levels"));
+            t.claims.push(levels_claim(z, Side::TwoLevels));
             t.claims.extend(switches);
         }
         settled
@@ -421,33 +430,62 @@ impl<'a> Field<'a> {
         vec![(half, half * half_error), (dwell, dwell * dwell_error)]
     }
 
+    /// Shorter blocks where these tell the level without doubt, as short as the number of blocks allows; coordinates are
+    /// then those of the shorter ones.
+    fn shortened(&mut self, x: &mut Coordinates) -> bool {
+        let part = (x[2].exp() / PLAIN).powi(-2);
+        let whole = self.rest.len().div_ceil(MOST_BLOCKS);
+        let shorter = ((part * self.length as f64) as usize).max(whole).max(1);
+        if self.first > 0 || shorter >= self.length {
+            return false;
+        }
+        *x = of_blocks(x, shorter as f64 / self.length as f64);
+        self.length = shorter;
+        self.blocks = means(&self.rest, shorter, MOST_BLOCKS);
+        self.dct = Dct::new(self.blocks.len());
+        self.bins = Rc::new(Bins::new(self.blocks.len()));
+        true
+    }
+
     /// The level, sample by sample; none where only a stretch was weighed, and where it is so much in doubt that taking it
     /// off would take noise off.
-    fn level(&self, x: &Coordinates) -> Option<Vec<f64>> {
-        let m = self.blocks.len();
-        let levels = path(&self.blocks, x);
+    fn level(&self, x: &Coordinates, filtered: bool) -> Option<Vec<f64>> {
         let steps_at = (x[2] + 0.5 * x[0]).exp();
-        let doubt = levels
-            .iter()
-            .map(|l| 1.0 - (l / steps_at).powi(2))
-            .sum::<f64>()
-            / m as f64;
-        let at = |i: usize| levels[(i / self.length).min(m - 1)];
-        (self.first == 0 && doubt < LARGEST_DOUBT)
-            .then(|| (0..self.search.panel.bins.n).map(at).collect())
+        // Behind a filter neighbours are no independent witnesses of a level; means of blocks are.
+        let levels = if filtered {
+            let of_blocks = path(&self.blocks, x);
+            let at = |i: usize| of_blocks[(i / self.length).min(of_blocks.len() - 1)];
+            (0..self.rest.len()).map(at).collect()
+        } else {
+            path(&self.rest, &of_blocks(x, 1.0 / self.length as f64))
+        };
+        let doubt = levels.iter().map(|l| 1.0 - (l / steps_at).powi(2));
+        let doubt = doubt.sum::<f64>() / levels.len() as f64;
+        (self.first == 0 && doubt < LARGEST_DOUBT).then_some(levels)
     }
 }
 
-/// The claim of a contest of levels: `z` standard errors from what the lead of two levels is for what was named.
-pub(crate) fn levels_claim(z: f64, named: &str) -> Outcome {
+/// Coordinates of blocks of another length, `part` times as long: white noise falls with the length, a walk grows.
+fn of_blocks(x: &Coordinates, part: f64) -> Coordinates {
+    let ln = part.ln();
+    [x[0] - ln, x[1] + 2.0 * ln, x[2] + 0.5 * ln, x[3] - ln]
+}
+
+/// The claim of a contest of levels: `z` standard errors from what the lead of two levels is for what was named. Readings that
+/// keep to two levels even better than replicates do, whose switches come in the middle of a block too, speak for two levels.
+pub(crate) fn levels_claim(z: f64, named: Side) -> Outcome {
     let more = if z > 0.0 { "more" } else { "less" };
+    let (name, against) = match named {
+        Side::Gaussian => ("a Gaussian process", true),
+        Side::TwoLevels => ("two levels", z < 0.0),
+    };
     Outcome {
         id: CheckId::ProcessLevels,
         about: vec![],
         statistic: z,
-        p_value: normal_tail(z),
+        p_value: if against { normal_tail(z) } else { 1.0 },
         what: format!(
-            "told as {named}, it lies {more} about two levels than one does, in standard errors"
+            "told as {name}, it lies {more} about two levels than one does, in standard errors"
         ),
     }
 }

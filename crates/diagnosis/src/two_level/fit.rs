@@ -44,18 +44,26 @@ fn chances(y: &[f64], x: &Coordinates) -> [Vec<f64>; 2] {
     [before, after]
 }
 
-/// The most probable mean level of each block, from the blocks before it, itself, and those behind it.
+/// The most probable mean level of each block, from the blocks before it, itself, and those behind it. A filter learns by the
+/// first switch what the levels are, so a block is weighed by the one that comes from the other end.
 pub(crate) fn path(y: &[f64], x: &Coordinates) -> Vec<f64> {
     let half = (x[2] + 0.5 * x[0]).exp();
     let [before, mut after] = chances(y, x);
     after.reverse();
     let switch = switch_of(x);
-    let known = |upper: f64| upper * (1.0 - switch) + (1.0 - upper) * switch;
+    // From the neighbour in a direction; of none nothing is known.
+    let from = |upper: Option<&f64>| {
+        upper.map_or(0.5, |upper| upper * (1.0 - switch) + (1.0 - upper) * switch)
+    };
     (0..y.len())
         .map(|t| {
-            let from_before = if t > 0 { known(before[t - 1]) } else { 0.5 };
-            let upper = from_before * after[t];
-            let lower = (1.0 - from_before) * (1.0 - after[t]);
+            let (known, itself) = if t < y.len() / 2 {
+                (from(t.checked_sub(1).and_then(|t| before.get(t))), after[t])
+            } else {
+                (from(after.get(t + 1)), before[t])
+            };
+            let upper = known * itself;
+            let lower = (1.0 - known) * (1.0 - itself);
             half * (upper - lower) / (upper + lower).max(f64::MIN_POSITIVE)
         })
         .collect()
