@@ -199,6 +199,17 @@ impl State {
         self.terms.iter().all(Term::is_normal)
     }
 
+    /// The noise without what the level stands for where it is known sample by sample.
+    pub(crate) fn noise_beside_level(&self) -> Noise {
+        let mut noise = self.noise.clone();
+        if self.level.is_some() {
+            let processes = self.terms.iter().filter(|t| t.is_covariance());
+            let mut stated = processes.map(|t| t.stated.is_some());
+            noise.terms.retain(|_| !stated.next().unwrap_or(false));
+        }
+        noise
+    }
+
     /// All columns in use, term by term.
     #[must_use]
     pub fn columns(&self) -> Vec<usize> {
@@ -300,13 +311,7 @@ pub fn whitened(panel: &Panel, state: &State) -> (Vec<f64>, Vec<f64>) {
     let level = panel.dct.forward(level);
     let mut r = residual(panel, &state.columns(), &state.solution);
     r.iter_mut().zip(level).skip(1).for_each(|(r, l)| *r -= l);
-    let mut noise = state.noise.clone();
-    let covariances = state
-        .terms
-        .iter()
-        .filter(|t| matches!(t.form, Form::Covariance(..)));
-    let mut stated = covariances.map(|t| t.stated.is_some());
-    noise.terms.retain(|_| !stated.next().unwrap_or(false));
+    let noise = state.noise_beside_level();
     // What the process took of the random walk is the walk's again.
     let rest = Panel::new(&panel.dct, &panel.bins, &panel.dct.inverse(&r));
     let (noise, solution) = rest.fit(&noise, &[]);

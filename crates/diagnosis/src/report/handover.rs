@@ -149,14 +149,13 @@ fn own_part(all: &Levels, sigma: &Parameter, n: f64) -> Levels {
 fn parameters(s: &Searched<'_>, state: &State, levels: &Levels, grid: &Grid) -> Parameters {
     let (unit, rate) = (s.target.unit.as_str(), grid.rate_hz);
     let white = levels.white.sqrt();
-    let n = grid.n as f64;
     let walk = white * (levels.log_walk / 2.0).exp() * rate.sqrt();
     let (density, density_unit) = if unit == "deg/s" {
         (60.0 / rate.sqrt(), "deg/sqrt(h)".to_owned())
     } else {
         (1.0 / rate.sqrt(), format!("{unit}*sqrt(s)"))
     };
-    let mean_error = (state.solution.white / n + walk * walk * n / rate / 3.0).sqrt();
+    let mean_error = mean_error(s, state, walk, rate);
     let named = |name: &str, value, error, unit: &str| {
         (name.to_owned(), Parameter::estimated(value, error, unit))
     };
@@ -178,7 +177,17 @@ fn parameters(s: &Searched<'_>, state: &State, levels: &Levels, grid: &Grid) -> 
     .into()
 }
 
-/// The mean of the readings less that of what the terms add.
+/// Standard error of the mean beside a random walk of `walk` per root second: white noise and processes by their density at
+/// the lowest frequency of the record, 1 / 2T.
+fn mean_error(s: &Searched<'_>, state: &State, walk: f64, rate_hz: f64) -> f64 {
+    let n = s.search.panel.bins.n as f64;
+    let mut stationary = state.noise_beside_level();
+    stationary.log_walk = f64::NEG_INFINITY;
+    let lowest = stationary.everywhere(&s.search.panel.bins)[1];
+    (state.solution.white * lowest / n + walk * walk * n / rate_hz / 3.0).sqrt()
+}
+
+/// The mean of the readings less that of what the terms add, a level that is known among them.
 fn bias(s: &Searched<'_>, state: &State, grid: &Grid) -> f64 {
     let n = grid.n as f64;
     let mean = s.target.y.iter().sum::<f64>() / n;
@@ -190,7 +199,8 @@ fn bias(s: &Searched<'_>, state: &State, grid: &Grid) -> f64 {
         let first = s.search.panel.first(c, 1);
         first.first().map(|sum| beta * sum / n.sqrt())
     });
-    mean - added.sum::<f64>()
+    let level = state.level.iter().flat_map(|level| level.iter());
+    mean - added.sum::<f64>() - level.sum::<f64>() / n
 }
 
 /// Samples of a simulation that tells what a fault of the counts adds, and how often it is made.

@@ -392,6 +392,7 @@ impl<'a> Field<'a> {
         if shortened || stepped {
             other = gaussian(&self.panel(), self.processes(&settled), &[]);
         }
+        self.give_spectrum(&mut settled, without - 1, &x);
         if many_ahead(&self.blocks, &x) > MARGIN {
             settled.notes.push(Note {
                 what: "jumps between more than two levels".into(),
@@ -409,6 +410,24 @@ impl<'a> Field<'a> {
             t.claims.extend(switches);
         }
         settled
+    }
+
+    /// Gives the noise of a state the random walk that was found beside the two levels, and the term that stands for them
+    /// their spectrum: for a process of one pole, walk and levels are much the same.
+    fn give_spectrum(&self, state: &mut State, term: usize, x: &Coordinates) {
+        let blocks = (self.length as f64).ln();
+        let white = state.solution.white.ln();
+        let least = least_walk(self.search.panel.bins.n);
+        state.noise.log_walk = (x[0] + x[1] - blocks - white).max(least);
+        let of_levels = spectrum(x, blocks, white);
+        let processes = state.terms.iter_mut().enumerate();
+        let processes = processes.filter(|(_, t)| t.is_covariance());
+        for ((i, t), (_, theta)) in processes.zip(&mut state.noise.terms) {
+            if let (true, Form::Covariance(_, own)) = (i == term, &mut t.form) {
+                own.clone_from(&of_levels);
+                theta.clone_from(&of_levels);
+            }
+        }
     }
 
     /// Half height and dwell time, s, with their standard errors.
@@ -463,6 +482,13 @@ impl<'a> Field<'a> {
         let doubt = doubt.sum::<f64>() / levels.len() as f64;
         (self.first == 0 && doubt < LARGEST_DOUBT).then_some(levels)
     }
+}
+
+/// The coordinates of a process of one pole with the spectrum of two levels: of their variance, over `white` (both as ln), and
+/// half their dwell time long.
+fn spectrum(x: &Coordinates, blocks: f64, white: f64) -> Vec<f64> {
+    let variance = 2.0 * x[2] + x[0];
+    vec![variance - white, x[3] + blocks - std::f64::consts::LN_2]
 }
 
 /// Coordinates of blocks of another length, `part` times as long: white noise falls with the length, a walk grows.

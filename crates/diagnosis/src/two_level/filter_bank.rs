@@ -59,10 +59,13 @@ fn below_least<const K: usize, const AT_ONCE: bool>(of: &mut [Each; K]) -> Each 
 
 wide! {
     /// Log likelihoods of readings of one length, the mean taken out, under jumps between any of `levels`, all equally
-    /// likely; `seen` is told the chances of the first level after each reading.
+    /// likely, the first reading on the level of the number `first`; `seen` is told the chances of the first of `levels`
+    /// after each reading. Where the first level is not known either, every level has two places where the mean may be, and
+    /// a filter that merges them by moments ends up at none of them.
     pub(crate) fn filter[const K: usize](
         y: [&[f64]; ABREAST],
         x: &[Coordinates; ABREAST],
+        first: &[usize; ABREAST],
         levels: &[f64; K],
         seen: impl FnMut(&Each),
     ) -> Each = run::<K, true>, else run::<K, false>
@@ -74,6 +77,7 @@ wide! {
 fn run<const K: usize, const AT_ONCE: bool>(
     y: [&[f64]; ABREAST],
     x: &[Coordinates; ABREAST],
+    first: &[usize; ABREAST],
     levels: &[f64; K],
     mut seen: impl FnMut(&Each),
 ) -> Each {
@@ -90,7 +94,8 @@ fn run<const K: usize, const AT_ONCE: bool>(
     let (stays, comes) = (switch.map(|s| 1.0 - s), switch.map(|s| s / others));
     let start = each(|l| 1e4 * white[l] + half[l] * half[l]);
     // State by level: weight, mean and variance of the slow level.
-    let mut weight = [[(K as f64).recip(); ABREAST]; K];
+    let mut weight: [Each; K] =
+        std::array::from_fn(|i| each(|l| if first[l] == i { 1.0 } else { 0.0 }));
     let mut mean = [[0.0; ABREAST]; K];
     let mut variance = [start; K];
     let mut sums = [-0.5 * count as f64 * std::f64::consts::TAU.ln(); ABREAST];
@@ -179,7 +184,7 @@ fn run<const K: usize, const AT_ONCE: bool>(
     // The diffuse start integrates the mean out. Its prior density is put back, and the factor of sqrt(count) by which
     // that integral differs from the density of the coefficients k >= 1 of the orthonormal DCT.
     each(|l| {
-        sums[l]
+        sums[l] - (K as f64).ln()
             + products[l].ln()
             + product[l].ln()
             + 0.5 * (std::f64::consts::TAU * start[l] * count as f64).ln()
@@ -197,14 +202,15 @@ mod tests {
             .collect();
         let x: [Coordinates; ABREAST] =
             std::array::from_fn(|l| [0.1 * l as f64, -9.0, -0.5 + 0.3 * l as f64, 4.0]);
+        let first = [0, 1, 1, 0];
         let (two, many) = ([1.0, -1.0], [-1.5, -0.7, 0.0, 0.7, 1.5]);
         let here = [
-            filter([&y; ABREAST], &x, &two, |_| {}),
-            filter([&y; ABREAST], &x, &many, |_| {}),
+            filter([&y; ABREAST], &x, &first, &two, |_| {}),
+            filter([&y; ABREAST], &x, &first, &many, |_| {}),
         ];
         let plain = [
-            run::<2, false>([&y; ABREAST], &x, &two, |_| {}),
-            run::<5, false>([&y; ABREAST], &x, &many, |_| {}),
+            run::<2, false>([&y; ABREAST], &x, &first, &two, |_| {}),
+            run::<5, false>([&y; ABREAST], &x, &first, &many, |_| {}),
         ];
         for (a, b) in here.iter().flatten().zip(plain.iter().flatten()) {
             assert!((a / b - 1.0).abs() < 1e-10, "{a} {b}");

@@ -17,8 +17,7 @@ fn from_levels(search: &Search<'_>, state: State, length: usize, x: &Coordinates
     let blocks = (length as f64).ln();
     for t in terms.iter_mut().filter(|t| t.is_process()) {
         if let Form::Covariance(_, theta) = &mut t.form {
-            // Two levels have the spectrum of a one-pole process of their variance, half their dwell time long.
-            *theta = vec![2.0 * x[2] - blocks, x[3] + blocks - std::f64::consts::LN_2];
+            *theta = super::spectrum(x, blocks, x[0] + blocks);
         }
     }
     let other = search.refit(terms, least_walk(search.panel.bins.n));
