@@ -308,14 +308,13 @@ pub fn whitened(panel: &Panel, state: &State) -> (Vec<f64>, Vec<f64>) {
     let Some(level) = &state.level else {
         return whitened_by_spectrum(panel, state);
     };
-    let level = panel.dct.forward(level);
-    let mut r = residual(panel, &state.columns(), &state.solution);
-    r.iter_mut().zip(level).skip(1).for_each(|(r, l)| *r -= l);
-    let noise = state.noise_beside_level();
+    let columns = state.columns();
     // What the process took of the random walk is the walk's again.
-    let rest = Panel::new(&panel.dct, &panel.bins, &panel.dct.inverse(&r));
-    let (noise, solution) = rest.fit(&noise, &[]);
-    by_model(panel, &r, &noise, solution.white)
+    let (r, noise, white) = panel.without(level, || {
+        let (noise, solution) = panel.fit(&state.noise_beside_level(), &columns);
+        (residual(panel, &columns, &solution), noise, solution.white)
+    });
+    by_model(panel, &r, &noise, white)
 }
 
 /// The same with every process as its spectrum alone.

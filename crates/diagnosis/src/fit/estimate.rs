@@ -58,7 +58,12 @@ pub(crate) fn normalised<T>(points: Vec<(f64, T)>) -> Vec<(f64, T)> {
 #[must_use]
 pub fn coefficients(panel: &Panel, state: &State) -> Vec<(f64, f64)> {
     let columns = state.columns();
-    averaged(&mixture(panel, &state.noise, &columns), columns.len())
+    let noise = state.noise_beside_level();
+    let mixed = || averaged(&mixture(panel, &noise, &columns), columns.len());
+    match &state.level {
+        Some(level) => panel.without(level, mixed),
+        None => mixed(),
+    }
 }
 
 /// The first `count` coefficients of a mixture with standard errors.

@@ -4,6 +4,7 @@
 //! white noise and a random walk of the level) by a bank of Kalman filters, one for each level, merged by moments.
 
 mod dwell_times;
+mod level;
 mod steps;
 
 use std::f64::consts::TAU;
@@ -19,9 +20,7 @@ use crate::fit::threshold;
 use crate::search::Search;
 use crate::test_level::{CLAIM_LEVEL, CheckId, Outcome};
 pub use crate::two_level::fit::two_level;
-use crate::two_level::fit::{
-    Coordinates, Side, Sides, again, covariance_of, fitted, many_ahead, path,
-};
+use crate::two_level::fit::{Coordinates, Side, Sides, again, covariance_of, fitted, many_ahead};
 use numerics::tails::normal_tail;
 
 /// Nats by which two levels have to be better.
@@ -30,17 +29,12 @@ const MARGIN: f64 = 4.0;
 const LEAST_SWITCHES: f64 = 3.0;
 /// Nats within which the answer stays open.
 const OPEN: f64 = 3.0;
-/// Half height over the standard deviation of a block from which on a block tells its level without doubt: shorter ones do as
-/// well, and fewer of them hold a switch.
-const PLAIN: f64 = 4.0;
 /// Longest block of a short record, s, and most blocks.
 const BLOCK_S: f64 = 0.2;
 const MOST_BLOCKS: usize = 6000;
 /// How much longer a block is behind a filter of a pole up to 0.7 from sample to sample: it leaves neighbours of such
 /// blocks a correlation of a tenth.
 const BEHIND_A_FILTER: f64 = 4.0;
-/// Variance of the level about its most probable mean, over that of the two levels, above which it is not taken off.
-const LARGEST_DOUBT: f64 = 0.05;
 /// Fewest blocks on which both sides are weighed.
 const LEAST_BLOCKS: usize = 200;
 /// Blocks of a coarse look.
@@ -278,6 +272,24 @@ struct Field<'a> {
     bins: Rc<Bins>,
 }
 
+/// Two levels fitted, with what they are held against.
+struct LevelFit {
+    /// Log likelihood and coordinates.
+    two: f64,
+    x: Coordinates,
+    /// The claim that they switch at random.
+    switches: Option<Outcome>,
+    /// Log likelihood, noise and white variance of the Gaussian side.
+    other: (f64, Noise, f64),
+}
+
+impl LevelFit {
+    fn at_random(&self) -> bool {
+        let claim = self.switches.as_ref();
+        !claim.is_some_and(|s| s.p_value < CLAIM_LEVEL)
+    }
+}
+
 impl<'a> Field<'a> {
     /// None of too few blocks.
     fn new(
@@ -366,67 +378,67 @@ impl<'a> Field<'a> {
         mut self,
         rival: State,
         ahead: f64,
-        (mut two, mut x): (f64, Coordinates),
-        mut other: (f64, Noise, f64),
+        (two, x): (f64, Coordinates),
+        other: (f64, Noise, f64),
     ) -> State {
         let mut settled = rival;
-        let without = settled.terms.len();
-        let shortened = self.shortened(&mut x);
-        if shortened {
-            (two, x) = again(&self.blocks, &x);
+        let mut term = settled.terms.len() - 1;
+        let mut fit = LevelFit {
+            two,
+            x,
+            switches: dwell_times::at_random(&self.blocks, &x, self.block_s()),
+            other,
+        };
+        if self.shortened(&mut fit.x) {
+            fit = self.again(&settled, &fit.x);
         }
-        let block_s = self.length as f64 / self.search.view.rate_hz;
-        let at_random =
-            |blocks: &[f64], x: &Coordinates| dwell_times::at_random(blocks, x, block_s);
-        let mut switches = at_random(&self.blocks, &x);
         // What switches by a clock has no steps beside it: its own are surprises to levels that switch at random.
-        if !switches.as_ref().is_some_and(|s| s.p_value < CLAIM_LEVEL) {
-            settled = steps::beside(self.search, settled, &mut self.rest, self.length, &x);
+        if fit.at_random() {
+            let before = settled.terms.len();
+            settled = steps::beside(self.search, settled, &mut self.rest, self.length, &fit.x);
+            if settled.terms.len() > before {
+                fit = self.again(&settled, &fit.x);
+            }
         }
-        let stepped = settled.terms.len() > without;
-        if stepped {
-            self.blocks = means(&self.rest[self.first..], self.length, MOST_BLOCKS);
-            (two, x) = again(&self.blocks, &x);
-            switches = at_random(&self.blocks, &x);
+        settled.level = self.level(&settled, &fit.x).map(Rc::new);
+        let level = settled.level.clone().filter(|_| fit.at_random());
+        if let Some(more) = level.and_then(|l| level::beside(self.search, &settled, term, &l)) {
+            (settled, term, self.rest) = (more.state, more.term, more.rest);
+            fit = self.again(&settled, &fit.x);
+            settled.level = self.level(&settled, &fit.x).map(Rc::new);
         }
-        if shortened || stepped {
-            other = gaussian(&self.panel(), self.processes(&settled), &[]);
-        }
-        self.give_spectrum(&mut settled, without - 1, &x);
-        if many_ahead(&self.blocks, &x) > MARGIN {
+        self.give_spectrum(&mut settled, term, &fit.x);
+        if many_ahead(&self.blocks, &fit.x) > MARGIN {
             settled.notes.push(Note {
                 what: "jumps between more than two levels".into(),
                 at: None,
             });
         }
-        let filtered = settled.terms.iter().any(Term::is_filter);
-        settled.level = self.level(&x, filtered).map(Rc::new);
-        let stated = self.stated(&x, block_s);
-        if let Some(t) = settled.terms.get_mut(without - 1) {
+        let stated = self.stated(&fit.x, self.block_s());
+        if let Some(t) = settled.terms.get_mut(term) {
             t.stated = Some(stated);
             t.lr = 2.0 * (ahead - MARGIN) + t.threshold;
-            let z = self.cox(two, &x, other, Side::TwoLevels);
+            let z = self.cox(fit.two, &fit.x, fit.other, Side::TwoLevels);
             t.claims.push(levels_claim(z, Side::TwoLevels));
-            t.claims.extend(switches);
+            t.claims.extend(fit.switches);
         }
         settled
     }
 
-    /// Gives the noise of a state the random walk that was found beside the two levels, and the term that stands for them
-    /// their spectrum: for a process of one pole, walk and levels are much the same.
-    fn give_spectrum(&self, state: &mut State, term: usize, x: &Coordinates) {
-        let blocks = (self.length as f64).ln();
-        let white = state.solution.white.ln();
-        let least = least_walk(self.search.panel.bins.n);
-        state.noise.log_walk = (x[0] + x[1] - blocks - white).max(least);
-        let of_levels = spectrum(x, blocks, white);
-        let processes = state.terms.iter_mut().enumerate();
-        let processes = processes.filter(|(_, t)| t.is_covariance());
-        for ((i, t), (_, theta)) in processes.zip(&mut state.noise.terms) {
-            if let (true, Form::Covariance(_, own)) = (i == term, &mut t.form) {
-                own.clone_from(&of_levels);
-                theta.clone_from(&of_levels);
-            }
+    /// Seconds of a block.
+    fn block_s(&self) -> f64 {
+        self.length as f64 / self.search.view.rate_hz
+    }
+
+    /// Both sides weighed again on what a state leaves, from where the levels were.
+    fn again(&mut self, state: &State, x: &Coordinates) -> LevelFit {
+        self.blocks = means(&self.rest[self.first..], self.length, MOST_BLOCKS);
+        let (two, x) = again(&self.blocks, x);
+        LevelFit {
+            two,
+            x,
+            switches: dwell_times::at_random(&self.blocks, &x, self.block_s()),
+            other: gaussian(&self.panel(), self.processes(state), &[]),
         }
     }
 
@@ -448,53 +460,6 @@ impl<'a> Field<'a> {
         let dwell = x[3].exp() * block_s;
         vec![(half, half * half_error), (dwell, dwell * dwell_error)]
     }
-
-    /// Shorter blocks where these tell the level without doubt, as short as the number of blocks allows; coordinates are
-    /// then those of the shorter ones.
-    fn shortened(&mut self, x: &mut Coordinates) -> bool {
-        let part = (x[2].exp() / PLAIN).powi(-2);
-        let whole = self.rest.len().div_ceil(MOST_BLOCKS);
-        let shorter = ((part * self.length as f64) as usize).max(whole).max(1);
-        if self.first > 0 || shorter >= self.length {
-            return false;
-        }
-        *x = of_blocks(x, shorter as f64 / self.length as f64);
-        self.length = shorter;
-        self.blocks = means(&self.rest, shorter, MOST_BLOCKS);
-        self.dct = Dct::new(self.blocks.len());
-        self.bins = Rc::new(Bins::new(self.blocks.len()));
-        true
-    }
-
-    /// The level, sample by sample; none where only a stretch was weighed, and where it is so much in doubt that taking it
-    /// off would take noise off.
-    fn level(&self, x: &Coordinates, filtered: bool) -> Option<Vec<f64>> {
-        let steps_at = (x[2] + 0.5 * x[0]).exp();
-        // Behind a filter neighbours are no independent witnesses of a level; means of blocks are.
-        let levels = if filtered {
-            let of_blocks = path(&self.blocks, x);
-            let at = |i: usize| of_blocks[(i / self.length).min(of_blocks.len() - 1)];
-            (0..self.rest.len()).map(at).collect()
-        } else {
-            path(&self.rest, &of_blocks(x, 1.0 / self.length as f64))
-        };
-        let doubt = levels.iter().map(|l| 1.0 - (l / steps_at).powi(2));
-        let doubt = doubt.sum::<f64>() / levels.len() as f64;
-        (self.first == 0 && doubt < LARGEST_DOUBT).then_some(levels)
-    }
-}
-
-/// The coordinates of a process of one pole with the spectrum of two levels: of their variance, over `white` (both as ln), and
-/// half their dwell time long.
-fn spectrum(x: &Coordinates, blocks: f64, white: f64) -> Vec<f64> {
-    let variance = 2.0 * x[2] + x[0];
-    vec![variance - white, x[3] + blocks - std::f64::consts::LN_2]
-}
-
-/// Coordinates of blocks of another length, `part` times as long: white noise falls with the length, a walk grows.
-fn of_blocks(x: &Coordinates, part: f64) -> Coordinates {
-    let ln = part.ln();
-    [x[0] - ln, x[1] + 2.0 * ln, x[2] + 0.5 * ln, x[3] - ln]
 }
 
 /// The claim of a contest of levels: `z` standard errors from what the lead of two levels is for what was named. Readings that

@@ -17,7 +17,7 @@ fn from_levels(search: &Search<'_>, state: State, length: usize, x: &Coordinates
     let blocks = (length as f64).ln();
     for t in terms.iter_mut().filter(|t| t.is_process()) {
         if let Form::Covariance(_, theta) = &mut t.form {
-            *theta = super::spectrum(x, blocks, x[0] + blocks);
+            *theta = super::level::spectrum(x, blocks, x[0] + blocks);
         }
     }
     let other = search.refit(terms, least_walk(search.panel.bins.n));
