@@ -101,6 +101,29 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
 }
 
 #[test]
+fn spi_bytes_behind_the_timelines_last_follow_each_other() {
+    let all = Timeline::default();
+    let short = Timeline {
+        spi_bytes: all.spi_bytes[..10].to_vec(),
+        ..all.clone()
+    };
+    let heard = |timeline: &Timeline| {
+        let mut decoder = Decoder::new();
+        let mut samples = Vec::new();
+        native(&run(Scenario::quiet(4), 20.0), timeline, |byte| {
+            if let Some(Ok(Frame::Sample(sample))) = decoder.push(byte.byte) {
+                samples.push(sample);
+            }
+            ControlFlow::Continue(())
+        });
+        samples
+    };
+    let (short, all) = (heard(&short), heard(&all));
+    assert_eq!(short.len(), all.len());
+    assert!(short.iter().all(|s| s.flags == flags::IN_ORDER));
+}
+
+#[test]
 fn the_motor_turns_while_the_host_is_there_and_stops_without() {
     let mut run = run(Scenario::quiet(2), 20.0);
     run.requests = duty_profile(&[(2.0, 200), (6.0, -100)], 10.0);
