@@ -112,6 +112,19 @@ fn a_correction_by_what_was_found_comes_near_what_the_noise_alone_leaves() {
     graded(&all);
 }
 
+/// What is planted on an axis and shows in a record: a lean only while the base turns, the others above all at rest.
+fn shows(stage: &str, causes: &[&str]) -> String {
+    let (askew, mut others): (Vec<&str>, Vec<&str>) =
+        causes.iter().partition(|cause| **cause == "cross_axis");
+    others.sort_unstable();
+    match (stage, others.is_empty(), askew.is_empty()) {
+        ("at rest", true, _) => "nothing that shows at rest".to_owned(),
+        ("at rest", false, _) => others.join(" and "),
+        (_, _, false) => "askew".to_owned(),
+        _ => "not askew".to_owned(),
+    }
+}
+
 fn graded(all: &[(u64, &str, u64, Value)]) {
     // By record and span, planted axes apart: near the limit, better than read.
     let mut table: BTreeMap<(String, u64), Vec<[f64; 4]>> = BTreeMap::new();
@@ -133,11 +146,7 @@ fn graded(all: &[(u64, &str, u64, Value)]) {
             let causes: Vec<&str> = (planted.iter().filter(|(_, c)| c == channel))
                 .map(|(cause, _)| cause.as_str())
                 .collect();
-            let of = if causes.is_empty() {
-                "nothing".to_owned()
-            } else {
-                causes.join("+")
-            };
+            let of = shows(stage, &causes);
             table
                 .entry((format!("{stage}, {of}"), span as u64))
                 .or_default()
