@@ -213,6 +213,42 @@ fn stalls_glitches_dead_lines_and_lost_bytes_show_as_what_they_are() {
 }
 
 #[test]
+fn a_request_that_is_due_waits_until_the_one_before_it_has_its_answer() {
+    let mut run = run(Scenario::quiet(2), 3.0);
+    let [first, mut second] = bench::arming(1_000_000, 1);
+    // The first takes 5 ms on the line; the second says the nonce of its answer.
+    second.at_us = first.at_us + 1_000;
+    run.requests = vec![first, second];
+    let told: Vec<_> = hear(&run).replies().iter().map(|r| r.status).collect();
+    assert_eq!(told, [Status::Ok; 2]);
+}
+
+#[test]
+fn a_stored_set_up_outlasts_a_reboot() {
+    let mut run = run(Scenario::quiet(2), 6.0);
+    let commands = [
+        Command::SetBoardId { board_id: 4242 },
+        Command::StoreConfig,
+        Command::SetBoardId { board_id: 17 },
+        Command::Reboot,
+        Command::GetHello,
+    ];
+    run.requests = (0u16..)
+        .zip(commands)
+        .map(|(number, command)| bench::TimedRequest {
+            at_us: 1_000_000 + u64::from(number) * 900_000,
+            request: Request { number, command },
+        })
+        .collect();
+    let heard = hear(&run);
+    let hellos = heard.frames.iter().filter_map(|(_, frame)| match frame {
+        Frame::Hello(hello) => Some(hello.board_id),
+        _ => None,
+    });
+    assert_eq!(hellos.last(), Some(4242));
+}
+
+#[test]
 fn a_register_that_reads_as_written_is_ok_and_one_that_does_not_is_told() {
     let mut run = run(Scenario::quiet(4), 3.0);
     let write = |number, address, value| bench::TimedRequest {
