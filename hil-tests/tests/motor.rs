@@ -217,6 +217,37 @@ fn a_millisecond_clock_that_was_stopped_runs_again_with_the_next_tick_and_the_mo
     }
 }
 
+/// `rjmp .-2`, which the runtime's exit ends with.
+const FOR_EVER: [u8; 2] = 0xcfff_u16.to_le_bytes();
+
+#[test]
+fn a_main_loop_that_hangs_delays_neither_the_motors_cut_nor_the_watchdog() {
+    let board = Board::new();
+    let flash = &board.simulated.mcu().image().flash;
+    let place = flash.chunks_exact(2).position(|word| word == FOR_EVER);
+    let at = 2 * place.expect("an instruction that jumps to itself") as u32;
+    let mut hangs = None;
+    let board = left_alone(|simulated, t| {
+        // The keep-alive of 2.9 s has come, and the tick of 2.95 s is done.
+        if t > 2.975 && hangs.is_none() && simulated.mcu_mut().wake_at(at) {
+            hangs = Some(t);
+        }
+    });
+    let hangs = hangs.expect("it sleeps between two ticks");
+    assert!(hangs < 2.985, "{hangs}");
+    let stopped = board.last_change();
+    assert!((3.1..=3.108).contains(&stopped), "stopped at {stopped} s");
+    assert_eq!(board.simulated.duty(), 0.0);
+    // The watchdog's second, and the gyros' start.
+    let silence = (board.heard.samples())
+        .map(|(t, _)| t)
+        .filter(|t| *t > hangs);
+    let first = silence.reduce(f64::min).expect("it samples again");
+    assert!((3.9..4.6).contains(&first), "{first}");
+    let health = board.heard.last_health();
+    assert_eq!(health.faults.get(Fault::WatchdogReset), 1);
+}
+
 #[test]
 fn a_millisecond_clock_that_never_moves_ends_in_a_watchdog_reset_with_the_motor_off() {
     let board = left_alone(|simulated, _| {

@@ -5,10 +5,12 @@ use bench::Scenario;
 use bench::simavr::{NoProbe, Simulated};
 use hil_tests::calls::{recursion, stack_bound};
 use hil_tests::{Heard, at, generator, image, run, seed};
-use wire::{Axis, Command, Sensor, Shape};
+use wire::{Axis, Command, Fault, Sensor, Shape};
 
 /// The ATmega16 has that many, reset included.
 const VECTORS: usize = 21;
+/// Where its SRAM begins.
+const SRAM: usize = 0x60;
 
 #[test]
 fn the_deepest_stack_leaves_room_with_every_command_at_any_phase_of_the_tick() {
@@ -108,6 +110,32 @@ fn the_deepest_stack_leaves_room_with_every_command_at_any_phase_of_the_tick() {
         said + 1 >= left && said <= left + 64,
         "the board says {said} B were left, there were {left}"
     );
+}
+
+#[test]
+fn a_stack_that_came_near_the_statics_is_told_to_the_byte_and_counted() {
+    const LEFT: u16 = 20;
+    let mut simulated = Simulated::new(&image(), &Scenario::quiet(2), NoProbe).expect("an image");
+    let mut heard = Heard::default();
+    let mut run = |simulated: &mut Simulated<NoProbe>, until_s: f64| {
+        (simulated.run_until(until_s, &mut |byte| heard.push(byte))).expect("it runs");
+        let health = heard.last_health();
+        (health.stack_free, health.faults.get(Fault::StackLow))
+    };
+    let (free, low) = run(&mut simulated, 2.5);
+    assert!(free > 64 && low == 0, "{free} B left, {low} times low");
+    // What a call that deep would have left there.
+    let end = simulated
+        .mcu()
+        .image()
+        .symbol("_end")
+        .expect("the linker's")
+        & 0xffff;
+    let place = end as usize + usize::from(LEFT) - SRAM;
+    simulated.mcu_mut().sram_mut()[place] = 0;
+    let (free, low) = run(&mut simulated, 5.6);
+    assert_eq!(free, LEFT);
+    assert_eq!(low, 3, "once in each health frame");
 }
 
 #[test]

@@ -472,3 +472,19 @@ fn a_sway_is_no_rest() {
         assert!((swayed - rested).abs() < 0.01, "{rested} {swayed}");
     }
 }
+
+#[test]
+fn each_row_and_the_crcs_has_its_place_in_either_copy_and_none_behind_it() {
+    let mut correction = Correction::new();
+    for newest in [1, 2] {
+        correction.newest = newest;
+        for (other, copy) in [(false, newest), (true, 3 - newest)] {
+            let begin = COPIES[usize::from(copy) - 1];
+            for row in 0..=ROWS as u8 {
+                let place = begin + 6 * u16::from(row);
+                assert_eq!(correction.place(other, row), Some(place));
+            }
+            assert_eq!(correction.place(other, ROWS as u8 + 1), None);
+        }
+    }
+}

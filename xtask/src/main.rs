@@ -39,7 +39,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}
   size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt
   mutants  plants small faults in drivers, wire, firmware and bench, one at a time, and says which of them no test notices;
-           --seed N and --count N draw, --write keeps docs/mutants.txt, --registers plants those that only the image has
+           --seed N and --count N draw, --minutes N bounds, --write keeps docs/mutants.txt, --registers plants those that only the image has
   page     builds the page that runs the engine in a browser: target/page/index.html
   wheel    builds the Python package, target/wheel/dist/*.whl, and tests it in a virtual environment of its own;
            --dev compiles it as tests are

@@ -17,13 +17,15 @@ use tree::{Outcome, Tree};
 
 /// How many are drawn where nobody says.
 const COUNT: usize = 100;
-const USAGE: &str = "cargo xtask mutants [--seed N] [--count N] [--package NAME] [--write], or cargo xtask mutants --registers [WORD]";
+const USAGE: &str = "cargo xtask mutants [--seed N] [--count N] [--minutes N] [--package NAME] [--write], or cargo xtask mutants --registers [WORD]";
 
 /// What is asked for.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Asked {
     seed: Option<u64>,
     count: Option<usize>,
+    /// No other is begun after so many; the first ones of a draw are what a smaller count draws.
+    minutes: Option<u64>,
     package: Option<String>,
     write: bool,
     registers: bool,
@@ -44,6 +46,7 @@ impl Asked {
             match word.as_str() {
                 "--seed" => asked.seed = Some(number()?),
                 "--count" => asked.count = Some(number()? as usize),
+                "--minutes" => asked.minutes = Some(number()?),
                 "--package" => asked.package = words.next().cloned(),
                 "--write" => asked.write = true,
                 "--registers" => asked.registers = true,
@@ -85,8 +88,14 @@ pub fn hunt(root: &Path, arguments: &[String]) -> Result<(), Failure> {
         sound(&tree, package)?;
     }
     let mut known = Known::read(root)?;
-    let mut verdicts = Vec::new();
+    let (mut verdicts, begun) = (Vec::new(), Instant::now());
     for (n, mutant) in drawn.into_iter().enumerate() {
+        if let Some(minutes) = asked.minutes
+            && begun.elapsed().as_secs() >= 60 * minutes
+        {
+            println!("{minutes} minutes are over");
+            break;
+        }
         let from = Instant::now();
         let outcome = tree.try_one(&mutant)?;
         let seconds = from.elapsed().as_secs();
@@ -163,6 +172,13 @@ mod tests {
         once.sort();
         once.dedup();
         assert_eq!(once.len(), 20);
+        assert_eq!(
+            ids(3)[..7],
+            draw(all.clone(), 3, 7)
+                .iter()
+                .map(Mutant::id)
+                .collect::<Vec<_>>()
+        );
         assert_eq!(draw(all, 1, 1000).len(), 50);
     }
 
@@ -170,9 +186,9 @@ mod tests {
     fn what_is_asked_is_read_and_what_is_not_known_is_refused() {
         let of =
             |words: &[&str]| Asked::of(&words.iter().map(|w| (*w).to_owned()).collect::<Vec<_>>());
-        let asked = of(&["--seed", "7", "--count", "20", "--write"]).expect("known");
+        let asked = of(&["--seed", "7", "--minutes", "20", "--write"]).expect("known");
         assert_eq!(
-            (asked.seed, asked.count, asked.write),
+            (asked.seed, asked.minutes, asked.write),
             (Some(7), Some(20), true)
         );
         assert!(of(&["--registers", "TXC"]).is_ok_and(|asked| asked.word.is_some()));

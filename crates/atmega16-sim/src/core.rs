@@ -149,6 +149,10 @@ impl Core {
         self.avr().pc
     }
 
+    pub fn set_program_counter(&mut self, to: u32) {
+        self.avr_mut().pc = to;
+    }
+
     pub fn stack_pointer(&self) -> u16 {
         let at = 0x20 + usize::from(r::SPL);
         u16::from_le_bytes([self.data()[at], self.data()[at + 1]])

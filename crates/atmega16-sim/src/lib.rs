@@ -180,6 +180,17 @@ impl Mcu {
         self.core.program_counter()
     }
 
+    /// Wakes the processor, to go on at an address in bytes: for planting a program that hangs. False, and nothing done, unless
+    /// it sleeps with interrupts on, when no instruction is half done.
+    pub fn wake_at(&mut self, address: u32) -> bool {
+        let sleeps = self.asleep && self.core.interrupts_enabled();
+        if sleeps {
+            self.asleep = false;
+            self.core.set_program_counter(address);
+        }
+        sleeps
+    }
+
     fn chip(&self) -> &Chip {
         self.core.chip()
     }

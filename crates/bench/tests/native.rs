@@ -101,6 +101,29 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
 }
 
 #[test]
+fn spi_bytes_behind_the_timelines_last_follow_each_other() {
+    let all = Timeline::default();
+    let short = Timeline {
+        spi_bytes: all.spi_bytes[..10].to_vec(),
+        ..all.clone()
+    };
+    let heard = |timeline: &Timeline| {
+        let mut decoder = Decoder::new();
+        let mut samples = Vec::new();
+        native(&run(Scenario::quiet(4), 20.0), timeline, |byte| {
+            if let Some(Ok(Frame::Sample(sample))) = decoder.push(byte.byte) {
+                samples.push(sample);
+            }
+            ControlFlow::Continue(())
+        });
+        samples
+    };
+    let (short, all) = (heard(&short), heard(&all));
+    assert_eq!(short.len(), all.len());
+    assert!(short.iter().all(|s| s.flags == flags::IN_ORDER));
+}
+
+#[test]
 fn the_motor_turns_while_the_host_is_there_and_stops_without() {
     let mut run = run(Scenario::quiet(2), 20.0);
     run.requests = duty_profile(&[(2.0, 200), (6.0, -100)], 10.0);
@@ -187,6 +210,46 @@ fn stalls_glitches_dead_lines_and_lost_bytes_show_as_what_they_are() {
     let lossy = run(Scenario::quiet(4).with(Fault::LossyLine { count: 5 }), 60.0);
     let heard = hear(&lossy);
     assert!((1..=5).contains(&heard.bad), "{} damaged frames", heard.bad);
+}
+
+#[test]
+fn a_request_that_is_due_waits_until_the_one_before_it_has_its_answer() {
+    let mut run = run(Scenario::quiet(2), 3.0);
+    let [first, mut second] = bench::arming(1_000_000, 1);
+    // The first takes 5 ms on the line; the second says the nonce of its answer.
+    second.at_us = first.at_us + 1_000;
+    run.requests = vec![first, second];
+    let replies = hear(&run).replies();
+    let told = |of: usize| (replies[of].status, replies[of].value);
+    // A question is answered by a nonce, the right nonce by 0.
+    assert_eq!(replies.len(), 2);
+    assert!(told(0).0 == Status::Ok && told(0).1 != 0);
+    assert_eq!(told(1), (Status::Ok, 0));
+}
+
+#[test]
+fn a_stored_set_up_outlasts_a_reboot() {
+    let mut run = run(Scenario::quiet(2), 6.0);
+    let commands = [
+        Command::SetBoardId { board_id: 4242 },
+        Command::StoreConfig,
+        Command::SetBoardId { board_id: 17 },
+        Command::Reboot,
+        Command::GetHello,
+    ];
+    run.requests = (0u16..)
+        .zip(commands)
+        .map(|(number, command)| bench::TimedRequest {
+            at_us: 1_000_000 + u64::from(number) * 900_000,
+            request: Request { number, command },
+        })
+        .collect();
+    let heard = hear(&run);
+    let hellos = heard.frames.iter().filter_map(|(_, frame)| match frame {
+        Frame::Hello(hello) => Some(hello.board_id),
+        _ => None,
+    });
+    assert_eq!(hellos.last(), Some(4242));
 }
 
 #[test]

@@ -90,7 +90,7 @@ const TABLE: &[Planted] = &[
         "if ticked && passed {", "if passed {"),
     planted("the watchdog is off", [TICK, "boot"],
         "        watchdog.wdtcr.write(|w| bits!(w, 1 << 3 | 6));\n", "        let _ = watchdog;\n"),
-    planted("the interrupt of the millisecond does not cut the motor", [TICK, "flood"],
+    planted("the interrupt of the millisecond does not cut the motor", [TICK, "motor"],
         "                board::cut_motor();\n", ""),
     planted("a stopped millisecond clock stays stopped", [TICK, "motor"],
         "    timer1().timsk.write(|w| bits!(w, OCIE1A));\n    run_milliseconds();\n", "    timer1().timsk.write(|w| bits!(w, OCIE1A));\n"),

@@ -10,33 +10,20 @@ use model::record::Record;
 use serde::Serialize;
 use wire::{Corrected, correction_state};
 
+use super::noise::Noise;
+
 /// Spans over which angles are judged, s.
 pub const SPANS_S: [f64; 3] = [10.0, 100.0, 600.0];
 /// Windows begin this many times in each length.
 const OVERLAP: usize = 10;
 /// Spans that the time behind the rest holds at least: one alone says nothing of an rms.
-const SPANS_AT_LEAST: usize = 2;
+pub(super) const SPANS_AT_LEAST: f64 = 2.0;
 /// Standard deviations that hold an error of the bias 95 times of 100: what is worse by no more is chance.
 const NORMAL_95: f64 = 1.96;
 /// Blocks that the filter knows are counted in 1/256.
 const KNOWN_ONE: f64 = 256.0;
 /// Share of its rows that a window has readings in, at least.
 const READINGS: f64 = 0.9;
-
-/// What a model says of the noise that no correction takes off a gyro.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Noise {
-    /// Angle random walk N, deg/sqrt(s).
-    pub n: f64,
-    /// Rate random walk K, deg/s/sqrt(s).
-    pub k: f64,
-    /// Processes that come back to zero: rms, deg/s, and correlation time, s.
-    pub wanders: Vec<(f64, f64)>,
-    /// Coefficients that the correction rests on: the standard error of each, and the channel that it multiplies.
-    pub uncertain: Vec<(f64, String)>,
-    /// Variance of the mean of a block of the bias filter, (deg/s)^2, as the correction has it.
-    pub block: f64,
-}
 
 /// A record to be judged.
 #[derive(Clone, Copy)]
@@ -110,6 +97,7 @@ pub fn judge(stage: &Stage<'_>, matters: f64) -> Judged {
     let record = stage.record;
     let rate_hz = record.header.rate_hz.unwrap_or(f64::NAN);
     let rest = (stage.rest_s * rate_hz) as usize;
+    let behind_s = record.len().saturating_sub(rest) as f64 / rate_hz;
     let mut rows = Vec::new();
     for axis in 0..3 {
         let channel = ["gyro_x", "gyro_y", "gyro_z"][axis];
@@ -128,7 +116,11 @@ pub fn judge(stage: &Stage<'_>, matters: f64) -> Judged {
         let noise = &stage.noise[axis];
         let bias = bias_variance(noise, stage.corrected, axis, rest, rate_hz);
         for span_s in SPANS_S {
-            let over = |errors: &[f64]| rms(errors, rest, span_s, rate_hz);
+            let over = |errors: &[f64]| {
+                let enough =
+                    errors.len().saturating_sub(rest) as f64 >= SPANS_AT_LEAST * span_s * rate_hz;
+                enough.then(|| rms(errors, rest, span_s, rate_hz)).flatten()
+            };
             let (Some(before_deg), Some(after_deg)) = (over(&read), over(&corrected)) else {
                 continue;
             };
@@ -138,7 +130,7 @@ pub fn judge(stage: &Stage<'_>, matters: f64) -> Judged {
                 span_s,
                 before_deg,
                 after_deg,
-                predicted_deg: predicted(noise, bias, record, rest, span_s),
+                predicted_deg: noise.angle_deg(bias, record, rest, [span_s, behind_s]),
                 limit_deg: limit.as_deref().and_then(over),
                 worse: after_deg > (1.0 + matters) * before_deg.hypot(chance),
             });
@@ -146,7 +138,7 @@ pub fn judge(stage: &Stage<'_>, matters: f64) -> Judged {
     }
     Judged {
         what: stage.what,
-        seconds: record.len().saturating_sub(rest) as f64 / rate_hz,
+        seconds: behind_s,
         rows,
         board: States::of(stage.corrected),
     }
@@ -196,21 +188,21 @@ fn mean(values: &[f64]) -> f64 {
     sum / count
 }
 
-fn without_rest(mut values: Vec<f64>, rest: usize) -> Vec<f64> {
+pub(super) fn without_rest(mut values: Vec<f64>, rest: usize) -> Vec<f64> {
     let bias = mean(&values[..rest.min(values.len())]);
     values.iter_mut().for_each(|v| *v -= bias);
     values
 }
 
-/// Begins of the windows of a length behind the rest, in rows; nothing where there are too few.
+/// Begins of the windows of a length behind the rest, in rows; nothing where there is none.
 fn windows(rows: usize, rest: usize, length: usize) -> Option<impl Iterator<Item = usize>> {
     let behind = rows.checked_sub(rest)?;
-    (length > 0 && behind >= SPANS_AT_LEAST * length)
+    (length > 0 && behind >= length)
         .then(|| (rest..=rows - length).step_by((length / OVERLAP).max(1)))
 }
 
 /// Root mean square of the integrals over the windows, in the unit of `errors` times s.
-fn rms(errors: &[f64], rest: usize, span_s: f64, rate_hz: f64) -> Option<f64> {
+pub(super) fn rms(errors: &[f64], rest: usize, span_s: f64, rate_hz: f64) -> Option<f64> {
     let length = (span_s * rate_hz).round() as usize;
     let (mut squares, mut count) = (0.0, 0.0);
     for begin in windows(errors.len(), rest, length)? {
@@ -236,31 +228,7 @@ fn bias_variance(
     if known > 0 && noise.block > 0.0 {
         return noise.block * KNOWN_ONE / f64::from(known);
     }
-    // A mean is off by a third of its walk.
-    let rest_s = rest as f64 / rate_hz;
-    noise.n.powi(2) / rest_s + noise.k.powi(2) * rest_s / 3.0
-}
-
-/// The angle error that noise and uncertain coefficients leave, deg: the bias is known from the rest alone and walks on from
-/// there.
-fn predicted(noise: &Noise, bias: f64, record: &Record, rest: usize, span_s: f64) -> f64 {
-    let rate_hz = record.header.rate_hz.unwrap_or(f64::NAN);
-    let (n2, k2) = (noise.n.powi(2), noise.k.powi(2));
-    let behind_s = record.len().saturating_sub(rest) as f64 / rate_hz;
-    // Middle of the windows' begins, since the rest.
-    let since_s = (behind_s - span_s).max(0.0) / 2.0;
-    let white = n2 * span_s;
-    let walk = k2 * span_s.powi(2) * (since_s + span_s / 3.0);
-    let wanders = noise.wanders.iter().map(|(sigma, tau)| {
-        2.0 * sigma.powi(2) * tau * (span_s - tau * (1.0 - (-span_s / tau).exp()))
-    });
-    let uncertain = noise.uncertain.iter().filter_map(|(error, channel)| {
-        let values = &record.channel(channel)?.values;
-        let values = without_rest(values.clone(), rest);
-        Some((error * rms(&values, rest, span_s, rate_hz)?).powi(2))
-    });
-    let all = white + bias * span_s.powi(2) + walk + wanders.sum::<f64>() + uncertain.sum::<f64>();
-    all.sqrt()
+    noise.of_a_mean(rest as f64 / rate_hz)
 }
 
 #[cfg(test)]
@@ -272,7 +240,7 @@ mod tests {
         let errors = vec![0.5; 3000];
         let angle = rms(&errors, 200, 10.0, 20.0);
         assert!((angle.unwrap() - 5.0).abs() < 1e-9);
-        assert_eq!(rms(&errors, 200, 100.0, 20.0), None, "less than two spans");
+        assert_eq!(rms(&errors, 200, 150.0, 20.0), None, "no span");
         let left = rms(&without_rest(errors, 200), 200, 10.0, 20.0);
         assert!(left.unwrap() < 1e-9);
     }

@@ -2,9 +2,15 @@
 //! correction is worth. Nothing here knows whether the board is a real one.
 
 mod judge;
+mod length;
+mod noise;
 mod record;
+mod worth;
 mod write;
 
-pub use judge::{Judged, Noise, Row, SPANS_S, Stage, States, judge};
+pub use judge::{Judged, Row, SPANS_S, Stage, States, judge};
+pub use length::{NEAR, Needed, needed};
+pub use noise::{Noise, Uncertain};
 pub use record::{Course, Taken, record};
+pub use worth::keep_what_is_worth_it;
 pub use write::{Change, Proposed, in_use};

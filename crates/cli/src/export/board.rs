@@ -30,8 +30,10 @@ const REACH_RATE_DPS: f64 = 100.0;
 /// The rounding of a term may be this share of the error that white noise alone makes of a mean over [`JUDGED_OVER_S`].
 const SHARE_OF_NOISE: f64 = 0.25;
 const JUDGED_OVER_S: f64 = 600.0;
-/// Shortest block of the bias filter, samples as a power of two.
+/// Shortest block of the bias filter, samples as a power of two, and how long others may be, s: the first block of a rest and the one
+/// that its end cuts are lost, and a rest may be a minute.
 const SHORTEST_BLOCK: u8 = 4;
+const LONGEST_BLOCK_S: f64 = 1.0;
 /// Blocks that the filter may remember: its gain is 1/256 at the least.
 const MOST_BLOCKS: f64 = 200.0;
 /// Least growth of the variance in a block, over that of a block: a step of what is stored.
@@ -214,7 +216,7 @@ fn temp_range(mean_c: f64, reach_c: f64) -> [i8; 2] {
     ]
 }
 
-/// What the filter is told: the shortest block whose memory it can hold, and the noise in it. By axis N^2, what neighbours that are
+/// What the filter is told: the shortest block whose memory it can hold, up to a second, and the noise in it. By axis N^2, what neighbours that are
 /// alike multiply it by, and K^2 of all that walks.
 fn filter(
     out: &mut Correction,
@@ -230,7 +232,9 @@ fn filter(
     let holds = |shift: &u8| all(*shift, &|g| g == 0.0 || g.sqrt() >= 1.0 / MOST_BLOCKS);
     let follows = |shift: &u8| all(*shift, &|g| g <= MOST_WALK);
     // Axes may walk so differently that no block is right for all: then the fastest can still be followed.
-    let shifts = SHORTEST_BLOCK..=BLOCK_SHIFT_MAX;
+    let is_short = |shift: &u8| f64::from(1u32 << shift) / rate_hz <= LONGEST_BLOCK_S;
+    let longest = (SHORTEST_BLOCK..=BLOCK_SHIFT_MAX).rfind(is_short);
+    let shifts = SHORTEST_BLOCK..=longest.unwrap_or(SHORTEST_BLOCK);
     out.block_shift = (shifts.clone().filter(follows).find(holds))
         .or_else(|| shifts.rev().find(follows))
         .unwrap_or(SHORTEST_BLOCK);
@@ -376,6 +380,29 @@ mod tests {
             let note = &board.notes[0];
             assert!(note.contains("gyro_x walks faster"), "{note}");
         }
+    }
+
+    #[test]
+    fn a_walk_too_slow_to_be_told_from_none_takes_no_more_of_a_rest_than_none_does() {
+        let block = |k: f64, rate_hz: f64| {
+            let mut model = ModelFile {
+                rate_hz,
+                ..ModelFile::paper()
+            };
+            for channel in &mut model.channels {
+                if let Some(walk) = channel.baseline.get_mut("rate_random_walk") {
+                    walk.value = k;
+                }
+            }
+            let board = BoardCorrection::of(&model, SENS_AVG).unwrap();
+            board.correction.block_shift
+        };
+        assert_eq!(
+            [block(0.0, 20.0), block(1e-5, 20.0), block(4e-4, 20.0)],
+            [4; 3]
+        );
+        // Up to a second at any rate.
+        assert_eq!([block(1e-5, 100.0), block(1e-5, 256.0)], [6, 7]);
     }
 
     #[test]

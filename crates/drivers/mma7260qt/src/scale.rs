@@ -233,6 +233,17 @@ mod tests {
     }
 
     #[test]
+    fn what_a_flip_says_is_rounded_to_the_nearest() {
+        // 2 g over the difference of both, both in sixteenths: 2 * 10^6 * 16 * 16 / span.
+        for span in 1_000..6_000 {
+            let scale = Scale::from_flip(8_000 + span, 8_000).unwrap();
+            let exact = 512e6 / f64::from(span);
+            let off = f64::from(scale.micro_g_per_count_q4()) - exact;
+            assert!(off.abs() <= 0.5, "{span}: {off}");
+        }
+    }
+
+    #[test]
     fn a_flip_tells_the_range_and_a_part_that_is_out_of_limits() {
         for (range, _) in RANGES {
             let flip = |zero_error: f64, sensitivity_error: f64| {

@@ -89,6 +89,10 @@ pub struct Arguments {
     /// Correct by this model file instead of what was found, to see what it is worth now
     #[arg(long, value_name = "FILE", requires = "correct")]
     correct_by: Option<PathBuf>,
+    /// With --correct: the first record is taken again where its correction would be too unsure, as long as that needs, up to
+    /// this length, s; 12 times --seconds if not said
+    #[arg(long, value_name = "SECONDS", requires = "correct", value_parser = longest)]
+    longest: Option<f64>,
     #[command(
         flatten,
         next_help_heading = "Close the loop on a real board, which stands still, with the belt off"
@@ -122,6 +126,12 @@ pub struct Span(f64, f64);
 
 /// Longest part that is traced, s: a hundred megabytes.
 const LONGEST_TRACE_S: f64 = 60.0;
+
+/// A length of the first record, s.
+fn longest(text: &str) -> std::result::Result<f64, String> {
+    let seconds = text.parse().ok().filter(|s| (60.0..=86_400.0).contains(s));
+    seconds.ok_or_else(|| "takes a length within 60 .. 86400 s".to_owned())
+}
 
 /// `0,2`.
 fn span(text: &str) -> std::result::Result<Span, String> {

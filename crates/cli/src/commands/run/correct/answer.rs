@@ -2,16 +2,13 @@
 
 use diagnosis::MATTERS;
 use diagnosis::result::{Diagnosis, Finding};
-use imu_stand::correct::{Change, Judged, Noise, Proposed, Row, SPANS_S};
+use imu_stand::correct::{Change, Judged, NEAR, Needed, Proposed, Row, SPANS_S};
 use imu_stand::stand::planted::Comparison;
 use model::ModelFile;
-use model::effect::value;
 use serde::Serialize;
 use std::fmt::Write as _;
 
 const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
-/// Steps of the motor's command at full duty.
-const FULL_DUTY: f64 = 255.0;
 /// Causes that the board takes off, with the parameters that it has terms for.
 const CORRECTED: [(&str, &[&str]); 7] = [
     ("temperature", &["slope"]),
@@ -36,6 +33,58 @@ struct Written {
     notes: Vec<String>,
 }
 
+/// The first record.
+#[derive(Serialize)]
+pub struct Recorded {
+    /// Its length, s.
+    pub seconds: f64,
+    /// As asked for, s.
+    asked_s: f64,
+    /// What a record of that length is too short for.
+    pub needed: Option<Needed>,
+}
+
+impl Recorded {
+    /// As long as asked for.
+    pub fn new(asked_s: f64) -> Self {
+        Self {
+            seconds: asked_s,
+            asked_s,
+            needed: None,
+        }
+    }
+
+    /// Why it is as long as it is.
+    fn line(&self) -> Option<String> {
+        let Some(needed) = &self.needed else {
+            return (self.seconds > self.asked_s).then(|| {
+                format!(
+                    "first record: {:.0} s, as long as the second: what that can show is to be in the model",
+                    self.seconds
+                )
+            });
+        };
+        let more = if self.seconds < needed.seconds {
+            format!(
+                "; {:.0} s would bring it within {NEAR} times that (`--longest {:.0}`)",
+                needed.seconds, needed.seconds
+            )
+        } else {
+            String::new()
+        };
+        Some(format!(
+            "first record: {:.0} s, because by {:.0} s {} on {} is so unsure that the corrected rates would be off by {} deg over {:.0} s, where the noise alone leaves {}{more}",
+            self.seconds,
+            self.asked_s,
+            needed.cause,
+            needed.channel,
+            short(needed.expected_deg),
+            needed.span_s,
+            short(needed.floor_deg),
+        ))
+    }
+}
+
 /// A cause that was corrected on an axis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
@@ -47,6 +96,7 @@ pub struct Cause {
 #[derive(Serialize)]
 pub struct Answer {
     format: &'static str,
+    recorded: Recorded,
     correction: Written,
     /// Angle errors in the second history.
     angle_errors: Vec<Judged>,
@@ -66,7 +116,7 @@ pub struct Answer {
 }
 
 /// The causes that a model has corrected, by axis.
-fn corrected_causes(model: &ModelFile) -> Vec<Cause> {
+pub fn corrected_causes(model: &ModelFile) -> Vec<Cause> {
     let effects = model.effects.iter();
     let those = effects.filter(|e| CORRECTED.iter().any(|(cause, _)| *cause == e.cause));
     let by_axis = those.flat_map(|effect| {
@@ -84,49 +134,11 @@ fn corrected_causes(model: &ModelFile) -> Vec<Cause> {
     all
 }
 
-/// What a model says of the noise beside what is corrected.
-pub fn model_noise(model: &ModelFile, proposed: &Proposed) -> [Noise; 3] {
-    let mut all = [Noise::default(), Noise::default(), Noise::default()];
-    for (axis, noise) in all.iter_mut().enumerate() {
-        let channel = model.channels.iter().find(|c| c.name == GYROS[axis]);
-        let of = |key: &str| {
-            let parameter = channel.and_then(|c| c.baseline.get(key));
-            parameter.map_or(0.0, |p| p.value)
-        };
-        noise.block = proposed.board.correction.noise[axis];
-        // N is in deg/sqrt(h).
-        (noise.n, noise.k) = (of("angle_random_walk") / 60.0, of("rate_random_walk"));
-        let here =
-            |channels: &[String]| channels.is_empty() || channels.iter().any(|c| c == GYROS[axis]);
-        for effect in model.effects.iter().filter(|e| here(&e.channels)) {
-            let p = &effect.parameters;
-            let error = |name: &str| p.get(name).and_then(|p| p.std_error).unwrap_or(0.0);
-            let temp = ["temp_x", "temp_y", "temp_z"][axis].to_owned();
-            match effect.cause.as_str() {
-                "gauss_markov" => noise
-                    .wanders
-                    .push((value(p, "sigma"), value(p, "correlation_time"))),
-                "temperature" | "temperature_quadratic" => {
-                    noise.uncertain.push((error("slope"), temp));
-                }
-                "motor_bias" => noise
-                    .uncertain
-                    .push((error("at_full_duty") / FULL_DUTY, "pwm".to_owned())),
-                "supply_sensitivity" => noise.uncertain.push((error("slope"), "supply".to_owned())),
-                "cross_axis" => noise
-                    .uncertain
-                    .extend(GYROS.map(|gyro| (error(&format!("from_{gyro}")), gyro.to_owned()))),
-                _ => {}
-            }
-        }
-    }
-    all
-}
-
 impl Answer {
     pub fn new(
         model: &ModelFile,
         proposed: Proposed,
+        recorded: Recorded,
         angle_errors: Vec<Judged>,
         planted: Option<Comparison>,
         first: Vec<Diagnosis>,
@@ -150,6 +162,7 @@ impl Answer {
         });
         Self {
             format: "imu-stand-loop/1",
+            recorded,
             correction: Written {
                 number: proposed.board.correction.number,
                 changed: proposed.changed,
@@ -168,10 +181,11 @@ impl Answer {
 
     /// For people.
     pub fn lines(&self) -> Vec<String> {
-        let mut lines = vec![format!(
+        let mut lines: Vec<String> = self.recorded.line().into_iter().collect();
+        lines.push(format!(
             "correction {:#06x} written, read back, in use; the same stand again under another history",
             self.correction.number
-        )];
+        ));
         lines.extend(
             self.correction
                 .notes

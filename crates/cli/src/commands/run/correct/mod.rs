@@ -10,7 +10,9 @@ use std::path::{Path, PathBuf};
 use diagnosis::DiagnoseOptions;
 use diagnosis::result::Diagnosis;
 use imu_stand::capture::{ReadOptions, corrected, read_capture};
-use imu_stand::correct::{Proposed, Stage, Taken, judge, record};
+use imu_stand::correct::{
+    Noise, Proposed, Stage, Taken, judge, keep_what_is_worth_it, needed, record,
+};
 use imu_stand::link::{DEFAULT_BAUD, Link};
 use imu_stand::stand::planted::{compare, planted};
 use imu_stand::stand::{Board, Plan, Simulated, another_history, without_defects, without_errors};
@@ -21,11 +23,14 @@ use model::record::Record;
 
 use super::super::outputs;
 use super::{Arguments, Outputs};
-use answer::{Answer, model_noise};
-use stages::{BEGIN_S, Length, Planned};
+use answer::{Answer, Recorded, corrected_causes};
+use stages::{BEGIN_S, Length, Planned, REST_S};
 
 /// Causes that a stand shows only while it turns: they are taken from the record of its sway.
 const OF_TURNS: [&str; 2] = ["cross_axis", "scale_error"];
+
+/// The first record becomes so many times as long as was asked for, at the most, where nobody says how long.
+const LONGEST_TIMES: f64 = 12.0;
 
 /// The files of the loop: beside `run.csv` run-sway.csv, run-corrected.csv, run-corrected-sway.csv and run.toml.
 struct Files {
@@ -124,7 +129,7 @@ impl Loop<'_> {
         let sways =
             matches!(&bench, Bench::Simulated(_, plan) if plan.run.scenario.base.sway_deg != 0.0);
         let seconds = self.arguments.seconds;
-        let first = Planned::new(Length::First(seconds), sways, seeds.fault);
+        let mut first = Planned::new(Length::First(seconds), sways, seeds.fault);
         let second = Planned::new(Length::Second(seconds), sways, again);
 
         let (mut link, scenarios) = match bench {
@@ -136,35 +141,51 @@ impl Loop<'_> {
             }
         };
         let mark = scenarios.is_some();
-        let mut taken = self.take(&mut link, &first)?;
+        let all = first.courses.len();
+        let mut taken = self.take(&mut link, &first, all)?;
         self.write(&mut taken, 0, mark)?;
-        let found = self.diagnose(0, taken.len())?;
-        let model = model_of(&found)?;
+        let mut found = self.diagnose(0, all)?;
+        let mut recorded = Recorded::new(seconds);
+        if let Some(longer) = self.longer(&taken[0], &found, &mut recorded) {
+            first = Planned::new(Length::First(longer), sways, seeds.fault);
+            if let Some((board, plan, _)) = &scenarios {
+                link = simulated(board, first.scenario(&plan.run.scenario));
+            }
+            // What the sway tells is known already.
+            self.write(&mut self.take(&mut link, &first, 1)?, 0, mark)?;
+            found.splice(..1, self.diagnose(0, 1)?);
+        }
+        let mut model = model_of(&found)?;
+        let refused = keep_what_is_worth_it(&mut model);
         super::super::write(&self.files.model, &model.to_toml())?;
-        let model = match &self.arguments.correct_by {
-            Some(path) => super::super::read_model(path)?,
-            None => model,
+        let (model, refused) = match &self.arguments.correct_by {
+            Some(path) => (super::super::read_model(path)?, Vec::new()),
+            None => (model, refused),
         };
 
         // The same parts: another history of the simulated stand, or the same board a while later.
         if let Some((board, _, two)) = &scenarios {
             link = simulated(board, two.clone());
         }
-        let proposed = Proposed::of(&mut link, &model)?.map_err(|error| {
+        let mut proposed = Proposed::of(&mut link, &model)?.map_err(|error| {
             miette::miette!(
                 help = "nothing was written; docs/wire-format.md lists what the board holds",
                 "the model of the first record: {error}"
             )
         })?;
         proposed.write(&mut link)?;
-        let mut taken = self.take(&mut link, &second)?;
+        proposed.board.notes.extend(refused);
+        let mut taken = self.take(&mut link, &second, all)?;
         drop(link);
         self.write(&mut taken, 1, mark)?;
         let known = match &scenarios {
             Some((board, _, two)) => Some(self.known(board, &second, two, &model, seeds.stand)?),
             None => None,
         };
-        let noise = model_noise(&model, &proposed);
+        let mut noise = Noise::of_model(&model);
+        for (noise, block) in noise.iter_mut().zip(proposed.board.correction.noise) {
+            noise.block = block;
+        }
         let judged: Vec<_> = (taken.iter().zip(&second.courses).enumerate())
             .map(|(k, (taken, (what, _)))| {
                 let stage = Stage {
@@ -189,6 +210,7 @@ impl Loop<'_> {
         let answer = Answer::new(
             &model,
             proposed,
+            recorded,
             judged,
             comparison,
             found.into_iter().map(|f| f.diagnosis).collect(),
@@ -199,11 +221,31 @@ impl Loop<'_> {
         Ok(())
     }
 
-    /// The records of a history.
-    fn take(&self, link: &mut Link, planned: &Planned) -> Result<Vec<Taken>> {
+    /// How long the first record has to be when it is taken again, s, as far as the user lets it: as the coefficients need, and as
+    /// long as the second one, for what that can show is to be in the model.
+    fn longer(&self, rest: &Taken, found: &[Found], recorded: &mut Recorded) -> Option<f64> {
+        let model = &found.first()?.model;
+        if self.arguments.correct_by.is_some() || corrected_causes(model).is_empty() {
+            return None;
+        }
+        let asked_s = recorded.seconds;
+        let second_s = Length::Second(asked_s).seconds();
+        let judged_s = [REST_S, second_s - REST_S];
+        recorded.needed = needed(&rest.record, &Noise::of_model(model), judged_s);
+        let wanted = recorded
+            .needed
+            .as_ref()
+            .map_or(0.0, |needed| needed.seconds);
+        let longest = self.arguments.longest.unwrap_or(LONGEST_TIMES * asked_s);
+        recorded.seconds = wanted.max(second_s).min(longest).max(asked_s);
+        (recorded.seconds > asked_s).then_some(recorded.seconds)
+    }
+
+    /// The first so many records of a history.
+    fn take(&self, link: &mut Link, planned: &Planned, count: usize) -> Result<Vec<Taken>> {
         let mut all = Vec::new();
         self.bar.set_length(planned.end_s() as u64);
-        for (_, course) in &planned.courses {
+        for (_, course) in planned.courses.iter().take(count) {
             let bar = &self.bar;
             let from = course.from.as_secs_f64();
             let taken = record(link, course, |t| {
@@ -268,12 +310,12 @@ impl Loop<'_> {
         Proposed::of(&mut link, &perfect(model, &sound))?
             .map_err(|error| miette::miette!("the noise of the stand itself: {error}"))?
             .write(&mut link)?;
-        let limit = self.take(&mut link, planned)?;
+        let limit = self.take(&mut link, planned, planned.courses.len())?;
         drop(link);
         let moves = sound.base.sway_deg != 0.0 || !sound.faults.is_empty();
         let exact = || {
             let mut link = simulated(&Board::Native, without_errors(scenario, stand));
-            self.take(&mut link, planned)
+            self.take(&mut link, planned, planned.courses.len())
         };
         let truth = moves.then(exact).transpose()?;
         Ok(Known { limit, truth })

@@ -10,7 +10,7 @@ use model::record::Base;
 /// When records begin, s since power came on: a correction is written and read back in 6 s before.
 pub const BEGIN_S: f64 = 20.0;
 /// The rest in which the bias is taken, s.
-const REST_S: f64 = 60.0;
+pub const REST_S: f64 = 60.0;
 /// Between two records, s: the motor runs down in 2.
 const GAP_S: f64 = 5.0;
 /// The record of the sway: its rest, and its length, s.
@@ -25,6 +25,16 @@ pub enum Length {
     Second(f64),
 }
 
+impl Length {
+    /// In seconds.
+    pub fn seconds(&self) -> f64 {
+        match *self {
+            Length::First(seconds) => seconds,
+            Length::Second(seconds) => REST_S + 2.0 * seconds,
+        }
+    }
+}
+
 /// The records of a history.
 pub struct Planned {
     /// In words, and the course.
@@ -33,10 +43,7 @@ pub struct Planned {
 
 impl Planned {
     pub fn new(length: Length, sways: bool, seed: u64) -> Self {
-        let seconds = match length {
-            Length::First(seconds) => seconds,
-            Length::Second(seconds) => REST_S + 2.0 * seconds,
-        };
+        let seconds = length.seconds();
         let rest = Course {
             from: Duration::from_secs_f64(BEGIN_S),
             seconds,

@@ -1,0 +1,122 @@
+//! Which of a model's effects a correction makes better, and which it would make worse.
+//!
+//! A coefficient c that is known to e takes c off and leaves e: of c^2 the part c^2 - e^2 is real, so that it is worth it where
+//! c^2 > 2 e^2. A scale that was held against the tilt of accelerometers is as good as theirs: below their own tolerance it
+//! says nothing of the gyro.
+
+use model::ModelFile;
+use model::file::EffectModel;
+use model::parameter::Parameter;
+
+/// Standard errors from which on a coefficient is more than its error.
+const WORTH: f64 = std::f64::consts::SQRT_2;
+/// Tolerance of the accelerometers' sensitivity, 1 (MMA7260QT data sheet: 740 to 860 mV/g).
+const ACC_TOLERANCE: f64 = 0.075;
+/// Standard errors beyond which a size is not chance (95 %).
+const NORMAL_95: f64 = 1.96;
+/// Causes whose coefficients multiply channels of their own, and stand alone.
+const ALONE: [&str; 2] = ["cross_axis", "g_sensitivity"];
+
+/// Takes out of a model what a correction by it would make worse; says what, and why.
+pub fn keep_what_is_worth_it(model: &mut ModelFile) -> Vec<String> {
+    let mut refused = Vec::new();
+    model.effects.retain_mut(|effect| match worth(effect) {
+        Ok(()) => true,
+        Err(why) => {
+            refused.push(format!(
+                "{} on {} is not corrected: {why}",
+                effect.cause,
+                effect.channels.join(", ")
+            ));
+            false
+        }
+    });
+    refused
+}
+
+fn is_worth(p: &Parameter) -> bool {
+    p.std_error
+        .is_none_or(|error| p.value.abs() > WORTH * error)
+}
+
+fn worth(effect: &mut EffectModel) -> Result<(), String> {
+    let cause = effect.cause.as_str();
+    if cause == "scale_error"
+        && let Some(relative) = effect.parameters.get("relative")
+    {
+        let error = NORMAL_95 * relative.std_error.unwrap_or(0.0);
+        if relative.value.abs() < ACC_TOLERANCE + error {
+            return Err(format!(
+                "{:.1} +- {:.1} % against the tilt of accelerometers, whose own scale is within {:.1} %; a rate table tells",
+                100.0 * relative.value,
+                100.0 * error,
+                100.0 * ACC_TOLERANCE
+            ));
+        }
+    }
+    if ALONE.contains(&cause) {
+        for p in effect.parameters.values_mut().filter(|p| !is_worth(p)) {
+            p.value = 0.0;
+        }
+    }
+    let mut sizes = effect.parameters.values().filter(|p| p.std_error.is_some());
+    if sizes.clone().next().is_some() && sizes.all(|p| !is_worth(p)) {
+        return Err("it is no larger than its own uncertainty".to_owned());
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kept(effect: &str) -> (ModelFile, Vec<String>) {
+        let mut text = ModelFile::paper().to_toml();
+        text.push_str(effect);
+        let mut model = ModelFile::parse(&text).expect("a model");
+        let refused = keep_what_is_worth_it(&mut model);
+        (model, refused)
+    }
+
+    #[test]
+    fn a_scale_within_the_accelerometers_own_tolerance_is_refused_and_one_beyond_it_is_not() {
+        for (relative, error, stays) in [
+            (0.07, 0.001, false),
+            (-0.08, 0.01, false),
+            (0.2, 0.01, true),
+        ] {
+            let (model, refused) = kept(&format!(
+                "[[effect]]\ncause = \"scale_error\"\nchannels = [\"gyro_x\"]\nrelative = {{ value = {relative}, std_error = {error}, unit = \"1\" }}\n"
+            ));
+            assert_eq!(model.effects.len(), usize::from(stays), "{relative}");
+            assert_eq!(refused.is_empty(), stays);
+            assert!(
+                refused
+                    .iter()
+                    .all(|why| why.starts_with("scale_error on gyro_x is not corrected: "))
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_smaller_than_its_own_error_is_refused_by_itself_where_it_stands_alone() {
+        let slope = |value: f64| {
+            kept(&format!(
+                "[[effect]]\ncause = \"temperature\"\nchannels = [\"gyro_y\"]\nslope = {{ value = {value}, std_error = 0.02, unit = \"deg/s/degC\" }}\n"
+            ))
+        };
+        assert_eq!(slope(-0.029).0.effects.len(), 1);
+        let (model, refused) = slope(-0.028);
+        assert!(model.effects.is_empty());
+        assert!(
+            refused[0].ends_with("no larger than its own uncertainty"),
+            "{refused:?}"
+        );
+        let (model, refused) = kept(
+            "[[effect]]\ncause = \"cross_axis\"\nchannels = [\"gyro_y\"]\nfrom_gyro_x = { value = 0.05, std_error = 0.001, unit = \"1\" }\nfrom_gyro_z = { value = 0.01, std_error = 0.02, unit = \"1\" }\n",
+        );
+        let share = |of: &str| model.effects[0].parameters[of].value;
+        assert_eq!((share("from_gyro_x"), share("from_gyro_z")), (0.05, 0.0));
+        assert!(refused.is_empty());
+    }
+}
