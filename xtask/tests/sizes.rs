@@ -29,11 +29,6 @@ const LONG_FUNCTIONS: &[(&str, &str, &str)] = &[
         "one arm for each thing that is hidden",
     ),
     (
-        "crates/diagnosis/src/criticise/common_noise.rs",
-        "common",
-        "to be split",
-    ),
-    (
         "crates/diagnosis/src/two_level/filter_bank.rs",
         "run",
         "one loop over the readings, whose state stays in registers",
