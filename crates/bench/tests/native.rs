@@ -245,11 +245,11 @@ fn a_stored_set_up_outlasts_a_reboot() {
         })
         .collect();
     let heard = hear(&run);
-    let hellos = heard.frames.iter().filter_map(|(_, frame)| match frame {
+    let mut hellos = heard.frames.iter().filter_map(|(_, frame)| match frame {
         Frame::Hello(hello) => Some(hello.board_id),
         _ => None,
     });
-    assert_eq!(hellos.last(), Some(4242));
+    assert_eq!(hellos.next_back(), Some(4242));
 }
 
 #[test]
