@@ -12,6 +12,12 @@ const VECTORS: usize = 21;
 /// Where its SRAM begins.
 const SRAM: usize = 0x60;
 
+/// Where the statics of the image end, an address of SRAM.
+fn end_of_statics(simulated: &Simulated<NoProbe>) -> u32 {
+    let end = simulated.mcu().image().symbol("_end");
+    end.expect("the linker's") & 0xffff
+}
+
 #[test]
 fn the_deepest_stack_leaves_room_with_every_command_at_any_phase_of_the_tick() {
     let seconds = 60.0;
@@ -84,12 +90,7 @@ fn the_deepest_stack_leaves_room_with_every_command_at_any_phase_of_the_tick() {
     let mut heard = Heard::default();
     let ended = simulated.run_until(seconds, &mut |byte| heard.push(byte));
     let lowest = simulated.mcu().min_stack_pointer().expect("watched");
-    let end = simulated
-        .mcu()
-        .image()
-        .symbol("_end")
-        .expect("the linker's")
-        & 0xffff;
+    let end = end_of_statics(&simulated);
     println!(
         "{number} requests: deepest stack {} B, {} B between it and the statics, which end at {end:#x}",
         0x45f - u32::from(lowest),
@@ -125,12 +126,7 @@ fn a_stack_that_came_near_the_statics_is_told_to_the_byte_and_counted() {
     let (free, low) = run(&mut simulated, 2.5);
     assert!(free > 64 && low == 0, "{free} B left, {low} times low");
     // What a call that deep would have left there.
-    let end = simulated
-        .mcu()
-        .image()
-        .symbol("_end")
-        .expect("the linker's")
-        & 0xffff;
+    let end = end_of_statics(&simulated);
     let place = end as usize + usize::from(LEFT) - SRAM;
     simulated.mcu_mut().sram_mut()[place] = 0;
     let (free, low) = run(&mut simulated, 5.6);

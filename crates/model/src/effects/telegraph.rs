@@ -38,7 +38,7 @@ impl Effect for Telegraph {
             excitation: "Nothing; many switches within the record.",
             test: "Likelihood of a two-level hidden Markov chain against Gauss-Markov and steps; Bartlett's test of the dwell times, which are exponential where it switches at random.",
             remedy: "Check contacts and replace the part where it persists; until then simulate two levels with this dwell time and let the filter's bias follow.",
-            figure: "Rate in time blocks with the most probable level.",
+            figure: "Rate in time blocks beside a simulation without the two levels.",
             example: Example::new(
                 Plot::RateInTime { block_s: 2.0 },
                 &[("half_height", 0.3), ("dwell_time", 40.0)],

@@ -54,6 +54,9 @@ impl Field<'_> {
     /// The level, sample by sample; none where only a stretch was weighed, and where it is so much in doubt that taking it
     /// off would take noise off.
     pub(super) fn level(&self, state: &State, x: &Coordinates) -> Option<Vec<f64>> {
+        if self.first > 0 {
+            return None;
+        }
         let steps_at = (x[2] + 0.5 * x[0]).exp();
         // Behind a filter neighbours are no independent witnesses of a level; means of blocks are.
         let levels = if state.terms.iter().any(Term::is_filter) {
@@ -65,7 +68,7 @@ impl Field<'_> {
         };
         let doubt = levels.iter().map(|l| 1.0 - (l / steps_at).powi(2));
         let doubt = doubt.sum::<f64>() / levels.len() as f64;
-        (self.first == 0 && doubt < LARGEST_DOUBT).then_some(levels)
+        (doubt < LARGEST_DOUBT).then_some(levels)
     }
 }
 
