@@ -113,6 +113,8 @@ pub struct Outcome {
     pub wrong: Vec<String>,
     /// What is unexplained.
     pub unexplained: Vec<String>,
+    /// The checks that see each of those entries; none where a term of the search without a name is all there is.
+    pub checks: Vec<Vec<String>>,
     /// Estimates of what was named.
     pub estimates: Vec<Estimate>,
     /// Rate random walks of the axes.
@@ -432,6 +434,7 @@ pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
             .iter()
             .map(|u| format!("{}: {}", u.channel, u.what))
             .collect(),
+        checks: d.unexplained.iter().map(|u| u.checks.clone()).collect(),
         estimates,
         walks,
         strength: strange,

@@ -42,6 +42,8 @@ struct Line {
     truths: Vec<(String, Option<f64>, Hit)>,
     wrong: Vec<String>,
     unexplained: Vec<String>,
+    #[serde(default)]
+    checks: Vec<Vec<String>>,
     estimates: Vec<(String, String, f64, f64, f64)>,
     walks: [f64; 3],
     strength: Option<f64>,
@@ -71,6 +73,7 @@ impl Line {
                 .collect(),
             wrong: o.wrong.clone(),
             unexplained: o.unexplained.clone(),
+            checks: o.checks.clone(),
             estimates: o
                 .estimates
                 .iter()
@@ -116,6 +119,7 @@ impl Line {
                 .collect::<Option<Vec<_>>>()?,
             wrong: self.wrong,
             unexplained: self.unexplained,
+            checks: self.checks,
             estimates: self
                 .estimates
                 .into_iter()
@@ -208,6 +212,7 @@ mod tests {
             truths: vec![(BY_STRENGTH[2], 8.5, Hit::InSet)],
             wrong: vec!["line on gyro_x".into()],
             unexplained: vec![],
+            checks: vec![],
             estimates: vec![Estimate {
                 label: BY_STRENGTH[2],
                 parameter: "amplitude".into(),

@@ -9,6 +9,7 @@ use crate::plant::{BY_COUNT, BY_STRENGTH, asked_from, strong as row_of};
 use crate::tally::{ORACLE, Rate, d95, oracle};
 
 mod bars;
+mod checks;
 mod company;
 
 /// Whether a run says something that a summary hides.
@@ -148,6 +149,7 @@ pub fn page(all: &[Outcome], command: &str, date: &str, seconds: f64, planned: u
     counted(&mut out, all);
     company::tables(&mut out, all);
     foreign(&mut out, all);
+    checks::table(&mut out, all);
     intervals(&mut out, all);
     confusion(&mut out, all);
     times(&mut out, all);

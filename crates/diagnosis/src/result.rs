@@ -38,7 +38,7 @@ pub struct Input {
 /// One omnibus check of a channel, against the model before and after it was extended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Check {
-    /// `ljung_box`, `band_energy`, `variance_in_time`, ...
+    /// `ljung_box`, `band_energy`, `time_frequency`, ...
     pub id: String,
     /// The channel, or `record` where it concerns all.
     pub channel: String,

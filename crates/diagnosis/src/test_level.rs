@@ -121,12 +121,10 @@ checks! {
     LjungBox "ljung_box" OMNIBUS_LEVEL, OfAxis;
     BandEnergy "band_energy" OMNIBUS_LEVEL, OfAxis;
     TimeFrequency "time_frequency" OMNIBUS_LEVEL, OfAxis;
-    VarianceInTime "variance_in_time" OMNIBUS_LEVEL, OfAxis;
     Kurtosis "kurtosis" OMNIBUS_LEVEL, OfAxis;
     Skewness "skewness" OMNIBUS_LEVEL, OfAxis;
     Bicovariance "bicovariance" OMNIBUS_LEVEL, OfAxis;
     ThreeReadings "three_readings" OMNIBUS_LEVEL, OfAxis;
-    Neighbours "neighbours" OMNIBUS_LEVEL, OfAxis;
     VarianceRhythm "variance_rhythm" OMNIBUS_LEVEL, OfAxis;
     Period "period" OMNIBUS_LEVEL, OfAxis;
     ColourFollows "colour_follows" OMNIBUS_LEVEL, OfAxis;
@@ -146,8 +144,6 @@ checks! {
     ProcessSource "process_source" CLAIM_LEVEL, Named;
     ProcessRhythm "process_rhythm" CLAIM_LEVEL, Named;
     BandSpectrum "band_spectrum" CLAIM_LEVEL, Named;
-    BandSteadiness "band_steadiness" CLAIM_LEVEL, Named;
-    BandSize "band_size" CLAIM_LEVEL, Named;
     BandEnvelope "band_envelope" ENVELOPE_LEVEL, Named;
     BandSource "band_source" CLAIM_LEVEL, Named;
     BandAlone "band_alone" ENVELOPE_LEVEL, Named;
@@ -207,12 +203,11 @@ impl CheckId {
             Self::LjungBox => "neighbouring readings depend on each other",
             Self::BandEnergy => "some frequencies hold another energy than the model's",
             Self::TimeFrequency => "energy comes and goes at some frequencies",
-            Self::VarianceInTime => "the noise has another size for a while",
             Self::VarianceRhythm => "the size of the noise swings",
             Self::VarianceFollows => "the size of the noise follows what was recorded",
             Self::Kurtosis => "the noise has tails that are not normal",
             Self::Skewness => "the noise reaches farther to one side",
-            Self::Bicovariance | Self::ThreeReadings | Self::Neighbours => {
+            Self::Bicovariance | Self::ThreeReadings => {
                 "readings depend on each other as those of no linear, normal noise do"
             }
             Self::Period => "a pattern comes again and again",
@@ -229,12 +224,9 @@ impl CheckId {
             | Self::ProcessSize
             | Self::ProcessSource
             | Self::ProcessRhythm => "a coloured noise of no known kind",
-            Self::BandSpectrum
-            | Self::BandSteadiness
-            | Self::BandSize
-            | Self::BandEnvelope
-            | Self::BandSource
-            | Self::BandAlone => "a band of no known kind",
+            Self::BandSpectrum | Self::BandEnvelope | Self::BandSource | Self::BandAlone => {
+                "a band of no known kind"
+            }
             Self::VarianceLaw => "the size of the noise changes by no known law",
             Self::FollowerLaw => "it follows a channel by no known law",
             _ => return None,
@@ -253,10 +245,8 @@ impl CheckId {
         Self::ProcessSource,
     ];
     /// The same of what stands at one frequency.
-    pub const OF_BAND: [Self; 6] = [
+    pub const OF_BAND: [Self; 4] = [
         Self::BandSpectrum,
-        Self::BandSteadiness,
-        Self::BandSize,
         Self::BandEnvelope,
         Self::BandSource,
         Self::BandAlone,

@@ -284,7 +284,7 @@ fn rails_explain_a_variance_that_follows_the_level() {
             "{:?}",
             causes(&a)
         );
-        assert_eq!(a.is_suppressed("variance_in_time", "gyro_y"), step > 0);
+        assert_eq!(a.is_suppressed("time_frequency", "gyro_y"), step > 0);
     }
 }
 

@@ -104,7 +104,7 @@ impl Audit {
         ratio: Option<f64>,
     ) -> bool {
         let by_fault = |s: &Suppression| {
-            s.id == "variance_in_time" && s.channel == channel && s.by != rounding::STEP
+            s.id == "time_frequency" && s.channel == channel && s.by != rounding::STEP
         };
         let rounded = self.rounded.get(channel);
         self.suppressed.iter().any(by_fault)
@@ -118,11 +118,9 @@ impl Audit {
             &[
                 "kurtosis",
                 "skewness",
-                "variance_in_time",
                 "time_frequency",
                 "bicovariance",
                 "three_readings",
-                "neighbours",
                 "variance_rhythm",
                 CheckId::ColourFollows.as_str(),
                 CheckId::Leaning.as_str(),
@@ -142,7 +140,6 @@ impl Audit {
                 "skewness",
                 "bicovariance",
                 "three_readings",
-                "neighbours",
                 CheckId::Leaning.as_str(),
             ];
             self.suppress(&ids, channel, by);

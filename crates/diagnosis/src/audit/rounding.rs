@@ -211,11 +211,9 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     let [least, largest] = rounded.variances;
     if largest - least > SWINGS {
         let ids = [
-            "variance_in_time",
             "time_frequency",
             "bicovariance",
             "three_readings",
-            "neighbours",
             "variance_rhythm",
             "variance_follows",
             CheckId::ColourFollows.as_str(),

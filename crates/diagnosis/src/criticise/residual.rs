@@ -8,28 +8,24 @@ use numerics::tails::{chi_tail, kurtosis_score, normal_tail};
 
 mod dependence;
 
-pub(crate) use dependence::{
-    Repeats, bicovariance, neighbours, repeats, three_readings, variance_rhythm,
-};
+pub(crate) use dependence::{Repeats, bicovariance, repeats, three_readings, variance_rhythm};
 
 /// Lags of the Ljung-Box statistic.
 const LAGS: usize = 20;
 /// Bands.
 const BANDS: usize = 19;
 
-/// All checks of one channel, whose readings come in steps of `step` standard deviations of the residual (0: none known).
+/// All checks of one channel: its whitened coefficients, and the same in time.
 #[must_use]
-pub fn all(u: &[f64], e: &[f64], rate_hz: f64, step: f64) -> Vec<Outcome> {
+pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
     vec![
         ljung_box(e),
         bands(u, rate_hz),
         tiles(e, rate_hz),
-        variance_cusum(e, rate_hz),
         kurtosis(e, rate_hz),
         skewness(e),
         dependence::bicovariance(e),
         dependence::three_readings(e),
-        dependence::neighbours(e, step),
         dependence::variance_rhythm(e, rate_hz),
         dependence::period(e, rate_hz),
     ]
@@ -305,43 +301,6 @@ fn tiles(e: &[f64], rate_hz: f64) -> Outcome {
         p_value: 1.0,
         what: "too short for tiles".into(),
     })
-}
-
-fn variance_cusum(e: &[f64], rate_hz: f64) -> Outcome {
-    let n = e.len() as f64;
-    let mean = e.iter().map(|v| v * v).sum::<f64>() / n;
-    let spread = e.iter().map(|v| (v * v - mean).powi(2)).sum::<f64>() / n;
-    let (mut sum, mut low, mut high) = (0.0, (0.0, 0usize), (0.0, 0usize));
-    for (i, v) in e.iter().enumerate() {
-        sum += v * v - mean;
-        if sum < low.0 {
-            low = (sum, i);
-        }
-        if sum > high.0 {
-            high = (sum, i);
-        }
-    }
-    let v = (high.0 - low.0) / (n * spread).sqrt();
-    let p: f64 = (1..=40)
-        .map(|j| {
-            let x = 2.0 * (f64::from(j) * v).powi(2);
-            2.0 * (2.0 * x - 1.0) * (-x).exp()
-        })
-        .sum();
-    let (from, to) = (
-        low.1.min(high.1) as f64 / rate_hz,
-        low.1.max(high.1) as f64 / rate_hz,
-    );
-    let size = if low.1 < high.1 { "larger" } else { "smaller" };
-    Outcome {
-        id: CheckId::VarianceInTime,
-        about: vec![],
-        statistic: v,
-        p_value: if v < 0.9 { 1.0 } else { p.clamp(0.0, 1.0) },
-        what: format!(
-            "range of the cumulated squares of the whitened residual; it is {size} from {from:.1} to {to:.1} s"
-        ),
-    }
 }
 
 /// Kurtosis about 0, less the 3 of a normal distribution.

@@ -258,8 +258,7 @@ pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
 }
 
 /// Tests that withdraw the name of a law of the variance where they fail.
-const OF_VARIANCE: [CheckId; 6] = [
-    CheckId::VarianceInTime,
+const OF_VARIANCE: [CheckId; 5] = [
     CheckId::VarianceLaw,
     CheckId::ColourFollows,
     CheckId::Order,
