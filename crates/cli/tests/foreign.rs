@@ -298,7 +298,7 @@ fn a_misspelt_column_is_told_with_the_name_that_was_meant_and_another_spelling_i
     for told in [
         "`Gyro-Y` is taken as `gyro_y`",
         "`temp_X` is taken as `temp_x`",
-        "`gyro_zz` is none of the format's, so it is a channel of its own that explains nothing: did you mean `gyro_z`?",
+        "`gyro_zz` is none of the format's, so it is a channel of its own, which no cause knows: did you mean `gyro_z`?",
     ] {
         let times = notes.iter().filter(|note| note.contains(told)).count();
         assert_eq!(times, 1, "{told}: {notes:?}");

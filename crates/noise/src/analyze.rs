@@ -247,7 +247,12 @@ pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, An
                 let channels = record.channels.iter();
                 channels.filter(|c| all.contains(&c.quantity)).collect()
             };
-            let main = of(&[Quantity::Gyro, Quantity::Acc, Quantity::Other]);
+            let main = of(&[
+                Quantity::Gyro,
+                Quantity::Acc,
+                Quantity::Other,
+                Quantity::Derived,
+            ]);
             // Who has nothing else to show has chosen by that.
             if main.is_empty() {
                 of(&[Quantity::Temp, Quantity::Supply])

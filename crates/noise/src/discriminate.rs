@@ -210,7 +210,7 @@ fn signals(world: &World) -> Vec<Signal> {
             Quantity::Acc => "m/s^2",
             Quantity::Temp => "degC",
             Quantity::Supply => "V",
-            Quantity::Pwm | Quantity::Other => "1",
+            Quantity::Pwm | Quantity::Other | Quantity::Derived => "1",
         }
         .to_owned(),
         values: Arc::new(values.to_vec()),

@@ -323,7 +323,7 @@ impl RecordBuilder {
         let rates = [0, 1, 2].map(|axis| {
             let counts = counts(&|c| c.rate[axis]);
             let scale = (0.0, CORRECTED_LSB_DPS);
-            in_counts(CORRECTED[axis], Quantity::Other, "deg/s", scale, &counts)
+            in_counts(CORRECTED[axis], Quantity::Derived, "deg/s", scale, &counts)
         });
         // A firmware without an attitude leaves its cells empty.
         let attitude = [0, 1, 2, 3].map(|part: usize| {
@@ -339,7 +339,7 @@ impl RecordBuilder {
         let others = (OF_CORRECTION.into_iter().zip(lsb))
             .zip(others.into_iter().chain(attitude))
             .map(|((name, lsb), counts)| {
-                in_counts(name, Quantity::Other, "1", (0.0, lsb), &counts)
+                in_counts(name, Quantity::Derived, "1", (0.0, lsb), &counts)
             });
         rates.into_iter().chain(others.collect::<Vec<_>>())
     }

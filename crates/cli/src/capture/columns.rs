@@ -478,13 +478,13 @@ fn role_of(name: &str, lines: &Lines, is_capture: bool) -> Result<Option<Role>, 
         }
         (_, Quantity::Pwm) => scaled(0.0, 1.0, "1"),
         (name, _) if is_capture && CORRECTED.contains(&name) => Role::Measured {
-            quantity,
+            quantity: Quantity::Derived,
             unit: "deg/s".to_owned(),
             zero: 0.0,
             scale: lines.scale("corrected_lsb_dps", name)?,
             counts: false,
         },
-        (_, Quantity::Other) => return Ok(None),
+        (_, Quantity::Other | Quantity::Derived) => return Ok(None),
     }))
 }
 
@@ -492,7 +492,7 @@ fn role_of(name: &str, lines: &Lines, is_capture: bool) -> Result<Option<Role>, 
 fn misspelt(name: &str, missing: &[&'static str]) -> Option<String> {
     let ours = meant(name, missing)?;
     Some(format!(
-        "column `{}` is none of the format's, so it is a channel of its own that explains nothing: did you mean `{ours}`? \
+        "column `{}` is none of the format's, so it is a channel of its own, which no cause knows: did you mean `{ours}`? \
          Then rename it in the line of the names",
         brief(name)
     ))

@@ -45,7 +45,7 @@ impl ColumnMapping {
             What::Channel(Quantity::Temp) => "temp",
             What::Channel(Quantity::Supply) => "supply",
             What::Channel(Quantity::Pwm) => "pwm",
-            What::Channel(Quantity::Other) => "other",
+            What::Channel(Quantity::Other | Quantity::Derived) => "other",
         };
         let find = |key: &str| {
             self.units

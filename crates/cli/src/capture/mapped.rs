@@ -197,7 +197,7 @@ fn unknown_name(name: &str, what: What) -> Option<String> {
     }
     let nearest = nearest(name)?;
     Some(format!(
-        "`{name}` is no name of this program's, so the column is a channel of its own that explains nothing: did you mean \
+        "`{name}` is no name of this program's, so the column is a channel of its own, which no cause knows: did you mean \
          {nearest}? (time, gyro_x .. gyro_z, acc_x .. acc_z, temp or temp_x .. temp_z, supply, pwm)"
     ))
 }

@@ -3,6 +3,7 @@
 use model::record::{Quantity, Record};
 
 use super::STANDARD_GRAVITY;
+use super::units::FULL_DUTY;
 
 /// White noise of the ADIS16250, a noisy part (data sheet), deg/s/sqrt(Hz). A reading at rest that is five times as noisy is
 /// more often a unit that is wrong by 57.3.
@@ -29,6 +30,7 @@ pub(super) fn doubts(record: &Record, is_assumed: bool) -> Vec<String> {
     notes.extend(gravity(record));
     notes.extend(rates(record, is_assumed));
     notes.extend(temperatures(record));
+    notes.extend(command(record));
     notes
 }
 
@@ -101,6 +103,27 @@ fn rates(record: &Record, is_assumed: bool) -> Option<String> {
             "a gyro has a noise of {} deg/s/sqrt(Hz), less than parts of silicon have, and nothing says its unit: is the file in \
              rad/s? Then say `--units gyro=rad/s`",
             short(quietest)
+        )
+    })
+}
+
+/// A command of no more than one step of 255 drives nothing; as a fraction it is the whole range.
+fn command(record: &Record) -> Option<String> {
+    let of = record.all(Quantity::Pwm).next()?;
+    let sizes = of.values.iter().map(|v| v.abs()).filter(|v| v.is_finite());
+    let largest = sizes.fold(0.0, f64::max);
+    if largest > FULL_DUTY {
+        return Some(format!(
+            "the motor command reaches {}, and full duty is {FULL_DUTY}: in which unit is the file? `--units pwm=%`, \
+             `pwm=fraction`",
+            short(largest)
+        ));
+    }
+    (0.0 < largest && largest <= 1.0).then(|| {
+        format!(
+            "the motor command is {} of {FULL_DUTY} at most, which turns nothing: is the file in fractions of full duty? Then \
+             say `--units pwm=fraction`",
+            short(largest)
         )
     })
 }

@@ -10,7 +10,7 @@ pub(super) const ANGLE: &str = "deg";
 pub(super) const COUNTS: &str = "counts";
 
 /// One name of each unit, and the others that it has in headers and papers, in small letters.
-const SPELLINGS: [(&str, &[&str]); 24] = [
+const SPELLINGS: [(&str, &[&str]); 26] = [
     (
         "deg/s",
         &[
@@ -65,7 +65,12 @@ const SPELLINGS: [(&str, &[&str]); 24] = [
     ("h", &["hours"]),
     (COUNTS, &["lsb", "raw", "count"]),
     ("1", &["-"]),
+    ("%", &["percent"]),
+    ("fraction", &[]),
 ];
+
+/// A motor command at full duty.
+pub(super) const FULL_DUTY: f64 = 255.0;
 
 /// Our name of a unit; `None` where it is none of those known.
 pub(super) fn known(text: &str) -> Option<&'static str> {
@@ -169,8 +174,12 @@ fn scale(what: What, unit: &str) -> Option<Conversion> {
             };
         }
         What::Channel(Quantity::Supply) => &[("V", "V", 1.0), ("mV", "V", 1e-3)],
-        What::Channel(Quantity::Pwm) => &[("1", "1", 1.0)],
-        What::Channel(Quantity::Other) => &[],
+        What::Channel(Quantity::Pwm) => &[
+            ("1", "1", 1.0),
+            ("%", "1", 0.01 * FULL_DUTY),
+            ("fraction", "1", FULL_DUTY),
+        ],
+        What::Channel(Quantity::Other | Quantity::Derived) => &[],
     };
     table
         .iter()
@@ -191,7 +200,7 @@ pub(super) fn usual(what: What) -> &'static str {
         What::Channel(Quantity::Acc) => "m/s^2",
         What::Channel(Quantity::Temp) => "degC",
         What::Channel(Quantity::Supply) => "V",
-        What::Channel(Quantity::Pwm | Quantity::Other) => "1",
+        What::Channel(Quantity::Pwm | Quantity::Other | Quantity::Derived) => "1",
     }
 }
 
@@ -211,7 +220,7 @@ pub(super) fn convert(what: What, given: Option<&str>) -> Result<Conversion, Cap
         option: "--units",
         why: format!("`{given}` is no unit of {}", usual(what)),
         help: "time: s, ms, us, ns; gyro: deg/s, rad/s, mrad/s, deg/h, mdps, or of an angle deg, rad, arcsec; acc: m/s2, g, \
-               mg; temp: degC, K, degF; supply: V, mV"
+               mg; temp: degC, K, degF; supply: V, mV; pwm: 1 (-255 to 255), % or fraction (of the full command)"
             .to_owned(),
     })
 }

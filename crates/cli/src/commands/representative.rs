@@ -56,7 +56,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             record
                 .channels
                 .iter()
-                .filter(|c| matches!(c.quantity, Quantity::Gyro | Quantity::Other))
+                .filter(|c| {
+                    matches!(
+                        c.quantity,
+                        Quantity::Gyro | Quantity::Other | Quantity::Derived
+                    )
+                })
                 .any(|c| {
                     c.values.len() > 10
                         && other.channel(&c.name).is_some_and(|o| o.values == c.values)

@@ -105,7 +105,8 @@ pub(crate) fn withdraw(
                 "follows the {of}, which no effect of the library does (likelihood ratio {:.0})",
                 term.lr
             );
-            unexplained.push(Observation::of_noise(name, what).following(of));
+            let seen = Observation::of_noise(name, what);
+            unexplained.push(term.of.iter().fold(seen, |seen, of| seen.following(of)));
         } else {
             match doubt {
                 Doubt::No => kept.push(finding),

@@ -12,7 +12,7 @@ use model::record::Quantity;
 
 use numerics::column::LONG;
 
-use super::{Combination, accelerations, centred, lagged};
+use super::{Combination, accelerations, centred, lagged, others};
 
 /// Time constants, s, a factor of four apart: a lag half way between two of them is spanned by either to some percent.
 const SUPPLY_S: [f64; 4] = [0.5, 2.0, 8.0, 32.0];
@@ -100,6 +100,9 @@ pub(super) fn combinations<'a>(
             pairs(format!("size of {}", m.name), &HEAT_S, size, m);
         }
         pairs(m.name.clone(), &COMMAND_S, smooth, m);
+    }
+    for o in others(view) {
+        pairs(o.name.clone(), &TEMPERATURE_S, smooth, o);
     }
     for a in accelerations(view) {
         all.push(Combination {

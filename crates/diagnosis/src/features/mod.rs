@@ -1,6 +1,8 @@
 //! Combinations of the recorded channels that no effect of the library is made of. A channel that follows one of them
 //! has a cause without a name: the search weighs them beside the effects, and the answer is "unexplained, but follows".
 
+use std::sync::Arc;
+
 use model::effect::{
     Column, Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Regression, Rival,
     Signal, Stage, View,
@@ -177,6 +179,14 @@ pub(crate) fn combinations<'a>(view: &'a View<'_>) -> Vec<Combination<'a>> {
             || w.smooth.iter().map(|v| v * v).collect(),
         ));
     }
+    for o in others(view) {
+        all.push(Combination::of(o.name.clone(), &[o], || centred(&o.smooth)));
+        // What is smoothed away of a channel that is fast may be what is followed.
+        if !Arc::ptr_eq(&o.smooth, &o.values) {
+            let what = format!("{}, reading by reading", o.name);
+            all.push(Combination::of(what, &[o], || centred(&o.values)));
+        }
+    }
     all.extend(lagged::combinations(view, motor, supply));
     all
 }
@@ -186,6 +196,12 @@ fn accelerations<'a>(view: &'a View<'_>) -> impl Iterator<Item = &'a Signal> {
     let still = !view.sways();
     view.all(Quantity::Acc)
         .filter(move |a| still && a.std_dev() >= LEAST_VIBRATION)
+}
+
+/// Channels of no quantity that the library knows.
+fn others<'a>(view: &'a View<'_>) -> impl Iterator<Item = &'a Signal> {
+    let changes = |s: &&Signal| s.range() > 0.0;
+    view.all(Quantity::Other).filter(changes)
 }
 
 /// Gyros that the table turns.

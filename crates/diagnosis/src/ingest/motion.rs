@@ -130,5 +130,6 @@ pub(crate) fn felt(y: &[f64], others: &[Signal], rate_hz: f64, dct: &Dct) -> Vec
 
 /// Whether a quantity can drive a gyro's bias.
 pub(crate) fn drives(quantity: Quantity) -> bool {
-    matches!(quantity, Quantity::Temp | Quantity::Supply | Quantity::Pwm)
+    use Quantity::{Other, Pwm, Supply, Temp};
+    matches!(quantity, Temp | Supply | Pwm | Other)
 }

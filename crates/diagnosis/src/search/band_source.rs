@@ -16,6 +16,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::envelope::law::pitch;
 use super::envelope::{Band, REACH, envelope_of, kept};
+use crate::ingest::motion::drives;
 use crate::test_level::{CheckId, Outcome};
 use numerics::column::dot;
 
@@ -136,9 +137,8 @@ pub(super) fn claim(own: &Moves, signals: &[Signal], named: &str) -> Option<Outc
     let cells = own.size.len();
     // What is left of a ring in the next cell.
     let keep = (-2.0 * PI * own.half / cells as f64).exp();
-    let slow = [Quantity::Temp, Quantity::Supply, Quantity::Pwm];
     let mut all: Vec<(&str, Vec<f64>)> = vec![];
-    for s in signals.iter().filter(|s| slow.contains(&s.quantity)) {
+    for s in signals.iter().filter(|s| drives(s.quantity)) {
         let plain = in_cells(&s.smooth, cells);
         let first = beyond(plain.clone(), &[]);
         let square = beyond(first.iter().map(|v| v * v).collect(), &[&first]);

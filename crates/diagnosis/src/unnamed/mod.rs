@@ -3,6 +3,7 @@
 //! Under them a simulation is the record's where nothing can be named. Each is sought only on channels where the search, or the
 //! replicates of the model, left something.
 
+mod followed;
 mod spectrum;
 mod white;
 
@@ -17,6 +18,7 @@ use crate::ingest::types::Grid;
 use crate::result::Finding;
 use crate::search::searched::Searched;
 use crate::test_level::{self, Observation};
+use followed::of_combinations;
 use spectrum::{Bump, Spectrum, as_one, spectrum};
 use white::{White, hz};
 
@@ -116,6 +118,7 @@ pub(crate) fn fit(
         }
         if alone {
             all.terms.extend(of_white(s, &white, grid.rate_hz));
+            all.terms.extend(of_combinations(s, grid));
             all.terms.extend(of_signals(s, &white, grid));
         }
         whites.push((name, s, white));

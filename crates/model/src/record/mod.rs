@@ -24,8 +24,10 @@ pub enum Quantity {
     Supply,
     /// Motor command, -255..255.
     Pwm,
-    /// Anything else: analyzed, never explained.
+    /// Anything else that was measured beside them: a sensor may follow it, as no effect of the library does.
     Other,
+    /// What the board makes of its readings, like corrected rates: analyzed, and no source of anything.
+    Derived,
 }
 
 /// A body axis.

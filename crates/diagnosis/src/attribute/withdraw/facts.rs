@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use model::effect::Signal;
-use model::record::Quantity;
 
 use crate::audit::repeats;
 use crate::criticise::follower_shape;
 use crate::criticise::residual::{self, Place, Repeats};
 use crate::fit::channel::{Form, ID, Term};
+use crate::ingest::motion::drives;
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Outcome, RECORD, omnibus_level};
 
@@ -383,7 +383,7 @@ fn bent(s: &Searched<'_>, failing: &dyn Fn(CheckId) -> bool) -> f64 {
     // Variances of skewness and kurtosis of n normal values.
     let skewness = || n / 6.0 * residual::skewness_of(e).powi(2);
     let lightness = || n / 24.0 * residual::excess_kurtosis(e).min(0.0).powi(2);
-    let all: [(CheckId, &dyn Fn() -> f64); 8] = [
+    let all: [(CheckId, &dyn Fn() -> f64); 7] = [
         (CheckId::Slew, &|| f64::INFINITY),
         (CheckId::RepeatedReadings, &|| f64::INFINITY),
         (CheckId::Skewness, &skewness),
@@ -393,9 +393,6 @@ fn bent(s: &Searched<'_>, failing: &dyn Fn(CheckId) -> bool) -> f64 {
         }),
         (CheckId::ThreeReadings, &|| {
             residual::three_readings(e).statistic
-        }),
-        (CheckId::Neighbours, &|| {
-            residual::neighbours(e, s.step()).statistic
         }),
         (CheckId::VarianceRhythm, &|| {
             residual::variance_rhythm(e, rate_hz).statistic
@@ -416,13 +413,7 @@ fn swings_as(s: &Searched<'_>, t: &Term) -> Option<String> {
         (at - SAME_SWING).ceil() as usize,
         (at + SAME_SWING) as usize,
     );
-    let slow = [Quantity::Temp, Quantity::Supply, Quantity::Pwm];
-    let mut signals = s
-        .search
-        .view
-        .signals
-        .iter()
-        .filter(|o| slow.contains(&o.quantity));
+    let mut signals = s.search.view.signals.iter().filter(|o| drives(o.quantity));
     let swings = |o: &&Signal| {
         let c = panel.dct.forward(&o.smooth);
         let energy = |c: &[f64]| c.iter().map(|c| c * c).sum::<f64>();

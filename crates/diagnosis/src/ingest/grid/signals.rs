@@ -16,7 +16,8 @@ pub(super) fn of_gyro(c: &Channel, target: &Target) -> Signal {
     }
 }
 
-/// A channel that is no gyro, and the coefficients of what can drive a gyro's bias: motor command, supply, temperatures.
+/// A channel that is no gyro, and the coefficients of what can drive a gyro's bias: motor command, supply, temperatures, and
+/// what is none of these.
 pub(super) fn other(
     c: &Channel,
     places: &[usize],
@@ -26,7 +27,10 @@ pub(super) fn other(
 ) -> (Signal, Option<Rc<Vec<f64>>>) {
     let read = spread(&c.values, places, n, &[]);
     let values = Arc::new(interpolated(&read));
-    let is_noisy = matches!(c.quantity, Quantity::Temp | Quantity::Supply);
+    let is_noisy = matches!(
+        c.quantity,
+        Quantity::Temp | Quantity::Supply | Quantity::Other
+    );
     let coefficients = drives(c.quantity).then(|| Rc::new(dct.forward(&values)));
     let step = || c.lsb.unwrap_or_else(|| smallest_step(few(&c.values)));
     let smooth = coefficients.as_ref().filter(|_| is_noisy);
