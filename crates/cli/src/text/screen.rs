@@ -149,6 +149,13 @@ fn write_unexplained(out: &mut String, all: &[Unexplained]) {
             let cost = answer::consequence_of(c, left.material);
             let _ = writeln!(out, "{}", item("", &cost));
         }
+        if let Some(of) = &left.follows {
+            let next = format!(
+                "What to do: change {of} alone and record again; where {} follows again, subtract what follows it.",
+                left.channel
+            );
+            let _ = writeln!(out, "{}", item("", &next));
+        }
     }
     if large.len() > SHOWN {
         let more = large.len() - SHOWN;
