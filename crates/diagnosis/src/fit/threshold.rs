@@ -36,10 +36,11 @@ pub fn regression(columns: usize, siblings: usize) -> f64 {
     WIDENED * quantile(columns, siblings as f64)
 }
 
-/// A shape with one coordinate on a grid.
+/// A shape with one coordinate on a grid of so many places, two steps of which are one independent of the others; as many as
+/// the exponentials of a short record have, at least.
 #[must_use]
-pub fn shaped(columns: usize) -> f64 {
-    WIDENED * quantile(columns, 2.5)
+pub fn shaped(columns: usize, grid: usize) -> f64 {
+    WIDENED * quantile(columns, 0.5 * grid.max(5) as f64)
 }
 
 /// A step anywhere in `n` samples: measured 27.7 at a chance of 1e-4 for 12 000 samples; doubling the length adds as

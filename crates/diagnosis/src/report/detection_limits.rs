@@ -310,7 +310,7 @@ fn of_shape(
     let (place, columns) = c.grid().get(c.grid().len() / 2)?;
     let parameter = shape.columns(*place).first()?.parameter;
     let (first, rest) = columns.split_first()?;
-    let wanted = strength_for(threshold::shaped(columns.len()));
+    let wanted = strength_for(threshold::shaped(columns.len(), c.grid().len()));
     let size = meter.column(&[own.as_slice(), rest].concat(), *first, wanted)?;
     Some(Smallest {
         coefficients: vec![size],

@@ -119,7 +119,7 @@ impl Search<'_> {
             })
             .max_by(|a, b| a.2.total_cmp(&b.2))?;
         let names: Vec<_> = shape.columns(at).iter().map(|c| c.parameter).collect();
-        let limit = threshold::shaped(names.len());
+        let limit = threshold::shaped(names.len(), of.candidate.grid.len());
         // Between the points of the grid it may be much better: what is a rival is weighed at its best.
         let lr = if lr > limit {
             lr.max(2.0 * (self.between(of.walks, &of.own, shape.as_ref(), at) - of.null))

@@ -110,7 +110,10 @@ impl Effect for WarmUp {
     }
 }
 
-/// exp(-t / tau), tau from a fiftieth to a third of the record.
+/// Shortest time constant that is sought in a long record, s: a die on its leads settles in tens of seconds.
+const SHORTEST_S: f64 = 10.0;
+
+/// exp(-t / tau), tau to a third of the record from a fiftieth of it, or from [`SHORTEST_S`] where that is less.
 struct Exponentials {
     samples: usize,
     rate_hz: f64,
@@ -123,10 +126,12 @@ impl Shape for Exponentials {
 
     fn grid(&self) -> Vec<f64> {
         let seconds = self.samples as f64 / self.rate_hz;
-        [50.0, 24.0, 12.0, 6.0, 3.0]
-            .iter()
-            .map(|part| seconds / part)
-            .collect()
+        let of_record = [50.0, 24.0, 12.0, 6.0, 3.0].map(|part| seconds / part);
+        let shorter = std::iter::successors(Some(0.5 * of_record[0]), |tau| Some(0.5 * tau));
+        let mut all: Vec<f64> = shorter.take_while(|tau| *tau >= SHORTEST_S).collect();
+        all.reverse();
+        all.extend(of_record);
+        all
     }
 
     fn columns(&self, at: f64) -> Vec<Column> {
