@@ -9,7 +9,7 @@ mod worth;
 mod write;
 
 pub use judge::{Judged, Row, SPANS_S, Stage, States, judge};
-pub use length::{NEAR, Needed, needed};
+pub use length::{NEAR, Needed, needed, short};
 pub use noise::{Noise, Uncertain};
 pub use record::{Course, Taken, record};
 pub use worth::keep_what_is_worth_it;

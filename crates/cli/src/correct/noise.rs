@@ -94,13 +94,19 @@ impl Noise {
         self.n.powi(2) / seconds + self.k.powi(2) * seconds / 3.0
     }
 
+    /// Variance of the angle over a span that the white noise in it makes, deg^2.
+    #[must_use]
+    pub fn white(&self, span_s: f64) -> f64 {
+        self.n.powi(2) * span_s
+    }
+
     /// Variance of the angle over a span that noise alone leaves, deg^2, in a record of `behind_s` behind the rest. The bias is
     /// known from the rest, with the variance `bias`, and walks on from there.
     #[must_use]
     pub fn floor(&self, bias: f64, [span_s, behind_s]: [f64; 2]) -> f64 {
         // Middle of the windows' begins, since the rest.
         let since_s = (behind_s - span_s).max(0.0) / 2.0;
-        let white = self.n.powi(2) * span_s;
+        let white = self.white(span_s);
         let walk = self.k.powi(2) * span_s.powi(2) * (since_s + span_s / 3.0);
         let wanders = self.wanders.iter().map(|(sigma, tau)| {
             2.0 * sigma.powi(2) * tau * (span_s - tau * (1.0 - (-span_s / tau).exp()))

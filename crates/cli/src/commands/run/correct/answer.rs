@@ -2,7 +2,7 @@
 
 use diagnosis::MATTERS;
 use diagnosis::result::{Diagnosis, Finding};
-use imu_stand::correct::{Change, Judged, NEAR, Needed, Proposed, Row, SPANS_S};
+use imu_stand::correct::{Change, Judged, NEAR, Needed, Proposed, Row, SPANS_S, short};
 use imu_stand::stand::planted::Comparison;
 use model::ModelFile;
 use serde::Serialize;
@@ -40,8 +40,12 @@ pub struct Recorded {
     pub seconds: f64,
     /// As asked for, s.
     asked_s: f64,
-    /// What a record of that length is too short for.
+    /// What a record of the length asked for is too short for.
     pub needed: Option<Needed>,
+    /// What this one is too short for.
+    pub left: Option<Needed>,
+    /// The heater was to be on for so long and off for so long in turn, s.
+    pub heater_s: Option<f64>,
 }
 
 impl Recorded {
@@ -51,37 +55,36 @@ impl Recorded {
             seconds: asked_s,
             asked_s,
             needed: None,
+            left: None,
+            heater_s: None,
         }
     }
 
-    /// Why it is as long as it is.
+    /// Why it is as it is.
     fn line(&self) -> Option<String> {
-        let Some(needed) = &self.needed else {
-            return (self.seconds > self.asked_s).then(|| {
-                format!(
-                    "first record: {:.0} s, as long as the second: what that can show is to be in the model",
-                    self.seconds
-                )
-            });
-        };
-        let more = if self.seconds < needed.seconds {
-            format!(
-                "; {:.0} s would bring it within {NEAR} times that (`--longest {:.0}`)",
-                needed.seconds, needed.seconds
-            )
-        } else {
-            String::new()
-        };
-        Some(format!(
-            "first record: {:.0} s, because by {:.0} s {} on {} is so unsure that the corrected rates would be off by {} deg over {:.0} s, where the noise alone leaves {}{more}",
-            self.seconds,
-            self.asked_s,
-            needed.cause,
-            needed.channel,
-            short(needed.expected_deg),
-            needed.span_s,
-            short(needed.floor_deg),
-        ))
+        if self.seconds <= self.asked_s {
+            return None;
+        }
+        let mut line = format!("first record: {:.0} s", self.seconds);
+        if let Some(half_s) = self.heater_s {
+            let _ = write!(line, ", the heater on and off for {half_s:.0} s each");
+        }
+        match &self.needed {
+            None => {
+                line.push_str(", as long as the second: what that can show is to be in the model");
+            }
+            Some(needed) => {
+                let _ = write!(line, ", because by {:.0} s {needed}", self.asked_s);
+            }
+        }
+        if let Some(left) = &self.left {
+            let _ = write!(
+                line,
+                "; by {:.0} s {left}, and nine of ten records of {:.0} s would bring it within {NEAR} times that (`--longest {:.0}`)",
+                self.seconds, left.seconds, left.seconds
+            );
+        }
+        Some(line)
     }
 }
 
@@ -113,6 +116,13 @@ pub struct Answer {
     pub planted: Option<Comparison>,
     first: Vec<Diagnosis>,
     second: Vec<Diagnosis>,
+}
+
+impl Cause {
+    /// Whether the bias follows the temperature.
+    pub fn is_of_temperature(&self) -> bool {
+        ["temperature", "temperature_quadratic"].contains(&self.cause.as_str())
+    }
 }
 
 /// The causes that a model has corrected, by axis.
@@ -278,18 +288,6 @@ fn cell(row: &Row) -> String {
         short(row.predicted_deg),
         if row.worse { " !" } else { "" }
     )
-}
-
-/// Three digits.
-fn short(value: f64) -> String {
-    let digits = if value >= 100.0 {
-        0
-    } else if value >= 10.0 {
-        1
-    } else {
-        2
-    };
-    format!("{value:.digits$}")
 }
 
 /// What is to be looked at.

@@ -11,7 +11,7 @@ use diagnosis::DiagnoseOptions;
 use diagnosis::result::Diagnosis;
 use imu_stand::capture::{ReadOptions, corrected, read_capture};
 use imu_stand::correct::{
-    Noise, Proposed, Stage, Taken, judge, keep_what_is_worth_it, needed, record,
+    Needed, Noise, Proposed, Stage, Taken, judge, keep_what_is_worth_it, needed, record,
 };
 use imu_stand::link::{DEFAULT_BAUD, Link};
 use imu_stand::stand::planted::{compare, planted};
@@ -23,8 +23,8 @@ use model::record::Record;
 
 use super::super::outputs;
 use super::{Arguments, Outputs};
-use answer::{Answer, Recorded, corrected_causes};
-use stages::{BEGIN_S, Length, Planned, REST_S};
+use answer::{Answer, Cause, Recorded, corrected_causes};
+use stages::{BEGIN_S, HEATER_S, Length, Planned, REST_S};
 
 /// Causes that a stand shows only while it turns: they are taken from the record of its sway.
 const OF_TURNS: [&str; 2] = ["cross_axis", "scale_error"];
@@ -147,13 +147,16 @@ impl Loop<'_> {
         let mut found = self.diagnose(0, all)?;
         let mut recorded = Recorded::new(seconds);
         if let Some(longer) = self.longer(&taken[0], &found, &mut recorded) {
-            first = Planned::new(Length::First(longer), sways, seeds.fault);
+            let heated = recorded.heater_s.is_some();
+            first = Planned::new(Length::First(longer), sways, seeds.fault).heated(heated);
             if let Some((board, plan, _)) = &scenarios {
                 link = simulated(board, first.scenario(&plan.run.scenario));
             }
             // What the sway tells is known already.
-            self.write(&mut self.take(&mut link, &first, 1)?, 0, mark)?;
+            let mut again = self.take(&mut link, &first, 1)?;
+            self.write(&mut again, 0, mark)?;
             found.splice(..1, self.diagnose(0, 1)?);
+            recorded.left = self.too_short(&again[0], &found);
         }
         let mut model = model_of(&found)?;
         let refused = keep_what_is_worth_it(&mut model);
@@ -222,23 +225,36 @@ impl Loop<'_> {
     }
 
     /// How long the first record has to be when it is taken again, s, as far as the user lets it: as the coefficients need, and as
-    /// long as the second one, for what that can show is to be in the model.
+    /// long as the second one, for what that can show is to be in the model. A slope over temperature wants a heater besides.
     fn longer(&self, rest: &Taken, found: &[Found], recorded: &mut Recorded) -> Option<f64> {
-        let model = &found.first()?.model;
-        if self.arguments.correct_by.is_some() || corrected_causes(model).is_empty() {
+        let causes = corrected_causes(&found.first()?.model);
+        if self.arguments.correct_by.is_some() || causes.is_empty() {
             return None;
         }
         let asked_s = recorded.seconds;
-        let second_s = Length::Second(asked_s).seconds();
-        let judged_s = [REST_S, second_s - REST_S];
-        recorded.needed = needed(&rest.record, &Noise::of_model(model), judged_s);
+        recorded.needed = self.too_short(rest, found);
         let wanted = recorded
             .needed
             .as_ref()
             .map_or(0.0, |needed| needed.seconds);
         let longest = self.arguments.longest.unwrap_or(LONGEST_TIMES * asked_s);
+        let second_s = Length::Second(asked_s).seconds();
         recorded.seconds = wanted.max(second_s).min(longest).max(asked_s);
-        (recorded.seconds > asked_s).then_some(recorded.seconds)
+        let is_longer = recorded.seconds > asked_s;
+        recorded.heater_s =
+            (is_longer && causes.iter().any(Cause::is_of_temperature)).then_some(HEATER_S);
+        is_longer.then_some(recorded.seconds)
+    }
+
+    /// What a record at rest is too short for.
+    fn too_short(&self, rest: &Taken, found: &[Found]) -> Option<Needed> {
+        let second_s = Length::Second(self.arguments.seconds).seconds();
+        let judged_s = [REST_S, second_s - REST_S];
+        needed(
+            &rest.record,
+            &Noise::of_model(&found.first()?.model),
+            judged_s,
+        )
     }
 
     /// The first so many records of a history.
@@ -248,13 +264,35 @@ impl Loop<'_> {
         for (_, course) in planned.courses.iter().take(count) {
             let bar = &self.bar;
             let from = course.from.as_secs_f64();
+            // That of the simulated stand is switched by its own clock.
+            let half_s = planned.heater_s.filter(|_| self.arguments.line.is_named());
+            let mut switched = 0;
             let taken = record(link, course, |t| {
-                bar.set_position((from + t.max(0.0)) as u64)
+                bar.set_position((from + t.max(0.0)) as u64);
+                let Some(half_s) = half_s else { return };
+                let half = (t / half_s).floor() as i64 + 1;
+                if half > switched {
+                    switched = half;
+                    self.prompt(half % 2 == 1, half_s);
+                }
             });
             all.push(taken?);
         }
         self.bar.reset();
         Ok(all)
+    }
+
+    /// Asks for the heater, of whoever is there: nothing waits for it.
+    fn prompt(&self, on: bool, half_s: f64) {
+        if self.arguments.quiet {
+            return;
+        }
+        let (word, minutes) = (if on { "on" } else { "off" }, half_s / 60.0);
+        self.bar.suspend(|| {
+            say!(
+                "switch the heater {word} if there is one, for {minutes:.0} minutes; a hair dryer on a timer will do"
+            );
+        });
     }
 
     fn write(&self, taken: &mut [Taken], history: usize, mark: bool) -> Result<()> {
