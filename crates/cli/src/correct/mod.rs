@@ -1,6 +1,7 @@
 //! The loop from a model back to the board: the correction written over a link, a record taken over it, and what the
 //! correction is worth. Nothing here knows whether the board is a real one.
 
+mod heater;
 mod judge;
 mod length;
 mod noise;
@@ -8,6 +9,7 @@ mod record;
 mod worth;
 mod write;
 
+pub use heater::HEATER_S;
 pub use judge::{Judged, Row, SPANS_S, Stage, States, judge};
 pub use length::{NEAR, Needed, needed, short};
 pub use noise::{Noise, Uncertain};

@@ -11,7 +11,7 @@ use diagnosis::DiagnoseOptions;
 use diagnosis::result::Diagnosis;
 use imu_stand::capture::{ReadOptions, corrected, read_capture};
 use imu_stand::correct::{
-    Needed, Noise, Proposed, Stage, Taken, judge, keep_what_is_worth_it, needed, record,
+    HEATER_S, Needed, Noise, Proposed, Stage, Taken, judge, keep_what_is_worth_it, needed, record,
 };
 use imu_stand::link::{DEFAULT_BAUD, Link};
 use imu_stand::stand::planted::{compare, planted};
@@ -24,7 +24,7 @@ use model::record::Record;
 use super::super::outputs;
 use super::{Arguments, Outputs};
 use answer::{Answer, Cause, Recorded, corrected_causes};
-use stages::{BEGIN_S, HEATER_S, Length, Planned, REST_S};
+use stages::{BEGIN_S, Length, Planned, REST_S};
 
 /// Causes that a stand shows only while it turns: they are taken from the record of its sway.
 const OF_TURNS: [&str; 2] = ["cross_axis", "scale_error"];

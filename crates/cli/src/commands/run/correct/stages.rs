@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bench::{Run, Scenario, duty_profile};
-use imu_stand::correct::Course;
+use imu_stand::correct::{Course, HEATER_S};
 use imu_stand::stand::course;
 use model::record::Base;
 
@@ -16,11 +16,6 @@ const GAP_S: f64 = 5.0;
 /// The record of the sway: its rest, and its length, s.
 const SWAY_REST_S: f64 = 30.0;
 const SWAY_S: f64 = 330.0;
-
-/// A heater beside the board is on and off for so long each, s: twice the time in which a board follows (240 s, the stand's).
-/// With square waves of 700 to 1400 s the slope's standard error is within a tenth of the least that any period gives, for K of
-/// 0 to 0.005 deg/s/sqrt(s): slower ones are lost in the bias's walk, faster ones do not warm the board.
-pub const HEATER_S: f64 = 480.0;
 
 /// Length of the record at rest.
 pub enum Length {
