@@ -8,7 +8,7 @@
 //! | quantity | format |
 //! |---|---|
 //! | rates, biases | Q12.20 deg/s |
-//! | what they depend on | Q16.16, whole counts but for the temperature behind its low pass |
+//! | what they depend on | Q16.16, whole counts but for the motor's speed |
 //! | squares of rates at rest | Q16 (deg/s)^2 |
 //! | what the filter knows | Q8.8 blocks |
 //! | noise over what was told | Q8 |
@@ -19,7 +19,7 @@
 
 use wire::correction::{
     ADAPT_SHIFT, BLOCK_SHIFT_MAX, GATE_SHIFT, LONGEST_TICKS, NOISE_SHIFT, REST_DPS, ROWS,
-    STORED_LEN, TEMPERATURE_SHIFT,
+    STORED_LEN,
 };
 use wire::correction_state::{
     APPLIED, AT_REST, EXTRAPOLATED, FILTERED, NOISE_OFF, NOT_IN_ORDER, REFUSED, YAW_FREE,
@@ -32,7 +32,7 @@ use zerocopy::little_endian::{I32, U16};
 use crate::acquire::Raw;
 use crate::attitude;
 use crate::config::Config;
-use crate::math::{divide, mul, product, shifted, times, upper};
+use crate::math::{divide, product, shifted, times, upper};
 use crate::stand::Board;
 use crate::stand::store::newest;
 
@@ -64,8 +64,6 @@ pub struct Correction {
     left: u8,
     sum: Sum,
     /// Of each axis, in arrays of their own: a stride that is no power of two is a product on the AVR.
-    /// TEMP_OUT behind its low pass, Q10.22.
-    temp: [i32; 3],
     /// Rates with the model's terms, before the other axes' shares.
     rate: [i32; 3],
     /// Of what is left of the rates of a block: below 4 deg/s in each of 128 at rest.
@@ -147,7 +145,6 @@ impl Correction {
             state: 0,
             left: 0,
             sum: Sum { at: 0, total: 0 },
-            temp: [0; 3],
             rate: [0; 3],
             left_over: [0; 3],
             axes: [Axis {
@@ -264,8 +261,8 @@ impl Correction {
         }
         let range = self.sum.next(board).to_le_bytes().map(u8::cast_signed);
         let ahead = self.drive(board, duty);
-        self.model(board, raw, duty, config);
-        self.rest(board, ahead, range);
+        self.model(board, raw, duty, config, range);
+        self.rest(board, ahead);
         self.frame.state |= self.state;
         self.left = self.left.wrapping_sub(1);
     }
@@ -281,8 +278,14 @@ impl Correction {
     }
 
     /// The model's terms for each axis.
-    fn model<B: Board>(&mut self, board: &mut B, raw: &Raw, duty: i16, config: &Config) {
-        let starts = self.state & YAW_FREE == 0;
+    fn model<B: Board>(
+        &mut self,
+        board: &mut B,
+        raw: &Raw,
+        duty: i16,
+        config: &Config,
+        [lowest, highest]: [i8; 2],
+    ) {
         let [acc_x, acc_y, acc_z] = raw.acc.map(u16::cast_signed);
         let turning = match duty {
             0 => 0,
@@ -302,19 +305,22 @@ impl Correction {
             acc_z,
         ];
         let sum = &mut self.sum;
-        for ((((temp, counts), rate), word), scale) in (self.temp.iter_mut())
-            .zip(&raw.temp)
+        for (((temp, rate), word), scale) in (raw.temp.iter())
             .zip(&mut self.rate)
             .zip(&raw.gyro)
             .zip(&config.set_up.scale)
         {
             // Ten bits.
-            warm(temp, (counts.bits() << 6).cast_signed(), starts);
+            let temp = (temp.bits() << 6).cast_signed() >> 6;
+            let step = (temp >> 2) as i8;
+            if step < lowest || step > highest {
+                self.frame.state |= EXTRAPOLATED;
+            }
             // Q24 times counts is Q16. A scale beyond 1/8 deg/s for each count makes rates that wrap, which no part has.
             sum.total = times(scale.get() << 8, word.signed_14()) << 4;
-            sum.weigh(board, shifted(*temp, 6));
+            sum.count(board, temp);
             // Its square, Q22.10.
-            sum.weigh(board, shifted(mul(*temp, *temp), 2));
+            sum.weigh(board, product(temp, temp) << 10);
             for &x in &shared {
                 sum.count(board, x);
             }
@@ -325,10 +331,9 @@ impl Correction {
     /// The shares of the other axes, what the motor does until it has spun up, and the filter's bias; what is left is told, and
     /// summed up unless it is too much for a stand at rest.
     #[inline(always)]
-    fn rest<B: Board>(&mut self, board: &mut B, ahead: i32, [lowest, highest]: [i8; 2]) {
+    fn rest<B: Board>(&mut self, board: &mut B, ahead: i32) {
         let sum = &mut self.sum;
-        for ((((rate, temp), left_over), to), bias) in (self.rate.iter())
-            .zip(&self.temp)
+        for (((rate, left_over), to), bias) in (self.rate.iter())
             .zip(&mut self.left_over)
             .zip(&mut self.frame.rate)
             .zip(&self.frame.bias)
@@ -348,10 +353,6 @@ impl Correction {
                 self.squares = self.squares.wrapping_add(square(left));
             } else {
                 self.state &= !AT_REST;
-            }
-            let temp = (*temp >> 24) as i8;
-            if temp < lowest || temp > highest {
-                self.frame.state |= EXTRAPOLATED;
             }
         }
     }
@@ -440,17 +441,6 @@ fn block_len(shift: u8) -> u8 {
         len <<= 1;
     }
     len
-}
-
-/// The low pass of the temperature.
-#[inline(always)]
-fn warm(temp: &mut i32, counts_q6: i16, starts: bool) {
-    let now = i32::from(counts_q6) << 16;
-    if starts {
-        *temp = now;
-    }
-    let change = shifted(now.wrapping_sub(*temp), TEMPERATURE_SHIFT);
-    *temp = temp.wrapping_add(change);
 }
 
 impl Axis {

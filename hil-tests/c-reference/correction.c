@@ -11,7 +11,6 @@
 /* Rest ends here, upper half of Q12.20 deg/s: 4 deg/s. */
 #define REST 64
 #define BLOCK_SHIFT_MAX 7
-#define TEMPERATURE_SHIFT 4
 /* A block's mean may be off by four sigma, squared. */
 #define GATE_SHIFT 4
 #define ADAPT_SHIFT 5
@@ -37,7 +36,6 @@ static struct {
     uint32_t squares; /* of what is left of all rates in the block, Q16 */
     int32_t speed;    /* of the motor, steps in Q16 */
     struct axis {
-        int32_t temp; /* behind its low pass, Q10.22 */
         int32_t rate; /* with the model's terms */
         int32_t sum;  /* of what is left of the block's rates */
         int16_t noise; /* over what was told, less 1: Q8 */
@@ -118,17 +116,17 @@ void correction_tell(void)
 }
 
 /* The model's terms for each axis. */
-static void model(const struct raw *raw, int16_t duty)
+static void model(const struct raw *raw, int16_t duty, int8_t lowest, int8_t highest)
 {
     for (uint8_t i = 0; i < 3; i++) {
         struct axis *axis = &now.axes[i];
-        int32_t temp = (int32_t)((uint32_t)(raw->temp[i] << 6) << 16); /* ten bits */
-        if (!(now.state & STATE_YAW_FREE))
-            axis->temp = temp;
-        axis->temp += (temp - axis->temp) >> TEMPERATURE_SHIFT;
+        int16_t temp = (int16_t)(raw->temp[i] << 6) >> 6; /* ten bits */
+        int8_t step = (int8_t)(temp >> 2);
+        if (step < lowest || step > highest)
+            now.frame.state |= STATE_EXTRAPOLATED;
         total = (uint32_t)times(config.set_up.scale[i] << 8, (int16_t)(raw->gyro[i] << 2) >> 2) << 4;
-        weigh(axis->temp >> 6);
-        weigh(mul(axis->temp, axis->temp) >> 2);
+        count(temp);
+        weigh((int32_t)temp * temp << 10);
         count(1 << 10);
         count(1);
         count(duty);
@@ -149,7 +147,7 @@ static uint32_t __attribute__((noinline)) square(int32_t x)
 }
 
 /* The shares of the other axes, the motor's surge and the filter's bias; what is left is summed up at rest. */
-static void rest(int32_t ahead, int8_t lowest, int8_t highest)
+static void rest(int32_t ahead)
 {
     for (uint8_t i = 0; i < 3; i++) {
         struct axis *axis = &now.axes[i];
@@ -169,9 +167,6 @@ static void rest(int32_t ahead, int8_t lowest, int8_t highest)
         } else {
             now.state &= (uint8_t)~STATE_AT_REST;
         }
-        int8_t temp = (int8_t)(axis->temp >> 24);
-        if (temp < lowest || temp > highest)
-            now.frame.state |= STATE_EXTRAPOLATED;
     }
 }
 
@@ -209,8 +204,8 @@ static void __attribute__((noinline)) correct(const struct raw *raw, int16_t dut
     total = (uint32_t)now.speed;
     weigh(ahead << 1);
     now.speed = (int32_t)total;
-    model(raw, duty);
-    rest(ahead, (int8_t)range, (int8_t)(range >> 8));
+    model(raw, duty, (int8_t)range, (int8_t)(range >> 8));
+    rest(ahead);
     now.frame.state |= now.state;
     now.left--;
 }

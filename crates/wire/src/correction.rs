@@ -9,7 +9,7 @@
 //! rate = v + surge (d - m) - b
 //! ```
 //!
-//! T being TEMP_OUT behind a low pass of 16 samples, d the motor command, m what the motor has turned to, m <- m + follow (d - m)
+//! T being TEMP_OUT, d the motor command, m what the motor has turned to, m <- m + follow (d - m)
 //! after each sample, s SUPPLY_OUT and a the ADC counts; b is what the bias filter has found, a scalar Kalman filter for each axis
 //! that measures in blocks of samples in which the stand is at rest. Every coefficient is what is *added*: that of an effect with
 //! its sign turned.
@@ -62,8 +62,6 @@ pub const ACC_ZERO: i16 = 512;
 /// The attitude is followed over samples that are this many ticks of 4 us apart at the most: 100 ms, in which a gyro turns by less
 /// than the radian that its arithmetic is for.
 pub const LONGEST_TICKS: u16 = 25_000;
-/// Samples that the low pass of the temperature averages, as a power of two.
-pub const TEMPERATURE_SHIFT: u8 = 4;
 /// Most samples in a block of the bias filter, as a power of two.
 pub const BLOCK_SHIFT_MAX: u8 = 7;
 /// A rate further from the filter's bias than this is no bias, deg/s.

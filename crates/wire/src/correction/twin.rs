@@ -2,7 +2,7 @@
 
 use super::{
     ACC_ZERO, ADAPT_SHIFT, Correction, GATE_SHIFT, KNOWN_MAX, LONGEST_TICKS, NOISE_SHIFT, REACH,
-    REST_DPS, TEMPERATURE_SHIFT,
+    REST_DPS,
 };
 
 /// Where the attitude begins.
@@ -32,8 +32,6 @@ pub struct Inputs {
 /// One axis of the bias filter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Axis {
-    /// TEMP_OUT behind its low pass.
-    pub temp: f64,
     /// deg/s.
     pub bias: f64,
     /// What the filter knows, in blocks: the variance of the bias is that of a block, as it was told, over this.
@@ -90,7 +88,8 @@ impl Twin {
         let acc = inputs.acc.map(f64::from);
         let mut u = [0.0; 3];
         for (i, u) in u.iter_mut().enumerate() {
-            let t = self.axes[i].temp;
+            // Ten bits: -49 to 99 degC.
+            let t = f64::from((inputs.temp[i] << 6) >> 6);
             *u = inputs.rate[i]
                 + c.bias[i]
                 + t * (c.temperature[i] + t * c.temperature_squared[i])
@@ -111,14 +110,6 @@ impl Twin {
 
     /// The corrected rates of a sample, deg/s.
     pub fn step(&mut self, inputs: &Inputs) -> [f64; 3] {
-        for (axis, &counts) in self.axes.iter_mut().zip(&inputs.temp) {
-            // Ten bits: -49 to 99 degC.
-            let counts = f64::from((counts << 6) >> 6);
-            if self.t_ticks.is_none() {
-                axis.temp = counts;
-            }
-            axis.temp += (counts - axis.temp) / f64::from(1u32 << TEMPERATURE_SHIFT);
-        }
         let v = self.modelled(inputs);
         let ahead = f64::from(inputs.duty) - self.speed;
         self.speed += self.correction.follow * ahead;
