@@ -147,8 +147,8 @@ impl Loop<'_> {
         let mut found = self.diagnose(0, all)?;
         let mut recorded = Recorded::new(seconds);
         if let Some(longer) = self.longer(&taken[0], &found, &mut recorded) {
-            let heated = recorded.heater_s.is_some();
-            first = Planned::new(Length::First(longer), sways, seeds.fault).heated(heated);
+            first =
+                Planned::new(Length::First(longer), sways, seeds.fault).heated(recorded.heater_s);
             if let Some((board, plan, _)) = &scenarios {
                 link = simulated(board, first.scenario(&plan.run.scenario));
             }
@@ -181,10 +181,9 @@ impl Loop<'_> {
         let mut taken = self.take(&mut link, &second, all)?;
         drop(link);
         self.write(&mut taken, 1, mark)?;
-        let known = match &scenarios {
-            Some((board, _, two)) => Some(self.known(board, &second, two, &model, seeds.stand)?),
-            None => None,
-        };
+        let known = (scenarios.as_ref())
+            .map(|(board, _, two)| self.known(board, &second, two, &model, seeds.stand))
+            .transpose()?;
         let mut noise = Noise::of_model(&model);
         for (noise, block) in noise.iter_mut().zip(proposed.board.correction.noise) {
             noise.block = block;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bench::{Run, Scenario, duty_profile};
-use imu_stand::correct::{Course, HEATER_S};
+use imu_stand::correct::Course;
 use imu_stand::stand::course;
 use model::record::Base;
 
@@ -65,9 +65,9 @@ impl Planned {
         }
     }
 
-    /// With a heater that is switched, so that the temperature tells as much as it can.
-    pub fn heated(mut self, is_heated: bool) -> Self {
-        self.heater_s = is_heated.then_some(HEATER_S);
+    /// With a heater that is switched, on for so long and off for so long, s.
+    pub fn heated(mut self, heater_s: Option<f64>) -> Self {
+        self.heater_s = heater_s;
         self
     }
 
