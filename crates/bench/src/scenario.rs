@@ -318,3 +318,6 @@ impl Scenario {
         self
     }
 }
+
+#[cfg(test)]
+mod tests;
