@@ -39,38 +39,6 @@ pub fn example(effect: &dyn Effect, with_it: bool) -> ModelFile {
     model
 }
 
-/// The example in words.
-fn caption(effect: &dyn Effect) -> String {
-    let example = effect.docs().example;
-    let parameters: Vec<String> = example
-        .parameters
-        .iter()
-        .map(|(name, value)| {
-            let spec = effect.parameters().iter().find(|s| s.name == *name);
-            match spec.map_or("1", |s| s.unit) {
-                "1" => format!("`{name}` {value}"),
-                unit => format!("`{name}` {value} {unit}"),
-            }
-        })
-        .collect();
-    let world: Vec<String> = example
-        .world
-        .iter()
-        .map(|(key, value)| format!("`{key}` {value}"))
-        .collect();
-    let world = if world.is_empty() {
-        String::new()
-    } else {
-        format!("; {}", world.join(", "))
-    };
-    let on = if example.channels.is_empty() {
-        "all axes".to_owned()
-    } else {
-        example.channels.join(", ")
-    };
-    format!("*{} on {on}{world}.*", parameters.join(", "))
-}
-
 /// Two causes that may look the same, each pair once, and what to record to tell them apart: as rows of a table.
 fn rivals(out: &mut String) {
     out.push_str(
@@ -95,11 +63,7 @@ fn rivals(out: &mut String) {
 
 /// Whether `text` is `x` with the axis x replaced by `axis`, as a name of its own or at the end of one.
 fn is_of_axis(x: &str, text: &str, axis: &str) -> bool {
-    let words = |s: &str| -> Vec<String> {
-        s.split(|c: char| c == ' ' || c == '_')
-            .map(str::to_owned)
-            .collect()
-    };
+    let words = |s: &str| -> Vec<String> { s.split([' ', '_']).map(str::to_owned).collect() };
     let (x, text) = (words(x), words(text));
     let same = |(a, b): (&String, &String)| a == b || (a == "x" && b == axis);
     x.len() == text.len() && x != text && x.iter().zip(&text).all(same)
@@ -141,8 +105,8 @@ pub fn effects_markdown() -> String {
     let mut out = String::from(
         "# The effects\n\n\
          Made of `crates/model/src/effects/`, a file for each, by `cargo xtask effects`; how a cause is tested stands there \
-         (`Docs::test`). Each figure is a simulated run of the paper's stand, {SECONDS} s at {RATE} Hz with seed {SEED}, \
-         beside the same run without the effect; below it stand what was simulated and the settings of the stand.\n",
+         (`Docs::test`). Each figure is a simulated run of the paper's stand (`Docs::example`), {SECONDS} s at {RATE} Hz \
+         with seed {SEED}, beside the same run without the effect.\n",
     );
     for (key, value) in [
         ("{SECONDS}", EXAMPLE_SECONDS.to_string()),
@@ -166,11 +130,10 @@ pub fn effects_markdown() -> String {
         }
         let _ = write!(
             out,
-            "- Remedy: {}\n\n![{1}](figures/effects/{1}.svg)\n\n{2} {3}\n",
+            "- Remedy: {}\n\n![{1}](figures/effects/{1}.svg)\n\n{2}\n",
             docs.remedy,
             e.id(),
-            docs.figure,
-            caption(*e)
+            docs.figure
         );
     }
     rivals(&mut out);
