@@ -145,7 +145,7 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
         call_short_term(&of.channel, &mut figures, &mut odd);
     }
     Ok(Representative {
-        run: nearest_to_the_middle(records.len(), &figures, &is_odd),
+        run: middle(records.len(), &figures, &is_odd),
         odd,
         limit,
         limit_alone,
@@ -165,10 +165,12 @@ fn common_channels(records: &[Cow<'_, Record>]) -> Result<Vec<String>, AnalysisE
             .filter(|name| records.iter().all(|r| r.channel(name).is_some()))
             .collect()
     };
-    let mut names = common(true);
-    if names.is_empty() {
-        names = common(false);
-    }
+    let gyros = common(true);
+    let names = if gyros.is_empty() {
+        common(false)
+    } else {
+        gyros
+    };
     if names.is_empty() {
         return Err(AnalysisError::NoChannel {
             name: "common to all runs".into(),
@@ -205,32 +207,23 @@ fn stand_out(figures: &[RunFigure], limit: f64, limit_alone: f64) -> Vec<Odd> {
 /// Where the terms do not describe the whole band, N is what they say below; the whole band compares runs all the same, by
 /// what it holds at its upper end, too, under another name.
 fn call_short_term(channel: &str, figures: &mut [RunFigure], odd: &mut [Odd]) {
-    let is_white = |c: &str, figure: &str| c == channel && figure == WHITE;
-    for f in figures
-        .iter_mut()
-        .filter(|f| is_white(&f.channel, &f.figure))
-    {
-        f.figure = SHORT_TERM.to_owned();
-    }
-    for o in odd.iter_mut().filter(|o| is_white(&o.channel, &o.figure)) {
-        o.figure = SHORT_TERM.to_owned();
+    let figures = figures.iter_mut().map(|f| (&f.channel, &mut f.figure));
+    let odd = odd.iter_mut().map(|o| (&o.channel, &mut o.figure));
+    for (of, figure) in figures.chain(odd) {
+        if of == channel && figure == WHITE {
+            SHORT_TERM.clone_into(figure);
+        }
     }
 }
 
 /// The run with the least sum of z^2 over the figures, among those that are not odd.
-fn nearest_to_the_middle(
-    runs: usize,
-    figures: &[RunFigure],
-    is_odd: &dyn Fn(usize) -> bool,
-) -> usize {
+fn middle(runs: usize, figures: &[RunFigure], is_odd: &dyn Fn(usize) -> bool) -> usize {
     let distance = |run: usize| figures.iter().map(|f| f.z[run].powi(2)).sum::<f64>();
+    let place = |run: usize| (is_odd(run), distance(run));
     (0..runs)
-        .min_by(|a, b| {
-            is_odd(*a)
-                .cmp(&is_odd(*b))
-                .then(distance(*a).total_cmp(&distance(*b)))
-        })
-        .unwrap_or(0)
+        .map(|run| (place(run), run))
+        .min_by(|((a, x), _), ((b, y), _)| a.cmp(b).then(x.total_cmp(y)))
+        .map_or(0, |(_, run)| run)
 }
 
 /// Adds to each figure what its runs say together; the tests of equality are corrected for their number by Holm's method.

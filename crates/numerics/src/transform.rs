@@ -2,13 +2,10 @@
 //! a time.
 //!
 //! ```
-//! use numerics::transform::Dct;
-//!
-//! // DCT-II, orthonormal: the energy stays, and a constant has one coefficient, sqrt(n) times it.
-//! let dct = Dct::new(9);
+//! // DCT-II, orthonormal: a constant has one coefficient, sqrt(n) times it.
+//! let dct = numerics::transform::Dct::new(9);
 //! let c = dct.forward(&[2.0; 9]);
-//! assert!((c[0] - 6.0).abs() < 1e-12 && c[1..].iter().all(|v| v.abs() < 1e-12));
-//! assert!((dct.inverse(&c)[4] - 2.0).abs() < 1e-12);
+//! assert!((c[0] - 6.0).abs() < 1e-12 && (dct.inverse(&c)[4] - 2.0).abs() < 1e-12);
 //! ```
 
 use std::cell::{Cell, OnceCell, RefCell};
