@@ -161,6 +161,27 @@ impl GyroChain {
         t: f64,
         dt: f64,
     ) -> (Outputs, u16) {
+        let (electrical, extra_power) = self.electrical(world, t, dt);
+        let part = &self.part;
+        let keep = (-TAU * part.pole_hz * dt).exp();
+        let input = world.rate_dps * (1.0 + part.scale_error) + electrical;
+        let before = self.signal.unwrap_or(input);
+        let signal = input + (before - input) * keep;
+        self.signal = Some(signal);
+        let noise = self.noise_dps(keep, extra_power);
+        let mut analog = signal + noise + adis.stimulus_counts() * 0.073_26;
+        for tone in &self.tones {
+            analog += behind_the_pole(tone, self.part.pole_hz, t);
+        }
+        let filtered = self.filtered(analog, adis.filter());
+        let corrected = filtered * adis.scale() + f64::from(adis.offset()) * 0.018_315;
+        self.angle_deg += corrected * dt;
+        let alarms = alarms(world, corrected.abs() > adis.range_dps());
+        (self.outputs(world, corrected / adis.lsb_dps()), alarms)
+    }
+
+    /// What the electronics add to the rate, deg/s, and by how much they raise the power of the noise, over its own.
+    fn electrical(&mut self, world: &Stimulus, t: f64, dt: f64) -> (f64, f64) {
         let part = &self.part;
         self.walk_dps += part.rate_random_walk * dt.sqrt() * standard_normal(&mut self.bias_noise);
         let mut electrical = self.walk_dps
@@ -231,7 +252,11 @@ impl GyroChain {
                 _ => 0.0,
             };
         }
-        let keep = (-TAU * part.pole_hz * dt).exp();
+        (electrical, extra_power)
+    }
+
+    /// White noise behind the analog pole, deg/s.
+    fn noise_dps(&mut self, keep: f64, extra_power: f64) -> f64 {
         let fresh = (1.0 - keep * keep).sqrt();
         self.analog_noise = keep * self.analog_noise + fresh * standard_normal(&mut self.noise);
         let mut noise = self.sigma_dps * self.analog_noise;
@@ -240,57 +265,58 @@ impl GyroChain {
                 keep * self.extra_noise + fresh * standard_normal(&mut self.fault_noise);
             noise += self.sigma_dps * extra_power.sqrt() * self.extra_noise;
         }
-        let input = world.rate_dps * (1.0 + part.scale_error) + electrical;
-        let before = self.signal.unwrap_or(input);
-        let signal = input + (before - input) * keep;
-        self.signal = Some(signal);
-        let mut analog = signal + noise + adis.stimulus_counts() * 0.073_26;
-        for tone in &self.tones {
-            // One pole in closed form, so that what lies above half the sample rate folds as it would.
-            let ratio = tone.frequency_hz / part.pole_hz;
-            let (gain, lag) = ((1.0 + ratio * ratio).sqrt().recip(), ratio.atan());
-            analog += tone.amplitude_dps
-                * gain
-                * (TAU * (tone.frequency_hz * t + tone.phase) - lag).sin();
-        }
+        noise
+    }
+
+    /// The part's Bartlett filter over the last samples.
+    fn filtered(&mut self, analog: f64, filter: u32) -> f64 {
         self.newest = (self.newest + 1) % HISTORY;
         self.history[self.newest] = analog;
-        let filter = adis.filter();
         if self.weights.0 != filter {
             self.weights = (filter, bartlett(filter));
         }
-        let filtered: f64 = self
-            .weights
-            .1
-            .iter()
-            .enumerate()
+        let weights = self.weights.1.iter().enumerate();
+        weights
             .map(|(back, weight)| weight * self.history[(self.newest + HISTORY - back) % HISTORY])
-            .sum();
-        let corrected = filtered * adis.scale() + f64::from(adis.offset()) * 0.018_315;
-        self.angle_deg += corrected * dt;
-        let counts = (corrected / adis.lsb_dps()).round().clamp(-8192.0, 8191.0);
+            .sum()
+    }
+
+    /// The registers, of a rate in counts.
+    fn outputs(&mut self, world: &Stimulus, counts: f64) -> Outputs {
+        let counts = counts.round().clamp(-8192.0, 8191.0);
         let temp =
-            world.die_c + part.temp_offset_c + 0.05 * standard_normal(&mut self.sensor_noise);
+            world.die_c + self.part.temp_offset_c + 0.05 * standard_normal(&mut self.sensor_noise);
         let supply = world.supply_v + 1e-3 * standard_normal(&mut self.sensor_noise);
-        let outputs = Outputs {
+        Outputs {
             gyro: counts as i16,
             temp: ((temp - 25.0) / TEMP_LSB_C).round().clamp(-2048.0, 2047.0) as i16,
             supply: (supply / SUPPLY_LSB_V).round().clamp(0.0, 4095.0) as u16,
             aux: 0,
             angle: (self.angle_deg / 0.036_63).rem_euclid(16384.0) as u16,
-        };
-        let mut alarms = 0;
-        if world.supply_v < 4.75 {
-            alarms |= status::SUPPLY_LOW;
         }
-        if world.supply_v > 5.25 {
-            alarms |= status::SUPPLY_HIGH;
-        }
-        if corrected.abs() > adis.range_dps() {
-            alarms |= status::OVERRANGE;
-        }
-        (outputs, alarms)
     }
+}
+
+/// A tone behind one pole in closed form, deg/s, so that what lies above half the sample rate folds as it would.
+fn behind_the_pole(tone: &Tone, pole_hz: f64, t: f64) -> f64 {
+    let ratio = tone.frequency_hz / pole_hz;
+    let (gain, lag) = ((1.0 + ratio * ratio).sqrt().recip(), ratio.atan());
+    tone.amplitude_dps * gain * (TAU * (tone.frequency_hz * t + tone.phase) - lag).sin()
+}
+
+/// The persistent bits of STATUS.
+fn alarms(world: &Stimulus, is_over_range: bool) -> u16 {
+    let mut alarms = 0;
+    if world.supply_v < 4.75 {
+        alarms |= status::SUPPLY_LOW;
+    }
+    if world.supply_v > 5.25 {
+        alarms |= status::SUPPLY_HIGH;
+    }
+    if is_over_range {
+        alarms |= status::OVERRANGE;
+    }
+    alarms
 }
 
 /// rms behind the Bartlett filter for rms 1 behind the analog pole: h' R h with R_ij = exp(-2 pi f dt |i - j|).

@@ -205,16 +205,7 @@ fn life(
     let timeline = chip.borrow().timeline.clone();
     let power = chip.borrow().now;
     let start = power + timeline.start;
-    let gyros = [0, 1, 2].map(|axis| {
-        Adis16250::new(GyroSpi {
-            chip: Rc::clone(chip),
-            axis,
-        })
-    });
-    let mut sensors = HostSensors {
-        chip: Rc::clone(chip),
-        gyros,
-    };
+    let mut sensors = sensors(chip);
     let board = &mut HostBoard(Rc::clone(chip));
     chip.borrow_mut().now = power + timeline.configure;
     let mut stand = firmware::Stand::new();
@@ -240,18 +231,7 @@ fn life(
             let now = chip.borrow().now;
             return deliver(chip, now);
         }
-        {
-            let chip = &mut *chip.borrow_mut();
-            (chip.now, chip.tick, chip.last_tick) = (tick, Some((tick, 0)), tick);
-        }
-        firmware::acquire(&mut sensors, &mut raw);
-        let job = {
-            let chip = &mut *chip.borrow_mut();
-            chip.tick = None;
-            chip.ticks += 1;
-            chip.job.take()
-        };
-        firmware::acquire::work(&mut sensors, &job.unwrap_or_default(), &mut raw.done);
+        sample(chip, &mut sensors, &mut raw, tick);
         raw.t_ticks = raw.t_ticks.wrapping_add(period);
         period = chip.borrow().period;
         // A job may have taken the processor for longer.
@@ -262,17 +242,41 @@ fn life(
         };
         stand.on_sample(board, &raw, 0);
         stand.correct(board, &raw);
-        work(
-            chip,
-            &mut stand,
-            received,
-            &mut millisecond,
-            framed,
-            Some(framed),
-        );
+        let late = Some(framed);
+        work(chip, &mut stand, received, &mut millisecond, framed, late);
         let now = chip.borrow().now;
         deliver(chip, now)?;
     }
+}
+
+/// The sensors on the buses of a chip.
+fn sensors(chip: &Shared) -> HostSensors {
+    let gyros = [0, 1, 2].map(|axis| {
+        Adis16250::new(GyroSpi {
+            chip: Rc::clone(chip),
+            axis,
+        })
+    });
+    HostSensors {
+        chip: Rc::clone(chip),
+        gyros,
+    }
+}
+
+/// The work of a tick with the sensors: the readings, then what a command asked of them.
+fn sample(chip: &Shared, sensors: &mut HostSensors, raw: &mut firmware::Raw, tick: u64) {
+    {
+        let chip = &mut *chip.borrow_mut();
+        (chip.now, chip.tick, chip.last_tick) = (tick, Some((tick, 0)), tick);
+    }
+    firmware::acquire(sensors, raw);
+    let job = {
+        let chip = &mut *chip.borrow_mut();
+        chip.tick = None;
+        chip.ticks += 1;
+        chip.job.take()
+    };
+    firmware::acquire::work(sensors, &job.unwrap_or_default(), &mut raw.done);
 }
 
 /// What is due until `until`: received bytes and milliseconds. With `late`, all of it at that cycle, bytes first, as

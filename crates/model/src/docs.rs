@@ -1,8 +1,9 @@
 //! docs/effects.md, made of what every effect says about itself.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use crate::effect::Effect;
+use crate::effect::{Effect, ParameterSpec};
 use crate::effects::EFFECTS;
 use crate::file::{EffectModel, ModelFile};
 use crate::parameter::Parameter;
@@ -11,6 +12,9 @@ use crate::parameter::Parameter;
 pub const EXAMPLE_SECONDS: f64 = 600.0;
 /// Seed of the examples.
 pub const EXAMPLE_SEED: u64 = 1;
+
+/// What an effect says that any record shows.
+const ANY_RECORD: &str = "Nothing.";
 
 /// The run that shows an effect: the stand of the paper with it, or the same without it.
 #[must_use]
@@ -35,54 +39,63 @@ pub fn example(effect: &dyn Effect, with_it: bool) -> ModelFile {
     model
 }
 
-/// The example in words.
-fn caption(effect: &dyn Effect) -> String {
-    let example = effect.docs().example;
-    let parameters: Vec<String> = example
-        .parameters
-        .iter()
-        .map(|(name, value)| {
-            let spec = effect.parameters().iter().find(|s| s.name == *name);
-            match spec.map_or("1", |s| s.unit) {
-                "1" => format!("`{name}` {value}"),
-                unit => format!("`{name}` {value} {unit}"),
-            }
-        })
-        .collect();
-    let world: Vec<String> = example
-        .world
-        .iter()
-        .map(|(key, value)| format!("`{key}` {value}"))
-        .collect();
-    let world = if world.is_empty() {
-        String::new()
-    } else {
-        format!(", in a world with {}", world.join(", "))
-    };
-    let on = if example.channels.is_empty() {
-        "all axes".to_owned()
-    } else {
-        example.channels.join(", ")
-    };
-    format!("*Simulated: {} on {on}{world}.*", parameters.join(", "))
-}
-
 /// Two causes that may look the same, each pair once, and what to record to tell them apart: as rows of a table.
 fn rivals(out: &mut String) {
     out.push_str(
         "\n## Telling two causes apart\n\nWhat to record where a diagnosis says that a record leaves both open.\n\n\
-         | this | or that | record |\n|---|---|---|\n",
+         | this | or that: record |\n|---|---|\n",
     );
-    let mut known: Vec<[&str; 2]> = Vec::new();
+    let mut known = BTreeSet::new();
     for e in EFFECTS {
-        for r in e.rivals() {
+        let others = e.rivals().iter().filter(|r| {
             let mut pair = [e.id(), r.cause];
             pair.sort_unstable();
-            if !known.contains(&pair) {
-                known.push(pair);
-                let _ = writeln!(out, "| `{}` | `{}` | {} |", e.id(), r.cause, r.experiment);
-            }
+            known.insert(pair)
+        });
+        let others: Vec<String> = others
+            .map(|r| format!("`{}`: {}", r.cause, r.experiment))
+            .collect();
+        if !others.is_empty() {
+            let _ = writeln!(out, "| `{}` | {} |", e.id(), others.join(". "));
         }
+    }
+}
+
+/// Whether `text` is `x` with the axis x replaced by `axis`, as a name of its own or at the end of one.
+fn is_of_axis(x: &str, text: &str, axis: &str) -> bool {
+    let words = |s: &str| -> Vec<String> { s.split([' ', '_']).map(str::to_owned).collect() };
+    let (x, text) = (words(x), words(text));
+    let same = |(a, b): (&String, &String)| a == b || (a == "x" && b == axis);
+    x.len() == text.len() && x != text && x.iter().zip(&text).all(same)
+}
+
+/// How many parameters from the first on are those of x, y and z: they stand in one line.
+fn axes(parameters: &[ParameterSpec]) -> usize {
+    let [x, y, z, ..] = parameters else { return 1 };
+    let like = |p: &ParameterSpec, axis: &str| {
+        (p.unit, p.required) == (x.unit, x.required)
+            && is_of_axis(x.name, p.name, axis)
+            && is_of_axis(x.meaning, p.meaning, axis)
+    };
+    if like(y, "y") && like(z, "z") { 3 } else { 1 }
+}
+
+/// The parameters as a list.
+fn parameters(out: &mut String, mut left: &[ParameterSpec]) {
+    while let Some(p) = left.first() {
+        let count = axes(left);
+        let optional = if p.required { "" } else { " (optional)" };
+        let of_axes = if count > 1 {
+            "; the same for y and z"
+        } else {
+            ""
+        };
+        let _ = writeln!(
+            out,
+            "- `{}` ({}): {}{of_axes}{optional}",
+            p.name, p.unit, p.meaning
+        );
+        left = &left[count..];
     }
 }
 
@@ -92,8 +105,8 @@ pub fn effects_markdown() -> String {
     let mut out = String::from(
         "# The effects\n\n\
          Made of `crates/model/src/effects/`, a file for each, by `cargo xtask effects`; how a cause is tested stands there \
-         (`Docs::test`). Each figure is a simulated run of the paper's stand, {SECONDS} s at {RATE} Hz with seed {SEED}, \
-         beside the same run without the effect.\n",
+         (`Docs::test`). Each figure is a simulated run of the paper's stand (`Docs::example`), {SECONDS} s at {RATE} Hz \
+         with seed {SEED}, beside the same run without the effect.\n",
     );
     for (key, value) in [
         ("{SECONDS}", EXAMPLE_SECONDS.to_string()),
@@ -111,23 +124,16 @@ pub fn effects_markdown() -> String {
             docs.title,
             docs.physics
         );
-        for p in e.parameters() {
-            let meaning = if p.required {
-                p.meaning.to_owned()
-            } else {
-                format!("{} (optional)", p.meaning)
-            };
-            let _ = writeln!(out, "- `{}` ({}): {meaning}", p.name, p.unit);
+        parameters(&mut out, e.parameters());
+        if docs.excitation != ANY_RECORD {
+            let _ = writeln!(out, "- Needs: {}", docs.excitation);
         }
         let _ = write!(
             out,
-            "- Needs: {}\n- What to do: {}\n\n![{}](figures/effects/{}.svg)\n\n{} {}\n",
-            docs.excitation,
+            "- Remedy: {}\n\n![{1}](figures/effects/{1}.svg)\n\n{2}\n",
             docs.remedy,
-            docs.title,
             e.id(),
-            docs.figure,
-            caption(*e)
+            docs.figure
         );
     }
     rivals(&mut out);

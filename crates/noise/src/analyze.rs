@@ -14,7 +14,7 @@ use crate::angles::{Angle, Attitude, angle, attitude};
 pub use crate::curves::DeviationPoint;
 use crate::curves::{curve, gapped_curve, gaps_note};
 use crate::fit::{Described, Estimated, NoiseFit, Ramp, Spectrum, Term, fit_described};
-use crate::paper::{Figure, paper_figures};
+use crate::paper::{Figure, PaperFigures, paper_figures};
 use crate::units::{Scale, Units};
 use channel::analyze_channel;
 pub use channel::misfit_warning;
@@ -215,6 +215,47 @@ pub struct Analysis {
     pub attitude: Option<Attitude>,
 }
 
+/// Names of the channels of a record.
+fn names(record: &Record) -> Vec<String> {
+    record.channels.iter().map(|c| c.name.clone()).collect()
+}
+
+/// The channels to analyze: those that were asked for, or the gyros, accelerometers and others; where there are none of these,
+/// thermometers and supply.
+fn chosen<'a>(
+    record: &'a Record,
+    asked: Option<&[String]>,
+) -> Result<Vec<&'a Channel>, AnalysisError> {
+    let absent = |name: &str| AnalysisError::NoChannel {
+        name: name.to_owned(),
+        present: names(record),
+    };
+    let of = |all: &[Quantity]| -> Vec<&Channel> {
+        let channels = record.channels.iter();
+        channels.filter(|c| all.contains(&c.quantity)).collect()
+    };
+    let found = match asked {
+        Some(asked) => asked
+            .iter()
+            .map(|name| record.channel(name).ok_or_else(|| absent(name)))
+            .collect::<Result<Vec<_>, _>>()?,
+        None => match of(&[
+            Quantity::Gyro,
+            Quantity::Acc,
+            Quantity::Other,
+            Quantity::Derived,
+        ]) {
+            // Who has nothing else to show has chosen by that.
+            main if main.is_empty() => of(&[Quantity::Temp, Quantity::Supply]),
+            main => main,
+        },
+    };
+    if found.is_empty() {
+        return Err(absent("gyro_*, acc_*, temp* or supply"));
+    }
+    Ok(found)
+}
+
 /// Analyze a record.
 ///
 /// # Errors
@@ -223,50 +264,7 @@ pub struct Analysis {
 /// positive, [`AnalysisError::Inconclusive`] below 3 samples, [`AnalysisError::Constant`] when nothing in it moves.
 pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, AnalysisError> {
     let record = &*rows::in_order(record);
-    let present = || {
-        record
-            .channels
-            .iter()
-            .map(|c| c.name.clone())
-            .collect::<Vec<_>>()
-    };
-    let chosen: Vec<&Channel> = match &options.channels {
-        Some(names) => names
-            .iter()
-            .map(|name| {
-                record
-                    .channel(name)
-                    .ok_or_else(|| AnalysisError::NoChannel {
-                        name: name.clone(),
-                        present: present(),
-                    })
-            })
-            .collect::<Result<_, _>>()?,
-        None => {
-            let of = |all: &[Quantity]| -> Vec<&Channel> {
-                let channels = record.channels.iter();
-                channels.filter(|c| all.contains(&c.quantity)).collect()
-            };
-            let main = of(&[
-                Quantity::Gyro,
-                Quantity::Acc,
-                Quantity::Other,
-                Quantity::Derived,
-            ]);
-            // Who has nothing else to show has chosen by that.
-            if main.is_empty() {
-                of(&[Quantity::Temp, Quantity::Supply])
-            } else {
-                main
-            }
-        }
-    };
-    if chosen.is_empty() {
-        return Err(AnalysisError::NoChannel {
-            name: "gyro_*, acc_*, temp* or supply".into(),
-            present: present(),
-        });
-    }
+    let chosen = chosen(record, options.channels.as_deref())?;
     if record.len() < 3 {
         return Err(AnalysisError::Inconclusive {
             what: "a deviation".into(),
@@ -304,7 +302,7 @@ pub fn analyze(record: &Record, options: &AnalyzeOptions) -> Result<Analysis, An
             seconds: record.len() as f64 * sampling.tau0,
             rate_hz: 1.0 / sampling.tau0,
             samples: record.len(),
-            channels: present(),
+            channels: names(record),
             gaps: sampling.runs.len().saturating_sub(1),
             lost_samples: sampling.lost,
             notes: record.notes.clone(),

@@ -1,4 +1,14 @@
 //! From rates to angles: the drift of the integral with what the fitted model predicts for it, and the attitude.
+//!
+//! ```
+//! use noise::attitude::{angle_between, integrate};
+//!
+//! // 90 deg in a second about z.
+//! let start = [1.0, 0.0, 0.0, 0.0];
+//! let rates = [[0.0, 0.0, std::f64::consts::FRAC_PI_2]; 11];
+//! let (_, end) = integrate(&rates, 0.1, start)[5];
+//! assert!((angle_between(start, end).to_degrees() - 90.0).abs() < 1e-9);
+//! ```
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -19,7 +29,14 @@ pub struct AnglePoint {
 }
 
 /// Integrate the longest run of `values`: the bias is the mean over the first `calibration_s`, and the angle grows from
-/// there. `points` of them are returned, evenly spaced; empty when the run is not longer than the calibration.
+/// there. Empty when the run is not longer than the calibration.
+///
+/// | name | meaning | unit | shape |
+/// |---|---|---|---|
+/// | `values` | readings | U | `n` |
+/// | `runs` | rows without a gap between them | – | any |
+/// | `calibration_s` | length over which the bias is taken | s | scalar |
+/// | returns | angles at `points` instants, evenly spaced, and what `fit` predicts of them | U·s | `points` |
 ///
 /// The prediction is the variance of θ(T+t) − θ(T) − (t/T)(θ(T) − θ(0)) for white noise, flicker, random walk and
 /// quantization noise together, from their generalized structure functions: N²τ, −(B²/π)τ² ln τ, −K²τ³/6, 2Q².
@@ -141,7 +158,7 @@ fn rotation(vector: [f64; 3]) -> Quaternion {
     ]
 }
 
-/// Product of two quaternions, normalised.
+/// Product of two unit quaternions (w, x, y, z), normalised: the rotation `b`, then `a`.
 #[must_use]
 pub fn multiply(a: Quaternion, b: Quaternion) -> Quaternion {
     let q = [
@@ -232,5 +249,53 @@ mod tests {
         }
         // χ²(1000): 4 standard deviations are 18 %.
         assert!((squares / f64::from(runs) - 1.0).abs() < 0.18, "{squares}");
+    }
+
+    /// Rms of the angle of the attitude over the rms that is predicted for it, with the standard error of that ratio, on
+    /// stands at rest whose white noise predicts so many degrees; a tenth of 600 s calibrates, as in `analyze`.
+    fn rms_over_predicted(predicted_deg: f64, stands: usize, seed: u64) -> (f64, f64) {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let (tau0, calibration, length) = (1.0f64, 60usize, 600usize);
+        let rest = (length - calibration - 1) as f64 * tau0;
+        let unit = growth_sigma([1.0, 0.0, 0.0, 0.0], calibration as f64 * tau0, rest);
+        let n = predicted_deg.to_radians() / (3f64.sqrt() * unit);
+        let squares: Vec<f64> = (0..stands)
+            .map(|_| {
+                let mut rates: Vec<[f64; 3]> = (0..length)
+                    .map(|_| {
+                        let mut gauss = || -> f64 { StandardNormal.sample(&mut rng) };
+                        [gauss(), gauss(), gauss()].map(|g| n / tau0.sqrt() * g)
+                    })
+                    .collect();
+                let bias = [0, 1, 2].map(|axis| {
+                    rates[..calibration].iter().map(|r| r[axis]).sum::<f64>() / calibration as f64
+                });
+                rates.drain(..calibration);
+                for rate in &mut rates {
+                    *rate = std::array::from_fn(|axis| rate[axis] - bias[axis]);
+                }
+                let start = [1.0, 0.0, 0.0, 0.0];
+                let (_, end) = *integrate(&rates, tau0, start).last().unwrap();
+                (angle_between(start, end).to_degrees() / predicted_deg).powi(2)
+            })
+            .collect();
+        let count = stands as f64;
+        let mean = squares.iter().sum::<f64>() / count;
+        let variance = squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / count;
+        let ratio = mean.sqrt();
+        (ratio, (variance / count).sqrt() / (2.0 * ratio))
+    }
+
+    #[test]
+    fn rotations_of_noise_add_like_numbers_up_to_the_limit_and_not_far_beyond() {
+        for predicted in [20.0, 40.0, crate::angles::PREDICTED_TO_DEG] {
+            let (ratio, error) = rms_over_predicted(predicted, 3000, 17);
+            println!("predicted {predicted} deg rms: {ratio:.3} +- {error:.3} of it");
+            assert!((ratio - 1.0).abs() < 4.0 * error, "{ratio} +- {error}");
+        }
+        // There the angle comes round.
+        let (ratio, error) = rms_over_predicted(120.0, 3000, 17);
+        println!("predicted 120 deg rms: {ratio:.3} +- {error:.3} of it");
+        assert!(ratio < 1.0 - 4.0 * error, "{ratio} +- {error}");
     }
 }

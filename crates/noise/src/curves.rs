@@ -41,6 +41,47 @@ pub struct DeviationPoint {
     pub noise_alpha: i32,
 }
 
+/// Estimates at some averaging factors. The larger white noise of partly filled clusters is divided out by the share that
+/// the fit gives it.
+fn estimates(
+    gapped: &Gapped,
+    kind: Deviation,
+    fitted: Option<&NoiseFit>,
+    tau0: f64,
+    factors: &[usize],
+) -> Vec<GappedEstimate> {
+    let share = |of: fn(&NoiseFit, usize) -> f64, m: usize| fitted.map_or(1.0, |f| of(f, m));
+    if kind == Deviation::Theoh {
+        return gapped.theoh_curve(tau0, factors, |theo1, m| {
+            let of = if theo1 {
+                NoiseFit::white_share_theo1
+            } else {
+                NoiseFit::white_share
+            };
+            share(of, m)
+        });
+    }
+    let at = |m: usize| match kind {
+        Deviation::Adev => gapped.allan(tau0, m, share(NoiseFit::white_share, m)),
+        Deviation::Hdev => gapped.hadamard(tau0, m, share(NoiseFit::white_share_hadamard, m)),
+        Deviation::Ohdev => {
+            gapped.overlapping_hadamard(tau0, m, share(NoiseFit::white_share_hadamard, m))
+        }
+        Deviation::Mdev | Deviation::Tdev => {
+            gapped.modified_allan(tau0, m, share(NoiseFit::white_share_modified, m))
+        }
+        Deviation::Totdev => gapped.total(tau0, m, share(NoiseFit::white_share, m)),
+        Deviation::Mtotdev => {
+            gapped.modified_total(tau0, m, share(NoiseFit::white_share_modified, m))
+        }
+        Deviation::Theo1 => gapped.theo1(tau0, m, share(NoiseFit::white_share_theo1, m)),
+        Deviation::Oadev | Deviation::Theoh => {
+            gapped.overlapping_allan(tau0, m, share(NoiseFit::white_share, m))
+        }
+    };
+    factors.iter().copied().filter_map(at).collect()
+}
+
 /// The curve of a record with gaps. The freedom is that of the grid, less the share of differences that
 /// the gaps took.
 pub(crate) fn gapped_curve(
@@ -55,39 +96,8 @@ pub(crate) fn gapped_curve(
     let lengths = gapped.lengths();
     let longest = kind.longest(lengths.iter().copied().max().unwrap_or(0));
     let factors = grid.factors(longest);
-    let share = |of: fn(&NoiseFit, usize) -> f64, m: usize| fitted.map_or(1.0, |f| of(f, m));
-    let found: Vec<GappedEstimate> = if kind == Deviation::Theoh {
-        gapped.theoh_curve(tau0, &factors, |theo1, m| {
-            let of = if theo1 {
-                NoiseFit::white_share_theo1
-            } else {
-                NoiseFit::white_share
-            };
-            share(of, m)
-        })
-    } else {
-        let at = |m: usize| match kind {
-            Deviation::Adev => gapped.allan(tau0, m, share(NoiseFit::white_share, m)),
-            Deviation::Hdev => gapped.hadamard(tau0, m, share(NoiseFit::white_share_hadamard, m)),
-            Deviation::Ohdev => {
-                gapped.overlapping_hadamard(tau0, m, share(NoiseFit::white_share_hadamard, m))
-            }
-            Deviation::Mdev | Deviation::Tdev => {
-                gapped.modified_allan(tau0, m, share(NoiseFit::white_share_modified, m))
-            }
-            Deviation::Totdev => gapped.total(tau0, m, share(NoiseFit::white_share, m)),
-            Deviation::Mtotdev => {
-                gapped.modified_total(tau0, m, share(NoiseFit::white_share_modified, m))
-            }
-            Deviation::Theo1 => gapped.theo1(tau0, m, share(NoiseFit::white_share_theo1, m)),
-            Deviation::Oadev | Deviation::Theoh => {
-                gapped.overlapping_allan(tau0, m, share(NoiseFit::white_share, m))
-            }
-        };
-        factors.into_iter().filter_map(at).collect()
-    };
     let mut noise = NoiseType::WhiteRate;
-    found
+    estimates(gapped, kind, fitted, tau0, &factors)
         .into_iter()
         .map(|mut found| {
             let m = found.estimate.m;

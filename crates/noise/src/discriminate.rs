@@ -117,25 +117,13 @@ pub fn separation(
         signals: &signals,
     };
     let (parameter, own) = shapes(cause, &view)?;
-    let shapeless = |effect: &dyn Effect| {
-        format!(
-            "{} has no shape in time that an excitation would give it: nothing can be planned for it here",
-            effect.id()
-        )
-    };
-    if own.is_empty() {
-        return Err(shapeless(cause));
-    }
     // Of a family of shapes the middle one stands for the cause.
-    let own = &own[own.len() / 2];
+    let own = own.get(own.len() / 2).ok_or_else(|| shapeless(cause))?;
     let weights = weights(noise, 1.0 / rate_hz, samples);
     let dct = Dct::new(samples);
     let whiten = |column: &[f64]| -> Vec<f64> {
-        dct.forward(column)
-            .iter()
-            .zip(&weights)
-            .map(|(c, w)| c * w)
-            .collect()
+        let c = dct.forward(column);
+        c.iter().zip(&weights).map(|(c, w)| c * w).collect()
     };
     let a = whiten(&own[0]);
     let whole = dot(&a, &a);
@@ -161,6 +149,14 @@ pub fn separation(
         told_apart: TOLD_APART / left.sqrt(),
         parameter,
     })
+}
+
+/// Why nothing can be said of an effect that is noise.
+fn shapeless(effect: &dyn Effect) -> String {
+    format!(
+        "{} has no shape in time that an excitation would give it: nothing can be planned for it here",
+        effect.id()
+    )
 }
 
 /// The parameter whose size is asked for, and the shapes: members of a family, of one or more columns each; none for a

@@ -1,4 +1,15 @@
 //! Equivalent degrees of freedom of a deviation, and its chi-square interval.
+//!
+//! ```
+//! use noise::allan::Deviation;
+//! use noise::edf::{NoiseType, chi_square_interval, edf};
+//!
+//! // White noise, 1000 samples, clusters of 100.
+//! let freedom = edf(Deviation::Oadev, NoiseType::WhiteRate, 100, &[1000]);
+//! let (low, high) = chi_square_interval(1.0, freedom, 0.95);
+//! assert!((12.0..16.0).contains(&freedom));
+//! assert!(low < 1.0 && 1.0 < high);
+//! ```
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -119,17 +130,18 @@ fn covariance(
     strides: usize,
 ) -> Vec<f64> {
     let alpha = noise.alpha();
+    // Of a difference of white points with itself, shifted by 0, 1, 2, ... points.
+    let binomial: &[f64] = if order == 2 {
+        &[6.0, -4.0, 1.0]
+    } else {
+        &[20.0, -15.0, 6.0, -1.0]
+    };
     if alpha == 2 && !modified {
         // White phase: only differences that share a point are correlated, at multiples of τ.
-        let at_multiples: &[f64] = if order == 2 {
-            &[6.0, -4.0, 1.0]
-        } else {
-            &[20.0, -15.0, 6.0, -1.0]
-        };
         return (0..=order * strides)
             .map(|lag| {
                 if lag.is_multiple_of(strides) {
-                    at_multiples[lag / strides]
+                    binomial[lag / strides]
                 } else {
                     0.0
                 }
@@ -154,11 +166,6 @@ fn covariance(
                         - generalized(t + 1.0 / f, alpha))
             }
         }
-    };
-    let binomial: &[f64] = if order == 2 {
-        &[6.0, -4.0, 1.0]
-    } else {
-        &[20.0, -15.0, 6.0, -1.0]
     };
     (0..(order + 1) * strides)
         .map(|lag| {
@@ -243,7 +250,8 @@ fn theo1_edf(noise: NoiseType, m: usize, run_samples: &[usize]) -> f64 {
         .sum()
 }
 
-/// Interval of a deviation with `edf` degrees of freedom: σ·√(edf/χ²) at the two tails of `1 − confidence`.
+/// Interval of a deviation with `edf` degrees of freedom: σ·√(edf/χ²) at the two tails of `1 − confidence`, in the unit of
+/// `deviation`; 0 to infinity where `edf` is not positive.
 #[must_use]
 pub fn chi_square_interval(deviation: f64, edf: f64, confidence: f64) -> (f64, f64) {
     let Some(chi2) = ChiSquared::new(edf).ok().filter(|_| edf > 0.0) else {

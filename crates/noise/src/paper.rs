@@ -192,7 +192,10 @@ fn at(sorted: &[f64], p: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * p).round() as usize]
 }
 
-/// Compute both, by least squares in log-log with the slope held; intervals from replicates of `fit`.
+/// Compute both, by least squares in log-log with the slope held: N in U·√s, the level in U, of a record in unit U.
+///
+/// Intervals (95 %) are those of replicates of `fit`, which `rng` draws. `gapped` is the record where it has gaps. A figure is
+/// left out where the record does not hold its range of cluster times.
 #[must_use]
 pub fn paper_figures(
     phase: &Phase,

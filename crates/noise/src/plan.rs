@@ -1,4 +1,18 @@
 //! How long to record: what a run of a given length would tell, from the Fisher information of the present model.
+//!
+//! ```
+//! use noise::plan::{KnownNoise, Letter, expected, seconds_for};
+//!
+//! let noise = KnownNoise {
+//!     angle_random_walk_n: 0.0878,  // deg/sqrt(s), 5.27 deg/sqrt(h)
+//!     rate_random_walk_k: 0.0015,   // deg/s/sqrt(s)
+//!     ..KnownNoise::default()
+//! };
+//! let seconds = seconds_for(&noise, 20.0, Letter::K, 0.2)?;
+//! let error = expected(&noise, 20.0, seconds).of(Letter::K).unwrap();
+//! assert!((error - 0.2).abs() < 0.002);
+//! # Ok::<(), model::record::AnalysisError>(())
+//! ```
 
 use std::f64::consts::PI;
 
@@ -78,7 +92,8 @@ impl Expected {
 }
 
 /// Relative standard errors of N, B, K, Q and R from a record of `seconds` at `rate_hz`: the Cramér-Rao bound of the exact
-/// likelihood in the DCT-II domain. The ramp is a mean: its odd coefficients tell it from the noise.
+/// likelihood in the DCT-II domain. The ramp is a mean: its odd coefficients tell it from the noise. What is absent from
+/// `noise` has none.
 #[must_use]
 pub fn expected(noise: &KnownNoise, rate_hz: f64, seconds: f64) -> Expected {
     let tau0 = 1.0 / rate_hz;
@@ -114,26 +129,8 @@ pub fn expected(noise: &KnownNoise, rate_hz: f64, seconds: f64) -> Expected {
         k += count;
     }
     let present: Vec<usize> = (0..4).filter(|i| c[*i] > 0.0).collect();
-    let variance = |wanted: usize| -> Option<f64> {
-        let p = present.iter().position(|i| *i == wanted)?;
-        // Schur complement by elimination of the others.
-        let mut a: Vec<Vec<f64>> = present
-            .iter()
-            .map(|i| present.iter().map(|j| fisher[*i][*j]).collect())
-            .collect();
-        for q in (0..present.len()).filter(|q| *q != p) {
-            let pivot = a[q].clone();
-            for (row, line) in a.iter_mut().enumerate() {
-                if row != q {
-                    let f = line[q] / pivot[q];
-                    line.iter_mut().zip(&pivot).for_each(|(x, y)| *x -= f * y);
-                }
-            }
-        }
-        Some(1.0 / a[p][p])
-    };
     // A letter is the root of its coefficient: half the relative error.
-    let relative = |i: usize| variance(i).map(|v| 0.5 * v.sqrt());
+    let relative = |i: usize| variance(&fisher, &present, i).map(|v| 0.5 * v.sqrt());
     let ramp = noise.rate_ramp_r.abs();
     Expected([
         relative(0),
@@ -142,6 +139,25 @@ pub fn expected(noise: &KnownNoise, rate_hz: f64, seconds: f64) -> Expected {
         relative(3),
         (ramp > 0.0).then(|| 1.0 / (ramp * of_ramp.sqrt())),
     ])
+}
+
+/// Variance of one of the `present` parameters, the others estimated with it: the Schur complement, by elimination.
+fn variance(fisher: &[[f64; 4]; 4], present: &[usize], wanted: usize) -> Option<f64> {
+    let p = present.iter().position(|i| *i == wanted)?;
+    let mut a: Vec<Vec<f64>> = present
+        .iter()
+        .map(|i| present.iter().map(|j| fisher[*i][*j]).collect())
+        .collect();
+    for q in (0..present.len()).filter(|q| *q != p) {
+        let pivot = a[q].clone();
+        for (row, line) in a.iter_mut().enumerate() {
+            if row != q {
+                let f = line[q] / pivot[q];
+                line.iter_mut().zip(&pivot).for_each(|(x, y)| *x -= f * y);
+            }
+        }
+    }
+    Some(1.0 / a[p][p])
 }
 
 /// How well an angle is known `after_s` after a still calibration, from the noise that is known.

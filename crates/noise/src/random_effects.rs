@@ -1,4 +1,11 @@
 //! One number from many runs: their mean, how much they differ beyond their own errors, and whether they differ at all.
+//!
+//! ```
+//! let pooled = noise::random_effects::pool(&[5.0, 5.4, 5.1, 5.3], &[0.2; 4]).unwrap();
+//! assert!((pooled.mean - 5.2).abs() < 1e-9);
+//! assert_eq!(pooled.run_to_run, 0.0); // the errors explain what is seen
+//! assert_eq!(noise::random_effects::pool(&[5.0, 5.4], &[0.2; 2]), None);
+//! ```
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};

@@ -121,25 +121,7 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
         });
     }
     let records: Vec<Cow<'_, Record>> = records.iter().map(rows::in_order).collect();
-    let common = |gyro: bool| -> Vec<String> {
-        records[0]
-            .channels
-            .iter()
-            .filter(|c| !gyro || c.quantity == Quantity::Gyro)
-            .map(|c| c.name.clone())
-            .filter(|name| records.iter().all(|r| r.channel(name).is_some()))
-            .collect()
-    };
-    let mut names = common(true);
-    if names.is_empty() {
-        names = common(false);
-    }
-    if names.is_empty() {
-        return Err(AnalysisError::NoChannel {
-            name: "common to all runs".into(),
-            present: Vec::new(),
-        });
-    }
+    let names = common_channels(&records)?;
     let samplings = records
         .iter()
         .map(|r| Sampling::of(r, None))
@@ -154,8 +136,54 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let limit = limit(records.len(), figures.len(), &mut rng);
     let limit_alone = limit_alone(records.len(), figures.len());
+    let mut odd = stand_out(&figures, limit, limit_alone);
+    let odd_runs: Vec<usize> = odd.iter().map(|o| o.run).collect();
+    let is_odd = |run: usize| odd_runs.contains(&run);
+    pool_figures(&mut figures, &is_odd);
+    let together = together(&records, &samplings, &names, &spectra, &is_odd, &mut rng);
+    for of in (together.iter()).filter(|t| t.parameters_hold_from_s != Some(samplings[0].tau0)) {
+        call_short_term(&of.channel, &mut figures, &mut odd);
+    }
+    Ok(Representative {
+        run: middle(records.len(), &figures, &is_odd),
+        odd,
+        limit,
+        limit_alone,
+        figures,
+        together,
+    })
+}
+
+/// Names of the gyros (without any, of all channels) that every run has.
+fn common_channels(records: &[Cow<'_, Record>]) -> Result<Vec<String>, AnalysisError> {
+    let common = |gyro: bool| -> Vec<String> {
+        records[0]
+            .channels
+            .iter()
+            .filter(|c| !gyro || c.quantity == Quantity::Gyro)
+            .map(|c| c.name.clone())
+            .filter(|name| records.iter().all(|r| r.channel(name).is_some()))
+            .collect()
+    };
+    let gyros = common(true);
+    let names = if gyros.is_empty() {
+        common(false)
+    } else {
+        gyros
+    };
+    if names.is_empty() {
+        return Err(AnalysisError::NoChannel {
+            name: "common to all runs".into(),
+            present: Vec::new(),
+        });
+    }
+    Ok(names)
+}
+
+/// Runs beyond one of the limits, of the median of all or of the mean of the others, by the one they exceed more.
+fn stand_out(figures: &[RunFigure], limit: f64, limit_alone: f64) -> Vec<Odd> {
     let mut odd = Vec::new();
-    for figure in &figures {
+    for figure in figures {
         for (run, z) in figure.z.iter().enumerate() {
             let alone = from_the_others(figure, run);
             let found = [(*z, limit), (alone, limit_alone)]
@@ -173,41 +201,29 @@ pub fn representative(records: &[Record], seed: u64) -> Result<Representative, A
             }
         }
     }
-    let odd_runs: Vec<usize> = odd.iter().map(|o| o.run).collect();
-    let is_odd = |run: usize| odd_runs.contains(&run);
-    pool_figures(&mut figures, &is_odd);
-    let together = together(&records, &samplings, &names, &spectra, &is_odd, &mut rng);
-    // Where the terms do not describe the whole band, N is what they say below; the whole band compares runs all the same,
-    // by what it holds at its upper end, too.
-    for of in (together.iter()).filter(|t| t.parameters_hold_from_s != Some(samplings[0].tau0)) {
-        let is_white = |channel: &str, figure: &str| channel == of.channel && figure == WHITE;
-        for figure in figures
-            .iter_mut()
-            .filter(|f| is_white(&f.channel, &f.figure))
-        {
-            figure.figure = SHORT_TERM.to_owned();
-        }
-        for odd in odd.iter_mut().filter(|o| is_white(&o.channel, &o.figure)) {
-            odd.figure = SHORT_TERM.to_owned();
+    odd
+}
+
+/// Where the terms do not describe the whole band, N is what they say below; the whole band compares runs all the same, by
+/// what it holds at its upper end, too, under another name.
+fn call_short_term(channel: &str, figures: &mut [RunFigure], odd: &mut [Odd]) {
+    let figures = figures.iter_mut().map(|f| (&f.channel, &mut f.figure));
+    let odd = odd.iter_mut().map(|o| (&o.channel, &mut o.figure));
+    for (of, figure) in figures.chain(odd) {
+        if of == channel && figure == WHITE {
+            SHORT_TERM.clone_into(figure);
         }
     }
+}
+
+/// The run with the least sum of z^2 over the figures, among those that are not odd.
+fn middle(runs: usize, figures: &[RunFigure], is_odd: &dyn Fn(usize) -> bool) -> usize {
     let distance = |run: usize| figures.iter().map(|f| f.z[run].powi(2)).sum::<f64>();
-    let run = (0..records.len())
-        .min_by(|a, b| {
-            let out = |r: &usize| odd.iter().any(|o| o.run == *r);
-            out(a)
-                .cmp(&out(b))
-                .then(distance(*a).total_cmp(&distance(*b)))
-        })
-        .unwrap_or(0);
-    Ok(Representative {
-        run,
-        odd,
-        limit,
-        limit_alone,
-        figures,
-        together,
-    })
+    let place = |run: usize| (is_odd(run), distance(run));
+    (0..runs)
+        .map(|run| (place(run), run))
+        .min_by(|((a, x), _), ((b, y), _)| a.cmp(b).then(x.total_cmp(y)))
+        .map_or(0, |(_, run)| run)
 }
 
 /// Adds to each figure what its runs say together; the tests of equality are corrected for their number by Holm's method.

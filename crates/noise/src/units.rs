@@ -37,7 +37,8 @@ pub struct Units {
 impl Units {
     /// For a channel of that quantity and unit. Gyros in deg/s or rad/s report deg/s, deg/sqrt(h), deg/h,
     /// deg/s/sqrt(s), deg/s^2 and deg; accelerometers in m/s^2 or g report m/s^2, m/s/sqrt(h), m/s^2,
-    /// m/s^2/sqrt(s), m/s^3 and m/s; anything else keeps its unit and seconds.
+    /// m/s^2/sqrt(s), m/s^3 and m/s; anything else keeps its unit and seconds, and a ratio (unit 1) has sqrt(s), 1/sqrt(s),
+    /// 1/s and s.
     #[must_use]
     pub fn of(quantity: Quantity, unit: &str) -> Self {
         let scale = |factor: f64, unit: &str| Scale {
@@ -81,14 +82,22 @@ impl Units {
         }
         Self {
             reading: scale(1.0, unit),
-            angle_random_walk: scale(1.0, &format!("{unit}*sqrt(s)")),
+            angle_random_walk: scale(1.0, &times(unit, "sqrt(s)")),
             bias_instability: scale(1.0, unit),
             rate_random_walk: scale(1.0, &format!("{unit}/sqrt(s)")),
             rate_ramp: scale(1.0, &format!("{unit}/s")),
-            quantization_noise: scale(1.0, &format!("{unit}*s")),
-            integral: scale(1.0, &format!("{unit}*s")),
-            time_deviation: scale(1.0, &format!("{unit}*s")),
+            quantization_noise: scale(1.0, &times(unit, "s")),
+            integral: scale(1.0, &times(unit, "s")),
+            time_deviation: scale(1.0, &times(unit, "s")),
         }
+    }
+}
+
+/// A product of units. That of a ratio, as fractional frequency is (IEEE Std 1139), with a time is the time.
+fn times(unit: &str, other: &str) -> String {
+    match unit {
+        "1" => other.to_owned(),
+        unit => format!("{unit}*{other}"),
     }
 }
 
@@ -104,6 +113,19 @@ mod tests {
         assert!((n * units.angle_random_walk.factor - 5.27).abs() < 0.001);
         let rad = Units::of(Quantity::Gyro, "rad/s");
         assert!((n.to_radians() * rad.bias_instability.factor - 10f64.powf(2.5)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_fractional_frequency_has_units_of_time_alone() {
+        let units = Units::of(Quantity::Other, "1");
+        let of = [
+            units.angle_random_walk,
+            units.rate_random_walk,
+            units.rate_ramp,
+            units.time_deviation,
+        ];
+        let of = of.map(|scale| scale.unit);
+        assert_eq!(of, ["sqrt(s)", "1/sqrt(s)", "1/s", "s"]);
     }
 
     #[test]

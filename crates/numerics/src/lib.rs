@@ -1,6 +1,6 @@
 //! Arithmetic without policy: transforms, columns, tails, order statistics, searches for a minimum.
 //!
-//! Slices in, numbers out: nothing here knows what a record, a channel or an effect is.
+//! Slices in, numbers out: nothing here knows what a record, a channel or an effect is. Units are the caller's.
 
 pub mod column;
 pub mod exp_ln;

@@ -211,6 +211,17 @@ impl Simplex {
 }
 
 /// Nelder-Mead search for the lowest point of `f`, at most `evaluations` evaluations or until the simplex is flat.
+///
+/// `start` has the point to begin with, one number a parameter, and `steps` the first step along each. `f` must not return NaN.
+///
+/// ```
+/// let f = |x: &[f64]| (x[0] - 3.0).powi(2) + (x[1] + 1.0).powi(2);
+/// let lowest = numerics::minimise::nelder_mead(&f, &[0.0, 0.0], &[1.0, 1.0], 300);
+/// assert!((lowest[0] - 3.0).abs() < 0.02 && (lowest[1] + 1.0).abs() < 0.02);
+/// ```
+///
+/// # Source
+/// J. A. Nelder, R. Mead, "A simplex method for function minimization", Computer J. 7 (1965) 308.
 pub fn nelder_mead(
     f: &dyn Fn(&[f64]) -> f64,
     start: &[f64],

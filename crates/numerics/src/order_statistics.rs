@@ -1,11 +1,20 @@
 //! Order statistics: quantiles, medians and widths.
+//!
+//! ```
+//! use numerics::order_statistics::{median, quantile};
+//!
+//! let readings = [3.0, 1.0, f64::NAN, 2.0, 100.0, 4.0];
+//! assert_eq!(median(&readings), 3.0);
+//! assert_eq!(quantile(&readings, 1.0), 100.0);
+//! ```
 
 use crate::wide;
 
 /// The 90 % point of the standard normal.
 pub const TENTH: f64 = 1.281_552;
 
-/// Half the width between the 10 % and 90 % points over that of the standard normal.
+/// Standard deviation of normal values by the width between their 10 % and 90 % points: what lies beyond does not move it.
+/// 0 of none.
 #[must_use]
 pub fn robust_sigma(values: &[f64]) -> f64 {
     width(values, 0.1) / (2.0 * TENTH)
@@ -88,48 +97,121 @@ wide! {
     = counted_in_bins
 }
 
-#[inline(always)]
-fn counted_in_bins(
-    values: &[f64],
-    places: impl Fn(usize) -> [usize; 2],
-    Span { low, high }: Span,
-) -> Option<[f64; 2]> {
-    const BINS: usize = 2048;
+/// Bins of a span, what lies beyond in the outer ones.
+const BINS: usize = 2048;
+
+/// Even bins over a span.
+#[derive(Clone, Copy)]
+struct Bins {
+    low: f64,
+    scale: f64,
+}
+
+impl Bins {
     const LAST: f64 = (BINS - 1) as f64;
-    /// Tallies in turn: readings come in codes, and to add to a number that was just added to takes its time.
-    const TURNS: usize = 4;
-    /// Share of the values from which on a bin is thought to hold one code.
-    const CODE: usize = 100;
-    /// 2^52: added to a number, its whole part stands in the last bits.
-    const WHOLE: f64 = 4_503_599_627_370_496.0;
-    let scale = if high > low { LAST / (high - low) } else { 0.0 };
-    // What is not finite has the bin behind all others.
-    let bin = |v: f64| {
-        let at = (v - low) * scale;
+
+    #[inline(always)]
+    fn of(Span { low, high }: Span) -> Self {
+        let scale = if high > low {
+            Self::LAST / (high - low)
+        } else {
+            0.0
+        };
+        Self { low, scale }
+    }
+
+    /// The bin of a value; what is not finite has the one behind all others.
+    #[inline(always)]
+    fn at(self, v: f64) -> u64 {
+        /// 2^52: added to a number, its whole part stands in the last bits.
+        const WHOLE: f64 = 4_503_599_627_370_496.0;
+        let at = (v - self.low) * self.scale;
         let at = if at > 0.0 { at } else { 0.0 };
-        let at = if at < LAST { at } else { LAST };
+        let at = if at < Self::LAST { at } else { Self::LAST };
         let whole = (at + WHOLE).to_bits() - WHOLE.to_bits();
         if v.abs() <= f64::MAX {
             whole
         } else {
             BINS as u64
         }
-    };
-    let bins = |few: &[f64; ABREAST]| few.map(bin);
-    let (many, rest) = values.as_chunks::<ABREAST>();
-    let mut tallies = [[0u32; BINS + 1]; TURNS];
-    for few in many {
-        for (i, b) in bins(few).into_iter().enumerate() {
-            tallies[i % TURNS][(b as usize).min(BINS)] += 1;
+    }
+
+    #[inline(always)]
+    fn of_few(self, few: &[f64; ABREAST]) -> [u64; ABREAST] {
+        few.map(|v| self.at(v))
+    }
+
+    /// Values in each bin.
+    #[inline(always)]
+    fn tally(self, values: &[f64]) -> [u32; BINS + 1] {
+        /// Tallies in turn: readings come in codes, and to add to a number that was just added to takes its time.
+        const TURNS: usize = 4;
+        let (many, rest) = values.as_chunks::<ABREAST>();
+        let mut tallies = [[0u32; BINS + 1]; TURNS];
+        for few in many {
+            for (i, b) in self.of_few(few).into_iter().enumerate() {
+                tallies[i % TURNS][(b as usize).min(BINS)] += 1;
+            }
         }
+        let [mut tally, others @ ..] = tallies;
+        for v in rest {
+            tally[(self.at(*v) as usize).min(BINS)] += 1;
+        }
+        for other in others {
+            tally.iter_mut().zip(other).for_each(|(t, o)| *t += o);
+        }
+        tally
     }
-    let [mut tally, others @ ..] = tallies;
-    for v in rest {
-        tally[(bin(*v) as usize).min(BINS)] += 1;
+
+    /// Least and greatest value in bin `b`.
+    #[inline(always)]
+    fn extremes(self, values: &[f64], b: u64) -> [f64; 2] {
+        let (many, rest) = values.as_chunks::<ABREAST>();
+        let [mut least, mut most] = [f64::INFINITY, f64::NEG_INFINITY].map(|v| [v; ABREAST]);
+        for few in many {
+            let of = self.of_few(few);
+            for i in 0..ABREAST {
+                let (v, inside) = (few[i], of[i] == b);
+                least[i] = if inside & (v < least[i]) { v } else { least[i] };
+                most[i] = if inside & (v > most[i]) { v } else { most[i] };
+            }
+        }
+        let inside = || rest.iter().copied().filter(|v| self.at(*v) == b);
+        let least = least.into_iter().chain(inside());
+        let most = most.into_iter().chain(inside());
+        [
+            least.fold(f64::INFINITY, f64::min),
+            most.fold(f64::NEG_INFINITY, f64::max),
+        ]
     }
-    for other in others {
-        tally.iter_mut().zip(other).for_each(|(t, o)| *t += o);
+
+    /// The values in bin `b`, `count` of them.
+    #[inline(always)]
+    fn inside(self, values: &[f64], b: u64, count: usize) -> Vec<f64> {
+        let (many, rest) = values.as_chunks::<ABREAST>();
+        let mut inside = Vec::with_capacity(count);
+        for few in many {
+            let of = self.of_few(few);
+            if of.contains(&b) {
+                let here = few.iter().zip(of).filter(|(_, of)| *of == b);
+                inside.extend(here.map(|(v, _)| *v));
+            }
+        }
+        inside.extend(rest.iter().filter(|v| self.at(**v) == b));
+        inside
     }
+}
+
+#[inline(always)]
+fn counted_in_bins(
+    values: &[f64],
+    places: impl Fn(usize) -> [usize; 2],
+    span: Span,
+) -> Option<[f64; 2]> {
+    /// Share of the values from which on a bin is thought to hold one code.
+    const CODE: usize = 100;
+    let bins = Bins::of(span);
+    let tally = bins.tally(values);
     let count = values.len() - tally[BINS] as usize;
     if count == 0 {
         return None;
@@ -143,37 +225,12 @@ fn counted_in_bins(
         let here = tally[b] as usize;
         let b = b as u64;
         if here > values.len() / CODE {
-            let [mut least, mut most] = [f64::INFINITY, f64::NEG_INFINITY].map(|v| [v; ABREAST]);
-            for few in many {
-                let of = bins(few);
-                for i in 0..ABREAST {
-                    let (v, inside) = (few[i], of[i] == b);
-                    least[i] = if inside & (v < least[i]) { v } else { least[i] };
-                    most[i] = if inside & (v > most[i]) { v } else { most[i] };
-                }
-            }
-            let inside = || rest.iter().copied().filter(|v| bin(*v) == b);
-            let least = least
-                .into_iter()
-                .chain(inside())
-                .fold(f64::INFINITY, f64::min);
-            let most = most
-                .into_iter()
-                .chain(inside())
-                .fold(f64::NEG_INFINITY, f64::max);
+            let [least, most] = bins.extremes(values, b);
             if least == most {
                 return least;
             }
         }
-        let mut inside = Vec::with_capacity(here);
-        for few in many {
-            let of = bins(few);
-            if of.contains(&b) {
-                let here = few.iter().zip(of).filter(|(_, of)| *of == b);
-                inside.extend(here.map(|(v, _)| *v));
-            }
-        }
-        inside.extend(rest.iter().filter(|v| bin(**v) == b));
+        let mut inside = bins.inside(values, b, here);
         *inside
             .select_nth_unstable_by(place - before, f64::total_cmp)
             .1

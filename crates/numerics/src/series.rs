@@ -1,4 +1,13 @@
 //! What is asked of a series of readings.
+//!
+//! ```
+//! use numerics::series::{smallest_step, white_by_differences};
+//!
+//! // A ramp that is rounded to 0.5, with alternating noise of +-1: the ramp does not count.
+//! let readings: Vec<f64> = (0..1000).map(|i| f64::from(i / 500) * 0.5 + f64::from(i % 2) * 2.0).collect();
+//! assert_eq!(smallest_step(&readings), 0.5);
+//! assert!((white_by_differences(&readings) - (2.0f64 / 0.6745).powi(2) / 2.0).abs() < 1e-9);
+//! ```
 
 use crate::order_statistics::robust_sigma;
 
@@ -21,7 +30,8 @@ pub fn smallest_step(values: &[f64]) -> f64 {
     if multiples > 0.8 * all { step } else { 0.0 }
 }
 
-/// White variance from first differences, robust against steps and spikes.
+/// White variance from first differences, robust against steps and spikes: half the square of their median size over 0.6745,
+/// the median of a standard normal's size. In the square of the unit of `y`; what is not finite is left out; 0 below two values.
 pub fn white_by_differences(y: &[f64]) -> f64 {
     let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
     let mut d: Vec<f64> = known.windows(2).map(|w| (w[1] - w[0]).abs()).collect();

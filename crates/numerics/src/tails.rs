@@ -1,4 +1,12 @@
-//! Chances far out.
+//! Chances far out: tails of distributions, where one minus the distribution function has no digits left.
+//!
+//! ```
+//! use numerics::tails::{chi_square, two_sided};
+//!
+//! assert!((two_sided(1.959_964) - 0.05).abs() < 1e-6);
+//! assert!((chi_square(3.841_459, 1.0) - 0.05).abs() < 1e-6);
+//! assert!(two_sided(20.0) > 0.0);
+//! ```
 
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal, Poisson};
 

@@ -1,5 +1,12 @@
 //! Fourier and cosine transforms of real records: of an even length through complex ones of half of it, of an odd one two at
 //! a time.
+//!
+//! ```
+//! // DCT-II, orthonormal: a constant has one coefficient, sqrt(n) times it.
+//! let dct = numerics::transform::Dct::new(9);
+//! let c = dct.forward(&[2.0; 9]);
+//! assert!((c[0] - 6.0).abs() < 1e-12 && (dct.inverse(&c)[4] - 2.0).abs() < 1e-12);
+//! ```
 
 use std::cell::{Cell, OnceCell, RefCell};
 use std::collections::{HashMap, HashSet};

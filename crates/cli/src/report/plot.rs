@@ -389,8 +389,14 @@ pub fn tidy(value: f64, digits: usize) -> String {
     let rounded: f64 = format!("{value:.*e}", digits.saturating_sub(1))
         .parse()
         .unwrap_or(value);
+    if rounded != 0.0 && rounded.abs() < LEAST_PLAIN {
+        return format!("{rounded:e}");
+    }
     format!("{rounded}")
 }
+
+/// Sizes below it are written with an exponent.
+const LEAST_PLAIN: f64 = 1e-4;
 
 /// Thins a signal to what a figure can show: the lowest and the highest of each of `columns` stretches.
 #[must_use]
@@ -428,6 +434,7 @@ mod tests {
         assert_eq!(number(999_999.9, 4), "1.000e6");
         assert_eq!(tidy(20.000_000_001, 6), "20");
         assert_eq!(tidy(599.75, 6), "599.75");
+        assert_eq!(tidy(2.587e-11, 6), "2.587e-11");
         assert_eq!(number(3.2e-7, 2), "3.2e-7");
         assert_eq!(number(0.0, 3), "0");
     }

@@ -235,15 +235,7 @@ pub(super) fn modified_total<T: PhasePoint>(
             .map(|(i, w)| w * branch.inner(&ramp, i).powi(2))
             .sum::<f64>();
     }
-    // The points at the ends of a window: with the others through their sum, and with themselves.
-    let ends = [0, length].map(|end| {
-        let mut row = vec![0.0; length + 1];
-        for branch in branches.iter().filter(|b| b.end == end) {
-            branch.add_to(&mut row, |_| branch.factor);
-            row[end] -= 0.5 * branch.factor.powi(2) * branch.weights.iter().sum::<f64>();
-        }
-        (end, row)
-    });
+    let ends = [0, length].map(|end| (end, of_end(&branches, end, length)));
     let mut total = 0.0;
     for (start, end) in blocks(windows, m) {
         let w = end - start;
@@ -271,6 +263,16 @@ pub(super) fn modified_total<T: PhasePoint>(
         }
     }
     (total.max(0.0) / (6 * m) as f64, windows)
+}
+
+/// What multiplies the point at an end of a window: with the others through their sum, and with itself.
+fn of_end(branches: &[Branch], end: usize, length: usize) -> Vec<f64> {
+    let mut row = vec![0.0; length + 1];
+    for branch in branches.iter().filter(|b| b.end == end) {
+        branch.add_to(&mut row, |_| branch.factor);
+        row[end] -= 0.5 * branch.factor.powi(2) * branch.weights.iter().sum::<f64>();
+    }
+    row
 }
 
 /// Σ_w Σᵢ (weight of i)·(zᵢ without the end point)².

@@ -1,4 +1,16 @@
 //! The Allan family: estimators on integrated readings, their grids of cluster times and the streaming form.
+//!
+//! ```
+//! use noise::allan::{Deviation, Phase, deviation};
+//!
+//! // A reading that alternates by +-1 averages out over two samples.
+//! let readings: Vec<f64> = (0..100).map(|i| f64::from(1 - 2 * (i % 2))).collect();
+//! let phase = Phase::from_values(&readings, &[0..100]);
+//! let at = |m| deviation(&phase, Deviation::Oadev, 0.05, m).map(|e| e.deviation);
+//! assert!((at(1).unwrap() - 2f64.sqrt()).abs() < 1e-12);
+//! assert!(at(2).unwrap() < 1e-12);
+//! assert_eq!(at(51), None);
+//! ```
 
 mod correlate;
 mod fast;

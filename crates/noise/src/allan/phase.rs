@@ -249,32 +249,9 @@ impl Phase {
         if kind == Deviation::Theoh {
             return self.theoh(tau0, &[m], correlator).pop();
         }
-        fn sum<T: PhasePoint>(
-            runs: &[Vec<T>],
-            kind: Deviation,
-            m: usize,
-            correlator: &mut Correlator,
-        ) -> (f64, usize) {
-            let mut out = (0.0, 0);
-            for x in runs {
-                let (squares, n) = match kind {
-                    Deviation::Adev => kernels::second_differences(x, m, m),
-                    Deviation::Oadev => kernels::second_differences(x, m, 1),
-                    Deviation::Mdev | Deviation::Tdev => kernels::averaged_second_differences(x, m),
-                    Deviation::Hdev => kernels::third_differences(x, m, m),
-                    Deviation::Ohdev => kernels::third_differences(x, m, 1),
-                    Deviation::Totdev => total::total(x, m),
-                    Deviation::Mtotdev => total::modified_total(x, m, correlator),
-                    Deviation::Theo1 | Deviation::Theoh => total::theo1(x, m, correlator),
-                };
-                out.0 += squares;
-                out.1 += n;
-            }
-            out
-        }
         let (squares, n) = match &self.runs {
-            Runs::Counts(runs) => sum(runs, kind, m, correlator),
-            Runs::Values(runs) => sum(runs, kind, m, correlator),
+            Runs::Counts(runs) => squares(runs, kind, m, correlator),
+            Runs::Values(runs) => squares(runs, kind, m, correlator),
         };
         if n == 0 {
             return None;
@@ -302,6 +279,31 @@ impl Phase {
             n,
         })
     }
+}
+
+/// Sum of the squared differences of a deviation over all runs, and their number.
+fn squares<T: PhasePoint>(
+    runs: &[Vec<T>],
+    kind: Deviation,
+    m: usize,
+    correlator: &mut Correlator,
+) -> (f64, usize) {
+    let mut out = (0.0, 0);
+    for x in runs {
+        let (squares, n) = match kind {
+            Deviation::Adev => kernels::second_differences(x, m, m),
+            Deviation::Oadev => kernels::second_differences(x, m, 1),
+            Deviation::Mdev | Deviation::Tdev => kernels::averaged_second_differences(x, m),
+            Deviation::Hdev => kernels::third_differences(x, m, m),
+            Deviation::Ohdev => kernels::third_differences(x, m, 1),
+            Deviation::Totdev => total::total(x, m),
+            Deviation::Mtotdev => total::modified_total(x, m, correlator),
+            Deviation::Theo1 | Deviation::Theoh => total::theo1(x, m, correlator),
+        };
+        out.0 += squares;
+        out.1 += n;
+    }
+    out
 }
 
 #[cfg(test)]

@@ -166,6 +166,18 @@ fn below_a_step(channel: &Channel, fitted: &NoiseFit, tau0: f64) -> Option<Strin
     })
 }
 
+/// The paper's figures in the units of reports.
+fn in_units(figures: PaperFigures, units: &Units) -> Paper {
+    Paper {
+        angle_random_walk: Interval::figure(figures.angle_random_walk, &units.angle_random_walk),
+        in_run_bias_stability: Interval::figure(
+            figures.in_run_bias_stability,
+            &units.bias_instability,
+        ),
+        notes: figures.notes,
+    }
+}
+
 pub(super) fn analyze_channel(
     channel: &Channel,
     sampling: &Sampling,
@@ -217,15 +229,10 @@ pub(super) fn analyze_channel(
         .collect();
     seen.angle(&fitted, &mut out);
     out.warnings.extend(below_a_step(channel, &fitted, tau0));
-    let figures = paper_figures(phase, gapped, &spectrum, &fitted, &mut rng);
-    out.paper = Paper {
-        angle_random_walk: Interval::figure(figures.angle_random_walk, &units.angle_random_walk),
-        in_run_bias_stability: Interval::figure(
-            figures.in_run_bias_stability,
-            &units.bias_instability,
-        ),
-        notes: figures.notes,
-    };
+    out.paper = in_units(
+        paper_figures(phase, gapped, &spectrum, &fitted, &mut rng),
+        &units,
+    );
     (out, Some(fitted))
 }
 

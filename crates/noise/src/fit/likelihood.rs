@@ -130,58 +130,27 @@ fn ratio(a: impl Iterator<Item = f64>, b: impl Iterator<Item = f64>) -> f64 {
     a.sum::<f64>() / b.sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
+/// Most steps of a climb.
+const STEPS: usize = 60;
+/// Most halvings of a step that gains nothing.
+const HALVINGS: usize = 30;
+/// A step that gains less ends a climb, nats.
+const LEAST_GAIN: f64 = 1e-9;
+
 fn climb(spectrum: &Spectrum, model: Model, fixed: Option<usize>, mut c: Coefficients) -> Maximum {
     let (mut best, mut ramp) = evaluate(spectrum, model, &c);
-    for _ in 0..60 {
-        let mut gradient = [0.0; 4];
-        let mut fisher = [[0.0; 4]; 4];
-        // What the ramp's precision adds to the slope of the restricted likelihood.
-        let mut leverage = [0.0; 4];
-        let mut precision = 0.0;
-        for bin in &spectrum.bins {
-            let v = Spectrum::variance(bin, &c);
-            let inverse = 1.0 / v;
-            let part = bin.rr * inverse;
-            precision += part;
-            let pull = 0.5 * (residual(bin, ramp) * inverse - bin.count) * inverse;
-            let weight = 0.5 * bin.count * inverse * inverse;
-            for i in 0..4 {
-                gradient[i] += bin.shape[i] * pull;
-                leverage[i] += 0.5 * bin.shape[i] * part * inverse;
-                for j in i..4 {
-                    fisher[i][j] += bin.shape[i] * bin.shape[j] * weight;
-                }
-            }
-        }
-        if model.ramp == Ramp::Restricted {
-            for (g, l) in gradient.iter_mut().zip(leverage) {
-                *g += l / precision;
-            }
-        }
-        let mut active: Vec<usize> = (0..4)
-            .filter(|t| model.terms[*t] && fixed != Some(*t) && (c[*t] > 0.0 || gradient[*t] > 0.0))
-            .collect();
-        // A term whose step would go below zero stops at zero, and the others step without it.
-        let step = loop {
-            if active.is_empty() {
-                break None;
-            }
-            let Some(step) = solve(&fisher, &gradient, &active) else {
-                break None;
-            };
-            match active.iter().position(|t| c[*t] <= 0.0 && step[*t] <= 0.0) {
-                Some(p) => {
-                    active.remove(p);
-                }
-                None => break Some(step),
-            }
-        };
-        let Some(step) = step else {
+    for _ in 0..STEPS {
+        let (gradient, fisher) = slope(spectrum, model, &c, ramp);
+        let free =
+            |t: &usize| model.terms[*t] && fixed != Some(*t) && (c[*t] > 0.0 || gradient[*t] > 0.0);
+        let Some((step, active)) =
+            feasible_step(&fisher, &gradient, &c, (0..4).filter(free).collect())
+        else {
             break;
         };
         let mut scale = 1.0;
         let mut gained = None;
-        for _ in 0..30 {
+        for _ in 0..HALVINGS {
             let mut trial = c;
             for &t in &active {
                 trial[t] = (c[t] + scale * step[t]).max(0.0);
@@ -201,7 +170,7 @@ fn climb(spectrum: &Spectrum, model: Model, fixed: Option<usize>, mut c: Coeffic
         best += gain;
         c = trial;
         ramp = r;
-        if gain < 1e-9 {
+        if gain < LEAST_GAIN {
             break;
         }
     }
@@ -210,6 +179,61 @@ fn climb(spectrum: &Spectrum, model: Model, fixed: Option<usize>, mut c: Coeffic
         ramp,
         log_likelihood: best,
     }
+}
+
+/// Gradient and Fisher information (upper triangle) of the log likelihood by the coefficients of the terms.
+fn slope(
+    spectrum: &Spectrum,
+    model: Model,
+    c: &Coefficients,
+    ramp: f64,
+) -> ([f64; 4], [[f64; 4]; 4]) {
+    let mut gradient = [0.0; 4];
+    let mut fisher = [[0.0; 4]; 4];
+    // What the ramp's precision adds to the slope of the restricted likelihood.
+    let mut leverage = [0.0; 4];
+    let mut precision = 0.0;
+    for bin in &spectrum.bins {
+        let v = Spectrum::variance(bin, c);
+        let inverse = 1.0 / v;
+        let part = bin.rr * inverse;
+        precision += part;
+        let pull = 0.5 * (residual(bin, ramp) * inverse - bin.count) * inverse;
+        let weight = 0.5 * bin.count * inverse * inverse;
+        for i in 0..4 {
+            gradient[i] += bin.shape[i] * pull;
+            leverage[i] += 0.5 * bin.shape[i] * part * inverse;
+            for j in i..4 {
+                fisher[i][j] += bin.shape[i] * bin.shape[j] * weight;
+            }
+        }
+    }
+    if model.ramp == Ramp::Restricted {
+        for (g, l) in gradient.iter_mut().zip(leverage) {
+            *g += l / precision;
+        }
+    }
+    (gradient, fisher)
+}
+
+/// Fisher step, with the terms that take it: one whose step would go below zero stops at zero, and the others step without
+/// it.
+fn feasible_step(
+    fisher: &[[f64; 4]; 4],
+    gradient: &[f64; 4],
+    c: &Coefficients,
+    mut active: Vec<usize>,
+) -> Option<([f64; 4], Vec<usize>)> {
+    while !active.is_empty() {
+        let step = solve(fisher, gradient, &active)?;
+        match active.iter().position(|t| c[*t] <= 0.0 && step[*t] <= 0.0) {
+            Some(p) => {
+                active.remove(p);
+            }
+            None => return Some((step, active)),
+        }
+    }
+    None
 }
 
 /// Fisher step of the active terms, by Cholesky with the columns scaled to unit diagonal.
@@ -288,13 +312,7 @@ pub fn profile_interval(
     let low = if peak <= 0.0 || (term != 0 && below(0.0) >= 0.0) {
         0.0
     } else {
-        let mut inside = peak;
-        let mut outside = peak * 0.9;
-        while below(outside) > 0.0 && outside > peak * 1e-9 {
-            inside = outside;
-            outside *= 0.7;
-        }
-        bisect(&mut below, inside, outside)
+        lower_end(&mut below, peak)
     };
     // Where the term is strongest, a thousandth of all there is.
     let Some(strongest) = spectrum
@@ -307,12 +325,28 @@ pub fn profile_interval(
     };
     let shape_scale = strongest.shape[term];
     let there = Spectrum::variance(strongest, &maximum.coefficients);
-    let mut inside = peak;
-    let mut outside = if peak > 0.0 {
+    let first = if peak > 0.0 {
         peak * 1.1
     } else {
         1e-3 * there / shape_scale
     };
+    (low, upper_end(&mut below, peak, first))
+}
+
+/// Where the profile falls through its level below the peak.
+fn lower_end(below: &mut impl FnMut(f64) -> f64, peak: f64) -> f64 {
+    let mut inside = peak;
+    let mut outside = peak * 0.9;
+    while below(outside) > 0.0 && outside > peak * 1e-9 {
+        inside = outside;
+        outside *= 0.7;
+    }
+    bisect(below, inside, outside)
+}
+
+/// Where it does above the peak, looked for from `first` on in growing steps.
+fn upper_end(below: &mut impl FnMut(f64) -> f64, peak: f64, first: f64) -> f64 {
+    let (mut inside, mut outside) = (peak, first);
     for _ in 0..80 {
         if below(outside) <= 0.0 {
             break;
@@ -320,7 +354,7 @@ pub fn profile_interval(
         inside = outside;
         outside = (outside + (outside - peak)).max(outside * 1.2);
     }
-    (low, bisect(&mut below, inside, outside))
+    bisect(below, inside, outside)
 }
 
 fn bisect(below: &mut impl FnMut(f64) -> f64, mut inside: f64, mut outside: f64) -> f64 {

@@ -5,6 +5,21 @@
 //! chosen. Intervals are profile likelihoods of the model that has *every* term, the ramp integrated out: what the
 //! record does not establish may be there all the same, and has to be allowed for. The interval of the ramp is averaged
 //! over the random walk, because the two hide each other and a plug-in interval is too narrow.
+//!
+//! ```
+//! use noise::fit::{Spectrum, Term, fit};
+//! use noise::synthetic::Truth;
+//! use rand_core::SeedableRng;
+//!
+//! let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
+//! let truth = Truth { n: 0.05, ..Truth::default() };
+//! let readings = truth.record(12_000, 0.05, &mut rng);
+//! let fitted = fit(&Spectrum::of(&readings, &[0..12_000], 0.05));
+//! let n = fitted.term(Term::White);
+//! assert!((n.value.unwrap() - 0.05).abs() < 4.0 * n.std_error.unwrap());
+//! // What is not there has an upper limit and no value.
+//! assert_eq!(fitted.term(Term::Flicker).value, None);
+//! ```
 
 mod band;
 mod likelihood;
@@ -163,7 +178,9 @@ const EVERYTHING: Model = Model {
     ramp: Ramp::Restricted,
 };
 
-/// Fit the terms to a spectrum.
+/// Fit the terms to a spectrum: of a record in unit U, N in U·√s, B in U, K in U/√s, Q in U·s, R in U/s.
+///
+/// Values are those of the chosen model, intervals (95 %) those of the model with all terms, by profile likelihood.
 #[must_use]
 pub fn fit(spectrum: &Spectrum) -> NoiseFit {
     let (model, maximum) = choose(spectrum);

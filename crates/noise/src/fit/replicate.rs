@@ -37,7 +37,24 @@ pub struct Misfit {
     pub ratio: f64,
 }
 
-/// Misfit of `fit` at the averaging factors `ms`, against `count` replicates that are fitted like the record itself.
+/// Mean and standard deviation over replicates (rows) of each of `columns` figures.
+fn moments(replicates: &[Vec<f64>], columns: usize) -> Vec<(f64, f64)> {
+    let n = replicates.len() as f64;
+    (0..columns)
+        .map(|i| {
+            let mean = replicates.iter().map(|r| r[i]).sum::<f64>() / n;
+            let variance = replicates
+                .iter()
+                .map(|r| (r[i] - mean).powi(2))
+                .sum::<f64>()
+                / (n - 1.0).max(1.0);
+            (mean, variance.sqrt().max(1e-12))
+        })
+        .collect()
+}
+
+/// Misfit of `fit` at the averaging factors `ms` (samples), against `count` replicates that are fitted like the record itself;
+/// `None` without a factor or a replicate.
 #[must_use]
 pub fn misfit(
     spectrum: &Spectrum,
@@ -75,17 +92,7 @@ pub fn misfit(
         })
         .collect();
     let n = count as f64;
-    let moments: Vec<(f64, f64)> = (0..ms.len())
-        .map(|i| {
-            let mean = replicates.iter().map(|r| r[i]).sum::<f64>() / n;
-            let variance = replicates
-                .iter()
-                .map(|r| (r[i] - mean).powi(2))
-                .sum::<f64>()
-                / (n - 1.0).max(1.0);
-            (mean, variance.sqrt().max(1e-12))
-        })
-        .collect();
+    let moments = moments(&replicates, ms.len());
     let sup = |v: &[f64]| {
         v.iter()
             .zip(&moments)

@@ -173,12 +173,8 @@ pub(super) fn of_process(
     let bins = Bins::new(stand.samples());
     let ones = vec![1.0; stand.samples()];
     let count = bins.products(&ones, &ones);
-    let walk: Vec<f64> = bins
-        .at
-        .omega
-        .iter()
-        .map(|w| 1.0 / (2.0 - 2.0 * w.cos()))
-        .collect();
+    let omega = bins.at.omega.iter();
+    let walk: Vec<f64> = omega.map(|w| 1.0 / (2.0 - 2.0 * w.cos())).collect();
     let n: f64 = count.iter().sum();
     let minus_two_l = |lambda: f64, density: &dyn Fn(usize) -> f64| {
         let (mut sum, mut logs) = (0.0, 0.0);

@@ -90,11 +90,8 @@ fn walk(model: &mut ModelFile, by: f64) {
     }
 }
 
-/// The bursts of a record laid end to end, where it comes in such; no part of it is much longer than the others.
-#[must_use]
-pub fn end_to_end(record: &Record) -> Option<(Record, Bursts)> {
-    let steps = steps(record)?;
-    let rows = record.len();
+/// Rows of a record between its pauses, by the steps of its rows.
+fn parts(steps: &[f64]) -> Vec<Range<usize>> {
     let mut parts: Vec<Range<usize>> = vec![];
     let mut from = 0;
     for (row, step) in steps.iter().enumerate().skip(1) {
@@ -103,8 +100,12 @@ pub fn end_to_end(record: &Record) -> Option<(Record, Bursts)> {
             from = row;
         }
     }
-    parts.push(from..rows);
-    let lengths: Vec<f64> = parts.iter().map(|p| p.len() as f64).collect();
+    parts.push(from..steps.len());
+    parts
+}
+
+/// Whether parts are bursts: many, long enough, alike in length and pause, and none much longer than the others.
+fn are_bursts(parts: &[Range<usize>], lengths: &[f64], steps: &[f64]) -> bool {
     let pause = |p: &Range<usize>| steps[p.start];
     let pauses: Vec<f64> = parts.iter().skip(1).map(pause).collect();
     let most = |all: &[f64]| {
@@ -113,14 +114,23 @@ pub fn end_to_end(record: &Record) -> Option<(Record, Bursts)> {
         near.count() as f64 >= MOST * all.len() as f64
     };
     let longest = lengths.iter().copied().fold(0.0, f64::max);
-    let fits = parts.len() >= LEAST
-        && rate::median(&lengths) >= LEAST_READINGS as f64
-        && longest < ONE_PART * rows as f64
-        && most(&lengths)
-        && most(&pauses);
+    parts.len() >= LEAST
+        && rate::median(lengths) >= LEAST_READINGS as f64
+        && longest < ONE_PART * steps.len() as f64
+        && most(lengths)
+        && most(&pauses)
+}
+
+/// The bursts of a record laid end to end, where it comes in such; no part of it is much longer than the others.
+#[must_use]
+pub fn end_to_end(record: &Record) -> Option<(Record, Bursts)> {
+    let steps = steps(record)?;
+    let parts = parts(&steps);
+    let lengths: Vec<f64> = parts.iter().map(|p| p.len() as f64).collect();
+    let fits = are_bursts(&parts, &lengths, &steps);
     let rate_hz = super::by_times(record).or(record.header.rate_hz);
     let rate_hz = rate_hz.filter(|r| fits && *r > 0.0)?;
-    let (mut places, mut starts, mut at_s) = (Vec::with_capacity(rows), vec![], vec![]);
+    let (mut places, mut starts, mut at_s) = (Vec::with_capacity(record.len()), vec![], vec![]);
     let (mut place, mut time) = (0i64, 0.0);
     for part in &parts {
         for row in part.clone() {
