@@ -297,7 +297,7 @@ fn measured(folder: PathBuf) -> Result<Vec<Entry>, String> {
                 .map_err(|e| e.to_string())?,
             rate_hz: e.rate_hz,
             skip_bad: false,
-            topic: None,
+            ..ReadOptions::default()
         };
         all.push(entry(format!("measured {i} {}", e.file), true, move || {
             let read = read_capture(&path, &options).map_err(|e| e.to_string())?;

@@ -5,7 +5,7 @@ mod common;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use common::{assert_success, folder, json, run};
+use common::{assert_refused, assert_success, folder, json, run};
 
 fn text(path: &Path) -> &str {
     path.to_str().expect("a name in UTF-8")
@@ -106,15 +106,50 @@ fn even(k: usize) -> f64 {
 }
 
 #[test]
-fn two_sample_rates_in_one_file_are_told_by_all() {
+fn two_sample_rates_in_one_file_are_refused_by_all_and_a_span_takes_one() {
     let folder = folder("doubts_rates");
     let time = |k: usize| match k.checked_sub(1200) {
         None => even(k),
         Some(later) => 60.0 + 0.01 * later as f64,
     };
+    let path = table(&folder, "joined.csv", time, FLAT);
+    let file = text(&path);
+    for words in [
+        &["analyze", file][..],
+        &["diagnose", file],
+        &["report", file],
+        &["export", file, "--to", "vins", "--at-rate", "200"],
+        &["plan", file, "--want", "K within 20 %"],
+        &["representative", file, file],
+    ] {
+        let said = assert_refused(&run(words), &["two sample rates"]);
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            said.contains("20.0000 Hz before row 1201, 100.000 Hz from there on (60.000000 s"),
+            "{said}"
+        );
+        assert!(
+            said.contains("`--span ,60.000000` or `--span 60.000000,`"),
+            "{said}"
+        );
+    }
+    for (span, rows, hz) in [(",60", 1201, "20 Hz"), ("60,", 1200, "100 Hz")] {
+        let said = assert_success(&run(&["analyze", file, "--span", span]));
+        assert!(said.contains(&format!("{hz}, {rows} samples")), "{said}");
+        assert!(said.contains("(--span)"), "{said}");
+    }
+    let changing = table(
+        &folder,
+        "twice.csv",
+        |k| {
+            let fast = k.clamp(800, 1600) - 800;
+            0.05 * (k - fast) as f64 + 0.01 * fast as f64
+        },
+        FLAT,
+    );
     told_by_all(
-        &table(&folder, "joined.csv", time, FLAT),
-        "the sample rate changes: 20.0000 Hz at the start, 100.0000 Hz",
+        &changing,
+        "the sample rate changes: 20.0000 Hz at the start",
     );
 }
 

@@ -1,6 +1,9 @@
 //! Tables of others as text: what separates their cells, where their names and units stand, and what is said where that
 //! cannot be told. All but the errors hold the same rows, 20 ms apart: gyro x rises by 0.25 deg/s a row, y is -1 deg/s.
 
+#[path = "foreign/names.rs"]
+mod names;
+
 use imu_stand::capture::{Read, read_from};
 use imu_stand::{CaptureError, ColumnMapping, ReadOptions};
 use proptest::prelude::*;
@@ -98,7 +101,7 @@ fn a_header_in_a_comment_is_one_and_a_table_without_names_goes_by_numbers() {
     );
     let said = error(none.as_bytes(), "", "");
     assert!(
-        said.contains("--columns gyro_x=1,gyro_y=2,gyro_z=3 --units gyro=deg/s"),
+        said.contains("--columns time=1,gyro_x=2,gyro_y=3 --units gyro=deg/s"),
         "{said}"
     );
     let said = error(none.as_bytes(), "gyro_x=4", "");
@@ -389,119 +392,6 @@ fn lines_before_the_table_are_passed_over_and_told() {
         said.contains("there is no column `gx`; the columns are: remark"),
         "{said}"
     );
-}
-
-#[test]
-fn names_that_say_what_they_are_and_in_which_unit_need_no_mapping() {
-    for head in [
-        // EuRoC; phyphox; rostopic echo -p; PX4's ulog2csv.
-        "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1]\n",
-        "Time (s),Gyroscope x (rad/s),Gyroscope y (rad/s)\n",
-        "%time,field.angular_velocity.x,field.angular_velocity.y\n",
-        "timestamp,gyro_rad[0],gyro_rad[1]\n",
-    ] {
-        let per_s = match head {
-            _ if head.starts_with("#time") || head.starts_with("%time") => 1e9,
-            _ if head.starts_with("timestamp") => 1e6,
-            _ => 1.0,
-        };
-        let text = table(head, ",", ".", per_s, RAD);
-        let read = read(text.as_bytes(), "", "").expect(head);
-        is_the_table(&read);
-        let notes = read.record.notes.join("; ");
-        assert!(
-            notes.contains("taken as their names say: ") && notes.contains("gyro in rad/s"),
-            "{notes}"
-        );
-    }
-    // What is not read of it is said.
-    let text = "stamp [ns],gx_dps,Q\n0,0.1,25\n50000000,0.2,25\n100000000,0.1,25\n";
-    let notes = read(text.as_bytes(), "", "").expect("a table");
-    let notes = notes.record.notes.join("; ");
-    assert!(notes.contains("not read: `Q`"), "{notes}");
-    // A unit given goes before a convention, and one that nobody says is asked for.
-    let text = table("t (s),gx,gy\n", ",", ".", 1.0, 1.0);
-    is_the_table(&read(text.as_bytes(), "", "gyro=deg/s").expect("the unit is said"));
-    let said = error(text.as_bytes(), "", "");
-    assert!(
-        said.contains("--columns 'time=t (s),gyro_x=gx,gyro_y=gy'"),
-        "{said}"
-    );
-    // A logger for phones has x, y, z in the file of each sensor: they may be an accelerometer's.
-    let bare = table("seconds_elapsed,x,y\n", ",", ".", 1.0, RAD);
-    let said = error(bare.as_bytes(), "", "");
-    assert!(said.contains("--units gyro=rad/s"), "{said}");
-    // Two that could be one are a choice.
-    let two = "Time (s),imu0.gyro.x (rad/s),imu1.gyro.x (rad/s)\n0,1,2\n1,1,2\n";
-    let said = error(two.as_bytes(), "", "");
-    assert!(said.contains("gyro_x=imu0.gyro.x (rad/s)"), "{said}");
-    // The mapping of a name that says its unit has that unit.
-    let ros = table(
-        "t,angular_velocity.x,angular_velocity.y\n",
-        ",",
-        ".",
-        1.0,
-        RAD,
-    );
-    let map = "time=t,gyro_x=angular_velocity.x,gyro_y=angular_velocity.y";
-    is_the_table(&read(ros.as_bytes(), map, "").expect("rad/s"));
-}
-
-#[test]
-fn a_mapping_of_what_stands_beside_leaves_the_gyros_that_have_our_names() {
-    let text = table("stamp,gyro_x,gyro_y\n", ",", ".", 1e3, 1.0);
-    for columns in ["time=stamp", "t=stamp"] {
-        let read = read(text.as_bytes(), columns, "time=ms,gyro=deg/s").expect(columns);
-        is_the_table(&read);
-    }
-    let text = "time,time_s,gyro_x,Die\n0,9,1,300\n20,8,2,301\n40,7,3,302\n";
-    let both = read(
-        text.as_bytes(),
-        "time=time,temp=Die",
-        "time=ms,gyro=deg/s,temp=K",
-    )
-    .expect("four columns");
-    let times = both.record.host_time_s.as_ref().expect("times");
-    assert!((times[2] - 0.04).abs() < 1e-12, "{times:?}");
-    assert!((both.record.channel("temp").expect("temp").values[0] - 26.85).abs() < 1e-9);
-    // Who maps a gyro chooses.
-    let text = "time,gyro_x,gx\n0,1,5\n0.02,2,6\n";
-    let chosen = read(text.as_bytes(), "time=time,gyro_x=gx", "gyro=deg/s").expect("one gyro");
-    assert_eq!(chosen.record.channels.len(), 1);
-    assert_eq!(chosen.record.channels[0].values, [5.0, 6.0]);
-}
-
-#[test]
-fn one_thermometer_is_that_of_all_gyros_and_any_column_of_any_unit_is_a_channel() {
-    let text = "t,gx,gy,die\n0,1,2,20\n0.02,2,3,21\n";
-    let map = "time=t,gyro_x=gx,gyro_y=gy,temp_x=die";
-    let shared = read(text.as_bytes(), map, "gyro=deg/s,temp=degC")
-        .expect("two gyros")
-        .record;
-    let temp = shared.channel("temp").expect("temp");
-    assert_eq!((temp.axis, temp.values[1]), (None, 21.0));
-    assert!(
-        shared
-            .notes
-            .iter()
-            .any(|n| n.contains("temp_x is the only thermometer")),
-        "{:?}",
-        shared.notes
-    );
-    // Of one gyro it is that gyro's.
-    let own = read(
-        text.as_bytes(),
-        "time=t,gyro_x=gx,temp_x=die",
-        "gyro=deg/s,temp=degC",
-    )
-    .expect("one gyro");
-    assert!(own.record.channel("temp_x").is_some());
-    let clock = read(text.as_bytes(), "time=t,freq=gx", "freq=1")
-        .expect("an oscillator")
-        .record;
-    let freq = clock.channel("freq").expect("freq");
-    assert_eq!((freq.unit.as_str(), freq.values[1]), ("1", 2.0));
-    assert!(clock.notes.is_empty(), "{:?}", clock.notes);
 }
 
 /// Pieces that tables are made of, right and wrong.

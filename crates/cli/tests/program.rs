@@ -1,5 +1,14 @@
 //! The program as a user runs it.
 
+#[path = "program/there_and_back.rs"]
+mod there_and_back;
+
+#[path = "program/times.rs"]
+mod times;
+
+#[path = "program/measured.rs"]
+mod measured;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -161,120 +170,6 @@ fn a_simulated_run_is_reproducible_and_its_analysis_has_the_contracts_shape() {
 }
 
 #[test]
-fn what_is_put_into_a_model_is_found_and_the_extended_model_simulates() {
-    let folder = folder("loop");
-    let [model, run_csv, out, found, again] =
-        ["m.toml", "run.csv", "d.json", "found.toml", "again.csv"].map(|name| folder.join(name));
-    // The paper's stand with a line of half the noise's standard deviation: d' is far above the detection limit.
-    let made = run(&[
-        "simulate",
-        "--seconds",
-        "60",
-        "--out",
-        folder.join("paper.csv").to_str().unwrap(),
-    ]);
-    assert!(made.status.success());
-    let mut stand = model::file::ModelFile::paper();
-    let effect = "[[effect]]\ncause = \"line\"\nchannels = [\"gyro_z\"]\nfrequency = { value = 3.7, unit = \"Hz\" }\n\
-                  amplitude = { value = 0.2, unit = \"deg/s\" }\n";
-    let text = format!("{}\n{effect}", stand.to_toml());
-    stand = model::file::ModelFile::parse(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
-    std::fs::write(&model, stand.to_toml()).unwrap();
-    let simulate = |model: &Path, out: &Path| {
-        run(&[
-            "simulate",
-            "--model",
-            model.to_str().unwrap(),
-            "--seed",
-            "3",
-            "--out",
-            out.to_str().unwrap(),
-        ])
-    };
-    assert!(simulate(&model, &run_csv).status.success());
-    let made = run(&[
-        "diagnose",
-        run_csv.to_str().unwrap(),
-        "--json",
-        out.to_str().unwrap(),
-        "--model-out",
-        found.to_str().unwrap(),
-    ]);
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
-    let diagnosis = json(&out);
-    assert_eq!(diagnosis["format"], "imu-stand-diagnosis/1");
-    assert_eq!(diagnosis["verdict"], "extended", "{diagnosis}");
-    let line = diagnosis["findings"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|f| f["cause"] == "line")
-        .expect("a line");
-    assert_eq!(line["channels"], serde_json::json!(["gyro_z"]));
-    let frequency = line["parameters"]["frequency"]["value"].as_f64().unwrap();
-    assert!((frequency - 3.7).abs() < 0.002, "{frequency}");
-    assert!(
-        simulate(&found, &again).status.success(),
-        "the extended model is a simulator"
-    );
-}
-
-#[test]
-fn a_cause_that_needs_excitation_comes_back_from_the_fitted_model() {
-    let folder = folder("there-and-back");
-    let text = format!(
-        "{}\n[[effect]]\ncause = \"temperature\"\nchannels = [\"gyro_y\"]\n\
-         slope = {{ value = -0.13, unit = \"deg/s/degC\" }}\n",
-        model::file::ModelFile::paper().to_toml()
-    );
-    let still = folder.join("still.toml");
-    std::fs::write(&still, &text).unwrap();
-    let warmed = folder.join("warmed.toml");
-    let excitation = "\n[excitation]\nself_heating_degc = 8.0\n\n[[channel]]";
-    std::fs::write(&warmed, text.replacen("\n[[channel]]", excitation, 1)).unwrap();
-    let simulate = |model: &Path, out: &str, seed: &str| {
-        let made = run(&[
-            "simulate",
-            "--model",
-            model.to_str().unwrap(),
-            "--seed",
-            seed,
-            "--out",
-            folder.join(out).to_str().unwrap(),
-        ]);
-        assert!(made.status.success());
-        String::from_utf8_lossy(&made.stderr).into_owned()
-    };
-    let warning = simulate(&still, "still.csv", "1");
-    assert!(warning.contains("temperature will not show"), "{warning}");
-    assert_eq!(simulate(&warmed, "first.csv", "2"), "");
-    let fitted = folder.join("fitted.toml");
-    for (capture, seed) in [("first.csv", "3"), ("second.csv", "4")] {
-        let answer = folder.join("d.json");
-        let made = run(&[
-            "diagnose",
-            folder.join(capture).to_str().unwrap(),
-            "--quiet",
-            "--json",
-            answer.to_str().unwrap(),
-            "--model-out",
-            fitted.to_str().unwrap(),
-        ]);
-        assert!(made.status.success());
-        let diagnosis = json(&answer);
-        assert_eq!(
-            diagnosis["findings"][0]["cause"], "temperature",
-            "{capture}: {diagnosis}"
-        );
-        assert_eq!(simulate(&fitted, "second.csv", seed), "");
-    }
-}
-
-#[test]
 fn a_model_file_with_an_unknown_effect_is_an_error_that_names_the_line() {
     let folder = folder("model");
     let path = folder.join("m.toml");
@@ -348,68 +243,6 @@ fn a_fault_hidden_in_the_stand_goes_through_the_boards_logic_and_is_named() {
         "{said}"
     );
     assert!(!said.contains(" { "), "{said}");
-}
-
-/// Measured records: `IMU_STAND_DATA` names their folder.
-fn measured(file: &str) -> Option<PathBuf> {
-    match std::env::var_os("IMU_STAND_DATA") {
-        Some(folder) => Some(Path::new(&folder).join(file)),
-        None => {
-            println!("NOT RUN: {file} is looked for where IMU_STAND_DATA points, and it is unset");
-            None
-        }
-    }
-}
-
-#[test]
-fn measured_records_are_analyzed_and_diagnosed_by_column_mapping() {
-    let axes =
-        "gyro_x=gx_dps,gyro_y=gy_dps,gyro_z=gz_dps,acc_x=ax_mps2,acc_y=ay_mps2,acc_z=az_mps2";
-    for (file, more) in [
-        ("adis16405_run1_20hz_600s.csv.gz", ""),
-        ("mpu6050_static_20hz_600s.csv.gz", ",temp=temp_c"),
-    ] {
-        let Some(path) = measured(file) else { return };
-        let folder = folder(file);
-        let columns = format!("time=time_s,{axes}{more}");
-        let units = "gyro=deg/s,acc=m/s2,temp=degC";
-        let out = folder.join("out.json");
-        for (command, format) in [
-            ("analyze", "imu-stand-analysis/1"),
-            ("diagnose", "imu-stand-diagnosis/1"),
-        ] {
-            let made = run(&[
-                command,
-                path.to_str().unwrap(),
-                "--columns",
-                &columns,
-                "--units",
-                units,
-                "--json",
-                out.to_str().unwrap(),
-            ]);
-            assert!(
-                made.status.success(),
-                "{}",
-                String::from_utf8_lossy(&made.stderr)
-            );
-            assert_eq!(json(&out)["format"], format);
-        }
-        // Static records at constant temperature, far from any motor: nothing of the stand's own may be blamed.
-        for finding in json(&out)["findings"].as_array().unwrap() {
-            let cause = finding["cause"].as_str().unwrap();
-            assert!(
-                ![
-                    "motor_bias",
-                    "motor_noise",
-                    "supply_sensitivity",
-                    "base_motion"
-                ]
-                .contains(&cause),
-                "{cause}"
-            );
-        }
-    }
 }
 
 #[test]
@@ -530,90 +363,6 @@ fn a_run_writes_over_its_own_captures_and_over_no_others() {
     let refused = run(&["run", "--native", "--out", nowhere.to_str().unwrap()]);
     assert_eq!(refused.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("is no folder"));
-}
-
-/// A table of a gyro with white noise at these times, and its name.
-fn table_at(folder: &Path, name: &str, times: impl Iterator<Item = f64>) -> PathBuf {
-    let mut state = 88_172_645_463_325_252_u64;
-    let mut uniform = move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    let mut text = "t,gx\n".to_owned();
-    for t in times {
-        let noise: f64 = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-        text += &format!("{t},{noise}\n");
-    }
-    let path = folder.join(name);
-    std::fs::write(&path, text).unwrap();
-    path
-}
-
-#[test]
-fn analyze_and_diagnose_read_one_rate_from_whole_seconds_and_from_a_clock_that_was_set_back() {
-    let folder = folder("rates");
-    let at = |i: u32| 0.05 * f64::from(i);
-    let whole = table_at(&folder, "whole.csv", (0..2400).map(|i| at(i).floor()));
-    let set_back = (0..2400).map(|i| if i < 1000 { at(i) } else { at(i) - 20.0 });
-    let set_back = table_at(&folder, "set_back.csv", set_back);
-    for (path, told) in [
-        (&whole, "rounded to more than the interval"),
-        (&set_back, "was set back by 19.950 s before row 1001"),
-    ] {
-        for command in ["analyze", "diagnose"] {
-            let out = folder.join("found.json");
-            let done = run(&[
-                command,
-                path.to_str().unwrap(),
-                "--columns",
-                "time=t,gyro_x=gx",
-                "--units",
-                "gyro=deg/s",
-                "--quiet",
-                "--json",
-                out.to_str().unwrap(),
-            ]);
-            let said = String::from_utf8_lossy(&done.stderr).into_owned();
-            assert_eq!(done.status.code(), Some(0), "{said}");
-            let input = &json(&out)["input"];
-            let rate = input["rate_hz"].as_f64().unwrap();
-            assert!((rate - 20.0).abs() < 5e-3, "{command} {told}: {rate}");
-            assert_eq!(input["samples"], 2400);
-            assert!(input["notes"].to_string().contains(told), "{input}");
-        }
-    }
-    // Another rate than that of the times is a mistake, whichever of them is wrong.
-    let stated = ["--columns", "time=t,gyro_x=gx", "--rate", "40"];
-    let refused = run(&[&["analyze", set_back.to_str().unwrap()], &stated[..]].concat());
-    let said = String::from_utf8_lossy(&refused.stderr);
-    assert_eq!(refused.status.code(), Some(1), "{said}");
-    assert!(
-        said.contains("by their times the rows come at 20.0000 Hz"),
-        "{said}"
-    );
-    let still = table_at(&folder, "still.csv", (0..100).map(|_| 5.0));
-    let refused = run(&[
-        "analyze",
-        still.to_str().unwrap(),
-        "--columns",
-        "time=t,gyro_x=gx",
-    ]);
-    let said = String::from_utf8_lossy(&refused.stderr);
-    assert!(said.contains("the time column is 5 throughout"), "{said}");
-}
-
-#[test]
-fn a_rate_that_makes_too_long_a_record_is_told_with_the_length() {
-    let line = "simulate --rate 1e9 --seconds 1 --out x.csv";
-    let refused = run(&line.split(' ').collect::<Vec<_>>());
-    let said = String::from_utf8_lossy(&refused.stderr);
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(
-        said.contains("1 s at 1000000000 Hz are 1000000000 samples"),
-        "{said}"
-    );
 }
 
 #[test]

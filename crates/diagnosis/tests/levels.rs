@@ -98,3 +98,36 @@ fn noise_that_two_of_three_axes_share_is_theirs_and_one_source_is_the_alternativ
     );
     Ok(())
 }
+
+#[test]
+fn the_figure_of_two_levels_draws_both_and_the_readings_beside_them() -> Tested {
+    // Plain to see; hardly above the noise; so many switches that a part of the record is drawn.
+    for (half, dwell, seed) in [(0.5, 20.0, 1), (0.2, 40.0, 2), (1.0, 3.0, 3)] {
+        let mut model = ModelFile::paper();
+        let parameters = [("half_height", half, "deg/s"), ("dwell_time", dwell, "s")];
+        model.effects = vec![stated("telegraph", "gyro_x", &parameters)];
+        let record = model::simulate(&model, 600.0, 20.0, seed)?;
+        let d = diagnosis::diagnose(&record, &DiagnoseOptions::default())?;
+        let figure = d.evidence.iter().find(|e| e.cause == "telegraph");
+        let figure = figure.ok_or(format!("half height {half}: no figure"))?;
+        let [readings, levels] = &figure.series[..] else {
+            return Err(format!("{} series", figure.series.len()).into());
+        };
+        let drawn = levels.x.last().ok_or("a point")?;
+        assert!(!figure.log_x && *drawn <= 600.0, "{half}: up to {drawn} s");
+        let (low, high) = ends(&levels.y);
+        let apart = (high - low) / (2.0 * half);
+        assert!((apart - 1.0).abs() < 0.15, "{half}: {apart} of the truth");
+        // Most readings lie nearer to the level drawn than to the other one.
+        let both = readings.y.iter().zip(&levels.y);
+        let near = both.filter(|(y, l)| (*y - *l).abs() < half).count();
+        assert!(near * 10 > readings.y.len() * 9, "{half}: {near}");
+    }
+    Ok(())
+}
+
+/// Least and largest.
+fn ends(of: &[f64]) -> (f64, f64) {
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    of.iter().fold(none, |(l, h), v| (l.min(*v), h.max(*v)))
+}

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use diagnosis::DiagnoseOptions;
 use diagnosis::result::Diagnosed;
-use imu_stand::capture::{Read, Table, mark_simulated, read_capture, read_columns};
+use imu_stand::capture::{Read, Span, Table, mark_simulated, read_capture, read_columns};
 use imu_stand::explain::explain;
 use imu_stand::report::{Subject, report};
 use imu_stand::{ColumnMapping, ReadOptions, text, write_capture};
@@ -112,6 +112,10 @@ fn bytes<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyBytes> {
 
 /// Reads a file as the program does.
 #[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "the arguments of `imu_stand.read`, which names them"
+)]
 fn read(
     py: Python<'_>,
     path: PathBuf,
@@ -120,12 +124,23 @@ fn read(
     rate_hz: Option<f64>,
     skip_bad: bool,
     topic: Option<String>,
+    span: Option<(f64, f64)>,
 ) -> PyResult<Capture> {
+    let no_span = || {
+        Error::new_err(
+            "span: two times, s from the first row, the later one second\nspan=(None, 60) or span=(60, None) leaves an end out",
+        )
+    };
+    let span = match span {
+        Some((from_s, to_s)) => Some(Span::new(from_s, to_s).ok_or_else(no_span)?),
+        None => None,
+    };
     let options = ReadOptions {
         mapping: ColumnMapping { columns, units },
         rate_hz,
         skip_bad,
         topic,
+        span,
     };
     let mut hash = Sha256::new();
     py.detach(|| {

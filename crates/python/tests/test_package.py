@@ -165,3 +165,17 @@ def test_other_threads_run_while_it_computes():
     took = time.perf_counter() - begun
     # With the lock held, one look would take as long as the whole; half leaves room for a busy machine.
     assert longest < took / 2, (longest, took)
+
+
+def test_a_file_of_two_rates_is_refused_and_a_span_takes_one(tmp_path):
+    gyro = white(1200)
+    time = np.r_[np.arange(601) * 0.05, 30 + np.arange(1, 600) * 0.01]
+    path = tmp_path / "joined.csv"
+    np.savetxt(path, np.c_[time, gyro], delimiter=",", header="time_s,gyro_x", comments="")
+    with pytest.raises(imu_stand.Error, match=r"`span=\(None, 30.000000\)` or `span=\(30.000000, None\)`"):
+        imu_stand.analyze(path, units="gyro=deg/s")
+    first = imu_stand.read(path, units="gyro=deg/s", span=(None, 30))
+    assert first["gyro_x"].shape == (601,) and any("span" in note for note in first.notes)
+    assert imu_stand.analyze(first)["input"]["rate_hz"] == pytest.approx(20)
+    with pytest.raises(imu_stand.Error, match="the later one second"):
+        imu_stand.read(path, units="gyro=deg/s", span=(30, 10))

@@ -124,77 +124,113 @@ fn outcome(
     let variance = white(&slices);
     let length = slices.first().map_or(1.0, |run| run[1].t - run[0].t);
     let mut out = Outcome {
-        sequence: "heater",
-        identified: Vec::new(),
-        not_identified: SEQUENCES[2]
-            .cannot
-            .iter()
-            .map(|c| (*c).to_owned())
-            .collect(),
         refused,
-        effects: Vec::new(),
-        baseline: [None, None, None],
-        temperatures: None,
-        rate_hz: c.rate_hz,
-        lsb_dps: c.gyro_lsb_dps,
+        ..Outcome::of(&SEQUENCES[2], c.rate_hz, c.gyro_lsb_dps)
     };
-    let t: Vec<f64> = points.iter().map(|p| p.t).collect();
     // One middle for all: that of the temperatures that the correction is for.
-    let all = points.iter().flat_map(|p| p.temp);
-    let [lowest, highest] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
-        [l.min(v), h.max(v)]
-    });
-    let reference = (lowest + highest) / 2.0;
+    let [lowest, highest] = range(points.iter().flat_map(|p| p.temp));
     out.temperatures = Some([lowest, highest]);
     for (k, axis) in AXES.iter().enumerate() {
-        let temp: Vec<f64> = points.iter().map(|p| p.temp[k]).collect();
-        let low = temp.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = temp.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Without a point there is no range either.
-        let moved = (high - low).max(0.0);
-        if moved < LEAST_C {
-            return Err(SequenceError::NotDone {
-                what: format!(
-                    "the thermometer of gyro {axis} moved by {moved:.1} degC; {LEAST_C:.0} are needed"
-                ),
-                help: "a stronger heater, or longer: `--seconds 1800`".to_owned(),
-            });
-        }
-        let y: Vec<f64> = points.iter().map(|p| p.gyro[k]).collect();
-        let noise: Vec<f64> = points.iter().map(|p| variance[k] / p.count).collect();
-        let along: Vec<f64> = temp.iter().map(|t| t - reference).collect();
-        let square: Vec<f64> = along.iter().map(|a| a * a).collect();
-        let ones = vec![1.0; y.len()];
-        let bent = fit(&y, &t, &noise, &[ones.clone(), along.clone(), square]);
-        // A curvature that its interval does not tell from none is none: it would bend beyond what was measured.
-        let bent = bent.filter(|f| f.values[2].abs() > 1.96 * f.errors[2]);
-        let is_bent = bent.is_some();
-        let Some(found) = bent.or_else(|| fit(&y, &t, &noise, &[ones, along])) else {
+        let Some(found) = course(axis, &points, k, variance[k], (lowest + highest) / 2.0)? else {
             continue;
         };
-        let mut parameters = BTreeMap::new();
-        let channel = format!("gyro_{axis}");
-        for (name, at, unit) in [("slope", 1, "deg/s/degC"), ("curvature", 2, "deg/s/degC^2")] {
-            if let (Some(value), Some(error)) = (found.values.get(at), found.errors.get(at)) {
-                let size = Parameter::estimated(*value, *error, unit);
-                out.identified.push(Identified {
-                    channel: channel.clone(),
-                    what: format!("temperature, {name} ({low:.1} to {high:.1} degC)"),
-                    size: size.clone(),
-                });
-                parameters.insert(name.to_owned(), size);
-            }
-        }
-        let with_time = correlation(&temp, &t);
-        if with_time.abs() > 0.9 {
+        out.baseline[k] = Some((
+            found.bias.clone(),
+            Parameter::exact((variance[k] * length).sqrt() * 60.0, "deg/sqrt(h)"),
+        ));
+        found.add_to(&mut out, format!("gyro_{axis}"));
+    }
+    Ok(out)
+}
+
+fn range(of: impl Iterator<Item = f64>) -> [f64; 2] {
+    of.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
+        [l.min(v), h.max(v)]
+    })
+}
+
+/// How the bias of a gyro goes with its temperature.
+struct Course {
+    /// At the reference.
+    bias: Parameter,
+    /// Name and size: a slope, and a curvature where there is one.
+    sizes: Vec<(&'static str, Parameter)>,
+    /// Temperatures between which it was seen, and that from which a parabola counts, degC.
+    seen: [f64; 2],
+    reference: f64,
+    /// Correlation of the temperature with time.
+    with_time: f64,
+}
+
+/// The course of gyro `k` over points of a white variance; none where it cannot be fitted.
+fn course(
+    axis: &str,
+    points: &[Point],
+    k: usize,
+    variance: f64,
+    reference: f64,
+) -> Result<Option<Course>, SequenceError> {
+    let temp: Vec<f64> = points.iter().map(|p| p.temp[k]).collect();
+    let [low, high] = range(temp.iter().copied());
+    // Without a point there is no range either.
+    let moved = (high - low).max(0.0);
+    if moved < LEAST_C {
+        return Err(SequenceError::NotDone {
+            what: format!(
+                "the thermometer of gyro {axis} moved by {moved:.1} degC; {LEAST_C:.0} are needed"
+            ),
+            help: "a stronger heater, or longer: `--seconds 1800`".to_owned(),
+        });
+    }
+    let t: Vec<f64> = points.iter().map(|p| p.t).collect();
+    let y: Vec<f64> = points.iter().map(|p| p.gyro[k]).collect();
+    let noise: Vec<f64> = points.iter().map(|p| variance / p.count).collect();
+    let along: Vec<f64> = temp.iter().map(|t| t - reference).collect();
+    let square: Vec<f64> = along.iter().map(|a| a * a).collect();
+    let ones = vec![1.0; y.len()];
+    let bent = fit(&y, &t, &noise, &[ones.clone(), along.clone(), square]);
+    // A curvature that its interval does not tell from none is none: it would bend beyond what was measured.
+    let bent = bent.filter(|f| f.values[2].abs() > 1.96 * f.errors[2]);
+    let Some(found) = bent.or_else(|| fit(&y, &t, &noise, &[ones, along])) else {
+        return Ok(None);
+    };
+    let named = [("slope", "deg/s/degC"), ("curvature", "deg/s/degC^2")].into_iter();
+    let sizes = named.zip(found.values.iter().zip(&found.errors).skip(1));
+    Ok(Some(Course {
+        bias: Parameter::estimated(found.values[0], found.errors[0], "deg/s"),
+        sizes: sizes
+            .map(|((name, unit), (value, error))| {
+                (name, Parameter::estimated(*value, *error, unit))
+            })
+            .collect(),
+        seen: [low, high],
+        reference,
+        with_time: correlation(&temp, &t),
+    }))
+}
+
+impl Course {
+    fn add_to(self, out: &mut Outcome, channel: String) {
+        let [low, high] = self.seen;
+        let identified = self.sizes.iter().map(|(name, size)| Identified {
+            channel: channel.clone(),
+            what: format!("temperature, {name} ({low:.1} to {high:.1} degC)"),
+            size: size.clone(),
+        });
+        out.identified.extend(identified);
+        if self.with_time.abs() > 0.9 {
             out.not_identified.push(format!(
-                "gyro_{axis}: its temperature went with time (correlation {with_time:.2}): a bias that drifts looks alike; let it cool as far as it warmed"
+                "{channel}: its temperature went with time (correlation {:.2}): a bias that drifts looks alike; let it cool as far as it warmed",
+                self.with_time
             ));
         }
-        if is_bent {
-            parameters.insert("reference".to_owned(), Parameter::exact(reference, "degC"));
-        }
+        let is_bent = self.sizes.len() > 1;
+        let sizes = self.sizes.into_iter();
+        let mut parameters: BTreeMap<String, Parameter> =
+            sizes.map(|(name, size)| (name.to_owned(), size)).collect();
         let cause = if is_bent {
+            let reference = Parameter::exact(self.reference, "degC");
+            parameters.insert("reference".to_owned(), reference);
             "temperature_quadratic"
         } else {
             "temperature"
@@ -204,10 +240,5 @@ fn outcome(
             channels: vec![channel],
             parameters,
         });
-        out.baseline[k] = Some((
-            Parameter::estimated(found.values[0], found.errors[0], "deg/s"),
-            Parameter::exact((variance[k] * length).sqrt() * 60.0, "deg/sqrt(h)"),
-        ));
     }
-    Ok(out)
 }

@@ -4,6 +4,8 @@ use model::file::{ChannelModel, EffectModel};
 use model::{ModelFile, Parameter};
 use serde::Serialize;
 
+use crate::plan::Sequence;
+
 const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 
 /// A number that can be told now and could not before.
@@ -43,6 +45,23 @@ pub struct Outcome {
     /// Unit of a count, deg/s.
     #[serde(skip)]
     pub lsb_dps: f64,
+}
+
+impl Outcome {
+    /// Of a sequence that has found nothing yet, on a board whose gyros have steps of `lsb_dps`.
+    pub(super) fn of(sequence: &Sequence, rate_hz: f64, lsb_dps: f64) -> Self {
+        Self {
+            sequence: sequence.name,
+            identified: Vec::new(),
+            not_identified: sequence.cannot.iter().map(|c| (*c).to_owned()).collect(),
+            refused: Vec::new(),
+            effects: Vec::new(),
+            baseline: [None, None, None],
+            temperatures: None,
+            rate_hz,
+            lsb_dps,
+        }
+    }
 }
 
 /// Whether one takes the place of the other: a slope and a parabola over temperature are one thing.

@@ -276,58 +276,25 @@ struct Accelerometer {
     scale: [(f64, f64); 3],
 }
 
-/// From the six means: the length of gravity is 1 g on every side, however it lies. Six equations, six unknowns, by Newton's steps
-/// from where the sides would be flat.
+/// From the six means: the length of gravity is 1 g on every side, however it lies.
 fn accelerometer(taken: &[Taken], c: &Calibration) -> Accelerometer {
     let means: Vec<[f64; 3]> = taken
         .iter()
         .map(|t| mean_of(&t.blocks, |b| b.acc))
         .collect();
-    let mut zero = [c.acc_zero_counts; 3];
-    let mut scale = [c.acc_counts_per_g; 3];
     let reads = |axis: usize, up: bool| {
         let at = taken.iter().position(|t| t.side == Side { axis, up });
         at.map_or(0.0, |at| means[at][axis])
     };
+    let (mut zero, mut scale) = ([c.acc_zero_counts; 3], [c.acc_counts_per_g; 3]);
     for k in 0..3 {
         zero[k] = (reads(k, true) + reads(k, false)) / 2.0;
         scale[k] = (reads(k, true) - reads(k, false)) / 2.0;
     }
-    let mut inverse = Vec::new();
-    for _ in 0..8 {
-        let rows: Vec<Vec<f64>> = means
-            .iter()
-            .map(|m| {
-                let g = [0, 1, 2].map(|k| (m[k] - zero[k]) / scale[k]);
-                let by_zero = [0, 1, 2].map(|k| -2.0 * g[k] / scale[k]);
-                let by_scale = [0, 1, 2].map(|k| -2.0 * g[k] * g[k] / scale[k]);
-                by_zero.into_iter().chain(by_scale).collect()
-            })
-            .collect();
-        let Some(found) = inverted(rows) else { break };
-        let off: Vec<f64> = means
-            .iter()
-            .map(|m| {
-                1.0 - [0, 1, 2]
-                    .map(|k| ((m[k] - zero[k]) / scale[k]).powi(2))
-                    .iter()
-                    .sum::<f64>()
-            })
-            .collect();
-        let step: Vec<f64> = found
-            .iter()
-            .map(|row| row.iter().zip(&off).map(|(a, b)| a * b).sum())
-            .collect();
-        for k in 0..3 {
-            zero[k] += step[k];
-            scale[k] += step[k + 3];
-        }
-        inverse = found;
-    }
+    let (zero, scale, inverse) = of_length_one(&means, zero, scale);
     // Errors of the means, to the length of gravity, to the six.
-    let of_side: Vec<f64> = taken
-        .iter()
-        .zip(&means)
+    let sides = taken.iter().zip(&means);
+    let of_side: Vec<f64> = sides
         .map(|(t, m)| {
             let n = t.blocks.len() as f64;
             let squares = [0, 1, 2].map(|k| {
@@ -342,17 +309,51 @@ fn accelerometer(taken: &[Taken], c: &Calibration) -> Accelerometer {
     let error = |k: usize| {
         let row = inverse.get(k);
         row.map_or(f64::NAN, |row: &Vec<f64>| {
-            row.iter()
-                .zip(&of_side)
-                .map(|(a, v)| a * a * v)
-                .sum::<f64>()
-                .sqrt()
+            let squares = row.iter().zip(&of_side).map(|(a, v)| a * a * v);
+            squares.sum::<f64>().sqrt()
         })
     };
     Accelerometer {
         zero: [0, 1, 2].map(|k| (zero[k], error(k))),
         scale: [0, 1, 2].map(|k| (scale[k], error(k + 3))),
     }
+}
+
+/// Newton's steps for six unknowns of six equations.
+const NEWTON: usize = 8;
+
+/// Zeros and scales by which the six means are of length 1, from others near them, and the inverse of the derivatives there: of
+/// the length of each mean to the three zeros and the three scales.
+fn of_length_one(
+    means: &[[f64; 3]],
+    mut zero: [f64; 3],
+    mut scale: [f64; 3],
+) -> ([f64; 3], [f64; 3], Vec<Vec<f64>>) {
+    let mut inverse = Vec::new();
+    for _ in 0..NEWTON {
+        let in_g = |m: &[f64; 3]| [0, 1, 2].map(|k| (m[k] - zero[k]) / scale[k]);
+        let rows = means.iter().map(|m| {
+            let g = in_g(m);
+            let by_zero = [0, 1, 2].map(|k| -2.0 * g[k] / scale[k]);
+            let by_scale = [0, 1, 2].map(|k| -2.0 * g[k] * g[k] / scale[k]);
+            by_zero.into_iter().chain(by_scale).collect()
+        });
+        let Some(found) = inverted(rows.collect()) else {
+            break;
+        };
+        let off = means
+            .iter()
+            .map(|m| 1.0 - in_g(m).map(|g| g * g).iter().sum::<f64>());
+        let off: Vec<f64> = off.collect();
+        let along = |row: &Vec<f64>| row.iter().zip(&off).map(|(a, b)| a * b).sum();
+        let step: Vec<f64> = found.iter().map(along).collect();
+        for k in 0..3 {
+            zero[k] += step[k];
+            scale[k] += step[k + 3];
+        }
+        inverse = found;
+    }
+    (zero, scale, inverse)
 }
 
 fn mean_of(blocks: &[Block], of: impl Fn(&Block) -> [f64; 3]) -> [f64; 3] {
@@ -417,75 +418,55 @@ fn range_of(taken: &[Taken]) -> [f64; 2] {
 
 fn outcome(taken: &[Taken], c: &Calibration, refused: Vec<String>) -> Outcome {
     let acc = accelerometer(taken, c);
-    let runs: Vec<&[Block]> = taken.iter().map(|t| &t.blocks[..]).collect();
-    let variance = white(&runs);
-    let seconds = taken[0].blocks[1].t - taken[0].blocks[0].t;
     let mut out = Outcome {
-        sequence: "six-position",
-        identified: Vec::new(),
-        not_identified: SEQUENCES[0]
-            .cannot
-            .iter()
-            .map(|c| (*c).to_owned())
-            .collect(),
         refused,
-        effects: Vec::new(),
-        baseline: [None, None, None],
         temperatures: Some(range_of(taken)),
-        rate_hz: c.rate_hz,
-        lsb_dps: c.gyro_lsb_dps,
-    };
-    let mut add = |channel: String, what: &str, (value, error): (f64, f64), unit: &str| {
-        out.identified.push(Identified {
-            channel,
-            what: what.to_owned(),
-            size: Parameter::estimated(value, error, unit),
-        });
+        ..Outcome::of(&SEQUENCES[0], c.rate_hz, c.gyro_lsb_dps)
     };
     for (k, axis) in AXES.iter().enumerate() {
-        add(format!("acc_{axis}"), "zero", acc.zero[k], "counts");
-        add(format!("acc_{axis}"), "scale", acc.scale[k], "counts/g");
+        let sizes = [
+            ("zero", acc.zero[k], "counts"),
+            ("scale", acc.scale[k], "counts/g"),
+        ];
+        out.identified
+            .extend(sizes.map(|(what, (value, error), unit)| Identified {
+                channel: format!("acc_{axis}"),
+                what: what.to_owned(),
+                size: Parameter::estimated(value, error, unit),
+            }));
     }
-    let mut effects = Vec::new();
-    let mut baseline = [None, None, None];
-    for (k, axis) in AXES.iter().enumerate() {
-        let Some(found) = gyro(k, taken, &acc, variance[k]) else {
+    let runs: Vec<&[Block]> = taken.iter().map(|t| &t.blocks[..]).collect();
+    let seconds = taken[0].blocks[1].t - taken[0].blocks[0].t;
+    for (k, variance) in white(&runs).into_iter().enumerate() {
+        let Some(found) = gyro(k, taken, &acc, variance) else {
             continue;
         };
-        let names = ["acc_x", "acc_y", "acc_z"];
-        let parameters = names.iter().enumerate().map(|(i, name)| {
-            let (value, error) = (found.values[i + 1], found.errors[i + 1]);
-            (
-                (*name).to_owned(),
-                Parameter::estimated(value, error, "deg/s/g"),
-            )
-        });
-        let parameters: std::collections::BTreeMap<String, Parameter> = parameters.collect();
-        for (i, name) in names.iter().enumerate() {
-            let what = format!("g-sensitivity along {}", AXES[i]);
-            let size = &parameters[*name];
-            add(
-                format!("gyro_{axis}"),
-                &what,
-                (size.value, size.std_error.unwrap_or(f64::NAN)),
-                "deg/s/g",
-            );
-        }
-        effects.push(EffectModel {
-            cause: "g_sensitivity".to_owned(),
-            channels: vec![format!("gyro_{axis}")],
-            parameters,
-        });
         // The board counts acceleration from where its accelerometer would read 0 g if it had no error.
         let from_nominal: f64 = (0..3)
             .map(|i| found.values[i + 1] * (acc.zero[i].0 - c.acc_zero_counts) / c.acc_counts_per_g)
             .sum();
-        let noise = (variance[k] * seconds).sqrt() * 60.0;
-        baseline[k] = Some((
+        out.baseline[k] = Some((
             Parameter::estimated(found.values[0] - from_nominal, found.errors[0], "deg/s"),
-            Parameter::exact(noise, "deg/sqrt(h)"),
+            Parameter::exact((variance * seconds).sqrt() * 60.0, "deg/sqrt(h)"),
         ));
+        add_g_sensitivity(&mut out, format!("gyro_{}", AXES[k]), &found);
     }
-    (out.effects, out.baseline) = (effects, baseline);
     out
+}
+
+/// The three sensitivities to acceleration that follow the bias of a gyro in its fit.
+fn add_g_sensitivity(out: &mut Outcome, channel: String, found: &Fit) {
+    let of_axis =
+        |i: usize| Parameter::estimated(found.values[i + 1], found.errors[i + 1], "deg/s/g");
+    out.identified.extend((0..3).map(|i| Identified {
+        channel: channel.clone(),
+        what: format!("g-sensitivity along {}", AXES[i]),
+        size: of_axis(i),
+    }));
+    let parameters = (0..3).map(|i| (format!("acc_{}", AXES[i]), of_axis(i)));
+    out.effects.push(EffectModel {
+        cause: "g_sensitivity".to_owned(),
+        channels: vec![channel],
+        parameters: parameters.collect(),
+    });
 }

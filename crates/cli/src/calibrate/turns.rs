@@ -249,10 +249,6 @@ fn means(values: &[f64], length: usize) -> Vec<f64> {
 }
 
 fn outcome(record: &Record) -> Result<Outcome, SequenceError> {
-    let not_done = |what: &str, help: &str| SequenceError::NotDone {
-        what: what.to_owned(),
-        help: help.to_owned(),
-    };
     let read = read(record).ok_or_else(|| {
         not_done(
             "no sample arrived while the table turned",
@@ -262,6 +258,33 @@ fn outcome(record: &Record) -> Result<Outcome, SequenceError> {
     let turning: Vec<usize> = (0..read.t.len())
         .filter(|k| read.rate[2][*k].abs() > LEAST_DPS)
         .collect();
+    was_done(&read, &turning)?;
+    let rate_hz = record.header.rate_hz.unwrap_or(20.0);
+    let mut out = Outcome::of(&SEQUENCES[1], rate_hz, 0.073_26);
+    let across = |axis: usize| {
+        let all = turning
+            .iter()
+            .map(|k| read.acc[axis][*k] / STANDARD_GRAVITY);
+        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(v), h.max(v))
+        });
+        (high - low) / 2.0
+    };
+    let is_tilted = across(0).min(across(1)) > LEAST_G;
+    cross_axis(&read, is_tilted, &mut out);
+    scale_of_z(&read, is_tilted, &mut out);
+    Ok(out)
+}
+
+fn not_done(what: &str, help: &str) -> SequenceError {
+    SequenceError::NotDone {
+        what: what.to_owned(),
+        help: help.to_owned(),
+    }
+}
+
+/// Sees that the table turned both ways and rested between, and that nobody else moved the stand.
+fn was_done(read: &Read, turning: &[usize]) -> Result<(), SequenceError> {
     let both = [1.0, -1.0].map(|sign| {
         turning
             .iter()
@@ -280,45 +303,23 @@ fn outcome(record: &Record) -> Result<Outcome, SequenceError> {
             "less by `--duty`: it has to stop within seconds",
         ));
     }
-    if let Some(why) = not_at_rest(&read) {
-        return Err(not_done(
+    match not_at_rest(read) {
+        Some(why) => Err(not_done(
             &why,
             "leave the stand alone from the first rest to the last, and begin again",
-        ));
+        )),
+        None => Ok(()),
     }
-    let mut out = Outcome {
-        sequence: "turns",
-        identified: Vec::new(),
-        not_identified: SEQUENCES[1]
-            .cannot
-            .iter()
-            .map(|c| (*c).to_owned())
-            .collect(),
-        refused: Vec::new(),
-        effects: Vec::new(),
-        baseline: [None, None, None],
-        temperatures: None,
-        rate_hz: record.header.rate_hz.unwrap_or(20.0),
-        lsb_dps: 0.073_26,
-    };
+}
+
+/// The scale of gyro z against the turns that gravity counts, where it goes round often enough.
+fn scale_of_z(read: &Read, is_tilted: bool, out: &mut Outcome) {
     let mut angle = vec![0.0];
     for k in 1..read.t.len() {
         let rate = 0.5 * (read.rate[2][k - 1] + read.rate[2][k]);
         angle.push(angle[k - 1] + (rate * (read.t[k] - read.t[k - 1])).to_radians());
     }
-    let across = |axis: usize| {
-        let all = turning
-            .iter()
-            .map(|k| read.acc[axis][*k] / STANDARD_GRAVITY);
-        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(v), h.max(v))
-        });
-        (high - low) / 2.0
-    };
-    let is_tilted = across(0).min(across(1)) > LEAST_G;
-    cross_axis(&read, is_tilted, &mut out);
-    let span = |a: &[f64]| a.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-    let turned = span(&angle) / TAU;
+    let turned = angle.iter().fold(0.0f64, |most, v| most.max(v.abs())) / TAU;
     if !is_tilted {
         out.not_identified.push(
             "scale of gyro_z: its axis stands upright, and gravity does not go round; tilt the stand by 10 degrees or more and turn again".to_owned(),
@@ -327,7 +328,7 @@ fn outcome(record: &Record) -> Result<Outcome, SequenceError> {
         out.not_identified.push(format!(
             "scale of gyro_z: {turned:.1} turns, {LEAST_TURNS:.0} are needed: longer by `--seconds`"
         ));
-    } else if let Some((value, error)) = scale(&read, &angle) {
+    } else if let Some((value, error)) = scale(read, &angle) {
         let size = Parameter::estimated(value, error, "1");
         out.identified.push(Identified {
             channel: "gyro_z".to_owned(),
@@ -340,7 +341,6 @@ fn outcome(record: &Record) -> Result<Outcome, SequenceError> {
             parameters: BTreeMap::from([("relative".to_owned(), size)]),
         });
     }
-    Ok(out)
 }
 
 /// What the gyros about x and y read of the rate about z, beside a bias that walks; gravity that goes round has columns of its

@@ -6,12 +6,12 @@ use model::record::Quantity;
 
 use super::build::{CORRECTED, OF_CORRECTION};
 use super::conventions::unit_of;
-use super::error::{brief, brief_list};
+use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
 use super::mapped::{beside_ours, by_known_names, mapped};
 use super::names::{TIMES, left, meant, missing, not_read, respelt};
-use super::propose::proposal;
+use super::propose::unknown;
 use super::units::{COUNTS, What, convert, in_brackets, known, usual};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
 
@@ -123,12 +123,22 @@ pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Column
     };
     if !mapping.columns.is_empty() && !found.columns.iter().any(is_measured) {
         return Err(unknown(
-            said,
+            said.names,
             "`--columns` names nothing that was measured".to_owned(),
         ));
     }
     let names = found.columns.iter().map(|c| c.name.as_str());
     mapping.check_units(names)?;
+    not_twice(said, mapping, &found)?;
+    Ok(found)
+}
+
+/// Refuses a name that two columns have, where it was not its number that chose one of them.
+fn not_twice(
+    said: &Said<'_>,
+    mapping: &ColumnMapping,
+    found: &Columns,
+) -> Result<(), CaptureError> {
     let mut often: BTreeMap<&String, usize> = BTreeMap::new();
     for name in said.names {
         *often.entry(name).or_default() += 1;
@@ -147,7 +157,7 @@ pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Column
             });
         }
     }
-    Ok(found)
+    Ok(())
 }
 
 /// Says what was made of names that say it themselves.
@@ -177,21 +187,6 @@ fn refuse_units(said: &Said<'_>, mapping: &ColumnMapping) -> Result<(), CaptureE
             why: format!("{key}={unit}, but the file is a capture in counts, whose header has their scales"),
             help: "leave it out; to read the cells as other values, map them: `--columns gyro_x=gyro_x`".to_owned(),
         }),
-    }
-}
-
-pub(super) fn unknown(said: &Said<'_>, why: String) -> CaptureError {
-    let (example, is_guessed) = proposal(said.names, said.numbered);
-    CaptureError::Columns {
-        why,
-        columns: brief_list(said.names),
-        hint: if is_guessed {
-            " and see that the units are right, which the file does not say (phones and ROS log rad/s; `freq=NAME` and \
-             `--units freq=1` for `analyze` of what is no gyro)"
-        } else {
-            ""
-        },
-        example,
     }
 }
 
@@ -267,6 +262,8 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
             name if TIMES.contains(&name) && !has("host_time_s") && !found.has_time() => {
                 time(said, mapping, at, &mut found)?
             }
+            // The stand's own time, told once more in s by `export`.
+            name if TIMES.contains(&name) && has("host_time_s") => continue,
             _ if quantity == Quantity::Other => {
                 unread.push(theirs);
                 continue;
@@ -291,7 +288,7 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
     }
     take_counted(&mut found, &counted, said, mapping)?;
     if !found.columns.iter().any(is_inertial) {
-        return Err(unknown(said, NONE_OF_OURS.to_owned()));
+        return Err(unknown(said.names, NONE_OF_OURS.to_owned()));
     }
     found.assume(&assumed);
     found.notes.extend(not_read(&unread, &names));
@@ -434,7 +431,7 @@ fn own(
         });
     }
     if !columns.iter().any(is_inertial) {
-        return Err(unknown(said, NONE_OF_OURS.to_owned()));
+        return Err(unknown(said.names, NONE_OF_OURS.to_owned()));
     }
     notes.extend(not_read(&unread, &names));
     Ok(Columns {

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::report::plot::number;
+
 /// A capture that cannot be read or written.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 #[non_exhaustive]
@@ -218,6 +220,27 @@ pub enum CaptureError {
         why: String,
         /// What to do.
         help: String,
+    },
+    /// Two records behind one another.
+    #[error(
+        "the file has two sample rates: {} Hz before row {row}, {} Hz from there on ({at_s:.6} s after the first row)",
+        number(*before_hz, 6), number(*after_hz, 6)
+    )]
+    #[diagnostic(
+        code(capture::two_rates),
+        help(
+            "no noise figure holds for both: take one part, `--span ,{at_s:.6}` or `--span {at_s:.6},` (or cut the file there)"
+        )
+    )]
+    TwoRates {
+        /// Sample rates, Hz.
+        before_hz: f64,
+        /// The later one.
+        after_hz: f64,
+        /// First row of the second part, from 1 on.
+        row: usize,
+        /// Its time, s from the first row.
+        at_s: f64,
     },
     /// Columns of several lengths.
     #[error("the columns have different lengths: {lengths}")]

@@ -2,12 +2,13 @@
 
 use model::record::Quantity;
 
-use super::columns::{Column, Columns, Role, Said, contradiction, measured, time, unknown};
+use super::columns::{Column, Columns, Role, Said, contradiction, measured, time};
 use super::conventions::unit_of;
 use super::error::brief;
 use super::foreign::meaning;
 use super::names::TIMES;
-use super::propose::{alias, guess, nearest};
+use super::propose::seen::Seen;
+use super::propose::{alias, guess, nearest, unknown};
 use super::units::{What, in_brackets};
 use super::{CaptureError, ColumnMapping};
 
@@ -83,7 +84,7 @@ pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option
     if said.numbered || said.names.iter().any(is_ours) {
         return None;
     }
-    let guess = guess(said.names, false);
+    let guess = guess(said.names, false, &Seen::default());
     let has_gyro = guess
         .columns
         .iter()
@@ -134,7 +135,10 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
     let mut assumed = Vec::new();
     for (given, theirs) in &mapping.columns {
         let Some(at) = place(said, theirs) else {
-            return Err(unknown(said, format!("there is no column `{theirs}`")));
+            return Err(unknown(
+                said.names,
+                format!("there is no column `{theirs}`"),
+            ));
         };
         if let Some(other) = found.columns.iter().find(|c: &&Column| c.at == at) {
             return Err(given_twice(&said.names[at], &other.name, given));

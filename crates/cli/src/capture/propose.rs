@@ -4,8 +4,14 @@ use model::record::Quantity;
 
 use crate::text::shell_word;
 
+use super::CaptureError;
 use super::conventions::unit_of;
+use super::error::brief_list;
 use super::units::{What, in_brackets, is_unit_of, known};
+
+pub(super) mod seen;
+
+use seen::Seen;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 /// Bytes of a name beyond which its number is easier to write.
@@ -37,40 +43,83 @@ impl Guess {
     }
 }
 
-/// What the columns of a file most probably are, by their names. `numbered` says that the names are made up.
-pub(super) fn guess(names: &[String], numbered: bool) -> Guess {
+/// What the columns of a file most probably are, by their names and by what was seen of their values. `numbered` says that
+/// the names are made up.
+pub(super) fn guess(names: &[String], numbered: bool, seen: &Seen) -> Guess {
     let mut guess = Guess {
         columns: Vec::new(),
         units: Vec::new(),
         is_ambiguous: false,
     };
-    if numbered {
-        guess_by_number(names, &mut guess);
+    if numbered || are_numbers(names) {
+        guess_by_number(names, seen, &mut guess);
     } else {
-        guess_by_name(names, &mut guess);
+        guess_by_name(names, seen, &mut guess);
     }
     guess
 }
 
-/// As such files usually are: three gyros, three accelerometers, a time before them where the number is odd.
-fn guess_by_number(names: &[String], guess: &mut Guess) {
-    let first = usize::from(names.len() > 3 && names.len() != 6);
-    if first == 1 {
-        guess.add(names, "time", 0, What::Time);
+/// Whether names are places in one array of which its own name says nothing: `values[0]`, `values[1]`, ...
+fn are_numbers(names: &[String]) -> bool {
+    let stem = |name: &String| name.split_once('[').map(|(stem, _)| stem.to_owned());
+    let first = names.first().and_then(stem);
+    let is_same = |name| stem(name) == first;
+    names.len() > 1
+        && first.is_some()
+        && names.iter().all(is_same)
+        && meanings(names).iter().all(|m| m.kind == Kind::Unknown)
+}
+
+/// As such files usually are: a time, three gyros, three accelerometers. The time rises, and accelerometers read gravity; where
+/// no value is seen, the time is first where the number of columns is odd.
+fn guess_by_number(names: &[String], seen: &Seen, guess: &mut Guess) {
+    let all = || 0..names.len();
+    let time = match all().any(|at| seen.rises(at)) {
+        true => all().find(|at| seen.is_time(*at)),
+        false => (names.len() > 3 && names.len() != 6).then_some(0),
+    };
+    if let Some(at) = time {
+        guess.add(names, "time", at, What::Time);
     }
-    for (k, axis) in AXES.iter().enumerate().take(names.len() - first) {
-        let gyro = What::Channel(Quantity::Gyro);
-        guess.add(names, &format!("gyro_{axis}"), first + k, gyro);
+    let is_reading = |at: &usize| Some(*at) != time && !seen.rises(*at) && !seen.is_constant(*at);
+    let mut readings: Vec<usize> = all().filter(is_reading).collect();
+    if readings.is_empty() {
+        readings = all().filter(|at| Some(*at) != time).collect();
     }
-    if names.len() >= first + 6 {
-        for (k, axis) in AXES.iter().enumerate() {
-            let acc = What::Channel(Quantity::Acc);
-            guess.add(names, &format!("acc_{axis}"), first + 3 + k, acc);
+    let (first, then) = readings.split_at(readings.len().min(AXES.len()));
+    let then = &then[..if then.len() < AXES.len() {
+        0
+    } else {
+        AXES.len()
+    }];
+    let of_triple = |of: &[usize]| match of.len() == AXES.len() {
+        true => seen.gravity(of),
+        false => None,
+    };
+    let (gyros, accs) = match (of_triple(first), of_triple(then)) {
+        (Some(_), None) => (then, first),
+        _ => (first, then),
+    };
+    for (stem, of, quantity) in [
+        ("gyro", gyros, Quantity::Gyro),
+        ("acc", accs, Quantity::Acc),
+    ] {
+        for (axis, at) in AXES.iter().zip(of) {
+            guess.add(
+                names,
+                &format!("{stem}_{axis}"),
+                *at,
+                What::Channel(quantity),
+            );
         }
+    }
+    if let Some(unit) = of_triple(accs) {
+        let of_acc = guess.units.iter_mut().filter(|(key, _)| *key == "acc");
+        of_acc.for_each(|(_, said)| *said = Some(unit));
     }
 }
 
-fn guess_by_name(names: &[String], guess: &mut Guess) {
+fn guess_by_name(names: &[String], seen: &Seen, guess: &mut Guess) {
     let meanings = meanings(names);
     let time = |with_unit: bool| {
         meanings.iter().zip(names).position(|(m, name)| {
@@ -78,7 +127,9 @@ fn guess_by_name(names: &[String], guess: &mut Guess) {
             m.kind == Kind::Time && (!with_unit || says() || m.is_seconds)
         })
     };
-    if let Some(at) = time(true).or_else(|| time(false)) {
+    let unknown = |at: &usize| meanings[*at].kind == Kind::Unknown;
+    let by_value = || (0..names.len()).find(|at| unknown(at) && seen.is_time(*at));
+    if let Some(at) = time(true).or_else(|| time(false)).or_else(by_value) {
         guess.add(names, "time", at, What::Time);
     }
     let find = |kind: Kind, axis: usize| {
@@ -115,17 +166,39 @@ fn guess_by_name(names: &[String], guess: &mut Guess) {
     }
     if !has_gyro && !has_acc && (0..3).all(|axis| find(Kind::Bare, axis).is_none()) {
         // A gyro without an axis; or nothing is recognized: the form of a mapping, with the first column that is no time.
-        let first = |wanted: fn(Kind) -> bool| meanings.iter().position(|m| wanted(m.kind));
-        if let Some(at) = first(|k| k == Kind::Gyro).or_else(|| first(|k| k != Kind::Time)) {
+        let first = |wanted: &dyn Fn(usize) -> bool| (0..meanings.len()).find(|at| wanted(*at));
+        let is_reading = |at: usize| meanings[at].kind != Kind::Time && !seen.rises(at);
+        let found = first(&|at| meanings[at].kind == Kind::Gyro)
+            .or_else(|| first(&is_reading))
+            .or_else(|| first(&|at| meanings[at].kind != Kind::Time));
+        if let Some(at) = found {
             guess.add(names, "gyro_x", at, What::Channel(Quantity::Gyro));
         }
+    }
+    no_rates(seen, guess);
+}
+
+/// What is too small to be a rate is a channel of its own: a clock's frequency, most often.
+fn no_rates(seen: &Seen, guess: &mut Guess) {
+    let mut gyros = guess
+        .columns
+        .iter()
+        .filter(|(ours, _)| ours.starts_with("gyro"));
+    if let (Some((_, at)), None) = (gyros.next(), gyros.next())
+        && seen.is_no_rate(*at)
+    {
+        let at = *at;
+        guess.columns.retain(|(_, other)| *other != at);
+        guess.units.retain(|(key, _)| *key != "gyro");
+        guess.columns.push(("freq".to_owned(), at));
+        guess.units.push(("freq", None));
     }
 }
 
 /// `--columns ... --units ...` made of a file's column names, as a shell takes them, and whether a unit in it is a guess.
 /// `numbered` says that the names are made up, and columns are called by their numbers.
-pub(super) fn proposal(names: &[String], numbered: bool) -> (String, bool) {
-    let guess = guess(names, numbered);
+fn proposal(names: &[String], numbered: bool, seen: &Seen) -> (String, bool) {
+    let guess = guess(names, numbered, seen);
     let column = |(ours, at): &(String, usize)| {
         let name = &names[*at];
         // What would be taken for the list's own commas goes by its number.
@@ -142,19 +215,64 @@ pub(super) fn proposal(names: &[String], numbered: bool) -> (String, bool) {
             ("time", None | Some("s")) => return None,
             (_, Some(unit)) => unit,
             ("gyro", None) => "deg/s",
+            ("freq", None) => "1",
             (_, None) => "m/s2",
         };
         is_guessed |= said.is_none();
         Some(format!("{key}={unit}"))
     };
     let units: Vec<String> = guess.units.iter().filter_map(unit).collect();
+    let has_time = guess.columns.iter().any(|(ours, _)| ours == "time");
+    let is_counted = !has_time && (0..names.len()).any(|at| seen.counts(at));
+    let rate = if is_counted { " --rate HZ" } else { "" };
     let columns: Vec<String> = guess.columns.iter().map(column).collect();
     let columns = shell_word(&columns.join(","));
     if units.is_empty() {
-        return (format!("--columns {columns}"), false);
+        return (format!("--columns {columns}{rate}"), false);
     }
     let units = shell_word(&units.join(","));
-    (format!("--columns {columns} --units {units}"), is_guessed)
+    (
+        format!("--columns {columns} --units {units}{rate}"),
+        is_guessed,
+    )
+}
+
+/// An error of columns that mean nothing here; a mapping is [`proposed`] once rows are seen.
+pub(super) fn unknown(names: &[String], why: String) -> CaptureError {
+    CaptureError::Columns {
+        why,
+        columns: brief_list(names),
+        hint: "",
+        example: String::new(),
+    }
+}
+
+/// An error of columns that mean nothing here, with a mapping by their names and what was seen of their values.
+pub(super) fn proposed(
+    error: CaptureError,
+    (names, numbered): (&[String], bool),
+    seen: &Seen,
+) -> CaptureError {
+    let CaptureError::Columns { why, columns, .. } = error else {
+        return error;
+    };
+    let (example, is_guessed) = proposal(names, numbered, seen);
+    CaptureError::Columns {
+        why,
+        columns,
+        hint: match (numbered, is_guessed) {
+            (true, _) => {
+                " and see that columns and units are right: the file does not say what its columns are, and this goes by their \
+                 places and values"
+            }
+            (false, true) => {
+                " and see that the units are right, which the file does not say (phones and ROS log rad/s; `freq=NAME` and \
+                 `--units freq=1` for `analyze` of what is no gyro)"
+            }
+            (false, false) => "",
+        },
+        example,
+    }
 }
 
 /// The name of ours that another spelling of it can only mean: `temperature`, `GyroX`, `accel_z`, `t`. `None` for names

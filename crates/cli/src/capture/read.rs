@@ -15,8 +15,11 @@ use super::layout::{Cells, Layout, next_row_into};
 use super::logs::read_log;
 use super::order::{check_rate, check_times, check_varies, in_order, unwrap, unwrap_times};
 use super::plausible::doubts;
+use super::propose::proposed;
+use super::propose::seen::{ROWS, Seen, first_rows};
 use super::skipped::keep_places;
-use super::steady::unsteady;
+use super::span::Span;
+use super::steady::{one_rate, unsteady};
 use super::stream::{TextLines, io, named, unpacked};
 use super::table::Table;
 #[cfg(feature = "native")]
@@ -35,6 +38,8 @@ pub struct ReadOptions {
     pub skip_bad: bool,
     /// Which topic of a log that has several IMUs.
     pub topic: Option<String>,
+    /// The part of the record that is taken; all of it without one.
+    pub span: Option<Span>,
 }
 
 /// A record, and what was left out of it.
@@ -102,7 +107,18 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         units: &layout.units,
         is_scaled: false,
     };
-    let mut found = columns(&said, &options.mapping)?;
+    let mut found = match columns(&said, &options.mapping) {
+        Err(error) => {
+            let seen = first_rows(
+                &mut text,
+                layout.first.take(),
+                &mut layout.cells,
+                said.names.len(),
+            )?;
+            return Err(proposed(error, (said.names, said.numbered), &seen));
+        }
+        Ok(found) => found,
+    };
     if let Some((first, last)) = layout.preamble {
         found.notes.push(format!(
             "the table begins in line {}: what stands before, from line {first} on, is not read",
@@ -126,7 +142,7 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         row = next_row_into(&mut text, cells)?;
     }
     let odd = std::mem::take(&mut reader.odd);
-    finish(header, found, values, options.rate_hz, &skipped, &odd)
+    finish(header, found, values, options, &skipped, &odd)
 }
 
 /// A record of named columns, as of a file of arrays: by the names and units of `table.about` (`rate_hz`, `unit of gyro_x`,
@@ -166,7 +182,11 @@ fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError>
         units: &units,
         is_scaled: true,
     };
-    let mut found = columns(&said, &options.mapping)?;
+    let mut found = columns(&said, &options.mapping).map_err(|error| {
+        let part = |of: &Vec<f64>| of.iter().copied().take(ROWS).collect();
+        let seen = Seen(table.columns.iter().map(part).collect());
+        proposed(error, (said.names, said.numbered), &seen)
+    })?;
     found.notes.splice(..0, table.notes);
     let mut cells = Vec::new();
     for column in &found.columns {
@@ -187,7 +207,7 @@ fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError>
         }
         cells.push(values);
     }
-    finish(header, found, cells, options.rate_hz, &[], &[])
+    finish(header, found, cells, options, &[], &[])
 }
 
 impl Role {
@@ -322,7 +342,7 @@ fn finish(
     header: Header,
     mut found: Columns,
     mut cells: Vec<Vec<f64>>,
-    rate_hz: Option<f64>,
+    options: &ReadOptions,
     skipped: &[usize],
     odd: &[Option<(u64, String)>],
 ) -> Result<Read, CaptureError> {
@@ -353,11 +373,19 @@ fn finish(
         );
         record.notes.push(note);
     }
+    let stated = record.header.rate_hz;
     let mut record = in_order(record);
     if let Some(times) = &record.host_time_s {
         check_times(times, found.time_is_assumed)?;
     }
-    check_rate(&mut record, rate_hz)?;
+    if let Some(span) = options.span {
+        span.cut(&mut record)?;
+        // The rate that all rows gave is none of a part's.
+        record.header.rate_hz = stated;
+        record = in_order(record);
+    }
+    one_rate(&record)?;
+    check_rate(&mut record, options.rate_hz)?;
     difference_angles(&mut record)?;
     share_thermometer(&mut record);
     let doubts = doubts(&record, found.gyro_is_assumed);

@@ -3,7 +3,7 @@
 use model::record::sampling::Sampling;
 use model::record::{Axis, Base, Quantity, Record};
 
-use super::STANDARD_GRAVITY;
+use super::{CaptureError, STANDARD_GRAVITY};
 
 /// Parts of a record that are compared, and steps that each has at least.
 const BLOCKS: usize = 30;
@@ -18,7 +18,7 @@ const GRAVITY: std::ops::Range<f64> = 0.7..1.3;
 /// What is not steady.
 pub(super) fn unsteady(record: &Record) -> Vec<String> {
     let times = times(record);
-    let rates = times.as_deref().and_then(two_rates);
+    let rates = times.as_deref().and_then(changing_rate);
     let own = match (&rates, Sampling::of(record, None)) {
         // It says of such times that they come in bursts.
         (None, Ok(sampling)) => sampling.warnings,
@@ -29,7 +29,7 @@ pub(super) fn unsteady(record: &Record) -> Vec<String> {
 }
 
 /// Device time where there is one, else the time column, s from the first row on.
-fn times(record: &Record) -> Option<Vec<f64>> {
+pub(super) fn times(record: &Record) -> Option<Vec<f64>> {
     match (&record.t_ticks, record.header.tick_s, &record.host_time_s) {
         (Some(ticks), Some(tick_s), _) => {
             let first = *ticks.first()?;
@@ -52,33 +52,86 @@ fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Two rates in one file. By median and mean of the steps in parts of the record: a gap moves one part's mean, arrival in
-/// bursts the medians alone.
-fn two_rates(times: &[f64]) -> Option<String> {
+/// Medians and means of the steps in parts of a record; `None` of one too short.
+fn by_parts(times: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
     let steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
     let length = steps.len() / BLOCKS;
     if length < STEPS {
         return None;
     }
     let parts = steps.chunks_exact(length).take(BLOCKS);
-    let (medians, means): (Vec<f64>, Vec<f64>) = parts
-        .map(|part| {
-            let mean = part.iter().sum::<f64>() / part.len() as f64;
-            (median(&mut part.to_vec()), mean)
-        })
-        .unzip();
-    let thirds = |of: &[f64]| -> Vec<f64> {
-        let parts = of.chunks_exact(BLOCKS / 3);
-        parts.map(|third| median(&mut third.to_vec())).collect()
-    };
+    let each = parts.map(|part| {
+        let mean = part.iter().sum::<f64>() / part.len() as f64;
+        (median(&mut part.to_vec()), mean)
+    });
+    Some(each.unzip())
+}
+
+/// Whether the steps of a record are not the same throughout. By their median and mean in parts: a gap moves one part's mean,
+/// arrival in bursts the medians alone.
+fn rate_changes(medians: &[f64], means: &[f64]) -> bool {
     let is_other = |of: &[f64]| {
-        let [least, most] = [f64::min, f64::max].map(|pick| of.iter().copied().reduce(pick));
+        let parts = of.chunks_exact(BLOCKS / 3);
+        let thirds: Vec<f64> = parts.map(|third| median(&mut third.to_vec())).collect();
+        let [least, most] = [f64::min, f64::max].map(|pick| thirds.iter().copied().reduce(pick));
         let (Some(least), Some(most)) = (least, most) else {
             return false;
         };
         least > 0.0 && most > OTHER_RATE * least
     };
-    if !is_other(&thirds(&medians)) || !is_other(&thirds(&means)) {
+    is_other(medians) && is_other(means)
+}
+
+/// The row from which on steps are nearer to the last ones than to the first: the split by which most steps are on their side.
+fn split(times: &[f64], first: f64, last: f64) -> usize {
+    let between = (first * last).sqrt();
+    let (mut lead, mut best) = (0_i64, (0_i64, 0));
+    for (k, step) in times.windows(2).map(|w| w[1] - w[0]).enumerate() {
+        lead += if (step > between) == (first > between) {
+            1
+        } else {
+            -1
+        };
+        if lead > best.0 {
+            best = (lead, k + 1);
+        }
+    }
+    best.1
+}
+
+/// An error where the file is two records behind one another, each of one rate.
+pub(super) fn one_rate(record: &Record) -> Result<(), CaptureError> {
+    times(record)
+        .and_then(|times| two_rates(&times))
+        .map_or(Ok(()), Err)
+}
+
+fn two_rates(times: &[f64]) -> Option<CaptureError> {
+    let (medians, means) = by_parts(times)?;
+    let (first, last) = (medians[0], medians[BLOCKS - 1]);
+    let is_other = first.max(last) > OTHER_RATE * first.min(last);
+    if !is_other || !rate_changes(&medians, &means) {
+        return None;
+    }
+    let row = split(times, first, last);
+    let is_steady = |part: &[f64]| {
+        by_parts(part).is_none_or(|(medians, means)| !rate_changes(&medians, &means))
+    };
+    if !is_steady(&times[..=row]) || !is_steady(&times[row..]) {
+        return None;
+    }
+    Some(CaptureError::TwoRates {
+        before_hz: 1.0 / first,
+        after_hz: 1.0 / last,
+        row: row + 1,
+        at_s: times[row],
+    })
+}
+
+/// What to say of a rate that changes more than once, or slowly.
+fn changing_rate(times: &[f64]) -> Option<String> {
+    let (medians, means) = by_parts(times)?;
+    if !rate_changes(&medians, &means) {
         return None;
     }
     let (first, last) = (medians[0], medians[BLOCKS - 1]);
@@ -89,10 +142,10 @@ fn two_rates(times: &[f64]) -> Option<String> {
     let at = medians
         .iter()
         .position(|m| (*m > between) != (first > between));
-    let row = at.map_or(0, |block| block * length);
+    let row = at.map_or(0, |block| block * (times.len() - 1) / BLOCKS);
     Some(format!(
         "the sample rate changes: {:.4} Hz at the start, {:.4} Hz at the end, the first change near row {} ({:.4} s): \
-         what is said of rates, noise and spectra mixes them; cut the file there, and take the parts one by one",
+         what is said of rates, noise and spectra mixes them; take the parts one by one (`--span FROM,TO`)",
         1.0 / first,
         1.0 / last,
         row + 1,
@@ -143,7 +196,7 @@ fn turned(record: &Record, times: Option<&[f64]>) -> Option<String> {
     let place = when.map_or(format!("row {}", row + 1), |t| format!("{t:.4} s"));
     Some(format!(
         "the sensor is turned against gravity, by {most:.0} deg at most, from {place} on: noise figures are of a sensor that \
-         lies still; cut the file there, or say in its header what the base does (`# base: moving`)"
+         lies still; take one part (`--span FROM,TO`), or say in its header what the base does (`# base: moving`)"
     ))
 }
 
@@ -151,40 +204,48 @@ fn turned(record: &Record, times: Option<&[f64]>) -> Option<String> {
 mod tests {
     use super::*;
 
+    fn times_of(step: &dyn Fn(usize) -> f64) -> Vec<f64> {
+        let steps = (0..1200).map(step).scan(0.0, |t, step| {
+            *t += step;
+            Some(*t)
+        });
+        steps.collect()
+    }
+
     #[test]
-    fn two_rates_are_told_with_their_place_and_gaps_and_bursts_are_none() {
-        let at = |step: &dyn Fn(usize) -> f64| {
-            let steps = (0..1200).map(step);
-            let times: Vec<f64> = steps
-                .scan(0.0, |t, step| {
-                    *t += step;
-                    Some(*t)
-                })
-                .collect();
-            two_rates(&times)
+    fn two_records_behind_one_another_are_refused_with_their_place_to_the_row() {
+        for (k, slow, fast) in [(600, 0.05, 1e-4), (300, 0.05, 0.01), (900, 0.01, 0.05)] {
+            // Sampled late or early by a tenth.
+            let late = |i: usize| 1.0 + 0.1 * ((i * 7 % 11) as f64 / 5.0 - 1.0);
+            let times = times_of(&|i| late(i) * if i < k { slow } else { fast });
+            let Some(CaptureError::TwoRates { row, at_s, .. }) = two_rates(&times) else {
+                panic!("{k}: one rate");
+            };
+            // The step that begins the second part is that of the row before.
+            assert_eq!(row, k, "{slow} {fast}");
+            assert_eq!(at_s, times[k - 1]);
+        }
+    }
+
+    #[test]
+    fn a_rate_that_changes_slowly_or_twice_is_told_and_gaps_and_bursts_are_none() {
+        let told = |step: &dyn Fn(usize) -> f64| {
+            let times = times_of(step);
+            (two_rates(&times).is_some(), changing_rate(&times).is_some())
         };
-        let joined = at(&|k| if k < 600 { 0.05 } else { 1e-4 }).expect("two rates");
-        assert!(
-            joined.contains("20.0000 Hz at the start, 10000.0000 Hz at the end"),
-            "{joined}"
-        );
-        // The change is sought by blocks: the row is near row 601, and said to be.
-        let row = joined
-            .split("near row ")
-            .nth(1)
-            .and_then(|t| t.split(' ').next());
-        let row: usize = row.and_then(|t| t.parse().ok()).expect("a row");
-        assert!(row.abs_diff(601) <= 20, "{joined}");
-        assert!(at(&|k| 0.1 * 1.006f64.powi(k as i32)).is_some());
-        assert_eq!(at(&|_| 0.05), None);
-        assert_eq!(at(&|k| if k == 700 { 500.0 } else { 0.05 }), None);
+        assert_eq!(told(&|k| 0.1 * 1.006f64.powi(k as i32)), (false, true));
+        let twice = |k: usize| if (400..800).contains(&k) { 0.01 } else { 0.05 };
+        assert_eq!(told(&twice), (false, true));
+        let none = (false, false);
+        assert_eq!(told(&|_| 0.05), none);
+        assert_eq!(told(&|k| if k == 700 { 500.0 } else { 0.05 }), none);
         // Ten rows at once, twice a second; and in the last third twenty at once, once a second.
-        assert_eq!(at(&|k| if k % 10 == 0 { 0.5 } else { 1e-6 }), None);
+        assert_eq!(told(&|k| if k % 10 == 0 { 0.5 } else { 1e-6 }), none);
         let later = |k: usize| match (k >= 800, k % 10, k % 20) {
             (false, 0, _) => 0.5,
             (true, _, 0) => 1.0,
             _ => 1e-6,
         };
-        assert_eq!(at(&later), None);
+        assert_eq!(told(&later), none);
     }
 }

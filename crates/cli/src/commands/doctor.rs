@@ -158,7 +158,7 @@ fn simulator() -> Found {
         is_there,
         details: Vec::new(),
         help: (!is_there).then(|| {
-            "in its sources, `cargo xtask demo` builds the program with it; `--native` runs the same logic on this computer".to_owned()
+            "in the source folder, `cargo xtask demo` builds the program with it; `--native` runs the same logic on this computer".to_owned()
         }),
     }
 }
@@ -175,7 +175,7 @@ fn image() -> Found {
             .collect(),
         help: (!is_there).then(|| {
             format!(
-                "in its sources, `cargo xtask image` builds {}",
+                "in the source folder, `cargo xtask image` builds {}",
                 super::run::IMAGE
             )
         }),

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use clap::{Args, ValueEnum};
-use imu_stand::capture::{Read, corrected, joined, read_from, unpacked};
+use imu_stand::capture::{Read, Span, corrected, joined, read_from, unpacked};
 use imu_stand::link::{DEFAULT_BAUD, Link};
 use imu_stand::{CaptureError, ColumnMapping, ReadOptions, read_capture};
 use miette::{IntoDiagnostic, Result, WrapErr};
@@ -47,6 +47,9 @@ pub struct Input {
     /// Sample rate, Hz, where the rows have no times; refused where these say another one
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub rate: Option<f64>,
+    /// Take a part of the record alone, s from its first row: `60,600`, `60,` or `,600`
+    #[arg(long, value_name = "FROM,TO", allow_hyphen_values = true)]
+    span: Option<Span>,
     /// Leave out what stands in rows that cannot be read, and count them
     #[arg(long)]
     skip_bad: bool,
@@ -137,6 +140,7 @@ impl Input {
             rate_hz: self.rate,
             skip_bad: self.skip_bad,
             topic: self.topic.clone(),
+            span: self.span,
         };
         let read = if path.is_dir() {
             joined(path).and_then(|(text, _)| read_from(text, &options))
@@ -158,31 +162,7 @@ impl Input {
             }),
             false => Ok(read),
         });
-        let mut read = read.map_err(|error| {
-            let error = match error {
-                CaptureError::Io { path, source } => return unreadable(&path, &source),
-                error => error,
-            };
-            let says_which = matches!(
-                error,
-                CaptureError::CutOff { .. }
-                    | CaptureError::Damaged { .. }
-                    | CaptureError::Table { .. }
-                    | CaptureError::Parts { .. }
-            );
-            let report = miette::Report::new(error);
-            if says_which {
-                report
-            } else {
-                let is_stdin = path.as_os_str() == outputs::DASH;
-                let name = if is_stdin {
-                    STDIN.into()
-                } else {
-                    path.display().to_string()
-                };
-                report.wrap_err(format!("cannot read {name}"))
-            }
-        })?;
+        let mut read = read.map_err(|error| not_read(error, path))?;
         if let Some(base) = self.base {
             read.record.header.base = Some(base.into());
         }
@@ -195,6 +175,30 @@ impl Input {
         }
         Ok(read)
     }
+}
+
+/// A capture that cannot be read, with its name where the error has none.
+fn not_read(error: CaptureError, path: &Path) -> miette::Report {
+    let error = match error {
+        CaptureError::Io { path, source } => return unreadable(&path, &source),
+        error => error,
+    };
+    let says_which = matches!(
+        error,
+        CaptureError::CutOff { .. }
+            | CaptureError::Damaged { .. }
+            | CaptureError::Table { .. }
+            | CaptureError::Parts { .. }
+    );
+    let report = miette::Report::new(error);
+    if says_which {
+        return report;
+    }
+    let name = match path.as_os_str() == outputs::DASH {
+        true => STDIN.into(),
+        false => path.display().to_string(),
+    };
+    report.wrap_err(format!("cannot read {name}"))
 }
 
 /// A file that cannot be opened or read, and what to do.

@@ -195,44 +195,7 @@ fn print_lengths(plan: &Plan) {
 /// Prints them.
 fn print_separate(separate: &[Told]) {
     for direction in separate.chunk_by(|a, b| a.cause == b.cause) {
-        let (cause, rival) = (&direction[0].cause, &direction[0].rival);
-        let Some(told) = direction.iter().find(|t| !t.sizes.is_empty()) else {
-            let why = direction.iter().find_map(|t| t.why.as_deref());
-            say!(
-                "{cause} against {rival}: {}",
-                why.unwrap_or("nothing moves")
-            );
-            continue;
-        };
-        say!(
-            "{cause} against {rival}: smallest {}, {}, by the length of the record",
-            told.parameter,
-            told.unit
-        );
-        row("", lengths().into_iter().map(duration));
-        for told in direction {
-            say!("  {}", told.excitation);
-            if told.sizes.is_empty() {
-                let why = told.why.as_deref().unwrap_or("nothing moves");
-                say!("    {why}");
-                continue;
-            }
-            let size = |size: f64| match size.is_finite() {
-                true => format!("{size:.2e}"),
-                false => "never".to_owned(),
-            };
-            row("is seen", told.sizes.iter().map(|(_, s, _)| size(*s)));
-            let apart = format!("is no {rival}");
-            row(&apart, told.sizes.iter().map(|(_, _, s)| size(*s)));
-        }
-        let first = |t: &&Told| t.sizes.first().map_or(f64::INFINITY, |s| s.2);
-        if let Some(best) = direction
-            .iter()
-            .min_by(|a, b| first(a).total_cmp(&first(b)))
-            .filter(|t| first(t).is_finite())
-        {
-            say!("  the best of these: {}", best.excitation);
-        }
+        print_direction(direction);
     }
     let sequence = separate.iter().find_map(|told| {
         let name = told.sequence?;
@@ -253,6 +216,48 @@ fn print_separate(separate: &[Told]) {
     say!(
         "sizes are {TOLD_APART} standard errors; a random walk fitted beside it takes a part of that"
     );
+}
+
+/// What tells a cause from its rival, excitation by excitation.
+fn print_direction(direction: &[Told]) {
+    let (cause, rival) = (&direction[0].cause, &direction[0].rival);
+    let Some(told) = direction.iter().find(|t| !t.sizes.is_empty()) else {
+        let why = direction.iter().find_map(|t| t.why.as_deref());
+        say!(
+            "{cause} against {rival}: {}",
+            why.unwrap_or("nothing moves")
+        );
+        return;
+    };
+    say!(
+        "{cause} against {rival}: smallest {}, {}, by the length of the record",
+        told.parameter,
+        told.unit
+    );
+    row("", lengths().into_iter().map(duration));
+    for told in direction {
+        say!("  {}", told.excitation);
+        if told.sizes.is_empty() {
+            let why = told.why.as_deref().unwrap_or("nothing moves");
+            say!("    {why}");
+            continue;
+        }
+        let size = |size: f64| match size.is_finite() {
+            true => format!("{size:.2e}"),
+            false => "never".to_owned(),
+        };
+        row("is seen", told.sizes.iter().map(|(_, s, _)| size(*s)));
+        let apart = format!("is no {rival}");
+        row(&apart, told.sizes.iter().map(|(_, _, s)| size(*s)));
+    }
+    let first = |t: &&Told| t.sizes.first().map_or(f64::INFINITY, |s| s.2);
+    if let Some(best) = direction
+        .iter()
+        .min_by(|a, b| first(a).total_cmp(&first(b)))
+        .filter(|t| first(t).is_finite())
+    {
+        say!("  the best of these: {}", best.excitation);
+    }
 }
 
 /// A row of a table of sizes, its name and a cell for each length of the record.

@@ -9,7 +9,7 @@ use model::ModelFile;
 use model::record::sampling::Sampling;
 use model::record::{Channel, Quantity, Record};
 use noise::analyze::misfit_warning;
-use noise::fit::{Spectrum, Term, fit, fit_described};
+use noise::fit::{Described, Spectrum, Term, fit, fit_described};
 use noise::plan::{KnownNoise, Letter, seconds_for};
 use noise::synthetic::Truth;
 use rand_core::SeedableRng;
@@ -300,6 +300,15 @@ pub fn of_record(
 ) -> Result<Noise> {
     let gyro = gyro_of(record, from, channel)?;
     let sampling = Sampling::of(record, rate_hz).map_err(explain)?;
+    let described = described(gyro, &sampling, seed)?;
+    Ok(Noise {
+        from: format!("{}, {}", from, gyro.name),
+        ..noise_of(&described, sampling.tau0)
+    })
+}
+
+/// The terms that describe the noise of a gyro.
+fn described(gyro: &Channel, sampling: &Sampling, seed: u64) -> Result<Described> {
     let runs = sampling.runs_of(&gyro.values);
     let spectrum = Spectrum::with_gaps(&gyro.values, &runs, &sampling.slots, sampling.tau0);
     let samples: usize = runs.iter().map(ExactSizeIterator::len).sum();
@@ -313,10 +322,14 @@ pub fn of_record(
     }
     let longest = runs.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let described = fit_described(&spectrum, longest / 5, &mut rng);
+    Ok(fit_described(&spectrum, longest / 5, &mut rng))
+}
+
+/// The noise to plan by, with notes on what is assumed of terms that are not established; steps are `tau0` s apart.
+fn noise_of(described: &Described, tau0: f64) -> Noise {
     let found = &described.fit;
     let mut notes = Vec::new();
-    notes.extend(misfit_warning(&described, sampling.tau0));
+    notes.extend(misfit_warning(described, tau0));
     let estimates = [
         found.term(Term::White),
         found.term(Term::Flicker),
@@ -340,16 +353,16 @@ pub fn of_record(
     let b = value("B", "deg/s", found.term(Term::Flicker));
     let k = value("K", "deg/s/sqrt(s)", found.term(Term::RandomWalk));
     let q = value("Q", "deg", found.term(Term::Quantization));
-    let r = value("R", "deg/s/s", found.rate_ramp);
+    let r = value("R", "deg/s^2", found.rate_ramp);
     if white.value.is_none() {
         notes.push(format!(
             "N is not established in this capture: planned at its limit, {} deg/s*sqrt(s)",
             number(n, 3)
         ));
     }
-    Ok(Noise {
-        from: format!("{}, {}", from, gyro.name),
-        rate_hz: 1.0 / sampling.tau0,
+    Noise {
+        from: String::new(),
+        rate_hz: 1.0 / tau0,
         n,
         b,
         k,
@@ -357,7 +370,7 @@ pub fn of_record(
         r,
         notes,
         limits,
-    })
+    }
 }
 
 /// The length, s, from `seconds` on, in steps, of which enough records keep to what is wanted, or the longest that is not too

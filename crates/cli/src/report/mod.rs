@@ -7,7 +7,7 @@ pub mod replicates;
 pub mod standalone;
 mod tables;
 
-use diagnosis::result::{Diagnosed, Finding, Verdict};
+use diagnosis::result::{Diagnosed, Diagnosis, Finding, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use model::record::sampling::Sampling;
 use model::record::{Record, rows};
@@ -58,18 +58,7 @@ pub enum ReportError {
 /// [`ReportError`].
 pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
     let diagnosis = &subject.diagnosed.diagnosis;
-    let joined = rows::end_to_end(&rows::in_order(subject.record));
-    let joined = joined.map(|(record, bursts)| {
-        let mut diagnosed = subject.diagnosed.clone();
-        bursts.join(&mut diagnosed.baseline_model);
-        bursts.join(&mut diagnosed.extended_model);
-        let findings = &mut diagnosed.diagnosis.findings;
-        for t in findings.iter_mut().flat_map(|f| &mut f.times_s) {
-            *t = bursts.joined(*t);
-        }
-        (record, bursts.rate_hz, diagnosed)
-    });
-    // Figures of bursts show them end to end, as they were diagnosed.
+    let joined = end_to_end(subject);
     let drawn = match &joined {
         Some((record, rate_hz, diagnosed)) => Subject {
             record,
@@ -122,6 +111,20 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
     Ok(page.into_string())
 }
 
+/// The bursts of a record end to end, as they were diagnosed and as figures show them, with their rate, Hz; `None` of a record
+/// without bursts.
+fn end_to_end(subject: &Subject<'_>) -> Option<(Record, f64, Diagnosed)> {
+    let (record, bursts) = rows::end_to_end(&rows::in_order(subject.record))?;
+    let mut diagnosed = subject.diagnosed.clone();
+    bursts.join(&mut diagnosed.baseline_model);
+    bursts.join(&mut diagnosed.extended_model);
+    let findings = &mut diagnosed.diagnosis.findings;
+    for t in findings.iter_mut().flat_map(|f| &mut f.times_s) {
+        *t = bursts.joined(*t);
+    }
+    Some((record, bursts.rate_hz, diagnosed))
+}
+
 /// What the verdict means for this record: the cause itself where there is one.
 fn headline(diagnosed: &Diagnosed) -> String {
     let d = &diagnosed.diagnosis;
@@ -129,11 +132,8 @@ fn headline(diagnosed: &Diagnosed) -> String {
         (Verdict::Adequate, _) => "the model describes this run".into(),
         (Verdict::Extended, [one]) => crate::text::answer::headline(one),
         (Verdict::Extended, all) => several(all),
-        (Verdict::Unexplained, []) => "something is left that no known cause explains".into(),
-        (Verdict::Unexplained, all) => format!(
-            "{}; something is left that no known cause explains",
-            several(all)
-        ),
+        (Verdict::Unexplained, []) => left_over(d),
+        (Verdict::Unexplained, all) => format!("{}; {}", several(all), left_over(d)),
     }
 }
 
@@ -141,6 +141,19 @@ fn headline(diagnosed: &Diagnosed) -> String {
 const NAMED: usize = 3;
 
 /// What was found and where, the largest first; how many there are where none of them matters.
+/// What no known cause explains: the largest of it.
+fn left_over(d: &Diagnosis) -> String {
+    let first = d.unexplained.iter().find(|u| u.material);
+    first.map_or_else(
+        || "something is left that no known cause explains".to_owned(),
+        |left| {
+            // What it is stands before its size and its nearest names.
+            let what = left.what.split(';').next().unwrap_or(&left.what);
+            format!("no known cause explains {what} on {}", left.channel)
+        },
+    )
+}
+
 fn several(all: &[Finding]) -> String {
     let name = |f: &Finding| {
         let title = crate::text::answer::title(&f.cause);

@@ -398,6 +398,16 @@ pub fn tidy(value: f64, digits: usize) -> String {
 /// Sizes below it are written with an exponent.
 const LEAST_PLAIN: f64 = 1e-4;
 
+/// A number with that many places; 0 has no sign.
+#[must_use]
+pub fn fixed(value: f64, places: usize) -> String {
+    let text = format!("{value:.places$}");
+    match text.strip_prefix('-') {
+        Some(zero) if zero.chars().all(|c| matches!(c, '0' | '.')) => zero.to_owned(),
+        _ => text,
+    }
+}
+
 /// Thins a signal to what a figure can show: the lowest and the highest of each of `columns` stretches.
 #[must_use]
 pub fn envelope(x: &[f64], y: &[f64], columns: usize) -> Vec<(f64, f64)> {

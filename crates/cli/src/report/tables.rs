@@ -137,7 +137,7 @@ fn finding(found: &Finding) -> Markup {
             @if let Some(remedy) = answer::remedy(found) { p { (remedy) } }
             table.plain {
                 tbody {
-                    @for (name, parameter) in found.parameters.iter().filter(|(n, p)| !answer::is_switch(&found.cause, n, p)) {
+                    @for (name, parameter) in answer::in_order(found).into_iter().filter(|(n, p)| !answer::is_switch(&found.cause, n, p)) {
                         tr { th { (name.replace('_', " ")) } td.number { (answer::size(name, parameter)) } }
                     }
                 }
@@ -224,12 +224,9 @@ fn gain(subject: &Subject<'_>) -> Markup {
 pub(super) fn noise(subject: &Subject<'_>) -> Markup {
     let diagnosed = subject.diagnosed;
     let of = |model: &ModelFile, channel: &str, name: &str| {
-        let own = model.channels.iter().find(|c| c.name == channel)?;
-        let shown = match name {
-            "bias" => answer::with_interval,
-            _ => answer::level,
-        };
-        own.baseline.get(name).map(shown)
+        let term =
+            crate::text::noise::term(model, channel, name, diagnosed.diagnosis.input.seconds);
+        term.map(|term| term.said)
     };
     let dash = || "\u{2013}".to_owned();
     html! {

@@ -3,7 +3,7 @@
 use diagnosis::result::{Consequence, Finding, Parameter, Unexplained};
 use model::effects::effect;
 
-use crate::report::plot::{number, tidy};
+use crate::report::plot::{fixed, number, tidy};
 
 /// Half the width of a 95 % interval, in standard errors of a normal law.
 pub const HALF_WIDTH_95: f64 = 1.96;
@@ -34,7 +34,10 @@ pub fn headline(finding: &Finding) -> String {
     let title = title(&finding.cause);
     let sizes: Vec<String> = named(finding)
         .into_iter()
-        .map(|(name, p)| format!("{} {}", name.replace('_', " "), size(name, p)))
+        .map(|(name, p)| match *name == p.unit {
+            true => size(name, p),
+            false => format!("{} {}", name.replace('_', " "), size(name, p)),
+        })
         .collect();
     let place = finding.channels.join(", ");
     let effective = match finding.effective {
@@ -65,15 +68,26 @@ pub fn brief(finding: &Finding) -> String {
     format!("{} on {place}{}", finding.cause, size.unwrap_or_default())
 }
 
+/// All parameters of a finding, in the order in which its effect lists them, and those of no list after them.
+#[must_use]
+pub fn in_order(finding: &Finding) -> Vec<(&String, &Parameter)> {
+    let specs = effect(&finding.cause).map_or(&[][..], |e| e.parameters());
+    let place = |name: &str| specs.iter().position(|s| s.name == name);
+    let mut all: Vec<_> = finding.parameters.iter().collect();
+    all.sort_by_key(|(name, _)| place(name).unwrap_or(specs.len()));
+    all
+}
+
 /// The parameters that say how large a finding is: those that its effect requires, then those that were estimated.
 fn named(finding: &Finding) -> Vec<(&String, &Parameter)> {
     let specs = effect(&finding.cause).map_or(&[][..], |e| e.parameters());
     let required = |name: &str| specs.iter().any(|s| s.name == name && s.required);
     let estimated = |p: &Parameter| p.std_error.is_some_and(|e| e.is_finite() && e > 0.0);
-    let all = || finding.parameters.iter();
-    let first = all().filter(|(name, _)| required(name));
-    let then = all().filter(|(name, p)| !required(name) && estimated(p));
-    first.chain(then).take(NAMED).collect()
+    let (first, then): (Vec<_>, Vec<_>) = in_order(finding)
+        .into_iter()
+        .partition(|(name, _)| required(name));
+    let then = then.into_iter().filter(|(_, p)| estimated(p));
+    first.into_iter().chain(then).take(NAMED).collect()
 }
 
 /// What leaving it out of the simulation costs; `None` where the diagnosis does not tell.
@@ -277,7 +291,7 @@ fn to_place_of(value: f64, half: f64) -> String {
     let place = exponent(half).unwrap_or(0) - 1;
     let size = exponent(value.abs().max(half)).unwrap_or(0);
     if (-4..9).contains(&size) && place > -10 {
-        return format!("{value:.*}", (-place).max(0) as usize);
+        return fixed(value, (-place).max(0) as usize);
     }
     format!("{value:.*e}", (size - place).max(1) as usize)
 }
@@ -332,6 +346,20 @@ mod tests {
         assert_eq!(
             headline(&f).replace('\u{a0}', " "),
             "gyro_x: Bias follows temperature (temperature), slope -0.1308 deg/s/degC (95 %: -0.1363 to -0.1253)"
+        );
+    }
+
+    #[test]
+    fn parameters_come_as_their_effect_lists_them_and_no_name_is_its_unit() {
+        let times = [("end", 9.0, None, "s"), ("start", 4.0, None, "s")];
+        let f = finding("noise_change", &times);
+        let said = headline(&f);
+        assert!(said.ends_with("start 4 s; end 9 s"), "{said}");
+        let f = finding("clock_rate", &[("ppm", 417.4, None, "ppm")]);
+        assert!(
+            headline(&f).ends_with("(clock_rate), 417.4 ppm"),
+            "{}",
+            headline(&f)
         );
     }
 

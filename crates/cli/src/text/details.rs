@@ -3,10 +3,10 @@
 
 use std::fmt::Write;
 
-use diagnosis::result::{DetectionLimit, Diagnosis, Finding, Unexplained};
+use diagnosis::result::{DetectionLimit, Diagnosis, Finding, Gain, Unexplained};
 
 use super::{answer, item};
-use crate::report::plot::{number, tidy};
+use crate::report::plot::{fixed, number, tidy};
 
 /// The details of a diagnosis.
 #[must_use]
@@ -194,7 +194,13 @@ fn write_finding(out: &mut String, finding: &Finding) {
     if let Some(experiment) = &finding.experiment {
         let _ = writeln!(out, "{}", item("to decide: ", experiment));
     }
-    let Some(gain) = &finding.gain else { return };
+    if let Some(gain) = &finding.gain {
+        write_gain(out, finding, gain);
+    }
+}
+
+/// By how much a cause makes the model better.
+fn write_gain(out: &mut String, finding: &Finding, gain: &Gain) {
     if let Some(nats) = gain.held_out_log_score_nats {
         let error = gain
             .std_error
@@ -259,7 +265,7 @@ pub fn measured(value: f64, std_error: Option<f64>) -> String {
     let size = exponent(value.abs().max(error)).unwrap_or(0);
     if (-4..9).contains(&size) && place > -10 {
         let places = (-place).max(0) as usize;
-        return format!("{value:.places$} +- {error:.places$}");
+        return format!("{} +- {error:.places$}", fixed(value, places));
     }
     let digits = (size - place).max(1) as usize;
     format!("{value:.digits$e} +- {error:.1e}")

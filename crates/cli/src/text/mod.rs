@@ -2,6 +2,7 @@
 
 pub mod answer;
 mod details;
+pub mod noise;
 mod screen;
 
 pub use details::{details, held_at, measured, rounded_as};

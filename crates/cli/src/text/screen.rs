@@ -2,10 +2,9 @@
 
 use std::fmt::Write;
 
-use diagnosis::result::{Diagnosed, Diagnosis, Finding, Parameter, Unexplained, Verdict};
-use model::file::ModelFile;
+use diagnosis::result::{Diagnosed, Diagnosis, Finding, Unexplained, Verdict};
 
-use super::{answer, item};
+use super::{answer, item, noise};
 
 /// Entries of what is left over that the first screen shows; the rest is counted.
 const SHOWN: usize = 4;
@@ -31,11 +30,12 @@ pub fn diagnosis(diagnosed: &Diagnosed) -> String {
     }
     let _ = writeln!(out, "verdict  {}", verdict(d));
     let small = |f: &&Finding| !f.material;
-    for (k, finding) in d.findings.iter().filter(|f| !small(f)).enumerate() {
+    let material: Vec<&Finding> = d.findings.iter().filter(|f| !small(f)).collect();
+    for (k, finding) in material.iter().enumerate() {
         let _ = writeln!(out, "\n{:>2}. {}", k + 1, lead(&answer::headline(finding)));
         let lines = [
             answer::cost(finding),
-            answer::remedy(finding),
+            remedy(&material, k),
             answer::open_question(finding),
         ];
         for line in lines.into_iter().flatten() {
@@ -74,6 +74,15 @@ fn write_replicates(out: &mut String, d: &Diagnosis) {
         ),
     };
     let _ = writeln!(out, "\n{}", item("", &said).trim_start());
+}
+
+/// What to do about the finding of the number `k`; once a cause.
+fn remedy(all: &[&Finding], k: usize) -> Option<String> {
+    let same = all.iter().position(|f| f.cause == all[k].cause);
+    match same.filter(|first| *first < k) {
+        Some(first) => Some(format!("What to do: as for {}.", first + 1)),
+        None => answer::remedy(all[k]),
+    }
 }
 
 fn verdict(d: &Diagnosis) -> String {
@@ -184,47 +193,38 @@ fn write_noise(out: &mut String, of: &Diagnosed) {
     if channels.is_empty() {
         return;
     }
-    let found = !of.diagnosis.findings.is_empty();
-    let title = if found {
-        "noise beside the causes"
-    } else {
-        "noise"
+    let (title, without) = match (
+        of.diagnosis.findings.is_empty(),
+        of.diagnosis.unexplained.is_empty(),
+    ) {
+        (false, _) => ("noise beside the causes", "without the causes"),
+        (true, false) => ("noise beside what has no name", "without what has no name"),
+        (true, true) => ("noise", ""),
     };
     let _ = writeln!(out, "\n{title}, with 95 % intervals");
+    let seconds = of.diagnosis.input.seconds;
     for name in channels {
-        let of_term = |term: &str| {
-            let after = baseline(&of.extended_model, name, term)?;
-            let before = baseline(&of.baseline_model, name, term);
-            Some(change(before, after))
-        };
-        for (letter, term) in [("N", "angle_random_walk"), ("K", "rate_random_walk")] {
-            if let Some(text) = of_term(term) {
-                let text = text.replace('\u{a0}', " ");
+        for (letter, key) in [("N", "angle_random_walk"), ("K", "rate_random_walk")] {
+            let before = noise::term(&of.baseline_model, name, key, seconds);
+            if let Some(after) = noise::term(&of.extended_model, name, key, seconds) {
+                let text = change(before, &after, without).replace('\u{a0}', " ");
                 let _ = writeln!(out, "    {name}  {letter} {text}");
             }
         }
     }
 }
 
-fn baseline<'a>(model: &'a ModelFile, channel: &str, term: &str) -> Option<&'a Parameter> {
-    let own = model.channels.iter().find(|c| c.name == channel)?;
-    own.baseline.get(term)
-}
-
 /// A parameter, and what it was before where it was clearly another.
-fn change(before: Option<&Parameter>, after: &Parameter) -> String {
-    let now = answer::level(after);
-    let error = after.std_error.unwrap_or(0.0).max(f64::MIN_POSITIVE);
-    match before {
-        Some(b) if (b.value - after.value).abs() > answer::HALF_WIDTH_95 * error => {
-            format!("{now}; without the causes {}", bare(b))
+fn change(before: Option<noise::Term>, after: &noise::Term, without: &str) -> String {
+    let now = &after.said;
+    let error = after.value.std_error.unwrap_or(0.0).max(f64::MIN_POSITIVE);
+    match before.map(|b| b.value.value) {
+        Some(b) if (b - after.value.value).abs() > answer::HALF_WIDTH_95 * error => {
+            let before = crate::report::plot::number(b, 3);
+            format!("{now}; {without} {before}")
         }
-        _ => now,
+        _ => now.clone(),
     }
-}
-
-fn bare(p: &Parameter) -> String {
-    crate::report::plot::number(p.value, 3)
 }
 
 fn write_rest(out: &mut String, d: &Diagnosis) {

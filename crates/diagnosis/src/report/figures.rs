@@ -7,6 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::{Dct, Panel};
 use crate::ingest::types::Grid;
+use crate::report::levels;
 use crate::result::{Evidence, Series, SeriesStyle};
 use crate::search::searched::Searched;
 use numerics::column::dot;
@@ -222,7 +223,10 @@ fn of_term(s: &Searched<'_>, grid: &Grid, term: &Term) -> Evidence {
         caption: term.effect.docs().figure.into(),
     };
     match &term.form {
-        Form::Covariance(..) => spectrum(s, grid, &mut evidence),
+        Form::Covariance(..) => match levels::of(s, term, &beside(s, &others), grid.rate_hz) {
+            Some(drawn) => (evidence.series, evidence.caption) = (drawn.series, drawn.caption),
+            None => spectrum(s, grid, &mut evidence),
+        },
         Form::Line(omega) => {
             let seen = beside(s, &others);
             peak(s, grid, term, *omega, 0.0, &seen, &mut evidence);

@@ -7,5 +7,6 @@ pub mod findings;
 pub mod gain;
 pub mod handover;
 pub(crate) mod left_over;
+mod levels;
 pub(crate) mod shocks;
 pub mod untested;

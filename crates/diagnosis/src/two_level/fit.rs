@@ -113,6 +113,12 @@ pub(crate) fn path(y: &[f64], x: &Coordinates) -> Vec<f64> {
         .collect()
 }
 
+/// Coordinates of blocks of another length, `part` times as long: white noise falls with the length, a walk grows.
+pub(crate) fn of_blocks(x: &Coordinates, part: f64) -> Coordinates {
+    let ln = part.ln();
+    [x[0] - ln, x[1] + 2.0 * ln, x[2] + 0.5 * ln, x[3] - ln]
+}
+
 /// Chance that two levels have switched from block to block.
 fn switch_of(x: &Coordinates) -> f64 {
     0.5 * (1.0 - (-2.0 * (-x[3]).exp()).exp())

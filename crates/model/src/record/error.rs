@@ -5,7 +5,7 @@
 #[non_exhaustive]
 pub enum AnalysisError {
     /// The record is too short to say anything. An answer, not a fault.
-    #[error("inconclusive: {what} needs {need} {unit}, the record has {have} {unit}")]
+    #[error("inconclusive: {what} needs {need} {unit}, the record has {} {unit}", (have * 1e3).round() / 1e3)]
     Inconclusive {
         /// What was asked.
         what: String,

@@ -40,7 +40,7 @@ __all__ = [
 
 
 @saying
-def read(path, *, columns=None, units=None, rate=None, skip_bad=False, topic=None) -> Capture:
+def read(path, *, columns=None, units=None, rate=None, skip_bad=False, topic=None, span=None) -> Capture:
     """Read a capture (``.csv``, ``.csv.gz``), any other table of text, or a log (MCAP, ROS 1 bag, ULog).
 
     Parquet, HDF5, ``.mat`` and NPZ are the business of pandas, h5py, scipy and numpy: give `diagnose` what they read.
@@ -59,13 +59,15 @@ def read(path, *, columns=None, units=None, rate=None, skip_bad=False, topic=Non
         Leave out rows that cannot be read, and count them in `Capture.notes`.
     topic : str, optional
         Which topic of a log that has several IMUs.
+    span : tuple of two floats, optional
+        A part of the record alone, from one time to another, s from its first row; None leaves an end out.
 
     Raises
     ------
     Error
         Where it cannot be read: says what was found and what to do.
     """
-    return Capture(read_file(path, columns, units, rate, skip_bad, topic))
+    return Capture(read_file(path, columns, units, rate, skip_bad, topic, span))
 
 
 @saying

@@ -47,6 +47,7 @@ def read(
     rate: Union[float, None] = None,
     skip_bad: bool = False,
     topic: Union[str, None] = None,
+    span: Union[tuple[Union[float, None], Union[float, None]], None] = None,
 ) -> Capture: ...
 def analyze(
     data: Data,

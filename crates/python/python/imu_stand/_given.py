@@ -16,6 +16,8 @@ AXES = ("gyro_x", "gyro_y", "gyro_z")
 # name of one; other words go on with the sentence.
 VALUE = r"'[^']*'|\"[^\"]*\"|[^\s`,;:)=]+=[^\s`;:)]+|[^\s`,;:)]+,[^\s`;:)]+|[A-Z]+\b|[0-9.]+\b"
 OPTION = re.compile(rf"--([a-z]+(?:-[a-z]+)*)(?:[ =]({VALUE}))?")
+# A part of a record, which is an argument of `read`: arrays are cut by their slices.
+SPAN = re.compile(r"`--span ([0-9.]*),([0-9.]*)`")
 # Those that are arguments here as well.
 ARGUMENTS = {
     "columns",
@@ -52,7 +54,10 @@ def in_python(message: str) -> str:
             return f"{option}={value}"
         return f'{option}="{value}"'
 
-    message = OPTION.sub(argument, message)
+    def part(found: re.Match) -> str:
+        return f"`span=({found[1] or None}, {found[2] or None})`"
+
+    message = SPAN.sub(part, OPTION.sub(argument, message))
     return message.replace("`--help` after the command lists its options, with an example", HELP)
 
 
@@ -126,7 +131,7 @@ class Capture(Mapping):
     @property
     def notes(self) -> list[str]:
         """What was put in order, left out or missing."""
-        return self._engine.notes()
+        return [in_python(note) for note in self._engine.notes()]
 
     def to_csv(self, path) -> None:
         """Write it as a capture of the program, ``.csv`` or ``.csv.gz``."""
@@ -198,12 +203,20 @@ def listed(data) -> dict[str, np.ndarray]:
     )
 
 
-def read_file(path, columns, units, rate, skip_bad=False, topic=None):
+def read_file(path, columns, units, rate, skip_bad=False, topic=None, span=None):
     """The record in a file."""
     # Who cannot open it says so with its name.
     with open(path, "rb"):
         pass
-    return _engine.read(os.fspath(path), pairs(columns), pairs(units), rate, skip_bad, topic)
+    return _engine.read(os.fspath(path), pairs(columns), pairs(units), rate, skip_bad, topic, ends(span))
+
+
+def ends(span):
+    """The two ends of a part of a record, s."""
+    if span is None:
+        return None
+    first, last = span
+    return (0.0 if first is None else float(first), np.inf if last is None else float(last))
 
 
 def given(data, rate, columns, units, name, base=None):

@@ -114,7 +114,7 @@ class Diagnosis(dict):
         return (type(self), (dict(self),), {"text": self.text, "model": self.model})
 
     def __str__(self) -> str:
-        return self.text or super().__str__()
+        return in_python(self.text) or super().__str__()
 
     def report_html(self) -> str:
         """The report as ``imu-stand diagnose --report`` writes it: one page of HTML, complete in itself. It takes some

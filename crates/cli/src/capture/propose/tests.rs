@@ -127,7 +127,7 @@ fn a_proposal_maps_each_axis_to_its_own_column_with_the_headers_units_and_quotes
     ];
     for (names, expected) in cases {
         let names: Vec<String> = names.split(';').map(str::to_owned).collect();
-        let (proposed, is_guessed) = proposal(&names, false);
+        let (proposed, is_guessed) = proposal(&names, false, &Seen::default());
         assert_eq!(proposed, expected);
         // A name that says no unit leaves it to be checked.
         let says = ["/s", " s^", "dps", "seconds_elapsed"]
@@ -135,7 +135,7 @@ fn a_proposal_maps_each_axis_to_its_own_column_with_the_headers_units_and_quotes
             .any(|unit| names[1 % names.len()].contains(unit));
         assert_eq!(is_guessed, !says, "{names:?}");
     }
-    let numbered = |n: usize| proposal(&vec![String::new(); n], true).0;
+    let numbered = |n: usize| proposal(&vec![String::new(); n], true, &Seen::default()).0;
     assert_eq!(numbered(1), "--columns gyro_x=1 --units gyro=deg/s");
     assert_eq!(
         numbered(3),
@@ -144,5 +144,93 @@ fn a_proposal_maps_each_axis_to_its_own_column_with_the_headers_units_and_quotes
     assert_eq!(
         numbered(7),
         "--columns time=1,gyro_x=2,gyro_y=3,gyro_z=4,acc_x=5,acc_y=6,acc_z=7 --units gyro=deg/s,acc=m/s2"
+    );
+}
+
+/// Eight rows and more of columns: a time by its step, a count, or noise about a middle.
+fn seen(columns: &[Of]) -> (Vec<String>, Seen) {
+    let row = |k: usize, of: &Of| match of {
+        Of::Time(step) => 3.0 + step * k as f64,
+        Of::Noise(middle) => middle + 0.1 * ((k * 7 % 11) as f64 / 5.0 - 1.0),
+    };
+    let column = |of: &Of| (0..50).map(|k| row(k, of)).collect();
+    let names = (1..=columns.len()).map(|k| format!("column_{k}")).collect();
+    (names, Seen(columns.iter().map(column).collect()))
+}
+
+enum Of {
+    Time(f64),
+    Noise(f64),
+}
+
+#[test]
+fn a_table_without_names_is_proposed_by_what_its_values_are() {
+    use Of::{Noise, Time};
+    let still = || [Noise(0.0), Noise(-0.2), Noise(0.3)];
+    let down = |g: f64| [Noise(0.01 * g), Noise(0.1 * g), Noise(g)];
+    let flat = |parts: Vec<Vec<Of>>| parts.into_iter().flatten().collect::<Vec<Of>>();
+    let cases = [
+        // An even time is none of three gyros.
+        (
+            vec![Time(0.05), Noise(0.0), Noise(1.0)],
+            "--columns time=1,gyro_x=2,gyro_y=3 --units gyro=deg/s",
+        ),
+        (
+            Vec::from(still()),
+            "--columns gyro_x=1,gyro_y=2,gyro_z=3 --units gyro=deg/s",
+        ),
+        // What numbers the rows is no time, and the rate is asked for.
+        (
+            vec![Time(1.0), Noise(0.0)],
+            "--columns gyro_x=2 --units gyro=deg/s --rate HZ",
+        ),
+        (
+            flat(vec![vec![Time(1.0), Time(0.01)], still().into()]),
+            "--columns time=2,gyro_x=3,gyro_y=4,gyro_z=5 --units gyro=deg/s",
+        ),
+        // Gravity tells the accelerometers, and their unit.
+        (
+            flat(vec![vec![Time(0.01)], down(9.81).into(), still().into()]),
+            "--columns time=1,gyro_x=5,gyro_y=6,gyro_z=7,acc_x=2,acc_y=3,acc_z=4 --units gyro=deg/s,acc=m/s2",
+        ),
+        (
+            flat(vec![still().into(), down(1000.0).into()]),
+            "--columns gyro_x=1,gyro_y=2,gyro_z=3,acc_x=4,acc_y=5,acc_z=6 --units gyro=deg/s,acc=mg",
+        ),
+    ];
+    for (columns, expected) in cases {
+        let (names, seen) = seen(&columns);
+        assert_eq!(proposal(&names, true, &seen).0, expected);
+    }
+}
+
+#[test]
+fn columns_of_one_array_go_by_their_places_and_values_too() {
+    let (_, values) = seen(&[
+        Of::Time(0.01),
+        Of::Noise(0.0),
+        Of::Noise(0.2),
+        Of::Noise(0.0),
+    ]);
+    let names: Vec<String> = (0..4).map(|k| format!("values[{k}]")).collect();
+    let (proposed, is_guessed) = proposal(&names, false, &values);
+    let expected = "--columns 'time=values[0],gyro_x=values[1],gyro_y=values[2],gyro_z=values[3]' --units gyro=deg/s";
+    assert_eq!((proposed.as_str(), is_guessed), (expected, true));
+}
+
+#[test]
+fn values_tell_a_time_whose_name_does_not_and_what_is_no_rate() {
+    let names = ["n", "k", "b"].map(str::to_owned);
+    let (_, values) = seen(&[Of::Noise(0.0), Of::Time(0.05), Of::Noise(1.0)]);
+    assert_eq!(
+        proposal(&names, false, &values).0,
+        "--columns time=k,gyro_x=n --units gyro=deg/s"
+    );
+    let (_, Seen(mut columns)) = seen(&[Of::Time(0.5), Of::Noise(0.0)]);
+    columns[1].iter_mut().for_each(|v| *v *= 1e-10);
+    let names = ["time_s", "y"].map(str::to_owned);
+    assert_eq!(
+        proposal(&names, false, &Seen(columns)).0,
+        "--columns time=time_s,freq=y --units freq=1"
     );
 }

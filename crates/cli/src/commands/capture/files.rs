@@ -251,25 +251,30 @@ impl Capture<'_> {
             reconnections: self.reconnections,
         };
         if !self.arguments.quiet {
-            let by_whom = by_whom(&[
-                ("by the board", answer.lost_by_board),
-                ("by the line", answer.lost_by_line),
-                ("while the port was gone", answer.apart.lost_while_port_gone),
-                (
-                    "while the capture did not run",
-                    answer.apart.lost_while_not_running,
-                ),
-                ("while the board started", answer.apart.lost_by_restart),
-                ("by nobody known", answer.lost_unattributed),
-            ]);
-            say!(
-                "{}: {} samples, {} missing{by_whom}",
-                answer.files.join(", "),
-                answer.rows,
-                answer.missing
-            );
+            say(&answer);
             say!("line: {heard}");
         }
         write_json(self.arguments.json.as_ref(), &answer)
     }
+}
+
+/// Says what was captured, and who lost what is missing.
+fn say(answer: &Answer) {
+    let by_whom = by_whom(&[
+        ("by the board", answer.lost_by_board),
+        ("by the line", answer.lost_by_line),
+        ("while the port was gone", answer.apart.lost_while_port_gone),
+        (
+            "while the capture did not run",
+            answer.apart.lost_while_not_running,
+        ),
+        ("while the board started", answer.apart.lost_by_restart),
+        ("by nobody known", answer.lost_unattributed),
+    ]);
+    say!(
+        "{}: {} samples, {} missing{by_whom}",
+        answer.files.join(", "),
+        answer.rows,
+        answer.missing
+    );
 }

@@ -142,26 +142,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let Some(image) = image else {
         return super::write_json(arguments.json.as_ref(), &answer);
     };
-    if fuses.is_locked() && !arguments.unlock {
-        miette::bail!(
-            help = "if what is on the part may go, add `--unlock`: flashing erases it, which lifts the lock",
-            "the part is locked (lock bits {:#04x}): somebody wanted its content protected",
-            fuses.lock
-        );
-    }
+    may_be_flashed(arguments, &answer)?;
     if !answer.deviations.is_empty() && !arguments.keep_fuses {
-        if !arguments.write_fuses {
-            let (low, high) = fuses.corrected();
-            miette::bail!(
-                help = format!(
-                    "add `--write-fuses` to write {low:#04x} and {high:#04x}, or `--keep-fuses` to flash all the same; \
-                     docs/hardware.md tells what each bit does"
-                ),
-                "nothing is written: the fuses (low {:#04x}, high {:#04x}) are not what the board needs",
-                fuses.low,
-                fuses.high
-            );
-        }
         fuses = write_fuses(arguments, fuses)?;
         answer.fuses = fuses;
         answer.deviations = fuses.deviations();
@@ -177,6 +159,31 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         say!("now: imu-stand board --port PORT info");
     }
     super::write_json(arguments.json.as_ref(), &answer)
+}
+
+/// Refuses a part that is locked, and fuses that are wrong, where the user has not said what to do about them.
+fn may_be_flashed(arguments: &Arguments, answer: &Answer) -> Result<()> {
+    let fuses = &answer.fuses;
+    if fuses.is_locked() && !arguments.unlock {
+        miette::bail!(
+            help = "if what is on the part may go, add `--unlock`: flashing erases it, which lifts the lock",
+            "the part is locked (lock bits {:#04x}): somebody wanted its content protected",
+            fuses.lock
+        );
+    }
+    if !answer.deviations.is_empty() && !arguments.keep_fuses && !arguments.write_fuses {
+        let (low, high) = fuses.corrected();
+        miette::bail!(
+            help = format!(
+                "add `--write-fuses` to write {low:#04x} and {high:#04x}, or `--keep-fuses` to flash all the same; \
+                 docs/hardware.md tells what each bit does"
+            ),
+            "nothing is written: the fuses (low {:#04x}, high {:#04x}) are not what the board needs",
+            fuses.low,
+            fuses.high
+        );
+    }
+    Ok(())
 }
 
 /// Prints the calls.

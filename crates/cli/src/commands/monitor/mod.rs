@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use imu_stand::link::{Change, Feed};
 use imu_stand::monitor::{About, Action, Control, Snapshot, View};
+use imu_stand::report::plot::fixed;
 use miette::{IntoDiagnostic, Result};
 use wire::Frame;
 
@@ -215,7 +216,7 @@ impl Monitor {
             Show::Nothing => {}
             Show::Lines => {
                 let rates = s.gyros.map(|gyro| {
-                    (gyro.mean_dps).map_or_else(|| "-".to_owned(), |rate| format!("{rate:.3}"))
+                    (gyro.mean_dps).map_or_else(|| "-".to_owned(), |rate| fixed(rate, 3))
                 });
                 eprintln!(
                     "{:>8.0} s {:>8} samples, {} missing  {} deg/s  {}",

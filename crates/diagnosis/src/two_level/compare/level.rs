@@ -7,7 +7,7 @@ use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::{Bins, Dct, least_walk};
 use crate::fit::scan::residual;
 use crate::search::Search;
-use crate::two_level::fit::{Coordinates, path};
+use crate::two_level::fit::{Coordinates, of_blocks, path};
 
 /// Half height over the standard deviation of a block from which on a block tells its level without doubt: shorter ones do as
 /// well, and fewer of them hold a switch.
@@ -144,10 +144,4 @@ pub(super) fn beside(
 pub(super) fn spectrum(x: &Coordinates, blocks: f64, white: f64) -> Vec<f64> {
     let variance = 2.0 * x[2] + x[0];
     vec![variance - white, x[3] + blocks - std::f64::consts::LN_2]
-}
-
-/// Coordinates of blocks of another length, `part` times as long: white noise falls with the length, a walk grows.
-pub(super) fn of_blocks(x: &Coordinates, part: f64) -> Coordinates {
-    let ln = part.ln();
-    [x[0] - ln, x[1] + 2.0 * ln, x[2] + 0.5 * ln, x[3] - ln]
 }

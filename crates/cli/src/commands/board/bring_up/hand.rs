@@ -27,7 +27,12 @@ pub(super) fn by_hand(
     arguments: &Arguments,
     steps: &mut Vec<Step>,
 ) -> Result<()> {
-    let link = &mut session.link;
+    signs(&mut session.link, arguments, steps)?;
+    six_sides(&mut session.link, arguments, steps)
+}
+
+/// The sign of each gyro, by a turn about its axis.
+fn signs(link: &mut Link, arguments: &Arguments, steps: &mut Vec<Step>) -> Result<()> {
     for (k, (_, name)) in AXES.into_iter().enumerate() {
         let what = format!("sign of gyro {name}");
         const EXPECTED: &str = "clockwise, seen from where the axis points, counts up";
@@ -52,6 +57,11 @@ pub(super) fn by_hand(
             }
         });
     }
+    Ok(())
+}
+
+/// Zero and scale of the accelerometers, by the six sides.
+fn six_sides(link: &mut Link, arguments: &Arguments, steps: &mut Vec<Step>) -> Result<()> {
     const SIDES: &str =
         "zero 461 to 563 counts, scale 230 to 267 counts/g: the part's 10 % and 7.5 %";
     if arguments.no_hand {

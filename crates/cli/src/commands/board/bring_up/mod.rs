@@ -257,65 +257,66 @@ fn listened(link: &mut Link, hello: &Hello, steps: &mut Vec<Step>) -> Result<()>
     let heard = link.heard().since(&before);
     let rate = rate_hz(hello).unwrap_or(20.0);
     let due = (LISTEN_S * rate) as usize;
-    let (Some((first, from)), Some((last, to))) = (samples.first(), samples.last()) else {
-        steps.push(step(
-            "samples",
-            format!("none in {LISTEN_S} s"),
-            &due.to_string(),
-            false,
-        ));
+    if samples.is_empty() {
+        let found = format!("none in {LISTEN_S} s");
+        steps.push(step("samples", found, &due.to_string(), false));
         return Ok(());
-    };
+    }
     let lost = heard.losses.device + heard.losses.line + heard.losses.unattributed;
-    let clean = lost == 0 && heard.counts.rejected() == 0 && samples.len() + 3 >= due;
+    let rejected = heard.counts.rejected();
     steps.push(step(
         "samples",
         format!(
-            "{} in {LISTEN_S} s, {lost} lost, {} frames rejected",
-            samples.len(),
-            heard.counts.rejected()
+            "{} in {LISTEN_S} s, {lost} lost, {rejected} frames rejected",
+            samples.len()
         ),
         &format!("{due}, none lost, none rejected"),
-        clean,
+        lost == 0 && rejected == 0 && samples.len() + 3 >= due,
     ));
-    let supply: Vec<f64> = samples
+    let supply = samples
         .iter()
-        .map(|(s, _)| f64::from(s.supply) * SUPPLY_LSB_V)
-        .collect();
-    let (low, high) = extremes(&supply);
+        .map(|(s, _)| f64::from(s.supply) * SUPPLY_LSB_V);
+    let (low, high) = extremes(&supply.collect::<Vec<f64>>());
     steps.push(step(
         "supply, by the gyros",
         format!("{low:.3} to {high:.3} V"),
         "4.75 to 5.25 V",
         low >= SUPPLY_V[0] && high <= SUPPLY_V[1],
     ));
-    let odd = samples
-        .iter()
-        .fold(0, |odd, (s, _)| odd | (s.flags ^ flags::IN_ORDER));
+    let flags = samples.iter().map(|(s, _)| s.flags ^ flags::IN_ORDER);
+    let odd = flags.fold(0, |odd, off| odd | off);
     steps.push(step(
         "flags of the samples",
-        format!("{:#06x} besides those of a row in order", odd),
+        format!("{odd:#06x} besides those of a row in order"),
         "0x0000",
         odd == 0,
     ));
+    steps.extend(clock(hello, &samples));
+    Ok(())
+}
+
+/// The period of samples and its clock, by samples with the times at which they came here.
+fn clock(hello: &Hello, samples: &[(Sample, f64)]) -> Option<Step> {
+    let ((first, from), (last, to)) = (samples.first()?, samples.last()?);
     let ticks = last.t_ticks.wrapping_sub(first.t_ticks);
-    let seconds = f64::from(ticks) * f64::from(hello.tick_ns) / 1e9;
-    let steps_apart = samples
+    let tick_s = f64::from(hello.tick_ns) / 1e9;
+    let apart = samples
         .windows(2)
         .map(|pair| pair[1].0.t_ticks.wrapping_sub(pair[0].0.t_ticks));
     let period = u32::from(hello.period_ticks) * u32::from(hello.periods_per_sample.max(1));
-    let uneven = steps_apart
-        .filter(|step| *step % period.max(1) != 0)
-        .count();
-    let ppm = (seconds / (to - from) - 1.0) * 1e6;
+    let uneven = apart.filter(|step| *step % period.max(1) != 0).count();
+    let ppm = (f64::from(ticks) * tick_s / (to - from) - 1.0) * 1e6;
     // Host times jitter by a frame's length: over five seconds, some thousand ppm.
-    steps.push(step(
+    let jitter_ppm = 2e6 / (LISTEN_S * rate_hz(hello).unwrap_or(20.0));
+    Some(step(
         "sample period",
-        format!("{:.6} s by the board, {uneven} steps off it; its clock {ppm:+.0} ppm beside this computer's", f64::from(period) * f64::from(hello.tick_ns) / 1e9),
+        format!(
+            "{:.6} s by the board, {uneven} steps off it; its clock {ppm:+.0} ppm beside this computer's",
+            f64::from(period) * tick_s
+        ),
         "no step off it, clocks alike (a board at 1 MHz would be off by 16 times)",
-        uneven == 0 && ppm.abs() < CLOCK_PPM.max(2e6 / (LISTEN_S * rate)),
-    ));
-    Ok(())
+        uneven == 0 && ppm.abs() < CLOCK_PPM.max(jitter_ppm),
+    ))
 }
 
 fn extremes(values: &[f64]) -> (f64, f64) {

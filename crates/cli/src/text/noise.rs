@@ -1,0 +1,99 @@
+//! The noise of a model in words: bias, N and K of a channel, in the units in which `analyze` has them.
+
+use model::file::ModelFile;
+use model::parameter::Parameter;
+
+use super::answer;
+
+/// Part of the smallest random walk to be seen below which a limit is none: where the likelihood has its peak at no random walk
+/// at all, its curvature there says nothing.
+const NOTHING: f64 = 0.01;
+
+/// A term of the noise of a channel.
+pub struct Term {
+    /// The value.
+    pub value: Parameter,
+    /// Value and 95 % interval, or an upper limit, for people.
+    pub said: String,
+}
+
+/// A term of the noise, by its key (`angle_random_walk`, ...), in a record of `seconds`.
+#[must_use]
+pub fn term(model: &ModelFile, channel: &str, key: &str, seconds: f64) -> Option<Term> {
+    let own = model.channels.iter().find(|c| c.name == channel)?;
+    let value = usual(own.baseline.get(key)?);
+    let limit = value.value + answer::HALF_WIDTH_95 * value.std_error.unwrap_or(0.0);
+    let said = match key {
+        "bias" => answer::with_interval(&value),
+        "rate_random_walk"
+            if limit < NOTHING * smallest_walk(own.baseline.get("angle_random_walk"), seconds) =>
+        {
+            "none to be seen".to_owned()
+        }
+        _ => answer::level(&value),
+    };
+    Some(Term { value, said })
+}
+
+/// The random walk that after `seconds` has gone as far as white noise moves a mean over them: K sqrt(T / 3) = N / sqrt(T).
+fn smallest_walk(white: Option<&Parameter>, seconds: f64) -> f64 {
+    let Some(n) = white else { return 0.0 };
+    // N in the channel's unit times sqrt(s).
+    let n = match n.unit.as_str() {
+        "deg/sqrt(h)" => n.value / 60.0,
+        _ => n.value,
+    };
+    3f64.sqrt() * n / seconds
+}
+
+/// A random walk of a velocity in m/s/sqrt(h), as of an angle in deg/sqrt(h); all else as it is.
+fn usual(p: &Parameter) -> Parameter {
+    let mut p = p.clone();
+    if p.unit == "m/s^2*sqrt(s)" {
+        p.unit = "m/s/sqrt(h)".to_owned();
+        p.value *= 60.0;
+        p.std_error = p.std_error.map(|e| 60.0 * e);
+    }
+    p
+}
+
+#[cfg(test)]
+mod tests {
+    use model::file::ChannelModel;
+
+    use super::*;
+
+    fn model(k: f64, error: f64) -> ModelFile {
+        let terms = [
+            ("angle_random_walk", 0.003, 3e-5, "m/s^2*sqrt(s)"),
+            ("rate_random_walk", k, error, "m/s^2/sqrt(s)"),
+        ];
+        let baseline = terms.map(|(key, value, error, unit)| {
+            (key.to_owned(), Parameter::estimated(value, error, unit))
+        });
+        let channel = ChannelModel {
+            name: "acc_x".to_owned(),
+            unit: "m/s^2".to_owned(),
+            baseline: baseline.into(),
+            ..ModelFile::paper().channels[0].clone()
+        };
+        ModelFile {
+            channels: vec![channel],
+            ..ModelFile::paper()
+        }
+    }
+
+    #[test]
+    fn a_velocity_walks_by_the_root_of_an_hour_and_a_limit_of_nothing_is_none() {
+        let said = |k, error, key: &str| {
+            let term = term(&model(k, error), "acc_x", key, 600.0).expect("a term");
+            term.said.replace('\u{a0}', " ")
+        };
+        let n = said(1e-4, 1e-5, "angle_random_walk");
+        assert_eq!(n, "0.1800 m/s/sqrt(h) (95 %: 0.1765 to 0.1835)");
+        // 0.003 sqrt(3) / 600 is 8.7e-6.
+        let walk = |k, error| said(k, error, "rate_random_walk");
+        assert_eq!(walk(3e-33, 3e-31), "none to be seen");
+        assert_eq!(walk(1e-6, 1e-5), "< 2.1e-5 m/s^2/sqrt(s)");
+    }
+}
