@@ -50,11 +50,7 @@ fn holds(python: &Path, program: &str, arguments: &[&Path]) {
         .args(arguments)
         .output()
         .expect("it starts");
-    assert!(
-        out.status.success(),
-        "{}",
-        String::from_utf8_lossy(&out.stderr)
-    );
+    assert_success(&out);
 }
 
 /// A capture of a minute, and its export under a name.

@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use common::{folder, json, run, said};
+use common::{assert_refused, folder, json, run, said};
 use serialport::{SerialPort as _, TTYPort};
 
 const PAGE: usize = 128;

@@ -1,5 +1,6 @@
 //! The program as a user runs it.
 
+mod common;
 #[path = "program/there_and_back.rs"]
 mod there_and_back;
 
@@ -10,27 +11,8 @@ mod times;
 mod measured;
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
-fn run(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_imu-stand"))
-        .args(arguments)
-        .output()
-        .expect("the program starts")
-}
-
-/// A folder of this test's own, new at each run.
-fn folder(name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = std::fs::remove_dir_all(&path);
-    std::fs::create_dir_all(&path).expect("a folder for the test");
-    path
-}
-
-fn json(path: &Path) -> serde_json::Value {
-    serde_json::from_str(&std::fs::read_to_string(path).expect("the JSON is there"))
-        .expect("it is JSON")
-}
+use common::{assert_success, folder, json, run};
 
 #[test]
 fn wrong_usage_exits_2_and_a_missing_file_1_with_what_to_do() {
@@ -114,11 +96,7 @@ fn a_simulated_run_is_reproducible_and_its_analysis_has_the_contracts_shape() {
             "--out",
             path.to_str().unwrap(),
         ]);
-        assert!(
-            made.status.success(),
-            "{}",
-            String::from_utf8_lossy(&made.stderr)
-        );
+        assert_success(&made);
     }
     let made = run(&[
         "analyze",
@@ -127,11 +105,7 @@ fn a_simulated_run_is_reproducible_and_its_analysis_has_the_contracts_shape() {
         out.to_str().unwrap(),
         "--quiet",
     ]);
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
+    assert_success(&made);
     assert!(made.stdout.is_empty(), "--quiet prints nothing");
     let analysis = json(&out);
     assert_eq!(analysis["format"], "imu-stand-analysis/1");
@@ -217,11 +191,7 @@ fn a_fault_hidden_in_the_stand_goes_through_the_boards_logic_and_is_named() {
         "--json",
         found.to_str().unwrap(),
     ]);
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
+    assert_success(&made);
     let said = String::from_utf8_lossy(&made.stdout);
     let diagnosis = json(&found);
     let named = diagnosis["findings"]
@@ -293,11 +263,7 @@ fn of_many_runs_the_one_that_is_noisier_is_not_the_representative_one() {
     arguments.extend(paths.iter().map(String::as_str));
     let made = run(&arguments);
     let said = String::from_utf8_lossy(&made.stdout);
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
+    assert_success(&made);
     let answer = json(&out);
     assert_eq!(answer["files"][3], "noisy.csv");
     assert_ne!(answer["run"], 3, "{said}");

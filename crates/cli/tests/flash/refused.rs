@@ -73,32 +73,17 @@ fn what_avrdude_complains_of_is_explained() {
         ..Part::ours()
     });
     let refused = wrong.flash(&[file]);
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(
-        said(&refused).contains("is no ATmega16"),
-        "{}",
-        said(&refused)
-    );
+    assert_refused(&refused, &["is no ATmega16"]);
 
     let worn = Programmer::with(Part {
         bad_page: Some(3),
         ..Part::ours()
     });
     let refused = worn.flash(&[file]);
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(
-        said(&refused).contains("read back differs"),
-        "{}",
-        said(&refused)
-    );
+    assert_refused(&refused, &["read back differs"]);
 
     let none = run(&["flash", file, "--programmer", "no-such-thing"]);
-    assert_eq!(none.status.code(), Some(1));
-    assert!(
-        said(&none).contains("lists the programmers"),
-        "{}",
-        said(&none)
-    );
+    assert_refused(&none, &["lists the programmers"]);
     let absent = run(&[
         "flash",
         file,

@@ -40,11 +40,7 @@ fn measured_records_are_analyzed_and_diagnosed_by_column_mapping() {
                 "--json",
                 out.to_str().unwrap(),
             ]);
-            assert!(
-                made.status.success(),
-                "{}",
-                String::from_utf8_lossy(&made.stderr)
-            );
+            assert_success(&made);
             assert_eq!(json(&out)["format"], format);
         }
         // Static records at constant temperature, far from any motor: nothing of the stand's own may be blamed.

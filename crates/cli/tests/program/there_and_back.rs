@@ -42,11 +42,7 @@ fn what_is_put_into_a_model_is_found_and_the_extended_model_simulates() {
         "--model-out",
         found.to_str().unwrap(),
     ]);
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
+    assert_success(&made);
     let diagnosis = json(&out);
     assert_eq!(diagnosis["format"], "imu-stand-diagnosis/1");
     assert_eq!(diagnosis["verdict"], "extended", "{diagnosis}");
