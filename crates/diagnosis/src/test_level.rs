@@ -125,6 +125,7 @@ checks! {
     Skewness "skewness" OMNIBUS_LEVEL, OfAxis;
     Bicovariance "bicovariance" OMNIBUS_LEVEL, OfAxis;
     ThreeReadings "three_readings" OMNIBUS_LEVEL, OfAxis;
+    Neighbours "neighbours" OMNIBUS_LEVEL, OfAxis;
     VarianceRhythm "variance_rhythm" OMNIBUS_LEVEL, OfAxis;
     Period "period" OMNIBUS_LEVEL, OfAxis;
     ColourFollows "colour_follows" OMNIBUS_LEVEL, OfAxis;
@@ -144,6 +145,7 @@ checks! {
     ProcessSource "process_source" CLAIM_LEVEL, Named;
     ProcessRhythm "process_rhythm" CLAIM_LEVEL, Named;
     BandSpectrum "band_spectrum" CLAIM_LEVEL, Named;
+    BandSize "band_size" CLAIM_LEVEL, Named;
     BandEnvelope "band_envelope" ENVELOPE_LEVEL, Named;
     BandSource "band_source" CLAIM_LEVEL, Named;
     BandAlone "band_alone" ENVELOPE_LEVEL, Named;
@@ -207,7 +209,7 @@ impl CheckId {
             Self::VarianceFollows => "the size of the noise follows what was recorded",
             Self::Kurtosis => "the noise has tails that are not normal",
             Self::Skewness => "the noise reaches farther to one side",
-            Self::Bicovariance | Self::ThreeReadings => {
+            Self::Bicovariance | Self::ThreeReadings | Self::Neighbours => {
                 "readings depend on each other as those of no linear, normal noise do"
             }
             Self::Period => "a pattern comes again and again",
@@ -224,9 +226,11 @@ impl CheckId {
             | Self::ProcessSize
             | Self::ProcessSource
             | Self::ProcessRhythm => "a coloured noise of no known kind",
-            Self::BandSpectrum | Self::BandEnvelope | Self::BandSource | Self::BandAlone => {
-                "a band of no known kind"
-            }
+            Self::BandSpectrum
+            | Self::BandSize
+            | Self::BandEnvelope
+            | Self::BandSource
+            | Self::BandAlone => "a band of no known kind",
             Self::VarianceLaw => "the size of the noise changes by no known law",
             Self::FollowerLaw => "it follows a channel by no known law",
             _ => return None,
@@ -245,8 +249,9 @@ impl CheckId {
         Self::ProcessSource,
     ];
     /// The same of what stands at one frequency.
-    pub const OF_BAND: [Self; 4] = [
+    pub const OF_BAND: [Self; 5] = [
         Self::BandSpectrum,
+        Self::BandSize,
         Self::BandEnvelope,
         Self::BandSource,
         Self::BandAlone,

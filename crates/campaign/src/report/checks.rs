@@ -1,4 +1,4 @@
-//! What each check sees of the foreign effects, and what it alone sees: a check that is never alone can go.
+//! What each check sees of the foreign effects, and what it alone sees.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -34,7 +34,8 @@ pub(super) fn table(out: &mut String, all: &[Outcome]) {
     let _ = writeln!(
         out,
         "\n## What each check sees of foreign effects\n\nRuns in which a check sees something that has no name, and those in which \
-         no other check does. A check that stays without a run of its own can go.\n\n| check | runs | alone |\n|---|---|---|"
+         no other check does. One that is never alone may be one too many: a campaign without it, of a seed that did not choose it, \
+         decides.\n\n| check | runs | alone |\n|---|---|---|"
     );
     for (id, s) in rows {
         let _ = writeln!(out, "| `{id}` | {} | {} |", s.runs, s.alone);

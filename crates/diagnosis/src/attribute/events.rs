@@ -42,10 +42,11 @@ const FAULT: f64 = 1000.0;
 /// Part of the readings whose excesses tell how the tail of the noise goes on.
 const TAIL: f64 = 0.01;
 /// Checks of the law of the noise: where one fails, wild readings have to stand clear of the tail that there is.
-const LAWS: [CheckId; 6] = [
+const LAWS: [CheckId; 7] = [
     CheckId::Skewness,
     CheckId::Bicovariance,
     CheckId::ThreeReadings,
+    CheckId::Neighbours,
     CheckId::VarianceRhythm,
     CheckId::TimeFrequency,
     CheckId::VarianceLaw,

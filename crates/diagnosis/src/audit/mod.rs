@@ -121,6 +121,7 @@ impl Audit {
                 "time_frequency",
                 "bicovariance",
                 "three_readings",
+                "neighbours",
                 "variance_rhythm",
                 CheckId::ColourFollows.as_str(),
                 CheckId::Leaning.as_str(),
@@ -140,6 +141,7 @@ impl Audit {
                 "skewness",
                 "bicovariance",
                 "three_readings",
+                "neighbours",
                 CheckId::Leaning.as_str(),
             ];
             self.suppress(&ids, channel, by);

@@ -214,6 +214,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             "time_frequency",
             "bicovariance",
             "three_readings",
+            "neighbours",
             "variance_rhythm",
             "variance_follows",
             CheckId::ColourFollows.as_str(),

@@ -35,6 +35,9 @@ use numerics::tails::{chi_tail, errors_of_sum, normal_tail};
 /// Part of what a band explains that its shape may leave: it is off by a fifth of its size. No mode of a real structure is
 /// a Lorentzian to the last.
 const LEFT: f64 = 0.05;
+/// How many more independent values a band has to have in a stretch, or the record: energies of a narrow one are far from
+/// normal, and a claim fails by chance once in a thousand bands.
+const MORE: f64 = 4.0;
 /// Highest order of the polynomials in ln w that bend a spectrum.
 const BENDS: usize = 6;
 /// Fewest independent values that a bend or a moment may rest on.
@@ -89,7 +92,24 @@ pub(crate) fn of_processes(
             state,
             u: &u,
             id: term.effect.id(),
+            // Whether it is Gaussian and steady, the envelope of a band has told.
+            claims: if term.is_band() {
+                [
+                    Some(CheckId::BandSpectrum),
+                    None,
+                    None,
+                    Some(CheckId::BandSize),
+                ]
+            } else {
+                [
+                    Some(CheckId::ProcessSpectrum),
+                    Some(CheckId::ProcessLaw).filter(|_| term.is_normal()),
+                    Some(CheckId::ProcessSteadiness),
+                    Some(CheckId::ProcessSize),
+                ]
+            },
             least: term.cluster.map_or(0.0, |c| LEFT * c.lr),
+            more: if term.is_band() { MORE } else { 1.0 },
             view: &search.view,
             law,
             white: &white,
@@ -98,15 +118,11 @@ pub(crate) fn of_processes(
                 terms: own.collect(),
             },
         };
-        all.extend(process.shape(if term.is_band() {
-            CheckId::BandSpectrum
-        } else {
-            CheckId::ProcessSpectrum
-        }));
-        // Two levels have the spectrum of a process that is Gaussian, and are not; a band's envelope has told.
+        all.extend(process.shape());
+        // Two levels have the spectrum of a process that is Gaussian, and are not.
         let gaussian = &search.candidates[term.candidate].hypothesis;
-        if matches!(gaussian, Hypothesis::Covariance(_)) && !term.is_band() {
-            all.extend(process.in_time(term.is_normal()));
+        if matches!(gaussian, Hypothesis::Covariance(_)) {
+            all.extend(process.in_time());
         }
     }
     all
@@ -181,8 +197,12 @@ struct Process<'a> {
     /// Whitened coefficients of the residual.
     u: &'a [f64],
     id: &'static str,
+    /// Its claims of shape, law, steadiness and size.
+    claims: [Option<CheckId>; 4],
     /// Chi-square below which its shape is not off by much, whatever the chance.
     least: f64,
+    /// Independent values that its energies rest on, over those that others do.
+    more: f64,
     view: &'a View<'a>,
     /// Law of the variance of the whole residual, and the white noise, which follows it.
     law: Option<&'a [f64]>,
@@ -245,7 +265,7 @@ impl Process<'_> {
     }
 
     /// Whether its part of the spectrum has its shape.
-    fn shape(&self, id: CheckId) -> Option<Outcome> {
+    fn shape(&self) -> Option<Outcome> {
         let bins = &self.panel.bins;
         let ones = vec![1.0; bins.n];
         let m = bins.products(&ones, &ones);
@@ -313,7 +333,7 @@ impl Process<'_> {
             "its spectrum is bent otherwise; all noise is {:.2} of the model's about {hz:.3} Hz",
             bent(heaviest).exp()
         );
-        Some(self.outcome(id, statistic, p_value, what))
+        Some(self.outcome(self.claims[0]?, statistic, p_value, what))
     }
 
     /// Standard deviations in time of what passes a filter, whose mean square is 1: of what the law of the variance changes, the
@@ -332,8 +352,8 @@ impl Process<'_> {
         Some(law.iter().map(size).collect())
     }
 
-    /// Whether it is Gaussian, where it is `normal` by its name, and there all the time.
-    fn in_time(&self, normal: bool) -> Vec<Outcome> {
+    /// Whether it is Gaussian, and there all the time.
+    fn in_time(&self) -> Vec<Outcome> {
         let bins = &self.panel.bins;
         let g = self.state.noise.everywhere(bins);
         let share: Vec<f64> = (self.alone.everywhere(bins).iter().zip(&g))
@@ -358,16 +378,16 @@ impl Process<'_> {
         let law = worst.and_then(|(z, p, name)| {
             let p = (p * f64::from(count)).min(1.0);
             let what = format!("{name}, in standard errors of a Gaussian one");
-            normal.then(|| self.outcome(CheckId::ProcessLaw, z, p, what))
+            Some(self.outcome(self.claims[1]?, z, p, what))
         });
-        let steadiness = drive.steadiness().map(|(statistic, p, j, energy)| {
+        let steadiness = drive.steadiness(self.more).and_then(|(statistic, p, j, energy)| {
             let length = self.u.len() as f64 / self.view.rate_hz / STRETCHES as f64;
             let what = format!(
                 "it is not there all the time alike; {energy:.2} of its mean from {:.0} to {:.0} s",
                 j as f64 * length,
                 (j + 1) as f64 * length
             );
-            self.outcome(CheckId::ProcessSteadiness, statistic, p, what)
+            Some(self.outcome(self.claims[2]?, statistic, p, what))
         });
         let size = self.size(&drive);
         law.into_iter().chain(steadiness).chain(size).collect()
@@ -379,7 +399,7 @@ impl Process<'_> {
         let recorded = quantities.iter().filter_map(|q| self.view.signal(*q));
         let asked: Vec<(&str, f64, f64)> = recorded
             .filter_map(|s| {
-                let (statistic, depth) = drive.follows(&s.smooth)?;
+                let (statistic, depth) = drive.follows(&s.smooth, self.more)?;
                 Some((s.name.as_str(), statistic, depth))
             })
             .collect();
@@ -387,7 +407,7 @@ impl Process<'_> {
         let chance = (asked.len() as f64 * chi_tail(*statistic, 2.0)).min(1.0);
         let p = if *depth < DEPTH { 1.0 } else { chance };
         let what = format!("its energy follows {name}, by {:.0} % rms", 100.0 * depth);
-        let outcome = self.outcome(CheckId::ProcessSize, *statistic, p, what);
+        let outcome = self.outcome(self.claims[3]?, *statistic, p, what);
         Some(Outcome {
             about: vec![(*name).to_owned()],
             ..outcome

@@ -8,16 +8,18 @@ use numerics::tails::{chi_tail, kurtosis_score, normal_tail};
 
 mod dependence;
 
-pub(crate) use dependence::{Repeats, bicovariance, repeats, three_readings, variance_rhythm};
+pub(crate) use dependence::{
+    Repeats, bicovariance, neighbours, repeats, three_readings, variance_rhythm,
+};
 
 /// Lags of the Ljung-Box statistic.
 const LAGS: usize = 20;
 /// Bands.
 const BANDS: usize = 19;
 
-/// All checks of one channel: its whitened coefficients, and the same in time.
+/// All checks of one channel, whose readings come in steps of `step` standard deviations of the residual (0: none known).
 #[must_use]
-pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
+pub fn all(u: &[f64], e: &[f64], rate_hz: f64, step: f64) -> Vec<Outcome> {
     vec![
         ljung_box(e),
         bands(u, rate_hz),
@@ -26,6 +28,7 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64) -> Vec<Outcome> {
         skewness(e),
         dependence::bicovariance(e),
         dependence::three_readings(e),
+        dependence::neighbours(e, step),
         dependence::variance_rhythm(e, rate_hz),
         dependence::period(e, rate_hz),
     ]

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use model::effect::View;
 
 use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
-use crate::fit::channel::whitened;
+use crate::fit::channel::{State, whitened};
 use crate::fit::estimate;
 use crate::fit::likelihood::{Bins, Panel};
 use crate::ingest::types::{Grid, Target};
@@ -41,12 +41,21 @@ fn laid_out<'a>(grid: &'a Grid, target: &'a Target) -> Search<'a> {
     search
 }
 
+/// Coefficients and samples of a residual.
+type Whitened = (Vec<f64>, Vec<f64>);
+
+/// The checks of the residual of the baseline.
+fn plain_checks((u, e): &Whitened, baseline: &State, grid: &Grid, target: &Target) -> Vec<Outcome> {
+    let step = target.step / baseline.solution.white.sqrt();
+    residual::all(u, e, grid.rate_hz, step)
+}
+
 /// Search a channel, and ask its model and what that leaves.
 pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     let search = laid_out(grid, target);
     let baseline = search.baseline(&target.noise);
     let mut plain = whitened(&search.panel, &baseline);
-    let mut before = residual::all(&plain.0, &plain.1, grid.rate_hz);
+    let mut before = plain_checks(&plain, &baseline, grid, target);
     let ascended = search.ascend(baseline.clone());
     let mut state = search.conclude(compare::hold(&search, ascended));
     let refilled = impute::again(&search, &state, target);
@@ -54,7 +63,7 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         state = refilled;
         if state.terms.is_empty() {
             plain = whitened(&search.panel, &state);
-            before = residual::all(&plain.0, &plain.1, grid.rate_hz);
+            before = plain_checks(&plain, &baseline, grid, target);
         }
     }
     let told = refilled.map(|s| impute::told(&search, &s, &target.lost));
@@ -126,15 +135,15 @@ fn estimate_over_time(s: &mut Searched<'_>, grid: &Grid) {
     }
 }
 
-/// Check of a normal distribution. Of a noise that has another one by its name, the replicates say whether it is that.
-const OF_NORMAL: CheckId = CheckId::Kurtosis;
+/// Checks of a normal distribution. Of a noise that has another one by its name, the replicates say whether it is that.
+const OF_NORMAL: [CheckId; 2] = [CheckId::Kurtosis, CheckId::Neighbours];
 
 /// All checks of a channel, those of the residual `before` the extension beside those after it.
 fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
     let after = if s.state.terms.is_empty() && s.variance.is_none() {
         before.clone()
     } else {
-        residual::all(&s.u, &s.e, s.search.view.rate_hz)
+        residual::all(&s.u, &s.e, s.search.view.rate_hz, s.step())
     };
     let normal = s.state.is_normal();
     let rhythm = after
@@ -156,7 +165,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
             fails_after: a.p_value < omnibus_level()
                 && !s.target.moving
                 && !s.search.view.sways()
-                && (normal || a.id != OF_NORMAL),
+                && (normal || !OF_NORMAL.contains(&a.id)),
             what: if a.p_value < omnibus_level() {
                 a.what
             } else {

@@ -383,7 +383,7 @@ fn bent(s: &Searched<'_>, failing: &dyn Fn(CheckId) -> bool) -> f64 {
     // Variances of skewness and kurtosis of n normal values.
     let skewness = || n / 6.0 * residual::skewness_of(e).powi(2);
     let lightness = || n / 24.0 * residual::excess_kurtosis(e).min(0.0).powi(2);
-    let all: [(CheckId, &dyn Fn() -> f64); 7] = [
+    let all: [(CheckId, &dyn Fn() -> f64); 8] = [
         (CheckId::Slew, &|| f64::INFINITY),
         (CheckId::RepeatedReadings, &|| f64::INFINITY),
         (CheckId::Skewness, &skewness),
@@ -393,6 +393,9 @@ fn bent(s: &Searched<'_>, failing: &dyn Fn(CheckId) -> bool) -> f64 {
         }),
         (CheckId::ThreeReadings, &|| {
             residual::three_readings(e).statistic
+        }),
+        (CheckId::Neighbours, &|| {
+            residual::neighbours(e, s.step()).statistic
         }),
         (CheckId::VarianceRhythm, &|| {
             residual::variance_rhythm(e, rate_hz).statistic

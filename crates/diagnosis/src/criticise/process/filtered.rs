@@ -46,9 +46,9 @@ impl Filtered {
 
     /// Sum of the squared deviations of the energies in stretches, its chance, the stretch that is farthest off and its
     /// energy over the mean.
-    pub(super) fn steadiness(&self) -> Option<(f64, f64, usize, f64)> {
+    pub(super) fn steadiness(&self, more: f64) -> Option<(f64, f64, usize, f64)> {
         let length = self.values.len() / STRETCHES;
-        if (length as f64) < LEAST * self.sums[0] {
+        if (length as f64) < more * LEAST * self.sums[0] {
             return None;
         }
         let energies: Vec<f64> = self
@@ -69,9 +69,9 @@ impl Filtered {
 
     /// Chi-square of two degrees of the energy against a course and its square, and the part of the energy, rms, that
     /// follows them. `None` where too few independent values stand behind.
-    pub(super) fn follows(&self, course: &[f64]) -> Option<(f64, f64)> {
+    pub(super) fn follows(&self, course: &[f64], more: f64) -> Option<(f64, f64)> {
         let n = self.values.len() as f64;
-        if n < LEAST_OF_COURSE * self.sums[0] {
+        if n < more * LEAST_OF_COURSE * self.sums[0] {
             return None;
         }
         let energy = self.values.iter().map(|v| v * v).sum::<f64>() / n;

@@ -31,7 +31,7 @@ fn moments_and_energies_of_a_gaussian_process_are_as_far_off_as_their_errors_say
     assert!((spread - 1.0).abs() < 0.1, "{spread}");
     let far = z.iter().filter(|z| z.abs() > 3.3).count();
     assert!(far <= 5, "{far}");
-    let unsteady = all.iter().filter(|f| f.steadiness().unwrap().1 < 0.01);
+    let unsteady = all.iter().filter(|f| f.steadiness(1.0).unwrap().1 < 0.01);
     let unsteady = unsteady.count();
     // 4 are expected.
     assert!(unsteady <= 12, "{unsteady}");
@@ -41,7 +41,7 @@ fn moments_and_energies_of_a_gaussian_process_are_as_far_off_as_their_errors_say
 fn a_size_that_follows_a_thermometer_is_told_and_one_that_does_not_is_not() {
     let warm = |i: usize| (i as f64 / 450.0).sin() + 0.4;
     let course: Vec<f64> = (0..6000).map(warm).collect();
-    let chance_of = |f: &Filtered, c: &[f64]| chi_tail(f.follows(c).unwrap().0, 2.0);
+    let chance_of = |f: &Filtered, c: &[f64]| chi_tail(f.follows(c, 1.0).unwrap().0, 2.0);
     let runs = 400;
     let low = (0..runs).filter(|s| chance_of(&filtered(*s), &course) < 0.01);
     let low = low.count();
@@ -50,11 +50,11 @@ fn a_size_that_follows_a_thermometer_is_told_and_one_that_does_not_is_not() {
     for seed in 0..10 {
         let mut f = filtered(seed);
         f.values.iter_mut().zip(&course).for_each(|(v, c)| *v *= c);
-        let (statistic, depth) = f.follows(&course).unwrap();
+        let (statistic, depth) = f.follows(&course, 1.0).unwrap();
         assert!(chi_tail(statistic, 2.0) < 1e-6 && depth > DEPTH, "{depth}");
     }
     // What rests, and what has two levels, whose square is the same course.
-    assert!(filtered(1).follows(&[25.29; 6000]).unwrap().0 < 1e-6);
+    assert!(filtered(1).follows(&[25.29; 6000], 1.0).unwrap().0 < 1e-6);
     let levels: Vec<f64> = (0..6000)
         .map(|i| if i % 700 < 90 { 0.3 } else { 0.7 })
         .collect();
@@ -65,7 +65,7 @@ fn a_size_that_follows_a_thermometer_is_told_and_one_that_does_not_is_not() {
 fn a_process_that_stops_half_way_is_unsteady_and_has_tails() {
     let mut f = filtered(7);
     f.values[3000..].iter_mut().for_each(|v| *v *= 0.3);
-    assert!(f.steadiness().unwrap().1 < 1e-9);
+    assert!(f.steadiness(1.0).unwrap().1 < 1e-9);
     assert!(f.moments()[1].1 > 4.0);
 }
 

@@ -3,9 +3,12 @@
 
 use std::f64::consts::PI;
 
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 use rustfft::num_complex::Complex;
 
-use crate::test_level::{CheckId, MOST, Outcome};
+use crate::test_level::{CheckId, MOST, Outcome, RECORD};
 use numerics::column::dot;
 use numerics::tails::{chi_tail, errors_of_sum};
 use numerics::transform::{Dct, RealFft};
@@ -51,6 +54,110 @@ pub(crate) fn bicovariance(e: &[f64]) -> Outcome {
             "correlation of the whitened residual with its own square over {lags} samples either way; largest {:+.3} with the square {} samples {order}",
             worst.1 / n.sqrt(),
             worst.0.abs()
+        ),
+    }
+}
+
+/// Distances of the pairs of readings that are held against independence, those of pairs that they are held against, and
+/// parts of equal count that readings are sorted into.
+const LAGS_OF_PAIRS: std::ops::RangeInclusive<usize> = 1..=3;
+const LAGS_APART: std::ops::RangeInclusive<usize> = 21..=40;
+const PARTS: usize = 10;
+/// Normal values of that size, over the step of the converter, hide the steps: exp(-2 pi^2 0.6^2) of the swing is left.
+const DITHER: f64 = 0.6;
+/// Fewest pairs that a cell of the table is to hold.
+const LEAST_PAIRS: usize = 20;
+/// Standard deviations of its chi-square at which the chance is 1e-5.
+const CERTAIN: f64 = 4.6;
+
+/// Where values are cut into parts of equal count, ascending.
+fn edges(mut values: Vec<f64>) -> Vec<f64> {
+    let n = values.len();
+    let mut all = vec![];
+    let mut rest = values.as_mut_slice();
+    for k in (1..PARTS).rev() {
+        let place = k * n / PARTS;
+        if place < rest.len() {
+            let (below, edge, _) = rest.select_nth_unstable_by(place, f64::total_cmp);
+            all.push(*edge);
+            rest = below;
+        } else {
+            all.extend(all.last().copied());
+        }
+    }
+    all.reverse();
+    all
+}
+
+/// How many pairs of readings `lag` apart lie in which two parts.
+fn pairs(part: &[usize], lag: usize) -> [f64; PARTS * PARTS] {
+    let mut table = [0.0; PARTS * PARTS];
+    for (a, b) in part.iter().zip(&part[lag..]) {
+        table[a * PARTS + b] += 1.0;
+    }
+    table
+}
+
+/// Whether readings near each other are independent, whatever their law: chi-square of where two of them lie among all,
+/// over how often two lie there that are farther apart and share no more than a level that drifts. What treats large changes otherwise than small ones leaves its mark here, though nothing correlates.
+pub(crate) fn neighbours(e: &[f64], step: f64) -> Outcome {
+    let e = &e[..e.len().min(MOST)];
+    let spread = (e.iter().map(|v| v * v).sum::<f64>() / e.len().max(1) as f64).sqrt();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x6e62_7273);
+    let e: Vec<f64> = e
+        .iter()
+        .map(|v| {
+            let dither: f64 = StandardNormal.sample(&mut rng);
+            v + DITHER * step * spread * dither
+        })
+        .collect();
+    let edges = edges(e.clone());
+    let part: Vec<usize> = e
+        .iter()
+        .map(|v| edges.partition_point(|edge| edge < v))
+        .collect();
+    let (mut statistic, mut freedom) = (0.0, 0.0);
+    let mut worst = (0.0, 0, 0.0);
+    if e.len() >= LEAST_PAIRS * PARTS * PARTS {
+        let mut apart = [0.0; PARTS * PARTS];
+        for lag in LAGS_APART {
+            let all = apart.iter_mut().zip(pairs(&part, lag));
+            all.for_each(|(sum, pairs)| *sum += pairs);
+        }
+        let far: f64 = apart.iter().sum();
+        // The mean of so many tables is off by a part of what one is.
+        let spread = 1.0 + 1.0 / LAGS_APART.count() as f64;
+        for lag in LAGS_OF_PAIRS {
+            let near = pairs(&part, lag);
+            let all = (e.len() - lag) as f64;
+            freedom += ((PARTS - 1) * (PARTS - 1)) as f64;
+            for (seen, apart) in near.iter().zip(apart).filter(|(_, a)| *a > 0.0) {
+                let expected = apart * all / far;
+                let off = (seen - expected).powi(2) / (expected * spread);
+                statistic += off;
+                if off > worst.0 {
+                    worst = (off, lag, seen / expected);
+                }
+            }
+        }
+    }
+    // A longer record is told what this one would be, as with the skewness.
+    let least = CERTAIN * (2.0 * freedom).sqrt() / RECORD;
+    let small = e.len() as f64 > RECORD && (statistic - freedom) / (e.len() as f64) < least;
+    Outcome {
+        id: CheckId::Neighbours,
+        about: vec![],
+        statistic,
+        p_value: if small || freedom < 1.0 {
+            1.0
+        } else {
+            chi_tail(statistic, freedom)
+        },
+        what: format!(
+            "readings near each other depend on each other otherwise than by correlation: of {} parts that pairs {} samples apart lie in, one holds {:.2} times as many as of pairs far apart",
+            PARTS * PARTS,
+            worst.1,
+            worst.2
         ),
     }
 }

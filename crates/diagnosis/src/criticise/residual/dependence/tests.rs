@@ -1,9 +1,5 @@
 //! Tests of [`super`].
 
-use rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
-use rand_xoshiro::Xoshiro256PlusPlus;
-
 use super::*;
 
 fn white(n: usize, seed: u64) -> Vec<f64> {
@@ -15,11 +11,12 @@ fn white(n: usize, seed: u64) -> Vec<f64> {
 fn they_fail_on_white_noise_as_often_as_their_chance_says() {
     let runs = 500;
     let (mut low, mut half, mut repeating) = (0, 0, 0);
-    let (mut rhythmic, mut of_three) = (0, 0);
+    let (mut rhythmic, mut of_three, mut depending) = (0, 0, 0);
     for seed in 0..runs {
         let e = white(3000, seed);
         rhythmic += usize::from(variance_rhythm(&e, 20.0).p_value < 0.01);
         of_three += usize::from(three_readings(&e).p_value < 0.01);
+        depending += usize::from(neighbours(&e, 0.0).p_value < 0.01);
         let p = bicovariance(&e).p_value;
         low += usize::from(p < 0.01);
         half += usize::from(p < 0.5);
@@ -29,7 +26,10 @@ fn they_fail_on_white_noise_as_often_as_their_chance_says() {
     assert!(low <= 15, "{low}");
     assert!((200..=300).contains(&half), "{half}");
     assert!(repeating <= 12, "{repeating}");
-    assert!(rhythmic <= 15 && of_three <= 15, "{rhythmic} {of_three}");
+    assert!(
+        rhythmic <= 15 && of_three <= 15 && depending <= 15,
+        "{rhythmic} {of_three} {depending}"
+    );
 }
 
 #[test]
@@ -46,6 +46,20 @@ fn a_square_that_is_left_behind_shows_though_nothing_correlates() {
         found.what
     );
     assert!(super::super::ljung_box(&x).p_value > 1e-4);
+}
+
+#[test]
+fn what_draws_small_readings_alone_to_the_one_before_shows() {
+    let mut held = 0.0;
+    let x: Vec<f64> = (white(6000, 16).iter())
+        .map(|e| {
+            let change = e - held;
+            held += change * (1.0 - 0.5 * (-change * change).exp());
+            held
+        })
+        .collect();
+    let found = neighbours(&x, 0.2);
+    assert!(found.p_value < 1e-9, "{}", found.p_value);
 }
 
 #[test]
