@@ -15,8 +15,11 @@ use model::record::{Record, rows};
 use plot::{AFTER, BEFORE, Drawn, Figure, Layer, MEASURED, number};
 use replicates::{Against, Places};
 
-/// Replicates behind the bands.
+/// Replicates behind the bands, and the fewest of a long record: the outermost of 39 hold 95 % on both sides.
 const REPLICATES: usize = 199;
+const FEWEST: usize = 39;
+/// Rows that are simulated for the bands of one model where that leaves enough replicates: seconds of one core.
+const DRAWN: usize = 35_000_000;
 /// Columns of a thinned signal.
 const COLUMNS: usize = 700;
 const STYLE: &str = include_str!("style.css");
@@ -95,7 +98,7 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
                         "Both models are simulated in the world that the run saw: its temperatures, supply, motor "
                         "command and accelerations. " b.before { "Before" } " is white noise, a random walk and a "
                         "constant bias; " b.after { "after" } " adds the causes found. Bands hold 95 % of "
-                        (REPLICATES) " replicates, with every parameter at its estimate."
+                        (replicates_of(subject.record)) " replicates, with every parameter at its estimate."
                         @if subject.diagnosed.diagnosis.findings.iter().any(|f| f.cause == "base_motion") {
                             " A motion of the base is an input too: of an axis that moved, " b.after { "after" }
                             " repeats what was read below 1 Hz, and only what is faster is simulated."
@@ -168,6 +171,11 @@ fn several(all: &[Finding]) -> String {
     }
 }
 
+/// Replicates of a record.
+fn replicates_of(record: &Record) -> usize {
+    (DRAWN / record.len().max(1)).clamp(FEWEST, REPLICATES)
+}
+
 /// The figures of every channel of the model, those with something to say first and open.
 fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
     let (record, diagnosed) = (subject.record, subject.diagnosed);
@@ -175,13 +183,24 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
     let sampling = Sampling::of(record, subject.rate_hz)?;
     let places = Places::new(&sampling, record.len());
     let simulate = |model: &model::file::ModelFile, stream: u64| {
-        replicates::replicate(model, record, &places, REPLICATES, subject.seed ^ stream)
+        replicates::replicate(
+            model,
+            record,
+            &places,
+            replicates_of(record),
+            subject.seed ^ stream,
+        )
     };
-    let simulated = simulate(before, 0x6265_666f_7265).and_then(|b| {
-        let a = simulate(after, 0x0061_6674_6572)?;
-        Ok::<_, model::simulate::SimulateError>((b, a))
+    // Each on a core of its own.
+    let both = std::thread::scope(|threads| {
+        let first = threads.spawn(|| simulate(before, 0x6265_666f_7265));
+        let second = simulate(after, 0x0061_6674_6572);
+        let first = first
+            .join()
+            .unwrap_or_else(|p| std::panic::resume_unwind(p));
+        Ok::<_, model::simulate::SimulateError>((first?, second?))
     });
-    let ((one_before, all_before), (one_after, all_after)) = match simulated {
+    let ((one_before, all_before), (one_after, all_after)) = match both {
         Ok(both) => both,
         Err(error) => {
             return Ok(vec![html! {
@@ -272,8 +291,8 @@ impl View<'_> {
                     figcaption {
                         b { "Overlapping Allan deviation" } " of " code { (name) } ", up to a tenth of the run. The bands "
                         "hold whole curves, not points. Chance of a curve as far off: "
-                        (chance(before.adev_p))
-                        @if !same { " before, " (chance(after.adev_p)) " after" }
+                        (chance(before))
+                        @if !same { " before, " (chance(after)) " after" }
                         "."
                     }
                 }
@@ -434,8 +453,8 @@ fn drawing(figure: &Figure) -> Result<Markup, ReportError> {
 }
 
 /// A chance as a reader wants it: never 0, because replicates are finite.
-fn chance(p: f64) -> String {
-    let floor = 1.0 / (REPLICATES as f64 + 1.0);
+fn chance(of: &Against) -> String {
+    let (p, floor) = (of.adev_p, 1.0 / (of.replicates as f64 + 1.0));
     if p <= floor * 1.001 {
         format!("at most {}", number(floor, 1))
     } else {

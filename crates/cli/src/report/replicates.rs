@@ -53,6 +53,8 @@ pub struct Against {
     pub adev: Band,
     /// Chance that a replicate strays from the model's mean curve, anywhere, as far as the measurement does.
     pub adev_p: f64,
+    /// How many replicates that rests on.
+    pub replicates: usize,
     /// Angle: at each instant by itself.
     pub angle: Band,
 }
@@ -222,13 +224,22 @@ pub fn against(measured: &Curves, replicates: &[Curves]) -> Against {
             high: edge(1.0),
         },
         adev_p: (beyond as f64 + 1.0) / (count + 1.0),
+        replicates: replicates.len(),
         angle,
     }
 }
 
-/// Of sorted values.
+/// Of sorted values, so that one more of their law lies below it with that chance: of n + 1 values each has any rank.
 fn quantile(sorted: &[f64], q: f64) -> f64 {
-    let at = ((sorted.len() as f64 - 1.0) * q).round() as usize;
+    let rank = (sorted.len() as f64 + 1.0) * q;
+    // Outwards, as far as rounding of the product does not decide.
+    let rank = if q > 0.5 {
+        (rank - 1e-9).ceil()
+    } else {
+        (rank + 1e-9).floor()
+    };
+    let last = sorted.len().saturating_sub(1);
+    let at = (rank as usize).saturating_sub(1).min(last);
     sorted.get(at).copied().unwrap_or(f64::NAN)
 }
 
@@ -266,6 +277,23 @@ mod tests {
         // At 2 %, four or more of twenty right ones are rejected with a chance of 0.6 %.
         assert!(outcomes[0] <= 3, "{outcomes:?}");
         assert_eq!(outcomes[1], 20, "{outcomes:?}");
+    }
+
+    #[test]
+    fn the_edges_of_a_band_leave_their_share_of_the_ranks() {
+        let sorted = |n: usize| (0..n).map(|k| k as f64).collect::<Vec<_>>();
+        // 40 ranks: one on either side of 95 %; two above 95 %.
+        let of = sorted(39);
+        assert_eq!(
+            [0.025, 0.5, 0.975, 0.95].map(|q| quantile(&of, q)),
+            [0.0, 19.0, 38.0, 37.0]
+        );
+        // 200 ranks: five on either side, ten above.
+        let of = sorted(199);
+        assert_eq!(
+            [0.025, 0.5, 0.975, 0.95].map(|q| quantile(&of, q)),
+            [4.0, 99.0, 194.0, 189.0]
+        );
     }
 
     #[test]
