@@ -1,5 +1,6 @@
 //! The figures that convict, and the Allan curve held against replicates.
 
+use model::effect::Peak;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -225,7 +226,7 @@ fn of_term(s: &Searched<'_>, grid: &Grid, term: &Term) -> Evidence {
     match &term.form {
         Form::Covariance(..) => match levels::of(s, term, &beside(s, &others), grid.rate_hz) {
             Some(drawn) => (evidence.series, evidence.caption) = (drawn.series, drawn.caption),
-            None => spectrum(s, grid, &mut evidence),
+            None => spectrum(s, grid, term.peak(), &mut evidence),
         },
         Form::Line(omega) => {
             let seen = beside(s, &others);
@@ -373,9 +374,12 @@ fn amplitudes(dct: &Dct, values: &[f64]) -> Vec<f64> {
 /// Fewest coefficients behind a point of a density, and the ratio of its ends.
 const LEAST: f64 = 4.0;
 const BAND: f64 = 1.1;
+/// Half widths of a peak within which points are closer, and those from one to the next.
+const NEAR: f64 = 6.0;
+const OF_A_PEAK: f64 = 0.5;
 
 /// Amplitude density of the rate with the models before and after.
-fn spectrum(s: &Searched<'_>, grid: &Grid, evidence: &mut Evidence) {
+fn spectrum(s: &Searched<'_>, grid: &Grid, peak: Option<Peak>, evidence: &mut Evidence) {
     let panel = &s.search.panel;
     let n = panel.bins.n;
     let c = panel.column(0);
@@ -390,13 +394,21 @@ fn spectrum(s: &Searched<'_>, grid: &Grid, evidence: &mut Evidence) {
     let ones: Vec<f64> = vec![1.0; n];
     let counts = panel.bins.products(&ones, &ones);
     let energies = panel.bins.products(&c, &c);
+    // A peak narrower than the ratio has points of its own.
+    let omega = &panel.bins.at.omega;
+    let resolves = |first: usize, last: usize| {
+        peak.is_some_and(|p| {
+            let near = (omega[last] - p.omega).abs() < NEAR * p.half_width;
+            near && omega[last] - omega[first] >= OF_A_PEAK * p.half_width
+        })
+    };
     let (mut middles, mut density) = (vec![], vec![]);
     let (mut first, mut energy, mut count, mut moment) = (0, 0.0, 0.0, 0.0);
     for (b, (e, m)) in energies.iter().zip(&counts).enumerate() {
         energy += e;
         count += m;
         moment += m * hz[b];
-        if count >= LEAST && hz[b] >= BAND * hz[first] {
+        if count >= LEAST && (hz[b] >= BAND * hz[first] || resolves(first, b)) {
             middles.push(moment / count);
             density.push((2.0 * energy / count / grid.rate_hz).sqrt());
             (first, energy, count, moment) = (b + 1, 0.0, 0.0, 0.0);

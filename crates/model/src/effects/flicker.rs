@@ -39,7 +39,7 @@ impl Effect for Flicker {
             excitation: "Nothing; the longer the record, the clearer.",
             test: "White variance, random walk and B refitted by maximum likelihood.",
             remedy: "Give the simulation flicker noise of this B and the filter a bias state with several time constants; averaging longer does not help.",
-            figure: "Spectrum of the rate with the model before and after: a slope of -1.",
+            figure: "Spectrum of the rate with the model before and after: a density that falls with the root of the frequency, its square as 1/f.",
             example: Example::new(Plot::Spectrum, &[("bias_instability", 300.0)]),
         }
     }
