@@ -36,6 +36,7 @@
 mod alarm;
 mod config;
 mod device;
+mod error;
 mod gpio;
 mod outputs;
 mod register;
@@ -43,7 +44,8 @@ mod word;
 
 pub use alarm::{Alarm, AlarmNumber, AlarmOutput, AlarmSource, Trigger};
 pub use config::{DataReady, Filter, Line, Pace, Polarity, Range, SamplePeriod, SensAvg, Stimulus};
-pub use device::{Adis16250, Error};
+pub use device::Adis16250;
+pub use error::Error;
 pub use gpio::{GpioCtrl, LineUse};
 pub use register::{Access, Command, Register, control};
 pub use word::{
