@@ -7,6 +7,18 @@ use std::path::{Path, PathBuf};
 
 use common::{assert_refused, assert_success, folder, json, run};
 
+/// Normal noise of variance 1: twelve even draws less their mean are normal enough for a sensor.
+fn noise() -> impl FnMut() -> f64 {
+    let mut state = 7u64;
+    let mut draw = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    move || (0..12).map(|_| draw()).sum::<f64>() - 6.0
+}
+
 fn text(path: &Path) -> &str {
     path.to_str().expect("a name in UTF-8")
 }
@@ -19,17 +31,7 @@ fn table(
     down: impl Fn(usize) -> [f64; 3],
 ) -> PathBuf {
     let mut out = "time_s,gyro_x [deg/s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]\n".to_owned();
-    let mut state = 7u64;
-    let mut noise = || {
-        // Twelve even draws less their mean: normal enough for a sensor.
-        let mut draw = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        (0..12).map(|_| draw()).sum::<f64>() - 6.0
-    };
+    let mut noise = noise();
     for k in 0..2400 {
         let acc = down(k).map(|g| 9.806_65 * g + 0.02 * noise());
         let _ = writeln!(
@@ -186,5 +188,50 @@ fn a_sound_record_has_no_doubts() {
     for command in ["analyze", "diagnose"] {
         let said = assert_success(&run(&[command, text(&path)]));
         assert!(!said.contains("note:"), "{command}: {said}");
+    }
+}
+
+/// What `diagnose` says, and writes, of a rate that follows a duty by 1 deg/s at full, where the file has the duty times `full`.
+fn of_duty(folder: &Path, full: f64, unit: &str) -> (String, serde_json::Value) {
+    let (path, out) = (folder.join("duty.csv"), folder.join("d.json"));
+    let mut noise = noise();
+    let mut rows = "time_s,gyro_x [deg/s],motor\n".to_owned();
+    for k in 0..2400 {
+        let duty = [0.0, 0.5, -0.5, 0.25][k / 100 % 4];
+        let rate = duty + 0.3 * noise();
+        let _ = writeln!(rows, "{:.2},{rate:.4},{}", even(k), full * duty);
+    }
+    std::fs::write(&path, rows).expect("room");
+    let said = assert_success(&run(&[
+        "diagnose",
+        text(&path),
+        "--columns",
+        "time=time_s,gyro_x=gyro_x,pwm=motor",
+        "--units",
+        &format!("time=s,gyro=deg/s,pwm={unit}"),
+        "--base",
+        "static",
+        "--no-replicates",
+        "--json",
+        text(&out),
+    ]));
+    (said, json(&out))
+}
+
+#[test]
+fn a_motor_command_has_a_unit_and_one_that_cannot_be_in_it_is_told() {
+    let folder = folder("doubts_motor");
+    for (full, unit) in [(1.0, "fraction"), (100.0, "%"), (255.0, "1")] {
+        let (said, d) = of_duty(&folder, full, unit);
+        assert!(!said.contains("motor command"), "{unit}: {said}");
+        let found = d["findings"].as_array().expect("findings");
+        let motor = found.iter().find(|f| f["cause"] == "motor_bias");
+        let size = motor.and_then(|f| f["parameters"]["at_full_duty"]["value"].as_f64());
+        let size = size.unwrap_or_else(|| panic!("{unit}: {d}"));
+        assert!((size - 1.0).abs() < 0.1, "{unit}: {size}");
+    }
+    for (full, what) in [(1.0, "turns nothing"), (1000.0, "full duty is 255")] {
+        let (said, _) = of_duty(&folder, full, "1");
+        assert!(said.contains(what), "{full}: {said}");
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use model::effect::{Effect, Hypothesis, Signal, View};
 use model::excitation::World;
-use model::record::{Axis, Base, Quantity};
+use model::record::{Axis, Base, FULL_DUTY, Quantity};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -20,8 +20,6 @@ const STANDARD_GRAVITY: f64 = 9.80665;
 /// Samples beyond which a long record is laid out at a lower rate. The noise keeps its densities; of a fast excitation
 /// (vibration) fewer samples count then, so that the sizes are on the safe side.
 const LAID_OUT: usize = 1 << 17;
-/// Counts of the motor's command at full duty.
-const FULL_DUTY: f64 = 255.0;
 /// Places of a bias step that are tried, in parts of the record.
 const STEPS: usize = 19;
 

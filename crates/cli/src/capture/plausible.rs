@@ -1,9 +1,8 @@
 //! Readings of others held against what the units claim: gravity at rest, and gyros as there are.
 
-use model::record::{Quantity, Record};
+use model::record::{FULL_DUTY, Quantity, Record};
 
 use super::STANDARD_GRAVITY;
-use super::units::FULL_DUTY;
 
 /// White noise of the ADIS16250, a noisy part (data sheet), deg/s/sqrt(Hz). A reading at rest that is five times as noisy is
 /// more often a unit that is wrong by 57.3.

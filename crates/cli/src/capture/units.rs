@@ -1,6 +1,6 @@
 //! Units: how others write them, in which of ours they end, and where a file says them.
 
-use model::record::Quantity;
+use model::record::{FULL_DUTY, Quantity};
 
 use super::{CaptureError, STANDARD_GRAVITY};
 
@@ -68,9 +68,6 @@ const SPELLINGS: [(&str, &[&str]); 26] = [
     ("%", &["percent"]),
     ("fraction", &[]),
 ];
-
-/// A motor command at full duty.
-pub(super) const FULL_DUTY: f64 = 255.0;
 
 /// Our name of a unit; `None` where it is none of those known.
 pub(super) fn known(text: &str) -> Option<&'static str> {

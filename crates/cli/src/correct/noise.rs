@@ -3,13 +3,11 @@
 
 use model::ModelFile;
 use model::effect::value;
-use model::record::Record;
+use model::record::{FULL_DUTY, Record};
 
 use super::judge::{rms, without_rest};
 
 const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
-/// Steps of the motor's command at full duty.
-const FULL_DUTY: f64 = 255.0;
 
 /// Noise of a gyro, and what its correction rests on.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 
 use model::ModelFile;
 use model::file::EffectModel;
+use model::record::FULL_DUTY;
 use wire::correction::{self, BLOCK_SHIFT_MAX, Correction, NUMBERS, RANGE_STEP, name, step};
 
 mod terms;
@@ -22,7 +23,6 @@ const SUPPLY_LSB_V: f64 = 1.8315e-3;
 /// ADC counts for each g at 1.5 g: 0.8 V/g at 3.3 V (MMA7260QT data sheet), and for 0 g.
 const ACC_COUNTS_PER_G: f64 = 0.8 / 3.3 * 1024.0;
 const ACC_ZERO: f64 = 512.0;
-const FULL_DUTY: f64 = 255.0;
 /// Over how far each kind of term reaches when its rounding is judged: counts of TEMP_OUT from the middle of the record at least,
 /// steps of the motor, 0.25 V of supply, 1 g, 100 deg/s.
 const REACH_SUPPLY: f64 = 0.25 / SUPPLY_LSB_V;

@@ -7,8 +7,7 @@ use crate::effect::{
     Rival, Shape, Stage, View, optional, parameter, value,
 };
 use crate::parameter::Parameter;
-use crate::record::Base;
-use crate::record::Quantity;
+use crate::record::{Base, FULL_DUTY, Quantity};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -281,7 +280,5 @@ impl Shape for Surge {
     }
 }
 
-/// Counts of the command at full duty.
-pub(super) const FULL_DUTY: f64 = 255.0;
 /// Smallest change of the command that says anything, counts.
 pub(super) const LEAST_CHANGE: f64 = 8.0;

@@ -5,7 +5,7 @@ use crate::effect::{
     VarianceLaw, View, optional, parameter, value,
 };
 use crate::parameter::Parameter;
-use crate::record::Quantity;
+use crate::record::{FULL_DUTY, Quantity};
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -75,12 +75,12 @@ impl Effect for MotorNoise {
         let size: Vec<f64> = signal
             .values
             .iter()
-            .map(|v| (v / super::motor_bias::FULL_DUTY).abs())
+            .map(|v| (v / FULL_DUTY).abs())
             .collect();
         let (low, high) = size
             .iter()
             .fold((f64::INFINITY, 0.0f64), |(l, h), &v| (l.min(v), h.max(v)));
-        if (high - low) * super::motor_bias::FULL_DUTY < super::motor_bias::LEAST_CHANGE {
+        if (high - low) * FULL_DUTY < super::motor_bias::LEAST_CHANGE {
             return Err(
                 "the motor command does not change in size: switch the motor during the record"
                     .into(),

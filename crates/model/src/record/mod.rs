@@ -30,6 +30,9 @@ pub enum Quantity {
     Derived,
 }
 
+/// Counts of the motor command at full duty ([`Quantity::Pwm`]).
+pub const FULL_DUTY: f64 = 255.0;
+
 /// A body axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -2,11 +2,12 @@
 
 use model::ModelFile;
 use model::file::EffectModel;
+use model::record::FULL_DUTY;
 use wire::correction::Correction;
 
 use super::{
-    ACC_COUNTS_PER_G, ACC_ZERO, BoardError, FLICKER_AT_S, FULL_DUTY, GYROS, SUPPLY_LSB_V,
-    TEMP_LSB_C, TEMP_ZERO_C,
+    ACC_COUNTS_PER_G, ACC_ZERO, BoardError, FLICKER_AT_S, GYROS, SUPPLY_LSB_V, TEMP_LSB_C,
+    TEMP_ZERO_C,
 };
 
 /// The terms of a model's effects, summed axis by axis.

@@ -2,12 +2,10 @@
 
 use bench::Run;
 use bench::scenario::MotorPart;
+use model::record::FULL_DUTY;
 use wire::Command;
 
 use super::Size;
-
-/// Duty in counts at full drive.
-const FULL_DUTY: f64 = 255.0;
 
 /// The steady current of a motor that turns is duty x `by_duty` + sign of duty x `by_friction`.
 struct Current {
