@@ -16,6 +16,7 @@ mod handed_over;
 mod prepared;
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use model::record::Record;
@@ -363,8 +364,22 @@ fn left_on(s: &Searched<'_>, fails: &[&Check], shared: &Shared) -> withdraw::Lef
     withdraw::Left {
         late: late.map(|l| l.1).sum(),
         colour: colours.next().map_or(0.0, |c| c.statistic),
-        about: fails.iter().flat_map(|c| c.about.iter().cloned()).collect(),
+        about: channels_of(fails),
     }
+}
+
+/// The recorded channels that failing checks are about, with the chi-square (of two degrees of freedom) that has the chance of the
+/// check that tells most; of a plain limit it is infinite.
+fn channels_of(fails: &[&Check]) -> BTreeMap<String, f64> {
+    let mut all = BTreeMap::<String, f64>::new();
+    for check in fails {
+        let chi_square = check.p_value.map_or(f64::INFINITY, |p| -2.0 * p.ln());
+        for name in &check.about {
+            let most = all.entry(name.clone()).or_default();
+            *most = most.max(chi_square);
+        }
+    }
+    all
 }
 
 /// Whether counts explain the law of the variance: a bit that sticks makes a noise of its own, which depends on the level.

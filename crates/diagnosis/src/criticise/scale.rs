@@ -12,6 +12,11 @@ const BAND_HZ: (f64, f64) = (0.02, 2.0);
 /// Least correlation of tilt rate and rate in the band of the sway.
 const LEAST_CORRELATION: f64 = 0.9;
 
+/// Standard gravity, m/s^2.
+const STANDARD_GRAVITY: f64 = 9.80665;
+/// The largest zero of an accelerometer that is taken for one, g: what the MMA7260QT's data sheet allows, 0.165 V at 0.8 V/g.
+const LARGEST_ZERO_G: f64 = 0.206;
+
 /// Scale over the stated one, minus 1, with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
@@ -56,19 +61,21 @@ pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
     let (Some(side), Some(up)) = (acc(along), acc(upright)) else {
         return Err("the accelerometers along the vertical and across the axis are needed".into());
     };
-    let sign = mean(up).signum();
     let n = grid.n;
     let across = acc(beside);
+    let zero = upright_zero(up, [Some(side), across]);
+    let up: Vec<f64> = up.values.iter().map(|a| a - zero).collect();
+    let sign = up.iter().sum::<f64>().signum();
     // The roll is atan(y / z). The pitch is that of x against both others, and its rate about the body's y is smaller
     // by the cosine of the roll.
     let other = |i: usize| across.filter(|_| pitches).map_or(0.0, |a| a.values[i]);
     let tilt: Vec<f64> = (0..n)
         .map(|i| {
-            let vertical = up.values[i].hypot(other(i)).copysign(sign * up.values[i]);
+            let vertical = up[i].hypot(other(i)).copysign(sign * up[i]);
             side.values[i].atan2(vertical).to_degrees()
         })
         .collect();
-    let leaning = |i: usize| (other(i).atan2(sign * up.values[i])).cos();
+    let leaning = |i: usize| (other(i).atan2(sign * up[i])).cos();
     // Central difference of the tilt, and the rate averaged with the same weights (trapezoids).
     let tilt_rate: Vec<f64> = (0..n)
         .map(|i| {
@@ -118,6 +125,34 @@ pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
         std_error: error / (slope * slope),
         gain,
     })
+}
+
+/// What the upright accelerometer reads beside the part of 1 g that the other axes leave it, in the mean over the record: its zero,
+/// which would pass for a scale factor of the tilt. None where the unit is not m/s^2, or where more is wrong than a zero.
+fn upright_zero(up: &Signal, level: [Option<&Signal>; 2]) -> f64 {
+    if up.unit != "m/s^2" {
+        return 0.0;
+    }
+    let square = |i: usize| -> f64 {
+        level
+            .into_iter()
+            .flatten()
+            .map(|s| s.values[i].powi(2))
+            .sum()
+    };
+    let n = up.values.len();
+    let beside: f64 = (0..n)
+        .map(|i| {
+            let left = (STANDARD_GRAVITY.powi(2) - square(i)).max(0.0).sqrt();
+            up.values[i] - left.copysign(up.values[i])
+        })
+        .sum();
+    let zero = beside / n.max(1) as f64;
+    if zero.abs() < LARGEST_ZERO_G * STANDARD_GRAVITY {
+        zero
+    } else {
+        0.0
+    }
 }
 
 /// What it gains to know the slope of the tilt rate over the rate, both in the band of the sway, on the part that is held out:

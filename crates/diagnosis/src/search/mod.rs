@@ -25,7 +25,7 @@ use model::record::Quantity;
 
 use crate::features;
 use crate::fit::channel::{Form, RIVAL_SPAN, State, Term};
-use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
+use crate::fit::likelihood::{self, Bins, Dct, Noise, Panel};
 use crate::fit::{channel, threshold};
 use crate::test_level::{CLAIM_LEVEL, worded};
 
@@ -435,49 +435,95 @@ impl<'a> Search<'a> {
     fn swap(&self, state: State) -> State {
         let mut best = state;
         for i in (0..best.terms.len()).rev() {
-            let Some(term) = best.terms.get(i).filter(|t| t.may_swallow()) else {
-                continue;
-            };
-            let (covariance, band) = (term.is_covariance(), term.is_band());
-            let mut rest = self.without(&best, i);
-            // Up to three terms may share what the one took.
-            for _ in 0..3 {
-                let offers = self.offers(&rest, &|c| {
-                    if band {
-                        // What stands at one frequency has taken what does.
-                        matches!(c.hypothesis, Hypothesis::Line | Hypothesis::SideBands)
-                    } else if covariance {
-                        !matches!(c.hypothesis, Hypothesis::Covariance(_))
-                    } else {
-                        c.effect.id() != channel::ID
-                    }
-                });
-                let Some(offer) = Self::simplest_best(offers) else {
-                    break;
-                };
-                if offer.score() <= 0.0 {
-                    break;
-                }
-                rest = self.accept(&rest, offer);
-                let ahead = if covariance {
-                    Self::total(&rest) - Self::total(&best)
-                } else {
-                    // Each has passed its threshold: what has a name needs to do as well, no better, but for what the
-                    // other gains by chance with more columns.
-                    let by_chance = match best.columns().len().saturating_sub(rest.columns().len())
-                    {
-                        0 => 0.0,
-                        more => threshold::tail(more, CLAIM_LEVEL),
-                    };
-                    2.0 * (rest.solution.log_likelihood - best.solution.log_likelihood)
-                        + RIVAL_SPAN.max(by_chance)
-                };
-                if ahead > 0.0 {
-                    best = rest;
-                    break;
-                }
+            if let Some(other) = self.in_the_place_of(&best, i) {
+                best = other;
             }
         }
         best
+    }
+
+    /// The state with up to three terms in the place of one that may have swallowed them, where they do as well.
+    fn in_the_place_of(&self, state: &State, i: usize) -> Option<State> {
+        let term = state.terms.get(i).filter(|t| t.may_swallow())?;
+        let (covariance, band) = (term.is_covariance(), term.is_band());
+        let allow = |c: &Candidate| {
+            if band {
+                // What stands at one frequency has taken what does.
+                matches!(c.hypothesis, Hypothesis::Line | Hypothesis::SideBands)
+            } else if covariance {
+                !matches!(c.hypothesis, Hypothesis::Covariance(_))
+            } else {
+                c.effect.id() != channel::ID
+            }
+        };
+        let mut rest = self.without(state, i);
+        for others in 0..=3 {
+            if others > 0 {
+                let offer = Self::simplest_best(self.offers(&rest, &allow));
+                rest = self.accept(&rest, offer.filter(|o| o.score() > 0.0)?);
+                if Self::as_good(state, &rest, covariance) {
+                    return Some(rest);
+                }
+            }
+            // It holds what has a name: the name takes its own part, and leaves it what is beyond.
+            if self.spans_part(&rest, term) {
+                return Some(self.accept(&rest, term.clone()));
+            }
+        }
+        None
+    }
+
+    /// Whether a state does as well as one of which a term gave way.
+    fn as_good(than: &State, state: &State, covariance: bool) -> bool {
+        if covariance {
+            return Self::total(state) > Self::total(than);
+        }
+        // Each has passed its threshold: what has a name needs to do as well, no better, but for what the other gains by chance
+        // with more columns.
+        let by_chance = match than.columns().len().saturating_sub(state.columns().len()) {
+            0 => 0.0,
+            more => threshold::tail(more, CLAIM_LEVEL),
+        };
+        let lost = 2.0 * (than.solution.log_likelihood - state.solution.log_likelihood);
+        lost < RIVAL_SPAN.max(by_chance)
+    }
+
+    /// Which columns of a term lie beyond those of a state.
+    fn beyond<'b>(
+        &'b self,
+        state: &State,
+        term: &'b Term,
+    ) -> impl Iterator<Item = usize> + use<'b, 'a> {
+        let own = state.columns();
+        let flat = vec![1.0; self.panel.bins.n];
+        (0..term.columns.len()).filter(move |i| {
+            let columns = [own.as_slice(), &[term.columns[*i]]].concat();
+            let (inverse, _) = likelihood::invert(&self.panel.normal(&flat, &columns).matrix);
+            inverse.last().and_then(|row| row.last()) != Some(&0.0)
+        })
+    }
+
+    /// Whether a state has some of the columns of a term without a name, and not all.
+    fn spans_part(&self, state: &State, term: &Term) -> bool {
+        term.has_no_name() && {
+            let beyond = self.beyond(state, term).count();
+            beyond > 0 && beyond < term.columns.len()
+        }
+    }
+
+    /// A term without a name with the columns that it has beyond those of a state; another one as it is.
+    fn stripped(&self, state: &State, term: Term) -> Term {
+        if !self.spans_part(state, &term) {
+            return term;
+        }
+        let new: Vec<usize> = self.beyond(state, &term).collect();
+        Term {
+            columns: new.iter().map(|i| term.columns[*i]).collect(),
+            names: new
+                .iter()
+                .filter_map(|i| term.names.get(*i).copied())
+                .collect(),
+            ..term
+        }
     }
 }

@@ -84,7 +84,7 @@ impl Search<'_> {
 
     /// Add a term, in place of the one that it extends.
     pub(crate) fn accept(&self, state: &State, term: Term) -> State {
-        let mut term = self.refine(state, term);
+        let mut term = self.refine(state, self.stripped(state, term));
         let mut terms = state.terms.clone();
         if term.effect.extends().is_some() && matches!(term.form, Form::Columns) {
             // Later it is weighed as a whole.

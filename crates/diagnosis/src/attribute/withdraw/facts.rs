@@ -1,6 +1,6 @@
 //! What is known of a channel when its names are weighed: which tests failed, what is left where, what follows what.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use model::effect::Signal;
@@ -22,7 +22,7 @@ pub(super) const LEFT: f64 = 0.05;
 /// Share of its likelihood ratio that a law of the variance keeps, by coefficient, where nothing is left over.
 const HOLDS: f64 = 0.6;
 /// Share of what a shape explains that it may leave to others: it is off by a seventh of its size.
-const REMAINDER: f64 = 0.02;
+pub(super) const REMAINDER: f64 = 0.02;
 /// The same for a combination of channels that stands for a cause without a name: off by half.
 const REMAINDER_BEYOND: f64 = 0.25;
 /// The same of what may have gone to a process: noise takes up what is off in any shape, a step or a line does in few.
@@ -51,8 +51,8 @@ pub(crate) struct Left {
     pub late: f64,
     /// The same of the energies that follow something recorded, where they do.
     pub colour: f64,
-    /// Recorded channels that the checks are about that fail.
-    pub about: BTreeSet<String>,
+    /// Recorded channels that the checks are about that fail, with the chi-square of the one that tells most.
+    pub about: BTreeMap<String, f64>,
 }
 
 /// The facts of a channel.
@@ -253,6 +253,22 @@ impl<'a> Facts<'a> {
     /// Whether the claim of the law of the effect of a term fails.
     pub(super) fn breaks_its_law(&self, t: &Term) -> bool {
         self.s.laws.iter().any(|l| unlawful_of(t.effect.id(), l))
+    }
+
+    /// What the effect of a term explains where nothing else follows the recorded channels that the term does: beside another
+    /// follower either may stand for what both make together, or cancel it.
+    pub(super) fn explained(&self, t: &Term) -> f64 {
+        let (search, terms) = (&self.s.search, &self.s.state.terms);
+        let sources = search.sources(t);
+        let of_effect = |o: &Term| o.effect.id() == t.effect.id();
+        let follows = |o: &Term| search.sources(o).iter().any(|c| sources.contains(c));
+        let fitted = |kept: &dyn Fn(&Term) -> bool| {
+            let kept = terms.iter().filter(|o| kept(o));
+            let columns: Vec<usize> = kept.flat_map(|o| o.columns.iter().copied()).collect();
+            search.panel.solve(&self.g, &columns).log_likelihood
+        };
+        let without = fitted(&|o| !follows(o));
+        2.0 * (fitted(&|o| of_effect(o) || !follows(o)) - without)
     }
 
     /// The recorded channel that a term swings as; what follows late begins with a transient, too.

@@ -7,14 +7,14 @@
 
 use std::collections::BTreeSet;
 
-use super::facts::{Facts, LEFT, REMAINDER_PROCESS, generic};
+use super::facts::{Facts, LEFT, REMAINDER, REMAINDER_PROCESS, generic};
 use super::{Doubt, nearest_of};
 use crate::criticise::residual;
 use crate::fit::channel;
 use crate::fit::channel::{Form, Term};
 use crate::result::{Check, Finding};
 use crate::search::searched::Searched;
-use crate::test_level::{CheckId, Observation};
+use crate::test_level::{CheckId, DEPARTURE, Observation};
 
 /// Share of the noise where a term acts that a fallen process makes, from which on the term may be a piece of it.
 const MADE: f64 = 0.25;
@@ -72,17 +72,25 @@ impl Kin<'_> {
         t.is_covariance() && terms.any(larger)
     }
 
-    /// Whether what is left over, or has fallen, follows the recorded channel that a term does.
+    /// Whether what is left over, or has fallen, follows the recorded channel that a term does, and is more than the effect of the
+    /// term leaves by being off a little.
     fn of_its_source(&self, t: &Term, doubts: &[Doubt]) -> bool {
+        let explained = self.facts.explained(t);
         let by_variance = self.facts.s.variance.as_ref().filter(|_| self.variance);
-        let by_variance = by_variance.and_then(|v| v.follows.as_ref());
+        let by_variance =
+            by_variance.and_then(|v| v.follows.as_ref().filter(|_| v.lr > DEPARTURE * explained));
         let terms = self.facts.s.state.terms.iter().zip(doubts);
         let by_terms = terms.filter(|(o, d)| **d != Doubt::No || o.effect.id() == channel::ID);
+        let by_checks = self.facts.left.about.iter();
         let others: BTreeSet<&String> = by_terms
-            .filter(|(o, _)| o.effect.id() != t.effect.id())
+            .filter(|(o, _)| o.effect.id() != t.effect.id() && o.lr > DEPARTURE * explained)
             .flat_map(|(o, _)| self.facts.s.search.sources(o))
             .chain(by_variance)
-            .chain(&self.facts.left.about)
+            .chain(
+                by_checks
+                    .filter(|c| *c.1 > REMAINDER * explained)
+                    .map(|c| c.0),
+            )
             .collect();
         self.facts
             .s
@@ -129,7 +137,7 @@ impl Kin<'_> {
         };
         self.facts.fails(CheckId::VarianceFollows)
             || self.facts.bent > LEFT * v.lr
-            || source.is_some_and(|s| self.facts.left.about.contains(s))
+            || source.is_some_and(|s| self.facts.left.about.contains_key(s))
             || self.facts.s.state.terms.iter().zip(doubts).any(by_term)
     }
 }

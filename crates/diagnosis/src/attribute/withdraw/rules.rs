@@ -180,7 +180,7 @@ const TERMS: &[Rule] = &[
             };
             let beside = |o: &Term| {
                 o.effect.id() == ID
-                    && o.lr > DEPARTURE * t.term.lr
+                    && o.lr > DEPARTURE * f.explained(t.term)
                     && features::source(o) == Some(signal)
             };
             f.s.state.terms.iter().any(beside)
