@@ -1,7 +1,8 @@
-use adis16250::Word;
-use wire::{Command, Decoder, Frame, Request, Sample, encode_request};
+use adis16250::{Register, Word};
+use wire::{Command, Decoder, Frame, Request, Sample, encode_request, flags};
 
 use super::*;
+use crate::acquire::{Raw, Task};
 
 mod asked;
 
