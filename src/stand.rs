@@ -52,6 +52,10 @@ pub trait Board {
     fn reset_cause(&self) -> u8;
     /// Resets since power-on.
     fn restarts(&self) -> u16;
+    /// What [`keep`](Self::keep) was given last, before the reset or since; anything after power-on.
+    fn kept(&self) -> [u16; 2];
+    /// Keeps the counts of resets by the watchdog and by brown-out where a reset leaves them.
+    fn keep(&mut self, counts: [u16; 2]);
     /// The least stack that was ever left, bytes.
     fn stack_free(&self) -> u16;
     /// Timer ticks since the last tick of the sample clock.
@@ -100,6 +104,8 @@ pub struct Stand {
     silent: u8,
     /// Bit per axis: not set up as the hello frame says.
     misconfigured: u8,
+    /// Bit per axis: a register was written by hand since it was set up. It stays so until that is done again.
+    touched: u8,
     /// The gyros have to be set up (anew).
     unset: bool,
     /// The gyro that is being set up; [`SET`]: none.
@@ -113,6 +119,8 @@ pub struct Stand {
     nonce: u16,
     /// Who waits for the work on the gyros that is under way.
     job: Pending,
+    /// And the gyro that it is for.
+    job_axis: u8,
     self_test: requests::SelfTest,
     null: Pending,
     millisecond: u16,
@@ -146,6 +154,7 @@ impl Stand {
         Self {
             silent: 0,
             misconfigured: 0,
+            touched: 0,
             unset: false,
             setting: 0,
             wrong: 0,
@@ -153,6 +162,7 @@ impl Stand {
             noise: 0,
             nonce: 0,
             job: Pending::NONE,
+            job_axis: 0,
             self_test: requests::SelfTest::new(),
             null: Pending::NONE,
             millisecond: 0,
@@ -188,17 +198,30 @@ impl Stand {
     /// Reads the stored set-up and applies it.
     #[inline(never)]
     pub fn boot<B: Board>(&mut self, board: &mut B) {
-        if board.reset_cause() & reset_cause::WATCHDOG != 0 {
-            self.record(Fault::WatchdogReset, 0);
-        }
-        if board.reset_cause() & reset_cause::BROWN_OUT != 0 {
-            self.record(Fault::BrownOutReset, 0);
-        }
+        self.count_reset(board);
         if !self.load(board) {
             self.config.set_default();
         }
         self.apply(board);
         self.correction.on(board);
+    }
+
+    /// Takes up the counts of resets where the last one left them.
+    fn count_reset<B: Board>(&mut self, board: &mut B) {
+        let cause = board.reset_cause();
+        let [mut watchdog, mut brown_out] = board.kept();
+        if cause & reset_cause::POWER_ON != 0 {
+            (watchdog, brown_out) = (0, 0);
+        }
+        if cause & reset_cause::WATCHDOG != 0 {
+            watchdog = watchdog.saturating_add(1);
+        }
+        if cause & reset_cause::BROWN_OUT != 0 {
+            brown_out = brown_out.saturating_add(1);
+        }
+        board.keep([watchdog, brown_out]);
+        self.health.count(Fault::WatchdogReset, 0, watchdog);
+        self.health.count(Fault::BrownOutReset, 0, brown_out);
     }
 
     /// SENS/AVG that the gyros are to have.

@@ -42,6 +42,12 @@ impl Board for Eeprom {
     fn reset_cause(&self) -> u8 {
         0
     }
+    fn kept(&self) -> [u16; 2] {
+        unreachable!()
+    }
+    fn keep(&mut self, _: [u16; 2]) {
+        unreachable!()
+    }
     fn restarts(&self) -> u16 {
         0
     }

@@ -69,6 +69,7 @@ impl Stand {
         let now = (wrong | wrong >> 3) & 7;
         self.record_each(Fault::GyroRecoveredX, self.misconfigured & axes & !now);
         self.misconfigured = self.misconfigured & !axes | now;
+        self.touched &= !axes;
         self.record_each(Fault::GyroRegisterMismatchX, wrong);
         self.record_each(Fault::GyroScaleImpossibleX, wrong >> 3);
     }

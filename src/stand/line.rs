@@ -74,6 +74,7 @@ impl Stand {
             if board.send(kind::HEALTH, self.health.as_bytes()) {
                 if self.owed & CLEAR != 0 {
                     self.health.faults.zero();
+                    board.keep([0; 2]);
                 }
                 self.owed &= !(HEALTH | CLEAR);
                 self.reported();

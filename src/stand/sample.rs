@@ -43,7 +43,7 @@ impl Stand {
         }
         self.noise = wire::crc::update(self.noise, noise);
         self.look_after_gyros(board, silent, (seen >> ERROR_SHIFT) as u8 & 7);
-        if self.misconfigured & !silent != 0 || self.setting != SET {
+        if (self.misconfigured | self.touched) & !silent != 0 || self.setting != SET {
             seen |= flags::GYRO_MISCONFIGURED;
         }
         seen |= self.supply(silent, raw, &mut sample);

@@ -391,6 +391,61 @@ fn registers_are_read_and_written_by_a_job_that_is_answered_when_it_is_done() {
 }
 
 #[test]
+fn a_register_written_by_hand_takes_its_gyro_out_of_order_until_it_is_set_up_anew() {
+    let mut board = Board::new();
+    let mut stand = booted(&mut board);
+    let is_flagged = |stand: &mut Stand, board: &mut Board| {
+        sampled(stand, board, &raw()).flags & flags::GYRO_MISCONFIGURED != 0
+    };
+    let read = Command::ReadRegister {
+        gyro: wire::Axis::Y,
+        address: 0x38,
+    };
+    ask(&mut stand, &mut board, read);
+    ended(&mut stand, &mut board, Task::Read, Status::Ok, 0x0402);
+    assert!(!is_flagged(&mut stand, &mut board), "read alone");
+    for (gyro, axis) in [(wire::Axis::X, 0), (wire::Axis::Y, 1), (wire::Axis::Z, 2)] {
+        let write = Command::WriteRegister {
+            gyro,
+            address: 0x38,
+            value: 0x0102,
+        };
+        ask(&mut stand, &mut board, write);
+        ended(&mut stand, &mut board, Task::Write, Status::BadArgument, 0);
+        assert!(!is_flagged(&mut stand, &mut board), "nothing was written");
+        for status in [Status::Ok, Status::ReadBackWrong, Status::NotAnswering] {
+            ask(&mut stand, &mut board, write);
+            ended(&mut stand, &mut board, Task::Write, status, 0x0102);
+            assert!(is_flagged(&mut stand, &mut board), "{axis} {status:?}");
+            board.deeds.clear();
+            milliseconds(&mut stand, &mut board, 1_100);
+            assert!(is_flagged(&mut stand, &mut board), "it stays so");
+            assert!(jobs(&board).is_empty(), "and what was written stays");
+            let set = Command::SetGyro {
+                range: 4,
+                filter: 2,
+            };
+            ask(&mut stand, &mut board, set);
+            for n in 0..3 {
+                assert!(is_flagged(&mut stand, &mut board), "{n} of 3 are set up");
+                ended(&mut stand, &mut board, Task::Configure, Status::Ok, 0);
+            }
+            assert!(!is_flagged(&mut stand, &mut board), "{axis} {status:?}");
+        }
+        // One that was away is set up as it comes back.
+        ask(&mut stand, &mut board, write);
+        ended(&mut stand, &mut board, Task::Write, Status::Ok, 0x0102);
+        let mut away = raw();
+        away.gyro[axis] = Word(0);
+        away.supply[axis] = Word(0);
+        sampled(&mut stand, &mut board, &away);
+        assert!(is_flagged(&mut stand, &mut board));
+        (0..3).for_each(|_| ended(&mut stand, &mut board, Task::Configure, Status::Ok, 0));
+        assert!(!is_flagged(&mut stand, &mut board), "{axis}");
+    }
+}
+
+#[test]
 fn what_is_set_reaches_the_board_and_what_is_out_of_range_does_not() {
     let mut board = Board::new();
     let mut stand = booted(&mut board);
