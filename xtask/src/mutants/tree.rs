@@ -29,6 +29,8 @@ fn stages(package: &str) -> &'static [&'static [&'static str]] {
                 "wire",
                 "--lib",
                 "--test",
+                "decode",
+                "--test",
                 "link",
                 "--test",
                 "ref_vectors",

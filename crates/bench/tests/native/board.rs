@@ -218,3 +218,23 @@ fn each_range_of_the_accelerometer_reaches_its_pins() {
         );
     }
 }
+
+#[test]
+fn a_queue_takes_what_fits_to_the_byte() {
+    let room = wire::fields::room_for(wire::kind::HEALTH, wire::Health::LEN - 2);
+    let healths = |queue: usize| {
+        let timeline = Timeline {
+            queue,
+            ..Timeline::default()
+        };
+        let (mut decoder, mut count) = (Decoder::new(), 0);
+        native(&ideal(6.0, vec![]), &timeline, |byte| {
+            let frame = decoder.push(byte.byte);
+            count += usize::from(matches!(frame, Some(Ok(Frame::Health(_)))));
+            ControlFlow::Continue(())
+        });
+        count
+    };
+    assert!(healths(room) >= 4);
+    assert_eq!(healths(room - 1), 0);
+}
