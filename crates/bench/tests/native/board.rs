@@ -25,9 +25,9 @@ fn ideal(seconds: f64, requests: Vec<TimedRequest>) -> Run {
 }
 
 /// Bytes with the cycle at which each has ended.
-fn bytes(run: &Run) -> Vec<(u64, u8)> {
+fn bytes(run: &Run, timeline: &Timeline) -> Vec<(u64, u8)> {
     let mut all = Vec::new();
-    native(run, &Timeline::default(), |byte| {
+    native(run, timeline, |byte| {
         all.push(((byte.time_s * HZ).round() as u64, byte.byte));
         ControlFlow::Continue(())
     });
@@ -43,10 +43,8 @@ fn reply_at(heard: &Heard, number: u16) -> f64 {
 
 #[test]
 fn bytes_follow_each_other_at_the_lines_speed_and_a_new_one_holds_from_the_reply_on() {
-    let all = bytes(&ideal(
-        3.0,
-        vec![ask(1.5, 1, Command::SetBaud { divisor: 3 })],
-    ));
+    let set = ask(1.5, 1, Command::SetBaud { divisor: 3 });
+    let all = bytes(&ideal(3.0, vec![set]), &Timeline::default());
     let (mut decoder, mut changed) = (Decoder::new(), None);
     for &(at, byte) in &all {
         if let Some(Ok(Frame::Reply(_))) = decoder.push(byte) {
@@ -237,4 +235,42 @@ fn a_queue_takes_what_fits_to_the_byte() {
     };
     assert!(healths(room) >= 4);
     assert_eq!(healths(room - 1), 0);
+}
+
+/// A health frame that wants all of the queue goes in when what is left of the sample before lies in the transmitter, two
+/// bytes, and follows it without a gap. The board looks each millisecond: of the phases of a sample's end to it, 8320 of
+/// 16 000 cycles.
+#[test]
+fn two_bytes_of_a_frame_lie_in_the_transmitter_and_take_no_room() {
+    let timeline = Timeline {
+        queue: wire::fields::room_for(wire::kind::HEALTH, wire::Health::LEN - 2),
+        ..Timeline::default()
+    };
+    // A sample takes 13.02 ms on the line, one comes each 14.004 ms: the phase goes round.
+    let rate = Command::SetRate {
+        period_ticks: 3_501,
+        periods_per_sample: 1,
+    };
+    let mut run = ideal(400.0, vec![ask(0.3, 1, rate)]);
+    run.scenario.seconds = 400.0;
+    let (mut decoder, mut begins, mut last) = (Decoder::new(), None, 0);
+    let (mut close, mut apart) = (0, 0);
+    for (at, byte) in bytes(&run, &timeline) {
+        let (_, before) = *begins.get_or_insert((at, last));
+        if let Some(Ok(frame)) = decoder.push(byte) {
+            let (first, _) = begins.take().expect("its first byte");
+            if matches!(frame, Frame::Health(_)) && at > 16_000_000 {
+                match first - before {
+                    4_160 => close += 1,
+                    _ => apart += 1,
+                }
+            }
+        }
+        last = at;
+    }
+    let all = f64::from(close + apart);
+    assert!(all > 350.0, "{all}");
+    let share = f64::from(close) / all;
+    // 380 of them: 2.6 % rms.
+    assert!((share - 0.52).abs() < 0.1, "{share}");
 }
