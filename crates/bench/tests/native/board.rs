@@ -274,3 +274,38 @@ fn two_bytes_of_a_frame_lie_in_the_transmitter_and_take_no_room() {
     // 380 of them: 2.6 % rms.
     assert!((share - 0.52).abs() < 0.1, "{share}");
 }
+
+/// To the cycle: a sample begins to go out when it is framed, a reply when the last byte of its request is there.
+#[test]
+fn frames_begin_when_the_timeline_says() {
+    let timeline = Timeline::default();
+    let all = bytes(&ideal(3.0, vec![ask(1.0, 1, Command::Ping)]), &timeline);
+    let (mut decoder, mut begins, mut samples) = (Decoder::new(), None, 0);
+    for (at, byte) in all {
+        let first = *begins.get_or_insert(at);
+        let Some(Ok(frame)) = decoder.push(byte) else {
+            continue;
+        };
+        begins = None;
+        match frame {
+            Frame::Sample(sample) => {
+                let tick = timeline.start + 800_000 * (u64::from(sample.seq) + 1);
+                assert_eq!(first, tick + timeline.framed + 4_160, "{}", sample.seq);
+                samples += 1;
+            }
+            Frame::Reply(_) => {
+                // 19 bytes of ten bits; the receiver has the last one after ten sixteenths of its stop bit.
+                let heard = 16_000_000 + 19 * 4_160 - 416 * 6 / 16;
+                assert_eq!(first, heard + 4_160);
+            }
+            Frame::Health(health) => {
+                // The second ends with the tick: behind its sample.
+                assert_eq!(u32::from(health.next_seq), 20 * health.uptime_s);
+                // Ticks of 64 cycles from the tick to the framed sample.
+                assert_eq!(u64::from(health.tick_busy_max), timeline.framed / 64);
+            }
+            _ => {}
+        }
+    }
+    assert_eq!(samples, 55);
+}
