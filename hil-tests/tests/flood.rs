@@ -151,7 +151,7 @@ fn no_traffic_delays_the_motors_cut_or_costs_more_than_one_sample_in_four() {
         (976, 3, false),
         (976, 3, true),
     ] {
-        let (period_ticks, divisor, corrected) = setting;
+        let (period_ticks, _, corrected) = setting;
         for (name, traffic) in traffics() {
             let (simulated, heard) = flooded(traffic, setting);
             let is_corrected =

@@ -1,5 +1,6 @@
 //! A copy of the working tree in which mutants are compiled and tested, so that nobody's files change.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -88,12 +89,16 @@ impl Tree {
         let names = output.ok_or_else(|| {
             Failure::new("git does not list the files", "is this a checkout of git?")
         })?;
-        for name in String::from_utf8_lossy(&names.stdout).split_terminator('\0') {
+        let names = String::from_utf8_lossy(&names.stdout).into_owned();
+        let mut there = BTreeSet::new();
+        for name in names.split_terminator('\0') {
             // Deleted, but not yet told to git.
             if let Ok(bytes) = std::fs::read(root.join(name)) {
                 tree.put(name, &bytes)?;
+                there.insert(tree.root.join(name));
             }
         }
+        forget(&tree.root, &there);
         Ok(tree)
     }
 
@@ -247,6 +252,20 @@ impl Tree {
     }
 }
 
+/// Removes from a copy what has been renamed or deleted since it was made, but for what was built there.
+fn forget(folder: &Path, there: &BTreeSet<PathBuf>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            if entry.file_name() != "target" {
+                forget(&path, there);
+            }
+        } else if !there.contains(&path) && entry.file_name() != "Cargo.lock" {
+            let _ = std::fs::remove_file(&path);
+        }
+    }
+}
+
 /// How tests ended.
 pub struct Ended {
     pub passed: bool,
@@ -282,7 +301,26 @@ fn end(child: &mut Child) {
 
 #[cfg(test)]
 mod tests {
-    use super::failed;
+    use super::{failed, forget};
+
+    #[test]
+    fn what_was_renamed_is_gone_from_the_copy_and_what_was_built_stays() {
+        let root = std::env::temp_dir().join(format!("mutants-{}", std::process::id()));
+        for name in ["a/new.rs", "a/old.rs", "target/built"] {
+            let path = root.join(name);
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("room");
+            std::fs::write(path, "").expect("room");
+        }
+        forget(&root, &[root.join("a/new.rs")].into());
+        let is_there = |name: &str| root.join(name).exists();
+        let left = (
+            is_there("a/new.rs"),
+            is_there("a/old.rs"),
+            is_there("target/built"),
+        );
+        std::fs::remove_dir_all(&root).expect("it is ours");
+        assert_eq!(left, (true, false, true));
+    }
 
     #[test]
     fn the_first_test_that_failed_is_named() {
