@@ -13,6 +13,8 @@ use crate::step::{Failure, Pace};
 const DEADLINE: Duration = Duration::from_secs(900);
 /// How often the clock is looked at.
 const LOOKED: Duration = Duration::from_millis(50);
+/// And how often what the tests have said so far is read.
+const LOOKS_PER_READING: u32 = 40;
 /// A test that takes longer than that hangs: none takes a minute on two idle cores.
 const PATIENCE: Duration = Duration::from_secs(600);
 
@@ -222,15 +224,19 @@ impl Tree {
             .stderr(err)
             .spawn()
             .map_err(|error| Failure::new(&format!("cargo: {error}"), "is it in PATH?"))?;
-        let from = Instant::now();
+        let (from, mut looks) = (Instant::now(), 1u32);
         let status = loop {
             if let Ok(Some(status)) = child.try_wait() {
                 break Some(status);
             }
-            if from.elapsed() > patience {
+            // One that failed is enough: others may hang.
+            if from.elapsed() > patience
+                || looks.is_multiple_of(LOOKS_PER_READING) && has_failed(&log)
+            {
                 end(&mut child);
                 break None;
             }
+            looks += 1;
             std::thread::sleep(LOOKED);
         };
         let said = std::fs::read(&log).unwrap_or_default();
@@ -246,7 +252,7 @@ impl Tree {
             },
             None => Ended {
                 passed: false,
-                by: "a test that does not end".to_owned(),
+                by: failed_so_far(&said).unwrap_or_else(|| "a test that does not end".to_owned()),
             },
         })
     }
@@ -282,6 +288,20 @@ fn failed(said: &str) -> String {
     named.unwrap_or_else(|| "the test program, which ended".to_owned())
 }
 
+/// The first test that failed, while others still run: their names follow at the end alone.
+fn failed_so_far(said: &str) -> Option<String> {
+    let named = said
+        .lines()
+        .find_map(|line| line.strip_suffix(" --- FAILED"))?;
+    // Behind the dots of those that have passed.
+    Some(named.trim_start_matches('.').to_owned())
+}
+
+fn has_failed(log: &Path) -> bool {
+    let said = std::fs::read(log).unwrap_or_default();
+    failed_so_far(&String::from_utf8_lossy(&said)).is_some()
+}
+
 /// A group of its own, so that what it starts ends with it.
 fn apart(command: &mut Command) {
     #[cfg(unix)]
@@ -301,7 +321,7 @@ fn end(child: &mut Child) {
 
 #[cfg(test)]
 mod tests {
-    use super::{failed, forget};
+    use super::{failed, failed_so_far, forget};
 
     #[test]
     fn what_was_renamed_is_gone_from_the_copy_and_what_was_built_stays() {
@@ -327,5 +347,11 @@ mod tests {
         let said = "running 2 tests\n\nfailures:\n\n---- motor::tests::it_stops stdout ----\npanicked\n---- b stdout ----\n";
         assert_eq!(failed(said), "motor::tests::it_stops");
         assert_eq!(failed("signal: 11"), "the test program, which ended");
+        let said = "running 3 tests\n.. 2/3\n.motor::tests::it_stops --- FAILED\n";
+        assert_eq!(
+            failed_so_far(said).as_deref(),
+            Some("motor::tests::it_stops")
+        );
+        assert_eq!(failed_so_far("running 3 tests\n..."), None);
     }
 }
