@@ -16,7 +16,7 @@ const LOOKED: Duration = Duration::from_millis(50);
 /// And how often what the tests have said so far is read.
 const LOOKS_PER_READING: u32 = 40;
 /// A test that takes longer than that hangs: none takes a minute on two idle cores.
-const PATIENCE: Duration = Duration::from_secs(600);
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// The tests of purpose of a package: stages, of which the later ones run where the earlier ones noticed nothing.
 fn stages(package: &str) -> &'static [&'static [&'static str]] {
