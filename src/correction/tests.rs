@@ -6,6 +6,7 @@ use super::*;
 use crate::acquire::Job;
 
 mod attitude;
+mod gate;
 mod warming;
 
 /// An EEPROM, and nothing else.

@@ -116,9 +116,12 @@ fn a_gap_begins_the_attitude_anew_and_it_is_said() {
     }
     let (_, turned) = board.step(&at(125_000), 1);
     assert!(turned.state & YAW_FREE != 0 && turned.attitude[1].get() > 1 << 24);
-    let (_, anew) = board.step(&at(125_000 + 25_001), 1);
+    // 100 ms are not too long, a tick more is.
+    let (_, still) = board.step(&at(150_000), 1);
+    assert!(still.state & YAW_FREE != 0 && still.attitude[1].get() > turned.attitude[1].get());
+    let (_, anew) = board.step(&at(150_000 + 25_001), 1);
     assert_eq!(anew.state & YAW_FREE, 0);
     assert_eq!(anew.attitude.map(I32::get), [1 << 30, 0, 0, 0]);
-    let (_, on) = board.step(&at(125_000 + 25_001 + 12_500), 1);
+    let (_, on) = board.step(&at(150_000 + 25_001 + 12_500), 1);
     assert!(on.state & YAW_FREE != 0 && on.attitude[1].get() > 0);
 }
