@@ -5,6 +5,7 @@ use super::*;
 use crate::acquire::{Raw, Task};
 
 mod asked;
+mod registers;
 
 /// What the stand has asked the board for, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,6 +5,7 @@ use super::*;
 /// By how much two attitudes differ, deg.
 fn between(a: [f64; 4], b: [f64; 4]) -> f64 {
     let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+    assert!(dot.is_finite(), "{a:?} {b:?}");
     let across = (1.0
         - dot * dot / a.iter().map(|a| a * a).sum::<f64>() / b.iter().map(|b| b * b).sum::<f64>())
     .max(0.0);
@@ -44,7 +45,7 @@ fn the_attitude_follows_the_twin_for_600_s() {
             // With the motor on nothing leads it.
             let (_, frame) = board.step(&raw, 1);
             twin.step(&inputs(&raw, 1));
-            worst = worst.max(between(attitude(&frame), twin.attitude));
+            worst = worse(worst, between(attitude(&frame), twin.attitude));
             turned += rate
                 .iter()
                 .map(|c| (f64::from(*c) * scale()).powi(2))

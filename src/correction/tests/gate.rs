@@ -52,7 +52,7 @@ fn the_gates_own_edge_is_inside() {
         let state = axis.measure(
             (mean * Q20) as i32,
             TOLD,
-            &mut I32::ZERO,
+            &mut I32::new(0),
             &mut U16::new(u16::MAX),
         );
         assert_eq!(state & REFUSED, refused, "{square}");
@@ -118,4 +118,20 @@ fn rest_ends_at_four_degrees_a_second_either_way_and_with_the_motor() {
         }
     }
     assert!(!at_rest(0, 0, 1) && !at_rest(0, 0, -1) && at_rest(0, 0, 0));
+}
+
+#[test]
+fn each_row_and_the_crcs_has_its_place_in_either_copy_and_none_behind_it() {
+    let mut correction = Correction::new();
+    for newest in [1, 2] {
+        correction.newest = newest;
+        for (other, copy) in [(false, newest), (true, 3 - newest)] {
+            let begin = COPIES[usize::from(copy) - 1];
+            for row in 0..=ROWS as u8 {
+                let place = begin + 6 * u16::from(row);
+                assert_eq!(correction.place(other, row), Some(place));
+            }
+            assert_eq!(correction.place(other, ROWS as u8 + 1), None);
+        }
+    }
 }
