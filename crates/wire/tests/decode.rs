@@ -198,6 +198,24 @@ fn a_board_tells_what_is_no_request_from_what_it_refuses() {
     }
 }
 
+/// Only a reply may fill a queue: any other frame leaves room for one.
+#[test]
+fn room_is_asked_for_the_frame_and_for_a_reply_beside_it() {
+    use wire::fields::room_for;
+    assert_eq!(room_for(kind::REPLY, Reply::LEN - 2), Reply::FRAME_LEN);
+    let with_reply = |len: usize| len + Reply::FRAME_LEN;
+    assert_eq!(
+        room_for(kind::SAMPLE, SAMPLE),
+        with_reply(Sample::FRAME_LEN)
+    );
+    // Whatever the fields are: what goes out has the length that was asked for.
+    for fields in 0..=240 {
+        let mut line = [0; 300];
+        let len = wire::fields::encode(kind::SAMPLE, &vec![7; fields], &mut line);
+        assert_eq!(room_for(kind::SAMPLE, fields), with_reply(len), "{fields}");
+    }
+}
+
 /// Bytes of arguments that a command has, by docs/wire-format.md.
 fn used(code: u8) -> Option<usize> {
     Some(match code {
