@@ -354,6 +354,64 @@ mod tests {
     }
 
     #[test]
+    fn a_profile_without_cycles_does_not_end_by_itself() {
+        // A count of a byte would have gone round.
+        let targets = {
+            let mut motor = motor(255, u16::MAX);
+            assert!(motor.profile(shape::STEPS, 50, 0, 2, 0));
+            (0..2 * 600).map(move |_| {
+                motor.on_millisecond();
+                motor.target
+            })
+        };
+        assert!(targets.into_iter().all(|duty| duty.abs() == 50));
+        let mut many = motor(255, u16::MAX);
+        assert!(many.profile(shape::STEPS, 50, 0, 2, 255));
+        let on = (0..2 * 600).map(|_| {
+            many.on_millisecond();
+            many.target
+        });
+        assert_eq!(on.filter(|&duty| duty != 0).count(), 2 * 255 - 1);
+    }
+
+    #[test]
+    fn from_rest_it_starts_with_the_next_millisecond_either_way() {
+        for way in [1, -1] {
+            for rested in 0..6 {
+                let mut motor = motor(255, 64_000);
+                (0..rested).for_each(|_| motor.on_millisecond());
+                motor.command(way * 255);
+                motor.on_millisecond();
+                // 64 steps a millisecond, of which 4194 / 2^16 makes some thousandths less.
+                assert_eq!(motor.output(), way * 63, "{way} after {rested} ms");
+                assert!(motor.is_on());
+            }
+        }
+    }
+
+    #[test]
+    fn its_ramp_is_in_steps_a_second_and_never_stands_still() {
+        for ramp in [510, 1_000, 250, 40] {
+            let mut motor = motor(255, ramp);
+            motor.command(255);
+            let full = (1..60_000).find(|_| {
+                motor.on_millisecond();
+                motor.output() == 255
+            });
+            // Never faster, and slower by less than a 64th of a step in a millisecond and what 4194 / 2^16 lacks.
+            let exact = f64::from(ramp) * 0.064;
+            let full = f64::from(full.expect("it gets there"));
+            let least = 255.0 * 64.0 / exact;
+            let most = 255.0 * 64.0 / (exact - 1.01);
+            assert!((least..=most + 1.0).contains(&full), "{ramp}: {full} ms");
+        }
+        let mut motor = motor(255, 0);
+        motor.command(3);
+        (0..3 * 64).for_each(|_| motor.on_millisecond());
+        assert_eq!(motor.output(), 3);
+    }
+
+    #[test]
     fn what_is_out_of_range_changes_nothing() {
         let mut motor = motor(255, 510);
         for (shape, amplitude, offset, period) in [

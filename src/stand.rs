@@ -1,20 +1,21 @@
-//! The board's work below the tick: scaling, framing, counting. What the PC asks for is in [`requests`].
+//! The board's work below the tick: what it keeps, its start and its millisecond. The sample is in [`sample`], what keeps the gyros
+//! set up in [`gyros`], what has its turn on the line in [`line`], what the PC asks for in [`requests`].
 
-use adis16250::Register;
-use fixed::types::I16F16;
-use wire::fields::{Health, Reply, Sample};
-use wire::{Asked, Fault, RequestDecoder, Status, code, flags, kind, reset_cause};
-use zerocopy::{FromZeros, IntoBytes};
+use wire::fields::{Health, Reply};
+use wire::{Asked, Fault, RequestDecoder, Status, code, reset_cause};
 
+mod gyros;
+mod line;
 mod requests;
+mod sample;
 pub(crate) mod store;
 
-use crate::acquire::{Job, Raw, Task};
-use crate::bias::{BiasNull, Outcome, TURNS};
+use crate::acquire::Job;
+use crate::bias::BiasNull;
 use crate::config::Config;
 use crate::correction::Correction;
-use crate::math::times;
 use crate::motor::Motor;
+use line::{CORRECTED_LEN, REPLY_LEN, SAMPLE_LEN};
 use store::Store;
 
 /// The rest of the board, as the stand sees it.
@@ -51,6 +52,10 @@ pub trait Board {
     fn reset_cause(&self) -> u8;
     /// Resets since power-on.
     fn restarts(&self) -> u16;
+    /// What [`keep`](Self::keep) was given last, before the reset or since; anything after power-on.
+    fn kept(&self) -> [u16; 2];
+    /// Keeps the counts of resets by the watchdog and by brown-out where a reset leaves them.
+    fn keep(&mut self, counts: [u16; 2]);
     /// The least stack that was ever left, bytes.
     fn stack_free(&self) -> u16;
     /// Timer ticks since the last tick of the sample clock.
@@ -65,8 +70,6 @@ mod source {
     pub const SET: u8 = 3;
 }
 
-/// Less stack than this left at any time is counted with each health frame: an interrupt's worth.
-const STACK_GUARD: u16 = 32;
 /// Milliseconds from health frame to health frame.
 const HEALTH_MS: u16 = 1_000;
 /// Bits of what is owed to the host.
@@ -76,21 +79,6 @@ const HEALTH: u8 = 2;
 const CLEAR: u8 = 4;
 /// [`Stand::setting`] when all gyros are set up.
 const SET: u8 = 3;
-/// The flags of EA begin here.
-const ERROR_SHIFT: u8 = 3;
-const _: () = assert!(flags::error(0) == 1 << ERROR_SHIFT);
-/// Lengths on the line.
-const SAMPLE_LEN: u8 = wire::Sample::FRAME_LEN as u8;
-const REPLY_LEN: u8 = wire::Reply::FRAME_LEN as u8;
-const HELLO_LEN: u8 = wire::Hello::FRAME_LEN as u8;
-const HEALTH_LEN: u8 = wire::Health::FRAME_LEN as u8;
-const CORRECTED_LEN: u8 = wire::Corrected::FRAME_LEN as u8;
-/// Samples from one reply to the next, and from one hello or health frame to the next, where the queue has no room for a
-/// sample beside it: 16 samples, 4 replies and a health frame are 1002 bytes, so that samples have four fifths of any line.
-const SAMPLES_PER_REPLY: u8 = 4;
-const SAMPLES_PER_REPORT: u8 = 16;
-/// Codes at which the accelerometer's output is at the converter's end.
-const ADC_MAX: u16 = 1_023;
 
 /// A request that is answered later, when what it asks for is done.
 #[derive(Clone, Copy)]
@@ -116,6 +104,8 @@ pub struct Stand {
     silent: u8,
     /// Bit per axis: not set up as the hello frame says.
     misconfigured: u8,
+    /// Bit per axis: a register was written by hand since it was set up. It stays so until that is done again.
+    touched: u8,
     /// The gyros have to be set up (anew).
     unset: bool,
     /// The gyro that is being set up; [`SET`]: none.
@@ -129,6 +119,8 @@ pub struct Stand {
     nonce: u16,
     /// Who waits for the work on the gyros that is under way.
     job: Pending,
+    /// And the gyro that it is for.
+    job_axis: u8,
     self_test: requests::SelfTest,
     null: Pending,
     millisecond: u16,
@@ -162,6 +154,7 @@ impl Stand {
         Self {
             silent: 0,
             misconfigured: 0,
+            touched: 0,
             unset: false,
             setting: 0,
             wrong: 0,
@@ -169,6 +162,7 @@ impl Stand {
             noise: 0,
             nonce: 0,
             job: Pending::NONE,
+            job_axis: 0,
             self_test: requests::SelfTest::new(),
             null: Pending::NONE,
             millisecond: 0,
@@ -204,17 +198,30 @@ impl Stand {
     /// Reads the stored set-up and applies it.
     #[inline(never)]
     pub fn boot<B: Board>(&mut self, board: &mut B) {
-        if board.reset_cause() & reset_cause::WATCHDOG != 0 {
-            self.record(Fault::WatchdogReset, 0);
-        }
-        if board.reset_cause() & reset_cause::BROWN_OUT != 0 {
-            self.record(Fault::BrownOutReset, 0);
-        }
+        self.count_reset(board);
         if !self.load(board) {
             self.config.set_default();
         }
         self.apply(board);
         self.correction.on(board);
+    }
+
+    /// Takes up the counts of resets where the last one left them.
+    fn count_reset<B: Board>(&mut self, board: &mut B) {
+        let cause = board.reset_cause();
+        let [mut watchdog, mut brown_out] = board.kept();
+        if cause & reset_cause::POWER_ON != 0 {
+            (watchdog, brown_out) = (0, 0);
+        }
+        if cause & reset_cause::WATCHDOG != 0 {
+            watchdog = watchdog.saturating_add(1);
+        }
+        if cause & reset_cause::BROWN_OUT != 0 {
+            brown_out = brown_out.saturating_add(1);
+        }
+        board.keep([watchdog, brown_out]);
+        self.health.count(Fault::WatchdogReset, 0, watchdog);
+        self.health.count(Fault::BrownOutReset, 0, brown_out);
     }
 
     /// SENS/AVG that the gyros are to have.
@@ -240,295 +247,6 @@ impl Stand {
     #[inline(never)]
     fn record(&mut self, fault_of_x: Fault, axis: u8) {
         self.health.count(fault_of_x, axis, 1);
-    }
-
-    /// The next sequence number; `times` of them are spent.
-    #[inline(never)]
-    fn take_seq(&mut self, times: u8) -> u16 {
-        let seq = self.health.next_seq.get();
-        self.health.next_seq.set(seq.wrapping_add(times.into()));
-        seq
-    }
-
-    /// A tick's sample, and how many ticks before it had none: scales, flags, counts and sends it.
-    #[inline(never)]
-    pub fn on_sample<B: Board>(&mut self, board: &mut B, raw: &Raw, missed: u8) {
-        let mut sample = Sample::new_zeroed();
-        let mut seen = 0;
-        if missed != 0 {
-            self.count(Fault::TickOverrun, missed);
-            self.take_seq(missed);
-            seen = flags::TICK_OVERRUN;
-        }
-        sample.seq.set(self.take_seq(1));
-        sample.t_ticks.set(raw.t_ticks);
-        sample.pwm.set(self.motor.output());
-        let (mut silent, mut bit, mut noise) = (0, 1, 0);
-        for axis in 0..3 {
-            let gyro = self.gyro(axis, bit, raw, &mut sample);
-            if gyro & flags::GYRO_NOT_ANSWERING != 0 {
-                silent |= bit;
-            }
-            seen |= gyro | self.accelerometer(axis, bit, raw, &mut sample);
-            noise ^= raw.gyro[axis as usize].bits() as u8;
-            bit <<= 1;
-        }
-        self.noise = wire::crc::update(self.noise, noise);
-        self.look_after_gyros(board, silent, (seen >> ERROR_SHIFT) as u8 & 7);
-        if self.misconfigured & !silent != 0 || self.setting != SET {
-            seen |= flags::GYRO_MISCONFIGURED;
-        }
-        seen |= self.supply(silent, raw, &mut sample);
-        self.in_order = seen == flags::IN_ORDER;
-        if !self.null.is_none() {
-            seen |= flags::BIAS_NULL;
-            self.step_bias_null(board, &sample);
-        }
-        sample.flags.set(seen);
-        if self.late != 0 || !board.send(kind::SAMPLE, sample.as_bytes()) {
-            self.record(Fault::FrameDropped, 0);
-        } else {
-            self.since_reply = self.since_reply.saturating_add(1);
-            self.since_report = self.since_report.saturating_add(1);
-        }
-        self.late = if self.since_report >= SAMPLES_PER_REPORT {
-            self.owed & self.waited
-        } else {
-            0
-        };
-        self.waited = self.owed;
-        if !matches!(raw.done.task, Task::None) {
-            self.job_done(board, raw.done);
-        }
-        let busy = board.ticks_since();
-        if busy > self.health.tick_busy_max.get() {
-            self.health.tick_busy_max.set(busy);
-        }
-    }
-
-    /// Corrects the sample that [`on_sample`](Self::on_sample) had just before. Its frame goes out with a millisecond, as soon as
-    /// the line has room for it beside the next one and a reply, and nothing else is owed; one that has not until the next sample is dropped.
-    #[inline(always)]
-    pub fn correct<B: Board>(&mut self, board: &mut B, raw: &Raw) {
-        if self.correction.is_ready(board) {
-            // One behind the other, so that the stack has to hold one of them.
-            self.correction.end(board);
-            self.correct_rates(board, raw);
-            self.correction.turn(raw);
-        }
-    }
-
-    #[inline(never)]
-    fn correct_rates<B: Board>(&mut self, board: &mut B, raw: &Raw) {
-        self.correction.step(
-            board,
-            raw,
-            self.health.next_seq.get().wrapping_sub(1),
-            self.motor.output(),
-            &self.config,
-            self.in_order,
-        );
-    }
-
-    /// A gyro that answers again may have lost its set-up with its power; one that raises its error or alarm bit, bit per
-    /// axis in `errors`, keeps it up until its STATUS is read.
-    fn look_after_gyros<B: Board>(&mut self, board: &mut B, silent: u8, errors: u8) {
-        let back = self.silent & !silent;
-        self.silent = silent;
-        if back != 0 {
-            self.record_each(Fault::GyroRecoveredX, back);
-            self.unset = true;
-        }
-        if !self.job.is_none() {
-            return;
-        }
-        if self.unset {
-            if self.configure(board, 0) {
-                self.unset = false;
-                self.job.code = Pending::OWN;
-            }
-            return;
-        }
-        let uncleared = errors & !self.cleared;
-        if uncleared == 0 {
-            return;
-        }
-        // The lowest of them.
-        let (mut axis, mut bit) = (0, 1);
-        while uncleared & bit == 0 {
-            axis += 1;
-            bit <<= 1;
-        }
-        let job = Job {
-            task: Task::Read,
-            axis,
-            address: Register::Status.address(),
-            value: 0,
-        };
-        if board.post(job) {
-            self.cleared |= bit;
-            self.job.code = Pending::OWN;
-        }
-    }
-
-    /// Has a gyro set up in the next slot; the others follow, each in its own.
-    #[inline(never)]
-    fn configure<B: Board>(&mut self, board: &mut B, axis: u8) -> bool {
-        let posted = board.post(Job {
-            task: Task::Configure,
-            axis,
-            value: self.config.sens_avg(),
-            address: 0,
-        });
-        if posted {
-            self.setting = axis;
-        }
-        posted
-    }
-
-    /// Counts a fault of each axis that has its bit set.
-    #[inline(never)]
-    fn record_each(&mut self, fault_of_x: Fault, axes: u8) {
-        for axis in 0..3 {
-            if axes & (1 << axis) != 0 {
-                self.record(fault_of_x, axis);
-            }
-        }
-    }
-
-    /// One gyro's part of the sample; its flags. `bit` is the one of the axis.
-    fn gyro(&mut self, axis: u8, bit: u8, raw: &Raw, sample: &mut Sample) -> u16 {
-        let at = axis as usize;
-        if at >= 3 {
-            return 0;
-        }
-        let word = raw.gyro[at];
-        let stalled = raw.spi_stalled & bit != 0;
-        if stalled {
-            self.record(Fault::SpiStalled, 0);
-        }
-        // A rate may be zero without new data, or -1 count with an alarm; its supply is neither 0 V nor full scale.
-        if stalled || word.is_stuck() && raw.supply[at].is_stuck() {
-            self.record(Fault::GyroNotAnsweringX, axis);
-            return flags::GYRO_NOT_ANSWERING;
-        }
-        sample.gyro[at].set(word.signed_14());
-        sample.temp[at].set(raw.temp[at].signed_12());
-        // Q24 times counts; scale and bias are bounded so that nothing wraps.
-        let scale = self.config.set_up.scale[at].get();
-        let rate = I16F16::from_bits(times(scale << 8, word.signed_14()));
-        let bias = I16F16::from_bits(self.config.set_up.bias[at].get());
-        sample.rate[at].set(rate.wrapping_sub(bias).to_bits());
-        let mut seen = 0;
-        if word.is_new() {
-            seen = flags::NEW_X * u16::from(bit);
-        } else {
-            self.record(Fault::GyroStaleX, axis);
-        }
-        if word.has_error() {
-            seen |= flags::ERROR_X * u16::from(bit);
-            self.record(Fault::GyroErrorAlarmX, axis);
-        }
-        seen
-    }
-
-    fn accelerometer(&mut self, axis: u8, bit: u8, raw: &Raw, sample: &mut Sample) -> u16 {
-        let at = axis as usize;
-        if at >= 3 {
-            return 0;
-        }
-        let counts = raw.acc[at];
-        sample.acc[at].set(counts);
-        if raw.adc_stalled & bit != 0 {
-            self.record(Fault::AdcStalled, 0);
-            flags::ACC_NOT_CONVERTED
-        } else if counts == 0 || counts >= ADC_MAX {
-            self.record(Fault::AccAtRailX, axis);
-            flags::ACC_AT_RAIL
-        } else {
-            0
-        }
-    }
-
-    /// One supply for three gyros: the first that answers says what it is.
-    fn supply(&mut self, silent: u8, raw: &Raw, sample: &mut Sample) -> u16 {
-        let mut bit = 1;
-        for &word in &raw.supply {
-            if silent & bit == 0 {
-                let counts = word.unsigned_12();
-                sample.supply.set(counts);
-                if word.supply().is_in_range() {
-                    return 0;
-                }
-                self.record(Fault::SupplyOutOfRange, 0);
-                return flags::SUPPLY_OUT_OF_RANGE;
-            }
-            bit <<= 1;
-        }
-        0
-    }
-
-    fn step_bias_null<B: Board>(&mut self, board: &mut B, sample: &Sample) {
-        let outcome = if self.motor.is_on() {
-            Outcome::Moving
-        } else {
-            self.bias_null.take(&sample.gyro, self.in_order)
-        };
-        let status = match outcome {
-            Outcome::GoesOn => return,
-            Outcome::NotInOrder => Status::NotAnswering,
-            Outcome::Done if self.take_biases() => Status::Ok,
-            _ => Status::Moving,
-        };
-        self.end_bias_null(board, status);
-    }
-
-    /// The reply to the bias measurement that is under way, if one is.
-    #[inline(never)]
-    fn end_bias_null<B: Board>(&mut self, board: &mut B, status: Status) {
-        if self.null.is_none() {
-            return;
-        }
-        if !matches!(status, Status::Ok) {
-            self.answer.zero();
-        }
-        let asked = core::mem::replace(&mut self.null, Pending::NONE);
-        self.reply(board, asked, status);
-    }
-
-    /// The means become the biases; false, and nothing changed, when the stand turns.
-    fn take_biases(&mut self) -> bool {
-        let mut largest = 0;
-        for ((sum, scale), mean) in (self.bias_null.axes())
-            .zip(&self.config.set_up.scale)
-            .zip(&mut self.answer.detail)
-        {
-            let scale = scale.get();
-            let found = self.bias_null.mean(sum, scale);
-            if found == TURNS {
-                return false;
-            }
-            mean.set(found);
-            largest = self.bias_null.error(sum, scale).max(largest);
-        }
-        self.answer.value.set(largest);
-        self.config.set_up.bias = self.answer.detail;
-        self.config.set_up.config_source = source::SET;
-        true
-    }
-
-    /// Whether there is room for the reply that the next received byte may bring. Until then the bytes wait: no request,
-    /// however many there are, takes the room of a sample, or of a report that is late.
-    #[inline(never)]
-    pub fn listens<B: Board>(&self, board: &B) -> bool {
-        let beside = if self.late != 0 {
-            HEALTH_LEN + REPLY_LEN
-        } else if self.since_reply >= SAMPLES_PER_REPLY {
-            0
-        } else {
-            SAMPLE_LEN + REPLY_LEN
-        };
-        board.room() >= beside.wrapping_add(REPLY_LEN)
     }
 
     /// A received byte.
@@ -579,80 +297,6 @@ impl Stand {
             self.motor.cut();
             self.record(Fault::MotorTimeout, 0);
         }
-    }
-
-    /// The one reply to a request, with what [`answer`](Self::answer) says.
-    #[inline(never)]
-    fn reply<B: Board>(&mut self, board: &mut B, asked: Pending, status: Status) {
-        self.answer.number.set(asked.number);
-        self.answer.command = asked.code;
-        self.answer.status = status as u8;
-        if !board.send(kind::REPLY, self.answer.as_bytes()) {
-            self.record(Fault::ReportDropped, 0);
-        }
-        self.since_reply = 0;
-        self.answer.zero();
-    }
-
-    /// Whether a hello or health frame of this length has its turn: unless it is late there has to be room for a sample beside
-    /// it.
-    fn may_report<B: Board>(&self, board: &B, len: u8) -> bool {
-        let beside = if self.late != 0 {
-            REPLY_LEN
-        } else {
-            REPLY_LEN + SAMPLE_LEN
-        };
-        board.room() >= beside.wrapping_add(len)
-    }
-
-    /// Sends what is owed, and `more`, as far as there is room.
-    #[inline(never)]
-    fn tell<B: Board>(&mut self, board: &mut B, more: u8) {
-        self.owed |= more;
-        if self.owed & HELLO != 0 && self.may_report(board, HELLO_LEN) {
-            let hello = wire::fields::Hello {
-                firmware: crate::VERSION,
-                board_id: self.config.board_id,
-                reset_cause: board.reset_cause(),
-                restarts: board.restarts().into(),
-                next_seq: self.health.next_seq,
-                tick_ns: crate::TICK_NS.into(),
-                set_up: self.config.set_up,
-            };
-            if board.send(kind::HELLO, hello.as_bytes()) {
-                self.owed &= !HELLO;
-                self.reported();
-            }
-        }
-        if self.owed & HEALTH != 0 && self.may_report(board, HEALTH_LEN) {
-            let stack_free = board.stack_free();
-            self.health.stack_free.set(stack_free);
-            if stack_free < STACK_GUARD {
-                self.record(Fault::StackLow, 0);
-            }
-            if board.send(kind::HEALTH, self.health.as_bytes()) {
-                if self.owed & CLEAR != 0 {
-                    self.health.faults.zero();
-                }
-                self.owed &= !(HEALTH | CLEAR);
-                self.reported();
-            }
-        }
-    }
-
-    /// A hello or health frame has been sent.
-    fn reported(&mut self) {
-        (self.since_report, self.late) = (0, 0);
-    }
-
-    /// What has come of setting up the gyros that have their bit in `axes`.
-    #[inline(never)]
-    fn note_configured(&mut self, axes: u8, wrong: u8) {
-        let now = (wrong | wrong >> 3) & 7;
-        self.record_each(Fault::GyroRecoveredX, self.misconfigured & axes & !now);
-        self.misconfigured = self.misconfigured & !axes | now;
-        self.record_each(Fault::GyroRegisterMismatchX, wrong);
-        self.record_each(Fault::GyroScaleImpossibleX, wrong >> 3);
     }
 
     #[inline(never)]

@@ -13,6 +13,8 @@
 extern uint8_t _end; /* of .data, .bss and .noinit, by the linker */
 
 static uint16_t restarts __attribute__((section(".noinit")));
+uint16_t board_watchdog_resets __attribute__((section(".noinit")));
+uint16_t board_brown_out_resets __attribute__((section(".noinit")));
 static uint8_t reset_cause;
 
 /* After the stack pointer is set, before anything is on the stack. */
@@ -29,9 +31,13 @@ void board_start(void)
     reset_cause = MCUCSR & (_BV(PORF) | _BV(EXTRF) | _BV(BORF) | _BV(WDRF) | _BV(JTRF));
     MCUCSR = 0;
     if (reset_cause & _BV(PORF))
-        restarts = 0;
+        restarts = board_watchdog_resets = board_brown_out_resets = 0;
     else if (restarts != UINT16_MAX)
         restarts++;
+    if (reset_cause & _BV(WDRF) && board_watchdog_resets != UINT16_MAX)
+        board_watchdog_resets++;
+    if (reset_cause & _BV(BORF) && board_brown_out_resets != UINT16_MAX)
+        board_brown_out_resets++;
 }
 
 uint8_t board_reset_cause(void)

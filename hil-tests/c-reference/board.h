@@ -10,6 +10,8 @@ void board_start(void);
 uint8_t board_reset_cause(void);
 /* Resets since power-on. */
 uint16_t board_restarts(void);
+/* Those by the watchdog and by brown-out, until they are cleared. */
+extern uint16_t board_watchdog_resets, board_brown_out_resets;
 /* The least stack that was ever left, bytes. */
 uint16_t board_stack_free(void);
 /* -255..255 */

@@ -32,7 +32,7 @@ struct pending stand_job, stand_null;
 uint8_t stand_setting;
 uint32_t stand_noise;
 struct reply stand_answer;
-uint8_t stand_misconfigured;
+uint8_t stand_misconfigured, stand_touched;
 static struct health health;
 static uint8_t silent; /* bit per axis: not answering at the last sample */
 static uint8_t owed;   /* to the host, as soon as there is room */
@@ -99,8 +99,10 @@ void __attribute__((noinline)) stand_tell(uint8_t more)
         if (health.stack_free < STACK_GUARD)
             stand_count(FAULT_STACK_LOW, 1);
         if (frame_send(KIND_HEALTH, &health, sizeof health)) {
-            if (owed & OWED_CLEAR)
+            if (owed & OWED_CLEAR) {
                 memset(health.faults, 0, sizeof health.faults);
+                board_watchdog_resets = board_brown_out_resets = 0;
+            }
             owed &= (uint8_t)~(OWED_HEALTH | OWED_CLEAR);
             since_report = late = 0;
         }
@@ -130,6 +132,7 @@ void stand_note_configured(uint8_t axes, uint8_t wrong)
     uint8_t now = (wrong | wrong >> 3) & 7;
     stand_count_each(FAULT_GYRO_RECOVERED_X, stand_misconfigured & axes & (uint8_t)~now);
     stand_misconfigured = (uint8_t)((stand_misconfigured & ~axes) | now);
+    stand_touched &= (uint8_t)~axes;
     stand_count_each(FAULT_GYRO_REGISTER_MISMATCH_X, wrong & 7);
     stand_count_each(FAULT_GYRO_SCALE_IMPOSSIBLE_X, wrong >> 3);
 }
@@ -155,10 +158,8 @@ void stand_apply(void)
 
 void stand_boot(void)
 {
-    if (board_reset_cause() & _BV(WDRF))
-        stand_count(FAULT_WATCHDOG_RESET, 1);
-    if (board_reset_cause() & _BV(BORF))
-        stand_count(FAULT_BROWN_OUT_RESET, 1);
+    health.faults[FAULT_WATCHDOG_RESET] = board_watchdog_resets;
+    health.faults[FAULT_BROWN_OUT_RESET] = board_brown_out_resets;
     if (!store_load())
         config_set_default();
     stand_apply();
@@ -342,7 +343,7 @@ void __attribute__((noinline)) stand_on_sample(const struct raw *raw, uint8_t mi
     }
     stand_noise = crc_update_byte(stand_noise, noise);
     look_after_gyros(silent_now, (flags >> 3) & 7); /* the flags of EA */
-    if ((stand_misconfigured & ~silent_now) || stand_setting != SET)
+    if (((stand_misconfigured | stand_touched) & ~silent_now) || stand_setting != SET)
         flags |= FLAG_GYRO_MISCONFIGURED;
     flags |= take_supply(raw, &sample);
     in_order = flags == FLAGS_IN_ORDER;

@@ -39,6 +39,8 @@ extern struct pending stand_job, stand_null;
 extern struct reply stand_answer;
 /* Bit per axis: not set up as the hello frame says. */
 extern uint8_t stand_misconfigured;
+/* Bit per axis: a register was written by hand since it was set up. */
+extern uint8_t stand_touched;
 
 /* Sends what is owed, and more, as far as there is room; counters are cleared once they have been told. */
 void stand_tell(uint8_t more);

@@ -1,10 +1,10 @@
 //! The image starts, says who it is, and samples.
 
-use atmega16_sim::{Board, CLOCK_HZ, Image, Mcu, Pins, Stop};
+use atmega16_sim::{Board, CLOCK_HZ, Image, Mcu, Pins, ResetCause, Stop};
 use bench::Scenario;
 use bench::simavr::{NoProbe, Simulated};
 use hil_tests::{Heard, at, hear, image, run};
-use wire::{Command, Status, flags, reset_cause};
+use wire::{Command, Fault, Status, flags, reset_cause};
 
 #[test]
 fn it_says_hello_and_then_samples_at_20_hz_without_a_gap() {
@@ -67,7 +67,33 @@ fn a_reboot_by_command_is_answered_and_comes_back_by_the_watchdog_with_its_cause
         );
     }
     let health = heard.last_health();
-    assert_eq!(health.faults.get(wire::Fault::WatchdogReset), 1);
+    assert_eq!(health.faults.get(Fault::WatchdogReset), 1);
+}
+
+#[test]
+fn resets_are_counted_over_resets_until_they_are_cleared_or_power_goes() {
+    let mut simulated = Simulated::new(&image(), &Scenario::quiet(7), NoProbe).expect("an image");
+    let mut heard = Heard::default();
+    let mut counts = |simulated: &mut Simulated<NoProbe>, command: Option<Command>| {
+        let from = simulated.time_s();
+        if let Some(command) = command {
+            simulated.request(&[at(from + 0.5, 1, command)]);
+        }
+        simulated
+            .run_until(from + 2.5, &mut |byte| heard.push(byte))
+            .expect("it runs");
+        let faults = heard.last_health().faults;
+        [Fault::WatchdogReset, Fault::BrownOutReset].map(|fault| faults.get(fault))
+    };
+    assert_eq!(counts(&mut simulated, None), [0, 0]);
+    assert_eq!(counts(&mut simulated, Some(Command::Reboot)), [1, 0]);
+    assert_eq!(counts(&mut simulated, Some(Command::Reboot)), [2, 0]);
+    simulated.reset(ResetCause::BrownOut);
+    assert_eq!(counts(&mut simulated, None), [2, 1]);
+    assert_eq!(counts(&mut simulated, Some(Command::ClearCounters)), [0, 0]);
+    assert_eq!(counts(&mut simulated, Some(Command::Reboot)), [1, 0]);
+    simulated.power_cycle();
+    assert_eq!(counts(&mut simulated, None), [0, 0]);
 }
 
 #[test]

@@ -316,6 +316,36 @@ fn a_register_that_does_not_read_back_is_told_and_set_right_by_itself() {
     }
 }
 
+/// SENS/AVG of one gyro, written past the set-up: its rates are no longer what the hello frame's scale makes of them.
+#[test]
+fn a_register_written_by_hand_is_flagged_until_the_gyros_are_set_up_anew() {
+    for gyro in [wire::Axis::X, wire::Axis::Y, wire::Axis::Z] {
+        let mut simulated = Simulated::new(&image(), &Scenario::quiet(8), bench::simavr::NoProbe)
+            .expect("an image");
+        let write = Command::WriteRegister {
+            gyro,
+            address: SENS_AVG as u8,
+            value: 0x0104,
+        };
+        let set = Command::SetGyro {
+            range: 4,
+            filter: 2,
+        };
+        simulated.request(&[at(2.0, 1, write), at(5.0, 2, set)]);
+        let heard = hear_out(simulated, 8.0);
+        assert_answered(&heard, 1);
+        assert_answered(&heard, 2);
+        for (t, sample) in heard.samples() {
+            let flagged = sample.flags & flags::GYRO_MISCONFIGURED != 0;
+            if (2.2..5.0).contains(&t) {
+                assert!(flagged, "{gyro:?} at {t}");
+            } else if !(2.0..5.5).contains(&t) {
+                assert_eq!(sample.flags, flags::IN_ORDER, "{gyro:?} at {t}");
+            }
+        }
+    }
+}
+
 #[test]
 fn an_impossible_scale_of_a_gyro_is_told_and_counted() {
     for axis in 0..3u8 {

@@ -50,6 +50,14 @@ fn traffics() -> Vec<(&'static str, Traffic)> {
             }),
         ),
         (
+            "reads of a correction",
+            of(Command::GetCorrection {
+                other: false,
+                row: 5,
+            }),
+        ),
+        ("stores of the set-up", of(Command::StoreConfig)),
+        (
             "motor duty, without keep-alive",
             of(Command::MotorDuty { duty: 255 }),
         ),
@@ -75,10 +83,34 @@ fn traffics() -> Vec<(&'static str, Traffic)> {
     ]
 }
 
-/// From 3 s on nothing but this traffic, at a rate and a speed of the line.
-fn flooded(mut traffic: Traffic, period_ticks: u16, divisor: u16) -> (Simulated<Shaft>, Heard) {
+/// An EEPROM whose first copy of a correction is in order.
+fn with_a_correction() -> Vec<u8> {
+    let correction = wire::correction::Correction {
+        block_shift: 7,
+        sens_avg: 0x0402,
+        temp_range: [-60, 60],
+        noise: [0.02; 3],
+        walk: [1e-7; 3],
+        ..wire::correction::Correction::default()
+    };
+    let numbers = correction.numbers().expect("they fit");
+    let mut copy: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
+    copy.extend(wire::crc::crc32c(&copy).to_le_bytes());
+    let mut eeprom = vec![0xff; 512];
+    eeprom[144..144 + copy.len()].copy_from_slice(&copy);
+    eeprom
+}
+
+/// From 3 s on nothing but this traffic, at a rate and a speed of the line, with a correction in use or without.
+fn flooded(
+    mut traffic: Traffic,
+    (period_ticks, divisor, corrected): (u16, u16, bool),
+) -> (Simulated<Shaft>, Heard) {
     let mut simulated =
         Simulated::new(&image(), &Scenario::quiet(8), Shaft::default()).expect("an image");
+    if corrected {
+        simulated.mcu_mut().set_eeprom(&with_a_correction());
+    }
     let mut requests = vec![
         at(0.5, 900, Command::SetBaud { divisor }),
         at(
@@ -113,9 +145,18 @@ fn flooded(mut traffic: Traffic, period_ticks: u16, divisor: u16) -> (Simulated<
 
 #[test]
 fn no_traffic_delays_the_motors_cut_or_costs_more_than_one_sample_in_four() {
-    for (period_ticks, divisor) in [(12_500, 25), (12_500, 3), (976, 3)] {
+    for setting in [
+        (12_500, 25, false),
+        (12_500, 3, false),
+        (976, 3, false),
+        (976, 3, true),
+    ] {
+        let (period_ticks, _, corrected) = setting;
         for (name, traffic) in traffics() {
-            let (simulated, heard) = flooded(traffic, period_ticks, divisor);
+            let (simulated, heard) = flooded(traffic, setting);
+            let is_corrected =
+                |(_, frame): &(f64, wire::Frame)| matches!(frame, wire::Frame::Corrected(_));
+            assert_eq!(heard.frames.iter().any(is_corrected), corrected);
             let hz = simulated.hz();
             let &(last, duty) = simulated.probe().0.last().expect("it turned");
             let stopped = last as f64 / hz;
@@ -126,7 +167,7 @@ fn no_traffic_delays_the_motors_cut_or_costs_more_than_one_sample_in_four() {
                 .count();
             let health = heard.last_health();
             println!(
-                "{period_ticks} ticks, divisor {divisor}, {name}: stopped at {stopped:.4} s, {got} of {expected:.0} samples, \
+                "{setting:?}, {name}: stopped at {stopped:.4} s, {got} of {expected:.0} samples, \
                  {} replies, {} bytes lost, {} replies dropped",
                 heard.replies().filter(|&(t, _)| t > 3.0).count(),
                 health.faults.get(Fault::RxOverrun),

@@ -31,6 +31,8 @@ unsafe extern "C" {
 
 #[unsafe(link_section = ".noinit")]
 static mut RESTARTS: u16 = 0;
+#[unsafe(link_section = ".noinit")]
+static mut KEPT: [u16; 2] = [0; 2];
 /// Why it started.
 static mut RESET_CAUSE: u8 = 0;
 
@@ -190,6 +192,16 @@ impl Board for AvrBoard {
     fn restarts(&self) -> u16 {
         // SAFETY: as above.
         unsafe { RESTARTS }
+    }
+
+    fn kept(&self) -> [u16; 2] {
+        // SAFETY: the main loop's alone.
+        unsafe { KEPT }
+    }
+
+    fn keep(&mut self, counts: [u16; 2]) {
+        // SAFETY: as above.
+        unsafe { KEPT = counts };
     }
 
     #[inline(never)]

@@ -6,6 +6,7 @@ use super::*;
 use crate::acquire::Job;
 
 mod attitude;
+mod gate;
 mod warming;
 
 /// An EEPROM, and nothing else.
@@ -41,6 +42,12 @@ impl Board for Eeprom {
     fn reboot(&mut self) {}
     fn reset_cause(&self) -> u8 {
         0
+    }
+    fn kept(&self) -> [u16; 2] {
+        unreachable!()
+    }
+    fn keep(&mut self, _: [u16; 2]) {
+        unreachable!()
     }
     fn restarts(&self) -> u16 {
         0
@@ -161,6 +168,12 @@ impl OnBoard {
     }
 }
 
+/// The larger size. What is no number is not small, which `f64::max` would make it.
+fn worse(worst: f64, off: f64) -> f64 {
+    assert!(off.is_finite(), "{off}");
+    worst.max(off.abs())
+}
+
 /// The same sample for the twin.
 fn inputs(raw: &Raw, duty: i16) -> Inputs {
     Inputs {
@@ -192,7 +205,7 @@ fn the_models_terms_are_those_of_the_twin_over_the_whole_range() {
         let duty = random.between(-255, 255) as i16;
         let (got, _) = board.step(&raw, duty);
         for (got, wanted) in got.into_iter().zip(twin.step(&inputs(&raw, duty))) {
-            worst = worst.max((got - wanted).abs());
+            worst = worse(worst, got - wanted);
         }
     }
     println!("worst of 12000: {worst:.2e} deg/s");
@@ -250,7 +263,7 @@ fn the_filter_follows_the_twin_for_an_hour() {
                 if sigma.is_finite() {
                     of_sigma += (off / sigma).powi(2) / 216_000.0;
                 }
-                worst = worst.max((got[axis] + off - wanted[axis]).abs());
+                worst = worse(worst, got[axis] + off - wanted[axis]);
             }
         }
         println!(
@@ -416,7 +429,7 @@ fn the_surge_behind_a_step_of_the_motor_is_taken_off() {
         let wanted = twin.step(&inputs(&raw, duty));
         for axis in 0..3 {
             let off = f64::from(frame.bias[axis].get()) / Q20 - biases[axis];
-            worst = worst.max((got[axis] + off - wanted[axis]).abs());
+            worst = worse(worst, got[axis] + off - wanted[axis]);
         }
         left = left.max(got[0].abs());
         read = read.max(f64::from(rate[0]).abs() * scale());
@@ -471,21 +484,5 @@ fn a_sway_is_no_rest() {
         );
         assert!(learned <= 2 + (12_000 >> shift) / 50, "{learned}");
         assert!((swayed - rested).abs() < 0.01, "{rested} {swayed}");
-    }
-}
-
-#[test]
-fn each_row_and_the_crcs_has_its_place_in_either_copy_and_none_behind_it() {
-    let mut correction = Correction::new();
-    for newest in [1, 2] {
-        correction.newest = newest;
-        for (other, copy) in [(false, newest), (true, 3 - newest)] {
-            let begin = COPIES[usize::from(copy) - 1];
-            for row in 0..=ROWS as u8 {
-                let place = begin + 6 * u16::from(row);
-                assert_eq!(correction.place(other, row), Some(place));
-            }
-            assert_eq!(correction.place(other, ROWS as u8 + 1), None);
-        }
     }
 }

@@ -22,7 +22,6 @@ pub(super) struct SelfTest {
     /// 0: none runs.
     step: u8,
     wait_ms: u8,
-    axis: u8,
 }
 
 /// Steps of the self-test, each with the job that it waits for.
@@ -38,7 +37,6 @@ impl SelfTest {
         Self {
             step: 0,
             wait_ms: 0,
-            axis: 0,
         }
     }
 
@@ -317,6 +315,7 @@ impl Stand {
     fn post<B: Board>(&mut self, board: &mut B, asked: &Asked, job: Job) -> Answer {
         if self.job.is_none() && board.post(job) {
             self.job = asked.into();
+            self.job_axis = job.axis;
             Answer::Later
         } else {
             Answer::Now(Status::Busy)
@@ -354,7 +353,13 @@ impl Stand {
                     status = Status::ReadBackWrong;
                 }
             }
-            _ => self.answer.value.set(value.into()),
+            code => {
+                // By hand: what the part is set to now is not what the set-up says.
+                if code == code::WRITE_REGISTER && !matches!(status, Status::BadArgument) {
+                    self.touched |= 1u8.wrapping_shl(self.job_axis.into());
+                }
+                self.answer.value.set(value.into());
+            }
         }
         let asked = core::mem::replace(&mut self.job, Pending::NONE);
         self.reply(board, asked, status);
@@ -372,10 +377,10 @@ impl Stand {
             Answer::Now(Status::Busy)
         } else {
             self.job = asked.into();
+            self.job_axis = sensor;
             self.self_test = SelfTest {
                 step: step::CLEAR_STATUS,
                 wait_ms: 1,
-                axis: sensor,
             };
             // Its rate is not to be trusted until the end.
             self.misconfigured |= 1 << sensor;
@@ -389,7 +394,7 @@ impl Stand {
         if test.wait_ms > 0 {
             return;
         }
-        let axis = test.axis;
+        let axis = self.job_axis;
         let (task, register) = match test.step {
             step::START => (Task::Write, Register::MscCtrl),
             step::HAS_ENDED => (Task::Read, Register::MscCtrl),
@@ -432,7 +437,7 @@ impl Stand {
             _ => status,
         };
         test.step = 0;
-        self.misconfigured &= !(1u8.wrapping_shl(test.axis.into()));
+        self.misconfigured &= !(1u8.wrapping_shl(self.job_axis.into()));
         Some(end)
     }
 }

@@ -1,9 +1,11 @@
-use adis16250::Word;
-use wire::{Command, Decoder, Frame, Request, Sample, encode_request};
+use adis16250::{Register, Word};
+use wire::{Command, Decoder, Frame, Request, Sample, encode_request, flags};
 
 use super::*;
+use crate::acquire::{Raw, Task};
 
 mod asked;
+mod registers;
 
 /// What the stand has asked the board for, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +33,7 @@ struct Board {
     free: bool,
     since: u16,
     stack: u16,
+    kept: [u16; 2],
 }
 
 impl Board {
@@ -47,6 +50,8 @@ impl Board {
             free: true,
             since: 0,
             stack: 99,
+            // As SRAM comes up.
+            kept: [0xdead; 2],
         }
     }
 }
@@ -110,6 +115,12 @@ impl super::Board for Board {
     }
     fn restarts(&self) -> u16 {
         0
+    }
+    fn kept(&self) -> [u16; 2] {
+        self.kept
+    }
+    fn keep(&mut self, counts: [u16; 2]) {
+        self.kept = counts;
     }
     fn stack_free(&self) -> u16 {
         self.stack
@@ -210,20 +221,31 @@ fn a_stored_set_up_comes_back_and_of_two_the_newer_one() {
 }
 
 #[test]
-fn each_cause_of_a_reset_has_its_counter() {
-    for (cause, watchdog, brown_out) in [
-        (reset_cause::POWER_ON, 0, 0),
-        (reset_cause::EXTERNAL, 0, 0),
-        (reset_cause::BROWN_OUT, 0, 1),
-        (reset_cause::WATCHDOG, 1, 0),
-        (reset_cause::WATCHDOG | reset_cause::BROWN_OUT, 1, 1),
-    ] {
-        let mut board = Board::new();
+fn each_cause_of_a_reset_has_its_counter_which_outlasts_resets_until_power_goes_or_it_is_cleared() {
+    use reset_cause::{BROWN_OUT, EXTERNAL, POWER_ON, WATCHDOG};
+    let mut board = Board::new();
+    let mut start = |cause, clear: bool| {
         board.cause = cause;
-        let stand = booted(&mut board);
-        assert_eq!(counted(&stand, Fault::WatchdogReset), watchdog, "{cause}");
-        assert_eq!(counted(&stand, Fault::BrownOutReset), brown_out, "{cause}");
-    }
+        let mut stand = booted(&mut board);
+        let told = [Fault::WatchdogReset, Fault::BrownOutReset].map(|f| counted(&stand, f));
+        if clear {
+            ask(&mut stand, &mut board, Command::ClearCounters);
+        }
+        told
+    };
+    assert_eq!(start(POWER_ON, false), [0, 0]);
+    assert_eq!(start(WATCHDOG, false), [1, 0]);
+    assert_eq!(start(EXTERNAL, false), [1, 0]);
+    assert_eq!(start(BROWN_OUT, false), [1, 1]);
+    assert_eq!(start(WATCHDOG | BROWN_OUT, false), [2, 2]);
+    assert_eq!(start(BROWN_OUT, true), [2, 3]);
+    assert_eq!(start(WATCHDOG, false), [1, 0]);
+    // Brown-out while power comes up is one.
+    assert_eq!(start(POWER_ON | BROWN_OUT, false), [0, 1]);
+    board.kept = [u16::MAX; 2];
+    board.cause = WATCHDOG;
+    let stand = booted(&mut board);
+    assert_eq!(counted(&stand, Fault::WatchdogReset), u16::MAX, "saturates");
 }
 
 #[test]

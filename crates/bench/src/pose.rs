@@ -124,6 +124,54 @@ mod tests {
     }
 
     #[test]
+    fn each_pose_is_reached_and_one_that_is_there_already_turns_nothing() {
+        let sides = [
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.3, -0.8, 0.2],
+        ];
+        let apart = |a: [f64; 3], b: [f64; 3]| {
+            let apart = [0, 1, 2].map(|k| a[k] - b[k]);
+            dot(apart, apart).sqrt()
+        };
+        for side in sides {
+            let over = side.map(|value: f64| -value);
+            let pose = |at_s, up| Pose {
+                at_s,
+                turn_s: 1.0,
+                up,
+            };
+            // There, there once more, over to the other side, and back.
+            let poses = [
+                pose(1.0, side),
+                pose(3.0, side),
+                pose(5.0, over),
+                pose(7.0, side),
+            ];
+            for (t, wanted) in [
+                (2.5, side),
+                (3.5, side),
+                (4.5, side),
+                (6.5, over),
+                (8.5, side),
+            ] {
+                let (up, rate) = at(&poses, t);
+                assert!(apart(up, unit(wanted)) < 1e-9, "{t} s: {up:?}");
+                assert!(dot(rate, rate).sqrt() < 1e-6, "{t} s: {rate:?}");
+            }
+            // Half way over it lies across, and turns at its fastest: pi over the second, times pi / 2.
+            let (up, rate) = at(&poses, 5.5);
+            assert!(dot(up, unit(side)).abs() < 1e-9, "{up:?}");
+            assert!(
+                (dot(rate, rate).sqrt() / (90.0 * PI) - 1.0).abs() < 1e-9,
+                "{rate:?}"
+            );
+            assert!(dot(rate, up).abs() < 1e-6, "about what lies across");
+        }
+    }
+
+    #[test]
     fn a_table_that_turns_carries_gravity_round() {
         // 0.5 at 0.6435 rad, seen from 0.4 rad further on.
         let [x, y, z] = on_table([0.4, 0.3, 0.9], 0.4);

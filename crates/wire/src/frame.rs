@@ -32,7 +32,8 @@ pub mod flags {
     pub const SUPPLY_OUT_OF_RANGE: u16 = 1 << 11;
     /// At least one accelerometer channel could not be converted; its counts are 0 and mean nothing.
     pub const ACC_NOT_CONVERTED: u16 = 1 << 12;
-    /// At least one gyro is set up differently from what the hello frame says, or its set-up is being repaired.
+    /// At least one gyro is set up differently from what the hello frame says, its set-up is being repaired, or a register of
+    /// it was written by hand since.
     pub const GYRO_MISCONFIGURED: u16 = 1 << 13;
 
     /// What a sample in order reads: three new readings and nothing else.

@@ -214,3 +214,131 @@ fn what_was_sent_while_nobody_listened_is_nobodys_loss() {
     (0..25).for_each(|_| push(&mut link, board.tick(None)));
     assert_eq!(link.losses().line, 1);
 }
+
+fn sample(seq: u16, t_ticks: u32) -> Frame {
+    Frame::Sample(Sample {
+        seq,
+        t_ticks,
+        ..Sample::default()
+    })
+}
+
+#[test]
+fn sixty_four_numbers_back_are_a_repetition_and_one_more_is_a_gap() {
+    // A repetition does not move what is expected next.
+    for (seq, gap, out_of_order, next) in [
+        (1_000, 0, 0, 1_001),
+        (999, 0, 1, 1_000),
+        (936, 0, 1, 1_000),
+        (935, 65_471, 0, 936),
+        (1_001, 1, 0, 1_002),
+    ] {
+        let mut link = LinkStats::new();
+        link.push(&sample(999, 50));
+        assert_eq!(link.push(&sample(seq, 60)), gap, "{seq}");
+        let losses = link.losses();
+        assert_eq!(losses.out_of_order, out_of_order, "{seq}");
+        assert_eq!(losses.unattributed, u64::from(gap), "{seq}");
+        assert_eq!(link.push(&sample(next, 70)), 0, "{seq}");
+    }
+}
+
+#[test]
+fn time_that_goes_on_by_less_than_half_its_circle_is_no_start() {
+    for (ticks, restarts) in [
+        (1, 0),
+        (0x7fff_ffff, 0),
+        (0x8000_0000, 1),
+        (u32::MAX, 1),
+        (0, 0),
+    ] {
+        let mut link = LinkStats::new();
+        link.push(&sample(7, 123));
+        link.push(&sample(8, 123u32.wrapping_add(ticks)));
+        assert_eq!(link.losses().restarts, restarts, "{ticks:#x}");
+    }
+}
+
+#[test]
+fn what_nobody_is_charged_with_adds_up_over_starts_and_interruptions() {
+    let mut link = LinkStats::new();
+    let lose = |link: &mut LinkStats, from: u16, lost: u16| {
+        link.push(&sample(from, u32::from(from)));
+        let next = from + lost + 1;
+        assert_eq!(link.push(&sample(next, u32::from(next))), lost);
+    };
+    lose(&mut link, 10, 3);
+    link.interrupted();
+    lose(&mut link, 100, 4);
+    link.interrupted();
+    assert_eq!(link.losses().unattributed, 7);
+    lose(&mut link, 200, 5);
+    // The board starts: the hello frame says so by its count of restarts.
+    let hello = |restarts, next_seq| {
+        Frame::Hello(Hello {
+            restarts,
+            next_seq,
+            ..Hello::default()
+        })
+    };
+    link.push(&hello(0, 206));
+    assert_eq!(link.losses().restarts, 0);
+    link.push(&hello(1, 0));
+    assert_eq!(
+        (link.losses().restarts, link.losses().unattributed),
+        (1, 12)
+    );
+    lose(&mut link, 0, 6);
+    assert_eq!(link.losses().unattributed, 18, "not yet bracketed");
+    // The same start, told once more on request, is none; a number that falls to 0 is one even where the count stays.
+    link.push(&hello(1, 8));
+    assert_eq!(link.losses().restarts, 1);
+    link.push(&hello(1, 0));
+    assert_eq!(
+        (link.losses().restarts, link.losses().unattributed),
+        (2, 18)
+    );
+    link.push(&hello(1, 0));
+    assert_eq!(link.losses().restarts, 2, "nothing was spent in between");
+}
+
+#[test]
+fn a_health_frame_charges_no_more_than_is_missing_and_only_between_two_of_one_start() {
+    let health = |uptime_s, next_seq, lost| {
+        let mut faults = FaultCounts::default();
+        (0..lost).for_each(|_| faults.record(Fault::FrameDropped));
+        Frame::Health(Health {
+            uptime_s,
+            next_seq,
+            faults,
+            ..Health::default()
+        })
+    };
+    let mut link = LinkStats::new();
+    // Heard from the middle on: what it lost before is not known.
+    link.push(&sample(50, 50));
+    assert_eq!(link.push(&health(3, 53, 9)), 2);
+    assert_eq!(link.losses().unattributed, 2);
+    // Nothing is missing: a counter that has moved all the same charges nobody.
+    link.push(&sample(53, 53));
+    assert_eq!(link.push(&health(4, 54, 12)), 0);
+    // Three are missing, two of them the board's.
+    assert_eq!(link.push(&health(5, 57, 14)), 3);
+    // In the same second too.
+    assert_eq!(link.push(&health(5, 58, 15)), 1);
+    let expected = Losses {
+        received: 2,
+        device: 3,
+        line: 1,
+        unattributed: 2,
+        ..Losses::default()
+    };
+    assert_eq!(link.losses(), expected);
+    // Less time than before is a start; what it lost since nobody knows.
+    link.push(&health(1, 20, 4));
+    assert_eq!((link.losses().restarts, link.losses().device), (1, 3));
+    link.push(&sample(20, 20));
+    link.push(&sample(22, 22));
+    link.push(&health(2, 23, 5));
+    assert_eq!((link.losses().device, link.losses().unattributed), (4, 2));
+}

@@ -17,7 +17,7 @@ fn hellos(board: &Board) -> usize {
 }
 
 /// A job has ended with the sample.
-fn ended(stand: &mut Stand, board: &mut Board, task: Task, status: Status, value: u16) {
+pub(super) fn ended(stand: &mut Stand, board: &mut Board, task: Task, status: Status, value: u16) {
     let done = Done {
         task,
         status,
@@ -26,11 +26,11 @@ fn ended(stand: &mut Stand, board: &mut Board, task: Task, status: Status, value
     stand.on_sample(board, &Raw { done, ..raw() }, 0);
 }
 
-fn milliseconds(stand: &mut Stand, board: &mut Board, count: u16) {
+pub(super) fn milliseconds(stand: &mut Stand, board: &mut Board, count: u16) {
     (0..count).for_each(|_| stand.on_millisecond(board));
 }
 
-fn jobs(board: &Board) -> Vec<Job> {
+pub(super) fn jobs(board: &Board) -> Vec<Job> {
     let job = |deed: &Deed| match deed {
         Deed::Job(job) => Some(*job),
         _ => None,
@@ -344,50 +344,6 @@ fn a_self_test_goes_step_by_step_and_each_way_it_ends_is_told() {
     let sensor = wire::Sensor::Accelerometer;
     ask(&mut stand, &mut board, Command::SelfTest { sensor });
     assert_eq!(last_reply(&board).status, Status::Unsupported);
-}
-
-#[test]
-fn registers_are_read_and_written_by_a_job_that_is_answered_when_it_is_done() {
-    let mut board = Board::new();
-    let mut stand = booted(&mut board);
-    board.deeds.clear();
-    let gyro = wire::Axis::Z;
-    let read = Command::ReadRegister {
-        gyro,
-        address: 0x38,
-    };
-    ask(&mut stand, &mut board, read);
-    ask(&mut stand, &mut board, read);
-    assert_eq!(last_reply(&board).status, Status::Busy);
-    ended(&mut stand, &mut board, Task::Read, Status::Ok, 0xbeef);
-    let reply = last_reply(&board);
-    assert_eq!((reply.status, reply.value), (Status::Ok, 0xbeef));
-    let value = 0x1234;
-    let write = Command::WriteRegister {
-        gyro,
-        address: 0x36,
-        value,
-    };
-    ask(&mut stand, &mut board, write);
-    ended(
-        &mut stand,
-        &mut board,
-        Task::Write,
-        Status::ReadBackWrong,
-        1,
-    );
-    let reply = last_reply(&board);
-    assert_eq!((reply.status, reply.value), (Status::ReadBackWrong, 1));
-    let job = |task, address, value| Job {
-        task,
-        axis: 2,
-        address,
-        value,
-    };
-    assert_eq!(
-        jobs(&board),
-        [job(Task::Read, 0x38, 0), job(Task::Write, 0x36, value)]
-    );
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! A copy of the working tree in which mutants are compiled and tested, so that nobody's files change.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -12,8 +13,10 @@ use crate::step::{Failure, Pace};
 const DEADLINE: Duration = Duration::from_secs(900);
 /// How often the clock is looked at.
 const LOOKED: Duration = Duration::from_millis(50);
+/// And how often what the tests have said so far is read.
+const LOOKS_PER_READING: u32 = 40;
 /// A test that takes longer than that hangs: none takes a minute on two idle cores.
-const PATIENCE: Duration = Duration::from_secs(600);
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// The tests of purpose of a package: stages, of which the later ones run where the earlier ones noticed nothing.
 fn stages(package: &str) -> &'static [&'static [&'static str]] {
@@ -28,6 +31,8 @@ fn stages(package: &str) -> &'static [&'static [&'static str]] {
                 "-p",
                 "wire",
                 "--lib",
+                "--test",
+                "decode",
                 "--test",
                 "link",
                 "--test",
@@ -86,12 +91,16 @@ impl Tree {
         let names = output.ok_or_else(|| {
             Failure::new("git does not list the files", "is this a checkout of git?")
         })?;
-        for name in String::from_utf8_lossy(&names.stdout).split_terminator('\0') {
+        let names = String::from_utf8_lossy(&names.stdout).into_owned();
+        let mut there = BTreeSet::new();
+        for name in names.split_terminator('\0') {
             // Deleted, but not yet told to git.
             if let Ok(bytes) = std::fs::read(root.join(name)) {
                 tree.put(name, &bytes)?;
+                there.insert(tree.root.join(name));
             }
         }
+        forget(&tree.root, &there);
         Ok(tree)
     }
 
@@ -215,15 +224,19 @@ impl Tree {
             .stderr(err)
             .spawn()
             .map_err(|error| Failure::new(&format!("cargo: {error}"), "is it in PATH?"))?;
-        let from = Instant::now();
+        let (from, mut looks) = (Instant::now(), 1u32);
         let status = loop {
             if let Ok(Some(status)) = child.try_wait() {
                 break Some(status);
             }
-            if from.elapsed() > patience {
+            // One that failed is enough: others may hang.
+            if from.elapsed() > patience
+                || looks.is_multiple_of(LOOKS_PER_READING) && has_failed(&log)
+            {
                 end(&mut child);
                 break None;
             }
+            looks += 1;
             std::thread::sleep(LOOKED);
         };
         let said = std::fs::read(&log).unwrap_or_default();
@@ -239,9 +252,23 @@ impl Tree {
             },
             None => Ended {
                 passed: false,
-                by: "a test that does not end".to_owned(),
+                by: failed_so_far(&said).unwrap_or_else(|| "a test that does not end".to_owned()),
             },
         })
+    }
+}
+
+/// Removes from a copy what has been renamed or deleted since it was made, but for what was built there.
+fn forget(folder: &Path, there: &BTreeSet<PathBuf>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            if entry.file_name() != "target" {
+                forget(&path, there);
+            }
+        } else if !there.contains(&path) && entry.file_name() != "Cargo.lock" {
+            let _ = std::fs::remove_file(&path);
+        }
     }
 }
 
@@ -259,6 +286,20 @@ fn failed(said: &str) -> String {
         Some(name.to_owned())
     });
     named.unwrap_or_else(|| "the test program, which ended".to_owned())
+}
+
+/// The first test that failed, while others still run: their names follow at the end alone.
+fn failed_so_far(said: &str) -> Option<String> {
+    let named = said
+        .lines()
+        .find_map(|line| line.strip_suffix(" --- FAILED"))?;
+    // Behind the dots of those that have passed.
+    Some(named.trim_start_matches('.').to_owned())
+}
+
+fn has_failed(log: &Path) -> bool {
+    let said = std::fs::read(log).unwrap_or_default();
+    failed_so_far(&String::from_utf8_lossy(&said)).is_some()
 }
 
 /// A group of its own, so that what it starts ends with it.
@@ -280,12 +321,37 @@ fn end(child: &mut Child) {
 
 #[cfg(test)]
 mod tests {
-    use super::failed;
+    use super::{failed, failed_so_far, forget};
+
+    #[test]
+    fn what_was_renamed_is_gone_from_the_copy_and_what_was_built_stays() {
+        let root = std::env::temp_dir().join(format!("mutants-{}", std::process::id()));
+        for name in ["a/new.rs", "a/old.rs", "target/built"] {
+            let path = root.join(name);
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("room");
+            std::fs::write(path, "").expect("room");
+        }
+        forget(&root, &[root.join("a/new.rs")].into());
+        let is_there = |name: &str| root.join(name).exists();
+        let left = (
+            is_there("a/new.rs"),
+            is_there("a/old.rs"),
+            is_there("target/built"),
+        );
+        std::fs::remove_dir_all(&root).expect("it is ours");
+        assert_eq!(left, (true, false, true));
+    }
 
     #[test]
     fn the_first_test_that_failed_is_named() {
         let said = "running 2 tests\n\nfailures:\n\n---- motor::tests::it_stops stdout ----\npanicked\n---- b stdout ----\n";
         assert_eq!(failed(said), "motor::tests::it_stops");
         assert_eq!(failed("signal: 11"), "the test program, which ended");
+        let said = "running 3 tests\n.. 2/3\n.motor::tests::it_stops --- FAILED\n";
+        assert_eq!(
+            failed_so_far(said).as_deref(),
+            Some("motor::tests::it_stops")
+        );
+        assert_eq!(failed_so_far("running 3 tests\n..."), None);
     }
 }

@@ -379,6 +379,37 @@ fn registers_hold_rounded_and_clamped_counts_and_the_angle_goes_round() {
     assert!((f64::from(out.angle) - (16384.0 - 100.0 / 0.036_63)).abs() < 60.0);
 }
 
+/// The sensors' own noise: 0.05 degC and 1 mV, and the rounding of a count, whose variance is a twelfth.
+#[test]
+fn temperature_and_supply_have_their_noise() {
+    let mut chain = chain(still(), &[]);
+    let adis = Adis16250::new();
+    let n = 20_000;
+    let spread = |values: Vec<f64>| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        rms(&values.iter().map(|x| x - mean).collect::<Vec<_>>())
+    };
+    // The world creeps over many counts, so that rounding is even; what it is then is taken off.
+    let (mut temp, mut supply) = (vec![], vec![]);
+    for k in 0..n {
+        let part = f64::from(k) / f64::from(n);
+        let world = Stimulus {
+            die_c: 25.0 + 20.0 * TEMP_LSB_C * part,
+            supply_v: 5.0 + 20.0 * SUPPLY_LSB_V * part,
+            ..world()
+        };
+        let (outputs, _) = chain.sample(&world, &adis, 1.0, DT);
+        temp.push(f64::from(outputs.temp) - 20.0 * part);
+        supply.push(f64::from(outputs.supply) - 20.0 * part);
+    }
+    for (values, sigma) in [(temp, 0.05 / TEMP_LSB_C), (supply, 1e-3 / SUPPLY_LSB_V)] {
+        let wanted = (sigma * sigma + 1.0 / 12.0).sqrt();
+        let got = spread(values);
+        // 20 000 values: 0.5 % rms.
+        assert!((got / wanted - 1.0).abs() < 0.03, "{got}, not {wanted}");
+    }
+}
+
 #[test]
 fn alarms_have_their_thresholds() {
     let adis = Adis16250::new();

@@ -43,6 +43,7 @@ pub(super) struct Chip {
     pub reboot: bool,
     pub cause: u8,
     pub restarts: u16,
+    pub kept: [u16; 2],
     pub last_tick: u64,
     /// Ticks since power came on, this one not counted.
     pub ticks: usize,
@@ -73,6 +74,7 @@ impl Chip {
             reboot: false,
             cause: reset_cause::POWER_ON,
             restarts: 0,
+            kept: [0; 2],
             last_tick: 0,
             ticks: 0,
         }
@@ -356,6 +358,14 @@ impl Board for HostBoard {
 
     fn restarts(&self) -> u16 {
         self.0.borrow().restarts
+    }
+
+    fn kept(&self) -> [u16; 2] {
+        self.0.borrow().kept
+    }
+
+    fn keep(&mut self, counts: [u16; 2]) {
+        self.0.borrow_mut().kept = counts;
     }
 
     fn stack_free(&self) -> u16 {

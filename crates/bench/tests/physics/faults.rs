@@ -177,3 +177,41 @@ fn the_motor_faults_follow_the_current() {
         "{rate} deg/s at {current} A"
     );
 }
+
+/// A sensor that leans by the angle whose sine is 0.6 feels 0.6 of the other axis and 0.8 of its own.
+#[test]
+fn a_gyro_that_leans_reads_both_axes_by_sine_and_cosine() {
+    let turned = |gyro: usize, from: usize, share: f64| {
+        let mut scenario = silent(15).with(Fault::Misalignment { gyro, from, share });
+        scenario.motor.table_ratio = 0.004;
+        // Floor and supply have nothing to do with it.
+        scenario.supply.wander_v = 0.0;
+        let stand = &mut Stand::new(&scenario);
+        stand.set_motor(0.5, 1.0);
+        let rates = [0, 1, 2].map(|axis| signed(read(stand, axis, register::GYRO_OUT, 9.0)) * LSB);
+        (rates, stand.motor().table_dps())
+    };
+    for (share, own) in [(0.6, 0.8), (-0.6, 0.8), (0.28, 0.96)] {
+        for from in [0, 1] {
+            // About z alone: nothing comes over from the other axis, and its own grows less.
+            let (rates, table) = turned(2, from, share);
+            assert!(table > 20.0, "{table}");
+            for (axis, wanted) in [(0, 0.0), (1, 0.0), (2, own * table)] {
+                assert!(
+                    (rates[axis] - wanted).abs() <= LSB,
+                    "{axis}: {}",
+                    rates[axis]
+                );
+            }
+            // And one that leans towards it.
+            let (rates, table) = turned(from, 2, share);
+            for (axis, wanted) in [(from, share * table), (1 - from, 0.0), (2, table)] {
+                assert!(
+                    (rates[axis] - wanted).abs() <= LSB,
+                    "{axis}: {}",
+                    rates[axis]
+                );
+            }
+        }
+    }
+}

@@ -144,6 +144,27 @@ fn a_self_test_lasts_25_ms_and_clears_its_bit() {
     assert_eq!(part.get(reg::MSC_CTRL), 0x0301);
 }
 
+/// The bit is in the upper byte, which a driver may write alone; the lower byte starts no test and ends none.
+#[test]
+fn a_self_test_is_started_by_its_bit_and_by_no_other() {
+    let byte = |part: &mut Adis16250, address: u8, value: u8, t: f64| {
+        part.frame(0x8000 | u16::from(address) << 8 | u16::from(value), t);
+    };
+    let mut part = part();
+    byte(&mut part, reg::MSC_CTRL + 1, 1 << 2, T);
+    part.refresh(outputs(0), 0, T + 0.024);
+    assert_eq!(part.get(reg::MSC_CTRL), 1 << 10);
+    part.refresh(outputs(0), 0, T + 0.026);
+    assert_eq!(part.get(reg::MSC_CTRL), 0, "it has ended");
+    // Asleep for no time at all it is awake, and so it is after other registers.
+    byte(&mut part, reg::SLP_CNT, 0, T + 1.0);
+    byte(&mut part, reg::SENS_AVG, 4, T + 1.0);
+    assert!(!part.is_busy(T + 1.0));
+    byte(&mut part, reg::SLP_CNT, 1, T + 1.0);
+    assert!(part.is_busy(T + 1.49) && !part.is_busy(T + 1.51));
+    assert_eq!(part.get(reg::SLP_CNT), 0, "it counts down to nothing");
+}
+
 #[test]
 fn asleep_it_answers_nothing_for_half_a_second_a_count() {
     let mut part = part();

@@ -4,7 +4,7 @@
 use adis16250::{
     Access, Adis16250, Alarm, AlarmNumber, AlarmOutput, AlarmSource, AuxCounts, Command, DataReady,
     Error, Filter, Line, OffsetCounts, Pace, Polarity, Range, Register, SamplePeriod, SensAvg,
-    Status, Stimulus, Trigger, Word,
+    Status, Stimulus, Trigger,
 };
 use embedded_hal_mock::eh1::delay::{CheckedDelay, Transaction as Pause};
 use embedded_hal_mock::eh1::spi::{Mock as Spi, Transaction as Bus};
@@ -442,74 +442,4 @@ fn data_ready_and_stimulus_have_a_byte_each() {
             Ok::<_, Error<_>>(())
         })
         .unwrap();
-}
-
-#[test]
-fn ref_scaling_points_of_the_data_sheet() {
-    let near = |micro: i64, expected: i64, tolerance: i64| {
-        assert!((micro - expected).abs() <= tolerance, "{micro}")
-    };
-    near(
-        Word(4368).rate().micro_dps(Range::Dps320).into(),
-        320_000_000,
-        73_260,
-    );
-    near(
-        Word(8192).rate().micro_dps(Range::Dps320).into(),
-        -600_145_920,
-        0,
-    );
-    near(Word(2730).supply().microvolts().into(), 5_000_000, 1_832);
-    near(
-        Word(0x0E41).temperature().micro_celsius().into(),
-        -40_000_000,
-        145_300,
-    );
-    near(
-        Word(413).temperature().micro_celsius().into(),
-        85_000_000,
-        145_300,
-    );
-    near(Word(4095).aux().microvolts().into(), 2_500_000, 611);
-    near(
-        Word(9828).angle().micro_degrees().into(),
-        360_000_000,
-        36_630,
-    );
-    assert!(
-        Word(2594).supply().is_in_range() && !Word(2593).supply().is_in_range(),
-        "4.75 V"
-    );
-    assert!(
-        Word(2866).supply().is_in_range() && !Word(2867).supply().is_in_range(),
-        "5.25 V"
-    );
-}
-
-#[test]
-fn bits_of_the_twelve_bit_outputs_that_mean_nothing_are_dropped() {
-    assert_eq!(Word(0xB000 | 0x0E41).temperature().0, -447);
-    assert_eq!(Word(0xF000 | 2730).supply().0, 2730);
-    assert_eq!(Word(0xC000 | 0x3FFF).rate().0, -1);
-}
-
-/// The fixed-point product against the same in 64 bits, for every code.
-#[test]
-fn q16_rates_are_the_exact_product_rounded_down() {
-    for range in [Range::Dps320, Range::Dps160, Range::Dps80] {
-        let scale = range.scale_q24();
-        assert!(
-            (i64::from(scale) * 1_000_000 - (i64::from(range.micro_dps_per_count()) << 24)).abs()
-                <= 500_000
-        );
-        for code in 0..0x4000_u16 {
-            let counts = Word(code).rate();
-            let exact = (i64::from(counts.0) * i64::from(scale)) >> 8;
-            assert_eq!(
-                i64::from(counts.dps_q16(scale)),
-                exact,
-                "{counts:?} {range:?}"
-            );
-        }
-    }
 }

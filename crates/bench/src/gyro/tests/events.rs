@@ -75,8 +75,6 @@ fn stalls_glitches_and_dead_lines_come_where_they_are_planned_to() {
         assert!((0.0..=DT).contains(&(t - time)), "{t} {time}");
         near(counts.abs(), (30.0 / LSB).round());
     }
-    let both = |sign: f64| struck.iter().any(|(_, counts)| counts.signum() == sign);
-    assert!(both(1.0) || both(-1.0));
     for (level, all) in [(true, 0xffff), (false, 0)] {
         let mut gyro = plan(&[Fault::DeadSpi {
             gyro: 1,
@@ -125,6 +123,48 @@ fn stalls_glitches_and_dead_lines_come_where_they_are_planned_to() {
     let gyro = plan(&others);
     assert!(gyro.stalls.is_empty() && gyro.glitches.is_empty() && gyro.dead.is_empty());
     assert_eq!(gyro.chain.part.pole_hz, 50.0);
+}
+
+/// Whether values fill a range evenly: mean and variance of a uniform law, both within four standard errors.
+fn is_even(values: &[f64], low: f64, high: f64) {
+    let n = values.len() as f64;
+    assert!(values.iter().all(|x| (low..=high).contains(x)));
+    let half = (high - low) / 2.0;
+    let mean = values.iter().sum::<f64>() / n;
+    let off = (mean - (low + half)) / half;
+    // On -1 .. 1 the variance is 1/3 and the fourth moment 1/5.
+    assert!(off.abs() < 4.0 / (3.0 * n).sqrt(), "{off}");
+    let of_square = |x: &f64| ((x - low) / half - 1.0).powi(2);
+    let variance = values.iter().map(of_square).sum::<f64>() / n;
+    let error = (1.0 / 5.0 - 1.0 / 9.0) / n;
+    assert!((variance - 1.0 / 3.0).abs() < 4.0 * error.sqrt());
+}
+
+#[test]
+fn events_are_spread_over_the_run_and_discharges_have_either_sign_as_often() {
+    let (count, seconds, length_s) = (1000, 40.0, 8.0);
+    let faults = [
+        Fault::Stall {
+            gyro: 1,
+            count,
+            length_s,
+            flags: StallFlags::Silent,
+        },
+        Fault::Glitches {
+            gyro: 1,
+            count,
+            height_dps: 30.0,
+        },
+    ];
+    let gyro = Gyro::new(1, &still(), &faults, &[], seconds, 5);
+    let starts: Vec<f64> = gyro.stalls.iter().map(|stall| stall.0).collect();
+    is_even(&starts, 1.0, seconds - length_s);
+    let times: Vec<f64> = gyro.glitches.iter().map(|glitch| glitch.0).collect();
+    is_even(&times, 1.0, seconds);
+    let up = gyro.glitches.iter().filter(|glitch| glitch.1 > 0).count();
+    // Four standard errors of half of them.
+    let off = (up as f64 - 500.0) / (1000f64.sqrt() / 2.0);
+    assert!(off.abs() < 4.0, "{up} of {count}");
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub enum Register {
         /// Name of the data sheet (SENS_AVG, STATUS, ...), address (0x38), or `all`
         register: String,
     },
-    /// Write one register and read it back
+    /// Write one register and read it back; the samples are flagged as misconfigured until `board set gyro` or a restart
     Write {
         /// x, y or z
         axis: AxisName,

@@ -1,5 +1,7 @@
 //! The firmware's logic on the simulated stand, by its bytes.
 
+mod board;
+
 use std::ops::ControlFlow;
 use std::time::Instant;
 
