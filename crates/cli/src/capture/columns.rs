@@ -13,7 +13,7 @@ use super::header::Lines;
 use super::mapped::{beside_ours, by_known_names, mapped};
 use super::names::{TIMES, left, meant, missing, not_read, respelt};
 use super::propose::unknown;
-use super::units::{COUNTS, What, convert, in_brackets, known, usual};
+use super::units::{COUNTS, What, convert, in_brackets};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
 
 /// A column of the file: what it is here, and how its cells become values.
