@@ -272,6 +272,7 @@ fn pretty(value: &impl Serialize) -> Result<String, Failure> {
         what: error.to_string(),
         help: None,
         proposal: None,
+        span: None,
     })?;
     Ok(text + "\n")
 }
