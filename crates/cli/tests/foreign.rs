@@ -101,7 +101,7 @@ fn a_header_in_a_comment_is_one_and_a_table_without_names_goes_by_numbers() {
     );
     let said = error(none.as_bytes(), "", "");
     assert!(
-        said.contains("--columns time=1,gyro_x=2,gyro_y=3 --units gyro=deg/s"),
+        said.contains("--columns time=1,gyro_x=2,gyro_y=3 --units gyro=UNIT"),
         "{said}"
     );
     let said = error(none.as_bytes(), "gyro_x=4", "");
@@ -169,20 +169,33 @@ fn time_is_read_in_its_unit_and_as_a_date_and_asked_for_where_seconds_make_no_se
         .chain(rows)
         .collect();
     is_the_table(&read(text.as_bytes(), map, "gyro=deg/s").expect("dates"));
-    let said = error(b"t,gx,gy\n0,1,0\n2,1,0\n1,1,0\n9,1,0\n2,2,0\n", map, "");
+    let said = error(
+        b"t,gx,gy\n0,1,0\n2,1,0\n1,1,0\n9,1,0\n2,2,0\n",
+        map,
+        "gyro=deg/s",
+    );
     assert!(said.contains("first in row 3"), "{said}");
 }
 
 #[test]
-fn what_is_assumed_is_told_and_what_contradicts_itself_is_refused() {
+fn a_gyros_unit_is_asked_for_what_is_assumed_is_told_and_what_contradicts_itself_is_refused() {
     let map = "time=t,gyro_x=gx,gyro_y=gy";
     let text = table("t,gx,gy\n", ",", ".", 1.0, 1.0);
-    let notes = read(text.as_bytes(), map, "").expect("deg/s").record.notes;
-    assert_eq!(notes.len(), 1);
+    let said = error(text.as_bytes(), map, "");
     assert!(
-        notes[0].starts_with("gyro_x, gyro_y taken in deg/s"),
-        "{notes:?}"
+        said.contains("nothing says the unit of gyro_x, gyro_y") && said.contains("gyro=rad/s"),
+        "{said}"
     );
+    let counts = table("t,gx,gy\n", ",", ".", 1e4, 131.0);
+    let units = "time=0.1ms,gyro=0.00763358778625954deg/s";
+    is_the_table(&read(counts.as_bytes(), map, units).expect("counts"));
+    let warm = "time=t,gyro_x=gx,temp=gy";
+    let notes = read(text.as_bytes(), warm, "gyro=deg/s")
+        .expect("degC")
+        .record
+        .notes;
+    assert_eq!(notes.len(), 1);
+    assert!(notes[0].starts_with("temp taken in degC"), "{notes:?}");
     let head = table("t,gx (rad/s),gy (rad/s)\n", ",", ".", 1.0, 1.0);
     let notes = read(head.as_bytes(), map, "gyro=deg/s")
         .expect("deg/s")
@@ -257,7 +270,11 @@ fn text_in_a_column_that_nobody_asked_for_is_left_alone_and_told() {
     );
     assert_eq!(mapped.expect("two columns").record.channels.len(), 1);
     // Who asks for it is told that it cannot be had.
-    let said = error(b"t,gx,note\n0,1,a\n0.02,2,b\n", "gyro_x=gx,acc_x=note", "");
+    let said = error(
+        b"t,gx,note\n0,1,a\n0.02,2,b\n",
+        "gyro_x=gx,acc_x=note",
+        "gyro=deg/s",
+    );
     assert!(said.contains("line 2, column `acc_x`: `a`"), "{said}");
 }
 
@@ -392,6 +409,60 @@ fn lines_before_the_table_are_passed_over_and_told() {
         said.contains("there is no column `gx`; the columns are: remark"),
         "{said}"
     );
+}
+
+#[test]
+fn files_put_end_to_end_with_their_names_are_read_on_and_told() {
+    let part = table("t_s,gx_dps,gy_dps\n", ",", ".", 1.0, 1.0);
+    let later: String = (8..16)
+        .map(|k| format!("{:.2},1,-1\n", 0.02 * f64::from(k)))
+        .collect();
+    let text = format!("{part}t_s,gx_dps,gy_dps\n{later}");
+    let both = read(text.as_bytes(), "", "").expect("two parts");
+    assert_eq!(both.record.len(), 16);
+    let notes = both.record.notes.join("; ");
+    assert!(
+        notes.contains("stand again 1 x, first in line 10"),
+        "{notes}"
+    );
+    // Other names are no names again.
+    let other = format!("{part}{}", part.replace("gy_dps", "gz_dps"));
+    let said = error(other.as_bytes(), "", "");
+    assert!(said.contains("line 10"), "{said}");
+}
+
+#[test]
+fn decimal_commas_between_commas_and_names_that_stand_twice_are_told() {
+    let text = table("t_s,gx_dps,gy_dps\n", ",", ",", 1.0, 1.0);
+    let said = error(text.as_bytes(), "", "");
+    assert!(
+        said.contains("the table has 3 columns") && said.contains("decimal commas"),
+        "{said}"
+    );
+    let said = error(b"t_s,gx_dps,gx_dps\n0,1,2\n1,3,1\n", "", "");
+    assert!(
+        said.contains("two columns are called `gx_dps`") && said.contains("gyro_x=2"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_column_of_dates_is_a_time_whatever_it_is_called() {
+    for name in ["date", "datetime", "UTC"] {
+        let rows = (0..8).map(|k| format!("2026-03-01T12:00:00.{:03}Z,{k}\n", 20 * k));
+        let text: String = std::iter::once(format!("{name},gx_dps\n"))
+            .chain(rows)
+            .collect();
+        let read = read(text.as_bytes(), "", "").expect(name);
+        let times = read.record.host_time_s.expect("a time");
+        assert!(
+            (times[7] - times[0] - 0.14).abs() < 1e-9,
+            "{name}: {times:?}"
+        );
+    }
+    let day = "date,time,gx_dps\n2026-03-01,12:00:00.00,1\n2026-03-01,12:00:00.02,2\n";
+    let read = read(day.as_bytes(), "", "").expect("a day and a time of day");
+    assert!(read.record.host_time_s.is_some());
 }
 
 /// Pieces that tables are made of, right and wrong.

@@ -345,13 +345,13 @@ fn what_cannot_be_read_is_said_once_and_a_cut_file_by_its_name() {
     let (none, few) = (folder.join("none.csv"), folder.join("few.csv"));
     std::fs::write(&none, format!("t,gx\n{}", "0,\n".repeat(700))).unwrap();
     std::fs::write(&few, "t,gx\n0,1\n1,3\n2,2\n").unwrap();
-    let columns = ["--columns", "gyro_x=gx", "--rate", "20"];
+    let columns = "--columns gyro_x=gx --units gyro=deg/s --rate 20".split(' ');
     for (command, path, told) in [
         ("diagnose", &none, "map the columns"),
         ("plan", &few, "64 samples"),
     ] {
         let mut line = vec![command, path.to_str().unwrap()];
-        line.extend(columns);
+        line.extend(columns.clone());
         line.extend(
             ["--want", "K within 20 %"]
                 .iter()

@@ -54,18 +54,58 @@ fn npz_and_mat_give_the_columns_of_their_matrices() {
     }
     // A scalar is a key of the header.
     for name in ["imu.npz", "imu73.mat"] {
-        let record = read(&data(name), "gyro_x=gyr[0]", "").unwrap();
+        let record = read(&data(name), "gyro_x=gyr[0]", "gyro=rad/s").unwrap();
         assert_eq!(record.header.rate_hz, Some(10.0));
     }
     // A field of a struct.
-    let record = read(&data("imu73.mat"), "gyro_x=gyr[0],temp=run.temp", "").unwrap();
+    let record = read(
+        &data("imu73.mat"),
+        "gyro_x=gyr[0],temp=run.temp",
+        "gyro=rad/s",
+    )
+    .unwrap();
     assert!((values(&record, "temp")[49] - 24.9).abs() < 1e-12);
+}
+
+/// `imu/gyro` of three columns in rad/s, `imu/time` in ms, by h5py: 50 rows.
+#[test]
+fn the_units_that_hdf5_states_are_taken() {
+    let record = read(&data("units.h5"), "", "").unwrap();
+    let x = values(&record, "gyro_x");
+    assert!((x[3] - 3f64.to_degrees()).abs() < 1e-9, "{x:?}");
+    let times = record.host_time_s.as_ref().expect("a time");
+    assert!((times[10] - times[0] - 0.5).abs() < 1e-12, "{times:?}");
+}
+
+#[test]
+fn a_file_that_was_cut_off_or_is_of_an_old_version_is_told_so() {
+    let folder = folder_of("a_file_that_was_cut_off");
+    let whole = std::fs::read(data("zstd.parquet")).unwrap();
+    let path = folder.join("cut.parquet");
+    std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    let error = read(&path, "", "").unwrap_err();
+    assert!(
+        error.contains("begins as Parquet and does not end so"),
+        "{error}"
+    );
+    // The head of a matrix of version 4: kind, rows, columns, no imaginary part, length of the name.
+    let path = folder.join("old.mat");
+    let head: Vec<u8> = [0_u32, 2, 1, 0, 2]
+        .iter()
+        .flat_map(|n| n.to_le_bytes())
+        .collect();
+    std::fs::write(&path, [&head[..], b"x\0", &[0; 16]].concat()).unwrap();
+    let error = read(&path, "", "").unwrap_err();
+    assert!(
+        error.contains("version 4") && error.contains("-v7"),
+        "{error}"
+    );
 }
 
 #[test]
 fn parquet_gives_nulls_as_missing_and_stamps_as_seconds() {
     let columns = "time=stamp,gyro_x=gx,gyro_y=gy,temp=temp";
-    let record = read(&data("imu.parquet"), columns, "").unwrap();
+    let record = read(&data("imu.parquet"), columns, "gyro=deg/s").unwrap();
     assert!(values(&record, "gyro_x")[7].is_nan());
     assert_eq!(values(&record, "gyro_x")[8], 4.0);
     assert_eq!(values(&record, "gyro_y")[45], -11.25);
@@ -133,9 +173,9 @@ fn what_cannot_be_read_is_named_with_what_there_is() {
         let error = read(&path, "", "").unwrap_err();
         assert!(error.contains(expected), "{name}: {error}");
     }
-    let error = read(&folder.join("short.txt"), "gyro_x=1", "").unwrap_err();
+    let error = read(&folder.join("short.txt"), "gyro_x=1", "gyro=deg/s").unwrap_err();
     assert!(
-        error.contains("line 2") && error.contains("1 cells"),
+        error.contains("line 2 has 1 cells, and the table has 2 columns"),
         "{error}"
     );
 }

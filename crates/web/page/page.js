@@ -19,7 +19,7 @@ async function start() {
   links.splice(0).forEach((link) => URL.revokeObjectURL(link));
   ['failed', 'downloads', 'report'].forEach((id) => show(id, false));
   const rate = part('rate').value.trim().replace(',', '.');
-  const read = { name: file.name, columns: part('columns').value, units: part('units').value, rate_hz: rate ? Number(rate) : null };
+  const read = { name: file.name, columns: part('columns').value, units: part('units').value, rate_hz: rate ? Number(rate) : null, span: part('span').value };
   if (rate && !(read.rate_hz > 0)) return fail({ what: `the sample rate is \`${rate}\``, help: 'it has to be a number above 0, in Hz' });
   const began = Date.now();
   let says = 'starting';
@@ -44,15 +44,16 @@ async function start() {
   }
 }
 
-function fail({ what, help, proposal }) {
+function fail({ what, help, proposal, span }) {
   part('said').textContent = '';
   part('failed').textContent = help ? `${what}\n\n${help}` : what;
   show('failed', true);
   if (proposal) {
     [part('columns').value, part('units').value] = proposal;
-    part('mapping').open = true;
   }
-  dispatchEvent(new CustomEvent('failed', { detail: { what, help, proposal } }));
+  if (span) part('span').value = span;
+  if (proposal || span) part('mapping').open = true;
+  dispatchEvent(new CustomEvent('failed', { detail: { what, help, proposal, span } }));
 }
 
 function finish(done, seconds) {

@@ -2,7 +2,7 @@
 
 use diagnosis::DiagnoseOptions;
 use diagnosis::result::Diagnosed;
-use imu_stand::capture::{CaptureError, Read, read_from, unpacked};
+use imu_stand::capture::{CaptureError, Read, Span, read_from, unpacked};
 use imu_stand::explain::explain;
 use imu_stand::report::{Subject, report};
 use imu_stand::text::{self, shell_word};
@@ -21,12 +21,9 @@ enum Request {
     Read {
         /// Its name.
         name: String,
-        /// As `--columns`, `--units` and `--rate` of the program.
-        #[serde(default)]
-        columns: String,
-        #[serde(default)]
-        units: String,
-        rate_hz: Option<f64>,
+        /// How.
+        #[serde(flatten)]
+        how: How,
     },
     /// The analysis.
     Analyze,
@@ -36,13 +33,60 @@ enum Request {
     Report,
 }
 
+/// As `--columns`, `--units`, `--rate` and `--span` of the program.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct How {
+    columns: String,
+    units: String,
+    rate_hz: Option<f64>,
+    span: String,
+}
+
+impl How {
+    fn options(&self) -> Result<ReadOptions, CaptureError> {
+        let span = said(&self.span).map(str::parse::<Span>).transpose();
+        Ok(ReadOptions {
+            mapping: ColumnMapping::parse(said(&self.columns), said(&self.units))?,
+            rate_hz: self.rate_hz,
+            span: span.map_err(|why| CaptureError::Option {
+                option: "--span",
+                why: format!("`{}`", self.span),
+                help: format!("it {why}"),
+            })?,
+            ..ReadOptions::default()
+        })
+    }
+
+    /// The program's words for it.
+    fn words(&self) -> Vec<String> {
+        let texts = [
+            ("--columns", &self.columns),
+            ("--units", &self.units),
+            ("--span", &self.span),
+        ];
+        let texts = texts.into_iter().filter_map(|(option, text)| {
+            said(text).map(|value| format!("{option} {}", shell_word(value)))
+        });
+        let rate = self.rate_hz.map(|rate| format!("--rate {rate}"));
+        texts.chain(rate).collect()
+    }
+}
+
+/// What stands in a field; nothing where it is empty.
+fn said(field: &str) -> Option<&str> {
+    Some(field.trim()).filter(|text| !text.is_empty())
+}
+
 /// Why something was not done.
 #[derive(Debug, Serialize)]
 struct Failure {
     what: String,
     help: Option<String>,
-    /// A mapping that would read the file, where the program proposes one: columns and units.
+    /// A mapping for the file, where the program proposes one: columns and units.
     proposal: Option<[String; 2]>,
+    /// The first part of a file with two sample rates.
+    span: Option<String>,
 }
 
 impl Failure {
@@ -51,6 +95,7 @@ impl Failure {
             what: error.to_string(),
             help: error.help().map(|help| help.to_string()),
             proposal: None,
+            span: None,
         }
     }
 
@@ -59,6 +104,7 @@ impl Failure {
             what: "nothing was read yet".to_owned(),
             help: None,
             proposal: None,
+            span: None,
         }
     }
 }
@@ -66,8 +112,12 @@ impl Failure {
 impl From<CaptureError> for Failure {
     fn from(error: CaptureError) -> Self {
         let mut failure = Self::of(&error);
-        if let CaptureError::Columns { example, .. } = &error {
-            failure.proposal = Some(["--columns", "--units"].map(|name| option(example, name)));
+        match &error {
+            CaptureError::Columns { example, .. } => {
+                failure.proposal = Some(["--columns", "--units"].map(|name| option(example, name)));
+            }
+            CaptureError::TwoRates { at_s, .. } => failure.span = Some(format!(",{at_s:.6}")),
+            _ => {}
         }
         failure
     }
@@ -111,6 +161,7 @@ impl Session {
                 what: format!("the page asks `{request}`: {error}"),
                 help: Some("this is a defect: report it".to_owned()),
                 proposal: None,
+                span: None,
             }),
         };
         match answer {
@@ -122,33 +173,16 @@ impl Session {
 
     fn done(&mut self, file: &[u8], request: Request) -> Result<Value, Failure> {
         match request {
-            Request::Read {
-                name,
-                columns,
-                units,
-                rate_hz,
-            } => self.open(file, name, [&columns, &units], rate_hz),
+            Request::Read { name, how } => self.open(file, name, &how),
             Request::Analyze => self.analyzed(),
             Request::Diagnose => self.diagnosed(),
             Request::Report => self.reported(),
         }
     }
 
-    fn open(
-        &mut self,
-        file: &[u8],
-        name: String,
-        mapping: [&str; 2],
-        rate_hz: Option<f64>,
-    ) -> Result<Value, Failure> {
+    fn open(&mut self, file: &[u8], name: String, how: &How) -> Result<Value, Failure> {
         *self = Self::default();
-        let [columns, units] =
-            mapping.map(|text| Some(text).filter(|text| !text.trim().is_empty()));
-        let options = ReadOptions {
-            mapping: ColumnMapping::parse(columns, units)?,
-            rate_hz,
-            ..ReadOptions::default()
-        };
+        let options = how.options()?;
         let text = unpacked(file).map_err(|source| CaptureError::Io {
             path: name.clone().into(),
             source,
@@ -159,14 +193,7 @@ impl Session {
             "diagnose".to_owned(),
             shell_word(&name),
         ];
-        for (option, value) in [("--columns", columns), ("--units", units)] {
-            if let Some(value) = value {
-                words.extend([option.to_owned(), shell_word(value)]);
-            }
-        }
-        if let Some(rate) = rate_hz {
-            words.push(format!("--rate {rate}"));
-        }
+        words.extend(how.words());
         words.push("--report report.html".to_owned());
         let said = json!({
             "samples": read.record.len(),
@@ -233,6 +260,7 @@ impl Session {
             what: format!("no report: {error}"),
             help: Some("text and JSON give the same answers".to_owned()),
             proposal: None,
+            span: None,
         })?;
         Ok(json!({ "html": page }))
     }
@@ -244,6 +272,7 @@ fn pretty(value: &impl Serialize) -> Result<String, Failure> {
         what: error.to_string(),
         help: None,
         proposal: None,
+        span: None,
     })?;
     Ok(text + "\n")
 }

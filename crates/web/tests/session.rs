@@ -54,6 +54,40 @@ fn a_foreign_table_is_proposed_a_mapping_that_reads_it() {
 }
 
 #[test]
+fn a_file_with_two_sample_rates_is_read_in_parts() {
+    let rows = (0..400).map(|k| (f64::from(k) * 0.05, k));
+    let faster = (1..400).map(|k| (20.0 + f64::from(k) * 0.01, k));
+    let mut file = "time_s,gyro_x_dps\n".to_owned();
+    for (t, k) in rows.chain(faster) {
+        file += &format!("{t:.3},{}\n", f64::from(k * 7919 % 101) / 100.0);
+    }
+    let mut session = Session::default();
+    let mut read = |span: &str| {
+        let request = json!({"do": "read", "name": "two.csv", "span": span});
+        asked(&mut session, file.as_bytes(), &request)
+    };
+    let failed = read("");
+    let first = failed["failed"]["span"]
+        .as_str()
+        .expect("a span")
+        .to_owned();
+    for (span, samples) in [(first.as_str(), 400), ("20,", 399)] {
+        let part = read(span);
+        let near = part["ok"]["samples"]
+            .as_i64()
+            .is_some_and(|n| (n - samples).abs() <= 1);
+        assert!(near, "{span}: {part}");
+    }
+    let refused = read("9,3");
+    assert!(
+        refused["failed"]["what"]
+            .as_str()
+            .is_some_and(|what| what.contains("--span")),
+        "{refused}"
+    );
+}
+
+#[test]
 fn what_cannot_be_done_is_said() {
     let mut session = Session::default();
     for request in [

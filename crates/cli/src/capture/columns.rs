@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use model::record::Quantity;
 
+use super::assumed::{contradiction, note, whose};
 use super::build::{CORRECTED, OF_CORRECTION};
 use super::conventions::unit_of;
 use super::error::brief;
@@ -12,7 +13,7 @@ use super::header::Lines;
 use super::mapped::{beside_ours, by_known_names, mapped};
 use super::names::{TIMES, left, meant, missing, not_read, respelt};
 use super::propose::unknown;
-use super::units::{COUNTS, What, convert, in_brackets, known, usual};
+use super::units::{COUNTS, What, convert, in_brackets};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
 
 /// A column of the file: what it is here, and how its cells become values.
@@ -64,8 +65,8 @@ pub(super) struct Columns {
     pub notes: Vec<String>,
     /// Whether the time column is in a unit that nobody said.
     pub time_is_assumed: bool,
-    /// Whether the gyros are.
-    pub gyro_is_assumed: bool,
+    /// Gyros of which nobody did.
+    pub assumed_gyros: Vec<String>,
 }
 
 impl Columns {
@@ -78,8 +79,17 @@ impl Columns {
     /// Takes what nobody stated in the usual units, and says so.
     pub fn assume(&mut self, assumed: &[(String, What)]) {
         self.notes.extend(note(assumed));
-        let is_gyro = |(_, what): &(String, What)| *what == What::Channel(Quantity::Gyro);
-        self.gyro_is_assumed |= assumed.iter().any(is_gyro);
+        let gyros = (assumed.iter()).filter(|(_, what)| *what == What::Channel(Quantity::Gyro));
+        self.assumed_gyros
+            .extend(gyros.map(|(name, _)| name.clone()));
+    }
+
+    /// Asks for the unit of gyros that nobody stated.
+    pub fn ask(&self) -> Result<(), CaptureError> {
+        match self.assumed_gyros.as_slice() {
+            [] => Ok(()),
+            gyros => Err(whose(gyros)),
+        }
     }
 }
 
@@ -342,45 +352,6 @@ pub(super) fn time(
         ));
     }
     Ok(Role::Time { scale })
-}
-
-/// Says that a unit given is another one than the column's own.
-pub(super) fn contradiction(
-    ours: &str,
-    column: &str,
-    given: Option<&str>,
-    stated: Option<&str>,
-) -> Option<String> {
-    let (given, stated) = (known(given?)?, known(stated?)?);
-    (given != stated).then(|| {
-        format!(
-            "{ours} is taken in {given}, as --units says, although its column `{column}` says {stated}"
-        )
-    })
-}
-
-/// Says what was assumed.
-fn note(assumed: &[(String, What)]) -> Vec<String> {
-    let mut notes = Vec::new();
-    for (quantity, key) in [
-        (Quantity::Gyro, "gyro=rad/s"),
-        (Quantity::Acc, "acc=g"),
-        (Quantity::Temp, "temp=K"),
-        (Quantity::Supply, "supply=mV"),
-    ] {
-        let what = What::Channel(quantity);
-        let names: Vec<&str> = (assumed.iter().filter(|(_, w)| *w == what))
-            .map(|(name, _)| name.as_str())
-            .collect();
-        if !names.is_empty() {
-            notes.push(format!(
-                "{} taken in {}, as nothing says a unit; `--units {key}` or the like does",
-                names.join(", "),
-                usual(what)
-            ));
-        }
-    }
-    notes
 }
 
 /// Columns of the stand's own format that are no channels.

@@ -51,7 +51,7 @@ pub enum CaptureError {
         code(capture::missing_key),
         help(
             "where the cells are counts, add a line `# {key}: VALUE` before the column names; where they are measured values, \
-             say their unit: `--units gyro=deg/s,acc=m/s2`"
+             say their unit: `--units gyro=deg/s` or `gyro=rad/s`, `acc=m/s2` or `acc=g`"
         )
     )]
     MissingKey {
@@ -75,14 +75,14 @@ pub enum CaptureError {
     },
     /// No column names, or none that mean anything here.
     #[error("{why}; the columns are: {}", columns.join(", "))]
-    #[diagnostic(code(capture::columns), help("map them{hint}, for example: {example}"))]
+    #[diagnostic(code(capture::columns), help("map them{hint}: {example}"))]
     Columns {
         /// What is wrong.
         why: String,
         /// What there is.
         columns: Vec<String>,
         /// What to see to.
-        hint: &'static str,
+        hint: String,
         /// A mapping made of them.
         example: String,
     },
@@ -158,6 +158,22 @@ pub enum CaptureError {
         found: String,
         /// What is wrong with it.
         expected: String,
+    },
+    /// A row of another width than its table.
+    #[error("line {line} has {found} cells, and the table has {expected} columns")]
+    #[diagnostic(
+        code(capture::bad_row),
+        help("{hint}`--skip-bad` leaves such rows out and counts them; the file stays as it is")
+    )]
+    Cells {
+        /// Where.
+        line: u64,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+        /// What it may come from.
+        hint: &'static str,
     },
     /// A capture would overwrite a file.
     #[error("{} is there already", path.display())]

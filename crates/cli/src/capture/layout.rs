@@ -304,6 +304,11 @@ impl Cells {
         }
     }
 
+    /// What stands between cells.
+    pub fn separator(&self) -> char {
+        self.separator
+    }
+
     /// The cells of a line.
     pub fn cut<'a>(&self, line: &'a str) -> Vec<Cow<'a, str>> {
         if line.contains('"') {

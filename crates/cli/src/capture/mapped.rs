@@ -2,7 +2,8 @@
 
 use model::record::Quantity;
 
-use super::columns::{Column, Columns, Role, Said, contradiction, measured, time};
+use super::assumed::contradiction;
+use super::columns::{Column, Columns, Role, Said, measured, time};
 use super::conventions::unit_of;
 use super::error::brief;
 use super::foreign::meaning;

@@ -1,6 +1,7 @@
 //! Captures: the CSV of the stand, foreign CSV and files of arrays by mapping; all become a [`Record`](model::record::Record).
 
 mod angle;
+mod assumed;
 mod build;
 #[cfg(feature = "native")]
 mod codecs;
@@ -27,6 +28,7 @@ mod pages;
 mod plausible;
 mod propose;
 mod read;
+mod rows;
 mod series;
 mod skipped;
 mod span;

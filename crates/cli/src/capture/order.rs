@@ -5,6 +5,8 @@ use std::borrow::Cow;
 use model::record::Record;
 use model::record::sampling::Sampling;
 
+use crate::report::plot::number;
+
 use super::CaptureError;
 
 /// Share of the steps that go back from which on rows are shuffled; that go forward, up to which all are turned round.
@@ -143,11 +145,21 @@ pub(super) fn check_times(times: &[f64], is_assumed: bool) -> Result<(), Capture
     if !is_believed {
         return Err(CaptureError::Time {
             why: format!("in seconds, rows would be {usual} s apart"),
-            help: "say the unit of the time column: `--units time=ms` (or us, ns; s, if it is so)"
-                .to_owned(),
+            help: format!(
+                "say the unit of the time column: `--units time=ms` ({}; s if it is so; `0.1ms` and the like if it counts \
+                 something else), or leave it out and say `--rate HZ`",
+                by_unit(usual)
+            ),
         });
     }
     Ok(())
+}
+
+/// The sample rate that each unit of a time makes of a step.
+fn by_unit(step: f64) -> String {
+    let units = [("ms", 1e3), ("us", 1e6), ("ns", 1e9)];
+    let rates = units.map(|(unit, per_s)| format!("{unit}: {} Hz", number(per_s / step, 4)));
+    rates.join(", ")
 }
 
 /// Deviation of a rate given from that of the times beyond which one of them is wrong: no clock is, by as much.

@@ -1,6 +1,6 @@
 //! Readings of others held against what the units claim: gravity at rest, and gyros as there are.
 
-use model::record::{FULL_DUTY, Quantity, Record};
+use model::record::{Channel, FULL_DUTY, Quantity, Record};
 
 use super::STANDARD_GRAVITY;
 
@@ -30,7 +30,33 @@ pub(super) fn doubts(record: &Record, is_assumed: bool) -> Vec<String> {
     notes.extend(rates(record, is_assumed));
     notes.extend(temperatures(record));
     notes.extend(command(record));
+    notes.extend(copy(record));
     notes
+}
+
+/// Two axes have no noise in common to the last digit.
+fn copy(record: &Record) -> Option<String> {
+    let is_one = |a: &f64, b: &f64| a == b || (a.is_nan() && b.is_nan());
+    [Quantity::Gyro, Quantity::Acc]
+        .into_iter()
+        .find_map(|kind| {
+            let all: Vec<_> = record.all(kind).collect();
+            let varies = |values: &[f64]| values.windows(2).any(|w| w[0] != w[1]);
+            let (one, other) = (all.iter().enumerate()).find_map(|(k, one)| {
+                let same = |other: &&&Channel| {
+                    one.values
+                        .iter()
+                        .zip(&other.values)
+                        .all(|(a, b)| is_one(a, b))
+                };
+                let other = all[k + 1..].iter().find(same)?;
+                varies(&one.values).then_some((one, other))
+            })?;
+            Some(format!(
+                "{} reads as {} in every row: is one column in the file, or in `--columns`, twice?",
+                other.name, one.name
+            ))
+        })
 }
 
 /// Gravity is what a still accelerometer reads.
@@ -176,7 +202,7 @@ fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use model::record::{Axis, Channel};
+    use model::record::Axis;
 
     /// Noise of a standard deviation about a middle, without a generator: a quantile of each row in turn.
     fn noise(sigma: f64, middle: f64) -> Vec<f64> {
@@ -209,6 +235,19 @@ mod tests {
     }
 
     #[test]
+    fn a_column_that_stands_twice_is_told() {
+        let mut record = record(0.3, [0.1, -0.2, STANDARD_GRAVITY], 25.0);
+        assert_eq!(copy(&record), None);
+        let mut twin = record.channels[0].clone();
+        twin.name = "gyro_y".to_owned();
+        record.channels.push(twin);
+        let said = copy(&record).expect("a copy");
+        assert!(said.starts_with("gyro_y reads as gyro_x"), "{said}");
+        record.channels[0].values[500] += 1e-9;
+        assert_eq!(copy(&record), None);
+    }
+
+    #[test]
     fn what_cannot_be_in_the_unit_claimed_is_told_and_what_can_is_not() {
         let g = STANDARD_GRAVITY;
         let level = [0.1, -0.2, g];
@@ -225,7 +264,7 @@ mod tests {
             ),
             (
                 0.3,
-                [0.0, 0.1, 0.1],
+                [0.0, 0.1, 0.12],
                 25.0,
                 false,
                 Some("gravity was taken off"),

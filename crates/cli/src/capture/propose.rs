@@ -2,20 +2,16 @@
 
 use model::record::Quantity;
 
-use crate::text::shell_word;
-
-use super::CaptureError;
 use super::conventions::unit_of;
-use super::error::brief_list;
 use super::units::{What, in_brackets, is_unit_of, known};
 
+mod say;
 pub(super) mod seen;
 
+pub(super) use say::{proposed, unknown};
 use seen::Seen;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Bytes of a name beyond which its number is easier to write.
-const LONG: usize = 80;
 
 /// What the columns of a file most probably are.
 pub(super) struct Guess {
@@ -56,7 +52,22 @@ pub(super) fn guess(names: &[String], numbered: bool, seen: &Seen) -> Guess {
     } else {
         guess_by_name(names, seen, &mut guess);
     }
+    by_gravity(seen, &mut guess);
     guess
+}
+
+/// Three accelerometers of a unit that nobody says read gravity, and so say it.
+fn by_gravity(seen: &Seen, guess: &mut Guess) {
+    let accs = guess
+        .columns
+        .iter()
+        .filter(|(ours, _)| ours.starts_with("acc_"));
+    let accs: Vec<usize> = accs.map(|(_, at)| *at).collect();
+    if accs.len() == AXES.len()
+        && let Some((_, said)) = guess.units.iter_mut().find(|(key, _)| *key == "acc")
+    {
+        *said = said.or_else(|| seen.gravity(&accs));
+    }
 }
 
 /// Whether names are places in one array of which its own name says nothing: `values[0]`, `values[1]`, ...
@@ -113,10 +124,6 @@ fn guess_by_number(names: &[String], seen: &Seen, guess: &mut Guess) {
             );
         }
     }
-    if let Some(unit) = of_triple(accs) {
-        let of_acc = guess.units.iter_mut().filter(|(key, _)| *key == "acc");
-        of_acc.for_each(|(_, said)| *said = Some(unit));
-    }
 }
 
 fn guess_by_name(names: &[String], seen: &Seen, guess: &mut Guess) {
@@ -127,9 +134,15 @@ fn guess_by_name(names: &[String], seen: &Seen, guess: &mut Guess) {
             m.kind == Kind::Time && (!with_unit || says() || m.is_seconds)
         })
     };
+    // A date beside a time of day is most often the day alone.
+    let date = || meanings.iter().position(|m| m.kind == Kind::Date);
     let unknown = |at: &usize| meanings[*at].kind == Kind::Unknown;
     let by_value = || (0..names.len()).find(|at| unknown(at) && seen.is_time(*at));
-    if let Some(at) = time(true).or_else(|| time(false)).or_else(by_value) {
+    if let Some(at) = time(true)
+        .or_else(|| time(false))
+        .or_else(date)
+        .or_else(by_value)
+    {
         guess.add(names, "time", at, What::Time);
     }
     let find = |kind: Kind, axis: usize| {
@@ -144,10 +157,13 @@ fn guess_by_name(names: &[String], seen: &Seen, guess: &mut Guess) {
         Kind::Bare
     };
     guess.is_ambiguous |= gyro == Kind::Bare;
-    for (kind, stem, quantity) in [
-        (gyro, "gyro", Quantity::Gyro),
-        (Kind::Acc, "acc", Quantity::Acc),
-    ] {
+    let bare: Vec<usize> = (0..3).filter_map(|axis| find(Kind::Bare, axis)).collect();
+    let is_gravity = bare.len() == AXES.len() && seen.gravity(&bare).is_some();
+    let (gyro, acc) = match gyro {
+        Kind::Bare if is_gravity => (Kind::Gyro, Kind::Bare),
+        gyro => (gyro, Kind::Acc),
+    };
+    for (kind, stem, quantity) in [(gyro, "gyro", Quantity::Gyro), (acc, "acc", Quantity::Acc)] {
         for (k, axis) in AXES.iter().enumerate() {
             if let Some(at) = find(kind, k) {
                 let same = |m: &&Meaning| m.kind == kind && m.axis == Some(k);
@@ -195,86 +211,6 @@ fn no_rates(seen: &Seen, guess: &mut Guess) {
     }
 }
 
-/// `--columns ... --units ...` made of a file's column names, as a shell takes them, and whether a unit in it is a guess.
-/// `numbered` says that the names are made up, and columns are called by their numbers.
-fn proposal(names: &[String], numbered: bool, seen: &Seen) -> (String, bool) {
-    let guess = guess(names, numbered, seen);
-    let column = |(ours, at): &(String, usize)| {
-        let name = &names[*at];
-        // What would be taken for the list's own commas goes by its number.
-        if numbered || name.contains(',') || name.len() > LONG {
-            format!("{ours}={}", at + 1)
-        } else {
-            format!("{ours}={name}")
-        }
-    };
-    let mut is_guessed = false;
-    let unit = |(key, said): &(&str, Option<&str>)| {
-        let unit = match (*key, *said) {
-            // Seconds go without saying; other times are guessed by nobody.
-            ("time", None | Some("s")) => return None,
-            (_, Some(unit)) => unit,
-            ("gyro", None) => "deg/s",
-            ("freq", None) => "1",
-            (_, None) => "m/s2",
-        };
-        is_guessed |= said.is_none();
-        Some(format!("{key}={unit}"))
-    };
-    let units: Vec<String> = guess.units.iter().filter_map(unit).collect();
-    let has_time = guess.columns.iter().any(|(ours, _)| ours == "time");
-    let is_counted = !has_time && (0..names.len()).any(|at| seen.counts(at));
-    let rate = if is_counted { " --rate HZ" } else { "" };
-    let columns: Vec<String> = guess.columns.iter().map(column).collect();
-    let columns = shell_word(&columns.join(","));
-    if units.is_empty() {
-        return (format!("--columns {columns}{rate}"), false);
-    }
-    let units = shell_word(&units.join(","));
-    (
-        format!("--columns {columns} --units {units}{rate}"),
-        is_guessed,
-    )
-}
-
-/// An error of columns that mean nothing here; a mapping is [`proposed`] once rows are seen.
-pub(super) fn unknown(names: &[String], why: String) -> CaptureError {
-    CaptureError::Columns {
-        why,
-        columns: brief_list(names),
-        hint: "",
-        example: String::new(),
-    }
-}
-
-/// An error of columns that mean nothing here, with a mapping by their names and what was seen of their values.
-pub(super) fn proposed(
-    error: CaptureError,
-    (names, numbered): (&[String], bool),
-    seen: &Seen,
-) -> CaptureError {
-    let CaptureError::Columns { why, columns, .. } = error else {
-        return error;
-    };
-    let (example, is_guessed) = proposal(names, numbered, seen);
-    CaptureError::Columns {
-        why,
-        columns,
-        hint: match (numbered, is_guessed) {
-            (true, _) => {
-                " and see that columns and units are right: the file does not say what its columns are, and this goes by their \
-                 places and values"
-            }
-            (false, true) => {
-                " and see that the units are right, which the file does not say (phones and ROS log rad/s; `freq=NAME` and \
-                 `--units freq=1` for `analyze` of what is no gyro)"
-            }
-            (false, false) => "",
-        },
-        example,
-    }
-}
-
 /// The name of ours that another spelling of it can only mean: `temperature`, `GyroX`, `accel_z`, `t`. `None` for names
 /// that are ours already, and for all others.
 pub(super) fn alias(name: &str) -> Option<String> {
@@ -317,7 +253,7 @@ pub(super) fn nearest(name: &str) -> Option<String> {
                 .axis
                 .map_or_else(|| "temp".to_owned(), |_| with_axis("temp")),
         ),
-        Kind::Time => Some("time".to_owned()),
+        Kind::Time | Kind::Date => Some("time".to_owned()),
         Kind::Bare | Kind::Unknown if is(&["volt", "vdd", "vcc", "supply", "batt"]) => {
             Some("supply".to_owned())
         }
@@ -329,6 +265,7 @@ pub(super) fn nearest(name: &str) -> Option<String> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Time,
+    Date,
     Gyro,
     Acc,
     Temp,
@@ -399,7 +336,7 @@ impl Meaning {
             Kind::Acc
         } else if is(&["temp"]) {
             Kind::Temp
-        } else if ["time", "zeit", "stamp", "epoch"]
+        } else if ["time", "zeit", "stamp", "epoch", "datetime"]
             .iter()
             .any(|s| first.starts_with(s))
             || first == "t"
@@ -408,6 +345,8 @@ impl Meaning {
             || unit_is_of(What::Time)
         {
             Kind::Time
+        } else if first == "date" || first == "utc" {
+            Kind::Date
         } else if unit_is_of(What::Channel(Quantity::Gyro)) {
             Kind::Gyro
         } else if unit_is_of(What::Channel(Quantity::Acc)) {

@@ -11,12 +11,13 @@ use super::columns::{Column, Columns, Role, Said, columns};
 use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
-use super::layout::{Cells, Layout, next_row_into};
+use super::layout::{Layout, next_row_into};
 use super::logs::read_log;
 use super::order::{check_rate, check_times, check_varies, in_order, unwrap, unwrap_times};
 use super::plausible::doubts;
 use super::propose::proposed;
 use super::propose::seen::{ROWS, Seen, first_rows};
+use super::rows::RowReader;
 use super::skipped::keep_places;
 use super::span::Span;
 use super::steady::{one_rate, unsteady};
@@ -24,7 +25,6 @@ use super::stream::{TextLines, io, named, unpacked};
 use super::table::Table;
 #[cfg(feature = "native")]
 use super::tables::read_table;
-use super::time::Clock;
 use super::{CaptureError, ColumnMapping};
 
 /// How to read.
@@ -64,7 +64,7 @@ pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureE
     #[cfg(feature = "native")]
     if let Some(table) = read_table(path) {
         no_topics(options)?;
-        return from_table(table?, options);
+        return from_table(table?, options, Of::File);
     }
     let open = || unpacked(BufReader::with_capacity(READ_AT_ONCE, File::open(path)?));
     // An error of the stream has no path yet.
@@ -93,7 +93,7 @@ fn no_topics(options: &ReadOptions) -> Result<(), CaptureError> {
 /// [`CaptureError`].
 pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read, CaptureError> {
     if let Some(table) = read_log(&mut input, options.topic.as_deref()) {
-        return from_table(table?, options);
+        return from_table(table?, options, Of::File);
     }
     no_topics(options)?;
     let mut text = TextLines::new(input)?;
@@ -115,10 +115,11 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
                 &mut layout.cells,
                 said.names.len(),
             )?;
-            return Err(proposed(error, (said.names, said.numbered), &seen));
+            return Err(proposed(error, &said, header.rate_hz.is_some(), &seen));
         }
         Ok(found) => found,
     };
+    found.ask()?;
     if let Some((first, last)) = layout.preamble {
         found.notes.push(format!(
             "the table begins in line {}: what stands before, from line {first} on, is not read",
@@ -127,7 +128,7 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
     }
     let mut values: Vec<Vec<f64>> = found.columns.iter().map(|_| Vec::new()).collect();
     let mut reader = RowReader::new(&found.columns, layout.names.len(), layout.cells);
-    let mut skipped = Vec::new();
+    let (mut skipped, mut again) = (Vec::new(), Vec::new());
     let (mut row, mut cells) = layout.first.take().unzip();
     let cells = cells.get_or_insert_default();
     while let Some(line) = row {
@@ -136,17 +137,24 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
                 .iter_mut()
                 .zip(&reader.values)
                 .for_each(|(column, &value)| column.push(value)),
+            Err(_) if reader.is_names(cells, said.names) => again.push(line),
             Err(_) if options.skip_bad => skipped.push(values.first().map_or(0, Vec::len)),
             Err(error) => return Err(error),
         }
         row = next_row_into(&mut text, cells)?;
     }
     let odd = std::mem::take(&mut reader.odd);
+    if let Some(first) = again.first() {
+        found.notes.push(format!(
+            "the names of the columns stand again {} x, first in line {first}, as where files were put end to end: the rows are read on",
+            again.len()
+        ));
+    }
     finish(header, found, values, options, &skipped, &odd)
 }
 
-/// A record of named columns, as of a file of arrays: by the names and units of `table.about` (`rate_hz`, `unit of gyro_x`,
-/// ...), or by a mapping.
+/// A record of a program's columns: by the names and units of `table.about` (`rate_hz`, `unit of gyro_x`, ...), or by a
+/// mapping; in deg/s, m/s^2, degC and V where neither says a unit.
 ///
 /// # Errors
 /// [`CaptureError`].
@@ -160,12 +168,21 @@ pub fn read_columns(table: Table, options: &ReadOptions) -> Result<Read, Capture
             lengths: lengths.join(", "),
         });
     }
-    from_table(table, options)
+    from_table(table, options, Of::Caller)
 }
 
-/// From the columns of a file of arrays. Without a mapping, names of ours are taken as they are: in the units the file
-/// states, in counts with the header's scales where it says `counts`, else in deg/s and m/s^2.
-fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError> {
+/// Where named columns come from.
+#[derive(Clone, Copy, PartialEq)]
+enum Of {
+    /// A file, whose gyros may be in deg/s or rad/s.
+    File,
+    /// A program, which was told that deg/s are meant where it says no unit.
+    Caller,
+}
+
+/// From named columns. Without a mapping, names of ours are taken as they are: in the units stated, in counts with the
+/// header's scales where they say `counts`, else in the usual ones, but for the gyros of a file.
+fn from_table(table: Table, options: &ReadOptions, of: Of) -> Result<Read, CaptureError> {
     let mut lines = Lines::default();
     lines.entries.extend(
         (table.about.iter().enumerate())
@@ -185,8 +202,11 @@ fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError>
     let mut found = columns(&said, &options.mapping).map_err(|error| {
         let part = |of: &Vec<f64>| of.iter().copied().take(ROWS).collect();
         let seen = Seen(table.columns.iter().map(part).collect());
-        proposed(error, (said.names, said.numbered), &seen)
+        proposed(error, &said, header.rate_hz.is_some(), &seen)
     })?;
+    if of == Of::File {
+        found.ask()?;
+    }
     found.notes.splice(..0, table.notes);
     let mut cells = Vec::new();
     for column in &found.columns {
@@ -208,134 +228,6 @@ fn from_table(table: Table, options: &ReadOptions) -> Result<Read, CaptureError>
         cells.push(values);
     }
     finish(header, found, cells, options, &[], &[])
-}
-
-impl Role {
-    /// Whether a column of this kind can have such a cell.
-    fn takes(&self, v: f64) -> bool {
-        // Beyond what an i64 holds none of these is taken; `fract` is a call for each cell.
-        let is_whole = v as i64 as f64 == v;
-        let whole = v >= 0.0 && is_whole;
-        match self {
-            Role::Seq | Role::Ticks => whole && v < 9e15,
-            Role::Flags => whole && v <= 65_535.0,
-            Role::Time { .. } => v.is_finite(),
-            Role::Measured { counts: true, .. } => v.is_nan() || (is_whole && v.abs() < 1e9),
-            Role::Measured { .. } => !v.is_infinite(),
-        }
-    }
-}
-
-/// Reads the rows of a text.
-struct RowReader<'a> {
-    columns: &'a [Column],
-    width: usize,
-    cells: Cells,
-    clocks: Vec<Clock>,
-    /// Of the last row.
-    values: Vec<f64>,
-    /// All numbers of a plain row.
-    numbers: Vec<f64>,
-    /// Of columns that nobody asked for: line and text of the first cell that is no number.
-    odd: Vec<Option<(u64, String)>>,
-}
-
-impl<'a> RowReader<'a> {
-    fn new(columns: &'a [Column], width: usize, cells: Cells) -> Self {
-        let clock = |column: &Column| match column.role {
-            Role::Time { scale } => Clock::new(scale),
-            _ => Clock::new(1.0),
-        };
-        Self {
-            columns,
-            width,
-            cells,
-            clocks: columns.iter().map(clock).collect(),
-            values: vec![0.0; columns.len()],
-            numbers: Vec::new(),
-            odd: vec![None; columns.len()],
-        }
-    }
-
-    /// Reads a row of plain numbers, as most are; nothing where it is anything else.
-    fn plain(&mut self, text: &str) -> Option<()> {
-        self.cells.plain(text, &mut self.numbers)?;
-        if self.numbers.len() != self.width {
-            return None;
-        }
-        for (k, column) in self.columns.iter().enumerate() {
-            let number = *self.numbers.get(column.at)?;
-            let value = match column.role {
-                Role::Time { .. } => self.clocks[k].plain(number)?,
-                _ => number,
-            };
-            if !column.role.takes(value) {
-                return None;
-            }
-            self.values[k] = value;
-        }
-        Some(())
-    }
-
-    fn read(&mut self, text: &str, line: u64) -> Result<(), CaptureError> {
-        if self.plain(text).is_some() {
-            return Ok(());
-        }
-        let bad = |column: &Column, found: &str, expected: String| CaptureError::BadRow {
-            line,
-            column: brief(&column.name),
-            found: brief(found),
-            expected,
-        };
-        let row = self.cells.cut(text);
-        let ends_in_separator = row.len() == self.width + 1 && row[self.width].is_empty();
-        if row.len() != self.width
-            && !ends_in_separator
-            && let Some(column) = self.columns.first()
-        {
-            let found = format!("{} cells", row.len());
-            return Err(bad(
-                column,
-                &found,
-                format!("not a row of {} cells", self.width),
-            ));
-        }
-        for (k, column) in self.columns.iter().enumerate() {
-            let cell = row.get(column.at).map_or("", |cell| cell.as_ref());
-            let is_measured = matches!(column.role, Role::Measured { .. });
-            let read = match (cell, &column.role) {
-                ("" | "nan" | "NaN" | "NAN", _) if is_measured => Some(f64::NAN),
-                (_, Role::Time { .. }) => {
-                    let cells = &mut self.cells;
-                    self.clocks[k].seconds(cell, |cell| cells.number(cell))
-                }
-                _ => self.cells.number(cell),
-            };
-            if read.is_none() && !column.is_asked {
-                self.odd[k].get_or_insert_with(|| (line, cell.to_owned()));
-                self.values[k] = f64::NAN;
-                continue;
-            }
-            let Some(value) = read else {
-                if matches!(column.role, Role::Time { .. }) {
-                    return Err(CaptureError::Time {
-                        why: format!("line {line}, column `{}`: `{}` is no time", brief(&column.name), brief(cell)),
-                        help: "a time is a number (`--units time=ms` says of what) or a date like 2026-11-21 19:02:59.78 or 21.11.2026 \
-                               19:02:59.78; where others stand in the file, leave time out and say `--rate HZ`; `--skip-bad` leaves \
-                               out single bad rows"
-                            .to_owned(),
-                    });
-                }
-                return Err(bad(column, cell, "not a finite number".to_owned()));
-            };
-            if !column.role.takes(value) {
-                let what = "not a whole number of the range that this column has";
-                return Err(bad(column, cell, what.to_owned()));
-            }
-            self.values[k] = value;
-        }
-        Ok(())
-    }
 }
 
 fn finish(
@@ -388,7 +280,7 @@ fn finish(
     check_rate(&mut record, options.rate_hz)?;
     difference_angles(&mut record)?;
     share_thermometer(&mut record);
-    let doubts = doubts(&record, found.gyro_is_assumed);
+    let doubts = doubts(&record, !found.assumed_gyros.is_empty());
     record.notes.extend(doubts);
     let unsteady = unsteady(&record);
     record.notes.extend(unsteady);

@@ -189,6 +189,23 @@ pub(super) fn is_unit_of(unit: &str, what: What) -> bool {
     scale(what, unit).is_some()
 }
 
+/// How a number of units, as what one count is (`0.0076deg/s`), becomes the unit of ours.
+fn multiple(what: What, given: &str) -> Option<Conversion> {
+    if !given.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
+        return None;
+    }
+    let ends = given.char_indices().rev().map(|(at, _)| at);
+    let (at, number) = ends
+        .into_iter()
+        .find_map(|at| Some((at, given[..at].parse::<f64>().ok()?)))?;
+    let unit = given[at..].trim_start();
+    if !(number > 0.0 && number.is_finite()) {
+        return None;
+    }
+    let one = scale(what, known(unit)?)?;
+    (one.zero == 0.0).then(|| Conversion::by(&one.unit, 0.0, one.scale * number))
+}
+
 /// The unit that is taken where none is said.
 pub(super) fn usual(what: What) -> &'static str {
     match what {
@@ -213,11 +230,12 @@ pub(super) fn convert(what: What, given: Option<&str>) -> Result<Conversion, Cap
         return Ok(Conversion::by(given, 0.0, 1.0));
     }
     let found = known(given).and_then(|unit| scale(what, unit));
-    found.ok_or_else(|| CaptureError::Option {
+    found.or_else(|| multiple(what, given)).ok_or_else(|| CaptureError::Option {
         option: "--units",
         why: format!("`{given}` is no unit of {}", usual(what)),
         help: "time: s, ms, us, ns; gyro: deg/s, rad/s, mrad/s, deg/h, mdps, or of an angle deg, rad, arcsec; acc: m/s2, g, \
-               mg; temp: degC, K, degF; supply: V, mV; pwm: 1 (-255 to 255), % or fraction (of the full command)"
+               mg; temp: degC, K, degF; supply: V, mV; pwm: 1 (-255 to 255), % or fraction (of the full command); a number \
+               before it multiplies it, as for counts of 131 a deg/s: gyro=0.00763deg/s"
             .to_owned(),
     })
 }
@@ -270,7 +288,40 @@ mod tests {
             let value = (cell - by.zero) * by.scale;
             assert!((value - 20.0).abs() < 1e-9, "{unit}: {value}");
         }
-        assert!(convert(What::Channel(Quantity::Gyro), Some("furlong/s")).is_err());
+        let gyro = What::Channel(Quantity::Gyro);
+        assert!(convert(gyro, Some("furlong/s")).is_err());
+        assert!(convert(gyro, Some("UNIT")).is_err());
         assert!(convert(What::Time, Some("deg/s")).is_err());
+    }
+
+    #[test]
+    fn a_number_before_a_unit_is_what_one_count_is() {
+        let gyro = What::Channel(Quantity::Gyro);
+        for (what, given, unit, scale) in [
+            (gyro, "0.07326deg/s", "deg/s", 0.07326),
+            (gyro, "1e-3 rad/s", "deg/s", 0.180 / std::f64::consts::PI),
+            (What::Time, "0.1ms", "s", 1e-4),
+            (What::Channel(Quantity::Temp), "0.1453degC", "degC", 0.1453),
+        ] {
+            let by = convert(what, Some(given)).expect(given);
+            assert_eq!(by.unit, unit, "{given}");
+            assert!((by.scale / scale - 1.0).abs() < 1e-12, "{given}: {by:?}");
+        }
+        // The zero of a scale is not known; no number, none above 0, no unit.
+        for given in [
+            "0.1K",
+            "x deg/s",
+            "0deg/s",
+            "infdeg/s",
+            "-1deg/s",
+            "1e999deg/s",
+            "0.1",
+        ] {
+            let what = match given.ends_with('K') {
+                true => What::Channel(Quantity::Temp),
+                false => gyro,
+            };
+            assert!(convert(what, Some(given)).is_err(), "{given}");
+        }
     }
 }

@@ -25,11 +25,19 @@ pub fn captures(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
         let entries =
             std::fs::read_dir(path).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
         let entries = entries.map_err(|error| super::unreadable(path, &error))?;
-        let files = entries.into_iter().map(|entry| entry.path());
-        let mut files: Vec<PathBuf> = files.filter(|file| is_capture(file)).collect();
+        let all_files: Vec<PathBuf> = entries.into_iter().map(|entry| entry.path()).collect();
+        let files = all_files.iter().filter(|file| is_capture(file));
+        let mut files: Vec<PathBuf> = files.cloned().collect();
         if files.is_empty() {
+            let is_sqlite = |file: &PathBuf| file.extension().is_some_and(|e| e == "db3");
             return Err(miette!(
-                help = "captures end in .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .mcap, .bag, .ulg or .txt",
+                help = match all_files.iter().find(|file| is_sqlite(file)) {
+                    Some(file) => format!(
+                        "{} is a rosbag2 in SQLite: make an MCAP of it, which is read, by `ros2 bag convert` or `mcap convert`",
+                        file.display()
+                    ),
+                    None => "captures end in .csv, .csv.gz, .npz, .npy, .parquet, .mat, .h5, .mcap, .bag, .ulg or .txt".to_owned(),
+                },
                 "{}: no capture is in this folder",
                 path.display()
             ));

@@ -9,6 +9,7 @@ mod tables;
 
 use diagnosis::result::{Diagnosed, Diagnosis, Finding, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use model::file::ModelFile;
 use model::record::sampling::Sampling;
 use model::record::{Record, rows};
 
@@ -179,31 +180,26 @@ fn replicates_of(record: &Record) -> usize {
 /// The figures of every channel of the model, those with something to say first and open.
 fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
     let (record, diagnosed) = (subject.record, subject.diagnosed);
-    let (before, after) = (&diagnosed.baseline_model, &diagnosed.extended_model);
+    let after = &diagnosed.extended_model;
+    let said = |name: &str| {
+        let d = &diagnosed.diagnosis;
+        d.findings
+            .iter()
+            .any(|f| f.channels.iter().any(|c| c == name))
+            || d.unexplained.iter().any(|u| u.channel == name)
+    };
+    let before = of_channels(&diagnosed.baseline_model, said);
     let sampling = Sampling::of(record, subject.rate_hz)?;
     let places = Places::new(&sampling, record.len());
-    let simulate = |model: &model::file::ModelFile, stream: u64| {
-        replicates::replicate(
-            model,
-            record,
-            &places,
-            replicates_of(record),
-            subject.seed ^ stream,
-        )
+    let simulate = |model: &ModelFile, stream: u64| {
+        let count = replicates_of(record);
+        replicates::replicate(model, record, &places, count, subject.seed ^ stream)
     };
-    // Each on a core of its own, where there is a second thread: a browser has one.
-    let both = std::thread::scope(|threads| {
-        let first = || simulate(before, 0x6265_666f_7265);
-        let beside = std::thread::Builder::new().spawn_scoped(threads, first);
-        let second = simulate(after, 0x0061_6674_6572);
-        let first = match beside {
-            Ok(thread) => thread
-                .join()
-                .unwrap_or_else(|p| std::panic::resume_unwind(p)),
-            Err(_) => first(),
-        };
-        Ok::<_, model::simulate::SimulateError>((first?, second?))
-    });
+    let first = match before.channels.is_empty() {
+        true => Ok(Default::default()),
+        false => simulate(&before, 0x6265_666f_7265),
+    };
+    let both = first.and_then(|first| Ok((first, simulate(after, 0x0061_6674_6572)?)));
     let ((one_before, all_before), (one_after, all_after)) = match both {
         Ok(both) => both,
         Err(error) => {
@@ -212,34 +208,28 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
             }]);
         }
     };
-    let said = |name: &str| {
-        let d = &diagnosed.diagnosis;
-        d.findings
-            .iter()
-            .any(|f| f.channels.iter().any(|c| c == name))
-            || d.unexplained.iter().any(|u| u.channel == name)
-    };
     let mut out = Vec::new();
     for (index, channel) in after.channels.iter().enumerate() {
         let Some(measured) = record.channel(&channel.name) else {
             continue;
         };
-        let before_index = before
-            .channels
-            .iter()
-            .position(|c| c.name == channel.name)
-            .unwrap_or(index);
+        let of_before = (before.channels.iter()).position(|c| c.name == channel.name);
+        // Of a channel of which nothing is said the two models are one.
+        let (one, all) = match of_before {
+            Some(k) => (&one_before[k], &all_before[k]),
+            None => (&one_after[index], &all_after[index]),
+        };
         let view = View {
             name: &channel.name,
             unit: &channel.unit,
             values: &measured.values,
-            simulated: [&one_before[before_index], &one_after[index]],
+            simulated: [one, &one_after[index]],
             tau0: sampling.tau0,
             extended: said(&channel.name),
         };
         let own = places.curves(&measured.values);
         let against = [
-            replicates::against(&own, &all_before[before_index]),
+            replicates::against(&own, all),
             replicates::against(&own, &all_after[index]),
         ];
         let at = places.abscissae(&measured.values);
@@ -248,6 +238,17 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
     }
     out.sort_by_key(|(said, ..)| !said);
     Ok(folded(out))
+}
+
+/// A model without the channels of which nothing is said. Its baseline joins no two of them; a model with effects, as of a
+/// base that moved, stays whole.
+fn of_channels(model: &ModelFile, said: impl Fn(&str) -> bool) -> ModelFile {
+    let mut model = model.clone();
+    let is_any = model.channels.iter().any(|c| said(&c.name));
+    if !is_any || (model.effects.is_empty() && model.unnamed.is_empty()) {
+        model.channels.retain(|c| said(&c.name));
+    }
+    model
 }
 
 /// Figures of channels, by name, each to be opened; those of which something is said are open.

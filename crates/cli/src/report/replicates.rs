@@ -1,10 +1,13 @@
 //! Simulated replicates of a record: what its model would have given, again and again.
 
+use std::ops::Range;
+use std::thread;
+
 use model::file::ModelFile;
 use model::record::Record;
 use model::record::sampling::Sampling;
 use model::simulate::{Replicas, SimulateError};
-use noise::allan::{Deviation, Phase, TauGrid, deviation};
+use noise::allan::{Phase, TauGrid};
 
 /// Instants at which the integrated angle is compared.
 const ANGLE_POINTS: usize = 150;
@@ -113,20 +116,22 @@ impl<'a> Places<'a> {
         let tau0 = self.sampling.tau0;
         let factors = self.factors(values);
         let phase = Phase::from_values(values, &self.sampling.runs_of(values));
+        let mut deviations = phase
+            .overlapping_allan(tau0, &factors)
+            .into_iter()
+            .peekable();
+        // A cluster time that no run is long enough for has no deviation.
         let ln_adev = factors
             .iter()
             .map(|m| {
-                deviation(&phase, Deviation::Oadev, tau0, *m)
-                    .map_or(f64::NAN, |estimate| estimate.deviation.ln())
+                let own = deviations.next_if(|estimate| estimate.m == *m);
+                own.map_or(f64::NAN, |estimate| estimate.deviation.ln())
             })
             .collect();
         let calibration = self.rows / CALIBRATION;
-        let finite: Vec<f64> = values[..calibration]
-            .iter()
-            .copied()
-            .filter(|v| v.is_finite())
-            .collect();
-        let bias = finite.iter().sum::<f64>() / finite.len().max(1) as f64;
+        let finite = values[..calibration].iter().filter(|v| v.is_finite());
+        let (sum, count) = finite.fold((0.0, 0), |(sum, n), v| (sum + v, n + 1));
+        let bias = sum / count.max(1) as f64;
         let mut angle = Vec::with_capacity(ANGLE_POINTS);
         let (mut sum, mut row) = (0.0, calibration);
         for until in self.angle_rows() {
@@ -146,7 +151,8 @@ impl<'a> Places<'a> {
 type Drawn = (Vec<Vec<f64>>, Vec<Vec<Curves>>);
 
 /// Simulates a model in the world that the record saw, `count` times, with the record's own gaps: the readings of each
-/// channel of the model once, and the curves of each every time.
+/// channel of the model once, and the curves of each every time. The second half is drawn beside the first where there is a
+/// thread for it (a browser has none), with the same numbers.
 ///
 /// # Errors
 /// Those of the simulation.
@@ -157,11 +163,38 @@ pub fn replicate(
     count: usize,
     seed: u64,
 ) -> Result<Drawn, SimulateError> {
+    let draws = |of: Range<u64>| draws(model, record, places, of, seed);
+    let (count, half) = (count as u64, count.div_ceil(2) as u64);
+    thread::scope(|threads| {
+        let beside = thread::Builder::new().spawn_scoped(threads, || draws(half..count));
+        let (once, mut curves) = draws(0..half)?;
+        let (_, rest) = match beside {
+            Ok(thread) => thread
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            Err(_) => draws(half..count),
+        }?;
+        for (curves, rest) in curves.iter_mut().zip(rest) {
+            curves.extend(rest);
+        }
+        Ok((once, curves))
+    })
+}
+
+/// Some of the draws, by their numbers, and the readings of the first of them.
+fn draws(
+    model: &ModelFile,
+    record: &Record,
+    places: &Places<'_>,
+    numbers: Range<u64>,
+    seed: u64,
+) -> Result<Drawn, SimulateError> {
     let mut replicas = Replicas::new(model, record, model.rate_hz, &[])?;
     let mut readings = vec![];
-    let mut curves = vec![Vec::with_capacity(count); model.channels.len()];
+    let mut curves = vec![Vec::new(); model.channels.len()];
     let mut once = vec![];
-    for k in 0..count as u64 {
+    let first = numbers.start;
+    for k in numbers {
         replicas.draw(seed.wrapping_add(k), &mut readings);
         for (channel, values) in model.channels.iter().zip(&mut readings) {
             let measured = record.channel(&channel.name).map(|c| c.values.iter());
@@ -174,7 +207,7 @@ pub fn replicate(
         for (curves, values) in curves.iter_mut().zip(&readings) {
             curves.push(places.curves(values));
         }
-        if k == 0 {
+        if k == first {
             once.clone_from(&readings);
         }
     }

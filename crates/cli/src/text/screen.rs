@@ -173,7 +173,15 @@ fn write_unexplained(out: &mut String, all: &[Unexplained]) {
             "    and {more} more (all of them: --json, or the report)"
         );
     }
-    let next = "Record again, twice as long: what comes again belongs to the sensor or the stand. The report shows where it lies.";
+    let was_read = |left: &&&Unexplained| !left.checks.is_empty() || left.rms.is_some();
+    let next = match large.iter().filter(was_read).count() {
+        0 => {
+            "Look to the sensor, its supply and the column: nothing can be said of what was not measured."
+        }
+        _ => {
+            "Record again, twice as long: what comes again belongs to the sensor or the stand. The report shows where it lies."
+        }
+    };
     let _ = writeln!(out, "{}", item("", next));
 }
 

@@ -55,8 +55,14 @@ fn analyze_and_diagnose_read_one_rate_from_whole_seconds_and_from_a_clock_that_w
         }
     }
     // Another rate than that of the times is a mistake, whichever of them is wrong.
+    let units = ["--units", "gyro=deg/s"];
     let stated = ["--columns", "time=t,gyro_x=gx", "--rate", "40"];
-    let refused = run(&[&["analyze", set_back.to_str().unwrap()], &stated[..]].concat());
+    let refused = run(&[
+        &["analyze", set_back.to_str().unwrap()],
+        &stated[..],
+        &units,
+    ]
+    .concat());
     let said = String::from_utf8_lossy(&refused.stderr);
     assert_eq!(refused.status.code(), Some(1), "{said}");
     assert!(
@@ -69,6 +75,8 @@ fn analyze_and_diagnose_read_one_rate_from_whole_seconds_and_from_a_clock_that_w
         still.to_str().unwrap(),
         "--columns",
         "time=t,gyro_x=gx",
+        units[0],
+        units[1],
     ]);
     let said = String::from_utf8_lossy(&refused.stderr);
     assert!(said.contains("the time column is 5 throughout"), "{said}");

@@ -1,3 +1,4 @@
+use super::say::proposal;
 use super::*;
 
 #[test]
@@ -76,11 +77,11 @@ fn a_proposal_maps_each_axis_to_its_own_column_with_the_headers_units_and_quotes
         ),
         (
             "t;GyroX;GyroY;GyroZ;AccX;MagX",
-            "--columns time=t,gyro_x=GyroX,gyro_y=GyroY,gyro_z=GyroZ,acc_x=AccX --units gyro=deg/s,acc=m/s2",
+            "--columns time=t,gyro_x=GyroX,gyro_y=GyroY,gyro_z=GyroZ,acc_x=AccX --units gyro=UNIT,acc=UNIT",
         ),
         (
             "gyr[0];gyr[1];gyr[2];mag[0]",
-            "--columns 'gyro_x=gyr[0],gyro_y=gyr[1],gyro_z=gyr[2]' --units gyro=deg/s",
+            "--columns 'gyro_x=gyr[0],gyro_y=gyr[1],gyro_z=gyr[2]' --units gyro=UNIT",
         ),
         (
             "Zeit (s);Drehrate x (°/s);Drehrate y (°/s)",
@@ -88,62 +89,59 @@ fn a_proposal_maps_each_axis_to_its_own_column_with_the_headers_units_and_quotes
         ),
         (
             "imu0.time;imu0.gx;imu0.gyro.y;imu0.ax",
-            "--columns time=imu0.time,gyro_x=imu0.gx,gyro_y=imu0.gyro.y,acc_x=imu0.ax --units gyro=deg/s,acc=m/s2",
+            "--columns time=imu0.time,gyro_x=imu0.gx,gyro_y=imu0.gyro.y,acc_x=imu0.ax --units gyro=UNIT,acc=UNIT",
         ),
         (
             "micros;gx;gy",
-            "--columns time=micros,gyro_x=gx,gyro_y=gy --units time=us,gyro=deg/s",
+            "--columns time=micros,gyro_x=gx,gyro_y=gy --units time=us,gyro=UNIT",
         ),
-        (
-            "Zeit;gx",
-            "--columns time=Zeit,gyro_x=gx --units gyro=deg/s",
-        ),
+        ("Zeit;gx", "--columns time=Zeit,gyro_x=gx --units gyro=UNIT"),
         (
             "t;xgyro;ygyro;zgyro;xacc",
-            "--columns time=t,gyro_x=xgyro,gyro_y=ygyro,gyro_z=zgyro,acc_x=xacc --units gyro=deg/s,acc=m/s2",
+            "--columns time=t,gyro_x=xgyro,gyro_y=ygyro,gyro_z=zgyro,acc_x=xacc --units gyro=UNIT,acc=UNIT",
         ),
         (
             "omega1;omega2;omega3",
-            "--columns gyro_x=omega1,gyro_y=omega2,gyro_z=omega3 --units gyro=deg/s",
+            "--columns gyro_x=omega1,gyro_y=omega2,gyro_z=omega3 --units gyro=UNIT",
         ),
         (
             "t;roll;rollrate;pitch_rate;yawRate",
-            "--columns time=t,gyro_x=rollrate,gyro_y=pitch_rate,gyro_z=yawRate --units gyro=deg/s",
+            "--columns time=t,gyro_x=rollrate,gyro_y=pitch_rate,gyro_z=yawRate --units gyro=UNIT",
         ),
         (
             "r;q;p;throttle",
-            "--columns gyro_x=p,gyro_y=q,gyro_z=r --units gyro=deg/s",
+            "--columns gyro_x=p,gyro_y=q,gyro_z=r --units gyro=UNIT",
         ),
         (
             "t;rot_x;rot_y",
-            "--columns time=t,gyro_x=rot_x,gyro_y=rot_y --units gyro=deg/s",
+            "--columns time=t,gyro_x=rot_x,gyro_y=rot_y --units gyro=UNIT",
         ),
         (
             "t;acc;Gyro's rate",
-            r"--columns 'time=t,gyro_x=Gyro'\''s rate' --units gyro=deg/s",
+            r"--columns 'time=t,gyro_x=Gyro'\''s rate' --units gyro=UNIT",
         ),
-        ("y", "--columns gyro_y=y --units gyro=deg/s"),
-        ("values", "--columns gyro_x=values --units gyro=deg/s"),
+        ("y", "--columns gyro_y=y --units gyro=UNIT"),
+        ("values", "--columns gyro_x=values --units gyro=UNIT"),
     ];
     for (names, expected) in cases {
         let names: Vec<String> = names.split(';').map(str::to_owned).collect();
-        let (proposed, is_guessed) = proposal(&names, false, &Seen::default());
-        assert_eq!(proposed, expected);
-        // A name that says no unit leaves it to be checked.
-        let says = ["/s", " s^", "dps", "seconds_elapsed"]
-            .iter()
-            .any(|unit| names[1 % names.len()].contains(unit));
-        assert_eq!(is_guessed, !says, "{names:?}");
+        let proposed = proposal(&names, false, true, &Seen::default());
+        assert_eq!(proposed.line, expected);
+        assert_eq!(
+            !proposed.open.is_empty(),
+            expected.contains("=UNIT"),
+            "{names:?}"
+        );
     }
-    let numbered = |n: usize| proposal(&vec![String::new(); n], true, &Seen::default()).0;
-    assert_eq!(numbered(1), "--columns gyro_x=1 --units gyro=deg/s");
+    let numbered = |n: usize| proposal(&vec![String::new(); n], true, true, &Seen::default()).line;
+    assert_eq!(numbered(1), "--columns gyro_x=1 --units gyro=UNIT");
     assert_eq!(
         numbered(3),
-        "--columns gyro_x=1,gyro_y=2,gyro_z=3 --units gyro=deg/s"
+        "--columns gyro_x=1,gyro_y=2,gyro_z=3 --units gyro=UNIT"
     );
     assert_eq!(
         numbered(7),
-        "--columns time=1,gyro_x=2,gyro_y=3,gyro_z=4,acc_x=5,acc_y=6,acc_z=7 --units gyro=deg/s,acc=m/s2"
+        "--columns time=1,gyro_x=2,gyro_y=3,gyro_z=4,acc_x=5,acc_y=6,acc_z=7 --units gyro=UNIT,acc=UNIT"
     );
 }
 
@@ -173,34 +171,35 @@ fn a_table_without_names_is_proposed_by_what_its_values_are() {
         // An even time is none of three gyros.
         (
             vec![Time(0.05), Noise(0.0), Noise(1.0)],
-            "--columns time=1,gyro_x=2,gyro_y=3 --units gyro=deg/s",
+            "--columns time=1,gyro_x=2,gyro_y=3 --units gyro=UNIT",
         ),
         (
             Vec::from(still()),
-            "--columns gyro_x=1,gyro_y=2,gyro_z=3 --units gyro=deg/s",
+            "--columns gyro_x=1,gyro_y=2,gyro_z=3 --units gyro=UNIT",
         ),
         // What numbers the rows is no time, and the rate is asked for.
         (
             vec![Time(1.0), Noise(0.0)],
-            "--columns gyro_x=2 --units gyro=deg/s --rate HZ",
+            "--columns gyro_x=2 --units gyro=UNIT --rate HZ",
         ),
         (
             flat(vec![vec![Time(1.0), Time(0.01)], still().into()]),
-            "--columns time=2,gyro_x=3,gyro_y=4,gyro_z=5 --units gyro=deg/s",
+            "--columns time=2,gyro_x=3,gyro_y=4,gyro_z=5 --units gyro=UNIT",
         ),
         // Gravity tells the accelerometers, and their unit.
         (
             flat(vec![vec![Time(0.01)], down(9.81).into(), still().into()]),
-            "--columns time=1,gyro_x=5,gyro_y=6,gyro_z=7,acc_x=2,acc_y=3,acc_z=4 --units gyro=deg/s,acc=m/s2",
+            "--columns time=1,gyro_x=5,gyro_y=6,gyro_z=7,acc_x=2,acc_y=3,acc_z=4 --units gyro=UNIT,acc=m/s2",
         ),
         (
             flat(vec![still().into(), down(1000.0).into()]),
-            "--columns gyro_x=1,gyro_y=2,gyro_z=3,acc_x=4,acc_y=5,acc_z=6 --units gyro=deg/s,acc=mg",
+            "--columns gyro_x=1,gyro_y=2,gyro_z=3,acc_x=4,acc_y=5,acc_z=6 --units gyro=UNIT,acc=mg",
         ),
     ];
     for (columns, expected) in cases {
         let (names, seen) = seen(&columns);
-        assert_eq!(proposal(&names, true, &seen).0, expected);
+        let knows_rate = !expected.contains("--rate");
+        assert_eq!(proposal(&names, true, knows_rate, &seen).line, expected);
     }
 }
 
@@ -213,9 +212,12 @@ fn columns_of_one_array_go_by_their_places_and_values_too() {
         Of::Noise(0.0),
     ]);
     let names: Vec<String> = (0..4).map(|k| format!("values[{k}]")).collect();
-    let (proposed, is_guessed) = proposal(&names, false, &values);
-    let expected = "--columns 'time=values[0],gyro_x=values[1],gyro_y=values[2],gyro_z=values[3]' --units gyro=deg/s";
-    assert_eq!((proposed.as_str(), is_guessed), (expected, true));
+    let proposed = proposal(&names, false, false, &values);
+    let expected = "--columns 'time=values[0],gyro_x=values[1],gyro_y=values[2],gyro_z=values[3]' --units gyro=UNIT";
+    assert_eq!(
+        (proposed.line.as_str(), proposed.open),
+        (expected, vec!["gyro"])
+    );
 }
 
 #[test]
@@ -223,14 +225,29 @@ fn values_tell_a_time_whose_name_does_not_and_what_is_no_rate() {
     let names = ["n", "k", "b"].map(str::to_owned);
     let (_, values) = seen(&[Of::Noise(0.0), Of::Time(0.05), Of::Noise(1.0)]);
     assert_eq!(
-        proposal(&names, false, &values).0,
-        "--columns time=k,gyro_x=n --units gyro=deg/s"
+        proposal(&names, false, false, &values).line,
+        "--columns time=k,gyro_x=n --units gyro=UNIT"
     );
     let (_, Seen(mut columns)) = seen(&[Of::Time(0.5), Of::Noise(0.0)]);
     columns[1].iter_mut().for_each(|v| *v *= 1e-10);
     let names = ["time_s", "y"].map(str::to_owned);
     assert_eq!(
-        proposal(&names, false, &Seen(columns)).0,
+        proposal(&names, false, false, &Seen(columns)).line,
         "--columns time=time_s,freq=y --units freq=1"
+    );
+}
+
+#[test]
+fn gravity_tells_the_accelerometer_where_axes_have_no_other_name() {
+    let (_, values) = seen(&[
+        Of::Time(0.05),
+        Of::Noise(9.8),
+        Of::Noise(0.1),
+        Of::Noise(0.3),
+    ]);
+    let names = ["seconds_elapsed", "z", "y", "x"].map(str::to_owned);
+    assert_eq!(
+        proposal(&names, false, false, &values).line,
+        "--columns time=seconds_elapsed,acc_x=x,acc_y=y,acc_z=z --units acc=m/s2"
     );
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::super::units::known;
 use super::{Arrays, open};
 
 /// An array of a group or struct is called `GROUP.ARRAY`.
@@ -34,6 +35,9 @@ const PACKS: u64 = 1032;
 
 /// Bytes of a file that is read at once.
 const WHOLE: u64 = 1 << 30;
+
+/// Attributes in which writers state the unit of an array (`units` in the CF conventions).
+const UNITS: [&str; 3] = ["units", "unit", "Units"];
 
 /// Groups within groups that are followed.
 const DEEPEST: usize = 16;
@@ -70,7 +74,15 @@ fn hdf5_group(
             _ => continue,
         };
         let shape: Vec<usize> = shape.iter().map(|n| *n as usize).collect();
+        let before = out.columns.len();
         out.add(&format!("{within}{name}"), &shape, values, true);
+        let stated = UNITS.iter().find_map(|key| attributes.get(*key)?.as_str());
+        // Text that is no unit of this program's says nothing; the unit is asked for then.
+        if let Some(unit) = stated.and_then(known) {
+            let columns = out.columns[before..].iter();
+            let stated = columns.map(|(name, _)| (format!("unit of {name}"), unit.to_owned()));
+            out.about.extend(stated);
+        }
     }
     for name in group.groups()? {
         // What MATLAB keeps for itself begins so.

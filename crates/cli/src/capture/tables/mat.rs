@@ -14,6 +14,14 @@ pub(super) fn mat(path: &Path) -> Result<Arrays, String> {
     if file.read_exact(&mut start).is_ok() && &start == b"MATLAB 7.3" {
         return hdf5(path);
     }
+    // Later versions begin with words; version 4 with the kind of its first array.
+    if !start.is_ascii() || start.contains(&0) {
+        return Err(
+            "it does not begin as a .mat of version 5 to 7.3: one of version 4 is written anew by `save(FILE, '-v7')`, or \
+             scipy's `savemat(FILE, ...)`"
+                .to_owned(),
+        );
+    }
     out.reserve("of all", &[unpacked_mat(&mut file)? / NUMBER])?;
     let file = matfile::MatFile::parse(Cursor::new(start).chain(file))
         .map_err(|error| format!("it is no .mat of version 5 to 7: {error}"))?;

@@ -14,11 +14,27 @@ use super::super::pages::{Pages, is_packed_otherwise};
 use super::{Arrays, open};
 
 fn bad(error: ParquetError) -> String {
-    format!("it is no Parquet file: {error}")
+    format!("it cannot be read as Parquet: {error}")
+}
+
+/// What is wrong with a file that has no end of a Parquet file, where its index stands.
+fn without_end(error: ParquetError, path: &Path) -> String {
+    let begins = || {
+        let mut start = [0; 4];
+        std::io::Read::read_exact(&mut open(path).ok()?, &mut start).ok()?;
+        (&start == b"PAR1").then_some(())
+    };
+    match begins() {
+        Some(()) => format!(
+            "it begins as Parquet and does not end so: was it copied, or written, to its end? ({error})"
+        ),
+        None => bad(error),
+    }
 }
 
 pub(super) fn parquet_file(path: &Path) -> Result<Arrays, String> {
-    let reader = SerializedFileReader::new(open(path)?).map_err(bad)?;
+    let reader =
+        SerializedFileReader::new(open(path)?).map_err(|error| without_end(error, path))?;
     let mut file = open(path)?;
     let metadata = reader.metadata().file_metadata();
     let mut out = Arrays::of(&file)?;
