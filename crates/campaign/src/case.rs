@@ -72,6 +72,16 @@ impl Family {
             Self::Foreign(i) => FOREIGN[i],
         }
     }
+
+    /// Whether `only` leaves it: its row of the tables, or for a foreign effect its set.
+    #[must_use]
+    pub fn is_of(self, only: &str) -> bool {
+        let set = match self {
+            Self::Foreign(i) => only == format!("set {}", foreign::set(i)),
+            _ => false,
+        };
+        set || self.label() == only
+    }
 }
 
 /// How an effect was found.

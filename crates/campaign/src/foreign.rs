@@ -44,6 +44,12 @@ pub fn number(place: usize) -> u64 {
     u64::from(EFFECTS[place].id)
 }
 
+/// The set that one was written in, by its place in [`FOREIGN`].
+#[must_use]
+pub fn set(place: usize) -> usize {
+    EFFECTS[place].set
+}
+
 /// Whether the engine has been changed after one was graded, or was developed with it, by its place in [`FOREIGN`].
 #[must_use]
 pub fn is_seen(place: usize) -> bool {

@@ -128,13 +128,13 @@ pub fn family_of(label: &str) -> Option<Family> {
         .find(|f| f.label() == label)
 }
 
-/// All cases of a size that `only` (a row of the tables) leaves. Families are interleaved: wherever the runs are cut
+/// All cases of a size that `only` (a row of the tables, or "set 15") leaves. Families are interleaved: wherever the runs are cut
 /// off, each has had its share of them.
 #[must_use]
 pub fn cases(size: Size, only: Option<&str>) -> Vec<(Family, u64)> {
     let mut all: Vec<(f64, Family, u64)> = families(size)
         .into_iter()
-        .filter(|(f, _)| only.is_none_or(|o| f.label() == o))
+        .filter(|(f, _)| only.is_none_or(|o| f.is_of(o)))
         .flat_map(|(f, count)| (0..count).map(move |i| ((i as f64 + 0.5) / count as f64, f, i)))
         .collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

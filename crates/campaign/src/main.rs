@@ -31,7 +31,8 @@ struct Arguments {
     /// Begin no run after so many minutes.
     #[arg(long)]
     minutes: Option<f64>,
-    /// Only this row of the tables ("line", "nothing", "two", "chirp", ...), with every run that is not right listed.
+    /// Only this row of the tables ("line", "nothing", "two", "chirp", ...), or the foreign effects of one set ("set 15"),
+    /// with every run that is not right listed.
     #[arg(long)]
     only: Option<String>,
     /// Runs per family in place of the size's.

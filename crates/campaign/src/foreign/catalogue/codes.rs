@@ -4,6 +4,7 @@ use super::super::shape::{by_chance, map};
 use super::Make::Shaped;
 use super::{ForeignEffect, Strength, TM, row};
 
+mod blocks;
 mod edges;
 mod gaps;
 mod maps;
@@ -47,4 +48,10 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(547, 13, "half-precision number about a power of two", Shaped(|d, s, a, _| map(a, maps::halved(d, s, a)))).twin(400),
     row(565, 14, "output stage that slews softly", Shaped(|d, s, a, _| by_chance(a, steps::slewing(d, s, a)))).parts(&["low_pass"]).twin(483),
     row(566, 14, "filter that smooths small changes", Shaped(|d, s, a, _| by_chance(a, steps::smoothing(d, s, a)))).parts(&["low_pass"]).twin(396),
+    row(568, 15, "bits that toggle pull at the ground", Shaped(|d, s, a, _| blocks::pulling(d, s, a))),
+    row(569, 15, "blocks that come out sorted", Shaped(|d, s, a, _| blocks::sorted(d, s, a))),
+    row(570, 15, "lost readings mirrored from those before", Shaped(|d, s, a, w| blocks::mirrored(d, s, a, w))).twin(467),
+    row(571, 15, "fraction printed without its zero", Shaped(|_, _, a, _| map(a, maps::without_zero))),
+    row(572, 15, "reading held while the part calibrates", Shaped(|d, s, a, w| blocks::held(d, s, a, w))).parts(&["stale_samples"]).strength(Strength::Whole),
+    row(573, 15, "block of readings with one exponent", Shaped(|d, s, a, _| blocks::exponents(d, s, a))).parts(&["stuck_bit"]),
 ];

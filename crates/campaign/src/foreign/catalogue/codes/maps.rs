@@ -180,3 +180,20 @@ pub(super) fn printed(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) 
     let form = form_of(draw, stand, axis, wanted);
     map(axis, move |code| form.read(code))
 }
+
+/// A rate printed by its whole and its hundredths, as "%d.%d" does: the zero of hundredths below ten is missing, and 1.05
+/// is read again as 1.5. Some lines are printed so.
+pub(super) fn without_zero(code: i32) -> i32 {
+    const HUNDREDTHS: i32 = 100;
+    let hundredths = (f64::from(HUNDREDTHS) * LSB * f64::from(code)).round() as i32;
+    let part = hundredths.abs() % HUNDREDTHS;
+    // What has one digit counts tenths.
+    let read = if part < 10 { 10 * part } else { part };
+    let whole = hundredths.abs() - part;
+    let rate = f64::from(hundredths.signum() * (whole + read)) / f64::from(HUNDREDTHS);
+    if part < 10 && part > 0 {
+        (rate / LSB).round() as i32
+    } else {
+        code
+    }
+}

@@ -344,3 +344,16 @@ fn traps(samples: usize, sign: f64, of: impl Fn(i32) -> Vec<f64>) -> Vec<f64> {
     }
     about_mean(&all)
 }
+
+/// A buffer of some readings that is sent backwards: while the table's drive ramps from rate to rate, each block runs against
+/// the time.
+pub(super) fn backwards(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let rate = ramped_table(draw, stand);
+    let length = 4 + draw.of_many(9);
+    let last = rate.len() - 1;
+    let sent = |i: usize| {
+        let block = i / length * length;
+        rate[(block + length - 1 - (i - block)).min(last)] - rate[i]
+    };
+    (0..=last).map(sent).collect()
+}

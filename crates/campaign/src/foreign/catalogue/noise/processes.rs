@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use super::super::super::act::Change;
 use super::super::super::known::Known;
-use super::super::super::shape::{Shape, sized};
-use super::super::super::words::{Turning, each, extremes, resonating};
+use super::super::super::shape::{Shape, noise, sized};
+use super::super::super::words::{Turning, each, each_pair, extremes, resonating};
 use crate::random::Draw;
 use crate::stand::{Stand, lagged};
 use crate::strength::Meter;
@@ -248,4 +248,50 @@ pub(super) fn wandering_ramp(draw: &mut Draw, stand: &Stand, axis: usize) -> Sha
 /// part.
 fn of_humps(meter: &Meter, f: f64, keep: f64, rate_hz: f64) -> Vec<f64> {
     each(meter.omega(), |w| of_hump(TAU * f / rate_hz, keep, w))
+}
+
+/// Firmware that adds the rate up to an angle in a short floating-point word and differences it again (24 bits, as compilers
+/// for small controllers have them, hold 16 of mantissa): the word's last digit doubles whenever the angle, which a rest of the
+/// bias carries away, passes a power of two, and the rounding with it.
+pub(super) fn short_float(draw: &mut Draw, axis: usize) -> Shape {
+    const PARTS: usize = 16;
+    const FINE: usize = 64;
+    let end = draw.between(1.0, 2.0);
+    // The last digit at a part of the record, over the last one that there is.
+    let digit = move |part: f64| (end * part).max(1e-3).log2().floor().exp2();
+    let square = |part: usize| {
+        let at = |k: usize| (part as f64 + (k as f64 + 0.5) / FINE as f64) / PARTS as f64;
+        (0..FINE).map(|k| digit(at(k)).powi(2)).sum::<f64>() / FINE as f64
+    };
+    let squares: Vec<f64> = (0..PARTS).map(square).collect();
+    let mean = squares.iter().sum::<f64>() / PARTS as f64;
+    // The size is the variance of the largest rounding over the white noise's; a difference has two.
+    noise(
+        f64::INFINITY,
+        move |stand, size| {
+            let (meter, white) = (Meter::new(stand, axis), stand.white(axis));
+            let of = |square: f64, w: f64| 1.0 + 2.0 * size * square * (1.0 - w.cos());
+            let change = |w| white * (of(mean, w) / (1.0 + 2.0 * size * mean) - 1.0);
+            // What the mean spectrum tells, and what its changes tell beside.
+            let steady = meter.of_density(&each(meter.omega(), change)).powi(2);
+            let moves = |w| {
+                let logs: f64 = squares.iter().map(|square| of(*square, w).ln()).sum();
+                of(mean, w).ln() - logs / PARTS as f64
+            };
+            let bins = each_pair(meter.omega(), meter.counts(), |w, m| m * moves(w));
+            Known::Strength((steady + bins.iter().sum::<f64>()).sqrt())
+        },
+        move |stand, draw, size| {
+            let n = stand.samples() as f64;
+            let scale = (1.0 + 2.0 * size * mean).sqrt();
+            let most = (12.0 * size).sqrt();
+            let mut before = 0.0;
+            stand.series(|i| {
+                let rounded = most * digit(i as f64 / n) * draw.between(-0.5, 0.5);
+                let x = draw.normal() + rounded - before;
+                before = rounded;
+                x / scale
+            })
+        },
+    )
 }
