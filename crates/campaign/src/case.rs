@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::clean::KINDS;
 use crate::company::{self, STRUCTURES};
-use crate::foreign::{self, FOREIGN, Foreign, add, foreign};
+use crate::foreign::{EFFECTS, Foreign, add, foreign};
 use crate::plant::{
     BY_COUNT, BY_STRENGTH, COUNTED, STRONG, Truth, as_effect, plant, plant_counted,
 };
@@ -36,7 +36,7 @@ pub enum Family {
     OneAxis,
     /// One effect on an axis with a structure of another kind, by its place in [`STRUCTURES`].
     Beside(usize),
-    /// An effect that the library does not have, by its place in [`FOREIGN`].
+    /// An effect that the library does not have, by its place among those.
     Foreign(usize),
 }
 
@@ -53,7 +53,7 @@ impl Family {
             Self::Beside(i) => u64::from(STRUCTURES[i].id),
             Self::One(i) => u64::from(STRONG[i].id),
             Self::Counted(i) => u64::from(COUNTED[i].id),
-            Self::Foreign(i) => foreign::number(i),
+            Self::Foreign(i) => u64::from(EFFECTS[i].id),
         }
     }
 
@@ -69,7 +69,7 @@ impl Family {
             Self::Beside(i) => STRUCTURES[i].label,
             Self::One(i) => BY_STRENGTH[i],
             Self::Counted(i) => BY_COUNT[i],
-            Self::Foreign(i) => FOREIGN[i],
+            Self::Foreign(i) => EFFECTS[i].name,
         }
     }
 
@@ -77,7 +77,7 @@ impl Family {
     #[must_use]
     pub fn is_of(self, only: &str) -> bool {
         let set = match self {
-            Self::Foreign(i) => only == format!("set {}", foreign::set(i)),
+            Self::Foreign(i) => only == format!("set {}", EFFECTS[i].set),
             _ => false,
         };
         set || self.label() == only
@@ -245,13 +245,8 @@ struct Planted {
 fn needed(family: Family) -> Needs {
     match family {
         Family::One(i) => STRONG[i].needs,
-        Family::Pair | Family::OneAxis | Family::Beside(_) => Needs {
-            temperature: true,
-            supply: true,
-            motor: true,
-            vibration: true,
-        },
-        Family::Foreign(i) => foreign::needs(i),
+        Family::Pair | Family::OneAxis | Family::Beside(_) => Needs::ALL,
+        Family::Foreign(i) => EFFECTS[i].needs,
         _ => Needs::default(),
     }
 }
@@ -288,8 +283,8 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         }
         Family::Foreign(i) => {
             let wanted = draw.by_ratio(25.0, 40.0);
-            axis = foreign::on_axis(i, axis);
-            allowed.extend(foreign::parts(i));
+            axis = EFFECTS[i].axis(axis);
+            allowed.extend(EFFECTS[i].true_causes());
             unknown = Some(foreign(draw, &mut stand, i, axis, wanted));
         }
     }

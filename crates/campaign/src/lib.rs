@@ -115,7 +115,7 @@ fn families(size: Size) -> Vec<(Family, u64)> {
     families.extend((0..company::STRUCTURES.len()).map(|i| (Family::Beside(i), size.beside)));
     families.extend((0..plant::BY_STRENGTH.len()).map(|i| (Family::One(i), size.one)));
     families.extend((0..plant::BY_COUNT.len()).map(|i| (Family::Counted(i), size.counted)));
-    families.extend((0..foreign::FOREIGN.len()).map(|i| (Family::Foreign(i), size.foreign)));
+    families.extend((0..foreign::EFFECTS.len()).map(|i| (Family::Foreign(i), size.foreign)));
     families
 }
 

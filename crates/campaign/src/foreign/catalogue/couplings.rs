@@ -1,14 +1,8 @@
 //! What one axis has of another, beyond a straight line in the same frame.
 
-use super::super::act::Change;
-use super::super::known::{Known, REACH, law, law_of};
-use super::super::shape::{Shape, by_energy, coupled, coupled_series, sized};
-use super::super::words::{about_mean, each, each_pair, resonating};
+use super::super::prelude::*;
 use super::Make::Shaped;
 use super::{ForeignEffect, Strength, TM, row};
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
-use crate::strength::Meter;
 
 /// One row each, unbroken so that columns can be read down.
 #[rustfmt::skip]

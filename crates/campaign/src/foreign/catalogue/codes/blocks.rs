@@ -1,13 +1,8 @@
 //! Readings that are handled by blocks, and words that disturb the next.
 
-use super::super::super::act::Change;
-use super::super::super::known::{Known, law, mean_and_sigma};
-use super::super::super::shape::{Shape, sized};
-use super::super::super::words::{each, mean_square};
+use super::super::super::prelude::*;
 use super::edges::zero_of;
 use super::gaps::gaps_for;
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
 
 /// Nats by which a reading tells that it is a copy of another one: the entropy of its law.
 fn nats_of_copy(stand: &Stand, axis: usize) -> f64 {

@@ -1,13 +1,8 @@
 //! Converters: where one code ends and the next one begins.
 
-use std::f64::consts::TAU;
 use std::rc::Rc;
 
-use super::super::super::act::Change;
-use super::super::super::known::{Known, even_edges, law, mean_and_sigma, shares};
-use super::super::super::shape::{Shape, edges, sized};
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
+use super::super::super::prelude::*;
 
 /// Most that the line of a wavy converter leans: at 1 it would turn back, and codes be missing.
 pub(super) const STEEPEST: f64 = 0.9;

@@ -1,12 +1,6 @@
 //! Gaps that a driver hides.
 
-use std::f64::consts::TAU;
-
-use super::super::super::act::Change;
-use super::super::super::known::Known;
-use super::super::super::shape::Shape;
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
+use super::super::super::prelude::*;
 
 /// Readings of a gap, least and most.
 pub(super) const GAP: (usize, usize) = (4, 10);

@@ -1,11 +1,7 @@
 //! Codes that are read as others.
 
-use super::super::super::act::Change;
-use super::super::super::known::{Known, even_edges, law, mean_and_sigma, shares};
-use super::super::super::shape::{Shape, map};
+use super::super::super::prelude::*;
 use super::edges::zero_of;
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
 
 /// Those whose last digit is more than a count, and less than the noise, at the rates of a stand at rest: deg/s, gon/s,
 /// minutes of arc a second, and deg/h.

@@ -1,13 +1,6 @@
 //! Readings that depend on those before or after them.
 
-use super::super::super::act::Change;
-use super::super::super::known::{
-    Known, even_edges, law, long_run, mean_and_sigma, shares, steps_of,
-};
-use super::super::super::shape::{Shape, sized};
-use super::super::super::words::{each, each_pair};
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
+use super::super::super::prelude::*;
 
 /// Largest play, counts.
 pub(super) const MOST_PLAY: f64 = 6.0;

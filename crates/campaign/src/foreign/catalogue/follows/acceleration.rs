@@ -1,13 +1,6 @@
 //! Signals that follow an acceleration.
 
-use std::f64::consts::TAU;
-
-use super::super::super::words::{
-    Turning, about_mean, behind_plays, cycles, each, each_pair, either_way, from_trim, mean_square,
-    one_if, resonating, shaken, shaking, shocks, swelling, without_line,
-};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// Vibration along a slant in spells: the anisoelastic error goes with the mean square over a sample, while the
 /// accelerometers see single aliased values.

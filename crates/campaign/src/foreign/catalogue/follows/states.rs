@@ -1,11 +1,6 @@
 //! Signals of what a recorded channel switches, triggers or releases.
 
-use super::super::super::words::{
-    about_mean, cycles, each, either_way, from_trim, loaded, mean_square, one_if, shaking, shocks,
-    within_range,
-};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// The part is screwed to metal of another expansion: as the temperature moves, stress builds up in the joint, which
 /// friction holds, and each shock lets all of it go. The bias is what the temperature has moved by since the last shock.

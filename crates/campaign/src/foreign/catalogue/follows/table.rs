@@ -1,13 +1,6 @@
 //! What a part that turns with a rate table gets wrong by the rate, the angle or the sense.
 
-use std::f64::consts::TAU;
-
-use super::super::super::words::{
-    DWELL, about_mean, angle_of_table, by_turns, changes, cycles, each, each_pair, either_way,
-    extremes, from_trim, in_steps, programme, ramped_table, rate_of_table, swing, turned,
-};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// How long an indexed table rests at a heading, s.
 pub(super) const RESTS: (f64, f64) = (1.5, 7.0);

@@ -1,12 +1,6 @@
 //! Noise whose readings depend on each other where a spectrum does not show it, or not all of it.
 
-use std::f64::consts::{PI, TAU};
-
-use super::super::super::known::Known;
-use super::super::super::shape::{Shape, noise, share};
-use super::super::super::words::{about_mean, by_turns, each, extremes, in_steps, mean_square};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// Most of the noise that may be of another kind.
 pub(super) const MOST: f64 = 0.95;

@@ -1,14 +1,6 @@
 //! Processes beside the white noise: modes that noise drives, and humps that move.
 
-use std::f64::consts::TAU;
-
-use super::super::super::act::Change;
-use super::super::super::known::Known;
-use super::super::super::shape::{Shape, noise, sized};
-use super::super::super::words::{Turning, each, each_pair, extremes, resonating};
-use crate::random::Draw;
-use crate::stand::{Stand, lagged};
-use crate::strength::Meter;
+use super::super::super::prelude::*;
 
 /// A damped mode that something random drives: x[i] = first x[i-1] + second x[i-2] + sqrt(drive) e[i], of variance 1.
 #[derive(Clone, Copy)]

@@ -1,15 +1,8 @@
 //! Noise of another spectrum, in place of the white noise.
 
-use std::f64::consts::{PI, TAU};
-
 use diagnosis::likelihood::Dct;
 
-use super::super::super::act::Change;
-use super::super::super::known::Known;
-use super::super::super::shape::{Shape, noise, share, sized};
-use super::super::super::words::{each, each_pair, one_if};
-use crate::random::Draw;
-use crate::stand::{LSB, Stand, lagged};
+use super::super::super::prelude::*;
 
 /// Orders of the memory: with less a random walk hides all but little of it, with more it is flicker noise.
 pub(super) const ORDERS: (f64, f64) = (0.28, 0.32);

@@ -1,10 +1,6 @@
 //! Tones, whose pitch, size or phase changes.
 
-use std::f64::consts::TAU;
-
-use super::super::super::words::{about_mean, each, in_spells, in_time, one_if, tone};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// The first coordinate of the Lorenz system (1963) at its usual parameters: a swing about either of two places.
 pub(super) fn swing_without_period(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
