@@ -96,7 +96,8 @@ pub const SETS: [Set; 15] = [
     seen("2026-11-22", NOTHING, &[grade(89_432_555_532_976, 383, 15, 400), grade(63_774_036_767_264, 380, 10, 394)])
         .wrong("`gauss_markov`, `warm_up` (16): a thermometer of coarse steps")
         .unseen(),
-    seen("2026-11-25", "docs/power.md, docs/effects.md, the earlier sets", &[])
+    seen("2026-11-25", "docs/power.md, docs/effects.md, the earlier sets", &[grade(1_795_571_875, 309, 31, 390)])
+        .wrong("`line` (13): blocks that come out sorted")
         .unseen(),
 ];
 
