@@ -242,8 +242,7 @@ fn tail(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
             let mean = from.iter().map(|c| f64::from(*c)).sum::<f64>() / from.len() as f64;
             let mut held = 0.0;
             each_pair(&counts[axis], from, |own, from| {
-                // Within its step the rate is anywhere.
-                let new = f64::from(own) + draw.between(-0.5, 0.5) + sign * share * held;
+                let new = within_step(own, draw) + sign * share * held;
                 held = keep * held + f64::from(from) - mean;
                 new.round() as i32
             })
@@ -275,8 +274,7 @@ fn of_both(
             &about_bias(&counts[other], bias),
             &counts[axis],
             |z, own| {
-                // Within its step the rate is anywhere.
-                let rate = LSB * (f64::from(own) + draw.between(-0.5, 0.5)) - own_bias;
+                let rate = LSB * within_step(own, draw) - own_bias;
                 ((own_bias + of(rate, z)) / LSB).round() as i32
             },
         )
@@ -356,18 +354,16 @@ fn duplicates(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Shape {
         }
         Known::Strength((2.0 * stand.samples() as f64 * nats).max(0.0).sqrt())
     };
-    sized(
+    remade(
         1.0,
         move |stand, chance| strength(stand, chance.min(1.0)),
-        move |_, _, chance| {
-            Change::made(move |counts, draw| {
-                let mut last = counts[axis][0];
-                each_pair(&counts[axis], &counts[other], |own, its| {
-                    if own != its || !draw.chance(chance) {
-                        last = own;
-                    }
-                    last
-                })
+        move |counts, draw, chance| {
+            let mut last = counts[axis][0];
+            each_pair(&counts[axis], &counts[other], |own, its| {
+                if own != its || !draw.chance(chance) {
+                    last = own;
+                }
+                last
             })
         },
     )
@@ -389,19 +385,17 @@ fn by_neighbour(draw: &mut Draw, axis: usize) -> Shape {
         let frames = stand.samples() as f64 * square(&law(stand, other).1);
         Known::Strength((2.0 * frames * (again + moves)).max(0.0).sqrt())
     };
-    sized(
+    remade(
         1.0,
         move |stand, chance| strength(stand, chance.min(1.0)),
-        move |_, _, chance| {
-            Change::made(move |counts, draw| {
-                let (mut last, mut its_last) = (counts[axis][0], counts[other][0].wrapping_add(1));
-                each_pair(&counts[axis], &counts[other], |own, its| {
-                    if its != its_last || !draw.chance(chance) {
-                        last = own;
-                    }
-                    its_last = its;
-                    last
-                })
+        move |counts, draw, chance| {
+            let (mut last, mut its_last) = (counts[axis][0], counts[other][0].wrapping_add(1));
+            each_pair(&counts[axis], &counts[other], |own, its| {
+                if its != its_last || !draw.chance(chance) {
+                    last = own;
+                }
+                its_last = its;
+                last
             })
         },
     )
@@ -451,8 +445,7 @@ fn limited(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
                 let [a, b] = [one, two].map(|k| about_bias(&counts[k], biases[k]));
                 let others = each_pair(&a, &b, f64::hypot);
                 each_pair(&counts[axis], &others, |own, r| {
-                    // Within its step the rate is anywhere.
-                    let rate = LSB * (f64::from(own) + draw.between(-0.5, 0.5)) - biases[axis];
+                    let rate = LSB * within_step(own, draw) - biases[axis];
                     ((biases[axis] + within(rate, r, limit).0) / LSB).round() as i32
                 })
             })

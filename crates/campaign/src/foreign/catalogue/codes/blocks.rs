@@ -32,22 +32,19 @@ pub(super) fn pulling(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let rms = mean_square(&each(&bits, |b| b - usual)).sqrt();
     let sign = draw.sign();
     // The size is what a bit pulls, counts.
-    sized(
+    remade(
         f64::INFINITY,
         move |stand, size| {
             let sigma = stand.white(axis).sqrt() / LSB;
             Known::Strength(size * rms / sigma * (stand.samples() as f64).sqrt())
         },
-        move |_, _, size| {
-            Change::made(move |counts, draw| {
-                let (mut last, mut before) = (counts[axis][0], counts[axis][0]);
-                each(&counts[axis], |own| {
-                    let pulled = sign * size * (toggled(last, before) - usual);
-                    before = last;
-                    // Within its step the rate is anywhere.
-                    last = (f64::from(own) + draw.between(-0.5, 0.5) + pulled).round() as i32;
-                    last
-                })
+        move |counts, draw, size| {
+            let (mut last, mut before) = (counts[axis][0], counts[axis][0]);
+            each(&counts[axis], |own| {
+                let pulled = sign * size * (toggled(last, before) - usual);
+                before = last;
+                last = (within_step(own, draw) + pulled).round() as i32;
+                last
             })
         },
     )
@@ -64,7 +61,7 @@ pub(super) fn sorted(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let pairs = (length * (length - 1) / 2) as f64;
     let orders: f64 = (2..=length).map(|k| k as f64).product();
     let times = orders * (-equal * pairs * 2f64.ln()).exp();
-    sized(
+    remade(
         1.0,
         move |stand, chance| {
             let blocks = (stand.samples() / length) as f64;
@@ -74,16 +71,14 @@ pub(super) fn sorted(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
                     .sqrt(),
             )
         },
-        move |_, _, chance| {
-            Change::made(move |counts, draw| {
-                let mut own = counts[axis].clone();
-                for block in own[first..].chunks_exact_mut(length) {
-                    if draw.chance(chance) {
-                        block.sort_unstable();
-                    }
+        move |counts, draw, chance| {
+            let mut own = counts[axis].clone();
+            for block in own[first..].chunks_exact_mut(length) {
+                if draw.chance(chance) {
+                    block.sort_unstable();
                 }
-                own
-            })
+            }
+            own
         },
     )
 }
@@ -147,7 +142,7 @@ pub(super) fn exponents(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
         .map(|block| f64::from(step_of(block)).powi(BLOCK as i32))
         .filter(|times| *times > 1.0)
         .collect();
-    sized(
+    remade(
         1.0,
         move |_, chance| {
             let nats: f64 = times
@@ -156,20 +151,18 @@ pub(super) fn exponents(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
                 .sum();
             Known::Strength((2.0 * nats).max(0.0).sqrt())
         },
-        move |_, _, chance| {
-            Change::made(move |counts, draw| {
-                let mut own = counts[axis].clone();
-                for block in own.chunks_exact_mut(BLOCK) {
-                    let step = step_of(block);
-                    if draw.chance(chance) {
-                        for code in block {
-                            let mantissa = f64::from(*code - zero) / f64::from(step);
-                            *code = zero + step * mantissa.round() as i32;
-                        }
+        move |counts, draw, chance| {
+            let mut own = counts[axis].clone();
+            for block in own.chunks_exact_mut(BLOCK) {
+                let step = step_of(block);
+                if draw.chance(chance) {
+                    for code in block {
+                        let mantissa = f64::from(*code - zero) / f64::from(step);
+                        *code = zero + step * mantissa.round() as i32;
                     }
                 }
-                own
-            })
+            }
+            own
         },
     )
 }

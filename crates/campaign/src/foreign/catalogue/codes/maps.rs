@@ -68,35 +68,25 @@ impl Form {
     }
 }
 
-/// One of the forms that are strong enough, or the coarsest.
-pub(super) fn form_of(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Form {
-    let strong = |form: &&Form| {
-        Known::map(stand, axis, 1.0, &|c| form.read(c)).strength(stand, axis) >= wanted
-    };
-    let enough: Vec<&Form> = FORMS.iter().filter(strong).collect();
-    match enough.len() {
-        0 => FORMS[FORMS.len() - 1],
-        k => *enough[draw.of_many(k)],
-    }
-}
-
 /// A decimating filter whose register has no bit to spare: what is beyond its range comes out at the other end. So it is in
 /// the frames that are taken at the larger of two gains.
-pub(super) fn wrapped(draw: &mut Draw, stand: &Stand, axis: usize) -> impl Fn(i32) -> i32 + use<> {
+pub(super) fn wrapped(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (_, sigma) = mean_and_sigma(stand, axis);
     let zero = zero_of(draw, stand, axis).round() as i32;
     let half = (sigma * draw.between(0.8, 1.6)).round().max(2.0) as i32;
-    move |code| zero - half + (code - zero + half).rem_euclid(2 * half)
+    map(axis, move |code| {
+        zero - half + (code - zero + half).rem_euclid(2 * half)
+    })
 }
 
 /// Words kept as numbers of half precision, eleven bits of mantissa: beyond a power of two, which lies near the reading at
 /// rest, only every second has a number of its own, and one between two goes to that whose mantissa is even. Some frames are
 /// kept so.
-pub(super) fn halved(draw: &mut Draw, stand: &Stand, axis: usize) -> impl Fn(i32) -> i32 + use<> {
+pub(super) fn halved(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let zero = zero_of(draw, stand, axis).round() as i32;
     // Of a part that is mounted upside down, it is the readings below.
     let up = draw.sign() as i32;
-    move |code| {
+    map(axis, move |code| {
         let off = up * (code - zero);
         if off > 0 {
             let mantissa = (0.5 * f64::from(off)).round_ties_even() as i32;
@@ -104,18 +94,18 @@ pub(super) fn halved(draw: &mut Draw, stand: &Stand, axis: usize) -> impl Fn(i32
         } else {
             code
         }
-    }
+    })
 }
 
 /// A gain of one that a word of fractions cannot hold (Q15 ends at 0x7fff): the product is a little less than the reading
 /// and, cut toward zero as integers are divided in C, one short of it, whatever the reading but zero. So are a gain and its
 /// correction by two, and the code of zero takes five. Some frames go through it, others as they are.
-pub(super) fn cut(draw: &mut Draw, stand: &Stand, axis: usize) -> impl Fn(i32) -> i32 + use<> {
+pub(super) fn cut(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let zero = zero_of(draw, stand, axis).round() as i32;
-    move |code| {
+    map(axis, move |code| {
         let q15 = |v: i64, _: i32| v * 0x7fff / 0x8000;
         zero + (0..MULTIPLICATIONS).fold(i64::from(code - zero), q15) as i32
-    }
+    })
 }
 
 /// The bus is read bit by bit in software, and an interrupt that falls between two bits lets each be taken for the other:
@@ -171,9 +161,16 @@ pub(super) fn gated(stand: &Stand, axis: usize, wanted: f64) -> Shape {
     Shape::Fixed(known(gate), change)
 }
 
-/// Lines printed with few digits, and read again.
+/// Lines printed with few digits, and read again: in one of the forms that are strong enough, or the coarsest.
 pub(super) fn printed(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
-    let form = form_of(draw, stand, axis, wanted);
+    let strong = |form: &&Form| {
+        Known::map(stand, axis, 1.0, &|c| form.read(c)).strength(stand, axis) >= wanted
+    };
+    let enough: Vec<&Form> = FORMS.iter().filter(strong).collect();
+    let form = match enough.len() {
+        0 => FORMS[FORMS.len() - 1],
+        k => *enough[draw.of_many(k)],
+    };
     map(axis, move |code| form.read(code))
 }
 
