@@ -367,6 +367,16 @@ pub fn digest(seed: u64, family: Family, index: u64) -> u64 {
     hash
 }
 
+/// The answer to what case `index` plants.
+fn answer(p: &Planted, index: u64) -> Diagnosis {
+    let options = DiagnoseOptions {
+        seed: index,
+        ..DiagnoseOptions::default()
+    };
+    let d = diagnose(&p.record, &options).expect("a simulated run can be diagnosed");
+    d.diagnosis
+}
+
 /// What case `index` of a family plants, in words, and the whole answer.
 ///
 /// # Panics
@@ -374,30 +384,17 @@ pub fn digest(seed: u64, family: Family, index: u64) -> u64 {
 #[must_use]
 pub fn describe(seed: u64, family: Family, index: u64) -> (String, Diagnosis) {
     let p = planted(seed, family, index);
-    let options = DiagnoseOptions {
-        seed: index,
-        ..DiagnoseOptions::default()
+    let told = |t: &Truth| {
+        let values = t
+            .parameters
+            .iter()
+            .map(|(k, p)| format!("{k} {:.4}", p.value));
+        let values: Vec<String> = values.collect();
+        let (label, channel, values) = (t.label, &t.channel, values.join(", "));
+        format!("{label} on {channel} (d' {:.1}): {values}", t.strength)
     };
-    let d = diagnose(&p.record, &options).expect("a simulated run can be diagnosed");
-    let told: Vec<String> = p
-        .truths
-        .iter()
-        .map(|t| {
-            let values: Vec<String> = t
-                .parameters
-                .iter()
-                .map(|(k, p)| format!("{k} {:.4}", p.value))
-                .collect();
-            format!(
-                "{} on {} (d' {:.1}): {}",
-                t.label,
-                t.channel,
-                t.strength,
-                values.join(", ")
-            )
-        })
-        .collect();
-    (told.join("; "), d.diagnosis)
+    let all: Vec<String> = p.truths.iter().map(told).collect();
+    (all.join("; "), answer(&p, index))
 }
 
 /// Run case `index` of a family.
@@ -406,43 +403,26 @@ pub fn describe(seed: u64, family: Family, index: u64) -> (String, Diagnosis) {
 /// When a simulated run cannot be diagnosed: that is a defect of the diagnosis.
 #[must_use]
 pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
-    let Planted {
-        record,
-        truths,
-        allowed,
-        walks,
-        strange,
-    } = planted(seed, family, index);
+    let p = planted(seed, family, index);
     let begun = Instant::now();
-    let d = diagnose(
-        &record,
-        &DiagnoseOptions {
-            seed: index,
-            ..DiagnoseOptions::default()
-        },
-    )
-    .expect("a simulated run can be diagnosed")
-    .diagnosis;
+    let d = answer(&p, index);
     let seconds = begun.elapsed().as_secs_f64();
-    let (hits, wrong, estimates) = grade(&d, &truths, &allowed);
+    let (hits, wrong, estimates) = grade(&d, &p.truths, &p.allowed);
+    let truths = p.truths.iter().zip(hits);
+    let left = d.unexplained.iter();
     Outcome {
         family,
         index,
-        truths: truths
-            .iter()
-            .zip(hits)
-            .map(|(t, h)| (t.label, t.strength, h))
-            .collect(),
+        truths: truths.map(|(t, h)| (t.label, t.strength, h)).collect(),
         wrong,
-        unexplained: d
-            .unexplained
-            .iter()
+        unexplained: left
+            .clone()
             .map(|u| format!("{}: {}", u.channel, u.what))
             .collect(),
-        checks: d.unexplained.iter().map(|u| u.checks.clone()).collect(),
+        checks: left.map(|u| u.checks.clone()).collect(),
         estimates,
-        walks,
-        strength: strange,
+        walks: p.walks,
+        strength: p.strange,
         seconds,
     }
 }

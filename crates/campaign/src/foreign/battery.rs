@@ -1,8 +1,6 @@
 //! What every foreign effect is held to, row by row: it is not a case of the library, comes as strong as wanted, acts on its
 //! channel alone, and does to the readings what its strength reckons with.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use model::effects::EFFECTS as LIBRARY;
 
 use super::act::{Change, counts};
@@ -137,25 +135,12 @@ fn hold_each(kinds: &[&str], of: &(dyn Fn(usize, &ForeignEffect) -> Vec<String> 
         .filter(|(kind, _)| kinds.contains(kind))
         .flat_map(|(_, effects)| *effects)
         .collect();
-    let next = AtomicUsize::new(0);
-    let threads = std::thread::available_parallelism().map_or(1, Into::into);
-    let wrong: Vec<String> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads)
-            .map(|_| {
-                scope.spawn(|| {
-                    let mut own = vec![];
-                    while let Some(effect) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let wrong = of((effect.id - EFFECTS[0].id) as usize, effect);
-                        let named = |w| format!("{}: {w}", effect.name);
-                        own.extend(wrong.into_iter().map(named));
-                    }
-                    own
-                })
-            })
-            .collect();
-        let joined = workers.into_iter().map(|w| w.join().expect("no panic"));
-        joined.flatten().collect()
-    });
+    let wrong = crate::in_parallel(&all, crate::threads(), |effect| {
+        let wrong = of(usize::from(effect.id - EFFECTS[0].id), effect);
+        let named = |w| format!("{}: {w}", effect.name);
+        Some(wrong.into_iter().map(named).collect::<Vec<String>>())
+    })
+    .concat();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 

@@ -136,7 +136,7 @@ pub(super) fn edges(axis: usize, at: impl Fn(&Stand, f64) -> (i32, Vec<f64>) + '
         move |stand, size| Known::edges(stand, axis, &known(stand, size)),
         move |stand, _, size| {
             let (first, edges) = at(stand, size);
-            Change::Edges(first, edges)
+            Change::edges(axis, first, edges)
         },
     )
 }

@@ -141,10 +141,14 @@ fn nats_of_copy(stand: &Stand, axis: usize, other: usize) -> f64 {
 fn late(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (other, frames) = (other_than(draw, axis), 1 + draw.of_many(4));
     let sign = draw.sign();
-    by_energy(energy_of(stand, other), move |share| Change::Late {
-        axis: other,
-        share: share * sign,
-        frames,
+    by_energy(energy_of(stand, other), move |share| {
+        Change::made(move |counts, draw| {
+            let from = about_mean(&each(&counts[other], |c| LSB * f64::from(c)));
+            let added = (0..from.len()).map(|i| sign * share * from[i.saturating_sub(frames)]);
+            let own = counts[axis].iter().zip(added);
+            own.map(|(own, a)| ((LSB * within_step(*own, draw) + a) / LSB).round() as i32)
+                .collect()
+        })
     })
 }
 
@@ -154,12 +158,15 @@ fn other_frames(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Shape {
     let other = other_than(draw, axis);
     let off = draw.between(-1.0, 1.0) * stand.white(axis).sqrt();
     stand.bias[other] = stand.bias[axis] + off;
-    sized(
+    remade(
         0.9,
         move |stand, chance| Known::Strength(of_exchanged(stand, axis, other, chance)),
-        move |_, _, chance| Change::Frames {
-            axis: other,
-            chance,
+        move |counts, draw, chance| {
+            let taken = each(&counts[other], |its| draw.chance(chance).then_some(its));
+            each_pair(&counts[axis], &taken, |own, its| {
+                let own = within_step(own, draw).round() as i32;
+                its.unwrap_or(own)
+            })
         },
     )
 }

@@ -271,16 +271,30 @@ impl Wave {
     }
 }
 
-/// Codes that are missing: one in so many.
-pub(super) fn missing(draw: &mut Draw) -> Shape {
+/// Codes that are missing, one in so many: their readings move up by one.
+pub(super) fn missing(draw: &mut Draw, axis: usize) -> Shape {
     let every = [3, 5, 6, 7, 10][draw.of_many(5)];
-    Shape::Fixed(Known::Strength(f64::NAN), Change::Missing(every))
+    let change = Change::made(move |counts, draw| {
+        each(&counts[axis], |own| {
+            let code = within_step(own, draw).round() as i32;
+            code + i32::from(code.rem_euclid(every) == 0)
+        })
+    });
+    Shape::Fixed(Known::Strength(f64::NAN), change)
 }
 
 /// A dead band about the middle, of the size of the noise.
 pub(super) fn still_band(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let band = stand.white(axis).sqrt() * draw.between(0.5, 1.2);
-    Shape::Fixed(Known::Strength(f64::NAN), Change::DeadBand(band))
+    let middle = stand.bias[axis];
+    let change = Change::made(move |counts, draw| {
+        each(&counts[axis], |own| {
+            let rate = LSB * within_step(own, draw);
+            let still = (rate - middle).abs() < band;
+            (if still { middle } else { rate } / LSB).round() as i32
+        })
+    });
+    Shape::Fixed(Known::Strength(f64::NAN), change)
 }
 
 /// Sigma either way of the bias within which the edges between codes are drawn.
@@ -315,7 +329,7 @@ pub(super) fn uneven_steps(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape
     sized(
         0.98,
         move |stand, size| against_even(stand, axis, first, &known(size), &known(0.0)),
-        move |_, _, size| Change::Edges(first, edges(size)),
+        move |_, _, size| Change::edges(axis, first, edges(size)),
     )
 }
 
@@ -333,7 +347,7 @@ pub(super) fn two_in_one(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let edges: Vec<f64> = (first..=last).map(edge).collect();
     let even = even_edges(first, (last - first) as usize);
     let known = against_even(stand, axis, first, &edges, &even);
-    Shape::Fixed(known, Change::Edges(first, edges))
+    Shape::Fixed(known, Change::edges(axis, first, edges))
 }
 
 /// Crossover: of two transistors that push and pull, neither leads until the input is a little off zero. Firmware that takes
@@ -389,7 +403,7 @@ pub(super) fn growing_steps(draw: &mut Draw, stand: &Stand, axis: usize, wanted:
         .find(|limit| known(*limit).strength(stand, axis) >= wanted)
         .unwrap_or(1);
     let (first, edges) = of_growing(middle, limit, reach);
-    Shape::Fixed(known(limit), Change::Edges(first, edges))
+    Shape::Fixed(known(limit), Change::edges(axis, first, edges))
 }
 
 /// An amplifier that is straight for small rates and bends to a logarithm for large ones, either way, so that they fit into

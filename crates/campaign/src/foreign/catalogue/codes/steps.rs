@@ -294,7 +294,7 @@ pub(super) fn gate_for(stand: &Stand, axis: usize, wanted: f64) -> f64 {
 /// and a comparator with hysteresis does the same: the code that stands is wider than the others, and its neighbours
 /// come less often after it.
 pub(super) fn threshold(axis: usize) -> Shape {
-    sized(
+    remade(
         4.0,
         move |stand, beyond| {
             let (first, even) = law(stand, axis);
@@ -306,7 +306,17 @@ pub(super) fn threshold(axis: usize) -> Shape {
                 held: even,
             }
         },
-        |_, _, beyond| Change::Holds(0.5 + beyond),
+        move |counts, draw, beyond| {
+            // The first reading is taken whatever it is.
+            let mut last = f64::INFINITY;
+            each(&counts[axis], |own| {
+                let now = within_step(own, draw);
+                if (now - last).abs() >= 0.5 + beyond {
+                    last = now.round();
+                }
+                last as i32
+            })
+        },
     )
 }
 
