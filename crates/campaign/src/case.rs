@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::clean::KINDS;
 use crate::company::{self, STRUCTURES};
-use crate::foreign::{self, FOREIGN, Foreign, add, foreign};
+use crate::foreign::{EFFECTS, Foreign, add, foreign};
 use crate::plant::{
     BY_COUNT, BY_STRENGTH, COUNTED, STRONG, Truth, as_effect, plant, plant_counted,
 };
@@ -36,7 +36,7 @@ pub enum Family {
     OneAxis,
     /// One effect on an axis with a structure of another kind, by its place in [`STRUCTURES`].
     Beside(usize),
-    /// An effect that the library does not have, by its place in [`FOREIGN`].
+    /// An effect that the library does not have, by its place among those.
     Foreign(usize),
 }
 
@@ -53,7 +53,7 @@ impl Family {
             Self::Beside(i) => u64::from(STRUCTURES[i].id),
             Self::One(i) => u64::from(STRONG[i].id),
             Self::Counted(i) => u64::from(COUNTED[i].id),
-            Self::Foreign(i) => foreign::number(i),
+            Self::Foreign(i) => u64::from(EFFECTS[i].id),
         }
     }
 
@@ -69,8 +69,18 @@ impl Family {
             Self::Beside(i) => STRUCTURES[i].label,
             Self::One(i) => BY_STRENGTH[i],
             Self::Counted(i) => BY_COUNT[i],
-            Self::Foreign(i) => FOREIGN[i],
+            Self::Foreign(i) => EFFECTS[i].name,
         }
+    }
+
+    /// Whether `only` leaves it: its row of the tables, or for a foreign effect its set.
+    #[must_use]
+    pub fn is_of(self, only: &str) -> bool {
+        let set = match self {
+            Self::Foreign(i) => only == format!("set {}", EFFECTS[i].set),
+            _ => false,
+        };
+        set || self.label() == only
     }
 }
 
@@ -235,13 +245,8 @@ struct Planted {
 fn needed(family: Family) -> Needs {
     match family {
         Family::One(i) => STRONG[i].needs,
-        Family::Pair | Family::OneAxis | Family::Beside(_) => Needs {
-            temperature: true,
-            supply: true,
-            motor: true,
-            vibration: true,
-        },
-        Family::Foreign(i) => foreign::needs(i),
+        Family::Pair | Family::OneAxis | Family::Beside(_) => Needs::ALL,
+        Family::Foreign(i) => EFFECTS[i].needs,
         _ => Needs::default(),
     }
 }
@@ -278,8 +283,8 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         }
         Family::Foreign(i) => {
             let wanted = draw.by_ratio(25.0, 40.0);
-            axis = foreign::on_axis(i, axis);
-            allowed.extend(foreign::parts(i));
+            axis = EFFECTS[i].axis(axis);
+            allowed.extend(EFFECTS[i].true_causes());
             unknown = Some(foreign(draw, &mut stand, i, axis, wanted));
         }
     }
@@ -362,6 +367,16 @@ pub fn digest(seed: u64, family: Family, index: u64) -> u64 {
     hash
 }
 
+/// The answer to what case `index` plants.
+fn answer(p: &Planted, index: u64) -> Diagnosis {
+    let options = DiagnoseOptions {
+        seed: index,
+        ..DiagnoseOptions::default()
+    };
+    let d = diagnose(&p.record, &options).expect("a simulated run can be diagnosed");
+    d.diagnosis
+}
+
 /// What case `index` of a family plants, in words, and the whole answer.
 ///
 /// # Panics
@@ -369,30 +384,17 @@ pub fn digest(seed: u64, family: Family, index: u64) -> u64 {
 #[must_use]
 pub fn describe(seed: u64, family: Family, index: u64) -> (String, Diagnosis) {
     let p = planted(seed, family, index);
-    let options = DiagnoseOptions {
-        seed: index,
-        ..DiagnoseOptions::default()
+    let told = |t: &Truth| {
+        let values = t
+            .parameters
+            .iter()
+            .map(|(k, p)| format!("{k} {:.4}", p.value));
+        let values: Vec<String> = values.collect();
+        let (label, channel, values) = (t.label, &t.channel, values.join(", "));
+        format!("{label} on {channel} (d' {:.1}): {values}", t.strength)
     };
-    let d = diagnose(&p.record, &options).expect("a simulated run can be diagnosed");
-    let told: Vec<String> = p
-        .truths
-        .iter()
-        .map(|t| {
-            let values: Vec<String> = t
-                .parameters
-                .iter()
-                .map(|(k, p)| format!("{k} {:.4}", p.value))
-                .collect();
-            format!(
-                "{} on {} (d' {:.1}): {}",
-                t.label,
-                t.channel,
-                t.strength,
-                values.join(", ")
-            )
-        })
-        .collect();
-    (told.join("; "), d.diagnosis)
+    let all: Vec<String> = p.truths.iter().map(told).collect();
+    (all.join("; "), answer(&p, index))
 }
 
 /// Run case `index` of a family.
@@ -401,43 +403,26 @@ pub fn describe(seed: u64, family: Family, index: u64) -> (String, Diagnosis) {
 /// When a simulated run cannot be diagnosed: that is a defect of the diagnosis.
 #[must_use]
 pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
-    let Planted {
-        record,
-        truths,
-        allowed,
-        walks,
-        strange,
-    } = planted(seed, family, index);
+    let p = planted(seed, family, index);
     let begun = Instant::now();
-    let d = diagnose(
-        &record,
-        &DiagnoseOptions {
-            seed: index,
-            ..DiagnoseOptions::default()
-        },
-    )
-    .expect("a simulated run can be diagnosed")
-    .diagnosis;
+    let d = answer(&p, index);
     let seconds = begun.elapsed().as_secs_f64();
-    let (hits, wrong, estimates) = grade(&d, &truths, &allowed);
+    let (hits, wrong, estimates) = grade(&d, &p.truths, &p.allowed);
+    let truths = p.truths.iter().zip(hits);
+    let left = d.unexplained.iter();
     Outcome {
         family,
         index,
-        truths: truths
-            .iter()
-            .zip(hits)
-            .map(|(t, h)| (t.label, t.strength, h))
-            .collect(),
+        truths: truths.map(|(t, h)| (t.label, t.strength, h)).collect(),
         wrong,
-        unexplained: d
-            .unexplained
-            .iter()
+        unexplained: left
+            .clone()
             .map(|u| format!("{}: {}", u.channel, u.what))
             .collect(),
-        checks: d.unexplained.iter().map(|u| u.checks.clone()).collect(),
+        checks: left.map(|u| u.checks.clone()).collect(),
         estimates,
-        walks,
-        strength: strange,
+        walks: p.walks,
+        strength: p.strange,
         seconds,
     }
 }

@@ -6,83 +6,24 @@
 use model::record::Record;
 
 use crate::random::Draw;
-use crate::stand::{Needs, Stand};
+use crate::stand::Stand;
 
 mod act;
 #[cfg(test)]
 mod battery;
 mod catalogue;
 mod known;
+mod prelude;
 pub mod sets;
 mod shape;
 mod words;
 
 use act::Change;
 pub use act::add;
-use catalogue::{EFFECTS, ForeignEffect, Make};
+pub(crate) use catalogue::EFFECTS;
+use catalogue::{ForeignEffect, Make};
 use known::Known;
 use shape::{exponential, more, signal};
-
-/// How many foreign effects there are.
-const COUNT: usize = EFFECTS.len();
-
-/// What there is, by number: first those that the engine was developed with or has been changed after, then those kept
-/// back.
-pub const FOREIGN: [&str; COUNT] = {
-    let mut all = [""; COUNT];
-    let mut i = 0;
-    while i < COUNT {
-        all[i] = EFFECTS[i].name;
-        i += 1;
-    }
-    all
-};
-
-/// The number of the family of one, by its place in [`FOREIGN`].
-#[must_use]
-pub fn number(place: usize) -> u64 {
-    u64::from(EFFECTS[place].id)
-}
-
-/// Whether the engine has been changed after one was graded, or was developed with it, by its place in [`FOREIGN`].
-#[must_use]
-pub fn is_seen(place: usize) -> bool {
-    sets::SETS[EFFECTS[place].set - 1].seen
-}
-
-/// Whether one has a near twin in an earlier set, by its place in [`FOREIGN`]: its own set says so, from the tenth on.
-#[must_use]
-pub fn has_twin(place: usize) -> bool {
-    EFFECTS[place].twin.is_some()
-}
-
-/// Whether the library has got the cause of one since, by its place in [`FOREIGN`]: it is foreign no longer.
-#[must_use]
-pub fn is_known_since(place: usize) -> bool {
-    EFFECTS[place].later.is_some()
-}
-
-/// The environment that one needs, by its place in [`FOREIGN`].
-#[must_use]
-pub fn needs(place: usize) -> Needs {
-    EFFECTS[place].needs
-}
-
-/// The axis that one acts on where it was to act on `axis`, by its place in [`FOREIGN`].
-#[must_use]
-pub fn on_axis(place: usize, axis: usize) -> usize {
-    if EFFECTS[place].level {
-        axis.min(1)
-    } else {
-        axis
-    }
-}
-
-/// Causes of the library that are a true part of one, by its place in [`FOREIGN`].
-pub fn parts(place: usize) -> impl Iterator<Item = &'static str> {
-    let effect = &EFFECTS[place];
-    effect.true_parts.iter().copied().chain(effect.later)
-}
 
 /// One of them on an axis of a stand, as drawn.
 pub struct Foreign {
@@ -95,7 +36,7 @@ pub struct Foreign {
 /// Largest rms of what is added, deg/s: a gyro that reads more below 1 Hz has been turned, whoever looks at it.
 const LARGEST_RMS: f64 = 0.28;
 
-/// One of them by its place in [`FOREIGN`], on an axis of a stand, at a strength of `wanted`; weaker where that would need
+/// One of them by its place in [`EFFECTS`], on an axis of a stand, at a strength of `wanted`; weaker where that would need
 /// more than [`LARGEST_RMS`] however it is drawn. The world of the stand may gain what drives it.
 #[must_use]
 pub fn foreign(

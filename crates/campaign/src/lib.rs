@@ -115,7 +115,7 @@ fn families(size: Size) -> Vec<(Family, u64)> {
     families.extend((0..company::STRUCTURES.len()).map(|i| (Family::Beside(i), size.beside)));
     families.extend((0..plant::BY_STRENGTH.len()).map(|i| (Family::One(i), size.one)));
     families.extend((0..plant::BY_COUNT.len()).map(|i| (Family::Counted(i), size.counted)));
-    families.extend((0..foreign::FOREIGN.len()).map(|i| (Family::Foreign(i), size.foreign)));
+    families.extend((0..foreign::EFFECTS.len()).map(|i| (Family::Foreign(i), size.foreign)));
     families
 }
 
@@ -128,17 +128,41 @@ pub fn family_of(label: &str) -> Option<Family> {
         .find(|f| f.label() == label)
 }
 
-/// All cases of a size that `only` (a row of the tables) leaves. Families are interleaved: wherever the runs are cut
+/// All cases of a size that `only` (a row of the tables, or "set 15") leaves. Families are interleaved: wherever the runs are cut
 /// off, each has had its share of them.
 #[must_use]
 pub fn cases(size: Size, only: Option<&str>) -> Vec<(Family, u64)> {
     let mut all: Vec<(f64, Family, u64)> = families(size)
         .into_iter()
-        .filter(|(f, _)| only.is_none_or(|o| f.label() == o))
+        .filter(|(f, _)| only.is_none_or(|o| f.is_of(o)))
         .flat_map(|(f, count)| (0..count).map(move |i| ((i as f64 + 0.5) / count as f64, f, i)))
         .collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     all.into_iter().map(|(_, f, i)| (f, i)).collect()
+}
+
+/// How many threads this computer has.
+#[must_use]
+pub fn threads() -> usize {
+    std::thread::available_parallelism().map_or(1, Into::into)
+}
+
+/// What `of` makes of each item, on so many threads and in no order, until it makes nothing of one.
+pub fn in_parallel<T: Sync, R: Send>(
+    items: &[T],
+    threads: usize,
+    of: impl Fn(&T) -> Option<R> + Sync,
+) -> Vec<R> {
+    let next = AtomicUsize::new(0);
+    let take = || items.get(next.fetch_add(1, Ordering::Relaxed));
+    let work = || std::iter::from_fn(|| of(take()?)).collect::<Vec<R>>();
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(work)).collect();
+        let joined = workers.into_iter().map(std::thread::ScopedJoinHandle::join);
+        joined
+            .flat_map(|own| own.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+            .collect()
+    })
 }
 
 /// Run cases on `threads` threads until they are done or `stop` is set; `seen` is told of each as it ends.
@@ -149,31 +173,13 @@ pub fn run_all(
     stop: &AtomicBool,
     seen: &(dyn Fn(&Outcome) + Sync),
 ) -> Vec<Outcome> {
-    let next = AtomicUsize::new(0);
-    let mut all: Vec<Outcome> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads.max(1))
-            .map(|_| {
-                scope.spawn(|| {
-                    let mut own = vec![];
-                    while !stop.load(Ordering::Relaxed)
-                        && let Some((family, index)) =
-                            cases.get(next.fetch_add(1, Ordering::Relaxed))
-                    {
-                        let outcome = case::run(seed, *family, *index);
-                        seen(&outcome);
-                        own.push(outcome);
-                    }
-                    own
-                })
-            })
-            .collect();
-        workers
-            .into_iter()
-            .flat_map(|w| match w.join() {
-                Ok(own) => own,
-                Err(panic) => std::panic::resume_unwind(panic),
-            })
-            .collect()
+    let mut all = in_parallel(cases, threads, |(family, index)| {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let outcome = case::run(seed, *family, *index);
+        seen(&outcome);
+        Some(outcome)
     });
     all.sort_by_key(|o| (o.family, o.index));
     all

@@ -31,7 +31,8 @@ struct Arguments {
     /// Begin no run after so many minutes.
     #[arg(long)]
     minutes: Option<f64>,
-    /// Only this row of the tables ("line", "nothing", "two", "chirp", ...), with every run that is not right listed.
+    /// Only this row of the tables ("line", "nothing", "two", "chirp", ...), or the foreign effects of one set ("set 15"),
+    /// with every run that is not right listed.
     #[arg(long)]
     only: Option<String>,
     /// Runs per family in place of the size's.
@@ -194,10 +195,7 @@ fn go_on(
     let held: std::collections::HashSet<_> =
         log.outcomes.iter().map(|o| (o.family, o.index)).collect();
     let left: Vec<_> = all.iter().copied().filter(|c| !held.contains(c)).collect();
-    let threads = a
-        .threads
-        .or_else(|| std::thread::available_parallelism().ok().map(Into::into))
-        .unwrap_or(1);
+    let threads = a.threads.unwrap_or_else(campaign::threads);
     let standard = !(a.quick || a.full || a.runs.is_some() || a.only.is_some());
     let minutes = a.minutes.or(standard.then_some(campaign::MINUTES));
     let list = a.list || a.only.is_some();

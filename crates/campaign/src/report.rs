@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::case::{Estimate, Family, Hit, Outcome};
-use crate::foreign::{FOREIGN, is_known_since, sets};
+use crate::foreign::{EFFECTS, sets};
 use crate::plant::asked_from;
 use crate::tally::Rate;
 
@@ -217,12 +217,12 @@ fn is_short(unexplained: Rate, named: Rate) -> bool {
 fn foreign(out: &mut String, all: &[Outcome]) {
     let mut rows = String::new();
     let mut others = 0;
-    for (i, label) in FOREIGN.iter().enumerate() {
+    for (i, effect) in EFFECTS.iter().enumerate() {
         let own: Vec<&Outcome> = all
             .iter()
             .filter(|o| o.family == Family::Foreign(i))
             .collect();
-        if own.is_empty() || is_known_since(i) {
+        if own.is_empty() || effect.later.is_some() {
             continue;
         }
         let unexplained = Rate::of(own.iter().map(|o| !o.unexplained.is_empty()));
@@ -233,7 +233,8 @@ fn foreign(out: &mut String, all: &[Outcome]) {
         }
         let _ = writeln!(
             rows,
-            "| {label} | {} | {} |",
+            "| {} | {} | {} |",
+            effect.name,
             count(unexplained),
             counts(own.iter().flat_map(|o| &o.wrong))
         );

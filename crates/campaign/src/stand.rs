@@ -36,6 +36,33 @@ impl Needs {
         motor: false,
         vibration: false,
     };
+    /// All of it.
+    pub const ALL: Self = Self {
+        temperature: true,
+        supply: true,
+        motor: true,
+        vibration: true,
+    };
+    /// A temperature that moves.
+    pub const TEMPERATURE: Self = Self {
+        temperature: true,
+        ..Self::NONE
+    };
+    /// A supply whose load switches.
+    pub const SUPPLY: Self = Self {
+        supply: true,
+        ..Self::NONE
+    };
+    /// A motor that is switched.
+    pub const MOTOR: Self = Self {
+        motor: true,
+        ..Self::NONE
+    };
+    /// Vibration.
+    pub const VIBRATION: Self = Self {
+        vibration: true,
+        ..Self::NONE
+    };
 }
 
 /// A stand: length, noise and world.

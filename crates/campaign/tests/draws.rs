@@ -4,10 +4,8 @@
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
-use campaign::{Family, Size, case, cases};
+use campaign::{Family, Size, case, cases, in_parallel, threads};
 
 /// Seed of the cases.
 const SEED: u64 = 17;
@@ -16,22 +14,10 @@ const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/draws.txt");
 
 /// The digest of the first case of each family, in the order of their numbers.
 fn digests() -> Vec<(Family, u64)> {
-    let mut all: Vec<Family> = cases(Size::even(1), None).iter().map(|c| c.0).collect();
-    all.sort_by_key(|f| f.number());
-    let next = AtomicUsize::new(0);
-    let found = Mutex::new(vec![]);
-    let threads = std::thread::available_parallelism().map_or(1, Into::into);
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some(family) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let digest = case::digest(SEED, *family, 0);
-                    found.lock().expect("no panic").push((*family, digest));
-                }
-            });
-        }
+    let all: Vec<Family> = cases(Size::even(1), None).iter().map(|c| c.0).collect();
+    let mut found = in_parallel(&all, threads(), |family| {
+        Some((*family, case::digest(SEED, *family, 0)))
     });
-    let mut found = found.into_inner().expect("no panic");
     found.sort_by_key(|(f, _)| f.number());
     found
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use campaign::plant::asked_from;
 use campaign::tally::Rate;
-use campaign::{Family, Hit, Outcome, Size, cases, report, run_all};
+use campaign::{Family, Hit, Outcome, Size, cases, report, run_all, threads};
 
 const SAMPLE: Size = Size {
     clean: 60,
@@ -26,25 +26,29 @@ const ONE_IN: u64 = 10;
 /// Chance that an engine that just meets a bar fails the test on it.
 const UNLUCKY: f64 = 1e-3;
 
-/// Not worse than a bar of "at least" by more than the draw explains.
+/// A bar that is missed by more than the draw explains: `unlucky` is the chance of the rate where the bar is just met.
+fn short(what: &str, rate: Rate, asked: &str, unlucky: f64) -> Option<String> {
+    let told = format!("{what}: {} of {}, asked {asked}", rate.hits, rate.trials);
+    println!("{told}");
+    (unlucky < UNLUCKY).then_some(told)
+}
+
 fn at_least(what: &str, rate: Rate, asked: f64) -> Option<String> {
-    println!("{what}: {} of {}, asked {asked}", rate.hits, rate.trials);
-    (rate.at_most(asked) < UNLUCKY).then(|| {
-        format!(
-            "{what}: {} of {}, asked at least {asked}",
-            rate.hits, rate.trials
-        )
-    })
+    short(
+        what,
+        rate,
+        &format!("at least {asked}"),
+        rate.at_most(asked),
+    )
 }
 
 fn at_most(what: &str, rate: Rate, asked: f64) -> Option<String> {
-    println!("{what}: {} of {}, asked {asked}", rate.hits, rate.trials);
-    (rate.at_least(asked) < UNLUCKY).then(|| {
-        format!(
-            "{what}: {} of {}, asked at most {asked}",
-            rate.hits, rate.trials
-        )
-    })
+    short(
+        what,
+        rate,
+        &format!("at most {asked}"),
+        rate.at_least(asked),
+    )
 }
 
 #[test]
@@ -54,14 +58,13 @@ fn a_fresh_sample_of_the_campaign_is_not_worse_than_its_bars() {
         .and_then(|s| s.parse().ok())
         .unwrap_or_else(|| std::hash::RandomState::new().build_hasher().finish() >> 16);
     println!("IMU_STAND_SEED={seed}");
-    let threads = std::thread::available_parallelism().map_or(1, Into::into);
     let never = AtomicBool::new(false);
     let mut drawn = cases(SAMPLE, None);
     drawn.retain(|(family, _)| match family {
         Family::Foreign(number) => *number as u64 % ONE_IN == seed % ONE_IN,
         _ => true,
     });
-    let all = run_all(seed, &drawn, threads, &never, &|o| {
+    let all = run_all(seed, &drawn, threads(), &never, &|o| {
         if report::worth_a_line(o) {
             println!("{}", report::line(o));
         }

@@ -1,9 +1,8 @@
 //! What a foreign effect does to the readings of a finished run.
 
-use std::cell::Cell;
-
 use model::record::Record;
 
+use super::words::{each, within_step};
 use crate::random::Draw;
 use crate::stand::{GYROS, LSB, Stand};
 
@@ -17,59 +16,23 @@ pub(super) enum Change {
     Add(Vec<f64>),
     /// White noise of this size over the usual one.
     Scale(Vec<f64>),
-    /// Every reading within this distance of the middle reads the middle, deg/s.
-    DeadBand(f64),
-    /// Every so many counts a code that never comes: its readings move up by one.
-    Missing(i32),
     /// Noise in place of the white noise, of variance 1, as a share of it.
     Noise(Vec<f64>, f64),
-    /// Lower edges of the codes from the first one on, counts.
-    Edges(i32, Vec<f64>),
-    /// A reading stands until the rate is this far from it, counts.
-    Holds(f64),
-    /// A share of another axis's reading, about its mean, so many frames before.
-    Late {
-        axis: usize,
-        share: f64,
-        frames: usize,
-    },
-    /// With this chance the reading is another axis's of the same frame.
-    Frames {
-        axis: usize,
-        chance: f64,
-    },
     /// Counts of the axis, made of those of all three.
     Made(Box<Making>),
 }
 
 /// Add a signal to a channel, and let the converter round again.
 pub fn add(record: &mut Record, channel: &str, signal: &[f64], draw: &mut Draw) {
-    change_readings(record, channel, draw, |i, v| v + signal[i]);
-}
-
-fn change_readings(
-    record: &mut Record,
-    channel: &str,
-    draw: &mut Draw,
-    new: impl Fn(usize, f64) -> f64,
-) {
     let Some(c) = record.channels.iter_mut().find(|c| c.name == channel) else {
         return;
     };
     let Some(counts) = &mut c.counts else { return };
     for (i, count) in counts.iter_mut().enumerate() {
-        // Within its step the rate is anywhere.
-        let inside = draw.between(-0.5, 0.5);
-        let v = new(i, LSB * (f64::from(*count) + inside));
+        let v = LSB * within_step(*count, draw) + signal[i];
         *count = (v / LSB).round() as i32;
         c.values[i] = LSB * f64::from(*count);
     }
-}
-
-/// What an axis reads, deg/s.
-fn readings(record: &Record, axis: usize) -> Vec<f64> {
-    let own = record.channels.iter().find(|c| c.name == GYROS[axis]);
-    own.map(|c| c.values.clone()).unwrap_or_default()
 }
 
 /// What the three axes read, counts.
@@ -91,6 +54,15 @@ fn code(at: f64, first: i32, edges: &[f64]) -> i32 {
 }
 
 impl Change {
+    /// What a converter of these lower edges of its codes from the first on, counts, reads of an axis.
+    pub(super) fn edges(axis: usize, first: i32, edges: Vec<f64>) -> Self {
+        Self::made(move |counts, draw| {
+            each(&counts[axis], |own| {
+                code(within_step(own, draw), first, &edges)
+            })
+        })
+    }
+
     /// Counts of an axis that are made of those of all three.
     pub(super) fn made(new: impl Fn(&Counts, &mut Draw) -> Vec<i32> + 'static) -> Self {
         Self::Made(Box::new(new))
@@ -130,24 +102,6 @@ impl Change {
                     .collect();
                 add(record, channel, &mixed, draw);
             }
-            Self::Late {
-                axis,
-                share,
-                frames,
-            } => {
-                let other = readings(record, *axis);
-                let mean = other.iter().sum::<f64>() / other.len() as f64;
-                let signal: Vec<f64> = (0..other.len())
-                    .map(|i| share * (other[i.saturating_sub(*frames)] - mean))
-                    .collect();
-                add(record, channel, &signal, draw);
-            }
-            Self::Frames { axis, chance } => {
-                let other = readings(record, *axis);
-                let taken: Vec<bool> = other.iter().map(|_| draw.chance(*chance)).collect();
-                let new = |i: usize, v: f64| if taken[i] { other[i] } else { v };
-                change_readings(record, channel, draw, new);
-            }
             Self::Made(new) => {
                 let new = new(&counts(record), draw);
                 if let Some(c) = record.channels.iter_mut().find(|c| c.name == channel) {
@@ -155,31 +109,6 @@ impl Change {
                     c.counts = Some(new);
                 }
             }
-            _ => self.convert(record, channel, stand.bias[axis], draw),
         }
-    }
-
-    /// Act as a converter does, that knows each reading and at most the one before.
-    fn convert(&self, record: &mut Record, channel: &str, middle: f64, draw: &mut Draw) {
-        let last = Cell::new(f64::NAN);
-        let new = |v: f64| match self {
-            Self::DeadBand(band) if (v - middle).abs() < *band => middle,
-            Self::Missing(every) => {
-                let code = (v / LSB).round() as i32;
-                let next = code.rem_euclid(*every) == 0;
-                LSB * f64::from(code + i32::from(next))
-            }
-            Self::Edges(first, edges) => LSB * f64::from(code(v / LSB, *first, edges)),
-            Self::Holds(beyond) => {
-                let now = v / LSB;
-                // The first reading is taken whatever it is.
-                if last.get().is_nan() || (now - last.get()).abs() >= *beyond {
-                    last.set(now.round());
-                }
-                LSB * last.get()
-            }
-            _ => v,
-        };
-        change_readings(record, channel, draw, |_, v| new(v));
     }
 }

@@ -1,14 +1,12 @@
 //! What every foreign effect is held to, row by row: it is not a case of the library, comes as strong as wanted, acts on its
 //! channel alone, and does to the readings what its strength reckons with.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use model::effects::EFFECTS as LIBRARY;
 
 use super::act::{Change, counts};
-use super::catalogue::{EFFECTS, FIRST_ID, ForeignEffect, KINDS, Strength};
+use super::catalogue::{EFFECTS, ForeignEffect, KINDS, Strength};
 use super::known::Known;
-use super::{Foreign, LARGEST_RMS, foreign, needs, sets};
+use super::{Foreign, LARGEST_RMS, foreign, sets};
 use crate::random::Draw;
 use crate::stand::{GYROS, LSB, Stand};
 use crate::strength::Meter;
@@ -34,8 +32,8 @@ struct Drawn {
 
 fn drawn(place: usize, seconds: f64, index: u64, wanted: Option<f64>) -> (Drawn, f64) {
     let mut draw = Draw::of(SEED, u64::from(EFFECTS[place].id), index);
-    let mut stand = Stand::draw(&mut draw, seconds, 20.0, needs(place));
-    let axis = super::on_axis(place, draw.of_many(3));
+    let mut stand = Stand::draw(&mut draw, seconds, 20.0, EFFECTS[place].needs);
+    let axis = EFFECTS[place].axis(draw.of_many(3));
     let wanted = wanted.unwrap_or_else(|| draw.by_ratio(25.0, 40.0));
     let effect = foreign(&mut draw, &mut stand, place, axis, wanted);
     let drawn = Drawn {
@@ -137,25 +135,12 @@ fn hold_each(kinds: &[&str], of: &(dyn Fn(usize, &ForeignEffect) -> Vec<String> 
         .filter(|(kind, _)| kinds.contains(kind))
         .flat_map(|(_, effects)| *effects)
         .collect();
-    let next = AtomicUsize::new(0);
-    let threads = std::thread::available_parallelism().map_or(1, Into::into);
-    let wrong: Vec<String> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads)
-            .map(|_| {
-                scope.spawn(|| {
-                    let mut own = vec![];
-                    while let Some(effect) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let wrong = of((effect.id - FIRST_ID) as usize, effect);
-                        let named = |w| format!("{}: {w}", effect.name);
-                        own.extend(wrong.into_iter().map(named));
-                    }
-                    own
-                })
-            })
-            .collect();
-        let joined = workers.into_iter().map(|w| w.join().expect("no panic"));
-        joined.flatten().collect()
-    });
+    let wrong = crate::in_parallel(&all, crate::threads(), |effect| {
+        let wrong = of(usize::from(effect.id - EFFECTS[0].id), effect);
+        let named = |w| format!("{}: {w}", effect.name);
+        Some(wrong.into_iter().map(named).collect::<Vec<String>>())
+    })
+    .concat();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
@@ -370,6 +355,7 @@ fn neighbours_of(stand: &Stand, axis: usize, by: &[f64]) -> f64 {
 fn rows_have_names_sets_twins_and_parts_that_there_are() {
     for (place, effect) in EFFECTS.iter().enumerate() {
         let name = effect.name;
+        assert_eq!(usize::from(effect.id - EFFECTS[0].id), place, "{name}");
         assert!(EFFECTS[..place].iter().all(|e| e.name != name), "{name}");
         assert!((1..=sets::SETS.len()).contains(&effect.set), "{name}");
         assert!(place == 0 || EFFECTS[place - 1].set <= effect.set, "{name}");
@@ -387,7 +373,7 @@ fn rows_have_names_sets_twins_and_parts_that_there_are() {
 #[test]
 fn an_effect_of_the_library_describes_itself() {
     let draw = &mut Draw::of(SEED, 11, 0);
-    let stand = Stand::draw(draw, 600.0, 20.0, needs(0));
+    let stand = Stand::draw(draw, 600.0, 20.0, EFFECTS[0].needs);
     let of = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
         let at = |i: usize| 0.1 * f(i as f64 / stand.rate_hz);
         (0..stand.samples()).map(at).collect()

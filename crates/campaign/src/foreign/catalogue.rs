@@ -1,5 +1,8 @@
 //! The foreign effects, one row each, in a table for each kind beside what makes them.
 
+use std::sync::LazyLock;
+
+use super::sets::SETS;
 use super::shape::Shape;
 use crate::random::Draw;
 use crate::stand::{Needs, Stand};
@@ -39,18 +42,17 @@ pub(super) enum Strength {
 
 /// A foreign effect.
 #[derive(Clone, Copy)]
-pub(super) struct ForeignEffect {
-    /// Number of its family, from [`FIRST_ID`] on: all draws hang on it, so it never changes.
+pub(crate) struct ForeignEffect {
+    /// Number of its family, from 300 on: all draws hang on it, so it never changes.
     pub id: u16,
     /// The set that it was written in, from 1 on.
     pub set: usize,
     /// The row of the tables.
     pub name: &'static str,
     /// How it is drawn.
-    pub make: Make,
+    pub(super) make: Make,
     /// How strong it comes.
-    #[cfg_attr(not(test), expect(dead_code, reason = "what the battery holds it to"))]
-    pub strength: Strength,
+    pub(super) strength: Strength,
     /// The environment that it needs.
     pub needs: Needs,
     /// Causes of the library that are a true part of it: neither right nor wrong when they are named.
@@ -65,21 +67,11 @@ pub(super) struct ForeignEffect {
     pub level: bool,
 }
 
-/// A temperature that moves.
-const T: Needs = Needs {
-    temperature: true,
-    ..Needs::NONE
-};
-/// Vibration.
-const V: Needs = Needs {
-    vibration: true,
-    ..Needs::NONE
-};
-/// A temperature that moves and a motor that is switched.
+const T: Needs = Needs::TEMPERATURE;
+const V: Needs = Needs::VIBRATION;
+/// Several of them, by their initials.
 const TM: Needs = Needs { motor: true, ..T };
-/// The same with a supply whose load switches.
 const TMS: Needs = Needs { supply: true, ..TM };
-/// The same with vibration in its place.
 const TMV: Needs = Needs {
     vibration: true,
     ..TM
@@ -102,37 +94,49 @@ const fn row(id: u16, set: usize, name: &'static str, make: Make) -> ForeignEffe
 }
 
 impl ForeignEffect {
-    const fn needs(self, needs: Needs) -> Self {
-        Self { needs, ..self }
+    const fn needs(mut self, needs: Needs) -> Self {
+        self.needs = needs;
+        self
     }
 
-    const fn parts(self, true_parts: &'static [&'static str]) -> Self {
-        Self { true_parts, ..self }
+    const fn parts(mut self, true_parts: &'static [&'static str]) -> Self {
+        self.true_parts = true_parts;
+        self
     }
 
-    const fn later(self, cause: &'static str) -> Self {
-        Self {
-            later: Some(cause),
-            ..self
-        }
+    const fn later(mut self, cause: &'static str) -> Self {
+        self.later = Some(cause);
+        self
     }
 
-    const fn twin(self, id: u16) -> Self {
-        Self {
-            twin: Some(id),
-            ..self
-        }
+    const fn twin(mut self, id: u16) -> Self {
+        self.twin = Some(id);
+        self
     }
 
-    const fn level(self) -> Self {
-        Self {
-            level: true,
-            ..self
-        }
+    const fn level(mut self) -> Self {
+        self.level = true;
+        self
     }
 
-    const fn strength(self, strength: Strength) -> Self {
-        Self { strength, ..self }
+    const fn strength(mut self, strength: Strength) -> Self {
+        self.strength = strength;
+        self
+    }
+
+    /// Whether the engine has been changed after it was graded, or was developed with it.
+    pub fn is_seen(&self) -> bool {
+        SETS[self.set - 1].seen
+    }
+
+    /// The axis that it acts on where it was to act on this one.
+    pub fn axis(&self, axis: usize) -> usize {
+        if self.level { axis.min(1) } else { axis }
+    }
+
+    /// Causes of the library that are a true part of it.
+    pub fn true_causes(&self) -> impl Iterator<Item = &'static str> {
+        self.true_parts.iter().copied().chain(self.later)
     }
 }
 
@@ -146,39 +150,9 @@ pub(super) const KINDS: [(&str, &[ForeignEffect]); 6] = [
     ("couplings", couplings::EFFECTS),
 ];
 
-/// Number of the first.
-pub(super) const FIRST_ID: u16 = 300;
-
-/// How many there are.
-const COUNT: usize = {
-    let (mut all, mut kind) = (0, 0);
-    while kind < KINDS.len() {
-        all += KINDS[kind].1.len();
-        kind += 1;
-    }
+/// All of them, by number.
+pub(crate) static EFFECTS: LazyLock<Vec<&ForeignEffect>> = LazyLock::new(|| {
+    let mut all: Vec<&ForeignEffect> = KINDS.iter().flat_map(|(_, kind)| *kind).collect();
+    all.sort_by_key(|effect| effect.id);
     all
-};
-
-/// All of them, by number. It does not compile where one is missing or comes twice.
-pub(super) const EFFECTS: [&ForeignEffect; COUNT] = {
-    let mut all: [Option<&ForeignEffect>; COUNT] = [None; COUNT];
-    let mut kind = 0;
-    while kind < KINDS.len() {
-        let mut i = 0;
-        while i < KINDS[kind].1.len() {
-            let effect = &KINDS[kind].1[i];
-            let place = (effect.id - FIRST_ID) as usize;
-            assert!(all[place].is_none(), "two effects of one number");
-            all[place] = Some(effect);
-            i += 1;
-        }
-        kind += 1;
-    }
-    let mut effects = [&KINDS[0].1[0]; COUNT];
-    let mut place = 0;
-    while place < COUNT {
-        effects[place] = all[place].expect("a number that no effect has");
-        place += 1;
-    }
-    effects
-};
+});

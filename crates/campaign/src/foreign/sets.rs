@@ -74,7 +74,7 @@ const NOTHING: &str = "nothing; 20 drawn of 40";
 
 /// All sets, the first one first.
 #[rustfmt::skip]
-pub const SETS: [Set; 14] = [
+pub const SETS: [Set; 15] = [
     seen("2026-11-21", "the engine: its own author", &[grade(2_353_998_398, 35, 9, 48)]),
     seen("2026-11-21", "not how the diagnosis decides", &[grade(16_172_907_664_231, 247, 30, 276)])
         .wrong("`gauss_markov`, `telegraph` (19): aperiodic oscillation"),
@@ -95,6 +95,9 @@ pub const SETS: [Set; 14] = [
     seen("2026-11-22", NOTHING, &[grade(47_298_557_885_862, 374, 25, 400), grade(27_004_272_196_837, 361, 31, 394)]),
     seen("2026-11-22", NOTHING, &[grade(89_432_555_532_976, 383, 15, 400), grade(63_774_036_767_264, 380, 10, 394)])
         .wrong("`gauss_markov`, `warm_up` (16): a thermometer of coarse steps")
+        .unseen(),
+    seen("2026-11-25", "docs/power.md, docs/effects.md, the earlier sets", &[grade(1_795_571_875, 309, 31, 390)])
+        .wrong("`line` (13): blocks that come out sorted")
         .unseen(),
 ];
 

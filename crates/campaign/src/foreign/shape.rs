@@ -4,6 +4,7 @@ use std::rc::Rc;
 
 use super::act::{Change, Counts};
 use super::known::{Known, Next};
+use super::words::within_step;
 use crate::random::Draw;
 use crate::stand::{LSB, Stand};
 use crate::strength::{Meter, size_for};
@@ -56,6 +57,17 @@ pub(super) fn sized(
         knows: Box::new(knows),
         does: Box::new(does),
     }
+}
+
+/// What has a size of at most `most`, by which it makes new counts of an axis of those of all three.
+pub(super) fn remade(
+    most: f64,
+    knows: impl Fn(&Stand, f64) -> Known + 'static,
+    new: impl Fn(&Counts, &mut Draw, f64) -> Vec<i32> + 'static,
+) -> Shape {
+    sized(most, knows, |_, _, size| {
+        Change::made(move |counts, draw| new(counts, draw, size))
+    })
 }
 
 /// What adds a series of these energies by bin, at size 1, to an axis.
@@ -124,7 +136,7 @@ pub(super) fn edges(axis: usize, at: impl Fn(&Stand, f64) -> (i32, Vec<f64>) + '
         move |stand, size| Known::edges(stand, axis, &known(stand, size)),
         move |stand, _, size| {
             let (first, edges) = at(stand, size);
-            Change::Edges(first, edges)
+            Change::edges(axis, first, edges)
         },
     )
 }
@@ -133,14 +145,12 @@ pub(super) fn edges(axis: usize, at: impl Fn(&Stand, f64) -> (i32, Vec<f64>) + '
 pub(super) fn map(axis: usize, map: impl Fn(i32) -> i32 + 'static) -> Shape {
     let map = Rc::new(map);
     let known = Rc::clone(&map);
-    sized(
+    remade(
         1.0,
         move |stand, chance| Known::map(stand, axis, chance.min(1.0), &*known),
-        move |_, _, chance| {
-            Change::made(move |counts, draw| {
-                let read = |c: &i32| if draw.chance(chance) { map(*c) } else { *c };
-                counts[axis].iter().map(read).collect()
-            })
+        move |counts, draw, chance| {
+            let read = |c: &i32| if draw.chance(chance) { map(*c) } else { *c };
+            counts[axis].iter().map(read).collect()
         },
     )
 }
@@ -149,24 +159,22 @@ pub(super) fn map(axis: usize, map: impl Fn(i32) -> i32 + 'static) -> Shape {
 pub(super) fn by_chance(axis: usize, next: impl Fn(i32, i32) -> i32 + 'static) -> Shape {
     let next: Rc<Next> = Rc::new(next);
     let known = Rc::clone(&next);
-    sized(
+    remade(
         1.0,
         move |stand, chance| Known::next(stand, axis, chance.min(1.0), &*known),
-        move |_, _, chance| {
-            Change::made(move |counts, draw| {
-                let own = &counts[axis];
-                let mut reading = own[0];
-                own.iter()
-                    .map(|code| {
-                        reading = if draw.chance(chance) {
-                            next(reading, *code)
-                        } else {
-                            *code
-                        };
-                        reading
-                    })
-                    .collect()
-            })
+        move |counts, draw, chance| {
+            let own = &counts[axis];
+            let mut reading = own[0];
+            own.iter()
+                .map(|code| {
+                    reading = if draw.chance(chance) {
+                        next(reading, *code)
+                    } else {
+                        *code
+                    };
+                    reading
+                })
+                .collect()
         },
     )
 }
@@ -197,7 +205,7 @@ pub(super) fn coupled_series(
                 .iter()
                 .zip(of(counts))
                 .map(|(own, added)| {
-                    let rate = f64::from(*own) + draw.between(-0.5, 0.5);
+                    let rate = within_step(*own, draw);
                     (rate + size * added / LSB).round() as i32
                 })
                 .collect()

@@ -48,11 +48,19 @@ pub(super) fn shaken(draw: &mut Draw, stand: &mut Stand, pitch: (f64, f64)) -> V
         stand.rate_hz,
     );
     let shake = part.of(draw, stand.samples());
-    let still = if along == 2 { 1.0 } else { 0.0 };
-    for (a, s) in stand.world.acc[along].iter_mut().zip(&shake) {
-        *a = still + rms * s + 0.005 * draw.normal();
-    }
+    felt(draw, stand, along, &each(&shake, |s| rms * s));
     shake
+}
+
+/// What the accelerometer along an axis reads of a force, g, which the stand gets.
+pub(super) fn felt(draw: &mut Draw, stand: &mut Stand, along: usize, force: &[f64]) {
+    let still = if along == 2 { 1.0 } else { 0.0 };
+    stand.world.acc[along] = each(force, |a| still + a + 0.005 * draw.normal());
+}
+
+/// A rate, counts, that was read as this code: within its step it is anywhere.
+pub(super) fn within_step(code: i32, draw: &mut Draw) -> f64 {
+    f64::from(code) + draw.between(-0.5, 0.5)
 }
 
 /// What follows a command no faster than so much a second.

@@ -13,23 +13,6 @@ type Row = LibraryEffect<How>;
 /// The motor's bias by physics: it follows the current of a motor that has to spin up, not the command.
 pub(super) const CURRENT: &str = "motor_bias by current";
 
-const TEMPERATURE: Needs = Needs {
-    temperature: true,
-    ..Needs::NONE
-};
-const SUPPLY: Needs = Needs {
-    supply: true,
-    ..Needs::NONE
-};
-const MOTOR: Needs = Needs {
-    motor: true,
-    ..Needs::NONE
-};
-const VIBRATION: Needs = Needs {
-    vibration: true,
-    ..Needs::NONE
-};
-
 const fn row(id: u16, cause: &'static str, how: How) -> Row {
     Row::new(id, cause, how)
 }
@@ -37,17 +20,17 @@ const fn row(id: u16, cause: &'static str, how: How) -> Row {
 /// The rows, by number. What is asked beyond the usual has its reason in docs/power.md, "Bars".
 #[rustfmt::skip]
 pub const STRONG: [Row; 25] = [
-    row(100, "temperature", |_, _, a| size("slope", a.sign)).needs(TEMPERATURE),
-    row(101, "temperature_quadratic", parabola).needs(TEMPERATURE),
+    row(100, "temperature", |_, _, a| size("slope", a.sign)).needs(Needs::TEMPERATURE),
+    row(101, "temperature_quadratic", parabola).needs(Needs::TEMPERATURE),
     row(102, "warm_up", warm_up),
     row(103, "rate_ramp", |_, _, a| size("slope", a.sign)),
     row(104, "line", line).asked(8.0, 1.7),
     row(105, "am_line", am_line).asked(13.0, 2.5),
-    row(106, "motor_bias", motor_bias).needs(MOTOR),
-    Row { label: CURRENT, ..row(107, "motor_bias", by_current).needs(MOTOR) },
-    row(108, "motor_noise", motor_noise).needs(MOTOR),
-    row(109, "g_sensitivity", g_sensitivity).needs(VIBRATION),
-    row(110, "supply_sensitivity", |_, _, a| size("slope", a.sign)).needs(SUPPLY),
+    row(106, "motor_bias", motor_bias).needs(Needs::MOTOR),
+    Row { label: CURRENT, ..row(107, "motor_bias", by_current).needs(Needs::MOTOR) },
+    row(108, "motor_noise", motor_noise).needs(Needs::MOTOR),
+    row(109, "g_sensitivity", g_sensitivity).needs(Needs::VIBRATION),
+    row(110, "supply_sensitivity", |_, _, a| size("slope", a.sign)).needs(Needs::SUPPLY),
     row(111, "bias_step", bias_step).asked(8.0, 1.5),
     row(112, "cross_axis", cross_axis).on_a_moving_base(),
     Row { true_parts: &["base_motion"], ..row(113, "scale_error", scale_error).asked(10.0, 2.0).on_a_moving_base() },

@@ -6,7 +6,7 @@ use super::structures::{kept, named};
 use super::{covers, estimates, percent, strong};
 use crate::case::{Family, Outcome};
 use crate::clean::KINDS;
-use crate::foreign::{has_twin, is_known_since, is_seen, sets};
+use crate::foreign::{EFFECTS, sets};
 use crate::tally::Rate;
 
 /// The side of a bar on which a rate meets it.
@@ -89,7 +89,7 @@ fn unseen_sets() -> String {
 fn strange(all: &[Outcome], seen: bool) -> Vec<&Outcome> {
     all.iter()
         .filter(|o| {
-            matches!(o.family, Family::Foreign(i) if is_seen(i) == seen && !is_known_since(i))
+            matches!(o.family, Family::Foreign(i) if EFFECTS[i].is_seen() == seen && EFFECTS[i].later.is_none())
                 && (o.strength.is_nan() || o.strength >= 0.99 * 25.0)
         })
         .collect()
@@ -158,7 +158,7 @@ pub(super) fn bars(out: &mut String, all: &[Outcome]) {
     let without_twin: Vec<&Outcome> = unseen
         .iter()
         .copied()
-        .filter(|o| matches!(o.family, Family::Foreign(i) if !has_twin(i)))
+        .filter(|o| matches!(o.family, Family::Foreign(i) if EFFECTS[i].twin.is_none()))
         .collect();
     let fit: Vec<_> = estimates(all).into_values().flatten().collect();
     let covered = Rate::of(fit.iter().map(|e| covers(e)));

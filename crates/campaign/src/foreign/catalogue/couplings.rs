@@ -1,14 +1,8 @@
 //! What one axis has of another, beyond a straight line in the same frame.
 
-use super::super::act::Change;
-use super::super::known::{Known, REACH, law, law_of};
-use super::super::shape::{Shape, by_energy, coupled, coupled_series, sized};
-use super::super::words::{about_mean, each, each_pair, resonating};
+use super::super::prelude::*;
 use super::Make::Shaped;
-use super::{ForeignEffect, TM, row};
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
-use crate::strength::Meter;
+use super::{ForeignEffect, Strength, TM, row};
 
 /// One row each, unbroken so that columns can be read down.
 #[rustfmt::skip]
@@ -25,6 +19,9 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(462, 9, "gain that another axis turns", Shaped(|d, s, a, w| gain(d, s, a, w))).needs(TM),
     row(463, 9, "diode between two axes", Shaped(|d, s, a, _| diode(d, s, a))).needs(TM).parts(&["cross_axis"]),
     row(515, 12, "axis that reads its neighbour for a while", Shaped(neighbour)).parts(&["noise_change"]).twin(367),
+    row(585, 15, "reading dropped where it equals its neighbour's", Shaped(|d, s, a, _| duplicates(d, s, a))).parts(&["stale_samples"]).strength(Strength::Whole),
+    row(586, 15, "reading renewed only when its neighbour's changes", Shaped(|d, _, a, _| by_neighbour(d, a))).parts(&["stale_samples"]),
+    row(587, 15, "limit to the length of the vector", Shaped(|d, s, a, _| limited(d, s, a))),
 ];
 
 /// One of the two others.
@@ -144,10 +141,14 @@ fn nats_of_copy(stand: &Stand, axis: usize, other: usize) -> f64 {
 fn late(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (other, frames) = (other_than(draw, axis), 1 + draw.of_many(4));
     let sign = draw.sign();
-    by_energy(energy_of(stand, other), move |share| Change::Late {
-        axis: other,
-        share: share * sign,
-        frames,
+    by_energy(energy_of(stand, other), move |share| {
+        Change::made(move |counts, draw| {
+            let from = about_mean(&each(&counts[other], |c| LSB * f64::from(c)));
+            let added = (0..from.len()).map(|i| sign * share * from[i.saturating_sub(frames)]);
+            let own = counts[axis].iter().zip(added);
+            own.map(|(own, a)| ((LSB * within_step(*own, draw) + a) / LSB).round() as i32)
+                .collect()
+        })
     })
 }
 
@@ -157,12 +158,15 @@ fn other_frames(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Shape {
     let other = other_than(draw, axis);
     let off = draw.between(-1.0, 1.0) * stand.white(axis).sqrt();
     stand.bias[other] = stand.bias[axis] + off;
-    sized(
+    remade(
         0.9,
         move |stand, chance| Known::Strength(of_exchanged(stand, axis, other, chance)),
-        move |_, _, chance| Change::Frames {
-            axis: other,
-            chance,
+        move |counts, draw, chance| {
+            let taken = each(&counts[other], |its| draw.chance(chance).then_some(its));
+            each_pair(&counts[axis], &taken, |own, its| {
+                let own = within_step(own, draw).round() as i32;
+                its.unwrap_or(own)
+            })
         },
     )
 }
@@ -245,8 +249,7 @@ fn tail(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
             let mean = from.iter().map(|c| f64::from(*c)).sum::<f64>() / from.len() as f64;
             let mut held = 0.0;
             each_pair(&counts[axis], from, |own, from| {
-                // Within its step the rate is anywhere.
-                let new = f64::from(own) + draw.between(-0.5, 0.5) + sign * share * held;
+                let new = within_step(own, draw) + sign * share * held;
                 held = keep * held + f64::from(from) - mean;
                 new.round() as i32
             })
@@ -278,8 +281,7 @@ fn of_both(
             &about_bias(&counts[other], bias),
             &counts[axis],
             |z, own| {
-                // Within its step the rate is anywhere.
-                let rate = LSB * (f64::from(own) + draw.between(-0.5, 0.5)) - own_bias;
+                let rate = LSB * within_step(own, draw) - own_bias;
                 ((own_bias + of(rate, z)) / LSB).round() as i32
             },
         )
@@ -337,4 +339,123 @@ fn neighbour(draw: &mut Draw, stand: &mut Stand, axis: usize, wanted: f64) -> Sh
         own
     });
     Shape::Fixed(Known::Strength((2.0 * long as f64 * nats).sqrt()), change)
+}
+
+/// Firmware that drops duplicates, and compares with the axis sent before instead of the frame before: where both read the
+/// same, the last reading is sent again. It has taken the biases off. No correlation tells, only codes that never coincide.
+fn duplicates(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Shape {
+    let other = other_than(draw, axis);
+    stand.bias[other] = stand.bias[axis] + 0.3 * stand.white(axis).sqrt() * draw.between(-1.0, 1.0);
+    let strength = move |stand: &Stand, chance: f64| {
+        let (first, own) = law(stand, axis);
+        let (its_first, its) = law(stand, other);
+        let mut nats = 0.0;
+        for (p, code) in own.iter().zip(first..) {
+            let at = usize::try_from(code - its_first).ok();
+            let same = p * at.and_then(|at| its.get(at)).copied().unwrap_or(0.0);
+            // What is dropped is missing here, and comes where the reading before was.
+            nats += same * (1.0 - chance) * (1.0 - chance).max(1e-12).ln();
+            let gains =
+                |r: &f64| same / p.max(1e-300) * r * (r + chance * p) * (chance * p / r).ln_1p();
+            nats += own.iter().filter(|r| **r > 1e-300).map(gains).sum::<f64>();
+        }
+        Known::Strength((2.0 * stand.samples() as f64 * nats).max(0.0).sqrt())
+    };
+    remade(
+        1.0,
+        move |stand, chance| strength(stand, chance.min(1.0)),
+        move |counts, draw, chance| {
+            let mut last = counts[axis][0];
+            each_pair(&counts[axis], &counts[other], |own, its| {
+                if own != its || !draw.chance(chance) {
+                    last = own;
+                }
+                last
+            })
+        },
+    )
+}
+
+/// A driver that waits for new data by looking whether the word of another axis has changed: by chance it is the same code
+/// twice, and this axis is not read then. Where something else wakes it, it reads.
+fn by_neighbour(draw: &mut Draw, axis: usize) -> Shape {
+    let other = other_than(draw, axis);
+    let strength = move |stand: &Stand, chance: f64| {
+        let square = |law: &[f64]| law.iter().map(|p| p * p).sum::<f64>();
+        let own = law(stand, axis).1;
+        let stands = |p: &f64| {
+            let again = chance + (1.0 - chance) * p;
+            p * again * (again / p).ln()
+        };
+        let again: f64 = own.iter().filter(|p| **p > 1e-300).map(stands).sum();
+        let moves = (1.0 - chance) * (1.0 - square(&own)) * (1.0 - chance).max(1e-12).ln();
+        let frames = stand.samples() as f64 * square(&law(stand, other).1);
+        Known::Strength((2.0 * frames * (again + moves)).max(0.0).sqrt())
+    };
+    remade(
+        1.0,
+        move |stand, chance| strength(stand, chance.min(1.0)),
+        move |counts, draw, chance| {
+            let (mut last, mut its_last) = (counts[axis][0], counts[other][0].wrapping_add(1));
+            each_pair(&counts[axis], &counts[other], |own, its| {
+                if its != its_last || !draw.chance(chance) {
+                    last = own;
+                }
+                its_last = its;
+                last
+            })
+        },
+    )
+}
+
+/// What is left of a rate where the length of a vector may be so much, and the slope of that.
+fn within(own: f64, others: f64, limit: f64) -> (f64, f64) {
+    let length = own.hypot(others);
+    if length <= limit {
+        return (own, 1.0);
+    }
+    let part = limit / length;
+    (own * part, part * (others / length).powi(2))
+}
+
+/// Firmware that limits the length of the rate's vector, about the biases: a reading is drawn in where the other axes are
+/// large. The size is 1 over the limit, in sigma of this axis.
+fn limited(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let (one, two) = ((axis + 1) % 3, (axis + 2) % 3);
+    let own = white_of(draw, stand, axis);
+    let others = each_pair(
+        &white_of(draw, stand, one),
+        &white_of(draw, stand, two),
+        f64::hypot,
+    );
+    let biases = stand.bias;
+    let limit_of = move |stand: &Stand, size: f64| stand.white(axis).sqrt() / size.max(1e-9);
+    sized(
+        f64::INFINITY,
+        move |stand, size| {
+            let limit = limit_of(stand, size);
+            // No slope tells more than the code that is read.
+            let least = LSB / stand.white(axis).sqrt() / std::f64::consts::TAU;
+            let (mut square, mut logs) = (0.0, 0.0);
+            for (w, r) in own.iter().zip(&others) {
+                let (read, slope) = within(*w, *r, limit);
+                square += read * read;
+                logs += slope.max(least).ln();
+            }
+            let n = own.len() as f64;
+            let input: f64 = own.iter().map(|w| w * w).sum();
+            Known::Strength((n * (square / input).ln() - 2.0 * logs).max(0.0).sqrt())
+        },
+        move |stand, _, size| {
+            let limit = limit_of(stand, size);
+            Change::made(move |counts, draw| {
+                let [a, b] = [one, two].map(|k| about_bias(&counts[k], biases[k]));
+                let others = each_pair(&a, &b, f64::hypot);
+                each_pair(&counts[axis], &others, |own, r| {
+                    let rate = LSB * within_step(own, draw) - biases[axis];
+                    ((biases[axis] + within(rate, r, limit).0) / LSB).round() as i32
+                })
+            })
+        },
+    )
 }

@@ -10,6 +10,7 @@ use super::{ForeignEffect, T, TM, TMS, TMV, V, row};
 mod acceleration;
 mod drive;
 mod motor;
+mod states;
 mod supply;
 mod table;
 mod temperature;
@@ -115,4 +116,10 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(563, 14, "belt that jumps a tooth", Signal(|d, s, _| drive::tooth(d, s))).parts(&["motor_bias"]).twin(499),
     row(564, 14, "range that is switched with hysteresis", Signal(|d, s, _| table::range(d, s))).parts(&["motor_bias"]).twin(484),
     row(567, 14, "oil that sloshes in the gear", Signal(|d, s, _| drive::slosh(d, s))).parts(&["motor_bias"]).twin(510),
+    row(579, 15, "stress that each shock releases", Signal(states::released)).parts(&["temperature"]),
+    row(580, 15, "restart at each dip of the supply", Signal(|d, s, _| states::restarts(d, s))),
+    row(581, 15, "drive that sleeps until it is shaken", Signal(|d, s, _| states::asleep(d, s))).needs(V),
+    row(582, 15, "thermometer's charge in every few frames", Signal(states::of_thermometer)).parts(&["temperature"]),
+    row(583, 15, "popcorn that freezes out in the cold", Signal(|d, s, a| states::popcorn(d, s, a))).needs(T).parts(&["telegraph"]),
+    row(584, 15, "buffer sent backwards while the table ramps", Signal(|d, s, _| table::backwards(d, s))),
 ];

@@ -73,4 +73,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(543, 13, "fan coil that a thermostat switches", More(|d, s, _| variance::fan(d, s))).twin(521),
     row(544, 13, "gas that leaks into the cavity", More(|d, s, _| variance::gas(d, s))).twin(421),
     row(554, 14, "edge that whistles at some speeds", More(|d, s, _| variance::whistle(d, s))).parts(&["motor_noise"]).twin(481),
+    row(574, 15, "denoiser that shrinks small differences", Shaped(|d, s, _, _| memory::shrunk(d, s))).parts(&["low_pass"]),
+    row(575, 15, "modulator that rings after an overload", Shaped(|d, _, _, _| memory::overloaded(d))).parts(&["low_pass"]),
+    row(576, 15, "angle summed in a short float", Shaped(|d, _, a, _| processes::short_float(d, a))).parts(&["quantization_noise"]),
 ];

@@ -49,4 +49,6 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(524, 12, "moisture that diffuses in and out", Signal(|d, s, _| levels::moisture(d, s))).twin(429),
     row(526, 12, "draught of the air conditioning", Signal(|d, s, _| levels::draught(d, s))).twin(496),
     row(537, 13, "sun through clouds on one side", Signal(|d, s, _| levels::sun(d, s))).twin(350),
+    row(577, 15, "spring pendulum", Signal(|d, s, _| tones::spring_pendulum(d, s))),
+    row(578, 15, "radio field that fades as somebody walks", Signal(|d, s, _| tones::fading(d, s))),
 ];

@@ -1,77 +1,34 @@
 //! Converters: where one code ends and the next one begins.
 
-use std::f64::consts::TAU;
 use std::rc::Rc;
 
-use super::super::super::act::Change;
-use super::super::super::known::{Known, even_edges, law, mean_and_sigma, shares};
-use super::super::super::shape::{Shape, edges, sized};
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
+use super::super::super::prelude::*;
 
 /// Most that the line of a wavy converter leans: at 1 it would turn back, and codes be missing.
 pub(super) const STEEPEST: f64 = 0.9;
 
-/// First code, and the lower edge of each code within so many of a middle one, counts.
-fn about(middle: i32, reach: i32, edge: impl Fn(i32) -> f64) -> (i32, Vec<f64>) {
-    let first = middle - reach;
-    (first, (first..=middle + reach).map(edge).collect())
-}
-
-/// First code and lower edges, counts, of an amplifier that reads asinh(bend x) / bend of what is x off its middle.
-pub(super) fn of_bend(middle: f64, reach: i32, bend: f64) -> (i32, Vec<f64>) {
-    about(middle.round() as i32, reach, |code| {
-        let off = f64::from(code) - 0.5 - middle;
-        middle + (bend * off).sinh() / bend
-    })
+/// First code, and the lower edge of each code within a reach of a middle one, counts, by the edge that an even converter has
+/// there.
+fn about(middle: f64, reach: f64, edge: impl Fn(f64) -> f64) -> (i32, Vec<f64>) {
+    let (middle, reach) = (middle.round() as i32, reach.ceil() as i32);
+    let codes = middle - reach..=middle + reach;
+    (
+        middle - reach,
+        codes.map(|code| edge(f64::from(code) - 0.5)).collect(),
+    )
 }
 
 /// The major carry: at mid-scale, which lies near the rate at rest, all bits of the converter turn over, and the largest
 /// weighs more than all others together by so many counts, or less: readings on one side are off from those on the other,
 /// with codes between that never come, or that come from both sides.
-pub(super) fn mid_scale(
-    draw: &mut Draw,
-    stand: &Stand,
-    axis: usize,
-) -> impl Fn(f64) -> Stage + use<> {
+pub(super) fn mid_scale(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (zero, sign) = (zero_of(draw, stand, axis), draw.sign());
-    move |size| Stage {
+    by_stage(axis, move |size| Stage {
         zero,
         threshold: 0.0,
         inside: 1.0,
         beyond: 1.0,
         from: 0.5 * sign * size,
-    }
-}
-
-/// First code and lower edges, counts, of a stage that does not answer until its input is `zone` counts off zero, and then
-/// answers by what is beyond; zero lies at `middle`.
-pub(super) fn with_zone(middle: i32, reach: i32, zone: f64) -> (i32, Vec<f64>) {
-    about(middle, reach, |code| {
-        f64::from(code) - 0.5 + if code > middle { zone } else { -zone }
-    })
-}
-
-/// Lower edges, counts, of even codes about a middle, of which all rates within `band` read the middle.
-pub(super) fn with_band(middle: i32, reach: i32, band: f64) -> (i32, Vec<f64>) {
-    about(middle, reach, |code| {
-        let even = f64::from(code - middle) - 0.5;
-        let edge = if code <= middle {
-            even.min(-band)
-        } else {
-            even.max(band)
-        };
-        f64::from(middle) + edge
-    })
-}
-
-/// Lower edges, counts, of codes about a middle, above which the rate counts `exp(log_ratio / 2)` times, below it the
-/// inverse.
-pub(super) fn of_two_gains(middle: f64, reach: i32, log_ratio: f64) -> (i32, Vec<f64>) {
-    let gain = (0.5 * log_ratio).exp();
-    about(middle.round() as i32, reach, |code| {
-        let off = f64::from(code) - 0.5 - middle;
-        middle + if off > 0.0 { off / gain } else { off * gain }
     })
 }
 
@@ -169,8 +126,7 @@ impl Stage {
         Change::made(move |counts, draw| {
             counts[axis]
                 .iter()
-                // Within its step the rate is anywhere.
-                .map(|c| self.of(f64::from(*c) + draw.between(-0.5, 0.5)).round() as i32)
+                .map(|c| self.of(within_step(*c, draw)).round() as i32)
                 .collect()
         })
     }
@@ -183,45 +139,29 @@ pub(super) fn zero_of(draw: &mut Draw, stand: &Stand, axis: usize) -> f64 {
 }
 
 /// Nothing comes out until the rate is so far from zero, counts, and only what is beyond afterwards.
-pub(super) fn dead_zone(
-    draw: &mut Draw,
-    stand: &Stand,
-    axis: usize,
-) -> impl Fn(f64) -> Stage + use<> {
+pub(super) fn dead_zone(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let zero = zero_of(draw, stand, axis);
-    move |size| Stage {
+    by_stage(axis, move |size| Stage {
         zero,
         threshold: size,
         inside: 0.0,
         beyond: 1.0,
         from: 0.0,
-    }
+    })
 }
 
 /// A stage that changes its range beyond a rate: the coarse one has an offset from the fine one, counts, and another gain.
-pub(super) fn ranges(draw: &mut Draw, stand: &Stand, axis: usize) -> impl Fn(f64) -> Stage + use<> {
+pub(super) fn ranges(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let zero = zero_of(draw, stand, axis);
     let threshold = stand.white(axis).sqrt() / LSB * draw.between(0.7, 1.5);
     let (offset, gain) = (draw.sign(), draw.sign() * draw.between(0.02, 0.08));
-    move |size| Stage {
+    by_stage(axis, move |size| Stage {
         zero,
         threshold,
         inside: 1.0,
         beyond: (gain * size).exp(),
         from: threshold * (offset * size / threshold).exp(),
-    }
-}
-
-/// Lower edges of the readings, counts, when codes `fine` counts apart, the first of them `offset` counts off, are rounded
-/// to whole counts; with the first reading.
-pub(super) fn edges_of(fine: f64, offset: f64, from: i32, to: i32) -> Vec<f64> {
-    // The lowest code that rounds to a reading begins half a code below itself.
-    (from..=to)
-        .map(|reading| {
-            let lowest = ((f64::from(reading) - 0.5 - offset) / fine).ceil();
-            (lowest - 0.5) * fine + offset
-        })
-        .collect()
+    })
 }
 
 /// A converter by successive approximation of which one bit is not what it should be, counts.
@@ -331,16 +271,30 @@ impl Wave {
     }
 }
 
-/// Codes that are missing: one in so many.
-pub(super) fn missing(draw: &mut Draw) -> Shape {
+/// Codes that are missing, one in so many: their readings move up by one.
+pub(super) fn missing(draw: &mut Draw, axis: usize) -> Shape {
     let every = [3, 5, 6, 7, 10][draw.of_many(5)];
-    Shape::Fixed(Known::Strength(f64::NAN), Change::Missing(every))
+    let change = Change::made(move |counts, draw| {
+        each(&counts[axis], |own| {
+            let code = within_step(own, draw).round() as i32;
+            code + i32::from(code.rem_euclid(every) == 0)
+        })
+    });
+    Shape::Fixed(Known::Strength(f64::NAN), change)
 }
 
 /// A dead band about the middle, of the size of the noise.
 pub(super) fn still_band(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let band = stand.white(axis).sqrt() * draw.between(0.5, 1.2);
-    Shape::Fixed(Known::Strength(f64::NAN), Change::DeadBand(band))
+    let middle = stand.bias[axis];
+    let change = Change::made(move |counts, draw| {
+        each(&counts[axis], |own| {
+            let rate = LSB * within_step(own, draw);
+            let still = (rate - middle).abs() < band;
+            (if still { middle } else { rate } / LSB).round() as i32
+        })
+    });
+    Shape::Fixed(Known::Strength(f64::NAN), change)
 }
 
 /// Sigma either way of the bias within which the edges between codes are drawn.
@@ -375,7 +329,7 @@ pub(super) fn uneven_steps(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape
     sized(
         0.98,
         move |stand, size| against_even(stand, axis, first, &known(size), &known(0.0)),
-        move |_, _, size| Change::Edges(first, edges(size)),
+        move |_, _, size| Change::edges(axis, first, edges(size)),
     )
 }
 
@@ -385,10 +339,15 @@ pub(super) fn two_in_one(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     // Below that, every other reading would be double: a bit that sticks at times does the same.
     let (gain, offset) = (draw.between(0.72, 0.91), draw.between(-0.5, 0.5));
     let (first, last) = reach(stand, axis);
-    let edges = edges_of(gain, offset, first, last);
+    // The lowest code of the part that rounds to a reading begins half a code below itself.
+    let edge = |reading: i32| {
+        let lowest = ((f64::from(reading) - 0.5 - offset) / gain).ceil();
+        (lowest - 0.5) * gain + offset
+    };
+    let edges: Vec<f64> = (first..=last).map(edge).collect();
     let even = even_edges(first, (last - first) as usize);
     let known = against_even(stand, axis, first, &edges, &even);
-    Shape::Fixed(known, Change::Edges(first, edges))
+    Shape::Fixed(known, Change::edges(axis, first, edges))
 }
 
 /// Crossover: of two transistors that push and pull, neither leads until the input is a little off zero. Firmware that takes
@@ -396,21 +355,25 @@ pub(super) fn two_in_one(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 /// left of the bias lies within a sigma of that zero.
 pub(super) fn push_pull(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (bias, sigma) = mean_and_sigma(stand, axis);
-    let middle = (bias + draw.between(-1.0, 1.0) * sigma).round() as i32;
-    let reach = (8.0 * sigma).ceil() as i32;
-    // Two sigma of it would leave few readings but zero.
+    let middle = (bias + draw.between(-1.0, 1.0) * sigma).round();
     edges(axis, move |_, zone| {
-        with_zone(middle, reach, zone.min(2.0 * sigma))
+        // Two sigma of it would leave few readings but zero.
+        let zone = zone.min(2.0 * sigma);
+        let edge = |even| even + if even > middle { zone } else { -zone };
+        about(middle, 8.0 * sigma, edge)
     })
 }
 
 /// A threshold against drift: rates that are small, the bias taken off, read zero, and the others are left as they are.
 pub(super) fn dead_band(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (bias, sigma) = mean_and_sigma(stand, axis);
-    let middle = (bias + sigma * draw.between(-0.5, 0.5)).round() as i32;
-    let reach = (10.0 * sigma).ceil() as i32;
+    let middle = (bias + sigma * draw.between(-0.5, 0.5)).round();
     edges(axis, move |_, wider| {
-        with_band(middle, reach, 0.5 + wider.min(3.0 * sigma))
+        let band = 0.5 + wider.min(3.0 * sigma);
+        about(middle, 10.0 * sigma, |even| match even - middle {
+            off if off < 0.0 => middle + off.min(-band),
+            off => middle + off.max(band),
+        })
     })
 }
 
@@ -419,9 +382,12 @@ pub(super) fn dead_band(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 pub(super) fn two_gains(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (mean, sigma) = mean_and_sigma(stand, axis);
     let (middle, sign) = (mean + sigma * draw.between(-0.3, 0.3), draw.sign());
-    let reach = (20.0 * sigma).ceil() as i32;
     edges(axis, move |_, log_ratio| {
-        of_two_gains(middle, reach, sign * log_ratio.min(1.6))
+        let gain = (0.5 * sign * log_ratio.min(1.6)).exp();
+        about(middle, 20.0 * sigma, |even| match even - middle {
+            off if off > 0.0 => middle + off / gain,
+            off => middle + off * gain,
+        })
     })
 }
 
@@ -437,7 +403,7 @@ pub(super) fn growing_steps(draw: &mut Draw, stand: &Stand, axis: usize, wanted:
         .find(|limit| known(*limit).strength(stand, axis) >= wanted)
         .unwrap_or(1);
     let (first, edges) = of_growing(middle, limit, reach);
-    Shape::Fixed(known(limit), Change::Edges(first, edges))
+    Shape::Fixed(known(limit), Change::edges(axis, first, edges))
 }
 
 /// An amplifier that is straight for small rates and bends to a logarithm for large ones, either way, so that they fit into
@@ -445,9 +411,11 @@ pub(super) fn growing_steps(draw: &mut Draw, stand: &Stand, axis: usize, wanted:
 pub(super) fn bent(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (mean, sigma) = mean_and_sigma(stand, axis);
     let middle = mean + sigma * draw.between(-0.3, 0.3);
-    let reach = (10.0 * sigma).ceil() as i32;
     edges(axis, move |_, bend| {
-        of_bend(middle, reach, bend.min(3.0) / sigma)
+        let bend = bend.min(3.0) / sigma;
+        about(middle, 10.0 * sigma, |even| {
+            middle + (bend * (even - middle)).sinh() / bend
+        })
     })
 }
 
@@ -464,7 +432,7 @@ pub(super) fn weighs_wrong(draw: &mut Draw, stand: &Stand, axis: usize, wanted: 
 }
 
 /// A stage of a size.
-pub(super) fn by_stage(axis: usize, stage: impl Fn(f64) -> Stage + 'static) -> Shape {
+fn by_stage(axis: usize, stage: impl Fn(f64) -> Stage + 'static) -> Shape {
     let stage = Rc::new(stage);
     let known = Rc::clone(&stage);
     sized(

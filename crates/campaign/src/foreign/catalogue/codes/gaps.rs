@@ -1,12 +1,6 @@
 //! Gaps that a driver hides.
 
-use std::f64::consts::TAU;
-
-use super::super::super::act::Change;
-use super::super::super::known::Known;
-use super::super::super::shape::Shape;
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
+use super::super::super::prelude::*;
 
 /// Readings of a gap, least and most.
 pub(super) const GAP: (usize, usize) = (4, 10);
@@ -23,14 +17,14 @@ pub(super) fn nats_of_gap(length: usize, sigma_counts: f64) -> f64 {
 }
 
 /// Gaps that a link has lost, as strong as wanted together, none touching another: the first reading and the length of each,
-/// with half the d'^2 that is left.
-fn gaps_for(
+/// with half the d'^2 that is left. `nats` tells what a gap of a length adds to that.
+pub(super) fn gaps_for(
     draw: &mut Draw,
     stand: &Stand,
-    axis: usize,
     wanted: f64,
+    nats: &dyn Fn(usize) -> f64,
 ) -> (Vec<(usize, usize)>, f64) {
-    let (n, sigma) = (stand.samples(), stand.white(axis).sqrt() / LSB);
+    let n = stand.samples();
     let mut gaps: Vec<(usize, usize)> = vec![];
     let mut left = 0.5 * wanted * wanted;
     while left > 0.0 {
@@ -43,14 +37,13 @@ fn gaps_for(
             continue;
         }
         // The last one is as short as it has to be.
-        let of = |length: &usize| *length as f64 * nats_of_gap(*length, sigma);
-        let off = |length: &usize| (of(length) - left).abs();
+        let off = |length: &usize| (nats(*length) - left).abs();
         let length = (1..=length)
             .min_by(|a, b| off(a).total_cmp(&off(b)))
             .unwrap_or(length);
-        left -= of(&length);
+        left -= nats(length);
         gaps.push((from, length));
-        if left < 0.5 * nats_of_gap(1, sigma) {
+        if left < 0.5 * nats(1) {
             break;
         }
     }
@@ -60,7 +53,9 @@ fn gaps_for(
 /// A driver that hides what the link has lost: between the last reading before a gap and the first one after it there is a
 /// straight line.
 pub(super) fn bridged(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
-    let (gaps, left) = gaps_for(draw, stand, axis, wanted);
+    let sigma = stand.white(axis).sqrt() / LSB;
+    let nats = |length| length as f64 * nats_of_gap(length, sigma);
+    let (gaps, left) = gaps_for(draw, stand, wanted, &nats);
     let change = Change::made(move |counts, _| {
         let mut own = counts[axis].clone();
         for (from, length) in &gaps {

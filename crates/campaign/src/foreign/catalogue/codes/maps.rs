@@ -1,11 +1,7 @@
 //! Codes that are read as others.
 
-use super::super::super::act::Change;
-use super::super::super::known::{Known, even_edges, law, mean_and_sigma, shares};
-use super::super::super::shape::{Shape, map};
+use super::super::super::prelude::*;
 use super::edges::zero_of;
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
 
 /// Those whose last digit is more than a count, and less than the noise, at the rates of a stand at rest: deg/s, gon/s,
 /// minutes of arc a second, and deg/h.
@@ -72,35 +68,25 @@ impl Form {
     }
 }
 
-/// One of the forms that are strong enough, or the coarsest.
-pub(super) fn form_of(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Form {
-    let strong = |form: &&Form| {
-        Known::map(stand, axis, 1.0, &|c| form.read(c)).strength(stand, axis) >= wanted
-    };
-    let enough: Vec<&Form> = FORMS.iter().filter(strong).collect();
-    match enough.len() {
-        0 => FORMS[FORMS.len() - 1],
-        k => *enough[draw.of_many(k)],
-    }
-}
-
 /// A decimating filter whose register has no bit to spare: what is beyond its range comes out at the other end. So it is in
 /// the frames that are taken at the larger of two gains.
-pub(super) fn wrapped(draw: &mut Draw, stand: &Stand, axis: usize) -> impl Fn(i32) -> i32 + use<> {
+pub(super) fn wrapped(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (_, sigma) = mean_and_sigma(stand, axis);
     let zero = zero_of(draw, stand, axis).round() as i32;
     let half = (sigma * draw.between(0.8, 1.6)).round().max(2.0) as i32;
-    move |code| zero - half + (code - zero + half).rem_euclid(2 * half)
+    map(axis, move |code| {
+        zero - half + (code - zero + half).rem_euclid(2 * half)
+    })
 }
 
 /// Words kept as numbers of half precision, eleven bits of mantissa: beyond a power of two, which lies near the reading at
 /// rest, only every second has a number of its own, and one between two goes to that whose mantissa is even. Some frames are
 /// kept so.
-pub(super) fn halved(draw: &mut Draw, stand: &Stand, axis: usize) -> impl Fn(i32) -> i32 + use<> {
+pub(super) fn halved(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let zero = zero_of(draw, stand, axis).round() as i32;
     // Of a part that is mounted upside down, it is the readings below.
     let up = draw.sign() as i32;
-    move |code| {
+    map(axis, move |code| {
         let off = up * (code - zero);
         if off > 0 {
             let mantissa = (0.5 * f64::from(off)).round_ties_even() as i32;
@@ -108,18 +94,18 @@ pub(super) fn halved(draw: &mut Draw, stand: &Stand, axis: usize) -> impl Fn(i32
         } else {
             code
         }
-    }
+    })
 }
 
 /// A gain of one that a word of fractions cannot hold (Q15 ends at 0x7fff): the product is a little less than the reading
 /// and, cut toward zero as integers are divided in C, one short of it, whatever the reading but zero. So are a gain and its
 /// correction by two, and the code of zero takes five. Some frames go through it, others as they are.
-pub(super) fn cut(draw: &mut Draw, stand: &Stand, axis: usize) -> impl Fn(i32) -> i32 + use<> {
+pub(super) fn cut(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let zero = zero_of(draw, stand, axis).round() as i32;
-    move |code| {
+    map(axis, move |code| {
         let q15 = |v: i64, _: i32| v * 0x7fff / 0x8000;
         zero + (0..MULTIPLICATIONS).fold(i64::from(code - zero), q15) as i32
-    }
+    })
 }
 
 /// The bus is read bit by bit in software, and an interrupt that falls between two bits lets each be taken for the other:
@@ -175,8 +161,32 @@ pub(super) fn gated(stand: &Stand, axis: usize, wanted: f64) -> Shape {
     Shape::Fixed(known(gate), change)
 }
 
-/// Lines printed with few digits, and read again.
+/// Lines printed with few digits, and read again: in one of the forms that are strong enough, or the coarsest.
 pub(super) fn printed(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
-    let form = form_of(draw, stand, axis, wanted);
+    let strong = |form: &&Form| {
+        Known::map(stand, axis, 1.0, &|c| form.read(c)).strength(stand, axis) >= wanted
+    };
+    let enough: Vec<&Form> = FORMS.iter().filter(strong).collect();
+    let form = match enough.len() {
+        0 => FORMS[FORMS.len() - 1],
+        k => *enough[draw.of_many(k)],
+    };
     map(axis, move |code| form.read(code))
+}
+
+/// A rate printed by its whole and its hundredths, as "%d.%d" does: the zero of hundredths below ten is missing, and 1.05
+/// is read again as 1.5. Some lines are printed so.
+pub(super) fn without_zero(code: i32) -> i32 {
+    const HUNDREDTHS: i32 = 100;
+    let hundredths = (f64::from(HUNDREDTHS) * LSB * f64::from(code)).round() as i32;
+    let part = hundredths.abs() % HUNDREDTHS;
+    // What has one digit counts tenths.
+    let read = if part < 10 { 10 * part } else { part };
+    let whole = hundredths.abs() - part;
+    let rate = f64::from(hundredths.signum() * (whole + read)) / f64::from(HUNDREDTHS);
+    if part < 10 && part > 0 {
+        (rate / LSB).round() as i32
+    } else {
+        code
+    }
 }

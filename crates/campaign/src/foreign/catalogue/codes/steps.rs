@@ -1,13 +1,6 @@
 //! Readings that depend on those before or after them.
 
-use super::super::super::act::Change;
-use super::super::super::known::{
-    Known, even_edges, law, long_run, mean_and_sigma, shares, steps_of,
-};
-use super::super::super::shape::{Shape, sized};
-use super::super::super::words::{each, each_pair};
-use crate::random::Draw;
-use crate::stand::{LSB, Stand};
+use super::super::super::prelude::*;
 
 /// Largest play, counts.
 pub(super) const MOST_PLAY: f64 = 6.0;
@@ -57,36 +50,28 @@ pub(super) fn torn(draw: &mut Draw) -> impl Fn(i32, i32) -> i32 + use<> {
 
 /// An output stage whose input pair can steer so much current and no more: small changes come out whole, and large ones
 /// the less, by the pair's tanh. So it is in the frames in which something else loads it.
-pub(super) fn slewing(
-    draw: &mut Draw,
-    stand: &Stand,
-    axis: usize,
-) -> impl Fn(i32, i32) -> i32 + use<> {
+pub(super) fn slewing(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (_, sigma) = mean_and_sigma(stand, axis);
     let most = sigma * draw.between(0.3, 1.0);
-    move |before, code| {
+    by_chance(axis, move |before, code| {
         let change = f64::from(code - before);
         before + (most * (change / most).tanh()).round() as i32
-    }
+    })
 }
 
 /// Firmware that smooths what changes little and lets through what changes by more than a gate; where its time runs short,
 /// the reading goes out as it is.
-pub(super) fn smoothing(
-    draw: &mut Draw,
-    stand: &Stand,
-    axis: usize,
-) -> impl Fn(i32, i32) -> i32 + use<> {
+pub(super) fn smoothing(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (_, sigma) = mean_and_sigma(stand, axis);
     let (gate, share) = (sigma * draw.between(0.8, 2.0), draw.between(0.1, 0.4));
-    move |before, code| {
+    by_chance(axis, move |before, code| {
         let change = f64::from(code - before);
         if change.abs() < gate {
             before + (share * change).round() as i32
         } else {
             code
         }
-    }
+    })
 }
 
 /// Chances from each code (row) to the next reading's, when one stands until the input is `holds` counts away from it.
@@ -231,14 +216,10 @@ pub(super) fn steps_of_nibble(stand: &Stand, axis: usize, chance: f64) -> Known 
 
 /// An output that is driven upward and let go downward: where a long cable hangs on it, as it does in some frames, it falls
 /// by so much at most, of the noise's sigma, from one reading to the next.
-pub(super) fn falling(
-    draw: &mut Draw,
-    stand: &Stand,
-    axis: usize,
-) -> impl Fn(i32, i32) -> i32 + use<> {
+pub(super) fn falling(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (_, sigma) = mean_and_sigma(stand, axis);
     let most = (sigma * draw.between(0.2, 0.9)).round().max(1.0) as i32;
-    move |before, code| code.max(before - most)
+    by_chance(axis, move |before, code| code.max(before - most))
 }
 
 /// The median of three.
@@ -313,7 +294,7 @@ pub(super) fn gate_for(stand: &Stand, axis: usize, wanted: f64) -> f64 {
 /// and a comparator with hysteresis does the same: the code that stands is wider than the others, and its neighbours
 /// come less often after it.
 pub(super) fn threshold(axis: usize) -> Shape {
-    sized(
+    remade(
         4.0,
         move |stand, beyond| {
             let (first, even) = law(stand, axis);
@@ -325,7 +306,17 @@ pub(super) fn threshold(axis: usize) -> Shape {
                 held: even,
             }
         },
-        |_, _, beyond| Change::Holds(0.5 + beyond),
+        move |counts, draw, beyond| {
+            // The first reading is taken whatever it is.
+            let mut last = f64::INFINITY;
+            each(&counts[axis], |own| {
+                let now = within_step(own, draw);
+                if (now - last).abs() >= 0.5 + beyond {
+                    last = now.round();
+                }
+                last as i32
+            })
+        },
     )
 }
 
@@ -353,7 +344,7 @@ pub(super) fn limited(stand: &Stand, axis: usize, wanted: f64) -> Shape {
 /// A tracking converter whose comparator has hysteresis: its code moves only when the rate is further off than that, and
 /// then no closer.
 pub(super) fn play(axis: usize) -> Shape {
-    sized(
+    remade(
         MOST_PLAY,
         move |stand, play| {
             let (first, even) = law(stand, axis);
@@ -363,15 +354,12 @@ pub(super) fn play(axis: usize) -> Shape {
                 &even,
             )
         },
-        move |_, _, play| {
-            Change::made(move |counts, draw| {
-                let own = &counts[axis];
-                let mut code = own[0];
-                each(own, |c| {
-                    // Within its step the rate is anywhere.
-                    code = followed(code, f64::from(c) + draw.between(-0.5, 0.5), play);
-                    code
-                })
+        move |counts, draw, play| {
+            let own = &counts[axis];
+            let mut code = own[0];
+            each(own, |c| {
+                code = followed(code, within_step(c, draw), play);
+                code
             })
         },
     )
@@ -379,21 +367,19 @@ pub(super) fn play(axis: usize) -> Shape {
 
 /// An output stage that gets no further than so much between two readings, and is that much nearer then.
 pub(super) fn slew(axis: usize) -> Shape {
-    sized(
+    remade(
         f64::INFINITY,
         move |stand, steep| {
             let (first, even) = law(stand, axis);
             Known::steps(first, steps_of_limit(stand, axis, limit_of(steep)), &even)
         },
-        move |_, _, steep| {
+        move |counts, draw, steep| {
             let limit = limit_of(steep);
-            Change::made(move |counts, draw| {
-                let mut reading = counts[axis][0];
-                each(&counts[axis], |code| {
-                    let above = i32::from(draw.chance(limit.fract()));
-                    reading = slewed(limit as i32 + above)(reading, code);
-                    reading
-                })
+            let mut reading = counts[axis][0];
+            each(&counts[axis], |code| {
+                let above = i32::from(draw.chance(limit.fract()));
+                reading = slewed(limit as i32 + above)(reading, code);
+                reading
             })
         },
     )
@@ -419,21 +405,19 @@ pub(super) fn despiked(stand: &Stand, axis: usize, wanted: f64) -> Shape {
 /// Words that are packed by one and a half bytes, of which the byte with the nibbles is read last: where the part has a new
 /// reading meanwhile, the low nibble is already that one's.
 pub(super) fn nibble(axis: usize) -> Shape {
-    sized(
+    remade(
         1.0,
         move |stand, chance| steps_of_nibble(stand, axis, chance.min(1.0)),
-        move |_, _, chance| {
-            Change::made(move |counts, draw| {
-                let own = &counts[axis];
-                let one = |i: usize| {
-                    if draw.chance(chance) {
-                        mixed(own[i], own[(i + 1).min(own.len() - 1)])
-                    } else {
-                        own[i]
-                    }
-                };
-                (0..own.len()).map(one).collect()
-            })
+        move |counts, draw, chance| {
+            let own = &counts[axis];
+            let one = |i: usize| {
+                if draw.chance(chance) {
+                    mixed(own[i], own[(i + 1).min(own.len() - 1)])
+                } else {
+                    own[i]
+                }
+            };
+            (0..own.len()).map(one).collect()
         },
     )
 }

@@ -1,10 +1,6 @@
 //! Knocks, and what they ring.
 
-use std::f64::consts::TAU;
-
-use super::super::super::words::{about_mean, events, in_time, resonating, since, sizes};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// Lorries pass now and then: the ground swells under each, sways at a pitch of its own that the load moves a little, and is
 /// still again.

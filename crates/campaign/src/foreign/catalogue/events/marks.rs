@@ -1,10 +1,6 @@
 //! What passes or happens now and then, and what it leaves behind.
 
-use std::f64::consts::{PI, TAU};
-
-use super::super::super::words::{about_mean, each, events, in_time, since, sizes};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// Shortest and longest avalanche, s.
 pub(super) const AVALANCHES: (f64, f64) = (0.1, 4.0);

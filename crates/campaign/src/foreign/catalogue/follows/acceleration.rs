@@ -1,13 +1,6 @@
 //! Signals that follow an acceleration.
 
-use std::f64::consts::TAU;
-
-use super::super::super::words::{
-    Turning, about_mean, behind_plays, cycles, each, each_pair, either_way, from_trim, mean_square,
-    one_if, resonating, shaken, shaking, shocks, swelling, without_line,
-};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// Vibration along a slant in spells: the anisoelastic error goes with the mean square over a sample, while the
 /// accelerometers see single aliased values.
@@ -161,10 +154,7 @@ pub(super) fn slips(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let contacts: [(f64, f64); CONTACTS] =
         std::array::from_fn(|_| (rms * draw.between(0.3, 1.5), draw.between(0.5, 1.5)));
     let y = behind_plays(&force, &contacts);
-    let still = if along == 2 { 1.0 } else { 0.0 };
-    for (acc, a) in stand.world.acc[along].iter_mut().zip(&force) {
-        *acc = still + a + 0.005 * draw.normal();
-    }
+    felt(draw, stand, along, &force);
     without_line(&y, &force)
 }
 
@@ -182,16 +172,10 @@ pub(super) fn squared(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let depth = draw.between(0.3, 0.9);
     let swell = TAU / (draw.by_ratio(10.0, 80.0) * rate_hz);
     let first = draw.between(0.0, TAU);
-    let still = if along == 2 { 1.0 } else { 0.0 };
-    shake
-        .iter()
-        .enumerate()
-        .map(|(i, s)| {
-            let a = rms * s * (1.0 + depth * (first + swell * i as f64).sin());
-            stand.world.acc[along][i] = still + a + 0.005 * draw.normal();
-            a * a
-        })
-        .collect()
+    let swell = |i: usize| 1.0 + depth * (first + swell * i as f64).sin();
+    let force: Vec<f64> = (0..n).map(|i| rms * shake[i] * swell(i)).collect();
+    felt(draw, stand, along, &force);
+    each(&force, |a| a * a)
 }
 
 /// A shock drives the loop that holds the part's amplitude to its stop. It comes back from there over seconds, and the rate

@@ -1,13 +1,6 @@
 //! What the mechanics of a rate table do beside what is commanded: bearings, belts, gears and cables.
 
-use std::f64::consts::TAU;
-
-use super::super::super::words::{
-    DWELL, about_mean, angle_of_table, changes, each, each_pair, either_way, in_steps, passes,
-    programme, ramped_table, rate_of_table, resonating, turned,
-};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// Steps of the reckoning for each reading: many for a belt that swings a few times a second.
 pub(super) const FINE: usize = 20;

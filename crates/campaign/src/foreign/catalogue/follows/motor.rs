@@ -1,14 +1,7 @@
 //! Signals that follow the motor's command, its current or the angle that it has turned.
 
-use std::f64::consts::{PI, TAU};
-
-use super::super::super::words::{
-    DWELL, by_turns, changes, each, each_pair, in_spells, in_steps, programme, resonating, tone,
-    with_rests,
-};
+use super::super::super::prelude::*;
 use crate::motor::current;
-use crate::random::Draw;
-use crate::stand::Stand;
 
 /// A rotor's ripple: its pitch is the speed of the motor, which follows the duty behind a lag and under a load that
 /// wanders.

@@ -1,10 +1,6 @@
 //! Signals that follow the supply.
 
-use std::f64::consts::TAU;
-
-use super::super::super::words::{about_mean, each, each_pair, loaded, tone};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// A window comparator, or a rectifier in the reference: what the supply is off its middle, either way.
 pub(super) fn fold(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {

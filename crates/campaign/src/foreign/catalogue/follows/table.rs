@@ -1,13 +1,6 @@
 //! What a part that turns with a rate table gets wrong by the rate, the angle or the sense.
 
-use std::f64::consts::TAU;
-
-use super::super::super::words::{
-    DWELL, about_mean, angle_of_table, by_turns, changes, cycles, each, each_pair, either_way,
-    extremes, from_trim, in_steps, programme, ramped_table, rate_of_table, swing, turned,
-};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// How long an indexed table rests at a heading, s.
 pub(super) const RESTS: (f64, f64) = (1.5, 7.0);
@@ -343,4 +336,17 @@ fn traps(samples: usize, sign: f64, of: impl Fn(i32) -> Vec<f64>) -> Vec<f64> {
         all.iter_mut().zip(of(k)).for_each(|(v, t)| *v += sign * t);
     }
     about_mean(&all)
+}
+
+/// A buffer of some readings that is sent backwards: while the table's drive ramps from rate to rate, each block runs against
+/// the time.
+pub(super) fn backwards(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+    let rate = ramped_table(draw, stand);
+    let length = 4 + draw.of_many(9);
+    let last = rate.len() - 1;
+    let sent = |i: usize| {
+        let block = i / length * length;
+        rate[(block + length - 1 - (i - block)).min(last)] - rate[i]
+    };
+    (0..=last).map(sent).collect()
 }

@@ -1,13 +1,6 @@
 //! Signals that follow a temperature.
 
-use std::f64::consts::TAU;
-
-use super::super::super::words::{
-    about_mean, behind_plays, changes, cycles, each, each_pair, either_way, extremes, from_trim,
-    in_time, lamp, lit, one_if, pace, swing, tone, within_range, without_line,
-};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// Degrees in which a leak grows twofold.
 pub(super) const TWOFOLD_K: f64 = 10.0;

@@ -1,13 +1,6 @@
 //! White noise of another law than the normal one.
 
-use std::f64::consts::{PI, TAU};
-
-use super::super::super::act::Change;
-use super::super::super::known::{Known, cells, of_law};
-use super::super::super::shape::{Shape, noise, share, sized};
-use super::super::super::words::{each, with_rests};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// Least and largest share of the variance that leans; below the least the law is normal, as far as can be seen.
 pub(super) const SHARES: (f64, f64) = (0.05, 0.95);

@@ -1,12 +1,6 @@
 //! Noise whose readings depend on each other where a spectrum does not show it, or not all of it.
 
-use std::f64::consts::{PI, TAU};
-
-use super::super::super::known::Known;
-use super::super::super::shape::{Shape, noise, share};
-use super::super::super::words::{about_mean, by_turns, each, extremes, in_steps, mean_square};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// Most of the noise that may be of another kind.
 pub(super) const MOST: f64 = 0.95;
@@ -375,4 +369,63 @@ pub(super) fn filled(draw: &mut Draw, stand: &Stand) -> Shape {
     let samples: Vec<f64> = (0..n + 2).map(|_| size * draw.normal()).collect();
     let known = move |_: &Stand, share: f64| Known::Strength(of_filled(ratio, share, n));
     share(MOST, known, filled_up(ratio, &samples, n))
+}
+
+/// A denoiser by Haar's wavelet of two readings: their mean stays, and their difference d shrinks to
+/// d (1 - share / (1 + (d / large)^2)), small ones the most. Neighbours of one pair come to correlate, those of two do not.
+pub(super) fn shrunk(draw: &mut Draw, stand: &Stand) -> Shape {
+    let white: Vec<f64> = stand.series(|_| draw.normal());
+    let (large, first) = (draw.between(0.5, 1.2), draw.of_many(2));
+    let input = mean_square(&white);
+    let known = white.clone();
+    // The series with the mean logarithm of what each reading's slope is.
+    let of = move |share: f64, white: &[f64]| {
+        let (mut all, mut logs) = (white.to_vec(), 0.0);
+        for pair in all[first..].chunks_exact_mut(2) {
+            let (mean, d) = (0.5 * (pair[0] + pair[1]), (pair[1] - pair[0]) / 2f64.sqrt());
+            let near = 1.0 / (1.0 + (d / large).powi(2));
+            // As for the filter that lets large changes through.
+            logs += (1.0 - share * (2.0 * near * near - near)).ln();
+            let half = d * (1.0 - share * near) / 2f64.sqrt();
+            (pair[0], pair[1]) = (mean - half, mean + half);
+        }
+        (all, logs / white.len() as f64)
+    };
+    noise(
+        MOST,
+        move |stand, share| {
+            let (y, logs) = of(share.min(MOST), &known);
+            by_nats(stand, (mean_square(&y) / input).ln() - 2.0 * logs)
+        },
+        move |_, _, share| {
+            let (y, _) = of(share.min(MOST), &white);
+            let scale = mean_square(&y).sqrt();
+            each(&y, |v| v / scale)
+        },
+    )
+}
+
+/// A modulator whose integrators a large swing overloads: what was beyond comes out over the readings that follow, to either
+/// side in turn and less each time. Predicted from the past the noise has variance 1.
+pub(super) fn overloaded(draw: &mut Draw) -> Shape {
+    let (beyond, keep) = (draw.between(1.3, 1.9), draw.between(0.3, 0.75));
+    let tail = 0.5 * statrs::function::erf::erfc(beyond / 2f64.sqrt());
+    let density = (-0.5 * beyond * beyond).exp() / TAU.sqrt();
+    // Mean square of what a normal law has beyond, and of its sum over the readings after.
+    let square = 2.0 * ((1.0 + beyond * beyond) * tail - beyond * density);
+    let rings = square / (1.0 - keep * keep);
+    noise(
+        f64::INFINITY,
+        move |stand, size| by_nats(stand, (size * size * rings).ln_1p()),
+        move |stand, draw, size| {
+            let scale = (1.0 + size * size * rings).sqrt();
+            let mut left = 0.0;
+            stand.series(|_| {
+                let e = draw.normal();
+                let x = e + size * left;
+                left = e - e.clamp(-beyond, beyond) - keep * left;
+                x / scale
+            })
+        },
+    )
 }

@@ -1,98 +1,12 @@
 //! Processes beside the white noise: modes that noise drives, and humps that move.
 
-use std::f64::consts::TAU;
-
-use super::super::super::act::Change;
-use super::super::super::known::Known;
-use super::super::super::shape::{Shape, sized};
-use super::super::super::words::{Turning, each, extremes, resonating};
-use crate::random::Draw;
-use crate::stand::{Stand, lagged};
-use crate::strength::Meter;
-
-/// A damped mode that something random drives: x[i] = first x[i-1] + second x[i-2] + sqrt(drive) e[i], of variance 1.
-#[derive(Clone, Copy)]
-pub(super) struct Mode {
-    first: f64,
-    second: f64,
-    drive: f64,
-}
-
-impl Mode {
-    /// By frequency and half width, Hz.
-    pub(super) fn new(f: f64, half_width: f64, rate_hz: f64) -> Self {
-        let r = (-TAU * half_width / rate_hz).exp();
-        let (first, second) = (2.0 * r * (TAU * f / rate_hz).cos(), -r * r);
-        Self {
-            first,
-            second,
-            // Yule and Walker.
-            drive: (1.0 + second) * ((1.0 - second).powi(2) - first * first) / (1.0 - second),
-        }
-    }
-
-    /// Its density at an angular frequency, rad per sample.
-    pub(super) fn density(&self, w: f64) -> f64 {
-        let re = 1.0 - self.first * w.cos() - self.second * (2.0 * w).cos();
-        let im = self.first * w.sin() + self.second * (2.0 * w).sin();
-        self.drive / (re * re + im * im)
-    }
-}
-
-/// A rate that follows its ramp, each forgetting by a time constant of its own, samples: of variance 1.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ramp {
-    ramp: f64,
-    rate: f64,
-}
-
-impl Ramp {
-    /// Longest time constant, s: what is slower is hidden by a random walk.
-    const LONGEST_S: f64 = 4.0;
-
-    pub(super) fn new(draw: &mut Draw, rate_hz: f64) -> Self {
-        let mut samples = || rate_hz * draw.by_ratio(0.8, Self::LONGEST_S);
-        let (ramp, rate) = (samples(), samples());
-        Self { ramp, rate }
-    }
-
-    /// Variance of the white noise that drives it.
-    pub(super) fn drive(self) -> f64 {
-        // Of two poles in series, which are many samples long.
-        2.0 * (self.ramp + self.rate)
-    }
-
-    /// Its density at an angular frequency, rad per sample.
-    pub(super) fn density(self, w: f64) -> f64 {
-        let pole = |samples: f64| {
-            let keep = (-1.0 / samples).exp();
-            (1.0 - keep).powi(2) / (1.0 - 2.0 * keep * w.cos() + keep * keep)
-        };
-        self.drive() * pole(self.ramp) * pole(self.rate)
-    }
-
-    /// So many samples.
-    pub(super) fn of(self, draw: &mut Draw, n: usize) -> Vec<f64> {
-        // It wandered before.
-        let before = (10.0 * self.ramp.max(self.rate)) as usize;
-        let size = self.drive().sqrt();
-        let drive: Vec<f64> = (0..before + n).map(|_| size * draw.normal()).collect();
-        lagged(&lagged(&drive, self.ramp, 1.0), self.rate, 1.0).split_off(before)
-    }
-}
+use super::super::super::prelude::*;
 
 /// Density of a mode of this pitch and half width, Hz, driven by white noise of variance 1.
 pub(super) fn of_mode((pitch, half_width): (f64, f64), rate_hz: f64, w: f64) -> f64 {
     let (keep, own) = ((-TAU * half_width / rate_hz).exp(), TAU * pitch / rate_hz);
     let pole = |off: f64| 1.0 - 2.0 * keep * off.cos() + keep * keep;
     (keep * own.sin()).powi(2) / (pole(w - own) * pole(w + own))
-}
-
-/// Density of a hump about a frequency, of variance 1, at an angular frequency: the real part of a circle that turns, fades
-/// and is driven at random.
-pub(super) fn of_hump(turn: f64, keep: f64, w: f64) -> f64 {
-    let side = |from: f64| 1.0 / (1.0 - 2.0 * keep * (w - from).cos() + keep * keep);
-    0.5 * (1.0 - keep * keep) * (side(turn) + side(-turn))
 }
 
 /// A process of this density at size 1 beside the noise.
@@ -108,17 +22,24 @@ fn beside(
     )
 }
 
-/// A resonance that something random drives.
+/// A damped mode that something random drives: x[i] = first x[i-1] + second x[i-2] + sqrt(drive) e[i], of variance 1.
 pub(super) fn resonance(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let f = draw.by_ratio(0.6, 8.0);
     // A mode damped much more has no peak left.
     let half_width = draw.by_ratio(0.03, 0.3).min(f / 4.0);
-    let mode = Mode::new(f, half_width, stand.rate_hz);
-    let density = move |w| mode.density(w);
+    let r = (-TAU * half_width / stand.rate_hz).exp();
+    let (first, second) = (2.0 * r * (TAU * f / stand.rate_hz).cos(), -r * r);
+    // Yule and Walker.
+    let drive = (1.0 + second) * ((1.0 - second).powi(2) - first * first) / (1.0 - second);
+    let density = move |w: f64| {
+        let re = 1.0 - first * w.cos() - second * (2.0 * w).cos();
+        let im = first * w.sin() + second * (2.0 * w).sin();
+        drive / (re * re + im * im)
+    };
     beside(axis, density, move |stand, draw| {
         let (mut now, mut before) = (0.0, 0.0);
         let mut next = || {
-            let new = mode.first * now + mode.second * before + mode.drive.sqrt() * draw.normal();
+            let new = first * now + second * before + drive.sqrt() * draw.normal();
             (now, before) = (new, now);
             new
         };
@@ -236,16 +157,82 @@ pub(super) fn narrow_band(draw: &mut Draw, axis: usize) -> Shape {
 /// Not the rate but its ramp takes a random walk: a spectrum by the fourth power, above corners where both leak, for else it
 /// would leave the scale.
 pub(super) fn wandering_ramp(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    let ramp = Ramp::new(draw, stand.rate_hz);
-    beside(
-        axis,
-        move |w| ramp.density(w),
-        move |stand, draw| ramp.of(draw, stand.samples()),
-    )
+    // Longest time constant, s: what is slower is hidden by a random walk.
+    const LONGEST_S: f64 = 4.0;
+    let mut samples = || stand.rate_hz * draw.by_ratio(0.8, LONGEST_S);
+    let (ramp, rate) = (samples(), samples());
+    // Of two poles in series, which are many samples long.
+    let drive = 2.0 * (ramp + rate);
+    let density = move |w: f64| {
+        let pole = |samples: f64| {
+            let keep = (-1.0 / samples).exp();
+            (1.0 - keep).powi(2) / (1.0 - 2.0 * keep * w.cos() + keep * keep)
+        };
+        drive * pole(ramp) * pole(rate)
+    };
+    beside(axis, density, move |stand, draw| {
+        // It wandered before.
+        let before = (10.0 * ramp.max(rate)) as usize;
+        let size = drive.sqrt();
+        let drive: Vec<f64> = (0..before + stand.samples())
+            .map(|_| size * draw.normal())
+            .collect();
+        lagged(&lagged(&drive, ramp, 1.0), rate, 1.0).split_off(before)
+    })
 }
 
 /// Density of a hump about a frequency, Hz, of variance 1: of a circle that turns, fades and is driven at random, the real
 /// part.
 fn of_humps(meter: &Meter, f: f64, keep: f64, rate_hz: f64) -> Vec<f64> {
-    each(meter.omega(), |w| of_hump(TAU * f / rate_hz, keep, w))
+    let turn = TAU * f / rate_hz;
+    each(meter.omega(), |w| {
+        let side = |from: f64| 1.0 / (1.0 - 2.0 * keep * (w - from).cos() + keep * keep);
+        0.5 * (1.0 - keep * keep) * (side(turn) + side(-turn))
+    })
+}
+
+/// Firmware that adds the rate up to an angle in a short floating-point word and differences it again (24 bits, as compilers
+/// for small controllers have them, hold 16 of mantissa): the word's last digit doubles whenever the angle, which a rest of the
+/// bias carries away, passes a power of two, and the rounding with it.
+pub(super) fn short_float(draw: &mut Draw, axis: usize) -> Shape {
+    const PARTS: usize = 16;
+    const FINE: usize = 64;
+    let end = draw.between(1.0, 2.0);
+    // The last digit at a part of the record, over the last one that there is.
+    let digit = move |part: f64| (end * part).max(1e-3).log2().floor().exp2();
+    let square = |part: usize| {
+        let at = |k: usize| (part as f64 + (k as f64 + 0.5) / FINE as f64) / PARTS as f64;
+        (0..FINE).map(|k| digit(at(k)).powi(2)).sum::<f64>() / FINE as f64
+    };
+    let squares: Vec<f64> = (0..PARTS).map(square).collect();
+    let mean = squares.iter().sum::<f64>() / PARTS as f64;
+    // The size is the variance of the largest rounding over the white noise's; a difference has two.
+    noise(
+        f64::INFINITY,
+        move |stand, size| {
+            let (meter, white) = (Meter::new(stand, axis), stand.white(axis));
+            let of = |square: f64, w: f64| 1.0 + 2.0 * size * square * (1.0 - w.cos());
+            let change = |w| white * (of(mean, w) / (1.0 + 2.0 * size * mean) - 1.0);
+            // What the mean spectrum tells, and what its changes tell beside.
+            let steady = meter.of_density(&each(meter.omega(), change)).powi(2);
+            let moves = |w| {
+                let logs: f64 = squares.iter().map(|square| of(*square, w).ln()).sum();
+                of(mean, w).ln() - logs / PARTS as f64
+            };
+            let bins = each_pair(meter.omega(), meter.counts(), |w, m| m * moves(w));
+            Known::Strength((steady + bins.iter().sum::<f64>()).sqrt())
+        },
+        move |stand, draw, size| {
+            let n = stand.samples() as f64;
+            let scale = (1.0 + 2.0 * size * mean).sqrt();
+            let most = (12.0 * size).sqrt();
+            let mut before = 0.0;
+            stand.series(|i| {
+                let rounded = most * digit(i as f64 / n) * draw.between(-0.5, 0.5);
+                let x = draw.normal() + rounded - before;
+                before = rounded;
+                x / scale
+            })
+        },
+    )
 }

@@ -1,99 +1,11 @@
 //! Noise of another spectrum, in place of the white noise.
 
-use std::f64::consts::{PI, TAU};
-
 use diagnosis::likelihood::Dct;
 
-use super::super::super::act::Change;
-use super::super::super::known::Known;
-use super::super::super::shape::{Shape, noise, share, sized};
-use super::super::super::words::{each, each_pair, one_if};
-use crate::random::Draw;
-use crate::stand::{LSB, Stand, lagged};
+use super::super::super::prelude::*;
 
 /// Orders of the memory: with less a random walk hides all but little of it, with more it is flicker noise.
 pub(super) const ORDERS: (f64, f64) = (0.28, 0.32);
-
-/// What a filter of steep sides passes between two edges, rad per sample, of variance 1.
-pub(super) struct Band {
-    pub(super) low: f64,
-    pub(super) high: f64,
-}
-
-impl Band {
-    pub(super) fn of(draw: &mut Draw, rate_hz: f64) -> Self {
-        let (low, width) = (draw.by_ratio(0.6, 6.5), draw.by_ratio(0.5, 3.0));
-        Self {
-            low: TAU * low / rate_hz,
-            high: TAU * (low + width) / rate_hz,
-        }
-    }
-
-    /// Density at an angular frequency, rad per sample.
-    pub(super) fn density(&self, w: f64) -> f64 {
-        if (self.low..self.high).contains(&w) {
-            PI / (self.high - self.low)
-        } else {
-            0.0
-        }
-    }
-}
-
-/// Density, of mean 1, of white noise that a loop of first order holds down below its edge: without the loop's share of it,
-/// |jw / (jw + edge)|^2 is left.
-pub(super) struct HeldDown {
-    edge: f64,
-    mean: f64,
-}
-
-impl HeldDown {
-    /// By the edge of the loop, Hz.
-    pub(super) fn new(edge_hz: f64, rate_hz: f64) -> Self {
-        let edge = TAU * edge_hz / rate_hz;
-        // Mean of w^2 / (w^2 + edge^2) over 0..pi.
-        let mean = 1.0 - edge / PI * (PI / edge).atan();
-        Self { edge, mean }
-    }
-
-    /// Density at an angular frequency, rad per sample.
-    pub(super) fn density(&self, w: f64) -> f64 {
-        w * w / (w * w + self.edge * self.edge) / self.mean
-    }
-}
-
-/// What a filter of high order passes, of variance 1: white up to an edge, Hz, then down by the 2 x `order`-th power of
-/// the frequency (Butterworth 1930).
-pub(super) struct Edge {
-    edge: f64,
-    order: i32,
-    mean: f64,
-}
-
-impl Edge {
-    /// By its edge, Hz, and its order.
-    pub(super) fn new(edge_hz: f64, order: i32, rate_hz: f64) -> Self {
-        const CELLS: i32 = 4096;
-        let mut new = Self {
-            edge: TAU * edge_hz / rate_hz,
-            order,
-            mean: 1.0,
-        };
-        let at = |i: i32| PI * (f64::from(i) + 0.5) / f64::from(CELLS);
-        new.mean = (0..CELLS).map(|i| new.density(at(i))).sum::<f64>() / f64::from(CELLS);
-        new
-    }
-
-    /// Density at an angular frequency, rad per sample.
-    pub(super) fn density(&self, w: f64) -> f64 {
-        1.0 / (1.0 + (w / self.edge).powi(2 * self.order)) / self.mean
-    }
-}
-
-/// Density of noise of variance 1 of which a share comes back from its own output so many samples ago.
-pub(super) fn of_return(share: f64, after: usize, w: f64) -> f64 {
-    let square = share * share;
-    (1.0 - square) / (1.0 + square - 2.0 * share * (after as f64 * w).cos())
-}
 
 /// Density of fractionally integrated noise of that order, 1 in the mean (Granger and Joyeux 1980).
 pub(super) fn of_memory(order: f64, w: f64) -> f64 {
@@ -218,18 +130,14 @@ pub(super) fn rounded(draw: &mut Draw, stand: &Stand, axis: usize, most: f64) ->
     share(most, known, series)
 }
 
-/// What an echo of a share `g` after so many samples changes, at an angular frequency.
-fn by_echo(g: f64, after: usize, w: f64) -> f64 {
-    2.0 * g / (1.0 + g * g) * (after as f64 * w).cos()
-}
-
 /// A share of the reading some samples ago comes again: a buffer or a capacitor that is not emptied.
 pub(super) fn echo(draw: &mut Draw, axis: usize) -> Shape {
     let (after, sign) = (3 + draw.of_many(23), draw.sign());
     noise(
         1.0,
         move |stand, share| {
-            Known::shaped(stand, axis, |w| by_echo(sign * share.min(1.0), after, w))
+            let (g, after) = (sign * share.min(1.0), after as f64);
+            Known::shaped(stand, axis, |w| 2.0 * g / (1.0 + g * g) * (after * w).cos())
         },
         move |stand, draw, share| {
             let all = stand.samples() + after;
@@ -247,7 +155,10 @@ pub(super) fn reverberation(draw: &mut Draw, axis: usize) -> Shape {
     noise(
         0.95,
         move |stand, share| {
-            let by = |w: f64| of_return(sign * share.min(0.95), after, w) - 1.0;
+            let share = sign * share.min(0.95);
+            let (square, after) = (share * share, after as f64);
+            let of = |w: f64| (1.0 - square) / (1.0 + square - 2.0 * share * (after * w).cos());
+            let by = |w: f64| of(w) - 1.0;
             Known::shaped(stand, axis, by)
         },
         move |stand, draw, share| {
@@ -287,25 +198,37 @@ pub(super) fn hole(draw: &mut Draw) -> Shape {
     )
 }
 
-/// A part whose own noise is cut by a filter of high order, as sigma-delta converters have it, and a stage behind that is
-/// white: the spectrum has a shoulder and then a floor.
+/// A part whose own noise is cut by a filter of high order (Butterworth 1930), as sigma-delta converters have it, and a stage
+/// behind that is white: the spectrum has a shoulder, falls by the 2 x order-th power of the frequency, and then a floor.
 pub(super) fn edge(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    let (hz, order) = (draw.between(1.5, 7.5), 4 + draw.of_many(5) as i32);
-    let part = Edge::new(hz, order, stand.rate_hz);
-    of_density(draw, stand, axis, move |w| part.density(w))
+    const CELLS: i32 = 4096;
+    let edge = TAU * draw.between(1.5, 7.5) / stand.rate_hz;
+    let order = 4 + draw.of_many(5) as i32;
+    let passes = move |w: f64| 1.0 / (1.0 + (w / edge).powi(2 * order));
+    let at = |i: i32| passes(PI * (f64::from(i) + 0.5) / f64::from(CELLS));
+    let mean = (0..CELLS).map(at).sum::<f64>() / f64::from(CELLS);
+    of_density(draw, stand, axis, move |w| passes(w) / mean)
 }
 
-/// A gyro that is balanced by force: what the loop can follow it takes out of its own noise, and what is faster stays. A
-/// stage behind the loop adds white noise that no loop sees.
+/// A gyro that is balanced by force: what the loop, of first order, can follow it takes out of its own noise, and of what is
+/// faster |jw / (jw + edge)|^2 stays. A stage behind the loop adds white noise that no loop sees.
 pub(super) fn held_down(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    let part = HeldDown::new(draw.by_ratio(0.7, 3.0), stand.rate_hz);
-    of_density(draw, stand, axis, move |w| part.density(w))
+    let edge = TAU * draw.by_ratio(0.7, 3.0) / stand.rate_hz;
+    // Mean of w^2 / (w^2 + edge^2) over 0..pi.
+    let mean = 1.0 - edge / PI * (PI / edge).atan();
+    of_density(draw, stand, axis, move |w| {
+        w * w / (w * w + edge * edge) / mean
+    })
 }
 
 /// What a filter of steep sides passes between two edges.
 pub(super) fn band(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    let band = Band::of(draw, stand.rate_hz);
-    of_density(draw, stand, axis, move |w| band.density(w))
+    let (low, width) = (draw.by_ratio(0.6, 6.5), draw.by_ratio(0.5, 3.0));
+    let [low, high] = [low, low + width].map(|hz| TAU * hz / stand.rate_hz);
+    let passes = PI / (high - low);
+    of_density(draw, stand, axis, move |w| {
+        passes * one_if((low..high).contains(&w))
+    })
 }
 
 /// Noise that forgets by a power of time, between white and flicker. Its strength is that of its order, a little above 25
@@ -344,8 +267,7 @@ pub(super) fn behind_corner(stand: &Stand, axis: usize) -> Shape {
     };
     sized(f64::INFINITY, knows, move |_, _, corner| {
         Change::made(move |counts, draw| {
-            // Within its step the rate is anywhere.
-            let rate: Vec<f64> = each(&counts[axis], |c| f64::from(c) + draw.between(-0.5, 0.5));
+            let rate: Vec<f64> = each(&counts[axis], |c| within_step(c, draw));
             each(&behind_capacitor(&rate, level, corner, rate_hz), |v| {
                 (level + v).round() as i32
             })

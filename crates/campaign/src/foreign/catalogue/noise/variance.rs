@@ -1,16 +1,6 @@
 //! Noise whose variance changes: by what is recorded, by its own course, or by its last readings.
 
-use std::f64::consts::TAU;
-
-use super::super::super::known::Known;
-use super::super::super::shape::{Shape, noise, variance};
-use super::super::super::words::{
-    DWELL, about_mean, angle_of_table, by_turns, changes, each, extremes, in_spells, in_steps,
-    in_time, loaded, mean_square, one_if, pace, programme, shaking, shocks, swing, turned,
-    within_range,
-};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// What noise that feeds its own size makes of independent draws: variance[i] = 1 - stays + gain last^2 + (stays - gain)
 /// variance[i-1], with the series itself.

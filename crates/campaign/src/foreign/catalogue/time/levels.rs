@@ -1,12 +1,6 @@
 //! Levels: what is switched, charged, clocked or counted, with a time of its own.
 
-use std::f64::consts::{PI, TAU};
-
-use super::super::super::words::{
-    about_mean, by_turns, each, each_pair, either_way, in_time, one_if,
-};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// Primitive polynomials.
 pub(super) const PRIMITIVE: [(u32, u32); 3] = [(5, 2), (6, 1), (7, 1)];

@@ -1,10 +1,6 @@
 //! Tones, whose pitch, size or phase changes.
 
-use std::f64::consts::TAU;
-
-use super::super::super::words::{each, in_spells, in_time, one_if, tone};
-use crate::random::Draw;
-use crate::stand::Stand;
+use super::super::super::prelude::*;
 
 /// The first coordinate of the Lorenz system (1963) at its usual parameters: a swing about either of two places.
 pub(super) fn swing_without_period(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
@@ -292,4 +288,71 @@ pub(super) fn comes_and_goes(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         left -= 1.0 / stand.rate_hz;
         one_if(on) * (TAU * f * t).sin()
     })
+}
+
+/// A mass that hangs on a spring twice as fast as it swings: the bounce drives the swing, and the swing the bounce, so that
+/// the energy goes to and fro between them (Vitt and Gorelik 1933). Amplitudes by their slow equations; draughts push a little.
+pub(super) fn spring_pendulum(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    const DRAUGHT: f64 = 0.004;
+    type Complex = (f64, f64);
+    let times = |(a, b): Complex, (c, d): Complex| (a * c - b * d, a * d + b * c);
+    // Both turn by i times the product: of the bounce with the conjugate of the swing, and of the swing with itself.
+    let slope = |swing: Complex, bounce: Complex| {
+        let (one, two) = (times(bounce, (swing.0, -swing.1)), times(swing, swing));
+        ((-one.1, one.0), (-two.1, two.0))
+    };
+    let along = |from: Complex, by: f64, to: Complex| (from.0 + by * to.0, from.1 + by * to.1);
+    let step = 1.0 / (draw.by_ratio(2.0, 10.0) * stand.rate_hz);
+    let turn = TAU * draw.by_ratio(0.3, 3.0) / stand.rate_hz;
+    let seen = draw.between(0.2, 0.7);
+    let (mut swing, mut bounce) = ((0.2 + 0.3 * draw.normal(), 0.2), (1.0, draw.normal()));
+    stand.series(|i| {
+        let middle = slope(swing, bounce);
+        let half = (
+            along(swing, 0.5 * step, middle.0),
+            along(bounce, 0.5 * step, middle.1),
+        );
+        let then = slope(half.0, half.1);
+        let pushed = (DRAUGHT * draw.normal(), DRAUGHT * draw.normal());
+        swing = along(along(swing, step, then.0), 1.0, pushed);
+        bounce = along(bounce, step, then.1);
+        // What the draughts bring the losses take.
+        let energy = swing.0.powi(2) + swing.1.powi(2) + bounce.0.powi(2) + bounce.1.powi(2);
+        let whole = 1.0 / energy.sqrt();
+        (swing, bounce) = (
+            (whole * swing.0, whole * swing.1),
+            (whole * bounce.0, whole * bounce.1),
+        );
+        let (sin, cos) = (turn * i as f64).sin_cos();
+        let real = |(re, im): Complex, sin: f64, cos: f64| re * cos - im * sin;
+        real(swing, sin, cos) + seen * real(bounce, 2.0 * sin * cos, cos * cos - sin * sin)
+    })
+}
+
+/// A transmitter whose waves come over many ways: the input rectifies what they add up to. Somebody walks through the room and
+/// stops, and with every half wave the field goes through crests and holes (Clarke 1968); while nobody moves it stands.
+pub(super) fn fading(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    const WAYS: usize = 8;
+    let fastest = TAU * draw.by_ratio(0.2, 2.0) / stand.rate_hz;
+    let speed = stand.held(draw, (2.0, 10.0), |d| {
+        if d.chance(0.3) {
+            0.0
+        } else {
+            d.between(0.3, 1.0)
+        }
+    });
+    let mut ways: Vec<(f64, f64)> = (0..WAYS)
+        .map(|_| (draw.between(0.0, TAU).cos(), draw.between(0.0, TAU)))
+        .collect();
+    let sign = draw.sign();
+    let power = each(&speed, |s| {
+        let (mut re, mut im) = (0.0, 0.0);
+        for (toward, phase) in &mut ways {
+            *phase += fastest * s * *toward;
+            re += phase.cos();
+            im += phase.sin();
+        }
+        sign * (re * re + im * im) / WAYS as f64
+    });
+    about_mean(&power)
 }

@@ -1,0 +1,168 @@
+//! Readings that are handled by blocks, and words that disturb the next.
+
+use super::super::super::prelude::*;
+use super::edges::zero_of;
+use super::gaps::gaps_for;
+
+/// Nats by which a reading tells that it is a copy of another one: the entropy of its law.
+fn nats_of_copy(stand: &Stand, axis: usize) -> f64 {
+    let (_, law) = law(stand, axis);
+    law.iter().filter(|p| **p > 0.0).map(|p| -p * p.ln()).sum()
+}
+
+/// Nats of a block that a fault, of this chance, makes so many times likelier.
+fn nats_of_block(chance: f64, times: f64) -> f64 {
+    let quiet = (1.0 - chance).max(1e-12);
+    chance * (quiet + chance * times).ln() + (1.0 - chance) * quiet.ln()
+}
+
+/// Bits of a word of the part that differ from another one.
+fn toggled(one: i32, other: i32) -> f64 {
+    const WORD: i32 = (1 << 14) - 1;
+    f64::from(((one ^ other) & WORD).count_ones())
+}
+
+/// While a reading is converted, the word before is shifted out, and each of its bits that toggles against the word before that
+/// pulls at the ground. About zero all bits of a negative number toggle.
+pub(super) fn pulling(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let (mean, sigma) = mean_and_sigma(stand, axis);
+    let words: Vec<i32> = stand.series(|_| (mean + sigma * draw.normal()).round() as i32);
+    let bits: Vec<f64> = words.windows(2).map(|w| toggled(w[0], w[1])).collect();
+    let usual = bits.iter().sum::<f64>() / bits.len() as f64;
+    let rms = mean_square(&each(&bits, |b| b - usual)).sqrt();
+    let sign = draw.sign();
+    // The size is what a bit pulls, counts.
+    remade(
+        f64::INFINITY,
+        move |stand, size| {
+            let sigma = stand.white(axis).sqrt() / LSB;
+            Known::Strength(size * rms / sigma * (stand.samples() as f64).sqrt())
+        },
+        move |counts, draw, size| {
+            let (mut last, mut before) = (counts[axis][0], counts[axis][0]);
+            each(&counts[axis], |own| {
+                let pulled = sign * size * (toggled(last, before) - usual);
+                before = last;
+                last = (within_step(own, draw) + pulled).round() as i32;
+                last
+            })
+        },
+    )
+}
+
+/// Firmware that sorts a block of readings where it lies, to take its median, and then sends the block: its readings rise.
+/// Where it comes too late, the block has been sent already.
+pub(super) fn sorted(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let length = 4 + draw.of_many(4);
+    let first = draw.of_many(length);
+    let (_, law) = law(stand, axis);
+    // Of two readings that are equal, either order is sorted.
+    let equal: f64 = law.iter().map(|p| p * p).sum();
+    let pairs = (length * (length - 1) / 2) as f64;
+    let orders: f64 = (2..=length).map(|k| k as f64).product();
+    let times = orders * (-equal * pairs * 2f64.ln()).exp();
+    remade(
+        1.0,
+        move |stand, chance| {
+            let blocks = (stand.samples() / length) as f64;
+            Known::Strength(
+                (2.0 * blocks * nats_of_block(chance.min(1.0), times))
+                    .max(0.0)
+                    .sqrt(),
+            )
+        },
+        move |counts, draw, chance| {
+            let mut own = counts[axis].clone();
+            for block in own[first..].chunks_exact_mut(length) {
+                if draw.chance(chance) {
+                    block.sort_unstable();
+                }
+            }
+            own
+        },
+    )
+}
+
+/// A driver that hides what the link has lost by mirroring the readings before the gap at the last one, as sound is mended.
+pub(super) fn mirrored(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
+    let nats = nats_of_copy(stand, axis);
+    let (gaps, left) = gaps_for(draw, stand, wanted, &|length| length as f64 * nats);
+    let change = Change::made(move |counts, _| {
+        let mut own = counts[axis].clone();
+        for (from, length) in &gaps {
+            for k in 0..*length {
+                own[from + k] = own[from.saturating_sub(2 + k)];
+            }
+        }
+        own
+    });
+    Shape::Fixed(
+        Known::Strength((wanted * wanted - 2.0 * left).sqrt()),
+        change,
+    )
+}
+
+/// A part that calibrates itself at a fixed period, and holds its output for some readings meanwhile.
+pub(super) fn held(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
+    let (n, length) = (stand.samples(), 4 + draw.of_many(6));
+    let nats = nats_of_copy(stand, axis) * length as f64;
+    let count = (0.5 * wanted * wanted / nats).ceil();
+    let (period, first) = (n as f64 / count, draw.between(0.05, 0.9));
+    let change = Change::made(move |counts, _| {
+        let mut own = counts[axis].clone();
+        for k in 0..count as usize {
+            let from = ((first + k as f64) * period) as usize;
+            let to = (from + length).min(n);
+            let kept = own[from.saturating_sub(1)];
+            own[from.min(n)..to].fill(kept);
+        }
+        own
+    });
+    Shape::Fixed(Known::Strength((2.0 * count * nats).sqrt()), change)
+}
+
+/// A link that saves bits by block floating point: eight readings have one exponent, by the largest of them, and mantissas of
+/// three bits and a sign. The firmware has taken the bias off. Only while the link is busy does it do so.
+pub(super) fn exponents(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    const BLOCK: usize = 8;
+    const LARGEST: i32 = 7;
+    let zero = zero_of(draw, stand, axis).round() as i32;
+    let step_of = move |block: &[i32]| {
+        let most = block.iter().map(|c| (c - zero).abs()).max().unwrap_or(0);
+        (0..14)
+            .map(|k| 1 << k)
+            .find(|step| most <= LARGEST * step)
+            .unwrap_or(1)
+    };
+    let (mean, sigma) = mean_and_sigma(stand, axis);
+    let like: Vec<i32> = stand.series(|_| (mean + sigma * draw.normal()).round() as i32);
+    // How much likelier a block is by its step; one of single counts tells nothing.
+    let times: Vec<f64> = like
+        .chunks_exact(BLOCK)
+        .map(|block| f64::from(step_of(block)).powi(BLOCK as i32))
+        .filter(|times| *times > 1.0)
+        .collect();
+    remade(
+        1.0,
+        move |_, chance| {
+            let nats: f64 = times
+                .iter()
+                .map(|t| nats_of_block(chance.min(1.0), *t))
+                .sum();
+            Known::Strength((2.0 * nats).max(0.0).sqrt())
+        },
+        move |counts, draw, chance| {
+            let mut own = counts[axis].clone();
+            for block in own.chunks_exact_mut(BLOCK) {
+                let step = step_of(block);
+                if draw.chance(chance) {
+                    for code in block {
+                        let mantissa = f64::from(*code - zero) / f64::from(step);
+                        *code = zero + step * mantissa.round() as i32;
+                    }
+                }
+            }
+            own
+        },
+    )
+}
