@@ -2,13 +2,8 @@
 
 use super::Search;
 use crate::fit::channel::{Form, State, Term};
+use crate::fit::estimate::{PLACED, neighbours};
 use crate::fit::{scan, threshold};
-
-/// The points of a grid beside one of it.
-pub(super) fn neighbours(grid: &[f64], at: f64) -> (f64, f64) {
-    let i = grid.iter().position(|g| *g == at).unwrap_or(0);
-    (grid[i.saturating_sub(1)], grid[(i + 1).min(grid.len() - 1)])
-}
 
 impl Search<'_> {
     /// Build the columns of a scanned term and refine its location.
@@ -43,7 +38,8 @@ impl Search<'_> {
                         .map(|c| c.values)
                         .collect()
                 };
-                *at = numerics::minimise::golden(&|x| with(&make(x)), low.ln(), high.ln(), 8).exp();
+                *at = numerics::minimise::golden(&|x| with(&make(x)), low.ln(), high.ln(), PLACED)
+                    .exp();
                 make(at.ln())
             }
             Form::Line(omega) => {
@@ -98,6 +94,22 @@ impl Search<'_> {
             terms.retain(|t| !(t.effect.id() == extended && carrier(t)));
         }
         terms.push(term);
-        self.refit(terms, state.noise.log_walk)
+        self.refit(self.placed(state, terms), state.noise.log_walk)
+    }
+
+    /// Terms of which every shape but the last, which is new, has its best place beside the others.
+    fn placed(&self, state: &State, terms: Vec<Term>) -> Vec<Term> {
+        let mut beside = State {
+            terms,
+            ..state.clone()
+        };
+        for i in 0..beside.terms.len().saturating_sub(1) {
+            if matches!(beside.terms[i].form, Form::Shaped(..)) {
+                let term = beside.terms.remove(i);
+                let term = self.refine(&beside, term);
+                beside.terms.insert(i, term);
+            }
+        }
+        beside.terms
     }
 }
