@@ -94,8 +94,7 @@ pub const SETS: [Set; 15] = [
         .wrong("a line (20): hum, draught; `gauss_markov` (13): quadrature"),
     seen("2026-11-22", NOTHING, &[grade(47_298_557_885_862, 374, 25, 400), grade(27_004_272_196_837, 361, 31, 394)]),
     seen("2026-11-22", NOTHING, &[grade(89_432_555_532_976, 383, 15, 400), grade(63_774_036_767_264, 380, 10, 394)])
-        .wrong("`gauss_markov`, `warm_up` (16): a thermometer of coarse steps")
-        .unseen(),
+        .wrong("`gauss_markov`, `warm_up` (16): a thermometer of coarse steps"),
     seen("2026-11-25", "docs/power.md, docs/effects.md, the earlier sets", &[grade(1_795_571_875, 309, 31, 390)])
         .wrong("`line` (13): blocks that come out sorted")
         .unseen(),
