@@ -5,6 +5,7 @@
 mod band_alone;
 mod band_source;
 pub(crate) mod bands;
+mod beyond;
 pub(crate) mod envelope;
 pub(crate) mod impute;
 pub(crate) mod power_law;
@@ -25,7 +26,7 @@ use model::record::Quantity;
 
 use crate::features;
 use crate::fit::channel::{Form, RIVAL_SPAN, State, Term};
-use crate::fit::likelihood::{self, Bins, Dct, Noise, Panel};
+use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
 use crate::fit::{channel, threshold};
 use crate::test_level::{CLAIM_LEVEL, worded};
 
@@ -486,44 +487,5 @@ impl<'a> Search<'a> {
         };
         let lost = 2.0 * (than.solution.log_likelihood - state.solution.log_likelihood);
         lost < RIVAL_SPAN.max(by_chance)
-    }
-
-    /// Which columns of a term lie beyond those of a state.
-    fn beyond<'b>(
-        &'b self,
-        state: &State,
-        term: &'b Term,
-    ) -> impl Iterator<Item = usize> + use<'b, 'a> {
-        let own = state.columns();
-        let flat = vec![1.0; self.panel.bins.n];
-        (0..term.columns.len()).filter(move |i| {
-            let columns = [own.as_slice(), &[term.columns[*i]]].concat();
-            let (inverse, _) = likelihood::invert(&self.panel.normal(&flat, &columns).matrix);
-            inverse.last().and_then(|row| row.last()) != Some(&0.0)
-        })
-    }
-
-    /// Whether a state has some of the columns of a term without a name, and not all.
-    fn spans_part(&self, state: &State, term: &Term) -> bool {
-        term.has_no_name() && {
-            let beyond = self.beyond(state, term).count();
-            beyond > 0 && beyond < term.columns.len()
-        }
-    }
-
-    /// A term without a name with the columns that it has beyond those of a state; another one as it is.
-    fn stripped(&self, state: &State, term: Term) -> Term {
-        if !self.spans_part(state, &term) {
-            return term;
-        }
-        let new: Vec<usize> = self.beyond(state, &term).collect();
-        Term {
-            columns: new.iter().map(|i| term.columns[*i]).collect(),
-            names: new
-                .iter()
-                .filter_map(|i| term.names.get(*i).copied())
-                .collect(),
-            ..term
-        }
     }
 }
