@@ -321,10 +321,10 @@ pub(crate) fn beside_a_structure(
     }
 }
 
-/// How strong an effect is beside a structure. Of a process counts what stands out over the structure's density.
+/// How strong an effect is beside a structure, whose density is known.
 fn beside_structure(meter: &Meter, one: &Truth, structure: &Structure) -> f64 {
     match (&one.density, &structure.density) {
-        (Some(own), Some(other)) => meter.of_density(&meter.screened(own, other)),
+        (Some(own), Some(other)) => meter.over(other).of_density(own),
         (None, Some(other)) if one.signal.is_some() => {
             let meter = meter.over(other);
             let signal = one.signal.as_deref().unwrap_or(&[]);

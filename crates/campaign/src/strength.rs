@@ -75,6 +75,9 @@ pub struct Meter {
     length: Rc<Length>,
     /// Variance of a coefficient without the effect.
     clean: Vec<f64>,
+    /// White variance, and over it what processes beside the effect add: the baseline has them too.
+    white: f64,
+    beside: Option<Vec<f64>>,
 }
 
 impl Meter {
@@ -87,7 +90,12 @@ impl Meter {
             .iter()
             .map(|w| stand.white(axis) + stand.step(axis) * w)
             .collect();
-        Self { length, clean }
+        Self {
+            length,
+            clean,
+            white: stand.white(axis),
+            beside: None,
+        }
     }
 
     /// Angular frequencies of the bins, rad per sample.
@@ -96,15 +104,18 @@ impl Meter {
         &self.length.bins.at.omega
     }
 
-    /// The same channel with a process beside its noise that adds `density` to the variance of each coefficient.
+    /// The same channel with a process beside its noise that adds `density` to the variance of each coefficient, and that is
+    /// known: what it makes likelier is no strength of an effect beside it.
     #[must_use]
     pub fn over(&self, density: &[f64]) -> Self {
         let mut other = self.clone();
-        other
-            .clean
-            .iter_mut()
-            .zip(density)
-            .for_each(|(v, d)| *v += d);
+        let mut beside = other.beside.take();
+        let all = beside.get_or_insert_with(|| vec![0.0; density.len()]);
+        for ((clean, all), d) in other.clean.iter_mut().zip(all).zip(density) {
+            *clean += d;
+            *all += d / self.white;
+        }
+        other.beside = beside;
         other
     }
 
@@ -112,13 +123,6 @@ impl Meter {
     #[must_use]
     pub fn counts(&self) -> &[f64] {
         &self.length.count
-    }
-
-    /// What a process adds to the variance of each coefficient, as it stands out where another process adds `by`.
-    #[must_use]
-    pub fn screened(&self, density: &[f64], by: &[f64]) -> Vec<f64> {
-        let parts = density.iter().zip(by).zip(&self.clean);
-        parts.map(|((d, b), v)| d * v / (v + b)).collect()
     }
 
     /// Energy of a signal in each bin.
@@ -206,24 +210,25 @@ impl Meter {
         self.against_baseline(&expected, truth)
     }
 
-    /// White noise and random walk refitted to expected energies.
+    /// White noise and random walk refitted to expected energies, beside the processes that are known.
     fn against_baseline(&self, expected: &[f64], truth: f64) -> f64 {
         let n: f64 = self.length.count.iter().sum();
+        let beside = self.beside.as_deref();
         let minus_two_l = |log_walk: f64| {
             let lambda = log_walk.exp();
             let (mut sum, mut logs) = (0.0, 0.0);
-            for ((e, w), m) in expected
-                .iter()
-                .zip(&self.length.walk)
-                .zip(&self.length.count)
-            {
-                let g = 1.0 + lambda * w;
+            let all = expected.iter().zip(&self.length.walk);
+            for (b, ((e, w), m)) in all.zip(&self.length.count).enumerate() {
+                let g = 1.0 + lambda * w + beside.map_or(0.0, |d| d[b]);
                 sum += e / g;
                 logs += m * g.ln();
             }
             n * (sum / n).ln() + logs + n
         };
-        let tried = |(_, weight, logs): &(f64, Vec<f64>, f64)| {
+        let tried = |(log_walk, weight, logs): &(f64, Vec<f64>, f64)| {
+            if beside.is_some() {
+                return minus_two_l(*log_walk);
+            }
             let sum: f64 = expected.iter().zip(weight).map(|(e, w)| e * w).sum();
             n * (sum / n).ln() + logs + n
         };
@@ -256,4 +261,30 @@ pub fn of_common(whites: &[f64], shared: f64, samples: usize) -> f64 {
     let joint: f64 = whites.iter().map(|w| w.ln()).sum::<f64>()
         + (1.0 + shared * whites.iter().map(|w| 1.0 / w).sum::<f64>()).ln();
     (samples as f64 * (own - joint)).max(0.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Draw;
+    use crate::stand::Needs;
+
+    #[test]
+    fn noise_of_four_times_the_variance_halves_a_strength_and_its_own_is_none() {
+        let mut draw = Draw::of(5, 0, 0);
+        let stand = Stand::draw(&mut draw, 600.0, 20.0, Needs::NONE);
+        let meter = Meter::new(&stand, 0);
+        let tone = |i: usize| (1.3 * i as f64).sin();
+        let unit: Vec<f64> = (0..stand.samples()).map(tone).collect();
+        let energy = meter.energy(&unit);
+        let (size, alone) = meter.sized(&energy, 6.0);
+        let energy: Vec<f64> = energy.iter().map(|e| size * size * e).collect();
+        let flat = vec![3.0 * stand.white(0); energy.len()];
+        let loud = meter.over(&flat);
+        // The random walk is lost in such noise, so that a little more than half is left of what it hid.
+        let left = loud.of_signal(&energy) / alone;
+        assert!((left - 0.5).abs() < 0.01, "{left}");
+        let none = vec![0.0; energy.len()];
+        assert!(loud.of_signal(&none) < 0.1, "{}", loud.of_signal(&none));
+    }
 }
