@@ -1,8 +1,8 @@
-//! One estimate of everything on a channel whose white variance follows a law: white noise at the law's zero, random walk,
-//! processes, regressors and the law itself, in one likelihood.
+//! One estimate of everything on a channel whose white variance follows laws: white noise at their zero, random walk,
+//! processes, regressors and the laws themselves, in one likelihood.
 //!
 //! y_t = x_t'b + m_t + sum_j z_jt + e_t with a flat-start random walk m, first-order processes z_j and white noise e of variance
-//! s2 (1 + gamma d_t). Lost readings are missing. The likelihood is exact ([`filter`]); where the white noise went through a
+//! s2 (1 + gamma d_t), of several laws their product. Lost readings are missing. The likelihood is exact ([`filter`]); where the white noise went through a
 //! filter, data and columns are divided by its square root in the DCT domain first, which is exact but for the noise within a
 //! filter's memory of a change of the variance. Without a law the DCT-II likelihood of [`crate::fit::likelihood`] is the same one,
 //! and its fit is the joint estimate already.
@@ -13,7 +13,7 @@ mod filter;
 use model::effect::Found;
 use model::record::rows::Bursts;
 
-use crate::fit::channel::{Form, Joint, Levels, State, Term};
+use crate::fit::channel::{Form, Joint, Levels, State, Term, VarianceFound};
 use crate::fit::estimate;
 use crate::fit::likelihood::{Noise, least_walk};
 use crate::search::searched::Searched;
@@ -26,17 +26,17 @@ const WALKS: u32 = 20;
 /// Largest ln(1 + gamma) of a law.
 const MOST_LAW: f64 = 5.0;
 
-/// The joint estimate of a channel under white noise of variance s2 (1 + gamma shape); none where a process of the channel, a
-/// band among them, is no sum of first-order ones. Of `bursts` that were laid end to end the walk goes on between them.
+/// The joint estimate of a channel under white noise whose variance follows `laws`, or none; no estimate where a process of the
+/// channel, a band among them, is no sum of first-order ones. Of `bursts` that were laid end to end the walk goes on between
+/// them.
 pub(crate) fn estimate(
     s: &Searched<'_>,
-    shape: &[f64],
-    gamma: f64,
+    laws: &[VarianceFound],
     bursts: Option<&Bursts>,
 ) -> Option<Joint> {
-    let spans = bursts.map(|b| b.spans(shape.len()));
-    let model = Model::of(s, shape, spans.as_deref())?;
-    let start = model.start(&s.state, shape, gamma);
+    let spans = bursts.map(|b| b.spans(s.search.panel.bins.n));
+    let model = Model::of(s, laws, spans.as_deref())?;
+    let start = model.start(&s.state, laws);
     let value = |x: &[f64]| {
         let (normal, log_det) = model.series.through(&model.point(x));
         let solution = normal.solved(model.series.free(), log_det);
@@ -47,13 +47,18 @@ pub(crate) fn estimate(
     // The walk of a channel is that of bursts end to end, until its model is told.
     levels.log_walk += bursts.map_or(0.0, |b| (b.period_s / b.length_s).ln());
     let found = model.found(s, &peak, levels.white, &coordinates);
-    let top = filter::top(shape);
-    let last = peak.x.len() - 1;
-    let law = (
-        (peak.x[last].exp() - 1.0) / top,
-        peak.x[last].exp() / top * peak.error(last),
-    );
-    Some(Joint { levels, law, found })
+    let first = peak.x.len() - laws.len();
+    let told = laws.iter().enumerate().map(|(k, v)| {
+        let (i, top) = (first + k, filter::top(&v.shape));
+        let ratio = peak.x[i].exp();
+        ((ratio - 1.0) / top, ratio / top * peak.error(i))
+    });
+    let laws = told.collect();
+    Some(Joint {
+        levels,
+        laws,
+        found,
+    })
 }
 
 /// A channel as the filter sees it.
@@ -67,7 +72,11 @@ struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    fn of(s: &'a Searched<'_>, shape: &'a [f64], spans: Option<&'a [f64]>) -> Option<Self> {
+    fn of(
+        s: &'a Searched<'_>,
+        laws: &'a [VarianceFound],
+        spans: Option<&'a [f64]>,
+    ) -> Option<Self> {
         let (panel, state) = (&s.search.panel, &s.state);
         let samples = panel.bins.n;
         let known = |t: &&Term| match &t.form {
@@ -90,25 +99,31 @@ impl<'a> Model<'a> {
             c
         }));
         Some(Self {
-            series: Series::new(columns, shape, &s.target.lost, spans),
+            series: Series::new(
+                samples,
+                columns,
+                laws.iter().map(|v| v.shape.as_slice()),
+                &s.target.lost,
+                spans,
+            ),
             processes,
             samples,
             slow: slow.unwrap_or(1.0),
         })
     }
 
-    /// Coordinates: ln of the walk, those of the processes, ln(1 + gamma) at the top of the law.
-    fn start(&self, state: &State, shape: &[f64], gamma: f64) -> Vec<f64> {
+    /// Coordinates: ln of the walk, those of the processes, ln(1 + gamma) at the top of each law.
+    fn start(&self, state: &State, laws: &[VarianceFound]) -> Vec<f64> {
         // The search's are over the mean white variance.
-        let mean = 1.0 + gamma * shape.iter().sum::<f64>() / shape.len() as f64;
-        let over = mean.max(f64::MIN_POSITIVE).ln();
-        let law = (1.0 + gamma * filter::top(shape)).max(1e-3).ln();
+        let over = mean_under(&laws.iter().collect::<Vec<_>>()).ln();
+        let top = |v: &VarianceFound| 1.0 + v.gamma() * filter::top(&v.shape);
+        let tops = laws.iter().map(|v| top(v).max(1e-3).ln());
         let mut x = vec![state.noise.log_walk + over - self.slow.ln()];
         for theta in self.processes.iter().map(|t| coordinates(t)) {
             x.push(theta[0] + over - self.slow.ln());
             x.extend(&theta[1..]);
         }
-        x.push(law);
+        x.extend(tops);
         let bounds = self.bounds();
         x.iter()
             .zip(bounds)
@@ -123,14 +138,14 @@ impl<'a> Model<'a> {
             _ => vec![],
         });
         let walk = std::iter::once((least_walk(n), 6.0));
-        walk.chain(all).chain([(-MOST_LAW, MOST_LAW)]).collect()
+        let laws = (0..self.series.laws()).map(|_| (-MOST_LAW, MOST_LAW));
+        walk.chain(all).chain(laws).collect()
     }
 
     fn steps(&self) -> Vec<f64> {
         let mut steps = vec![0.1; self.bounds().len()];
-        if let Some(law) = steps.last_mut() {
-            *law = 0.02;
-        }
+        let first = steps.len() - self.series.laws();
+        steps[first..].fill(0.02);
         steps
     }
 
@@ -148,7 +163,7 @@ impl<'a> Model<'a> {
         Point {
             log_walk: x[0],
             poles,
-            law: rest.first().map_or(0.0, |v| v.exp() - 1.0),
+            laws: rest.iter().map(|v| v.exp() - 1.0).collect(),
         }
     }
 
@@ -259,13 +274,27 @@ pub(crate) fn levels_of(s: &Searched<'_>, state: &State) -> Levels {
     }
 }
 
-/// The noise at the zero of a law where no joint estimate can be made: that of the state, whose white variance is the mean.
-pub(crate) fn levels_under(s: &Searched<'_>, shape: &[f64], gamma: f64) -> Levels {
-    let mean = 1.0 + gamma * shape.iter().sum::<f64>() / shape.len() as f64;
+/// Mean of the white variance over that at the zero of its laws.
+fn mean_under(laws: &[&VarianceFound]) -> f64 {
+    let count = laws.first().map_or(0, |v| v.shape.len());
+    if count == 0 {
+        return 1.0;
+    }
+    let at = |i: usize| -> f64 {
+        let factors = laws.iter().map(|v| 1.0 + v.gamma() * v.shape[i]);
+        factors.product()
+    };
+    let sum: f64 = (0..count).map(at).sum();
+    (sum / count as f64).max(f64::MIN_POSITIVE)
+}
+
+/// The noise at the zero of laws where no joint estimate can be made: that of the state, whose white variance is the mean.
+pub(crate) fn levels_under(s: &Searched<'_>, laws: &[&VarianceFound]) -> Levels {
+    let mean = mean_under(laws);
     let all = levels_of(s, &s.state);
     Levels {
-        white: all.white / mean.max(f64::MIN_POSITIVE),
-        log_walk: all.log_walk + mean.max(f64::MIN_POSITIVE).ln(),
+        white: all.white / mean,
+        log_walk: all.log_walk + mean.ln(),
         ..all
     }
 }

@@ -25,6 +25,7 @@ use crate::attribute::{events, masking, merge, withdraw};
 use crate::audit::Audit;
 use crate::criticise::common_noise::{Shared, common};
 use crate::criticise::cross_axis::couplings;
+use crate::fit::channel::VarianceFound;
 use crate::ingest::grid::spike_limit;
 use crate::ingest::types::Grid;
 use crate::ingest::wild;
@@ -220,7 +221,7 @@ fn set_aside_wild(grid: &mut Grid, audited: &Audit) {
             s.state.solution.white.sqrt(),
             s.search.panel.dct.inverse(&s.search.panel.column(0)),
         );
-        let law = |i: usize| s.variance.as_ref().map_or(1.0, |v| v.law[i].sqrt());
+        let law = |i: usize| s.variance.product().map_or(1.0, |v| v[i].sqrt());
         let known: Vec<f64> = (target.aside.iter())
             .map(|(at, given)| s.e[*at] + (given - data[*at]) / (white * law(*at)))
             .collect();
@@ -330,9 +331,11 @@ fn name_channel(
     named.findings.extend(all_worded(moved));
     named.withdrawn.extend(all_worded(unmoved));
     let of_terms = all_worded(term_findings(s, grid, seed));
-    let variance = variance_finding(s)
-        .filter(|_| !by_counts(s, audited))
-        .map(worded);
+    let of_law = |v: &VarianceFound| {
+        let told = !by_counts(s, v, audited);
+        told.then(|| worded(variance_finding(s, v)))
+    };
+    let variance = s.variance.each.iter().map(of_law).collect();
     let left = left_on(s, &fails, &tested.shared);
     let (kept, nearest, told) = withdraw::withdraw(s, of_terms, variance, &failing, &left);
     let findings = &mut named.findings;
@@ -382,13 +385,11 @@ fn channels_of(fails: &[&Check]) -> BTreeMap<String, f64> {
     all
 }
 
-/// Whether counts explain the law of the variance: a bit that sticks makes a noise of its own, which depends on the level.
-fn by_counts(s: &Searched<'_>, audited: &Audit) -> bool {
-    s.variance.as_ref().is_some_and(|v| {
-        let more = v.parameters.get("variance_increase");
-        let ratio = more.map(|p| 1.0 + p.value);
-        audited.explains_variance(&s.target.name, v.lr, v.threshold, ratio)
-    })
+/// Whether counts explain a law of the variance: a bit that sticks makes a noise of its own, which depends on the level.
+fn by_counts(s: &Searched<'_>, v: &VarianceFound, audited: &Audit) -> bool {
+    let more = v.parameters.get("variance_increase");
+    let ratio = more.map(|p| 1.0 + p.value);
+    audited.explains_variance(&s.target.name, v.lr, v.threshold, ratio)
 }
 
 #[cfg(test)]

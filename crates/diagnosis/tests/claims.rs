@@ -563,6 +563,63 @@ fn the_law_of_the_motors_noise_is_told_where_the_record_tells_it() {
 }
 
 #[test]
+fn two_laws_of_the_variance_on_one_axis_are_both_told_with_their_sizes() {
+    graded(
+        "a noisy motor, and noise that is larger for a while",
+        |run, rng| {
+            let mut between = |low, high| Uniform::new(low, high).expect("a range").sample(rng);
+            let (by_motor, by_time) = (between(0.8, 2.0), between(0.8, 2.0));
+            let start = between(20.0, 400.0);
+            let end = start + between(80.0, 180.0);
+            let effect = |cause: &str, of: &[(&str, f64, &str)]| EffectModel {
+                cause: cause.into(),
+                channels: vec!["gyro_y".into()],
+                parameters: (of.iter())
+                    .map(|(k, v, unit)| ((*k).to_owned(), Parameter::exact(*v, unit)))
+                    .collect(),
+            };
+            let mut model = ModelFile::paper();
+            model.excitation.insert("motor_duty".into(), 0.9);
+            let increase = "variance_increase_at_full_duty";
+            model.effects = vec![
+                effect("motor_noise", &[(increase, by_motor, "1")]),
+                effect(
+                    "noise_change",
+                    &[
+                        ("start", start, "s"),
+                        ("end", end, "s"),
+                        ("variance_increase", by_time, "1"),
+                    ],
+                ),
+            ];
+            let r = model::simulate(&model, 600.0, 20.0, 9100 + run).expect("a run");
+            let d = told(&r);
+            // In standard errors; the law of the motor may stay open, and is then the square's, as planted.
+            let off = |cause: &str, parameter: &str, truth: f64| {
+                let found = d.findings.iter().find(|f| f.cause == cause);
+                let size = found.and_then(|f| f.parameters.get(parameter));
+                size.map_or(f64::INFINITY, |p| {
+                    (p.value - truth) / p.std_error.unwrap_or(f64::NAN)
+                })
+            };
+            let offs = [
+                off("motor_noise", increase, by_motor),
+                off("noise_change", "variance_increase", by_time),
+            ];
+            let right = named(&d).len() == 2
+                && d.unexplained.is_empty()
+                && offs.iter().all(|z| z.abs() < 4.0);
+            right.then_some(()).ok_or_else(|| {
+                format!(
+                    "{by_motor} and {by_time} from {start} to {end} s: {offs:?} {}",
+                    said(&d)
+                )
+            })
+        },
+    );
+}
+
+#[test]
 fn acceleration_that_is_felt_a_little_late_is_felt_and_what_comes_a_sample_later_is_another_thing()
 {
     for late in [(0.15, 0.4), (0.9, 1.0)] {

@@ -8,7 +8,6 @@
 //! A turn of the base is one thing that happens to a base at rest. Where the channel wanders by jumps, or otherwise than a
 //! stationary Gaussian process, in the band of such a turn, it is as likely the largest piece of that.
 
-use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -237,10 +236,8 @@ fn wild_of(s: &Searched<'_>, e: &[f64], times: &[f64]) -> Vec<Wild> {
 /// How far the readings at some times lie from what the model expects there, unit of the channel.
 pub(crate) fn sizes(s: &Searched<'_>, times: &[f64]) -> Vec<f64> {
     let white = s.state.solution.white.sqrt();
-    let e: Cow<'_, [f64]> = s.variance.as_ref().map_or(Cow::Borrowed(&s.e), |v| {
-        let undivided = s.e.iter().zip(&v.law).map(|(e, v)| e * v.sqrt());
-        undivided.collect()
-    });
+    let mut e = s.e.clone();
+    s.variance.undo(&mut e);
     wild_of(s, &e, times)
         .iter()
         .map(|w| w.size * white)
@@ -265,12 +262,13 @@ pub(crate) fn hold_outliers(
         return vec![];
     }
     // A law of the variance that is no cause of its own explains no loud neighbours.
-    let doubted = s.variance.as_ref();
-    let doubted = doubted.filter(|v| kept.iter().all(|f| f.cause != v.effect.id()));
-    let e: Cow<'_, [f64]> = doubted.map_or(Cow::Borrowed(&s.e), |v| {
-        let undivided = s.e.iter().zip(&v.law).map(|(e, v)| e * v.sqrt());
-        undivided.collect()
-    });
+    let mut e = s.e.clone();
+    let laws = s.variance.each.iter();
+    for v in laws.filter(|v| kept.iter().all(|f| f.cause != v.effect.id())) {
+        e.iter_mut()
+            .zip(&v.law)
+            .for_each(|(e, law)| *e *= law.sqrt());
+    }
     let mut told = vec![];
     for finding in named {
         let (rest, said) = outliers(s, &e, finding, failing);

@@ -37,16 +37,18 @@ enum Doubt {
     Remainder(&'static str, f64),
 }
 
-/// For each term of a channel, whether its name is withdrawn; and whether that of the law of its variance is.
-fn doubted(facts: &Facts<'_>) -> (Vec<Doubt>, bool) {
+/// For each term of a channel, whether its name is withdrawn; and for each law of its variance.
+fn doubted(facts: &Facts<'_>) -> (Vec<Doubt>, Vec<bool>) {
     let parts = facts.s.state.parts();
     let seen = parts.map(|(term, own)| rules::doubt_of(facts, &Seen { term, own }));
     let mut terms: Vec<Doubt> = seen.collect();
-    let mut variance = rules::variance_withdrawn(facts);
+    let variance = rules::variance_withdrawn(facts);
     let kin = Kin { facts, variance };
     kin.fall(&mut terms);
-    variance |= kin.variance_falls(&terms);
-    (terms, variance)
+    let laws = facts.s.variance.each.iter();
+    let falls = laws.map(|v| variance || kin.variance_falls(v, &terms));
+    let falls = falls.collect();
+    (terms, falls)
 }
 
 /// What the library comes nearest to a channel with.
@@ -80,12 +82,12 @@ fn fallen(s: &Searched<'_>, doubts: &[Doubt]) -> Vec<usize> {
         .collect()
 }
 
-/// Take the doubted names of a channel out of its findings, given as one for each term and then the rest; what follows a
-/// combination without a name goes the same way.
+/// Take the doubted names of a channel out of its findings, given as one for each term and one for each law of the variance that
+/// is told; what follows a combination without a name goes the same way.
 pub(crate) fn withdraw(
     s: &Searched<'_>,
     of_terms: Vec<Finding>,
-    of_variance: Option<Finding>,
+    of_variance: Vec<Option<Finding>>,
     failing: &dyn Fn(CheckId) -> bool,
     left: &Left,
 ) -> (Vec<Finding>, Vec<Finding>, Vec<Observation>) {
@@ -132,9 +134,9 @@ pub(crate) fn withdraw(
             }
         }
     }
-    match of_variance {
-        Some(finding) if variance => nearest.push(finding),
-        other => kept.extend(other),
+    for (finding, falls) in of_variance.into_iter().zip(variance) {
+        let told = if falls { &mut nearest } else { &mut kept };
+        told.extend(finding);
     }
     if let Some(PowerLawFound { exponent, .. }) = s.state.power_law {
         let what = format!(

@@ -94,10 +94,8 @@ impl Piece {
         let channels = searched
             .iter()
             .map(|s| {
-                let law = s
-                    .variance
-                    .as_ref()
-                    .map_or(1.0, |v| largest(&v.law, &blow.readings));
+                let law = s.variance.product();
+                let law = law.map_or(1.0, |v| largest(v, &blow.readings));
                 let white = s.state.solution.white * law;
                 let g = s.state.noise.everywhere(&bins);
                 let mut weight: Vec<f64> = g.iter().map(|g| (white * g).recip()).collect();

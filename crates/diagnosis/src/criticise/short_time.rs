@@ -410,12 +410,12 @@ fn outcomes(s: &Searched<'_>) -> Vec<Outcome> {
         all.push(leaning(&e, &courses));
     }
     // The law of the variance holds for the white noise alone.
-    if let Some(v) = &s.variance {
-        e.iter_mut().zip(&v.law).for_each(|(e, v)| *e *= v.sqrt());
+    let law = s.variance.product();
+    if law.is_some() {
+        s.variance.undo(&mut e);
         spectra = of(&e);
     }
     let steady: Vec<Vec<f64>> = spectra.iter().map(|x| steady(s, x)).collect();
-    let law = s.variance.as_ref().map(|v| v.law.as_slice());
     all.push(colour(view.rate_hz, law, &courses, &spectra, &steady));
     all
 }
@@ -427,7 +427,7 @@ pub(crate) fn checks(s: &Searched<'_>) -> impl Iterator<Item = Check> {
         .terms
         .iter()
         .any(|t| matches!(t.form, Form::Covariance(..)));
-    let threshold = if process || s.variance.is_some() {
+    let threshold = if process || s.variance.product().is_some() {
         test_level::CLAIM_LEVEL
     } else {
         omnibus_level()

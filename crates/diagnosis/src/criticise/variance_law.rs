@@ -2,70 +2,71 @@
 
 use std::f64::consts::PI;
 
-use model::effect::{Found, Hypothesis, VarianceLaw};
+use model::effect::{Effect, Found, Hypothesis, VarianceLaw};
 
-use crate::fit::channel::VarianceFound;
+use crate::fit::channel::{VarianceFound, VarianceLaws, over_mean};
 use crate::fit::{scan, threshold};
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, DEPARTURE, Outcome};
 use numerics::tails::{chi_tail, errors_of_sum};
 
-/// The best law of the variance, if one passes its threshold.
-pub(crate) fn best(s: &Searched<'_>) -> Option<VarianceFound> {
-    let e = &s.e;
-    let mut all: Vec<VarianceFound> = s
-        .search
-        .candidates
-        .iter()
-        .filter_map(|c| {
-            let Hypothesis::Variance(law) = &c.hypothesis else {
-                return None;
-            };
-            let rate_hz = s.search.view.rate_hz;
-            let mut found = Found {
-                unit: s.target.unit.clone(),
-                rate_hz,
-                ..Found::default()
-            };
-            let follows = match law {
-                VarianceLaw::Shape { follows, .. } => Some(follows.clone()),
-                VarianceLaw::Segment => None,
-            };
-            let (lr, limit, shape) = match law {
-                VarianceLaw::Shape { shape, .. } => {
-                    let (lr, gamma, error) = scan::variance_law(e, shape);
-                    found.coefficients = vec![(gamma, error)];
-                    (lr, threshold::variance_law(), shape.clone())
+/// The laws of the variance that pass their thresholds beside each other: the best one, and what the residual divided by it
+/// follows by another effect, each estimated anew beside the others.
+pub(crate) fn found(s: &Searched<'_>) -> VarianceLaws {
+    let mut each: Vec<VarianceFound> = vec![];
+    while let Some(next) = best(s, &beside(&s.e, &each, None), &|id| {
+        each.iter().all(|v| v.effect.id() != id)
+    }) {
+        each.push(next);
+        if each.len() > 1 {
+            anew(s, &mut each);
+        }
+    }
+    VarianceLaws::of(each)
+}
+
+/// Rounds in which laws are estimated beside each other: of two that hardly overlap the second one moves by little.
+const ROUNDS: usize = 2;
+
+/// Every law estimated beside the others; one that they leave nothing goes.
+fn anew(s: &Searched<'_>, each: &mut Vec<VarianceFound>) {
+    for _ in 0..ROUNDS {
+        let mut i = 0;
+        while i < each.len() {
+            let own = each[i].effect.id();
+            match best(s, &beside(&s.e, each, Some(i)), &|id| id == own) {
+                Some(again) => {
+                    each[i] = again;
+                    i += 1;
                 }
-                VarianceLaw::Segment => {
-                    let (lr, start, end, increase) = scan::segment(e);
-                    let (n, inside) = (e.len() as f64, (end - start) as f64);
-                    let error = (1.0 + increase)
-                        * (2.0 / inside.max(1.0) + 2.0 / (n - inside).max(1.0)).sqrt();
-                    found.coefficients = vec![(increase, error)];
-                    let (first, last) = scan::ends(e, start, end, increase);
-                    found.location = [first, last]
-                        .map(|(at, error)| (at / rate_hz, error / rate_hz))
-                        .to_vec();
-                    let inside = (0..e.len()).map(|i| f64::from(u8::from(i >= start && i < end)));
-                    (lr, threshold::segment(), inside.collect())
+                None => {
+                    each.remove(i);
                 }
-            };
-            let gamma = found.coefficients[0].0;
-            Some(VarianceFound {
-                effect: c.effect,
-                parameters: c.effect.describe(&found),
-                found,
-                lr,
-                threshold: limit,
-                alternatives: vec![],
-                law: shape.iter().map(|d| 1.0 + gamma * d).collect(),
-                shape,
-                follows,
-            })
-        })
-        .filter(|v| v.lr > v.threshold)
-        .collect();
+            }
+        }
+    }
+}
+
+/// A residual over the square root of all laws but one.
+fn beside(e: &[f64], each: &[VarianceFound], but: Option<usize>) -> Vec<f64> {
+    let mut e = e.to_vec();
+    for (_, v) in each.iter().enumerate().filter(|(i, _)| Some(*i) != but) {
+        let both = e.iter_mut().zip(&v.law);
+        both.for_each(|(e, law)| *e /= law.sqrt());
+    }
+    e
+}
+
+/// The best law of the variance of a residual by one of some effects, if one passes its threshold.
+fn best(s: &Searched<'_>, e: &[f64], asked: &dyn Fn(&str) -> bool) -> Option<VarianceFound> {
+    let candidates = s.search.candidates.iter();
+    let offers = candidates.filter(|c| asked(c.effect.id())).filter_map(|c| {
+        let Hypothesis::Variance(law) = &c.hypothesis else {
+            return None;
+        };
+        Some(offer(s, e, c.effect, law))
+    });
+    let mut all: Vec<VarianceFound> = offers.filter(|v| v.lr > v.threshold).collect();
     let score = |v: &VarianceFound| v.lr - v.threshold;
     all.sort_by(|a, b| score(b).total_cmp(&score(a)));
     let (best, rest) = all.split_first_mut()?;
@@ -75,17 +76,75 @@ pub(crate) fn best(s: &Searched<'_>) -> Option<VarianceFound> {
                 .push((other.effect, (score(other) - score(best)) / 2.0));
         }
     }
-    let mean = best.law.iter().sum::<f64>() / best.law.len() as f64;
-    best.law.iter_mut().for_each(|v| *v /= mean);
     Some(all.swap_remove(0))
+}
+
+/// What a law of the variance offers to a residual.
+fn offer(
+    s: &Searched<'_>,
+    e: &[f64],
+    effect: &'static dyn Effect,
+    law: &VarianceLaw,
+) -> VarianceFound {
+    let rate_hz = s.search.view.rate_hz;
+    let mut found = Found {
+        unit: s.target.unit.clone(),
+        rate_hz,
+        ..Found::default()
+    };
+    let follows = match law {
+        VarianceLaw::Shape { follows, .. } => Some(follows.clone()),
+        VarianceLaw::Segment => None,
+    };
+    let (lr, limit, shape) = match law {
+        VarianceLaw::Shape { shape, .. } => {
+            let (lr, gamma, error) = scan::variance_law(e, shape);
+            found.coefficients = vec![(gamma, error)];
+            (lr, threshold::variance_law(), shape.clone())
+        }
+        VarianceLaw::Segment => {
+            let (lr, start, end, increase) = scan::segment(e);
+            let (n, inside) = (e.len() as f64, (end - start) as f64);
+            let error =
+                (1.0 + increase) * (2.0 / inside.max(1.0) + 2.0 / (n - inside).max(1.0)).sqrt();
+            found.coefficients = vec![(increase, error)];
+            let (first, last) = scan::ends(e, start, end, increase);
+            found.location = [first, last]
+                .map(|(at, error)| (at / rate_hz, error / rate_hz))
+                .to_vec();
+            let inside = (0..e.len()).map(|i| f64::from(u8::from(i >= start && i < end)));
+            (lr, threshold::segment(), inside.collect())
+        }
+    };
+    let gamma = found.coefficients[0].0;
+    let mut law: Vec<f64> = shape.iter().map(|d| 1.0 + gamma * d).collect();
+    over_mean(&mut law);
+    VarianceFound {
+        effect,
+        parameters: effect.describe(&found),
+        found,
+        lr,
+        threshold: limit,
+        alternatives: vec![],
+        law,
+        shape,
+        follows,
+    }
 }
 
 /// Nats by which one law of an effect's variance has to be ahead of its others; within them the record does not tell which it
 /// is, and the effect's own is the first.
 const OPEN: f64 = 3.0;
 
-/// Of the laws of the effect that was found, the one that the residual `e` tells.
-pub(crate) fn settle(s: &Searched<'_>, v: &mut VarianceFound, e: &[f64]) {
+/// Of the laws of each effect that was found, the one that the residual `e` tells beside the others.
+pub(crate) fn settle(s: &Searched<'_>, laws: &mut VarianceLaws, e: &[f64]) {
+    for i in 0..laws.each.len() {
+        let e = beside(e, &laws.each, Some(i));
+        settle_one(s, &mut laws.each[i], &e);
+    }
+}
+
+fn settle_one(s: &Searched<'_>, v: &mut VarianceFound, e: &[f64]) {
     let own = s.search.candidates.iter();
     let own = own.filter(|c| c.effect.id() == v.effect.id());
     let laws: Vec<_> = own
@@ -112,18 +171,21 @@ pub(crate) fn settle(s: &Searched<'_>, v: &mut VarianceFound, e: &[f64]) {
     v.parameters = v.effect.describe(&v.found);
 }
 
-/// What the law of the variance that was found on a channel claims, each claim with its chance.
-pub(crate) fn claims(s: &Searched<'_>) -> impl Iterator<Item = Outcome> {
-    let found = s.variance.iter();
-    found.flat_map(|v| {
-        let (rate_hz, id) = (s.search.view.rate_hz, v.effect.id());
-        [
-            evenness(&s.e, id, v.lr, rate_hz),
-            added_white(&s.e, &v.law, id, v.lr),
-        ]
-        .into_iter()
-        .chain(either_sign(s, v))
-    })
+/// What the laws of the variance that were found on a channel claim, each claim with its chance.
+pub(crate) fn claims(s: &Searched<'_>) -> Vec<Outcome> {
+    let Some(law) = s.variance.product() else {
+        return vec![];
+    };
+    let ids: Vec<&str> = s.variance.each.iter().map(|v| v.effect.id()).collect();
+    let (named, lr) = (ids.join(" and "), s.variance.lr());
+    let either = s.variance.each.iter();
+    [
+        evenness(&s.e, &named, lr, s.search.view.rate_hz),
+        added_white(&s.e, law, &named, lr),
+    ]
+    .into_iter()
+    .chain(either.filter_map(|v| either_sign(s, v)))
+    .collect()
 }
 
 /// Half cycles of the cosines that a changed variance is held against.

@@ -277,6 +277,61 @@ pub(crate) struct VarianceFound {
     pub follows: Option<String>,
 }
 
+impl VarianceFound {
+    /// Coefficient of the law.
+    pub fn gamma(&self) -> f64 {
+        self.found.coefficients.first().map_or(0.0, |c| c.0)
+    }
+}
+
+/// Laws of the variance of a channel, which multiply.
+#[derive(Default)]
+pub(crate) struct VarianceLaws {
+    /// Each law.
+    pub each: Vec<VarianceFound>,
+    /// Variance under all of them over its mean, by sample; of no law empty.
+    product: Vec<f64>,
+}
+
+impl VarianceLaws {
+    /// These laws together.
+    pub fn of(each: Vec<VarianceFound>) -> Self {
+        let count = each.first().map_or(0, |v| v.law.len());
+        let at = |i: usize| each.iter().map(|v| v.law[i]).product::<f64>();
+        let mut product: Vec<f64> = (0..count).map(at).collect();
+        over_mean(&mut product);
+        Self { each, product }
+    }
+
+    /// Variance over its mean by sample, where it is not the same throughout.
+    pub fn product(&self) -> Option<&[f64]> {
+        (!self.each.is_empty()).then_some(self.product.as_slice())
+    }
+
+    /// Likelihood ratio of all of them.
+    pub fn lr(&self) -> f64 {
+        self.each.iter().map(|v| v.lr).sum()
+    }
+
+    /// A residual over the square root of the variance.
+    pub fn divide(&self, e: &mut [f64]) {
+        let both = e.iter_mut().zip(&self.product);
+        both.for_each(|(e, v)| *e /= v.sqrt());
+    }
+
+    /// The same undone.
+    pub fn undo(&self, e: &mut [f64]) {
+        let both = e.iter_mut().zip(&self.product);
+        both.for_each(|(e, v)| *e *= v.sqrt());
+    }
+}
+
+/// Values over their mean.
+pub(crate) fn over_mean(values: &mut [f64]) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter_mut().for_each(|v| *v /= mean);
+}
+
 /// What the noise of a channel is, at the law's zero where it follows one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Levels {
@@ -295,8 +350,8 @@ pub(crate) struct Levels {
 pub(crate) struct Joint {
     /// Noise.
     pub levels: Levels,
-    /// Coefficient of the law with its standard error.
-    pub law: (f64, f64),
+    /// Coefficient of each law with its standard error.
+    pub laws: Vec<(f64, f64)>,
     /// What was found for each term.
     pub found: Vec<Found>,
 }

@@ -18,8 +18,8 @@ pub(super) struct Point {
     pub log_walk: f64,
     /// Variance and pole of each first-order process.
     pub poles: Vec<(f64, f64)>,
-    /// Increase of the white variance at the top of the law.
-    pub law: f64,
+    /// Increase of the white variance at the top of each law.
+    pub laws: Vec<f64>,
 }
 
 /// The data, the columns that may explain them, and the law's shape.
@@ -27,9 +27,8 @@ pub(super) struct Series<'a> {
     /// Values by sample: the data, then the columns.
     values: Vec<f64>,
     width: usize,
-    /// What a law adds, 1 at its top.
-    shape: &'a [f64],
-    top: f64,
+    /// What each law adds, and the largest value of that.
+    laws: Vec<(&'a [f64], f64)>,
     /// Samples from the one before to each, where time passed that has no place.
     spans: Option<&'a [f64]>,
     /// Whether a sample was read.
@@ -39,15 +38,16 @@ pub(super) struct Series<'a> {
 }
 
 impl<'a> Series<'a> {
-    /// The data first, then the columns; `lost` samples were not read; `spans` as [`Series::spans`].
+    /// Of `n` samples the data first, then the columns; `lost` samples were not read; `spans` as [`Series::spans`].
     pub(super) fn new(
+        n: usize,
         columns: impl Iterator<Item = Vec<f64>>,
-        shape: &'a [f64],
+        shapes: impl Iterator<Item = &'a [f64]>,
         lost: &[usize],
         spans: Option<&'a [f64]>,
     ) -> Self {
         let columns: Vec<Vec<f64>> = columns.collect();
-        let (width, n) = (columns.len(), shape.len());
+        let width = columns.len();
         let mut values = vec![0.0; width * n];
         for (j, column) in columns.iter().enumerate() {
             // The level is the walk's: what is far from zero costs digits.
@@ -62,8 +62,7 @@ impl<'a> Series<'a> {
         Self {
             values,
             width,
-            shape,
-            top: top(shape),
+            laws: shapes.map(|s| (s, top(s))).collect(),
             spans,
             read,
             count,
@@ -75,6 +74,23 @@ impl<'a> Series<'a> {
         self.width - 1
     }
 
+    /// Laws of the variance.
+    pub(super) fn laws(&self) -> usize {
+        self.laws.len()
+    }
+
+    /// The white variance by sample, over that at the laws' zero.
+    fn white(&self, at: &Point) -> Vec<f64> {
+        let mut white = vec![1.0; self.read.len()];
+        for ((shape, top), law) in self.laws.iter().zip(&at.laws) {
+            let by = law / top;
+            for (white, shape) in white.iter_mut().zip(*shape) {
+                *white *= (1.0 + by * shape).max(f64::MIN_POSITIVE);
+            }
+        }
+        white
+    }
+
     /// Innovations that count: the first reading tells the level.
     pub(super) fn free(&self) -> f64 {
         self.count as f64 - 1.0
@@ -83,7 +99,7 @@ impl<'a> Series<'a> {
     /// Sums of products of the innovations over their variances, and the sum of the logarithms of these.
     pub(super) fn through(&self, at: &Point) -> (Normal, f64) {
         let (w, d) = (self.width, 1 + at.poles.len());
-        let (step, law) = (at.log_walk.exp(), at.law / self.top);
+        let (step, white) = (at.log_walk.exp(), self.white(at));
         let mut p = vec![0.0; d * d];
         p[0] = FLAT;
         for (j, (variance, _)) in at.poles.iter().enumerate() {
@@ -94,8 +110,8 @@ impl<'a> Series<'a> {
         let (mut sums, mut nu, mut row_sums) = (vec![0.0; w * w], vec![0.0; w], vec![0.0; d]);
         let (mut logs, mut product) = (0.0, 1.0f64);
         let mut begun = false;
-        let rows = self.values.chunks_exact(w).zip(self.shape).zip(&self.read);
-        for (i, ((row, shape), read)) in rows.enumerate() {
+        let rows = self.values.chunks_exact(w).zip(&white).zip(&self.read);
+        for (i, ((row, white), read)) in rows.enumerate() {
             let span = self.spans.map_or(1.0, |s| s[i]);
             if begun || !at.poles.is_empty() {
                 predict(
@@ -112,7 +128,7 @@ impl<'a> Series<'a> {
             for (sum, p) in row_sums.iter_mut().zip(p.chunks_exact(d)) {
                 *sum = p.iter().sum();
             }
-            let s = row_sums.iter().sum::<f64>() + (1.0 + law * shape).max(f64::MIN_POSITIVE);
+            let s = row_sums.iter().sum::<f64>() + white;
             nu.copy_from_slice(row);
             for component in state.chunks_exact(w) {
                 nu.iter_mut().zip(component).for_each(|(nu, m)| *nu -= m);

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use model::effect::View;
 
 use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
-use crate::fit::channel::{State, whitened};
+use crate::fit::channel::{State, VarianceLaws, whitened};
 use crate::fit::estimate;
 use crate::fit::likelihood::{Bins, Panel};
 use crate::ingest::types::{Grid, Target};
@@ -84,7 +84,7 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         u,
         told,
         checks: vec![],
-        variance: None,
+        variance: VarianceLaws::default(),
         joint: None,
         limits: vec![],
         laws: vec![],
@@ -98,7 +98,7 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     s.search.panel.release(&s.state.columns());
     grid.dct.keep_no_more();
     if !target.moving {
-        s.variance = variance_law::best(&s);
+        s.variance = variance_law::found(&s);
     }
     estimate_under_law(&mut s, grid);
     estimate_over_time(&mut s, grid);
@@ -106,30 +106,32 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     s
 }
 
-/// Everything that was found, estimated anew under the law of the variance where there is one, and the residual by it.
+/// Everything that was found, estimated anew under the laws of the variance where there are any, and the residual by them.
 fn estimate_under_law(s: &mut Searched<'_>, grid: &Grid) {
-    let Some(mut v) = s.variance.take() else {
+    let mut laws = std::mem::take(&mut s.variance);
+    if laws.each.is_empty() {
         return;
-    };
-    variance_law::settle(s, &mut v, &s.e);
-    s.joint = joint::estimate(s, &v.shape, v.found.coefficients[0].0, grid.bursts.as_ref());
+    }
+    variance_law::settle(s, &mut laws, &s.e);
+    s.joint = joint::estimate(s, &laws.each, grid.bursts.as_ref());
     if let Some(joint) = &s.joint {
         s.found.clone_from(&joint.found);
-        v.found.coefficients = vec![joint.law];
-        v.parameters = v.effect.describe(&v.found);
+        for (v, told) in laws.each.iter_mut().zip(&joint.laws) {
+            v.found.coefficients = vec![*told];
+            v.parameters = v.effect.describe(&v.found);
+        }
     }
-    s.e.iter_mut().zip(&v.law).for_each(|(e, v)| *e /= v.sqrt());
-    s.variance = Some(v);
+    laws.divide(&mut s.e);
+    s.variance = laws;
 }
 
 /// Everything that was found in bursts laid end to end, estimated anew by the time that passed between them: a slope over a
 /// course that goes on there is known as well as the walk lets it be.
 fn estimate_over_time(s: &mut Searched<'_>, grid: &Grid) {
-    if s.variance.is_some() || grid.bursts.is_none() {
+    if !s.variance.each.is_empty() || grid.bursts.is_none() {
         return;
     }
-    let no_law = vec![0.0; grid.n];
-    s.joint = joint::estimate(s, &no_law, 0.0, grid.bursts.as_ref());
+    s.joint = joint::estimate(s, &[], grid.bursts.as_ref());
     if let Some(joint) = &s.joint {
         s.found.clone_from(&joint.found);
     }
@@ -140,7 +142,7 @@ const OF_NORMAL: [CheckId; 2] = [CheckId::Kurtosis, CheckId::Neighbours];
 
 /// All checks of a channel, those of the residual `before` the extension beside those after it.
 fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
-    let after = if s.state.terms.is_empty() && s.variance.is_none() {
+    let after = if s.state.terms.is_empty() && s.variance.each.is_empty() {
         before.clone()
     } else {
         residual::all(&s.u, &s.e, s.search.view.rate_hz, s.step())
@@ -182,8 +184,7 @@ fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
 /// What the names on a channel claim; `rhythm` is the check for a rhythm of the variance.
 fn claims(s: &Searched<'_>, rhythm: Option<&Outcome>) -> Vec<Check> {
     // Before a process was named nothing was claimed of it.
-    let law = s.variance.as_ref().map(|v| v.law.as_slice());
-    let claims = process::of_processes(&s.search, &s.state, law);
+    let claims = process::of_processes(&s.search, &s.state, s.variance.product());
     let stationary = rhythm.and_then(|r| process::stationary(s, r));
     let claims = claims.into_iter().chain(stationary);
     let laws = s.laws.iter().map(|(_, outcome)| outcome.clone());

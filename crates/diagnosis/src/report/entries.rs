@@ -117,8 +117,8 @@ fn of_noise(group: &[Observation], s: &Searched<'_>, grid: &Grid, matters: f64) 
     } = left_over(s, grid, &terms);
     // A law of the variance that has lost its name stays out of the residual.
     let nearest = |title: &str| group.iter().any(|o| o.nearest.contains(&title));
-    let law = s.variance.as_ref();
-    if let Some(v) = law.filter(|v| nearest(v.effect.docs().title)) {
+    let laws = s.variance.each.iter();
+    for v in laws.filter(|v| nearest(v.effect.docs().title)) {
         let largest = extremes(&v.law)[1].max(0.0).sqrt() - 1.0;
         consequence.largest_change = consequence.largest_change.max(largest);
     }

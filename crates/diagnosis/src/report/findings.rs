@@ -11,7 +11,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::attribute::events;
 use crate::criticise::scale;
-use crate::fit::channel::{Form, Term};
+use crate::fit::channel::{Form, Term, VarianceFound};
 use crate::fit::{estimate, prequential, threshold};
 use crate::ingest::types::Grid;
 use crate::report::{detection_limits, figures};
@@ -187,13 +187,13 @@ fn neighbours(values: &[f64]) -> f64 {
     }
 }
 
-pub(crate) fn variance_finding(s: &Searched<'_>) -> Option<Finding> {
-    let v = s.variance.as_ref()?;
+/// What is told of a law of the variance of a channel, whose gain is that beside the others.
+pub(crate) fn variance_finding(s: &Searched<'_>, v: &VarianceFound) -> Finding {
     let alternatives = alternatives(&v.alternatives);
     let undivided: Vec<f64> = s.e.iter().zip(&v.law).map(|(e, v)| e * v.sqrt()).collect();
     let (nats, std_error) = prequential::of_variance(&undivided, &v.law);
     let parameters = v.parameters.clone();
-    Some(Finding {
+    Finding {
         cause: v.effect.id().into(),
         channels: vec![s.target.name.clone()],
         experiment: experiment(v.effect, &alternatives),
@@ -210,7 +210,7 @@ pub(crate) fn variance_finding(s: &Searched<'_>) -> Option<Finding> {
         parameters,
         likelihood_ratio: Some(v.lr),
         ..Finding::default()
-    })
+    }
 }
 
 /// Coefficients over which the energy of a motion is averaged, and the energy over the noise's from which on it is there.

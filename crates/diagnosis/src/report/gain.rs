@@ -273,7 +273,8 @@ pub(crate) fn complete(
                     continue;
                 };
                 let rest = Rest::of(s);
-                let law = s.variance.as_ref().filter(|v| v.effect.id() == f.cause);
+                let mut laws = s.variance.each.iter();
+                let law = laws.find(|v| v.effect.id() == f.cause);
                 let law = law.map(|v| v.law.as_slice());
                 let (before, after) = (rest.angles(s, None, grid), rest.angles(s, law, grid));
                 own.angle_rms_deg = pairs(before, after);

@@ -9,7 +9,7 @@ use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
 use model::unnamed::Unnamed;
 
 use crate::attribute::events;
-use crate::fit::channel::{Levels, State};
+use crate::fit::channel::{Levels, State, VarianceFound};
 use crate::ingest::types::Grid;
 use crate::joint::{levels_of, levels_under};
 use crate::result::{Finding, Parameter};
@@ -107,13 +107,12 @@ fn baseline(s: &Searched<'_>, grid: &Grid) -> Parameters {
 /// The baseline beside the causes `named`.
 fn beside(s: &Searched<'_>, named: &[&Finding], grid: &Grid) -> Parameters {
     let on_it = |f: &&&Finding| f.channels.contains(&s.target.name);
-    let law = s.variance.as_ref();
-    let law = law.filter(|v| named.iter().filter(on_it).any(|f| f.cause == v.effect.id()));
-    let mut levels = match (law, &s.joint) {
-        (None, Some(joint)) if s.variance.is_none() => joint.levels,
-        (None, _) => levels_of(s, &s.state),
-        (Some(_), Some(joint)) => joint.levels,
-        (Some(v), None) => levels_under(s, &v.shape, v.found.coefficients[0].0),
+    let is_named =
+        |v: &&VarianceFound| named.iter().filter(on_it).any(|f| f.cause == v.effect.id());
+    let laws: Vec<&VarianceFound> = s.variance.each.iter().filter(is_named).collect();
+    let mut levels = match &s.joint {
+        Some(joint) if laws.len() == s.variance.each.len() => joint.levels,
+        _ => levels_under(s, &laws),
     };
     let mut common = s.search.candidates.iter();
     let common = common.find(|c| matches!(c.hypothesis, Hypothesis::Common));

@@ -2,7 +2,7 @@
 
 use model::effect::Found;
 
-use crate::fit::channel::{Joint, State, VarianceFound};
+use crate::fit::channel::{Joint, State, VarianceLaws};
 use crate::ingest::types::Target;
 use crate::result::{Check, DetectionLimit};
 use crate::search::Search;
@@ -23,9 +23,9 @@ pub(crate) struct Searched<'a> {
     pub told: Option<Vec<f64>>,
     /// Omnibus checks, before and after.
     pub checks: Vec<Check>,
-    /// The law of the variance, where one was found.
-    pub variance: Option<VarianceFound>,
-    /// The estimate of all parameters under it.
+    /// The laws of the variance that were found.
+    pub variance: VarianceLaws,
+    /// The estimate of all parameters under them.
     pub joint: Option<Joint>,
     /// Smallest sizes that the search would have named, whether it did or not.
     pub limits: Vec<DetectionLimit>,

@@ -39,9 +39,7 @@ impl<'a> White<'a> {
             .map(|(u, r)| u * r)
             .collect();
         let mut e = panel.dct.inverse(&u);
-        if let Some(v) = &s.variance {
-            e.iter_mut().zip(&v.law).for_each(|(e, v)| *e /= v.sqrt());
-        }
+        s.variance.divide(&mut e);
         Self { s, e, density }
     }
 

@@ -441,10 +441,12 @@ fn swings_as(s: &Searched<'_>, t: &Term) -> Option<String> {
     signals.find(swings).map(|o| o.name.clone())
 }
 
-/// Whether the law of the variance holds in the coefficients beside those that something left over fills: a noise that
+/// Whether the laws of the variance hold in the coefficients beside those that something left over fills: a noise that
 /// changes does so at all frequencies, and what comes and goes brings its squares with it.
 fn everywhere(s: &Searched<'_>, filled: &dyn Fn(usize) -> bool) -> bool {
-    let Some(v) = &s.variance else { return true };
+    let Some(law) = s.variance.product() else {
+        return true;
+    };
     let mut kept = 0.0;
     let u: Vec<f64> = (s.u.iter().enumerate())
         .map(|(k, u)| {
@@ -456,9 +458,9 @@ fn everywhere(s: &Searched<'_>, filled: &dyn Fn(usize) -> bool) -> bool {
     let e = s.search.panel.dct.inverse(&u);
     let n = e.len() as f64;
     let energy: f64 = e.iter().map(|e| e * e).sum();
-    let scaled: f64 = e.iter().zip(&v.law).map(|(e, v)| e * e / v).sum();
-    let logs: f64 = v.law.iter().map(|v| v.ln()).sum();
+    let scaled: f64 = e.iter().zip(law).map(|(e, v)| e * e / v).sum();
+    let logs: f64 = law.iter().map(|v| v.ln()).sum();
     // A share of the coefficients holds that share of what all of them tell.
     let lr = kept / n * (n * (energy / scaled).ln() - logs);
-    lr > HOLDS * kept / n * v.lr
+    lr > HOLDS * kept / n * s.variance.lr()
 }

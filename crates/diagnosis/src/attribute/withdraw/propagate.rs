@@ -11,7 +11,7 @@ use super::facts::{Facts, LEFT, REMAINDER, REMAINDER_PROCESS, generic};
 use super::{Doubt, nearest_of};
 use crate::criticise::residual;
 use crate::fit::channel;
-use crate::fit::channel::{Form, Term};
+use crate::fit::channel::{Form, Term, VarianceFound};
 use crate::result::{Check, Finding};
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, DEPARTURE, Observation};
@@ -24,7 +24,7 @@ const LARGER: f64 = 2.0;
 /// How withdrawals spread from one name to others.
 pub(super) struct Kin<'a> {
     pub facts: &'a Facts<'a>,
-    /// Whether the name of the law of the variance falls.
+    /// Whether the names of the laws of the variance fall by themselves.
     pub variance: bool,
 }
 
@@ -76,9 +76,10 @@ impl Kin<'_> {
     /// term leaves by being off a little.
     fn of_its_source(&self, t: &Term, doubts: &[Doubt]) -> bool {
         let explained = self.facts.explained(t);
-        let by_variance = self.facts.s.variance.as_ref().filter(|_| self.variance);
-        let by_variance =
-            by_variance.and_then(|v| v.follows.as_ref().filter(|_| v.lr > DEPARTURE * explained));
+        let laws = self.facts.s.variance.each.iter();
+        let by_variance = laws
+            .filter(|v| self.variance && v.lr > DEPARTURE * explained)
+            .filter_map(|v| v.follows.as_ref());
         let terms = self.facts.s.state.terms.iter().zip(doubts);
         let by_terms = terms.filter(|(o, d)| **d != Doubt::No || o.effect.id() == channel::ID);
         let by_checks = self.facts.left.about.iter();
@@ -125,10 +126,7 @@ impl Kin<'_> {
     }
 
     /// Whether the name of a law of the variance falls beside what is left.
-    pub(super) fn variance_falls(&self, doubts: &[Doubt]) -> bool {
-        let Some(v) = &self.facts.s.variance else {
-            return false;
-        };
+    pub(super) fn variance_falls(&self, v: &VarianceFound, doubts: &[Doubt]) -> bool {
         let source = v.follows.as_ref();
         let by_term = |(t, doubt): (&Term, &Doubt)| {
             let follows = |s: &String| self.facts.s.search.sources(t).contains(s);
