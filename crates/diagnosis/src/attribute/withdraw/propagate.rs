@@ -60,16 +60,41 @@ impl Kin<'_> {
     }
 
     /// Whether noise explains less than what follows a recorded channel beside it by no law of the library, or no more than what
-    /// the shape of a fallen process leaves.
-    fn beside_larger(&self, t: &Term, doubts: &[Doubt]) -> bool {
-        let mut terms = self.facts.s.state.terms.iter().zip(doubts);
-        let larger = |(o, d): (&Term, &Doubt)| {
+    /// the shape of a fallen process leaves where it acts.
+    fn beside_larger(&self, t: &Term, own: &[f64], doubts: &[Doubt]) -> bool {
+        if !t.is_covariance() {
+            return false;
+        }
+        let acts = self.acts(t, own);
+        let mut terms = self.facts.s.state.parts().zip(doubts);
+        terms.any(|((o, of_other), d)| {
             let follows = o.effect.id() == channel::ID || *d != Doubt::No && !generic(o);
             let process = *d != Doubt::No && o.is_covariance() && !o.is_filter();
-            let all = o.cluster.map_or(o.lr, |c| c.lr);
-            follows && o.lr > t.lr || process && REMAINDER_PROCESS * all > t.lr
-        };
-        t.is_covariance() && terms.any(larger)
+            follows && o.lr > t.lr
+                || process && REMAINDER_PROCESS * self.explains_there(o, of_other, &acts) > t.lr
+        })
+    }
+
+    /// How much a term acts in each bin, 1 where it does most.
+    fn acts(&self, t: &Term, own: &[f64]) -> Vec<f64> {
+        let information = self.facts.information(t, own);
+        let each = information.iter().zip(&self.facts.counts);
+        let mut acts: Vec<f64> = each.map(|(i, m)| i / m).collect();
+        let most = acts.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        acts.iter_mut().for_each(|a| *a /= most);
+        acts
+    }
+
+    /// What a process explains; of a band, which has a place, the part where a term acts.
+    fn explains_there(&self, o: &Term, own: &[f64], acts: &[f64]) -> f64 {
+        if !o.is_band() {
+            return o.lr;
+        }
+        let information = self.facts.information(o, own);
+        let all: f64 = information.iter().sum();
+        let there: f64 = information.iter().zip(acts).map(|(i, a)| i * a).sum();
+        let lr = o.cluster.map_or(o.lr, |c| c.lr);
+        if all > 0.0 { lr * there / all } else { 0.0 }
     }
 
     /// Whether what is left over, or has fallen, follows the recorded channel that a term does, and is more than the effect of the
@@ -112,7 +137,7 @@ impl Kin<'_> {
                 };
                 let of_kind = self.in_its_band(t, own, &fallen)
                     || self.of_its_source(t, doubts)
-                    || self.beside_larger(t, doubts)
+                    || self.beside_larger(t, own, doubts)
                     || line.is_some() && self.facts.repeats.is_some()
                     || t.is_filter() && self.facts.fails(CheckId::VarianceLaw);
                 *doubt == Doubt::No && !t.is_band() && of_kind
