@@ -22,20 +22,23 @@ fn holds_the_other(truths: &[Truth]) -> bool {
     both("temperature", "temperature_quadratic") || both("line", "am_line")
 }
 
-/// How strong an effect is beside others on its channel. What two processes leave of each other is not worked out: 0.
+/// How strong an effect is beside others on its channel.
 fn beside(meter: &Meter, one: &Truth, others: &[&Truth]) -> f64 {
     let signals: Vec<Vec<f64>> = others.iter().filter_map(|t| t.signal.clone()).collect();
-    let densities = || others.iter().filter_map(|t| t.density.as_deref());
+    let densities = others.iter().filter_map(|t| t.density.as_deref());
+    let among = densities.fold(meter.clone(), |m, d| m.over(d));
     match (&one.signal, &one.density) {
         (Some(signal), _) => {
-            let meter = densities().fold(meter.clone(), |m, d| m.over(d));
-            if signals.is_empty() {
-                meter.of_signal(&meter.energy(signal))
+            let energy = if signals.is_empty() {
+                meter.energy(signal)
             } else {
-                meter.of_signal(&meter.energy(&meter.beyond(signal, &signals)))
-            }
+                meter.energy(&among.beyond(signal, &signals))
+            };
+            among.beside_fitted(&|m| m.of_signal(&energy))
         }
-        (None, Some(_)) if densities().next().is_some() => 0.0,
+        (None, Some(own)) if others.iter().any(|t| t.density.is_some()) => {
+            among.beside_fitted(&|m| m.of_density(own))
+        }
         _ => one.strength,
     }
 }

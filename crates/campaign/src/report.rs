@@ -154,7 +154,7 @@ const METHOD: &str = "\
 - **A run** is a simulated stand: 600 s at 20 Hz, three axes; angle random walk 3.6 to 7 deg/sqrt(h), rate random walk 0 (15 % of the
   axes) or 3e-4 to 7e-3 deg/s/sqrt(s); temperature, supply, motor command and vibration act. An effect is on a random channel.
 - **Strength d'** is the square root of twice the expected log likelihood ratio against white noise and a random walk fitted again.
-  It is computed from the simulated signal or density, with the other effects of the channel present.
+  It is computed from the simulated signal or density, beside the other effects of the channel, their sizes fitted again.
 - **The oracle** knows the shape of the effect and makes one test at 1 %. It finds 95 of 100 from d' 4.22 on.
 - **Slow effects** stay below 0.25 deg/s rms (foreign ones 0.28): a gyro that reads more below 1 Hz may have been turned.
 - **Seeds**: thresholds were chosen on seeds below 1000; each campaign draws a fresh one.

@@ -14,6 +14,8 @@ use crate::stand::Stand;
 /// Random walks that are tried first, and the largest of them.
 const WALKS: usize = 24;
 const MOST_WALK: f64 = 2.0;
+/// Sizes of a process beside another one that are tried, of its own.
+const RESIZED: (f64, f64) = (0.1, 10.0);
 
 /// What a length is made of, whatever its noise.
 struct Length {
@@ -208,6 +210,22 @@ impl Meter {
             .map(|(v, m)| m * (1.0 + v.ln()))
             .sum();
         self.against_baseline(&expected, truth)
+    }
+
+    /// A strength beside processes whose size is fitted again too: what more or less of them explains does not count.
+    #[must_use]
+    pub fn beside_fitted(&self, strength: &dyn Fn(&Self) -> f64) -> f64 {
+        if self.beside.is_none() {
+            return strength(self);
+        }
+        let sized = |ln: f64| {
+            let mut other = self.clone();
+            let beside = other.beside.iter_mut().flatten();
+            beside.for_each(|d| *d *= ln.exp());
+            strength(&other)
+        };
+        let (least, most) = RESIZED;
+        sized(golden(&sized, least.ln(), most.ln(), 20))
     }
 
     /// White noise and random walk refitted to expected energies, beside the processes that are known.

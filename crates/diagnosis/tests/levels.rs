@@ -5,7 +5,7 @@ use diagnosis::result::{Diagnosed, Parameter};
 use model::file::{EffectModel, ModelFile};
 use model::record::Base;
 use rand_core::SeedableRng;
-use rand_distr::{Distribution, Uniform};
+use rand_distr::{Distribution, StandardNormal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 type Tested = Result<(), Box<dyn std::error::Error>>;
@@ -28,6 +28,15 @@ fn stated(cause: &str, channel: &str, parameters: &[(&str, f64, &str)]) -> Effec
 /// The answer to 600 s of the paper's stand with a bias that walks by 1e-3 deg/s/sqrt(s), on a base that its operator
 /// calls static.
 fn answer(effects: Vec<EffectModel>, seed: u64) -> Result<Diagnosed, Box<dyn std::error::Error>> {
+    answer_with(effects, &[], seed)
+}
+
+/// The same with a signal that is added to `gyro_x`, deg/s.
+fn answer_with(
+    effects: Vec<EffectModel>,
+    added: &[f64],
+    seed: u64,
+) -> Result<Diagnosed, Box<dyn std::error::Error>> {
     let mut model = ModelFile::paper();
     model.effects = effects;
     for channel in &mut model.channels {
@@ -36,6 +45,12 @@ fn answer(effects: Vec<EffectModel>, seed: u64) -> Result<Diagnosed, Box<dyn std
     }
     let mut record = model::simulate(&model, 600.0, 20.0, seed)?;
     record.header.base = Some(Base::Static);
+    let mut gyros = record.channels.iter_mut().filter(|c| c.name == "gyro_x");
+    let gyro = gyros.next().ok_or("a channel")?;
+    let lsb = gyro.lsb.ok_or("a step")?;
+    for (v, more) in gyro.values.iter_mut().zip(added) {
+        *v = ((*v + more) / lsb).round() * lsb;
+    }
     let options = DiagnoseOptions {
         no_evidence: true,
         ..DiagnoseOptions::default()
@@ -77,6 +92,64 @@ fn levels_beyond_the_drift_of_a_bias_are_the_sensors_and_their_dwell_times_hold(
     }
     assert!(named >= FEWEST, "{named} of {DRAWS} named");
     assert!(held + 4 >= named, "{held} of {named} intervals");
+    Ok(())
+}
+
+#[test]
+fn a_step_beside_rounded_angles_keeps_its_name_and_so_do_they() -> Tested {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x726f_756e_6473);
+    let mut both = 0;
+    for seed in 0..DRAWS {
+        let mut within = |low: f64, high: f64| {
+            let range = Uniform::new(low, high).expect("a range");
+            range.sample(&mut rng)
+        };
+        let (height, at) = (within(0.8, 1.6), within(60.0, 540.0));
+        let step = [("height", height, "deg/s"), ("time", at, "s")];
+        let rounded = [("q", within(0.009, 0.013), "deg")];
+        let effects = vec![
+            stated("bias_step", "gyro_x", &step),
+            stated("quantization_noise", "gyro_x", &rounded),
+        ];
+        let d = answer(effects, 300 + seed)?;
+        both += usize::from(
+            found(&d, "bias_step", "height").is_some()
+                && found(&d, "quantization_noise", "q").is_some(),
+        );
+    }
+    assert!(both >= FEWEST, "{both} of {DRAWS}");
+    Ok(())
+}
+
+/// A mode at 4 Hz that noise drives and whose pitch wanders by 0.2 Hz in some ten seconds, deg/s rms: no band of the library.
+fn vibration(rng: &mut Xoshiro256PlusPlus, rms: f64) -> Vec<f64> {
+    let mut normal = || -> f64 { StandardNormal.sample(rng) };
+    let (keep, slow) = (0.975f64, 0.995f64);
+    let (mut x, mut y, mut pitch) = (0.0, 0.0, 0.0);
+    let mut step = || {
+        pitch = slow * pitch + (1.0 - slow * slow).sqrt() * 0.2 * normal();
+        let (s, c) = (std::f64::consts::TAU * (4.0 + pitch) / 20.0).sin_cos();
+        let more = (1.0 - keep * keep).sqrt();
+        (x, y) = (
+            keep * (c * x - s * y) + more * normal(),
+            keep * (s * x + c * y) + more * normal(),
+        );
+        rms * x
+    };
+    (0..12_000).map(|_| step()).collect()
+}
+
+#[test]
+fn two_levels_keep_their_name_beside_a_vibration_elsewhere_that_has_none() -> Tested {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x7669_6272);
+    let mut named = 0;
+    for seed in 0..DRAWS {
+        let added = vibration(&mut rng, 0.3);
+        let (effect, _) = telegraph(&mut rng, [0.25, 0.35]);
+        let d = answer_with(vec![effect], &added, 500 + seed)?;
+        named += usize::from(found(&d, "telegraph", "half_height").is_some());
+    }
+    assert!(named >= FEWEST, "{named} of {DRAWS}");
     Ok(())
 }
 

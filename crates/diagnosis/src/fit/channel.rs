@@ -3,7 +3,7 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
-use model::effect::{Effect, Found, Parameters, Peak, Shape};
+use model::effect::{Effect, Found, Frequencies, Parameters, Peak, Shape};
 
 use crate::fit::likelihood::{Noise, Panel, Solution};
 use crate::fit::scan::residual;
@@ -114,6 +114,21 @@ impl Term {
     /// Whether it is a process that is added and stands at no one frequency.
     pub(crate) fn is_process(&self) -> bool {
         matches!(&self.form, Form::Covariance(c, _) if !c.filters_white() && !c.is_peak())
+    }
+
+    /// Whether it is a process that wanders: one whose density falls with the frequency. Rounded angles make one that rises, in
+    /// which no level stays.
+    pub(crate) fn wanders(&self) -> bool {
+        const ENDS: [f64; 2] = [0.01, std::f64::consts::PI];
+        let Form::Covariance(c, theta) = &self.form else {
+            return false;
+        };
+        let at = Frequencies {
+            omega: ENDS.to_vec(),
+            cosine: ENDS.map(f64::cos).to_vec(),
+        };
+        let density = c.density(theta, &at);
+        self.is_process() && density.first() > density.last()
     }
 
     /// The peak that it is, where it stands at one frequency.

@@ -103,9 +103,9 @@ fn looks_two_level(search: &Search<'_>, state: &State) -> bool {
     two - gaussian > MARGIN
 }
 
-/// Whether two levels may stand in the place of a term: a process that is added, or a step.
+/// Whether two levels may stand in the place of a term: a process that wanders, or a step.
 fn contested(t: &Term) -> bool {
-    t.is_process() || is_step(t)
+    t.wanders() || is_step(t)
 }
 
 fn is_step(t: &Term) -> bool {
@@ -328,11 +328,11 @@ impl<'a> Field<'a> {
         steps.map(|column| panel.add(&column)).collect()
     }
 
-    /// The processes of a state. Correlation times are in samples: of blocks, they are shorter by the block.
+    /// The processes of a state that wander. Correlation times are in samples: of blocks, they are shorter by the block.
     fn processes(&self, state: &State) -> Processes {
         let shorter = (self.length as f64).ln();
         let of = |t: &Term| match &t.form {
-            Form::Covariance(c, theta) if t.is_process() => {
+            Form::Covariance(c, theta) if t.wanders() => {
                 let mut theta = theta.clone();
                 theta[0] += shorter;
                 if let Some(tau) = theta.get_mut(1) {

@@ -77,8 +77,8 @@ impl Effect for QuantizationNoise {
         };
         let q = found.white_sigma * (size / 2.0).exp() / (SQRT_2 * found.rate_hz);
         let unit = match found.unit.as_str() {
-            "deg/s" => "deg".to_owned(),
-            other => format!("{other} s"),
+            "1" => "s".to_owned(),
+            other => crate::integral::of(other).1,
         };
         [(
             "q".to_owned(),

@@ -15,7 +15,7 @@ const REACH: usize = 1000;
 fn from_levels(search: &Search<'_>, state: State, length: usize, x: &Coordinates) -> State {
     let mut terms = state.terms.clone();
     let blocks = (length as f64).ln();
-    for t in terms.iter_mut().filter(|t| t.is_process()) {
+    for t in terms.iter_mut().filter(|t| t.wanders()) {
         if let Form::Covariance(_, theta) = &mut t.form {
             *theta = super::level::spectrum(x, blocks, x[0] + blocks);
         }
