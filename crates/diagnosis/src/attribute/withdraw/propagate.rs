@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 
 use super::facts::{Facts, LEFT, REMAINDER, REMAINDER_PROCESS, generic};
-use super::{Doubt, nearest_of};
+use super::{Doubt, nearest_of, rules};
 use crate::criticise::residual;
 use crate::fit::channel;
 use crate::fit::channel::{Form, Term, VarianceFound};
@@ -18,6 +18,8 @@ use crate::test_level::{CheckId, DEPARTURE, Observation};
 
 /// Share of the noise where a term acts that a fallen process makes, from which on the term may be a piece of it.
 const MADE: f64 = 0.25;
+/// The same of a peak that is no narrow one, from which on the two share their place.
+const SHARED: f64 = 0.05;
 /// Likelihood ratio of a term over that of the process, from which on it is none.
 const LARGER: f64 = 2.0;
 
@@ -56,6 +58,27 @@ impl Kin<'_> {
             let shares = density.iter().zip(&self.facts.g).map(|(d, g)| d / g);
             let held: f64 = information.iter().zip(shares).map(|(i, s)| i * s).sum();
             all > 0.0 && held > MADE * all
+        })
+    }
+
+    /// Whether a process shares its place with a peak that is no narrow one: the two are the pieces of one spectrum of another
+    /// shape, of an echo or an edge.
+    fn with_a_hump(&self, t: &Term, own: &[f64]) -> bool {
+        if !t.is_covariance() {
+            return false;
+        }
+        let information = self.facts.information(t, own);
+        let all: f64 = information.iter().sum();
+        let wide = |o: &&Term| o.peak().is_some_and(|p| rules::wide(&p));
+        let mut humps = self.facts.s.state.terms.iter().filter(wide);
+        humps.any(|o| {
+            let Form::Covariance(process, theta) = &o.form else {
+                return false;
+            };
+            let density = process.density(theta, &self.facts.s.search.panel.bins.at);
+            let shares = density.iter().zip(&self.facts.g).map(|(d, g)| d / g);
+            let held: f64 = information.iter().zip(shares).map(|(i, s)| i * s).sum();
+            held > SHARED * all
         })
     }
 
@@ -138,6 +161,7 @@ impl Kin<'_> {
                 let of_kind = self.in_its_band(t, own, &fallen)
                     || self.of_its_source(t, doubts)
                     || self.beside_larger(t, own, doubts)
+                    || self.with_a_hump(t, own)
                     || line.is_some() && self.facts.repeats.is_some()
                     || t.is_filter() && self.facts.fails(CheckId::VarianceLaw);
                 *doubt == Doubt::No && !t.is_band() && of_kind

@@ -214,7 +214,7 @@ const NARROW: f64 = 1.0 / 3.0;
 
 /// Whether a peak is no narrow one, or is not seen to have two sides: a fifth of its height, two half widths from its middle, lies
 /// beyond half the sample rate.
-fn wide(peak: &Peak) -> bool {
+pub(super) fn wide(peak: &Peak) -> bool {
     let width = 2.0 * peak.half_width;
     width > NARROW * peak.omega || peak.omega + width > PI
 }
