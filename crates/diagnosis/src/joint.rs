@@ -2,9 +2,9 @@
 //! processes, regressors and the laws themselves, in one likelihood.
 //!
 //! y_t = x_t'b + m_t + sum_j z_jt + e_t with a flat-start random walk m, first-order processes z_j and white noise e of variance
-//! s2 (1 + gamma d_t), of several laws their product. Lost readings are missing. The likelihood is exact ([`filter`]); where the white noise went through a
-//! filter, data and columns are divided by its square root in the DCT domain first, which is exact but for the noise within a
-//! filter's memory of a change of the variance. Without a law the DCT-II likelihood of [`crate::fit::likelihood`] is the same one,
+//! s2 (1 + gamma d_t), of several laws their product. Lost readings are missing. The likelihood is exact ([`filter`]); where the
+//! white noise went through a filter, data and columns are divided by its square root in the DCT domain first, which is exact but
+//! for the noise within a filter's memory of a change of the variance. Without a law the DCT-II likelihood of [`crate::fit::likelihood`] is the same one,
 //! and its fit is the joint estimate already.
 
 mod climb;

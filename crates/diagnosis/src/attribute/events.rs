@@ -16,7 +16,7 @@ use model::record::Quantity;
 
 use crate::audit::MOST_TIMES;
 use crate::criticise::residual;
-use crate::fit::channel::{Form, Term};
+use crate::fit::channel::{Form, Term, undo};
 use crate::ingest::base_turns::Excursion;
 use crate::result::{Finding, Parameter};
 use crate::search::searched::Searched;
@@ -265,9 +265,7 @@ pub(crate) fn hold_outliers(
     let mut e = s.e.clone();
     let laws = s.variance.each.iter();
     for v in laws.filter(|v| kept.iter().all(|f| f.cause != v.effect.id())) {
-        e.iter_mut()
-            .zip(&v.law)
-            .for_each(|(e, law)| *e *= law.sqrt());
+        undo(&mut e, &v.law);
     }
     let mut told = vec![];
     for finding in named {

@@ -427,7 +427,7 @@ pub(crate) fn checks(s: &Searched<'_>) -> impl Iterator<Item = Check> {
         .terms
         .iter()
         .any(|t| matches!(t.form, Form::Covariance(..)));
-    let threshold = if process || s.variance.product().is_some() {
+    let threshold = if process || !s.variance.is_empty() {
         test_level::CLAIM_LEVEL
     } else {
         omnibus_level()

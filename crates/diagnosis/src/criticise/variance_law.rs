@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use model::effect::{Effect, Found, Hypothesis, VarianceLaw};
 
-use crate::fit::channel::{VarianceFound, VarianceLaws, over_mean};
+use crate::fit::channel::{VarianceFound, VarianceLaws, divide, over_mean};
 use crate::fit::{scan, threshold};
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, DEPARTURE, Outcome};
@@ -51,8 +51,7 @@ fn anew(s: &Searched<'_>, each: &mut Vec<VarianceFound>) {
 fn beside(e: &[f64], each: &[VarianceFound], but: Option<usize>) -> Vec<f64> {
     let mut e = e.to_vec();
     for (_, v) in each.iter().enumerate().filter(|(i, _)| Some(*i) != but) {
-        let both = e.iter_mut().zip(&v.law);
-        both.for_each(|(e, law)| *e /= law.sqrt());
+        divide(&mut e, &v.law);
     }
     e
 }

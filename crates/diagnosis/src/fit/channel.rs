@@ -320,7 +320,7 @@ impl VarianceLaws {
 
     /// Variance over its mean by sample, where it is not the same throughout.
     pub fn product(&self) -> Option<&[f64]> {
-        (!self.each.is_empty()).then_some(self.product.as_slice())
+        (!self.is_empty()).then_some(self.product.as_slice())
     }
 
     /// Likelihood ratio of all of them.
@@ -328,17 +328,32 @@ impl VarianceLaws {
         self.each.iter().map(|v| v.lr).sum()
     }
 
+    /// Whether the variance is the same throughout.
+    pub fn is_empty(&self) -> bool {
+        self.each.is_empty()
+    }
+
     /// A residual over the square root of the variance.
     pub fn divide(&self, e: &mut [f64]) {
-        let both = e.iter_mut().zip(&self.product);
-        both.for_each(|(e, v)| *e /= v.sqrt());
+        divide(e, &self.product);
     }
 
     /// The same undone.
     pub fn undo(&self, e: &mut [f64]) {
-        let both = e.iter_mut().zip(&self.product);
-        both.for_each(|(e, v)| *e *= v.sqrt());
+        undo(e, &self.product);
     }
+}
+
+/// A residual over the square root of a variance by sample; of no variance as it is.
+pub(crate) fn divide(e: &mut [f64], variance: &[f64]) {
+    let both = e.iter_mut().zip(variance);
+    both.for_each(|(e, v)| *e /= v.sqrt());
+}
+
+/// The same undone.
+pub(crate) fn undo(e: &mut [f64], variance: &[f64]) {
+    let both = e.iter_mut().zip(variance);
+    both.for_each(|(e, v)| *e *= v.sqrt());
 }
 
 /// Values over their mean.

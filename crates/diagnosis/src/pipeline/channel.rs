@@ -109,7 +109,7 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
 /// Everything that was found, estimated anew under the laws of the variance where there are any, and the residual by them.
 fn estimate_under_law(s: &mut Searched<'_>, grid: &Grid) {
     let mut laws = std::mem::take(&mut s.variance);
-    if laws.each.is_empty() {
+    if laws.is_empty() {
         return;
     }
     variance_law::settle(s, &mut laws, &s.e);
@@ -128,7 +128,7 @@ fn estimate_under_law(s: &mut Searched<'_>, grid: &Grid) {
 /// Everything that was found in bursts laid end to end, estimated anew by the time that passed between them: a slope over a
 /// course that goes on there is known as well as the walk lets it be.
 fn estimate_over_time(s: &mut Searched<'_>, grid: &Grid) {
-    if !s.variance.each.is_empty() || grid.bursts.is_none() {
+    if !s.variance.is_empty() || grid.bursts.is_none() {
         return;
     }
     s.joint = joint::estimate(s, &[], grid.bursts.as_ref());
@@ -142,7 +142,7 @@ const OF_NORMAL: [CheckId; 2] = [CheckId::Kurtosis, CheckId::Neighbours];
 
 /// All checks of a channel, those of the residual `before` the extension beside those after it.
 fn channel_checks(s: &Searched<'_>, before: Vec<Outcome>) -> Vec<Check> {
-    let after = if s.state.terms.is_empty() && s.variance.each.is_empty() {
+    let after = if s.state.terms.is_empty() && s.variance.is_empty() {
         before.clone()
     } else {
         residual::all(&s.u, &s.e, s.search.view.rate_hz, s.step())

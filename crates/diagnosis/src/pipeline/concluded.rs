@@ -90,9 +90,8 @@ pub(super) fn concluded(
 
 /// Whether what was found on a channel may have bent the distribution of its counts; then the residual decides.
 fn bent(name: &str, searched: &[Searched<'_>], checks: &[Check]) -> bool {
-    let found = |s: &Searched<'_>| {
-        !s.state.terms.is_empty() || s.variance.product().is_some() || s.target.moving
-    };
+    let found =
+        |s: &Searched<'_>| !s.state.terms.is_empty() || !s.variance.is_empty() || s.target.moving;
     let tails = |c: &Check| c.id == CheckId::Kurtosis && c.channel == name && c.fails_after;
     let mut own = searched.iter().filter(|s| s.target.name == name);
     own.any(found) && !checks.iter().any(tails)

@@ -11,7 +11,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::attribute::events;
 use crate::criticise::scale;
-use crate::fit::channel::{Form, Term, VarianceFound};
+use crate::fit::channel::{Form, Term, VarianceFound, undo};
 use crate::fit::{estimate, prequential, threshold};
 use crate::ingest::types::Grid;
 use crate::report::{detection_limits, figures};
@@ -190,7 +190,8 @@ fn neighbours(values: &[f64]) -> f64 {
 /// What is told of a law of the variance of a channel, whose gain is that beside the others.
 pub(crate) fn variance_finding(s: &Searched<'_>, v: &VarianceFound) -> Finding {
     let alternatives = alternatives(&v.alternatives);
-    let undivided: Vec<f64> = s.e.iter().zip(&v.law).map(|(e, v)| e * v.sqrt()).collect();
+    let mut undivided = s.e.clone();
+    undo(&mut undivided, &v.law);
     let (nats, std_error) = prequential::of_variance(&undivided, &v.law);
     let parameters = v.parameters.clone();
     Finding {

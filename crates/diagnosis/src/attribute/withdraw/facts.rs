@@ -16,7 +16,7 @@ use crate::test_level::{CheckId, Outcome, RECORD, omnibus_level};
 /// Share of a term's energy in bands that fail, from which on the failure is the term's.
 const SHARE: f64 = 0.25;
 /// Share of it in a place, from which on the term is touched by what is left there.
-const TOUCHED: f64 = 0.05;
+pub(super) const TOUCHED: f64 = 0.05;
 /// Part of what a term explains that may be left over where it acts: it is off by a fifth of its size, and no makeshift.
 pub(super) const LEFT: f64 = 0.05;
 /// Share of its likelihood ratio that a law of the variance keeps, by coefficient, where nothing is left over.

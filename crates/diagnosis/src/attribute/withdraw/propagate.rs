@@ -7,7 +7,7 @@
 
 use std::collections::BTreeSet;
 
-use super::facts::{Facts, LEFT, REMAINDER, REMAINDER_PROCESS, generic};
+use super::facts::{Facts, LEFT, REMAINDER, REMAINDER_PROCESS, TOUCHED, generic};
 use super::{Doubt, nearest_of, rules};
 use crate::criticise::residual;
 use crate::fit::channel;
@@ -18,8 +18,6 @@ use crate::test_level::{CheckId, DEPARTURE, Observation};
 
 /// Share of the noise where a term acts that a fallen process makes, from which on the term may be a piece of it.
 const MADE: f64 = 0.25;
-/// The same of a peak that is no narrow one, from which on the two share their place.
-const SHARED: f64 = 0.05;
 /// Likelihood ratio of a term over that of the process, from which on it is none.
 const LARGER: f64 = 2.0;
 
@@ -52,13 +50,17 @@ impl Kin<'_> {
         if large.is_empty() {
             return false;
         }
+        let mut large = large.iter();
+        large.any(|(density, _)| self.makes(density, t, own) > MADE)
+    }
+
+    /// Share of the noise that a process of this density makes where a term acts.
+    fn makes(&self, density: &[f64], t: &Term, own: &[f64]) -> f64 {
         let information = self.facts.information(t, own);
         let all: f64 = information.iter().sum();
-        large.iter().any(|(density, _)| {
-            let shares = density.iter().zip(&self.facts.g).map(|(d, g)| d / g);
-            let held: f64 = information.iter().zip(shares).map(|(i, s)| i * s).sum();
-            all > 0.0 && held > MADE * all
-        })
+        let shares = density.iter().zip(&self.facts.g).map(|(d, g)| d / g);
+        let held: f64 = information.iter().zip(shares).map(|(i, s)| i * s).sum();
+        if all > 0.0 { held / all } else { 0.0 }
     }
 
     /// Whether a process shares its place with a peak that is no narrow one: the two are the pieces of one spectrum of another
@@ -67,18 +69,14 @@ impl Kin<'_> {
         if !t.is_covariance() {
             return false;
         }
-        let information = self.facts.information(t, own);
-        let all: f64 = information.iter().sum();
+        let at = &self.facts.s.search.panel.bins.at;
         let wide = |o: &&Term| o.peak().is_some_and(|p| rules::wide(&p));
         let mut humps = self.facts.s.state.terms.iter().filter(wide);
         humps.any(|o| {
             let Form::Covariance(process, theta) = &o.form else {
                 return false;
             };
-            let density = process.density(theta, &self.facts.s.search.panel.bins.at);
-            let shares = density.iter().zip(&self.facts.g).map(|(d, g)| d / g);
-            let held: f64 = information.iter().zip(shares).map(|(i, s)| i * s).sum();
-            held > SHARED * all
+            self.makes(&process.density(theta, at), t, own) > TOUCHED
         })
     }
 
