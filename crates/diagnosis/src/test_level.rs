@@ -29,7 +29,7 @@ pub const OMNIBUS_LEVEL: f64 = 1e-5;
 pub(crate) const CLAIM_LEVEL: f64 = 1e-3;
 /// The same of what the envelope of a band claims: a narrow one has few independent values, and ten times as many of the names that
 /// are not true would pass at [`CLAIM_LEVEL`].
-pub(crate) const ENVELOPE_LEVEL: f64 = 1e-3;
+pub(crate) const ENVELOPE_LEVEL: f64 = 1e-2;
 /// Chance of a false alarm of one audit on one channel.
 pub const AUDIT_LEVEL: f64 = 2e-5;
 thread_local! {

@@ -18,6 +18,30 @@ const LOCKED: [(i32, i32); 6] = [(2, 1), (1, 2), (3, 1), (1, 3), (3, 2), (2, 3)]
 /// Frequencies either side that are the neighbourhood of the mean, without the next ones.
 const BESIDE: usize = 24;
 
+/// A product of envelopes over the record in `n` values, turned back by what their places differ by in coefficients.
+pub(super) fn between(
+    n: usize,
+    turns: f64,
+    mut product: impl FnMut(usize) -> Complex<f64>,
+) -> Vec<Complex<f64>> {
+    let back = PI * turns / n as f64;
+    (0..n)
+        .map(|i| product(i) * Complex::from_polar(1.0, back * i as f64))
+        .collect()
+}
+
+/// Chance that the mean of a series stands out of its spectrum as well, and the size of its sum.
+pub(super) fn stands_out(mut product: Vec<Complex<f64>>) -> (f64, f64) {
+    let n = product.len();
+    FftPlanner::new().plan_fft_forward(n).process(&mut product);
+    let beside = (2..=BESIDE).flat_map(|d| [d, n - d]);
+    let count = 2.0 * (BESIDE as f64 - 1.0);
+    let mean = beside.map(|d| product[d].norm_sqr()).sum::<f64>() / count;
+    // The chance of an exponential value over the mean of `count` others.
+    let ratio = product[0].norm_sqr() / mean.max(f64::MIN_POSITIVE);
+    ((-count * (ratio / count).ln_1p()).exp(), product[0].norm())
+}
+
 /// Chance that the phases of two bands are locked as well at these powers; none where they lie elsewhere.
 fn locked(a: &Moves, b: &Moves, (j, k): (i32, i32)) -> Option<f64> {
     let (to_a, to_b) = (f64::from(j), f64::from(k));
@@ -26,28 +50,23 @@ fn locked(a: &Moves, b: &Moves, (j, k): (i32, i32)) -> Option<f64> {
         return None;
     }
     let n = a.envelope.len().max(b.envelope.len());
-    // What the two envelopes are turned by over the record.
-    let turns = PI * (to_a * a.places.start as f64 - to_b * b.places.start as f64) / n as f64;
+    let turns = to_a * a.places.start as f64 - to_b * b.places.start as f64;
     let at = |m: &Moves, i: usize| m.envelope[i * m.envelope.len() / n];
-    let mut product: Vec<Complex<f64>> = (0..n)
-        .map(|i| {
-            let both = at(a, i).powi(j) * at(b, i).conj().powi(k);
-            both * Complex::from_polar(1.0, turns * i as f64)
-        })
-        .collect();
-    FftPlanner::new().plan_fft_forward(n).process(&mut product);
-    let beside = (2..=BESIDE).flat_map(|d| [d, n - d]);
-    let count = 2.0 * (BESIDE as f64 - 1.0);
-    let mean = beside.map(|d| product[d].norm_sqr()).sum::<f64>() / count;
-    // The chance of an exponential value over the mean of `count` others.
-    let ratio = product[0].norm_sqr() / mean.max(f64::MIN_POSITIVE);
-    Some((-count * (ratio / count).ln_1p()).exp())
+    let both = |i| at(a, i).powi(j) * at(b, i).conj().powi(k);
+    Some(stands_out(between(n, turns, both)).0)
 }
 
-/// The claim of a band that is told as `named`: that it knows nothing of the other bands.
-pub(super) fn claim(own: &Moves, others: &[&Moves], named: &str) -> Option<Outcome> {
+/// The claim of a band that is told as `named`: that it is a sine, whose `harmonics` have these chances, and knows nothing of the
+/// other bands.
+pub(super) fn claim(
+    own: &Moves,
+    others: &[&Moves],
+    harmonics: &[f64],
+    named: &str,
+) -> Option<Outcome> {
     let cells = own.size.len();
-    let mut all: Vec<(f64, &'static str)> = vec![];
+    let harmonics = harmonics.iter();
+    let mut all: Vec<(f64, &'static str)> = harmonics.map(|p| (*p, "it has harmonics")).collect();
     // Bands that overlap are one cluster, and asked together.
     for o in others {
         let course = |values: &[f64]| beyond(in_cells(values, cells), &[]);
@@ -80,7 +99,7 @@ pub(super) fn claim(own: &Moves, others: &[&Moves], named: &str) -> Option<Outco
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
@@ -89,9 +108,22 @@ mod tests {
     use super::*;
     use crate::fit::likelihood::Dct;
 
-    const COUNT: usize = 8192;
+    pub(in super::super) const COUNT: usize = 8192;
     /// Half width of the lower band, coefficients.
-    const HALF: f64 = 12.0;
+    pub(in super::super) const HALF: f64 = 12.0;
+
+    /// A Lorentzian of variance 0.5 among coefficients of noise of this level.
+    pub(in super::super) fn band_of(c: &[f64], middle: f64, half: f64, level: f64) -> Moves {
+        let reach = 6.0 * half;
+        let (from, to) = ((middle - reach) as usize, (middle + reach) as usize);
+        let top = 0.5 * COUNT as f64 / (PI * half) / level;
+        let density = (from..to).map(|k| top / (1.0 + ((k as f64 - middle) / half).powi(2)));
+        let band = Band {
+            coefficients: c[from..to].iter().map(|c| c / level.sqrt()).collect(),
+            density: density.collect(),
+        };
+        Moves::of(&band, from).expect("long enough")
+    }
 
     /// A band of a tone whose phase is `times` a wandering one, in a little noise.
     fn band(phase: &[f64], times: f64, rng: &mut Xoshiro256PlusPlus) -> Moves {
@@ -100,18 +132,7 @@ mod tests {
             (times * p).cos() + 0.5 * e
         });
         let c = Dct::new(COUNT).forward(&samples.collect::<Vec<_>>());
-        let middle = times * 0.2 * COUNT as f64;
-        let half = times * times * HALF;
-        let reach = 6.0 * half;
-        let (from, to) = ((middle - reach) as usize, (middle + reach) as usize);
-        let level = 0.25;
-        let top = 0.5 * COUNT as f64 / (PI * half) / level;
-        let density = (from..to).map(|k| top / (1.0 + ((k as f64 - middle) / half).powi(2)));
-        let band = Band {
-            coefficients: c[from..to].iter().map(|c| c / level.sqrt()).collect(),
-            density: density.collect(),
-        };
-        Moves::of(&band, from).expect("long enough")
+        band_of(&c, times * 0.2 * COUNT as f64, times * times * HALF, 0.25)
     }
 
     fn phase(rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
@@ -134,7 +155,7 @@ mod tests {
             let first = band(&one, 1.0, &mut rng);
             let own = band(&one, 2.0, &mut rng);
             let foreign = band(&other, 2.0, &mut rng);
-            let p = |second: &Moves| claim(&first, &[second], "").expect("asked").p_value;
+            let p = |second: &Moves| claim(&first, &[second], &[], "").expect("asked").p_value;
             seen += usize::from(p(&own) < 1e-2);
             low += usize::from(p(&foreign) < 5e-2);
         }

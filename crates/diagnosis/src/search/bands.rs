@@ -6,12 +6,14 @@
 //! noise.
 
 use std::f64::consts::{FRAC_2_PI, PI};
+use std::ops::Range;
 use std::sync::Arc;
 
 use model::effect::{Covariance, Hypothesis, Peak};
 
 use super::band_source::{self, Moves};
 use super::envelope::{Band, Seen};
+use super::harmonic::{self, Place};
 use super::{Search, band_alone, envelope};
 use crate::fit::channel::{Cluster, Form, State, Term};
 use crate::fit::likelihood::{Bins, Noise};
@@ -255,6 +257,8 @@ impl Search<'_> {
             );
             let lr = 2.0 * (state.solution.log_likelihood - rest.solution.log_likelihood);
             let lr = self.of_read() * lr;
+            let harmonics = moves[number].as_ref();
+            let harmonics = harmonics.map_or(vec![], |own| self.harmonics(state, &cluster, own));
             for (place, i) in cluster.iter().enumerate() {
                 let t = &mut state.terms[*i];
                 t.cluster = Some(Cluster { number, place, lr });
@@ -278,7 +282,7 @@ impl Search<'_> {
                         .and_then(|own| band_source::claim(own, self.view.signals, t.effect.id()));
                     let alone = moves[number]
                         .as_ref()
-                        .and_then(|own| band_alone::claim(own, &others, t.effect.id()));
+                        .and_then(|own| band_alone::claim(own, &others, &harmonics, t.effect.id()));
                     t.claims.extend(source.into_iter().chain(alone));
                 }
             }
@@ -317,19 +321,41 @@ impl Search<'_> {
             });
         let [low, high] = ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])?;
         let (from, to) = (low.max(1.0) as usize, (high as usize + 1).min(n));
-        let omega = || (from..to).map(|k| k as f64 / to_k);
-        let beside = Self::beside(state, cluster).through(omega());
-        let all = state.noise.through(omega());
-        let r = residual(&self.panel, &state.columns(), &state.solution);
-        let white = state.solution.white;
-        let whole = r[from..to]
-            .iter()
-            .zip(&beside)
-            .map(|(r, g)| r / (white * g).sqrt());
+        let (coefficients, beside) = self.beside_in(state, cluster, from..to);
+        let all = state.noise.through((from..to).map(|k| k as f64 / to_k));
         let band = Band {
-            coefficients: whole.collect(),
+            coefficients,
             density: all.iter().zip(&beside).map(|(a, b)| a / b - 1.0).collect(),
         };
         Some((band, from))
+    }
+
+    /// Coefficients over all noise but some bands, and that noise over the white one.
+    fn beside_in(
+        &self,
+        state: &State,
+        without: &[usize],
+        places: Range<usize>,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let to_omega = PI / self.panel.bins.n as f64;
+        let omega = places.clone().map(|k| k as f64 * to_omega);
+        let beside = Self::beside(state, without).through(omega);
+        let white = state.solution.white;
+        let r = residual(&self.panel, &state.columns(), &state.solution);
+        let whole = r[places].iter().zip(&beside);
+        let coefficients = whole.map(|(r, g)| r / (white * g).sqrt()).collect();
+        (coefficients, beside)
+    }
+
+    /// Chances that a channel has as much at the harmonics of some bands that are one thing.
+    fn harmonics(&self, state: &State, cluster: &[usize], own: &Moves) -> Vec<f64> {
+        let middle = own.middle() as usize;
+        let chance = |order| {
+            let place = Place::of(own, order, self.panel.bins.n)?;
+            let (_, level) = self.beside_in(state, cluster, middle..middle + 1);
+            let (there, levels) = self.beside_in(state, cluster, place.places.clone());
+            Some(place.chance(own, &there, levels[levels.len() / 2] / level[0]))
+        };
+        harmonic::ORDERS.filter_map(chance).collect()
     }
 }

@@ -7,6 +7,7 @@ mod band_source;
 pub(crate) mod bands;
 mod beyond;
 pub(crate) mod envelope;
+mod harmonic;
 pub(crate) mod impute;
 pub(crate) mod power_law;
 mod process_pairs;
