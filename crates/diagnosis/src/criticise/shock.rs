@@ -37,6 +37,8 @@ pub(crate) struct Felt {
     pub lr: f64,
     /// Phase of a ring at its begin, rad.
     pub phase: Option<(f64, f64)>,
+    /// Share of the noise that the processes of the channel make where it acts.
+    pub by_processes: f64,
 }
 
 /// A blow as the final model has it.
@@ -65,6 +67,8 @@ struct Channel {
     left: Vec<f64>,
     /// 1 / variance of each.
     weight: Vec<f64>,
+    /// Share of it that processes make.
+    by_processes: Vec<f64>,
 }
 
 /// A piece of the record about a blow.
@@ -100,9 +104,14 @@ impl Piece {
                 let g = s.state.noise.everywhere(&bins);
                 let mut weight: Vec<f64> = g.iter().map(|g| (white * g).recip()).collect();
                 weight[0] = 0.0;
+                let beside = s.state.noise_beside_processes().everywhere(&bins);
+                let shares = beside.iter().zip(&g).map(|(b, g)| 1.0 - b / g);
+                let mut by_processes: Vec<f64> = shares.collect();
+                by_processes[0] = 0.0;
                 Channel {
                     left: dct.forward(&left(s, &all)),
                     weight,
+                    by_processes,
                 }
             })
             .collect();
@@ -146,7 +155,7 @@ impl Piece {
         let shapes: Vec<Vec<f64>> = columns.iter().map(|c| self.dct.forward(c)).collect();
         of.iter()
             .map(|k| {
-                let Channel { left, weight } = &self.channels[*k];
+                let Channel { left, weight, .. } = &self.channels[*k];
                 let over = |a: &[f64], b: &[f64]| -> f64 {
                     let pairs = a.iter().zip(b).zip(weight);
                     pairs.map(|((a, b), w)| a * b * w).sum()
@@ -164,6 +173,24 @@ impl Piece {
                 }
             })
             .collect()
+    }
+
+    /// Share of the noise of a channel that its processes make where columns act.
+    fn by_processes(&self, columns: &[Vec<f64>], channel: usize) -> f64 {
+        let Channel {
+            weight,
+            by_processes,
+            ..
+        } = &self.channels[channel];
+        let (mut made, mut all) = (0.0, f64::MIN_POSITIVE);
+        for column in columns {
+            let own = self.dct.forward(column);
+            for ((c, w), share) in own.iter().zip(weight).zip(by_processes) {
+                made += c * c * w * share;
+                all += c * c * w;
+            }
+        }
+        made / all
     }
 }
 
@@ -342,10 +369,11 @@ fn of_channel(piece: &Piece, known: &Known, (best, start): (Place, f64), channel
             (begins, e.hypot(pitch * start))
         }),
     };
-    let own = piece.columns(best).map(|c| piece.sizes(&c, &[channel]));
+    let columns = piece.columns(best).unwrap_or_default();
     Felt {
         channel,
-        lr: own.iter().flatten().map(|s| s.lr).sum(),
+        lr: piece.sizes(&columns, &[channel]).iter().map(|s| s.lr).sum(),
+        by_processes: piece.by_processes(&columns, channel),
         peak: (mean, (square - mean * mean).max(0.0).sqrt()),
         phase,
     }

@@ -214,6 +214,16 @@ impl State {
         self.terms.iter().all(Term::is_normal)
     }
 
+    /// The noise without all processes and bands.
+    pub(crate) fn noise_beside_processes(&self) -> Noise {
+        let mut noise = self.noise.clone();
+        let mut filters = (self.terms.iter())
+            .filter(|t| t.is_covariance())
+            .map(Term::is_filter);
+        noise.terms.retain(|_| filters.next().unwrap_or(false));
+        noise
+    }
+
     /// The noise without what the level stands for where it is known sample by sample.
     pub(crate) fn noise_beside_level(&self) -> Noise {
         let mut noise = self.noise.clone();

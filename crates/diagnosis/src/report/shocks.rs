@@ -3,7 +3,8 @@
 use model::effect::{Effect, Found, Hypothesis};
 
 use crate::attribute::events;
-use crate::criticise::shock::{Fitted, fit};
+use crate::attribute::withdraw::propagate;
+use crate::criticise::shock::{Felt, Fitted, fit};
 use crate::ingest::blows::Blow;
 use crate::ingest::types::Grid;
 use crate::report::findings::experiment;
@@ -12,7 +13,7 @@ use crate::search::searched::Searched;
 use crate::test_level::CheckId;
 
 /// The finding of each blow; none of one that the final model does not bear out, by those channels whose noise does not make
-/// such readings by itself. `failing` tells of a channel and a check.
+/// such readings by itself, neither as a whole nor by a process that is not what its name claims. `failing` tells of a channel and a check.
 pub(crate) fn findings(
     searched: &[&Searched<'_>],
     blows: &[Blow],
@@ -34,7 +35,13 @@ pub(crate) fn findings(
         if fitted.felt.iter().any(|felt| part(felt.channel)) {
             return None;
         }
+        let by_process = |felt: &&Felt| {
+            let s = searched[felt.channel];
+            let name = s.target.name.as_str();
+            propagate::is_of_a_process(s, felt.lr, felt.by_processes, &|id| failing(name, id))
+        };
         let lawful = fitted.felt.iter().filter(|felt| !by_noise(felt.channel));
+        let lawful = lawful.filter(|felt| !by_process(felt));
         let told: f64 = lawful.map(|felt| felt.lr).sum();
         (told >= fitted.least).then(|| finding(of, &fitted, searched, grid))
     });

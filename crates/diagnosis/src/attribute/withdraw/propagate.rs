@@ -187,6 +187,26 @@ impl Kin<'_> {
     }
 }
 
+/// Whether a blow of that likelihood ratio may be the largest piece of a process of the channel that is not what its name claims:
+/// `made` is the share of the noise that the processes make where it acts.
+pub(crate) fn is_of_a_process(
+    s: &Searched<'_>,
+    lr: f64,
+    made: f64,
+    failing: &dyn Fn(CheckId) -> bool,
+) -> bool {
+    let unlike = |t: &Term| {
+        let claims: &[CheckId] = if t.is_band() {
+            &CheckId::OF_BAND
+        } else {
+            &CheckId::OF_PROCESS
+        };
+        (t.is_band() || t.is_process()) && claims.iter().any(|id| failing(*id))
+    };
+    let larger = |t: &Term| LARGER * t.cluster.map_or(t.lr, |c| c.lr) > lr;
+    made > MADE && s.state.terms.iter().any(|t| unlike(t) && larger(t))
+}
+
 /// Whether noise that axes share is a side of what one of them takes from another in a way of its own.
 pub(crate) fn shared_falls(finding: &Finding, checks: &[Check]) -> bool {
     let channels = &finding.channels;
