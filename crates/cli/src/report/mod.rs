@@ -190,9 +190,15 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
     };
     let before = of_channels(&diagnosed.baseline_model, said);
     let sampling = Sampling::of(record, subject.rate_hz)?;
-    let places = Places::new(&sampling, record.len());
+    let places_of = |model: &ModelFile| -> Vec<Option<Places>> {
+        let readings = model.channels.iter().map(|c| record.channel(&c.name));
+        readings
+            .map(|c| c.map(|c| Places::new(&sampling, &c.values)))
+            .collect()
+    };
     let simulate = |model: &ModelFile, stream: u64| {
         let count = replicates_of(record);
+        let places = places_of(model);
         replicates::replicate(model, record, &places, count, subject.seed ^ stream)
     };
     let first = match before.channels.is_empty() {
@@ -209,8 +215,8 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
         }
     };
     let mut out = Vec::new();
-    for (index, channel) in after.channels.iter().enumerate() {
-        let Some(measured) = record.channel(&channel.name) else {
+    for (index, (channel, places)) in after.channels.iter().zip(places_of(after)).enumerate() {
+        let (Some(measured), Some(places)) = (record.channel(&channel.name), places) else {
             continue;
         };
         let of_before = (before.channels.iter()).position(|c| c.name == channel.name);
@@ -232,7 +238,7 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
             replicates::against(&own, all),
             replicates::against(&own, &all_after[index]),
         ];
-        let at = places.abscissae(&measured.values);
+        let at = places.abscissae();
         let figures = view.figures(&own, &at, &against)?;
         out.push((said(&channel.name), channel.name.as_str(), figures));
     }
