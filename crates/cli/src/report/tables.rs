@@ -138,7 +138,7 @@ fn finding(found: &Finding) -> Markup {
             table.plain {
                 tbody {
                     @for (name, parameter) in answer::in_order(found).into_iter().filter(|(n, p)| !answer::is_switch(&found.cause, n, p)) {
-                        tr { th { (name.replace('_', " ")) } td.number { (answer::size(name, parameter)) } }
+                        tr { th { (name.replace('_', " ")) } td.number { (answer::found_size(&found.cause, name, parameter)) } }
                     }
                 }
             }

@@ -35,8 +35,12 @@ pub fn headline(finding: &Finding) -> String {
     let sizes: Vec<String> = named(finding)
         .into_iter()
         .map(|(name, p)| match *name == p.unit {
-            true => size(name, p),
-            false => format!("{} {}", name.replace('_', " "), size(name, p)),
+            true => found_size(&finding.cause, name, p),
+            false => format!(
+                "{} {}",
+                name.replace('_', " "),
+                found_size(&finding.cause, name, p)
+            ),
         })
         .collect();
     let place = finding.channels.join(", ");
@@ -246,10 +250,29 @@ pub fn size(name: &str, p: &Parameter) -> String {
     between(p, model::bounds(name, &p.unit))
 }
 
+/// The same of a finding: what its effect requires was estimated, and says so where the record gives no interval; the rest
+/// is a setting, as a reference temperature is.
+#[must_use]
+pub fn found_size(cause: &str, name: &str, p: &Parameter) -> String {
+    let specs = effect(cause).map_or(&[][..], |e| e.parameters());
+    let is_setting = specs.iter().any(|s| s.name == name && !s.required);
+    let remark = if is_setting { "" } else { no_interval(p) };
+    size(name, p) + remark
+}
+
 /// A value with its 95 % interval and unit.
 #[must_use]
 pub fn with_interval(p: &Parameter) -> String {
-    between(p, [f64::NEG_INFINITY, f64::INFINITY])
+    between(p, [f64::NEG_INFINITY, f64::INFINITY]) + no_interval(p)
+}
+
+/// What is said behind a value that should have an interval and has none; a count or a code is exact.
+fn no_interval(p: &Parameter) -> &'static str {
+    let is_exact = matches!(p.unit.as_str(), "1" | "counts") && p.value.fract() == 0.0;
+    match p.std_error.is_some_and(|e| e > 0.0 && e.is_finite()) || is_exact {
+        true => "",
+        false => NO_INTERVAL,
+    }
 }
 
 /// What stands behind a value that the record gives no interval for.
@@ -273,9 +296,7 @@ fn between(p: &Parameter, [least, most]: [f64; 2]) -> String {
         .std_error
         .filter(|e| *e > 0.0 && e.is_finite() && p.value.is_finite());
     let Some(error) = error else {
-        let exact = matches!(p.unit.as_str(), "1" | "counts") && p.value.fract() == 0.0;
-        let without = if exact { "" } else { NO_INTERVAL };
-        return format!("{}{unit}{without}", without_error(p.value));
+        return format!("{}{unit}", without_error(p.value));
     };
     let half = HALF_WIDTH_95 * error;
     let show = |v: f64| to_place_of(v, half);
@@ -365,6 +386,16 @@ mod tests {
         assert_eq!(said(0.000_126_444, "deg/s/sqrt(s)"), [k, k]);
         let time = "43211 s (no interval from this record)";
         assert_eq!(said(43_210.6, "s"), [time, time]);
+        // A reference is a setting.
+        let reference = Parameter {
+            value: 20.0,
+            std_error: None,
+            unit: "degC".into(),
+        };
+        assert_eq!(
+            found_size("temperature_quadratic", "reference", &reference),
+            "20 degC"
+        );
         // A count is exact, and so is a code.
         assert_eq!(said(1234.0, "1"), ["1234", "1234"]);
         assert_eq!(said(-8192.0, "counts"), ["-8192 counts", "-8192 counts"]);
