@@ -65,6 +65,9 @@ for (const width of WIDTHS) {
     });
     const far = shown.querySelectorAll('figure .narrow svg, header *, article *');
     far.forEach((e) => { if (e.getBoundingClientRect().right > width + 1) at(`${e.tagName} reaches beyond the page`); });
+    const sentences = [...shown.querySelectorAll('.scroll td:last-child:not(.number)')];
+    const broken = sentences.filter((e) => e.textContent.length > 40 && e.getBoundingClientRect().width < 150);
+    if (broken.length) at(`${broken.length} cells of a table are a word wide`);
     if (shown.scripts.length) at('has a script');
     left -= 1;
     if (left === 0) {
