@@ -65,6 +65,9 @@ for (const width of WIDTHS) {
     });
     const far = shown.querySelectorAll('figure .narrow svg, header *, article *');
     far.forEach((e) => { if (e.getBoundingClientRect().right > width + 1) at(`${e.tagName} reaches beyond the page`); });
+    const sentences = [...shown.querySelectorAll('.scroll td:last-child:not(.number)')];
+    const broken = sentences.filter((e) => e.textContent.length > 40 && e.getBoundingClientRect().width < 150);
+    if (broken.length) at(`${broken.length} cells of a table are a word wide`);
     if (shown.scripts.length) at('has a script');
     left -= 1;
     if (left === 0) {
@@ -78,20 +81,49 @@ for (const width of WIDTHS) {
 }
 </script></body></html>"#;
 
+/// Shows a page as it is printed, in a frame of the width of an A4 page, and writes down which letters of its drawings are
+/// smaller than 9 px, 7 pt.
+const PRINTED: &str = r#"<!DOCTYPE html><html><body><script>
+const frame = document.createElement('iframe');
+frame.style = 'width:703px;height:900px;border:0';
+frame.onload = () => {
+  const wrong = [], shown = frame.contentDocument;
+  shown.querySelectorAll('details').forEach((d) => d.open = true);
+  const drawings = [...shown.querySelectorAll('figure svg')].filter((s) => s.getBoundingClientRect().width > 0);
+  if (drawings.length < 7) wrong.push(`${drawings.length} drawings`);
+  drawings.forEach((s, k) => {
+    const letters = [...s.querySelectorAll('text')].map((t) => {
+      const { a, b } = t.getScreenCTM();
+      return Math.hypot(a, b) * parseFloat(getComputedStyle(t).fontSize);
+    });
+    if (!(Math.min(...letters) >= 9)) wrong.push(`drawing ${k}: letters of ${Math.min(...letters)} px`);
+  });
+  const said = document.createElement('p');
+  said.textContent = 'SAID' + JSON.stringify(wrong) + 'SAID';
+  document.body.replaceChildren(said);
+};
+frame.srcdoc = PAGE;
+document.body.append(frame);
+</script></body></html>"#;
+
 /// Nothing but its own styles: whatever else it asks for is refused, and the console says so.
 const NOTHING_ELSE: &str = "<head><meta http-equiv=\"Content-Security-Policy\" \
      content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">";
 
 /// What a browser finds wrong with a page at 390 and 1280 px.
 fn wrong_with(browser: &Browser, page: &str, beside: &Path) -> Vec<String> {
+    let look = LOOK.replace("WIDTHS", "[390, 1280]");
+    looked_at(browser, page, beside, &look)
+}
+
+/// What a browser finds wrong with a page by the script of another one.
+fn looked_at(browser: &Browser, page: &str, beside: &Path, look: &str) -> Vec<String> {
     let page = page.replacen("<head>", NOTHING_ELSE, 1);
     assert!(page.contains(NOTHING_ELSE));
     let quoted = serde_json::to_string(&page).expect("JSON");
     // Its end would end the script, too.
     let quoted = quoted.replace("</", "<\\/");
-    let look = LOOK
-        .replace("WIDTHS", "[390, 1280]")
-        .replace("PAGE", &quoted);
+    let look = look.replace("PAGE", &quoted);
     let (dom, console) = browser.dom(&look, beside).expect("it shows a page");
     let said = dom
         .split("SAID")
@@ -136,6 +168,16 @@ fn a_report_that_is_wrong_is_seen_to_be() {
     ] {
         assert!(wrong.contains(what), "{what} is not seen:\n{wrong}");
     }
+}
+
+#[test]
+fn letters_of_a_printed_figure_can_be_read() {
+    let Some(browser) = browser() else { return };
+    let (folder, page) = reported();
+    let printed = page.replace("@media print", "@media all");
+    assert_ne!(&printed, page);
+    let wrong = looked_at(&browser, &printed, folder, PRINTED);
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]

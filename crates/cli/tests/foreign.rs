@@ -3,6 +3,8 @@
 
 #[path = "foreign/names.rs"]
 mod names;
+#[path = "foreign/pandas.rs"]
+mod pandas;
 
 use imu_stand::capture::{Read, read_from};
 use imu_stand::{CaptureError, ColumnMapping, ReadOptions};

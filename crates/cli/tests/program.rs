@@ -383,3 +383,14 @@ fn what_cannot_be_read_is_said_once_and_a_cut_file_by_its_name() {
         "{said}"
     );
 }
+
+#[test]
+fn a_rate_that_was_worked_out_is_said_as_a_person_writes_it() {
+    let folder = folder("rate");
+    let out = folder.join("c.csv");
+    let rate = "--rate=19.999999999999908";
+    let out = out.to_str().unwrap();
+    let made = run(&["simulate", "--seconds", "60", rate, "--out", out]);
+    let said = String::from_utf8_lossy(&made.stdout);
+    assert!(said.contains("1200 rows at 20 Hz, seed 1"), "{said}");
+}

@@ -188,7 +188,24 @@ fn guess_by_name(names: &[String], seen: &Seen, guess: &mut Guess) {
             .or_else(|| first(&is_reading))
             .or_else(|| first(&|at| meanings[at].kind != Kind::Time));
         if let Some(at) = found {
-            guess.add(names, "gyro_x", at, What::Channel(Quantity::Gyro));
+            // The other axes have the same name but for the axis.
+            let stem = |at: usize| {
+                let mut words = words(&names[at]);
+                words.pop();
+                words
+            };
+            let of_axis = |axis| {
+                let mut all = 0..names.len();
+                all.find(|k| meanings[*k].axis == Some(axis) && stem(*k) == stem(at))
+            };
+            let of = match [0, 1, 2].map(of_axis) {
+                [Some(x), Some(y), Some(z)] if meanings[at].axis.is_some() => vec![x, y, z],
+                _ => vec![at],
+            };
+            for (axis, at) in AXES.iter().zip(of) {
+                let ours = format!("gyro_{axis}");
+                guess.add(names, &ours, at, What::Channel(Quantity::Gyro));
+            }
         }
     }
     no_rates(seen, guess);
@@ -328,7 +345,7 @@ impl Meaning {
         let unit_is_of = |what| unit.is_some_and(|unit| is_unit_of(unit, what));
         let kind = if is(&["mag", "quat", "orient", "gravity", "euler", "tick"]) {
             Kind::Unknown
-        } else if is(&["gyr", "angular", "omega", "rot", "rate"])
+        } else if is(&["gyr", "angular", "omega", "rot", "rate", "dreh"])
             || letters(&["g", "w", "gx", "gy", "gz", "wx", "wy", "wz"])
         {
             Kind::Gyro

@@ -20,7 +20,7 @@ use super::propose::seen::{ROWS, Seen, first_rows};
 use super::rows::RowReader;
 use super::skipped::keep_places;
 use super::span::Span;
-use super::steady::{one_rate, unsteady};
+use super::steady::{by_rounded_times, one_rate, unsteady};
 use super::stream::{TextLines, io, named, unpacked};
 use super::table::Table;
 #[cfg(feature = "native")]
@@ -277,6 +277,10 @@ fn finish(
         record = in_order(record);
     }
     one_rate(&record)?;
+    if options.rate_hz.is_none() && stated.is_none() {
+        let note = by_rounded_times(&record)?;
+        record.notes.extend(note);
+    }
     check_rate(&mut record, options.rate_hz)?;
     difference_angles(&mut record)?;
     share_thermometer(&mut record);

@@ -114,7 +114,7 @@ impl<'a> RowReader<'a> {
             let cell = row.get(column.at).map_or("", |cell| cell.as_ref());
             let is_measured = matches!(column.role, Role::Measured { .. });
             let read = match (cell, &column.role) {
-                ("" | "nan" | "NaN" | "NAN", _) if is_measured => Some(f64::NAN),
+                (cell, _) if is_measured && is_missing(cell) => Some(f64::NAN),
                 (_, Role::Time { .. }) => {
                     let cells = &mut self.cells;
                     self.clocks[k].seconds(cell, |cell| cells.number(cell))
@@ -146,4 +146,10 @@ impl<'a> RowReader<'a> {
         }
         Ok(())
     }
+}
+
+/// Whether a cell says that there is no reading: nothing, or what tables write for it.
+fn is_missing(cell: &str) -> bool {
+    const WORDS: [&str; 7] = ["nan", "na", "n/a", "#n/a", "<na>", "null", "none"];
+    cell.is_empty() || WORDS.iter().any(|word| cell.eq_ignore_ascii_case(word))
 }

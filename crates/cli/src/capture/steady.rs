@@ -4,6 +4,7 @@ use model::record::sampling::Sampling;
 use model::record::{Axis, Base, Quantity, Record};
 
 use super::{CaptureError, STANDARD_GRAVITY};
+use crate::report::plot::number;
 
 /// Parts of a record that are compared, and steps that each has at least.
 const BLOCKS: usize = 30;
@@ -97,6 +98,44 @@ fn split(times: &[f64], first: f64, last: f64) -> usize {
         }
     }
     best.1
+}
+
+/// Part of itself to which a rate has to be known where the times alone tell it, and by which a note says how far it is.
+const KNOWN: f64 = 0.05;
+const TOLD: f64 = 2e-3;
+
+/// Part of itself by which the rate may be off where most rows have the time of the row before: the times are rounded to
+/// steps, and neither the first nor the last is seen whole. `None` of other times.
+fn rounded(times: &[f64]) -> Option<f64> {
+    let steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+    let mut apart: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
+    if 2 * apart.len() >= steps.len() {
+        return None;
+    }
+    let step = median(&mut apart);
+    let span = times.last()? - times.first()?;
+    Some(step / span).filter(|part| part.is_finite())
+}
+
+/// What to say of a rate that only rounded times tell.
+///
+/// # Errors
+/// Where they are too coarse to tell it, as seconds since 1970 in single precision are.
+pub(super) fn by_rounded_times(record: &Record) -> Result<Option<String>, CaptureError> {
+    let Some(part) = times(record).as_deref().and_then(rounded) else {
+        return Ok(None);
+    };
+    let percent = number(100.0 * part, 2);
+    if part > KNOWN {
+        return Err(CaptureError::Time {
+            why: format!("the times are rounded so coarsely that they tell the rate to {percent} % only"),
+            help: "say the rate: `--rate HZ`; or write the times with more digits (seconds since 1970 need double precision)"
+                .to_owned(),
+        });
+    }
+    Ok((part > TOLD).then(|| {
+        format!("such times tell the rate to {percent} %; `--rate HZ` says it to all digits")
+    }))
 }
 
 /// An error where the file is two records behind one another, each of one rate.

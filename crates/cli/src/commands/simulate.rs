@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use imu_stand::capture::write_to;
+use imu_stand::report::plot::tidy;
 use miette::Result;
 use model::file::ModelFile;
 
@@ -65,9 +66,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if !arguments.quiet {
         say!(
-            "{}: {} rows at {rate} Hz, seed {}",
+            "{}: {} rows at {} Hz, seed {}",
             arguments.out.display(),
             record.len(),
+            tidy(rate, 6),
             arguments.seed
         );
     }

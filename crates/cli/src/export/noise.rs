@@ -260,7 +260,7 @@ fn walks(analysis: &Analysis) -> Option<String> {
 
 /// A rate as a person would write it: a sample interval that was measured or computed has a last digit of its own.
 fn tidy(rate_hz: f64) -> f64 {
-    format!("{rate_hz:.7e}").parse().unwrap_or(rate_hz)
+    format!("{rate_hz:.5e}").parse().unwrap_or(rate_hz)
 }
 
 /// Root mean square of those that are known; 0 where none is.
@@ -270,4 +270,14 @@ pub(super) fn rms(values: impl Iterator<Item = Option<f64>>) -> f64 {
         return 0.0;
     }
     (known.iter().map(|v| v * v).sum::<f64>() / known.len() as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_rate_from_times_in_whole_milliseconds_is_written_as_the_one_meant() {
+        // 11999 intervals of 10 ms, the last time cut to 119 989 ms for 119 990.
+        assert_eq!(super::tidy(99.999_991).to_string(), "100");
+        assert_eq!(super::tidy(19.864_312).to_string(), "19.8643");
+    }
 }

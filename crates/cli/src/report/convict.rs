@@ -2,17 +2,15 @@
 //! measurement beside a simulation without the cause.
 
 use diagnosis::result::{Evidence, Finding};
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 use model::effect::Plot;
 use model::effects::effect;
 use model::record::Record;
 
 use super::exhibits::views::{self, Pair};
 use super::plot::{self, Figure};
-use super::{ReportError, Subject, drawing, standalone};
+use super::{ReportError, Subject, at_two_widths, standalone};
 
-/// Width and height of a figure on a telephone, units of its view box: letters keep their size at 390 px.
-const NARROW: (u32, u32) = (430, 320);
 /// Share of its frequency by which the view of a line reaches either side, and that reach at least, Hz.
 const AROUND_LINE: f64 = 0.1;
 const LEAST_AROUND_HZ: f64 = 0.2;
@@ -34,7 +32,7 @@ pub(super) fn figures(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError>
             out.push(captioned(
                 &standalone::figure(evidence),
                 &evidence.title,
-                &evidence.caption,
+                &caption(evidence),
             )?);
         }
         if own.is_empty() {
@@ -56,6 +54,38 @@ fn fits(evidence: &Evidence) -> bool {
     let by_value = matches!(plot, Plot::RateByValue(_));
     let in_time = matches!(plot, Plot::RateInTime { .. });
     !(by_value || in_time && evidence.log_x)
+}
+
+/// What an engine's figure shows, by what it has at its axes. An effect says it of the kind of figure that it names; the
+/// engine draws another where a term has another form, as the surge of a motor has, which it shows in time.
+fn caption(evidence: &Evidence) -> String {
+    let docs = effect(&evidence.cause).map(|e| e.docs());
+    let Some(docs) = docs.filter(|d| evidence.caption == d.figure) else {
+        return evidence.caption.clone();
+    };
+    let plot = docs.example.plot;
+    let (is_said, own) = match evidence.x_label.as_str() {
+        _ if evidence.log_x => (
+            matches!(plot, Plot::Spectrum),
+            "Spectrum of the rate with the model before and after.".to_owned(),
+        ),
+        "frequency, Hz" => (
+            matches!(plot, Plot::Lines { .. }),
+            "Amplitude spectrum of the rate around it, other terms taken out.".to_owned(),
+        ),
+        "time, s" => (
+            matches!(plot, Plot::RateInTime { .. }),
+            "Rate in time blocks, the other terms taken out, with the course that the model gives it.".to_owned(),
+        ),
+        other => (
+            matches!(plot, Plot::RateAgainst(_)),
+            format!("Rate in time blocks, the other terms taken out, against {other}."),
+        ),
+    };
+    match is_said {
+        true => docs.figure.to_owned(),
+        false => own,
+    }
 }
 
 /// A simulation of the baseline in the world of the record; `None` where the model cannot be simulated.
@@ -92,9 +122,14 @@ fn view(
         labels: ["measured", "simulated without it"],
         at: (finding.times_s.first()).map(|t| (t * rate_hz).round() as usize),
     };
-    let figure = views::figure(place(docs.example.plot, finding, channel), channel, &pair).ok()?;
+    let plot = place(docs.example.plot, finding, channel);
+    let figure = views::figure(plot, channel, &pair).ok()?;
     let title = format!("{channel}: {}", docs.title);
-    Some(captioned(&figure, &title, docs.figure))
+    Some(captioned(
+        &figure,
+        &title,
+        &views::caption(plot, pair.labels),
+    ))
 }
 
 /// The view of this finding: on its own axis, along the channel that it follows most, about its own frequency.
@@ -148,23 +183,92 @@ fn strongest(finding: &Finding) -> Option<&'static str> {
     scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|s| s.1)
 }
 
-/// A figure for a wide page and for a telephone, of which the style shows one.
+/// A figure with title and caption.
 fn captioned(figure: &Figure, title: &str, caption: &str) -> Result<Markup, ReportError> {
     let wide = Figure {
         width: plot::WIDE,
         height: 400,
         ..figure.clone()
     };
-    let narrow = Figure {
-        width: NARROW.0,
-        height: NARROW.1,
-        ..figure.clone()
-    };
     Ok(html! {
         figure {
-            div.wide { (drawing(&wide)?) }
-            div.narrow { (PreEscaped(narrow.svg()?)) }
+            (at_two_widths(&wide)?)
             figcaption { b { (title) ". " } (caption) }
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn evidence(cause: &str, x_label: &str, log_x: bool) -> Evidence {
+        Evidence {
+            cause: cause.into(),
+            title: String::new(),
+            channel: "gyro_x".into(),
+            x_label: x_label.into(),
+            y_label: "rate, deg/s".into(),
+            log_x,
+            log_y: log_x,
+            series: vec![],
+            caption: effect(cause).map_or("", |e| e.docs().figure).into(),
+        }
+    }
+
+    #[test]
+    fn a_caption_says_what_stands_at_the_axes_whatever_the_cause() {
+        let kinds = [
+            ("time, s", false, "in time blocks"),
+            ("pwm, counts", false, "against"),
+            ("frequency, Hz", false, "Amplitude spectrum"),
+            ("frequency, Hz", true, "Spectrum of the rate"),
+        ];
+        for effect in model::effects::EFFECTS {
+            for (x_label, log_x, words) in kinds {
+                let said = caption(&evidence(effect.id(), x_label, log_x));
+                let in_time = x_label == "time, s";
+                assert!(
+                    said.contains(words),
+                    "{} over {x_label}: {said}",
+                    effect.id()
+                );
+                assert!(
+                    !(in_time && said.contains("against")),
+                    "{}: {said}",
+                    effect.id()
+                );
+            }
+        }
+        // The surge of a motor is drawn in time, its steady part over the duty.
+        let said = caption(&evidence("motor_bias", "time, s", false));
+        assert!(
+            said.starts_with("Rate in time blocks, the other terms"),
+            "{said}"
+        );
+        let said = caption(&evidence("motor_bias", "pwm, counts", false));
+        assert_eq!(said, "Rate in time blocks against duty.");
+        // What the engine says of a figure of its own stays.
+        let own = Evidence {
+            caption: "Two levels.".into(),
+            ..evidence("telegraph", "time, s", false)
+        };
+        assert_eq!(caption(&own), "Two levels.");
+    }
+
+    #[test]
+    fn a_view_says_itself_what_it_shows() {
+        for effect in model::effects::EFFECTS {
+            let plot = effect.docs().example.plot;
+            let said = views::caption(plot, ["measured", "simulated without it"]);
+            // No view is whitened, or has terms taken out, or a model in it.
+            for word in ["hitened", "taken out", "before and after", "each of them"] {
+                assert!(!said.contains(word), "{}: {said}", effect.id());
+            }
+            assert!(
+                said.ends_with(": measured and simulated without it."),
+                "{said}"
+            );
+        }
+    }
 }

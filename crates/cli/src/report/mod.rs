@@ -21,6 +21,8 @@ const REPLICATES: usize = 199;
 const FEWEST: usize = 39;
 /// Rows that are simulated for the bands of one model where that leaves enough replicates: seconds of one core.
 const DRAWN: usize = 35_000_000;
+/// Width of the figure of a signal, units of its view box.
+const SIGNAL: u32 = 880;
 /// Columns of a thinned signal.
 const COLUMNS: usize = 700;
 const STYLE: &str = include_str!("style.css");
@@ -89,7 +91,7 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
                 @if !convicting.is_empty() {
                     section {
                         h2 { "The evidence for each cause" }
-                        @for figure in &convicting { (figure) }
+                        .evidence { @for figure in &convicting { (figure) } }
                     }
                 }
                 (tables::noise(subject))
@@ -190,9 +192,15 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
     };
     let before = of_channels(&diagnosed.baseline_model, said);
     let sampling = Sampling::of(record, subject.rate_hz)?;
-    let places = Places::new(&sampling, record.len());
+    let places_of = |model: &ModelFile| -> Vec<Option<Places>> {
+        let readings = model.channels.iter().map(|c| record.channel(&c.name));
+        readings
+            .map(|c| c.map(|c| Places::new(&sampling, &c.values)))
+            .collect()
+    };
     let simulate = |model: &ModelFile, stream: u64| {
         let count = replicates_of(record);
+        let places = places_of(model);
         replicates::replicate(model, record, &places, count, subject.seed ^ stream)
     };
     let first = match before.channels.is_empty() {
@@ -209,8 +217,8 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
         }
     };
     let mut out = Vec::new();
-    for (index, channel) in after.channels.iter().enumerate() {
-        let Some(measured) = record.channel(&channel.name) else {
+    for (index, (channel, places)) in after.channels.iter().zip(places_of(after)).enumerate() {
+        let (Some(measured), Some(places)) = (record.channel(&channel.name), places) else {
             continue;
         };
         let of_before = (before.channels.iter()).position(|c| c.name == channel.name);
@@ -232,7 +240,7 @@ fn channels(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
             replicates::against(&own, all),
             replicates::against(&own, &all_after[index]),
         ];
-        let at = places.abscissae(&measured.values);
+        let at = places.abscissae();
         let figures = view.figures(&own, &at, &against)?;
         out.push((said(&channel.name), channel.name.as_str(), figures));
     }
@@ -354,8 +362,9 @@ impl View<'_> {
                     String::new()
                 },
                 y_label: self.unit.to_owned(),
-                width: plot::WIDE,
-                height: if k == last { 132 } else { 110 },
+                // Narrower than the page: its letters can be read in print.
+                width: SIGNAL,
+                height: if k == last { 106 } else { 84 },
                 y_range: (low < high).then_some(low - margin..high + margin),
                 layers: vec![Drawn::new(
                     label,
@@ -417,7 +426,7 @@ impl View<'_> {
             layers,
             ..Figure::default()
         };
-        drawing(&figure)
+        at_two_widths(&figure)
     }
 
     fn angle(
@@ -442,13 +451,31 @@ impl View<'_> {
             layers,
             ..Figure::default()
         };
-        drawing(&figure)
+        at_two_widths(&figure)
     }
 }
 
 fn capitalised(word: &str) -> String {
     let first = word.chars().next().into_iter().flat_map(char::to_uppercase);
     first.chain(word.chars().skip(1)).collect()
+}
+
+/// Width and height of a figure on a telephone and in a column of a printed page, units of its view box: letters keep their
+/// size at 390 px, and have 7 pt in print.
+const NARROW: (u32, u32) = (430, 264);
+
+/// A figure as it is for a wide page, and for a telephone and a printed one, of which the style shows one.
+fn at_two_widths(wide: &Figure) -> Result<Markup, ReportError> {
+    let narrow = Figure {
+        width: NARROW.0,
+        height: NARROW.1,
+        ..wide.clone()
+    };
+    Ok(html! {
+        (wide.legend())
+        div.wide { (PreEscaped(wide.svg()?)) }
+        div.narrow { (PreEscaped(narrow.svg()?)) }
+    })
 }
 
 /// A figure with its legend above it.

@@ -210,7 +210,7 @@ impl Figure {
         let mut chart = ChartBuilder::on(area)
             .margin(8)
             .margin_right(18)
-            .x_label_area_size(44)
+            .x_label_area_size(if self.x_label.is_empty() { 26 } else { 44 })
             .y_label_area_size(78)
             .build_cartesian_2d(x, y)?;
         chart

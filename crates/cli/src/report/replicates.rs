@@ -7,7 +7,8 @@ use model::file::ModelFile;
 use model::record::Record;
 use model::record::sampling::Sampling;
 use model::simulate::{Replicas, SimulateError};
-use noise::allan::{Phase, TauGrid};
+use noise::allan::{Estimate, Phase, TauGrid};
+use numerics::column;
 
 /// Instants at which the integrated angle is compared.
 const ANGLE_POINTS: usize = 150;
@@ -15,6 +16,12 @@ const ANGLE_POINTS: usize = 150;
 const CALIBRATION: usize = 10;
 /// The record has to be at least this many times longer than the longest cluster time (the paper's rule).
 const LONGER_THAN_TAU: usize = 10;
+/// Rows of a record above which a long cluster time is read at every [`THINNED`]th place only: the places of the others say
+/// the same again.
+const LONG: usize = 1 << 18;
+const THINNED: usize = 8;
+/// Places in a cluster time that is read so, at least.
+const OVERLAPS: usize = 8;
 /// Coverage of the bands.
 const COVERAGE: f64 = 0.95;
 
@@ -62,46 +69,47 @@ pub struct Against {
     pub angle: Band,
 }
 
-/// Places at which curves are read off.
-pub struct Places<'a> {
-    sampling: &'a Sampling,
+/// Places at which the curves of one channel are read off.
+#[derive(Clone, Debug)]
+pub struct Places {
+    tau0: f64,
     rows: usize,
+    /// Rows without a gap between them. A replicate lacks the readings that the record lacks, and has the same.
+    runs: Vec<Range<usize>>,
+    factors: Vec<usize>,
+    /// Rows without a reading.
+    missing: Vec<usize>,
 }
 
-impl<'a> Places<'a> {
-    /// For a record of `rows` rows sampled so.
+impl Places {
+    /// For the readings of a channel of a record sampled so.
     #[must_use]
-    pub fn new(sampling: &'a Sampling, rows: usize) -> Self {
-        Self { sampling, rows }
-    }
-
-    /// The abscissae of the curves of a channel.
-    #[must_use]
-    pub fn abscissae(&self, values: &[f64]) -> Abscissae {
-        let tau0 = self.sampling.tau0;
-        let calibration = self.rows / CALIBRATION;
-        Abscissae {
-            tau_s: self
-                .factors(values)
-                .iter()
-                .map(|m| *m as f64 * tau0)
+    pub fn new(sampling: &Sampling, values: &[f64]) -> Self {
+        let runs = sampling.runs_of(values);
+        let samples: usize = runs.iter().map(ExactSizeIterator::len).sum();
+        Self {
+            tau0: sampling.tau0,
+            rows: values.len(),
+            factors: TauGrid::Octave.factors(samples / LONGER_THAN_TAU),
+            runs,
+            missing: (0..values.len())
+                .filter(|row| !values[*row].is_finite())
                 .collect(),
-            angle_s: self
-                .angle_rows()
-                .map(|row| (row - calibration) as f64 * tau0)
-                .collect(),
-            calibration_s: calibration as f64 * tau0,
         }
     }
 
-    fn factors(&self, values: &[f64]) -> Vec<usize> {
-        let samples: usize = self
-            .sampling
-            .runs_of(values)
-            .iter()
-            .map(ExactSizeIterator::len)
-            .sum();
-        TauGrid::Octave.factors(samples / LONGER_THAN_TAU)
+    /// The abscissae of the curves.
+    #[must_use]
+    pub fn abscissae(&self) -> Abscissae {
+        let calibration = self.rows / CALIBRATION;
+        Abscissae {
+            tau_s: self.factors.iter().map(|m| *m as f64 * self.tau0).collect(),
+            angle_s: self
+                .angle_rows()
+                .map(|row| (row - calibration) as f64 * self.tau0)
+                .collect(),
+            calibration_s: calibration as f64 * self.tau0,
+        }
     }
 
     fn angle_rows(&self) -> impl Iterator<Item = usize> {
@@ -110,40 +118,75 @@ impl<'a> Places<'a> {
         (1..=ANGLE_POINTS).map(move |k| calibration + k * rest / ANGLE_POINTS)
     }
 
-    /// The curves of a channel. Rows that it lacks are neither filled nor integrated.
+    /// Whether every row has a reading, and none is missing between them.
+    fn is_whole(&self) -> bool {
+        self.runs.iter().eq([&(0..self.rows)])
+    }
+
+    /// The curves of readings that lack what the channel lacks: that is neither filled nor integrated.
     #[must_use]
     pub fn curves(&self, values: &[f64]) -> Curves {
-        let tau0 = self.sampling.tau0;
-        let factors = self.factors(values);
-        let phase = Phase::from_values(values, &self.sampling.runs_of(values));
-        let mut deviations = phase
-            .overlapping_allan(tau0, &factors)
-            .into_iter()
-            .peekable();
+        Curves {
+            ln_adev: self.ln_adev(values),
+            angle: self.angle(values),
+        }
+    }
+
+    fn ln_adev(&self, values: &[f64]) -> Vec<f64> {
+        let is_thinned = self.rows > LONG && self.is_whole();
+        let split = match is_thinned {
+            true => self.factors.partition_point(|m| *m < OVERLAPS * THINNED),
+            false => self.factors.len(),
+        };
+        let (short, long) = self.factors.split_at(split);
+        let mut estimates =
+            Phase::from_values(values, &self.runs).overlapping_allan(self.tau0, short);
+        if !long.is_empty() {
+            let (groups, _) = values.as_chunks::<THINNED>();
+            let means: Vec<f64> = groups
+                .iter()
+                .map(|g| g.iter().sum::<f64>() / THINNED as f64)
+                .collect();
+            let factors: Vec<usize> = long.iter().map(|m| m / THINNED).collect();
+            let thinned =
+                Phase::in_place(means).overlapping_allan(self.tau0 * THINNED as f64, &factors);
+            estimates.extend(thinned.into_iter().map(|e| Estimate {
+                m: e.m * THINNED,
+                ..e
+            }));
+        }
         // A cluster time that no run is long enough for has no deviation.
-        let ln_adev = factors
+        let mut estimates = estimates.into_iter().peekable();
+        self.factors
             .iter()
             .map(|m| {
-                let own = deviations.next_if(|estimate| estimate.m == *m);
+                let own = estimates.next_if(|estimate| estimate.m == *m);
                 own.map_or(f64::NAN, |estimate| estimate.deviation.ln())
             })
-            .collect();
-        let calibration = self.rows / CALIBRATION;
-        let finite = values[..calibration].iter().filter(|v| v.is_finite());
-        let (sum, count) = finite.fold((0.0, 0), |(sum, n), v| (sum + v, n + 1));
-        let bias = sum / count.max(1) as f64;
-        let mut angle = Vec::with_capacity(ANGLE_POINTS);
-        let (mut sum, mut row) = (0.0, calibration);
-        for until in self.angle_rows() {
-            sum += values[row..until]
+            .collect()
+    }
+
+    fn angle(&self, values: &[f64]) -> Vec<f64> {
+        let is_whole = self.is_whole();
+        let total = |part: &[f64]| match is_whole {
+            true => (column::sum_of(part, |v| v), part.len()),
+            false => part
                 .iter()
                 .filter(|v| v.is_finite())
-                .map(|v| (v - bias) * tau0)
-                .sum::<f64>();
+                .fold((0.0, 0), |(sum, n), v| (sum + v, n + 1)),
+        };
+        let calibration = self.rows / CALIBRATION;
+        let (sum, count) = total(&values[..calibration]);
+        let bias = sum / count.max(1) as f64;
+        let mut angle = Vec::with_capacity(ANGLE_POINTS);
+        let (mut all, mut row) = (0.0, calibration);
+        for until in self.angle_rows() {
+            let (sum, count) = total(&values[row..until]);
+            all += (sum - bias * count as f64) * self.tau0;
             row = until;
-            angle.push(sum);
+            angle.push(all);
         }
-        Curves { ln_adev, angle }
+        angle
     }
 }
 
@@ -151,7 +194,7 @@ impl<'a> Places<'a> {
 type Drawn = (Vec<Vec<f64>>, Vec<Vec<Curves>>);
 
 /// Simulates a model in the world that the record saw, `count` times, with the record's own gaps: the readings of each
-/// channel of the model once, and the curves of each every time. The second half is drawn beside the first where there is a
+/// channel of the model once, and the curves of those that have places every time. The second half is drawn beside the first where there is a
 /// thread for it (a browser has none), with the same numbers.
 ///
 /// # Errors
@@ -159,7 +202,7 @@ type Drawn = (Vec<Vec<f64>>, Vec<Vec<Curves>>);
 pub fn replicate(
     model: &ModelFile,
     record: &Record,
-    places: &Places<'_>,
+    places: &[Option<Places>],
     count: usize,
     seed: u64,
 ) -> Result<Drawn, SimulateError> {
@@ -185,7 +228,7 @@ pub fn replicate(
 fn draws(
     model: &ModelFile,
     record: &Record,
-    places: &Places<'_>,
+    places: &[Option<Places>],
     numbers: Range<u64>,
     seed: u64,
 ) -> Result<Drawn, SimulateError> {
@@ -196,15 +239,12 @@ fn draws(
     let first = numbers.start;
     for k in numbers {
         replicas.draw(seed.wrapping_add(k), &mut readings);
-        for (channel, values) in model.channels.iter().zip(&mut readings) {
-            let measured = record.channel(&channel.name).map(|c| c.values.iter());
-            for (value, measured) in values.iter_mut().zip(measured.into_iter().flatten()) {
-                if !measured.is_finite() {
-                    *value = f64::NAN;
-                }
+        for ((places, curves), values) in places.iter().zip(&mut curves).zip(&mut readings) {
+            // The record lacks the channel: nothing is held against it.
+            let Some(places) = places else { continue };
+            for row in &places.missing {
+                values[*row] = f64::NAN;
             }
-        }
-        for (curves, values) in curves.iter_mut().zip(&readings) {
             curves.push(places.curves(values));
         }
         if k == first {
@@ -301,9 +341,11 @@ mod tests {
             for (model, outcome) in [&paper, &noisy].into_iter().zip(&mut outcomes) {
                 let record = record(model, 1000 + seed);
                 let sampling = Sampling::of(&record, None).unwrap();
-                let places = Places::new(&sampling, record.len());
+                let values = &record.channel("gyro_x").unwrap().values;
+                let places = Places::new(&sampling, values);
+                let measured = places.curves(values);
+                let places = [Some(places)];
                 let (_, replicates) = replicate(&paper, &record, &places, 99, seed * 1000).unwrap();
-                let measured = places.curves(&record.channel("gyro_x").unwrap().values);
                 *outcome += usize::from(against(&measured, &replicates[0]).adev_p <= 0.02);
             }
         }
@@ -340,13 +382,37 @@ mod tests {
         }
         values[rows / 2] = f64::NAN;
         let sampling = Sampling::of(&record, None).unwrap();
-        let places = Places::new(&sampling, rows);
         let values = &record.channels[0].values;
-        let (curves, at) = (places.curves(values), places.abscissae(values));
+        let places = Places::new(&sampling, values);
+        let (curves, at) = (places.curves(values), places.abscissae());
         assert!((at.calibration_s - 30.0).abs() < 1e-9);
         let (first, last) = (curves.angle[0], *curves.angle.last().unwrap());
         assert!((first - 2.0 * at.angle_s[0]).abs() < 1e-9);
         // One reading is missing and is not invented: 2 deg/s over 0.05 s less.
         assert!((last - (2.0 * at.angle_s.last().unwrap() - 0.1)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_long_record_has_the_curve_that_all_places_of_its_clusters_give() {
+        let mut model = ModelFile::paper();
+        model.channels.truncate(1);
+        let record = model::simulate(&model, 15_000.0, 20.0, 3).expect("it simulates");
+        let values = &record.channels[0].values;
+        assert!(values.len() > LONG);
+        let sampling = Sampling::of(&record, None).unwrap();
+        let places = Places::new(&sampling, values);
+        let all = Phase::from_values(values, &places.runs)
+            .overlapping_allan(sampling.tau0, &places.factors);
+        let curve = places.curves(values).ln_adev;
+        assert_eq!(curve.len(), all.len());
+        for (ln, all) in curve.iter().zip(&all) {
+            // A deviation of 64 samples is known to 1 % in this record.
+            assert!(
+                (ln - all.deviation.ln()).abs() < 2e-3,
+                "{all:?} {}",
+                ln.exp()
+            );
+        }
+        assert!((0..curve.len()).any(|i| curve[i] != all[i].deviation.ln()));
     }
 }

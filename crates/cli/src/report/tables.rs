@@ -1,6 +1,6 @@
 //! The words and tables of the report.
 
-use diagnosis::result::{Check, Finding, Unexplained, Verdict};
+use diagnosis::result::{Check, Finding, NotTested, Unexplained, Verdict};
 use maud::{Markup, html};
 use model::file::ModelFile;
 
@@ -138,7 +138,7 @@ fn finding(found: &Finding) -> Markup {
             table.plain {
                 tbody {
                     @for (name, parameter) in answer::in_order(found).into_iter().filter(|(n, p)| !answer::is_switch(&found.cause, n, p)) {
-                        tr { th { (name.replace('_', " ")) } td.number { (answer::size(name, parameter)) } }
+                        tr { th { (name.replace('_', " ")) } td.number { (answer::found_size(&found.cause, name, parameter)) } }
                     }
                 }
             }
@@ -331,11 +331,24 @@ fn limits(subject: &Subject<'_>) -> Markup {
                 h2 { "Not tested" }
                 table {
                     thead { tr { th { "cause" } th { "why, and what to record" } } }
-                    tbody { @for not in &d.not_tested { tr { td { (not.cause.replace('_', " ")) } td { (not.why) } } } }
+                    tbody { @for (causes, why) in by_reason(&d.not_tested) { tr { td { (causes) } td { (why) } } } }
                 }
             }
         }
     }
+}
+
+/// What was not tested, one entry a reason: a base that moves rules out twenty causes by one.
+fn by_reason(all: &[NotTested]) -> Vec<(String, &str)> {
+    let mut out: Vec<(String, &str)> = vec![];
+    for not in all {
+        let cause = not.cause.replace('_', " ");
+        match out.iter_mut().find(|(_, why)| *why == not.why) {
+            Some((causes, _)) => *causes += &format!(", {cause}"),
+            None => out.push((cause, &not.why)),
+        }
+    }
+    out
 }
 
 fn made(subject: &Subject<'_>) -> Markup {
@@ -360,5 +373,30 @@ fn chance(p: f64) -> String {
         number(p, 2)
     } else {
         "< 1e-300".to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn causes_that_one_reason_rules_out_are_one_entry() {
+        let not = |cause: &str, why: &str| NotTested {
+            cause: cause.into(),
+            why: why.into(),
+        };
+        let all = [
+            not("warm_up", "it moves"),
+            not("motor_bias", "no motor channel"),
+            not("rate_ramp", "it moves"),
+        ];
+        assert_eq!(
+            by_reason(&all),
+            [
+                ("warm up, rate ramp".to_owned(), "it moves"),
+                ("motor bias".to_owned(), "no motor channel")
+            ]
+        );
     }
 }

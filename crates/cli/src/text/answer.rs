@@ -35,8 +35,12 @@ pub fn headline(finding: &Finding) -> String {
     let sizes: Vec<String> = named(finding)
         .into_iter()
         .map(|(name, p)| match *name == p.unit {
-            true => size(name, p),
-            false => format!("{} {}", name.replace('_', " "), size(name, p)),
+            true => found_size(&finding.cause, name, p),
+            false => format!(
+                "{} {}",
+                name.replace('_', " "),
+                found_size(&finding.cause, name, p)
+            ),
         })
         .collect();
     let place = finding.channels.join(", ");
@@ -246,10 +250,41 @@ pub fn size(name: &str, p: &Parameter) -> String {
     between(p, model::bounds(name, &p.unit))
 }
 
+/// The same of a finding: what its effect requires was estimated, and says so where the record gives no interval; the rest
+/// is a setting, as a reference temperature is.
+#[must_use]
+pub fn found_size(cause: &str, name: &str, p: &Parameter) -> String {
+    let specs = effect(cause).map_or(&[][..], |e| e.parameters());
+    let is_setting = specs.iter().any(|s| s.name == name && !s.required);
+    let remark = if is_setting { "" } else { no_interval(p) };
+    size(name, p) + remark
+}
+
 /// A value with its 95 % interval and unit.
 #[must_use]
 pub fn with_interval(p: &Parameter) -> String {
-    between(p, [f64::NEG_INFINITY, f64::INFINITY])
+    between(p, [f64::NEG_INFINITY, f64::INFINITY]) + no_interval(p)
+}
+
+/// What is said behind a value that should have an interval and has none; a count or a code is exact.
+fn no_interval(p: &Parameter) -> &'static str {
+    let is_exact = matches!(p.unit.as_str(), "1" | "counts") && p.value.fract() == 0.0;
+    match p.std_error.is_some_and(|e| e > 0.0 && e.is_finite()) || is_exact {
+        true => "",
+        false => NO_INTERVAL,
+    }
+}
+
+/// What stands behind a value that the record gives no interval for.
+pub const NO_INTERVAL: &str = " (no\u{a0}interval from this record)";
+
+/// A value without an error: three digits, and those before the point, as of a time or a count.
+#[must_use]
+pub fn without_error(value: f64) -> String {
+    match value.abs() {
+        1e3..1e9 => format!("{value:.0}"),
+        _ => tidy(value, 3),
+    }
 }
 
 fn between(p: &Parameter, [least, most]: [f64; 2]) -> String {
@@ -261,7 +296,7 @@ fn between(p: &Parameter, [least, most]: [f64; 2]) -> String {
         .std_error
         .filter(|e| *e > 0.0 && e.is_finite() && p.value.is_finite());
     let Some(error) = error else {
-        return format!("{}{unit}", tidy(p.value, 6));
+        return format!("{}{unit}", without_error(p.value));
     };
     let half = HALF_WIDTH_95 * error;
     let show = |v: f64| to_place_of(v, half);
@@ -338,6 +373,35 @@ mod tests {
     }
 
     #[test]
+    fn a_value_without_an_error_has_three_digits_and_says_that_it_has_no_interval() {
+        let said = |value: f64, unit: &str| {
+            let p = Parameter {
+                value,
+                std_error: None,
+                unit: unit.into(),
+            };
+            [with_interval(&p), level(&p)].map(|s| s.replace('\u{a0}', " "))
+        };
+        let k = "0.000126 deg/s/sqrt(s) (no interval from this record)";
+        assert_eq!(said(0.000_126_444, "deg/s/sqrt(s)"), [k, k]);
+        let time = "43211 s (no interval from this record)";
+        assert_eq!(said(43_210.6, "s"), [time, time]);
+        // A reference is a setting.
+        let reference = Parameter {
+            value: 20.0,
+            std_error: None,
+            unit: "degC".into(),
+        };
+        assert_eq!(
+            found_size("temperature_quadratic", "reference", &reference),
+            "20 degC"
+        );
+        // A count is exact, and so is a code.
+        assert_eq!(said(1234.0, "1"), ["1234", "1234"]);
+        assert_eq!(said(-8192.0, "counts"), ["-8192 counts", "-8192 counts"]);
+    }
+
+    #[test]
     fn the_headline_says_where_what_and_how_large_with_its_interval() {
         let f = finding(
             "temperature",
@@ -354,10 +418,15 @@ mod tests {
         let times = [("end", 9.0, None, "s"), ("start", 4.0, None, "s")];
         let f = finding("noise_change", &times);
         let said = headline(&f);
-        assert!(said.ends_with("start 4 s; end 9 s"), "{said}");
+        let said = said.replace('\u{a0}', " ");
+        let none = "(no interval from this record)";
+        assert!(
+            said.ends_with(&format!("start 4 s {none}; end 9 s {none}")),
+            "{said}"
+        );
         let f = finding("clock_rate", &[("ppm", 417.4, None, "ppm")]);
         assert!(
-            headline(&f).ends_with("(clock_rate), 417.4 ppm"),
+            headline(&f).contains("(clock_rate), 417 ppm (no"),
             "{}",
             headline(&f)
         );

@@ -235,7 +235,7 @@ fn write_gain(out: &mut String, finding: &Finding, gain: &Gain) {
     }
 }
 
-/// Digits of a value without an error.
+/// Digits of a value whose error is 0.
 const DIGITS: usize = 6;
 
 /// A value with as many places as one that was measured with this standard error is shown with.
@@ -251,13 +251,13 @@ pub fn rounded_as(value: f64, std_error: Option<f64>) -> String {
     }
 }
 
-/// A value to the second digit of its standard error, both with the same places; as it is where it has none, as counts.
+/// A value to the second digit of its standard error, both with the same places; to three digits where it has none.
 #[must_use]
 pub fn measured(value: f64, std_error: Option<f64>) -> String {
     let error = match std_error {
         Some(error) if error > 0.0 && error.is_finite() && value.is_finite() => error,
         Some(error) => return format!("{} +- {}", tidy(value, DIGITS), tidy(error, 2)),
-        None => return tidy(value, DIGITS),
+        None => return answer::without_error(value),
     };
     // Of the rounded error: 0.0996 is 0.10.
     let exponent = |v: f64| format!("{v:.1e}").rsplit_once('e')?.1.parse::<i32>().ok();

@@ -39,8 +39,14 @@ pub(super) fn proposal(
         .cloned();
     let column = |(ours, at): &(String, usize)| {
         let name = &names[*at];
-        // What would be taken for the list's own commas goes by its number, and so does a name that two columns have.
-        if numbered || is_twice(name) || name.contains(',') || name.len() > LONG {
+        // What would be taken for the list's own commas goes by its number, and so do a name that two columns have and none at
+        // all, as pandas gives an index.
+        if numbered
+            || is_twice(name)
+            || name.trim().is_empty()
+            || name.contains(',')
+            || name.len() > LONG
+        {
             format!("{ours}={}", at + 1)
         } else {
             format!("{ours}={name}")

@@ -42,6 +42,16 @@ pub(in crate::report) struct Pair<'a> {
     pub at: Option<usize>,
 }
 
+/// What the figure of that kind shows, and of which two records.
+pub(in crate::report) fn caption(plot: Plot, labels: [&str; 2]) -> String {
+    format!(
+        "{}: {} and {}.",
+        sketches::caption(plot),
+        labels[0],
+        labels[1]
+    )
+}
+
 /// The figure of that kind of a channel, with the effect and without it. What is the same in both is drawn once.
 ///
 /// # Errors

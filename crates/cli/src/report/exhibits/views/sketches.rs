@@ -57,6 +57,38 @@ impl<'a> Sketch<'a> {
     }
 }
 
+/// What the figure of that kind shows.
+pub(super) fn caption(plot: Plot) -> String {
+    let text = match plot {
+        Plot::RateInTime { .. } => "Rate in time blocks",
+        Plot::RateAgainst(other) => return format!("Rate in time blocks against {other}"),
+        Plot::RateByValue(other) => return format!("Rate in blocks of {other} against {other}"),
+        Plot::PowerInTime => {
+            "Mean square of the noise (half that of the steps between readings) in time blocks"
+        }
+        Plot::PowerAgainst(other) => {
+            return format!(
+                "Mean square of the noise (half that of the steps between readings) in time blocks against {other}"
+            );
+        }
+        Plot::Spectrum => "Spectrum of the rate",
+        Plot::Lines { .. } => "Amplitude spectrum of the rate around it",
+        Plot::AxisAgainst(other) => {
+            return format!("Rate of {other} against the rate, reading by reading");
+        }
+        Plot::Tilt => {
+            "Tilt by the accelerometers against tilt by the rate, each without a straight line"
+        }
+        Plot::Around => "Readings around one event",
+        Plot::Histogram => "Histogram of the counts, and the normal law",
+        Plot::Bits => "Share of ones by bit",
+        Plot::Gaps => "Frames missing over time",
+        Plot::DeviceTime => "Device time minus its line",
+        Plot::HostTime => "Host time minus device time",
+    };
+    text.to_owned()
+}
+
 const TIME: &str = "time, s";
 const FREQUENCY: &str = "frequency, Hz";
 
