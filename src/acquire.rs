@@ -15,9 +15,9 @@ pub trait Sensors {
     /// Waits.
     type Delay: DelayNs;
 
-    /// The three gyros, x, y, z.
-    fn gyros(&mut self) -> &mut [Adis16250<Self::Spi>; 3];
-    /// The delay that goes with them.
+    /// A gyro: 0, 1, 2 are x, y, z.
+    fn gyro(&mut self, axis: u8) -> Option<&mut Adis16250<Self::Spi>>;
+    /// The delay that goes with it.
     fn delay(&mut self) -> Self::Delay;
     /// Slows SPI down to what a gyro of any sample period stands (1 MHz), or back to the sampling's own clock.
     fn slow(&mut self, _slow: bool) {}
@@ -131,8 +131,7 @@ impl Done {
 /// One frame with one gyro; `None` where it does not end.
 #[inline(never)]
 fn exchange<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Option<Word> {
-    let gyro = sensors.gyros().get_mut(axis as usize)?;
-    gyro.exchange(command).ok()
+    sensors.gyro(axis)?.exchange(command).ok()
 }
 
 /// One frame with each gyro: what they answer to the command of the round before, and a bit for each that does not.

@@ -157,8 +157,9 @@ impl Motor {
         self.turns()
     }
 
-    #[inline(never)]
-    fn turns(&self) -> bool {
+    /// The same in line, for what asks each millisecond.
+    #[inline(always)]
+    pub fn turns(&self) -> bool {
         self.output_q6 != 0 || self.target != 0 || self.shape != shape::STOP
     }
 
@@ -171,19 +172,18 @@ impl Motor {
         self.shape = shape::STOP;
     }
 
-    /// A millisecond has passed.
+    /// A millisecond has passed. `on` is what [`is_on`](Self::is_on) says.
     #[inline(always)]
-    pub fn on_millisecond(&mut self) {
-        if self.output > 0 {
-            self.dead = DEAD_MS;
-        } else if self.output < 0 {
-            self.dead = -DEAD_MS;
+    pub fn on_millisecond(&mut self, on: bool) {
+        // One that is not on puts nothing out.
+        if on && self.output != 0 {
+            self.dead = if self.output < 0 { -DEAD_MS } else { DEAD_MS };
         } else if self.dead > 0 {
             self.dead = self.dead.wrapping_sub(1);
         } else if self.dead < 0 {
             self.dead = self.dead.wrapping_add(1);
         }
-        if !self.turns() {
+        if !on {
             return;
         }
         if self.shape != shape::STOP {
@@ -244,11 +244,11 @@ mod tests {
             } else {
                 motor.command(255);
             }
-            (0..100).for_each(|_| motor.on_millisecond());
+            (0..100).for_each(|_| motor.on_millisecond(motor.is_on()));
             assert_ne!(motor.output(), 0);
             motor.cut();
             (0..400).for_each(|_| {
-                motor.on_millisecond();
+                motor.on_millisecond(motor.is_on());
                 assert_eq!(motor.output(), 0);
             });
             assert!(!motor.is_on());
@@ -261,7 +261,7 @@ mod tests {
         motor.command(255);
         let (mut before, mut highest) = (0, 0);
         for _ in 0..1000 {
-            motor.on_millisecond();
+            motor.on_millisecond(motor.is_on());
             assert!(motor.output() - before <= 1);
             before = motor.output();
             highest = highest.max(before);
@@ -276,7 +276,7 @@ mod tests {
             let (mut way, mut rested, mut turns) = (0, 0, 0);
             for ms in 0..4000 {
                 motor.command(if ms / 1000 % 2 == 0 { 255 } else { -255 });
-                motor.on_millisecond();
+                motor.on_millisecond(motor.is_on());
                 let now = motor.output().signum();
                 if now == 0 {
                     rested += 1;
@@ -296,10 +296,10 @@ mod tests {
     fn a_cut_does_not_shorten_the_rest() {
         let mut motor = motor(255, u16::MAX);
         motor.command(255);
-        (0..10).for_each(|_| motor.on_millisecond());
+        (0..10).for_each(|_| motor.on_millisecond(motor.is_on()));
         motor.cut();
         motor.command(-255);
-        motor.on_millisecond();
+        motor.on_millisecond(motor.is_on());
         assert_eq!(motor.output(), 0);
     }
 
@@ -307,7 +307,7 @@ mod tests {
     fn a_motor_without_limits_set_does_not_turn() {
         let mut motor = Motor::new();
         assert_eq!(motor.command(255), 0);
-        motor.on_millisecond();
+        motor.on_millisecond(motor.is_on());
         assert_eq!(motor.output(), 0);
     }
 
@@ -317,7 +317,7 @@ mod tests {
         assert!(motor.profile(shape, amplitude, offset, period_ms, cycles));
         (0..2 * u32::from(period_ms))
             .map(|_| {
-                motor.on_millisecond();
+                motor.on_millisecond(motor.is_on());
                 motor.target
             })
             .collect()
@@ -360,7 +360,7 @@ mod tests {
             let mut motor = motor(255, u16::MAX);
             assert!(motor.profile(shape::STEPS, 50, 0, 2, 0));
             (0..2 * 600).map(move |_| {
-                motor.on_millisecond();
+                motor.on_millisecond(motor.is_on());
                 motor.target
             })
         };
@@ -368,7 +368,7 @@ mod tests {
         let mut many = motor(255, u16::MAX);
         assert!(many.profile(shape::STEPS, 50, 0, 2, 255));
         let on = (0..2 * 600).map(|_| {
-            many.on_millisecond();
+            many.on_millisecond(many.is_on());
             many.target
         });
         assert_eq!(on.filter(|&duty| duty != 0).count(), 2 * 255 - 1);
@@ -379,9 +379,9 @@ mod tests {
         for way in [1, -1] {
             for rested in 0..6 {
                 let mut motor = motor(255, 64_000);
-                (0..rested).for_each(|_| motor.on_millisecond());
+                (0..rested).for_each(|_| motor.on_millisecond(motor.is_on()));
                 motor.command(way * 255);
-                motor.on_millisecond();
+                motor.on_millisecond(motor.is_on());
                 // 64 steps a millisecond, of which 4194 / 2^16 makes some thousandths less.
                 assert_eq!(motor.output(), way * 63, "{way} after {rested} ms");
                 assert!(motor.is_on());
@@ -395,7 +395,7 @@ mod tests {
             let mut motor = motor(255, ramp);
             motor.command(255);
             let full = (1..60_000).find(|_| {
-                motor.on_millisecond();
+                motor.on_millisecond(motor.is_on());
                 motor.output() == 255
             });
             // Never faster, and slower by less than a 64th of a step in a millisecond and what 4194 / 2^16 lacks.
@@ -407,7 +407,7 @@ mod tests {
         }
         let mut motor = motor(255, 0);
         motor.command(3);
-        (0..3 * 64).for_each(|_| motor.on_millisecond());
+        (0..3 * 64).for_each(|_| motor.on_millisecond(motor.is_on()));
         assert_eq!(motor.output(), 3);
     }
 

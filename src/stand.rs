@@ -262,8 +262,8 @@ impl Stand {
     /// A millisecond has passed: motor, EEPROM, self-test, health.
     #[inline(never)]
     pub fn on_millisecond<B: Board>(&mut self, board: &mut B) {
-        self.miss_host(board);
-        self.motor.on_millisecond();
+        let on = self.miss_host(board);
+        self.motor.on_millisecond(on);
         board.set_motor(self.motor.output());
         if !self.store.is_idle() {
             self.step_store(board);
@@ -290,13 +290,16 @@ impl Stand {
         }
     }
 
-    /// Where the host fell silent the board has cut the motor: its command ends with it.
+    /// Where the host fell silent the board has cut the motor: its command ends with it. Whether the motor is on then.
     #[inline(never)]
-    fn miss_host<B: Board>(&mut self, board: &B) {
-        if self.motor.is_on() && !board.host_is_there() {
+    fn miss_host<B: Board>(&mut self, board: &B) -> bool {
+        let on = self.motor.turns();
+        if on && !board.host_is_there() {
             self.motor.cut();
             self.record(Fault::MotorTimeout, 0);
+            return false;
         }
+        on
     }
 
     #[inline(never)]

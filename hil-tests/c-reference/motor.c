@@ -101,17 +101,16 @@ void motor_cut(void)
     shape = SHAPE_STOP;
 }
 
-void motor_on_millisecond(void)
+void motor_on_millisecond(bool on)
 {
-    if (output > 0)
-        dead = DEAD_MS;
-    else if (output < 0)
-        dead = -DEAD_MS;
+    /* One that is not on puts nothing out. */
+    if (on && output)
+        dead = output < 0 ? -DEAD_MS : DEAD_MS;
     else if (dead > 0)
         dead--;
     else if (dead < 0)
         dead++;
-    if (!motor_is_on())
+    if (!on)
         return;
     if (shape != SHAPE_STOP)
         step_profile();

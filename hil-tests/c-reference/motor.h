@@ -20,4 +20,4 @@ int16_t motor_output(void);
 bool motor_is_on(void);
 void motor_cut(void);
 /* A millisecond has passed. */
-void motor_on_millisecond(void);
+void motor_on_millisecond(bool on);

@@ -137,12 +137,15 @@ void stand_note_configured(uint8_t axes, uint8_t wrong)
     stand_count_each(FAULT_GYRO_SCALE_IMPOSSIBLE_X, wrong >> 3);
 }
 
-void stand_miss_host(void)
+bool stand_miss_host(void)
 {
-    if (motor_is_on() && !tick_host_is_there()) {
+    bool on = motor_is_on();
+    if (on && !tick_host_is_there()) {
         motor_cut();
         stand_count(FAULT_MOTOR_TIMEOUT, 1);
+        return false;
     }
+    return on;
 }
 
 void stand_apply(void)
@@ -378,8 +381,7 @@ void stand_correct(const struct raw *raw)
 void __attribute__((noinline)) stand_on_millisecond(void)
 {
     static uint16_t millisecond;
-    stand_miss_host();
-    motor_on_millisecond();
+    motor_on_millisecond(stand_miss_host());
     board_set_motor(motor_output());
     requests_on_millisecond();
     if (++millisecond >= HEALTH_MS) {

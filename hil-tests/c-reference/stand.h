@@ -46,7 +46,7 @@ extern uint8_t stand_touched;
 void stand_tell(uint8_t more);
 enum { OWED_HELLO = 1, OWED_HEALTH = 2, OWED_CLEAR = 4 };
 /* Where the host fell silent the motor has been cut: its command ends with it. */
-void stand_miss_host(void);
+bool stand_miss_host(void);
 /* Applies the set-up to motor, clock, line and sensors. */
 void stand_apply(void);
 /* What has come of setting up the gyros that have their bit in axes. */

@@ -38,6 +38,10 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 /// take less than a millisecond.
 const BYTES_PER_PASS: u8 = 32;
 
+/// Bits of the two clocks, sample and millisecond.
+const TICKED: u8 = 1;
+const PASSED: u8 = 2;
+
 /// All zeros: in .bss, which costs no flash.
 static mut STAND: Stand = Stand::new();
 
@@ -59,14 +63,14 @@ fn main() -> ! {
 
     let mut console = console::Console::new();
     // Which of the two clocks have moved since the watchdog was fed.
-    let (mut ticked, mut passed) = (false, false);
+    let mut moved = 0u8;
     loop {
         if let Some((raw, missed)) = tick::take() {
             stand.on_sample(&mut board, raw, missed);
             stand.correct(&mut board, raw);
-            ticked = true;
+            moved |= TICKED;
         } else if tick::take_passed() {
-            ticked = true;
+            moved |= TICKED;
         }
         for _ in 0..BYTES_PER_PASS {
             if !serial::has_received() || !stand.listens(&board) {
@@ -82,13 +86,13 @@ fn main() -> ! {
         serial::count_losses(stand);
         if tick::take_millisecond() {
             stand.on_millisecond(&mut board);
-            passed = true;
+            moved |= PASSED;
         }
         // Fed by both clocks, and from here alone: one that stalls is a reset, a main loop that hangs is one, and a reset
         // stops the motor.
-        if ticked && passed {
+        if moved == TICKED | PASSED {
             asm::wdr();
-            (ticked, passed) = (false, false);
+            moved = 0;
         }
         serial::work();
         tick::sleep_until_work(!serial::has_received() || stand.listens(&board));

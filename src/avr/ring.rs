@@ -24,18 +24,18 @@ impl<const N: usize> Ring<N> {
         (N - 1) as u8
     };
 
-    /// Writes a byte ahead of what the reader sees: `offset` from the next place, less than [`room`](Self::room).
-    /// The writer's.
+    /// Writes a byte ahead of what the reader sees: `offset` from the next place, less than [`room`](Self::room). `head` is
+    /// [`head`](Self::head), which moves by the writer alone and is read once for a frame. The writer's.
     #[inline(always)]
-    pub fn put(&self, offset: u8, byte: u8) {
+    pub fn put(&self, head: u8, offset: u8, byte: u8) {
         // SAFETY: inside, and behind the head the reader does not look.
-        unsafe { write_volatile(self.place(Self::further(self.head(), offset)), byte) }
+        unsafe { write_volatile(self.place(Self::further(head, offset)), byte) }
     }
 
-    /// Shows the reader `len` bytes that [`put`](Self::put) has written. The writer's.
-    pub fn advance(&self, len: u8) {
+    /// Shows the reader `len` bytes behind `head` that [`put`](Self::put) has written. The writer's.
+    pub fn advance(&self, head: u8, len: u8) {
         // SAFETY: a byte, written once.
-        unsafe { write_volatile(self.head.get(), Self::further(self.head(), len)) }
+        unsafe { write_volatile(self.head.get(), Self::further(head, len)) }
     }
 
     /// `at + by`, round the ring; `by` is at most [`LAST`](Self::LAST).
@@ -67,7 +67,8 @@ impl<const N: usize> Ring<N> {
         }
     }
 
-    fn head(&self) -> u8 {
+    /// Next to write.
+    pub fn head(&self) -> u8 {
         // SAFETY: a byte.
         unsafe { read_volatile(self.head.get()) }
     }

@@ -164,15 +164,13 @@ impl DelayNs for Delay {
 
 /// The three gyros and the accelerometer.
 pub struct AvrSensors {
-    gyros: [Adis16250<GyroSpi>; 3],
+    /// The one that is spoken to. All that tells it from the others is its chip select.
+    gyro: Adis16250<GyroSpi>,
 }
 
+/// All zeros: a static that begins otherwise costs flash, and the first of them the routine that copies it at reset as well.
 static mut SENSORS: AvrSensors = AvrSensors {
-    gyros: [
-        Adis16250::new(GyroSpi { select: SELECTS[0] }),
-        Adis16250::new(GyroSpi { select: SELECTS[1] }),
-        Adis16250::new(GyroSpi { select: SELECTS[2] }),
-    ],
+    gyro: Adis16250::new(GyroSpi { select: 0 }),
 };
 
 /// The one set of them.
@@ -222,8 +220,15 @@ impl Sensors for AvrSensors {
     type Spi = GyroSpi;
     type Delay = Delay;
 
-    fn gyros(&mut self) -> &mut [Adis16250<GyroSpi>; 3] {
-        &mut self.gyros
+    fn gyro(&mut self, axis: u8) -> Option<&mut Adis16250<GyroSpi>> {
+        let select = match axis {
+            0 => SELECTS[0],
+            1 => SELECTS[1],
+            2 => SELECTS[2],
+            _ => return None,
+        };
+        self.gyro = Adis16250::new(GyroSpi { select });
+        Some(&mut self.gyro)
     }
 
     fn delay(&mut self) -> Delay {

@@ -89,8 +89,9 @@ pub fn send(kind: u8, fields: &[u8]) -> bool {
     if waits || usize::from(room()) < room_for(kind, fields.len()) {
         return false;
     }
-    let len = encode_by(kind, fields, |at, byte| TX.put(at, byte));
-    TX.advance(len);
+    let head = TX.head();
+    let len = encode_by(kind, fields, |at, byte| TX.put(head, at, byte));
+    TX.advance(head, len);
     begin();
     true
 }

@@ -44,7 +44,8 @@ struct Shared {
     /// Ticks lost that the main loop does not know of, and how many of them are before the sample that waits.
     missed: u8,
     before: u8,
-    ready: bool,
+    /// Whether a sample waits: 0, 1. The main loop compares a byte in less than it takes to mask a `bool`.
+    ready: u8,
     /// A period without a sample has passed.
     passed: bool,
     ticked: bool,
@@ -67,7 +68,7 @@ static mut SHARED: Shared = Shared {
     masked_ucsrb: 0,
     missed: 0,
     before: 0,
-    ready: false,
+    ready: 0,
     passed: false,
     ticked: false,
 };
@@ -161,13 +162,13 @@ pub fn ticks_since() -> u16 {
 /// The sample that waits, if one does, and how many ticks before it are lost. It is the caller's until the next call.
 pub fn take() -> Option<(&'static Raw, u8)> {
     // SAFETY: a byte, which only the tick sets.
-    if !unsafe { core::ptr::read_volatile(&raw const (*shared()).ready) } {
+    if unsafe { core::ptr::read_volatile(&raw const (*shared()).ready) } == 0 {
         return None;
     }
     interrupt::free(|_| {
         // SAFETY: interrupts are off.
         let shared = unsafe { &mut *shared() };
-        shared.ready = false;
+        shared.ready = 0;
         shared.reading ^= 1;
         let missed = shared.before;
         shared.missed = shared.missed.wrapping_sub(missed);
@@ -233,7 +234,7 @@ pub fn sleep_until_work(listens: bool) {
         interrupt::disable();
         // SAFETY: interrupts are off.
         let sampled = unsafe { core::ptr::read_volatile(&raw const (*shared()).ready) };
-        if sampled || milliseconds_wait() || listens && serial::has_received() {
+        if sampled != 0 || milliseconds_wait() || listens && serial::has_received() {
             // SAFETY: they were on.
             unsafe { interrupt::enable() };
             return;
@@ -328,7 +329,7 @@ fn TIMER1_COMPB() {
     sensors::adc_off();
     raw.t_ticks = shared.t_ticks;
     // One that nobody took is overwritten; the end of a job stays, or it would never be answered.
-    let lost = shared.ready;
+    let lost = shared.ready != 0;
     if !matches!(shared.job.task, Task::None) {
         work(sensors, &shared.job, &mut raw.done);
         shared.job.task = Task::None;
@@ -341,7 +342,7 @@ fn TIMER1_COMPB() {
         count_missed(shared);
     }
     shared.before = shared.missed;
-    shared.ready = true;
+    shared.ready = 1;
     if shared.period != shared.next_period {
         shared.period = shared.next_period;
         set_compare(shared.period);

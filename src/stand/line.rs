@@ -52,7 +52,11 @@ impl Stand {
         self.owed |= more;
         if self.owed & HELLO != 0 && self.may_report(board, HELLO_LEN) {
             let hello = wire::fields::Hello {
-                firmware: crate::VERSION,
+                // Byte by byte: as a whole it would be a constant in the SRAM.
+                firmware: {
+                    let [major, minor, patch] = crate::VERSION;
+                    [major, minor, patch]
+                },
                 board_id: self.config.board_id,
                 reset_cause: board.reset_cause(),
                 restarts: board.restarts().into(),

@@ -18,7 +18,7 @@ fn between(low: f64, high: f64, rng: &mut impl Rng) -> f64 {
 }
 
 fn count(r: &Record) -> usize {
-    values(r, Quantity::Temperature).len()
+    values(r, Quantity::Temp).len()
 }
 
 /// Shapes by the part of a period.

@@ -219,8 +219,8 @@ impl Sensors for HostSensors {
     type Spi = GyroSpi;
     type Delay = Delay;
 
-    fn gyros(&mut self) -> &mut [Adis16250<GyroSpi>; 3] {
-        &mut self.gyros
+    fn gyro(&mut self, axis: u8) -> Option<&mut Adis16250<GyroSpi>> {
+        self.gyros.get_mut(usize::from(axis))
     }
 
     fn delay(&mut self) -> Delay {

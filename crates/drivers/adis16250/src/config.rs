@@ -226,10 +226,10 @@ impl SamplePeriod {
 /// figures themselves are *unverified*.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
+    /// Below 64 SPS: clock up to 1.0 MHz, frames 100 µs apart. The first, so that a part as it begins is all zeros.
+    Normal,
     /// From 64 SPS up: clock up to 2.5 MHz, frames 40 µs from start to start with a gap of 30 µs.
     Fast,
-    /// Below 64 SPS: clock up to 1.0 MHz, frames 100 µs apart.
-    Normal,
 }
 
 impl Pace {
