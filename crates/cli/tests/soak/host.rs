@@ -35,8 +35,9 @@ pub struct Soak {
 /// Turns of the run in each of which one sound request is sent, and so many damaged ones: more of either than 16 bits count.
 const TURNS: f64 = 30_000.0;
 const DAMAGED_REQUESTS: u64 = 3;
-/// Corrections that are stored: more than the generation's 8 bits count.
-const CORRECTIONS: f64 = 260.0;
+/// Times that a set-up and a correction are stored: more than the generation's 8 bits count, also where the line damages the reply to
+/// one in a hundred. A set-up whose reply is lost does not count: it may not have been stored.
+const CORRECTIONS: f64 = 280.0;
 /// Files, and lines about how it goes.
 const PARTS: u64 = 30;
 /// Files after which the board is reset. Its counters begin anew with each, so they are left alone from then on.
