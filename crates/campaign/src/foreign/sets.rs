@@ -107,6 +107,8 @@ The first grade of a set, before any change of the engine by it, tells what to e
 as seen. Tests hold that no effect of the library, nor two of them for a signal, explains 95 % of what a foreign effect adds to the
 likelihood. A library effect that is a true part of a foreign one (the straight line through a bent law) counts neither as right nor as
 wrong. Dates, authors, seeds and near twins: `crates/campaign/src/foreign/sets.rs`.
+Bands were first asked for harmonics after the failures of all sets had been read, those of set 15 as well: what it measures since
+2026-11-25 is no longer quite that of an unseen set.
 ";
 
 /// First grades: of the seen sets together, and of each unseen one.
