@@ -13,7 +13,8 @@ use crate::search::searched::Searched;
 use crate::test_level::CheckId;
 
 /// The finding of each blow; none of one that the final model does not bear out, by those channels whose noise does not make
-/// such readings by itself, neither as a whole nor by a process that is not what its name claims. `failing` tells of a channel and a check.
+/// such readings by itself, neither as a whole nor by a process that is not what its name claims. `failing` tells of a channel and
+/// a check.
 pub(crate) fn findings(
     searched: &[&Searched<'_>],
     blows: &[Blow],

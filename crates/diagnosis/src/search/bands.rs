@@ -321,7 +321,9 @@ impl Search<'_> {
             });
         let [low, high] = ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])?;
         let (from, to) = (low.max(1.0) as usize, (high as usize + 1).min(n));
-        let (coefficients, beside) = self.beside_in(state, cluster, from..to);
+        let noise = Self::beside(state, cluster);
+        let r = residual(&self.panel, &state.columns(), &state.solution);
+        let (coefficients, beside) = over(&noise, state.solution.white, &r, from..to);
         let all = state.noise.through((from..to).map(|k| k as f64 / to_k));
         let band = Band {
             coefficients,
@@ -330,32 +332,27 @@ impl Search<'_> {
         Some((band, from))
     }
 
-    /// Coefficients over all noise but some bands, and that noise over the white one.
-    fn beside_in(
-        &self,
-        state: &State,
-        without: &[usize],
-        places: Range<usize>,
-    ) -> (Vec<f64>, Vec<f64>) {
-        let to_omega = PI / self.panel.bins.n as f64;
-        let omega = places.clone().map(|k| k as f64 * to_omega);
-        let beside = Self::beside(state, without).through(omega);
-        let white = state.solution.white;
-        let r = residual(&self.panel, &state.columns(), &state.solution);
-        let whole = r[places].iter().zip(&beside);
-        let coefficients = whole.map(|(r, g)| r / (white * g).sqrt()).collect();
-        (coefficients, beside)
-    }
-
     /// Chances that a channel has as much at the harmonics of some bands that are one thing.
     fn harmonics(&self, state: &State, cluster: &[usize], own: &Moves) -> Vec<f64> {
+        let noise = Self::beside(state, cluster);
+        let r = residual(&self.panel, &state.columns(), &state.solution);
+        let over = |places| over(&noise, state.solution.white, &r, places);
         let middle = own.middle() as usize;
+        let (_, level) = over(middle..middle + 1);
         let chance = |order| {
-            let place = Place::of(own, order, self.panel.bins.n)?;
-            let (_, level) = self.beside_in(state, cluster, middle..middle + 1);
-            let (there, levels) = self.beside_in(state, cluster, place.places.clone());
+            let place = Place::of(own, order, r.len())?;
+            let (there, levels) = over(place.places.clone());
             Some(place.chance(own, &there, levels[levels.len() / 2] / level[0]))
         };
         harmonic::ORDERS.filter_map(chance).collect()
     }
+}
+
+/// Coefficients of a residual over a noise, and that noise over the white one.
+fn over(noise: &Noise, white: f64, residual: &[f64], places: Range<usize>) -> (Vec<f64>, Vec<f64>) {
+    let to_omega = PI / residual.len() as f64;
+    let levels = noise.through(places.clone().map(|k| k as f64 * to_omega));
+    let each = residual[places].iter().zip(&levels);
+    let whole = each.map(|(r, g)| r / (white * g).sqrt()).collect();
+    (whole, levels)
 }
