@@ -23,7 +23,7 @@ use model::record::Record;
 
 use crate::attribute::{events, masking, merge, withdraw};
 use crate::audit::Audit;
-use crate::criticise::common_noise::{Shared, common};
+use crate::criticise::common_noise::{Late, Shared, common};
 use crate::criticise::cross_axis::couplings;
 use crate::fit::channel::VarianceFound;
 use crate::ingest::grid::spike_limit;
@@ -141,7 +141,7 @@ fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         limits: std::mem::take(&mut audited.limits),
         ..Named::default()
     };
-    let name = |named, s| name_channel(named, s, &tested, &audited, grid, options.seed);
+    let name = |named, s| name_channel(named, s, &searched, &tested, &audited, grid, options.seed);
     let named = searched.iter().fold(first, name);
     input.notes.append(&mut audited.notes);
     input.file.clone_from(&options.file);
@@ -317,6 +317,7 @@ struct Named {
 fn name_channel(
     mut named: Named,
     s: &Searched<'_>,
+    searched: &[Searched<'_>],
     tested: &Tested,
     audited: &Audit,
     grid: &Grid,
@@ -336,7 +337,7 @@ fn name_channel(
         told.then(|| worded(variance_finding(s, v)))
     };
     let variance = s.variance.each.iter().map(of_law).collect();
-    let left = left_on(s, &fails, &tested.shared);
+    let left = left_on(s, searched, &fails, &tested.shared);
     let (kept, nearest, told) = withdraw::withdraw(s, of_terms, variance, &failing, &left);
     let findings = &mut named.findings;
     let stale = withdraw::propagate::stale(s, findings, &failing);
@@ -360,12 +361,23 @@ fn name_channel(
 }
 
 /// What the failing checks leave on a channel.
-fn left_on(s: &Searched<'_>, fails: &[&Check], shared: &Shared) -> withdraw::Left {
+fn left_on<'a>(
+    s: &Searched<'_>,
+    searched: &'a [Searched<'_>],
+    fails: &[&Check],
+    shared: &Shared,
+) -> withdraw::Left<'a> {
     // What an axis takes from another one later has a spectrum, and is no process of its own.
-    let late = shared.late.iter().filter(|l| l.0 == s.target.name);
+    let late: Vec<&Late> = (shared.late.iter())
+        .filter(|l| l.second == s.target.name)
+        .collect();
+    let first = |o: &&Searched<'_>| late.iter().any(|l| l.first == o.target.name);
     let mut colours = fails.iter().filter(|c| c.id == CheckId::ColourFollows);
     withdraw::Left {
-        late: late.map(|l| l.1).sum(),
+        late: late.iter().map(|l| l.chi_square).sum(),
+        before: (searched.iter().filter(first))
+            .map(|o| o.e.as_slice())
+            .collect(),
         colour: colours.next().map_or(0.0, |c| c.statistic),
         about: channels_of(fails),
     }

@@ -89,7 +89,7 @@ pub(crate) fn withdraw(
     of_terms: Vec<Finding>,
     of_variance: Vec<Option<Finding>>,
     failing: &dyn Fn(CheckId) -> bool,
-    left: &Left,
+    left: &Left<'_>,
 ) -> (Vec<Finding>, Vec<Finding>, Vec<Observation>) {
     let (terms, variance) = doubted(&Facts::new(s, failing, left));
     let name = s.target.name.as_str();

@@ -21,6 +21,14 @@ use numerics::tails::ONE_SIDED;
 /// Correlation in sigma that each pair has to show before a source is said to be that of all axes.
 const LEAST_OF_ALL: f64 = 0.5;
 
+/// An axis that follows another one some samples later.
+pub(crate) struct Late {
+    pub first: String,
+    pub second: String,
+    /// Of the correlation of their residuals.
+    pub chi_square: f64,
+}
+
 /// What the axes share.
 #[derive(Default)]
 pub(crate) struct Shared {
@@ -29,8 +37,8 @@ pub(crate) struct Shared {
     pub left: Vec<Observation>,
     /// Smallest source that would have been found, by channel.
     pub limits: Vec<DetectionLimit>,
-    /// Channels that follow another one some samples later, and the chi-square of that.
-    pub late: Vec<(String, f64)>,
+    /// Channels that follow another one some samples later.
+    pub late: Vec<Late>,
 }
 
 /// Standard error of the mean covariance of some pairs of axes that share a source of variance `shared`: estimates of
@@ -378,19 +386,30 @@ fn smallest(pairs: &[Pair<'_>], of: &dyn Effect, samples: f64) -> Vec<DetectionL
 /// Samples by which one axis may follow another.
 const LATE: usize = 20;
 
+/// Correlations of two residuals as standard normal scores, the second 1, 2 and so on samples later.
+fn scores_behind(first: &[f64], second: &[f64]) -> Vec<f64> {
+    let power = |e: &[f64]| dot(e, e) / e.len() as f64;
+    let scale = (power(first) * power(second)).sqrt();
+    let sums = dots_behind(first, second, LATE.min(first.len() / 2));
+    let each = (1..).zip(sums);
+    each.map(|(lag, sum)| sum / (scale * ((first.len() - lag) as f64).sqrt()))
+        .collect()
+}
+
+/// Chance that two residuals correlate as well, either of them up to [`LATE`] samples later.
+pub(crate) fn late_chance(a: &[f64], b: &[f64]) -> f64 {
+    let both = [scores_behind(a, b), scores_behind(b, a)];
+    let chi_square = both.iter().flatten().map(|z| z * z).sum();
+    tails::chi_tail(chi_square, 2.0 * LATE as f64)
+}
+
 /// Correlation of the residuals of two axes, one of them some samples later.
 fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
-    let power = |e: &[f64]| dot(e, e) / e.len() as f64;
-    let scale = (power(&a.e) * power(&b.e)).sqrt();
     // An axis, the one that follows it, the samples, z.
     let mut worst = (a, b, 0, 0.0f64);
     let mut statistic = 0.0;
-    let lags = LATE.min(a.e.len() / 2);
-    let sums = [(a, b), (b, a)].map(|(first, second)| dots_behind(&first.e, &second.e, lags));
-    for lag in 1..=lags {
-        for ((first, second), sums) in [(a, b), (b, a)].into_iter().zip(&sums) {
-            let sum = sums[lag - 1];
-            let z = sum / (scale * ((first.e.len() - lag) as f64).sqrt());
+    for (first, second) in [(a, b), (b, a)] {
+        for (lag, z) in (1..).zip(scores_behind(&first.e, &second.e)) {
             statistic += z * z;
             if z.abs() > worst.3.abs() {
                 worst = (first, second, lag, z);
@@ -416,7 +435,11 @@ fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
         what: format!("correlation of the whitened residuals of two axes over {LATE} samples either way: {} {what}", second.target.name),
     });
     if fails {
-        shared.late.push((second.target.name.clone(), statistic));
+        shared.late.push(Late {
+            first: first.target.name.clone(),
+            second: second.target.name.clone(),
+            chi_square: statistic,
+        });
         let seen = Observation::of_coupling(&second.target.name, what, r);
         let seen = seen.by(CheckId::CrossCorrelationLate, p);
         shared.left.push(seen.following(&first.target.name));

@@ -29,6 +29,9 @@ pub(super) const REACH: f64 = 6.0;
 /// Simulations of either kind, and the most coefficients of one.
 const RUNS: usize = 96;
 const MOST: usize = 2048;
+/// Chance below which fresh simulations are counted, and how many.
+const COUNTED: f64 = 0.05;
+const FRESH: usize = 199;
 /// Values of the envelope for each coefficient of the band.
 const OVERSAMPLED: usize = 4;
 /// Part of its mean by which the ratio of a real band is off as a rule, beside chance: a size that swings by a fifth, or tails
@@ -58,10 +61,10 @@ pub(super) struct Seen {
     /// ln of how much likelier it is of a steady tone than of noise.
     pub odds: f64,
     portrait: Portrait,
-    /// What a steady tone gives, and noise.
-    laws: [Law; 2],
-    /// How much farther what they give scatters than what is of the record.
-    fewer: f64,
+    /// Second moments of the squared envelope that a steady tone gives, and noise.
+    seconds: [f64; 2],
+    /// Chance that the likelier of them makes an envelope that is as far off, and what is farthest.
+    chance: (f64, &'static str),
 }
 
 /// Coefficients less what the noise beside the band has of them.
@@ -86,71 +89,140 @@ fn tone(dct: &Dct, count: usize, half: f64, rng: &mut Xoshiro256PlusPlus) -> Vec
     dct.forward(&samples.collect::<Vec<_>>())
 }
 
+fn portrait(coefficients: &[f64], density: &[f64], planner: &mut FftPlanner<f64>) -> Portrait {
+    let z = envelope_of(&kept(coefficients, density), planner);
+    Portrait::of(&z, planner)
+}
+
+/// Simulations of the envelope of a band, by a steady tone and by noise, with its noise and of its shape.
+struct Simulations {
+    /// How much farther what they give scatters than what is of the record.
+    fewer: f64,
+    /// The density of the band over the noise, at as many coefficients as are simulated.
+    density: Vec<f64>,
+    /// The same of a tone, whose band lies in the middle of the transform of that length; its half width and its size.
+    lorentzian: Vec<f64>,
+    from: usize,
+    length: usize,
+    half: f64,
+    size: f64,
+    dct: Dct,
+    rng: Xoshiro256PlusPlus,
+    planner: FftPlanner<f64>,
+}
+
+impl Simulations {
+    /// Of a band of this height and half width over the noise.
+    fn new(band: &Band, (top, half): (f64, f64), seed: u64) -> Self {
+        // A shorter record has fewer values of the same kind.
+        let stride = band.density.len().div_ceil(MOST);
+        let half = half / stride as f64;
+        let reach = ((2.0 * REACH * half) as usize).clamp(8, 2 * MOST);
+        let length = (2 * reach).next_power_of_two();
+        let from = length / 2 - reach / 2;
+        let lorentzian = (from..from + reach)
+            .map(|k| top / (1.0 + ((k as f64 - 0.5 * length as f64) / half).powi(2)));
+        Self {
+            fewer: (stride as f64).sqrt(),
+            density: band.density.iter().copied().step_by(stride).collect(),
+            lorentzian: lorentzian.collect(),
+            from,
+            length,
+            half,
+            size: (top * PI * half / length as f64).sqrt(),
+            dct: Dct::new(length),
+            rng: Xoshiro256PlusPlus::seed_from_u64(seed),
+            planner: FftPlanner::new(),
+        }
+    }
+
+    fn steady(&mut self) -> Portrait {
+        let c = tone(&self.dct, self.length, self.half, &mut self.rng);
+        let of_band = &c[self.from..self.from + self.lorentzian.len()];
+        let own: Vec<f64> = (of_band.iter())
+            .map(|c| self.size * c + normal(&mut self.rng))
+            .collect();
+        portrait(&own, &self.lorentzian, &mut self.planner)
+    }
+
+    fn noise(&mut self) -> Portrait {
+        let own: Vec<f64> = (self.density.iter())
+            .map(|d| (1.0 + d).sqrt() * normal(&mut self.rng))
+            .collect();
+        portrait(&own, &self.density, &mut self.planner)
+    }
+
+    /// As many of the one or the other.
+    fn draw(&mut self, count: usize, noise: bool) -> Vec<Portrait> {
+        let one = |_| if noise { self.noise() } else { self.steady() };
+        (0..count).map(one).collect()
+    }
+
+    /// Chance that a law makes an envelope that is as far off as one that was seen, and what is farthest. Few values have heavier
+    /// tails than the law of a largest one: where that finds little chance, fresh simulations are counted (Barnard, 1963).
+    fn chance(&mut self, seen: &Portrait, law: &Law, noise: bool) -> (f64, &'static str) {
+        let (p, off) = law.chance(seen, self.fewer);
+        if p > COUNTED {
+            return (p, off);
+        }
+        let score = law.score(seen, self.fewer, 1.0);
+        let fresh = self.draw(FRESH, noise);
+        let beyond = (fresh.iter())
+            .filter(|r| law.score(r, self.fewer, self.fewer) >= score)
+            .count();
+        let share = (beyond + 1) as f64 / (FRESH + 1) as f64;
+        (if beyond > 0 { share } else { p.min(share) }, off)
+    }
+}
+
 impl Seen {
     /// What the envelope of a band is like; `None` where no more than the noise is there.
     pub(super) fn new(band: &Band, seed: u64) -> Option<Self> {
-        let count = band.density.len();
         let top = band.density.iter().copied().fold(0.0, f64::max);
-        if count < 4 || top <= 0.0 {
+        if band.density.len() < 4 || top <= 0.0 {
             return None;
         }
         // Of a Lorentzian the sum over all coefficients is pi times its half width and its height; what lies within the
         // reach is 2 / pi atan(REACH) of it.
         let half = band.density.iter().sum::<f64>() / (2.0 * REACH.atan() * top);
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut planner = FftPlanner::new();
-        let mut portrait = |c: &[f64], d: &[f64]| {
-            let z = envelope_of(&kept(c, d), &mut planner);
-            Portrait::of(&z, &mut planner)
-        };
-        // A shorter record has fewer values of the same kind.
-        let stride = count.div_ceil(MOST);
-        let fewer = (stride as f64).sqrt();
-        let thinned: Vec<f64> = band.density.iter().copied().step_by(stride).collect();
-        let noise: Vec<Portrait> = (0..RUNS)
-            .map(|_| {
-                let own = thinned.iter().map(|d| (1.0 + d).sqrt() * normal(&mut rng));
-                portrait(&own.collect::<Vec<_>>(), &thinned)
-            })
-            .collect();
-        let half = half / stride as f64;
-        let reach = ((2.0 * REACH * half) as usize).clamp(8, 2 * MOST);
-        let length = (2 * reach).next_power_of_two();
-        let from = length / 2 - reach / 2;
-        let dct = Dct::new(length);
-        let size = (top * PI * half / length as f64).sqrt();
-        let lorentzian: Vec<f64> = (from..from + reach)
-            .map(|k| top / (1.0 + ((k as f64 - 0.5 * length as f64) / half).powi(2)))
-            .collect();
-        let steady: Vec<Portrait> = (0..RUNS)
-            .map(|_| {
-                let c = tone(&dct, length, half, &mut rng);
-                let of_band = &c[from..from + reach];
-                let own = of_band.iter().map(|c| size * c + normal(&mut rng));
-                portrait(&own.collect::<Vec<_>>(), &lorentzian)
-            })
-            .collect();
-        let portrait = portrait(&band.coefficients, &band.density);
+        let mut simulations = Simulations::new(band, (top, half), seed);
+        let noise = simulations.draw(RUNS, true);
+        let steady = simulations.draw(RUNS, false);
+        let fewer = simulations.fewer;
         let laws = [Law::of(&steady, fewer, false), Law::of(&noise, fewer, true)];
+        let portrait = portrait(&band.coefficients, &band.density, &mut simulations.planner);
         let likely = |(mean, spread): (f64, f64)| {
             let spread = spread.hypot(TOLERATED);
             -0.5 * ((portrait.size[0] - mean) / spread).powi(2) - spread.ln()
         };
-        let odds = likely(laws[0].second) - likely(laws[1].second);
-        odds.is_finite().then_some(Self {
+        let mut odds = likely(laws[0].second) - likely(laws[1].second);
+        if !odds.is_finite() {
+            return None;
+        }
+        let mut of = |k: usize| simulations.chance(&portrait, &laws[k], k == 1);
+        let nearer = usize::from(odds <= 0.0);
+        let mut chance = of(nearer);
+        let level = CheckId::BandEnvelope.level();
+        // Where one moment leaves the name open, all of the envelope tells.
+        if odds.abs() < OPEN && chance.0 < level {
+            let other = of(1 - nearer);
+            if other.0 >= level {
+                (odds, chance) = (-odds, other);
+            }
+        }
+        Some(Self {
             odds,
+            seconds: [0, 1].map(|k: usize| laws[k].second.0.exp()),
             portrait,
-            laws,
-            fewer,
+            chance,
         })
     }
 
     /// What the name claims of the envelope.
     pub(super) fn claim(&self, named: &str) -> Outcome {
-        let own = &self.laws[usize::from(self.odds <= 0.0)];
-        let (p_value, off) = own.chance(&self.portrait, self.fewer);
+        let (p_value, off) = self.chance;
         let [second, _, geometric] = self.portrait.size.map(f64::exp);
-        let [steady, noise] = [0, 1].map(|k| self.laws[k].second.0.exp());
+        let [steady, noise] = self.seconds;
         Outcome {
             id: CheckId::BandEnvelope,
             about: vec![],

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use model::effect::Signal;
+use model::effect::{Peak, Signal};
 
 use crate::audit::repeats;
+use crate::criticise::common_noise::late_chance;
 use crate::criticise::follower_shape;
 use crate::criticise::residual::{self, Place, Repeats};
 use crate::fit::channel::{Form, ID, Term};
@@ -43,12 +44,20 @@ const OF_ECHO: f64 = 0.4;
 /// which on the band may be what its shape leaves.
 const BAND_REACH: f64 = 3.0;
 const OF_BAND: f64 = 0.5;
+/// Energy that a follower has at the place of a band over what it would have of an even spectrum, from which on it is that of
+/// the band.
+const CONCENTRATED: f64 = 2.0;
+/// Part of the nats of a failure that is left without the coefficients of a band, up to which the failure is the band's: of one
+/// that is of all frequencies more is left, as long as the band is narrow.
+const ELSEWHERE: f64 = 1.0 / 3.0;
 
 /// What is left on a channel.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Left {
+pub(crate) struct Left<'a> {
     /// Chi-square of what it takes from others later.
     pub late: f64,
+    /// Whitened residuals of those others.
+    pub before: Vec<&'a [f64]>,
     /// The same of the energies that follow something recorded, where they do.
     pub colour: f64,
     /// Recorded channels that the checks are about that fail, with the chi-square of the one that tells most.
@@ -60,7 +69,7 @@ pub(super) struct Facts<'a> {
     pub s: &'a Searched<'a>,
     /// Whether a test fails on the channel.
     pub failing: &'a dyn Fn(CheckId) -> bool,
-    pub left: &'a Left,
+    pub left: &'a Left<'a>,
     /// Density of all noise over the white one, by bin.
     pub g: Vec<f64>,
     /// Coefficients by bin.
@@ -83,6 +92,22 @@ pub(super) struct Facts<'a> {
     echo: Option<usize>,
 }
 
+/// Tests of the whitened residual in time.
+type InTime = fn(&Facts<'_>, &[f64]) -> Outcome;
+const IN_TIME: [(CheckId, InTime); 7] = [
+    (CheckId::Kurtosis, |f, e| residual::kurtosis(e, f.rate_hz())),
+    (CheckId::Skewness, |_, e| residual::skewness(e)),
+    (CheckId::Bicovariance, |_, e| residual::bicovariance(e)),
+    (CheckId::ThreeReadings, |_, e| residual::three_readings(e)),
+    (CheckId::Neighbours, |f, e| {
+        residual::neighbours(e, f.s.step())
+    }),
+    (CheckId::VarianceRhythm, |f, e| {
+        residual::variance_rhythm(e, f.rate_hz())
+    }),
+    (CheckId::Period, |f, e| residual::period(e, f.rate_hz())),
+];
+
 /// Whether an angular frequency, rad per sample, lies in a place.
 fn in_place(p: &Place, omega: f64) -> bool {
     omega / PI >= p.from && omega / PI < p.to
@@ -98,7 +123,7 @@ impl<'a> Facts<'a> {
     pub(super) fn new(
         s: &'a Searched<'a>,
         failing: &'a dyn Fn(CheckId) -> bool,
-        left: &'a Left,
+        left: &'a Left<'a>,
     ) -> Self {
         let panel = &s.search.panel;
         let g = s.state.noise.over(&panel.bins);
@@ -140,6 +165,10 @@ impl<'a> Facts<'a> {
     /// Whether a test fails on the channel.
     pub(super) fn fails(&self, id: CheckId) -> bool {
         (self.failing)(id)
+    }
+
+    fn rate_hz(&self) -> f64 {
+        self.s.search.view.rate_hz
     }
 
     /// Of a longer record what is left counts by what one of ten minutes would show.
@@ -295,16 +324,17 @@ impl<'a> Facts<'a> {
         self.fails(CheckId::LjungBox) && self.echo.is_none()
     }
 
-    /// Whether a band explains no more than a follower of a recorded channel has at its place: late or bent, that leaves as
-    /// much. The follower, and the share of what it explains.
-    pub(super) fn beside_follower(&self, t: &Term) -> Option<(&'static str, f64)> {
-        let peak = t.peak()?;
-        let lr = t.cluster.map_or(t.lr, |c| c.lr);
+    /// What follows a recorded channel tells, and the part of that at the place of a band, by effect; the largest part.
+    fn follower_there(
+        &self,
+        peak: &Peak,
+        of: &dyn Fn(&Term) -> bool,
+    ) -> Option<(&'static str, f64)> {
         let panel = &self.s.search.panel;
         let inside = |w: f64| (w - peak.omega).abs() < BAND_REACH * peak.half_width;
         let mut found: BTreeMap<&'static str, f64> = BTreeMap::new();
         for (o, own) in self.s.state.parts() {
-            if self.s.search.followed(o).is_none() {
+            if self.s.search.followed(o).is_none() || !of(o) {
                 continue;
             }
             let information = self.information(o, own);
@@ -313,9 +343,74 @@ impl<'a> Facts<'a> {
             *found.entry(o.effect.id()).or_default() +=
                 there.sum::<f64>() / self.s.state.solution.white;
         }
-        let most = found.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let all = self.followed.iter().find(|f| f.0 == most.0)?.1;
-        (most.1 > OF_BAND * lr).then_some((most.0, lr / all))
+        found.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    fn all_of(&self, id: &str) -> Option<f64> {
+        self.followed.iter().find(|f| f.0 == id).map(|f| f.1)
+    }
+
+    /// Whether a band explains no more than a follower of a recorded channel has at its place: late or bent, that leaves as
+    /// much. The follower, and the share of what it explains.
+    pub(super) fn beside_follower(&self, t: &Term) -> Option<(&'static str, f64)> {
+        let lr = t.cluster.map_or(t.lr, |c| c.lr);
+        let most = self.follower_there(&t.peak()?, &|_| true)?;
+        (most.1 > OF_BAND * lr).then_some((most.0, lr / self.all_of(most.0)?))
+    }
+
+    /// Whether what follows a recorded channel by no law of the library does so at the place of a band: noise and a tone that
+    /// wanders know nothing of what was recorded, and the two are one thing.
+    pub(super) fn is_told_by_a_channel(&self, t: &Term) -> bool {
+        let Some(peak) = t.peak() else {
+            return false;
+        };
+        let lr = t.cluster.map_or(t.lr, |c| c.lr);
+        let panel = &self.s.search.panel;
+        let mut nameless = self.s.state.parts().filter(|(o, _)| o.effect.id() == ID);
+        nameless.any(|(o, coefficients)| {
+            let mut sum = vec![0.0; panel.bins.n];
+            panel.add_columns(&mut sum, 0, &o.columns, coefficients);
+            let energy = panel.bins.products(&sum, &sum);
+            let all: f64 = energy.iter().sum();
+            let inside = |w: f64| (w - peak.omega).abs() < BAND_REACH * peak.half_width;
+            let count = |values: &[f64]| -> f64 {
+                let places = values.iter().zip(&panel.bins.at.omega);
+                places.filter(|(_, w)| inside(**w)).map(|(v, _)| v).sum()
+            };
+            let over: Vec<f64> = energy.iter().zip(&self.g).map(|(e, g)| e / g).collect();
+            let tells = count(&over) / self.s.state.solution.white;
+            let even = count(&self.counts) / self.counts.iter().sum::<f64>();
+            tells > LEFT * lr && count(&energy) > CONCENTRATED * even * all
+        })
+    }
+
+    /// Whether a test of the residual in time fails, and hardly does without the coefficients of a band: what it shows is then
+    /// how that band is made, for which its name has no word.
+    pub(super) fn failure_is_of(&self, t: &Term) -> bool {
+        let asked = IN_TIME.iter().filter(|(id, _)| self.fails(*id));
+        let asked: Vec<_> = asked.map(|a| a.1).collect();
+        let Some(peak) = t
+            .peak()
+            .filter(|_| !asked.is_empty() || !self.left.before.is_empty())
+        else {
+            return false;
+        };
+        let dct = &self.s.search.panel.dct;
+        let step = PI / self.s.u.len() as f64;
+        let reach = BAND_REACH * peak.half_width;
+        let outside = |(k, u): (usize, &f64)| {
+            let inside = (k as f64 * step - peak.omega).abs() < reach;
+            if inside { 0.0 } else { *u }
+        };
+        let all = dct.inverse(&self.s.u);
+        let rest = dct.inverse(&self.s.u.iter().enumerate().map(outside).collect::<Vec<_>>());
+        let gone = |chance: &dyn Fn(&[f64]) -> f64| {
+            let nats = |e: &[f64]| -chance(e).max(f64::MIN_POSITIVE).ln();
+            nats(&rest) < ELSEWHERE * nats(&all)
+        };
+        let in_time = |test: &InTime| gone(&|e| test(self, e).p_value);
+        asked.iter().any(in_time)
+            || (self.left.before.iter()).any(|first| gone(&|e| late_chance(first, e)))
     }
 
     /// Whether readings that are those before make neighbours correlate.

@@ -12,6 +12,9 @@
 //! * Memory, of noise alone: Haar variances of size and pitch by octaves of time (Allan, 1966). Of Gaussian noise the covariance of
 //!   the size is the square of that of the band (Isserlis, 1918), so both are told by its density; a tone whose pitch wanders may
 //!   stay for as long as it likes.
+//! * Jumps: the fourth moment of Haar differences of the envelope itself over the square of the second, by octaves of time. Noise and
+//!   a phase that walks diffuse, and differences of noise are normal at every distance. What is switched, keyed or struck has the
+//!   same spectrum by few large changes, the heavier tails of which show in the octaves about its dwell.
 //!
 //! The farthest of them, in standard errors, is held against the farthest of each simulation, whose law is that of a largest value
 //! (Gumbel, 1958): statistics that hang together count once.
@@ -54,6 +57,8 @@ pub(super) struct Portrait {
     lines: [Line; 3],
     /// Cube roots of the Haar variances of size and pitch, by octave: nearly normal (Wilson and Hilferty, 1931).
     octaves: [Vec<f64>; 2],
+    /// Logarithms of the fourth moment of the Haar differences over the square of the second, by octave.
+    jumps: Vec<f64>,
 }
 
 /// The strongest line among the first `bins` frequencies of a series.
@@ -96,10 +101,38 @@ fn octaves(series: &[f64]) -> Vec<f64> {
     all
 }
 
+/// Logarithms of the fourth moment of the differences of neighbouring means over the square of the second, over more and more
+/// values, of an envelope turned back by its mean pitch.
+fn jumps(z: &[Complex<f64>]) -> Vec<f64> {
+    let mut turn = Complex::new(1.0, 0.0);
+    let back = turned_back(z);
+    let still = z.iter().map(|z| {
+        turn *= back;
+        z * turn
+    });
+    let still: Vec<Complex<f64>> = still.collect();
+    let mean = |c: &[Complex<f64>]| c.iter().sum::<Complex<f64>>() / c.len() as f64;
+    let mut means: Vec<Complex<f64>> = still.chunks_exact(OVERSAMPLED / 2).map(mean).collect();
+    let mut all = vec![];
+    while means.len() >= 2 * LEAST {
+        let squares = means.windows(2).map(|w| (w[1] - w[0]).norm_sqr());
+        let (second, fourth) = squares.fold((0.0, 0.0), |(a, b), s| (a + s, b + s * s));
+        let count = (means.len() - 1) as f64;
+        all.push((count * fourth / (second * second).max(f64::MIN_POSITIVE)).ln());
+        means = means.chunks_exact(2).map(mean).collect();
+    }
+    all
+}
+
+/// What turns an envelope back from value to value by its mean pitch.
+fn turned_back(z: &[Complex<f64>]) -> Complex<f64> {
+    let turn: Complex<f64> = z.windows(2).map(|w| w[1] * w[0].conj()).sum();
+    turn.conj() / turn.norm().max(f64::MIN_POSITIVE)
+}
+
 /// Change of phase from value to value over that of all together, times the squared size: what the pitch is weighed by.
 pub(crate) fn pitch(z: &[Complex<f64>]) -> Vec<f64> {
-    let turn: Complex<f64> = z.windows(2).map(|w| w[1] * w[0].conj()).sum();
-    let back = turn.conj() / turn.norm().max(f64::MIN_POSITIVE);
+    let back = turned_back(z);
     let off = z.windows(2).map(|w| (w[1] * w[0].conj() * back).im);
     off.chain([0.0]).collect()
 }
@@ -130,6 +163,7 @@ impl Portrait {
                 line(square, quarter, planner),
             ],
             octaves: [octaves(&size), octaves(&pitch)],
+            jumps: jumps(z),
         }
     }
 }
@@ -141,7 +175,7 @@ const DISTANCE: Spread = Spread {
     spread: 0.3925,
 };
 
-/// Of the largest of six standard normal values, as many as there are statistics (Harter, 1961): what is tolerated makes the
+/// Of the largest of six standard normal values, about as many as there are statistics (Harter, 1961): what is tolerated makes the
 /// scores of simulations smaller.
 const LARGEST: Spread = Spread {
     middle: 1.267,
@@ -168,13 +202,14 @@ impl Spread {
 }
 
 /// What is farthest off, in words.
-const OFF: [&str; 6] = [
+const OFF: [&str; 7] = [
     "its sizes are not those of its law",
     "its size has a rhythm",
     "its pitch has a rhythm",
     "its square is a steady line",
     "its size stays otherwise than its spectrum tells",
     "its pitch stays otherwise than its spectrum tells",
+    "it jumps",
 ];
 
 /// What simulations of a law give.
@@ -185,6 +220,7 @@ pub(super) struct Law {
     distance: Spread,
     lines: [Spread; 3],
     octaves: [Vec<Spread>; 2],
+    jumps: Vec<Spread>,
     /// The same of the second moment alone.
     pub(super) second: (f64, f64),
     /// Place and scale of the largest score.
@@ -213,10 +249,15 @@ impl Law {
             .map(|i| (0..SIZES).map(|j| covariance(i, j)).collect())
             .collect();
         let inverse = invert(&matrix).0;
-        let shared = |k: usize| {
-            let count = runs.iter().map(|r| r.octaves[k].len()).min().unwrap_or(0);
-            let of = |i: usize| Spread::of(runs.iter().map(move |r| r.octaves[k][i]));
-            (0..if noise { count } else { 0 }).map(of).collect()
+        let by_octave = |of: &dyn Fn(&'_ Portrait) -> &[f64]| -> Vec<Spread> {
+            let values: Vec<&[f64]> = runs.iter().map(|r| of(r)).collect();
+            let count = values.iter().map(|v| v.len()).min().unwrap_or(0);
+            let each = (0..count).map(|i| Spread::of(values.iter().map(move |v| v[i])));
+            each.collect()
+        };
+        let memory = |k: usize| match noise {
+            true => by_octave(&|r| &r.octaves[k]),
+            false => vec![],
         };
         let mut law = Self {
             middle,
@@ -226,7 +267,8 @@ impl Law {
                 spread: 1.0,
             },
             lines: std::array::from_fn(|k| Spread::of(runs.iter().map(move |r| r.lines[k].nats))),
-            octaves: [shared(0), shared(1)],
+            octaves: [memory(0), memory(1)],
+            jumps: by_octave(&|r| &r.jumps),
             second: (middle[0], sizes[0].spread / fewer),
             largest: (0.0, 1.0),
         };
@@ -269,16 +311,25 @@ impl Law {
                 all.push(((l.nats - s.middle) / s.spread.max(f64::MIN_POSITIVE), 1 + k));
             }
         }
-        for (k, (own, told)) in seen.octaves.iter().zip(&self.octaves).enumerate() {
+        let mut by_octave = |own: &[f64], told: &[Spread], room: fn(&Spread) -> f64, of: usize| {
             for (v, s) in own.iter().zip(told) {
-                // A third of that of the variance, which is off by twice what its root is.
-                let room = 2.0 * TOLERATED / 3.0 * s.middle;
-                let scale = (s.spread / fewer).hypot(room);
-                all.push((((v - s.middle) / drawn / scale).abs(), 4 + k));
+                let scale = (s.spread / fewer).hypot(room(s));
+                all.push((((v - s.middle) / drawn / scale).abs(), of));
             }
+        };
+        // A third of that of the variance, which is off by twice what its root is.
+        let of_root = |s: &Spread| 2.0 * TOLERATED / 3.0 * s.middle;
+        for (k, (own, told)) in seen.octaves.iter().zip(&self.octaves).enumerate() {
+            by_octave(own, told, of_root, 4 + k);
         }
+        by_octave(&seen.jumps, &self.jumps, |_| TOLERATED, 6);
         let larger = |a: (f64, usize), b: (f64, usize)| if b.0 > a.0 { b } else { a };
         all.into_iter().fold((f64::NEG_INFINITY, 0), larger)
+    }
+
+    /// The largest score of an envelope, whose statistics are `drawn` times as scattered as those of the record.
+    pub(super) fn score(&self, seen: &Portrait, fewer: f64, drawn: f64) -> f64 {
+        self.farthest(seen, fewer, drawn).0
     }
 
     /// Chance that the law makes an envelope that is as far off, and where it is farthest, in words.
