@@ -4,6 +4,9 @@
 //! the half line of frequencies, is a complex envelope z: |z|^2 is its size, and the imaginary part of z(t+1) z*(t), turned back
 //! by the mean pitch, its pitch. Both are regressed on each recorded course, on its square, and for a command on what rings
 //! after each change of it. The scatter of a coefficient is that of the residual at the frequencies where the course moves.
+//!
+//! What drives a mode may be recorded, too: then z is coherent with the envelope of that at the same place, whatever the mode
+//! makes of its phase.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -14,6 +17,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::band_alone::stands_out;
 use super::envelope::law::pitch;
 use super::envelope::{Band, REACH, envelope_of, kept};
 use crate::ingest::motion::drives;
@@ -132,8 +136,24 @@ impl Moves {
     }
 }
 
-/// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded.
-pub(super) fn claim(own: &Moves, signals: &[Signal], named: &str) -> Option<Outcome> {
+/// Chance that a band is as coherent with a recorded channel of these coefficients, and the part of its energy that is.
+fn coherent(own: &Moves, coefficients: &[f64]) -> (f64, f64) {
+    let there = envelope_of(&coefficients[own.places.clone()], &mut FftPlanner::new());
+    let energy = |z: &[Complex<f64>]| z.iter().map(Complex::norm_sqr).sum::<f64>();
+    let product = own.envelope.iter().zip(&there);
+    let (p, sum) = stands_out(product.map(|(a, b)| a * b.conj()).collect());
+    let both = energy(&own.envelope) * energy(&there);
+    (p, sum * sum / both.max(f64::MIN_POSITIVE))
+}
+
+/// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded, and that it is none
+/// of what was `felt`, of channels with their coefficients.
+pub(super) fn claim(
+    own: &Moves,
+    signals: &[Signal],
+    felt: &[(&str, Vec<f64>)],
+    named: &str,
+) -> Option<Outcome> {
     let cells = own.size.len();
     // What is left of a ring in the next cell.
     let keep = (-2.0 * PI * own.half / cells as f64).exp();
@@ -158,6 +178,13 @@ pub(super) fn claim(own: &Moves, signals: &[Signal], named: &str) -> Option<Outc
             if part > FOLLOWED && least.as_ref().is_none_or(|l| p < l.0) {
                 least = Some((p, name, what));
             }
+        }
+    }
+    for (name, coefficients) in felt {
+        let (p, part) = coherent(own, coefficients);
+        asked += 1;
+        if part > FOLLOWED && least.as_ref().is_none_or(|l| p < l.0) {
+            least = Some((p, name, "phase"));
         }
     }
     let (p, name, what) = least?;

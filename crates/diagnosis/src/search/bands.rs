@@ -10,6 +10,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use model::effect::{Covariance, Hypothesis, Peak};
+use model::record::Quantity;
 
 use super::band_source::{self, Moves};
 use super::envelope::{Band, Seen};
@@ -244,6 +245,10 @@ impl Search<'_> {
         let clusters = Self::clusters(state);
         let bands: Vec<Option<(Band, usize)>> =
             clusters.iter().map(|c| self.band(state, c)).collect();
+        let shaken = (self.view.signals.iter())
+            .filter(|s| s.quantity == Quantity::Acc && !bands.is_empty());
+        let felt = shaken.map(|s| (s.name.as_str(), self.panel.dct.forward(&s.values)));
+        let felt: Vec<(&str, Vec<f64>)> = felt.collect();
         let moves: Vec<Option<Moves>> = (bands.iter())
             .map(|b| b.as_ref().and_then(|(band, from)| Moves::of(band, *from)))
             .collect();
@@ -277,9 +282,9 @@ impl Search<'_> {
                     t.claims.push(seen.claim(t.effect.id()));
                     let others = moves.iter().enumerate().filter(|(k, _)| *k != number);
                     let others: Vec<&Moves> = others.filter_map(|(_, m)| m.as_ref()).collect();
-                    let source = moves[number]
-                        .as_ref()
-                        .and_then(|own| band_source::claim(own, self.view.signals, t.effect.id()));
+                    let source = moves[number].as_ref().and_then(|own| {
+                        band_source::claim(own, self.view.signals, &felt, t.effect.id())
+                    });
                     let alone = moves[number]
                         .as_ref()
                         .and_then(|own| band_alone::claim(own, &others, &harmonics, t.effect.id()));

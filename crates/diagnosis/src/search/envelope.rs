@@ -31,7 +31,7 @@ const RUNS: usize = 96;
 const MOST: usize = 2048;
 /// Chance below which fresh simulations are counted, and how many.
 const COUNTED: f64 = 0.05;
-const FRESH: usize = 199;
+const FRESH: usize = 200;
 /// Values of the envelope for each coefficient of the band.
 const OVERSAMPLED: usize = 4;
 /// Part of its mean by which the ratio of a real band is off as a rule, beside chance: a size that swings by a fifth, or tails

@@ -29,15 +29,19 @@ pub(super) struct Kin<'a> {
 }
 
 impl Kin<'_> {
-    /// Densities of the processes that have fallen, with what each explains.
+    /// Densities of the processes that have fallen, with what each explains; of a filter by how much it moves the white noise.
     fn fallen(&self, doubts: &[Doubt]) -> Vec<(Vec<f64>, f64)> {
         let at = &self.facts.s.search.panel.bins.at;
         let terms = self.facts.s.state.terms.iter().zip(doubts);
         terms
             .filter(|(_, d)| **d != Doubt::No)
             .filter_map(|(t, _)| match &t.form {
-                Form::Covariance(process, theta) if !process.filters_white() => {
-                    Some((process.density(theta, at), t.lr))
+                Form::Covariance(process, theta) => {
+                    let mut density = process.density(theta, at);
+                    if process.filters_white() {
+                        density.iter_mut().for_each(|d| *d = (*d - 1.0).abs());
+                    }
+                    Some((density, t.lr))
                 }
                 _ => None,
             })
