@@ -8,6 +8,7 @@ mod blocks;
 mod edges;
 mod gaps;
 mod maps;
+mod protocol;
 mod steps;
 
 /// One row each, unbroken so that columns can be read down.
@@ -54,4 +55,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(571, 15, "fraction printed without its zero", Shaped(|_, _, a, _| map(a, maps::without_zero))),
     row(572, 15, "reading held while the part calibrates", Shaped(|d, s, a, w| blocks::held(d, s, a, w))).parts(&["stale_samples"]).strength(Strength::Whole),
     row(573, 15, "block of readings with one exponent", Shaped(|d, s, a, _| blocks::exponents(d, s, a))).parts(&["stuck_bit"]),
+    row(599, 16, "reading moved on where it would repeat", Shaped(|d, _, a, _| by_chance(a, protocol::moved_on(d)))),
+    row(600, 16, "coarse range kept after a large swing", Shaped(|d, s, a, _| protocol::coarse_for_a_while(d, s, a))).parts(&["stuck_bit"]),
+    row(601, 16, "alive counter in the lowest bits", Shaped(|d, _, a, _| protocol::alive(d, a))),
 ];

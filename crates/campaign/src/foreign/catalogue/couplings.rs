@@ -4,6 +4,8 @@ use super::super::prelude::*;
 use super::Make::Shaped;
 use super::{ForeignEffect, Strength, TM, row};
 
+mod memory;
+
 /// One row each, unbroken so that columns can be read down.
 #[rustfmt::skip]
 pub(super) const EFFECTS: &[ForeignEffect] = &[
@@ -22,6 +24,8 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(585, 15, "reading dropped where it equals its neighbour's", Shaped(|d, s, a, _| duplicates(d, s, a))).parts(&["stale_samples"]).strength(Strength::Whole),
     row(586, 15, "reading renewed only when its neighbour's changes", Shaped(|d, _, a, _| by_neighbour(d, a))).parts(&["stale_samples"]),
     row(587, 15, "limit to the length of the vector", Shaped(|d, s, a, _| limited(d, s, a))),
+    row(602, 16, "latch that another axis sets and clears", Shaped(|d, s, a, _| memory::latch(d, s, a))).parts(&["telegraph"]),
+    row(603, 16, "last reading turned round by another axis", Shaped(|d, s, a, _| memory::turned_round(d, s, a))),
 ];
 
 /// One of the two others.

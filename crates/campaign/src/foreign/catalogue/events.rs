@@ -6,6 +6,7 @@ use super::{ForeignEffect, TM, row};
 
 mod knocks;
 mod marks;
+mod trains;
 
 /// One row each, unbroken so that columns can be read down.
 #[rustfmt::skip]
@@ -32,4 +33,6 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(525, 12, "drive loop that loses its lock", Signal(|d, s, _| marks::lock(d, s))).twin(320),
     row(540, 13, "trains that pass", Signal(|d, s, _| knocks::trains(d, s))).twin(489),
     row(556, 14, "door that is opened and shut", Signal(|d, s, _| marks::door(d, s))).twin(478),
+    row(590, 16, "slips that set off others", Signal(|d, s, _| trains::aftershocks(d, s))),
+    row(591, 16, "tap that drips without a period", Signal(|d, s, _| trains::dripping(d, s))),
 ];

@@ -9,6 +9,7 @@ use super::{ForeignEffect, T, TM, TMS, TMV, V, row};
 
 mod acceleration;
 mod drive;
+mod events;
 mod motor;
 mod states;
 mod supply;
@@ -122,4 +123,8 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(582, 15, "thermometer's charge in every few frames", Signal(states::of_thermometer)).parts(&["temperature"]),
     row(583, 15, "popcorn that freezes out in the cold", Signal(|d, s, a| states::popcorn(d, s, a))).needs(T).parts(&["telegraph"]),
     row(584, 15, "buffer sent backwards while the table ramps", Signal(|d, s, _| table::backwards(d, s))),
+    row(592, 16, "oven whose loop runs off and back", Signal(events::oven)).parts(&["temperature"]),
+    row(593, 16, "correction by the command before", Signal(|d, s, _| events::command_before(d, s))),
+    row(594, 16, "grease that sets while the motor rests", Signal(|d, s, _| events::grease(d, s))).parts(&["motor_bias"]).twin(499),
+    row(595, 16, "tone sampled later while the motor is served", Signal(|d, s, _| events::served(d, s))).parts(&["line"]),
 ];

@@ -4,6 +4,7 @@ use super::Make::{Exponential, More, Shaped};
 use super::{ForeignEffect, Strength, T, TM, TMV, row};
 
 mod laws;
+mod maps;
 mod memory;
 mod processes;
 mod spectrum;
@@ -76,4 +77,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(574, 15, "denoiser that shrinks small differences", Shaped(|d, s, _, _| memory::shrunk(d, s))).parts(&["low_pass"]),
     row(575, 15, "modulator that rings after an overload", Shaped(|d, _, _, _| memory::overloaded(d))).parts(&["low_pass"]),
     row(576, 15, "angle summed in a short float", Shaped(|d, _, a, _| processes::short_float(d, a))).parts(&["quantization_noise"]),
+    row(596, 16, "ripple that obeys a cubic map", Shaped(|d, s, _, _| maps::cubic(d, s))),
+    row(597, 16, "small swings that go on and large ones that turn back", Shaped(|_, _, _, _| maps::turning_back())),
+    row(598, 16, "filter that begins anew with each block", Shaped(|d, _, _, _| maps::anew(d))).parts(&["low_pass"]),
 ];

@@ -3,6 +3,7 @@
 use super::Make::Signal;
 use super::{ForeignEffect, TM, row};
 
+mod driven;
 mod levels;
 mod tones;
 
@@ -51,4 +52,6 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(537, 13, "sun through clouds on one side", Signal(|d, s, _| levels::sun(d, s))).twin(350),
     row(577, 15, "spring pendulum", Signal(|d, s, _| tones::spring_pendulum(d, s))),
     row(578, 15, "radio field that fades as somebody walks", Signal(|d, s, _| tones::fading(d, s))),
+    row(588, 16, "plate that a sway helps over", Signal(|d, s, _| driven::snapping(d, s))),
+    row(589, 16, "arm that repeats its moves whenever it is asked", Signal(|d, s, _| driven::moves(d, s))),
 ];

@@ -11,7 +11,7 @@ fn nats_of_copy(stand: &Stand, axis: usize) -> f64 {
 }
 
 /// Nats of a block that a fault, of this chance, makes so many times likelier.
-fn nats_of_block(chance: f64, times: f64) -> f64 {
+pub(super) fn nats_of_block(chance: f64, times: f64) -> f64 {
     let quiet = (1.0 - chance).max(1e-12);
     chance * (quiet + chance * times).ln() + (1.0 - chance) * quiet.ln()
 }

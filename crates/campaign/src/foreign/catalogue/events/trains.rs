@@ -1,0 +1,75 @@
+//! Events that bring each other about.
+
+use super::super::super::prelude::*;
+
+/// A mount that settles: a slip loads its neighbours, so that each slip sets off others, sooner rather than later (Omori 1894),
+/// and these again others (Hawkes 1971): minutes of quiet, and swarms. Sizes by a power law, as those of earthquakes; the part
+/// turns by each slip, and back.
+pub(super) fn aftershocks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    /// Shortest and longest time after which a slip sets off another one, s.
+    const AFTER: (f64, f64) = (0.1, 30.0);
+    const MOST: usize = 2000;
+    let brings = draw.between(0.75, 0.92);
+    let quiet = draw.by_ratio(8.0, 25.0);
+    let mut slips = vec![];
+    let mut at = quiet * draw.exponential();
+    while at < stand.seconds {
+        slips.push(at);
+        at += quiet * draw.exponential();
+    }
+    let mut next = 0;
+    while next < slips.len().min(MOST) {
+        // As many as a process of Poisson has.
+        let mut left = brings - draw.exponential();
+        while left > 0.0 {
+            // By one over the time.
+            let then = slips[next] + draw.by_ratio(AFTER.0, AFTER.1);
+            if then < stand.seconds {
+                slips.push(then);
+            }
+            left -= draw.exponential();
+        }
+        next += 1;
+    }
+    let keep = (-1.0 / (draw.by_ratio(0.05, 0.25) * stand.rate_hz)).exp();
+    let mut kicks = vec![0.0; stand.samples()];
+    for at in slips {
+        let size = draw.sign() * draw.between(0.05, 1.0).powf(-0.6);
+        if let Some(kick) = kicks.get_mut((at * stand.rate_hz) as usize) {
+            *kick += size;
+        }
+    }
+    let mut left = 0.0;
+    each(&kicks, |kick| {
+        left = keep * left + kick;
+        left
+    })
+}
+
+/// A tap that drips: how long a drop takes to fall hangs on how far the one before has sprung back, by a law that has no period
+/// (Shaw 1984): a short wait tells how long the next one is, and nothing tells the tenth. Each drop is the same blow.
+pub(super) fn dripping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let mean = draw.by_ratio(0.8, 2.5);
+    let (bend, wide) = (draw.between(1.75, 1.95), draw.between(0.35, 0.6));
+    let keep = (-1.0 / (draw.by_ratio(0.06, 0.2) * stand.rate_hz)).exp();
+    let mut place = draw.between(-0.5, 0.5);
+    let mut blows = vec![0.0; stand.samples()];
+    let mut at = draw.between(0.0, 2.0);
+    while at < stand.seconds {
+        let reading = at * stand.rate_hz;
+        let late = reading.fract();
+        for (k, share) in [(0, 1.0 - late), (1, late)] {
+            if let Some(blow) = blows.get_mut(reading as usize + k) {
+                *blow += share;
+            }
+        }
+        // The air moves the drops a little.
+        place = (1.0 - bend * place * place + 0.003 * draw.normal()).clamp(-1.0, 1.0);
+        at += mean * (1.0 + wide * place);
+    }
+    let (sign, mut left) = (draw.sign(), 0.0);
+    about_mean(&each(&blows, |blow| {
+        left = keep * left + sign * blow;
+        left
+    }))
+}
