@@ -151,8 +151,8 @@ impl Kin<'_> {
             .any(|c| others.contains(c))
     }
 
-    /// Doubt what is of a kind with what has fallen.
-    pub(super) fn fall(&self, doubts: &mut [Doubt]) {
+    /// Doubt what is of a kind with what has fallen; whether there is any.
+    pub(super) fn fall(&self, doubts: &mut [Doubt]) -> bool {
         let fallen = self.fallen(doubts);
         let falls: Vec<bool> = (self.facts.s.state.parts().zip(&*doubts))
             .map(|((t, own), doubt)| {
@@ -169,11 +169,12 @@ impl Kin<'_> {
                 *doubt == Doubt::No && !t.is_band() && of_kind
             })
             .collect();
-        for (doubt, falls) in doubts.iter_mut().zip(falls) {
-            if falls {
+        for (doubt, falls) in doubts.iter_mut().zip(&falls) {
+            if *falls {
                 *doubt = Doubt::Checks;
             }
         }
+        falls.contains(&true)
     }
 
     /// Whether the name of a law of the variance falls beside what is left.
