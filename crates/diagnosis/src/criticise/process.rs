@@ -13,7 +13,8 @@
 //! * Dwells: Bartlett's test of whether two levels switch at random (`contest::dwells`).
 //! * Steadiness: energies of what drives it in stretches of the record, whose variance follows from the sum of r^2.
 //! * Source: what it knows nothing of, by its mean (`source`).
-//! * Size: the same energy against temperature, supply and command and their squares, which it knows nothing of.
+//! * Size: the same energy against temperature, supply and command and what stands in the model beside it, a line say, and against
+//!   their squares: it knows nothing of them.
 
 mod filtered;
 pub(crate) mod independence;
@@ -393,23 +394,37 @@ impl Process<'_> {
         law.into_iter().chain(steadiness).chain(size).collect()
     }
 
-    /// Whether its size follows what else was recorded.
+    /// What the terms of the model with a course of their own make in time, by the title of their effect.
+    fn courses(&self) -> impl Iterator<Item = (&str, Vec<f64>)> {
+        let in_time = self.state.parts().filter(|(t, _)| !t.is_covariance());
+        in_time.map(|(t, own)| {
+            let mut sum = vec![0.0; self.panel.bins.n];
+            self.panel.add_columns(&mut sum, 0, &t.columns, own);
+            (t.effect.id(), self.panel.dct.inverse(&sum))
+        })
+    }
+
+    /// Whether its size follows what else was recorded, or what stands in the model beside it.
     fn size(&self, drive: &Filtered) -> Option<Outcome> {
         let quantities = [Quantity::Temp, Quantity::Supply, Quantity::Pwm];
         let recorded = quantities.iter().filter_map(|q| self.view.signal(*q));
-        let asked: Vec<(&str, f64, f64)> = recorded
-            .filter_map(|s| {
-                let (statistic, depth) = drive.follows(&s.smooth, self.more)?;
-                Some((s.name.as_str(), statistic, depth))
-            })
+        let recorded =
+            recorded.map(|s| (s.name.as_str(), true, drive.follows(&s.smooth, self.more)));
+        let beside = self
+            .courses()
+            .map(|(id, course)| (id, false, drive.follows(&course, self.more)));
+        let all = recorded.chain(beside);
+        let asked: Vec<_> = all
+            .filter_map(|(name, recorded, found)| Some((name, recorded, found?)))
             .collect();
-        let (name, statistic, depth) = asked.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (name, recorded, (statistic, depth)) =
+            asked.iter().max_by(|a, b| a.2.0.total_cmp(&b.2.0))?;
         let chance = (asked.len() as f64 * chi_tail(*statistic, 2.0)).min(1.0);
         let p = if *depth < DEPTH { 1.0 } else { chance };
         let what = format!("its energy follows {name}, by {:.0} % rms", 100.0 * depth);
         let outcome = self.outcome(self.claims[3]?, *statistic, p, what);
         Some(Outcome {
-            about: vec![(*name).to_owned()],
+            about: recorded.then(|| (*name).to_owned()).into_iter().collect(),
             ..outcome
         })
     }

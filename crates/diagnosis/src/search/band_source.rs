@@ -3,7 +3,7 @@
 //! A mode that noise drives and a tone whose pitch wanders know nothing of temperature, supply and command. The band alone, on
 //! the half line of frequencies, is a complex envelope z: |z|^2 is its size, and the imaginary part of z(t+1) z*(t), turned back
 //! by the mean pitch, its pitch. Both are regressed on each recorded course, on its square, and for a command on what rings
-//! after each change of it. The scatter of a coefficient is that of the residual at the frequencies where the course moves.
+//! after each change of it; so are the squared changes of z, as a command that shifts its phase makes it jump. The scatter of a coefficient is that of the residual at the frequencies where the course moves.
 //!
 //! What drives a mode may be recorded, too: then z is coherent with the envelope of that at the same place, whatever the mode
 //! makes of its phase.
@@ -18,7 +18,7 @@ use rustfft::num_complex::Complex;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::band_alone::stands_out;
-use super::envelope::law::pitch;
+use super::envelope::law::{changes, pitch};
 use super::envelope::{Band, REACH, envelope_of, kept};
 use crate::ingest::motion::drives;
 use crate::test_level::{CheckId, Outcome};
@@ -106,9 +106,10 @@ pub(super) struct Moves {
     /// Half its width, coefficients.
     pub(super) half: f64,
     pub(super) envelope: Vec<Complex<f64>>,
-    /// Its pitch and its size in time, without their means.
+    /// Its pitch, its size and how much it changes in time, without their means.
     pub(super) pitch: Vec<f64>,
     pub(super) size: Vec<f64>,
+    changes: Vec<f64>,
 }
 
 impl Moves {
@@ -126,6 +127,7 @@ impl Moves {
             half,
             pitch: beyond(pitch(&z), &[]),
             size: beyond(z.iter().map(Complex::norm_sqr).collect(), &[]),
+            changes: beyond(changes(&z), &[]),
             envelope: z,
         })
     }
@@ -170,7 +172,12 @@ pub(super) fn claim(
     let mut asked = 0;
     let mut least: Option<(f64, &str, &'static str)> = None;
     for (name, course) in &all {
-        for (what, series) in [("pitch", &own.pitch), ("size", &own.size)] {
+        let all = [
+            ("pitch", &own.pitch),
+            ("size", &own.size),
+            ("jumps", &own.changes),
+        ];
+        for (what, series) in all {
             let Some((p, part)) = chance(series, course) else {
                 continue;
             };

@@ -245,8 +245,8 @@ impl Search<'_> {
         let clusters = Self::clusters(state);
         let bands: Vec<Option<(Band, usize)>> =
             clusters.iter().map(|c| self.band(state, c)).collect();
-        let shaken = (self.view.signals.iter())
-            .filter(|s| s.quantity == Quantity::Acc && !bands.is_empty());
+        let shaken =
+            (self.view.signals.iter()).filter(|s| s.quantity == Quantity::Acc && !bands.is_empty());
         let felt = shaken.map(|s| (s.name.as_str(), self.panel.dct.forward(&s.values)));
         let felt: Vec<(&str, Vec<f64>)> = felt.collect();
         let moves: Vec<Option<Moves>> = (bands.iter())

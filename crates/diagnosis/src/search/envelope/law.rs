@@ -124,6 +124,13 @@ fn jumps(z: &[Complex<f64>]) -> Vec<f64> {
     all
 }
 
+/// Squared change from value to value of an envelope that is turned back by its mean pitch.
+pub(crate) fn changes(z: &[Complex<f64>]) -> Vec<f64> {
+    let back = turned_back(z);
+    let off = z.windows(2).map(|w| (w[1] * back - w[0]).norm_sqr());
+    off.chain([0.0]).collect()
+}
+
 /// What turns an envelope back from value to value by its mean pitch.
 fn turned_back(z: &[Complex<f64>]) -> Complex<f64> {
     let turn: Complex<f64> = z.windows(2).map(|w| w[1] * w[0].conj()).sum();
