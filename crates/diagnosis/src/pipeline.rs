@@ -376,7 +376,7 @@ fn left_on<'a>(
     withdraw::Left {
         late: late.iter().map(|l| l.chi_square).sum(),
         before: (searched.iter().filter(first))
-            .map(|o| o.e.as_slice())
+            .map(|o| o.u.as_slice())
             .collect(),
         colour: colours.next().map_or(0.0, |c| c.statistic),
         about: channels_of(fails),

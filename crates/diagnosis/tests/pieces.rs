@@ -1,10 +1,11 @@
 //! What is a piece of something without a name has none itself: the first harmonic of what repeats itself in another shape than a
-//! sine, and the largest of many strokes.
+//! sine, the largest of many strokes, the band of a mode that an acceleration or another axis drives, noise that a line swells.
 
 mod graded;
 
 use std::f64::consts::{PI, TAU};
 
+use diagnosis::result::Diagnosis;
 use graded::{add, graded, named, record, said, told, values};
 use model::record::{Quantity, Record};
 use rand_core::Rng;
@@ -53,6 +54,84 @@ fn what_repeats_itself_as_no_sine_is_no_wandering_line() {
         (told_of && !wrong)
             .then_some(())
             .ok_or_else(|| format!("{pitch_hz} Hz, {linewidth_hz} Hz: {}", said(&d)))
+    });
+}
+
+/// What a mode of that frequency and linewidth makes of a drive, over its own rms.
+fn rung(drive: &[f64], (pitch_hz, linewidth_hz): (f64, f64)) -> Vec<f64> {
+    let keep = (-PI * linewidth_hz / RATE_HZ).exp();
+    let turn = 2.0 * keep * (TAU * pitch_hz / RATE_HZ).cos();
+    let (mut last, mut before) = (0.0, 0.0);
+    let next = |v: &f64| {
+        (last, before) = (turn * last - keep * keep * before + v, last);
+        last
+    };
+    let all: Vec<f64> = drive.iter().map(next).collect();
+    let rms = (all.iter().map(|v| v * v).sum::<f64>() / all.len() as f64).sqrt();
+    all.iter().map(|v| v / rms).collect()
+}
+
+/// Whether something is told of gyro_x, and no band is named there.
+fn no_band(d: &Diagnosis, of: impl Fn() -> String) -> Result<(), String> {
+    let told_of = d.unexplained.iter().any(|u| u.channel.contains("gyro_x"));
+    let band = |n: &(&str, &str)| ["narrow_band", "wandering_line"].contains(&n.0);
+    let wrong = named(d).iter().any(band);
+    (told_of && !wrong)
+        .then_some(())
+        .ok_or_else(|| format!("{}: {}", of(), said(d)))
+}
+
+#[test]
+fn a_mode_that_an_acceleration_drives_is_no_noise_of_the_sensor() {
+    graded("a mode behind an acceleration", |run, rng| {
+        let mut r = record(&[], 7300 + run);
+        let mode = (between(0.8, 8.0, rng), between(0.05, 0.3, rng));
+        let shakes: Vec<f64> = (0..count(&r)).map(|_| StandardNormal.sample(rng)).collect();
+        let felt = r.channels.iter_mut().find(|c| c.quantity == Quantity::Acc);
+        let felt = felt.expect("an accelerometer");
+        let lsb = felt.lsb.expect("counts");
+        // Of three counts, beside the noise of the sensor.
+        let each = felt.values.iter_mut().zip(&shakes);
+        each.for_each(|(v, a)| *v = ((*v / lsb) + 3.0 * a).round() * lsb);
+        let course = rung(&shakes, mode);
+        add(&mut r, "gyro_x", |i| 0.12 * course[i]);
+        no_band(&told(&r), || format!("{mode:?}"))
+    });
+}
+
+#[test]
+fn a_mode_that_another_axis_drives_is_none_of_this_one() {
+    graded("a mode behind another axis", |run, rng| {
+        let mut r = record(&[], 7400 + run);
+        let mode = (between(0.8, 8.0, rng), between(0.1, 0.4, rng));
+        let other = r.channels.iter().find(|c| c.name == "gyro_y");
+        let course = rung(&other.expect("an axis").values.clone(), mode);
+        add(&mut r, "gyro_x", |i| 0.15 * course[i]);
+        no_band(&told(&r), || format!("{mode:?}"))
+    });
+}
+
+#[test]
+fn noise_that_a_line_swells_is_no_process_of_the_library() {
+    graded("noise that a line swells", |run, rng| {
+        let mut r = record(&[], 7500 + run);
+        let (period_s, memory_s) = (between(15.0, 40.0, rng), between(0.4, 1.0, rng));
+        let keep = (-1.0 / (memory_s * RATE_HZ)).exp();
+        let mut level = 0.0;
+        let course: Vec<f64> = (0..count(&r))
+            .map(|i| {
+                let drive: f64 = StandardNormal.sample(rng);
+                level = keep * level + (1.0 - keep * keep).sqrt() * drive;
+                let line = (TAU * i as f64 / RATE_HZ / period_s).sin();
+                0.15 * line + 0.2 * (1.0 + line) * level
+            })
+            .collect();
+        add(&mut r, "gyro_x", |i| course[i]);
+        let d = told(&r);
+        let wrong = named(&d).iter().any(|n| n.0 != "line");
+        (!wrong && !d.unexplained.is_empty())
+            .then_some(())
+            .ok_or_else(|| format!("{period_s} s, {memory_s} s: {}", said(&d)))
     });
 }
 

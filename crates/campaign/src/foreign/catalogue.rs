@@ -2,7 +2,6 @@
 
 use std::sync::LazyLock;
 
-use super::sets::SETS;
 use super::shape::Shape;
 use crate::random::Draw;
 use crate::stand::{Needs, Stand};
@@ -122,11 +121,6 @@ impl ForeignEffect {
     const fn strength(mut self, strength: Strength) -> Self {
         self.strength = strength;
         self
-    }
-
-    /// Whether the engine has been changed after it was graded, or was developed with it.
-    pub fn is_seen(&self) -> bool {
-        SETS[self.set - 1].seen
     }
 
     /// The axis that it acts on where it was to act on this one.

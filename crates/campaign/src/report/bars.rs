@@ -78,27 +78,18 @@ not 7.2. The modulation of an AM line holds depth^2 / (2 + depth^2) of its energ
 21 at depth 0.5; depths are drawn from 0.5 to 1.
 ";
 
-/// The sets that the engine owes nothing to, in words.
-fn unseen_sets() -> String {
-    let unseen = sets::SETS.iter().enumerate().filter(|(_, set)| !set.seen);
-    let told: Vec<String> = unseen.map(|(i, _)| format!("set {}", i + 1)).collect();
-    told.join(", ")
-}
-
 /// Foreign effects that are strong enough to be reported.
-fn strange(all: &[Outcome], seen: bool) -> Vec<&Outcome> {
+fn strange(all: &[Outcome]) -> Vec<&Outcome> {
     all.iter()
         .filter(|o| {
-            matches!(o.family, Family::Foreign(i) if EFFECTS[i].is_seen() == seen && EFFECTS[i].later.is_none())
+            matches!(o.family, Family::Foreign(i) if EFFECTS[i].later.is_none())
                 && (o.strength.is_nan() || o.strength >= 0.99 * 25.0)
         })
         .collect()
 }
 
-/// Both bars of some foreign effects.
-fn of_strange(what: &str, runs: &[&Outcome]) -> [Bar; 2] {
-    let told = Rate::of(runs.iter().map(|o| !o.unexplained.is_empty()));
-    let wrong = Rate::of(runs.iter().map(|o| !o.wrong.is_empty()));
+/// Both bars of foreign effects: told, and given a name.
+fn of_strange(what: &str, [told, wrong]: [Rate; 2]) -> [Bar; 2] {
     let what = format!("{what}: reported as unexplained");
     [
         bar(what, AtLeast, UNEXPLAINED, told),
@@ -154,22 +145,22 @@ fn of_library(all: &[Outcome]) -> Vec<Bar> {
 
 /// The table of the bars.
 pub(super) fn bars(out: &mut String, all: &[Outcome]) {
-    let unseen = strange(all, false);
-    let without_twin: Vec<&Outcome> = unseen
-        .iter()
-        .copied()
-        .filter(|o| matches!(o.family, Family::Foreign(i) if EFFECTS[i].twin.is_none()))
-        .collect();
     let fit: Vec<_> = estimates(all).into_values().flatten().collect();
     let covered = Rate::of(fit.iter().map(|e| covers(e)));
     let mut bars = of_clean(all);
     bars.extend(of_library(all));
-    let what = format!("foreign effects of d' >= 25, {}, unseen", unseen_sets());
-    bars.extend(of_strange(&what, &unseen));
-    let what = "those of them without a near twin in an earlier set";
-    bars.extend(of_strange(what, &without_twin));
-    let what = "foreign effects of d' >= 25, seen sets";
-    bars.extend(of_strange(what, &strange(all, true)));
+    if let Some((latest, first)) = sets::latest() {
+        let of = |hits| Rate::of((0..first.runs).map(|run| run < hits));
+        let what = format!("foreign effects of d' >= 25, set {latest} before any change by it");
+        bars.extend(of_strange(&what, [first.unexplained, first.named].map(of)));
+    }
+    let strange = strange(all);
+    let of = |hit: fn(&Outcome) -> bool| Rate::of(strange.iter().map(|o| hit(o)));
+    let rates = [
+        of(|o| !o.unexplained.is_empty()),
+        of(|o| !o.wrong.is_empty()),
+    ];
+    bars.extend(of_strange("foreign effects of d' >= 25, all sets", rates));
     bars.push(bar(
         "95 % intervals that hold the truth",
         AtLeast,

@@ -44,8 +44,7 @@ fn doubted(facts: &Facts<'_>) -> (Vec<Doubt>, Vec<bool>) {
     let mut terms: Vec<Doubt> = seen.collect();
     let variance = rules::variance_withdrawn(facts);
     let kin = Kin { facts, variance };
-    // What falls may take others with it.
-    while kin.fall(&mut terms) {}
+    kin.fall(&mut terms);
     let laws = facts.s.variance.each.iter();
     let falls = laws.map(|v| variance || kin.variance_falls(v, &terms));
     let falls = falls.collect();

@@ -396,13 +396,6 @@ fn scores_behind(first: &[f64], second: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Chance that two residuals correlate as well, either of them up to [`LATE`] samples later.
-pub(crate) fn late_chance(a: &[f64], b: &[f64]) -> f64 {
-    let both = [scores_behind(a, b), scores_behind(b, a)];
-    let chi_square = both.iter().flatten().map(|z| z * z).sum();
-    tails::chi_tail(chi_square, 2.0 * LATE as f64)
-}
-
 /// Correlation of the residuals of two axes, one of them some samples later.
 fn late(a: &Searched<'_>, b: &Searched<'_>, shared: &mut Shared) {
     // An axis, the one that follows it, the samples, z.

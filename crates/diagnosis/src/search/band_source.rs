@@ -29,7 +29,7 @@ const SMOOTHED: usize = 6;
 /// Degrees of freedom of such a mean: two for each frequency.
 const DEGREES: f64 = 2.0 * (2.0 * SMOOTHED as f64 + 1.0);
 /// Least part of the energy of pitch or size that has to follow: it is otherwise off by a seventh at most.
-const FOLLOWED: f64 = 0.02;
+pub(crate) const FOLLOWED: f64 = 0.02;
 /// Fewest values of the envelope.
 const LEAST: usize = 64;
 
@@ -138,13 +138,19 @@ impl Moves {
     }
 }
 
-/// Chance that a band is as coherent with a recorded channel of these coefficients, and the part of its energy that is.
-fn coherent(own: &Moves, coefficients: &[f64]) -> (f64, f64) {
-    let there = envelope_of(&coefficients[own.places.clone()], &mut FftPlanner::new());
+/// Chance that the coefficients of two channels at one place are as coherent, and the part of the energy that is.
+pub(crate) fn coherence(own: &[f64], there: &[f64]) -> (f64, f64) {
+    let mut planner = FftPlanner::new();
+    let own = envelope_of(own, &mut planner);
+    coherent(&own, &envelope_of(there, &mut planner))
+}
+
+/// The same of two envelopes.
+fn coherent(own: &[Complex<f64>], there: &[Complex<f64>]) -> (f64, f64) {
     let energy = |z: &[Complex<f64>]| z.iter().map(Complex::norm_sqr).sum::<f64>();
-    let product = own.envelope.iter().zip(&there);
+    let product = own.iter().zip(there);
     let (p, sum) = stands_out(product.map(|(a, b)| a * b.conj()).collect());
-    let both = energy(&own.envelope) * energy(&there);
+    let both = energy(own) * energy(there);
     (p, sum * sum / both.max(f64::MIN_POSITIVE))
 }
 
@@ -188,7 +194,8 @@ pub(super) fn claim(
         }
     }
     for (name, coefficients) in felt {
-        let (p, part) = coherent(own, coefficients);
+        let there = envelope_of(&coefficients[own.places.clone()], &mut FftPlanner::new());
+        let (p, part) = coherent(&own.envelope, &there);
         asked += 1;
         if part > FOLLOWED && least.as_ref().is_none_or(|l| p < l.0) {
             least = Some((p, name, "phase"));

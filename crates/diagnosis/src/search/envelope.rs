@@ -314,24 +314,31 @@ mod tests {
     const HALF: f64 = 60.0;
     const LEVEL: f64 = 0.25;
 
-    /// A tone whose phase makes these steps, in a little noise, as the band that its Lorentzian says.
-    fn band(rng: &mut Xoshiro256PlusPlus, step: fn(&mut Xoshiro256PlusPlus) -> f64) -> Band {
-        let mut phase = 0.0;
-        let samples = (0..COUNT).map(|_| {
-            phase += 0.4 * PI + step(rng);
-            phase.cos() + LEVEL.sqrt() * normal(rng)
-        });
+    /// A signal of mean square 1/2 in a little noise, as the band that a Lorentzian of that half width says.
+    fn band_of(signal: &[f64], half: f64, rng: &mut Xoshiro256PlusPlus) -> Band {
+        let samples = signal.iter().map(|s| s + LEVEL.sqrt() * normal(rng));
         let c = Dct::new(COUNT).forward(&samples.collect::<Vec<_>>());
         let middle = 0.4 * COUNT as f64;
-        let (from, to) = (middle - REACH * HALF, middle + REACH * HALF);
-        let top = 0.5 * COUNT as f64 / (PI * HALF) / LEVEL;
+        let (from, to) = (middle - REACH * half, middle + REACH * half);
+        let top = 0.5 * COUNT as f64 / (PI * half) / LEVEL;
         let places = || from as usize..to as usize;
         Band {
             coefficients: places().map(|k| c[k] / LEVEL.sqrt()).collect(),
             density: (places())
-                .map(|k| top / (1.0 + ((k as f64 - middle) / HALF).powi(2)))
+                .map(|k| top / (1.0 + ((k as f64 - middle) / half).powi(2)))
                 .collect(),
         }
+    }
+
+    /// A tone whose phase makes these steps.
+    fn band(rng: &mut Xoshiro256PlusPlus, step: fn(&mut Xoshiro256PlusPlus) -> f64) -> Band {
+        let mut phase = 0.0;
+        let samples = (0..COUNT).map(|_| {
+            phase += 0.4 * PI + step(rng);
+            phase.cos()
+        });
+        let samples: Vec<f64> = samples.collect();
+        band_of(&samples, HALF, rng)
     }
 
     /// A phase that walks: its variance grows by twice the half width, rad per sample.
@@ -360,5 +367,55 @@ mod tests {
         // 0.2 of 20 are expected by chance.
         assert!(walking <= 2, "{walking}");
         assert!(turning >= 18, "{turning}");
+    }
+
+    /// Half width of what stays for some time, coefficients.
+    const SLOW: f64 = 8.0;
+
+    /// A mode that noise drives.
+    fn driven(rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+        let keep = (-PI * SLOW / COUNT as f64).exp();
+        let drive = (0.5 * (1.0 - keep * keep)).sqrt();
+        let mut z = Complex::new(normal(rng), normal(rng)) * 0.5f64.sqrt();
+        let next = |i| {
+            z = z * keep + Complex::new(normal(rng), normal(rng)) * drive;
+            (z * Complex::from_polar(1.0, 0.4 * PI * i as f64)).re
+        };
+        (0..COUNT).map(next).collect()
+    }
+
+    /// A mode that is struck at random, with the same memory.
+    fn struck(rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+        let rate = PI * SLOW / COUNT as f64;
+        let keep = (-rate).exp();
+        let mut z = Complex::new(0.0, 0.0);
+        let chance = Uniform::new(0.0, 1.0).expect("a range");
+        let next = |i| {
+            z *= keep;
+            // Once in three of its memories, with a mean square of 2 rate.
+            if chance.sample(rng) < rate / 3.0 {
+                z += Complex::new(normal(rng), normal(rng)) * 3f64.sqrt();
+            }
+            (z * Complex::from_polar(1.0, 0.4 * PI * i as f64)).re
+        };
+        (0..COUNT).map(next).collect()
+    }
+
+    #[test]
+    fn a_mode_that_noise_drives_has_its_name_and_one_that_is_struck_has_none() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(29);
+        let mut fails = |of: fn(&mut Xoshiro256PlusPlus) -> Vec<f64>| {
+            let of = (0..40).filter(|seed| {
+                let signal = of(&mut rng);
+                let band = band_of(&signal, SLOW, &mut rng);
+                let seen = Seen::new(&band, *seed).expect("a band");
+                seen.claim("").p_value < CheckId::BandEnvelope.level()
+            });
+            of.count()
+        };
+        let (driven, struck) = (fails(driven), fails(struck));
+        // 0.4 of 40 are expected by chance.
+        assert!(driven <= 3, "{driven}");
+        assert!(struck >= 36, "{struck}");
     }
 }

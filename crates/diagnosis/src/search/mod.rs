@@ -3,7 +3,7 @@
 //! others make superfluous is dropped. The search knows hypotheses, not effects.
 
 mod band_alone;
-mod band_source;
+pub(crate) mod band_source;
 pub(crate) mod bands;
 mod beyond;
 pub(crate) mod envelope;

@@ -2,15 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use model::effect::{Peak, Signal};
 
 use crate::audit::repeats;
-use crate::criticise::common_noise::late_chance;
 use crate::criticise::follower_shape;
 use crate::criticise::residual::{self, Place, Repeats};
 use crate::fit::channel::{Form, ID, Term};
 use crate::ingest::motion::drives;
+use crate::search::band_source::{FOLLOWED, coherence};
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Outcome, RECORD, omnibus_level};
 
@@ -56,7 +57,7 @@ const ELSEWHERE: f64 = 1.0 / 3.0;
 pub(crate) struct Left<'a> {
     /// Chi-square of what it takes from others later.
     pub late: f64,
-    /// Whitened residuals of those others.
+    /// Whitened coefficients of those others.
     pub before: Vec<&'a [f64]>,
     /// The same of the energies that follow something recorded, where they do.
     pub colour: f64,
@@ -384,33 +385,43 @@ impl<'a> Facts<'a> {
         })
     }
 
+    /// Coefficients about the centre of a band that hold what it explains.
+    fn place_of(&self, peak: &Peak) -> Range<usize> {
+        let to_places = self.s.u.len() as f64 / PI;
+        let reach = BAND_REACH * peak.half_width;
+        let from = ((peak.omega - reach).max(0.0) * to_places) as usize;
+        let to = ((peak.omega + reach) * to_places).ceil() as usize;
+        from.max(1)..to.min(self.s.u.len())
+    }
+
     /// Whether a test of the residual in time fails, and hardly does without the coefficients of a band: what it shows is then
     /// how that band is made, for which its name has no word.
     pub(super) fn failure_is_of(&self, t: &Term) -> bool {
-        let asked = IN_TIME.iter().filter(|(id, _)| self.fails(*id));
-        let asked: Vec<_> = asked.map(|a| a.1).collect();
-        let Some(peak) = t
-            .peak()
-            .filter(|_| !asked.is_empty() || !self.left.before.is_empty())
-        else {
+        let asked: Vec<&InTime> = (IN_TIME.iter())
+            .filter(|(id, _)| self.fails(*id))
+            .map(|(_, test)| test)
+            .collect();
+        let Some(peak) = t.peak().filter(|_| !asked.is_empty()) else {
             return false;
         };
         let dct = &self.s.search.panel.dct;
-        let step = PI / self.s.u.len() as f64;
-        let reach = BAND_REACH * peak.half_width;
-        let outside = |(k, u): (usize, &f64)| {
-            let inside = (k as f64 * step - peak.omega).abs() < reach;
-            if inside { 0.0 } else { *u }
+        let mut without = self.s.u.clone();
+        without[self.place_of(&peak)].fill(0.0);
+        let (all, rest) = (dct.inverse(&self.s.u), dct.inverse(&without));
+        let nats = |test: &InTime, e: &[f64]| -test(self, e).p_value.max(f64::MIN_POSITIVE).ln();
+        (asked.iter()).any(|test| nats(test, &rest) < ELSEWHERE * nats(test, &all))
+    }
+
+    /// Whether the channel follows another axis later, and does so at the place of a band.
+    pub(super) fn is_of_another_axis(&self, t: &Term) -> bool {
+        let Some(peak) = t.peak() else {
+            return false;
         };
-        let all = dct.inverse(&self.s.u);
-        let rest = dct.inverse(&self.s.u.iter().enumerate().map(outside).collect::<Vec<_>>());
-        let gone = |chance: &dyn Fn(&[f64]) -> f64| {
-            let nats = |e: &[f64]| -chance(e).max(f64::MIN_POSITIVE).ln();
-            nats(&rest) < ELSEWHERE * nats(&all)
-        };
-        let in_time = |test: &InTime| gone(&|e| test(self, e).p_value);
-        asked.iter().any(in_time)
-            || (self.left.before.iter()).any(|first| gone(&|e| late_chance(first, e)))
+        let place = self.place_of(&peak);
+        self.left.before.iter().any(|before| {
+            let (p, part) = coherence(&self.s.u[place.clone()], &before[place.clone()]);
+            part > FOLLOWED && p < CheckId::BandSource.level()
+        })
     }
 
     /// Whether readings that are those before make neighbours correlate.

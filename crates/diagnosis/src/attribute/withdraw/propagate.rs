@@ -29,19 +29,15 @@ pub(super) struct Kin<'a> {
 }
 
 impl Kin<'_> {
-    /// Densities of the processes that have fallen, with what each explains; of a filter by how much it moves the white noise.
+    /// Densities of the processes that have fallen, with what each explains.
     fn fallen(&self, doubts: &[Doubt]) -> Vec<(Vec<f64>, f64)> {
         let at = &self.facts.s.search.panel.bins.at;
         let terms = self.facts.s.state.terms.iter().zip(doubts);
         terms
             .filter(|(_, d)| **d != Doubt::No)
             .filter_map(|(t, _)| match &t.form {
-                Form::Covariance(process, theta) => {
-                    let mut density = process.density(theta, at);
-                    if process.filters_white() {
-                        density.iter_mut().for_each(|d| *d = (*d - 1.0).abs());
-                    }
-                    Some((density, t.lr))
+                Form::Covariance(process, theta) if !process.filters_white() => {
+                    Some((process.density(theta, at), t.lr))
                 }
                 _ => None,
             })
@@ -151,8 +147,8 @@ impl Kin<'_> {
             .any(|c| others.contains(c))
     }
 
-    /// Doubt what is of a kind with what has fallen; whether there is any.
-    pub(super) fn fall(&self, doubts: &mut [Doubt]) -> bool {
+    /// Doubt what is of a kind with what has fallen.
+    pub(super) fn fall(&self, doubts: &mut [Doubt]) {
         let fallen = self.fallen(doubts);
         let falls: Vec<bool> = (self.facts.s.state.parts().zip(&*doubts))
             .map(|((t, own), doubt)| {
@@ -169,12 +165,11 @@ impl Kin<'_> {
                 *doubt == Doubt::No && !t.is_band() && of_kind
             })
             .collect();
-        for (doubt, falls) in doubts.iter_mut().zip(&falls) {
-            if *falls {
+        for (doubt, falls) in doubts.iter_mut().zip(falls) {
+            if falls {
                 *doubt = Doubt::Checks;
             }
         }
-        falls.contains(&true)
     }
 
     /// Whether the name of a law of the variance falls beside what is left.
