@@ -46,7 +46,10 @@ struct Reader {
 }
 
 /// Reads the file behind its first line.
-pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Result<Table, LogError> {
+pub(super) fn read(
+    input: &mut dyn BufRead,
+    topic: Option<&str>,
+) -> Result<(Table, bool), LogError> {
     let mut reader = Reader::default();
     // Nothing is taken of a length that the file does not have.
     let mut counted = |into: &mut Vec<u8>| -> std::io::Result<Option<bool>> {
@@ -69,13 +72,7 @@ pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Result<Table
             _ => break true,
         }
     };
-    let mut table = reader.topics.table(topic)?;
-    if is_cut {
-        table
-            .notes
-            .push("the file ends in the middle: it is read as far as it goes".to_owned());
-    }
-    Ok(table)
+    Ok((reader.topics.table(topic)?, is_cut))
 }
 
 impl Reader {

@@ -27,7 +27,10 @@ struct Reader {
 }
 
 /// Reads the file behind its magic.
-pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Result<Table, LogError> {
+pub(super) fn read(
+    input: &mut dyn BufRead,
+    topic: Option<&str>,
+) -> Result<(Table, bool), LogError> {
     let mut reader = Reader::default();
     let mut content = Vec::new();
     let is_cut = loop {
@@ -51,13 +54,7 @@ pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Result<Table
             std::io::copy(&mut input.take(length), &mut std::io::sink())?;
         }
     };
-    let mut table = reader.topics.table(topic)?;
-    if is_cut {
-        table
-            .notes
-            .push("the file ends in the middle: it is read as far as it goes".to_owned());
-    }
-    Ok(table)
+    Ok((reader.topics.table(topic)?, is_cut))
 }
 
 impl Reader {
