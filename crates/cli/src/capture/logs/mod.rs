@@ -33,12 +33,14 @@ fn packed_by(other: &str, known: &str) -> LogError {
     ))
 }
 
+/// The table of the topic that is asked for, and whether the file ends in the middle.
+type Read = Result<(Table, bool), LogError>;
+
 /// A kind of log: how it begins, what it is called, and who reads it.
 struct Kind {
     magic: &'static [u8],
     name: &'static str,
-    /// The table of the topic that is asked for, and whether the file ends in the middle.
-    read: fn(&mut dyn BufRead, Option<&str>) -> Result<(Table, bool), LogError>,
+    read: fn(&mut dyn BufRead, Option<&str>) -> Read,
 }
 
 const KINDS: [Kind; 3] = [
