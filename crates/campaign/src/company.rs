@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::foreign::words::phasor;
 use crate::plant::{STRONG, StrongRow as Row, Truth, plant, plant_outliers, strong};
 use crate::random::Draw;
 use crate::stand::{GYROS, Stand};
@@ -247,24 +248,13 @@ fn vibration(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
     let pitch = stand.wander(draw, 0.05 * centre, slow);
     let half_width = 0.02 * centre;
     let keep = (-TAU * half_width / rate_hz).exp();
-    let step = (1.0 - keep * keep).sqrt();
-    let (mut x, mut y) = (draw.normal(), draw.normal());
+    let turns = pitch.iter().map(|p| TAU * (centre + p) / rate_hz);
     let rms = (0.35 / 0.65 * stand.white(axis)).sqrt();
-    let signal: Vec<f64> = pitch
-        .iter()
-        .map(|p| {
-            let (s, c) = (TAU * (centre + p) / rate_hz).sin_cos();
-            (x, y) = (
-                keep * (c * x - s * y) + step * draw.normal(),
-                keep * (s * x + c * y) + step * draw.normal(),
-            );
-            rms * x
-        })
-        .collect();
+    let swings = phasor(draw, keep, turns);
+    let signal: Vec<f64> = swings.iter().map(|x| rms * x).collect();
     let meter = Meter::new(stand, axis);
-    let count = meter.counts();
     // What it has by bin is its periodogram, smoothed over so many bins that its scatter does not count.
-    let density = smoothed(&meter.energy(&signal), count);
+    let density = smoothed(&meter.energy(&signal), meter.counts());
     Structure {
         truth: None,
         added: Some(signal),

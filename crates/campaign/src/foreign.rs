@@ -16,7 +16,7 @@ mod known;
 mod prelude;
 pub mod sets;
 mod shape;
-mod words;
+pub(crate) mod words;
 
 use act::Change;
 pub use act::add;

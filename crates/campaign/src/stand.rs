@@ -15,54 +15,33 @@ const GRAVITY: f64 = 9.80665;
 /// Unit of the gyros, deg/s per count.
 pub const LSB: f64 = 0.07326;
 
-/// What the environment has to do so that an effect can show.
+/// What the environment has to do so that an effect can show: any of what it may do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Needs {
-    /// A temperature that moves.
-    pub temperature: bool,
-    /// A supply whose load switches.
-    pub supply: bool,
-    /// A motor that is switched.
-    pub motor: bool,
-    /// Vibration.
-    pub vibration: bool,
-}
+pub struct Needs(u8);
 
 impl Needs {
     /// Nothing beyond what any stand has.
-    pub const NONE: Self = Self {
-        temperature: false,
-        supply: false,
-        motor: false,
-        vibration: false,
-    };
-    /// All of it.
-    pub const ALL: Self = Self {
-        temperature: true,
-        supply: true,
-        motor: true,
-        vibration: true,
-    };
+    pub const NONE: Self = Self(0);
     /// A temperature that moves.
-    pub const TEMPERATURE: Self = Self {
-        temperature: true,
-        ..Self::NONE
-    };
+    pub const TEMPERATURE: Self = Self(1);
     /// A supply whose load switches.
-    pub const SUPPLY: Self = Self {
-        supply: true,
-        ..Self::NONE
-    };
+    pub const SUPPLY: Self = Self(2);
     /// A motor that is switched.
-    pub const MOTOR: Self = Self {
-        motor: true,
-        ..Self::NONE
-    };
+    pub const MOTOR: Self = Self(4);
     /// Vibration.
-    pub const VIBRATION: Self = Self {
-        vibration: true,
-        ..Self::NONE
-    };
+    pub const VIBRATION: Self = Self(8);
+    /// All of it.
+    pub const ALL: Self = Self(15);
+
+    /// This and more.
+    #[must_use]
+    pub const fn and(self, more: Self) -> Self {
+        Self(self.0 | more.0)
+    }
+
+    const fn has(self, one: Self) -> bool {
+        self.0 & one.0 != 0
+    }
 }
 
 /// A stand: length, noise and world.
@@ -324,7 +303,7 @@ pub(crate) fn wander(
 /// What the room and a heater make of the temperature, deg C.
 fn temperature(draw: &mut Draw, samples: usize, rate_hz: f64, needs: Needs) -> Vec<f64> {
     let seconds = samples as f64 / rate_hz;
-    let heater = needs.temperature || draw.chance(0.5);
+    let heater = needs.has(Needs::TEMPERATURE) || draw.chance(0.5);
     let mut temperature = vec![draw.between(18.0, 32.0); samples];
     let mut add = |values: Vec<f64>| {
         temperature
@@ -364,7 +343,7 @@ fn supply(draw: &mut Draw, duty: &[f64], rate_hz: f64, needs: Needs) -> Vec<f64>
     let mut supply = vec![5.0; samples];
     let mut sag = |values: Vec<f64>| supply.iter_mut().zip(values).for_each(|(u, v)| *u -= v);
     sag(wander(draw, samples, rate_hz, 0.001, 60.0));
-    if needs.supply || draw.chance(0.5) {
+    if needs.has(Needs::SUPPLY) || draw.chance(0.5) {
         let drop = draw.between(0.03, 0.06);
         let mut on = false;
         sag(held(draw, samples, rate_hz, (10.0, 50.0), |_| {
@@ -383,14 +362,14 @@ fn supply(draw: &mut Draw, duty: &[f64], rate_hz: f64, needs: Needs) -> Vec<f64>
 }
 
 fn world(draw: &mut Draw, samples: usize, rate_hz: f64, needs: Needs) -> World {
-    let duty = if needs.motor || draw.chance(0.6) {
+    let duty = if needs.has(Needs::MOTOR) || draw.chance(0.6) {
         duty(draw, samples, rate_hz)
     } else {
         vec![0.0; samples]
     };
     let temperature = temperature(draw, samples, rate_hz, needs);
     let supply = supply(draw, &duty, rate_hz, needs);
-    let rms = if needs.vibration || draw.chance(0.5) {
+    let rms = if needs.has(Needs::VIBRATION) || draw.chance(0.5) {
         draw.between(0.05, 0.2)
     } else {
         0.0

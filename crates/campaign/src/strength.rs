@@ -106,6 +106,12 @@ impl Meter {
         &self.length.bins.at.omega
     }
 
+    /// The bins of its length.
+    #[cfg(test)]
+    pub(crate) fn bins(&self) -> &Bins {
+        &self.length.bins
+    }
+
     /// The same channel with a process beside its noise that adds `density` to the variance of each coefficient, and that is
     /// known: what it makes likelier is no strength of an effect beside it.
     #[must_use]
@@ -125,6 +131,24 @@ impl Meter {
     #[must_use]
     pub fn counts(&self) -> &[f64] {
         &self.length.count
+    }
+
+    /// Expected energy in each bin where its coefficients have these variances.
+    fn energies(&self, variances: &[f64]) -> Vec<f64> {
+        let bins = variances.iter().zip(&self.length.count);
+        bins.map(|(v, m)| m * v).collect()
+    }
+
+    /// Expected energy of the noise in each bin.
+    #[must_use]
+    pub fn noise(&self) -> Vec<f64> {
+        self.energies(&self.clean)
+    }
+
+    /// Minus twice the log likelihood of a spectrum of these variances under itself.
+    fn under_itself(&self, variances: &[f64]) -> f64 {
+        let bins = variances.iter().zip(&self.length.count);
+        bins.map(|(v, m)| m * (1.0 + v.ln())).sum()
     }
 
     /// Energy of a signal in each bin.
@@ -166,16 +190,9 @@ impl Meter {
     /// d' of a signal of known shape, by its energies.
     #[must_use]
     pub fn of_signal(&self, energy: &[f64]) -> f64 {
-        let expected: Vec<f64> = (0..energy.len())
-            .map(|b| self.length.count[b] * self.clean[b] + energy[b])
-            .collect();
-        let truth: f64 = self
-            .clean
-            .iter()
-            .zip(&self.length.count)
-            .map(|(v, m)| m * (1.0 + v.ln()))
-            .sum();
-        self.against_baseline(&expected, truth)
+        let noise = self.noise();
+        let expected: Vec<f64> = noise.iter().zip(energy).map(|(n, e)| n + e).collect();
+        self.against_baseline(&expected, self.under_itself(&self.clean))
     }
 
     /// The multiple of a signal of these energies that is `wanted` strong, and how strong it is.
@@ -199,17 +216,7 @@ impl Meter {
             .zip(density)
             .map(|(v, d)| (v + d).max(1e-9 * v))
             .collect();
-        let expected: Vec<f64> = with
-            .iter()
-            .zip(&self.length.count)
-            .map(|(v, m)| v * m)
-            .collect();
-        let truth = with
-            .iter()
-            .zip(&self.length.count)
-            .map(|(v, m)| m * (1.0 + v.ln()))
-            .sum();
-        self.against_baseline(&expected, truth)
+        self.against_baseline(&self.energies(&with), self.under_itself(&with))
     }
 
     /// A strength beside processes whose size is fitted again too: what more or less of them explains does not count.

@@ -121,87 +121,103 @@ fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
             return diagnosed(of.with_those(&borne_out), options);
         }
     };
+    let named = name_all(&searched, &tested, &of, shocks, options.seed);
     let Prepared {
         ref grid,
         mut audited,
-        sticking,
+        sticking: mended,
         dead,
         mut input,
-        blows,
         ..
     } = of;
-    let mended: Vec<Finding> = sticking.clone();
-    let knocked: Vec<Range<usize>> = blows.into_iter().map(|b| b.readings).collect();
-    let far = masking::findings(&audited, &searched, grid);
-    let findings = [all_worded(sticking), all_worded(far)].concat();
-    let mut findings = merge::turning(findings, &knocked, grid);
-    findings.extend(all_worded(shocks));
-    let first = Named {
-        findings,
-        limits: std::mem::take(&mut audited.limits),
-        ..Named::default()
-    };
-    let name = |named, s| name_channel(named, s, &searched, &tested, &audited, grid, options.seed);
-    let named = searched.iter().fold(first, name);
     input.notes.append(&mut audited.notes);
     input.file.clone_from(&options.file);
     let mut told = concluded(&searched, tested, audited, dead, named);
     at_rest::with_motion(&mut told.findings, &at_rest);
     gain::complete(&mut told.findings, &searched, grid, &mended);
-    let HandedOver {
-        mut baseline_model,
-        mut extended_model,
-        replicates,
-        held,
-        taken_up,
-    } = handed_over::handed_over(&searched, grid, &told, &mended, options);
-    for f in &mut told.findings {
-        f.material = true;
-    }
-    let judged = options.replicates > 0;
-    if judged {
-        let (matters, seed) = (options.matters, options.seed);
-        replicates::consequence::state(&mut told.findings, &extended_model, grid, matters, seed);
-    }
-    let strays = !held.unexplained.is_empty();
-    told.checks.extend(held.checks);
-    told.unexplained.extend(held.unexplained);
-    told.unexplained.extend(taken_up);
-    let terms = &extended_model.unnamed;
-    let mut unexplained = entries(told.unexplained, &searched, grid, terms, options.matters);
-    ranked(&mut told.findings, &mut unexplained);
+    let mut models = handed_over::handed_over(&searched, grid, &told, &mended, options);
+    let strays = !models.held.unexplained.is_empty();
+    let mut unexplained = ranked_entries(&mut told, &mut models, &searched, grid, options);
     if let Some(bursts) = &grid.bursts {
-        bursts.part(&mut baseline_model);
-        bursts.part(&mut extended_model);
+        bursts.part(&mut models.baseline_model);
+        bursts.part(&mut models.extended_model);
         as_they_passed(&mut told.findings, &mut unexplained, bursts);
     }
     // Without replicates nothing says that what is left does not matter.
-    let unnamed = unexplained.iter().any(|u| u.material || !judged);
-    let verdict = match (strays || unnamed, told.findings.is_empty()) {
-        (true, _) => Verdict::Unexplained,
-        (false, true) => Verdict::Adequate,
-        (false, false) => Verdict::Extended,
-    };
+    let unnamed = (unexplained.iter()).any(|u| u.material || options.replicates == 0);
     Diagnosed {
         diagnosis: Diagnosis {
             format: DIAGNOSIS_FORMAT.into(),
-            baseline: handover::parameters_of(&baseline_model),
-            extended: handover::parameters_of(&extended_model),
+            baseline: handover::parameters_of(&models.baseline_model),
+            extended: handover::parameters_of(&models.extended_model),
             detection_limits: detection_limits::of_not_found(told.limits, &told.findings),
-            verdict,
-            replicates,
+            verdict: match (strays || unnamed, told.findings.is_empty()) {
+                (true, _) => Verdict::Unexplained,
+                (false, true) => Verdict::Adequate,
+                (false, false) => Verdict::Extended,
+            },
+            replicates: models.replicates,
             input,
             checks: told.checks,
             findings: told.findings,
             unexplained,
             not_tested: told.not_tested,
         },
-        baseline_model,
-        extended_model,
+        baseline_model: models.baseline_model,
+        extended_model: models.extended_model,
         evidence: (searched.iter().filter(|_| !options.no_evidence))
             .flat_map(|s| figures::of_channel(s, grid))
             .collect(),
     }
+}
+
+/// What is named: of the counts, the far readings, the shocks, and then channel by channel.
+fn name_all(
+    searched: &[Searched<'_>],
+    tested: &Tested,
+    of: &Prepared,
+    shocks: Vec<Finding>,
+    seed: u64,
+) -> Named {
+    let (grid, audited) = (&of.grid, &of.audited);
+    let knocked: Vec<Range<usize>> = of.blows.iter().map(|b| b.readings.clone()).collect();
+    let far = masking::findings(audited, searched, grid);
+    let findings = [all_worded(of.sticking.clone()), all_worded(far)].concat();
+    let mut findings = merge::turning(findings, &knocked, grid);
+    findings.extend(all_worded(shocks));
+    let first = Named {
+        findings,
+        limits: audited.limits.clone(),
+        ..Named::default()
+    };
+    let name = |named, s| name_channel(named, s, searched, tested, audited, grid, seed);
+    searched.iter().fold(first, name)
+}
+
+/// What has no name, by place; causes and entries get their ranks. What the replicates say of the models is told with the rest.
+fn ranked_entries(
+    told: &mut Told,
+    models: &mut HandedOver,
+    searched: &[Searched<'_>],
+    grid: &Grid,
+    options: &DiagnoseOptions,
+) -> Vec<Unexplained> {
+    let matters = options.matters;
+    for f in &mut told.findings {
+        f.material = true;
+    }
+    if options.replicates > 0 {
+        let (model, seed) = (&models.extended_model, options.seed);
+        replicates::consequence::state(&mut told.findings, model, grid, matters, seed);
+    }
+    told.checks.append(&mut models.held.checks);
+    let mut left = std::mem::take(&mut told.unexplained);
+    left.append(&mut models.held.unexplained);
+    left.append(&mut models.taken_up);
+    let terms = &models.extended_model.unnamed;
+    let mut unexplained = entries(left, searched, grid, terms, matters);
+    ranked(&mut told.findings, &mut unexplained);
+    unexplained
 }
 
 /// Sets aside wild readings that are too many rather than too far off, where a first search shows that nothing else makes them.

@@ -256,8 +256,6 @@ impl CheckId {
         Self::BandSource,
         Self::BandAlone,
     ];
-    /// The checks of short-time spectra.
-    pub const OF_SHORT_TIME: [Self; 3] = [Self::ColourFollows, Self::Order, Self::Leaning];
 }
 
 /// What holds a text for people. No rule reads one: where tests are built, every text may be replaced.

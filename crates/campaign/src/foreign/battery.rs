@@ -340,11 +340,9 @@ fn codes_come_and_repeat_as_often_as_their_strength_reckons_with() {
 
 /// Correlation of neighbours in white noise whose density is changed so, by bin.
 fn neighbours_of(stand: &Stand, axis: usize, by: &[f64]) -> f64 {
-    let ones = vec![1.0; stand.samples()];
-    let count = diagnosis::likelihood::Bins::new(stand.samples()).products(&ones, &ones);
     let meter = Meter::new(stand, axis);
     let (mut own, mut next) = (0.0, 0.0);
-    for ((w, b), m) in meter.omega().iter().zip(by).zip(&count) {
+    for ((w, b), m) in meter.omega().iter().zip(by).zip(meter.counts()) {
         own += m * (1.0 + b);
         next += m * (1.0 + b) * w.cos();
     }

@@ -69,12 +69,9 @@ pub(crate) struct ForeignEffect {
 const T: Needs = Needs::TEMPERATURE;
 const V: Needs = Needs::VIBRATION;
 /// Several of them, by their initials.
-const TM: Needs = Needs { motor: true, ..T };
-const TMS: Needs = Needs { supply: true, ..TM };
-const TMV: Needs = Needs {
-    vibration: true,
-    ..TM
-};
+const TM: Needs = T.and(Needs::MOTOR);
+const TMS: Needs = TM.and(Needs::SUPPLY);
+const TMV: Needs = TM.and(V);
 
 /// A row without what most do without.
 const fn row(id: u16, set: usize, name: &'static str, make: Make) -> ForeignEffect {

@@ -66,6 +66,11 @@ impl Known {
         }
     }
 
+    /// What the readings of a run tell, nats: d'^2 / 2.
+    pub(super) fn nats(nats: f64) -> Self {
+        Self::Strength((2.0 * nats).max(0.0).sqrt())
+    }
+
     /// A signal, deg/s.
     pub(super) fn signal(stand: &Stand, axis: usize, signal: &[f64]) -> Self {
         Self::Energy(Meter::new(stand, axis).energy(signal))

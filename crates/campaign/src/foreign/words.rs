@@ -79,6 +79,16 @@ pub(super) fn changes(series: &[f64]) -> Vec<f64> {
     each(series, |v| v - std::mem::replace(&mut last, v))
 }
 
+/// What a series adds to a store that leaks with a time constant, s.
+pub(super) fn leaking(series: &[f64], leaks_s: f64, rate_hz: f64) -> Vec<f64> {
+    let keep = (-1.0 / (leaks_s * rate_hz)).exp();
+    let mut left = 0.0;
+    each(series, |v| {
+        left = keep * left + v;
+        left
+    })
+}
+
 /// An axis's temperature from that at which something of it was trimmed, near the middle of its range.
 pub(super) fn from_trim(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
     let temperature = about_mean(&stand.world.temperature[axis]);
@@ -111,12 +121,34 @@ pub(super) fn in_time(stand: &Stand, mut of: impl FnMut(f64) -> f64) -> Vec<f64>
     stand.series(|i| of(i as f64 / stand.rate_hz))
 }
 
-/// Commands of a motor that rests in between.
-pub(super) fn with_rests(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+/// Commands of a motor, which the stand gets, of either sense: a level between two, each for a random time, s.
+pub(super) fn commanded(
+    draw: &mut Draw,
+    stand: &mut Stand,
+    dwell_s: (f64, f64),
+    (least, most): (f64, f64),
+) {
+    stand.world.duty = stand.held(draw, dwell_s, |d| {
+        in_steps(d.sign() * d.between(least, most))
+    });
+}
+
+/// The same of a motor that rests in between; it begins other than `turning`.
+pub(super) fn strokes(
+    draw: &mut Draw,
+    stand: &mut Stand,
+    turning: bool,
+    (dwell_s, (least, most)): ((f64, f64), (f64, f64)),
+) {
+    stand.world.duty = by_turns(draw, stand, turning, dwell_s, |d| {
+        in_steps(d.sign() * d.between(least, most))
+    });
+}
+
+/// The same up to full duty, whichever it begins with.
+pub(super) fn with_rests(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64), least: f64) {
     let turning = draw.chance(0.5);
-    by_turns(draw, stand, turning, (3.0, 12.0), |d| {
-        in_steps(d.sign() * d.between(0.3, 1.0))
-    })
+    strokes(draw, stand, turning, (dwell_s, (least, 1.0)));
 }
 
 /// What a series does to a mode of this pitch and half width, Hz, from the sample after on.
@@ -195,6 +227,23 @@ pub(super) struct Turning {
     turn: f64,
 }
 
+/// A stretch of a phasor, from any state on, that turns by so many rad from reading to reading, keeps a share of itself and is
+/// driven at random: the real part, of variance 1.
+pub(crate) fn phasor(draw: &mut Draw, keep: f64, turns: impl Iterator<Item = f64>) -> Vec<f64> {
+    let drive = (1.0 - keep * keep).sqrt();
+    let (mut re, mut im) = (draw.normal(), draw.normal());
+    turns
+        .map(|turn| {
+            let (sin, cos) = turn.sin_cos();
+            (re, im) = (
+                keep * (cos * re - sin * im) + drive * draw.normal(),
+                keep * (sin * re + cos * im) + drive * draw.normal(),
+            );
+            re
+        })
+        .collect()
+}
+
 impl Turning {
     /// By pitch and half width, Hz.
     pub(super) fn new(pitch: f64, half_width: f64, rate_hz: f64) -> Self {
@@ -213,18 +262,7 @@ impl Turning {
 
     /// A stretch of it, from any state on.
     pub(super) fn of(&self, draw: &mut Draw, n: usize) -> Vec<f64> {
-        let drive = (1.0 - self.keep * self.keep).sqrt();
-        let (sin, cos) = self.turn.sin_cos();
-        let (mut a, mut b) = (draw.normal(), draw.normal());
-        (0..n)
-            .map(|_| {
-                (a, b) = (
-                    self.keep * (cos * a - sin * b) + drive * draw.normal(),
-                    self.keep * (sin * a + cos * b) + drive * draw.normal(),
-                );
-                a
-            })
-            .collect()
+        phasor(draw, self.keep, std::iter::repeat_n(self.turn, n))
     }
 }
 
@@ -405,4 +443,40 @@ pub(super) fn in_spells<A: Copy>(
         }
         now
     })
+}
+
+/// A signal of what comes now and then: `add` adds what comes at a time, s, and tells when the next one does.
+pub(super) fn arriving(
+    stand: &Stand,
+    mut at: f64,
+    mut add: impl FnMut(&mut [f64], f64) -> f64,
+) -> Vec<f64> {
+    let mut all = vec![0.0; stand.samples()];
+    while at < stand.seconds {
+        at = add(&mut all, at);
+    }
+    all
+}
+
+/// Adds the ring, of a pitch, Hz, that decays in so many s, of a knock at a time, s; `end` decays later it is over.
+pub(super) fn ring(
+    y: &mut [f64],
+    rate_hz: f64,
+    (at, size): (f64, f64),
+    (f, decay): (f64, f64),
+    end: f64,
+) {
+    let first = (at * rate_hz).ceil() as usize;
+    for (k, v) in y.iter_mut().enumerate().skip(first) {
+        let since = k as f64 / rate_hz - at;
+        if since > end * decay {
+            break;
+        }
+        *v += size * (-since / decay).exp() * (TAU * f * since).sin();
+    }
+}
+
+/// Independent draws of the normal law.
+pub(super) fn white(draw: &mut Draw, n: usize) -> Vec<f64> {
+    (0..n).map(|_| draw.normal()).collect()
 }

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 use model::{Parameter, effects};
 
-use super::stuck::{self, Verdict};
+use super::stuck::{self, Stuck, Verdict};
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};
 use crate::result::{Alternative, Finding};
@@ -198,41 +198,51 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
         Verdict::Smooth => Shape::Sound,
         Verdict::Rails => Shape::Rails,
         Verdict::Bit(s) => {
-            audit.findings.push(Finding {
-                cause: effects::stuck_bit::ID.into(),
-                channels: vec![name.into()],
-                parameters: parameters(s.bit, s.value, s.fraction, Some(s.error)),
-                what: format!(
-                    "bit {} of {name} reads {} too often: it sticks in {:.1} +- {:.1} % of the samples",
-                    s.bit,
-                    s.value,
-                    100.0 * s.fraction,
-                    100.0 * s.error,
-                ),
-                ..Finding::default()
-            });
+            audit.findings.push(sticks(&s, name));
             let step = f64::from(1u32 << (s.bit + 1));
             audit.lacks_a_bit(name, effects::stuck_bit::ID, step, sigma);
             Shape::Other
         }
         Verdict::Unlike { nats, nearest } => {
-            let bit = nearest.map_or("no bit that sticks makes them so".to_owned(), |s| {
-                format!(
-                    "bit {} at {} in {:.0} % of the samples comes nearest and leaves much of it",
-                    s.bit,
-                    s.value,
-                    100.0 * s.fraction
-                )
-            });
-            let what = format!(
-                "the codes of {name} have shares that no smooth distribution has ({nats:.0} nats; {:.1} sigma at bit {}), and {bit}",
-                worst.share.z.abs(),
-                worst.share.bit
-            );
+            let what = unlike(name, &worst, nats, nearest.as_ref());
             audit.not_normal.push(Observation::of_readings(name, what));
             Shape::Other
         }
     }
+}
+
+/// The finding of a bit that sticks.
+fn sticks(s: &Stuck, name: &str) -> Finding {
+    Finding {
+        cause: effects::stuck_bit::ID.into(),
+        channels: vec![name.into()],
+        parameters: parameters(s.bit, s.value, s.fraction, Some(s.error)),
+        what: format!(
+            "bit {} of {name} reads {} too often: it sticks in {:.1} +- {:.1} % of the samples",
+            s.bit,
+            s.value,
+            100.0 * s.fraction,
+            100.0 * s.error,
+        ),
+        ..Finding::default()
+    }
+}
+
+/// What is said of codes that no smooth law explains, nor a bit.
+fn unlike(name: &str, worst: &Worst, nats: f64, nearest: Option<&Stuck>) -> String {
+    let bit = nearest.map_or("no bit that sticks makes them so".to_owned(), |s| {
+        format!(
+            "bit {} at {} in {:.0} % of the samples comes nearest and leaves much of it",
+            s.bit,
+            s.value,
+            100.0 * s.fraction
+        )
+    });
+    format!(
+        "the codes of {name} have shares that no smooth distribution has ({nats:.0} nats; {:.1} sigma at bit {}), and {bit}",
+        worst.share.z.abs(),
+        worst.share.bit
+    )
 }
 
 /// States the coarse grid of a channel: what it is taken for, and that its noise lacks those bits.

@@ -402,13 +402,7 @@ impl<'a> Laws<'a> {
         }
         let mut gains = vec![0.0; course.weights.len()];
         loop {
-            let Course {
-                weights,
-                round,
-                before,
-                ..
-            } = course;
-            let p = self.sound(weights);
+            let p = self.sound(&course.weights);
             let taken = self.taken(&p);
             let share = if course.held {
                 course.share
@@ -416,57 +410,64 @@ impl<'a> Laws<'a> {
                 self.best_share(&p, &taken, course.share)
             };
             let l = self.likelihood(&p, &taken, share);
-            let eighth = *round % 8 == 7;
-            let ended = eighth && l - *before < ENDED;
-            if *round >= rounds || ended {
+            let eighth = course.round % 8 == 7;
+            let ended = eighth && l - course.before < ENDED;
+            if course.round >= rounds || ended {
                 let fit = Fit {
                     spread: self.spread,
                     share,
                     likelihood: l,
-                    cost: self.cost(weights),
-                    weights: weights.clone(),
+                    cost: self.cost(&course.weights),
+                    weights: course.weights.clone(),
                 };
                 course.ended = ended.then(|| fit.clone());
                 return fit;
             }
             if eighth {
-                *before = l;
+                course.before = l;
             }
             if l < course.likelihood {
                 course.step = 1.0;
             }
             course.likelihood = l;
             course.share = share;
-            *round += 1;
-            let ratio: Vec<f64> = self
-                .times
-                .iter()
-                .zip(p.iter().zip(&taken))
-                .map(|(t, (p, a))| t / ((1.0 - share) * p + share * a).max(LEAST))
-                .collect();
-            let back: Vec<f64> = ratio
-                .iter()
-                .zip(&self.to)
-                .map(|(r, to)| (1.0 - share) * r + share * ratio[*to])
-                .collect();
-            for ((gain, w), (at, chances)) in gains
-                .iter_mut()
-                .zip(weights.iter())
-                .zip(&self.levels.chances)
-            {
-                *gain = 0.0;
-                if *w >= 1e-12 {
-                    *gain = dot(&back[*at..][..chances.len()], chances) / self.of.n;
-                }
-            }
-            powers(&mut gains, course.step);
-            let mut all = 0.0;
-            for (w, gain) in weights.iter_mut().zip(&gains) {
-                *w = if *w < 1e-12 { 0.0 } else { *w * gain };
-                all += *w;
-            }
-            weights.iter_mut().for_each(|w| *w /= all);
+            course.round += 1;
+            self.reweigh(course, &p, &taken, &mut gains);
         }
+    }
+
+    /// Weights times what each level gains, to the power of the step.
+    #[inline(always)]
+    fn reweigh(&self, course: &mut Course, p: &[f64], taken: &[f64], gains: &mut [f64]) {
+        let (weights, share) = (&mut course.weights, course.share);
+        let ratio: Vec<f64> = self
+            .times
+            .iter()
+            .zip(p.iter().zip(taken))
+            .map(|(t, (p, a))| t / ((1.0 - share) * p + share * a).max(LEAST))
+            .collect();
+        let back: Vec<f64> = ratio
+            .iter()
+            .zip(&self.to)
+            .map(|(r, to)| (1.0 - share) * r + share * ratio[*to])
+            .collect();
+        for ((gain, w), (at, chances)) in gains
+            .iter_mut()
+            .zip(weights.iter())
+            .zip(&self.levels.chances)
+        {
+            *gain = 0.0;
+            if *w >= 1e-12 {
+                *gain = dot(&back[*at..][..chances.len()], chances) / self.of.n;
+            }
+        }
+        powers(gains, course.step);
+        let mut all = 0.0;
+        for (w, gain) in weights.iter_mut().zip(gains) {
+            *w = if *w < 1e-12 { 0.0 } else { *w * *gain };
+            all += *w;
+        }
+        weights.iter_mut().for_each(|w| *w /= all);
     }
 
     /// What the levels cost, by how much wider than a reading's spread they make the law.

@@ -176,6 +176,25 @@ fn likeness(x: &[i32], run: &Run) -> f64 {
     x[run.first..end].iter().map(of).sum()
 }
 
+/// The stretch that it is least likely for two gyros to read alike by chance, with how late each is in it, frames. `of` gives the
+/// readings of one from a row on.
+fn least_by_chance(
+    a: &dyn Fn(usize) -> Vec<i32>,
+    b: &dyn Fn(usize) -> Vec<i32>,
+) -> Option<(Run, [usize; 2])> {
+    let mut found: Option<(Run, [usize; 2])> = None;
+    for (late_a, late_b) in BEHIND {
+        // The shorter one ends where the other does: rows are paired from the first on.
+        let run = longest(&a(late_a), &b(late_b));
+        if let Some(run) = run
+            && found.as_ref().is_none_or(|f| run.ln_chance < f.0.ln_chance)
+        {
+            found = Some((run, [late_a, late_b]));
+        }
+    }
+    found
+}
+
 /// A stretch over which one gyro holds the readings of the other.
 fn stretch(a: &Gyro<'_>, b: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     let Some((x, y, rows)) = counts(a, b, audit).filter(|c| c.2.len() >= LEAST_READINGS) else {
@@ -183,24 +202,12 @@ fn stretch(a: &Gyro<'_>, b: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     };
     let of =
         |all: &[i32], late: usize| -> Vec<i32> { rows[late..].iter().map(|i| all[*i]).collect() };
-    let mut found: Option<(Run, usize, usize)> = None;
-    for (late_a, late_b) in BEHIND {
-        // The shorter one ends where the other does: rows are paired from the first on.
-        let run = longest(&of(x, late_a), &of(y, late_b));
-        if let Some(run) = run
-            && found.as_ref().is_none_or(|f| run.ln_chance < f.0.ln_chance)
-        {
-            found = Some((run, late_a, late_b));
-        }
-    }
-    let Some((run, late_a, late_b)) = found else {
+    let Some((run, [late_a, late_b])) = least_by_chance(&|late| of(x, late), &|late| of(y, late))
+    else {
         return;
     };
-    let end = run.first + run.length;
-    let (of_a, of_b) = (
-        rows[run.first + late_a..end + late_a].to_vec(),
-        rows[run.first + late_b..end + late_b].to_vec(),
-    );
+    let rows_of = |late: usize| rows[run.first + late..][..run.length].to_vec();
+    let (of_a, of_b) = (rows_of(late_a), rows_of(late_b));
     // What both read is like what its own gyro reads about it.
     let for_a = likeness(&of(x, late_a), &run) - likeness(&of(y, late_b), &run);
     let (first, second) = (a.channel.name.as_str(), b.channel.name.as_str());
@@ -219,13 +226,13 @@ fn stretch(a: &Gyro<'_>, b: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
         seconds(from_to.last()),
         run.length
     );
+    let late = if late_a == late_b {
+        ""
+    } else {
+        " a frame late"
+    };
     let what = match holder {
         Some((holder, source, _)) => {
-            let late = if late_a == late_b {
-                ""
-            } else {
-                " a frame late"
-            };
             format!("{holder} holds the readings of {source}{late} {when}")
         }
         None => format!("{first} and {second} read the same {when}: one holds the other's"),

@@ -57,6 +57,28 @@ fn in_intervals(t: &[f64], number: &[f64]) -> Option<Vec<f64>> {
     Some(t.iter().map(|v| (v - first) / period).collect())
 }
 
+/// Intervals that pass without a number: by the times of the rows, in units of the interval, and their numbers.
+fn lost_in_time(time: &[f64], number: &[f64], audit: &mut Audit) {
+    let steps = time.windows(2).zip(number.windows(2));
+    let steps = steps.map(|(t, s)| t[1] - t[0] - (s[1] - s[0]));
+    // What is missing is whole intervals; a row that comes early or by halves is another matter.
+    let odd: Vec<f64> = steps
+        .map(|s| if s > 0.5 { s - s.round() } else { s })
+        .collect();
+    let spread = width(&odd, 0.02);
+    if spread > IRREGULAR {
+        audit.untested(
+            effects::dropped_samples::ID,
+            &format!(
+                "the times come at intervals that differ by {:.0} %, so a missing one does not show: record a sequence number or a device time",
+                100.0 * spread
+            ),
+        );
+    } else {
+        audit.silently_lost = leaps(time, number);
+    }
+}
+
 pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
     let rows = at.len();
     let names: Vec<String> = gyros.iter().map(|g| g.channel.name.clone()).collect();
@@ -83,60 +105,28 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         .map(|t| t.iter().map(|v| v.saturating_sub(t[0]) as f64).collect())
         .or_else(|| host.filter(|_| seq.is_none()).cloned());
     match clock.as_ref().and_then(|t| in_intervals(t, &number)) {
-        Some(time) => {
-            let steps: Vec<f64> = time
-                .windows(2)
-                .zip(number.windows(2))
-                .map(|(t, s)| t[1] - t[0] - (s[1] - s[0]))
-                .collect();
-            // What is missing is whole intervals; a row that comes early or by halves is another matter.
-            let odd: Vec<f64> = (steps.iter())
-                .map(|s| if *s > 0.5 { s - s.round() } else { *s })
-                .collect();
-            let spread = width(&odd, 0.02);
-            if spread > IRREGULAR {
-                audit.untested(
-                    effects::dropped_samples::ID,
-                    &format!(
-                        "the times come at intervals that differ by {:.0} %, so a missing one does not show: record a sequence number or a device time",
-                        100.0 * spread
-                    ),
-                );
-            } else {
-                audit.silently_lost = leaps(&time, &number);
-                events.extend(&audit.silently_lost);
-            }
-        }
+        Some(time) => lost_in_time(&time, &number, audit),
         None if seq.is_none() => audit.untested(
             effects::dropped_samples::ID,
             "the record has neither sequence numbers nor times",
         ),
         None => {}
     }
+    events.extend(&audit.silently_lost);
     let lost: u64 = events.iter().map(|e| e.1).sum();
     let what = format!(
         "{lost} frames are missing: {with_gaps} by the sequence numbers, {} by the time between numbers",
         lost - with_gaps
     );
     audit.smallest(effects::dropped_samples::ID, "record", "count", 1.0, "1");
-    let fails = audit.limit(
-        CheckId::DroppedSamples,
-        "record",
-        lost as f64,
-        0.0,
-        what.clone(),
-    );
+    let (id, count) = (CheckId::DroppedSamples, lost as f64);
+    let fails = audit.limit(id, "record", count, 0.0, what.clone());
     if fails && !names.is_empty() {
         events.sort_unstable();
         let times: Vec<f64> = events.iter().map(|e| at[e.0 - 1]).collect();
-        audit.findings.push(counted(
-            effects::dropped_samples::ID,
-            names,
-            lost as f64,
-            None,
-            &times,
-            what,
-        ));
+        let cause = effects::dropped_samples::ID;
+        let finding = counted(cause, names, count, None, &times, what);
+        audit.findings.push(finding);
     }
     flags(record, gyros, at, audit);
 }

@@ -311,7 +311,33 @@ struct Gyro<'a> {
     of_readings: Option<Local>,
 }
 
-impl Gyro<'_> {
+impl<'a> Gyro<'a> {
+    fn of(channel: &'a Channel) -> Self {
+        let rows = channel.values.len();
+        let counts = channel.counts.as_deref().filter(|c| c.len() == rows);
+        let local = match counts {
+            None => Local::new(&channel.values),
+            Some(c) => {
+                let known = |v: &f64, c: i32| {
+                    if v.is_finite() {
+                        f64::from(c)
+                    } else {
+                        f64::NAN
+                    }
+                };
+                let both = channel.values.iter().zip(c);
+                Local::new(&both.map(|(v, c)| known(v, *c)).collect::<Vec<f64>>())
+            }
+        };
+        let apart = counts.is_some_and(|c| !scaled(&channel.values, c));
+        Self {
+            channel,
+            counts,
+            local,
+            of_readings: apart.then(|| Local::new(&channel.values)),
+        }
+    }
+
     fn known(&self, row: usize) -> bool {
         self.channel.values[row].is_finite()
     }
@@ -399,33 +425,7 @@ pub fn audit(record: &Record) -> Audit {
     let gyros: Vec<Gyro<'_>> = record
         .all(Quantity::Gyro)
         .filter(|c| c.values.len() == rows)
-        .map(|channel| {
-            let counts = channel.counts.as_deref().filter(|c| c.len() == rows);
-            let local = match counts {
-                None => Local::new(&channel.values),
-                Some(c) => {
-                    let y: Vec<f64> = c
-                        .iter()
-                        .zip(&channel.values)
-                        .map(|(c, v)| {
-                            if v.is_finite() {
-                                f64::from(*c)
-                            } else {
-                                f64::NAN
-                            }
-                        })
-                        .collect();
-                    Local::new(&y)
-                }
-            };
-            let apart = counts.is_some_and(|c| !scaled(&channel.values, c));
-            Gyro {
-                channel,
-                counts,
-                local,
-                of_readings: apart.then(|| Local::new(&channel.values)),
-            }
-        })
+        .map(Gyro::of)
         .collect();
     for g in &gyros {
         audit.usable.insert(

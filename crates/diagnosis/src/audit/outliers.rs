@@ -4,6 +4,7 @@
 //! with the chance of a false alarm. It does not need to know the noise; the whitened residual of the search sees a
 //! little farther where the base is at rest.
 
+use super::local::Local;
 use super::{Audit, Gyro, counted};
 use crate::result::Finding;
 use crate::test_level::{CheckId, audit_level};
@@ -16,6 +17,29 @@ const ALONE: usize = 2;
 
 /// Where the base moves the prediction errs by the motion too, in its bends more than elsewhere.
 const MOVING: f64 = 1.3;
+
+/// Residuals against the neighbourhood beyond half a step, in sigma; 0 next to the ends, where there is none.
+fn deviations(local: &Local, step: f64) -> Vec<f64> {
+    let n = local.residual.len();
+    let inside = |i: usize| i >= local.edge && i + local.edge < n;
+    // Where the noise is within a count, a residual of one or two counts is rounding.
+    let all = local.residual.iter().zip(local.spread()).enumerate();
+    all.map(|(i, (r, s))| {
+        let z = (r.abs() - 0.5 * step).max(0.0) / s.max(0.3 * step);
+        if inside(i) { z } else { 0.0 }
+    })
+    .collect()
+}
+
+/// Places beyond the limit that have no other one beside them.
+fn single(z: &[f64], limit: f64) -> Vec<usize> {
+    let far: Vec<usize> = (0..z.len()).filter(|i| z[*i] > limit).collect();
+    let near = |a: Option<&usize>, b: usize| a.is_some_and(|a| a.abs_diff(b) <= ALONE);
+    (0..far.len())
+        .filter(|i| !near(far.get(i.wrapping_sub(1)), far[*i]) && !near(far.get(i + 1), far[*i]))
+        .map(|i| far[i])
+        .collect()
+}
 
 pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     let name = g.channel.name.as_str();
@@ -38,36 +62,12 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
         .as_ref()
         .map_or_else(|| g.channel.lsb.unwrap_or(1.0), |_| 1.0);
     let farthest = (limit + ONE_SIDED) * local.sigma.max(0.3 * step) + 0.5 * step;
-    audit.smallest(
-        effects::outliers::ID,
-        name,
-        "size",
-        unit * farthest,
-        &g.channel.unit,
-    );
-    // Where the noise is within a count, a residual of one or two counts is rounding.
-    let z: Vec<f64> = local
-        .residual
-        .iter()
-        .zip(local.spread())
-        .map(|(r, s)| ((r.abs() - 0.5 * step).max(0.0)) / s.max(0.3 * step))
-        .enumerate()
-        .map(|(i, z)| {
-            let inside = i >= local.edge && i + local.edge < n;
-            if inside { z } else { 0.0 }
-        })
-        .collect();
-    let far: Vec<usize> = (0..n).filter(|i| z[*i] > limit).collect();
-    let near = |a: Option<&usize>, b: usize| a.is_some_and(|a| a.abs_diff(b) <= ALONE);
-    let single: Vec<usize> = (0..far.len())
-        .filter(|i| !near(far.get(i.wrapping_sub(1)), far[*i]) && !near(far.get(i + 1), far[*i]))
-        .map(|i| far[i])
-        .collect();
-    let most = z
-        .iter()
-        .copied()
-        .filter(|v| v.is_finite())
-        .fold(0.0, f64::max);
+    let least = unit * farthest;
+    audit.smallest(effects::outliers::ID, name, "size", least, &g.channel.unit);
+    let z = deviations(local, step);
+    let single = single(&z, limit);
+    let finite = z.iter().copied().filter(|v| v.is_finite());
+    let most = finite.fold(0.0, f64::max);
     let chance = if local.bent && most < limit {
         1.0
     } else {
@@ -82,12 +82,12 @@ pub(super) fn audit(g: &Gyro<'_>, at: &[f64], audit: &mut Audit) {
     if !fails || single.is_empty() || audit.is_suppressed(effects::outliers::ID, name) {
         return;
     }
-    let times: Vec<f64> = single.iter().map(|i| at[*i]).collect();
+    let mut times: Vec<f64> = single.iter().map(|i| at[*i]).collect();
     single.iter().for_each(|i| audit.mask(name, *i));
     audit.singles.insert(name.to_owned(), single);
     let own = |f: &Finding| f.cause == effects::outliers::ID && f.channels == [name];
     let wild = audit.findings.iter().position(own);
-    let (mut times, mut what) = (times, what);
+    let mut what = what;
     if let Some(wild) = wild.map(|i| audit.findings.remove(i)) {
         times.extend(wild.times_s);
         times.sort_by(f64::total_cmp);

@@ -185,6 +185,34 @@ pub(super) fn in_steps(g: &Gyro<'_>) -> Option<(Vec<f64>, f64)> {
     })
 }
 
+/// What rounding explains of a channel.
+fn explained(rounded: &Rounded, name: &str, audit: &mut Audit) {
+    let mut explain = |ids: &[&str]| audit.suppress(ids, name, STEP);
+    if rounded.explains_tails {
+        explain(&["kurtosis", "skewness", CheckId::Leaning.as_str()]);
+    }
+    let [least, largest] = rounded.variances;
+    if largest - least > SWINGS {
+        explain(&[
+            "time_frequency",
+            "bicovariance",
+            "three_readings",
+            "neighbours",
+            "variance_rhythm",
+            "variance_follows",
+            CheckId::ColourFollows.as_str(),
+            CheckId::VarianceLaw.as_str(),
+        ]);
+    }
+    if rounded.sigma < LOST {
+        explain(&["ljung_box", "band_energy", CheckId::VarianceLaw.as_str()]);
+    }
+    if rounded.sigma < TOLD {
+        // The far readings of a residual are single codes.
+        explain(&["spikes"]);
+    }
+}
+
 /// Tell of a step that is coarse, and what it explains.
 pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     let name = g.channel.name.as_str();
@@ -201,37 +229,8 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     let Some(rounded) = of(&y) else {
         return;
     };
-    if rounded.explains_tails {
-        audit.suppress(
-            &["kurtosis", "skewness", CheckId::Leaning.as_str()],
-            name,
-            STEP,
-        );
-    }
-    let [least, largest] = rounded.variances;
-    if largest - least > SWINGS {
-        let ids = [
-            "time_frequency",
-            "bicovariance",
-            "three_readings",
-            "neighbours",
-            "variance_rhythm",
-            "variance_follows",
-            CheckId::ColourFollows.as_str(),
-            CheckId::VarianceLaw.as_str(),
-        ];
-        audit.suppress(&ids, name, STEP);
-    }
-    if rounded.sigma < LOST {
-        audit.suppress(
-            &["ljung_box", "band_energy", CheckId::VarianceLaw.as_str()],
-            name,
-            STEP,
-        );
-    }
+    explained(&rounded, name, audit);
     if rounded.sigma < TOLD {
-        // The far readings of a residual are single codes.
-        audit.suppress(&["spikes"], name, STEP);
         let lost = if rounded.sigma < LOST {
             audit.untested_on(
                 name,

@@ -197,72 +197,54 @@ pub(super) fn audit(g: &Gyro<'_>, shape: Shape, audit: &mut Audit) {
     let both = ends.low.beyond + ends.high.beyond;
     let chance = (1.0 + both) * (-both).exp();
     let piled = ends.low.clips() || ends.high.clips();
-    audit.smallest(
-        effects::saturation::ID,
-        name,
-        "clipped",
-        least_beyond().ceil(),
-        "1",
-    );
+    let least = least_beyond().ceil();
+    audit.smallest(effects::saturation::ID, name, "clipped", least, "1");
     let what = ends.words(name);
-    audit.check(
-        CheckId::MissingTail,
-        name,
-        both,
-        if piled {
-            chance.min(audit_level() / 2.0)
-        } else {
-            1.0
-        },
-        what.clone(),
-    );
-    if !piled {
-        return;
+    let chance = if piled {
+        chance.min(audit_level() / 2.0)
+    } else {
+        1.0
+    };
+    audit.check(CheckId::MissingTail, name, both, chance, what.clone());
+    if piled {
+        audit.findings.push(ends.finding(name, what));
+        let rails = ends.rails();
+        let kept = levels.iter().map(|(l, n)| (left_by(rails, l, sigma), n));
+        at_fault(name, swing(kept) > SWINGS, audit);
     }
-    audit.findings.push(ends.finding(name, what));
-    audit.suppress(
-        &[
-            effects::stuck_bit::ID,
-            effects::stale_samples::ID,
-            CheckId::Kurtosis.as_str(),
-            CheckId::Skewness.as_str(),
-            CheckId::ColourFollows.as_str(),
-            CheckId::Leaning.as_str(),
-        ],
-        name,
-        effects::saturation::ID,
-    );
-    let rails = ends.rails();
-    let kept = || levels.iter().map(|(l, n)| (left_by(rails, l, sigma), n));
-    if swing(kept()) > SWINGS {
+}
+
+/// What rails explain of a channel; and where what they leave of the noise `swings` with the level, that too.
+fn at_fault(name: &str, swings: bool, audit: &mut Audit) {
+    let mut explained = vec![
+        effects::stuck_bit::ID,
+        effects::stale_samples::ID,
+        CheckId::Kurtosis.as_str(),
+        CheckId::Skewness.as_str(),
+        CheckId::ColourFollows.as_str(),
+        CheckId::Leaning.as_str(),
+    ];
+    audit.suppress(&explained, name, effects::saturation::ID);
+    if swings {
         // The noise that is left depends on the level, so it changes with it, and the level itself is bent.
         audit.converter_at_fault(name, effects::saturation::ID);
-        audit.suppress(
-            &[
-                effects::outliers::ID,
-                CheckId::ProcessLaw.as_str(),
-                CheckId::ProcessLevels.as_str(),
-            ],
-            name,
-            effects::saturation::ID,
-        );
+        explained = vec![
+            effects::outliers::ID,
+            CheckId::ProcessLaw.as_str(),
+            CheckId::ProcessLevels.as_str(),
+        ];
+        audit.suppress(&explained, name, effects::saturation::ID);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use rand_core::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_xoshiro::Xoshiro256PlusPlus;
-
     use super::*;
+    use crate::fit::white;
 
     #[test]
     fn rails_leave_the_variance_that_is_measured() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
-        let z: Vec<f64> = (0..200_000)
-            .map(|_| StandardNormal.sample(&mut rng))
-            .collect();
+        let z = white(200_000, 11);
         for (rails, level, sigma) in [
             ([-20.0, -2.0], -8.0, 5.0),
             ([f64::NEG_INFINITY, 3.0], 1.0, 4.0),

@@ -168,6 +168,16 @@ struct Judged {
 }
 
 impl Judged {
+    /// None where the codes tell of nothing.
+    fn of(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Option<Self> {
+        const FAR: f64 = 8.0;
+        let h = Histogram::new(codes, FAR * sigma)?;
+        // Where codes are fewer than once each, no share of any is known. Where the level moves far it is the share of ones
+        // about each level that tells.
+        let told = h.times.len() as f64 <= h.n && (alarmed || h.spread <= MOVES * sigma);
+        told.then_some(Self { h, sigma, bits })
+    }
+
     /// The bits that a spread of readings can show, at both values.
     fn every(&self) -> impl Iterator<Item = (u32, i32)> {
         let near = (0..self.bits).filter(|b| f64::from(1u32 << b) <= WITHIN * self.sigma);
@@ -264,19 +274,9 @@ impl Judged {
 /// Judge codes with the spread `sigma` about their level, bits below `bits`; `alarmed` where something else has shown
 /// already that they are no law.
 pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verdict {
-    const FAR: f64 = 8.0;
-    let Some(h) = Histogram::new(codes, FAR * sigma) else {
+    let Some(of) = Judged::of(codes, sigma, bits, alarmed) else {
         return Verdict::Smooth;
     };
-    // Where codes are fewer than once each, no share of any is known.
-    if h.times.len() as f64 > h.n {
-        return Verdict::Smooth;
-    }
-    // Where the level moves far it is the share of ones about each level that tells.
-    if !alarmed && h.spread > MOVES * sigma {
-        return Verdict::Smooth;
-    }
-    let of = Judged { h, sigma, bits };
     let Some(first) = Tries::new(&of.h, Fault::None, sigma).best(FIRST) else {
         return Verdict::Smooth;
     };

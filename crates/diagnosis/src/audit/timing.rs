@@ -78,43 +78,36 @@ fn jitter(record: &Record, device: &[f64], tick_s: f64, names: &[String], audit:
         limit,
         what.clone(),
     ) {
-        let error = sigma * relative;
-        audit.findings.push(Finding {
-            cause: effects::timestamp_jitter::ID.into(),
-            channels: names.to_vec(),
-            parameters: [("sigma".to_owned(), Parameter::estimated(sigma, error, "s"))].into(),
-            what,
-            ..Finding::default()
-        });
+        let sigma = ("sigma", Parameter::estimated(sigma, sigma * relative, "s"));
+        audit
+            .findings
+            .push(of_clock(effects::timestamp_jitter::ID, names, sigma, what));
     }
 }
 
-fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
-    let host = record
-        .host_time_s
-        .as_ref()
-        .filter(|h| h.len() == device.len());
-    let Some(host) = host else {
-        audit.untested(
-            effects::clock_rate::ID,
-            "the record holds no host time (host_time_s)",
-        );
-        return;
-    };
-    let Some(tolerance) = record.header.tick_tolerance_ppm else {
-        audit.untested(
-            effects::clock_rate::ID,
-            "the header does not state the tolerance of the device clock (tick_tolerance_ppm)",
-        );
-        return;
-    };
+/// The course of the device clock against the host's, and the tolerance that the header states, ppm.
+///
+/// # Errors
+/// Why the record does not tell it.
+fn course(record: &Record, device: &[f64]) -> Result<(drift::Course, f64), &'static str> {
+    let host = record.host_time_s.as_ref();
+    let host = host
+        .filter(|h| h.len() == device.len())
+        .ok_or("the record holds no host time (host_time_s)")?;
+    let tolerance = record.header.tick_tolerance_ppm.ok_or(
+        "the header does not state the tolerance of the device clock (tick_tolerance_ppm)",
+    )?;
     if device.last().copied().unwrap_or(0.0) < LEAST_SECONDS {
-        audit.untested(effects::clock_rate::ID, "the record is shorter than 30 s");
-        return;
+        return Err("the record is shorter than 30 s");
     }
-    let Some(course) = drift::of(device, host, tolerance * 1e-6) else {
-        audit.untested(effects::clock_rate::ID, "too few host times");
-        return;
+    let course = drift::of(device, host, tolerance * 1e-6).ok_or("too few host times")?;
+    Ok((course, tolerance))
+}
+
+fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
+    let (course, tolerance) = match course(record, device) {
+        Ok(known) => known,
+        Err(why) => return audit.untested(effects::clock_rate::ID, why),
     };
     if let Some((kind, what)) = &course.uneven {
         if *kind == Uneven::Wanders {
@@ -156,21 +149,29 @@ fn rate(record: &Record, device: &[f64], names: &[String], audit: &mut Audit) {
         let scatter = 1.17 * (2.0 / drift::BLOCKS as f64).sqrt();
         let limit = law.inverse_cdf(1.0 - audit_level());
         let reach = limit * (1.0 + ONE_SIDED * scatter) + ONE_SIDED;
-        audit.smallest(
-            effects::clock_rate::ID,
-            "record",
-            "ppm",
-            tolerance + reach * error,
-            "ppm",
-        );
+        let seen = tolerance + reach * error;
+        audit.smallest(effects::clock_rate::ID, "record", "ppm", seen, "ppm");
     }
     if audit.check(CheckId::ClockRate, "record", ppm, chance, what.clone()) {
-        audit.findings.push(Finding {
-            cause: effects::clock_rate::ID.into(),
-            channels: names.to_vec(),
-            parameters: [("ppm".to_owned(), Parameter::estimated(ppm, error, "ppm"))].into(),
-            what,
-            ..Finding::default()
-        });
+        let ppm = ("ppm", Parameter::estimated(ppm, error, "ppm"));
+        audit
+            .findings
+            .push(of_clock(effects::clock_rate::ID, names, ppm, what));
+    }
+}
+
+/// A fault of the clock, which all channels have.
+fn of_clock(
+    cause: &str,
+    names: &[String],
+    (key, value): (&str, Parameter),
+    what: String,
+) -> Finding {
+    Finding {
+        cause: cause.into(),
+        channels: names.to_vec(),
+        parameters: [(key.to_owned(), value)].into(),
+        what,
+        ..Finding::default()
     }
 }

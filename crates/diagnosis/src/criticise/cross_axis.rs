@@ -130,6 +130,34 @@ fn most<'a>(
     Some((*z, *source, p))
 }
 
+/// What is told of the one that stands out `most` over so many samples.
+fn told(
+    id: CheckId,
+    channel: &str,
+    what: &str,
+    samples: usize,
+    (z, of, p): (f64, &Source, f64),
+) -> Check {
+    let share = z / (samples as f64).sqrt();
+    let fails = p < omnibus_level();
+    let what = format!("{what} {} ({share:+.3} of it)", of.what);
+    Check {
+        id: id.into(),
+        about: of.of.clone(),
+        channel: channel.into(),
+        statistic: z,
+        p_value: Some(p),
+        threshold: omnibus_level(),
+        fails_before: fails,
+        fails_after: fails,
+        what: if fails {
+            what
+        } else {
+            format!("most of all, {what}")
+        },
+    }
+}
+
 /// Each axis at rest against what the others are made of, and its variance against what the accelerometers felt.
 pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
     let still: Vec<&Searched<'_>> = searched
@@ -142,27 +170,6 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
     };
     let sources: Vec<Vec<Source>> = still.iter().map(|s| of_one(s, samples)).collect();
     let felt = felt(grid, samples);
-    let mut tell = |id: CheckId, channel: &str, what: &str, most: Option<(f64, &Source, f64)>| {
-        let Some((z, of, p)) = most else { return };
-        let share = z / (samples as f64).sqrt();
-        let fails = p < omnibus_level();
-        let what = format!("{what} {} ({share:+.3} of it)", of.what);
-        found.push(Check {
-            id: id.into(),
-            about: of.of.clone(),
-            channel: channel.into(),
-            statistic: z,
-            p_value: Some(p),
-            threshold: omnibus_level(),
-            fails_before: fails,
-            fails_after: fails,
-            what: if fails {
-                what
-            } else {
-                format!("most of all, {what}")
-            },
-        });
-    };
     for (i, a) in still.iter().enumerate() {
         let e = &a.e[..samples];
         let others = || (0..still.len()).filter(|j| *j != i);
@@ -179,19 +186,17 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
             })
             .collect();
         let all = others().flat_map(|j| &sources[j]).chain(&products);
-        let name = &a.target.name;
-        tell(
-            CheckId::Couplings,
-            name,
-            "the whitened residual follows",
-            most(e, all),
-        );
+        let mut tell = |id: CheckId, what: &str, most: Option<(f64, &Source, f64)>| {
+            found.extend(most.map(|most| told(id, &a.target.name, what, samples, most)));
+        };
+        let follows = "the whitened residual follows";
+        tell(CheckId::Couplings, follows, most(e, all));
         let square = without_mean(e.iter().map(|v| v * v).collect());
+        let of_variance = most(&square, felt.iter());
         tell(
             CheckId::VarianceFollows,
-            name,
             "the variance follows",
-            most(&square, felt.iter()),
+            of_variance,
         );
     }
     found

@@ -69,13 +69,14 @@ pub(crate) fn of_processes(
     }
     let (u, _) = whitened_by_spectrum(&search.panel, state);
     let covariances: Vec<&Term> = state.terms.iter().filter(|t| t.is_covariance()).collect();
-    let filters = covariances.iter().zip(&state.noise.terms);
-    let white = Noise {
-        log_walk: f64::NEG_INFINITY,
-        terms: (filters.filter(|(t, _)| t.is_filter()))
-            .map(|(_, t)| t.clone())
-            .collect(),
+    let beside_white = |of: &dyn Fn(&Term) -> bool| {
+        let own = covariances.iter().zip(&state.noise.terms);
+        Noise {
+            log_walk: f64::NEG_INFINITY,
+            terms: own.filter(|(o, _)| of(o)).map(|(_, t)| t.clone()).collect(),
+        }
     };
+    let white = beside_white(&Term::is_filter);
     for term in &covariances {
         // A filter is no process of its own, and a part of a band is asked with it.
         if term.is_filter() || term.is_part() {
@@ -86,38 +87,18 @@ pub(crate) fn of_processes(
             (Some(own), Some(other)) => own.number == other.number,
             _ => std::ptr::eq(*term, o),
         };
-        let all_terms = covariances.iter().zip(&state.noise.terms);
-        let own = all_terms.filter(|(o, _)| of_it(o)).map(|(_, t)| t.clone());
         let process = Process {
             panel: &search.panel,
             state,
             u: &u,
             id: term.effect.id(),
-            // Whether it is Gaussian and steady, the envelope of a band has told.
-            claims: if term.is_band() {
-                [
-                    Some(CheckId::BandSpectrum),
-                    None,
-                    None,
-                    Some(CheckId::BandSize),
-                ]
-            } else {
-                [
-                    Some(CheckId::ProcessSpectrum),
-                    Some(CheckId::ProcessLaw).filter(|_| term.is_normal()),
-                    Some(CheckId::ProcessSteadiness),
-                    Some(CheckId::ProcessSize),
-                ]
-            },
+            claims: claims(term),
             least: term.cluster.map_or(0.0, |c| LEFT * c.lr),
             more: if term.is_band() { MORE } else { 1.0 },
             view: &search.view,
             law,
             white: &white,
-            alone: Noise {
-                log_walk: f64::NEG_INFINITY,
-                terms: own.collect(),
-            },
+            alone: beside_white(&of_it),
         };
         all.extend(process.shape());
         // Two levels have the spectrum of a process that is Gaussian, and are not.
@@ -127,6 +108,21 @@ pub(crate) fn of_processes(
         }
     }
     all
+}
+
+/// What a process claims of its shape, law, steadiness and size.
+fn claims(term: &Term) -> [Option<CheckId>; 4] {
+    if term.is_band() {
+        // Whether it is Gaussian and steady, the envelope of a band has told.
+        let (shape, size) = (CheckId::BandSpectrum, CheckId::BandSize);
+        return [Some(shape), None, None, Some(size)];
+    }
+    [
+        Some(CheckId::ProcessSpectrum),
+        Some(CheckId::ProcessLaw).filter(|_| term.is_normal()),
+        Some(CheckId::ProcessSteadiness),
+        Some(CheckId::ProcessSize),
+    ]
 }
 
 /// Whether a channel that was told as a stationary, Gaussian process is stationary from reading to reading, by the `rhythm` of
@@ -233,6 +229,34 @@ fn orthogonal(x: &mut [f64], basis: &[Vec<f64>], m: &[f64]) -> f64 {
     information(m, x, x).sqrt()
 }
 
+/// Adds to an orthonormal basis the bends of a process that has this `share` of each bin: powers of ln w about where it acts, in
+/// standard deviations of it by the `weight` of its bins.
+fn add_bends(basis: &mut Vec<Vec<f64>>, omega: &[f64], share: &[f64], weight: &[f64], m: &[f64]) {
+    let ln: Vec<f64> = omega.iter().map(|w| w.ln()).collect();
+    let total: f64 = weight.iter().sum();
+    let mean = |of: &dyn Fn(f64) -> f64| -> f64 {
+        ln.iter().zip(weight).map(|(x, w)| w * of(*x)).sum::<f64>() / total
+    };
+    let middle = mean(&|x| x);
+    let spread = mean(&|x| (x - middle).powi(2)).sqrt();
+    for order in 1..=BENDS as i32 {
+        let bend = |(x, f): (&f64, &f64)| f * ((x - middle) / spread).powi(order);
+        let mut x: Vec<f64> = ln.iter().zip(share).map(bend).collect();
+        let before = information(m, &x, &x).sqrt();
+        let length = orthogonal(&mut x, basis, m);
+        // A shape that lies in the others' span has no length of its own; 0 of 0 is none either.
+        if length.is_nan() || length <= 1e-3 * before {
+            continue;
+        }
+        let power = |k| m.iter().zip(&x).map(|(m, x)| m * x.powi(k)).sum::<f64>();
+        let rests_on = power(2).powi(2) / power(4);
+        x.iter_mut().for_each(|x| *x /= length);
+        if rests_on > LEAST {
+            basis.push(x);
+        }
+    }
+}
+
 impl Process<'_> {
     fn outcome(&self, id: CheckId, statistic: f64, p_value: f64, what: String) -> Outcome {
         Outcome {
@@ -265,6 +289,20 @@ impl Process<'_> {
         all
     }
 
+    /// An orthonormal basis of what estimates of the noise take up.
+    fn basis(&self, bins: &Bins, g: &[f64], m: &[f64]) -> Vec<Vec<f64>> {
+        let mut basis: Vec<Vec<f64>> = vec![];
+        for mut x in self.estimated(bins, g) {
+            let before = information(m, &x, &x).sqrt();
+            let length = orthogonal(&mut x, &basis, m);
+            if length > 1e-6 * before.max(1e-6) {
+                x.iter_mut().for_each(|x| *x /= length);
+                basis.push(x);
+            }
+        }
+        basis
+    }
+
     /// Whether its part of the spectrum has its shape.
     fn shape(&self) -> Option<Outcome> {
         let bins = &self.panel.bins;
@@ -274,41 +312,10 @@ impl Process<'_> {
         let g = self.state.noise.over(bins);
         let alone = self.alone.over(bins);
         let share: Vec<f64> = alone.iter().zip(&g).map(|(a, g)| (a - 1.0) / g).collect();
-        let mut basis: Vec<Vec<f64>> = vec![];
-        for mut x in self.estimated(bins, &g) {
-            let before = information(&m, &x, &x).sqrt();
-            let length = orthogonal(&mut x, &basis, &m);
-            if length > 1e-6 * before.max(1e-6) {
-                x.iter_mut().for_each(|x| *x /= length);
-                basis.push(x);
-            }
-        }
+        let mut basis = self.basis(bins, &g, &m);
         let estimated = basis.len();
-        // ln w about where the process acts, in standard deviations of it.
-        let ln: Vec<f64> = bins.at.omega.iter().map(|w| w.ln()).collect();
         let weight: Vec<f64> = m.iter().zip(&share).map(|(m, f)| m * f * f).collect();
-        let total: f64 = weight.iter().sum();
-        let mean = |of: &dyn Fn(f64) -> f64| -> f64 {
-            ln.iter().zip(&weight).map(|(x, w)| w * of(*x)).sum::<f64>() / total
-        };
-        let middle = mean(&|x| x);
-        let spread = mean(&|x| (x - middle).powi(2)).sqrt();
-        for order in 1..=BENDS as i32 {
-            let bend = |(x, f): (&f64, &f64)| f * ((x - middle) / spread).powi(order);
-            let mut x: Vec<f64> = ln.iter().zip(&share).map(bend).collect();
-            let before = information(&m, &x, &x).sqrt();
-            let length = orthogonal(&mut x, &basis, &m);
-            // A shape that lies in the others' span has no length of its own; 0 of 0 is none either.
-            if length.is_nan() || length <= 1e-3 * before {
-                continue;
-            }
-            let power = |k| m.iter().zip(&x).map(|(m, x)| m * x.powi(k)).sum::<f64>();
-            let rests_on = power(2).powi(2) / power(4);
-            x.iter_mut().for_each(|x| *x /= length);
-            if rests_on > LEAST {
-                basis.push(x);
-            }
-        }
+        add_bends(&mut basis, &bins.at.omega, &share, &weight, &m);
         let bends = &basis[estimated..];
         let scores: Vec<f64> = bends
             .iter()

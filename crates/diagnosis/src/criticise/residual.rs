@@ -382,16 +382,8 @@ pub(crate) fn skewness(e: &[f64]) -> Outcome {
 
 #[cfg(test)]
 mod tests {
-    use rand_core::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_xoshiro::Xoshiro256PlusPlus;
-
     use super::*;
-
-    fn white(n: usize, seed: u64) -> Vec<f64> {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
-    }
+    use crate::fit::white;
 
     #[test]
     fn skewness_of_white_noise_fails_as_often_as_its_chance_says_and_shows_two_gains() {

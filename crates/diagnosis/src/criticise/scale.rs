@@ -33,56 +33,9 @@ pub struct Scale {
 /// # Errors
 /// Why the record does not allow it.
 pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
-    let Some(own) = target.axis else {
-        return Err("the gyro has no axis".into());
-    };
-    let acc = |axis| {
-        grid.signals
-            .iter()
-            .find(|s| s.quantity == Quantity::Acc && s.axis == Some(axis))
-    };
-    // Up is the axis that carries most of gravity, whichever way it points.
-    let mean = |s: &Signal| s.values.iter().sum::<f64>() / s.values.len().max(1) as f64;
-    let axes = [Axis::X, Axis::Y, Axis::Z];
-    let weight = |a: &Axis| acc(*a).map_or(0.0, |s| mean(s).abs());
-    let upright = axes
-        .into_iter()
-        .max_by(|a, b| weight(a).total_cmp(&weight(b)));
-    let upright = upright.unwrap_or(Axis::Z);
-    if upright == own {
-        return Err(
-            "a turn about the vertical tilts no accelerometer: sway about a horizontal axis".into(),
-        );
-    }
-    // About x the component along y tilts, about y the one along x.
-    let level: Vec<Axis> = axes.into_iter().filter(|a| *a != upright).collect();
-    let pitches = own == level[1];
-    let (along, beside) = (level[usize::from(!pitches)], own);
-    let (Some(side), Some(up)) = (acc(along), acc(upright)) else {
-        return Err("the accelerometers along the vertical and across the axis are needed".into());
-    };
     let n = grid.n;
-    let across = acc(beside);
-    let zero = upright_zero(up, [Some(side), across]);
-    let up: Vec<f64> = up.values.iter().map(|a| a - zero).collect();
-    let sign = up.iter().sum::<f64>().signum();
-    // The roll is atan(y / z). The pitch is that of x against both others, and its rate about the body's y is smaller
-    // by the cosine of the roll.
-    let other = |i: usize| across.filter(|_| pitches).map_or(0.0, |a| a.values[i]);
-    let tilt: Vec<f64> = (0..n)
-        .map(|i| {
-            let vertical = up[i].hypot(other(i)).copysign(sign * up[i]);
-            side.values[i].atan2(vertical).to_degrees()
-        })
-        .collect();
-    let leaning = |i: usize| (other(i).atan2(sign * up[i])).cos();
-    // Central difference of the tilt, and the rate averaged with the same weights (trapezoids).
-    let tilt_rate: Vec<f64> = (0..n)
-        .map(|i| {
-            let change = tilt[(i + 1).min(n - 1)] - tilt[i.saturating_sub(1)];
-            change * leaning(i).abs() * grid.rate_hz / 2.0
-        })
-        .collect();
+    let tilt_rate = Level::of(grid, target)?.tilt_rate(n, grid.rate_hz);
+    // The rate is averaged with the same weights as the central difference of the tilt (trapezoids).
     let y = &target.y;
     let rate: Vec<f64> = (0..n)
         .map(|i| (y[i.saturating_sub(1)] + 2.0 * y[i] + y[(i + 1).min(n - 1)]) / 4.0)
@@ -125,6 +78,85 @@ pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
         std_error: error / (slope * slope),
         gain,
     })
+}
+
+/// The accelerometers that tell how an axis tilts.
+struct Level<'a> {
+    /// Along the axis that it tilts.
+    side: &'a Signal,
+    /// Along the vertical.
+    up: &'a Signal,
+    /// Along the axis itself.
+    across: Option<&'a Signal>,
+    /// Whether it is the second of the level axes, about which the base pitches.
+    pitches: bool,
+}
+
+impl<'a> Level<'a> {
+    fn of(grid: &'a Grid, target: &Target) -> Result<Self, String> {
+        let Some(own) = target.axis else {
+            return Err("the gyro has no axis".into());
+        };
+        let acc = |axis| {
+            grid.signals
+                .iter()
+                .find(|s| s.quantity == Quantity::Acc && s.axis == Some(axis))
+        };
+        // Up is the axis that carries most of gravity, whichever way it points.
+        let mean = |s: &Signal| s.values.iter().sum::<f64>() / s.values.len().max(1) as f64;
+        let axes = [Axis::X, Axis::Y, Axis::Z];
+        let weight = |a: &Axis| acc(*a).map_or(0.0, |s| mean(s).abs());
+        let upright = axes
+            .into_iter()
+            .max_by(|a, b| weight(a).total_cmp(&weight(b)));
+        let upright = upright.unwrap_or(Axis::Z);
+        if upright == own {
+            return Err(
+                "a turn about the vertical tilts no accelerometer: sway about a horizontal axis"
+                    .into(),
+            );
+        }
+        // About x the component along y tilts, about y the one along x.
+        let level: Vec<Axis> = axes.into_iter().filter(|a| *a != upright).collect();
+        let pitches = own == level[1];
+        let (Some(side), Some(up)) = (acc(level[usize::from(!pitches)]), acc(upright)) else {
+            return Err(
+                "the accelerometers along the vertical and across the axis are needed".into(),
+            );
+        };
+        Ok(Self {
+            side,
+            up,
+            across: acc(own),
+            pitches,
+        })
+    }
+
+    /// How fast the axis tilts, deg/s: the central difference.
+    fn tilt_rate(&self, n: usize, rate_hz: f64) -> Vec<f64> {
+        let zero = upright_zero(self.up, [Some(self.side), self.across]);
+        let up: Vec<f64> = self.up.values.iter().map(|a| a - zero).collect();
+        let sign = up.iter().sum::<f64>().signum();
+        // The roll is atan(y / z). The pitch is that of x against both others, and its rate about the body's y is smaller
+        // by the cosine of the roll.
+        let other = |i: usize| {
+            let across = self.across.filter(|_| self.pitches);
+            across.map_or(0.0, |a| a.values[i])
+        };
+        let tilt: Vec<f64> = (0..n)
+            .map(|i| {
+                let vertical = up[i].hypot(other(i)).copysign(sign * up[i]);
+                self.side.values[i].atan2(vertical).to_degrees()
+            })
+            .collect();
+        let leaning = |i: usize| (other(i).atan2(sign * up[i])).cos();
+        (0..n)
+            .map(|i| {
+                let change = tilt[(i + 1).min(n - 1)] - tilt[i.saturating_sub(1)];
+                change * leaning(i).abs() * rate_hz / 2.0
+            })
+            .collect()
+    }
 }
 
 /// What the upright accelerometer reads beside the part of 1 g that the other axes leave it, in the mean over the record: its zero,

@@ -180,6 +180,25 @@ fn scores(spectra: &Spectra, (from, to): (usize, usize), told: impl Fn(usize) ->
     energies.iter().map(score).collect()
 }
 
+/// Standard scores of the energies in each band, by window, about their mean: over what a `law` of the variance that all but the
+/// `steady` share of the band follows tells of them.
+fn scores_about_mean(spectra: &Spectra, law: Option<&[f64]>, steady: &[f64]) -> Vec<Vec<f64>> {
+    let law = law.map(|law| spectra.means(law));
+    let bands = spectra.bands().into_iter().zip(steady);
+    bands
+        .map(|(band, steady)| {
+            let told = |i: usize| law.as_ref().map_or(1.0, |l| steady + (1.0 - steady) * l[i]);
+            let mut y = scores(spectra, band, told);
+            let middle = mean(&y);
+            y.iter_mut().for_each(|v| *v -= middle);
+            // What is more uneven than noise has larger errors.
+            let spread = mean(&y.iter().map(|v| v * v).collect::<Vec<f64>>()).sqrt();
+            y.iter_mut().for_each(|v| *v /= spread.max(1.0));
+            y
+        })
+        .collect()
+}
+
 /// Whether the energy in some bands follows something that was recorded, beyond a `law` of the variance that all but the
 /// `steady` share of each band follows.
 fn colour(
@@ -192,20 +211,8 @@ fn colour(
     let mut worst: Option<(f64, f64, Option<&Course>, String)> = None;
     let mut asked = 0usize;
     for (spectra, steady) in all.iter().zip(steady) {
-        let law = law.map(|law| spectra.means(law));
         let bands = spectra.bands();
-        let scores: Vec<Vec<f64>> = (bands.iter().zip(steady))
-            .map(|(band, steady)| {
-                let told = |i: usize| law.as_ref().map_or(1.0, |l| steady + (1.0 - steady) * l[i]);
-                let mut y = scores(spectra, *band, told);
-                let middle = mean(&y);
-                y.iter_mut().for_each(|v| *v -= middle);
-                // What is more uneven than noise has larger errors.
-                let spread = mean(&y.iter().map(|v| v * v).collect::<Vec<f64>>()).sqrt();
-                y.iter_mut().for_each(|v| *v /= spread.max(1.0));
-                y
-            })
-            .collect();
+        let scores = scores_about_mean(spectra, law, steady);
         for course in courses {
             let Some(values) = centred(&spectra.means(&course.values)) else {
                 continue;
@@ -222,18 +229,14 @@ fn colour(
                 let most = (0..z.len()).max_by(|a, b| z[*a].abs().total_cmp(&z[*b].abs()));
                 let most = most.unwrap_or(0);
                 let hz = |j: usize| j as f64 / spectra.length as f64 * rate_hz / 2.0;
-                worst = Some((
-                    statistic,
-                    p,
-                    Some(course),
-                    format!(
-                        "energy from {:.2} to {:.2} Hz follows {} by {:+.1} standard errors",
-                        hz(bands[most].0),
-                        hz(bands[most].1),
-                        course.what,
-                        z[most]
-                    ),
-                ));
+                let what = format!(
+                    "energy from {:.2} to {:.2} Hz follows {} by {:+.1} standard errors",
+                    hz(bands[most].0),
+                    hz(bands[most].1),
+                    course.what,
+                    z[most]
+                );
+                worst = Some((statistic, p, Some(course), what));
             }
         }
     }
@@ -281,6 +284,19 @@ impl Ridge {
     }
 }
 
+/// Energy and number of the coefficients of a window about each; none about the first two, and beyond the band.
+fn about_each(window: &[f64]) -> Vec<(f64, f64)> {
+    let length = window.len();
+    let ridge = |at: usize| {
+        let (from, to) = (at.saturating_sub(BESIDE), (at + BESIDE + 1).min(length));
+        if from == 0 || from >= to {
+            return (0.0, 0.0);
+        }
+        (window[from..to].iter().sum(), (to - from) as f64)
+    };
+    (0..=length).map(ridge).collect()
+}
+
 /// Whether a ridge runs through the spectra at a pitch in proportion to the speed of the motor (order tracking).
 fn order(view: &View<'_>, e: &[f64], all: &[Spectra]) -> Option<Outcome> {
     let motor = motor(view)?;
@@ -290,18 +306,8 @@ fn order(view: &View<'_>, e: &[f64], all: &[Spectra]) -> Option<Outcome> {
     let mut asked = 0usize;
     for spectra in all {
         let length = spectra.length;
-        // Energy and number of the coefficients about each; none about the first two, and beyond the band.
-        let about = |w: &Vec<f64>| -> Vec<(f64, f64)> {
-            let ridge = |at: usize| {
-                let (from, to) = (at.saturating_sub(BESIDE), (at + BESIDE + 1).min(length));
-                if from == 0 || from >= to {
-                    return (0.0, 0.0);
-                }
-                (w[from..to].iter().sum(), (to - from) as f64)
-            };
-            (0..=length).map(ridge).collect()
-        };
-        let evened: Vec<Vec<(f64, f64)>> = spectra.evened().iter().map(about).collect();
+        let evened = spectra.evened();
+        let evened: Vec<Vec<(f64, f64)>> = evened.iter().map(|w| about_each(w)).collect();
         for lag in LAGS_S {
             let speeds = spectra.means(&lagged(&size, lag * view.rate_hz));
             let mut ridges: Vec<(f64, f64)> = vec![(0.0, 0.0); FOLDS * length];

@@ -96,67 +96,13 @@ impl<'a> Combination<'a> {
 
 /// The combinations that a record allows.
 pub(crate) fn combinations<'a>(view: &'a View<'_>) -> Vec<Combination<'a>> {
-    let moves = |s: &&Signal, least: f64| s.range() >= least;
-    let temperature = view
-        .signal(Quantity::Temp)
-        .filter(|s| moves(s, LEAST_TEMPERATURE));
-    let motor = view
-        .signal(Quantity::Pwm)
-        .filter(|s| moves(s, LEAST_COMMAND));
-    let supply = view
-        .signal(Quantity::Supply)
-        .filter(|s| moves(s, LEAST_SUPPLY));
+    let moving = |quantity, least: f64| view.signal(quantity).filter(|s| s.range() >= least);
+    let temperature = moving(Quantity::Temp, LEAST_TEMPERATURE);
+    let motor = moving(Quantity::Pwm, LEAST_COMMAND);
+    let supply = moving(Quantity::Supply, LEAST_SUPPLY);
     let mut all: Vec<Combination<'a>> = vec![];
     if let Some(t) = temperature {
-        let c = || centred(&t.smooth);
-        let reach = ((SLOPE_S * view.rate_hz).round() as usize).max(1);
-        let name = &t.name;
-        all.push(Combination::of(
-            format!("rate of change of {name}"),
-            &[t],
-            move || slope(&t.smooth, reach),
-        ));
-        all.push(Combination::of(
-            format!("{name} behind a lag"),
-            &[t],
-            || lagged(&t.smooth, LAG_S * view.rate_hz),
-        ));
-        for share in PLAYS {
-            let play = share * t.range();
-            all.push(Combination::of(
-                format!("{name} with a play of {play:.1} {}", t.unit),
-                &[t],
-                move || played(&t.smooth, 0.5 * play),
-            ));
-        }
-        all.push(Combination::of(
-            format!("cube of {name}"),
-            &[t],
-            move || c().iter().map(|v| v.powi(3)).collect(),
-        ));
-        // The command has a zero of its own; the supply has none that means anything.
-        if let Some(m) = motor {
-            all.push(Combination::of(
-                format!("{} times {name}", m.name),
-                &[m, t],
-                move || product(&m.smooth, &c()),
-            ));
-        }
-        if let Some(u) = supply {
-            all.push(Combination::of(
-                format!("{} times {name}", u.name),
-                &[u, t],
-                move || product(&centred(&u.smooth), &c()),
-            ));
-        }
-        if let Some(m) = motor {
-            let size = || m.smooth.iter().map(|v| v.abs()).collect::<Vec<f64>>();
-            all.push(Combination::of(
-                format!("size of {} times {name}", m.name),
-                &[m, t],
-                move || product(&size(), &c()),
-            ));
-        }
+        all.extend(of_temperature(view, t, motor, supply));
     }
     if let (Some(m), Some(u)) = (motor, supply) {
         all.push(Combination::of(
@@ -188,6 +134,59 @@ pub(crate) fn combinations<'a>(view: &'a View<'_>) -> Vec<Combination<'a>> {
         }
     }
     all.extend(lagged::combinations(view, motor, supply));
+    all
+}
+
+/// Those of a thermometer, alone and with the motor or the supply.
+fn of_temperature<'a>(
+    view: &'a View<'_>,
+    t: &'a Signal,
+    motor: Option<&'a Signal>,
+    supply: Option<&'a Signal>,
+) -> Vec<Combination<'a>> {
+    let c = || centred(&t.smooth);
+    let reach = ((SLOPE_S * view.rate_hz).round() as usize).max(1);
+    let name = &t.name;
+    let mut all = vec![
+        Combination::of(format!("rate of change of {name}"), &[t], move || {
+            slope(&t.smooth, reach)
+        }),
+        Combination::of(format!("{name} behind a lag"), &[t], || {
+            lagged(&t.smooth, LAG_S * view.rate_hz)
+        }),
+    ];
+    for share in PLAYS {
+        let play = share * t.range();
+        let what = format!("{name} with a play of {play:.1} {}", t.unit);
+        all.push(Combination::of(what, &[t], move || {
+            played(&t.smooth, 0.5 * play)
+        }));
+    }
+    all.push(Combination::of(
+        format!("cube of {name}"),
+        &[t],
+        move || c().iter().map(|v| v.powi(3)).collect(),
+    ));
+    // The command has a zero of its own; the supply has none that means anything.
+    if let Some(m) = motor {
+        let what = format!("{} times {name}", m.name);
+        all.push(Combination::of(what, &[m, t], move || {
+            product(&m.smooth, &c())
+        }));
+    }
+    if let Some(u) = supply {
+        let what = format!("{} times {name}", u.name);
+        all.push(Combination::of(what, &[u, t], move || {
+            product(&centred(&u.smooth), &c())
+        }));
+    }
+    if let Some(m) = motor {
+        let size = || m.smooth.iter().map(|v| v.abs()).collect::<Vec<f64>>();
+        let what = format!("size of {} times {name}", m.name);
+        all.push(Combination::of(what, &[m, t], move || {
+            product(&size(), &c())
+        }));
+    }
     all
 }
 

@@ -2,9 +2,9 @@
 
 use model::effect::{Found, Peak};
 
-use crate::fit::channel::{Form, State};
+use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::scoring;
-use crate::fit::likelihood::{Noise, Panel, invert, least_walk};
+use crate::fit::likelihood::{Noise, Panel, Solution, invert, least_walk};
 
 /// Standard deviation of an instant between two readings, in their distance.
 const BETWEEN: f64 = 0.288_675_134_594_812_9;
@@ -12,11 +12,7 @@ const BETWEEN: f64 = 0.288_675_134_594_812_9;
 const WALKS: u32 = 28;
 
 /// Random walks with the logarithms of their posterior weights (flat in the random walk's size, restricted likelihood).
-fn weighted(
-    panel: &Panel,
-    noise: &Noise,
-    columns: &[usize],
-) -> Vec<(f64, crate::fit::likelihood::Solution)> {
+fn weighted(panel: &Panel, noise: &Noise, columns: &[usize]) -> Vec<(f64, Solution)> {
     let n = (panel.bins.n - 1) as f64;
     let high = (noise.log_walk + 4.0).max(least_walk(panel.bins.n) + 14.0);
     let low = least_walk(panel.bins.n);
@@ -36,11 +32,7 @@ fn weighted(
 
 /// Random walks with their posterior weights.
 #[must_use]
-pub fn mixture(
-    panel: &Panel,
-    noise: &Noise,
-    columns: &[usize],
-) -> Vec<(f64, crate::fit::likelihood::Solution)> {
+pub fn mixture(panel: &Panel, noise: &Noise, columns: &[usize]) -> Vec<(f64, Solution)> {
     normalised(weighted(panel, noise, columns))
 }
 
@@ -67,10 +59,7 @@ pub fn coefficients(panel: &Panel, state: &State) -> Vec<(f64, f64)> {
 }
 
 /// The first `count` coefficients of a mixture with standard errors.
-pub(crate) fn averaged(
-    mixed: &[(f64, crate::fit::likelihood::Solution)],
-    count: usize,
-) -> Vec<(f64, f64)> {
+pub(crate) fn averaged(mixed: &[(f64, Solution)], count: usize) -> Vec<(f64, f64)> {
     (0..count)
         .map(|i| {
             let mean: f64 = mixed.iter().map(|(w, s)| w * s.beta[i]).sum();
@@ -263,83 +252,80 @@ fn over_variants(panel: &Panel, state: &State, place: usize) -> Vec<f64> {
     squares.iter().map(|s| (s / weight).sqrt()).collect()
 }
 
+/// Where a term of columns lies, each with its standard error: an instant, s, or frequencies, Hz. Of a line its columns tell the
+/// amplitude.
+fn located(
+    panel: &Panel,
+    state: &State,
+    form: &Form,
+    own: &[(f64, f64)],
+    rate_hz: f64,
+) -> Vec<(f64, f64)> {
+    let n = panel.bins.n as f64;
+    let amplitude = |first: usize| own[first].0.hypot(own[first + 1].0);
+    // Cramer-Rao bound of a frequency, rad per sample: 24 s^2 / (A^2 n^3).
+    let frequency = |omega: f64, amplitude: f64| {
+        let variance = 24.0 * state.solution.white * state.noise.at(omega) / n.powi(3);
+        let hz = rate_hz / std::f64::consts::TAU;
+        (omega * hz, variance.sqrt() / amplitude * hz)
+    };
+    match form {
+        // It came at any instant between two readings.
+        Form::Step(at, error) => vec![((at - 0.5) / rate_hz, error.hypot(BETWEEN) / rate_hz)],
+        Form::Line(omega) => vec![frequency(*omega, amplitude(0))],
+        Form::SideBands(carrier, distance) => {
+            // Two side bands of half its size tell the frequency of the swing.
+            let (_, error) = frequency(*carrier, amplitude(2) / 2f64.sqrt());
+            let swing = distance * rate_hz / std::f64::consts::TAU;
+            vec![frequency(*carrier, amplitude(0)), (swing, error)]
+        }
+        Form::Columns | Form::Shaped(..) | Form::Covariance(..) => vec![],
+    }
+}
+
 /// What was found for each term of a state.
 #[must_use]
 pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Found> {
     let beta = coefficients(panel, state);
     let errors = noise_errors(panel, state);
-    let n = panel.bins.n as f64;
     let (mut column, mut coordinate, mut place) = (0, 1, 0);
-    let g = |omega: f64| state.noise.at(omega);
-    state
-        .terms
-        .iter()
-        .map(|t| {
-            let own = &beta[column..column + t.columns.len()];
-            column += t.columns.len();
-            let mut found = Found {
-                unit: unit.to_owned(),
-                rate_hz,
-                white_sigma: state.solution.white.sqrt(),
-                names: t.names.clone(),
-                coefficients: own.to_vec(),
-                fixed: t.fixed.clone(),
-                location: vec![],
-            };
-            if let Form::Covariance(c, _) = &t.form {
-                found.fixed.extend(c.fixed());
+    let of = |t: &Term| {
+        let own = &beta[column..column + t.columns.len()];
+        column += t.columns.len();
+        let mut found = Found {
+            unit: unit.to_owned(),
+            rate_hz,
+            white_sigma: state.solution.white.sqrt(),
+            names: t.names.clone(),
+            coefficients: own.to_vec(),
+            fixed: t.fixed.clone(),
+            location: located(panel, state, &t.form, own, rate_hz),
+        };
+        if let Form::Shaped(shape, at) = &t.form {
+            let (place, coefficients) = shaped(panel, state, t, shape.as_ref(), *at);
+            found.location.push(place);
+            found.coefficients = coefficients;
+        }
+        if let Form::Covariance(c, theta) = &t.form {
+            found.fixed.extend(c.fixed());
+            let wider = t.wider.iter().copied().chain(std::iter::repeat(1.0));
+            let own = theta.iter().zip(&errors[coordinate..]).zip(wider);
+            let mut own: Vec<(f64, f64)> = own.map(|((v, e), by)| (*v, e * by)).collect();
+            if t.wider.is_empty() {
+                let scatter = over_variants(panel, state, place);
+                let both = own.iter_mut().zip(scatter);
+                both.for_each(|((_, error), by)| *error = error.hypot(by));
             }
-            // Cramer-Rao bound of a frequency, rad per sample: 24 s^2 / (A^2 n^3).
-            let frequency = |omega: f64, amplitude: f64| {
-                let error = (24.0 * state.solution.white * g(omega) / n.powi(3)).sqrt() / amplitude;
-                let hz = rate_hz / std::f64::consts::TAU;
-                (omega * hz, error * hz)
-            };
-            match &t.form {
-                Form::Columns => {}
-                // It came at any instant between two readings.
-                Form::Step(at, error) => found
-                    .location
-                    .push(((at - 0.5) / rate_hz, error.hypot(BETWEEN) / rate_hz)),
-                Form::Line(omega) => found
-                    .location
-                    .push(frequency(*omega, own[0].0.hypot(own[1].0))),
-                Form::SideBands(carrier, distance) => {
-                    found
-                        .location
-                        .push(frequency(*carrier, own[0].0.hypot(own[1].0)));
-                    // Two side bands of half its size tell the frequency of the swing.
-                    let bands = own[2].0.hypot(own[3].0) / 2f64.sqrt();
-                    let (_, error) = frequency(*carrier, bands);
-                    found
-                        .location
-                        .push((distance * rate_hz / std::f64::consts::TAU, error));
-                }
-                Form::Shaped(shape, at) => {
-                    let (place, coefficients) = shaped(panel, state, t, shape.as_ref(), *at);
-                    found.location.push(place);
-                    found.coefficients = coefficients;
-                }
-                Form::Covariance(c, theta) => {
-                    let wider = t.wider.iter().copied().chain(std::iter::repeat(1.0));
-                    let own = theta.iter().zip(&errors[coordinate..]).zip(wider);
-                    let mut own: Vec<(f64, f64)> = own.map(|((v, e), by)| (*v, e * by)).collect();
-                    if t.wider.is_empty() {
-                        let scatter = over_variants(panel, state, place);
-                        let both = own.iter_mut().zip(scatter);
-                        both.for_each(|((_, error), by)| *error = error.hypot(by));
-                    }
-                    found.coefficients = c.described(&own);
-                    coordinate += theta.len();
-                    place += 1;
-                }
-            }
-            if let Some(stated) = &t.stated {
-                found.coefficients.clone_from(stated);
-            }
-            found
-        })
-        .collect()
+            found.coefficients = c.described(&own);
+            coordinate += theta.len();
+            place += 1;
+        }
+        if let Some(stated) = &t.stated {
+            found.coefficients.clone_from(stated);
+        }
+        found
+    };
+    state.terms.iter().map(of).collect()
 }
 
 /// Values of a shape's coordinate to either side that it is averaged over, and how far they reach in its logarithm: so many
@@ -367,7 +353,7 @@ pub(crate) fn neighbours(grid: &[f64], at: f64) -> (f64, f64) {
 fn shaped(
     panel: &Panel,
     state: &State,
-    term: &crate::fit::channel::Term,
+    term: &Term,
     shape: &dyn model::effect::Shape,
     at: f64,
 ) -> ((f64, f64), Vec<(f64, f64)>) {
@@ -397,7 +383,7 @@ fn shaped(
     } else {
         REACH[1]
     };
-    let mut all: Vec<(f64, f64, crate::fit::likelihood::Solution)> = vec![];
+    let mut all: Vec<(f64, f64, Solution)> = vec![];
     for i in -SHAPES..=SHAPES {
         let x = at.ln() + reach * f64::from(i) / f64::from(SHAPES);
         if x < low - 0.7 || x > high + 0.7 {
@@ -411,6 +397,12 @@ fn shaped(
         }
         panel.truncate(width);
     }
+    over_shapes(&all, term.columns.len())
+}
+
+/// A coordinate and so many coefficients, each with its standard error, averaged over fits: the logarithm of the coordinate, that
+/// of the weight, the solution.
+fn over_shapes(all: &[(f64, f64, Solution)], columns: usize) -> ((f64, f64), Vec<(f64, f64)>) {
     let top = all.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
     let weights: Vec<f64> = all.iter().map(|p| (p.1 - top).exp()).collect();
     let sum: f64 = weights.iter().sum();
@@ -419,7 +411,7 @@ fn shaped(
     };
     let x = mean_of(&|i| all[i].0);
     let spread = mean_of(&|i| (all[i].0 - x).powi(2)).sqrt();
-    let coefficients = (0..term.columns.len())
+    let coefficients = (0..columns)
         .map(|c| {
             let mean = mean_of(&|i| all[i].2.beta[c]);
             let variance = mean_of(&|i| {

@@ -8,3 +8,13 @@ pub mod prequential;
 pub mod scan;
 pub mod score_test;
 pub mod threshold;
+
+/// White noise of variance 1.
+#[cfg(test)]
+pub(crate) fn white(n: usize, seed: u64) -> Vec<f64> {
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
+    (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
+}

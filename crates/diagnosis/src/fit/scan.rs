@@ -93,6 +93,37 @@ fn energies_left(energies: &[f64], crossed: &[Vec<f64>], inverse: &[Vec<f64>]) -
     all
 }
 
+/// <step at t, x> under each of some noises, for all t of a grid of the steps whose coefficients have `parts` of those in the
+/// record; x is the residual, then each column. The sum of x over the noise, in time, from t on.
+fn from_each_time(
+    panel: &Panel,
+    dct: &Dct,
+    parts: &[f64],
+    columns: &[usize],
+    fits: &[(Vec<f64>, Solution)],
+) -> Vec<Vec<f64>> {
+    let m = parts.len();
+    let weighted = fits.iter().flat_map(|(g, solution)| {
+        let left = first_of_residual(panel, columns, solution, m);
+        let own = columns.iter().map(|c| panel.first(*c, m));
+        let all = std::iter::once(left).chain(own);
+        all.map(move |mut x| {
+            let by = parts.iter().zip(g).map(|(part, g)| part / g);
+            x.iter_mut().zip(by).for_each(|(x, by)| *x *= by);
+            x
+        })
+    });
+    let mut sums: Vec<Vec<f64>> = dct.inverse_all(weighted).collect();
+    for x in &mut sums {
+        let mut sum = 0.0;
+        for v in x.iter_mut().rev() {
+            sum += *v;
+            *v = sum;
+        }
+    }
+    sums
+}
+
 /// Likelihood ratio of a step at each of the grid's times, the random walk profiled; times in samples.
 #[must_use]
 pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Vec<(f64, f64)> {
@@ -120,25 +151,7 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
                 (noise.first(&panel.bins, m), solution)
             })
             .collect();
-        // <step at t, x> under a noise, for all t: the sum of x over it, in time, from t on.
-        let weighted = fits.iter().flat_map(|(g, solution)| {
-            let left = first_of_residual(panel, columns, solution, m);
-            let own = columns.iter().map(|c| panel.first(*c, m));
-            let all = std::iter::once(left).chain(own);
-            all.map(move |mut x| {
-                let by = parts.iter().zip(g).map(|(part, g)| part / g);
-                x.iter_mut().zip(by).for_each(|(x, by)| *x *= by);
-                x
-            })
-        });
-        let mut sums: Vec<Vec<f64>> = dct.inverse_all(weighted).collect();
-        for x in &mut sums {
-            let mut sum = 0.0;
-            for v in x.iter_mut().rev() {
-                sum += *v;
-                *v = sum;
-            }
-        }
+        let sums = from_each_time(panel, &dct, parts, columns, &fits);
         let sums = sums.chunks(1 + columns.len());
         for ((noise, (g, solution)), sums) in walks.iter().zip(&fits).zip(sums) {
             let energies = if noise.terms.is_empty() && m == n {
@@ -270,6 +283,19 @@ const CLOSE: f64 = 100.0;
 /// Largest density over the least at a line: what leaks out of it into quieter bands then says nothing of its place.
 const EVEN: f64 = 1.3;
 
+/// Sums of products of the cosine and the sine of a line over `n` samples of white noise of variance `own`.
+fn products_of_line(w: f64, n: usize, own: f64) -> [[f64; 2]; 2] {
+    // Sum of exp(-2 i w t).
+    let turn = Complex::from_polar(1.0, -2.0 * w);
+    let all = (1.0 - Complex::from_polar(1.0, -2.0 * w * n as f64)) / (1.0 - turn);
+    let half = 0.5 * n as f64;
+    let b = [
+        [half + 0.5 * all.re, -0.5 * all.im],
+        [-0.5 * all.im, half - 0.5 * all.re],
+    ];
+    b.map(|row| row.map(|v| v / own))
+}
+
 /// The frequency within half a cycle of `omega` at which a line explains most, the columns of the state with it; `None`
 /// where the noise about it is not even enough, or the line too slow, for sums in time.
 #[must_use]
@@ -307,15 +333,7 @@ pub fn place_of_line(
     let explained = |w: f64| -> f64 {
         let parts = |z: Complex<f64>| [z.re, -z.im];
         let a = parts(left.at(w));
-        // Sum of exp(-2 i w t).
-        let turn = Complex::from_polar(1.0, -2.0 * w);
-        let all = (1.0 - Complex::from_polar(1.0, -2.0 * w * n as f64)) / (1.0 - turn);
-        let half = 0.5 * n as f64;
-        let mut b = [
-            [half + 0.5 * all.re, -0.5 * all.im],
-            [-0.5 * all.im, half - 0.5 * all.re],
-        ];
-        b.iter_mut().flatten().for_each(|v| *v /= own);
+        let mut b = products_of_line(w, n, own);
         let crossed: Vec<(usize, [f64; 2])> =
             near.iter().map(|(c, z)| (*c, parts(z.at(w)))).collect();
         for (i, x) in &crossed {
@@ -330,17 +348,13 @@ pub fn place_of_line(
         }
         let det = b[0][0] * b[1][1] - b[0][1] * b[1][0];
         // Nothing is left of a line that the others make.
-        if det < 1e-6 * (half / own).powi(2) {
+        if det < 1e-6 * (0.5 * n as f64 / own).powi(2) {
             return 0.0;
         }
         (a[0] * a[0] * b[1][1] - 2.0 * a[0] * a[1] * b[0][1] + a[1] * a[1] * b[0][0]) / det
     };
-    Some(numerics::minimise::golden(
-        &|w| -explained(w),
-        omega - bin,
-        omega + bin,
-        20,
-    ))
+    let (from, to) = (omega - bin, omega + bin);
+    Some(numerics::minimise::golden(&|w| -explained(w), from, to, 20))
 }
 
 /// Likelihood ratio of a swing of a line's amplitude with the angular frequency k pi / n, for k = 0..n: its two side

@@ -406,20 +406,12 @@ fn usual(energies: &[f64], sizes: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use rand_core::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_xoshiro::Xoshiro256PlusPlus;
-
     use super::*;
-
-    fn noise(n: usize, seed: u64) -> Vec<f64> {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
-    }
+    use crate::fit::white;
 
     #[test]
     fn energies_of_white_noise_have_their_degrees_as_means() {
-        let e = noise(20_000, 1);
+        let e = white(20_000, 1);
         for shape in Shape::all(20.0) {
             let all: Vec<f64> = shape.energies(&e)[..19_900].to_vec();
             let asked = all.iter().filter(|v| **v > 0.0);
@@ -456,7 +448,7 @@ mod tests {
         let (n, runs, chance) = (1000, 600, 0.05);
         let shapes = Shape::all(20.0);
         let over = (0..runs).filter(|run| {
-            let channels: Vec<Vec<f64>> = (0..3).map(|k| noise(n, 3 * run + k)).collect();
+            let channels: Vec<Vec<f64>> = (0..3).map(|k| white(n, 3 * run + k)).collect();
             let places = standing_out(&channels, &shapes, chance);
             places.iter().any(|p| p.excess > 0.0)
         });

@@ -268,6 +268,48 @@ impl<'a> Layout<'a> {
         }
     }
 
+    /// The readings of a gyro beside the turns that were felt, the places of those that are missing, and a first guess of the white
+    /// variance.
+    fn given(
+        &self,
+        channel: &Channel,
+        felt: &[Vec<Excursion>],
+    ) -> Result<(Vec<f64>, Vec<usize>, f64), AnalysisError> {
+        let mut given = self.read(channel);
+        let read = given.iter().filter(|v| v.is_finite()).count();
+        if read < LEAST_SAMPLES {
+            return Err(short(read as f64, LEAST_SAMPLES as f64, "samples"));
+        }
+        for e in felt.iter().flatten() {
+            given[e.with_margin(self.n)].fill(f64::NAN);
+        }
+        let lost: Vec<usize> = (0..self.n).filter(|i| !given[*i].is_finite()).collect();
+        let (scale, _) = unit_of(channel);
+        let guess = white_by_differences(&given)
+            .max(channel.lsb.map_or(0.0, |l| (l * scale).powi(2) / 12.0));
+        if is_constant(&given) || guess <= 0.0 && white_of(&given) <= 0.0 {
+            let mut known = channel.values.iter().copied().filter(|v| v.is_finite());
+            return Err(AnalysisError::Constant {
+                name: channel.name.clone(),
+                value: known.next().unwrap_or(f64::NAN),
+            });
+        }
+        Ok((given, lost, guess))
+    }
+
+    /// Readings that are set aside, with their places: those that the audits take for none, and the spikes.
+    fn aside(&self, channel: &Channel, given: &[f64], spikes: &[usize]) -> Vec<(usize, f64)> {
+        let (scale, _) = unit_of(channel);
+        let of_audit = (self.masked)(&channel.name).into_iter();
+        let of_audit = of_audit.filter_map(|row| {
+            let given = channel.values.get(row).filter(|v| v.is_finite())?;
+            Some((*self.places.get(row)?, given * scale))
+        });
+        of_audit
+            .chain(spikes.iter().map(|i| (*i, given[*i])))
+            .collect()
+    }
+
     /// A gyro on the grid; `own` are the turns that it felt, `felt` those of all gyros: while the base turns, no axis of it is
     /// at rest.
     fn target(
@@ -278,24 +320,7 @@ impl<'a> Layout<'a> {
         rng: &mut Xoshiro256PlusPlus,
     ) -> Result<Target, AnalysisError> {
         let (scale, unit) = unit_of(channel);
-        let mut given = self.read(channel);
-        let read = given.iter().filter(|v| v.is_finite()).count();
-        if read < LEAST_SAMPLES {
-            return Err(short(read as f64, LEAST_SAMPLES as f64, "samples"));
-        }
-        for e in felt.iter().flatten() {
-            given[e.with_margin(self.n)].fill(f64::NAN);
-        }
-        let lost: Vec<usize> = (0..self.n).filter(|i| !given[*i].is_finite()).collect();
-        let guess = white_by_differences(&given)
-            .max(channel.lsb.map_or(0.0, |l| (l * scale).powi(2) / 12.0));
-        if is_constant(&given) || guess <= 0.0 && white_of(&given) <= 0.0 {
-            let mut known = channel.values.iter().copied().filter(|v| v.is_finite());
-            return Err(AnalysisError::Constant {
-                name: channel.name.clone(),
-                value: known.next().unwrap_or(f64::NAN),
-            });
-        }
+        let (given, lost, guess) = self.given(channel, felt)?;
         let (mut y, mut c, mut fit) = self.filled(&given, guess, rng);
         let is_rate = unit == "deg/s";
         let mut motion_rms = if is_rate {
@@ -304,29 +329,16 @@ impl<'a> Layout<'a> {
             0.0
         };
         let still = motion_rms <= MOTION_RMS;
+        let (dct, bins) = (&self.dct, &self.bins);
         let spikes = if still {
-            let (dct, bins) = (&self.dct, &self.bins);
             spikes(&given, &mut y, &mut c, &mut fit, dct, bins, rng)
         } else {
             vec![]
         };
-        let of_audit = (self.masked)(&channel.name).into_iter();
-        let of_audit = of_audit.filter_map(|row| {
-            let given = channel.values.get(row).filter(|v| v.is_finite())?;
-            Some((*self.places.get(row)?, given * scale))
-        });
-        let aside = of_audit.chain(spikes.iter().map(|i| (*i, given[*i])));
-        let aside = aside.collect();
+        let aside = self.aside(channel, &given, &spikes);
         let lost = [lost, spikes.clone()].concat();
         if still {
-            c = fill::first(
-                &channel.name,
-                &self.dct,
-                &self.bins,
-                &mut y,
-                &lost,
-                &mut fit,
-            );
+            c = fill::first(&channel.name, dct, bins, &mut y, &lost, &mut fit);
         }
         if is_rate && !spikes.is_empty() {
             motion_rms = self.motion(&y, &c, &lost, &fit);

@@ -197,7 +197,7 @@ pub(crate) fn set_aside(grid: &mut Grid, channel: usize, places: &[usize], limit
 
 #[cfg(test)]
 mod tests {
-    use rand_distr::{Distribution, StandardNormal, StudentT};
+    use rand_distr::{Distribution, StudentT};
 
     use super::*;
 
@@ -205,10 +205,7 @@ mod tests {
     const SINGLE: f64 = 6.1;
 
     fn noise(seed: u64) -> Vec<f64> {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        (0..12_000)
-            .map(|_| StandardNormal.sample(&mut rng))
-            .collect()
+        crate::fit::white(12_000, seed)
     }
 
     #[test]

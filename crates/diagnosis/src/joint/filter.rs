@@ -114,13 +114,8 @@ impl<'a> Series<'a> {
         for (i, ((row, white), read)) in rows.enumerate() {
             let span = self.spans.map_or(1.0, |s| s[i]);
             if begun || !at.poles.is_empty() {
-                predict(
-                    &mut p,
-                    &mut state,
-                    step * span * f64::from(u8::from(begun)),
-                    &at.poles,
-                    w,
-                );
+                let step = step * span * f64::from(u8::from(begun));
+                predict(&mut p, &mut state, step, &at.poles, w);
             }
             if !*read {
                 continue;
@@ -133,18 +128,7 @@ impl<'a> Series<'a> {
             for component in state.chunks_exact(w) {
                 nu.iter_mut().zip(component).for_each(|(nu, m)| *nu -= m);
             }
-            for (component, sum) in state.chunks_exact_mut(w).zip(&row_sums) {
-                let gain = sum / s;
-                component
-                    .iter_mut()
-                    .zip(&nu)
-                    .for_each(|(m, nu)| *m += gain * nu);
-            }
-            for (p, own) in p.chunks_exact_mut(d).zip(&row_sums) {
-                p.iter_mut()
-                    .zip(&row_sums)
-                    .for_each(|(p, other)| *p -= own * other / s);
-            }
+            correct(&mut p, &mut state, (&row_sums, s), &nu);
             if begun {
                 for (i, a) in nu.iter().enumerate() {
                     let by = a / s;
@@ -179,6 +163,20 @@ fn predict(p: &mut [f64], state: &mut [f64], step: f64, poles: &[(f64, f64)], w:
         p[j * d..(j + 1) * d].iter_mut().for_each(|p| *p *= pole);
         p[j..].iter_mut().step_by(d).for_each(|p| *p *= pole);
         p[j * (d + 1)] += variance * (1.0 - pole * pole);
+    }
+}
+
+/// What the innovations `nu` tell of each component, by the sums of its row of the covariance and the variance of them all.
+#[inline]
+fn correct(p: &mut [f64], state: &mut [f64], (row_sums, s): (&[f64], f64), nu: &[f64]) {
+    for (component, sum) in state.chunks_exact_mut(nu.len()).zip(row_sums) {
+        let gain = sum / s;
+        let each = component.iter_mut().zip(nu);
+        each.for_each(|(m, nu)| *m += gain * nu);
+    }
+    for (p, own) in p.chunks_exact_mut(row_sums.len()).zip(row_sums) {
+        let each = p.iter_mut().zip(row_sums);
+        each.for_each(|(p, other)| *p -= own * other / s);
     }
 }
 

@@ -40,11 +40,7 @@ pub(super) fn concluded(
     } = named;
     let mut unexplained = left_over(&checks, &shared);
     for s in searched {
-        let note = |note: &Note| Observation {
-            place: note.at.map(|(from, to)| [from / PI, to / PI]),
-            ..Observation::of_noise(&s.target.name, note.what.clone())
-        };
-        unexplained.extend(s.state.notes.iter().map(note));
+        unexplained.extend(s.state.notes.iter().map(|n| noted(s, n)));
         unexplained.extend(astray(s));
     }
     unexplained.extend(dead);
@@ -95,6 +91,14 @@ fn bent(name: &str, searched: &[Searched<'_>], checks: &[Check]) -> bool {
     let tails = |c: &Check| c.id == CheckId::Kurtosis && c.channel == name && c.fails_after;
     let mut own = searched.iter().filter(|s| s.target.name == name);
     own.any(found) && !checks.iter().any(tails)
+}
+
+/// What the search noted of a channel.
+fn noted(s: &Searched<'_>, note: &Note) -> Observation {
+    Observation {
+        place: note.at.map(|(from, to)| [from / PI, to / PI]),
+        ..Observation::of_noise(&s.target.name, note.what.clone())
+    }
 }
 
 /// An axis that moves on a table that turns another one.

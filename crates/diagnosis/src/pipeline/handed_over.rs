@@ -27,6 +27,20 @@ pub(super) struct HandedOver {
 /// Times that terms are sought for what the replicates of the model before have shown: each shows what the one before hid.
 const ROUNDS: usize = 3;
 
+/// What the models are fitted on.
+fn fitted_on(grid: &Grid, options: &DiagnoseOptions) -> FittedOn {
+    FittedOn {
+        file: options.file.clone(),
+        hash: options.hash.clone(),
+        seconds: grid.n as f64 / grid.rate_hz,
+    }
+}
+
+/// Whether a finding is what an effect of a model says.
+fn is_of(f: &Finding, e: &EffectModel) -> bool {
+    f.cause == e.cause && f.channels == e.channels
+}
+
 /// Terms without a name are sought where the search left something; and again, where the replicates of that model do not hold
 /// the record. Faults that were `mended` before the search are in the model, and not in what was fitted and is compared.
 pub(super) fn handed_over(
@@ -37,19 +51,12 @@ pub(super) fn handed_over(
     options: &DiagnoseOptions,
 ) -> HandedOver {
     let count = options.replicates;
-    let fitted_on = || FittedOn {
-        file: options.file.clone(),
-        hash: options.hash.clone(),
-        seconds: grid.n as f64 / grid.rate_hz,
-    };
     let causes: Vec<&Finding> = told.findings.iter().chain(&told.nearest).collect();
-    let baseline_model = handover::baseline_model(searched, grid, fitted_on());
-    let is_mended = |e: &EffectModel| {
-        let of = |f: &Finding| f.cause == e.cause && f.channels == e.channels;
-        mended.iter().any(of)
-    };
+    let baseline_model = handover::baseline_model(searched, grid, fitted_on(grid, options));
+    let is_mended = |e: &EffectModel| mended.iter().any(|f| is_of(f, e));
     let extended = |by: &Fitted| {
-        handover::extended_model(searched, grid, &causes, by, &is_mended, fitted_on())
+        let on = fitted_on(grid, options);
+        handover::extended_model(searched, grid, &causes, by, &is_mended, on)
     };
     let mut wanted = Wanted::of(&told.unexplained);
     let mut fitted = unnamed::fit(searched, grid, &wanted, &causes);

@@ -90,7 +90,7 @@ pub(crate) fn fit(
     causes: &[&Finding],
 ) -> Fitted {
     let mut all = Fitted::default();
-    let mut whites = vec![];
+    let mut whites: Vec<(&Searched<'_>, White)> = vec![];
     for s in searched.iter().filter(|s| !s.target.moving) {
         let name = &s.target.name;
         let alone = wanted.channels.contains(name);
@@ -121,33 +121,38 @@ pub(crate) fn fit(
             all.terms.extend(of_combinations(s, grid));
             all.terms.extend(of_signals(s, &white, grid));
         }
-        whites.push((name, s, white));
+        whites.push((s, white));
     }
-    for pair in &wanted.pairs {
-        let of = |name: &String| whites.iter().find(|w| w.0 == name);
-        let shares = |f: &&&Finding| {
-            let both = pair.iter().all(|c| f.channels.contains(c));
-            both && SHARING.contains(&f.cause.as_str())
-        };
-        let (Some(a), Some(b)) = (of(&pair[0]), of(&pair[1])) else {
-            continue;
-        };
-        if causes.iter().any(|f| shares(&f)) {
-            continue;
-        }
-        if let Some(r) = a.2.shared_with(&b.2) {
-            let sigma = (a.1.state.solution.white * b.1.state.solution.white).powf(0.25);
-            all.terms.push(Unnamed {
-                domain: Domain::Cross,
-                channels: pair.to_vec(),
-                follows: None,
-                refines: None,
-                rms: Parameter::exact(r.abs().sqrt() * sigma, &a.1.target.unit),
-                columns: vec![Column::new(vec![r], "1")],
-            });
-        }
-    }
+    let of_pair = |pair| of_pair(pair, &whites, causes);
+    all.terms.extend(wanted.pairs.iter().filter_map(of_pair));
     all
+}
+
+/// What the white noise of two channels shares, where none of these causes has it.
+fn of_pair(
+    pair: &[String; 2],
+    whites: &[(&Searched<'_>, White)],
+    causes: &[&Finding],
+) -> Option<Unnamed> {
+    let of = |name: &String| whites.iter().find(|w| w.0.target.name == *name);
+    let shares = |f: &&Finding| {
+        let both = pair.iter().all(|c| f.channels.contains(c));
+        both && SHARING.contains(&f.cause.as_str())
+    };
+    let ((a, white), (b, other)) = (of(&pair[0])?, of(&pair[1])?);
+    if causes.iter().any(shares) {
+        return None;
+    }
+    let r = white.shared_with(other)?;
+    let sigma = (a.state.solution.white * b.state.solution.white).powf(0.25);
+    Some(Unnamed {
+        domain: Domain::Cross,
+        channels: pair.to_vec(),
+        follows: None,
+        refines: None,
+        rms: Parameter::exact(r.abs().sqrt() * sigma, &a.target.unit),
+        columns: vec![Column::new(vec![r], "1")],
+    })
 }
 
 fn term(s: &Searched<'_>, domain: Domain, rms: f64, columns: Vec<Column>) -> Unnamed {

@@ -304,8 +304,9 @@ fn visited(fit: &mut Fit<'_>, merged: &[AsOne], omega: &[f64]) -> Vec<Vec<Bump>>
     combs
 }
 
-/// The spectrum of a channel, none where its causes' model describes it. Bands that are one in the model are told by their parts.
-pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
+/// The fit of a channel before anything is added: what its causes have stays, without the bands that are `merged`; white noise,
+/// filtered, and random walk are free in size.
+fn begun<'a>(s: &'a Searched<'_>, merged: &[AsOne]) -> Fit<'a> {
     let bins = &s.search.panel.bins;
     let noise = &s.state.noise;
     let counts = bins.counts();
@@ -327,16 +328,18 @@ pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
         each.for_each(|(n, v)| *n -= v);
     }
     let shapes = vec![filtered(noise, bins, rounding.min(MOST_ROUNDING)), walk];
-    let fixed = shapes.len();
-    let mut fit = Fit {
+    Fit {
         counts,
         power: power.map(|((e, m), g)| e / m * g).collect(),
         named: named.into_iter().map(|n| n.max(0.0)).collect(),
-        sizes: vec![1.0; fixed],
+        sizes: vec![1.0; shapes.len()],
         shapes,
-    };
-    let combs = visited(&mut fit, merged, &bins.at.omega);
-    let mut bumps = combs.concat();
+    }
+}
+
+/// Adds one bump after another to a fit, the one that takes up most, until none takes up enough. It has `fixed` shapes of
+/// noise, then those of the bumps that there are, which no score is held against.
+fn add_bumps(fit: &mut Fit<'_>, bumps: &mut Vec<Bump>, bins: &Bins, fixed: usize) {
     let of_tones = bumps.len();
     let places = places(bins.n);
     let shapes: Vec<Vec<f64>> = (places.iter())
@@ -371,6 +374,17 @@ pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
         fit.sizes.push(score.min(1.0) / most.max(f64::MIN_POSITIVE));
         fit.climb(ROUNDS);
     }
+}
+
+/// The spectrum of a channel, none where its causes' model describes it. Bands that are one in the model are told by their parts.
+pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
+    let bins = &s.search.panel.bins;
+    let mut fit = begun(s, merged);
+    let fixed = fit.shapes.len();
+    let combs = visited(&mut fit, merged, &bins.at.omega);
+    let mut bumps = combs.concat();
+    let of_tones = bumps.len();
+    add_bumps(&mut fit, &mut bumps, bins, fixed);
     if bumps.is_empty() {
         return None;
     }

@@ -1,11 +1,11 @@
 //! The same of laws of variance, of codes, and of steps from reading to reading.
 
-use diagnosis::likelihood::Bins;
 use model::effect::{Hypothesis, VarianceLaw};
 use model::effects::EFFECTS;
 
 use super::super::known::{of_law, of_steps, refitted};
-use super::library::{Kind, best_process, hypotheses, spectrum};
+use super::super::words::each_pair;
+use super::library::{Kind, best_process, hypotheses};
 use crate::stand::Stand;
 use crate::strength::{Meter, of_variance};
 
@@ -79,19 +79,14 @@ pub(super) fn of_processes(
     beside: &[f64],
     gain: f64,
 ) -> (&'static str, f64) {
-    let (ones, white) = (vec![1.0; stand.samples()], stand.white(axis));
-    let count = Bins::new(stand.samples()).products(&ones, &ones);
-    let mut expected = spectrum(stand, axis, &|_| 1.0, &[]);
-    let mut density = vec![0.0; count.len()];
-    for b in 0..count.len() {
-        let own = white * by.get(b).unwrap_or(&0.0) + beside.get(b).unwrap_or(&0.0);
-        density[b] = own;
-        expected[b] = (expected[b] + count[b] * own).max(1e-9 * expected[b]);
-    }
+    let (meter, white) = (Meter::new(stand, axis), stand.white(axis));
+    let own = |b: usize| white * by.get(b).unwrap_or(&0.0) + beside.get(b).unwrap_or(&0.0);
+    let density: Vec<f64> = (0..meter.counts().len()).map(own).collect();
+    let added = each_pair(meter.counts(), &density, |m, d| m * d);
+    let expected = each_pair(&meter.noise(), &added, |n, a| (n + a).max(1e-9 * n));
     let (id, share) = best_process(stand, axis, &expected, Kind::Noise);
     // Of what changes through the run a process has the mean spectrum alone.
-    let of_mean = Meter::new(stand, axis).of_density(&density).powi(2);
-    (id, share * of_mean / gain)
+    (id, share * meter.of_density(&density).powi(2) / gain)
 }
 
 /// Correlation of neighbours is all that white noise and one pole, or any filter of the library, have of them; the longer

@@ -10,6 +10,7 @@ use model::effects::EFFECTS;
 use model::record::{Axis, Base};
 use numerics::minimise::nelder_mead;
 
+use super::super::words::{each, each_pair};
 use crate::stand::{GYROS, LSB, Stand};
 use crate::strength::Meter;
 
@@ -161,20 +162,17 @@ pub(super) enum Kind {
 }
 
 /// Share of the gain of an expected spectrum that the best process of an effect describes, random walk and white noise
-/// refitted. `truth` is minus twice the log likelihood of what there is.
+/// refitted.
 pub(super) fn of_process(
     stand: &Stand,
     axis: usize,
     expected: &[f64],
-    truth: f64,
     effect: &dyn Effect,
     kind: Kind,
 ) -> f64 {
-    let bins = Bins::new(stand.samples());
-    let ones = vec![1.0; stand.samples()];
-    let count = bins.products(&ones, &ones);
-    let omega = bins.at.omega.iter();
-    let walk: Vec<f64> = omega.map(|w| 1.0 / (2.0 - 2.0 * w.cos())).collect();
+    let meter = Meter::new(stand, axis);
+    let (bins, count) = (meter.bins(), meter.counts());
+    let walk = each(meter.omega(), |w| 1.0 / (2.0 - 2.0 * w.cos()));
     let n: f64 = count.iter().sum();
     let minus_two_l = |lambda: f64, density: &dyn Fn(usize) -> f64| {
         let (mut sum, mut logs) = (0.0, 0.0);
@@ -193,11 +191,10 @@ pub(super) fn of_process(
         let Hypothesis::Covariance(process) = h else {
             continue;
         };
-        let samples = stand.samples();
         let starts = if process.is_peak() && kind == Kind::Noise {
-            placed(&process, expected, &count, &bins)
+            placed(&process, expected, count, bins)
         } else {
-            let starts = process.starts(samples).into_iter();
+            let starts = process.starts(stand.samples()).into_iter();
             starts.map(|s| (Arc::clone(&process), s)).collect()
         };
         for (process, start) in starts {
@@ -217,7 +214,8 @@ pub(super) fn of_process(
             }
         }
     }
-    (baseline - best) / (baseline - truth)
+    let under_itself = each_pair(expected, count, |e, m| m * (1.0 + (e / m).ln()));
+    (baseline - best) / (baseline - under_itself.iter().sum::<f64>())
 }
 
 /// A peak with each place that its search starts from: where the expected spectrum is highest, narrow and wide, and of each of its
@@ -248,42 +246,16 @@ fn placed(
         .collect()
 }
 
-/// Minus twice the log likelihood of a spectrum under itself.
-pub(super) fn saturated(stand: &Stand, expected: &[f64]) -> f64 {
-    let ones = vec![1.0; stand.samples()];
-    let count = Bins::new(stand.samples()).products(&ones, &ones);
-    expected
-        .iter()
-        .zip(&count)
-        .map(|(e, m)| m * (1.0 + (e / m).ln()))
-        .sum()
-}
-
-/// The spectrum that a channel has: its noise, with the white part shaped, and a process beside it.
-pub(super) fn spectrum(
-    stand: &Stand,
-    axis: usize,
-    shape: &dyn Fn(f64) -> f64,
-    beside: &[f64],
-) -> Vec<f64> {
-    let bins = Bins::new(stand.samples());
-    let ones = vec![1.0; stand.samples()];
-    let count = bins.products(&ones, &ones);
-    (0..count.len())
-        .map(|b| {
-            let w = bins.at.omega[b];
-            let walk = stand.step(axis) / (2.0 - 2.0 * w.cos());
-            count[b] * (stand.white(axis) * shape(w) + walk) + beside.get(b).copied().unwrap_or(0.0)
-        })
-        .collect()
+/// The spectrum that a channel has with this energy beside its noise, by bin.
+fn with_noise(meter: &Meter, energy: &[f64]) -> Vec<f64> {
+    each_pair(&meter.noise(), energy, |n, e| n + e)
 }
 
 /// The largest share of a signal's gain that each effect of the library describes.
 pub(super) fn of_all(stand: &Stand, axis: usize, signal: &[f64]) -> Vec<(&'static str, f64)> {
     let meter = Meter::new(stand, axis);
     let whole = meter.of_signal(&meter.energy(signal)).powi(2);
-    let expected = spectrum(stand, axis, &|_| 1.0, &meter.energy(signal));
-    let own = saturated(stand, &expected);
+    let expected = with_noise(&meter, &meter.energy(signal));
     let mut all: Vec<_> = EFFECTS
         .iter()
         .map(|effect| {
@@ -292,7 +264,7 @@ pub(super) fn of_all(stand: &Stand, axis: usize, signal: &[f64]) -> Vec<(&'stati
                 .iter()
                 .map(|set| 1.0 - meter.of_signal(&left(set)).powi(2) / whole)
                 .fold(
-                    of_process(stand, axis, &expected, own, *effect, Kind::Signal),
+                    of_process(stand, axis, &expected, *effect, Kind::Signal),
                     f64::max,
                 );
             (effect.id(), described)
@@ -359,7 +331,7 @@ pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> OfTwo {
         names.push(*id);
         if turn == 0 {
             // Beside the first a process may take more than a second regression.
-            let expected = spectrum(stand, axis, &|_| 1.0, &meter.energy(&rest));
+            let expected = with_noise(&meter, &meter.energy(&rest));
             let (id, process) = best_process(stand, axis, &expected, Kind::Signal);
             with_process = (id, 1.0 - gain(&rest) / whole * (1.0 - process));
         }
@@ -378,10 +350,9 @@ pub(super) fn best_process(
     expected: &[f64],
     kind: Kind,
 ) -> (&'static str, f64) {
-    let own = saturated(stand, expected);
     EFFECTS
         .iter()
-        .map(|e| (e.id(), of_process(stand, axis, expected, own, *e, kind)))
+        .map(|e| (e.id(), of_process(stand, axis, expected, *e, kind)))
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .expect("the library has processes")
 }

@@ -33,17 +33,6 @@ fn other_than(draw: &mut Draw, axis: usize) -> usize {
     (axis + 1 + draw.of_many(2)) % 3
 }
 
-/// What an axis reads, without its bias, by bin of the spectrum: expected energies.
-fn energy_of(stand: &Stand, axis: usize) -> Vec<f64> {
-    let ones = vec![1.0; stand.samples()];
-    let count = diagnosis::likelihood::Bins::new(stand.samples()).products(&ones, &ones);
-    let omega = Meter::new(stand, axis).omega().to_vec();
-    each_pair(&omega, &count, |w, m| {
-        let walk = 1.0 / (4.0 * (w / 2.0).sin().powi(2));
-        m * (stand.white(axis) + stand.step(axis) * walk)
-    })
-}
-
 /// d' of frames of which a share hold another axis's reading, who looks at one against mean and variance refitted, who
 /// knows at both.
 fn of_exchanged(stand: &Stand, axis: usize, other: usize, chance: f64) -> f64 {
@@ -145,7 +134,7 @@ fn nats_of_copy(stand: &Stand, axis: usize, other: usize) -> f64 {
 fn late(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (other, frames) = (other_than(draw, axis), 1 + draw.of_many(4));
     let sign = draw.sign();
-    by_energy(energy_of(stand, other), move |share| {
+    by_energy(Meter::new(stand, other).noise(), move |share| {
         Change::made(move |counts, draw| {
             let from = about_mean(&each(&counts[other], |c| LSB * f64::from(c)));
             let added = (0..from.len()).map(|i| sign * share * from[i.saturating_sub(frames)]);
@@ -244,7 +233,7 @@ fn tail(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     // Of its own noise, not of what the other axis's bias does.
     let energy: Vec<f64> = each_pair(
         Meter::new(stand, axis).omega(),
-        &energy_of(stand, other),
+        &Meter::new(stand, other).noise(),
         |w, e| e * of_tail(keep, w),
     );
     by_energy(energy, move |share| {
@@ -342,7 +331,7 @@ fn neighbour(draw: &mut Draw, stand: &mut Stand, axis: usize, wanted: f64) -> Sh
         own[from..to].copy_from_slice(&counts[other][from..to]);
         own
     });
-    Shape::Fixed(Known::Strength((2.0 * long as f64 * nats).sqrt()), change)
+    Shape::Fixed(Known::nats(long as f64 * nats), change)
 }
 
 /// Firmware that drops duplicates, and compares with the axis sent before instead of the frame before: where both read the
@@ -363,7 +352,7 @@ fn duplicates(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Shape {
                 |r: &f64| same / p.max(1e-300) * r * (r + chance * p) * (chance * p / r).ln_1p();
             nats += own.iter().filter(|r| **r > 1e-300).map(gains).sum::<f64>();
         }
-        Known::Strength((2.0 * stand.samples() as f64 * nats).max(0.0).sqrt())
+        Known::nats(stand.samples() as f64 * nats)
     };
     remade(
         1.0,
@@ -394,7 +383,7 @@ fn by_neighbour(draw: &mut Draw, axis: usize) -> Shape {
         let again: f64 = own.iter().filter(|p| **p > 1e-300).map(stands).sum();
         let moves = (1.0 - chance) * (1.0 - square(&own)) * (1.0 - chance).max(1e-12).ln();
         let frames = stand.samples() as f64 * square(&law(stand, other).1);
-        Known::Strength((2.0 * frames * (again + moves)).max(0.0).sqrt())
+        Known::nats(frames * (again + moves))
     };
     remade(
         1.0,

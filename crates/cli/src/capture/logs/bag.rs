@@ -3,10 +3,9 @@
 use std::collections::HashMap;
 use std::io::{BufRead, Read as _};
 
-use super::super::table::Table;
 use super::super::unpack::{unpack_bzip2, unpack_lz4};
 use super::imu::{Kind, Topics};
-use super::{Bytes, LogError, chunk_of, packed_by};
+use super::{Bytes, LogError, Read, chunk_of, packed_by};
 
 /// `op` of the records that are read (ROS wiki, Bags/Format/2.0).
 const MESSAGE: u8 = 0x02;
@@ -46,7 +45,7 @@ struct Reader {
 }
 
 /// Reads the file behind its first line.
-pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Result<Table, LogError> {
+pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Read {
     let mut reader = Reader::default();
     // Nothing is taken of a length that the file does not have.
     let mut counted = |into: &mut Vec<u8>| -> std::io::Result<Option<bool>> {
@@ -69,13 +68,7 @@ pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Result<Table
             _ => break true,
         }
     };
-    let mut table = reader.topics.table(topic)?;
-    if is_cut {
-        table
-            .notes
-            .push("the file ends in the middle: it is read as far as it goes".to_owned());
-    }
-    Ok(table)
+    Ok((reader.topics.table(topic)?, is_cut))
 }
 
 impl Reader {

@@ -4,10 +4,9 @@
 use std::collections::HashMap;
 use std::io::{BufRead, Read as _};
 
-use super::super::table::Table;
 use super::super::unpack::{unpack_lz4, unpack_zstd};
 use super::imu::{Kind, Topics};
-use super::{Bytes, LogError, chunk_of, packed_by};
+use super::{Bytes, LogError, Read, chunk_of, packed_by};
 
 /// Opcodes of the records that are read (MCAP format specification).
 const SCHEMA: u8 = 0x03;
@@ -27,7 +26,7 @@ struct Reader {
 }
 
 /// Reads the file behind its magic.
-pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Result<Table, LogError> {
+pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Read {
     let mut reader = Reader::default();
     let mut content = Vec::new();
     let is_cut = loop {
@@ -51,13 +50,7 @@ pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Result<Table
             std::io::copy(&mut input.take(length), &mut std::io::sink())?;
         }
     };
-    let mut table = reader.topics.table(topic)?;
-    if is_cut {
-        table
-            .notes
-            .push("the file ends in the middle: it is read as far as it goes".to_owned());
-    }
-    Ok(table)
+    Ok((reader.topics.table(topic)?, is_cut))
 }
 
 impl Reader {

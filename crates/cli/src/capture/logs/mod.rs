@@ -33,11 +33,14 @@ fn packed_by(other: &str, known: &str) -> LogError {
     ))
 }
 
+/// The table of the topic that is asked for, and whether the file ends in the middle.
+type Read = Result<(Table, bool), LogError>;
+
 /// A kind of log: how it begins, what it is called, and who reads it.
 struct Kind {
     magic: &'static [u8],
     name: &'static str,
-    read: fn(&mut dyn BufRead, Option<&str>) -> Result<Table, LogError>,
+    read: fn(&mut dyn BufRead, Option<&str>) -> Read,
 }
 
 const KINDS: [Kind; 3] = [
@@ -91,7 +94,14 @@ pub(super) fn read_log(
     };
     let kind = KINDS.iter().find(|kind| start.starts_with(kind.magic))?;
     input.consume(kind.magic.len());
-    Some((kind.read)(input, topic).map_err(|error| told(kind.name, error)))
+    let read = (kind.read)(input, topic).map(|(mut table, is_cut)| {
+        if is_cut {
+            let note = "the file ends in the middle: it is read as far as it goes";
+            table.notes.push(note.to_owned());
+        }
+        table
+    });
+    Some(read.map_err(|error| told(kind.name, error)))
 }
 
 /// Topics that a message lists.

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::io::{BufRead, Read as _};
 
 use super::super::table::Table;
-use super::{Bytes, LogError, held, since_first};
+use super::{Bytes, LogError, Read, held, since_first};
 
 /// A field of a topic.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,7 +63,7 @@ const DEEPEST: usize = 8;
 const HEAD: u64 = 3;
 
 /// Reads the file behind its magic.
-pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Result<Table, LogError> {
+pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Read {
     // Version, and the time of the start.
     std::io::copy(&mut input.take(9), &mut std::io::sink())?;
     let mut reader = Reader::default();
@@ -82,12 +82,7 @@ pub(super) fn read(input: &mut dyn BufRead, topic: Option<&str>) -> Result<Table
         }
         reader.message(kind, &content)?;
     };
-    let mut table = reader.table(topic)?;
-    if is_cut {
-        let note = "the file ends in the middle: it is read as far as it goes";
-        table.notes.push(note.to_owned());
-    }
-    Ok(table)
+    Ok((reader.table(topic)?, is_cut))
 }
 
 impl Reader {

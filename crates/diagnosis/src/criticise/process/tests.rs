@@ -13,8 +13,7 @@ use crate::fit::likelihood::Dct;
 fn filtered(seed: u64) -> Filtered {
     let n = 6000;
     let panel = Panel::new(&Dct::new(n), &Rc::new(Bins::new(n)), &vec![0.0; n]);
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let u: Vec<f64> = (0..n).map(|_| StandardNormal.sample(&mut rng)).collect();
+    let u = crate::fit::white(n, seed);
     let filter: Vec<f64> = (0..n)
         .map(|k| 1.0 / (1.0 + (PI * k as f64 / n as f64 * 3.0).powi(2)))
         .collect();

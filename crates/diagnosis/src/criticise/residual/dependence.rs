@@ -98,6 +98,38 @@ fn pairs(part: &[usize], lag: usize) -> [f64; PARTS * PARTS] {
     table
 }
 
+/// Chi-square of where two readings near each other lie among all parts, over how often two lie there that are farther apart; its
+/// degrees of freedom; and what is farthest off: by how much of it, the lag, and how many times as often. Nothing of too few.
+fn against_far_pairs(part: &[usize]) -> (f64, f64, (f64, usize, f64)) {
+    let (mut statistic, mut freedom) = (0.0, 0.0);
+    let mut worst = (0.0, 0, 0.0);
+    if part.len() < LEAST_PAIRS * PARTS * PARTS {
+        return (statistic, freedom, worst);
+    }
+    let mut apart = [0.0; PARTS * PARTS];
+    for lag in LAGS_APART {
+        let all = apart.iter_mut().zip(pairs(part, lag));
+        all.for_each(|(sum, pairs)| *sum += pairs);
+    }
+    let far: f64 = apart.iter().sum();
+    // The mean of so many tables is off by a part of what one is.
+    let spread = 1.0 + 1.0 / LAGS_APART.count() as f64;
+    for lag in LAGS_OF_PAIRS {
+        let near = pairs(part, lag);
+        let all = (part.len() - lag) as f64;
+        freedom += ((PARTS - 1) * (PARTS - 1)) as f64;
+        for (seen, apart) in near.iter().zip(apart).filter(|(_, a)| *a > 0.0) {
+            let expected = apart * all / far;
+            let off = (seen - expected).powi(2) / (expected * spread);
+            statistic += off;
+            if off > worst.0 {
+                worst = (off, lag, seen / expected);
+            }
+        }
+    }
+    (statistic, freedom, worst)
+}
+
 /// Whether readings near each other are independent, whatever their law: chi-square of where two of them lie among all,
 /// over how often two lie there that are farther apart and share no more than a level that drifts. What treats large changes otherwise than small ones leaves its mark here, though nothing correlates.
 pub(crate) fn neighbours(e: &[f64], step: f64) -> Outcome {
@@ -116,31 +148,7 @@ pub(crate) fn neighbours(e: &[f64], step: f64) -> Outcome {
         .iter()
         .map(|v| edges.partition_point(|edge| edge < v))
         .collect();
-    let (mut statistic, mut freedom) = (0.0, 0.0);
-    let mut worst = (0.0, 0, 0.0);
-    if e.len() >= LEAST_PAIRS * PARTS * PARTS {
-        let mut apart = [0.0; PARTS * PARTS];
-        for lag in LAGS_APART {
-            let all = apart.iter_mut().zip(pairs(&part, lag));
-            all.for_each(|(sum, pairs)| *sum += pairs);
-        }
-        let far: f64 = apart.iter().sum();
-        // The mean of so many tables is off by a part of what one is.
-        let spread = 1.0 + 1.0 / LAGS_APART.count() as f64;
-        for lag in LAGS_OF_PAIRS {
-            let near = pairs(&part, lag);
-            let all = (e.len() - lag) as f64;
-            freedom += ((PARTS - 1) * (PARTS - 1)) as f64;
-            for (seen, apart) in near.iter().zip(apart).filter(|(_, a)| *a > 0.0) {
-                let expected = apart * all / far;
-                let off = (seen - expected).powi(2) / (expected * spread);
-                statistic += off;
-                if off > worst.0 {
-                    worst = (off, lag, seen / expected);
-                }
-            }
-        }
-    }
+    let (statistic, freedom, worst) = against_far_pairs(&part);
     // A longer record is told what this one would be, as with the skewness.
     let least = CERTAIN * (2.0 * freedom).sqrt() / RECORD;
     let small = e.len() as f64 > RECORD && (statistic - freedom) / (e.len() as f64) < least;

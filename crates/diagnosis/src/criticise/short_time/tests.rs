@@ -3,10 +3,6 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
-use rand_xoshiro::Xoshiro256PlusPlus;
-
 use super::*;
 use crate::test_level::OMNIBUS_LEVEL;
 
@@ -14,8 +10,7 @@ const N: usize = 12_000;
 const RATE_HZ: f64 = 20.0;
 
 fn white(seed: u64) -> Vec<f64> {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    (0..N).map(|_| StandardNormal.sample(&mut rng)).collect()
+    crate::fit::white(N, seed)
 }
 
 /// A command that goes through levels of either sign, each held for 6.5 s.

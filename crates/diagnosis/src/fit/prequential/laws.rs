@@ -101,16 +101,8 @@ pub fn of_correlation(channels: &[&[f64]]) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use rand_core::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_xoshiro::Xoshiro256PlusPlus;
-
     use super::*;
-
-    fn white(n: usize, seed: u64) -> Vec<f64> {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
-    }
+    use crate::fit::white;
 
     #[test]
     fn a_law_of_the_variance_gains_what_it_is_worth_and_costs_where_there_is_none() {

@@ -2,7 +2,7 @@
 
 use super::super::super::prelude::*;
 use super::edges::zero_of;
-use super::gaps::gaps_for;
+use super::gaps::hidden;
 
 /// Nats by which a reading tells that it is a copy of another one: the entropy of its law.
 fn nats_of_copy(stand: &Stand, axis: usize) -> f64 {
@@ -65,11 +65,7 @@ pub(super) fn sorted(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
         1.0,
         move |stand, chance| {
             let blocks = (stand.samples() / length) as f64;
-            Known::Strength(
-                (2.0 * blocks * nats_of_block(chance.min(1.0), times))
-                    .max(0.0)
-                    .sqrt(),
-            )
+            Known::nats(blocks * nats_of_block(chance.min(1.0), times))
         },
         move |counts, draw, chance| {
             let mut own = counts[axis].clone();
@@ -86,20 +82,12 @@ pub(super) fn sorted(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 /// A driver that hides what the link has lost by mirroring the readings before the gap at the last one, as sound is mended.
 pub(super) fn mirrored(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
     let nats = nats_of_copy(stand, axis);
-    let (gaps, left) = gaps_for(draw, stand, wanted, &|length| length as f64 * nats);
-    let change = Change::made(move |counts, _| {
-        let mut own = counts[axis].clone();
-        for (from, length) in &gaps {
-            for k in 0..*length {
-                own[from + k] = own[from.saturating_sub(2 + k)];
-            }
+    let nats = |length| length as f64 * nats;
+    hidden(draw, stand, (axis, wanted), &nats, |own, from, length| {
+        for k in 0..length {
+            own[from + k] = own[from.saturating_sub(2 + k)];
         }
-        own
-    });
-    Shape::Fixed(
-        Known::Strength((wanted * wanted - 2.0 * left).sqrt()),
-        change,
-    )
+    })
 }
 
 /// A part that calibrates itself at a fixed period, and holds its output for some readings meanwhile.
@@ -118,7 +106,7 @@ pub(super) fn held(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> 
         }
         own
     });
-    Shape::Fixed(Known::Strength((2.0 * count * nats).sqrt()), change)
+    Shape::Fixed(Known::nats(count * nats), change)
 }
 
 /// A link that saves bits by block floating point: eight readings have one exponent, by the largest of them, and mantissas of
@@ -149,7 +137,7 @@ pub(super) fn exponents(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
                 .iter()
                 .map(|t| nats_of_block(chance.min(1.0), *t))
                 .sum();
-            Known::Strength((2.0 * nats).max(0.0).sqrt())
+            Known::nats(nats)
         },
         move |counts, draw, chance| {
             let mut own = counts[axis].clone();

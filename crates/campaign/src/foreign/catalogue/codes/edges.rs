@@ -188,19 +188,6 @@ impl Weight {
         }
     }
 
-    /// One that is as strong as wanted at the most that it may be off, if a few draws have one.
-    pub(super) fn new(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Self {
-        const TRIES: usize = 20;
-        let mut own = Self::any(draw);
-        for _ in 0..TRIES {
-            if own.strength(stand, axis, f64::INFINITY) >= wanted {
-                break;
-            }
-            own = Self::any(draw);
-        }
-        own
-    }
-
     /// Lower edges of the codes from the first on, counts. A code whose edge lies above a later one's never comes: the higher
     /// bit is tried first.
     pub(super) fn edges(self, stand: &Stand, axis: usize, off: f64) -> (i32, Vec<f64>) {
@@ -216,10 +203,6 @@ impl Weight {
             edges[i - 1] = edges[i - 1].min(edges[i]);
         }
         (first, edges)
-    }
-
-    pub(super) fn strength(self, stand: &Stand, axis: usize, off: f64) -> f64 {
-        Known::edges(stand, axis, &self.edges(stand, axis, off)).strength(stand, axis)
     }
 }
 
@@ -425,9 +408,18 @@ pub(super) fn wavy(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     edges(axis, move |stand, lean| wave.edges(stand, axis, lean))
 }
 
-/// A bit of the converter that weighs wrong.
+/// A bit of the converter that weighs wrong: one that at the most that it may be off is as strong as wanted, if a few draws have
+/// one.
 pub(super) fn weighs_wrong(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
-    let weight = Weight::new(draw, stand, axis, wanted);
+    const TRIES: usize = 20;
+    let mut weight = Weight::any(draw);
+    for _ in 0..TRIES {
+        let most = weight.edges(stand, axis, f64::INFINITY);
+        if Known::edges(stand, axis, &most).strength(stand, axis) >= wanted {
+            break;
+        }
+        weight = Weight::any(draw);
+    }
     edges(axis, move |stand, off| weight.edges(stand, axis, off))
 }
 

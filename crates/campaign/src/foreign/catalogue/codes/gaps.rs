@@ -16,14 +16,15 @@ pub(super) fn nats_of_gap(length: usize, sigma_counts: f64) -> f64 {
     (sigma_counts * TAU.sqrt()).ln() + 0.5 * mean
 }
 
-/// Gaps that a link has lost, as strong as wanted together, none touching another: the first reading and the length of each,
-/// with half the d'^2 that is left. `nats` tells what a gap of a length adds to that.
-pub(super) fn gaps_for(
+/// A driver that hides the gaps that a link has lost, none touching another and together as strong as wanted: `nats` tells what
+/// a gap of a length adds to half the d'^2, and `fill` fills one from a reading on.
+pub(super) fn hidden(
     draw: &mut Draw,
     stand: &Stand,
-    wanted: f64,
+    (axis, wanted): (usize, f64),
     nats: &dyn Fn(usize) -> f64,
-) -> (Vec<(usize, usize)>, f64) {
+    fill: fn(&mut [i32], usize, usize),
+) -> Shape {
     let n = stand.samples();
     let mut gaps: Vec<(usize, usize)> = vec![];
     let mut left = 0.5 * wanted * wanted;
@@ -47,7 +48,16 @@ pub(super) fn gaps_for(
             break;
         }
     }
-    (gaps, left)
+    let change = Change::made(move |counts, _| {
+        let mut own = counts[axis].clone();
+        gaps.iter()
+            .for_each(|(from, length)| fill(&mut own, *from, *length));
+        own
+    });
+    Shape::Fixed(
+        Known::Strength((wanted * wanted - 2.0 * left).sqrt()),
+        change,
+    )
 }
 
 /// A driver that hides what the link has lost: between the last reading before a gap and the first one after it there is a
@@ -55,21 +65,12 @@ pub(super) fn gaps_for(
 pub(super) fn bridged(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
     let sigma = stand.white(axis).sqrt() / LSB;
     let nats = |length| length as f64 * nats_of_gap(length, sigma);
-    let (gaps, left) = gaps_for(draw, stand, wanted, &nats);
-    let change = Change::made(move |counts, _| {
-        let mut own = counts[axis].clone();
-        for (from, length) in &gaps {
-            let (before, after) = (own[from - 1], own[from + length]);
-            for k in 1..=*length {
-                let part = k as f64 / (length + 1) as f64;
-                let along = f64::from(before) + part * f64::from(after - before);
-                own[from + k - 1] = along.round() as i32;
-            }
+    hidden(draw, stand, (axis, wanted), &nats, |own, from, length| {
+        let (before, after) = (own[from - 1], own[from + length]);
+        for k in 1..=length {
+            let part = k as f64 / (length + 1) as f64;
+            let along = f64::from(before) + part * f64::from(after - before);
+            own[from + k - 1] = along.round() as i32;
         }
-        own
-    });
-    Shape::Fixed(
-        Known::Strength((wanted * wanted - 2.0 * left).sqrt()),
-        change,
-    )
+    })
 }

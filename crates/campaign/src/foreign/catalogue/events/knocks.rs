@@ -6,9 +6,7 @@ use super::super::super::prelude::*;
 /// still again.
 pub(super) fn lorries(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let ground = draw.by_ratio(0.3, 2.0);
-    let mut y = vec![0.0; stand.samples()];
-    let mut at = draw.between(2.0, 25.0);
-    while at < stand.seconds {
+    arriving(stand, draw.between(2.0, 25.0), |y, at| {
         let (takes, size) = (draw.by_ratio(1.5, 4.0), draw.between(0.5, 1.5));
         let (pitch, first) = (ground * draw.between(0.85, 1.15), draw.between(0.0, TAU));
         let packet = in_time(stand, |t| {
@@ -16,9 +14,8 @@ pub(super) fn lorries(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
             size * (-0.5 * (since / takes).powi(2)).exp() * (first + TAU * pitch * since).sin()
         });
         y.iter_mut().zip(packet).for_each(|(y, p)| *y += p);
-        at += 4.0 * takes + 25.0 * draw.exponential();
-    }
-    y
+        at + (4.0 * takes + 25.0 * draw.exponential())
+    })
 }
 
 /// A washer or a ball falls on the bench and bounces: each bounce is as high as the square of the restitution times the one
@@ -26,36 +23,26 @@ pub(super) fn lorries(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// are more than can be counted. Each blow turns the part on its mount, which swings back.
 pub(super) fn ball(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     const GRAVITY: f64 = 9.81;
-    let n = stand.samples();
-    let mut y = vec![0.0; n];
     // How much of a turn is left after a sample: the mount's stiffness.
     let back = draw.between(0.3, 0.8);
-    let mut at = draw.between(2.0, 20.0);
-    while at < stand.seconds {
+    arriving(stand, draw.between(2.0, 20.0), |y, at| {
         let (height, restitution) = (draw.by_ratio(0.1, 1.0), draw.between(0.8, 0.95));
         let size = draw.sign() * height.sqrt();
         let (mut flight, mut blow, mut hit) = ((8.0 * height / GRAVITY).sqrt(), size, at);
         while blow.abs() > 0.05 * size.abs() {
             let place = hit * stand.rate_hz;
-            let first = place as usize;
             // A blow within a sample is shared with the next one.
-            let late = place - first as f64;
-            for (k, share) in [
-                (0, 1.0 - late),
-                (1, late - back * (1.0 - late)),
-                (2, -back * late),
-            ] {
-                if let Some(v) = y.get_mut(first + k) {
-                    *v += blow * share;
-                }
+            let late = place.fract();
+            let shares = [1.0 - late, late - back * (1.0 - late), -back * late];
+            for (v, share) in y.iter_mut().skip(place as usize).zip(shares) {
+                *v += blow * share;
             }
             flight *= restitution;
             hit += flight;
             blow *= restitution;
         }
-        at = hit + 3.0 + 30.0 * draw.exponential();
-    }
-    y
+        hit + 3.0 + 30.0 * draw.exponential()
+    })
 }
 
 /// What passes a chain of all-pass filters of this pole: every pitch as loud as before, each with a delay of its own.
@@ -77,13 +64,11 @@ pub(super) fn dispersed(series: &[f64], stages: usize, pole: f64) -> Vec<f64> {
 pub(super) fn pipe(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let apart = draw.by_ratio(6.0, 25.0);
     let (stages, pole) = (8 + draw.of_many(13), draw.sign() * draw.between(0.4, 0.7));
-    let mut knocks = vec![0.0; stand.samples()];
-    let mut at = apart * draw.exponential();
-    while at < stand.seconds {
+    let knocks = arriving(stand, apart * draw.exponential(), |knocks, at| {
         let size = draw.sign() * draw.between(0.5, 1.5);
         knocks[(at * stand.rate_hz) as usize] += size;
-        at += apart * (0.1 + draw.exponential());
-    }
+        at + apart * (0.1 + draw.exponential())
+    });
     dispersed(&knocks, stages, pole)
 }
 
@@ -91,14 +76,11 @@ pub(super) fn pipe(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn knocks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let mode = (draw.by_ratio(0.7, 9.0), draw.by_ratio(0.3, 3.0));
     let apart = draw.by_ratio(6.0, 30.0);
-    let mut y = vec![0.0; stand.samples()];
-    let mut at = apart * draw.exponential();
-    while at < stand.seconds {
+    arriving(stand, apart * draw.exponential(), |y, at| {
         let size = draw.sign() * (0.3 + draw.exponential());
-        ring(&mut y, stand.rate_hz, (at, size), mode, 10.0);
-        at += apart * draw.exponential();
-    }
-    y
+        ring(y, stand.rate_hz, (at, size), mode, 10.0);
+        at + apart * draw.exponential()
+    })
 }
 
 /// People pass by on a floor that rings: steps at a pace that is nearly regular, each a short ring, growing until the
@@ -127,9 +109,8 @@ pub(super) fn heart(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let rate_hz = stand.rate_hz;
     let (beat, breath) = (draw.between(0.7, 1.1), draw.between(3.0, 6.0));
     let (width, depth) = (draw.between(0.06, 0.1), draw.between(0.03, 0.08));
-    let mut y = vec![0.0; stand.samples()];
-    let (mut at, mut off) = (draw.between(0.0, 1.0), 0.0);
-    while at < stand.seconds {
+    let (first, mut off) = (draw.between(0.0, 1.0), 0.0);
+    arriving(stand, first, |y, at| {
         let breathes = (TAU * at / breath).sin();
         let size = 1.0 + 0.2 * breathes;
         for (after, share) in [(0.10, -0.6), (0.20, 1.0), (0.31, -0.5)] {
@@ -145,9 +126,8 @@ pub(super) fn heart(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
             }
         }
         off = 0.9 * off + 0.02 * draw.normal();
-        at += beat * (1.0 + depth * breathes + off);
-    }
-    y
+        at + beat * (1.0 + depth * breathes + off)
+    })
 }
 
 /// Knocks at the stand: the part rings, has another bias after each, and recovers a part of that. The accelerometers feel
@@ -214,9 +194,7 @@ pub(super) fn axles(draw: &mut Draw) -> [f64; 4] {
 /// by the axles of each, at the pace of the train, which is 30 to 100 km/h, swelling and fading as it goes by.
 pub(super) fn trains(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let ground = (draw.by_ratio(1.5, 8.0), draw.by_ratio(0.3, 1.2));
-    let mut strokes = vec![0.0; stand.samples()];
-    let mut at = draw.between(2.0, 30.0);
-    while at < stand.seconds {
+    let strokes = arriving(stand, draw.between(2.0, 30.0), |strokes, at| {
         let (carriage_s, carriages) = (draw.by_ratio(0.7, 2.5), 4 + draw.of_many(14));
         let (axles, heavy) = (axles(draw), draw.between(0.6, 1.4));
         let lasts = carriage_s * carriages as f64;
@@ -227,42 +205,26 @@ pub(super) fn trains(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
                 let near = 1.0 / (1.0 + (4.0 * (since / lasts - 0.5)).powi(2));
                 let place = (at + since) * stand.rate_hz;
                 // Between two readings, a part of it in either.
-                for (i, part) in [(0, 1.0 - place.fract()), (1, place.fract())] {
-                    if let Some(s) = strokes.get_mut(place as usize + i) {
-                        *s += part * load * near;
-                    }
+                let parts = [1.0 - place.fract(), place.fract()];
+                for (stroke, part) in strokes.iter_mut().skip(place as usize).zip(parts) {
+                    *stroke += part * load * near;
                 }
             }
         }
-        at += lasts + 5.0 + 30.0 * draw.exponential();
-    }
+        at + (lasts + 5.0 + 30.0 * draw.exponential())
+    });
     resonating(&strokes, ground, stand.rate_hz)
 }
 
 /// Knocks at a mount that rings, each at once with its swing.
 pub(super) fn bursts_of_ringing(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (f, decay) = (draw.between(0.8, 6.0), draw.between(0.5, 3.0));
-    let mut y = vec![0.0; stand.samples()];
-    let mut at = 5.0;
-    while at < stand.seconds {
+    arriving(stand, 5.0, |y, at| {
         let first = (at * stand.rate_hz) as usize;
         for (i, v) in y.iter_mut().enumerate().skip(first) {
             let s = i as f64 / stand.rate_hz - at;
             *v += (-s / decay).exp() * (TAU * f * s).sin();
         }
-        at += 15.0 * draw.exponential() + 3.0;
-    }
-    y
-}
-
-/// Adds the ring, of a pitch, Hz, that decays in so many s, of a knock at a time, s; `end` decays later it is over.
-fn ring(y: &mut [f64], rate_hz: f64, (at, size): (f64, f64), (f, decay): (f64, f64), end: f64) {
-    let first = (at * rate_hz).ceil() as usize;
-    for (k, v) in y.iter_mut().enumerate().skip(first) {
-        let since = k as f64 / rate_hz - at;
-        if since > end * decay {
-            break;
-        }
-        *v += size * (-since / decay).exp() * (TAU * f * since).sin();
-    }
+        at + (15.0 * draw.exponential() + 3.0)
+    })
 }

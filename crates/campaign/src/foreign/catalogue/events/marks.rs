@@ -9,26 +9,20 @@ pub(super) const AVALANCHES: (f64, f64) = (0.1, 4.0);
 /// of either sign, whose skirts never quite end.
 pub(super) fn peaks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (width, apart) = (draw.by_ratio(0.15, 0.9), draw.by_ratio(8.0, 40.0));
-    let mut all = vec![];
-    let mut at = apart * draw.exponential();
-    while at < stand.seconds {
-        all.push((at, draw.sign() * draw.between(0.5, 1.5)));
-        at += apart * (0.2 + draw.exponential());
-    }
-    let of = |t: f64| -> f64 {
-        let skirt = |(at, size): &(f64, f64)| size / (1.0 + ((t - at) / width).powi(2));
-        all.iter().map(skirt).sum()
-    };
-    stand.series(|i| of(i as f64 / stand.rate_hz))
+    arriving(stand, apart * draw.exponential(), |y, at| {
+        let size = draw.sign() * draw.between(0.5, 1.5);
+        for (i, v) in y.iter_mut().enumerate() {
+            *v += size / (1.0 + ((i as f64 / stand.rate_hz - at) / width).powi(2));
+        }
+        at + apart * (0.2 + draw.exponential())
+    })
 }
 
 /// A lift, a tram or a lorry passes: iron is a dipole, and its field at the part is that of a dipole on a straight line,
 /// (3 cos^2 - 1) / r^3 with the angle to where it points. Each passes at its own distance and speed, and is magnetised
 /// its own way.
 pub(super) fn passing(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let mut y = vec![0.0; stand.samples()];
-    let mut at = draw.between(0.0, 20.0);
-    while at < stand.seconds {
+    arriving(stand, draw.between(0.0, 20.0), |y, at| {
         // Distance over speed, s.
         let takes = draw.by_ratio(0.5, 4.0);
         let (size, (across, along)) = (draw.between(0.5, 1.5), draw.between(0.0, TAU).sin_cos());
@@ -38,43 +32,35 @@ pub(super) fn passing(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
             // The component across the way: 3 (m.r) r / r^5 - m / r^3.
             *v += size * (3.0 * (across + along * x) / square - across) / square.powf(1.5);
         }
-        at += 4.0 * takes + 25.0 * draw.exponential();
-    }
-    y
+        at + (4.0 * takes + 25.0 * draw.exponential())
+    })
 }
 
 /// The door of the laboratory: drawn open, the pressure falls, and it jumps up when the door falls shut, mostly right after;
 /// either leaks away through the gaps. The lid of the package bends by it.
 pub(super) fn door(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     const LEFT_OPEN: f64 = 0.2;
-    let (keep, sign) = (
-        (-1.0 / (draw.by_ratio(0.5, 4.0) * stand.rate_hz)).exp(),
-        draw.sign(),
-    );
-    let mut kicks = vec![0.0; stand.samples()];
-    let mut at = draw.between(1.0, 15.0);
-    while at < stand.seconds {
+    let leaks = draw.by_ratio(0.5, 4.0);
+    let sign = draw.sign();
+    let kicks = arriving(stand, draw.between(1.0, 15.0), |kicks, at| {
         let open = if draw.chance(LEFT_OPEN) {
             draw.between(10.0, 40.0)
         } else {
             draw.between(1.5, 6.0)
         };
-        for (when, kick) in [
+        let strokes = [
             (at, -draw.between(0.4, 1.0)),
             (at + open, draw.between(0.7, 1.5)),
-        ] {
+        ];
+        for (when, kick) in strokes {
             if let Some(k) = kicks.get_mut((when * stand.rate_hz) as usize) {
                 *k += sign * kick;
             }
         }
-        at += open + 2.0 + 12.0 * draw.exponential();
-    }
-    let mut pressure = 0.0;
-    let all: Vec<f64> = each(&kicks, |k| {
-        pressure = keep * pressure + k;
-        pressure
+        at + (open + 2.0 + 12.0 * draw.exponential())
     });
-    stand.lagged(&all, draw.by_ratio(0.05, 0.3))
+    let pressure = leaking(&kicks, leaks, stand.rate_hz);
+    stand.lagged(&pressure, draw.by_ratio(0.05, 0.3))
 }
 
 /// Somebody works at the stand and touches it now and then: heat goes in, reaches the part through what it is mounted on, and leaves again;
@@ -115,20 +101,17 @@ pub(super) fn pairs(draw: &mut Draw, stand: &Stand, wanted: f64) -> Vec<f64> {
 pub(super) fn crackle(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (least, most) = AVALANCHES;
     let apart = draw.by_ratio(0.5, 3.0);
-    let mut signal = vec![0.0; stand.samples()];
-    let mut at = apart * draw.exponential();
-    while at < stand.seconds {
+    arriving(stand, apart * draw.exponential(), |y, at| {
         let long = 1.0 / draw.between(1.0 / most, 1.0 / least);
         let sign = draw.sign();
         let from = (at * stand.rate_hz).ceil() as usize;
         let to = ((at + long) * stand.rate_hz).ceil() as usize;
-        for (i, v) in signal.iter_mut().enumerate().take(to).skip(from) {
+        for (i, v) in y.iter_mut().enumerate().take(to).skip(from) {
             let part = (i as f64 / stand.rate_hz - at) / long;
             *v += sign * long * 4.0 * part * (1.0 - part);
         }
-        at += long + apart * draw.exponential();
-    }
-    signal
+        at + (long + apart * draw.exponential())
+    })
 }
 
 /// Charges that arrive at random and leak away: shot noise, all of one sign.

@@ -40,9 +40,7 @@ pub(super) fn kicks(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// fast goes with its size or with its square, whatever its sense. The command is changed by steps.
 pub(super) fn chopped(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let power = 1 + draw.of_many(2) as i32;
-    stand.world.duty = stand.held(draw, (3.0, 15.0), |d| {
-        in_steps(d.sign() * d.between(0.0, 1.0))
-    });
+    commanded(draw, stand, (3.0, 15.0), (0.0, 1.0));
     each(&stand.world.duty, |d| {
         (4.0 * d.abs() * (1.0 - d.abs())).powi(power)
     })
@@ -71,20 +69,14 @@ pub(super) fn iron(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 
 /// Two brushes carry the current at rest; while the motor turns now one lifts and now the other, none for long.
 pub(super) fn chatter(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    stand.world.duty = with_rests(draw, stand);
+    with_rests(draw, stand, DWELL, 0.3);
     let dwell = draw.by_ratio(0.15, 0.5);
     let mut lifted = 1.0;
     let brush = stand.held(draw, (0.5 * dwell, 1.5 * dwell), |_| {
         lifted = -lifted;
         lifted
     });
-    each_pair(
-        &brush,
-        &stand.world.duty,
-        |b, d| {
-            if d == 0.0 { 0.0 } else { b }
-        },
-    )
+    each_pair(&brush, &stand.world.duty, |b, d| b * one_if(d != 0.0))
 }
 
 /// A motor on a governor, whose gear sticks: it starts where the command is beyond one threshold, then runs at its own
@@ -109,7 +101,6 @@ pub(super) fn sticking(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// Whenever the motor is turned about, the gear runs through its play and strikes on the other flank, and the arm that
 /// carries the part rings. A change of pace in one sense stays on its flank and is not felt.
 pub(super) fn reversals(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
     let mut sense = draw.sign();
     stand.world.duty = stand.held(draw, (2.0, 9.0), |d| {
         if d.chance(0.5) {
@@ -117,24 +108,15 @@ pub(super) fn reversals(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         }
         in_steps(sense * d.between(0.3, 1.0))
     });
-    let (f, decay) = (draw.by_ratio(0.8, 7.0), draw.by_ratio(0.3, 1.2));
+    let mode = (draw.by_ratio(0.8, 7.0), draw.by_ratio(0.3, 1.2));
     // The slower the motor after it was turned about, the longer it takes through the play.
     let play = draw.between(0.05, 0.2);
-    let mut y = vec![0.0; n];
-    for i in 1..n {
-        let (before, now) = (stand.world.duty[i - 1], stand.world.duty[i]);
-        if before * now >= 0.0 {
-            continue;
-        }
-        let at = i as f64 / rate_hz + play / now.abs();
-        for (k, v) in y.iter_mut().enumerate().skip(i) {
-            let since = k as f64 / rate_hz - at;
-            if since > 8.0 * decay {
-                break;
-            }
-            if since >= 0.0 {
-                *v += now * (-since / decay).exp() * (TAU * f * since).sin();
-            }
+    let mut y = vec![0.0; stand.samples()];
+    for (i, commands) in stand.world.duty.windows(2).enumerate() {
+        let (before, now) = (commands[0], commands[1]);
+        if before * now < 0.0 {
+            let at = (i + 1) as f64 / stand.rate_hz + play / now.abs();
+            ring(&mut y, stand.rate_hz, (at, now), mode, 8.0);
         }
     }
     y
@@ -175,9 +157,7 @@ pub(super) fn winding(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// One pit in the bearing of the table: at one angle of each turn it dips in and out again, the harder the faster it turns,
 /// and the angle is the sum of a speed that follows the command behind a lag.
 pub(super) fn pit(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    stand.world.duty = stand.held(draw, (3.0, 15.0), |d| {
-        in_steps(d.sign() * d.between(0.3, 1.0))
-    });
+    commanded(draw, stand, (3.0, 15.0), (0.3, 1.0));
     let (top, width) = (draw.by_ratio(0.3, 1.2), draw.between(0.04, 0.08));
     let mut angle = draw.between(0.0, 1.0);
     let speed = stand.lagged(&stand.world.duty, draw.between(0.1, 0.8));
@@ -234,9 +214,7 @@ pub(super) fn rotor(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// the command and whatever its sign, as a strain that the part's own thermometer does not show. The motor runs in spells
 /// of its own; where the supply sags, it does so by another load.
 pub(super) fn heat(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    stand.world.duty = by_turns(draw, stand, true, (3.0, 20.0), |d| {
-        in_steps(d.sign() * d.between(0.4, 1.0))
-    });
+    strokes(draw, stand, true, ((3.0, 20.0), (0.4, 1.0)));
     let current = current(draw, &stand.world.duty, stand.rate_hz);
     let warm = each(&current, |i| i * i);
     let case = stand.lagged(&warm, draw.by_ratio(0.5, 2.0));

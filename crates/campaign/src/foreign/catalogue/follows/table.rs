@@ -197,9 +197,8 @@ pub(super) fn zeroed(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     const SETTLES_S: f64 = 1.0;
     let turning = draw.chance(0.5);
     let dwell = draw.by_ratio(3.0, 9.0);
-    stand.world.duty = by_turns(draw, stand, turning, (0.5 * dwell, 1.5 * dwell), |d| {
-        in_steps(d.sign() * d.between(0.2, 1.0))
-    });
+    let levels = ((0.5 * dwell, 1.5 * dwell), (0.2, 1.0));
+    strokes(draw, stand, turning, levels);
     let settles = (SETTLES_S * stand.rate_hz).round() as usize;
     let (mut zero, mut rests) = (0.0, 0);
     about_mean(&each(&stand.world.duty, |d| {

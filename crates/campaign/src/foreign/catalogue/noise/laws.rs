@@ -113,7 +113,7 @@ pub(super) fn double_exponential() -> Shape {
 /// Sparks at the brushes, each with a tail to the side the current flows: skewed one way while the motor turns forward, the
 /// other way backward, and not at rest. Its size stays.
 pub(super) fn leaning(draw: &mut Draw, stand: &mut Stand) -> Shape {
-    stand.world.duty = with_rests(draw, stand);
+    with_rests(draw, stand, DWELL, 0.3);
     let turning = stand.world.duty.iter().filter(|d| **d != 0.0).count() as f64;
     let sense = draw.sign();
     let series = each(&stand.world.duty, |d| {

@@ -40,29 +40,6 @@ pub(super) fn mean_log(share: f64) -> f64 {
     sum / (PLACES * TONES) as f64
 }
 
-/// A filter that is slow for small changes and fast for large ones, which it takes for motion: of a change d it follows
-/// d (1 - share / (1 + (d / large)^2)).
-pub(super) struct Adaptive {
-    pub(super) share: f64,
-    pub(super) large: f64,
-}
-
-impl Adaptive {
-    /// What it makes of a series from 0 on, with the mean logarithm of its slope, which is what it gains.
-    pub(super) fn of(&self, series: &[f64]) -> (Vec<f64>, f64) {
-        let (mut y, mut logs) = (0.0, 0.0);
-        let all = each(series, |x| {
-            let d = x - y;
-            let near = 1.0 / (1.0 + (d / self.large).powi(2));
-            y += d * (1.0 - self.share * near);
-            // Of d near: near - 2 d^2 / large^2 near^2 = 2 near^2 - near.
-            logs += (1.0 - self.share * (2.0 * near * near - near)).ln();
-            y
-        });
-        (all, logs / series.len() as f64)
-    }
-}
-
 /// Where a reading lies among the samples of a part that gives `ratio` of them for each reading: the one before it, and
 /// how far it is on the way to the next.
 pub(super) fn between(ratio: f64, reading: usize) -> (usize, f64) {
@@ -129,7 +106,7 @@ pub(super) fn filled_up(ratio: f64, samples: &[f64], n: usize) -> Vec<f64> {
 
 /// A d' by the nats that each of the samples tells, twice over: d'^2 = samples x nats.
 fn by_nats(stand: &Stand, nats: f64) -> Known {
-    Known::Strength((stand.samples() as f64 * nats).max(0.0).sqrt())
+    Known::nats(0.5 * stand.samples() as f64 * nats)
 }
 
 /// Thermal tail of an amplifier: the heat of a swing, its square, unbalances the input when the next reading is taken.
@@ -215,25 +192,51 @@ pub(super) fn product() -> Shape {
     )
 }
 
-/// Firmware with a filter that lets large changes through. Given its last output, its next has the law of white noise
-/// through a bent line: d'^2 = samples x (ln variance - 2 mean ln slope), the random walk left out.
+/// Firmware with a filter that is slow for small changes and fast for large ones, which it takes for motion: of a change d it
+/// follows d (1 - share / (1 + (d / large)^2)).
 pub(super) fn adaptive(draw: &mut Draw, stand: &Stand) -> Shape {
-    let white: Vec<f64> = stand.series(|_| draw.normal());
+    let white = white(draw, stand.samples());
     let large = draw.between(0.4, 0.8);
-    let input = mean_square(&white);
+    bent(white, 0.97, move |share, white| {
+        let (mut y, mut logs) = (0.0, 0.0);
+        let all = each(white, |x| {
+            let d = x - y;
+            let near = 1.0 / (1.0 + (d / large).powi(2));
+            y += d * (1.0 - share * near);
+            logs += log_slope(share, near);
+            y
+        });
+        (all, logs)
+    })
+}
+
+/// Logarithm of the slope of d (1 - share near), near = 1 / (1 + (d / large)^2): of d near it is
+/// near - 2 d^2 / large^2 near^2 = 2 near^2 - near.
+fn log_slope(share: f64, near: f64) -> f64 {
+    (1.0 - share * (2.0 * near * near - near)).ln()
+}
+
+/// White noise that a share of something bends, up to `most`: `of` gives the series with the sum of the logarithms of its slope,
+/// and its variance is made 1 again. Given the readings before, the next has the law of white noise through a bent line:
+/// d'^2 = samples x (ln variance - 2 mean ln slope), the random walk left out.
+fn bent(
+    white: Vec<f64>,
+    most: f64,
+    of: impl Fn(f64, &[f64]) -> (Vec<f64>, f64) + Copy + 'static,
+) -> Shape {
     let known = white.clone();
-    let of = move |share: f64, white: &[f64]| {
-        let share = share.min(0.97);
-        Adaptive { share, large }.of(white)
-    };
     noise(
-        0.97,
+        most,
         move |stand, share| {
-            let (y, logs) = of(share, &known);
-            by_nats(stand, (mean_square(&y) / input).ln() - 2.0 * logs)
+            let (y, logs) = of(share.min(most), &known);
+            let logs = logs / known.len() as f64;
+            by_nats(
+                stand,
+                (mean_square(&y) / mean_square(&known)).ln() - 2.0 * logs,
+            )
         },
         move |_, _, share| {
-            let (y, _) = of(share, &white);
+            let (y, _) = of(share.min(most), &white);
             let scale = mean_square(&y).sqrt();
             each(&y, |v| v / scale)
         },
@@ -243,10 +246,7 @@ pub(super) fn adaptive(draw: &mut Draw, stand: &Stand) -> Shape {
 /// Firmware that smooths while the motor runs, against its hum, and not while it rests: each reading then is drawn to the
 /// one before. Below a half, what is left is predicted from the past with variance (1 - f)^2.
 pub(super) fn switched(draw: &mut Draw, stand: &mut Stand) -> Shape {
-    let on = draw.chance(0.5);
-    stand.world.duty = by_turns(draw, stand, on, (4.0, 20.0), |d| {
-        in_steps(d.sign() * d.between(0.2, 1.0))
-    });
+    with_rests(draw, stand, (4.0, 20.0), 0.2);
     let runs = each(&stand.world.duty, |d| d != 0.0);
     let share = runs.iter().filter(|r| **r).count() as f64 / runs.len() as f64;
     noise(
@@ -374,35 +374,19 @@ pub(super) fn filled(draw: &mut Draw, stand: &Stand) -> Shape {
 /// A denoiser by Haar's wavelet of two readings: their mean stays, and their difference d shrinks to
 /// d (1 - share / (1 + (d / large)^2)), small ones the most. Neighbours of one pair come to correlate, those of two do not.
 pub(super) fn shrunk(draw: &mut Draw, stand: &Stand) -> Shape {
-    let white: Vec<f64> = stand.series(|_| draw.normal());
+    let white = white(draw, stand.samples());
     let (large, first) = (draw.between(0.5, 1.2), draw.of_many(2));
-    let input = mean_square(&white);
-    let known = white.clone();
-    // The series with the mean logarithm of what each reading's slope is.
-    let of = move |share: f64, white: &[f64]| {
+    bent(white, MOST, move |share, white| {
         let (mut all, mut logs) = (white.to_vec(), 0.0);
         for pair in all[first..].chunks_exact_mut(2) {
             let (mean, d) = (0.5 * (pair[0] + pair[1]), (pair[1] - pair[0]) / 2f64.sqrt());
             let near = 1.0 / (1.0 + (d / large).powi(2));
-            // As for the filter that lets large changes through.
-            logs += (1.0 - share * (2.0 * near * near - near)).ln();
+            logs += log_slope(share, near);
             let half = d * (1.0 - share * near) / 2f64.sqrt();
             (pair[0], pair[1]) = (mean - half, mean + half);
         }
-        (all, logs / white.len() as f64)
-    };
-    noise(
-        MOST,
-        move |stand, share| {
-            let (y, logs) = of(share.min(MOST), &known);
-            by_nats(stand, (mean_square(&y) / input).ln() - 2.0 * logs)
-        },
-        move |_, _, share| {
-            let (y, _) = of(share.min(MOST), &white);
-            let scale = mean_square(&y).sqrt();
-            each(&y, |v| v / scale)
-        },
-    )
+        (all, logs)
+    })
 }
 
 /// A modulator whose integrators a large swing overloads: what was beyond comes out over the readings that follow, to either

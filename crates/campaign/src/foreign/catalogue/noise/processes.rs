@@ -71,17 +71,8 @@ fn moving_hump(
         Known::Beside(places.iter().map(of).collect())
     };
     sized(f64::INFINITY, knows, move |stand, draw, sigma| {
-        let (mut re, mut im) = (draw.normal(), draw.normal());
-        let drive = (1.0 - keep * keep).sqrt();
-        let turned = at_hz.iter().map(|f| {
-            let (sin, cos) = (TAU * f / stand.rate_hz).sin_cos();
-            (re, im) = (
-                keep * (re * cos - im * sin) + drive * draw.normal(),
-                keep * (re * sin + im * cos) + drive * draw.normal(),
-            );
-            sigma * re
-        });
-        Change::Add(turned.collect())
+        let turns = at_hz.iter().map(|f| TAU * f / stand.rate_hz);
+        Change::Add(each(&phasor(draw, keep, turns), |re| sigma * re))
     })
 }
 

@@ -202,15 +202,9 @@ pub(super) fn place_of_temperature(draw: &mut Draw, stand: &Stand, axis: usize) 
     within_range(&stand.world.temperature[axis])
 }
 
-/// A logarithm of the size that wanders.
-pub(super) fn wandering_size(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let tau = draw.by_ratio(5.0, 40.0);
-    stand.wander(draw, 1.0, tau)
-}
-
-/// The same by another pace.
-pub(super) fn random_size(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let tau = draw.by_ratio(0.5, 30.0);
+/// A logarithm of the size that wanders, within a time between these, s.
+pub(super) fn wandering_size(draw: &mut Draw, stand: &Stand, within_s: (f64, f64)) -> Vec<f64> {
+    let tau = draw.by_ratio(within_s.0, within_s.1);
     stand.wander(draw, 1.0, tau)
 }
 
@@ -249,15 +243,10 @@ pub(super) fn averaged(draw: &mut Draw, stand: &Stand) -> Shape {
     variance(move |share| each(&looks, |l| 1.0 - share.min(1.0) * (1.0 - 1.0 / l)))
 }
 
-/// So many independent draws of the normal law.
-fn independent(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    stand.series(|_| draw.normal())
-}
-
 /// A gain control that is pumped by what it has just passed: the variance of a reading goes with the square of the one
 /// before (Engle 1982). The spectrum stays white.
 pub(super) fn remembering(draw: &mut Draw, stand: &Stand) -> Shape {
-    let independent = independent(draw, stand);
+    let independent = white(draw, stand.samples());
     let known = independent.clone();
     // All that stays of a size is what the last reading gave.
     let of = |share: f64, independent: &[f64]| fed(share, share.min(0.95), independent);
@@ -279,7 +268,7 @@ fn evened((law, series): (Vec<f64>, Vec<f64>), sign: f64) -> Vec<f64> {
 /// The spectrum stays white.
 pub(super) fn feeding(draw: &mut Draw, stand: &Stand) -> Shape {
     let stays = 1.0 - draw.by_ratio(0.02, 0.1);
-    let independent = independent(draw, stand);
+    let independent = white(draw, stand.samples());
     let known = independent.clone();
     noise(
         f64::INFINITY,
@@ -292,7 +281,7 @@ pub(super) fn feeding(draw: &mut Draw, stand: &Stand) -> Shape {
 /// is noisier, after one to the other quieter (the asymmetry of Nelson 1991). Neither readings nor their squares correlate
 /// by much; a reading does with the square after it.
 pub(super) fn one_sided(draw: &mut Draw, stand: &Stand) -> Shape {
-    let independent = independent(draw, stand);
+    let independent = white(draw, stand.samples());
     let (known, sign) = (independent.clone(), draw.sign());
     noise(
         f64::INFINITY,
@@ -303,12 +292,7 @@ pub(super) fn one_sided(draw: &mut Draw, stand: &Stand) -> Shape {
 
 /// What a jump of the motor's command stirs up, by its size, and what dies away with a time constant, s.
 fn stirred(duty: &[f64], dies_s: f64, rate_hz: f64) -> Vec<f64> {
-    let keep = (-1.0 / (dies_s * rate_hz)).exp();
-    let mut left = 0.0f64;
-    each(&changes(duty), |change| {
-        left = keep * left + change.abs();
-        left
-    })
+    leaking(&each(&changes(duty), f64::abs), dies_s, rate_hz)
 }
 
 /// How fast the temperature moves either way, the fastest 1: while parts of unlike expansion rub along each other they

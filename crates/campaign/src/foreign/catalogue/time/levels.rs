@@ -191,38 +191,20 @@ pub(super) fn slipping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     })
 }
 
-/// A shift register with feedback, x^order + x^tap + 1 over two elements: bits that look random and come again after
-/// 2^order - 1 of them, if the polynomial is primitive.
-pub(super) struct Register {
-    order: u32,
-    tap: u32,
-    state: u32,
-}
-
-impl Register {
-    /// From a state other than zero.
-    pub(super) fn new((order, tap): (u32, u32), state: u32) -> Self {
-        Self { order, tap, state }
-    }
-
-    pub(super) fn next(&mut self) -> bool {
-        let bit = (self.state ^ (self.state >> self.tap)) & 1;
-        let out = self.state & 1 == 1;
-        self.state = (self.state >> 1) | (bit << (self.order - 1));
-        out
-    }
-}
-
-/// A converter dithers its input by a shift register and does not take all of it off again: the same 31, 63 or 127 levels
-/// over and over, spread over as many weak lines as the sequence is long.
+/// A converter dithers its input by a shift register with feedback, x^order + x^tap + 1 over two elements, and does not take all
+/// of it off again: as the polynomial is primitive the same 31, 63 or 127 levels over and over, spread over as many weak lines as
+/// the sequence is long.
 pub(super) fn dither(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let polynomial = PRIMITIVE[draw.of_many(PRIMITIVE.len())];
-    let state = 1 + draw.of_many((1 << polynomial.0) - 1) as u32;
-    let (mut register, hold) = (Register::new(polynomial, state), 1 + draw.of_many(2));
+    let (order, tap) = PRIMITIVE[draw.of_many(PRIMITIVE.len())];
+    // Any state other than zero.
+    let mut state = 1 + draw.of_many((1 << order) - 1) as u32;
+    let hold = 1 + draw.of_many(2);
     let mut level = 0.0;
     stand.series(|i| {
         if i % hold == 0 {
-            level = if register.next() { 1.0 } else { -1.0 };
+            level = if state & 1 == 1 { 1.0 } else { -1.0 };
+            let bit = (state ^ (state >> tap)) & 1;
+            state = (state >> 1) | (bit << (order - 1));
         }
         level
     })

@@ -106,20 +106,16 @@ pub(super) fn swaying(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn siren(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let fall = draw.by_ratio(0.2, 2.0);
     let apart = draw.by_ratio(15.0, 50.0);
-    let mut all = vec![];
-    let mut at = apart * draw.exponential();
-    while at < stand.seconds {
+    arriving(stand, apart * draw.exponential(), |y, at| {
         let pitch = draw.between(fall + 0.5, 9.5 - fall);
-        all.push((at, pitch, draw.by_ratio(0.6, 3.0), draw.between(0.0, TAU)));
-        at += apart * (0.3 + draw.exponential());
-    }
-    in_time(stand, |t| {
-        let of = |(at, pitch, pace, first): &(f64, f64, f64, f64)| {
+        let (pace, first) = (draw.by_ratio(0.6, 3.0), draw.between(0.0, TAU));
+        for (i, v) in y.iter_mut().enumerate() {
+            let t = i as f64 / stand.rate_hz;
             let distance = 1.0f64.hypot((t - at) / pace);
             let turns = pitch * (t - at) - fall * pace * distance;
-            (first + TAU * turns).sin() / distance
-        };
-        all.iter().map(of).sum()
+            *v += (first + TAU * turns).sin() / distance;
+        }
+        at + apart * (0.3 + draw.exponential())
     })
 }
 
@@ -154,26 +150,22 @@ pub(super) fn wandering(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// A machine in the next room that is started and stopped as it is needed: each time with a phase and a load of its own,
 /// rising and falling over a second or so.
 pub(super) fn starts_and_stops(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let rate_hz = stand.rate_hz;
     let (pitch, slip) = (draw.by_ratio(0.6, 9.5), draw.by_ratio(0.002, 0.02));
     let (runs, rests) = (draw.by_ratio(4.0, 20.0), draw.by_ratio(6.0, 40.0));
     let rise = draw.by_ratio(0.3, 2.0);
-    let mut y = vec![0.0; stand.samples()];
-    let mut from = rests * draw.exponential();
-    while from < stand.seconds {
+    arriving(stand, rests * draw.exponential(), |y, from| {
         let to = from + runs * draw.between(0.5, 1.5);
         let (f, phase) = (pitch * (1.0 + slip * draw.normal()), draw.between(0.0, TAU));
         let size = draw.between(0.6, 1.4);
         for (i, v) in y.iter_mut().enumerate() {
-            let t = i as f64 / rate_hz;
+            let t = i as f64 / stand.rate_hz;
             if (from..to).contains(&t) {
                 let swelling = ((t - from) / rise).min((to - t) / rise).min(1.0);
                 *v += size * swelling * (TAU * f * (t - from) + phase).sin();
             }
         }
-        from = to + rests * draw.exponential() + 0.5;
-    }
-    y
+        to + rests * draw.exponential() + 0.5
+    })
 }
 
 /// A machine next door whose rotor is not balanced starts, runs and is left to run down. It shakes the bench only while

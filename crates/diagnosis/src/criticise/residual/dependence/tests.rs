@@ -1,11 +1,7 @@
 //! Tests of [`super`].
 
 use super::*;
-
-fn white(n: usize, seed: u64) -> Vec<f64> {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
-}
+use crate::fit::white;
 
 #[test]
 fn they_fail_on_white_noise_as_often_as_their_chance_says() {
