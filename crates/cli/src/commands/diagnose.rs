@@ -214,11 +214,18 @@ fn row(file: &str, d: &Diagnosis) -> [String; 3] {
         Verdict::Extended => "extended",
         Verdict::Unexplained => "unexplained",
     };
-    let mut said: Vec<String> = d.findings.iter().map(text::answer::brief).collect();
+    let brief = |material: bool| {
+        let own = d.findings.iter().filter(|f| f.material == material);
+        own.map(text::answer::brief).collect::<Vec<_>>()
+    };
+    let (mut said, small) = (brief(true), brief(false));
     let mut left: Vec<&str> = d.unexplained.iter().map(|u| u.channel.as_str()).collect();
     left.dedup();
     if !left.is_empty() {
         said.push(format!("left over on {}", left.join(", ")));
+    }
+    if !small.is_empty() {
+        said.push(format!("too small to matter: {}", small.join(", ")));
     }
     [file.to_owned(), verdict.to_owned(), said.join("; ")]
 }

@@ -134,7 +134,7 @@ fn finding(found: &Finding) -> Markup {
         article {
             h2 { (answer::title(&found.cause)) small { " on " (found.channels.join(", ")) ", " code { (found.cause) } } }
             @if let Some(cost) = answer::cost(found) { p { (cost) } }
-            @if let Some(remedy) = answer::remedy(found) { p { (remedy) } }
+            @if let Some(remedy) = answer::remedy(found).filter(|_| found.material) { p { (remedy) } }
             table.plain {
                 tbody {
                     @for (name, parameter) in answer::in_order(found).into_iter().filter(|(n, p)| !answer::is_switch(&found.cause, n, p)) {
@@ -277,11 +277,36 @@ fn checks(subject: &Subject<'_>) -> Markup {
                 p { "All " (all.len()) " checks pass." }
             } @else {
                 p { (failing.len()) " of " (all.len()) " checks fail, before the extension or after it:" }
-                (check_table(&failing))
+                div.mended[failing.iter().all(|c| !c.fails_after)] { (check_table(&failing)) }
+                (mended(&failing))
             }
             details.fold {
                 summary { "All checks" }
                 (check_table(&all.iter().collect::<Vec<_>>()))
+            }
+        }
+    }
+}
+
+/// In print, the checks that the extension mended by name alone: the table there has those that still fail.
+fn mended(failing: &[&Check]) -> Markup {
+    let mended: Vec<_> = failing.iter().filter(|c| !c.fails_after).collect();
+    let channels: std::collections::BTreeSet<&str> =
+        mended.iter().map(|c| c.channel.as_str()).collect();
+    let names = |channel: &str| {
+        let own = mended.iter().filter(|c| c.channel == channel);
+        let names: Vec<String> = own.map(|c| c.id.replace('_', " ")).collect();
+        names.join(", ")
+    };
+    html! {
+        @if !mended.is_empty() {
+            p.printed {
+                "They fail before the extension and pass after it (the page on a screen has their sizes): "
+                @for (k, channel) in channels.iter().enumerate() {
+                    @if k > 0 { "; " }
+                    code { (channel) } " " (names(channel))
+                }
+                "."
             }
         }
     }
@@ -295,7 +320,7 @@ fn check_table(checks: &[&Check]) -> Markup {
                 th { "check" } th { "channel" } th.number { "statistic" } th.number { "p" } th { "before" }
                 th { "after" } th { "what it looks at" }
             } }
-            tbody { @for check in checks { tr {
+            tbody { @for check in checks { tr.mended[check.fails_before && !check.fails_after] {
                 td { (check.id.replace('_', " ")) }
                 td { code { (check.channel) } }
                 td.number { (number(check.statistic, 3)) }
@@ -329,7 +354,7 @@ fn limits(subject: &Subject<'_>) -> Markup {
         @if !d.not_tested.is_empty() {
             section {
                 h2 { "Not tested" }
-                table {
+                table.halves {
                     thead { tr { th { "cause" } th { "why, and what to record" } } }
                     tbody { @for (causes, why) in by_reason(&d.not_tested) { tr { td { (causes) } td { (why) } } } }
                 }
