@@ -203,9 +203,14 @@ pub fn to_stdout(write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> R
     }
 }
 
-/// A file that cannot be written, and what to do.
+/// A file that cannot be written, and what to do. A part of it that fitted on a full disk does not stay: it would be taken
+/// for the whole.
 pub fn failed(path: &Path, error: &std::io::Error) -> miette::Report {
     use std::io::ErrorKind as Kind;
+    let is_full = matches!(error.kind(), Kind::StorageFull | Kind::QuotaExceeded);
+    if is_full && path.is_file() {
+        let _ = std::fs::remove_file(path);
+    }
     let help = match error.kind() {
         Kind::StorageFull | Kind::QuotaExceeded => "make room, or name a file on another disk",
         Kind::IsADirectory => "name a file in it",
