@@ -246,3 +246,26 @@ fn table(rows: &[[String; 3]]) {
         line([file, verdict, found]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_tells_causes_that_matter_from_those_that_do_not() {
+        let finding = |cause: &str, material: bool| {
+            serde_json::json!({
+                "cause": cause, "channels": ["gyro_x"], "parameters": {}, "alternatives": [],
+                "experiment": null, "gain": null, "material": material
+            })
+        };
+        let d: Diagnosis = serde_json::from_value(serde_json::json!({
+            "format": "", "input": {"file": "", "seconds": 1.0, "rate_hz": 1.0, "samples": 1, "channels": []},
+            "baseline": {}, "checks": [], "unexplained": [], "not_tested": [], "verdict": "extended",
+            "findings": [finding("motor_bias", true), finding("low_pass", false), finding("shock", false)]
+        }))
+        .expect("a diagnosis");
+        let said = "motor_bias on gyro_x; too small to matter: low_pass on gyro_x, shock on gyro_x";
+        assert_eq!(row("a.csv", &d), ["a.csv", "extended", said]);
+    }
+}

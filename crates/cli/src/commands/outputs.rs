@@ -229,3 +229,22 @@ pub fn write_json(path: Option<&PathBuf>, value: &impl Serialize) -> Result<()> 
     text.push('\n');
     write(path, &text)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_fitted_on_a_full_disk_does_not_stay() {
+        let path = std::env::temp_dir().join(format!("imu-stand-full-{}", std::process::id()));
+        let left_by = |kind: std::io::ErrorKind| {
+            std::fs::write(&path, "a half").expect("a file");
+            let said = format!("{:?}", failed(&path, &kind.into()));
+            (path.exists(), said)
+        };
+        let (is_there, said) = left_by(std::io::ErrorKind::StorageFull);
+        assert!(!is_there && said.contains("make room"), "{said}");
+        assert!(left_by(std::io::ErrorKind::PermissionDenied).0);
+        std::fs::remove_file(&path).expect("it was there");
+    }
+}

@@ -221,7 +221,12 @@ impl Figure {
             .x_desc(&self.x_label)
             .y_desc(&self.y_label)
             .x_labels(if self.width < WIDE { 6 } else { 12 })
-            .y_labels(if self.height < 250 { 5 } else { 8 })
+            .y_labels(match self.height {
+                // A strip.
+                ..120 => 3,
+                120..250 => 5,
+                _ => 8,
+            })
             .light_line_style(TRANSPARENT)
             .bold_line_style(GRID)
             .axis_style(INK)
