@@ -173,7 +173,7 @@ mod tests {
     fn record(knocked: bool) -> Record {
         let at = |k: usize| {
             let t = k as f64 / 20.0;
-            let noise = if k % 2 == 0 { 0.2 } else { -0.2 };
+            let noise = if k.is_multiple_of(2) { 0.2 } else { -0.2 };
             let blow = if (5.0..6.0).contains(&t) {
                 (std::f64::consts::PI * (t - 5.0)).sin()
             } else {

@@ -24,7 +24,7 @@ pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
             }
             h1 { span.word { (word) } " " (headline) }
             @for note in &d.input.notes {
-                p.warning { "Note: " (note) "." }
+                p.warning { "Note: " (with_code(note)) "." }
             }
             @if d.findings.is_empty() && d.unexplained.is_empty() {
                 p.lead {
@@ -45,6 +45,15 @@ pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
             }
         }
         (left_over(&d.unexplained))
+    }
+}
+
+/// A text with what it puts between backticks set as code.
+fn with_code(text: &str) -> Markup {
+    html! {
+        @for (k, part) in text.split('`').enumerate() {
+            @if k % 2 == 1 { code { (part) } } @else { (part) }
+        }
     }
 }
 
@@ -84,7 +93,7 @@ fn entry(left: &Unexplained) -> Markup {
     html! {
         div {
             (left.what)
-            @if let Some(c) = &left.consequence { ". " (answer::consequence_of(c, left.material)) }
+            @if let Some(c) = &left.consequence { ". " (with_code(&answer::consequence_of(c, left.material))) }
             @if let Some(text) = answer::modelled(left) { " " (text) }
             @if !left.details.is_empty() {
                 details.fold {
@@ -133,7 +142,7 @@ fn finding(found: &Finding) -> Markup {
     html! {
         article {
             h2 { (answer::title(&found.cause)) small { " on " (found.channels.join(", ")) ", " code { (found.cause) } } }
-            @if let Some(cost) = answer::cost(found) { p { (cost) } }
+            @if let Some(cost) = answer::cost(found) { p { (with_code(&cost)) } }
             @if let Some(remedy) = answer::remedy(found).filter(|_| found.material) { p { (remedy) } }
             table.plain {
                 tbody {
@@ -404,6 +413,15 @@ fn chance(p: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_stands_between_backticks_is_code_and_the_rest_stays_text() {
+        let said = with_code("too small (`--matters`) & `<b>`").into_string();
+        assert_eq!(
+            said,
+            "too small (<code>--matters</code>) &amp; <code>&lt;b&gt;</code>"
+        );
+    }
 
     #[test]
     fn causes_that_one_reason_rules_out_are_one_entry() {

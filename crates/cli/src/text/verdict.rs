@@ -81,6 +81,9 @@ fn immaterial(found: &[Finding]) -> Option<String> {
     if found.is_empty() || found.iter().any(|f| f.material) {
         return None;
     }
+    if found.iter().any(|f| f.consequence.is_none()) {
+        return Some(format!("{} found, too small to matter", count(found.len())));
+    }
     let known = || found.iter().filter_map(|f| f.consequence.as_ref());
     let largest = known().map(|c| c.largest_change).fold(0.0, f64::max);
     let of_velocity = known().filter(|c| !c.velocity_rms_mps.is_empty()).count();
@@ -219,6 +222,11 @@ mod tests {
                     more than 3 %";
         let d = diagnosis(Verdict::Extended, one.clone(), vec![]);
         assert_eq!(said(&d), [format!("extended: {what}"), what.to_owned()]);
+        // Without its consequence nothing is promised.
+        let mut unknown = one.clone();
+        unknown[0].consequence = None;
+        let [short, _] = said(&diagnosis(Verdict::Extended, unknown, vec![]));
+        assert_eq!(short, "extended: 1 cause found, too small to matter");
         // Beside something that matters and has no name.
         let left = Unexplained {
             channel: "gyro_x".into(),
