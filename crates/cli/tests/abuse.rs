@@ -190,3 +190,27 @@ fn a_terminal_is_sent_no_command_of_a_file() {
         }
     }
 }
+
+#[test]
+fn a_table_without_rows_or_with_one_is_told_so_and_not_asked_for_units_or_a_rate() {
+    let folder = folder("abuse_rows");
+    let none = write(&folder, "none.csv", b"time_s,gyro_x\n");
+    refused(&none, "there is no row of data");
+    let one = write(&folder, "one.csv", b"time_s,gyro_x\n0,1\n");
+    for command in ["analyze", "diagnose"] {
+        let output = run(&[command, text(&one), "--units", "gyro=deg/s"]);
+        assert_refused(&output, &["one row of data", "copied whole"]);
+    }
+}
+
+/// `/dev/full` takes nothing, as a full disk does.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_under_standard_output_is_told() {
+    let output = common::program(&["simulate", "--seconds", "60", "--out"])
+        .arg(folder("abuse_full").join("s.csv"))
+        .stdout(File::options().write(true).open("/dev/full").expect("it"))
+        .output()
+        .expect("the program starts");
+    assert_refused(&output, &["cannot write standard output", "make room"]);
+}

@@ -42,6 +42,7 @@ def test_a_frame_of_captures_is_a_table_of_rows():
     assert (table.dtypes == fleet.EMPTY.dtypes).all()
     assert list(table["capture"]) == ["unit0000", "unit0001", "unit0002", "unit0003", "unit0009"]
     assert list(table["causes"]) == ["", "temperature", "", "temperature", ""]
+    assert list(table["material"]) == [0, 1, 0, 1, 0]
     assert table["error"].iloc[-1] and not table["error"].iloc[:-1].any()
     row = table.iloc[1]
     alone = imu_stand.diagnose(

@@ -91,6 +91,11 @@ def test_a_diagnosis_shows_itself_and_its_model_simulates():
     assert "verdict  extended" in str(diagnosis) and "--details" not in str(diagnosis)
     html = diagnosis._repr_html_()
     assert "+-" not in html and "warm_up" in html
+    # The verdict stands there in the words of the program; what is too small to matter says so.
+    assert "Diagnosis: extended: the simulation lacks" in html and "too small to matter" not in html
+    diagnosis["findings"][0]["material"] = False
+    assert html != diagnosis._repr_html_() and "(too small to matter)" in diagnosis._repr_html_()
+    diagnosis["findings"][0]["material"] = True
     assert "temperature" in html and "deg/s/degC" in html and "<b>:" not in html and "&lt;b&gt;" in html
     report = diagnosis.report_html()
     assert report.startswith("<!DOCTYPE html>") and "Bias follows temperature" in report

@@ -98,6 +98,10 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
     no_topics(options)?;
     let mut text = TextLines::new(input)?;
     let mut layout = Layout::read(&mut text)?;
+    if layout.first.is_none() {
+        // Before anything is asked of its columns.
+        return Err(CaptureError::Empty);
+    }
     let mut header = layout.lines.header()?;
     header.rate_hz = options.rate_hz.or(header.rate_hz);
     let said = Said {

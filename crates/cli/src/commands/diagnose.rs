@@ -214,11 +214,18 @@ fn row(file: &str, d: &Diagnosis) -> [String; 3] {
         Verdict::Extended => "extended",
         Verdict::Unexplained => "unexplained",
     };
-    let mut said: Vec<String> = d.findings.iter().map(text::answer::brief).collect();
+    let brief = |material: bool| {
+        let own = d.findings.iter().filter(|f| f.material == material);
+        own.map(text::answer::brief).collect::<Vec<_>>()
+    };
+    let (mut said, small) = (brief(true), brief(false));
     let mut left: Vec<&str> = d.unexplained.iter().map(|u| u.channel.as_str()).collect();
     left.dedup();
     if !left.is_empty() {
         said.push(format!("left over on {}", left.join(", ")));
+    }
+    if !small.is_empty() {
+        said.push(format!("too small to matter: {}", small.join(", ")));
     }
     [file.to_owned(), verdict.to_owned(), said.join("; ")]
 }
@@ -237,5 +244,28 @@ fn table(rows: &[[String; 3]]) {
     line(heads);
     for [file, verdict, found] in rows {
         line([file, verdict, found]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_tells_causes_that_matter_from_those_that_do_not() {
+        let finding = |cause: &str, material: bool| {
+            serde_json::json!({
+                "cause": cause, "channels": ["gyro_x"], "parameters": {}, "alternatives": [],
+                "experiment": null, "gain": null, "material": material
+            })
+        };
+        let d: Diagnosis = serde_json::from_value(serde_json::json!({
+            "format": "", "input": {"file": "", "seconds": 1.0, "rate_hz": 1.0, "samples": 1, "channels": []},
+            "baseline": {}, "checks": [], "unexplained": [], "not_tested": [], "verdict": "extended",
+            "findings": [finding("motor_bias", true), finding("low_pass", false), finding("shock", false)]
+        }))
+        .expect("a diagnosis");
+        let said = "motor_bias on gyro_x; too small to matter: low_pass on gyro_x, shock on gyro_x";
+        assert_eq!(row("a.csv", &d), ["a.csv", "extended", said]);
     }
 }

@@ -163,9 +163,9 @@ fn data(arguments: &Arguments, to: To) -> Result<()> {
         _ if is_dash => return outputs::to_stdout(|mut out| table.csv(&mut out)),
         _ => table.write_csv(out),
     };
-    written.map_err(|error| match error {
-        DataError::Io(error) => outputs::failed(out, &error),
-        other => miette::miette!("{}: {other}", out.display()),
+    written.map_err(|error| match of_the_system(&error) {
+        Some(error) => outputs::failed(out, error),
+        None => miette::miette!("{}: {error}", out.display()),
     })?;
     if !arguments.input.quiet {
         say!(
@@ -176,6 +176,18 @@ fn data(arguments: &Arguments, to: To) -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// What the system said, where a form of file failed by it.
+fn of_the_system(error: &DataError) -> Option<&std::io::Error> {
+    let mut next: Option<&(dyn std::error::Error + 'static)> = Some(error);
+    while let Some(error) = next {
+        if let Some(said) = error.downcast_ref() {
+            return Some(said);
+        }
+        next = error.source();
+    }
+    None
 }
 
 fn noise(arguments: &Arguments, consumer: Consumer) -> Result<()> {

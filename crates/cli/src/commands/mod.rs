@@ -163,6 +163,13 @@ impl Input {
             false => Ok(read),
         });
         let mut read = read.map_err(|error| not_read(error, path))?;
+        if read.record.len() == 1 && read.record.header.rate_hz.is_none() {
+            miette::bail!(
+                help = "was the file copied whole?",
+                "{}: one row of data, and a sample rate needs two",
+                name(path)
+            );
+        }
         if let Some(base) = self.base {
             read.record.header.base = Some(base.into());
         }
@@ -266,8 +273,13 @@ pub fn say(line: std::fmt::Arguments<'_>) {
     } else {
         writeln!(std::io::stdout(), "{line}")
     };
-    if said.is_err_and(|error| error.kind() != std::io::ErrorKind::BrokenPipe) {
-        std::process::exit(1);
+    match said {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            let report = outputs::failed(Path::new("standard output"), &error);
+            let _ = writeln!(std::io::stderr(), "Error: {report:?}");
+            std::process::exit(1);
+        }
+        _ => {}
     }
 }
 

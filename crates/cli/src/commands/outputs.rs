@@ -203,9 +203,14 @@ pub fn to_stdout(write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> R
     }
 }
 
-/// A file that cannot be written, and what to do.
+/// A file that cannot be written, and what to do. A part of it that fitted on a full disk does not stay: it would be taken
+/// for the whole.
 pub fn failed(path: &Path, error: &std::io::Error) -> miette::Report {
     use std::io::ErrorKind as Kind;
+    let is_full = matches!(error.kind(), Kind::StorageFull | Kind::QuotaExceeded);
+    if is_full && path.is_file() {
+        let _ = std::fs::remove_file(path);
+    }
     let help = match error.kind() {
         Kind::StorageFull | Kind::QuotaExceeded => "make room, or name a file on another disk",
         Kind::IsADirectory => "name a file in it",
@@ -223,4 +228,23 @@ pub fn write_json(path: Option<&PathBuf>, value: &impl Serialize) -> Result<()> 
     let mut text = serde_json::to_string_pretty(value).into_diagnostic()?;
     text.push('\n');
     write(path, &text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_fitted_on_a_full_disk_does_not_stay() {
+        let path = std::env::temp_dir().join(format!("imu-stand-full-{}", std::process::id()));
+        let left_by = |kind: std::io::ErrorKind| {
+            std::fs::write(&path, "a half").expect("a file");
+            let said = format!("{:?}", failed(&path, &kind.into()));
+            (path.exists(), said)
+        };
+        let (is_there, said) = left_by(std::io::ErrorKind::StorageFull);
+        assert!(!is_there && said.contains("make room"), "{said}");
+        assert!(left_by(std::io::ErrorKind::PermissionDenied).0);
+        std::fs::remove_file(&path).expect("it was there");
+    }
 }

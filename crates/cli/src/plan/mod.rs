@@ -338,11 +338,12 @@ fn noise_of(described: &Described, tau0: f64) -> Noise {
         found.rate_ramp,
     ];
     let limits = estimates.map(|e| if e.value.is_none() { e.high } else { 0.0 });
-    let mut value = |name: &str, unit: &str, e: noise::fit::Estimated| {
+    let mut absent = vec![];
+    let mut value = |name: &str, (scale, unit): (f64, &str), e: noise::fit::Estimated| {
         e.value.unwrap_or_else(|| {
-            notes.push(format!(
-                "{name} is not established in this capture: planned as absent, it is {} {unit} at the most",
-                number(e.high, 3)
+            absent.push(format!(
+                "{name} (at most {} {unit})",
+                number(scale * e.high, 3)
             ));
             0.0
         })
@@ -350,14 +351,20 @@ fn noise_of(described: &Described, tau0: f64) -> Noise {
     let white = found.term(Term::White);
     // No gyro is without it: of what is not known, the worst.
     let n = white.value.unwrap_or(white.high);
-    let b = value("B", "deg/s", found.term(Term::Flicker));
-    let k = value("K", "deg/s/sqrt(s)", found.term(Term::RandomWalk));
-    let q = value("Q", "deg", found.term(Term::Quantization));
-    let r = value("R", "deg/s^2", found.rate_ramp);
+    let b = value("B", (3600.0, "deg/h"), found.term(Term::Flicker));
+    let k = value("K", (1.0, "deg/s/sqrt(s)"), found.term(Term::RandomWalk));
+    let q = value("Q", (1.0, "deg"), found.term(Term::Quantization));
+    let r = value("R", (1.0, "deg/s^2"), found.rate_ramp);
+    if !absent.is_empty() {
+        notes.push(format!(
+            "not established in this capture, and planned as absent: {}",
+            absent.join(", ")
+        ));
+    }
     if white.value.is_none() {
         notes.push(format!(
-            "N is not established in this capture: planned at its limit, {} deg/s*sqrt(s)",
-            number(n, 3)
+            "N is not established in this capture: planned at its limit, {} deg/sqrt(h)",
+            number(60.0 * n, 3)
         ));
     }
     Noise {

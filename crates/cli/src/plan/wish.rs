@@ -140,8 +140,9 @@ impl WantedAngle {
             self.within_deg, self.after_s
         );
         let best = format!(
-            "the best, {:.0} s, gives {:.3} deg",
-            self.best_calibration_s, self.best_within_deg
+            "the best, {:.0} s, gives {} deg",
+            self.best_calibration_s,
+            crate::report::plot::number(self.best_within_deg, 3)
         );
         let checked = self.checked_share.map_or_else(String::new, |share| {
             format!(

@@ -9,6 +9,7 @@ use model::record::Record;
 
 use super::exhibits::views::{self, Pair};
 use super::plot::{self, Figure};
+use super::shock::{self, Knock};
 use super::{ReportError, Subject, at_two_widths, standalone};
 
 /// Share of its frequency by which the view of a line reaches either side, and that reach at least, Hz.
@@ -110,12 +111,24 @@ fn view(
     without: &Record,
 ) -> Option<Result<Markup, ReportError>> {
     let docs = effect(&finding.cause)?.docs();
+    let rate_hz = subject.diagnosed.diagnosis.input.rate_hz;
+    if finding.cause == model::effects::shock::ID {
+        let knock = Knock {
+            finding,
+            measured: subject.record,
+            without,
+            rate_hz,
+        };
+        if let Some(drawn) = shock::drawing(&knock) {
+            let title = format!("{}: {}", drawn.channel, docs.title);
+            return Some(captioned(&drawn.figure, &title, &drawn.caption));
+        }
+    }
     let channel = finding
         .channels
         .iter()
         .find(|c| subject.record.channel(c).is_some());
     let channel = channel.map_or("gyro_x", String::as_str);
-    let rate_hz = subject.diagnosed.diagnosis.input.rate_hz;
     let pair = Pair {
         with: subject.record,
         without,

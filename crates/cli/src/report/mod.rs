@@ -4,15 +4,17 @@ mod convict;
 pub mod exhibits;
 pub mod plot;
 pub mod replicates;
+mod shock;
 pub mod standalone;
 mod tables;
 
-use diagnosis::result::{Diagnosed, Diagnosis, Finding, Verdict};
+use diagnosis::result::Diagnosed;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use model::file::ModelFile;
 use model::record::sampling::Sampling;
 use model::record::{Record, rows};
 
+use crate::text::verdict;
 use plot::{AFTER, BEFORE, Drawn, Figure, Layer, MEASURED, number};
 use replicates::{Against, Places};
 
@@ -76,7 +78,7 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
     };
     let channels = channels(&drawn)?;
     let convicting = convict::figures(&drawn)?;
-    let title = format!("{}: {}", diagnosis.input.file, headline(subject.diagnosed));
+    let title = format!("{}: {}", diagnosis.input.file, verdict::banner(diagnosis));
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -87,7 +89,7 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
                 style { (PreEscaped(STYLE)) }
             }
             body {
-                (tables::verdict(subject, &headline(subject.diagnosed)))
+                (tables::verdict(subject, &verdict::banner(diagnosis)))
                 @if !convicting.is_empty() {
                     section {
                         h2 { "The evidence for each cause" }
@@ -129,49 +131,6 @@ fn end_to_end(subject: &Subject<'_>) -> Option<(Record, f64, Diagnosed)> {
         *t = bursts.joined(*t);
     }
     Some((record, bursts.rate_hz, diagnosed))
-}
-
-/// What the verdict means for this record: the cause itself where there is one.
-fn headline(diagnosed: &Diagnosed) -> String {
-    let d = &diagnosed.diagnosis;
-    match (d.verdict, d.findings.as_slice()) {
-        (Verdict::Adequate, _) => "the model describes this run".into(),
-        (Verdict::Extended, [one]) => crate::text::answer::headline(one),
-        (Verdict::Extended, all) => several(all),
-        (Verdict::Unexplained, []) => left_over(d),
-        (Verdict::Unexplained, all) => format!("{}; {}", several(all), left_over(d)),
-    }
-}
-
-/// Causes that a banner names; the cards below it have them all.
-const NAMED: usize = 3;
-
-/// What was found and where, the largest first; how many there are where none of them matters.
-/// What no known cause explains: the largest of it.
-fn left_over(d: &Diagnosis) -> String {
-    let first = d.unexplained.iter().find(|u| u.material);
-    first.map_or_else(
-        || "something is left that no known cause explains".to_owned(),
-        |left| {
-            // What it is stands before its size and its nearest names.
-            let what = left.what.split(';').next().unwrap_or(&left.what);
-            format!("no known cause explains {what} on {}", left.channel)
-        },
-    )
-}
-
-fn several(all: &[Finding]) -> String {
-    let name = |f: &Finding| {
-        let title = crate::text::answer::title(&f.cause);
-        format!("{title} on {}", f.channels.join(", "))
-    };
-    let material = all.iter().filter(|f| f.material);
-    let named: Vec<String> = material.take(NAMED).map(name).collect();
-    match (named.len(), all.len() - named.len()) {
-        (0, _) => format!("the simulation lacks {}", crate::text::causes(all)),
-        (_, 0) => named.join("; "),
-        (_, more) => format!("{}; and {more} more", named.join("; ")),
-    }
 }
 
 /// Replicates of a record.
@@ -353,8 +312,10 @@ impl View<'_> {
         );
         let margin = ((high - low) * 0.04).max(f64::MIN_POSITIVE);
         let last = panels.len() - 1;
+        let mut legend = Figure::default();
         let mut out = Vec::new();
         for (k, (label, colour, values)) in panels.iter().enumerate() {
+            let curve = Layer::Line(plot::envelope(&time, values, COLUMNS));
             let figure = Figure {
                 x_label: if k == last {
                     "time, s".into()
@@ -364,18 +325,15 @@ impl View<'_> {
                 y_label: self.unit.to_owned(),
                 // Narrower than the page: its letters can be read in print.
                 width: SIGNAL,
-                height: if k == last { 106 } else { 84 },
+                height: if k == last { 104 } else { 60 },
                 y_range: (low < high).then_some(low - margin..high + margin),
-                layers: vec![Drawn::new(
-                    label,
-                    *colour,
-                    Layer::Line(plot::envelope(&time, values, COLUMNS)),
-                )],
+                layers: vec![Drawn::new(label, *colour, curve)],
                 ..Figure::default()
             };
-            out.push(drawing(&figure)?);
+            out.push(figure.svg()?);
+            legend.layers.extend(figure.layers);
         }
-        Ok(html! { @for panel in out { (panel) } })
+        Ok(html! { (legend.legend()) @for panel in out { (PreEscaped(panel)) } })
     }
 
     fn bands(&self, x: &[f64], of: impl Fn(usize) -> replicates::Band) -> Vec<Drawn> {
@@ -462,7 +420,7 @@ fn capitalised(word: &str) -> String {
 
 /// Width and height of a figure on a telephone and in a column of a printed page, units of its view box: letters keep their
 /// size at 390 px, and have 7 pt in print.
-const NARROW: (u32, u32) = (430, 264);
+const NARROW: (u32, u32) = (430, 224);
 
 /// A figure as it is for a wide page, and for a telephone and a printed one, of which the style shows one.
 fn at_two_widths(wide: &Figure) -> Result<Markup, ReportError> {
@@ -476,12 +434,6 @@ fn at_two_widths(wide: &Figure) -> Result<Markup, ReportError> {
         div.wide { (PreEscaped(wide.svg()?)) }
         div.narrow { (PreEscaped(narrow.svg()?)) }
     })
-}
-
-/// A figure with its legend above it.
-fn drawing(figure: &Figure) -> Result<Markup, ReportError> {
-    let svg = figure.svg()?;
-    Ok(html! { (figure.legend()) (PreEscaped(svg)) })
 }
 
 /// A chance as a reader wants it: never 0, because replicates are finite.

@@ -21,6 +21,8 @@ pub const MEASURED: RGBColor = RGBColor(0x1b, 0x1f, 0x24);
 pub const BEFORE: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
 /// Of the extended model.
 pub const AFTER: RGBColor = RGBColor(0x00, 0x72, 0xb2);
+/// Of readings behind what is made of them.
+pub const READINGS: RGBColor = RGBColor(0xa8, 0xb0, 0xb8);
 const OTHERS: [RGBColor; 3] = [MEASURED, AFTER, RGBColor(0x00, 0x9e, 0x73)];
 const GRID: RGBColor = RGBColor(0xe3, 0xe6, 0xea);
 const INK: RGBColor = RGBColor(0x57, 0x60, 0x6a);
@@ -210,7 +212,8 @@ impl Figure {
         let mut chart = ChartBuilder::on(area)
             .margin(8)
             .margin_right(18)
-            .x_label_area_size(if self.x_label.is_empty() { 26 } else { 44 })
+            // Without a label it stands on another figure, which has the numbers.
+            .x_label_area_size(if self.x_label.is_empty() { 0 } else { 44 })
             .y_label_area_size(78)
             .build_cartesian_2d(x, y)?;
         chart
@@ -218,7 +221,12 @@ impl Figure {
             .x_desc(&self.x_label)
             .y_desc(&self.y_label)
             .x_labels(if self.width < WIDE { 6 } else { 12 })
-            .y_labels(if self.height < 250 { 5 } else { 8 })
+            .y_labels(match self.height {
+                // A strip.
+                ..120 => 3,
+                120..250 => 5,
+                _ => 8,
+            })
             .light_line_style(TRANSPARENT)
             .bold_line_style(GRID)
             .axis_style(INK)

@@ -24,7 +24,7 @@ pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
             }
             h1 { span.word { (word) } " " (headline) }
             @for note in &d.input.notes {
-                p.warning { "Note: " (note) "." }
+                p.warning { "Note: " (with_code(note)) "." }
             }
             @if d.findings.is_empty() && d.unexplained.is_empty() {
                 p.lead {
@@ -45,6 +45,15 @@ pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
             }
         }
         (left_over(&d.unexplained))
+    }
+}
+
+/// A text with what it puts between backticks set as code.
+fn with_code(text: &str) -> Markup {
+    html! {
+        @for (k, part) in text.split('`').enumerate() {
+            @if k % 2 == 1 { code { (part) } } @else { (part) }
+        }
     }
 }
 
@@ -84,7 +93,7 @@ fn entry(left: &Unexplained) -> Markup {
     html! {
         div {
             (left.what)
-            @if let Some(c) = &left.consequence { ". " (answer::consequence_of(c, left.material)) }
+            @if let Some(c) = &left.consequence { ". " (with_code(&answer::consequence_of(c, left.material))) }
             @if let Some(text) = answer::modelled(left) { " " (text) }
             @if !left.details.is_empty() {
                 details.fold {
@@ -133,8 +142,8 @@ fn finding(found: &Finding) -> Markup {
     html! {
         article {
             h2 { (answer::title(&found.cause)) small { " on " (found.channels.join(", ")) ", " code { (found.cause) } } }
-            @if let Some(cost) = answer::cost(found) { p { (cost) } }
-            @if let Some(remedy) = answer::remedy(found) { p { (remedy) } }
+            @if let Some(cost) = answer::cost(found) { p { (with_code(&cost)) } }
+            @if let Some(remedy) = answer::remedy(found).filter(|_| found.material) { p { (remedy) } }
             table.plain {
                 tbody {
                     @for (name, parameter) in answer::in_order(found).into_iter().filter(|(n, p)| !answer::is_switch(&found.cause, n, p)) {
@@ -277,11 +286,36 @@ fn checks(subject: &Subject<'_>) -> Markup {
                 p { "All " (all.len()) " checks pass." }
             } @else {
                 p { (failing.len()) " of " (all.len()) " checks fail, before the extension or after it:" }
-                (check_table(&failing))
+                div.mended[failing.iter().all(|c| !c.fails_after)] { (check_table(&failing)) }
+                (mended(&failing))
             }
             details.fold {
                 summary { "All checks" }
                 (check_table(&all.iter().collect::<Vec<_>>()))
+            }
+        }
+    }
+}
+
+/// In print, the checks that the extension mended by name alone: the table there has those that still fail.
+fn mended(failing: &[&Check]) -> Markup {
+    let mended: Vec<_> = failing.iter().filter(|c| !c.fails_after).collect();
+    let channels: std::collections::BTreeSet<&str> =
+        mended.iter().map(|c| c.channel.as_str()).collect();
+    let names = |channel: &str| {
+        let own = mended.iter().filter(|c| c.channel == channel);
+        let names: Vec<String> = own.map(|c| c.id.replace('_', " ")).collect();
+        names.join(", ")
+    };
+    html! {
+        @if !mended.is_empty() {
+            p.printed {
+                "They fail before the extension and pass after it (the page on a screen has their sizes): "
+                @for (k, channel) in channels.iter().enumerate() {
+                    @if k > 0 { "; " }
+                    code { (channel) } " " (names(channel))
+                }
+                "."
             }
         }
     }
@@ -295,7 +329,7 @@ fn check_table(checks: &[&Check]) -> Markup {
                 th { "check" } th { "channel" } th.number { "statistic" } th.number { "p" } th { "before" }
                 th { "after" } th { "what it looks at" }
             } }
-            tbody { @for check in checks { tr {
+            tbody { @for check in checks { tr.mended[check.fails_before && !check.fails_after] {
                 td { (check.id.replace('_', " ")) }
                 td { code { (check.channel) } }
                 td.number { (number(check.statistic, 3)) }
@@ -329,7 +363,7 @@ fn limits(subject: &Subject<'_>) -> Markup {
         @if !d.not_tested.is_empty() {
             section {
                 h2 { "Not tested" }
-                table {
+                table.halves {
                     thead { tr { th { "cause" } th { "why, and what to record" } } }
                     tbody { @for (causes, why) in by_reason(&d.not_tested) { tr { td { (causes) } td { (why) } } } }
                 }
@@ -379,6 +413,15 @@ fn chance(p: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_stands_between_backticks_is_code_and_the_rest_stays_text() {
+        let said = with_code("too small (`--matters`) & `<b>`").into_string();
+        assert_eq!(
+            said,
+            "too small (<code>--matters</code>) &amp; <code>&lt;b&gt;</code>"
+        );
+    }
 
     #[test]
     fn causes_that_one_reason_rules_out_are_one_entry() {

@@ -4,9 +4,10 @@ pub mod answer;
 mod details;
 pub mod noise;
 mod screen;
+pub mod verdict;
 
 pub use details::{details, held_at, measured, rounded_as};
-pub use screen::{MORE, causes, diagnosis};
+pub use screen::{MORE, diagnosis};
 
 /// Columns of a terminal that text is wrapped to.
 const WIDTH: usize = 80;

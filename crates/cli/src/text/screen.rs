@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use diagnosis::result::{Diagnosed, Diagnosis, Finding, Unexplained, Verdict};
+use diagnosis::result::{Diagnosed, Diagnosis, Finding, Unexplained};
 
-use super::{answer, item, noise};
+use super::{answer, item, noise, verdict};
 
 /// Entries of what is left over that the first screen shows; the rest is counted.
 const SHOWN: usize = 4;
@@ -28,7 +28,8 @@ pub fn diagnosis(diagnosed: &Diagnosed) -> String {
     for note in &input.notes {
         let _ = writeln!(out, "{}", item("note: ", note));
     }
-    let _ = writeln!(out, "verdict  {}", verdict(d));
+    let verdict = item("verdict  ", &verdict::sentence(d));
+    let _ = writeln!(out, "{}", verdict.trim_start());
     let small = |f: &&Finding| !f.material;
     let material: Vec<&Finding> = d.findings.iter().filter(|f| !small(f)).collect();
     for (k, finding) in material.iter().enumerate() {
@@ -82,39 +83,6 @@ fn remedy(all: &[&Finding], k: usize) -> Option<String> {
     match same.filter(|first| *first < k) {
         Some(first) => Some(format!("What to do: as for {}.", first + 1)),
         None => answer::remedy(all[k]),
-    }
-}
-
-fn verdict(d: &Diagnosis) -> String {
-    match (d.verdict, d.findings.len()) {
-        (Verdict::Adequate, _) => {
-            "adequate: white noise, random walk and a constant bias describe this record".into()
-        }
-        (Verdict::Extended, _) => {
-            format!("extended: the simulation lacks {}", causes(&d.findings))
-        }
-        (Verdict::Unexplained, 0) => {
-            "unexplained: the record has structure that no known cause explains".into()
-        }
-        (Verdict::Unexplained, _) => format!(
-            "unexplained: the simulation lacks {}; something is left that no known cause explains",
-            causes(&d.findings)
-        ),
-    }
-}
-
-/// How many causes there are, as the screen lists them: `2 causes, and 1 too small to matter`.
-#[must_use]
-pub fn causes(found: &[Finding]) -> String {
-    let material = found.iter().filter(|f| f.material).count();
-    let count = |n: usize| match n {
-        1 => "1 cause".to_owned(),
-        n => format!("{n} causes"),
-    };
-    match (material, found.len() - material) {
-        (n, 0) => count(n),
-        (0, small) => format!("{}, too small to matter", count(small)),
-        (n, small) => format!("{}, and {small} too small to matter", count(n)),
     }
 }
 
@@ -173,8 +141,7 @@ fn write_unexplained(out: &mut String, all: &[Unexplained]) {
             "    and {more} more (all of them: --json, or the report)"
         );
     }
-    let was_read = |left: &&&Unexplained| !left.checks.is_empty() || left.rms.is_some();
-    let next = match large.iter().filter(was_read).count() {
+    let next = match large.iter().filter(|u| verdict::was_read(u)).count() {
         0 => {
             "Look to the sensor, its supply and the column: nothing can be said of what was not measured."
         }

@@ -126,6 +126,11 @@ class Diagnosis(dict):
             )
         return self._engine.report()
 
+    def _sentence(self) -> str:
+        """The verdict in a sentence, as the program prints it; its word alone where that is not known."""
+        _, found, rest = self.text.partition("verdict  ")
+        return " ".join(rest.split("\n\n")[0].split()) if found else self["verdict"]
+
     def _repr_html_(self) -> str:
         rows = []
         for finding in self["findings"]:
@@ -142,13 +147,14 @@ class Diagnosis(dict):
                     finding["cause"],
                     ", ".join(finding["channels"]),
                     "; ".join(sizes),
-                    ", ".join(f"{number(value, 2)} {unit} after {horizon}" for by, unit in cost for horizon, value in by.items()),
+                    ", ".join(f"{number(value, 2)} {unit} after {horizon}" for by, unit in cost for horizon, value in by.items())
+                    + ("" if finding.get("material", True) else " (too small to matter)"),
                     " or ".join(a["cause"] for a in finding["alternatives"]) or "-",
                 )
             )
         left = [f"{entry['channel']}: {entry['what']}" for entry in self["unexplained"]]
         return (
-            head(f"Diagnosis: {self['verdict']}.", self["input"])
+            head(f"Diagnosis: {self._sentence()}.", self["input"])
             + (table(("cause", "channels", "size, 95 %", "angle or velocity error", "may also be"), rows) if rows else "<p>No cause.</p>")
             + "".join(f"<p>No name for: {escape(entry)}</p>" for entry in left)
         )

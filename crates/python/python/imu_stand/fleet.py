@@ -40,6 +40,7 @@ _TYPES = {
     "samples": "int64",
     "verdict": "object",
     "causes": "object",
+    "material": "int64",
     "findings": "object",
     "unexplained": "int64",
     "p_before": "float64",
@@ -108,6 +109,7 @@ def _of_channel(capture, name: str, result: dict, bias: dict) -> dict:
         "samples": about["samples"],
         "verdict": result["verdict"],
         "causes": ";".join(f["cause"] for f in own),
+        "material": sum(f.get("material") is not False for f in own),
         "findings": json.dumps(told),
         "unexplained": sum(u["channel"] == name for u in result["unexplained"]),
         "p_before": chance("before"),
@@ -152,7 +154,7 @@ def diagnose_frame(
     pandas.DataFrame
         A row for each capture and gyro, columns and types as `EMPTY`: ``n``, ``k`` beside the causes found; ``b`` from the
         Allan deviation, NaN where it is not established (``b_high`` is then its limit); ``findings`` as JSON; ``angle_*``
-        the rms angle that the causes together make; ``error``, empty where there is none.
+        the rms angle that the causes together make; ``material`` how many of them matter; ``error``, empty where there is none.
 
     Raises
     ------

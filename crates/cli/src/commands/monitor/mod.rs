@@ -215,17 +215,15 @@ impl Monitor {
         match show {
             Show::Nothing => {}
             Show::Lines => {
-                let rates = s.gyros.map(|gyro| {
-                    (gyro.mean_dps).map_or_else(|| "-".to_owned(), |rate| fixed(rate, 3))
-                });
-                eprintln!(
+                let line = format!(
                     "{:>8.0} s {:>8} samples, {} missing  {} deg/s  {}",
                     self.began.elapsed().as_secs_f64(),
                     s.samples,
                     s.missing,
-                    rates.join(" "),
+                    axes(s.gyros.map(|gyro| gyro.mean_dps)),
                     self.line
                 );
+                eprintln!("{}", line.trim_end());
             }
             Show::Terminal(terminal) => terminal.draw(&s, &self.about())?,
             Show::Web(web) => web.publish(&s, &self.about(), self.control.turns())?,
@@ -243,5 +241,21 @@ impl Monitor {
             self.step(None)?;
         }
         Ok(())
+    }
+}
+
+/// Rates below each other in the lines of a log, each behind its axis.
+fn axes(rates: [Option<f64>; 3]) -> String {
+    let said = rates.map(|rate| rate.map_or_else(|| "-".to_owned(), |rate| fixed(rate, 3)));
+    let [x, y, z] = said;
+    format!("x {x:>8}  y {y:>8}  z {z:>8}")
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn rates_stand_below_each_other_behind_their_axes() {
+        let line = super::axes([Some(-0.5), None, Some(12.25)]);
+        assert_eq!(line, "x   -0.500  y        -  z   12.250");
     }
 }
