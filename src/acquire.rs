@@ -128,6 +128,12 @@ impl Done {
     };
 }
 
+/// The bit of an axis; of a function, as the AVR shifts in a loop.
+#[inline(never)]
+pub(crate) fn bit(axis: u8) -> u8 {
+    1u8.wrapping_shl(axis.into())
+}
+
 /// One frame with one gyro; `None` where it does not end.
 #[inline(never)]
 fn exchange<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Option<Word> {
@@ -177,7 +183,7 @@ pub fn acquire<S: Sensors>(sensors: &mut S, raw: &mut Raw) {
 fn convert<S: Sensors>(sensors: &mut S, raw: &mut Raw, channel: u8) {
     let counts = sensors.adc_finish();
     if counts.is_none() {
-        raw.adc_stalled |= 1 << channel;
+        raw.adc_stalled |= bit(channel);
     }
     if let Some(place) = raw.acc.get_mut(channel as usize) {
         *place = counts.unwrap_or(0);
@@ -256,7 +262,7 @@ pub const FASTEST: u16 = 1;
 /// as the pace of all else hangs on it, then what would shift, flag or disturb the rate without a word.
 #[inline(never)]
 pub fn configure<S: Sensors>(sensors: &mut S, axis: u8, sens_avg: u16) -> u8 {
-    let bit = 1u8.wrapping_shl(axis.into());
+    let bit = bit(axis);
     let mut stall_us = SLOW_STALL_US;
     sensors.slow(true);
     let mut job = Job {

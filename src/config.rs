@@ -79,17 +79,18 @@ impl Config {
     /// The built-in set-up; the board keeps its number.
     #[inline(never)]
     pub fn set_default(&mut self) {
-        self.set_up.period_ticks.set(12_500);
-        self.set_up.periods_per_sample = 1;
-        self.set_up.baud_divisor.set(25);
-        self.set_up.gyro_range = 4;
-        self.set_up.gyro_filter = 2;
-        self.set_up.gyro_sample_period = 1;
-        self.set_up.acc_range = 0;
-        self.set_up.bias = [I32::ZERO; 3];
-        self.set_scale_of_range();
-        self.ramp_per_s.set(crate::motor::DEFAULT_RAMP_PER_S);
-        self.max_duty = 255;
+        let this = crate::math::somewhere(self);
+        this.set_up.period_ticks.set(12_500);
+        this.set_up.periods_per_sample = 1;
+        this.set_up.baud_divisor.set(25);
+        this.set_up.gyro_range = 4;
+        this.set_up.gyro_filter = 2;
+        this.set_up.gyro_sample_period = 1;
+        this.set_up.acc_range = 0;
+        this.set_up.bias = [I32::ZERO; 3];
+        this.set_scale_of_range();
+        this.ramp_per_s.set(crate::motor::DEFAULT_RAMP_PER_S);
+        this.max_duty = 255;
     }
 
     /// The nominal scale of the range.

@@ -97,19 +97,20 @@ impl Motor {
         period_ms: u16,
         cycles: u8,
     ) -> bool {
+        let this = crate::math::somewhere(self);
         if shape == shape::STOP {
-            self.command(0);
+            this.command(0);
             return true;
         }
         let in_range = |duty: i16| (-FULL..=FULL).contains(&duty);
         if shape > shape::SINE || period_ms < 2 || !in_range(amplitude) || !in_range(offset) {
             return false;
         }
-        (self.shape, self.cycles) = (shape, cycles);
-        (self.amplitude, self.offset) = (amplitude, offset);
-        self.phase = 0;
+        (this.shape, this.cycles) = (shape, cycles);
+        (this.amplitude, this.offset) = (amplitude, offset);
+        this.phase = 0;
         // Rounded up, so that the last millisecond of a period completes it.
-        self.phase_per_ms = divide(u32::MAX, period_ms).wrapping_add(1);
+        this.phase_per_ms = divide(u32::MAX, period_ms).wrapping_add(1);
         true
     }
 
@@ -166,40 +167,42 @@ impl Motor {
     /// Off at once, without the ramp: for faults.
     #[inline(never)]
     pub fn cut(&mut self) {
-        self.target = 0;
-        self.output_q6 = 0;
-        self.output = 0;
-        self.shape = shape::STOP;
+        let this = crate::math::somewhere(self);
+        this.target = 0;
+        this.output_q6 = 0;
+        this.output = 0;
+        this.shape = shape::STOP;
     }
 
     /// A millisecond has passed. `on` is what [`is_on`](Self::is_on) says.
     #[inline(always)]
     pub fn on_millisecond(&mut self, on: bool) {
+        let this = crate::math::somewhere(self);
         // One that is not on puts nothing out.
-        if on && self.output != 0 {
-            self.dead = if self.output < 0 { -DEAD_MS } else { DEAD_MS };
-        } else if self.dead > 0 {
-            self.dead = self.dead.wrapping_sub(1);
-        } else if self.dead < 0 {
-            self.dead = self.dead.wrapping_add(1);
+        if on && this.output != 0 {
+            this.dead = if this.output < 0 { -DEAD_MS } else { DEAD_MS };
+        } else if this.dead > 0 {
+            this.dead = this.dead.wrapping_sub(1);
+        } else if this.dead < 0 {
+            this.dead = this.dead.wrapping_add(1);
         }
         if !on {
             return;
         }
-        if self.shape != shape::STOP {
-            self.step_profile();
+        if this.shape != shape::STOP {
+            this.step_profile();
         }
-        let step = (self.target << 6)
-            .wrapping_sub(self.output_q6)
-            .min(self.ramp_q6)
-            .max(self.ramp_q6.wrapping_neg());
-        self.output_q6 = self.output_q6.wrapping_add(step);
-        if self.dead > 0 && self.output_q6 < 0 || self.dead < 0 && self.output_q6 > 0 {
-            self.output_q6 = 0;
+        let step = (this.target << 6)
+            .wrapping_sub(this.output_q6)
+            .min(this.ramp_q6)
+            .max(this.ramp_q6.wrapping_neg());
+        this.output_q6 = this.output_q6.wrapping_add(step);
+        if this.dead > 0 && this.output_q6 < 0 || this.dead < 0 && this.output_q6 > 0 {
+            this.output_q6 = 0;
         }
         // Towards zero, as a division rounds.
-        let round = if self.output_q6 < 0 { 63 } else { 0 };
-        self.output = self.output_q6.wrapping_add(round) >> 6;
+        let round = if this.output_q6 < 0 { 63 } else { 0 };
+        this.output = this.output_q6.wrapping_add(round) >> 6;
     }
 }
 

@@ -96,6 +96,12 @@ impl Pending {
     fn is_none(self) -> bool {
         self.code == 0
     }
+
+    /// What it was; from now on nothing is asked for.
+    #[inline(never)]
+    fn take(&mut self) -> Self {
+        core::mem::replace(self, Self::NONE)
+    }
 }
 
 /// The logic below the tick. Its initial value is all zeros, so that it costs no flash as a static.

@@ -143,12 +143,22 @@ pub fn set_period(ticks: u16, every: u8) {
 
 /// Posts a job for the slot after the next sample; false while one waits.
 pub fn post(job: Job) -> bool {
+    put(job.task, job.axis, job.address, job.value)
+}
+
+#[inline(never)]
+fn put(task: Task, axis: u8, address: u8, value: u16) -> bool {
     interrupt::free(|_| {
         // SAFETY: interrupts are off.
         let waiting = unsafe { &mut (*shared()).job };
         let free = matches!(waiting.task, Task::None);
         if free {
-            *waiting = job;
+            *waiting = Job {
+                task,
+                axis,
+                address,
+                value,
+            };
         }
         free
     })

@@ -4,7 +4,7 @@ use adis16250::{Register, control};
 use wire::{Asked, Sensor, Status, code};
 
 use super::{Board, Pending, SET, Stand, source};
-use crate::acquire::{Done, Job, Task};
+use crate::acquire::{Done, Job, Task, bit};
 use crate::motor::FULL;
 
 /// What becomes of a request at once.
@@ -123,7 +123,7 @@ impl Stand {
                     Status::NoKeepAlive
                 } else {
                     let holds = self.motor.command(duty);
-                    self.answer.value.set(holds.into());
+                    self.say(holds.into());
                     Status::Ok
                 }
             }
@@ -246,7 +246,7 @@ impl Stand {
                     return Answer::Now(Status::Busy);
                 }
                 self.config.set_scale_of_range();
-                self.job = asked.into();
+                self.await_job(asked);
                 return Answer::Later;
             }
             code::SET_ACC_RANGE => board.set_acc_range(set_up.acc_range),
@@ -264,7 +264,7 @@ impl Stand {
         let nonce = core::mem::take(&mut self.nonce);
         if said == 0 {
             self.nonce = self.noise as u16 | 1;
-            self.answer.value.set(self.nonce.into());
+            self.say(self.nonce.into());
         } else if said == nonce {
             board.keep_alive();
         } else {
@@ -298,9 +298,15 @@ impl Stand {
             self.begin_write(asked, place);
             return Answer::Later;
         }
-        self.answer.value.set(self.correction.in_use().into());
+        self.say(self.correction.in_use().into());
         self.correction.read(board, place, &mut self.answer.detail);
         Answer::Now(Status::Ok)
+    }
+
+    /// What the reply says beside its status.
+    #[inline(never)]
+    fn say(&mut self, value: i32) {
+        self.answer.value.set(value);
     }
 
     #[inline(never)]
@@ -311,10 +317,16 @@ impl Stand {
         done(in_range)
     }
 
+    /// The end of the work on the gyros answers this.
+    #[inline(never)]
+    fn await_job(&mut self, asked: &Asked) {
+        self.job = asked.into();
+    }
+
     /// Posts work whose end answers the request.
     fn post<B: Board>(&mut self, board: &mut B, asked: &Asked, job: Job) -> Answer {
         if self.job.is_none() && board.post(job) {
-            self.job = asked.into();
+            self.await_job(asked);
             self.job_axis = job.axis;
             Answer::Later
         } else {
@@ -326,7 +338,7 @@ impl Stand {
     pub(super) fn job_done<B: Board>(&mut self, board: &mut B, done: Done) {
         let (value, mut status) = (done.value, done.status);
         if matches!(done.task, Task::Configure) {
-            self.note_configured(1u8.wrapping_shl(self.setting.into()), value as u8);
+            self.note_configured(bit(self.setting), value as u8);
             if self.setting == 0 {
                 self.wrong = 0;
             }
@@ -348,7 +360,7 @@ impl Stand {
                 None => return,
             },
             code::SET_GYRO => {
-                self.answer.value.set(self.wrong.into());
+                self.say(self.wrong.into());
                 if self.wrong != 0 {
                     status = Status::ReadBackWrong;
                 }
@@ -356,12 +368,12 @@ impl Stand {
             code => {
                 // By hand: what the part is set to now is not what the set-up says.
                 if code == code::WRITE_REGISTER && !matches!(status, Status::BadArgument) {
-                    self.touched |= 1u8.wrapping_shl(self.job_axis.into());
+                    self.touched |= bit(self.job_axis);
                 }
-                self.answer.value.set(value.into());
+                self.say(value.into());
             }
         }
-        let asked = core::mem::replace(&mut self.job, Pending::NONE);
+        let asked = self.job.take();
         self.reply(board, asked, status);
     }
 
@@ -376,14 +388,14 @@ impl Stand {
         } else if !self.job.is_none() {
             Answer::Now(Status::Busy)
         } else {
-            self.job = asked.into();
+            self.await_job(asked);
             self.job_axis = sensor;
             self.self_test = SelfTest {
                 step: step::CLEAR_STATUS,
                 wait_ms: 1,
             };
             // Its rate is not to be trusted until the end.
-            self.misconfigured |= 1 << sensor;
+            self.misconfigured |= bit(sensor);
             Answer::Later
         }
     }
@@ -437,7 +449,7 @@ impl Stand {
             _ => status,
         };
         test.step = 0;
-        self.misconfigured &= !(1u8.wrapping_shl(self.job_axis.into()));
+        self.misconfigured &= !(bit(self.job_axis));
         Some(end)
     }
 }

@@ -6,7 +6,7 @@ use wire::{Fault, Status, flags, kind};
 use zerocopy::{FromZeros, IntoBytes};
 
 use super::line::SAMPLES_PER_REPORT;
-use super::{Board, Pending, SET, Stand, source};
+use super::{Board, SET, Stand, source};
 use crate::acquire::{Raw, Task};
 use crate::bias::{Outcome, TURNS};
 use crate::math::times;
@@ -229,7 +229,7 @@ impl Stand {
         if !matches!(status, Status::Ok) {
             self.answer.zero();
         }
-        let asked = core::mem::replace(&mut self.null, Pending::NONE);
+        let asked = self.null.take();
         self.reply(board, asked, status);
     }
 }

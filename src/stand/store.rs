@@ -119,7 +119,7 @@ impl Stand {
             self.record(Fault::ConfigNotStored, 0);
             Status::NotStored
         };
-        let asked = core::mem::replace(&mut self.store.asked, Pending::NONE);
+        let asked = self.store.asked.take();
         self.reply(board, asked, status);
     }
 

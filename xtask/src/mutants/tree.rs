@@ -93,7 +93,9 @@ impl Tree {
         })?;
         let names = String::from_utf8_lossy(&names.stdout).into_owned();
         let mut there = BTreeSet::new();
-        for name in names.split_terminator('\0') {
+        let names = names.split_terminator('\0');
+        // The copy lies in the tree, so cargo reads the tree's settings for it too: with its own it would have each flag twice.
+        for name in names.filter(|name| !name.starts_with(".cargo/")) {
             // Deleted, but not yet told to git.
             if let Ok(bytes) = std::fs::read(root.join(name)) {
                 tree.put(name, &bytes)?;
