@@ -9,6 +9,7 @@
 //! where the shape may be late or bent, is as likely a remainder of the shape as a cause of its own.
 
 mod facts;
+mod of_band;
 pub(crate) mod propagate;
 mod rules;
 

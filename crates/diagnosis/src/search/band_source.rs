@@ -17,7 +17,6 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::band_alone::stands_out;
 use super::envelope::law::{changes, pitch};
 use super::envelope::{Band, REACH, envelope_of, kept};
 use crate::ingest::motion::drives;
@@ -32,6 +31,8 @@ const DEGREES: f64 = 2.0 * (2.0 * SMOOTHED as f64 + 1.0);
 pub(crate) const FOLLOWED: f64 = 0.02;
 /// Fewest values of the envelope.
 const LEAST: usize = 64;
+/// Frequencies either side that are the neighbourhood of the mean, without the next ones.
+const BESIDE: usize = 24;
 
 /// Means of a course in `cells` parts of the record.
 pub(super) fn in_cells(values: &[f64], cells: usize) -> Vec<f64> {
@@ -97,6 +98,18 @@ pub(super) fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
     let t = slope * own / variance.sqrt();
     let law = StudentsT::new(0.0, 1.0, DEGREES).ok()?;
     Some((2.0 * law.sf(t.abs()), slope * slope * own / all))
+}
+
+/// Chance that the mean of a series stands out of its spectrum as well, and the size of its sum.
+pub(super) fn stands_out(mut product: Vec<Complex<f64>>) -> (f64, f64) {
+    let n = product.len();
+    FftPlanner::new().plan_fft_forward(n).process(&mut product);
+    let beside = (2..=BESIDE).flat_map(|d| [d, n - d]);
+    let count = 2.0 * (BESIDE as f64 - 1.0);
+    let mean = beside.map(|d| product[d].norm_sqr()).sum::<f64>() / count;
+    // The chance of an exponential value over the mean of `count` others.
+    let ratio = product[0].norm_sqr() / mean.max(f64::MIN_POSITIVE);
+    ((-count * (ratio / count).ln_1p()).exp(), product[0].norm())
 }
 
 /// How a band moves.

@@ -2,16 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
-use std::ops::Range;
 
-use model::effect::{Peak, Signal};
+use model::effect::Signal;
 
 use crate::audit::repeats;
 use crate::criticise::follower_shape;
 use crate::criticise::residual::{self, Place, Repeats};
 use crate::fit::channel::{Form, ID, Term};
 use crate::ingest::motion::drives;
-use crate::search::band_source::{FOLLOWED, coherence};
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Outcome, RECORD, omnibus_level};
 
@@ -41,16 +39,6 @@ const COMES_AGAIN: f64 = 5.0;
 const NO_FILTER: f64 = 3.3;
 /// Share of what tells a term that has the shape of an echo, up to which the echo is another thing.
 const OF_ECHO: f64 = 0.4;
-/// Half widths about the centre of a band that hold what it explains, and the share of that which a follower has there, from
-/// which on the band may be what its shape leaves.
-const BAND_REACH: f64 = 3.0;
-const OF_BAND: f64 = 0.5;
-/// Energy that a follower has at the place of a band over what it would have of an even spectrum, from which on it is that of
-/// the band.
-const CONCENTRATED: f64 = 2.0;
-/// Part of the nats of a failure that is left without the coefficients of a band, up to which the failure is the band's: of one
-/// that is of all frequencies more is left, as long as the band is narrow.
-const ELSEWHERE: f64 = 1.0 / 3.0;
 
 /// What is left on a channel.
 #[derive(Clone, Debug, Default)]
@@ -86,28 +74,12 @@ pub(super) struct Facts<'a> {
     /// Chi-square by which the channel is not of linear, normal noise, as a record of ten minutes would show it.
     pub bent: f64,
     /// What the effects that follow a recorded channel explain.
-    followed: Vec<(&'static str, f64)>,
+    pub(super) followed: Vec<(&'static str, f64)>,
     /// A recorded channel at whose frequency a line of the model swings.
     swing: Option<String>,
     /// The lag of an echo, samples, where correlation is left at that one.
     echo: Option<usize>,
 }
-
-/// Tests of the whitened residual in time.
-type InTime = fn(&Facts<'_>, &[f64]) -> Outcome;
-const IN_TIME: [(CheckId, InTime); 7] = [
-    (CheckId::Kurtosis, |f, e| residual::kurtosis(e, f.rate_hz())),
-    (CheckId::Skewness, |_, e| residual::skewness(e)),
-    (CheckId::Bicovariance, |_, e| residual::bicovariance(e)),
-    (CheckId::ThreeReadings, |_, e| residual::three_readings(e)),
-    (CheckId::Neighbours, |f, e| {
-        residual::neighbours(e, f.s.step())
-    }),
-    (CheckId::VarianceRhythm, |f, e| {
-        residual::variance_rhythm(e, f.rate_hz())
-    }),
-    (CheckId::Period, |f, e| residual::period(e, f.rate_hz())),
-];
 
 /// Whether an angular frequency, rad per sample, lies in a place.
 fn in_place(p: &Place, omega: f64) -> bool {
@@ -168,7 +140,7 @@ impl<'a> Facts<'a> {
         (self.failing)(id)
     }
 
-    fn rate_hz(&self) -> f64 {
+    pub(super) fn rate_hz(&self) -> f64 {
         self.s.search.view.rate_hz
     }
 
@@ -323,105 +295,6 @@ impl<'a> Facts<'a> {
     /// Whether correlation is left that is no echo.
     pub(super) fn correlated_otherwise(&self) -> bool {
         self.fails(CheckId::LjungBox) && self.echo.is_none()
-    }
-
-    /// What follows a recorded channel tells, and the part of that at the place of a band, by effect; the largest part.
-    fn follower_there(
-        &self,
-        peak: &Peak,
-        of: &dyn Fn(&Term) -> bool,
-    ) -> Option<(&'static str, f64)> {
-        let panel = &self.s.search.panel;
-        let inside = |w: f64| (w - peak.omega).abs() < BAND_REACH * peak.half_width;
-        let mut found: BTreeMap<&'static str, f64> = BTreeMap::new();
-        for (o, own) in self.s.state.parts() {
-            if self.s.search.followed(o).is_none() || !of(o) {
-                continue;
-            }
-            let information = self.information(o, own);
-            let there = information.iter().zip(&panel.bins.at.omega);
-            let there = there.filter(|(_, w)| inside(**w)).map(|(i, _)| i);
-            *found.entry(o.effect.id()).or_default() +=
-                there.sum::<f64>() / self.s.state.solution.white;
-        }
-        found.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))
-    }
-
-    fn all_of(&self, id: &str) -> Option<f64> {
-        self.followed.iter().find(|f| f.0 == id).map(|f| f.1)
-    }
-
-    /// Whether a band explains no more than a follower of a recorded channel has at its place: late or bent, that leaves as
-    /// much. The follower, and the share of what it explains.
-    pub(super) fn beside_follower(&self, t: &Term) -> Option<(&'static str, f64)> {
-        let lr = t.cluster.map_or(t.lr, |c| c.lr);
-        let most = self.follower_there(&t.peak()?, &|_| true)?;
-        (most.1 > OF_BAND * lr).then_some((most.0, lr / self.all_of(most.0)?))
-    }
-
-    /// Whether what follows a recorded channel by no law of the library does so at the place of a band: noise and a tone that
-    /// wanders know nothing of what was recorded, and the two are one thing.
-    pub(super) fn is_told_by_a_channel(&self, t: &Term) -> bool {
-        let Some(peak) = t.peak() else {
-            return false;
-        };
-        let lr = t.cluster.map_or(t.lr, |c| c.lr);
-        let panel = &self.s.search.panel;
-        let mut nameless = self.s.state.parts().filter(|(o, _)| o.effect.id() == ID);
-        nameless.any(|(o, coefficients)| {
-            let mut sum = vec![0.0; panel.bins.n];
-            panel.add_columns(&mut sum, 0, &o.columns, coefficients);
-            let energy = panel.bins.products(&sum, &sum);
-            let all: f64 = energy.iter().sum();
-            let inside = |w: f64| (w - peak.omega).abs() < BAND_REACH * peak.half_width;
-            let count = |values: &[f64]| -> f64 {
-                let places = values.iter().zip(&panel.bins.at.omega);
-                places.filter(|(_, w)| inside(**w)).map(|(v, _)| v).sum()
-            };
-            let over: Vec<f64> = energy.iter().zip(&self.g).map(|(e, g)| e / g).collect();
-            let tells = count(&over) / self.s.state.solution.white;
-            let even = count(&self.counts) / self.counts.iter().sum::<f64>();
-            tells > LEFT * lr && count(&energy) > CONCENTRATED * even * all
-        })
-    }
-
-    /// Coefficients about the centre of a band that hold what it explains.
-    fn place_of(&self, peak: &Peak) -> Range<usize> {
-        let to_places = self.s.u.len() as f64 / PI;
-        let reach = BAND_REACH * peak.half_width;
-        let from = ((peak.omega - reach).max(0.0) * to_places) as usize;
-        let to = ((peak.omega + reach) * to_places).ceil() as usize;
-        from.max(1)..to.min(self.s.u.len())
-    }
-
-    /// Whether a test of the residual in time fails, and hardly does without the coefficients of a band: what it shows is then
-    /// how that band is made, for which its name has no word.
-    pub(super) fn failure_is_of(&self, t: &Term) -> bool {
-        let asked: Vec<&InTime> = (IN_TIME.iter())
-            .filter(|(id, _)| self.fails(*id))
-            .map(|(_, test)| test)
-            .collect();
-        let Some(peak) = t.peak().filter(|_| !asked.is_empty()) else {
-            return false;
-        };
-        let dct = &self.s.search.panel.dct;
-        let mut without = self.s.u.clone();
-        without[self.place_of(&peak)].fill(0.0);
-        let (all, rest) = (dct.inverse(&self.s.u), dct.inverse(&without));
-        let nats = |test: &InTime, e: &[f64]| -test(self, e).p_value.max(f64::MIN_POSITIVE).ln();
-        (asked.iter()).any(|test| nats(test, &rest) < ELSEWHERE * nats(test, &all))
-    }
-
-    /// Whether the channel follows another axis later, and does so at the place of a band.
-    pub(super) fn is_of_another_axis(&self, t: &Term) -> bool {
-        let Some(peak) = t.peak() else {
-            return false;
-        };
-        let place = self.place_of(&peak);
-        self.left.before.iter().any(|before| {
-            let (p, part) = coherence(&self.s.u[place.clone()], &before[place.clone()]);
-            part > FOLLOWED && p < CheckId::BandSource.level()
-        })
     }
 
     /// Whether readings that are those before make neighbours correlate.

@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 
 use super::Doubt;
 use super::facts::{Facts, LEFT, generic};
+use super::of_band::explains;
 use crate::features;
 use crate::fit::channel::{Form, ID, Term};
 use crate::search::MOST_ALIKE;
@@ -233,7 +234,7 @@ fn crowded(f: &Facts<'_>) -> bool {
 pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
     // What stands at one frequency answers for what is left there, and for its own claims.
     if t.term.is_band() {
-        let lr = t.term.cluster.map_or(t.term.lr, |c| c.lr);
+        let lr = explains(t.term);
         let falls = CheckId::OF_BAND.into_iter().any(|id| f.fails(id))
             || f.left_where_it_acts(t.term, t.own, lr)
             || t.term.peak().is_some_and(|p| wide(&p))

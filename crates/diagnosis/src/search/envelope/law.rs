@@ -256,14 +256,18 @@ impl Law {
             .map(|i| (0..SIZES).map(|j| covariance(i, j)).collect())
             .collect();
         let inverse = invert(&matrix).0;
-        let by_octave = |of: &dyn Fn(&'_ Portrait) -> &[f64]| -> Vec<Spread> {
-            let values: Vec<&[f64]> = runs.iter().map(|r| of(r)).collect();
+        let by_octave = |of: fn(&Portrait) -> &[f64]| -> Vec<Spread> {
+            let values: Vec<&[f64]> = runs.iter().map(of).collect();
             let count = values.iter().map(|v| v.len()).min().unwrap_or(0);
             let each = (0..count).map(|i| Spread::of(values.iter().map(move |v| v[i])));
             each.collect()
         };
         let memory = |k: usize| match noise {
-            true => by_octave(&|r| &r.octaves[k]),
+            true => by_octave(if k == 0 {
+                |r| &r.octaves[0]
+            } else {
+                |r| &r.octaves[1]
+            }),
             false => vec![],
         };
         let mut law = Self {
@@ -275,7 +279,7 @@ impl Law {
             },
             lines: std::array::from_fn(|k| Spread::of(runs.iter().map(move |r| r.lines[k].nats))),
             octaves: [memory(0), memory(1)],
-            jumps: by_octave(&|r| &r.jumps),
+            jumps: by_octave(|r| &r.jumps),
             second: (middle[0], sizes[0].spread / fewer),
             largest: (0.0, 1.0),
         };
