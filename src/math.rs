@@ -242,6 +242,15 @@ pub fn root(x: u32) -> u16 {
     root
 }
 
+/// One more, up to 255.
+#[inline(never)]
+pub fn count_up(count: &mut u8) {
+    let more = count.wrapping_add(1);
+    if more != 0 {
+        *count = more;
+    }
+}
+
 /// The same place, without the compiler knowing that it is a static's: what lies there then takes two bytes of flash to reach, and
 /// not four. It pays where little else needs the pointer's registers.
 #[cfg(target_arch = "avr")]

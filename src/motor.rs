@@ -177,32 +177,31 @@ impl Motor {
     /// A millisecond has passed. `on` is what [`is_on`](Self::is_on) says.
     #[inline(always)]
     pub fn on_millisecond(&mut self, on: bool) {
-        let this = crate::math::somewhere(self);
         // One that is not on puts nothing out.
-        if on && this.output != 0 {
-            this.dead = if this.output < 0 { -DEAD_MS } else { DEAD_MS };
-        } else if this.dead > 0 {
-            this.dead = this.dead.wrapping_sub(1);
-        } else if this.dead < 0 {
-            this.dead = this.dead.wrapping_add(1);
+        if on && self.output != 0 {
+            self.dead = if self.output < 0 { -DEAD_MS } else { DEAD_MS };
+        } else if self.dead > 0 {
+            self.dead = self.dead.wrapping_sub(1);
+        } else if self.dead < 0 {
+            self.dead = self.dead.wrapping_add(1);
         }
         if !on {
             return;
         }
-        if this.shape != shape::STOP {
-            this.step_profile();
+        if self.shape != shape::STOP {
+            self.step_profile();
         }
-        let step = (this.target << 6)
-            .wrapping_sub(this.output_q6)
-            .min(this.ramp_q6)
-            .max(this.ramp_q6.wrapping_neg());
-        this.output_q6 = this.output_q6.wrapping_add(step);
-        if this.dead > 0 && this.output_q6 < 0 || this.dead < 0 && this.output_q6 > 0 {
-            this.output_q6 = 0;
+        let step = (self.target << 6)
+            .wrapping_sub(self.output_q6)
+            .min(self.ramp_q6)
+            .max(self.ramp_q6.wrapping_neg());
+        self.output_q6 = self.output_q6.wrapping_add(step);
+        if self.dead > 0 && self.output_q6 < 0 || self.dead < 0 && self.output_q6 > 0 {
+            self.output_q6 = 0;
         }
         // Towards zero, as a division rounds.
-        let round = if this.output_q6 < 0 { 63 } else { 0 };
-        this.output = this.output_q6.wrapping_add(round) >> 6;
+        let round = if self.output_q6 < 0 { 63 } else { 0 };
+        self.output = self.output_q6.wrapping_add(round) >> 6;
     }
 }
 

@@ -97,6 +97,12 @@ impl Pending {
         self.code == 0
     }
 
+    /// This is asked for from now on.
+    #[inline(never)]
+    fn ask(&mut self, asked: &Asked) {
+        *self = asked.into();
+    }
+
     /// What it was; from now on nothing is asked for.
     #[inline(never)]
     fn take(&mut self) -> Self {

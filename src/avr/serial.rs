@@ -183,11 +183,11 @@ fn USART_RXC() {
     unsafe {
         let lost = &mut *addr_of_mut!(LOST);
         if status & FE != 0 {
-            lost[1] = lost[1].saturating_add(1);
+            firmware::math::count_up(&mut lost[1]);
         }
         let full = !RX.push(byte);
         if status & DOR != 0 || full {
-            lost[0] = lost[0].saturating_add(1);
+            firmware::math::count_up(&mut lost[0]);
         }
     }
 }

@@ -10,6 +10,7 @@ use core::ptr::addr_of_mut;
 use avr_device::atmega16::{CPU, TC0, TC1};
 use avr_device::{asm, interrupt};
 use firmware::acquire::work;
+use firmware::math::count_up;
 use firmware::motor::KEEP_ALIVE_MS;
 use firmware::{Job, Raw, Task, acquire};
 
@@ -272,11 +273,6 @@ pub fn unmask() {
     timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE0));
 }
 
-#[inline(never)]
-fn count_missed(shared: &mut Shared) {
-    shared.missed = shared.missed.saturating_add(1);
-}
-
 #[avr_device::interrupt(atmega16)]
 fn TIMER0_COMP() {
     // SAFETY: counted here, compared by the main loop: a byte is read at once. Should the main loop be late by 256 ms, it
@@ -315,7 +311,7 @@ fn TIMER1_COMPB() {
     if timer1().tcnt1.read().bits() <= timer1().ocr1b.read().bits() {
         // Compare A has gone by: something held this up for longer than the guard. Waiting for the next one would make
         // that late too, and so on for ever; the main loop gets the time until then.
-        count_missed(shared);
+        count_up(&mut shared.missed);
         shared.skip = shared.next_every.wrapping_sub(1);
         timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE1B | OCIE0));
         return;
@@ -349,7 +345,7 @@ fn TIMER1_COMPB() {
     // Until the return, so that a tick that is late already does not come in on top of this one.
     interrupt::disable();
     if lost {
-        count_missed(shared);
+        count_up(&mut shared.missed);
     }
     shared.before = shared.missed;
     shared.ready = 1;

@@ -99,7 +99,7 @@ impl Stand {
                 if !self.null.is_none() {
                     Status::Busy
                 } else if !self.bias_null.begin(
-                    asked.u16::<0>(),
+                    word(asked),
                     set_up.gyro_filter,
                     set_up.period_ticks.get(),
                 ) {
@@ -107,7 +107,7 @@ impl Stand {
                 } else if self.motor.is_on() {
                     Status::Moving
                 } else {
-                    self.null = asked.into();
+                    self.null.ask(asked);
                     return Answer::Later;
                 }
             }
@@ -116,7 +116,7 @@ impl Stand {
                 return self.on_correction(board, asked);
             }
             code::MOTOR_DUTY => {
-                let duty = asked.i16::<0>();
+                let duty = word(asked).cast_signed();
                 if !(-FULL..=FULL).contains(&duty) {
                     Status::BadArgument
                 } else if duty != 0 && !board.host_is_there() {
@@ -164,7 +164,7 @@ impl Stand {
             }
             code::SELF_TEST => return self.begin_self_test(asked),
             code::STORE_CONFIG => {
-                if self.begin_store(asked.into()) {
+                if self.begin_store(asked) {
                     return Answer::Later;
                 }
                 Status::Busy
@@ -186,7 +186,7 @@ impl Stand {
                 Status::Ok
             }
             code::SET_BOARD_ID => {
-                self.config.board_id.set(asked.u16::<0>());
+                self.config.board_id.set(word(asked));
                 self.changed(true)
             }
             // What has a code but no arm here: none.
@@ -202,10 +202,10 @@ impl Stand {
         let set_up = &mut self.config.set_up;
         match asked.code {
             code::SET_RATE => {
-                set_up.period_ticks.set(asked.u16::<0>());
+                set_up.period_ticks.set(word(asked));
                 set_up.periods_per_sample = asked.u8::<2>().max(1);
             }
-            code::SET_BAUD => set_up.baud_divisor.set(asked.u16::<0>()),
+            code::SET_BAUD => set_up.baud_divisor.set(word(asked)),
             code::SET_GYRO => {
                 (set_up.gyro_range, set_up.gyro_filter) = (asked.u8::<0>(), asked.u8::<1>())
             }
@@ -246,7 +246,7 @@ impl Stand {
                     return Answer::Now(Status::Busy);
                 }
                 self.config.set_scale_of_range();
-                self.await_job(asked);
+                self.job.ask(asked);
                 return Answer::Later;
             }
             code::SET_ACC_RANGE => board.set_acc_range(set_up.acc_range),
@@ -259,7 +259,7 @@ impl Stand {
     /// motor may turn for as long as its keep-alives come. What somebody has recorded and sends again has another's nonce.
     #[inline(never)]
     fn arm<B: Board>(&mut self, board: &mut B, asked: &Asked) -> Status {
-        let said = asked.u16::<0>();
+        let said = word(asked);
         self.miss_host(board);
         let nonce = core::mem::take(&mut self.nonce);
         if said == 0 {
@@ -317,16 +317,10 @@ impl Stand {
         done(in_range)
     }
 
-    /// The end of the work on the gyros answers this.
-    #[inline(never)]
-    fn await_job(&mut self, asked: &Asked) {
-        self.job = asked.into();
-    }
-
     /// Posts work whose end answers the request.
     fn post<B: Board>(&mut self, board: &mut B, asked: &Asked, job: Job) -> Answer {
         if self.job.is_none() && board.post(job) {
-            self.await_job(asked);
+            self.job.ask(asked);
             self.job_axis = job.axis;
             Answer::Later
         } else {
@@ -388,7 +382,7 @@ impl Stand {
         } else if !self.job.is_none() {
             Answer::Now(Status::Busy)
         } else {
-            self.await_job(asked);
+            self.job.ask(asked);
             self.job_axis = sensor;
             self.self_test = SelfTest {
                 step: step::CLEAR_STATUS,
@@ -452,6 +446,12 @@ impl Stand {
         self.misconfigured &= !(bit(self.job_axis));
         Some(end)
     }
+}
+
+/// The first two bytes of the arguments. In line they are put together where one of them is at hand, which takes more.
+#[inline(never)]
+fn word(asked: &Asked) -> u16 {
+    asked.u16::<0>()
 }
 
 fn done(in_range: bool) -> Status {

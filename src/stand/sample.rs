@@ -9,7 +9,7 @@ use super::line::SAMPLES_PER_REPORT;
 use super::{Board, SET, Stand, source};
 use crate::acquire::{Raw, Task};
 use crate::bias::{Outcome, TURNS};
-use crate::math::times;
+use crate::math::{count_up, times};
 
 /// The flags of EA begin here.
 const ERROR_SHIFT: u8 = 3;
@@ -41,7 +41,8 @@ impl Stand {
             noise ^= raw.gyro[axis as usize].bits() as u8;
             bit <<= 1;
         }
-        self.noise = wire::crc::update(self.noise, noise);
+        let sum = crate::math::somewhere(&mut self.noise);
+        *sum = wire::crc::update(*sum, noise);
         self.look_after_gyros(board, silent, (seen >> ERROR_SHIFT) as u8 & 7);
         if (self.misconfigured | self.touched) & !silent != 0 || self.setting != SET {
             seen |= flags::GYRO_MISCONFIGURED;
@@ -56,8 +57,8 @@ impl Stand {
         if self.late != 0 || !board.send(kind::SAMPLE, sample.as_bytes()) {
             self.record(Fault::FrameDropped, 0);
         } else {
-            self.since_reply = self.since_reply.saturating_add(1);
-            self.since_report = self.since_report.saturating_add(1);
+            count_up(&mut self.since_reply);
+            count_up(&mut self.since_report);
         }
         self.late = if self.since_report >= SAMPLES_PER_REPORT {
             self.owed & self.waited

@@ -60,7 +60,7 @@ impl Store {
 
 impl Stand {
     /// Starts to store the set-up; false while something is written.
-    pub(super) fn begin_store(&mut self, asked: Pending) -> bool {
+    pub(super) fn begin_store(&mut self, asked: &Asked) -> bool {
         if !self.store.is_idle() {
             return false;
         }
@@ -68,14 +68,16 @@ impl Stand {
         let store = &mut self.store;
         // The copy that is not the newest is overwritten.
         store.place = Store::slot(store.newest ^ 1);
-        (store.asked, store.at, store.is_row) = (asked, 0, false);
+        store.asked.ask(asked);
+        (store.at, store.is_row) = (0, false);
         true
     }
 
     /// Starts to write a row of a correction. Not while something is written.
     pub(super) fn begin_write(&mut self, asked: &Asked, place: u16) {
         let store = &mut self.store;
-        (store.asked, store.at, store.is_row) = (asked.into(), 0, true);
+        store.asked.ask(asked);
+        (store.at, store.is_row) = (0, true);
         store.place = place;
         let [_, row @ .., _] = asked.arguments;
         store.row = Row(row);
