@@ -40,8 +40,10 @@ pub struct Recorded {
     pub seconds: f64,
     /// As asked for, s.
     asked_s: f64,
-    /// What a record of the length asked for is too short for.
+    /// What a record of that length, s, was too short for.
     pub needed: Option<Needed>,
+    #[serde(skip)]
+    pub needed_by_s: f64,
     /// What this one is too short for.
     pub left: Option<Needed>,
     /// The heater was to be on for so long and off for so long in turn, s.
@@ -55,6 +57,7 @@ impl Recorded {
             seconds: asked_s,
             asked_s,
             needed: None,
+            needed_by_s: asked_s,
             left: None,
             heater_s: None,
         }
@@ -74,7 +77,7 @@ impl Recorded {
                 line.push_str(", as long as the second: what that can show is to be in the model");
             }
             Some(needed) => {
-                let _ = write!(line, ", because by {:.0} s {needed}", self.asked_s);
+                let _ = write!(line, ", because by {:.0} s {needed}", self.needed_by_s);
             }
         }
         if let Some(left) = &self.left {
@@ -116,13 +119,6 @@ pub struct Answer {
     pub planted: Option<Comparison>,
     first: Vec<Diagnosis>,
     second: Vec<Diagnosis>,
-}
-
-impl Cause {
-    /// Whether the bias follows the temperature.
-    pub fn is_of_temperature(&self) -> bool {
-        ["temperature", "temperature_quadratic"].contains(&self.cause.as_str())
-    }
 }
 
 /// The causes that a model has corrected, by axis.

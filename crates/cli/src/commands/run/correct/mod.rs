@@ -23,7 +23,7 @@ use model::record::Record;
 
 use super::super::outputs;
 use super::{Arguments, Outputs};
-use answer::{Answer, Cause, Recorded, corrected_causes};
+use answer::{Answer, Recorded, corrected_causes};
 use stages::{BEGIN_S, Length, Planned, REST_S};
 
 /// Causes that a stand shows only while it turns: they are taken from the record of its sway.
@@ -31,6 +31,8 @@ const OF_TURNS: [&str; 2] = ["cross_axis", "scale_error"];
 
 /// The first record becomes so many times as long as was asked for, at the most, where nobody says how long.
 const LONGEST_TIMES: f64 = 12.0;
+/// It is taken again so often at the most: once as long as the first look needs, and once more by what that shows.
+const MOST_AGAIN: usize = 2;
 
 /// The files of the loop: beside `run.csv` run-sway.csv, run-corrected.csv, run-corrected-sway.csv and run.toml.
 struct Files {
@@ -146,7 +148,11 @@ impl Loop<'_> {
         self.write(&mut taken, 0, mark)?;
         let mut found = self.diagnose(0, all)?;
         let mut recorded = Recorded::new(seconds);
-        if let Some(longer) = self.longer(&taken[0], &found, &mut recorded) {
+        // A longer record may name what needs one longer still.
+        for _ in 0..MOST_AGAIN {
+            let Some(longer) = self.longer(&taken[0], &found, &mut recorded) else {
+                break;
+            };
             first =
                 Planned::new(Length::First(longer), sways, seeds.fault).heated(recorded.heater_s);
             if let Some((board, plan, _)) = &scenarios {
@@ -157,6 +163,7 @@ impl Loop<'_> {
             self.write(&mut again, 0, mark)?;
             found.splice(..1, self.diagnose(0, 1)?);
             recorded.left = self.too_short(&again[0], &found);
+            taken.splice(..1, again);
         }
         let mut model = model_of(&found)?;
         let refused = keep_what_is_worth_it(&mut model);
@@ -224,25 +231,27 @@ impl Loop<'_> {
     }
 
     /// How long the first record has to be when it is taken again, s, as far as the user lets it: as the coefficients need, and as
-    /// long as the second one, for what that can show is to be in the model. A slope over temperature wants a heater besides.
+    /// long as the second one, for what that can show is to be in the model. A slope over temperature wants a heater.
     fn longer(&self, rest: &Taken, found: &[Found], recorded: &mut Recorded) -> Option<f64> {
         let causes = corrected_causes(&found.first()?.model);
         if self.arguments.correct_by.is_some() || causes.is_empty() {
             return None;
         }
-        let asked_s = recorded.seconds;
-        recorded.needed = self.too_short(rest, found);
-        let wanted = recorded
-            .needed
-            .as_ref()
-            .map_or(0.0, |needed| needed.seconds);
+        let (asked_s, before_s) = (self.arguments.seconds, recorded.seconds);
+        let needed = self.too_short(rest, found);
+        let wanted = needed.as_ref().map_or(0.0, |needed| needed.seconds);
         let longest = self.arguments.longest.unwrap_or(LONGEST_TIMES * asked_s);
         let second_s = Length::Second(asked_s).seconds();
-        recorded.seconds = wanted.max(second_s).min(longest).max(asked_s);
-        let is_longer = recorded.seconds > asked_s;
-        recorded.heater_s =
-            (is_longer && causes.iter().any(Cause::is_of_temperature)).then_some(HEATER_S);
-        is_longer.then_some(recorded.seconds)
+        let seconds = wanted.max(second_s).min(longest);
+        if recorded.needed.is_none() || seconds > before_s {
+            (recorded.needed, recorded.needed_by_s) = (needed, before_s);
+        }
+        if seconds <= before_s {
+            return None;
+        }
+        // A slope over temperature that this one does not show may be among what is to be known.
+        (recorded.seconds, recorded.heater_s) = (seconds, Some(HEATER_S));
+        Some(seconds)
     }
 
     /// What a record at rest is too short for.
