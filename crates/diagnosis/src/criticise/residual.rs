@@ -9,7 +9,7 @@ use numerics::tails::{chi_tail, kurtosis_score, normal_tail};
 mod dependence;
 
 pub(crate) use dependence::{
-    Repeats, bicovariance, neighbours, period, repeats, three_readings, variance_rhythm,
+    Repeats, bicovariance, neighbours, repeats, three_readings, variance_rhythm,
 };
 
 /// Lags of the Ljung-Box statistic.
@@ -30,7 +30,7 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64, step: f64) -> Vec<Outcome> {
         dependence::three_readings(e),
         dependence::neighbours(e, step),
         dependence::variance_rhythm(e, rate_hz),
-        period(e, rate_hz),
+        dependence::period(e, rate_hz),
     ]
 }
 
@@ -313,7 +313,7 @@ pub(crate) fn excess_kurtosis(e: &[f64]) -> f64 {
     sum_of(e, |v| v.powi(4)) / n / (m2 * m2) - 3.0
 }
 
-pub(crate) fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
+fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
     let n = e.len() as f64;
     let excess = excess_kurtosis(e);
     let far = (0..e.len())
@@ -360,7 +360,7 @@ pub(crate) fn skewness_of(e: &[f64]) -> f64 {
     moment(3) / moment(2).powf(1.5)
 }
 
-pub(crate) fn skewness(e: &[f64]) -> Outcome {
+fn skewness(e: &[f64]) -> Outcome {
     let n = e.len() as f64;
     let skewness = skewness_of(e);
     Outcome {

@@ -7,13 +7,16 @@
 
 use std::f64::consts::PI;
 
+use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use super::band_source::{Moves, beyond, chance, in_cells, stands_out};
+use super::band_source::{Moves, beyond, chance, in_cells};
 use crate::test_level::{CheckId, Outcome};
 
 /// Powers at which the phases of two bands may be locked: harmonics up to the third.
 const LOCKED: [(i32, i32); 6] = [(2, 1), (1, 2), (3, 1), (1, 3), (3, 2), (2, 3)];
+/// Frequencies either side that are the neighbourhood of the mean, without the next ones.
+const BESIDE: usize = 24;
 
 /// A product of envelopes over the record in `n` values, turned back by what their places differ by in coefficients.
 pub(super) fn between(
@@ -25,6 +28,18 @@ pub(super) fn between(
     (0..n)
         .map(|i| product(i) * Complex::from_polar(1.0, back * i as f64))
         .collect()
+}
+
+/// Chance that the mean of a series stands out of its spectrum as well, and the size of its sum.
+pub(super) fn stands_out(mut product: Vec<Complex<f64>>) -> (f64, f64) {
+    let n = product.len();
+    FftPlanner::new().plan_fft_forward(n).process(&mut product);
+    let beside = (2..=BESIDE).flat_map(|d| [d, n - d]);
+    let count = 2.0 * (BESIDE as f64 - 1.0);
+    let mean = beside.map(|d| product[d].norm_sqr()).sum::<f64>() / count;
+    // The chance of an exponential value over the mean of `count` others.
+    let ratio = product[0].norm_sqr() / mean.max(f64::MIN_POSITIVE);
+    ((-count * (ratio / count).ln_1p()).exp(), product[0].norm())
 }
 
 /// Chance that the phases of two bands are locked as well at these powers; none where they lie elsewhere.

@@ -10,8 +10,8 @@ use std::ops::{Range, RangeInclusive};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use super::band_alone::between;
-use super::band_source::{Moves, stands_out};
+use super::band_alone::{between, stands_out};
+use super::band_source::Moves;
 use super::envelope::envelope_of;
 
 /// Harmonics that are asked for.

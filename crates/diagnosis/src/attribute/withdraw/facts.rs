@@ -140,10 +140,6 @@ impl<'a> Facts<'a> {
         (self.failing)(id)
     }
 
-    pub(super) fn rate_hz(&self) -> f64 {
-        self.s.search.view.rate_hz
-    }
-
     /// Of a longer record what is left counts by what one of ten minutes would show.
     pub(super) fn shown(&self) -> f64 {
         (RECORD / self.s.search.panel.bins.n as f64).min(1.0)

@@ -239,9 +239,7 @@ pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
             || f.left_where_it_acts(t.term, t.own, lr)
             || t.term.peak().is_some_and(|p| wide(&p))
             || crowded(f)
-            || f.failure_is_of(t.term)
-            || f.is_of_another_axis(t.term)
-            || f.is_told_by_a_channel(t.term);
+            || f.is_of_another_axis(t.term);
         return match f.beside_follower(t.term) {
             _ if falls => Doubt::Checks,
             Some((id, share)) => Doubt::Remainder(id, share),

@@ -407,7 +407,7 @@ pub(crate) fn repeats(e: &[f64]) -> Option<Repeats> {
 }
 
 /// What repeats itself every few samples, whatever its shape: each of its harmonics may be too weak for a line.
-pub(crate) fn period(e: &[f64], rate_hz: f64) -> Outcome {
+pub(super) fn period(e: &[f64], rate_hz: f64) -> Outcome {
     let Some(found) = repeats(e) else {
         return Outcome {
             id: CheckId::Period,
