@@ -93,6 +93,13 @@ impl Known {
     }
 }
 
+/// What the first history tells.
+struct First {
+    planned: Planned,
+    found: Vec<Found>,
+    recorded: Recorded,
+}
+
 struct Loop<'a> {
     arguments: &'a Arguments,
     files: Files,
@@ -131,40 +138,23 @@ impl Loop<'_> {
         let sways =
             matches!(&bench, Bench::Simulated(_, plan) if plan.run.scenario.base.sway_deg != 0.0);
         let seconds = self.arguments.seconds;
-        let mut first = Planned::new(Length::First(seconds), sways, seeds.fault);
+        let planned = Planned::new(Length::First(seconds), sways, seeds.fault);
         let second = Planned::new(Length::Second(seconds), sways, again);
 
         let (mut link, scenarios) = match bench {
             Bench::Port(link) => (*link, None),
             Bench::Simulated(board, plan) => {
-                let one = first.scenario(&plan.run.scenario);
+                let one = planned.scenario(&plan.run.scenario);
                 let two = second.scenario(&another_history(&plan.run.scenario, again));
                 (simulated(board, one), Some((board, plan, two)))
             }
         };
-        let mark = scenarios.is_some();
-        let all = first.courses.len();
-        let mut taken = self.take(&mut link, &first, all)?;
-        self.write(&mut taken, 0, mark)?;
-        let mut found = self.diagnose(0, all)?;
-        let mut recorded = Recorded::new(seconds);
-        // A longer record may name what needs one longer still.
-        for _ in 0..MOST_AGAIN {
-            let Some(longer) = self.longer(&taken[0], &found, &mut recorded) else {
-                break;
-            };
-            first =
-                Planned::new(Length::First(longer), sways, seeds.fault).heated(recorded.heater_s);
-            if let Some((board, plan, _)) = &scenarios {
-                link = simulated(board, first.scenario(&plan.run.scenario));
-            }
-            // What the sway tells is known already.
-            let mut again = self.take(&mut link, &first, 1)?;
-            self.write(&mut again, 0, mark)?;
-            found.splice(..1, self.diagnose(0, 1)?);
-            recorded.left = self.too_short(&again[0], &found);
-            taken.splice(..1, again);
-        }
+        let stand = scenarios.as_ref().map(|(board, plan, _)| (*board, *plan));
+        let First {
+            planned: first,
+            found,
+            recorded,
+        } = self.first(&mut link, planned, stand)?;
         let mut model = model_of(&found)?;
         let refused = keep_what_is_worth_it(&mut model);
         super::super::write(&self.files.model, &model.to_toml())?;
@@ -185,9 +175,9 @@ impl Loop<'_> {
         })?;
         proposed.write(&mut link)?;
         proposed.board.notes.extend(refused);
-        let mut taken = self.take(&mut link, &second, all)?;
+        let mut taken = self.take(&mut link, &second, second.courses.len())?;
         drop(link);
-        self.write(&mut taken, 1, mark)?;
+        self.write(&mut taken, 1, scenarios.is_some())?;
         let known = (scenarios.as_ref())
             .map(|(board, _, two)| self.known(board, &second, two, &model, seeds.stand))
             .transpose()?;
@@ -228,6 +218,42 @@ impl Loop<'_> {
         super::super::write_json(self.arguments.json.as_ref(), &answer)?;
         self.say(&answer);
         Ok(())
+    }
+
+    /// Takes the first history and diagnoses it; its record at rest again, as long as the one before it asks for.
+    fn first(
+        &self,
+        link: &mut Link,
+        mut planned: Planned,
+        stand: Option<(&Board, &Plan)>,
+    ) -> Result<First> {
+        let mark = stand.is_some();
+        let all = planned.courses.len();
+        let mut taken = self.take(link, &planned, all)?;
+        self.write(&mut taken, 0, mark)?;
+        let mut found = self.diagnose(0, all)?;
+        let mut recorded = Recorded::new(self.arguments.seconds);
+        // A longer record may name what needs one longer still.
+        for _ in 0..MOST_AGAIN {
+            let Some(longer) = self.longer(&taken[0], &found, &mut recorded) else {
+                break;
+            };
+            planned = planned.again(longer, recorded.heater_s);
+            if let Some((board, plan)) = stand {
+                *link = simulated(board, planned.scenario(&plan.run.scenario));
+            }
+            // What the sway tells is known already.
+            let mut again = self.take(link, &planned, 1)?;
+            self.write(&mut again, 0, mark)?;
+            found.splice(..1, self.diagnose(0, 1)?);
+            recorded.left = self.too_short(&again[0], &found);
+            taken.splice(..1, again);
+        }
+        Ok(First {
+            planned,
+            found,
+            recorded,
+        })
     }
 
     /// How long the first record has to be when it is taken again, s, as far as the user lets it: as the coefficients need, and as

@@ -41,6 +41,7 @@ pub struct Planned {
     pub courses: Vec<(&'static str, Course)>,
     /// The heater, where there is one, is on for so long and off for so long in turn, s; else it does as it likes.
     pub heater_s: Option<f64>,
+    seed: u64,
 }
 
 impl Planned {
@@ -62,13 +63,14 @@ impl Planned {
         Self {
             courses: [("at rest", rest)].into_iter().chain(sway).collect(),
             heater_s: None,
+            seed,
         }
     }
 
-    /// With a heater that is switched, on for so long and off for so long, s.
-    pub fn heated(mut self, heater_s: Option<f64>) -> Self {
-        self.heater_s = heater_s;
-        self
+    /// The same history with its record at rest longer, and the heater switched.
+    pub fn again(&self, seconds: f64, heater_s: Option<f64>) -> Self {
+        let longer = Self::new(Length::First(seconds), self.courses.len() > 1, self.seed);
+        Self { heater_s, ..longer }
     }
 
     /// The rest at the begin of a record, s.
