@@ -1,5 +1,6 @@
 //! What is a piece of something without a name has none itself: the first harmonic of what repeats itself in another shape than a
-//! sine, the largest of many strokes, the band of a mode that an acceleration or another axis drives, noise that a line swells.
+//! sine, the largest of many strokes, the band of a mode that an acceleration or another axis drives, a tone that the command shifts,
+//! noise that a line swells.
 
 mod graded;
 
@@ -13,6 +14,9 @@ use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
 
 /// Rate of the records.
 const RATE_HZ: f64 = 20.0;
+
+/// Full duty, counts.
+const FULL: f64 = 100.0;
 
 fn between(low: f64, high: f64, rng: &mut impl Rng) -> f64 {
     Uniform::new(low, high).expect("a range").sample(rng)
@@ -108,6 +112,30 @@ fn a_mode_that_another_axis_drives_is_none_of_this_one() {
         let course = rung(&other.expect("an axis").values.clone(), mode);
         add(&mut r, "gyro_x", |i| 0.15 * course[i]);
         no_band(&told(&r), || format!("{mode:?}"))
+    });
+}
+
+#[test]
+fn a_tone_whose_phase_the_command_shifts_is_no_wandering_line() {
+    graded("a phase behind the command", |run, rng| {
+        let mut r = record(&[], 7600 + run);
+        let (pitch_hz, late) = (between(0.5, 8.0, rng), between(4.0, 10.0, rng));
+        let mut left = 0;
+        let mut level = 0.0;
+        let commands = r.channels.iter_mut().find(|c| c.quantity == Quantity::Pwm);
+        let commands = commands.expect("a command");
+        for v in &mut commands.values {
+            if left == 0 {
+                left = (between(5.0, 20.0, rng) * RATE_HZ) as usize;
+                level = between(-1.0, 1.0, rng);
+            }
+            left -= 1;
+            *v = (FULL * level).round();
+        }
+        let duty = values(&r, Quantity::Pwm);
+        let phase = |i: usize| TAU * pitch_hz * i as f64 / RATE_HZ + late * (duty[i] / FULL).abs();
+        add(&mut r, "gyro_x", |i| 0.2 * phase(i).cos());
+        no_band(&told(&r), || format!("{pitch_hz} Hz, {late} rad"))
     });
 }
 

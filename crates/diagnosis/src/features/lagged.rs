@@ -5,9 +5,10 @@
 //! alone are points of it. Vibration has no time constant that fits a few samples; there it is any response of that
 //! many of them.
 
+use std::f64::consts::PI;
 use std::rc::Rc;
 
-use model::effect::{Signal, View};
+use model::effect::{Signal, View, extremes};
 use model::record::Quantity;
 
 use numerics::column::LONG;
@@ -31,6 +32,8 @@ const GATES: [f64; 3] = [0.02, 0.25, 0.5];
 const SENSE_S: [f64; 4] = [0.05, 0.5, 2.0, 8.0];
 /// Places of bends, as shares of what a signal spans.
 const BENDS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
+/// Half waves over what a level spans, of any phase by two neighbours.
+const HALF_WAVES: usize = 24;
 /// Samples over which a response to vibration may go on, and that of a long record.
 const SAMPLES: usize = 6;
 const SAMPLES_OF_LONG: usize = 3;
@@ -208,6 +211,22 @@ fn bent<'a>(f: Rc<Followed<'a>>) -> Columns<'a> {
         f.scaled.iter().map(|v| (v - at).max(0.0)).collect()
     });
     Box::new(powers.chain(drift).chain(bends))
+}
+
+/// What goes up and down over what a level spans, of no use to a response that is nearly straight: a table of steps makes a
+/// saw-tooth of it, light that interferes a wave.
+pub(crate) fn in_waves(signal: &Signal) -> Departure<'_> {
+    let [low, high] = extremes(&signal.smooth);
+    let wave = move |half: usize| {
+        let turn = PI * half as f64 / (high - low);
+        (signal.smooth.iter())
+            .map(|v| (turn * (v - low)).cos())
+            .collect()
+    };
+    Departure {
+        how: "in waves of its level",
+        columns: Box::new((1..=HALF_WAVES).map(wave)),
+    }
 }
 
 fn late<'a>(f: Rc<Followed<'a>>) -> Columns<'a> {

@@ -5,8 +5,8 @@
 //! by the mean pitch, its pitch. Both are regressed on each recorded course, on its square, and for a command on what rings
 //! after each change of it; so are the squared changes of z, as a command that shifts its phase makes it jump. The scatter of a coefficient is that of the residual at the frequencies where the course moves.
 //!
-//! What drives a mode may be recorded, too: then z is coherent with the envelope of that at the same place, whatever the mode
-//! makes of its phase.
+//! What drives a mode may be recorded, too, or make a period that wanders: then z is coherent with the envelope of that at the same
+//! place, whatever comes between makes of its phase.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -64,6 +64,15 @@ fn rung(course: &[f64], keep: f64) -> Vec<f64> {
             level
         })
         .collect()
+}
+
+/// Where a course changes, in cells of an envelope: a shift of phase shows in the differences to either neighbour, however large.
+fn switched(values: &[f64], cells: usize) -> Vec<f64> {
+    let changes = values.windows(2).map(|w| f64::from(u8::from(w[1] != w[0])));
+    let in_cells = in_cells(&changes.chain([0.0]).collect::<Vec<_>>(), cells);
+    let near = |i: usize| &in_cells[i.saturating_sub(1)..(i + 2).min(cells)];
+    let any = |i| near(i).iter().any(|c| *c > 0.0);
+    (0..cells).map(|i| f64::from(u8::from(any(i)))).collect()
 }
 
 /// Energies of a series by frequency.
@@ -186,6 +195,7 @@ pub(super) fn claim(
         all.extend([(s.name.as_str(), first), (&s.name, square)]);
         if s.quantity == Quantity::Pwm {
             all.push((&s.name, beyond(rung(&plain, keep), &[])));
+            all.push((&s.name, beyond(switched(&s.values, cells), &[])));
         }
     }
     let mut asked = 0;

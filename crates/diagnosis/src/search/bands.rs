@@ -20,6 +20,7 @@ use crate::fit::channel::{Cluster, Form, State, Term};
 use crate::fit::likelihood::{Bins, Noise};
 use crate::fit::scan::residual;
 use crate::fit::threshold;
+use crate::ingest::motion::drives;
 
 /// Nats by which another shape of a peak has to be ahead of the plain one: 95 % of a plain one's shapes are not, by the chi-square
 /// of the one degree that they differ by.
@@ -245,9 +246,12 @@ impl Search<'_> {
         let clusters = Self::clusters(state);
         let bands: Vec<Option<(Band, usize)>> =
             clusters.iter().map(|c| self.band(state, c)).collect();
-        let shaken =
-            (self.view.signals.iter()).filter(|s| s.quantity == Quantity::Acc && !bands.is_empty());
-        let felt = shaken.map(|s| (s.name.as_str(), self.panel.dct.forward(&s.values)));
+        let recorded = self.view.signals.iter().filter(|_| !bands.is_empty());
+        let courses = recorded.filter_map(|s| match s.quantity {
+            Quantity::Acc => Some((s, &s.values)),
+            quantity => drives(quantity).then_some((s, &s.smooth)),
+        });
+        let felt = courses.map(|(s, values)| (s.name.as_str(), self.panel.dct.forward(values)));
         let felt: Vec<(&str, Vec<f64>)> = felt.collect();
         let moves: Vec<Option<Moves>> = (bands.iter())
             .map(|b| b.as_ref().and_then(|(band, from)| Moves::of(band, *from)))

@@ -85,7 +85,9 @@ fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked>
     own.sort_unstable();
     own.dedup();
     let beside = Beside::new(panel, &g, &own);
-    let asked = lagged::departures(&search.view, signal);
+    let is_level = signal.quantity != Quantity::Pwm;
+    let waves = is_level.then(|| lagged::in_waves(signal));
+    let asked = lagged::departures(&search.view, signal).chain(waves);
     let asked = asked.map(|Departure { how, columns }| {
         let (chi_square, degrees) = beside.gain_of(columns);
         Asked {
