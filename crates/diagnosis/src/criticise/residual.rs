@@ -9,7 +9,7 @@ use numerics::tails::{chi_tail, kurtosis_score, normal_tail};
 mod dependence;
 
 pub(crate) use dependence::{
-    Repeats, bicovariance, neighbours, repeats, three_readings, variance_rhythm,
+    Repeats, bicovariance, neighbours, repeats, rhythm_in_samples, three_readings, variance_rhythm,
 };
 
 /// Lags of the Ljung-Box statistic.

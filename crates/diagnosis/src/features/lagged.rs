@@ -30,6 +30,8 @@ const TURNING_S: [f64; 2] = [0.8, 3.2];
 /// apart.
 const GATES: [f64; 3] = [0.02, 0.25, 0.5];
 const SENSE_S: [f64; 4] = [0.05, 0.5, 2.0, 8.0];
+/// Memories of what shakes, s, a factor of four apart.
+const SHAKEN_S: [f64; 4] = [0.5, 2.0, 8.0, 32.0];
 /// Places of bends, as shares of what a signal spans.
 const BENDS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// Half waves over what a level spans, of any phase by two neighbours.
@@ -227,6 +229,34 @@ pub(crate) fn in_waves(signal: &Signal) -> Departure<'_> {
         how: "in waves of its level",
         columns: Box::new((1..=HALF_WAVES).map(wave)),
     }
+}
+
+/// How much the accelerometers shake, of late: the mean square of all of them, and the largest, which fades.
+pub(crate) fn shaking<'a>(view: &'a View<'_>) -> Option<Departure<'a>> {
+    let mut squares = vec![];
+    for a in accelerations(view) {
+        let own = centred(&a.values).into_iter().map(|v| v * v);
+        match squares.is_empty() {
+            true => squares.extend(own),
+            false => squares.iter_mut().zip(own).for_each(|(s, v)| *s += v),
+        }
+    }
+    let any = !squares.is_empty();
+    let columns = move || {
+        resolved(view, &SHAKEN_S).flat_map(move |t| {
+            let fade = (-1.0 / (t * view.rate_hz)).exp();
+            let mut held = 0.0;
+            let largest = squares.iter().map(|s: &f64| {
+                held = s.sqrt().max(fade * held);
+                held
+            });
+            [largest.collect(), lagged(&squares, t * view.rate_hz)]
+        })
+    };
+    any.then(|| Departure {
+        how: "by how much they shake",
+        columns: Box::new(columns()),
+    })
 }
 
 fn late<'a>(f: Rc<Followed<'a>>) -> Columns<'a> {

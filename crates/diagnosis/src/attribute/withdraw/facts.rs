@@ -160,12 +160,18 @@ impl<'a> Facts<'a> {
         self.crowds.iter().any(|p| in_place(p, omega))
     }
 
-    /// Whether a line is a harmonic of what repeats itself, to a coefficient.
+    /// Whether a line is a harmonic of what repeats itself, in its mean or in its variance, to a coefficient.
     pub(super) fn harmonic(&self, omega: f64) -> bool {
         let n = self.s.search.panel.bins.n as f64;
-        self.repeats.as_ref().is_some_and(|r| {
-            let tooth = omega * r.period as f64 / (2.0 * PI);
-            (tooth - tooth.round()).abs() * 2.0 * n / (r.period as f64) < 1.0
+        let of_mean = self.repeats.as_ref().map(|r| r.period);
+        let of_variance = || {
+            let swings = self.fails(CheckId::VarianceRhythm);
+            swings.then(|| residual::rhythm_in_samples(&self.s.e))?
+        };
+        let periods = of_mean.into_iter().chain(of_variance());
+        periods.into_iter().any(|period| {
+            let tooth = omega * period as f64 / (2.0 * PI);
+            (tooth - tooth.round()).abs() * 2.0 * n / (period as f64) < 1.0
         })
     }
 

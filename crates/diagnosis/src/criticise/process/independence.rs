@@ -20,8 +20,8 @@ use numerics::tails::chi_tail;
 
 /// What columns of one kind explain beside all that the library has of a channel.
 struct Asked {
-    /// Name of the channel.
-    channel: String,
+    /// Names of the channels.
+    about: Vec<String>,
     how: String,
     chi_square: f64,
     degrees: usize,
@@ -45,9 +45,10 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<(&'static 
     if processes().next().is_none() {
         return vec![];
     }
-    let asked: Vec<Asked> = recorded(search)
+    let mut asked: Vec<Asked> = recorded(search)
         .flat_map(|signal| of_channel(search, state, signal))
         .collect();
+    asked.extend(of_shaking(search, state));
     let Some(most) = asked.iter().min_by(|a, b| a.chance.total_cmp(&b.chance)) else {
         return vec![];
     };
@@ -55,7 +56,7 @@ pub(crate) fn of_processes(search: &Search<'_>, state: &State) -> Vec<(&'static 
         let id = t.effect.id();
         let outcome = Outcome {
             id: CheckId::ProcessSource,
-            about: vec![most.channel.clone()],
+            about: most.about.clone(),
             statistic: most.chi_square,
             p_value: (most.chance * asked.len() as f64).min(1.0),
             what: format!(
@@ -84,19 +85,35 @@ fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked>
     own.extend(of_it.flat_map(Candidate::all_columns));
     own.sort_unstable();
     own.dedup();
-    let beside = Beside::new(panel, &g, &own);
     let is_level = signal.quantity != Quantity::Pwm;
     let waves = is_level.then(|| lagged::in_waves(signal));
-    let asked = lagged::departures(&search.view, signal).chain(waves);
-    let asked = asked.map(|Departure { how, columns }| {
-        let (chi_square, degrees) = beside.gain_of(columns);
-        Asked {
-            channel: signal.name.clone(),
-            how: format!("{} {how}", signal.name),
-            chi_square,
-            degrees,
-            chance: chi_tail(chi_square / WIDENED, degrees as f64),
-        }
-    });
+    let departures = lagged::departures(&search.view, signal).chain(waves);
+    let beside = Beside::new(panel, &g, &own);
+    let asked =
+        departures.map(|departure| ask(&beside, std::slice::from_ref(&signal.name), departure));
     asked.filter(|a| a.degrees > 0).collect()
+}
+
+/// How much the accelerometers shake, asked in the same way.
+fn of_shaking(search: &Search<'_>, state: &State) -> Option<Asked> {
+    let panel = &search.panel;
+    let g = state.noise.over(&panel.bins);
+    let shaking = lagged::shaking(&search.view)?;
+    let names = search.view.all(Quantity::Acc).map(|a| a.name.clone());
+    let names: Vec<String> = names.collect();
+    let beside = Beside::new(panel, &g, &state.columns());
+    let asked = ask(&beside, &names, shaking);
+    (asked.degrees > 0).then_some(asked)
+}
+
+fn ask(beside: &Beside<'_>, channels: &[String], departure: Departure<'_>) -> Asked {
+    let Departure { how, columns } = departure;
+    let (chi_square, degrees) = beside.gain_of(columns);
+    Asked {
+        about: channels.to_vec(),
+        how: format!("{} {how}", channels.join(", ")),
+        chi_square,
+        degrees,
+        chance: chi_tail(chi_square / WIDENED, degrees as f64),
+    }
 }

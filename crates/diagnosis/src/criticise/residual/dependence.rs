@@ -269,19 +269,52 @@ fn strongest_line(series: &[f64], fft: &mut Option<RealFft>) -> Option<(f64, f64
     Some((most / level, 0.5 * at as f64 / n as f64, count))
 }
 
+/// The strongest line of the products up to a span.
+struct Rhythm {
+    span: usize,
+    /// Chi-square, two degrees.
+    statistic: f64,
+    /// Cycles per sample.
+    at: f64,
+    /// At how many frequencies of all spans one was sought.
+    count: usize,
+}
+
+fn rhythm(e: &[f64]) -> Option<Rhythm> {
+    let mut fft = None;
+    let of_span = |span: &usize| {
+        // Of a long record as many products of every span.
+        let e = &e[..e.len().min(MOST + span)];
+        let (statistic, at, count) = strongest_line(&products_about(e, *span), &mut fft)?;
+        let count = count * SPANS.len();
+        Some(Rhythm {
+            span: *span,
+            statistic,
+            at,
+            count,
+        })
+    };
+    let all = SPANS.iter().filter_map(of_span);
+    all.max_by(|a, b| a.statistic.total_cmp(&b.statistic))
+}
+
+/// Of how many whole samples the period of the rhythm of the variance is, where it is of so many.
+pub(crate) fn rhythm_in_samples(e: &[f64]) -> Option<usize> {
+    let cycles = rhythm(e)?.at;
+    let whole = |m: &usize| (cycles - (cycles * *m as f64).round() / *m as f64).abs();
+    (2..=LONGEST_RHYTHM).find(|m| whole(m) * (e.len().min(MOST) as f64) < 1.0)
+}
+
 /// A rhythm of the variance, or of how neighbours depend on each other: the strongest line of the squares of the whitened
 /// residual, or of its products. What is held, switched or coded by a clock of its own has one.
 pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
-    let mut fft = None;
-    let found = SPANS
-        .iter()
-        .filter_map(|span| {
-            // Of a long record as many products of every span.
-            let e = &e[..e.len().min(MOST + span)];
-            Some((*span, strongest_line(&products_about(e, *span), &mut fft)?))
-        })
-        .max_by(|a, b| a.1.0.total_cmp(&b.1.0));
-    let Some((span, (statistic, at, count))) = found else {
+    let Some(Rhythm {
+        span,
+        statistic,
+        at,
+        count,
+    }) = rhythm(e)
+    else {
         return Outcome {
             id: CheckId::VarianceRhythm,
             about: vec![],
@@ -299,11 +332,13 @@ pub(crate) fn variance_rhythm(e: &[f64], rate_hz: f64) -> Outcome {
         id: CheckId::VarianceRhythm,
         about: vec![],
         statistic,
-        p_value: (chi_tail(statistic, 2.0) * (count * SPANS.len()) as f64).min(1.0),
+        p_value: (chi_tail(statistic, 2.0) * count as f64).min(1.0),
         what: format!("lines {of}; {:.4} Hz stands out most", at * rate_hz),
     }
 }
 
+/// Longest period of a rhythm that is told as one of whole samples: of longer ones some lie near any frequency.
+const LONGEST_RHYTHM: usize = 64;
 /// Longest period, samples, and fewest of them in the record.
 const LONGEST: usize = 512;
 const FEWEST: usize = 8;
