@@ -60,6 +60,25 @@ fn the_gates_own_edge_is_inside() {
     }
 }
 
+/// The noise that a filter goes by ends at a fourth and at four times what was told, and says so there.
+#[test]
+fn the_noise_ends_at_a_fourth_and_at_four_times() {
+    for (sigmas, variance) in [(0.0, 0.25), (3.9, 4.0)] {
+        let mut axis = Axis {
+            noise: 0,
+            trusted: true,
+        };
+        let mut state = 0;
+        for _ in 0..500 {
+            let told = f64::from(TOLD) / 262_144.0 * (1.0 + f64::from(axis.noise) / 256.0);
+            let mean = (sigmas * told.sqrt() * Q20) as i32;
+            state = axis.measure(mean, TOLD, &mut I32::new(0), &mut U16::new(u16::MAX));
+        }
+        assert_eq!(1.0 + f64::from(axis.noise) / 256.0, variance);
+        assert_eq!(state, FILTERED | NOISE_OFF);
+    }
+}
+
 /// Where next to nothing is known a mean of any size is, and is taken nearly whole.
 #[test]
 fn a_filter_that_knows_little_takes_what_it_sees() {

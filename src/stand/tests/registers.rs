@@ -102,12 +102,10 @@ fn a_register_written_by_hand_takes_its_gyro_out_of_order_until_it_is_set_up_ane
     }
 }
 
-#[test]
-fn a_row_is_read_of_the_copy_that_is_asked_for_and_written_to_the_one_that_is_not_in_use() {
-    use crate::correction::COPIES;
-    // Two copies that differ in every number; the second is the newer one.
+/// A board that stores a correction in each of its copies, which differ in every number; the second is the newer one.
+fn with_two_corrections() -> Board {
     let mut board = Board::new();
-    for (copy, at) in COPIES.into_iter().enumerate() {
+    for (copy, at) in crate::correction::COPIES.into_iter().enumerate() {
         let mut numbers: wire::correction::Numbers =
             std::array::from_fn(|n| (100 * copy + n) as i16);
         numbers[0] = i16::from_le_bytes([wire::correction::FORMAT, copy as u8]);
@@ -115,6 +113,28 @@ fn a_row_is_read_of_the_copy_that_is_asked_for_and_written_to_the_one_that_is_no
         bytes.extend(wire::crc::crc32c(&bytes).to_le_bytes());
         board.eeprom[usize::from(at)..usize::from(at) + bytes.len()].copy_from_slice(&bytes);
     }
+    board
+}
+
+#[test]
+fn a_correction_is_switched_on_where_one_is_stored_and_off_anywhere() {
+    for (mut board, in_use, on) in [
+        (Board::new(), 0, Status::NoConfig),
+        (with_two_corrections(), 2, Status::Ok),
+    ] {
+        let mut stand = booted(&mut board);
+        for (on, used, status) in [(false, 0, Status::Ok), (true, in_use, on)] {
+            ask(&mut stand, &mut board, Command::Correction { on });
+            assert_eq!(last_reply(&board).status, status);
+            assert_eq!(stand.correction.in_use(), used);
+        }
+    }
+}
+
+#[test]
+fn a_row_is_read_of_the_copy_that_is_asked_for_and_written_to_the_one_that_is_not_in_use() {
+    use crate::correction::COPIES;
+    let mut board = with_two_corrections();
     let mut stand = booted(&mut board);
     for (other, begins) in [(false, 103), (true, 3)] {
         ask(
