@@ -218,7 +218,12 @@ fn signals(world: &World) -> Vec<Signal> {
     let in_si = |g: &[f64]| -> Vec<f64> { g.iter().map(|g| g * STANDARD_GRAVITY).collect() };
     let [x, y, z] = world.acc.each_ref().map(|a| in_si(a));
     vec![
-        signal("temp_z", Quantity::Temp, Some(Axis::Z), temperature),
+        signal(
+            "the temperature",
+            Quantity::Temp,
+            Some(Axis::Z),
+            temperature,
+        ),
         signal("supply", Quantity::Supply, None, &world.supply),
         signal("pwm", Quantity::Pwm, None, &command),
         signal("acc_x", Quantity::Acc, Some(Axis::X), &x),

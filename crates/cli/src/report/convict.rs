@@ -24,12 +24,18 @@ pub(super) fn figures(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError>
     let diagnosed = subject.diagnosed;
     let mut without = None;
     let mut out = vec![];
+    let mut drawn: Vec<&Evidence> = vec![];
     for finding in &diagnosed.diagnosis.findings {
         let own: Vec<&Evidence> = (diagnosed.evidence.iter())
             .filter(|e| e.cause == finding.cause && finding.channels.contains(&e.channel))
             .filter(|e| fits(e))
             .collect();
+        // Of two steps of one axis each has its figure once.
         for evidence in &own {
+            if drawn.iter().any(|d| std::ptr::eq(*d, *evidence)) {
+                continue;
+            }
+            drawn.push(evidence);
             out.push(captioned(
                 &standalone::figure(evidence),
                 &evidence.title,

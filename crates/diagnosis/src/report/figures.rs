@@ -182,16 +182,49 @@ fn blocks(values: &[f64], count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// One figure for each term of a channel.
+/// The figures of the terms of a channel: one for each, and one for those of an effect that follow the same channel.
 pub(crate) fn of_channel(s: &Searched<'_>, grid: &Grid) -> Vec<Evidence> {
     // A band is shown once, with all that it is made of.
     let named = |t: &&Term| t.effect.id() != crate::fit::channel::ID && !t.is_part();
-    s.state
-        .terms
-        .iter()
-        .filter(named)
-        .map(|t| of_term(s, grid, t))
-        .collect()
+    let named: Vec<&Term> = s.state.terms.iter().filter(named).collect();
+    let over = |t: &Term| {
+        let followed = grid.signals.iter();
+        followed
+            .map(|g| &g.name)
+            .find(|g| t.follows.as_ref() == Some(*g))
+    };
+    let together = |a: &Term, b: &Term| {
+        let same = a.effect.id() == b.effect.id() && over(a) == over(b);
+        std::ptr::eq(a, b) || same && over(a).is_some() && is_course(a) && is_course(b)
+    };
+    let mut all: Vec<Evidence> = vec![];
+    for (i, term) in named.iter().enumerate() {
+        if named[..i].iter().any(|before| together(before, term)) {
+            continue;
+        }
+        let terms: Vec<&Term> = named
+            .iter()
+            .copied()
+            .filter(|t| together(term, t))
+            .collect();
+        all.push(of_terms(s, grid, &terms));
+    }
+    let titles: Vec<String> = all.iter().map(|e| e.title.clone()).collect();
+    for evidence in &mut all {
+        if titles.iter().filter(|t| **t == evidence.title).count() > 1 {
+            let by = evidence.x_label.split(',').next().unwrap_or_default();
+            evidence.title = format!("{}, by {by}", evidence.title);
+        }
+    }
+    all
+}
+
+/// Whether a term is seen in the rate itself, and not in a spectrum.
+fn is_course(term: &Term) -> bool {
+    !matches!(
+        term.form,
+        Form::Covariance(..) | Form::Line(_) | Form::SideBands(..)
+    )
 }
 
 fn series(label: &str, style: SeriesStyle, x: Vec<f64>, y: Vec<f64>) -> Series {
@@ -203,14 +236,11 @@ fn series(label: &str, style: SeriesStyle, x: Vec<f64>, y: Vec<f64>) -> Series {
     }
 }
 
-fn of_term(s: &Searched<'_>, grid: &Grid, term: &Term) -> Evidence {
-    let panel = &s.search.panel;
-    let others: Vec<&Term> = s
-        .state
-        .terms
-        .iter()
-        .filter(|t| t.columns != term.columns)
-        .collect();
+/// Terms that are seen in one figure, of which the first one says how.
+fn of_terms(s: &Searched<'_>, grid: &Grid, terms: &[&Term]) -> Evidence {
+    let term = terms[0];
+    let own = |t: &Term| terms.iter().any(|o| o.columns == t.columns);
+    let others: Vec<&Term> = s.state.terms.iter().filter(|t| !own(t)).collect();
     let unit = &s.target.unit;
     let mut evidence = Evidence {
         cause: term.effect.id().into(),
@@ -241,49 +271,51 @@ fn of_term(s: &Searched<'_>, grid: &Grid, term: &Term) -> Evidence {
             let seen = beside(s, &other);
             peak(s, grid, term, *omega, *apart, &seen, &mut evidence);
         }
-        _ => {
-            let seen = beside(s, &others);
-            let fitted = modelled(panel, &s.state, &[term]);
-            let count = BLOCKS.min(seen.len() / 4);
-            let followed = term
-                .follows
-                .as_ref()
-                .and_then(|f| grid.signals.iter().find(|g| g.name == *f));
-            let (x, order) = match followed {
-                Some(signal) => {
-                    evidence.x_label = if signal.unit.is_empty() || signal.unit == "1" {
-                        signal.name.clone()
-                    } else {
-                        format!("{}, {}", signal.name, signal.unit)
-                    };
-                    let x = blocks(&signal.smooth, count);
-                    let mut order: Vec<usize> = (0..count).collect();
-                    order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));
-                    (x, order)
-                }
-                None => {
-                    let time: Vec<f64> = (0..seen.len()).map(|i| i as f64 / grid.rate_hz).collect();
-                    (blocks(&time, count), (0..count).collect())
-                }
-            };
-            let (mut seen, fitted) = (blocks(&seen, count), blocks(&fitted, count));
-            // The constant is fitted beside the term: what the term does not say has no mean.
-            let left: f64 = seen.iter().zip(&fitted).map(|(y, f)| y - f).sum();
-            seen.iter_mut()
-                .for_each(|y| *y -= left / count.max(1) as f64);
-            let pick = |v: &[f64]| -> Vec<f64> { order.iter().map(|i| v[*i]).collect() };
-            evidence.series = vec![
-                series(
-                    "measured, other terms taken out",
-                    SeriesStyle::Points,
-                    pick(&x),
-                    pick(&seen),
-                ),
-                series("model", SeriesStyle::Line, pick(&x), pick(&fitted)),
-            ];
-        }
+        _ => course(s, grid, terms, &beside(s, &others), &mut evidence),
     }
     evidence
+}
+
+/// The readings `seen` in blocks, by time or by what the terms follow, and what the terms make of them.
+fn course(s: &Searched<'_>, grid: &Grid, terms: &[&Term], seen: &[f64], evidence: &mut Evidence) {
+    let fitted = modelled(&s.search.panel, &s.state, terms);
+    let count = BLOCKS.min(seen.len() / 4);
+    let followed = terms[0]
+        .follows
+        .as_ref()
+        .and_then(|f| grid.signals.iter().find(|g| g.name == *f));
+    let (x, order) = match followed {
+        Some(signal) => {
+            evidence.x_label = if signal.unit.is_empty() || signal.unit == "1" {
+                signal.name.clone()
+            } else {
+                format!("{}, {}", signal.name, signal.unit)
+            };
+            let x = blocks(&signal.smooth, count);
+            let mut order: Vec<usize> = (0..count).collect();
+            order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));
+            (x, order)
+        }
+        None => {
+            let time: Vec<f64> = (0..seen.len()).map(|i| i as f64 / grid.rate_hz).collect();
+            (blocks(&time, count), (0..count).collect())
+        }
+    };
+    let (mut seen, fitted) = (blocks(seen, count), blocks(&fitted, count));
+    // The constant is fitted beside the term: what the term does not say has no mean.
+    let left: f64 = seen.iter().zip(&fitted).map(|(y, f)| y - f).sum();
+    seen.iter_mut()
+        .for_each(|y| *y -= left / count.max(1) as f64);
+    let pick = |v: &[f64]| -> Vec<f64> { order.iter().map(|i| v[*i]).collect() };
+    evidence.series = vec![
+        series(
+            "measured, other terms taken out",
+            SeriesStyle::Points,
+            pick(&x),
+            pick(&seen),
+        ),
+        series("model", SeriesStyle::Line, pick(&x), pick(&fitted)),
+    ];
 }
 
 /// The readings about their mean, without these terms.
