@@ -65,6 +65,7 @@ pub(super) fn claim(
     named: &str,
 ) -> Option<Outcome> {
     let cells = own.size.len();
+    let planner = &mut FftPlanner::new();
     let harmonics = harmonics.iter();
     let mut all: Vec<(f64, &'static str)> = harmonics.map(|p| (*p, "it has harmonics")).collect();
     // Bands that overlap are one cluster, and asked together.
@@ -83,7 +84,7 @@ pub(super) fn claim(
             ),
         ];
         for (series, other, what) in alike {
-            all.extend(chance(series, &course(other)).map(|(p, _)| (p, what)));
+            all.extend(chance(series, &course(other), planner).map(|(p, _)| (p, what)));
         }
         let phases = LOCKED.iter().filter_map(|powers| locked(own, o, *powers));
         all.extend(phases.map(|p| (p, "its phase is locked to that of another band")));

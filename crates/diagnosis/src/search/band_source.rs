@@ -76,14 +76,18 @@ fn switched(values: &[f64], cells: usize) -> Vec<f64> {
 }
 
 /// Energies of a series by frequency.
-fn energies(series: &[f64]) -> Vec<f64> {
+fn energies(series: &[f64], planner: &mut FftPlanner<f64>) -> Vec<f64> {
     let mut z: Vec<Complex<f64>> = series.iter().map(|v| Complex::new(*v, 0.0)).collect();
-    FftPlanner::new().plan_fft_forward(z.len()).process(&mut z);
+    planner.plan_fft_forward(z.len()).process(&mut z);
     z.iter().map(Complex::norm_sqr).collect()
 }
 
 /// Chance that a series follows a course as well, and the part of its energy that does.
-pub(super) fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
+pub(super) fn chance(
+    series: &[f64],
+    course: &[f64],
+    planner: &mut FftPlanner<f64>,
+) -> Option<(f64, f64)> {
     let (all, own) = (dot(series, series), dot(course, course));
     if all <= 0.0 || own <= 1e-12 * all.min(1.0) {
         return None;
@@ -94,7 +98,7 @@ pub(super) fn chance(series: &[f64], course: &[f64]) -> Option<(f64, f64)> {
         .zip(course)
         .map(|(s, c)| s - slope * c)
         .collect();
-    let (of_course, of_rest) = (energies(course), energies(&residual));
+    let (of_course, of_rest) = (energies(course, planner), energies(&residual, planner));
     let n = of_rest.len();
     // Without frequency 0, which both lack.
     let about = |k: usize| {
@@ -148,15 +152,19 @@ impl Moves {
 
 /// Chance that the coefficients of two channels at one place are as coherent, and the part of the energy that is.
 pub(crate) fn coherence(own: &[f64], there: &[f64]) -> (f64, f64) {
-    let mut planner = FftPlanner::new();
-    let own = envelope_of(own, &mut planner);
-    coherent(&own, &envelope_of(there, &mut planner))
+    let planner = &mut FftPlanner::new();
+    let own = envelope_of(own, planner);
+    coherent(&own, &envelope_of(there, planner), planner)
 }
 
 /// The same of two envelopes. With phases at random (Theiler et al., 1992) each frequency adds its own energy to that of the sum of
 /// all, which is then exponential.
-fn coherent(own: &[Complex<f64>], there: &[Complex<f64>]) -> (f64, f64) {
-    let fft = FftPlanner::new().plan_fft_forward(own.len());
+fn coherent(
+    own: &[Complex<f64>],
+    there: &[Complex<f64>],
+    planner: &mut FftPlanner<f64>,
+) -> (f64, f64) {
+    let fft = planner.plan_fft_forward(own.len());
     let [own, there] = [own, there].map(|z| {
         let mut spectrum = z.to_vec();
         fft.process(&mut spectrum);
@@ -198,6 +206,7 @@ pub(super) fn claim(
             all.push((&s.name, beyond(switched(&s.values, cells), &[])));
         }
     }
+    let planner = &mut FftPlanner::new();
     let mut asked = 0;
     let mut least: Option<(f64, &str, &'static str)> = None;
     for (name, course) in &all {
@@ -207,7 +216,7 @@ pub(super) fn claim(
             ("jumps", &own.changes),
         ];
         for (what, series) in all {
-            let Some((p, part)) = chance(series, course) else {
+            let Some((p, part)) = chance(series, course, planner) else {
                 continue;
             };
             asked += 1;
@@ -217,8 +226,8 @@ pub(super) fn claim(
         }
     }
     for (name, coefficients) in felt {
-        let there = envelope_of(&coefficients[own.places.clone()], &mut FftPlanner::new());
-        let (p, part) = coherent(&own.envelope, &there);
+        let there = envelope_of(&coefficients[own.places.clone()], planner);
+        let (p, part) = coherent(&own.envelope, &there, planner);
         asked += 1;
         if part > FOLLOWED && least.as_ref().is_none_or(|l| p < l.0) {
             least = Some((p, name, "phase"));
@@ -287,10 +296,10 @@ mod tests {
         for _ in 0..400 {
             let course = beyond(slow(&mut rng, n, 40.0), &[]);
             let series = beyond(slow(&mut rng, n, 8.0), &[]);
-            let (p, _) = chance(&series, &course).expect("both move");
+            let (p, _) = chance(&series, &course, &mut FftPlanner::new()).expect("both move");
             low += usize::from(p < 0.01);
             let with: Vec<f64> = series.iter().zip(&course).map(|(s, c)| s + c).collect();
-            let (p, part) = chance(&with, &course).expect("both move");
+            let (p, part) = chance(&with, &course, &mut FftPlanner::new()).expect("both move");
             seen += usize::from(p < 1e-3 && part > FOLLOWED);
         }
         // 4 of 400 are expected at 1 %.
