@@ -1,6 +1,7 @@
 //! The figures that convict, and the Allan curve held against replicates.
 
-use model::effect::Peak;
+use model::effect::{Peak, Signal};
+use model::record::Quantity;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -8,7 +9,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::{Dct, Panel};
 use crate::ingest::types::Grid;
-use crate::report::levels;
+use crate::report::{epochs, levels};
 use crate::result::{Evidence, Series, SeriesStyle};
 use crate::search::searched::Searched;
 use numerics::column::dot;
@@ -227,7 +228,7 @@ fn is_course(term: &Term) -> bool {
     )
 }
 
-fn series(label: &str, style: SeriesStyle, x: Vec<f64>, y: Vec<f64>) -> Series {
+pub(super) fn series(label: &str, style: SeriesStyle, x: Vec<f64>, y: Vec<f64>) -> Series {
     Series {
         label: label.into(),
         style,
@@ -279,6 +280,16 @@ fn of_terms(s: &Searched<'_>, grid: &Grid, terms: &[&Term]) -> Evidence {
 /// The readings `seen` in blocks, by time or by what the terms follow, and what the terms make of them.
 fn course(s: &Searched<'_>, grid: &Grid, terms: &[&Term], seen: &[f64], evidence: &mut Evidence) {
     let fitted = modelled(&s.search.panel, &s.state, terms);
+    let is_command =
+        |g: &&Signal| g.quantity == Quantity::Pwm && s.search.sources(terms[0]).contains(&g.name);
+    // A shape of time behind a command is a surge, a shape of its changes.
+    let command = grid.signals.iter().find(is_command);
+    let command = command.filter(|_| terms[0].follows.is_none());
+    if let Some(drawn) = command.and_then(|c| epochs::of(c, grid.rate_hz, seen, &fitted)) {
+        (evidence.x_label, evidence.caption) = (drawn.x_label, drawn.caption);
+        evidence.series = drawn.series;
+        return;
+    }
     let count = BLOCKS.min(seen.len() / 4);
     let followed = terms[0]
         .follows

@@ -2,6 +2,7 @@
 
 pub mod detection_limits;
 pub(crate) mod entries;
+mod epochs;
 pub mod figures;
 pub mod findings;
 pub mod gain;
