@@ -18,7 +18,8 @@ pub const SPANS_S: [f64; 3] = [10.0, 100.0, 600.0];
 const OVERLAP: usize = 10;
 /// Spans that the time behind the rest holds at least: one alone says nothing of an rms.
 pub(super) const SPANS_AT_LEAST: f64 = 2.0;
-/// Standard deviations that hold an error of the bias 95 times of 100: what is worse by no more is chance.
+/// Standard deviations that hold an error of the bias 95 times of 100: what is worse by no more is chance. A bias that is off adds
+/// its angle to each window's, and so to their root mean square as much at the most (Minkowski).
 const NORMAL_95: f64 = 1.96;
 /// Blocks that the filter knows are counted in 1/256.
 const KNOWN_ONE: f64 = 256.0;
@@ -132,7 +133,7 @@ pub fn judge(stage: &Stage<'_>, matters: f64) -> Judged {
                 after_deg,
                 predicted_deg: noise.angle_deg(bias, record, rest, [span_s, behind_s]),
                 limit_deg: limit.as_deref().and_then(over),
-                worse: after_deg > (1.0 + matters) * before_deg.hypot(chance),
+                worse: after_deg > (1.0 + matters) * before_deg + chance,
             });
         }
     }
