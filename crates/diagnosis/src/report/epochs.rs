@@ -4,7 +4,6 @@
 //! of the command, the mean response at a lag is sum d y / sum d^2 times the largest change: noise and whatever else the rate does
 //! falls with the number of changes.
 
-use super::figures::series;
 use crate::result::{Series, SeriesStyle};
 use model::effect::Signal;
 
@@ -65,6 +64,12 @@ pub(super) fn of(command: &Signal, rate_hz: f64, seen: &[f64], fitted: &[f64]) -
     let lags = (-before..longest).take(shown);
     let x: Vec<f64> = lags.clone().map(|lag| lag as f64 / rate_hz).collect();
     let y: Vec<f64> = lags.map(|lag| response(seen, lag)).collect();
+    let series = |label: &str, style: SeriesStyle, y: Vec<f64>| Series {
+        label: label.into(),
+        style,
+        x: x.clone(),
+        y,
+    };
     let [name, count] = [command.name.clone(), epochs.len().to_string()];
     Some(Drawn {
         x_label: format!("time since a change of {name}, s"),
@@ -72,13 +77,8 @@ pub(super) fn of(command: &Signal, rate_hz: f64, seen: &[f64], fitted: &[f64]) -
             "What follows a change of {name}: mean of {count} of them by their sizes, for the largest, the other terms taken out."
         ),
         series: vec![
-            series(
-                "measured, other terms taken out",
-                SeriesStyle::Points,
-                x.clone(),
-                y,
-            ),
-            series("model", SeriesStyle::Line, x, modelled[..shown].to_vec()),
+            series("measured, other terms taken out", SeriesStyle::Points, y),
+            series("model", SeriesStyle::Line, modelled[..shown].to_vec()),
         ],
     })
 }

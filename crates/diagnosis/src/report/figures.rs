@@ -228,7 +228,7 @@ fn is_course(term: &Term) -> bool {
     )
 }
 
-pub(super) fn series(label: &str, style: SeriesStyle, x: Vec<f64>, y: Vec<f64>) -> Series {
+fn series(label: &str, style: SeriesStyle, x: Vec<f64>, y: Vec<f64>) -> Series {
     Series {
         label: label.into(),
         style,
