@@ -1,6 +1,6 @@
 //! What is a piece of something without a name has none itself: the first harmonic of what repeats itself in another shape than a
 //! sine, the largest of many strokes, the band of a mode that an acceleration or another axis drives, a tone that the command shifts,
-//! noise that a line swells.
+//! a zero in steps of the temperature, noise that a line swells.
 
 mod graded;
 
@@ -136,6 +136,42 @@ fn a_tone_whose_phase_the_command_shifts_is_no_wandering_line() {
         let phase = |i: usize| TAU * pitch_hz * i as f64 / RATE_HZ + late * (duty[i] / FULL).abs();
         add(&mut r, "gyro_x", |i| 0.2 * phase(i).cos());
         no_band(&told(&r), || format!("{pitch_hz} Hz, {late} rad"))
+    });
+}
+
+#[test]
+fn a_zero_in_steps_of_the_temperature_is_no_process() {
+    graded("steps of the temperature", |run, rng| {
+        let mut r = record(&[], 7700 + run);
+        let (step, period_s) = (between(0.7, 2.0, rng), between(120.0, 300.0, rng));
+        let swings = |i: usize| {
+            let turn = TAU * i as f64 / RATE_HZ;
+            5.0 * (turn / period_s).sin() + (turn / 61.0).sin()
+        };
+        for c in r
+            .channels
+            .iter_mut()
+            .filter(|c| c.quantity == Quantity::Temp)
+        {
+            let lsb = c.lsb.unwrap_or(0.1453);
+            let each = c.values.iter_mut().enumerate();
+            each.for_each(|(i, v)| *v = ((30.0 + swings(i)) / lsb).round() * lsb);
+        }
+        let saw_tooth = |i: usize| swings(i) / step - (swings(i) / step).round();
+        add(&mut r, "gyro_x", |i| 0.2 * saw_tooth(i));
+        let d = told(&r);
+        let told_of = d.unexplained.iter().any(|u| u.channel.contains("gyro_x"));
+        let a_process = [
+            "gauss_markov",
+            "flicker",
+            "low_pass",
+            "telegraph",
+            "narrow_band",
+        ];
+        let wrong = named(&d).iter().any(|n| a_process.contains(&n.0));
+        (told_of && !wrong)
+            .then_some(())
+            .ok_or_else(|| format!("{step} degC, {period_s} s: {}", said(&d)))
     });
 }
 

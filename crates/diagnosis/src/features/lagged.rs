@@ -35,7 +35,7 @@ const SHAKEN_S: [f64; 4] = [0.5, 2.0, 8.0, 32.0];
 /// Places of bends, as shares of what a signal spans.
 const BENDS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// Half waves over what a level spans, of any phase by two neighbours.
-const HALF_WAVES: usize = 24;
+const HALF_WAVES: usize = 48;
 /// Samples over which a response to vibration may go on, and that of a long record.
 const SAMPLES: usize = 6;
 const SAMPLES_OF_LONG: usize = 3;

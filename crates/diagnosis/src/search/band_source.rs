@@ -3,7 +3,8 @@
 //! A mode that noise drives and a tone whose pitch wanders know nothing of temperature, supply and command. The band alone, on
 //! the half line of frequencies, is a complex envelope z: |z|^2 is its size, and the imaginary part of z(t+1) z*(t), turned back
 //! by the mean pitch, its pitch. Both are regressed on each recorded course, on its square, and for a command on what rings
-//! after each change of it; so are the squared changes of z, as a command that shifts its phase makes it jump. The scatter of a coefficient is that of the residual at the frequencies where the course moves.
+//! after each change of it and on where it changes; so are the squared changes of z, as a command that shifts its phase makes it jump.
+//! The scatter of a coefficient is that of the residual at the frequencies where the course moves.
 //!
 //! What drives a mode may be recorded, too, or make a period that wanders: then z is coherent with the envelope of that at the same
 //! place, whatever comes between makes of its phase.

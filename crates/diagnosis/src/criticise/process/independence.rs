@@ -85,12 +85,12 @@ fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked>
     own.extend(of_it.flat_map(Candidate::all_columns));
     own.sort_unstable();
     own.dedup();
-    let is_level = signal.quantity != Quantity::Pwm;
-    let waves = is_level.then(|| lagged::in_waves(signal));
+    let is_temperature = signal.quantity == Quantity::Temp;
+    let waves = is_temperature.then(|| lagged::in_waves(signal));
     let departures = lagged::departures(&search.view, signal).chain(waves);
     let beside = Beside::new(panel, &g, &own);
-    let asked =
-        departures.map(|departure| ask(&beside, std::slice::from_ref(&signal.name), departure));
+    let names = std::slice::from_ref(&signal.name);
+    let asked = departures.map(|departure| ask(&beside, names, departure));
     asked.filter(|a| a.degrees > 0).collect()
 }
 
