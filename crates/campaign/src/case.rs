@@ -312,10 +312,10 @@ fn recorded(
     unknown: Option<(usize, &Foreign)>,
 ) -> Record {
     let effects: Vec<EffectModel> = truths.iter().filter_map(as_effect).collect();
-    let mut measured = stand.clone();
-    if let Some((axis, _)) = unknown.filter(|(_, f)| f.replaces_noise()) {
-        measured.walk_of_angle[axis] = 0.0;
-    }
+    let measured = match unknown.filter(|(_, f)| f.replaces_noise()) {
+        Some((axis, _)) => &stand.without_noise(axis),
+        None => stand,
+    };
     let mut record = measured
         .record(&effects, draw.seed())
         .expect("a stand of this crate can be simulated");

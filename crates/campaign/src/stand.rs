@@ -57,7 +57,7 @@ pub struct Stand {
     pub walk_of_rate: [f64; 3],
     /// Constant bias by axis, deg/s.
     pub bias: [f64; 3],
-    /// Step of the readings by axis, deg/s.
+    /// Step of the readings by axis, deg/s; 0 where they are exact.
     pub lsb: [f64; 3],
     /// Temperature, supply, duty, specific force; motion comes by the model file's excitation.
     pub world: World,
@@ -138,6 +138,15 @@ impl Stand {
         lagged(values, tau, self.rate_hz)
     }
 
+    /// The stand without the white noise of an axis, which something else brings: exact there, for without noise the steps of the
+    /// readings would be steps of the bias.
+    #[must_use]
+    pub(crate) fn without_noise(&self, axis: usize) -> Self {
+        let mut exact = self.clone();
+        (exact.walk_of_angle[axis], exact.lsb[axis]) = (0.0, 0.0);
+        exact
+    }
+
     /// Simulate with these effects.
     ///
     /// # Errors
@@ -146,7 +155,7 @@ impl Stand {
         let mut model = ModelFile::paper();
         model.rate_hz = self.rate_hz;
         for (i, channel) in model.channels.iter_mut().enumerate() {
-            channel.lsb = Some(self.lsb[i]);
+            channel.lsb = Some(self.lsb[i]).filter(|lsb| *lsb > 0.0);
             for (name, value) in [
                 ("angle_random_walk", self.walk_of_angle[i]),
                 ("rate_random_walk", self.walk_of_rate[i]),

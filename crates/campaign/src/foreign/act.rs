@@ -27,9 +27,12 @@ pub fn add(record: &mut Record, channel: &str, signal: &[f64], draw: &mut Draw) 
     let Some(c) = record.channels.iter_mut().find(|c| c.name == channel) else {
         return;
     };
-    let Some(counts) = &mut c.counts else { return };
+    // The step of readings without noise is next to nothing.
+    let (Some(counts), Some(step)) = (&mut c.counts, c.lsb.replace(LSB)) else {
+        return;
+    };
     for (i, count) in counts.iter_mut().enumerate() {
-        let v = LSB * within_step(*count, draw) + signal[i];
+        let v = step * within_step(*count, draw) + signal[i];
         *count = (v / LSB).round() as i32;
         c.values[i] = LSB * f64::from(*count);
     }
@@ -39,7 +42,9 @@ pub fn add(record: &mut Record, channel: &str, signal: &[f64], draw: &mut Draw) 
 pub(super) fn counts(record: &Record) -> Counts {
     GYROS.map(|name| {
         let own = record.channels.iter().find(|c| c.name == name);
-        own.and_then(|c| c.counts.clone()).unwrap_or_default()
+        let step = own.and_then(|c| c.lsb).unwrap_or(LSB);
+        let counts = own.and_then(|c| c.counts.clone()).unwrap_or_default();
+        each(&counts, |n| (f64::from(n) * step / LSB).round() as i32)
     })
 }
 
@@ -87,7 +92,7 @@ impl Change {
 
     /// Act on the channel of an axis.
     pub(super) fn act(&self, record: &mut Record, stand: &Stand, axis: usize, draw: &mut Draw) {
-        let (channel, sigma) = (GYROS[axis], stand.white(axis).sqrt());
+        let (channel, sigma) = (GYROS[axis], stand.white_before_rounding(axis).sqrt());
         match self {
             Self::Add(signal) => add(record, channel, signal, draw),
             Self::Scale(factor) => {

@@ -48,10 +48,10 @@ fn drawn(place: usize, seconds: f64, index: u64, wanted: Option<f64>) -> (Drawn,
 impl Drawn {
     /// What the axes read before it acts and after, deg/s.
     fn readings(&mut self) -> [[Vec<f64>; 3]; 2] {
-        let mut measured = self.stand.clone();
-        if self.effect.replaces_noise() {
-            measured.walk_of_angle[self.axis] = 0.0;
-        }
+        let measured = match self.effect.replaces_noise() {
+            true => &self.stand.without_noise(self.axis),
+            false => &self.stand,
+        };
         let before = measured.record(&[], 7).expect("a stand can be simulated");
         let mut after = before.clone();
         self.effect
