@@ -34,7 +34,8 @@ const SENSE_S: [f64; 4] = [0.05, 0.5, 2.0, 8.0];
 const SHAKEN_S: [f64; 4] = [0.5, 2.0, 8.0, 32.0];
 /// Places of bends, as shares of what a signal spans.
 const BENDS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
-/// Half waves over what a level spans, of any phase by two neighbours.
+/// Half waves over what a level spans, of any phase by two neighbours: 24 waves are those of a table in steps of half a degree over a
+/// heater cycle of 6 degC either way.
 const HALF_WAVES: usize = 48;
 /// Samples over which a response to vibration may go on, and that of a long record.
 const SAMPLES: usize = 6;
