@@ -1,6 +1,7 @@
 //! What is a piece of something without a name has none itself: the first harmonic of what repeats itself in another shape than a
 //! sine, the largest of many strokes, the band of a mode that an acceleration or another axis drives, a tone that the command shifts,
-//! a zero in steps of the temperature, noise that a line swells.
+//! a zero in steps of the temperature, noise that a line swells. Nor has what is like something in its spectrum alone, or in
+//! the place and width of it: noise between two edges, spikes in pairs.
 
 mod graded;
 
@@ -226,5 +227,51 @@ fn the_largest_of_many_strokes_is_no_shock() {
         (!wrong && !d.unexplained.is_empty())
             .then_some(())
             .ok_or_else(|| said(&d))
+    });
+}
+
+#[test]
+fn noise_between_two_edges_is_no_resonance() {
+    graded("noise between two edges", |run, rng| {
+        let mut r = record(&[], 7800 + run);
+        let (low_hz, width_hz) = (between(0.8, 7.0, rng), between(0.5, 2.0, rng));
+        let seconds = count(&r) as f64 / RATE_HZ;
+        let tones: Vec<(f64, f64)> = (0..(width_hz * seconds) as usize)
+            .map(|k| (low_hz + k as f64 / seconds, between(0.0, TAU, rng)))
+            .collect();
+        let size = 0.2 * (2.0 / tones.len() as f64).sqrt();
+        let tone =
+            |i: usize, (hz, first): &(f64, f64)| (TAU * hz * i as f64 / RATE_HZ + first).sin();
+        add(&mut r, "gyro_x", |i| {
+            size * tones.iter().map(|t| tone(i, t)).sum::<f64>()
+        });
+        no_band(&told(&r), || format!("{low_hz} Hz, {width_hz} Hz wide"))
+    });
+}
+
+#[test]
+fn spikes_in_pairs_are_no_rounded_angle() {
+    graded("spikes in pairs", |run, rng| {
+        let mut r = record(&[], 7900 + run);
+        let count = count(&r);
+        let (size, pairs) = (between(0.6, 1.2, rng), 250);
+        let mut course = vec![0.0; count];
+        for _ in 0..pairs {
+            let at = between(0.0, count as f64 - 1.0, rng) as usize;
+            let up = if between(0.0, 1.0, rng) < 0.5 {
+                size
+            } else {
+                -size
+            };
+            course[at] += up;
+            course[at + 1] -= up;
+        }
+        add(&mut r, "gyro_x", |i| course[i]);
+        let d = told(&r);
+        let told_of = d.unexplained.iter().any(|u| u.channel.contains("gyro_x"));
+        let wrong = named(&d).iter().any(|n| n.0 == "quantization_noise");
+        (told_of && !wrong)
+            .then_some(())
+            .ok_or_else(|| format!("{size} deg/s: {}", said(&d)))
     });
 }

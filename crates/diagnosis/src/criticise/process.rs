@@ -5,10 +5,11 @@
 //! term is asked alone, where it acts: has its part of the spectrum its shape, is it Gaussian, and is it there all the
 //! time? With d_k its density and g_k that of all noise, its share of coefficient k is f_k = d_k / g_k.
 //!
-//! * Shape: Rao's score test of ln d_k against smooth bends over ln w (Neyman's smooth test), which leave room for the
-//!   estimated parameters by being orthogonal to them in the information.
+//! * Shape: Rao's score test of ln d_k against smooth bends (Neyman's smooth test), which leave room for the estimated
+//!   parameters by being orthogonal to them in the information.
 //! * Law: third and fourth Hermite moments of the smoothed process (coefficients c_k f_k) and of what drives it (u_k f_k),
-//!   whose variances over a Gaussian process of correlation r are 6 and 24 times the sum of r^3 and r^4.
+//!   whose variances over a Gaussian process of correlation r are 6 and 24 times the sum of r^3 and r^4. Of what has short
+//!   tails by its name long ones alone are asked.
 //! * Levels: Cox's test of how far two levels are ahead or behind (`contest`).
 //! * Dwells: Bartlett's test of whether two levels switch at random (`contest::dwells`).
 //! * Steadiness: energies of what drives it in stretches of the record, whose variance follows from the sum of r^2.
@@ -33,13 +34,13 @@ use filtered::Filtered;
 use numerics::column::dot;
 use numerics::tails::{chi_tail, errors_of_sum, normal_tail};
 
-/// Part of what a band explains that its shape may leave: it is off by a fifth of its size. No mode of a real structure is
-/// a Lorentzian to the last.
-const LEFT: f64 = 0.05;
+/// Rms by which the density of a band may be off, as a part of it, where it acts: no mode of a real structure is a Lorentzian
+/// to the last.
+const OFF: f64 = 0.2;
 /// How many more independent values a band has to have in a stretch, or the record: energies of a narrow one are far from
 /// normal, and a claim fails by chance once in a thousand bands.
 const MORE: f64 = 4.0;
-/// Highest order of the polynomials in ln w that bend a spectrum.
+/// Cosines that bend a spectrum.
 const BENDS: usize = 6;
 /// Fewest independent values that a bend or a moment may rest on.
 const LEAST: f64 = 24.0;
@@ -78,8 +79,8 @@ pub(crate) fn of_processes(
     };
     let white = beside_white(&Term::is_filter);
     for term in &covariances {
-        // A filter is no process of its own, and a part of a band is asked with it.
-        if term.is_filter() || term.is_part() {
+        // A part of a band is asked with it.
+        if term.is_part() {
             continue;
         }
         // Bands that overlap are one.
@@ -92,13 +93,15 @@ pub(crate) fn of_processes(
             state,
             u: &u,
             id: term.effect.id(),
+            is_normal: term.is_normal(),
             claims: claims(term),
-            least: term.cluster.map_or(0.0, |c| LEFT * c.lr),
+            off: if term.cluster.is_some() { OFF } else { 0.0 },
             more: if term.is_band() { MORE } else { 1.0 },
             view: &search.view,
             law,
             white: &white,
             alone: beside_white(&of_it),
+            is_filter: term.is_filter(),
         };
         all.extend(process.shape());
         // Two levels have the spectrum of a process that is Gaussian, and are not.
@@ -119,7 +122,7 @@ fn claims(term: &Term) -> [Option<CheckId>; 4] {
     }
     [
         Some(CheckId::ProcessSpectrum),
-        Some(CheckId::ProcessLaw).filter(|_| term.is_normal()),
+        Some(CheckId::ProcessLaw),
         Some(CheckId::ProcessSteadiness),
         Some(CheckId::ProcessSize),
     ]
@@ -194,18 +197,21 @@ struct Process<'a> {
     /// Whitened coefficients of the residual.
     u: &'a [f64],
     id: &'static str,
+    /// Whether it is Gaussian.
+    is_normal: bool,
     /// Its claims of shape, law, steadiness and size.
     claims: [Option<CheckId>; 4],
-    /// Chi-square below which its shape is not off by much, whatever the chance.
-    least: f64,
+    /// Rms by which its density may be off, as a part of it, whatever the chance.
+    off: f64,
     /// Independent values that its energies rest on, over those that others do.
     more: f64,
     view: &'a View<'a>,
     /// Law of the variance of the whole residual, and the white noise, which follows it.
     law: Option<&'a [f64]>,
     white: &'a Noise,
-    /// Its noise beside a white one of variance 1.
+    /// Its noise beside a white one of variance 1, which it filters where it is a filter.
     alone: Noise,
+    is_filter: bool,
 }
 
 /// Sum of m a b / 2: the information that deviations a and b of ln variance share.
@@ -229,19 +235,21 @@ fn orthogonal(x: &mut [f64], basis: &[Vec<f64>], m: &[f64]) -> f64 {
     information(m, x, x).sqrt()
 }
 
-/// Adds to an orthonormal basis the bends of a process that has this `share` of each bin: powers of ln w about where it acts, in
-/// standard deviations of it by the `weight` of its bins.
-fn add_bends(basis: &mut Vec<Vec<f64>>, omega: &[f64], share: &[f64], weight: &[f64], m: &[f64]) {
-    let ln: Vec<f64> = omega.iter().map(|w| w.ln()).collect();
+/// Adds to an orthonormal basis the bends of a process that has this `share` of each bin: cosines over the part of its `weight`
+/// that lies below a bin, as Neyman's (1937) are over the distribution. So each bends as much where it acts as another, and
+/// none is made of its tails, where there is next to nothing of it.
+fn add_bends(basis: &mut Vec<Vec<f64>>, share: &[f64], weight: &[f64], m: &[f64]) {
     let total: f64 = weight.iter().sum();
-    let mean = |of: &dyn Fn(f64) -> f64| -> f64 {
-        ln.iter().zip(weight).map(|(x, w)| w * of(*x)).sum::<f64>() / total
-    };
-    let middle = mean(&|x| x);
-    let spread = mean(&|x| (x - middle).powi(2)).sqrt();
-    for order in 1..=BENDS as i32 {
-        let bend = |(x, f): (&f64, &f64)| f * ((x - middle) / spread).powi(order);
-        let mut x: Vec<f64> = ln.iter().zip(share).map(bend).collect();
+    let mut below = 0.0;
+    let place: Vec<f64> = (weight.iter())
+        .map(|w| {
+            below += w;
+            (below - 0.5 * w) / total
+        })
+        .collect();
+    for order in 1..=BENDS {
+        let bend = |(u, f): (&f64, &f64)| f * (PI * order as f64 * u).cos();
+        let mut x: Vec<f64> = place.iter().zip(share).map(bend).collect();
         let before = information(m, &x, &x).sqrt();
         let length = orthogonal(&mut x, basis, m);
         // A shape that lies in the others' span has no length of its own; 0 of 0 is none either.
@@ -266,6 +274,18 @@ impl Process<'_> {
             p_value,
             what: format!("told as {}: {what}", self.id),
         }
+    }
+
+    /// Its share of all noise `g`, of its density beside the white noise. That of a filter is what it leaves of the white noise
+    /// above the least that it leaves anywhere.
+    fn share(&self, alone: &[f64], g: &[f64]) -> Vec<f64> {
+        let white = if self.is_filter {
+            alone.iter().copied().fold(f64::INFINITY, f64::min)
+        } else {
+            1.0
+        };
+        let of = |(a, g): (&f64, &f64)| if g.is_finite() { (a - white) / g } else { 0.0 };
+        alone.iter().zip(g).map(of).collect()
     }
 
     /// Deviations of ln g by each coordinate of the noise, and by the white variance.
@@ -310,12 +330,11 @@ impl Process<'_> {
         let m = bins.products(&ones, &ones);
         let energy = bins.products(self.u, self.u);
         let g = self.state.noise.over(bins);
-        let alone = self.alone.over(bins);
-        let share: Vec<f64> = alone.iter().zip(&g).map(|(a, g)| (a - 1.0) / g).collect();
+        let share = self.share(&self.alone.over(bins), &g);
         let mut basis = self.basis(bins, &g, &m);
         let estimated = basis.len();
         let weight: Vec<f64> = m.iter().zip(&share).map(|(m, f)| m * f * f).collect();
-        add_bends(&mut basis, &bins.at.omega, &share, &weight, &m);
+        add_bends(&mut basis, &share, &weight, &m);
         let bends = &basis[estimated..];
         let scores: Vec<f64> = bends
             .iter()
@@ -325,10 +344,12 @@ impl Process<'_> {
             })
             .collect();
         let statistic: f64 = scores.iter().map(|s| s * s).sum();
-        let p_value = if bends.is_empty() || statistic < self.least {
+        let degrees = bends.len() as f64;
+        let least = self.off * self.off * 0.5 * weight.iter().sum::<f64>();
+        let p_value = if bends.is_empty() || statistic - degrees < least {
             1.0
         } else {
-            chi_tail(statistic, bends.len() as f64)
+            chi_tail(statistic, degrees)
         };
         // Where it acts, how far the bent spectrum is from the named one.
         let bent = |b: usize| -> f64 { scores.iter().zip(bends).map(|(s, x)| s * x[b]).sum() };
@@ -364,9 +385,7 @@ impl Process<'_> {
     fn in_time(&self) -> Vec<Outcome> {
         let bins = &self.panel.bins;
         let g = self.state.noise.everywhere(bins);
-        let share: Vec<f64> = (self.alone.everywhere(bins).iter().zip(&g))
-            .map(|(a, g)| if g.is_finite() { (a - 1.0) / g } else { 0.0 })
-            .collect();
+        let share = self.share(&self.alone.everywhere(bins), &g);
         let drive = Filtered::new(self.panel, self.u, &share, self.sizes(&share, &g));
         let filter: Vec<f64> = (share.iter().zip(&g))
             .map(|(f, g)| if g.is_finite() { f * g.sqrt() } else { 0.0 })
@@ -379,6 +398,12 @@ impl Process<'_> {
         let mut count = 0;
         for (z, name) in moments.filter(|m| m.0.is_finite()) {
             count += 1;
+            // Errors of rounding have shorter tails than Gaussian ones: it is long ones that they do not have.
+            let z = if self.is_normal || name.starts_with("skewness") {
+                z
+            } else {
+                z.max(0.0)
+            };
             if worst.as_ref().is_none_or(|w| z.abs() > w.0.abs()) {
                 worst = Some((z, normal_tail(z), name));
             }
