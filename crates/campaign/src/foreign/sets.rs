@@ -64,7 +64,7 @@ const NOTHING: &str = "nothing; 20 drawn of 40";
 
 /// All sets, the first one first.
 #[rustfmt::skip]
-pub const SETS: [Set; 16] = [
+pub const SETS: [Set; 17] = [
     set("2026-11-21", "the engine: its own author", &[grade(2_353_998_398, 35, 9, 48)]),
     set("2026-11-21", "not how the diagnosis decides", &[grade(16_172_907_664_231, 247, 30, 276)])
         .wrong("`gauss_markov`, `telegraph` (19): aperiodic oscillation"),
@@ -89,6 +89,7 @@ pub const SETS: [Set; 16] = [
         .wrong("`line` (13): blocks that come out sorted"),
     set("2026-11-25", "docs/effects.md, docs/power.md, the earlier sets; no code of the engine", &[grade(1_795_651_529, 121, 30, 160)])
         .wrong("`line` and `gauss_markov` (9): a plate that a sway helps over; `wandering_line` (8): a tone sampled later"),
+    set("2026-11-26", "the catalogue, docs/effects.md; no code of the engine", &[]),
 ];
 
 /// How the sets are written and graded.

@@ -58,4 +58,5 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(599, 16, "reading moved on where it would repeat", Shaped(|d, _, a, _| by_chance(a, protocol::moved_on(d)))),
     row(600, 16, "coarse range kept after a large swing", Shaped(|d, s, a, _| protocol::coarse_for_a_while(d, s, a))).parts(&["stuck_bit"]),
     row(601, 16, "alive counter in the lowest bits", Shaped(|d, _, a, _| protocol::alive(d, a))),
+    row(613, 17, "blocks packed by a cosine transform", Shaped(|d, s, a, _| blocks::packed(d, s, a))).strength(Strength::Own),
 ];

@@ -5,6 +5,7 @@ use super::Make::Shaped;
 use super::{ForeignEffect, Strength, TM, row};
 
 mod memory;
+mod words;
 
 /// One row each, unbroken so that columns can be read down.
 #[rustfmt::skip]
@@ -26,6 +27,8 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(587, 15, "limit to the length of the vector", Shaped(|d, s, a, _| limited(d, s, a))),
     row(602, 16, "latch that another axis sets and clears", Shaped(|d, s, a, _| memory::latch(d, s, a))).parts(&["telegraph"]),
     row(603, 16, "last reading turned round by another axis", Shaped(|d, s, a, _| memory::turned_round(d, s, a))),
+    row(614, 17, "words whose sum is kept even", Shaped(|_, _, a, _| words::even_sum(a))),
+    row(615, 17, "two parts that drive the line at once", Shaped(|d, _, a, _| words::both_drive(d, a))).parts(&["stuck_bit"]),
 ];
 
 /// One of the two others.

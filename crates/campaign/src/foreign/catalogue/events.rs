@@ -35,4 +35,5 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(556, 14, "door that is opened and shut", Signal(|d, s, _| marks::door(d, s))).twin(478),
     row(590, 16, "slips that set off others", Signal(|d, s, _| trains::aftershocks(d, s))),
     row(591, 16, "tap that drips without a period", Signal(|d, s, _| trains::dripping(d, s))),
+    row(610, 17, "flipped bits of the zero until the scrubber comes by", Signal(|d, s, _| trains::scrubbed(d, s))).parts(&["bias_step"]),
 ];

@@ -10,6 +10,7 @@ use super::{ForeignEffect, T, TM, TMS, TMV, V, row};
 mod acceleration;
 mod drive;
 mod events;
+mod instants;
 mod motor;
 mod states;
 mod supply;
@@ -127,4 +128,8 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(593, 16, "correction by the command before", Signal(|d, s, _| events::command_before(d, s))),
     row(594, 16, "grease that sets while the motor rests", Signal(|d, s, _| events::grease(d, s))).parts(&["motor_bias"]).twin(499),
     row(595, 16, "tone sampled later while the motor is served", Signal(|d, s, _| events::served(d, s))).parts(&["line"]),
+    row(604, 17, "ring of the bridge's edge that the sampling meets", Signal(|d, s, _| instants::edge(d, s))).parts(&["motor_bias"]),
+    row(605, 17, "brake that lets go ahead of each start", Signal(|d, s, _| instants::brake(d, s))),
+    row(606, 17, "peak of the shaking that each command clears", Signal(|d, s, _| instants::peak(d, s))).needs(V),
+    row(607, 17, "carrier whose path the vibration bends", Signal(|d, s, _| instants::path(d, s))).needs(V).parts(&["line"]),
 ];

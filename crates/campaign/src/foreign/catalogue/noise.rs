@@ -3,6 +3,7 @@
 use super::Make::{Exponential, More, Shaped};
 use super::{ForeignEffect, Strength, T, TM, TMV, row};
 
+mod blocks;
 mod laws;
 mod maps;
 mod memory;
@@ -80,4 +81,6 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(596, 16, "ripple that obeys a cubic map", Shaped(|d, s, _, _| maps::cubic(d, s))),
     row(597, 16, "small swings that go on and large ones that turn back", Shaped(|_, _, _, _| maps::turning_back())),
     row(598, 16, "filter that begins anew with each block", Shaped(|d, _, _, _| maps::anew(d))).parts(&["low_pass"]),
+    row(611, 17, "least and largest look of each stretch", Shaped(|d, _, _, _| blocks::extremes_of_stretch(d))),
+    row(612, 17, "blocks that are levelled", Shaped(|d, _, _, _| blocks::levelled(d))),
 ];

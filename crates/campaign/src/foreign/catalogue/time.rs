@@ -54,4 +54,6 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(578, 15, "radio field that fades as somebody walks", Signal(|d, s, _| tones::fading(d, s))),
     row(588, 16, "plate that a sway helps over", Signal(|d, s, _| driven::snapping(d, s))),
     row(589, 16, "arm that repeats its moves whenever it is asked", Signal(|d, s, _| driven::moves(d, s))),
+    row(608, 17, "trolley that comes back over the same joints", Signal(|d, s, _| driven::trolley(d, s))),
+    row(609, 17, "trim that is searched by halves", Signal(|d, s, _| driven::by_halves(d, s))),
 ];

@@ -154,3 +154,48 @@ pub(super) fn exponents(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
         },
     )
 }
+
+/// A logger that packs blocks of eight readings as pictures are packed: a cosine transform, of which the slow half is kept as it
+/// is and the fast half in coarse steps.
+pub(super) fn packed(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    const BLOCK: usize = 8;
+    const FINE: usize = 4;
+    let (_, sigma) = mean_and_sigma(stand, axis);
+    let step = sigma * draw.between(1.2, 2.2);
+    let waves: Vec<[f64; BLOCK]> = (FINE..BLOCK)
+        .map(|k| {
+            let at = |i: usize| PI * k as f64 * (i as f64 + 0.5) / BLOCK as f64;
+            std::array::from_fn(|i| (2.0 / BLOCK as f64).sqrt() * at(i).cos())
+        })
+        .collect();
+    // A coefficient is known to the rounding of the codes, and would be anywhere.
+    let rounding = 1.0 / 12.0 * TAU * 1f64.exp();
+    let nats = (step / rounding.sqrt()).ln() + 0.5 * (step * step / (12.0 * sigma * sigma)).ln_1p();
+    let blocks = (stand.samples() / BLOCK) as f64;
+    let known = Known::nats(blocks * (BLOCK - FINE) as f64 * nats);
+    let first = draw.of_many(BLOCK);
+    let change = Change::made(move |counts, _| {
+        let mut own = counts[axis].clone();
+        for block in own[first..].chunks_exact_mut(BLOCK) {
+            let mut unpacked = each(block, f64::from);
+            for wave in &waves {
+                let held: f64 = wave
+                    .iter()
+                    .zip(&*block)
+                    .map(|(w, c)| w * f64::from(*c))
+                    .sum();
+                let moved = step * (held / step).round() - held;
+                unpacked
+                    .iter_mut()
+                    .zip(wave)
+                    .for_each(|(v, w)| *v += moved * w);
+            }
+            block
+                .iter_mut()
+                .zip(unpacked)
+                .for_each(|(code, v)| *code = v.round() as i32);
+        }
+        own
+    });
+    Shape::Fixed(known, change)
+}

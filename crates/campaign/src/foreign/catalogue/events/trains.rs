@@ -1,4 +1,4 @@
-//! Events that bring each other about.
+//! Events that bring each other about, or that one clock ends.
 
 use super::super::super::prelude::*;
 
@@ -72,4 +72,30 @@ pub(super) fn dripping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         left = keep * left + sign * blow;
         left
     }))
+}
+
+/// A register of the zero whose bits particles flip at random, and a scrubber that comes by at a fixed period and puts right what
+/// it finds: each flip is a step by one weight of a bit, up where a 0 stood and down where a 1 did, and all of them end on the
+/// same clock.
+pub(super) fn scrubbed(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    const BITS: usize = 4;
+    let stored: [f64; BITS] = std::array::from_fn(|_| draw.sign());
+    let period = draw.by_ratio(6.0, 20.0);
+    let often = period * draw.between(0.4, 1.0);
+    let (mut flipped, mut to_flip) = ([false; BITS], draw.exponential() * often);
+    let mut to_scrub = period * draw.between(0.0, 1.0);
+    let steps = stand.series(|_| {
+        to_flip -= 1.0 / stand.rate_hz;
+        to_scrub -= 1.0 / stand.rate_hz;
+        if to_scrub <= 0.0 {
+            (flipped, to_scrub) = ([false; BITS], to_scrub + period);
+        }
+        if to_flip <= 0.0 {
+            flipped[draw.of_many(BITS)] ^= true;
+            to_flip += often * draw.exponential();
+        }
+        let weight = |k: usize| one_if(flipped[k]) * stored[k] * f64::from(1 << k);
+        (0..BITS).map(weight).sum()
+    });
+    about_mean(&steps)
 }

@@ -1,4 +1,4 @@
-//! Signals of what something else drives over a threshold, or starts again.
+//! Signals of what something else drives over a threshold, starts again, or leads to and fro.
 
 use super::super::super::prelude::*;
 
@@ -50,4 +50,53 @@ pub(super) fn moves(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         at += motif.len() as f64 / stand.rate_hz + 0.5 + waits * draw.exponential();
     }
     y
+}
+
+/// A trolley that goes to and fro over the rails next door, as far as it is needed: the floor leans by whatever is under its
+/// wheels, joints and warps that stay where they are. About each turn the lean is a palindrome, and the rate one of the other
+/// sign; a trip as a whole never comes again.
+pub(super) fn trolley(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    let joints: Vec<(f64, f64, f64)> = (0..8 + draw.of_many(7))
+        .map(|_| {
+            let high = draw.sign() * draw.between(0.3, 1.0);
+            (draw.between(0.0, 1.0), high, draw.by_ratio(0.008, 0.02))
+        })
+        .collect();
+    let most = 1.0 / (draw.by_ratio(8.0, 20.0) * stand.rate_hz);
+    let (mut place, mut goal) = (draw.between(0.0, 1.0), draw.between(0.0, 1.0));
+    let places = stand.series(|_| {
+        if place == goal {
+            goal = draw.between(0.0, 1.0);
+        }
+        place += (goal - place).clamp(-most, most);
+        place
+    });
+    let leans = each(&stand.lagged(&places, 0.3), |place| {
+        let joint = |(at, high, wide): &(f64, f64, f64)| {
+            high * (-0.5 * ((place - at) / wide).powi(2)).exp()
+        };
+        joints.iter().map(joint).sum()
+    });
+    changes(&leans)
+}
+
+/// A part that trims its zero anew now and then, and searches it by halves: it tries the largest bit of its trim, keeps it or
+/// not, then the next. Where the zero lies is different each time, and so is the way there.
+pub(super) fn by_halves(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
+    const BITS: i32 = 7;
+    let step_s = draw.by_ratio(0.3, 1.2);
+    let waits = draw.by_ratio(3.0, 12.0);
+    let first = draw.exponential() * waits;
+    arriving(stand, first, |y, at| {
+        let (zero, mut trim) = (draw.between(-1.0, 1.0), 0.0);
+        for bit in 1..=BITS {
+            trim += 0.5f64.powi(bit) * if zero > trim { 1.0 } else { -1.0 };
+            let begins = ((at + step_s * f64::from(bit - 1)) * stand.rate_hz) as usize;
+            let ends = ((at + step_s * f64::from(bit)) * stand.rate_hz) as usize;
+            let long = ends - begins;
+            let own = y.iter_mut().skip(begins).take(long);
+            own.for_each(|v| *v += trim - zero);
+        }
+        at + step_s * f64::from(BITS) + 1.0 + waits * draw.exponential()
+    })
 }
