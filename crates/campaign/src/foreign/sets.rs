@@ -89,7 +89,8 @@ pub const SETS: [Set; 17] = [
         .wrong("`line` (13): blocks that come out sorted"),
     set("2026-11-25", "docs/effects.md, docs/power.md, the earlier sets; no code of the engine", &[grade(1_795_651_529, 121, 30, 160)])
         .wrong("`line` and `gauss_markov` (9): a plate that a sway helps over; `wandering_line` (8): a tone sampled later"),
-    set("2026-11-26", "the catalogue, docs/effects.md; no code of the engine", &[]),
+    set("2026-11-26", "the catalogue, docs/effects.md; no code of the engine", &[grade(1_795_679_091, 113, 16, 144)])
+        .wrong("`quantization_noise` (11): blocks packed by a cosine transform; `gauss_markov` (3): a peak that a command clears, the ring of an edge"),
 ];
 
 /// How the sets are written and graded.
