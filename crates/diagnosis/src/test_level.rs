@@ -131,6 +131,7 @@ checks! {
     ColourFollows "colour_follows" OMNIBUS_LEVEL, OfAxis;
     Order "order" OMNIBUS_LEVEL, OfAxis;
     Leaning "leaning" OMNIBUS_LEVEL, OfAxis;
+    Mixing "mixing" OMNIBUS_LEVEL, OfAxis;
     SlowCycles "slow_cycles" OMNIBUS_LEVEL, OfAxis;
     Couplings "couplings" OMNIBUS_LEVEL, OfAxis;
     VarianceFollows "variance_follows" OMNIBUS_LEVEL, OfAxis;
@@ -213,6 +214,7 @@ impl CheckId {
                 "readings depend on each other as those of no linear, normal noise do"
             }
             Self::Period => "a pattern comes again and again",
+            Self::Mixing => "what shakes the base bends a tone",
             Self::SlowCycles => "a slow swing is no steady one",
             Self::ColourFollows => "the spectrum of the noise follows what was recorded",
             Self::Order => "a tone follows the motor",

@@ -1,7 +1,8 @@
 //! What is a piece of something without a name has none itself: the first harmonic of what repeats itself in another shape than a
 //! sine, the largest of many strokes, the band of a mode that an acceleration or another axis drives, a tone that the command shifts,
 //! a zero in steps of the temperature, noise that a line swells. Nor has what is like something in its spectrum alone, or in
-//! the place and width of it: noise between two edges, spikes in pairs.
+//! the place and width of it: noise between two edges, spikes in pairs. Nor is a tone that
+//! the shaking bends noise.
 
 mod graded;
 
@@ -273,5 +274,28 @@ fn spikes_in_pairs_are_no_rounded_angle() {
         (told_of && !wrong)
             .then_some(())
             .ok_or_else(|| format!("{size} deg/s: {}", said(&d)))
+    });
+}
+
+#[test]
+fn a_tone_whose_phase_the_shaking_bends_is_told() {
+    graded("a phase behind an acceleration", |run, rng| {
+        let mut r = record(&[], 8000 + run);
+        let (hz, bend) = (between(0.5, 9.0, rng), between(1.0, 3.0, rng));
+        let shakes: Vec<f64> = (0..count(&r)).map(|_| StandardNormal.sample(rng)).collect();
+        let felt = r.channels.iter_mut().find(|c| c.quantity == Quantity::Acc);
+        let felt = felt.expect("an accelerometer");
+        let lsb = felt.lsb.expect("counts");
+        let each = felt.values.iter_mut().zip(&shakes);
+        each.for_each(|(v, a)| *v = ((*v / lsb) + 8.0 * a).round() * lsb);
+        add(&mut r, "gyro_x", |i| {
+            0.15 * (TAU * hz * i as f64 / RATE_HZ + bend * shakes[i]).sin()
+        });
+        let d = told(&r);
+        let told_of = d.unexplained.iter().any(|u| u.channel.contains("gyro_x"));
+        let wrong = named(&d).iter().any(|n| n.0 != "line");
+        (told_of && !wrong)
+            .then_some(())
+            .ok_or_else(|| format!("{hz} Hz, {bend} rad: {}", said(&d)))
     });
 }

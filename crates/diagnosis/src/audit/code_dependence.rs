@@ -3,7 +3,7 @@
 //! Of a reading x and a later one, or one of another axis, y, let y be normal with the spread s when x is known. Then
 //! E exp(i (a x + b y)) = 0, but for exp(-(b s)^2 / 2), whatever x is, and so for x: where b s or a s is large enough, two
 //! codes have nothing in common that is as fine as that. What follows the other one more coarsely, as filters, walks and
-//! motion do, shows at low a and b alone. The sums over a record at a, b = 2 pi k / [`CODES`] are one Fourier transform of how
+//! motion do, shows at low a and b alone. So it is of the sum of two others and a third, whose parity a packer may keep. The sums over a record at a, b = 2 pi k / [`CODES`] are one Fourier transform of how
 //! often which two residues come together. A latch that keeps bits, differences with a set of sizes, a word torn between
 //! two readings and bits that stayed in a shift register show there, without any of them being known.
 
@@ -75,6 +75,22 @@ impl<'a> Codes<'a> {
                 .collect(),
             repeats: audit.found(&[effects::stale_samples::ID], name),
         })
+    }
+}
+
+impl<'a> Codes<'a> {
+    /// The sums with those of another axis.
+    fn with(&self, other: &Self) -> Self {
+        let pairs = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect();
+        let usable = self.usable.iter().zip(&other.usable);
+        let codes = self.codes.iter().zip(&other.codes);
+        Self {
+            name: self.name,
+            codes: codes.map(|(a, b)| (a + b) % CODES).collect(),
+            residual: pairs(&self.residual, &other.residual),
+            usable: usable.map(|(a, b)| *a && *b).collect(),
+            repeats: false,
+        }
     }
 }
 
@@ -209,6 +225,11 @@ pub(super) fn audit<'a>(gyros: &'a [Gyro<'a>], audit: &mut Audit) {
                 format!("that of {} in the frame before", other.name),
             );
         }
+        let mut others = all.iter().enumerate().filter(|(j, _)| *j != i);
+        if let (Some((_, a)), Some((_, b))) = (others.next(), others.next()) {
+            let of = format!("the sum of those of {} and {}", a.name, b.name);
+            ask(&a.with(b), 0, false, of);
+        }
         let looks = found.len() as f64;
         let most = found
             .into_iter()
@@ -285,6 +306,29 @@ mod tests {
         let low: Vec<f64> = all.filter(|p| *p < 0.02).collect();
         // 4.8 of 240 are expected; 14 come once in 2000 times.
         assert!(low.len() < 14, "{low:?}");
+    }
+
+    /// The chance of what a third axis has in common with the sum of two, of which it keeps the parity in some frames.
+    fn chance_of_three(kept: usize, seed: u64) -> f64 {
+        let [a, b, mut c] = [0, 1, 2].map(|k| codes(0.0, 1, |_, c| c, 3 * seed + k));
+        for i in (0..c.codes.len()).filter(|i| i % 10 < kept) {
+            c.codes[i] = (c.codes[i] + (a.codes[i] + b.codes[i] + c.codes[i]) % 2) % CODES;
+        }
+        let fft = FftPlanner::new().plan_fft_forward(CODES);
+        let common = Table::new(&a.with(&b), &c, 0).common(fft.as_ref(), false);
+        common.map_or(1.0, |c| c.chance)
+    }
+
+    #[test]
+    fn a_sum_of_three_words_that_is_kept_even_shows() {
+        let low = (0..100).filter(|seed| chance_of_three(0, *seed) < 0.02);
+        let low = low.count();
+        // 2 are expected; 9 come once in 4000 times.
+        assert!(low < 9, "{low}");
+        for seed in 0..10 {
+            let chance = chance_of_three(3, seed);
+            assert!(chance < 1e-6, "{seed}: {chance}");
+        }
     }
 
     #[test]

@@ -12,6 +12,7 @@ use std::f64::consts::PI;
 use model::effect::{Signal, View};
 use model::record::Quantity;
 
+use crate::criticise::mixing::mixing;
 use crate::features::{LEAST_COMMAND, LEAST_SUPPLY, LEAST_TEMPERATURE, lagged};
 use crate::fit::channel::Form;
 use crate::fit::likelihood::{Dct, Noise};
@@ -411,6 +412,7 @@ fn outcomes(s: &Searched<'_>) -> Vec<Outcome> {
     let courses = courses(view, e.len());
     let mut spectra = of(&e);
     let mut all: Vec<Outcome> = order(view, &e, &spectra).into_iter().collect();
+    all.extend(mixing(view, &e));
     // What is rounded leans by where its level lies between the codes.
     if s.step() < WIDEST_STEP {
         all.push(leaning(&e, &courses));

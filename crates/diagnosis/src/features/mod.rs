@@ -32,7 +32,7 @@ pub(crate) const LEAST_COMMAND: f64 = 8.0;
 pub(crate) const LEAST_SUPPLY: f64 = 5e-3;
 const LEAST_VIBRATION: f64 = 0.15;
 
-fn centred(values: &[f64]) -> Vec<f64> {
+pub(crate) fn centred(values: &[f64]) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     values.iter().map(|v| v - mean).collect()
 }
@@ -191,7 +191,7 @@ fn of_temperature<'a>(
 }
 
 /// Accelerometers that feel vibration.
-fn accelerations<'a>(view: &'a View<'_>) -> impl Iterator<Item = &'a Signal> {
+pub(crate) fn accelerations<'a>(view: &'a View<'_>) -> impl Iterator<Item = &'a Signal> {
     let still = !view.sways();
     view.all(Quantity::Acc)
         .filter(move |a| still && a.std_dev() >= LEAST_VIBRATION)
