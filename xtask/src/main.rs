@@ -26,7 +26,8 @@ use suite::Extent;
 
 const USAGE: &str = "usage: cargo xtask COMMAND
 
-  test     sets up what is missing and runs every check and test
+  test     sets up what is missing and runs every check and test; those that grade by rates make a sample of their draws,
+           with --all-draws all of them, as before a release
   check    the everyday part of it: format, lints, and the tests that are quick
   demo     hides something in the simulated stand, runs the image on it in the simulated ATmega16 for 600 s, captures,
            diagnoses, and shows what was planted beside what was found; then corrects the board by that, records the same
@@ -58,7 +59,14 @@ fn main() -> ExitCode {
     let own = own.map_or_else(|| env!("CARGO_MANIFEST_DIR").into(), PathBuf::from);
     let root = own.parent().unwrap_or(&own).to_owned();
     let done = match command.as_deref() {
-        Some("test") => suite::suite(&root, Extent::All),
+        Some("test") => match std::env::args().nth(2).as_deref() {
+            None => suite::suite(&root, Extent::All),
+            Some("--all-draws") => suite::suite(&root, Extent::AllDraws),
+            Some(_) => Err(Failure::new(
+                "`cargo xtask test` takes --all-draws or nothing",
+                "`cargo test -p PACKAGE --test NAME` runs one test program",
+            )),
+        },
         Some("check") => suite::suite(&root, Extent::Everyday),
         Some("demo") => demo::demo(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("image") => build_image(&root, &mut Pace::Rarer(0)).map(|complaints| {

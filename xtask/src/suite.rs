@@ -1,18 +1,18 @@
 //! Every check and test, and the everyday part of them.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::Instant;
 
 use crate::image;
 use crate::page;
-use crate::step::{Crates, Failure, Pace, Silent, run, watched};
+use crate::step::{Crates, Failure, Pace, run, watched};
 use crate::wheel::{self, Profile};
 use crate::{cargo, say_sizes, toolchain};
 
 mod programs;
 
-use programs::{TestProgram, side_by_side};
+pub use programs::TestProgram;
+use programs::side_by_side;
 
 /// no_std crates, tested each alone as well: a run of the workspace unites features.
 const ALONE: &[&str] = &["wire", "adis16250", "mma7260qt"];
@@ -58,8 +58,10 @@ const LONG: &[&str] = &[
 /// How much is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
-    /// Everything.
+    /// Everything; tests that grade by rates make a sample of their draws.
     All,
+    /// Everything, with all draws.
+    AllDraws,
     /// Format, lints, and the tests that are quick.
     Everyday,
 }
@@ -94,7 +96,7 @@ pub fn suite(root: &Path, extent: Extent) -> Result<(), Failure> {
         Ok("no warning".to_owned())
     })?;
     // Before the tests, which open it.
-    if extent == Extent::All {
+    if extent != Extent::Everyday {
         steps.step("page for a browser", page::page)?;
     }
     let mut built = Built::default();
@@ -102,16 +104,25 @@ pub fn suite(root: &Path, extent: Extent) -> Result<(), Failure> {
         built = Built::of(root)?;
         Ok(format!("{} programs", built.tests.len()))
     })?;
-    steps.step("tests", |_| built.run(extent))?;
-    if extent == Extent::All {
-        beside_the_tests(&mut steps, &built)?;
+    let mut beside = vec![];
+    if extent != Extent::Everyday {
+        steps.step("Python package", |root| {
+            let installed = wheel::installed(root, Profile::Dev)?;
+            beside.push(installed.tests(root, built.program()?));
+            Ok(installed.said)
+        })?;
+        beside.push(short_demo(root, &built)?);
+    }
+    steps.step("tests", |_| built.run(extent, &beside))?;
+    if extent != Extent::Everyday {
+        beside_the_tests(&mut steps)?;
     }
     println!("all passed in {:.0} s", start.elapsed().as_secs_f64());
     Ok(())
 }
 
-/// What is tested beside the workspace's tests: examples, packages alone, the Python package and the demo.
-fn beside_the_tests(steps: &mut Steps<'_>, built: &Built) -> Result<(), Failure> {
+/// What cargo tests beside the programs that were built: examples in the documentation, packages alone.
+fn beside_the_tests(steps: &mut Steps<'_>) -> Result<(), Failure> {
     steps.step("examples in the documentation", |root| {
         let mut docs = cargo(root, &["test", "--workspace", "--doc"]);
         watched(
@@ -134,10 +145,6 @@ fn beside_the_tests(steps: &mut Steps<'_>, built: &Built) -> Result<(), Failure>
             Ok(String::new())
         })?;
     }
-    steps.step("Python package", |root| {
-        wheel::tested(root, Profile::Dev, built.program()?)
-    })?;
-    steps.step("demo", |root| short_demo(root, built))?;
     Ok(())
 }
 
@@ -261,8 +268,14 @@ impl Built {
             } else {
                 package
             };
-            let name = format!("{package} {name}");
-            built.tests.push(TestProgram { name, file, folder });
+            built.tests.push(TestProgram {
+                name: format!("{package} {name}"),
+                file,
+                arguments: vec![],
+                environment: vec![("CARGO_MANIFEST_DIR", folder.clone().into())],
+                folder,
+                objection: |_| None,
+            });
         }
         built
     }
@@ -277,8 +290,8 @@ impl Built {
         })
     }
 
-    /// Runs the test programs, one on each core.
-    fn run(&self, extent: Extent) -> Result<String, Failure> {
+    /// Runs the test programs and others beside them, which are started first; one on each core.
+    fn run(&self, extent: Extent, beside: &[TestProgram]) -> Result<String, Failure> {
         let started = || FIRST.iter().chain(LONG);
         let unknown = started().find(|long| self.tests.iter().all(|test| test.name != **long));
         if let Some(name) = unknown {
@@ -298,7 +311,8 @@ impl Built {
             tests.retain(|test| !LONG.contains(&test.name.as_str()));
         }
         let left_out = self.tests.len() - tests.len();
-        let done = side_by_side(&tests)?;
+        tests.splice(0..0, beside);
+        let done = side_by_side(&tests, extent == Extent::AllDraws)?;
         let failed: Vec<&str> = (done.iter())
             .filter(|d| !d.passed)
             .map(|d| d.name.as_str())
@@ -327,29 +341,20 @@ fn field<'a>(message: &'a str, name: &str) -> Option<&'a str> {
 /// Most lines that the demo may print, whatever state the machine is in.
 const MOST_LINES: usize = 60;
 
-/// Runs the demo with the program that the tests were built with: it is short, complains of nothing, and finds what is
-/// planted.
-fn short_demo(root: &Path, built: &Built) -> Result<String, Failure> {
-    let wrong = |what: &str| Failure::new(what, "`cargo xtask demo` shows it");
-    let own = std::env::current_exe().map_err(|error| wrong(&format!("the demo: {error}")))?;
+/// The demo with the program that the tests were built with: it is short, complains of nothing, and finds what is planted.
+fn short_demo(root: &Path, built: &Built) -> Result<TestProgram, Failure> {
+    let own = std::env::current_exe().map_err(|error| {
+        Failure::new(&format!("the demo: {error}"), "`cargo xtask demo` shows it")
+    })?;
     let program = built.program()?;
-    let mut demo = Command::new(own);
-    demo.arg("demo")
-        .arg("--program")
-        .arg(program)
-        .current_dir(root);
-    demo.env("CARGO_MANIFEST_DIR", root.join("xtask"));
-    let said = watched(
-        "the demo",
-        &mut demo,
-        &mut Silent("runs"),
-        &mut Pace::Steady,
-    )?;
-    if let Some(what) = objection(&said.all) {
-        said.all.iter().for_each(|line| eprintln!("{line}"));
-        return Err(wrong(&what));
-    }
-    Ok(format!("{} lines", said.all.len()))
+    Ok(TestProgram {
+        name: "demo".to_owned(),
+        file: own,
+        arguments: vec!["demo".into(), "--program".into(), program.into()],
+        environment: vec![("CARGO_MANIFEST_DIR", root.join("xtask").into())],
+        folder: root.to_owned(),
+        objection,
+    })
 }
 
 /// What is wrong with what the demo printed.

@@ -1,9 +1,11 @@
 //! The Python package: its wheel, and its tests in a virtual environment of its own.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::step::{Crates, Failure, Pace, Silent, run, watched};
+use crate::suite::TestProgram;
 use crate::{cargo, toolchain};
 
 /// What builds the wheel and what its tests need; allantools is what deviations are compared with, so it is fixed. Dask maps
@@ -53,20 +55,50 @@ pub fn wheel(root: &Path, arguments: &[String]) -> Result<(), Failure> {
     let (mut crates, mut pace) = (Crates::default(), Pace::Rarer(0));
     watched("the program", &mut program, &mut crates, &mut pace)?;
     let program = root.join("target").join(folder).join("imu-stand");
-    let said = tested(
-        root,
-        profile,
-        &program.with_extension(std::env::consts::EXE_EXTENSION),
+    let installed = installed(root, profile)?;
+    let program = program.with_extension(std::env::consts::EXE_EXTENSION);
+    let said = watched(
+        "the tests of the wheel",
+        &mut installed.tests(root, &program).command(),
+        &mut Silent("runs"),
+        &mut Pace::Steady,
     )?;
-    println!("{said}");
+    let counted = said.all.last().map_or("", String::as_str).trim_matches('=');
+    println!("{}, {}", installed.said, counted.trim());
     Ok(())
 }
 
-/// Builds the wheel and runs its tests, those against the program too; says where the wheel is and how large.
+/// The wheel, in a virtual environment.
+pub struct Installed {
+    python: PathBuf,
+    /// Where the wheel is and how large.
+    pub said: String,
+}
+
+impl Installed {
+    /// Its tests, those against the program too.
+    pub fn tests(&self, root: &Path, program: &Path) -> TestProgram {
+        TestProgram {
+            name: "Python package".to_owned(),
+            file: self.python.clone(),
+            arguments: ["-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"]
+                .map(OsString::from)
+                .to_vec(),
+            environment: vec![
+                ("PYTHONDONTWRITEBYTECODE", "1".into()),
+                ("IMU_STAND_PROGRAM", program.into()),
+            ],
+            folder: root.join("crates/python"),
+            objection: |_| None,
+        }
+    }
+}
+
+/// Builds the wheel and installs it where its tests are run.
 ///
 /// # Errors
 /// As [`wheel`].
-pub fn tested(root: &Path, profile: Profile, program: &Path) -> Result<String, Failure> {
+pub fn installed(root: &Path, profile: Profile) -> Result<Installed, Failure> {
     let python = environment(root)?;
     let dist = root.join("target/wheel/dist");
     // One wheel is left in it: the one that is tested.
@@ -78,26 +110,13 @@ pub fn tested(root: &Path, profile: Profile, program: &Path) -> Result<String, F
     let mut install = pip(&python);
     install.args(["--force-reinstall", "--no-deps"]).arg(&wheel);
     run("the wheel", &mut install)?;
-    let mut tests = Command::new(&python);
-    tests
-        .current_dir(root.join("crates/python"))
-        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"])
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .env("IMU_STAND_PROGRAM", program);
-    let said = watched(
-        "the tests of the wheel",
-        &mut tests,
-        &mut Silent("runs"),
-        &mut Pace::Steady,
-    )?;
-    let counted = said.all.last().map_or("", String::as_str).trim_matches('=');
     let bytes = std::fs::metadata(&wheel).map_or(0, |file| file.len());
-    Ok(format!(
-        "{} of {:.1} MB, {}",
+    let said = format!(
+        "{} of {:.1} MB",
         wheel.strip_prefix(root).unwrap_or(&wheel).display(),
-        bytes as f64 / 1e6,
-        counted.trim()
-    ))
+        bytes as f64 / 1e6
+    );
+    Ok(Installed { python, said })
 }
 
 fn build(root: &Path, profile: Profile, python: &Path, dist: &Path) -> Result<(), Failure> {

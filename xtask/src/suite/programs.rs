@@ -1,5 +1,6 @@
 //! Test programs, run side by side.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::Command;
 use std::sync::Mutex;
@@ -8,14 +9,30 @@ use std::time::{Duration, Instant};
 
 use crate::step::{Failure, Pace, Progress};
 
-/// A test program.
+/// A test program, or another whose end tells whether something works.
 #[derive(Clone, Debug)]
 pub struct TestProgram {
     /// Package and target.
     pub name: String,
     pub file: PathBuf,
-    /// Folder of its package, in which cargo would run it.
+    pub arguments: Vec<OsString>,
+    pub environment: Vec<(&'static str, OsString)>,
+    /// Folder in which it runs: of its package, as cargo would run it.
     pub folder: PathBuf,
+    /// What is wrong with the lines that it printed, where it ended well.
+    pub objection: fn(&[String]) -> Option<String>,
+}
+
+impl TestProgram {
+    /// What starts it.
+    pub fn command(&self) -> Command {
+        let mut command = Command::new(&self.file);
+        command
+            .args(&self.arguments)
+            .envs(self.environment.iter().map(|(key, value)| (key, value)))
+            .current_dir(&self.folder);
+        command
+    }
 }
 
 /// How a test program ended.
@@ -28,8 +45,8 @@ pub struct Done {
 }
 
 /// Runs test programs, as many at a time as there are cores, each with one thread; prints what the failed ones said, and
-/// how long the longest took.
-pub fn side_by_side(tests: &[&TestProgram]) -> Result<Vec<Done>, Failure> {
+/// how long the longest took. Tests that grade by rates make all their draws, or a sample.
+pub fn side_by_side(tests: &[&TestProgram], all_draws: bool) -> Result<Vec<Done>, Failure> {
     let mut progress = Progress::new("tests", Pace::Steady);
     let workers = std::thread::available_parallelism().map_or(1, usize::from);
     let next = Mutex::new(tests.iter());
@@ -43,7 +60,7 @@ pub fn side_by_side(tests: &[&TestProgram]) -> Result<Vec<Done>, Failure> {
                 loop {
                     let test = next.lock().ok().and_then(|mut tests| tests.next());
                     let Some(test) = test else { return };
-                    if send.send(run_one(test)).is_err() {
+                    if send.send(run_one(test, all_draws)).is_err() {
                         return;
                     }
                 }
@@ -81,34 +98,43 @@ pub fn side_by_side(tests: &[&TestProgram]) -> Result<Vec<Done>, Failure> {
     Ok(done)
 }
 
-fn run_one(test: &TestProgram) -> Result<Done, Failure> {
+fn run_one(test: &TestProgram, all_draws: bool) -> Result<Done, Failure> {
     let from = Instant::now();
-    let output = Command::new(&test.file)
-        .current_dir(&test.folder)
-        .env("CARGO_MANIFEST_DIR", &test.folder)
-        .env("RUST_TEST_THREADS", "1")
-        .output()
-        .map_err(|error| {
-            Failure::new(
-                &format!("{} cannot be started: {error}", test.file.display()),
-                "run it again: another build may have taken it away",
-            )
-        })?;
+    let mut program = test.command();
+    program.env("RUST_TEST_THREADS", "1");
+    if all_draws {
+        // Read by crates/diagnosis/tests/draws/mod.rs.
+        program.env("IMU_STAND_ALL_DRAWS", "1");
+    }
+    let output = program.output().map_err(|error| {
+        Failure::new(
+            &format!("{} cannot be started: {error}", test.file.display()),
+            "run it again: another build may have taken it away",
+        )
+    })?;
     let mut said = String::from_utf8_lossy(&output.stdout).into_owned();
     said += &String::from_utf8_lossy(&output.stderr);
+    let lines: Vec<String> = said.lines().map(str::to_owned).collect();
+    let objection = (output.status.success())
+        .then(|| (test.objection)(&lines))
+        .flatten();
+    if let Some(what) = &objection {
+        said += &format!("error: {what}\n");
+    }
     Ok(Done {
         name: test.name.clone(),
-        passed: output.status.success(),
+        passed: output.status.success() && objection.is_none(),
         tests: passed(&said),
         seconds: from.elapsed().as_secs_f64(),
         said,
     })
 }
 
-/// Tests that passed, of what a test program says.
+/// Tests that passed, of what a test program says, of Rust's or of pytest's.
 fn passed(said: &str) -> usize {
     let counts = said.lines().filter_map(|line| {
-        let (before, _) = line.strip_prefix("test result: ")?.split_once(" passed")?;
+        let is_count = line.starts_with("test result: ") || line.contains(" passed in ");
+        let (before, _) = is_count.then_some(line)?.split_once(" passed")?;
         before.split_whitespace().last()?.parse::<usize>().ok()
     });
     counts.sum()
@@ -122,5 +148,6 @@ mod tests {
     fn passed_tests_are_counted() {
         let said = "test result: ok. 12 passed; 0 failed; 1 ignored\nx\ntest result: FAILED. 3 passed; 1 failed";
         assert_eq!(passed(said), 15);
+        assert_eq!(passed("....\n60 passed in 67.94s (0:01:07)"), 60);
     }
 }
