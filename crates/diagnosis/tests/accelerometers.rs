@@ -1,6 +1,8 @@
 //! Accelerometers of the paper's stand, diagnosed beside its gyros: what is planted in one is drawn, and what is told of it is
 //! graded by rate. `IMU_STAND_SEED` takes other draws.
 
+mod draws;
+
 use std::f64::consts::TAU;
 
 use diagnosis::result::{Diagnosis, Finding};
@@ -129,10 +131,10 @@ fn plant(kind: u64, record: &mut Record, name: &str, rng: &mut Xoshiro256PlusPlu
 
 #[test]
 fn what_is_planted_in_an_accelerometer_is_named_and_sized() {
-    const RUNS: u64 = 40;
+    let runs = draws::of(16, 40);
     let rng = &mut draws(1);
     let (mut named, mut alone, mut inside) = (0, 0, 0);
-    for run in 0..RUNS {
+    for run in 0..runs {
         let mut record = stand(rng);
         let name = ACCELEROMETERS[between(rng, 0.0, 3.0) as usize];
         let (cause, parameter, size) = plant(run % 4, &mut record, name, rng);
@@ -158,8 +160,8 @@ fn what_is_planted_in_an_accelerometer_is_named_and_sized() {
             );
         }
     }
-    asked("named", named, RUNS, 0.98);
-    asked("alone", alone, RUNS, 0.98);
+    asked("named", named, runs, 0.98);
+    asked("alone", alone, runs, 0.98);
     asked("sizes within their intervals", inside, named, 0.93);
 }
 

@@ -1,6 +1,8 @@
 //! Faults of the converter on noise of any shape: normal, light-tailed, heavy-tailed, correlated, about a level that
 //! wanders. Graded by rate; `IMU_STAND_SEED` draws other records and `IMU_STAND_RUNS` more of them.
 
+mod draws;
+
 use diagnosis::audit::{Audit, audit};
 use diagnosis::{DiagnoseOptions, diagnose};
 use model::record::{Axis, Channel, Header, Quantity, Record};
@@ -154,7 +156,7 @@ fn rails_are_no_bit() {
 
 #[test]
 fn noise_of_any_smooth_shape_is_no_fault_of_the_converter() {
-    let runs = setting("IMU_STAND_RUNS", 60);
+    let runs = setting("IMU_STAND_RUNS", draws::of(20, 60));
     let of_codes = ["stuck_bit", "saturation", "coarse_lsb"];
     let mut alarms = 0;
     for run in 0..runs {

@@ -1,6 +1,8 @@
 //! What an axis takes from the others, from its own past and from blows otherwise than in proportion, and steps beside
 //! telegraph noise: hidden at random in simulated runs, graded by rate.
 
+mod draws;
+
 use diagnosis::result::Diagnosis;
 use diagnosis::{DiagnoseOptions, diagnose};
 use model::file::EffectModel;
@@ -66,16 +68,16 @@ fn graded_of(
     right: impl Fn(&Diagnosis) -> bool,
 ) {
     let mut rng = Rng::seed_from_u64(seed);
-    let misses: Vec<String> = (0..RUNS)
-        .filter_map(|run| {
-            let mut record = model::simulate(model, seconds, 20.0, seed + run).expect("a run");
-            plant(&mut record, &mut rng);
-            let d = told(&record);
-            (!right(&d)).then(|| format!("{:?} | {:?}", d.findings, d.unexplained))
-        })
-        .collect();
-    let hits = RUNS - misses.len() as u64;
-    assert!(hits >= LEAST, "{hits} of {RUNS}; {misses:#?}");
+    let graded = draws::graded(RUNS, LEAST, |run| {
+        let mut record = model::simulate(model, seconds, 20.0, seed + run).expect("a run");
+        plant(&mut record, &mut rng);
+        let d = told(&record);
+        match right(&d) {
+            true => Ok(()),
+            false => Err(format!("{:?} | {:?}", d.findings, d.unexplained)),
+        }
+    });
+    assert!(graded.is_ok(), "{}", graded.unwrap_err());
 }
 
 /// Whether nothing is named and what is said of gyro_x holds `words`. Of two axes that follow each other by an alternating

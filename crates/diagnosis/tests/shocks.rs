@@ -1,6 +1,8 @@
 //! Shocks hidden in simulated runs of the paper's stand: their shape, place, size and axes are drawn, and what is told of them
 //! is graded by rate. What is like a shock and none has another name, or none. `IMU_STAND_SEED` takes other draws.
 
+mod draws;
+
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -176,11 +178,11 @@ fn asked(what: &str, hits: u64, of: u64, rate: f64) {
 
 #[test]
 fn a_shock_is_named_alone_and_its_sizes_hold() {
-    const RUNS: u64 = 120;
+    let runs = draws::of(40, 120);
     let rng = &mut draws(1);
     let (mut named, mut alone, mut inside, mut sizes) = (0, 0, 0, 0);
     let (mut times, mut at) = (0, 0);
-    for run in 0..RUNS {
+    for run in 0..runs {
         let mut record = stand(rng);
         // One reading of one channel alone is as well a disturbed word.
         let (kind, two) =
@@ -229,8 +231,8 @@ fn a_shock_is_named_alone_and_its_sizes_hold() {
         );
     }
     println!("begin within its interval and half a reading: {times} of {at}");
-    asked("named", named, RUNS, 0.98);
-    asked("alone", alone, RUNS, 0.98);
+    asked("named", named, runs, 0.98);
+    asked("alone", alone, runs, 0.98);
     asked(
         "largest readings within their intervals",
         inside,
@@ -241,9 +243,9 @@ fn a_shock_is_named_alone_and_its_sizes_hold() {
 
 #[test]
 fn a_clean_record_has_none() {
-    const RUNS: u64 = 60;
+    let runs = draws::of(20, 60);
     let rng = &mut draws(2);
-    let quiet = (0..RUNS).filter(|_| {
+    let quiet = (0..runs).filter(|_| {
         let d = told(&stand(rng));
         let quiet = d.findings.is_empty() && d.unexplained.is_empty();
         if !quiet {
@@ -251,7 +253,7 @@ fn a_clean_record_has_none() {
         }
         quiet
     });
-    asked("silent", quiet.count() as u64, RUNS, 0.995);
+    asked("silent", quiet.count() as u64, runs, 0.995);
 }
 
 /// A record in which something is that is no shock.
@@ -260,9 +262,9 @@ fn without_a_shock(
     of: u64,
     mut change: impl FnMut(&mut Record, &mut Xoshiro256PlusPlus),
 ) {
-    const RUNS: u64 = 16;
+    let runs = draws::of(6, 16);
     let rng = &mut draws(of);
-    let none = (0..RUNS).filter(|_| {
+    let none = (0..runs).filter(|_| {
         let mut record = stand(rng);
         change(&mut record, rng);
         let d = told(&record);
@@ -272,7 +274,7 @@ fn without_a_shock(
         }
         none
     });
-    asked(what, none.count() as u64, RUNS, 0.99);
+    asked(what, none.count() as u64, runs, 0.99);
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! Effects and causes hidden in simulated runs of the paper's stand, and what is told of them, graded by rate as in
 //! `closed_loop`.
 
+#[path = "../draws/mod.rs"]
+pub mod draws;
+
 use diagnosis::result::Diagnosis;
 use diagnosis::{DiagnoseOptions, diagnose};
 use model::ModelFile;
@@ -8,7 +11,7 @@ use model::record::{Quantity, Record};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Runs of a test.
+/// Runs of a test; `draws` says how many of them a sample makes.
 pub const RUNS: u64 = 8;
 /// Right answers that it asks for.
 pub const LEAST: u64 = 7;
@@ -51,23 +54,20 @@ pub fn named(d: &Diagnosis) -> Vec<(&str, &str)> {
         .collect()
 }
 
-/// Draws and grades [`RUNS`] runs.
+/// Draws and grades up to [`RUNS`] runs.
 pub fn graded(what: &str, right: impl FnMut(u64, &mut Xoshiro256PlusPlus) -> Result<(), String>) {
     graded_over((RUNS, LEAST), what, right);
 }
 
-/// Draws and grades so many runs, of which at least so many have to be right.
+/// Draws and grades up to so many runs, of which at least so many have to be right.
 pub fn graded_over(
     (runs, least): (u64, u64),
     what: &str,
     mut right: impl FnMut(u64, &mut Xoshiro256PlusPlus) -> Result<(), String>,
 ) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xc1a1);
-    let misses: Vec<String> = (0..runs)
-        .filter_map(|run| right(run, &mut rng).err())
-        .collect();
-    let hits = runs - misses.len() as u64;
-    assert!(hits >= least, "{what}: {hits} of {runs}; {misses:#?}");
+    let told = draws::graded(runs, least, |run| right(run, &mut rng));
+    assert!(told.is_ok(), "{what}: {}", told.unwrap_err());
 }
 
 /// An answer in short.
