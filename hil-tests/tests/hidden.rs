@@ -1,10 +1,12 @@
 //! Something is wrong with the stand, or nothing: drawn at random and planted by physics. The image in the simulated
 //! ATmega16 samples it, and the diagnosis gets the capture file alone.
 //!
-//! A run of the tests draws five from everything that can be wrong. With `IMU_STAND_LONG` set it goes four times round all
+//! A run of the tests draws three from everything that can be wrong (`IMU_STAND_ALL_DRAWS`: five). With `IMU_STAND_LONG` set it goes four times round all
 //! of it; `IMU_STAND_IMAGE_DRAWS` sets how many, `IMU_STAND_SEED` replays a run. Each has to lead to the same words as
 //! the same draw through the firmware's logic on the host, asked at the same instants; what is named is graded by rates.
 
+#[path = "../../crates/diagnosis/tests/draws/mod.rs"]
+mod draws;
 #[path = "../../crates/cli/tests/hidden/mod.rs"]
 mod hidden;
 
@@ -53,9 +55,9 @@ fn through_the_image(draw: &Draw, image: &[u8]) -> Graded {
 fn what_is_hidden_in_the_stand_is_named_through_the_image() {
     let usual = match std::env::var_os("IMU_STAND_LONG") {
         Some(_) => 4 * ROUND,
-        None => 5,
+        None => draws::of(3, 5),
     };
-    let draws: u64 = std::env::var("IMU_STAND_IMAGE_DRAWS").map_or(usual, |text| {
+    let runs: u64 = std::env::var("IMU_STAND_IMAGE_DRAWS").map_or(usual, |text| {
         text.parse().expect("IMU_STAND_IMAGE_DRAWS is a number")
     });
     let (seed, image, next) = (seed(), image(), AtomicU64::new(0));
@@ -67,10 +69,10 @@ fn what_is_hidden_in_the_stand_is_named_through_the_image() {
                     let mut own = vec![];
                     loop {
                         let number = next.fetch_add(1, Ordering::Relaxed);
-                        if number >= draws {
+                        if number >= runs {
                             return own;
                         }
-                        let draw = Draw::of(seed, number, draws < ROUND);
+                        let draw = Draw::of(seed, number, runs < ROUND);
                         own.push(through_the_image(&draw, &image));
                     }
                 })
