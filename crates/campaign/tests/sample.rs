@@ -2,6 +2,9 @@
 //! would reach once in a thousand runs of this test, by the binomial distribution: it fails when the engine is worse,
 //! not when the draw is unlucky. `IMU_STAND_SEED=N` repeats a draw.
 
+#[path = "../../diagnosis/tests/draws/mod.rs"]
+mod draws;
+
 use std::hash::{BuildHasher, Hasher};
 use std::sync::atomic::AtomicBool;
 
@@ -9,20 +12,36 @@ use campaign::plant::asked_from;
 use campaign::tally::Rate;
 use campaign::{Family, Hit, Outcome, Size, cases, report, run_all, threads};
 
-const SAMPLE: Size = Size {
-    clean: 60,
-    elsewhere: 6,
-    clean_of: 8,
-    one: 6,
-    counted: 2,
-    pairs: 12,
-    one_axis: 8,
-    beside: 4,
-    foreign: 1,
-};
+/// Runs of each kind: of a sample, and where all draws are asked for. How few are too few follows from how many were drawn. An
+/// engine that names 8 in 10 effects where 98 in 100 are asked fails the sample, of some 50, in 95 of 100 runs, one that names 9
+/// in 10 in 38 of 100 (in 80 where all are drawn).
+const SAMPLE: [Size; 2] = [
+    Size {
+        clean: 40,
+        elsewhere: 3,
+        clean_of: 4,
+        one: 3,
+        counted: 1,
+        pairs: 10,
+        one_axis: 4,
+        beside: 2,
+        foreign: 1,
+    },
+    Size {
+        clean: 60,
+        elsewhere: 6,
+        clean_of: 8,
+        one: 6,
+        counted: 2,
+        pairs: 12,
+        one_axis: 8,
+        beside: 4,
+        foreign: 1,
+    },
+];
 /// Of the foreign effects, whose rates `cargo xtask campaign` grades and this test does not: one in so many is drawn, others
 /// with each seed, to see that they can be made and are answered.
-const ONE_IN: u64 = 10;
+const ONE_IN: [u64; 2] = [20, 10];
 /// Chance that an engine that just meets a bar fails the test on it.
 const UNLUCKY: f64 = 1e-3;
 
@@ -59,9 +78,10 @@ fn a_fresh_sample_of_the_campaign_is_not_worse_than_its_bars() {
         .unwrap_or_else(|| std::hash::RandomState::new().build_hasher().finish() >> 16);
     println!("IMU_STAND_SEED={seed}");
     let never = AtomicBool::new(false);
-    let mut drawn = cases(SAMPLE, None);
+    let one_in = draws::of(ONE_IN[0], ONE_IN[1]);
+    let mut drawn = cases(draws::of(SAMPLE[0], SAMPLE[1]), None);
     drawn.retain(|(family, _)| match family {
-        Family::Foreign(number) => *number as u64 % ONE_IN == seed % ONE_IN,
+        Family::Foreign(number) => *number as u64 % one_in == seed % one_in,
         _ => true,
     });
     let all = run_all(seed, &drawn, threads(), &never, &|o| {
