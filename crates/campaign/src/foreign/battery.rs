@@ -1,9 +1,8 @@
 //! What every foreign effect is held to, row by row: it is not a case of the library, comes as strong as wanted, acts on its
 //! channel alone, and does to the readings what its strength reckons with.
 //!
-//! What is held of a row has no chance in it: its draws have fixed seeds. So all rows of the newest set are held at each run and of
-//! the others one in eight, others with each day; all of them where all draws are asked for. tests/draws.rs says of each row
-//! whether it is drawn as before.
+//! What is held of a row has no chance in it: its draws have fixed seeds. So the rows of the newest set are held and of the others
+//! one in eight; all of them where all draws are asked for. tests/draws.rs says of each row whether it is drawn as before.
 
 use model::effects::EFFECTS as LIBRARY;
 
@@ -28,17 +27,12 @@ const SEED: u64 = 20_261_122;
 /// Draws by which it is seen how strong one comes.
 const STRENGTHS: u64 = 8;
 
-/// Of the rows of earlier sets one in so many is held at a run.
-const ONE_IN: u64 = 8;
+/// Of the rows of earlier sets one in so many is held.
+const ONE_IN: u16 = 8;
 
-/// Whether a row is held today.
+/// Whether a row is held.
 fn is_held(effect: &ForeignEffect) -> bool {
-    let day = || {
-        let since = std::time::UNIX_EPOCH.elapsed();
-        since.map_or(0, |s| s.as_secs() / 86_400)
-    };
-    let in_turn = || u64::from(effect.id) % ONE_IN == day() % ONE_IN;
-    draws::all() || effect.set == sets::SETS.len() || in_turn()
+    draws::all() || effect.set == sets::SETS.len() || effect.id.is_multiple_of(ONE_IN)
 }
 
 /// A draw of an effect, on its stand: of so many seconds, at a strength.
@@ -147,7 +141,7 @@ impl Drawn {
     }
 }
 
-/// Every effect of some kinds that is held today, on all threads; what a row fails by is told of all of them.
+/// Every effect of some kinds that is held, on all threads; what a row fails by is told of all of them.
 fn hold_each(kinds: &[&str], of: &(dyn Fn(usize, &ForeignEffect) -> Vec<String> + Sync)) {
     let all: Vec<&ForeignEffect> = KINDS
         .iter()
