@@ -99,16 +99,17 @@ impl Board for AvrBoard {
             cut_motor();
             return;
         }
+        // A byte is enough for what is put out either way.
+        let mut magnitude = duty as u8;
         if duty < 0 {
+            magnitude = magnitude.wrapping_neg();
             port.portd
                 .modify(|r, w| bits!(w, r.bits() | MOTOR_DIRECTION));
         } else {
             port.portd
                 .modify(|r, w| bits!(w, r.bits() & !MOTOR_DIRECTION));
         }
-        timer
-            .ocr2
-            .write(|w| bits!(w, duty.unsigned_abs().min(255) as u8));
+        timer.ocr2.write(|w| bits!(w, magnitude));
         // Not behind the interrupt that cuts it.
         interrupt::free(|_| {
             if tick::host_is_there() {

@@ -134,6 +134,16 @@ fn ten_nops() {
     (nop(), nop(), nop(), nop(), nop());
 }
 
+/// Waits for so many microseconds. A pass takes 16 cycles: ten nops, the count in 16 bits and its test (4), the branch (2).
+#[inline(never)]
+fn pause(us: u16) {
+    let mut left = us;
+    while left != 0 {
+        ten_nops();
+        left = left.wrapping_sub(1);
+    }
+}
+
 /// Waits by counting cycles of 62.5 ns.
 #[derive(Clone, Copy)]
 pub struct Delay;
@@ -144,15 +154,10 @@ impl DelayNs for Delay {
         self.delay_us((ns >> 10).wrapping_add(1));
     }
 
-    #[inline(never)]
+    /// No caller waits for longer than 16 bits of microseconds hold.
+    #[inline(always)]
     fn delay_us(&mut self, us: u32) {
-        // A pass takes 16 cycles: ten nops, the count in 16 bits and its test (4), the branch (2). No caller waits for
-        // longer than 16 bits of microseconds hold.
-        let mut left = us as u16;
-        while left != 0 {
-            ten_nops();
-            left = left.wrapping_sub(1);
-        }
+        pause(us as u16);
     }
 
     fn delay_ms(&mut self, ms: u32) {
