@@ -176,8 +176,8 @@ impl Board for AvrBoard {
     }
 
     fn reboot(&mut self) {
-        interrupt::disable();
         serial::drain();
+        interrupt::disable();
         // SAFETY: nothing runs any more; 16 ms and the watchdog resets the board.
         unsafe { (*WDT::ptr()).wdtcr.write(|w| bits!(w, 1 << 3)) };
         loop {

@@ -103,14 +103,15 @@ impl<const N: usize> Ring<N> {
     /// Adds a byte; false when it is full. The writer's.
     #[inline(always)]
     pub fn push(&self, byte: u8) -> bool {
-        if self.room() == 0 {
+        let head = self.head();
+        let next = Self::after(head);
+        if next == self.tail() {
             return false;
         }
-        let head = self.head();
         // SAFETY: the head stays inside; the reader does not look at it before the head moves.
         unsafe {
             write_volatile(self.place(head), byte);
-            write_volatile(self.head.get(), Self::after(head));
+            write_volatile(self.head.get(), next);
         }
         true
     }

@@ -119,14 +119,9 @@ fn is_idle() -> bool {
     TX.is_empty() && usart().ucsra.read().bits() & (UDRE | TXC) == UDRE | TXC
 }
 
-/// Sends what is queued, with interrupts off. On a line so slow that it takes more than a second the watchdog ends it.
+/// Waits until what is queued has gone out. On a line so slow that it takes more than a second the watchdog ends it.
 pub fn drain() {
-    while let Some(byte) = TX.pop() {
-        while usart().ucsra.read().bits() & UDRE == 0 {}
-        usart().ucsra.write(|w| bits!(w, TXC));
-        usart().udr.write(|w| bits!(w, byte));
-    }
-    while usart().ucsra.read().bits() & TXC == 0 {}
+    while !is_idle() {}
 }
 
 /// Hands what the interrupts lost to the counters.

@@ -71,5 +71,7 @@ pub fn exchange<S: embedded_hal::spi::SpiDevice>(
 ) -> Result<Word, S::Error> {
     let mut frame = command.bytes();
     spi.transfer_in_place(&mut frame)?;
-    Ok(Word::from_bytes(frame))
+    // Byte by byte, as they came: as an array they would be put together in both orders on the AVR.
+    let [high, low] = frame;
+    Ok(Word(u16::from(high) << 8 | u16::from(low)))
 }
