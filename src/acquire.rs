@@ -134,10 +134,15 @@ pub(crate) fn bit(axis: u8) -> u8 {
     1u8.wrapping_shl(axis.into())
 }
 
-/// One frame with one gyro; `None` where it does not end.
+/// One frame with one gyro, and whether it ended; a word of 0 where it did not. (An `Option` would have the AVR move the word from
+/// registers to registers for each caller.)
 #[inline(never)]
-fn exchange<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Option<Word> {
-    sensors.gyro(axis)?.exchange(command).ok()
+fn exchange<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> (Word, bool) {
+    let gyro = sensors.gyro(axis);
+    match gyro.and_then(|gyro| gyro.exchange(command).ok()) {
+        Some(reply) => (reply, true),
+        None => (Word(0), false),
+    }
 }
 
 /// One frame with each gyro: what they answer to the command of the round before, and a bit for each that does not.
@@ -145,13 +150,11 @@ fn exchange<S: Sensors>(sensors: &mut S, axis: u8, command: Command) -> Option<W
 fn round<S: Sensors>(sensors: &mut S, command: Command, into: &mut [Word; 3]) -> u8 {
     let (mut axis, mut bit, mut stalled) = (0, 1, 0);
     for word in into {
-        *word = match exchange(sensors, axis, command) {
-            Some(reply) => reply,
-            None => {
-                stalled |= bit;
-                Word(0)
-            }
-        };
+        let (reply, ended) = exchange(sensors, axis, command);
+        *word = reply;
+        if !ended {
+            stalled |= bit;
+        }
         axis = axis.wrapping_add(1);
         bit <<= 1;
     }
@@ -197,14 +200,16 @@ pub fn work<S: Sensors>(sensors: &mut S, job: &Job, done: &mut Done) {
         return;
     }
     sensors.slow(true);
-    (done.status, done.value) = match job.task {
-        Task::None => (Status::Ok, 0),
-        Task::Configure => (Status::Ok, configure(sensors, job.axis, job.value).into()),
-        Task::Read => reach(sensors, job, SLOW_STALL_US),
-        Task::Write => match reach(sensors, job, SLOW_STALL_US) {
-            (Status::Ok, value) if value != job.value => (Status::ReadBackWrong, value),
+    let (axis, value) = (job.axis, job.value);
+    (done.value, done.status) = if job.task == Task::Configure {
+        (configure(sensors, axis, value).into(), Status::Ok)
+    } else {
+        match reach(sensors, axis, job.address, job.task, value, SLOW_STALL_US) {
+            (read, Status::Ok) if job.task == Task::Write && read != value => {
+                (read, Status::ReadBackWrong)
+            }
             reached => reached,
-        },
+        }
     };
     sensors.slow(false);
     done.task = job.task;
@@ -212,44 +217,54 @@ pub fn work<S: Sensors>(sensors: &mut S, job: &Job, done: &mut Done) {
 
 /// One frame with one gyro, and the pause that it wants after it.
 #[inline(never)]
-fn frame<S: Sensors>(sensors: &mut S, axis: u8, command: Command, stall_us: u8) -> Option<Word> {
+fn frame<S: Sensors>(sensors: &mut S, axis: u8, command: Command, stall_us: u8) -> (Word, bool) {
     let reply = exchange(sensors, axis, command);
     sensors.delay().delay_us(stall_us.into());
     reply
 }
 
-/// Reads the job's register, after writing it where that is asked for. The value is 0 but for [`Status::Ok`].
-fn reach<S: Sensors>(sensors: &mut S, job: &Job, stall_us: u8) -> (Status, u16) {
-    let (axis, address) = (job.axis, job.address & !1);
-    let [low, high] = job.value.to_le_bytes();
+/// Reads a register, after writing it where that is the task. The value is 0 but for [`Status::Ok`].
+#[inline(never)]
+fn reach<S: Sensors>(
+    sensors: &mut S,
+    axis: u8,
+    address: u8,
+    task: Task,
+    value: u16,
+    stall_us: u8,
+) -> (u16, Status) {
+    const REFUSED: (u16, Status) = (0, Status::BadArgument);
+    const SILENT: (u16, Status) = (0, Status::NotAnswering);
+    if axis > 2 {
+        return REFUSED;
+    }
+    let is_write = task == Task::Write;
+    // Before the first frame: looking it up takes 15 us, which would be a pause more.
     let read = Command::read_at(address);
-    let write = Command::write_at(address, low).zip(Command::write_at(address | 1, high));
-    let is_write = job.task == Task::Write;
-    if axis > 2
-        || if is_write {
-            write.is_none()
-        } else {
-            read.is_none()
-        }
-    {
-        return (Status::BadArgument, 0);
-    }
-    let value = (|| {
-        if let Some((low, high)) = write.filter(|_| is_write) {
-            frame(sensors, axis, low, stall_us)?;
-            frame(sensors, axis, high, stall_us)?;
-        }
-        let Some(read) = read else {
-            return Some(job.value);
+    if is_write {
+        let Some([low, high]) = Command::write_word_at(address, value) else {
+            return REFUSED;
         };
-        frame(sensors, axis, read, stall_us)?;
-        // The reply comes with any next frame; one that asks for ENDURANCE disturbs nothing.
-        frame(sensors, axis, Command::read(Register::Endurance), stall_us).map(Word::bits)
-    })();
-    match value {
-        Some(value) => (Status::Ok, value),
-        None => (Status::NotAnswering, 0),
+        if !frame(sensors, axis, low, stall_us).1 || !frame(sensors, axis, high, stall_us).1 {
+            return SILENT;
+        }
     }
+    let Some(read) = read else {
+        return if is_write {
+            (value, Status::Ok)
+        } else {
+            REFUSED
+        };
+    };
+    if frame(sensors, axis, read, stall_us).1 {
+        // The reply comes with any next frame; one that asks for ENDURANCE disturbs nothing.
+        let endurance = Command::read(Register::Endurance);
+        let (reply, ended) = frame(sensors, axis, endurance, stall_us);
+        if ended {
+            return (reply.bits(), Status::Ok);
+        }
+    }
+    SILENT
 }
 
 /// GYRO_SCALE as the parts leave the factory: 1.
@@ -262,42 +277,36 @@ pub const FASTEST: u16 = 1;
 /// as the pace of all else hangs on it, then what would shift, flag or disturb the rate without a word.
 #[inline(never)]
 pub fn configure<S: Sensors>(sensors: &mut S, axis: u8, sens_avg: u16) -> u8 {
+    const SENS_AVG: u8 = Register::SensAvg.address();
+    const GYRO_OFF: u8 = Register::GyroOff.address();
+    const ALM_CTRL: u8 = Register::AlmCtrl.address();
+    const MSC_CTRL: u8 = Register::MscCtrl.address();
     let bit = bit(axis);
     let mut stall_us = SLOW_STALL_US;
     sensors.slow(true);
-    let mut job = Job {
-        task: Task::Write,
-        axis,
-        address: Register::SmplPrd.address(),
-        value: FASTEST,
-    };
+    let (mut address, mut value) = (Register::SmplPrd.address(), FASTEST);
     loop {
         // A gyro that does not answer has no value.
-        if reach(sensors, &job, stall_us) != (Status::Ok, job.value) {
+        if reach(sensors, axis, address, Task::Write, value, stall_us) != (value, Status::Ok) {
             return bit;
         }
         // From here on it has its fastest sample period.
         sensors.slow(false);
         stall_us = FAST_STALL_US;
-        job.value = 0;
-        const SENS_AVG: u8 = Register::SensAvg.address();
-        const GYRO_OFF: u8 = Register::GyroOff.address();
-        const ALM_CTRL: u8 = Register::AlmCtrl.address();
-        const MSC_CTRL: u8 = Register::MscCtrl.address();
-        job.address = match job.address {
+        value = 0;
+        address = match address {
             SENS_AVG => GYRO_OFF,
             GYRO_OFF => ALM_CTRL,
             ALM_CTRL => MSC_CTRL,
             MSC_CTRL => break,
             _ => {
-                job.value = sens_avg;
+                value = sens_avg;
                 SENS_AVG
             }
         };
     }
-    job.task = Task::Read;
-    job.address = Register::GyroScale.address();
-    if reach(sensors, &job, stall_us).1 & 0x0fff != FACTORY_SCALE {
+    address = Register::GyroScale.address();
+    if reach(sensors, axis, address, Task::Read, 0, stall_us).0 & 0x0fff != FACTORY_SCALE {
         return bit << 3;
     }
     0

@@ -274,6 +274,17 @@ pub fn somewhere<T>(place: &mut T) -> &mut T {
     place
 }
 
+/// The same value, known here and at no later place. (`black_box` takes it by the stack.)
+#[cfg(target_arch = "avr")]
+#[inline(always)]
+#[allow(unsafe_code)]
+#[must_use]
+pub fn known<T>(mut place: *mut T) -> *mut T {
+    // SAFETY: it stays what it is; without `pure` it is neither left out nor moved beyond a sleep.
+    unsafe { core::arch::asm!("/* {} */", inout(reg_ptr) place, options(nostack)) };
+    place
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -10,7 +10,7 @@ use core::ptr::addr_of_mut;
 use avr_device::atmega16::{CPU, TC0, TC1};
 use avr_device::{asm, interrupt};
 use firmware::acquire::work;
-use firmware::math::count_up;
+use firmware::math::{count_up, known};
 use firmware::motor::KEEP_ALIVE_MS;
 use firmware::{Job, Raw, Task, acquire};
 
@@ -320,7 +320,7 @@ fn TIMER1_COMPB() {
     shared.ticked = false;
     // Chosen before the sleep, and the compiler kept from moving it: the choice takes longer for one place than for the
     // other, and after the wake-up that is jitter.
-    let free = core::hint::black_box(place(shared.reading ^ 1));
+    let free = known(place(shared.reading ^ 1));
     // Only compare A is left to wake it; the bound is for a wake-up that nobody explains.
     for _ in 0..4u8 {
         sleep_now();

@@ -145,6 +145,17 @@ impl Command {
         }
     }
 
+    /// Writes both bytes of a register by its address, the low one first. `None` where no register that can be written has it.
+    #[must_use]
+    #[inline]
+    pub const fn write_word_at(address: u8, value: u16) -> Option<[Self; 2]> {
+        if !has(WRITABLE, address) {
+            return None;
+        }
+        let ([low, high], to) = (value.to_le_bytes(), 0x80 | address & !1);
+        Some([Command([to, low]), Command([to | 1, high])])
+    }
+
     /// Writes the low byte of a register.
     #[must_use]
     #[inline]
