@@ -23,8 +23,16 @@ const RXEN_TXEN: u8 = 1 << 4 | 1 << 3;
 /// URSEL, 8 data bits, no parity, 1 stop bit.
 const UCSRC_8N1: u8 = 1 << 7 | 3 << 1;
 
-/// 1 + a divisor that waits for the line to be idle, which has 12 bits; 0: none.
-static mut NEXT: u16 = 0;
+/// A divisor that waits for the line to be idle, low byte and high byte, which has four bits and [`WAITS`].
+static mut NEXT: [u8; 2] = [0; 2];
+const WAITS: u8 = 1 << 7;
+
+/// Whether a divisor waits.
+fn next_waits() -> bool {
+    // SAFETY: the main loop's alone.
+    let [_, high] = unsafe { NEXT };
+    high != 0
+}
 
 /// Losses that the interrupts saw: overrun, framing.
 static mut LOST: [u8; 2] = [0; 2];
@@ -45,8 +53,9 @@ pub fn received() -> Option<u8> {
 #[inline(never)]
 pub fn set_baud(divisor: u16) {
     if usart().ucsrb.read().bits() != 0 {
+        let [low, high] = divisor.to_le_bytes();
         // SAFETY: the main loop's alone.
-        unsafe { NEXT = divisor.wrapping_add(1) };
+        unsafe { NEXT = [low, high | WAITS] };
         return;
     }
     set_divisor(divisor);
@@ -56,12 +65,12 @@ pub fn set_baud(divisor: u16) {
 
 /// What has to wait for the line to be idle.
 pub fn work() {
-    // SAFETY: as above.
-    let next = unsafe { NEXT };
-    if next != 0 && is_idle() {
-        set_divisor(next.wrapping_sub(1));
-        // SAFETY: as above.
-        unsafe { NEXT = 0 };
+    if next_waits() && is_idle() {
+        // SAFETY: as above. What is not of the divisor the register does not take.
+        unsafe {
+            set_divisor(u16::from_le_bytes(NEXT));
+            NEXT[1] = 0;
+        }
     }
 }
 
@@ -84,8 +93,7 @@ pub fn has_received() -> bool {
 /// divisor waits there are replies alone: a line that is too slow for its frames would never fall idle.
 #[inline(never)]
 pub fn send(kind: u8, fields: &[u8]) -> bool {
-    // SAFETY: the main loop's alone.
-    let waits = kind != wire::kind::REPLY && unsafe { NEXT } != 0;
+    let waits = kind != wire::kind::REPLY && next_waits();
     if waits || usize::from(room()) < room_for(kind, fields.len()) {
         return false;
     }
