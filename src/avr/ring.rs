@@ -24,33 +24,23 @@ impl<const N: usize> Ring<N> {
         (N - 1) as u8
     };
 
-    /// Writes a byte ahead of what the reader sees: `offset` from the next place, less than [`room`](Self::room). `head` is
-    /// [`head`](Self::head), which moves by the writer alone and is read once for a frame. The writer's.
+    /// Writes a byte ahead of what the reader sees, at a place from [`head`](Self::head) on, of which there is
+    /// [`room`](Self::room) for. The writer's.
     #[inline(always)]
-    pub fn put(&self, head: u8, offset: u8, byte: u8) {
+    pub fn put(&self, at: u8, byte: u8) {
         // SAFETY: inside, and behind the head the reader does not look.
-        unsafe { write_volatile(self.place(Self::further(head, offset)), byte) }
+        unsafe { write_volatile(self.place(at), byte) }
     }
 
-    /// Shows the reader `len` bytes behind `head` that [`put`](Self::put) has written. The writer's.
-    pub fn advance(&self, head: u8, len: u8) {
+    /// Shows the reader what [`put`](Self::put) has written before this place. The writer's.
+    pub fn advance(&self, to: u8) {
         // SAFETY: a byte, written once.
-        unsafe { write_volatile(self.head.get(), Self::further(head, len)) }
+        unsafe { write_volatile(self.head.get(), to) }
     }
 
-    /// `at + by`, round the ring; `by` is at most [`LAST`](Self::LAST).
+    /// The place behind one.
     #[inline(always)]
-    fn further(at: u8, by: u8) -> u8 {
-        // Places up to the end, which is not one.
-        let left = Self::LAST.wrapping_sub(at);
-        if by > left {
-            by.wrapping_sub(left).wrapping_sub(1)
-        } else {
-            at.wrapping_add(by)
-        }
-    }
-
-    fn after(at: u8) -> u8 {
+    pub fn after(at: u8) -> u8 {
         if at >= Self::LAST {
             0
         } else {

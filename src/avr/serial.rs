@@ -10,7 +10,8 @@ use wire::fields::{encode_by, room_for};
 use super::ring::Ring;
 
 /// Room for a sample, a health frame and the next sample: 190 bytes.
-static TX: Ring<192> = Ring::new();
+static TX: Tx = Ring::new();
+type Tx = Ring<192>;
 /// Nearly two requests: what comes while a sample is taken, at 250 kBd.
 static RX: Ring<36> = Ring::new();
 const UDRE: u8 = 1 << 5;
@@ -97,9 +98,8 @@ pub fn send(kind: u8, fields: &[u8]) -> bool {
     if waits || usize::from(room()) < room_for(kind, fields.len()) {
         return false;
     }
-    let head = TX.head();
-    let len = encode_by(kind, fields, |at, byte| TX.put(head, at, byte));
-    TX.advance(head, len);
+    let end = encode_by(kind, fields, TX.head(), Tx::after, |at, byte| TX.put(at, byte));
+    TX.advance(end);
     begin();
     true
 }

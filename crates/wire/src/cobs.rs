@@ -4,50 +4,56 @@ use heapless::Vec;
 
 use crate::crc;
 
-/// Puts out a payload with CRC and delimiter, stuffed as it comes; returns the frame's length on the line. `put` gets each
-/// byte with its place in the frame: places ascend, but for the code of a block, which is known at its end.
-pub(crate) fn write(kind: u8, fields: &[u8], mut put: impl FnMut(u8, u8)) -> u8 {
+/// Puts out a payload with CRC and delimiter, stuffed as it comes, from the place `first` on; returns the place behind it. `after`
+/// says which place follows one. `put` gets each byte with its place, in their order but for the code of a block, which is known
+/// at its end.
+pub(crate) fn write(
+    kind: u8,
+    fields: &[u8],
+    first: u8,
+    after: impl Fn(u8) -> u8,
+    mut put: impl FnMut(u8, u8),
+) -> u8 {
     let mut register = crc::INIT;
-    // Where the next byte goes, and where the code of the block being written goes.
-    let (mut at, mut code_at) = (1u8, 0u8);
-    // Version and kind, neither of which is ever zero.
-    let mut head = u16::from_le_bytes([crate::VERSION, kind]);
+    // Where the next byte goes, where the code of the block being written goes, and that code.
+    let (mut at, mut code_at, mut code) = (after(first), first, 1u8);
     let mut rest = fields.iter();
-    let mut crc_left = 4u8;
+    // Version, kind, the fields, and the four bytes of the CRC, each a step but for the fields.
+    let mut step = 0u8;
     loop {
-        let next = if head == 0 {
-            rest.next().copied()
-        } else {
-            let byte = head as u8;
-            head >>= 8;
-            Some(byte)
+        let next = match step {
+            0 => Some(crate::VERSION),
+            1 => Some(kind),
+            _ => rest.next().copied(),
         };
+        if step < 2 || next.is_none() {
+            step = step.wrapping_add(1);
+        }
         let byte = match next {
             Some(byte) => {
                 register = crc::update(register, byte);
                 byte
             }
-            None if crc_left == 0 => break,
+            None if step > 2 + 4 => break,
             None => {
-                crc_left = crc_left.wrapping_sub(1);
                 let byte = crc::finish(register) as u8;
                 register >>= 8;
                 byte
             }
         };
-        // A zero ends the block: its code says how long it is, and the next block's takes the zero's place.
-        let (place, value) = if byte == crate::DELIMITER {
-            let begun = core::mem::replace(&mut code_at, at);
-            (begun, at.wrapping_sub(begun))
+        if byte == crate::DELIMITER {
+            // It ends the block, and the code of the next one takes its place.
+            put(code_at, code);
+            (code_at, code) = (at, 1);
         } else {
-            (at, byte)
-        };
-        put(place, value);
-        at = at.wrapping_add(1);
+            put(at, byte);
+            code = code.wrapping_add(1);
+        }
+        at = after(at);
     }
-    put(code_at, at.wrapping_sub(code_at));
+    put(code_at, code);
     put(at, crate::DELIMITER);
-    at.wrapping_add(1)
+    after(at)
 }
 
 /// Why a run of bytes between two delimiters is no payload.

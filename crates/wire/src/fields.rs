@@ -135,11 +135,17 @@ pub struct Request {
 /// Writes a payload of these fields as it goes on the line; returns the frame's length. `out` has to take it
 /// ([`crate::MAX_FRAME`] bytes always do): what does not fit is lost.
 pub fn encode(kind: u8, fields: &[u8], out: &mut [u8]) -> usize {
-    let len = encode_by(kind, fields, |at, byte| {
-        if let Some(place) = out.get_mut(usize::from(at)) {
-            *place = byte;
-        }
-    });
+    let len = encode_by(
+        kind,
+        fields,
+        0,
+        |at| at.wrapping_add(1),
+        |at, byte| {
+            if let Some(place) = out.get_mut(usize::from(at)) {
+                *place = byte;
+            }
+        },
+    );
     usize::from(len)
 }
 
@@ -160,10 +166,16 @@ pub const fn room_for(kind: u8, fields: usize) -> usize {
     }
 }
 
-/// As [`encode`], by a function that puts a byte at its place in the frame, counted from 0. Places come in ascending order
-/// but for the codes of the stuffing, which are written when their block ends.
-pub fn encode_by(kind: u8, fields: &[u8], put: impl FnMut(u8, u8)) -> u8 {
-    crate::cobs::write(kind, fields, put)
+/// As [`encode`], to places that `after` puts in order, from `first` on; returns the place behind the frame. `put` gets each byte with
+/// its place. They come in that order but for the codes of the stuffing, which are written when their block ends.
+pub fn encode_by(
+    kind: u8,
+    fields: &[u8],
+    first: u8,
+    after: impl Fn(u8) -> u8,
+    put: impl FnMut(u8, u8),
+) -> u8 {
+    crate::cobs::write(kind, fields, first, after, put)
 }
 
 impl From<&crate::Sample> for Sample {
