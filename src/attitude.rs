@@ -119,7 +119,9 @@ pub fn begin(q: &mut [I32; 4]) {
 /// Turns by `rate`, Q12.20 deg/s, over so many timer ticks, [`wire::correction::LONGEST_TICKS`] at the most; with `acc`, counts, a little towards
 /// where that is up.
 pub fn step(q: &mut [I32; 4], rate: &[I32; 3], ticks: u16, acc: Option<&[u16; 3]>) {
+    // By a pointer, as a stack's place is reached up to its 63rd byte, and the last cell would lie behind it.
     let mut cells: Cells = [0; 16];
+    let cells = crate::math::somewhere(&mut cells);
     for (cell, q) in cells.iter_mut().zip(q.iter()) {
         *cell = q.get();
     }
@@ -128,18 +130,18 @@ pub fn step(q: &mut [I32; 4], rate: &[I32; 3], ticks: u16, acc: Option<&[u16; 3]
     }
     cells[K as usize] = i32::from(ticks) << 14;
     cells[T as usize] = HALF_TICK;
-    run(&mut cells, &ANGLES);
+    run(cells, &ANGLES);
     if let Some(acc) = acc {
         for (cell, counts) in cells.iter_mut().skip(V as usize).zip(acc) {
             *cell = i32::from(counts.cast_signed().wrapping_sub(ACC_ZERO) << 6) << 16;
         }
         cells[T as usize + 3] = LENGTH / 2;
-        run(&mut cells, &LEAN);
+        run(cells, &LEAN);
     }
     cells[K as usize] = THIRD;
     cells[V as usize] = LENGTH;
-    run(&mut cells, &TURN);
-    for (q, cell) in q.iter_mut().zip(&cells) {
+    run(cells, &TURN);
+    for (q, cell) in q.iter_mut().zip(&*cells) {
         q.set(*cell);
     }
 }

@@ -95,7 +95,8 @@ pub fn has_received() -> bool {
 #[inline(never)]
 pub fn send(kind: u8, fields: &[u8]) -> bool {
     let waits = kind != wire::kind::REPLY && next_waits();
-    if waits || usize::from(room()) < room_for(kind, fields.len()) {
+    // No frame is so long that a byte would not hold its room.
+    if waits || room() < room_for(kind, fields.len()) as u8 {
         return false;
     }
     let end = encode_by(kind, fields, TX.head(), Tx::after, |at, byte| TX.put(at, byte));
