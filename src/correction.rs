@@ -32,7 +32,7 @@ use zerocopy::little_endian::{I32, U16};
 use crate::acquire::Raw;
 use crate::attitude;
 use crate::config::Config;
-use crate::math::{divide, product, shifted, times, upper};
+use crate::math::{divide, product, shifted, sum, times, upper};
 use crate::stand::Board;
 use crate::stand::store::newest;
 
@@ -462,7 +462,7 @@ impl Axis {
             return 0;
         }
         let measured = divide(1 << 16, noise) as u16;
-        let now = known.get().saturating_add(measured);
+        let now = sum(known.get(), measured);
         known.set(now);
         let gain = divide(u32::from(measured) << 14, now) as i16;
         bias.set(bias.get().wrapping_add(times(mean << 2, gain)));

@@ -242,6 +242,13 @@ pub fn root(x: u32) -> u16 {
     root
 }
 
+/// `x + y`, up to 65 535. In line the compiler makes a bit of the carry, and asks it again.
+#[inline(never)]
+#[must_use]
+pub fn sum(x: u16, y: u16) -> u16 {
+    x.saturating_add(y)
+}
+
 /// One more, up to 255.
 #[inline(never)]
 pub fn count_up(count: &mut u8) {

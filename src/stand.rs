@@ -14,6 +14,7 @@ use crate::acquire::Job;
 use crate::bias::BiasNull;
 use crate::config::Config;
 use crate::correction::Correction;
+use crate::math::sum;
 use crate::motor::Motor;
 use line::{CORRECTED_LEN, REPLY_LEN, SAMPLE_LEN};
 use store::Store;
@@ -226,10 +227,10 @@ impl Stand {
             (watchdog, brown_out) = (0, 0);
         }
         if cause & reset_cause::WATCHDOG != 0 {
-            watchdog = watchdog.saturating_add(1);
+            watchdog = sum(watchdog, 1);
         }
         if cause & reset_cause::BROWN_OUT != 0 {
-            brown_out = brown_out.saturating_add(1);
+            brown_out = sum(brown_out, 1);
         }
         board.keep([watchdog, brown_out]);
         self.health.count(Fault::WatchdogReset, 0, watchdog);

@@ -2,6 +2,7 @@
 
 use avr_device::atmega16::{CPU, EEPROM, PORTC, PORTD, TC2, WDT};
 use avr_device::interrupt;
+use firmware::math::sum;
 use firmware::{Board, Job};
 
 use super::{serial, tick};
@@ -79,7 +80,7 @@ impl AvrBoard {
         *restarts = if reset_cause & POWER_ON != 0 {
             0
         } else {
-            restarts.saturating_add(1)
+            sum(*restarts, 1)
         };
         // SAFETY: as above.
         unsafe { RESET_CAUSE = reset_cause };
