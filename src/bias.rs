@@ -9,7 +9,7 @@
 
 use zerocopy::little_endian::I16;
 
-use crate::math::{divide, root, times};
+use crate::math::{area, divide, root, times};
 
 /// Largest spread (max - min) of a rate at rest, counts: eight times the 5.4 counts rms that a gyro has at 20 Hz
 /// (ARW 5.27 deg/sqrt(h)) is exceeded by a still stand once in many thousand runs; a turning one exceeds it at once.
@@ -145,7 +145,7 @@ impl BiasNull {
     #[inline(never)]
     pub fn mean(&self, sum: &AxisSum, scale: i32) -> i32 {
         // Of offsets that are above -60, so that the division needs no sign; |sum| <= 60 * 16384 < 2^20.
-        let lowest = u32::from(self.have).wrapping_mul(SPREAD_AT_REST as u32);
+        let lowest = area(self.have, SPREAD_AT_REST as u16);
         let above = sum.sum.cast_unsigned().wrapping_add(lowest);
         let mean_q8 = (sum.first.wrapping_sub(SPREAD_AT_REST) << 8)
             .wrapping_add(divide(above << 8, self.have) as i16);
@@ -160,9 +160,10 @@ impl BiasNull {
     #[must_use]
     pub fn error(&self, sum: &AxisSum, scale: i32) -> i32 {
         /// sqrt(pi)/2 in Q10.
-        const OF_MAGNITUDE: u32 = 907;
+        const OF_MAGNITUDE: u16 = 907;
         // Blocks differ by 60 b at the most: the sum is below 2^20, the quotient below 69 in Q10.
-        let steps = sum.steps.wrapping_mul(OF_MAGNITUDE);
+        let high = area((sum.steps >> 16) as u16, OF_MAGNITUDE);
+        let steps = area(sum.steps as u16, OF_MAGNITUDE).wrapping_add(high << 16);
         let samples = self.block.wrapping_mul(self.blocks.wrapping_sub(1));
         let step = divide(steps, samples);
         // sqrt(k) in Q8.

@@ -83,17 +83,71 @@ pub fn shifted(x: i32, n: u8) -> i32 {
     (u32::from(high) << 16 | u32::from(low)).cast_signed()
 }
 
+/// `x y` of what has no sign.
+#[cfg(not(target_arch = "avr"))]
+#[must_use]
+pub fn area(x: u16, y: u16) -> u32 {
+    u32::from(x).wrapping_mul(y.into())
+}
+
+/// `x y` of what has no sign. The compiler has none but that of 32 bits with 32.
+#[cfg(target_arch = "avr")]
+#[inline(never)]
+#[allow(unsafe_code)]
+#[must_use]
+pub fn area(x: u16, y: u16) -> u32 {
+    let (low, high): (u16, u16);
+    // SAFETY: registers and flags alone; r1 is zero again at the end.
+    unsafe {
+        core::arch::asm!(
+            "mul {x:l}, {y:l}",
+            "movw {low}, r0",
+            "mul {x:h}, {y:h}",
+            "movw {high}, r0",
+            "clr {zero}",
+            "mul {x:l}, {y:h}", "add {low:h}, r0", "adc {high:l}, r1", "adc {high:h}, {zero}",
+            "mul {x:h}, {y:l}", "add {low:h}, r0", "adc {high:l}, r1", "adc {high:h}, {zero}",
+            "clr r1",
+            x = in(reg_pair) x,
+            y = in(reg_pair) y,
+            low = out(reg_pair) low,
+            high = out(reg_pair) high,
+            zero = out(reg) _,
+            options(pure, nomem, nostack),
+        );
+    }
+    u32::from(high) << 16 | u32::from(low)
+}
+
+/// `x y`, of which one has a sign.
+#[inline(never)]
+#[must_use]
+pub fn scaled(x: i16, y: u16) -> i32 {
+    let exact = area(x.cast_unsigned(), y).cast_signed();
+    // Without its sign x was 2^16 more.
+    if x < 0 {
+        exact.wrapping_sub(i32::from(y.cast_signed()) << 16)
+    } else {
+        exact
+    }
+}
+
 /// `x y`.
 #[inline(never)]
 #[must_use]
 pub fn product(x: i16, y: i16) -> i32 {
-    i32::from(x).wrapping_mul(y.into())
+    let exact = scaled(x, y.cast_unsigned());
+    if y < 0 {
+        exact.wrapping_sub(i32::from(x) << 16)
+    } else {
+        exact
+    }
 }
 
 /// `x y / 2^16` of what has no sign, rounded down.
 #[must_use]
 pub fn upper(x: u16, y: u16) -> u16 {
-    (u32::from(x).wrapping_mul(y.into()) >> 16) as u16
+    (area(x, y) >> 16) as u16
 }
 
 /// `x y / 2^16`, to the nearest.
@@ -234,7 +288,7 @@ pub fn root(x: u32) -> u16 {
     let (mut root, mut bit) = (0u16, 0x8000u16);
     while bit != 0 {
         let tried = root | bit;
-        if u32::from(tried).wrapping_mul(u32::from(tried)) <= x {
+        if area(tried, tried) <= x {
             root = tried;
         }
         bit >>= 1;

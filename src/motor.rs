@@ -1,7 +1,7 @@
 //! The motor's command: never faster than its limits, never a jump. That it is off unless the PC is there is the board's
 //! part (see [`Board::keep_alive`](crate::Board::keep_alive)).
 
-use crate::math::{divide, times, upper};
+use crate::math::{divide, scaled, times, upper};
 
 /// The motor turns no longer than this without a word from the PC, ms.
 pub const KEEP_ALIVE_MS: u8 = 200;
@@ -224,7 +224,7 @@ fn sine_q14(part: i16) -> i16 {
 /// `a * b / 2^14`, rounded down.
 #[inline(never)]
 fn times_q14(a: i16, b: u16) -> i16 {
-    (i32::from(a).wrapping_mul(b.into()) >> 14) as i16
+    (scaled(a, b) >> 14) as i16
 }
 
 #[cfg(test)]
