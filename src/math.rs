@@ -306,9 +306,8 @@ pub fn sum(x: u16, y: u16) -> u16 {
 /// One more, up to 255.
 #[inline(never)]
 pub fn count_up(count: &mut u8) {
-    let more = count.wrapping_add(1);
-    if more != 0 {
-        *count = more;
+    if *count < u8::MAX {
+        *count = count.wrapping_add(1);
     }
 }
 

@@ -178,7 +178,7 @@ fn look<B: Board>(board: &mut B, copy: u16) -> Copy {
         at = at.wrapping_add(1);
         left = left.wrapping_sub(1);
     }
-    if register == wire::crc::RESIDUE && board.eeprom_read(copy) == format {
+    if wire::crc::is_whole(register) && board.eeprom_read(copy) == format {
         return Copy::Whole;
     }
     if all == 0xff {

@@ -147,7 +147,7 @@ impl<const N: usize> Deframer<N> {
             State::Filling if run != 0 => Some(Err(Broken::Cobs)),
             // Version, kind and CRC are there in every payload.
             State::Filling if self.body.len() < 6 => Some(Err(Broken::Length)),
-            State::Filling if register != crc::RESIDUE => Some(Err(Broken::Crc)),
+            State::Filling if !crc::is_whole(register) => Some(Err(Broken::Crc)),
             State::Filling => Some(
                 self.body
                     .get(..self.body.len().wrapping_sub(4))

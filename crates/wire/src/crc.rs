@@ -8,6 +8,13 @@ pub const INIT: u32 = 0xFFFF_FFFF;
 /// The register's value after a message and its own CRC, little endian, have passed: the same for every message.
 pub const RESIDUE: u32 = 0xB798_B438;
 
+/// Whether a register has passed a message and its own CRC.
+#[must_use]
+#[cfg_attr(target_arch = "avr", inline(never))]
+pub const fn is_whole(register: u32) -> bool {
+    register == RESIDUE
+}
+
 /// The CRC that a register stands for, once all bytes have passed.
 #[must_use]
 pub const fn finish(register: u32) -> u32 {
