@@ -17,6 +17,8 @@
 //! has it); the terms add 32 + 16 + 128 + 16 + 4 + 128 + 96 at the most, whatever the coefficients are, the matrix 3/8 of the sum, the
 //! surge 16: below 2048, which Q12.20 holds.
 
+use core::num::NonZeroU16;
+
 use wire::correction::{
     ADAPT_SHIFT, BLOCK_SHIFT_MAX, GATE_SHIFT, LONGEST_TICKS, NOISE_SHIFT, REST_DPS, ROWS,
     STORED_LEN,
@@ -176,13 +178,13 @@ impl Correction {
     /// Where a row of the newest copy begins, or of the other one; the row behind the last is that of the CRC.
     #[must_use]
     #[inline(never)]
-    pub fn place(&self, other: bool, row: u8) -> Option<u16> {
+    pub fn place(&self, other: bool, row: u8) -> Option<NonZeroU16> {
         if row > ROWS as u8 {
             return None;
         }
         let second = (self.newest == 2) != other;
         let copy = if second { COPIES[1] } else { COPIES[0] };
-        Some(copy.wrapping_add(u16::from(row.wrapping_mul(6))))
+        NonZeroU16::new(copy.wrapping_add(u16::from(row.wrapping_mul(6))))
     }
 
     /// No corrected frames any more.
@@ -196,7 +198,7 @@ impl Correction {
         *self = Self::new();
         self.newest = newest(board, COPIES[0], COPIES[1]) & 3;
         if let Some(at) = self.place(false, 0).filter(|_| self.newest != 0) {
-            self.at = at;
+            self.at = at.get();
         }
         self.at != 0
     }

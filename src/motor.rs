@@ -21,6 +21,13 @@ mod shape {
     pub const SINE: u8 = wire::Shape::Sine as u8;
 }
 
+/// Whether a command is in its range.
+#[inline(never)]
+#[must_use]
+pub fn is_duty(duty: i16) -> bool {
+    (-FULL..=FULL).contains(&duty)
+}
+
 /// Command, limits and what is put out now.
 #[derive(Clone, Copy, Debug)]
 pub struct Motor {
@@ -102,8 +109,7 @@ impl Motor {
             this.command(0);
             return true;
         }
-        let in_range = |duty: i16| (-FULL..=FULL).contains(&duty);
-        if shape > shape::SINE || period_ms < 2 || !in_range(amplitude) || !in_range(offset) {
+        if shape > shape::SINE || period_ms < 2 || !is_duty(amplitude) || !is_duty(offset) {
             return false;
         }
         (this.shape, this.cycles) = (shape, cycles);

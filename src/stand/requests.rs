@@ -5,7 +5,7 @@ use wire::{Asked, Sensor, Status, code};
 
 use super::{Board, Pending, SET, Stand, source};
 use crate::acquire::{Done, Job, Task, bit};
-use crate::motor::FULL;
+use crate::motor::is_duty;
 
 /// What becomes of a request at once.
 enum Answer {
@@ -117,7 +117,7 @@ impl Stand {
             }
             code::MOTOR_DUTY => {
                 let duty = word(asked).cast_signed();
-                if !(-FULL..=FULL).contains(&duty) {
+                if !is_duty(duty) {
                     Status::BadArgument
                 } else if duty != 0 && !board.host_is_there() {
                     Status::NoKeepAlive
@@ -295,11 +295,11 @@ impl Stand {
             return Answer::Now(Status::BadArgument);
         };
         if write {
-            self.begin_write(asked, place);
+            self.begin_write(asked, place.get());
             return Answer::Later;
         }
         self.say(self.correction.in_use().into());
-        self.correction.read(board, place, &mut self.answer.detail);
+        self.correction.read(board, place.get(), &mut self.answer.detail);
         Answer::Now(Status::Ok)
     }
 

@@ -1,6 +1,8 @@
 //! What is kept in the EEPROM: two copies of the set-up and two of the correction, written a byte at a time while everything else
 //! goes on. The copy that is not in use is written, so a cut at any byte leaves the other.
 
+use core::num::NonZeroU16;
+
 use wire::correction::{self, ROWS};
 use wire::{Asked, Fault, Status};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
@@ -101,11 +103,11 @@ impl Stand {
                 stored &= board.eeprom_read(place) == byte;
                 place = place.wrapping_add(1);
             }
-            let place = self.store.place;
-            if self.correction.place(true, ROWS as u8) == Some(place) {
+            let place = NonZeroU16::new(self.store.place);
+            if self.correction.place(true, ROWS as u8) == place {
                 // With the row of its CRC the copy is whole, and in use from then on.
                 stored &= self.correction.on(board)
-                    && self.correction.place(false, ROWS as u8) == Some(place);
+                    && self.correction.place(false, ROWS as u8) == place;
             }
         } else {
             let to = self.store.newest ^ 1;
