@@ -376,4 +376,45 @@ mod tests {
             assert_eq!(i64::from(mul(a, b)), (exact + (1 << 31)) >> 32, "{a} {b}");
         }
     }
+
+    #[test]
+    fn products_of_sixteen_bits_are_exact_with_and_without_signs() {
+        let words = [
+            0,
+            1,
+            60,
+            907,
+            0x7fff,
+            0x8000,
+            0x8001,
+            0xfffe,
+            u16::MAX,
+            0x1234,
+            0xa5c3,
+        ];
+        for x in words {
+            for y in words {
+                let (signed_x, signed_y) = (x.cast_signed(), y.cast_signed());
+                assert_eq!(area(x, y), u32::from(x) * u32::from(y), "{x} {y}");
+                let half = i64::from(signed_x) * i64::from(y);
+                assert_eq!(i64::from(scaled(signed_x, y)), half, "{x} {y}");
+                let exact = i32::from(signed_x) * i32::from(signed_y);
+                assert_eq!(product(signed_x, signed_y), exact, "{x} {y}");
+                assert_eq!(u32::from(upper(x, y)), u32::from(x) * u32::from(y) >> 16);
+                assert_eq!(
+                    u32::from(sum(x, y)),
+                    (u32::from(x) + u32::from(y)).min(65_535)
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_count_stops_at_255() {
+        for (before, after) in [(0, 1), (254, 255), (255, 255)] {
+            let mut count = before;
+            count_up(&mut count);
+            assert_eq!(count, after);
+        }
+    }
 }

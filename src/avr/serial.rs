@@ -67,7 +67,7 @@ pub fn set_baud(divisor: u16) {
 /// What has to wait for the line to be idle.
 pub fn work() {
     if next_waits() && is_idle() {
-        // SAFETY: as above. What is not of the divisor the register does not take.
+        // SAFETY: as above. `set_divisor` takes the divisor's twelve bits of it.
         unsafe {
             set_divisor(u16::from_le_bytes(NEXT));
             NEXT[1] = 0;
@@ -95,11 +95,14 @@ pub fn has_received() -> bool {
 #[inline(never)]
 pub fn send(kind: u8, fields: &[u8]) -> bool {
     let waits = kind != wire::kind::REPLY && next_waits();
-    // No frame is so long that a byte would not hold its room.
+    // A byte holds the room of any frame.
+    const { assert!(room_for(wire::kind::HEALTH, wire::MAX_FRAME) < 256) };
     if waits || room() < room_for(kind, fields.len()) as u8 {
         return false;
     }
-    let end = encode_by(kind, fields, TX.head(), Tx::after, |at, byte| TX.put(at, byte));
+    let end = encode_by(kind, fields, TX.head(), Tx::after, |at, byte| {
+        TX.put(at, byte)
+    });
     TX.advance(end);
     begin();
     true

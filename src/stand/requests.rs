@@ -299,7 +299,8 @@ impl Stand {
             return Answer::Later;
         }
         self.say(self.correction.in_use().into());
-        self.correction.read(board, place.get(), &mut self.answer.detail);
+        self.correction
+            .read(board, place.get(), &mut self.answer.detail);
         Answer::Now(Status::Ok)
     }
 

@@ -106,8 +106,8 @@ impl Stand {
             let place = NonZeroU16::new(self.store.place);
             if self.correction.place(true, ROWS as u8) == place {
                 // With the row of its CRC the copy is whole, and in use from then on.
-                stored &= self.correction.on(board)
-                    && self.correction.place(false, ROWS as u8) == place;
+                stored &=
+                    self.correction.on(board) && self.correction.place(false, ROWS as u8) == place;
             }
         } else {
             let to = self.store.newest ^ 1;

@@ -277,6 +277,10 @@ fn commands_reach_the_registers_that_there_are() {
             writes.then_some([0x80 | address, 0x5a]),
             "{address:#x}"
         );
+        // The low byte first, whichever of the two addresses is given.
+        let word = Command::write_word_at(address, 0x1234).map(|both| both.map(Command::bytes));
+        let both = [[0x80 | even, 0x34], [0x81 | even, 0x12]];
+        assert_eq!(word, writes.then_some(both), "{address:#x}");
     }
     assert_eq!(Command::read(Register::TempOut).bytes(), [0x0c, 0]);
     assert_eq!(Command::write_low(Register::SensAvg, 7).bytes(), [0xb8, 7]);
