@@ -193,6 +193,39 @@ fn mcap(topics: &[&str], rows: u32) -> Vec<u8> {
 }
 
 #[test]
+fn messages_that_are_packed_one_by_one_are_read() {
+    // As rosbag2 writes them with `compression_mode: message`.
+    let imu = |k: u32| {
+        let mut cdr = vec![0, 1, 0, 0];
+        cdr.extend((k / 100).to_le_bytes());
+        cdr.extend((k % 100 * 10_000_000).to_le_bytes());
+        cdr.extend([1, 0, 0, 0, 0, 0, 0, 0]); // the empty name of a frame, and what aligns
+        let mut numbers = vec![0.0; 4 + 9];
+        numbers.extend([0.01 * f64::from(k), 0.0, 0.0]);
+        numbers.extend([0.0; 9]);
+        numbers.extend([0.0, 0.0, 9.81]);
+        numbers.extend([0.0; 9]);
+        cdr.extend(numbers.iter().flat_map(|n: &f64| n.to_le_bytes()));
+        ruzstd::encoding::compress_to_vec(&cdr[..], ruzstd::encoding::CompressionLevel::Fastest)
+    };
+    let mut file = b"\x89MCAP0\r\n".to_vec();
+    let schema = [&1_u16.to_le_bytes()[..], &text("sensor_msgs/msg/Imu")].concat();
+    file.extend(record(0x03, &[schema, text("ros2msg"), text("")].concat()));
+    let channel = [&[1, 0, 1, 0][..], &text("/imu"), &text("cdr"), &text("")].concat();
+    file.extend(record(0x04, &channel));
+    for k in 0..50_u32 {
+        let head = [&[1, 0][..], &k.to_le_bytes(), &[0; 16]].concat();
+        file.extend(record(0x05, &[head, imu(k)].concat()));
+    }
+    file.extend(record(0x0f, &[0; 4]));
+    let read = read_from(&file[..], &ReadOptions::default()).map_err(told);
+    let record = read.unwrap().record;
+    let gyro = &record.channel("gyro_x").unwrap().values;
+    assert_eq!(gyro.len(), 50);
+    assert!((gyro[7] - 0.07 * DEGREES).abs() < 1e-9, "{gyro:?}");
+}
+
+#[test]
 fn what_is_cut_off_is_read_as_far_as_it_goes_and_several_imus_are_asked_for() {
     let options = ReadOptions::default();
     let whole = mcap(&["/imu"], 20);

@@ -160,3 +160,35 @@ fn a_capture_that_cannot_be_read_keeps_no_other_from_its_answer() {
         &["no capture is in this folder"],
     );
 }
+
+#[test]
+fn a_folder_of_rosbag2_is_its_recording() {
+    let folder = folder("many_rosbag2");
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    std::fs::write(
+        folder.join("metadata.yaml"),
+        "rosbag2_bagfile_information:\n",
+    )
+    .expect("room");
+    let log = folder.join("imu_0.mcap");
+    std::fs::copy(data.join("imu_zstd.mcap"), &log).expect("room");
+    let name = folder.to_str().expect("UTF-8");
+    let out = assert_success(&run(&["analyze", name, "--channels", "gyro_x"]));
+    assert!(out.contains("50 samples"), "{out}");
+    // Split, it is no record that can be joined here.
+    std::fs::copy(&log, folder.join("imu_1.mcap")).expect("room");
+    let words = ["split into 2 files", "imu_0.mcap", "ros2 bag convert"];
+    assert_refused(&run(&["analyze", name]), &words);
+    // Packed as a whole, and what is in SQLite says how to get out of it.
+    std::fs::remove_file(folder.join("imu_1.mcap")).expect("it is there");
+    let bytes = std::fs::read(&log).expect("it is there");
+    let fast = ruzstd::encoding::CompressionLevel::Fastest;
+    let packed = ruzstd::encoding::compress_to_vec(&bytes[..], fast);
+    std::fs::rename(&log, folder.join("imu_0.mcap.zstd")).expect("room");
+    std::fs::write(folder.join("imu_0.mcap.zstd"), packed).expect("room");
+    assert_success(&run(&["analyze", name, "--channels", "gyro_x"]));
+    assert_refused(&run(&["diagnose", name]), &["50 samples"]);
+    std::fs::remove_file(folder.join("imu_0.mcap.zstd")).expect("it is there");
+    std::fs::write(folder.join("imu_0.db3"), b"SQLite format 3\0").expect("room");
+    assert_refused(&run(&["analyze", name]), &["mcap"]);
+}

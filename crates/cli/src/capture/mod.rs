@@ -52,7 +52,7 @@ pub use heal::{Healed, heal, raw_path, since};
 pub use held::Held;
 pub use live::Live;
 pub use read::{Read, ReadOptions, read_capture, read_columns, read_from};
-pub use series::{DIGITS, PART, free_name, joined, last_part, part_name};
+pub use series::{DIGITS, PART, free_name, joined, last_part, log_of, part_name};
 pub use span::Span;
 pub use stream::unpacked;
 pub use table::Table;

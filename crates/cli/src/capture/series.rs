@@ -133,6 +133,42 @@ fn heads(folder: &Path, fits: impl Fn(&str) -> bool) -> Result<Vec<Head>, Captur
         .collect())
 }
 
+/// How the files of a rosbag2 end, which is a folder. One in SQLite is not read, and says so itself.
+const LOGS: [&str; 4] = [".mcap", ".mcap.zstd", ".mcap.zst", ".db3"];
+
+/// The file of a recording of rosbag2, whose folder is named; any other path as it is.
+///
+/// # Errors
+/// [`CaptureError::Parts`] where the recording was split; [`CaptureError::Io`].
+pub fn log_of(path: &Path) -> Result<PathBuf, CaptureError> {
+    if !path.join("metadata.yaml").is_file() {
+        return Ok(path.to_owned());
+    }
+    let entries = std::fs::read_dir(path).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
+    let mut files: Vec<PathBuf> = entries
+        .map_err(io(path))?
+        .iter()
+        .map(std::fs::DirEntry::path)
+        .filter(|file| {
+            let name = file.to_string_lossy();
+            LOGS.iter().any(|ending| name.ends_with(ending))
+        })
+        .collect();
+    files.sort();
+    match files.as_slice() {
+        [] => Ok(path.to_owned()),
+        [only] => Ok(only.clone()),
+        [first, ..] => Err(CaptureError::Parts {
+            path: path.to_owned(),
+            why: format!(
+                "the recording was split into {} files, from {} on; `ros2 bag convert` makes one of them",
+                files.len(),
+                first.file_name().unwrap_or_default().display()
+            ),
+        }),
+    }
+}
+
 /// The parts of one capture in a folder as one text, in their order.
 ///
 /// # Errors

@@ -20,6 +20,13 @@ pub(super) fn unpack_zstd(packed: &[u8], size: u64) -> Result<Vec<u8>> {
     whole(zstd(packed)?, size)
 }
 
+/// Of Zstandard, of an unknown length: no byte more than these.
+pub(super) fn unpack_zstd_up_to(packed: &[u8], most: u64) -> Result<Vec<u8>> {
+    let mut out = Vec::new();
+    zstd(packed)?.take(most).read_to_end(&mut out)?;
+    Ok(out)
+}
+
 /// Of LZ4 in its frame format.
 pub(super) fn unpack_lz4(packed: &[u8], size: u64) -> Result<Vec<u8>> {
     whole(lz4_flex::frame::FrameDecoder::new(packed), size)

@@ -12,7 +12,7 @@ const CAPTURES: [&str; 11] = [
     "csv", "txt", "npz", "npy", "parquet", "pq", "mat", "h5", "hdf5", "mcap", "bag",
 ];
 const ALSO: [&str; 2] = ["ulg", "tsv"];
-const PACKED: [&str; 3] = ["gz", "zst", "bz2"];
+const PACKED: [&str; 4] = ["gz", "zst", "zstd", "bz2"];
 
 /// The files that are named, folders by the captures in them, by name. Folders within folders are left alone.
 pub fn captures(named: &[PathBuf]) -> Result<Vec<PathBuf>> {

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use clap::{Args, ValueEnum};
-use imu_stand::capture::{Read, Span, corrected, joined, read_from, unpacked};
+use imu_stand::capture::{Read, Span, corrected, joined, log_of, read_from, unpacked};
 use imu_stand::link::{DEFAULT_BAUD, Link};
 use imu_stand::{CaptureError, ColumnMapping, ReadOptions, read_capture};
 use miette::{IntoDiagnostic, Result, WrapErr};
@@ -142,6 +142,7 @@ impl Input {
             topic: self.topic.clone(),
             span: self.span,
         };
+        let path = &log_of(path).map_err(|error| not_read(error, path))?;
         let read = if path.is_dir() {
             joined(path).and_then(|(text, _)| read_from(text, &options))
         } else if path.as_os_str() == outputs::DASH {
@@ -324,9 +325,10 @@ pub fn digest(path: &Path) -> Result<String> {
         hash.update(stdin()?);
         return Ok(format!("sha256:{:x}", hash.finalize()));
     }
+    let path = log_of(path)?;
     let files = match path.is_dir() {
-        true => joined(path)?.1,
-        false => vec![path.to_owned()],
+        true => joined(&path)?.1,
+        false => vec![path],
     };
     for path in files {
         let mut file = std::fs::File::open(&path)

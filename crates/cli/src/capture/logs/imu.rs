@@ -4,7 +4,13 @@
 use std::collections::BTreeMap;
 
 use super::super::table::Table;
+use super::super::unpack::unpack_zstd_up_to;
 use super::{Bytes, LogError, held, since_first};
+
+/// How a frame of Zstandard begins.
+const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+/// Bytes of a message, unpacked: what is read of it, and the longest name of a frame that anybody gives.
+const LONGEST_MESSAGE: u64 = 1 << 12;
 
 /// How a message is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +44,13 @@ impl Kind {
             }
             _ => Kind::Other,
         }
+    }
+
+    fn is_cdr(self) -> bool {
+        matches!(
+            self,
+            Kind::Imu(Encoding::Cdr) | Kind::Temperature(Encoding::Cdr)
+        )
     }
 }
 
@@ -83,6 +96,13 @@ impl Topics {
             return;
         };
         topic.messages += 1;
+        // rosbag2 with `compression_mode: message` packs each; CDR begins with 0.
+        let is_packed = topic.kind.is_cdr() && data.starts_with(&ZSTD);
+        let unpacked = is_packed.then(|| unpack_zstd_up_to(data, LONGEST_MESSAGE));
+        let data = match &unpacked {
+            Some(Ok(unpacked)) => unpacked,
+            _ => data,
+        };
         let (read, width) = match topic.kind {
             Kind::Imu(encoding) => (imu(data, encoding), 6),
             Kind::Temperature(encoding) => (temperature(data, encoding), 1),
