@@ -197,6 +197,26 @@ pub enum CaptureError {
         /// Why.
         why: String,
     },
+    /// A column says that the rows are of several sensors.
+    #[error(
+        "the rows are of several sensors: column `{column}` has `{first}`, and `{other}` in line {line}"
+    )]
+    #[diagnostic(
+        code(capture::several_sensors),
+        help(
+            "no noise figure holds for all of them: write a file for each; if the column means something else, give it another name"
+        )
+    )]
+    Several {
+        /// Which column.
+        column: String,
+        /// The first sensor.
+        first: String,
+        /// The next one.
+        other: String,
+        /// Where that begins, from 1 on.
+        line: u64,
+    },
     /// A folder whose captures are not the parts of one.
     #[error("{}: {why}", path.display())]
     #[diagnostic(

@@ -30,6 +30,7 @@ mod propose;
 mod read;
 mod rows;
 mod series;
+mod several;
 mod skipped;
 mod span;
 mod steady;

@@ -18,6 +18,7 @@ use super::plausible::doubts;
 use super::propose::proposed;
 use super::propose::seen::{ROWS, Seen, first_rows};
 use super::rows::RowReader;
+use super::several::Sensors;
 use super::skipped::keep_places;
 use super::span::Span;
 use super::steady::{by_rounded_times, one_rate, unsteady};
@@ -131,7 +132,7 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         ));
     }
     let mut values: Vec<Vec<f64>> = found.columns.iter().map(|_| Vec::new()).collect();
-    let mut reader = RowReader::new(&found.columns, layout.names.len(), layout.cells);
+    let mut reader = RowReader::new(&found.columns, &layout.names, layout.cells);
     let (mut skipped, mut again) = (Vec::new(), Vec::new());
     let (mut row, mut cells) = layout.first.take().unzip();
     let cells = cells.get_or_insert_default();
@@ -148,6 +149,7 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         row = next_row_into(&mut text, cells)?;
     }
     let odd = std::mem::take(&mut reader.odd);
+    reader.sensors.take().map_or(Ok(()), Sensors::one)?;
     if let Some(first) = again.first() {
         found.notes.push(format!(
             "the names of the columns stand again {} x, first in line {first}, as where files were put end to end: the rows are read on",

@@ -4,6 +4,7 @@ use super::CaptureError;
 use super::columns::{Column, Role};
 use super::error::brief;
 use super::layout::Cells;
+use super::several::Sensors;
 use super::time::Clock;
 
 impl Role {
@@ -38,22 +39,25 @@ pub(super) struct RowReader<'a> {
     numbers: Vec<f64>,
     /// Of columns that nobody asked for: line and text of the first cell that is no number.
     pub odd: Vec<Option<(u64, String)>>,
+    /// Who the rows are of, where a column says so.
+    pub sensors: Option<Sensors>,
 }
 
 impl<'a> RowReader<'a> {
-    pub fn new(columns: &'a [Column], width: usize, cells: Cells) -> Self {
+    pub fn new(columns: &'a [Column], names: &[String], cells: Cells) -> Self {
         let clock = |column: &Column| match column.role {
             Role::Time { scale } => Clock::new(scale),
             _ => Clock::new(1.0),
         };
         Self {
             columns,
-            width,
+            width: names.len(),
             cells,
             clocks: columns.iter().map(clock).collect(),
             values: vec![0.0; columns.len()],
             numbers: Vec::new(),
             odd: vec![None; columns.len()],
+            sensors: Sensors::of(names, columns),
         }
     }
 
@@ -68,7 +72,7 @@ impl<'a> RowReader<'a> {
     }
 
     /// Reads a row of plain numbers, as most are; nothing where it is anything else.
-    fn plain(&mut self, text: &str) -> Option<()> {
+    fn plain(&mut self, text: &str, line: u64) -> Option<()> {
         self.cells.plain(text, &mut self.numbers)?;
         if self.numbers.len() != self.width {
             return None;
@@ -84,11 +88,14 @@ impl<'a> RowReader<'a> {
             }
             self.values[k] = value;
         }
+        if let Some(sensors) = &mut self.sensors {
+            sensors.take_number(*self.numbers.get(sensors.at)?, line);
+        }
         Some(())
     }
 
     pub fn read(&mut self, text: &str, line: u64) -> Result<(), CaptureError> {
-        if self.plain(text).is_some() {
+        if self.plain(text, line).is_some() {
             return Ok(());
         }
         let bad = |column: &Column, found: &str, expected: String| CaptureError::BadRow {
@@ -109,6 +116,9 @@ impl<'a> RowReader<'a> {
                     false => "",
                 },
             });
+        }
+        if let Some(sensors) = &mut self.sensors {
+            sensors.take(row.get(sensors.at).map_or("", |cell| cell.as_ref()), line);
         }
         for (k, column) in self.columns.iter().enumerate() {
             let cell = row.get(column.at).map_or("", |cell| cell.as_ref());
