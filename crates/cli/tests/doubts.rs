@@ -235,3 +235,39 @@ fn a_motor_command_has_a_unit_and_one_that_cannot_be_in_it_is_told() {
         assert!(said.contains(what), "{full}: {said}");
     }
 }
+
+#[test]
+fn the_largest_holes_have_their_place() {
+    let folder = folder("doubts_holes");
+    let time = |k: usize| 0.05 * k as f64 + if k < 1000 { 0.0 } else { 20.0 };
+    let path = table(&folder, "hole.csv", time, |_| [0.0, 0.0, 1.0]);
+    told_by_all(&path, "no rows from 49.95 to 70.00 s (400");
+}
+
+#[test]
+fn several_sensors_in_one_file_are_no_record_of_one() {
+    let folder = folder("doubts_sensors");
+    let path = folder.join("two.csv");
+    let mut noise = noise();
+    for (first, other) in [("A", "B"), ("1", "2")] {
+        let mut out = "device_id,time_s,gyro_x [deg/s]\n".to_owned();
+        for k in 0..1200 {
+            let time = 0.05 * f64::from(k);
+            let _ = writeln!(out, "{first},{time:.2},{:.4}", noise());
+            let _ = writeln!(out, "{other},{time:.2},{:.4}", 3.0 + noise());
+        }
+        std::fs::write(&path, &out).expect("room");
+        let other = format!("`device_id` has `{first}`, and `{other}` in line 3");
+        for command in ["analyze", "diagnose", "export"] {
+            let words = [command, text(&path), "--to", "kalibr"];
+            let words = &words[..if command == "export" { 4 } else { 2 }];
+            assert_refused(&run(words), &[&other, "a file for each"]);
+        }
+        // One alone is as any column that nobody needs.
+        let is_other = |(k, _): &(usize, &str)| *k > 0 && k % 2 == 0;
+        let one = out.lines().enumerate().filter(|row| !is_other(row));
+        let one: Vec<&str> = one.map(|(_, line)| line).collect();
+        std::fs::write(&path, one.join("\n")).expect("room");
+        assert_success(&run(&["analyze", text(&path)]));
+    }
+}

@@ -26,7 +26,41 @@ pub(super) fn unsteady(record: &Record) -> Vec<String> {
         _ => Vec::new(),
     };
     let turned = turned(record, times.as_deref());
-    own.into_iter().chain(rates).chain(turned).collect()
+    let holes = holes(record, times.as_deref());
+    (own.into_iter().chain(rates).chain(turned).chain(holes)).collect()
+}
+
+/// Share of a record, and samples, from which on a hole has its place said; and how many such holes are no bursts.
+const HOLE: (f64, u64) = (0.01, 10);
+const HOLES: usize = 5;
+
+/// Where the largest holes are.
+fn holes(record: &Record, times: Option<&[f64]>) -> Option<String> {
+    let sampling = Sampling::of(record, None).ok()?;
+    let slots = &sampling.slots;
+    let all = slots.last()?.checked_sub(*slots.first()?)?;
+    let least = HOLE.1.max((HOLE.0 * all as f64) as u64);
+    let lost = |pair: &[u64]| pair[1].saturating_sub(pair[0]).saturating_sub(1);
+    let rows: Vec<usize> = (0..slots.len().saturating_sub(1))
+        .filter(|row| lost(&slots[*row..row + 2]) >= least)
+        .collect();
+    if rows.is_empty() || rows.len() > HOLES || times.is_none_or(|times| times.len() != slots.len())
+    {
+        return None;
+    }
+    let places = rows.iter().map(|row| {
+        let at = |row: usize| times.map_or(f64::NAN, |times| times[row]);
+        format!(
+            "{:.2} to {:.2} s ({} samples)",
+            at(*row),
+            at(row + 1),
+            lost(&slots[*row..row + 2])
+        )
+    });
+    Some(format!(
+        "no rows from {}",
+        places.collect::<Vec<_>>().join(", ")
+    ))
 }
 
 /// Device time where there is one, else the time column, s from the first row on.
@@ -264,6 +298,20 @@ mod tests {
             assert_eq!(row, k, "{slow} {fast}");
             assert_eq!(at_s, times[k - 1]);
         }
+    }
+
+    #[test]
+    fn a_hole_has_its_place_and_single_samples_and_bursts_have_none() {
+        let record = |step: &dyn Fn(usize) -> f64| Record {
+            host_time_s: Some(times_of(step)),
+            ..Record::default()
+        };
+        let told = |step: &dyn Fn(usize) -> f64| unsteady(&record(step)).join("; ");
+        let said = told(&|k| if k == 700 { 5.0 } else { 0.05 });
+        assert_eq!(said, "no rows from 34.95 to 39.95 s (99 samples)");
+        assert_eq!(told(&|k| if k % 100 == 50 { 0.1 } else { 0.05 }), "");
+        let bursts = told(&|k| if k % 100 == 50 { 30.0 } else { 0.05 });
+        assert!(!bursts.contains("no rows"), "{bursts}");
     }
 
     #[test]
