@@ -125,7 +125,8 @@ impl Table {
         }
     }
 
-    /// An NPZ: one array for each column, and `about.json` with the header and the units.
+    /// An NPZ: one array for each column, and `about.json` with the header and the units, a text that is an array too, so that
+    /// whoever goes over all arrays meets nothing else.
     ///
     /// # Errors
     /// [`DataError`].
@@ -146,8 +147,9 @@ impl Table {
             .iter()
             .map(|(key, value)| (key.clone(), value.clone().into()))
             .collect();
-        archive.start_file("about.json", options)?;
-        archive.write_all(&serde_json::to_vec_pretty(&about).unwrap_or_default())?;
+        archive.start_file("about.json.npy", options)?;
+        let about = serde_json::to_string_pretty(&about).unwrap_or_default();
+        archive.write_all(&npy_of_text(&about))?;
         archive.finish()?.flush()?;
         Ok(())
     }
@@ -256,6 +258,24 @@ fn write_npy<T: npyz::AutoSerialize + Copy>(
         .begin_nd()?;
     out.extend(cells.iter().copied())?;
     out.finish()
+}
+
+/// A text as NumPy writes one: an array without dimensions, of one string in UTF-32.
+fn npy_of_text(text: &str) -> Vec<u8> {
+    let descr = format!(
+        "{{'descr': '<U{}', 'fortran_order': False, 'shape': (), }}",
+        text.chars().count()
+    );
+    // Magic, version and length are 10 bytes; all of it is a multiple of 64, with a line's end.
+    let length = (10 + descr.len() + 1).next_multiple_of(64) - 10;
+    let mut out = b"\x93NUMPY\x01\x00".to_vec();
+    out.extend((length as u16).to_le_bytes());
+    out.extend(format!("{descr:<0$}\n", length - 1).into_bytes());
+    out.extend(
+        text.chars()
+            .flat_map(|letter| u32::from(letter).to_le_bytes()),
+    );
+    out
 }
 
 /// Time of each row from the first one on, s: the device's, else the host's, else by the rate; NaN where all three lack.

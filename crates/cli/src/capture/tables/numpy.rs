@@ -22,19 +22,36 @@ pub(super) fn npz(path: &Path) -> Result<Arrays, String> {
     for i in 0..archive.len() {
         let mut entry = archive.by_index(i).map_err(bad)?;
         let name = entry.name().map_err(bad)?.into_owned();
-        if let Some(name) = name.strip_suffix(".npy") {
+        if name == "about.json.npy" {
+            out.about.extend(about(&npy_text(&mut entry)?)?);
+        } else if let Some(name) = name.strip_suffix(".npy") {
             npy_array(&mut out, name, &mut entry)
                 .map_err(|why| format!("array `{name}`: {why}"))?;
         } else if name == "about.json" {
             let mut text = String::new();
             (entry.by_ref().take(LONGEST_TEXT).read_to_string(&mut text))
                 .map_err(|error| format!("about.json: {error}"))?;
-            let about: BTreeMap<String, String> =
-                serde_json::from_str(&text).map_err(|error| format!("about.json: {error}"))?;
-            out.about.extend(about);
+            out.about.extend(about(&text)?);
         }
     }
     Ok(out)
+}
+
+fn about(text: &str) -> Result<BTreeMap<String, String>, String> {
+    serde_json::from_str(text).map_err(|error| format!("about.json: {error}"))
+}
+
+/// An array that is one text in UTF-32; another one is none.
+fn npy_text(mut input: impl std::io::Read) -> Result<String, String> {
+    let (header, _) = npy_header(&mut input).map_err(|why| format!("about.json: {why}"))?;
+    if !String::from_utf8_lossy(&header).contains("'<U") {
+        return Err("about.json: it is no text".to_owned());
+    }
+    let mut bytes = Vec::new();
+    (input.take(4 * LONGEST_TEXT).read_to_end(&mut bytes))
+        .map_err(|error| format!("about.json: {error}"))?;
+    let letters = bytes.as_chunks().0.iter().map(|b| u32::from_le_bytes(*b));
+    Ok(letters.filter_map(char::from_u32).collect())
 }
 
 /// Bytes of the text about a file, and of the header of an array, that are read at most.
