@@ -39,7 +39,7 @@ const PAUSE: Duration = Duration::from_millis(50);
 #[non_exhaustive]
 pub enum BrowserError {
     /// None is installed.
-    #[error("no Chromium is found, which prints the report")]
+    #[error("no Chromium is found, which prints reports and draws figures as PNG")]
     #[diagnostic(
         code(browser::none),
         help(
@@ -140,19 +140,39 @@ impl Browser {
             .arg("--no-pdf-header-footer")
             .arg(format!("--print-to-pdf={}", printed.display()));
         self.open(command, page, &folder)?;
-        let io = |source| BrowserError::Io {
-            path: pdf.to_owned(),
-            source,
-        };
+        self.taken(&printed, b"%PDF-", pdf)
+    }
+
+    /// Puts what it wrote where it belongs, if it begins as it should.
+    fn taken(&self, made: &Path, magic: &[u8; 5], to: &Path) -> Result<(), BrowserError> {
         let mut start = [0; 5];
-        let is_pdf = std::fs::File::open(&printed)
+        let is_it = std::fs::File::open(made)
             .and_then(|mut file| file.read_exact(&mut start))
-            .is_ok_and(|()| &start == b"%PDF-");
-        if !is_pdf {
+            .is_ok_and(|()| &start == magic);
+        if !is_it {
             return Err(self.failed("it ended without a file"));
         }
-        std::fs::copy(&printed, pdf).map_err(io)?;
+        std::fs::copy(made, to).map_err(|source| BrowserError::Io {
+            path: to.to_owned(),
+            source,
+        })?;
         Ok(())
+    }
+
+    /// Draws a page of a size, in two dots a unit, as PNG.
+    ///
+    /// # Errors
+    /// [`BrowserError`].
+    pub fn draw(&self, page: &str, size: (u32, u32), png: &Path) -> Result<(), BrowserError> {
+        let folder = Folder::beside(png)?;
+        let drawn = folder.0.join("figure.png");
+        let mut command = self.command(&folder.0.join("profile"));
+        command
+            .args(["--hide-scrollbars", "--force-device-scale-factor=2"])
+            .arg(format!("--window-size={},{}", size.0, size.1))
+            .arg(format!("--screenshot={}", drawn.display()));
+        self.open(command, page, &folder)?;
+        self.taken(&drawn, b"\x89PNG\r", png)
     }
 
     /// A page as it is after its scripts have run, and what it said to the console.

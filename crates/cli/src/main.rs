@@ -52,7 +52,7 @@ enum Command {
     Representative(commands::representative::Arguments),
     /// One self-contained HTML file: the verdict, and the figures that it rests on.
     #[command(
-        after_help = "Example:\n  imu-stand report run.csv --out report.html --pdf report.pdf --figures figures"
+        after_help = "Example:\n  imu-stand report run.csv --out report.html --pdf report.pdf --figures figures --png"
     )]
     Report(commands::report::Arguments),
     /// The simulated stand with something hidden in it: capture, analysis, diagnosis in one go.

@@ -210,6 +210,47 @@ fn a_printed_report_of_ten_minutes_has_four_pages_at_most() {
 }
 
 #[test]
+fn a_figure_is_drawn_as_svg_and_as_png() {
+    let Some(_) = browser() else { return };
+    let (run_folder, _) = reported();
+    let folder = folder("browser_figures");
+    let path = |name: &str| folder.join(name).display().to_string();
+    let csv = run_folder.join("run.csv").display().to_string();
+    let (html, figures) = (path("r.html"), path("figures"));
+    let mut words = vec!["report", &csv, "--no-replicates", "--out", &html];
+    words.extend(["--figures", &figures, "--png"]);
+    assert_success(&run(&words));
+    let named = |ending: &str| -> Vec<PathBuf> {
+        let files = std::fs::read_dir(&figures).expect("the folder");
+        let mut paths: Vec<PathBuf> = files.map(|file| file.expect("a file").path()).collect();
+        paths.retain(|path| path.extension().is_some_and(|e| e == ending));
+        paths.sort();
+        paths
+    };
+    let (svg, png) = (named("svg"), named("png"));
+    assert!(!svg.is_empty());
+    assert!(
+        svg.iter()
+            .map(|svg| svg.with_extension("png"))
+            .eq(png.clone())
+    );
+    for path in png {
+        let bytes = std::fs::read(&path).expect("a PNG");
+        let number = |at: usize| {
+            bytes[at..at + 4]
+                .iter()
+                .fold(0, |n, b| n << 8 | u32::from(*b))
+        };
+        let (width, height) = imu_stand::report::standalone::SIZE;
+        assert_eq!((number(16), number(20)), (2 * width, 2 * height));
+        // Flat white would be a tenth of it.
+        assert!(bytes.len() > 20_000, "{} bytes", bytes.len());
+    }
+    let words = ["report", &csv, "--png"];
+    assert_refused(&run(&words), &["--figures"]);
+}
+
+#[test]
 fn without_a_browser_a_pdf_is_refused_before_the_work() {
     let folder = folder("browser_none");
     let pdf = folder.join("r.pdf");

@@ -6,7 +6,7 @@ use clap::Args;
 use diagnosis::DiagnoseOptions;
 use diagnosis::result::Diagnosed;
 use imu_stand::browser::Browser;
-use imu_stand::report::standalone::figures;
+use imu_stand::report::standalone::{self, figures};
 use imu_stand::report::{Subject, report};
 use imu_stand::text::shell_word;
 use miette::{IntoDiagnostic, Result, WrapErr};
@@ -34,6 +34,9 @@ pub struct Arguments {
     /// Write the figure of each cause as SVG, too, into this folder
     #[arg(long, value_name = "FOLDER")]
     figures: Option<PathBuf>,
+    /// Draw them as PNG, too; needs Chromium, Chrome or Edge
+    #[arg(long, requires = "figures")]
+    png: bool,
 }
 
 /// Runs it.
@@ -49,6 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(path) => Some((Browser::find()?, path)),
         None => None,
     };
+    let artist = arguments.png.then(Browser::find).transpose()?;
     let read = arguments.input.read(&arguments.capture)?;
     let hash = super::digest(&arguments.capture)?;
     let options = DiagnoseOptions {
@@ -70,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         hidden: None,
     };
     if let Some(folder) = &arguments.figures {
-        write_figures(folder, &diagnosed, arguments.input.quiet)?;
+        write_figures(folder, &diagnosed, artist.as_ref(), arguments.input.quiet)?;
     }
     let page = write(&arguments.out, &subject, arguments.input.quiet)?;
     if let Some((browser, path)) = printer {
@@ -82,7 +86,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-fn write_figures(folder: &Path, diagnosed: &Diagnosed, quiet: bool) -> Result<()> {
+fn write_figures(
+    folder: &Path,
+    diagnosed: &Diagnosed,
+    artist: Option<&Browser>,
+    quiet: bool,
+) -> Result<()> {
     let figures = figures(diagnosed).map_err(|error| miette::miette!("no figures: {error}"))?;
     std::fs::create_dir_all(folder)
         .into_diagnostic()
@@ -93,8 +102,15 @@ fn write_figures(folder: &Path, diagnosed: &Diagnosed, quiet: bool) -> Result<()
     for (name, svg) in figures {
         let path = folder.join(name);
         super::write(&path, &svg)?;
+        let drawn = path.with_extension("png");
+        if let Some(artist) = artist {
+            artist.draw(&standalone::page(&svg), standalone::SIZE, &drawn)?;
+        }
         if !quiet {
             say!("figure: {}", path.display());
+            if artist.is_some() {
+                say!("figure: {}", drawn.display());
+            }
         }
     }
     Ok(())

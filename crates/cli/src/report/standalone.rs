@@ -8,6 +8,18 @@ use super::plot::{self, Drawn, Figure, Layer, PlotError};
 
 /// Height of title and legend.
 const HEAD: u32 = 74;
+/// Height of what they stand above.
+const HEIGHT: u32 = 400;
+/// Width and height of a figure of [`figures`].
+pub const SIZE: (u32, u32) = (plot::WIDE, HEIGHT + HEAD);
+
+/// A page with a figure and nothing else, of [`SIZE`].
+#[must_use]
+pub fn page(svg: &str) -> String {
+    format!(
+        "<!doctype html><meta charset=utf-8><style>body{{margin:0}}svg{{display:block}}</style>{svg}"
+    )
+}
 
 /// The figure of an evidence.
 #[must_use]
@@ -36,7 +48,7 @@ pub fn figure(evidence: &Evidence) -> Figure {
         log_x: evidence.log_x,
         log_y: evidence.log_y,
         width: plot::WIDE,
-        height: 400,
+        height: HEIGHT,
         layers,
         ..Figure::default()
     }
