@@ -275,6 +275,8 @@ fn turned(record: &Record, times: Option<&[f64]>) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use model::record::Channel;
+
     use super::*;
 
     fn times_of(step: &dyn Fn(usize) -> f64) -> Vec<f64> {
@@ -302,9 +304,22 @@ mod tests {
 
     #[test]
     fn a_hole_has_its_place_and_single_samples_and_bursts_have_none() {
-        let record = |step: &dyn Fn(usize) -> f64| Record {
-            host_time_s: Some(times_of(step)),
-            ..Record::default()
+        let record = |step: &dyn Fn(usize) -> f64| {
+            let times = times_of(step);
+            let readings = Channel {
+                name: "gyro_x".to_owned(),
+                quantity: Quantity::Gyro,
+                axis: Some(Axis::X),
+                unit: "deg/s".to_owned(),
+                values: vec![0.0; times.len()],
+                counts: None,
+                lsb: None,
+            };
+            Record {
+                channels: vec![readings],
+                host_time_s: Some(times),
+                ..Record::default()
+            }
         };
         let told = |step: &dyn Fn(usize) -> f64| unsteady(&record(step)).join("; ");
         let said = told(&|k| if k == 700 { 5.0 } else { 0.05 });

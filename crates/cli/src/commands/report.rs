@@ -4,10 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use diagnosis::DiagnoseOptions;
-use diagnosis::result::Diagnosed;
 use imu_stand::browser::Browser;
-use imu_stand::report::standalone::{self, figures};
-use imu_stand::report::{Subject, report};
+use imu_stand::report::{Subject, figure_files, report, standalone};
 use imu_stand::text::shell_word;
 use miette::{IntoDiagnostic, Result, WrapErr};
 
@@ -74,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         hidden: None,
     };
     if let Some(folder) = &arguments.figures {
-        write_figures(folder, &diagnosed, artist.as_ref(), arguments.input.quiet)?;
+        write_figures(folder, &subject, artist.as_ref(), arguments.input.quiet)?;
     }
     let page = write(&arguments.out, &subject, arguments.input.quiet)?;
     if let Some((browser, path)) = printer {
@@ -88,16 +86,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 fn write_figures(
     folder: &Path,
-    diagnosed: &Diagnosed,
+    subject: &Subject<'_>,
     artist: Option<&Browser>,
     quiet: bool,
 ) -> Result<()> {
-    let figures = figures(diagnosed).map_err(|error| miette::miette!("no figures: {error}"))?;
+    let figures = figure_files(subject).map_err(|error| miette::miette!("no figures: {error}"))?;
     std::fs::create_dir_all(folder)
         .into_diagnostic()
         .wrap_err_with(|| folder.display().to_string())?;
     if figures.is_empty() && !quiet {
-        say!("no figure: no cause was found that one could show");
+        say!("no figure: no cause was found that one shows");
     }
     for (name, svg) in figures {
         let path = folder.join(name);

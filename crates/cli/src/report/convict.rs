@@ -16,11 +16,17 @@ use super::{ReportError, Subject, at_two_widths, standalone};
 const AROUND_LINE: f64 = 0.1;
 const LEAST_AROUND_HZ: f64 = 0.2;
 
-/// The figures of all findings, each with its caption.
-///
-/// # Errors
-/// [`ReportError`] where one cannot be drawn.
-pub(super) fn figures(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
+/// What convicts a cause on a channel.
+struct Convicting {
+    cause: String,
+    channel: String,
+    title: String,
+    caption: String,
+    figure: Figure,
+}
+
+/// Of all findings.
+fn all(subject: &Subject<'_>) -> Vec<Convicting> {
     let diagnosed = subject.diagnosed;
     let mut without = None;
     let mut out = vec![];
@@ -36,18 +42,49 @@ pub(super) fn figures(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError>
                 continue;
             }
             drawn.push(evidence);
-            out.push(captioned(
-                &standalone::figure(evidence),
-                &evidence.title,
-                &caption(evidence),
-            )?);
+            out.push(Convicting {
+                cause: evidence.cause.clone(),
+                channel: evidence.channel.clone(),
+                title: evidence.title.clone(),
+                caption: caption(evidence),
+                figure: standalone::figure(evidence),
+            });
         }
         if own.is_empty() {
             let without = without.get_or_insert_with(|| without_causes(subject));
-            if let Some(view) = without.as_ref().and_then(|r| view(subject, finding, r)) {
-                out.push(view?);
-            }
+            out.extend(without.as_ref().and_then(|r| view(subject, finding, r)));
         }
+    }
+    out
+}
+
+/// The figures of all findings, each with its caption.
+///
+/// # Errors
+/// [`ReportError`] where one cannot be drawn.
+pub(super) fn figures(subject: &Subject<'_>) -> Result<Vec<Markup>, ReportError> {
+    all(subject).iter().map(captioned).collect()
+}
+
+/// The same as files: `cause-channel.svg` and the SVG, with title and legend on white.
+///
+/// # Errors
+/// [`ReportError`] where one cannot be drawn.
+pub(super) fn files(subject: &Subject<'_>) -> Result<Vec<(String, String)>, ReportError> {
+    let mut out: Vec<(String, String)> = Vec::new();
+    for shown in all(subject) {
+        let stem = format!("{}-{}", shown.cause, shown.channel);
+        let again = out.iter().filter(|(name, _)| name.starts_with(&stem));
+        let name = match again.count() {
+            0 => format!("{stem}.svg"),
+            n => format!("{stem}-{}.svg", n + 1),
+        };
+        let figure = Figure {
+            width: standalone::SIZE.0,
+            height: standalone::HEIGHT,
+            ..shown.figure
+        };
+        out.push((name, standalone::alone(&shown.title, &figure)?));
     }
     Ok(out)
 }
@@ -111,13 +148,16 @@ fn without_causes(subject: &Subject<'_>) -> Option<Record> {
 }
 
 /// The view that the effect names; `None` where the record lacks what it is made of.
-fn view(
-    subject: &Subject<'_>,
-    finding: &Finding,
-    without: &Record,
-) -> Option<Result<Markup, ReportError>> {
+fn view(subject: &Subject<'_>, finding: &Finding, without: &Record) -> Option<Convicting> {
     let docs = effect(&finding.cause)?.docs();
     let rate_hz = subject.diagnosed.diagnosis.input.rate_hz;
+    let shown = |channel: &str, figure, caption| Convicting {
+        cause: finding.cause.clone(),
+        channel: channel.to_owned(),
+        title: format!("{channel}: {}", docs.title),
+        caption,
+        figure,
+    };
     if finding.cause == model::effects::shock::ID {
         let knock = Knock {
             finding,
@@ -126,8 +166,7 @@ fn view(
             rate_hz,
         };
         if let Some(drawn) = shock::drawing(&knock) {
-            let title = format!("{}: {}", drawn.channel, docs.title);
-            return Some(captioned(&drawn.figure, &title, &drawn.caption));
+            return Some(shown(&drawn.channel, drawn.figure, drawn.caption));
         }
     }
     let channel = finding
@@ -143,12 +182,7 @@ fn view(
     };
     let plot = place(docs.example.plot, finding, channel);
     let figure = views::figure(plot, channel, &pair).ok()?;
-    let title = format!("{channel}: {}", docs.title);
-    Some(captioned(
-        &figure,
-        &title,
-        &views::caption(plot, pair.labels),
-    ))
+    Some(shown(channel, figure, views::caption(plot, pair.labels)))
 }
 
 /// The view of this finding: on its own axis, along the channel that it follows most, about its own frequency.
@@ -203,16 +237,16 @@ fn strongest(finding: &Finding) -> Option<&'static str> {
 }
 
 /// A figure with title and caption.
-fn captioned(figure: &Figure, title: &str, caption: &str) -> Result<Markup, ReportError> {
+fn captioned(shown: &Convicting) -> Result<Markup, ReportError> {
     let wide = Figure {
         width: plot::WIDE,
         height: 400,
-        ..figure.clone()
+        ..shown.figure.clone()
     };
     Ok(html! {
         figure {
             (at_two_widths(&wide)?)
-            figcaption { b { (title) ". " } (caption) }
+            figcaption { b { (shown.title) ". " } (shown.caption) }
         }
     })
 }

@@ -60,14 +60,9 @@ pub enum ReportError {
     Analysis(#[from] model::record::AnalysisError),
 }
 
-/// Makes the report.
-///
-/// # Errors
-/// [`ReportError`].
-pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
-    let diagnosis = &subject.diagnosed.diagnosis;
-    let joined = end_to_end(subject);
-    let drawn = match &joined {
+/// What is drawn of a record: bursts are, end to end.
+fn drawn<'a>(subject: &Subject<'a>, joined: Option<&'a (Record, f64, Diagnosed)>) -> Subject<'a> {
+    match joined {
         Some((record, rate_hz, diagnosed)) => Subject {
             record,
             rate_hz: Some(*rate_hz),
@@ -75,7 +70,26 @@ pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
             ..*subject
         },
         None => *subject,
-    };
+    }
+}
+
+/// The figures that convict, as files: `cause-channel.svg` and the SVG, with title and legend on white.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn figure_files(subject: &Subject<'_>) -> Result<Vec<(String, String)>, ReportError> {
+    let joined = end_to_end(subject);
+    convict::files(&drawn(subject, joined.as_ref()))
+}
+
+/// Makes the report.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn report(subject: &Subject<'_>) -> Result<String, ReportError> {
+    let diagnosis = &subject.diagnosed.diagnosis;
+    let joined = end_to_end(subject);
+    let drawn = drawn(subject, joined.as_ref());
     let channels = channels(&drawn)?;
     let convicting = convict::figures(&drawn)?;
     let title = format!("{}: {}", diagnosis.input.file, verdict::banner(diagnosis));

@@ -1,16 +1,15 @@
-//! The figures that convict, as files of their own: for a page of somebody else's.
+//! A figure as a file of its own: for a page of somebody else's.
 
-use diagnosis::result::{Diagnosed, Evidence, SeriesStyle};
+use diagnosis::result::{Evidence, SeriesStyle};
 use maud::{PreEscaped, html};
 
-use super::ReportError;
 use super::plot::{self, Drawn, Figure, Layer, PlotError};
 
 /// Height of title and legend.
 const HEAD: u32 = 74;
 /// Height of what they stand above.
-const HEIGHT: u32 = 400;
-/// Width and height of a figure of [`figures`].
+pub(super) const HEIGHT: u32 = 400;
+/// Width and height of a figure of a file.
 pub const SIZE: (u32, u32) = (plot::WIDE, HEIGHT + HEAD);
 
 /// A page with a figure and nothing else, of [`SIZE`].
@@ -52,27 +51,6 @@ pub fn figure(evidence: &Evidence) -> Figure {
         layers,
         ..Figure::default()
     }
-}
-
-/// All figures that convict, `cause-channel.svg` and the SVG, with title and legend on white.
-///
-/// # Errors
-/// [`ReportError`] where one cannot be drawn.
-pub fn figures(diagnosed: &Diagnosed) -> Result<Vec<(String, String)>, ReportError> {
-    let mut out: Vec<(String, String)> = Vec::new();
-    for evidence in &diagnosed.evidence {
-        let stem = format!("{}-{}", evidence.cause, evidence.channel);
-        let again = out
-            .iter()
-            .filter(|(name, _)| name.starts_with(&stem))
-            .count();
-        let name = match again {
-            0 => format!("{stem}.svg"),
-            n => format!("{stem}-{}.svg", n + 1),
-        };
-        out.push((name, alone(&evidence.title, &figure(evidence))?));
-    }
-    Ok(out)
 }
 
 /// A figure with title and legend on white.

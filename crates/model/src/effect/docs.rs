@@ -25,7 +25,7 @@ pub enum Plot {
         /// Highest frequency, Hz.
         to_hz: f64,
     },
-    /// Another gyro against the rate, sample by sample.
+    /// By how much another gyro changes from reading to reading against by how much this one does, in blocks of that.
     AxisAgainst(&'static str),
     /// Tilt by the accelerometers against tilt by integrating the rate.
     Tilt,

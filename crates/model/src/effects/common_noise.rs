@@ -40,7 +40,7 @@ impl Effect for CommonNoise {
             excitation: "At least two gyros.",
             test: "Correlation of the whitened residuals of each pair of axes.",
             remedy: "Filter the shared supply and reference and isolate the base; until then give the filter correlated measurement noise.",
-            figure: "Whitened residual of one axis against another.",
+            figure: "By how much another axis changes from reading to reading, against by how much this one does.",
             example: Example::new(Plot::AxisAgainst("gyro_y"), &[("sigma", 0.5)]).on_all(),
         }
     }

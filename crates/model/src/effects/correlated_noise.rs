@@ -67,7 +67,7 @@ impl Effect for CorrelatedNoise {
             excitation: "At least two gyros.",
             test: "Correlation of the whitened residuals of each pair of axes, where no common noise explains it.",
             remedy: "Give the filter the full covariance matrix of the measurement noise; undo a mixing matrix before the noise is estimated.",
-            figure: "Whitened residual of one axis against another.",
+            figure: "By how much another axis changes from reading to reading, against by how much this one does.",
             example: Example::new(Plot::AxisAgainst("gyro_y"), &[(WITH[1], -0.5)]),
         }
     }

@@ -160,15 +160,10 @@ fn power(record: &Record, channel: &Channel) -> Vec<f64> {
         .collect()
 }
 
-/// Means of a channel in blocks of another one's values.
-fn by_value(x: &Channel, y: &Channel) -> Drawing {
+/// Means of `y` in blocks of the values of `x`.
+fn by_value(x: &[f64], y: &[f64]) -> Points {
     const COUNT: usize = 60;
-    let mut rows: Points = x
-        .values
-        .iter()
-        .copied()
-        .zip(y.values.iter().copied())
-        .collect();
+    let mut rows: Points = x.iter().copied().zip(y.iter().copied()).collect();
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
     let size = (rows.len() / COUNT).max(1);
     let centre = |part: &[(f64, f64)]| {
@@ -176,7 +171,7 @@ fn by_value(x: &Channel, y: &Channel) -> Drawing {
         let sum = part.iter().fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
         (sum.0 / n, sum.1 / n)
     };
-    Ok(rows.chunks_exact(size).map(centre).collect())
+    rows.chunks_exact(size).map(centre).collect()
 }
 
 /// Density by the squares of the cosine transform, averaged in bands of equal ratio.

@@ -74,7 +74,9 @@ pub(super) fn caption(plot: Plot) -> String {
         Plot::Spectrum => "Spectrum of the rate",
         Plot::Lines { .. } => "Amplitude spectrum of the rate around it",
         Plot::AxisAgainst(other) => {
-            return format!("Rate of {other} against the rate, reading by reading");
+            return format!(
+                "By how much {other} changes from reading to reading, in blocks of how much the rate does"
+            );
         }
         Plot::Tilt => {
             "Tilt by the accelerometers against tilt by the rate, each without a straight line"
@@ -110,7 +112,10 @@ pub(super) fn sketch<'a>(
         },
         Plot::RateAgainst(other) => rate_against(of(other)?, rate, channel, other),
         Plot::RateByValue(other) => Sketch::dots(of(other)?, rate, move |r| {
-            by_value(named(r, other)?, named(r, channel)?)
+            Ok(by_value(
+                &named(r, other)?.values,
+                &named(r, channel)?.values,
+            ))
         }),
         Plot::PowerInTime => power_in_time(power, channel),
         Plot::PowerAgainst(other) => power_against(of(other)?, power, channel, other),
@@ -121,8 +126,10 @@ pub(super) fn sketch<'a>(
             })
         }
         Plot::AxisAgainst(other) => {
-            let other_rate = format!("rate of {other}, {unit}");
-            Sketch::dots(rate, other_rate, move |r| axis_against(r, channel, other))
+            let change = |name: &str| format!("change of {name}, {unit}");
+            Sketch::dots(change(channel), change(other), move |r| {
+                axis_against(r, channel, other)
+            })
         }
         Plot::Tilt => Sketch::dots(
             format!("tilt by integrating {channel}, deg"),
@@ -185,14 +192,13 @@ fn density<'a>(unit: &str, channel: &'a str) -> Sketch<'a> {
     }
 }
 
+/// Changes from reading to reading, in which nothing that wanders slowly shows.
 fn axis_against(record: &Record, channel: &str, other: &str) -> Drawing {
-    let (x, y) = (
-        &named(record, channel)?.values,
-        &named(record, other)?.values,
-    );
-    let step = (x.len() / POINTS).max(1);
-    let pairs = x.iter().copied().zip(y.iter().copied());
-    Ok(pairs.step_by(step).collect())
+    let changes = |name: &str| -> Result<Vec<f64>, String> {
+        let values = named(record, name)?.values.windows(2);
+        Ok(values.map(|w| w[1] - w[0]).collect())
+    };
+    Ok(by_value(&changes(channel)?, &changes(other)?))
 }
 
 /// Either side of the sample that the pair names, or in which its records differ most; what was read stands there as a line.
