@@ -400,7 +400,7 @@ mod tests {
                 assert_eq!(i64::from(scaled(signed_x, y)), half, "{x} {y}");
                 let exact = i32::from(signed_x) * i32::from(signed_y);
                 assert_eq!(product(signed_x, signed_y), exact, "{x} {y}");
-                assert_eq!(u32::from(upper(x, y)), u32::from(x) * u32::from(y) >> 16);
+                assert_eq!(u32::from(upper(x, y)), (u32::from(x) * u32::from(y)) >> 16);
                 assert_eq!(
                     u32::from(sum(x, y)),
                     (u32::from(x) + u32::from(y)).min(65_535)
