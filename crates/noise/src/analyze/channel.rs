@@ -263,9 +263,16 @@ pub fn misfit_warning(described: &Described, tau0: f64) -> Option<String> {
     ))
 }
 
-/// Four significant digits, without zeros behind them.
-fn short(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
+/// Four significant digits, without zeros behind them, nor many before them.
+fn short(value: f64) -> String {
+    /// Sizes that are read as they stand.
+    const PLAIN: std::ops::Range<f64> = 1e-4..1e7;
+    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    if rounded == 0.0 || PLAIN.contains(&rounded.abs()) {
+        rounded.to_string()
+    } else {
+        format!("{rounded:e}")
+    }
 }
 
 /// The terms in a fit.
@@ -282,4 +289,15 @@ fn letters(fitted: &NoiseFit) -> String {
         .chain((fitted.model.ramp != Ramp::Absent).then_some("R"))
         .collect();
     names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn a_number_has_four_digits_and_no_row_of_zeros() {
+        let said = [2.587_04e-11, 0.05, 1234.56, 0.0, 3.2e9].map(short);
+        assert_eq!(said, ["2.587e-11", "0.05", "1235", "0", "3.2e9"]);
+    }
 }
