@@ -168,14 +168,16 @@ fn show(outcome: &Outcome) {
     say!("what the sequence found, with 95 % intervals");
     for found in &outcome.identified {
         let half = found.size.std_error.map_or(f64::NAN, |error| 1.96 * error);
-        say!(
-            "  {:<7} {:<48} {:>10.5} +- {:.5} {}",
+        // A share has none.
+        let unit = found.size.unit.as_str();
+        let line = format!(
+            "  {:<7} {:<48} {:>10.5} +- {half:.5} {}",
             found.channel,
             found.what,
             found.size.value,
-            half,
-            found.size.unit
+            if unit == "1" { "" } else { unit }
         );
+        say!("{}", line.trim_end());
     }
     say!("what this sequence cannot tell");
     for what in &outcome.not_identified {
