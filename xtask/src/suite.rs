@@ -26,7 +26,7 @@ const FIRST: &[&str] = &[
     "imu-stand board",
 ];
 
-/// Test programs that diagnose records by the hundred or run the image for minutes of its time, the longest first: they
+/// Test programs that diagnose records by the hundred, run the image for minutes of its time, or a board in real time: they
 /// are started next, and the everyday check leaves them out.
 const LONG: &[&str] = &[
     "campaign sample",
@@ -50,6 +50,9 @@ const LONG: &[&str] = &[
     "diagnosis audit",
     "imu-stand plan",
     "imu-stand tutorial",
+    "imu-stand resume",
+    "imu-stand bring_up",
+    "imu-stand live_page",
     "imu-stand correct",
     "hil-tests corrected",
     "noise analyze",
