@@ -77,14 +77,33 @@ fn rung(drive: &[f64], (pitch_hz, linewidth_hz): (f64, f64)) -> Vec<f64> {
     all.iter().map(|v| v / rms).collect()
 }
 
-/// Whether something is told of gyro_x, and no band is named there.
-fn no_band(d: &Diagnosis, of: impl Fn() -> String) -> Result<(), String> {
+/// Whether something is told of gyro_x, and nothing is named that would be wrong.
+fn told_without(
+    d: &Diagnosis,
+    is_wrong: impl Fn(&str) -> bool,
+    of: impl Fn() -> String,
+) -> Result<(), String> {
     let told_of = d.unexplained.iter().any(|u| u.channel.contains("gyro_x"));
-    let band = |n: &(&str, &str)| ["narrow_band", "wandering_line"].contains(&n.0);
-    let wrong = named(d).iter().any(band);
+    let wrong = named(d).iter().any(|n| is_wrong(n.0));
     (told_of && !wrong)
         .then_some(())
         .ok_or_else(|| format!("{}: {}", of(), said(d)))
+}
+
+/// The same of bands.
+fn no_band(d: &Diagnosis, of: impl Fn() -> String) -> Result<(), String> {
+    told_without(d, |n| ["narrow_band", "wandering_line"].contains(&n), of)
+}
+
+/// Shakes the first accelerometer by so many counts; the shaking, over its rms.
+fn shaken(r: &mut Record, counts: f64, rng: &mut impl Rng) -> Vec<f64> {
+    let shakes: Vec<f64> = (0..count(r)).map(|_| StandardNormal.sample(rng)).collect();
+    let felt = r.channels.iter_mut().find(|c| c.quantity == Quantity::Acc);
+    let felt = felt.expect("an accelerometer");
+    let lsb = felt.lsb.expect("counts");
+    let each = felt.values.iter_mut().zip(&shakes);
+    each.for_each(|(v, a)| *v = ((*v / lsb) + counts * a).round() * lsb);
+    shakes
 }
 
 #[test]
@@ -92,13 +111,8 @@ fn a_mode_that_an_acceleration_drives_is_no_noise_of_the_sensor() {
     graded("a mode behind an acceleration", |run, rng| {
         let mut r = record(&[], 7300 + run);
         let mode = (between(0.8, 8.0, rng), between(0.05, 0.3, rng));
-        let shakes: Vec<f64> = (0..count(&r)).map(|_| StandardNormal.sample(rng)).collect();
-        let felt = r.channels.iter_mut().find(|c| c.quantity == Quantity::Acc);
-        let felt = felt.expect("an accelerometer");
-        let lsb = felt.lsb.expect("counts");
-        // Of three counts, beside the noise of the sensor.
-        let each = felt.values.iter_mut().zip(&shakes);
-        each.for_each(|(v, a)| *v = ((*v / lsb) + 3.0 * a).round() * lsb);
+        // Beside the noise of the sensor.
+        let shakes = shaken(&mut r, 3.0, rng);
         let course = rung(&shakes, mode);
         add(&mut r, "gyro_x", |i| 0.12 * course[i]);
         no_band(&told(&r), || format!("{mode:?}"))
@@ -161,8 +175,6 @@ fn a_zero_in_steps_of_the_temperature_is_no_process() {
         }
         let saw_tooth = |i: usize| swings(i) / step - (swings(i) / step).round();
         add(&mut r, "gyro_x", |i| 0.2 * saw_tooth(i));
-        let d = told(&r);
-        let told_of = d.unexplained.iter().any(|u| u.channel.contains("gyro_x"));
         let a_process = [
             "gauss_markov",
             "flicker",
@@ -170,10 +182,11 @@ fn a_zero_in_steps_of_the_temperature_is_no_process() {
             "telegraph",
             "narrow_band",
         ];
-        let wrong = named(&d).iter().any(|n| a_process.contains(&n.0));
-        (told_of && !wrong)
-            .then_some(())
-            .ok_or_else(|| format!("{step} degC, {period_s} s: {}", said(&d)))
+        told_without(
+            &told(&r),
+            |n| a_process.contains(&n),
+            || format!("{step} degC, {period_s} s"),
+        )
     });
 }
 
@@ -268,12 +281,8 @@ fn spikes_in_pairs_are_no_rounded_angle() {
             course[at + 1] -= up;
         }
         add(&mut r, "gyro_x", |i| course[i]);
-        let d = told(&r);
-        let told_of = d.unexplained.iter().any(|u| u.channel.contains("gyro_x"));
-        let wrong = named(&d).iter().any(|n| n.0 == "quantization_noise");
-        (told_of && !wrong)
-            .then_some(())
-            .ok_or_else(|| format!("{size} deg/s: {}", said(&d)))
+        let is_wrong = |n: &str| n == "quantization_noise";
+        told_without(&told(&r), is_wrong, || format!("{size} deg/s"))
     });
 }
 
@@ -282,20 +291,11 @@ fn a_tone_whose_phase_the_shaking_bends_is_told() {
     graded("a phase behind an acceleration", |run, rng| {
         let mut r = record(&[], 8000 + run);
         let (hz, bend) = (between(0.5, 9.0, rng), between(1.0, 3.0, rng));
-        let shakes: Vec<f64> = (0..count(&r)).map(|_| StandardNormal.sample(rng)).collect();
-        let felt = r.channels.iter_mut().find(|c| c.quantity == Quantity::Acc);
-        let felt = felt.expect("an accelerometer");
-        let lsb = felt.lsb.expect("counts");
-        let each = felt.values.iter_mut().zip(&shakes);
-        each.for_each(|(v, a)| *v = ((*v / lsb) + 8.0 * a).round() * lsb);
+        let shakes = shaken(&mut r, 8.0, rng);
         add(&mut r, "gyro_x", |i| {
             0.15 * (TAU * hz * i as f64 / RATE_HZ + bend * shakes[i]).sin()
         });
-        let d = told(&r);
-        let told_of = d.unexplained.iter().any(|u| u.channel.contains("gyro_x"));
-        let wrong = named(&d).iter().any(|n| n.0 != "line");
-        (told_of && !wrong)
-            .then_some(())
-            .ok_or_else(|| format!("{hz} Hz, {bend} rad: {}", said(&d)))
+        let is_wrong = |n: &str| n != "line";
+        told_without(&told(&r), is_wrong, || format!("{hz} Hz, {bend} rad"))
     });
 }

@@ -1,5 +1,6 @@
 /* Timer 0 in CTC, timer 1 in CTC and in mode 14, flags, a stopped counter, waiting compare values. */
 #include "mark.h"
+#include "waits.h"
 
 volatile uint8_t tov_in_ctc, cleared, stopped, early, late;
 
@@ -41,18 +42,7 @@ int main(void) {
     cleared = TIFR;
     TCNT0 = 77;
     stopped = TCNT0;
-    /* In PWM a compare value waits for the end of the period. */
-    ICR1 = 1000;
-    TCCR1A = 1 << WGM11;
-    TCCR1B = 1 << WGM13 | 1 << WGM12 | 1;
-    TCNT1 = 100;
-    OCR1A = 300;
-    TIFR = 0xff;
-    while (TCNT1 < 500) {}
-    early = TIFR & 1 << OCF1A;
-    while (TCNT1 > 400) {}
-    while (TCNT1 < 400) {}
-    late = TIFR & 1 << OCF1A;
+    compare_waits(&early, &late);
 #endif
     end();
 }

@@ -1,6 +1,7 @@
 /* What a chip can see of itself, a line each over the USART, 38400 baud 8N1 at 16 MHz: `name value`. transcript.txt says between which
  * values the data sheet has it. It needs a crystal and TXD alone, and drives PB4, PB5, PB7 and PC0 to PC3 as well. */
 #include "mark.h"
+#include "waits.h"
 
 #define DIVISOR 25
 #define ADC_ON (1 << ADEN | 7) /* clock / 128 */
@@ -107,6 +108,7 @@ static void eeprom(void) {
 }
 
 static void timers(void) {
+    volatile uint8_t early, late;
     OCR0 = 20;
     TCCR0 = 1 << WGM01 | 1 << CS00;
     for (volatile uint8_t i = 0; i < 50; i++) {}
@@ -116,19 +118,8 @@ static void timers(void) {
     say("timer0_flag_cleared", TIFR & 1 << OCF0);
     TCNT0 = 77;
     say("timer0_stopped", TCNT0);
-    /* In PWM a compare value waits for the end of the period. */
     TCCR1B = 0;
-    ICR1 = 1000;
-    TCCR1A = 1 << WGM11;
-    TCCR1B = 1 << WGM13 | 1 << WGM12 | 1;
-    TCNT1 = 100;
-    OCR1A = 300;
-    TIFR = 0xff;
-    while (TCNT1 < 500) {}
-    uint8_t early = TIFR & 1 << OCF1A;
-    while (TCNT1 > 400) {}
-    while (TCNT1 < 400) {}
-    uint8_t late = TIFR & 1 << OCF1A;
+    compare_waits(&early, &late);
     TCCR1A = TCCR1B = 0;
     say("compare_before_period", early);
     say("compare_after_period", late);
