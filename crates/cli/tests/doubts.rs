@@ -270,4 +270,9 @@ fn several_sensors_in_one_file_are_no_record_of_one() {
         std::fs::write(&path, one.join("\n")).expect("room");
         assert_success(&run(&["analyze", text(&path)]));
     }
+    // A number that each row has for itself counts them.
+    let counted = (0..1200).map(|k| format!("{k},{:.2},{:.4}\n", 0.05 * f64::from(k), noise()));
+    let counted: String = counted.collect();
+    std::fs::write(&path, format!("serial,time_s,gyro_x [deg/s]\n{counted}")).expect("room");
+    assert_success(&run(&["analyze", text(&path)]));
 }

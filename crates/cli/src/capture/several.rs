@@ -22,11 +22,13 @@ const NAMES: [&str; 14] = [
     "nodeid",
 ];
 
-/// The column that names the sensor, the first name in it, and the first other one with its line.
+/// The column that names the sensor, the first name in it, whether that comes again, as it does not where rows are counted, and
+/// the first other one with its line.
 pub(super) struct Sensors {
     pub at: usize,
     column: String,
     first: Option<String>,
+    comes_again: bool,
     other: Option<(u64, String)>,
 }
 
@@ -44,6 +46,7 @@ impl Sensors {
             at,
             column: name.clone(),
             first: None,
+            comes_again: false,
             other: None,
         })
     }
@@ -51,19 +54,18 @@ impl Sensors {
     /// Takes what a line says; nothing is a missing reading.
     pub fn take(&mut self, cell: &str, line: u64) {
         let cell = cell.trim();
-        if cell.is_empty() || self.other.is_some() {
-            return;
-        }
         match &self.first {
+            _ if cell.is_empty() => {}
             None => self.first = Some(cell.to_owned()),
-            Some(first) if first != cell => self.other = Some((line, cell.to_owned())),
+            Some(first) if first == cell => self.comes_again = true,
+            Some(_) if self.other.is_none() => self.other = Some((line, cell.to_owned())),
             Some(_) => {}
         }
     }
 
     /// The same of a number.
     pub fn take_number(&mut self, number: f64, line: u64) {
-        if self.other.is_none() {
+        if !(self.comes_again && self.other.is_some()) {
             self.take(&number.to_string(), line);
         }
     }
@@ -71,7 +73,7 @@ impl Sensors {
     /// An error where there were several: no noise figure holds for all of them.
     pub fn one(self) -> Result<(), CaptureError> {
         match (self.first, self.other) {
-            (Some(first), Some((line, other))) => Err(CaptureError::Several {
+            (Some(first), Some((line, other))) if self.comes_again => Err(CaptureError::Several {
                 column: brief(&self.column),
                 first: brief(&first),
                 other: brief(&other),
