@@ -169,7 +169,7 @@ fn left_over(all: &[Unexplained]) -> String {
     }
     // What it is stands before its size and its nearest names.
     let what = left.what.split(';').next().unwrap_or(&left.what);
-    format!("no known cause explains {what} on {}", left.channel)
+    format!("no known cause explains this on {}: {what}", left.channel)
 }
 
 #[cfg(test)]
@@ -242,7 +242,7 @@ mod tests {
         );
         assert_eq!(
             long,
-            format!("no known cause explains noise that comes in spells on gyro_x; {what}")
+            format!("no known cause explains this on gyro_x: noise that comes in spells; {what}")
         );
     }
 
