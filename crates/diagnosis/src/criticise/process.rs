@@ -34,8 +34,8 @@ use filtered::Filtered;
 use numerics::column::dot;
 use numerics::tails::{chi_tail, errors_of_sum, normal_tail};
 
-/// Rms by which the density of a band may be off, as a part of it, where it acts: no mode of a real structure is a Lorentzian
-/// to the last.
+/// Rms by which the density of a band or a filter may be off, as a part of it, where it acts: no mode of a real structure is a
+/// Lorentzian to the last, and no window is one triangle.
 const OFF: f64 = 0.2;
 /// How many more independent values a band has to have in a stretch, or the record: energies of a narrow one are far from
 /// normal, and a claim fails by chance once in a thousand bands.
@@ -95,7 +95,11 @@ pub(crate) fn of_processes(
             id: term.effect.id(),
             is_normal: term.is_normal(),
             claims: claims(term),
-            off: if term.cluster.is_some() { OFF } else { 0.0 },
+            off: if term.cluster.is_some() || term.is_filter() {
+                OFF
+            } else {
+                0.0
+            },
             more: if term.is_band() { MORE } else { 1.0 },
             view: &search.view,
             law,
@@ -104,9 +108,10 @@ pub(crate) fn of_processes(
             is_filter: term.is_filter(),
         };
         all.extend(process.shape());
-        // Two levels have the spectrum of a process that is Gaussian, and are not.
+        // Two levels have the spectrum of a process that is Gaussian, and are not. The law and the course of what a filter lets
+        // through are those of the noise, which has tests of its own.
         let gaussian = &search.candidates[term.candidate].hypothesis;
-        if matches!(gaussian, Hypothesis::Covariance(_)) {
+        if matches!(gaussian, Hypothesis::Covariance(_)) && !term.is_filter() {
             all.extend(process.in_time());
         }
     }
