@@ -10,6 +10,7 @@ use model::effects;
 use model::record::{Channel, Quantity, Record, flag};
 
 use super::repeats::{agreement, equal};
+use super::runs::Runs;
 use super::{Audit, LEAST_READINGS, counted};
 use crate::test_level::CheckId;
 use numerics::series::smallest_step;
@@ -139,7 +140,7 @@ pub(super) fn audit(all: &[Still], at: &[f64], audit: &mut Audit) {
             &times,
             what,
         );
-        let runs = super::running(&still.rows, 0.0, at.len());
+        let runs = Runs::new(&still.rows, 0.0, at.len()).running();
         finding.parameters.insert("running".into(), runs);
         audit.findings.push(finding);
     }

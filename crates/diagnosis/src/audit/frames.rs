@@ -3,6 +3,7 @@
 use model::effects;
 use model::record::{Axis, Record, flag};
 
+use super::runs::Runs;
 use super::{Audit, Gyro, counted};
 use crate::test_level::{CheckId, Observation};
 use numerics::order_statistics::{median, width};
@@ -181,7 +182,7 @@ fn flags(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
         let times: Vec<f64> = rows.iter().map(|i| at[*i]).collect();
         let count = rows.len() as f64;
         let mut finding = counted(effects::stale_samples::ID, names, count, None, &times, what);
-        let runs = super::running(&rows, 0.0, flags.len());
+        let runs = Runs::new(&rows, 0.0, flags.len()).running();
         finding.parameters.insert("running".into(), runs);
         audit.findings.push(finding);
     }

@@ -18,6 +18,7 @@ mod outliers;
 mod rate_limit;
 pub(crate) mod repeats;
 mod rounding;
+mod runs;
 mod saturation;
 pub mod sign_bit;
 mod stuck;
@@ -380,20 +381,6 @@ fn counted(
         what,
         ..Finding::default()
     }
-}
-
-/// How many of the frames that repeat the one before follow each other, on the average, of `rows` in ascending order; `expected`
-/// of them, of `all`, repeat by chance, and so do some of those.
-fn running(rows: &[usize], expected: f64, all: usize) -> Parameter {
-    let count = rows.len() as f64 - expected;
-    let again = rows.windows(2).filter(|w| w[1] == w[0] + 1).count() as f64;
-    let by_chance = if expected > 0.0 {
-        (rows.len() as f64).powi(2) / all.max(1) as f64
-    } else {
-        0.0
-    };
-    let runs = (count - (again - by_chance).max(0.0)).max(1.0);
-    Parameter::exact((count / runs).max(1.0), "1")
 }
 
 /// Whether readings are counts times a unit, an offset added.

@@ -12,6 +12,7 @@ use std::f64::consts::SQRT_2;
 use model::effects;
 use model::record::Record;
 
+use super::runs::Runs;
 use super::{Audit, Gyro, LEAST_READINGS, counted};
 use crate::fit::likelihood::invert;
 use crate::test_level::{CheckId, audit_level};
@@ -314,15 +315,14 @@ impl<'a> Readings<'a> {
             return false;
         }
         let times: Vec<f64> = repeated.iter().map(|i| at[*i]).collect();
-        let count = (observed as f64 - expected).round().max(1.0);
         for name in &names {
             repeated.iter().for_each(|i| audit.mask(name, *i));
         }
         let error = Some(expected.sqrt());
         let cause = effects::stale_samples::ID;
-        let mut finding = counted(cause, names, count, error, &times, what);
-        let runs = super::running(&repeated, expected, self.rows);
-        finding.parameters.insert("running".into(), runs);
+        let runs = Runs::new(&repeated, expected, self.rows);
+        let mut finding = counted(cause, names, runs.stalled().round(), error, &times, what);
+        finding.parameters.insert("running".into(), runs.running());
         if record.flags.is_some() {
             finding.what.push_str("; the new-data flags do not tell");
         }
@@ -370,19 +370,15 @@ impl<'a> Readings<'a> {
             audit.unexplain(name, format!("{what}; {why}"));
             return;
         }
-        // Which of them is a repeat by chance cannot be told where those are the many, but of a reading that comes
-        // three times and more.
-        let held = |i: &&usize| {
-            let next = |j: usize| own.binary_search(&j).is_ok();
-            excess > expected || next(**i + 1) || next(i.saturating_sub(1))
-        };
-        own.iter().filter(held).for_each(|i| audit.mask(name, *i));
-        let times: Vec<f64> = own.iter().map(|i| at[*i]).collect();
-        let times = if excess > expected { times } else { vec![] };
+        // Which of them is a repeat by chance cannot be told, but of a run that is longer than chance makes it.
+        let times = own.iter().filter(|_| excess > expected).map(|i| at[*i]);
+        let times: Vec<f64> = times.collect();
         let names = vec![name.to_owned()];
-        let mut finding = counted(cause, names, excess.round(), Some(error), &times, what);
-        let runs = super::running(&own, expected, self.rows);
-        finding.parameters.insert("running".into(), runs);
+        let runs = Runs::new(&own, expected, self.rows);
+        runs.beyond_chance().for_each(|i| audit.mask(name, i));
+        let error = Some(error / (1.0 - p).max(0.1));
+        let mut finding = counted(cause, names, runs.stalled().round(), error, &times, what);
+        finding.parameters.insert("running".into(), runs.running());
         audit.findings.push(finding);
     }
 
