@@ -35,6 +35,11 @@ impl Effect for LowPass {
                 "1",
                 "1 where the filter is a triangular window, 0 where it is one pole; left out, a mean of two samples up to a correlation of 0.3 and one pole beyond",
             ),
+            optional(
+                "pole",
+                "1",
+                "correlation from one lag to the next beyond the first, of one pole behind a window that is shorter than a sample; left out, lag1_correlation",
+            ),
         ];
         PARAMETERS
     }
@@ -44,7 +49,7 @@ impl Effect for LowPass {
             title: "Low-pass filter",
             physics: "The white noise has passed a filter whose memory reaches over a sample: the Bartlett filter of the ADIS16250 with many taps, or a pole of the read-out.",
             excitation: "Nothing.",
-            test: "White noise shaped by one pole or by a triangular window, one width each, refitted by maximum likelihood.",
+            test: "White noise shaped by one pole, by one pole behind a window that is shorter than a sample, or by a triangular window, refitted by maximum likelihood.",
             remedy: "Simulate white noise through this filter, and take fewer taps, or a lower sample rate, if the filter has to see white noise.",
             figure: "Spectrum of the rate with the model before and after: it falls towards half the sample rate.",
             example: Example::new(Plot::Spectrum, &[("lag1_correlation", 0.5)]),
@@ -72,6 +77,7 @@ impl Effect for LowPass {
         Ok(vec![
             Hypothesis::Covariance(Arc::new(Pole)),
             Hypothesis::Covariance(Arc::new(Triangle)),
+            Hypothesis::Covariance(Arc::new(BehindWindow)),
         ])
     }
 
@@ -88,7 +94,13 @@ impl Effect for LowPass {
             "lag1_correlation".to_owned(),
             Parameter::estimated(rho, error * rho * (1.0 - rho), "1"),
         );
-        fixed.chain([size]).collect()
+        let pole = found.coefficients.get(1).map(|&(q, error)| {
+            let least = least_pole(rho);
+            let q_error = error * logistic(q) * (1.0 - logistic(q));
+            let pole = Parameter::estimated(pole(rho, q), (rho - least) * q_error, "1");
+            ("pole".to_owned(), pole)
+        });
+        fixed.chain([size]).chain(pole).collect()
     }
 
     fn stage(&self) -> Stage {
@@ -98,16 +110,21 @@ impl Effect for LowPass {
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let stated = value(parameters, "lag1_correlation");
         let kind = parameters.get("triangular").map(|p| p.value != 0.0);
+        let further = parameters.get("pole").map(|p| p.value);
         for &axis in channels {
             // The correlation is that of the readings: rounding, which comes behind the filter, has none.
             let rounding = simulation.rounding[axis] / simulation.white_sigma[axis].powi(2);
             let drawn = if rounding < 1.0 { 1.0 - rounding } else { 1.0 };
             let rho = (stated / drawn).clamp(0.0, 0.999);
             let noise = &mut simulation.white[axis];
-            match kind {
-                Some(true) => averaged(noise, &window(rho)),
-                None if rho <= 0.3 => averaged(noise, &two_samples(rho)),
-                Some(false) | None => through_a_pole(noise, rho),
+            match (kind, further) {
+                (Some(true), _) => averaged(noise, &window(rho)),
+                (None, None) if rho <= 0.3 => averaged(noise, &two_samples(rho)),
+                // From one lag to the next rounding changes nothing.
+                (_, pole) => {
+                    let pole = pole.unwrap_or(stated).clamp(least_pole(rho), rho);
+                    behind_a_window(noise, rho, pole);
+                }
             }
         }
     }
@@ -192,14 +209,30 @@ fn averaged(noise: &mut [f64], taps: &[f64]) {
     }
 }
 
-/// One pole in place, variance kept.
-fn through_a_pole(noise: &mut [f64], rho: f64) {
-    let step = (1.0 - rho * rho).sqrt();
-    let mut x = noise.first().copied().unwrap_or(0.0);
+/// One pole with the correlations rho and pole * rho at lags 1 and 2, in place, variance kept: x' = pole x + e' + theta e.
+fn behind_a_window(noise: &mut [f64], rho: f64, pole: f64) {
+    let off = rho - pole;
+    let own = 1.0 + pole * pole - 2.0 * pole * rho;
+    let theta = 2.0 * off / (own + (own * own - 4.0 * off * off).max(0.0).sqrt());
+    let step = ((1.0 - pole * pole) / (1.0 + 2.0 * pole * theta + theta * theta)).sqrt();
+    let mut before = noise.first().copied().unwrap_or(0.0);
+    let mut x = before;
     for v in noise.iter_mut().skip(1) {
-        x = rho * x + step * *v;
-        *v = x;
+        let drawn = *v;
+        x = pole * x + step * (drawn + theta * before);
+        (*v, before) = (x, drawn);
     }
+}
+
+/// Smallest pole that noise of the lag-1 correlation `rho` can have: below it some density would be negative.
+fn least_pole(rho: f64) -> f64 {
+    (2.0 * rho - 1.0).max(0.0)
+}
+
+/// The pole at the coordinate `q`, between the smallest one and that of a pole alone.
+fn pole(rho: f64, q: f64) -> f64 {
+    let least = least_pole(rho);
+    least + (rho - least) * logistic(q)
 }
 
 fn logistic(theta: f64) -> f64 {
@@ -234,6 +267,46 @@ impl Covariance for Pole {
         vec![vec![-3.0], vec![0.0]]
     }
 }
+
+/// One pole behind a window that is shorter than a sample, as a capacitor on a part that averages: rho pole^(|lag| - 1).
+/// Coordinates: logit of the lag-1 correlation, place of the pole between the smallest one and that of a pole alone.
+struct BehindWindow;
+
+impl Covariance for BehindWindow {
+    fn dimensions(&self) -> usize {
+        2
+    }
+
+    fn filters_white(&self) -> bool {
+        true
+    }
+
+    fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
+        let rho = logistic(theta[0]);
+        let pole = pole(rho, theta[1]).max(LEAST_POLE);
+        let share = rho / pole;
+        let alone = at.one_pole(share, pole).into_iter();
+        alone
+            .map(|d| (1.0 - share + d).max(LEAST_DENSITY))
+            .collect()
+    }
+
+    fn fixed(&self) -> Vec<(&'static str, f64, &'static str)> {
+        vec![("triangular", 0.0, "1")]
+    }
+
+    fn bounds(&self, _samples: usize) -> Vec<(f64, f64)> {
+        vec![(-7.0, 3.0), (-4.0, 4.0)]
+    }
+
+    fn starts(&self, _samples: usize) -> Vec<Vec<f64>> {
+        vec![vec![-1.0, 1.0], vec![0.5, 2.0]]
+    }
+}
+
+/// A pole of nothing, by which its share would be infinite; and a density that is none, but for the error of its terms.
+const LEAST_POLE: f64 = 1e-6;
+const LEAST_DENSITY: f64 = 1e-9;
 
 /// Triangular window (the data sheet's Bartlett filter). Coordinate: logit of the lag-1 correlation.
 struct Triangle;
@@ -310,7 +383,28 @@ impl Covariance for Triangle {
 
 #[cfg(test)]
 mod tests {
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
     use super::*;
+
+    #[test]
+    fn a_pole_behind_a_window_has_its_two_correlations() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+        let mut noise: Vec<f64> = (0..200_000)
+            .map(|_| StandardNormal.sample(&mut rng))
+            .collect();
+        behind_a_window(&mut noise, 0.65, 0.5);
+        let at = |lag: usize| {
+            let both = noise.iter().zip(&noise[lag..]).map(|(a, b)| a * b);
+            both.sum::<f64>() / noise.len() as f64
+        };
+        for (lag, wanted) in [(0, 1.0), (1, 0.65), (2, 0.325), (3, 0.1625)] {
+            // Four standard errors of 200 000 samples that are alike over three.
+            assert!((at(lag) - wanted).abs() < 0.016, "{lag}: {}", at(lag));
+        }
+    }
 
     #[test]
     fn what_is_simulated_has_the_correlations_that_are_fitted() {
