@@ -3,6 +3,7 @@
 mod fitted;
 mod moved;
 
+pub use moved::at_rest;
 pub(crate) use moved::{fast, moved_like, slow};
 
 use std::collections::BTreeMap;
@@ -99,6 +100,11 @@ pub const SETTINGS: &[Setting] = &[
         "amplitude of a sway of the base about x and y",
     ),
     setting("sway_period_s", 10.0, "period of the sway"),
+    setting(
+        "sway_from_s",
+        0.0,
+        "when the sway begins; the base is at rest before",
+    ),
     setting("sway_about_x", 1.0, "part of the sway that is about x"),
     setting("sway_about_y", 1.0, "part of the sway that is about y"),
     setting(
@@ -257,10 +263,10 @@ fn moved(
     let sway = |i: usize, shift: f64, part: f64| {
         let w = std::f64::consts::TAU / get("sway_period_s");
         let amplitude = part * get("sway_deg");
-        (
-            amplitude * (w * time(i) + shift).sin(),
-            amplitude * w * (w * time(i) + shift).cos(),
-        )
+        let since = time(i) - get("sway_from_s");
+        let phase = w * since.max(0.0) + shift;
+        let rate = if since < 0.0 { 0.0 } else { amplitude * w };
+        (amplitude * phase.sin(), rate * phase.cos())
     };
     let rms = get("vibration_g");
     let mut shake = |_| {

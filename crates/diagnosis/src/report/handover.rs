@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 
 use model::effect::{Effect, Hypothesis, Parameters, Stage};
 use model::effects::effect;
+use model::excitation::at_rest;
 use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
+use model::record::Base;
 use model::unnamed::Unnamed;
 
 use crate::attribute::events;
@@ -64,6 +66,10 @@ pub(crate) fn extended_model(
         .cloned()
         .collect();
     for (channel, s) in extended.channels.iter_mut().zip(searched) {
+        // What was fitted to a motion of the base is no noise of the sensor.
+        if s.target.moving && grid.base != Some(Base::Turntable) {
+            at_rest(channel, &s.target.y, grid.rate_hz);
+        }
         let lost = s.target.lost.len() as f64 / grid.n as f64;
         before_counts(channel, &read, grid.rate_hz, lost);
     }

@@ -19,6 +19,8 @@ use crate::simulate::{ACC_NOISE_G, ACC_PER_G, STANDARD_GRAVITY, SUPPLY_LSB_V, TE
 const MOST_BLOCKS: usize = 4000;
 /// Part of the scatter that a term has to take away before it is stated.
 const WORTH: f64 = 0.25;
+/// Blocks of half a second that make a rest, or a swing.
+const LEAST_REST: usize = 10;
 /// Time constants of the self-heating that are tried.
 const TIME_CONSTANTS: usize = 24;
 
@@ -325,11 +327,17 @@ impl Fit<'_> {
         }
     }
 
-    /// Amplitude and period, s, of a swing that is as large and as frequent.
+    /// Amplitude and period, s, of a swing that is as large and as frequent since it began.
     fn swing(&self, values: &[f64]) -> (f64, f64) {
         let rate = centred(&self.blocks(values));
-        let amplitude = std::f64::consts::SQRT_2 * rms(&rate);
-        (amplitude, period(&rate, self.block_s()))
+        let rate = &rate[rest_before(&rate)..];
+        let amplitude = std::f64::consts::SQRT_2 * rms(rate);
+        (amplitude, period(rate, self.block_s()))
+    }
+
+    /// When a swing begins, s.
+    fn begins(&self, values: &[f64]) -> f64 {
+        rest_before(&centred(&self.blocks(values))) as f64 * self.block_s()
     }
 
     /// The turning of a table or the sway of a base, by the gyro that sees most of it. A sway tilts the accelerometers: what
@@ -358,6 +366,11 @@ impl Fit<'_> {
         if tilt > 0.5 * sway.to_radians().sin() {
             settings.push(("sway_deg", sway));
             settings.push(("sway_period_s", period));
+            let begins = self.record.of(Quantity::Gyro, Some(axis));
+            let begins = begins.map_or(0.0, |c| fine.begins(&c.values));
+            if begins > 0.0 {
+                settings.push(("sway_from_s", begins));
+            }
             // Where it is not said which axes moved, both may have.
             let about = [
                 (Axis::X, "gyro_x", "sway_about_x"),
@@ -420,6 +433,26 @@ fn off_line(y: &[f64]) -> Vec<f64> {
         .enumerate()
         .map(|(i, v)| v - level - slope * (i as f64 - middle))
         .collect()
+}
+
+/// Values at the start that are at rest, of a history that swings about zero: where two variances, one before and one after,
+/// are likeliest; none where the first is not much less.
+fn rest_before(y: &[f64]) -> usize {
+    let all = dot(y, y);
+    let (mut before, mut best) = (0.0, (0, f64::INFINITY));
+    for (k, v) in y.iter().enumerate() {
+        let [rest, swing] = [(before, k), (all - before, y.len() - k)];
+        before += v * v;
+        if k < LEAST_REST || y.len() - k < LEAST_REST {
+            continue;
+        }
+        let [rest, swing] = [rest, swing].map(|(sum, n)| sum.max(f64::MIN_POSITIVE) / n as f64);
+        let unlikely = k as f64 * rest.ln() + (y.len() - k) as f64 * swing.ln();
+        if rest < WORTH * WORTH * swing && unlikely < best.1 {
+            best = (k, unlikely);
+        }
+    }
+    best.0
 }
 
 /// Period of a history that swings about zero, by how often it passes from well below to well above it.
