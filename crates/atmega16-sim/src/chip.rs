@@ -15,11 +15,15 @@ mod events;
 const SPM_ENABLE: u8 = 1;
 const SLEEP_ENABLE: u8 = 1 << 6;
 const SLEEP_MODES: u8 = 0xb0;
-/// MCUCR's interrupt sense bits may be set freely: the pins they sense are not modelled unless enabled in GICR.
-const EXTERNAL_INTERRUPTS: u8 = 0xe0;
+/// INT0: its pin on port D, its bit in GICR and GIFR. MCUCR has how it senses in its two lowest bits; those of INT1 and INT2 may
+/// be set freely, for they are not modelled unless enabled in GICR.
+const INT0_PIN: u8 = 1 << 2;
+const INT0: u8 = 1 << 6;
+const INT1_INT2: u8 = 0xa0;
 
 /// Vectors, by number.
 mod vector {
+    pub const INT0: u8 = 1;
     pub const TIMER2_COMP: u8 = 3;
     pub const TIMER2_OVF: u8 = 4;
     pub const TIMER1_CAPT: u8 = 5;
@@ -79,6 +83,10 @@ pub struct Chip {
     /// Levels that the outside drives: mask and value, for each port.
     outside: [(u8, u8); 4],
     mcucr: u8,
+    gicr: u8,
+    /// The level at INT0, and the flag of its edges.
+    int0_high: bool,
+    int0: bool,
     pub mcucsr: u8,
     sfior: u8,
     /// Registers that only hold what is written.
@@ -107,6 +115,9 @@ impl Chip {
             pins: Pins::default(),
             outside: [(0, 0); 4],
             mcucr: 0,
+            gicr: 0,
+            int0_high: false,
+            int0: false,
             mcucsr: ResetCause::PowerOn.flag(),
             sfior: 0,
             plain: [0; 64],
@@ -138,6 +149,9 @@ impl Chip {
         }
         self.pins = Pins::default();
         self.pins_changed = true;
+        self.gicr = 0;
+        self.sense();
+        self.int0 = false;
     }
 
     /// The outside drives pins of a port.
@@ -145,6 +159,7 @@ impl Chip {
         let (driven, value) = &mut self.outside[port as usize];
         *driven |= mask;
         *value = *value & !mask | levels & mask;
+        self.sense();
         let low = self.select_is_low();
         self.spi.check_select(low);
     }
@@ -152,6 +167,7 @@ impl Chip {
     /// The outside lets go of pins.
     pub fn release(&mut self, port: Port, mask: u8) {
         self.outside[port as usize].0 &= !mask;
+        self.sense();
         let low = self.select_is_low();
         self.spi.check_select(low);
     }
@@ -167,6 +183,30 @@ impl Chip {
         };
         let input = driven & value | !driven & pulled;
         self.pins.port[at] & self.pins.ddr[at] | input & !self.pins.ddr[at]
+    }
+
+    /// INT0 senses its pin, whatever drives it. (The real one takes two or three clocks to notice, and none of a pulse between
+    /// two of them.)
+    fn sense(&mut self) {
+        let high = self.input(Port::D) & INT0_PIN != 0;
+        let edge = high != self.int0_high;
+        self.int0_high = high;
+        self.int0 |= match self.mcucr & 3 {
+            1 => edge,
+            2 => edge && !high,
+            3 => edge && high,
+            // A level has no flag.
+            _ => false,
+        };
+    }
+
+    /// Whether INT0 asks for its interrupt.
+    fn int0_asks(&self) -> bool {
+        let asks = match self.mcucr & 3 {
+            0 => !self.int0_high,
+            _ => self.int0,
+        };
+        asks && self.gicr & INT0 != 0
     }
 
     /// SS is an input, and low.
@@ -248,6 +288,8 @@ impl Chip {
             r::TIFR => self.timer_flags(now),
             r::SFIOR => self.sfior,
             r::MCUCR => self.mcucr,
+            r::GICR => self.gicr,
+            r::GIFR => u8::from(self.int0) << 6,
             r::MCUCSR => self.mcucsr,
             _ => self.plain[usize::from(address & 63)],
         }
@@ -306,6 +348,7 @@ impl Chip {
                     _ => self.pins.port[port] = value,
                 }
                 self.pins_changed = true;
+                self.sense();
                 let low = self.select_is_low();
                 self.spi.check_select(low);
             }
@@ -379,19 +422,29 @@ impl Chip {
                     return Err(Unmodelled("another trigger of the ADC while it is on"));
                 }
                 self.sfior = value & !3;
+                self.sense();
             }
             r::MCUCR => {
+                let sensed = self.mcucr & 3 == value & 3;
                 self.mcucr = value;
+                if value & 3 == 0 {
+                    self.int0 = false;
+                }
                 if value & SLEEP_ENABLE != 0 && value & SLEEP_MODES != 0 {
                     return Err(Unmodelled("a sleep mode other than idle"));
                 }
-                return Ok(Effect::default());
+                if sensed {
+                    return Ok(Effect::default());
+                }
             }
             // Flags are cleared by writing 0.
             r::MCUCSR => self.mcucsr &= value | 0xe0,
-            r::GICR if value & EXTERNAL_INTERRUPTS != 0 => {
-                return Err(Unmodelled("the external interrupts"));
+            r::GICR if value & INT1_INT2 != 0 => {
+                return Err(Unmodelled("the external interrupts but INT0"));
             }
+            r::GICR => self.gicr = value,
+            // Flags are cleared by writing 1.
+            r::GIFR => self.int0 &= value & INT0 == 0,
             r::SPMCR if value & SPM_ENABLE != 0 => {
                 return Err(Unmodelled("a program that writes the flash"));
             }

@@ -46,6 +46,7 @@ pub const MCUCR: u8 = 0x35;
 pub const SPMCR: u8 = 0x37;
 pub const TIFR: u8 = 0x38;
 pub const TIMSK: u8 = 0x39;
+pub const GIFR: u8 = 0x3a;
 pub const GICR: u8 = 0x3b;
 pub const OCR0: u8 = 0x3c;
 /// Stack pointer and status are the processor's.

@@ -113,3 +113,55 @@ fn the_same_image_and_inputs_give_the_same_run_to_the_cycle() {
     };
     assert_eq!(go(), go());
 }
+
+const PD2: u8 = 1 << 2;
+
+/// Runs so long that what is due has been done.
+fn settle(mcu: &mut Mcu) {
+    assert_eq!(run(mcu, &mut Recorder::new(), 2_000), Stop::Reached);
+}
+
+/// What INT0 has been taken for behind power on, a fall, a rise and another fall of its pin.
+fn taken(sense: &str) -> [u8; 4] {
+    let mut mcu = load("external.c", &[&format!("-DISC={sense}")]);
+    settle(&mut mcu);
+    assert_eq!(byte(&mcu, "undriven"), PD2, "the pull-up");
+    let mut counts = [byte(&mcu, "taken"); 4];
+    for (n, low) in [true, false, true].into_iter().enumerate() {
+        if low {
+            mcu.drive(Port::D, PD2, 0);
+        } else {
+            mcu.release(Port::D, PD2);
+        }
+        settle(&mut mcu);
+        counts[n + 1] = byte(&mcu, "taken");
+    }
+    counts
+}
+
+#[test]
+fn int0_senses_the_edges_that_it_is_set_to_and_wakes_from_idle() {
+    assert_eq!(taken("2"), [0, 1, 1, 2], "falling");
+    assert_eq!(taken("3"), [0, 0, 1, 1], "rising");
+    assert_eq!(taken("1"), [0, 1, 2, 3], "any");
+    let [none, low, high, again] = taken("0");
+    assert!(none == 0 && low > 5 && high == low && again > high, "low");
+}
+
+#[test]
+fn an_edge_at_int0_is_kept_until_it_is_enabled_or_cleared_and_a_pulse_is_enough() {
+    let mut mcu = load("external.c", &["-DMASKED"]);
+    settle(&mut mcu);
+    for expected in [0, 1] {
+        mcu.drive(Port::D, PD2, 0);
+        mcu.release(Port::D, PD2);
+        settle(&mut mcu);
+        assert_eq!(byte(&mcu, "taken"), expected);
+    }
+    assert_eq!(byte(&mcu, "flag"), 1 << 6, "set, then cleared by a 1");
+    mcu.reset(atmega16_sim::ResetCause::External);
+    mcu.drive(Port::D, PD2, 0);
+    mcu.release(Port::D, PD2);
+    settle(&mut mcu);
+    assert_eq!(byte(&mcu, "taken"), 0, "a level has no flag");
+}

@@ -269,6 +269,39 @@ fn rows() -> Vec<(&'static str, String, String, String)> {
         &format!("{:#x}", common::byte(&mcu, "toggled")),
     );
 
+    let mut stock = Stock::new("external.c", &[]);
+    stock.run(2_000);
+    // AVR_IOCTL_IOPORT_GETIRQ('D')
+    // SAFETY: a query, and a level for a pin.
+    unsafe {
+        let port = u32::from_be_bytes(*b"iogD");
+        ffi::avr_raise_irq(ffi::avr_io_getirq(stock.avr, port, 2), 0);
+    }
+    stock.run(2_000);
+    let mut mcu = common::load("external.c", &[]);
+    let mut board = Recorder::new();
+    common::run(&mut mcu, &mut board, 2_000);
+    mcu.drive(atmega16_sim::Port::D, 1 << 2, 0);
+    common::run(&mut mcu, &mut board, 2_000);
+    row(
+        "PD2 with its pull-up, driven by nobody, read",
+        &4,
+        &stock.byte("undriven"),
+        &common::byte(&mcu, "undriven"),
+    );
+    row(
+        "INT0 at a falling edge: times taken",
+        &1,
+        &stock.byte("taken"),
+        &common::byte(&mcu, "taken"),
+    );
+    row(
+        "PD2 held low from outside, read behind a write of PORTD",
+        &0,
+        &stock.byte("pin"),
+        &common::byte(&mcu, "pin"),
+    );
+
     let mut stock = Stock::new("receive.c", &["-DDELAY=40"]);
     stock.run(10_000);
     for byte in 1..=10 {

@@ -136,6 +136,7 @@ impl Chip {
             .map(|bit| TIMER_FLAGS[bit].2);
         let [received, empty, sent] = self.usart.interrupts();
         let others = [
+            (self.int0_asks(), vector::INT0),
             (self.spi.interrupts(), vector::SPI_STC),
             (received, vector::USART_RXC),
             (empty, vector::USART_UDRE),
@@ -153,6 +154,7 @@ impl Chip {
     /// The interrupt is taken: its flag falls, where taking it clears it.
     pub fn taken(&mut self, vector: u8) {
         match vector {
+            vector::INT0 => self.int0 = false,
             vector::SPI_STC => self.spi.clear(),
             vector::USART_TXC => self.usart.clear_txc(),
             vector::ADC => self.adc.clear(),
