@@ -31,8 +31,13 @@ pub trait Board {
     /// The host is there: from now on the motor may turn for [`crate::motor::KEEP_ALIVE_MS`]. The board cuts it by itself
     /// when they are over, whatever its main loop is busy with.
     fn keep_alive(&mut self);
-    /// Whether they are not over yet.
+    /// Whether they are not over yet, and [`is_stopped`](Self::is_stopped) does not say so.
     fn host_is_there(&self) -> bool;
+    /// Whether the motor's stop is pressed, or was since [`forget_stop`](Self::forget_stop). The board cuts the motor by itself
+    /// then, at once.
+    fn is_stopped(&self) -> bool;
+    /// What was pressed before is over, what keep-alive there was with it; what is pressed is not.
+    fn forget_stop(&mut self);
     /// Sets the period of the sample timer, and that every n-th period has a sample.
     fn set_period(&mut self, ticks: u16, every: u8);
     /// Sets the USART's UBRR once what is queued has gone out.
@@ -303,13 +308,17 @@ impl Stand {
         }
     }
 
-    /// Where the host fell silent the board has cut the motor: its command ends with it. Whether the motor is on then.
+    /// Where the host fell silent, or the stop was pressed, the board has cut the motor: its command ends with it. Whether the
+    /// motor is on then.
     #[inline(never)]
     fn miss_host<B: Board>(&mut self, board: &B) -> bool {
         let on = self.motor.turns();
         if on && !board.host_is_there() {
             self.motor.cut();
-            self.record(Fault::MotorTimeout, 0);
+            // Somebody wanted that: no fault.
+            if !board.is_stopped() {
+                self.record(Fault::MotorTimeout, 0);
+            }
             return false;
         }
         on

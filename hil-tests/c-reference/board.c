@@ -26,7 +26,7 @@ static void __attribute__((naked, used, section(".init3"))) paint_stack(void)
 
 void board_start(void)
 {
-    PORTD = 0;
+    PORTD = _BV(PD2); /* the pull-up of the motor's stop */
     DDRD = _BV(PD7) | _BV(PD6);
     reset_cause = MCUCSR & (_BV(PORF) | _BV(EXTRF) | _BV(BORF) | _BV(WDRF) | _BV(JTRF));
     MCUCSR = 0;

@@ -117,13 +117,24 @@ static void set_up_changes(void)
     stand_end_bias_null(STATUS_ABORTED);
 }
 
-/* Without a nonce: makes one of the sensors' noise so far and tells it. With that one, once: the host is there. */
+/* Why the motor may not turn. */
+static uint8_t off(void)
+{
+    return tick_is_stopped() ? STATUS_STOPPED : STATUS_NO_KEEP_ALIVE;
+}
+
+/* Without a nonce: makes one of the sensors' noise so far and tells it. With that one, once: the host is there. A stop that is
+ * pressed refuses both, one that was pressed since the nonce was told refuses that. */
 static uint8_t arm(uint16_t said)
 {
     static uint16_t told;
     uint16_t nonce = told;
     stand_miss_host();
     told = 0;
+    if (said == 0)
+        tick_forget_stop();
+    if (tick_is_stopped())
+        return STATUS_STOPPED;
     if (said == 0)
         stand_answer.value = told = (uint16_t)stand_noise | 1;
     else if (said == nonce)
@@ -172,7 +183,7 @@ static uint8_t carry_out(const struct request *request)
     case CODE_KEEP_ALIVE:
         stand_miss_host();
         if (!tick_host_is_there())
-            return STATUS_NO_KEEP_ALIVE;
+            return off();
         tick_keep_alive();
         return STATUS_OK;
     case CODE_COUNTERS:
@@ -254,12 +265,12 @@ static uint8_t carry_out(const struct request *request)
         if (request->i16 < -MOTOR_FULL || request->i16 > MOTOR_FULL)
             return STATUS_BAD_ARGUMENT;
         if (request->i16 && !tick_host_is_there())
-            return STATUS_NO_KEEP_ALIVE;
+            return off();
         stand_answer.value = motor_command(request->i16);
         return STATUS_OK;
     case CODE_MOTOR_PROFILE:
         if (request->profile.shape != SHAPE_STOP && !tick_host_is_there())
-            return STATUS_NO_KEEP_ALIVE;
+            return off();
         return motor_profile(request->profile.shape, request->profile.amplitude, request->profile.offset,
                              request->profile.period_ms, request->profile.cycles)
                    ? STATUS_OK

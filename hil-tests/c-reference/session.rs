@@ -4,7 +4,7 @@
 // The sensors answer by how often they were asked, not by when, and the host counts from the image's first tick. So two
 // images that do the same work at different speeds have to say the same.
 
-use atmega16_sim::{CLOCK_HZ, Mcu, Stop};
+use atmega16_sim::{CLOCK_HZ, Mcu, Port, Stop};
 use wire::{Command, Shape, code, encode_request, kind};
 
 #[path = "hearing.rs"]
@@ -26,6 +26,8 @@ enum Deed {
     Arm(u16),
     /// The stand comes to rest, or moves again.
     Quiet(bool),
+    /// The motor's stop is pressed, or let go.
+    Press(bool),
     /// From here on the ticks' phase means nothing: a reset comes.
     LastTick,
     /// A bit of the EEPROM's byte at an address flips.
@@ -349,6 +351,27 @@ fn deeds() -> Vec<(u64, Deed)> {
         at += ms;
     }
     at += 500;
+    // The stop, held: no nonce. Pressed behind the nonce: it is spent. Pressed as it turns: off, until it is armed anew.
+    let duty = Command::MotorDuty { duty: 90 };
+    all.push((at, Deed::Press(true)));
+    all.push((at + 10, request(next(), Command::Arm { nonce: 0 })));
+    all.push((at + 60, request(next(), duty)));
+    all.push((at + 110, Deed::Press(false)));
+    all.push((at + 120, request(next(), Command::KeepAlive)));
+    all.push((at + 170, request(next(), Command::Arm { nonce: 0 })));
+    all.push((at + 220, Deed::Press(true)));
+    all.push((at + 221, Deed::Press(false)));
+    all.push((at + 230, Deed::Arm(next())));
+    all.push((at + 300, request(next(), Command::Arm { nonce: 0 })));
+    all.push((at + 350, Deed::Arm(next())));
+    all.push((at + 400, request(next(), duty)));
+    all.push((at + 450, request(next(), Command::KeepAlive)));
+    all.push((at + 470, Deed::Press(true)));
+    all.push((at + 471, Deed::Press(false)));
+    alive(&mut all, at + 500, 300, &mut next);
+    all.push((at + 850, request(next(), duty)));
+    all.push((at + 900, request(next(), Command::Counters)));
+    at += 1_000;
     // Bias: moving, then at rest, and another one meanwhile.
     all.push((at, request(next(), Command::BiasNull { samples: 24 })));
     at += 200;
@@ -648,10 +671,25 @@ fn chance(seed: u64) -> Vec<(u64, Deed)> {
     ];
     let mut all = vec![(1, Deed::Quiet(seed.is_multiple_of(2)))];
     let mut asked_for_nonce = false;
+    let mut let_go = None;
     // When the set-up was last stored; at the start nothing is.
     let mut stored = 0;
     for n in 0..CHANCE_REQUESTS {
         let bits = |salt: u64| spread(seed ^ spread(n << 8 | salt));
+        // The motor's stop, for a millisecond or for some requests.
+        if let_go == Some(n) {
+            all.push((20 + 50 * n, Deed::Press(false)));
+            let_go = None;
+            continue;
+        }
+        if let_go.is_none() && bits(4) % 24 == 0 {
+            all.push((20 + 50 * n, Deed::Press(true)));
+            match bits(5) % 6 {
+                0 => let_go = Some(n + 4),
+                _ => all.push((21 + 50 * n, Deed::Press(false))),
+            }
+            continue;
+        }
         let code = match bits(0) % 16 {
             0 => (bits(1) % 13 * 7) as u8,
             _ => CODES[(bits(1) % CODES.len() as u64) as usize],
@@ -773,6 +811,9 @@ fn act(mcu: &mut Mcu, deeds: Vec<(u64, Deed)>) -> Result<Script, String> {
             Deed::LastTick => script.reset = true,
             Deed::SendWithoutStopBit(byte) => mcu.send_without_stop_bit(byte),
             Deed::Quiet(quiet) => script.quiet = quiet,
+            // PD2.
+            Deed::Press(true) => mcu.drive(Port::D, 1 << 2, 0),
+            Deed::Press(false) => mcu.release(Port::D, 1 << 2),
             Deed::Flip(address) => {
                 let mut bytes = mcu.eeprom().to_vec();
                 bytes[address] ^= 1;

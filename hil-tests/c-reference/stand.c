@@ -142,7 +142,9 @@ bool stand_miss_host(void)
     bool on = motor_is_on();
     if (on && !tick_host_is_there()) {
         motor_cut();
-        stand_count(FAULT_MOTOR_TIMEOUT, 1);
+        /* Somebody wanted that: no fault. */
+        if (!tick_is_stopped())
+            stand_count(FAULT_MOTOR_TIMEOUT, 1);
         return false;
     }
     return on;

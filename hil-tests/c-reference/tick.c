@@ -31,6 +31,10 @@ static uint8_t masked_ucsrb;
 /* Milliseconds that the motor may still turn without a word from the host. */
 #define KEEP_ALIVE_MS 200
 static volatile uint8_t alive_ms;
+/* The motor's stop was pressed since a nonce was told last. */
+static volatile bool stopped;
+/* INT0 at a falling edge, in the register that has the sleep's bits, too. */
+#define AWAKE _BV(ISC01)
 
 enum slot { FREE, POSTED, DONE };
 static volatile uint8_t slot;
@@ -57,6 +61,8 @@ void tick_start(void)
     set_compare(period);
     wdt_enable(WDTO_1S); /* longer than the slowest tick */
     run_milliseconds();
+    MCUCR = AWAKE;
+    GICR = _BV(INT0);
     TCNT1 = 0;
     TCCR1B = _BV(WGM12) | _BV(CS11) | _BV(CS10);
     TIMSK = TIMSK_ALL;
@@ -142,10 +148,10 @@ const struct gyro_job *tick_fetch_done(void)
 /* sei takes effect after the next instruction, so no interrupt slips in before the sleep. */
 static inline void sleep_now(void)
 {
-    MCUCR = _BV(SE); /* idle */
+    MCUCR = _BV(SE) | AWAKE; /* idle */
     sei();
     sleep_cpu();
-    MCUCR = 0;
+    MCUCR = AWAKE;
 }
 
 /* A transmitted byte wakes the processor, and is no work. */
@@ -164,7 +170,32 @@ void tick_sleep_until_work(bool listens)
 static void unmask(void)
 {
     serial_unmask(masked_ucsrb);
+    GICR = _BV(INT0);
     TIMSK = _BV(OCIE1A) | _BV(OCIE0);
+}
+
+/* Cuts the motor until it is armed anew. */
+static inline void stop(void)
+{
+    TCCR2 = 0;
+    stopped = true;
+}
+
+/* The pin itself is looked at, too: its edge may have been missed. */
+bool tick_is_stopped(void)
+{
+    if (!(PIND & _BV(PD2)))
+        stop();
+    return stopped;
+}
+
+/* And what keep-alive there was; what is pressed meanwhile finds nobody there. */
+void tick_forget_stop(void)
+{
+    if (stopped) {
+        alive_ms = 0;
+        stopped = false;
+    }
 }
 
 void tick_keep_alive(void)
@@ -174,7 +205,13 @@ void tick_keep_alive(void)
 
 bool tick_host_is_there(void)
 {
-    return alive_ms != 0;
+    return !tick_is_stopped() && alive_ms != 0;
+}
+
+/* The motor's stop: at once, whatever goes on. In the guard and the first round it waits, or it would move the sample. */
+ISR(INT0_vect)
+{
+    stop();
 }
 
 ISR(TIMER0_COMP_vect)
@@ -214,6 +251,7 @@ ISR(TIMER1_COMPB_vect)
         return;
     }
     masked_ucsrb = serial_mask();
+    GICR = 0;
     ticked = false;
     struct raw *raw = &raws[filling];
     /* Only compare A is left to wake it; the bound is for a wake-up that nobody explains. */

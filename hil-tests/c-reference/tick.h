@@ -26,6 +26,9 @@ bool tick_post(uint8_t what, uint8_t axis, uint8_t address, uint16_t value);
 const struct gyro_job *tick_fetch_done(void);
 /* Sleeps until the next interrupt, unless something waits already; received bytes count where somebody listens. */
 void tick_sleep_until_work(bool listens);
-/* The host is there: the motor may turn for 200 ms, then the millisecond's interrupt cuts it. */
+/* The host is there: the motor may turn for 200 ms, then the millisecond's interrupt cuts it; its stop does at once. */
 void tick_keep_alive(void);
 bool tick_host_is_there(void);
+/* Whether the motor's stop (PD2, low) is pressed, or was since tick_forget_stop. */
+bool tick_is_stopped(void);
+void tick_forget_stop(void);

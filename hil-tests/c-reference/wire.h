@@ -76,6 +76,7 @@ enum status {
     STATUS_NOT_STORED,
     STATUS_NO_CONFIG,
     STATUS_ABORTED,
+    STATUS_STOPPED,
 };
 
 /* Places of the counters in the health frame; those of the axes y and z follow the one of x. */

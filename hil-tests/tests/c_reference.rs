@@ -100,6 +100,7 @@ fn it_sends_byte_for_byte_what_the_rust_image_sends() {
         "SelfTestFailed",
         "NoKeepAlive",
         "Aborted",
+        "Stopped",
         "NoConfig",
     ] {
         let said = format!("status: {status},");

@@ -10,6 +10,8 @@ use super::{serial, tick};
 /// PWM of the motor: OC2 = PD7; direction: PD6.
 const MOTOR_PWM: u8 = 1 << 7;
 const MOTOR_DIRECTION: u8 = 1 << 6;
+/// The motor's stop: PD2 = INT0, low where a contact to ground is closed; its pull-up holds it high.
+pub const STOP: u8 = 1 << 2;
 /// Fast PWM, clock / 8: 7.8 kHz, which common bridge drivers follow.
 const FAST_PWM: u8 = 1 << 6 | 1 << 3 | 2;
 /// Non-inverting output on OC2.
@@ -63,7 +65,7 @@ pub fn cut_motor() {
 pub struct AvrBoard(());
 
 impl AvrBoard {
-    /// Reads why it started, and sets the motor's pins to off.
+    /// Reads why it started, and sets the motor's pins to off, its stop to be felt.
     pub fn start() -> Self {
         // SAFETY: at start nothing else runs.
         let (cpu, port, restarts) = unsafe {
@@ -73,7 +75,7 @@ impl AvrBoard {
                 &mut *core::ptr::addr_of_mut!(RESTARTS),
             )
         };
-        port.portd.write(|w| bits!(w, 0));
+        port.portd.write(|w| bits!(w, STOP));
         port.ddrd.write(|w| bits!(w, MOTOR_PWM | MOTOR_DIRECTION));
         let reset_cause = cpu.mcucsr.read().bits() & RESET_FLAGS;
         cpu.mcucsr.write(|w| bits!(w, 0));
@@ -111,7 +113,7 @@ impl Board for AvrBoard {
                 .modify(|r, w| bits!(w, r.bits() & !MOTOR_DIRECTION));
         }
         timer.ocr2.write(|w| bits!(w, magnitude));
-        // Not behind the interrupt that cuts it.
+        // Not behind an interrupt that cuts it.
         interrupt::free(|_| {
             if tick::host_is_there() {
                 timer.tccr2.write(|w| bits!(w, FAST_PWM | PWM_TO_PIN));
@@ -125,6 +127,14 @@ impl Board for AvrBoard {
 
     fn host_is_there(&self) -> bool {
         tick::host_is_there()
+    }
+
+    fn is_stopped(&self) -> bool {
+        tick::is_stopped()
+    }
+
+    fn forget_stop(&mut self) {
+        tick::forget_stop();
     }
 
     fn room(&self) -> u8 {

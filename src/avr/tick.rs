@@ -7,13 +7,14 @@
 
 use core::ptr::addr_of_mut;
 
-use avr_device::atmega16::{CPU, TC0, TC1};
+use avr_device::atmega16::{CPU, EXINT, PORTD, TC0, TC1};
 use avr_device::{asm, interrupt};
 use firmware::acquire::work;
 use firmware::math::{count_up, known};
 use firmware::motor::KEEP_ALIVE_MS;
 use firmware::{Job, Raw, Task, acquire};
 
+use super::board::STOP;
 use super::{board, sensors, serial};
 
 /// Compare B comes this many ticks of 4 us before compare A: 1024 cycles, more than the longest section with
@@ -22,9 +23,13 @@ const GUARD_TICKS: u16 = 16;
 const OCIE1A: u8 = 1 << 4;
 const OCIE1B: u8 = 1 << 3;
 const OCIE0: u8 = 1 << 1;
+/// INT0 at a falling edge (ISC0 = 10), in the register that has the sleep's bits, too.
+const FALLING: u8 = 1 << 1;
 /// Sleep enable, mode idle (SM = 000).
-const SLEEP_IDLE: u8 = 1 << 6;
-const AWAKE: u8 = 0;
+const SLEEP_IDLE: u8 = 1 << 6 | FALLING;
+const AWAKE: u8 = FALLING;
+/// Of GICR.
+const INT0_ON: u8 = 1 << 6;
 
 /// All zeros at first, which costs no flash.
 struct Shared {
@@ -79,6 +84,8 @@ static mut MILLISECONDS: u8 = 0;
 static mut TAKEN: u8 = 0;
 /// Milliseconds that the motor may still turn without a word from the host.
 static mut ALIVE: u8 = 0;
+/// The motor's stop was pressed since a nonce was told last: 0, 1.
+static mut STOPPED: u8 = 0;
 
 fn shared() -> *mut Shared {
     addr_of_mut!(SHARED)
@@ -110,6 +117,9 @@ pub unsafe fn start() {
         watchdog.wdtcr.write(|w| bits!(w, 1 << 3 | 6));
     }
     run_milliseconds();
+    // SAFETY: the CPU's control register is touched in this module alone.
+    unsafe { (*CPU::ptr()).mcucr.write(|w| bits!(w, AWAKE)) };
+    sense_stop(INT0_ON);
     // Timer 1: CTC with OCR1A (mode 4), clock / 64: 4 us.
     timer1().tcnt1.write(|w| bits!(w, 0));
     timer1().tccr1b.write(|w| bits!(w, 1 << 3 | 3));
@@ -226,16 +236,56 @@ fn milliseconds_wait() -> bool {
     unsafe { core::ptr::read_volatile(&raw const MILLISECONDS) != TAKEN }
 }
 
-/// The host is there: the motor may turn for [`KEEP_ALIVE_MS`].
+/// The host is there: the motor may turn for [`KEEP_ALIVE_MS`], unless its stop was pressed.
 pub fn keep_alive() {
     // SAFETY: a byte. A millisecond is under way: one more makes it whole.
     unsafe { core::ptr::write_volatile(&raw mut ALIVE, KEEP_ALIVE_MS.wrapping_add(1)) };
 }
 
-/// Whether the host was heard in time.
+/// Whether the host was heard in time, and the motor's stop is not pressed.
+#[inline(never)]
 pub fn host_is_there() -> bool {
     // SAFETY: a byte.
-    unsafe { core::ptr::read_volatile(&raw const ALIVE) != 0 }
+    !is_stopped() && unsafe { core::ptr::read_volatile(&raw const ALIVE) != 0 }
+}
+
+/// Whether the motor's stop is pressed, or was since [`forget_stop`]. The pin itself is looked at, too: its edge may have been
+/// missed.
+#[inline(never)]
+pub fn is_stopped() -> bool {
+    // SAFETY: a pin is read; a byte is.
+    unsafe {
+        if (*PORTD::ptr()).pind.read().bits() & STOP == 0 {
+            stop();
+        }
+        core::ptr::read_volatile(&raw const STOPPED) != 0
+    }
+}
+
+/// What was pressed before is over, and so is what keep-alive there was.
+pub fn forget_stop() {
+    // SAFETY: a byte each. What is pressed meanwhile finds nobody there.
+    unsafe {
+        if core::ptr::read_volatile(&raw const STOPPED) != 0 {
+            core::ptr::write_volatile(&raw mut ALIVE, 0);
+            core::ptr::write_volatile(&raw mut STOPPED, 0);
+        }
+    }
+}
+
+/// Cuts the motor until it is armed anew.
+#[inline(always)]
+fn stop() {
+    board::cut_motor();
+    // SAFETY: a byte.
+    unsafe { core::ptr::write_volatile(&raw mut STOPPED, 1) };
+}
+
+/// The interrupts of the pins: [`INT0_ON`] or none.
+#[inline(always)]
+fn sense_stop(enabled: u8) {
+    // SAFETY: the register is this module's.
+    unsafe { (*EXINT::ptr()).gicr.write(|w| bits!(w, enabled)) };
 }
 
 /// Sleeps until there is work: a transmitted byte wakes the processor, and is none; nor are received bytes while nobody
@@ -270,7 +320,15 @@ fn sleep_now() {
 pub fn unmask() {
     // SAFETY: the masks are the tick's own; a single byte is read.
     serial::unmask(unsafe { (*shared()).masked_ucsrb });
+    sense_stop(INT0_ON);
     timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE0));
+}
+
+/// The motor's stop: at once, whatever goes on and whether the clocks run. In the guard and the first round over the sensors it
+/// waits, for 0.11 ms at the most, or it would move the sample.
+#[avr_device::interrupt(atmega16)]
+fn INT0() {
+    stop();
 }
 
 #[avr_device::interrupt(atmega16)]
@@ -317,6 +375,7 @@ fn TIMER1_COMPB() {
         return;
     }
     shared.masked_ucsrb = serial::mask();
+    sense_stop(0);
     shared.ticked = false;
     // Chosen before the sleep, and the compiler kept from moving it: the choice takes longer for one place than for the
     // other, and after the wake-up that is jitter.

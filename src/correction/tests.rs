@@ -24,6 +24,10 @@ impl Board for Eeprom {
     fn host_is_there(&self) -> bool {
         false
     }
+    fn is_stopped(&self) -> bool {
+        false
+    }
+    fn forget_stop(&mut self) {}
     fn set_period(&mut self, _: u16, _: u8) {}
     fn set_baud(&mut self, _: u16) {}
     fn set_acc_range(&mut self, _: u8) {}

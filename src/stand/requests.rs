@@ -72,7 +72,7 @@ impl Stand {
                     board.keep_alive();
                     Status::Ok
                 } else {
-                    Status::NoKeepAlive
+                    off(board)
                 }
             }
             code::COUNTERS | code::CLEAR_COUNTERS => {
@@ -120,7 +120,7 @@ impl Stand {
                 if !is_duty(duty) {
                     Status::BadArgument
                 } else if duty != 0 && !board.host_is_there() {
-                    Status::NoKeepAlive
+                    off(board)
                 } else {
                     let holds = self.motor.command(duty);
                     self.say(holds.into());
@@ -130,7 +130,7 @@ impl Stand {
             code::MOTOR_PROFILE => {
                 let shape = asked.u8::<0>();
                 if shape != 0 && !board.host_is_there() {
-                    Status::NoKeepAlive
+                    off(board)
                 } else {
                     done(self.motor.profile(
                         shape,
@@ -256,12 +256,19 @@ impl Stand {
     }
 
     /// Without a nonce: makes one of the sensors' noise so far and tells it. With that one, once: the host is there, and the
-    /// motor may turn for as long as its keep-alives come. What somebody has recorded and sends again has another's nonce.
+    /// motor may turn for as long as its keep-alives come. What somebody has recorded and sends again has another's nonce. A stop
+    /// that is pressed refuses both, one that was pressed since the nonce was told refuses that.
     #[inline(never)]
     fn arm<B: Board>(&mut self, board: &mut B, asked: &Asked) -> Status {
         let said = word(asked);
         self.miss_host(board);
         let nonce = core::mem::take(&mut self.nonce);
+        if said == 0 {
+            board.forget_stop();
+        }
+        if board.is_stopped() {
+            return Status::Stopped;
+        }
         if said == 0 {
             self.nonce = self.noise as u16 | 1;
             self.say(self.nonce.into());
@@ -453,6 +460,16 @@ impl Stand {
 #[inline(never)]
 fn word(asked: &Asked) -> u16 {
     asked.u16::<0>()
+}
+
+/// Why the motor may not turn.
+#[inline(never)]
+fn off<B: Board>(board: &B) -> Status {
+    if board.is_stopped() {
+        Status::Stopped
+    } else {
+        Status::NoKeepAlive
+    }
 }
 
 fn done(in_range: bool) -> Status {

@@ -25,6 +25,9 @@ struct Board {
     eeprom: [u8; 512],
     worn: Option<u16>,
     alive: bool,
+    /// The stop is pressed now; it was.
+    pressed: bool,
+    stopped: bool,
     cause: u8,
     /// Bytes that the queue takes, and the largest frame's that it still takes.
     room: u8,
@@ -44,6 +47,8 @@ impl Board {
             eeprom: [0xff; 512],
             worn: None,
             alive: false,
+            pressed: false,
+            stopped: false,
             cause: reset_cause::POWER_ON,
             room: 191,
             takes: 191,
@@ -79,7 +84,15 @@ impl super::Board for Board {
         self.alive = true;
     }
     fn host_is_there(&self) -> bool {
-        self.alive
+        self.alive && !self.is_stopped()
+    }
+    fn is_stopped(&self) -> bool {
+        self.pressed || self.stopped
+    }
+    fn forget_stop(&mut self) {
+        if std::mem::take(&mut self.stopped) {
+            self.alive = false;
+        }
     }
     fn set_period(&mut self, ticks: u16, every: u8) {
         self.deeds.push(Deed::Period(ticks, every));

@@ -34,7 +34,7 @@ pub use motor::Motor;
 pub use native::{Instants, Timeline, native, native_live};
 pub use pose::Pose;
 pub use random::{Stream, standard_normal, uniform};
-pub use run::{Ending, Run, SerialByte, TimedRequest, arming, duty_profile};
+pub use run::{Ending, Run, SerialByte, TOLD_NONCE, TimedRequest, arming, duty_profile};
 pub use scenario::{Fault, Scenario};
 pub use stand::{MECHANICAL_STEP_S, Stand};
 pub use supply::Supply;

@@ -235,6 +235,8 @@ pub struct Scenario {
     pub supply: SupplyPart,
     /// The motor.
     pub motor: MotorPart,
+    /// When somebody holds the motor's stop pressed, from and to, s since power came on, in order.
+    pub stop_pressed: Vec<[f64; 2]>,
     /// The base.
     pub base: BasePart,
     /// Length of the run, s: faults that strike at random times are spread over it.
@@ -257,6 +259,7 @@ impl Scenario {
             thermal: ThermalPart::default(),
             supply: SupplyPart::default(),
             motor: MotorPart::default(),
+            stop_pressed: Vec::new(),
             base: BasePart::default(),
             seconds: 600.0,
             crystal_ppm: 0.0,

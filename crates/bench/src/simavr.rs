@@ -2,7 +2,7 @@
 //!
 //! What the board's wiring is, this file says once more: chip selects at PB2, PB3, PB4 (x, y, z), the accelerometer's
 //! outputs at ADC 0, 1, 2 and its g-select pins at PC0, PC1 (open drain), the motor's pulse width at PD7 (OC2) and its
-//! direction at PD6.
+//! direction at PD6, the motor's stop at PD2, a contact to ground that is open unless the scenario or a test closes it.
 
 mod error;
 mod vcd;
@@ -11,7 +11,7 @@ mod world;
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
-use atmega16_sim::{LoadError, Mcu, ResetCause, Stop};
+use atmega16_sim::{LoadError, Mcu, Port, ResetCause, Stop};
 use wire::{Request, encode_request};
 
 pub use self::error::{Died, SimavrError};
@@ -23,6 +23,8 @@ use crate::{Ending, Run, Scenario, SerialByte, Stand, TimedRequest};
 
 /// Compare A of timer 1: the tick.
 const TICK_VECTOR: u8 = 6;
+/// The motor's stop, PD2.
+const STOP: u8 = 1 << 2;
 
 /// What happens at the pins, in cycles since power came on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,6 +134,8 @@ pub struct Simulated<P = NoProbe> {
     world: World<P>,
     cable: Cable,
     requests: VecDeque<(u64, Request)>,
+    /// Cycles at which the motor's stop is pressed and let go.
+    presses: VecDeque<(u64, bool)>,
 }
 
 impl<P: Probe> Simulated<P> {
@@ -146,7 +150,20 @@ impl<P: Probe> Simulated<P> {
             world: World::new(scenario, hz, probe),
             cable: Cable::new(scenario),
             requests: VecDeque::new(),
+            presses: (scenario.stop_pressed.iter())
+                .flat_map(|&[from, to]| [(from, true), (to, false)])
+                .map(|(t, pressed)| ((t * hz) as u64, pressed))
+                .collect(),
         })
+    }
+
+    /// Presses the motor's stop now, or lets it go: its contact ties PD2 to ground, or leaves it to the pull-up.
+    pub fn press_stop(&mut self, pressed: bool) {
+        if pressed {
+            self.mcu.drive(Port::D, STOP, 0);
+        } else {
+            self.mcu.release(Port::D, STOP);
+        }
     }
 
     /// The chip.
@@ -245,7 +262,14 @@ impl<P: Probe> Simulated<P> {
         const PIECE: u64 = 800_000;
         let end = (t * self.world.hz) as u64;
         loop {
-            let until = end.min(self.mcu.cycle() + PIECE);
+            while let Some(&(at, pressed)) = self.presses.front()
+                && at <= self.mcu.cycle()
+            {
+                self.presses.pop_front();
+                self.press_stop(pressed);
+            }
+            let press = self.presses.front().map_or(u64::MAX, |&(at, _)| at);
+            let until = end.min(self.mcu.cycle() + PIECE).min(press);
             while self.requests.front().is_some_and(|&(at, _)| at <= until) {
                 if let Some((at, request)) = self.requests.pop_front() {
                     let mut line = [0; Request::FRAME_LEN];

@@ -90,6 +90,8 @@ coded! {
         NoConfig = 11,
         /// Broken off by another command.
         Aborted = 12,
+        /// The motor's stop is pressed, or was since a nonce was last asked for.
+        Stopped = 13,
     }
 }
 

@@ -33,6 +33,11 @@ pub(super) struct Chip {
     pub next_divisor: Option<u16>,
     /// Milliseconds that the motor may still turn without a word from the host.
     pub alive: u8,
+    /// When the motor's stop is pressed, s; how many of these have begun by the last look.
+    presses: Vec<[f64; 2]>,
+    begun: usize,
+    /// It was pressed since a nonce was told last.
+    stopped: bool,
     /// The nonce that the board told last.
     pub nonce: u16,
     pub period: u32,
@@ -66,6 +71,9 @@ impl Chip {
             divisor: None,
             next_divisor: None,
             alive: 0,
+            presses: run.scenario.stop_pressed.clone(),
+            begun: 0,
+            stopped: false,
             nonce: 0,
             period: 12_500,
             line: VecDeque::new(),
@@ -85,7 +93,7 @@ impl Chip {
         self.reboot = false;
         self.now += WATCHDOG_CYCLES;
         (self.job, self.divisor, self.next_divisor, self.period) = (None, None, None, 12_500);
-        self.alive = 0;
+        (self.alive, self.stopped) = (0, false);
         self.cause = reset_cause::WATCHDOG;
         self.restarts = self.restarts.saturating_add(1);
         // What had not left the transmitter is lost with the reset.
@@ -141,6 +149,19 @@ impl Chip {
             self.line.pop_front();
         }
         self.timeline.queue.saturating_sub(self.line.len())
+    }
+
+    /// Looks at the motor's stop, where an edge has its interrupt, too; whether it has been pressed.
+    fn is_stopped(&mut self) -> bool {
+        let t = self.seconds(self.now);
+        let begun = self.presses.iter().filter(|[from, _]| *from <= t).count();
+        let held = begun > 0 && self.presses.get(begun - 1).is_some_and(|[_, to]| t < *to);
+        if held || begun > self.begun {
+            self.stopped = true;
+            self.stand.set_motor(0.0, t);
+        }
+        self.begun = begun;
+        self.stopped
     }
 
     /// The interrupt of the millisecond at a cycle: it cuts the motor, whatever the main loop is busy with.
@@ -279,12 +300,24 @@ impl Board for HostBoard {
     }
 
     fn host_is_there(&self) -> bool {
-        self.0.borrow().alive != 0
+        let chip = &mut *self.0.borrow_mut();
+        !chip.is_stopped() && chip.alive != 0
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.0.borrow_mut().is_stopped()
+    }
+
+    fn forget_stop(&mut self) {
+        let chip = &mut *self.0.borrow_mut();
+        if std::mem::take(&mut chip.stopped) {
+            chip.alive = 0;
+        }
     }
 
     fn set_motor(&mut self, duty: i16) {
         let chip = &mut *self.0.borrow_mut();
-        if duty != 0 && chip.alive == 0 {
+        if duty != 0 && (chip.is_stopped() || chip.alive == 0) {
             return;
         }
         let t = chip.seconds(chip.now);

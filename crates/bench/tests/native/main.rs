@@ -143,6 +143,27 @@ fn the_motor_turns_while_the_host_is_there_and_stops_without() {
 }
 
 #[test]
+fn the_motors_stop_ends_it_until_it_is_armed_anew() {
+    // Held for a while, and for less than a millisecond.
+    for held in [0.5, 4e-4] {
+        let mut run = run(Scenario::quiet(2), 10.0);
+        run.scenario.stop_pressed = vec![[4.000_3, 4.000_3 + held]];
+        run.requests = duty_profile(&[(2.0, 200)], 6.0);
+        let again = bench::arming(6_500_000, 900);
+        run.requests.extend(again);
+        let heard = hear(&run);
+        let samples = heard.samples();
+        let pwm = |t: f64| samples[(t * 20.0) as usize].pwm;
+        assert_eq!((pwm(3.5), pwm(4.5), pwm(5.9)), (200, 0, 0));
+        let (before, after): (Vec<_>, Vec<_>) =
+            (heard.replies().into_iter()).partition(|reply| reply.status == Status::Ok);
+        assert_eq!(before.last().map(|reply| reply.number), Some(901));
+        let stopped = after.iter().all(|reply| reply.status == Status::Stopped);
+        assert!(stopped && after.len() == 20, "{}", after.len());
+    }
+}
+
+#[test]
 fn a_bias_null_takes_the_bias_off_the_rates() {
     let mut run = run(Scenario::quiet(3), 40.0);
     run.scenario.gyros[0].turn_on_bias_dps = 2.0;

@@ -134,6 +134,7 @@ pub const fn words(status: Status) -> &'static str {
         Status::NotStored => "the EEPROM does not read back what was written",
         Status::NoConfig => "no stored set-up passes its check",
         Status::Aborted => "another command broke it off",
+        Status::Stopped => "the motor's stop is pressed, or was since it was armed",
     }
 }
 
@@ -174,6 +175,10 @@ fn remedy(code: u8, status: Status) -> &'static str {
             "repeat it with a steady supply; if it fails again the EEPROM is worn out"
         }
         Status::NoConfig => "`board set` what you need, then `board store`",
+        Status::Stopped => {
+            "see that nothing can be hurt, let go of the stop (PD2, pin 16, to ground), then start the motor anew; where nobody \
+             presses one look for a wire at PD2 (docs/hardware.md)"
+        }
         Status::Aborted | Status::Ok => "repeat the command",
     }
 }
