@@ -224,6 +224,24 @@ fn the_motor_turns_for_as_long_as_it_is_kept_alive_and_then_stands() {
 }
 
 #[test]
+fn a_motor_whose_stop_is_pressed_does_not_start_and_one_that_turns_ends_with_what_to_do() {
+    let mut scenario = Scenario::quiet(1);
+    scenario.stop_pressed = vec![[0.0, 3.0], [6.0, 6.2]];
+    let board = Board::with(scenario, Swallow::default());
+    let began = std::time::Instant::now();
+    let turn = || board.ask(&["motor", "--duty", "80", "--seconds", "20"]);
+    let needles = ["the motor's stop is pressed", "let go of the stop"];
+    let said = assert_refused(&turn(), &needles);
+    assert!(said.contains("arm motor"), "{said}");
+    std::thread::sleep(Duration::from_secs_f64(3.5).saturating_sub(began.elapsed()));
+    let said = assert_refused(&turn(), &needles);
+    assert!(said.contains("keep-alive"), "{said}");
+    assert!(began.elapsed() < Duration::from_secs(15));
+    let said = assert_success(&board.ask(&["motor", "--duty", "80", "--seconds", "1"]));
+    assert!(said.contains("and stands"), "{said}");
+}
+
+#[test]
 fn ctrl_c_stops_the_motor_and_a_killed_program_leaves_it_to_the_board() {
     let board = Board::start();
     let arguments = ["board", "--port", board.port(), "motor", "--duty", "80"];

@@ -423,3 +423,21 @@ fn the_motor_of_a_board_that_restarts_stays_off() {
     assert!(pwm.iter().any(|v| *v > 70.0), "{pwm:?}");
     assert_eq!(pwm.last(), Some(&0.0));
 }
+
+#[test]
+fn a_capture_goes_on_where_the_motors_stop_is_pressed() {
+    let mut scenario = Scenario::quiet(1);
+    scenario.stop_pressed = vec![[4.0, 4.1]];
+    let board = Board::with(scenario, Swallow::default());
+    let folder = folder("capture_stopped");
+    let out = folder.join("run.csv");
+    let child = start(&board, &out, &["--duty", "80", "--base", "static"]);
+    wait_for_rows(&out, 120);
+    let said = end(child);
+    assert!(said.contains("the motor's stop was pressed"), "{said}");
+    let record = record(&out);
+    assert!(holes(&record).is_empty());
+    let pwm = &record.channel("pwm").unwrap().values;
+    assert!(pwm.iter().any(|v| *v > 70.0), "{pwm:?}");
+    assert_eq!(pwm.last(), Some(&0.0));
+}

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use model::record::{Base, Record};
-use wire::{Command, Corrected, Frame, LinkCounts, Reply};
+use wire::{Command, Corrected, Frame, LinkCounts, Reply, Status};
 
 use crate::RecordBuilder;
 use crate::capture::Calibration;
@@ -91,8 +91,13 @@ impl Driver<'_> {
 
     /// An answer: the nonce, which goes back, or that the motor may turn.
     fn answered(&mut self, link: &mut Link, reply: &Reply) -> Result<(), LinkError> {
-        let Motor::Asked(number, _) = self.motor else {
-            return Ok(());
+        let number = match self.motor {
+            Motor::Asked(number, _) => number,
+            // A record that wants it turning is none without.
+            Motor::Alive(_) if reply.status == Status::Stopped => {
+                return done(&Command::KeepAlive, *reply).map(|_| ());
+            }
+            _ => return Ok(()),
         };
         let command = Command::Arm { nonce: 0 };
         if reply.number != number || reply.command != command.code() {

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use wire::{Command, Reply};
+use wire::{Command, Reply, Status, code};
 
 use super::{Link, LinkError, done};
 
@@ -71,7 +71,8 @@ impl Motor {
         Ok(())
     }
 
-    /// A reply: the nonce that arms it; to its command it says whether it turns. True where it turns from now on.
+    /// A reply: the nonce that arms it; to its command it says whether it turns; to a keep-alive, whether its stop was pressed,
+    /// after which it is off. True where it turns from now on.
     ///
     /// # Errors
     /// [`LinkError::Refused`].
@@ -88,6 +89,13 @@ impl Motor {
                 done(&command, *reply)?;
                 *self = Motor::Alive(Instant::now());
                 Ok(true)
+            }
+            Motor::Alive(_)
+                if reply.command == code::KEEP_ALIVE && reply.status == Status::Stopped =>
+            {
+                *self = Motor::Off;
+                done(&Command::KeepAlive, *reply)?;
+                Ok(false)
             }
             _ => Ok(false),
         }

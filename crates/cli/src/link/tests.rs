@@ -40,3 +40,23 @@ fn what_must_not_happen_twice_is_sent_once() {
         assert!(Patience::of(&again).tries > 1, "{again:?}");
     }
 }
+
+#[test]
+fn a_motor_whose_stop_is_pressed_is_off_and_a_late_keep_alive_leaves_it() {
+    let reply = |status| wire::Reply {
+        number: 1,
+        command: wire::code::KEEP_ALIVE,
+        status,
+        value: 0,
+        detail: [0; 3],
+    };
+    let mut motor = Motor::Alive(std::time::Instant::now());
+    for status in [Status::Ok, Status::NoKeepAlive] {
+        assert!(matches!(motor.replied(&reply(status)), Ok(false)));
+        assert!(motor.is_alive(), "{status:?}");
+    }
+    let refused = motor.replied(&reply(Status::Stopped));
+    let refused = refused.expect_err("it is told").to_string();
+    assert!(refused.contains("the motor's stop is pressed"), "{refused}");
+    assert_eq!(motor, Motor::Off);
+}

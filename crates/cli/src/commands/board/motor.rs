@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use imu_stand::link::{KEEP_ALIVE, Link, LinkError};
+use imu_stand::link::{KEEP_ALIVE, Link, LinkError, done};
 use miette::{IntoDiagnostic, Result};
 use serde::Serialize;
 use wire::{Command, Frame, Shape, Status};
@@ -14,6 +14,8 @@ use super::Session;
 
 /// The board answers each; without an answer for so long it has stopped the motor on its own.
 const DEAF: Duration = Duration::from_secs(1);
+/// By then the reply to a keep-alive has told why the motor was cut, if its stop was pressed.
+const TOLD: Duration = Duration::from_millis(300);
 /// How long a ramp down may take.
 pub const RAMP_DOWN: Duration = Duration::from_secs(10);
 
@@ -84,8 +86,8 @@ struct Turning {
     low: i16,
     high: i16,
     now: i16,
-    /// The board cut the motor: the command was there, and is not any more.
-    cut: bool,
+    /// The board cut the motor: the command was there, and is not any more. Since when.
+    cut: Option<Instant>,
 }
 
 pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
@@ -196,7 +198,7 @@ fn turn(
             }
             .into());
         }
-        if steady && turning.cut {
+        if steady && turning.cut.is_some_and(|cut| cut.elapsed() > TOLD) {
             return Err(LinkError::NotAsAsked {
                 what: "the board has stopped the motor".to_owned(),
                 help: "`imu-stand board health`: motor_timeout says that keep-alives came late, watchdog_reset or \
@@ -226,14 +228,22 @@ fn listen(link: &mut Link, turning: &mut Turning) -> Result<bool, LinkError> {
     let mut answered = false;
     while let Some(frame) = link.next() {
         match frame {
-            Frame::Reply(reply)
-                if reply.command == Command::KeepAlive.code() && reply.status == Status::Ok =>
-            {
-                turning.answered += 1;
-                answered = true;
+            Frame::Reply(reply) if reply.command == Command::KeepAlive.code() => {
+                match reply.status {
+                    Status::Ok => {
+                        turning.answered += 1;
+                        answered = true;
+                    }
+                    Status::Stopped => {
+                        done(&Command::KeepAlive, reply)?;
+                    }
+                    _ => {}
+                }
             }
             Frame::Sample(sample) => {
-                turning.cut |= turning.now != 0 && sample.pwm == 0;
+                if turning.now != 0 && sample.pwm == 0 {
+                    turning.cut.get_or_insert_with(Instant::now);
+                }
                 turning.now = sample.pwm;
                 turning.low = turning.low.min(sample.pwm);
                 turning.high = turning.high.max(sample.pwm);

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use imu_stand::link::{Feed, Motor};
+use imu_stand::link::{Feed, LinkError, Motor};
 use miette::Result;
-use wire::{Command, Reply};
+use wire::{Command, Reply, Status};
 
 use super::super::board::motor::RAMP_DOWN;
 use super::Capture;
@@ -27,12 +27,18 @@ impl Capture<'_> {
             row: 0,
         };
         if reply.command == asks.code() && self.live.is_none() {
-            self.corrects = reply.status == wire::Status::Ok && reply.value != 0;
+            self.corrects = reply.status == Status::Ok && reply.value != 0;
         }
-        if self.motor.replied(&reply)? {
-            self.tell("the motor is driven")?;
+        let turned = self.motor.is_alive();
+        match self.motor.replied(&reply) {
+            Ok(true) => self.tell("the motor is driven"),
+            // What the sensors say is in no doubt: the capture goes on.
+            Err(LinkError::Refused {
+                status: Status::Stopped,
+                ..
+            }) if turned => self.tell("the motor's stop was pressed: it stays off from here on"),
+            other => Ok(other.map(|_| ())?),
         }
-        Ok(())
     }
 
     pub(super) fn motor_is_off(&mut self) -> Result<()> {
