@@ -189,6 +189,46 @@ fn bytes_that_the_receiver_itself_loses_are_counted() {
     assert!(heard.last_health().faults.get(Fault::RxOverrun) > 5);
 }
 
+/// Requests without a pause, more than there is room for replies: the board stops listening, and the receive ring fills.
+#[test]
+fn bytes_that_find_the_ring_full_are_counted_and_those_in_it_stay() {
+    const RING: u16 = 35;
+    const SENT: u16 = 40;
+    let scenario = Scenario::quiet(10);
+    let mut simulated = Simulated::new(&image(), &scenario, NoProbe).expect("an image");
+    let mut heard = Heard::default();
+    let mut run = |simulated: &mut Simulated<NoProbe>, until_s: f64| {
+        simulated
+            .run_until(until_s, &mut |byte| heard.push(byte))
+            .expect("it runs");
+    };
+    run(&mut simulated, 2.0);
+    let len = wire::Request::FRAME_LEN as u16;
+    for number in 0..SENT {
+        let mut line = [0; wire::Request::FRAME_LEN];
+        let command = Command::Ping;
+        wire::encode_request(&wire::Request { number, command }, &mut line).expect("it fits");
+        simulated.send(&line);
+    }
+    run(&mut simulated, 6.0);
+    let replies: Vec<u16> = heard.replies().map(|(_, reply)| reply.number).collect();
+    let health = heard.last_health();
+    let lost = health.faults.get(Fault::RxOverrun);
+    let spoilt = health.faults.get(Fault::RxBadFrame);
+    println!("{replies:?}, {lost} bytes lost, {spoilt} frames spoilt");
+    let unanswered = SENT - replies.len() as u16;
+    assert!(unanswered > 3, "it never filled");
+    // The first ones, up to what the ring held as it filled, are all answered.
+    let first = replies.iter().zip(0..).take_while(|(a, b)| **a == *b);
+    assert!(first.count() as u16 * len >= RING);
+    assert!((1..=unanswered).contains(&spoilt), "{spoilt}");
+    // A request without an answer has lost a byte at least, and no other has.
+    assert!(
+        (unanswered..=unanswered * len).contains(&lost),
+        "{lost} bytes of {unanswered} requests"
+    );
+}
+
 #[test]
 fn a_bus_that_was_lost_costs_one_frame_is_told_and_is_taken_back() {
     let scenario = Scenario::quiet(7);

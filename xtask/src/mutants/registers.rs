@@ -38,6 +38,7 @@ const SERIAL: &str = "src/avr/serial.rs";
 const SENSORS: &str = "src/avr/sensors.rs";
 const BOARD: &str = "src/avr/board.rs";
 const TICK: &str = "src/avr/tick.rs";
+const RING: &str = "src/avr/ring.rs";
 const MAIN: &str = "src/avr/mod.rs";
 const ACQUIRE: &str = "src/acquire.rs";
 
@@ -132,6 +133,10 @@ const TABLE: &[Planted] = &[
         "status & FE != 0", "status & FE == 0xff"),
     planted("the receiver's overrun is not counted", [SERIAL, "registers"],
         "status & DOR != 0 || full", "full"),
+    planted("a ring is never full", [RING, "registers"],
+        "        if next == self.tail() {\n            return false;\n        }\n", ""),
+    planted("a frame is queued whether there is room or not", [SERIAL, "rates"],
+        "if waits || room() < room_for(kind, fields.len()) as u8 {", "if waits {"),
     planted("the guard is 8 us", [TICK, "timing"],
         "GUARD_TICKS: u16 = 16", "GUARD_TICKS: u16 = 2"),
     planted("the guard does not sleep", [TICK, "timing"],
