@@ -44,12 +44,17 @@ fn a_sound_board_is_found_sound_and_what_needs_a_hand_is_not_done_without_one() 
         "--json",
         out.to_str().unwrap(),
     ]));
-    assert!(said.contains("5 steps were not done"), "{said}");
+    assert!(said.contains("6 steps were not done"), "{said}");
     let all = verdicts(&json(&out));
     for (what, verdict) in &all {
-        let by_hand = ["fuses", "sign of", "accelerometers"]
-            .iter()
-            .any(|w| what.starts_with(w));
+        let by_hand = [
+            "fuses",
+            "motor's stop, pressed",
+            "sign of",
+            "accelerometers",
+        ]
+        .iter()
+        .any(|w| what.starts_with(w));
         assert_eq!(
             verdict,
             if by_hand { "not_done" } else { "ok" },
@@ -78,6 +83,7 @@ fn a_sound_board_is_found_sound_and_what_needs_a_hand_is_not_done_without_one() 
 fn a_weak_supply_and_a_gyro_that_is_silent_are_wrong() {
     let mut scenario = Scenario::quiet(3);
     scenario.supply.open_v = 4.6;
+    scenario.stop_pressed = vec![[0.0, 1e6]];
     let scenario = scenario.with(Fault::DeadSpi {
         gyro: 1,
         start_s: 0.0,
@@ -102,6 +108,7 @@ fn a_weak_supply_and_a_gyro_that_is_silent_are_wrong() {
         .map(|(w, _)| w)
         .collect();
     for what in [
+        "motor's stop, let go",
         "supply, by the gyros",
         "flags of the samples",
         "registers of gyro y",
@@ -131,6 +138,11 @@ fn turned_by_hand(sign: f64, expected: &str) {
         turn_s: 2.0,
         up: [1.0, 0.0, 0.0],
     }];
+    // And the stop, for a second now and then, once the board has been listened to.
+    scenario.stop_pressed = (0..20)
+        .map(|n| f64::from(n) * 3.0 + 6.0)
+        .map(|t| [t, t + 1.0])
+        .collect();
     let board = Board::with(scenario, Swallow::default());
     let folder = folder(&format!("bring_up_hand_{expected}"));
     let (page, out) = (folder.join("b.md"), folder.join("b.json"));
@@ -138,6 +150,8 @@ fn turned_by_hand(sign: f64, expected: &str) {
     let files = [page.to_str().unwrap(), "--json", out.to_str().unwrap()];
     let done = board.ask(&[&words[..], &files[..]].concat());
     let all = verdicts(&json(&out));
+    let stop = all.iter().find(|(what, _)| what == "motor's stop, pressed");
+    assert_eq!(stop.map(|(_, verdict)| verdict.as_str()), Some("ok"));
     let signs = all.iter().filter(|(what, _)| what.starts_with("sign of"));
     assert_eq!(signs.clone().count(), 3);
     for (what, verdict) in signs {

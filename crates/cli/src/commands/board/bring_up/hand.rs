@@ -1,11 +1,11 @@
-//! What a hand does to a new board: turns it about each axis, and lays it on each side.
+//! What a hand does to a new board: presses the motor's stop, turns it about each axis, and lays it on each side.
 
 use std::time::Duration;
 
 use imu_stand::calibrate::{self, Told};
 use imu_stand::link::Link;
 use miette::Result;
-use wire::Frame;
+use wire::{Command, Frame, Status};
 
 use super::super::Session;
 use super::super::show::{Q16, rate_hz};
@@ -15,20 +15,68 @@ use super::{AXES, Arguments, Step, not_done, step};
 const BY_HAND_DPS: f64 = 20.0;
 /// How much more the turned gyro has to see than each of the others.
 const PURE: f64 = 2.0;
+/// How long the stop is waited for at the most, s: not every board has one.
+const STOP_S: f64 = 30.0;
+/// From one look at it to the next.
+const LOOK: Duration = Duration::from_millis(150);
 /// How long each side is recorded, s.
 const SIDE_S: f64 = 5.0;
 /// Zero and scale of an MMA7260QT at 3.3 V: 1.65 V within 10 %, 800 mV/g within 7.5 % (its data sheet); in counts.
 const ACC_ZERO: [f64; 2] = [460.8, 563.2];
 const ACC_SCALE: [f64; 2] = [229.6, 266.9];
 
-/// The sign of each gyro, and the six sides.
+/// The motor's stop, the sign of each gyro, and the six sides.
 pub(super) fn by_hand(
     session: &mut Session,
     arguments: &Arguments,
     steps: &mut Vec<Step>,
 ) -> Result<()> {
+    stop(&mut session.link, arguments, steps)?;
     signs(&mut session.link, arguments, steps)?;
     six_sides(&mut session.link, arguments, steps)
+}
+
+/// The motor's stop: pressed, the board refuses to arm; let go, it does not. The motor never turns.
+fn stop(link: &mut Link, arguments: &Arguments, steps: &mut Vec<Step>) -> Result<()> {
+    const WHAT: &str = "motor's stop, pressed";
+    const EXPECTED: &str = "the board refuses to arm the motor; let go, it does not";
+    if arguments.no_hand {
+        steps.push(not_done(WHAT, EXPECTED));
+        return Ok(());
+    }
+    let within = arguments.within.min(STOP_S);
+    eprintln!(
+        ">> press the motor's stop for a second (a board without one: wait for {within:.0} s)"
+    );
+    if !armed_says(link, Status::Stopped, within)? {
+        steps.push(not_done(WHAT, EXPECTED));
+        return Ok(());
+    }
+    eprintln!(">> let go of it");
+    let opens = armed_says(link, Status::Ok, arguments.within)?;
+    let found = if opens {
+        "refused; let go, armed"
+    } else {
+        "refused, and it does not open"
+    };
+    steps.push(step(WHAT, found, EXPECTED, opens));
+    Ok(())
+}
+
+/// Asks for a nonce until the board answers so; false where it never does.
+fn armed_says(link: &mut Link, status: Status, within: f64) -> Result<bool> {
+    let end = link.now() + Duration::from_secs_f64(within);
+    while link.now() < end {
+        if link.ask_any(Command::Arm { nonce: 0 }, |_| {})?.status == status {
+            return Ok(true);
+        }
+        let next = link.now() + LOOK;
+        while link.now() < next {
+            link.read()?;
+            while link.next().is_some() {}
+        }
+    }
+    Ok(false)
 }
 
 /// The sign of each gyro, by a turn about its axis.

@@ -34,7 +34,7 @@ pub struct Arguments {
     /// The program to call for it
     #[arg(long, default_value = "avrdude", value_name = "PATH")]
     avrdude: PathBuf,
-    /// Leave out what a hand has to do: the sign of each gyro, the six sides
+    /// Leave out what a hand has to do: the motor's stop, the sign of each gyro, the six sides
     #[arg(long)]
     no_hand: bool,
     /// How long what a hand has to do is waited for, s
@@ -112,7 +112,7 @@ const REGISTERS: [(Register, &str, u16); 4] = [
 ];
 
 /// What no simulation and no line shows; hardware.md has what it matters for.
-const SCOPE: [(&str, &str); 9] = [
+const SCOPE: [(&str, &str); 10] = [
     (
         "MISO high level with each gyro selected",
         "3.3 V or more; below it a 74HCT125 at 5 V goes into the line",
@@ -134,6 +134,10 @@ const SCOPE: [(&str, &str); 9] = [
         "7.8 kHz, 60/255 high; low at rest and in reset",
     ),
     ("OC2 and direction at a reversal", "3 ms of rest between"),
+    (
+        "OC2 against PD2 as the motor's stop is pressed",
+        "low 0.12 ms behind the first edge at the latest",
+    ),
     ("bridge's supply at a reversal", "no spike above its rating"),
     ("5 V rail while the motor starts", "4.75 V or more"),
     ("TXD", "26.0 us a bit at 38400 baud; 0 to 5 V"),
@@ -146,6 +150,7 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let hello = session.link.ask_hello()?;
     let info = Info::of(&hello, session.link.name());
     set_up(&hello, &mut steps);
+    stop_let_go(&mut session.link, &mut steps)?;
     listened(&mut session.link, &hello, &mut steps)?;
     registers(&mut session.link, &mut steps)?;
     self_tests(&mut session.link, &mut steps)?;
@@ -238,6 +243,19 @@ fn set_up(hello: &Hello, steps: &mut Vec<Step>) {
         "a rate, a range and a filter of the parts",
         known,
     ));
+}
+
+/// The motor's stop, which nobody presses: the board tells a nonce, and nothing turns.
+fn stop_let_go(link: &mut Link, steps: &mut Vec<Step>) -> Result<()> {
+    let status = link.ask_any(Command::Arm { nonce: 0 }, |_| {})?.status;
+    let found = match status {
+        Status::Ok => "open",
+        Status::Stopped => "closed: somebody presses it, or PD2 is wired to ground",
+        other => words(other),
+    };
+    let is_ok = status == Status::Ok;
+    steps.push(step("motor's stop, let go", found, "open", is_ok));
+    Ok(())
 }
 
 /// Some seconds of samples: supply, thermometers, flags, losses, and the board's clock against this computer's.
