@@ -52,6 +52,9 @@ pub struct Arguments {
     /// With --pty: the belt is on, and the table makes so many turns for each turn of the motor; a real one some 0.004
     #[arg(long, value_name = "RATIO", requires = "pty", default_value_t = 0.0)]
     belt: f64,
+    /// With --pty: somebody holds the motor's stop pressed, FROM,TO in s; may be given again for a later time
+    #[arg(long, value_name = "FROM,TO", requires = "pty", value_parser = held)]
+    stop: Vec<Held>,
     /// Write the traces of the board's pins as a value change dump, to lay beside a logic analyser; needs the image, not
     /// --native
     #[arg(long, value_name = "FILE", conflicts_with_all = ["native", "pty", "correct"])]
@@ -133,15 +136,25 @@ fn longest(text: &str) -> std::result::Result<f64, String> {
     seconds.ok_or_else(|| "takes a length within 60 .. 86400 s".to_owned())
 }
 
+/// How long the stop is held, from and to, s.
+#[derive(Clone, Copy, Debug)]
+struct Held([f64; 2]);
+
+fn held(text: &str) -> std::result::Result<Held, String> {
+    match two_times(text) {
+        Some((from, to)) if from >= 0.0 && from < to => Ok(Held([from, to])),
+        _ => Err("takes two times of which the second is later: 20,25".to_owned()),
+    }
+}
+
+fn two_times(text: &str) -> Option<(f64, f64)> {
+    let (from, to) = text.split_once(',')?;
+    Some((from.trim().parse().ok()?, to.trim().parse().ok()?))
+}
+
 /// `0,2`.
 fn span(text: &str) -> std::result::Result<Span, String> {
-    let ends = text.split_once(',').and_then(|(from, to)| {
-        Some((
-            from.trim().parse::<f64>().ok()?,
-            to.trim().parse::<f64>().ok()?,
-        ))
-    });
-    match ends {
+    match two_times(text) {
         Some((from, to)) if from >= 0.0 && from < to && to - from <= LONGEST_TRACE_S => {
             Ok(Span(from, to))
         }
@@ -364,6 +377,8 @@ fn serve(board: Board, arguments: &Arguments) -> Result<()> {
         .flat_map(|poses| poses.0.clone())
         .collect();
     scenario.motor.table_ratio = arguments.belt;
+    scenario.stop_pressed = arguments.stop.iter().map(|held| held.0).collect();
+    scenario.stop_pressed.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).into_diagnostic()?;
