@@ -6,6 +6,7 @@ use crate::acquire::{Raw, Task};
 
 mod asked;
 mod registers;
+mod stopped;
 
 /// What the stand has asked the board for, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -354,6 +354,16 @@ fn flags_have_the_bits_of_the_page() {
     for (bit, flag) in bits.into_iter().enumerate() {
         assert_eq!(flag, 1 << bit, "{bit}");
     }
+    let named = [
+        flags::NEW_X,
+        flags::NEW_Y,
+        flags::NEW_Z,
+        flags::ERROR_X,
+        flags::ERROR_Y,
+        flags::ERROR_Z,
+    ];
+    assert_eq!(named, bits[..6], "by name as by axis");
+    assert_eq!(bits[10], flags::RESERVED_10);
     assert_eq!(flags::IN_ORDER, 7);
     let states = [
         state::APPLIED,
