@@ -176,10 +176,10 @@ pub fn name(place: usize) -> (char, &'static str, &'static str) {
         ("motor, while it spins up", "deg/s/step"),
     ];
     let (from, of): (usize, &[(&str, &str)]) = match place {
-        0..OF_AXES => return (' ', "", ""),
         OF_AXES..MATRIX => (OF_AXES, &OF_AXIS),
         MATRIX..FILTER => (MATRIX, &SHARES),
         FILTER..NUMBERS => (FILTER, &OF_FILTER),
+        // The header's, and none.
         _ => return (' ', "", ""),
     };
     let at = place - from;

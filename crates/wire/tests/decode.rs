@@ -1,8 +1,8 @@
 //! What is no frame, and why: each reason has its name, its counter and its words, on either side of the line.
 
 use wire::{
-    Asked, Command, DecodeError, Decoder, Frame, Reply, Request, RequestDecoder, RequestError,
-    Sample, Status, kind,
+    Asked, Command, DecodeError, Decoder, Frame, Health, Reply, Request, RequestDecoder,
+    RequestError, Sample, Status, kind,
 };
 
 /// A payload with its CRC and a delimiter, stuffed: written from docs/wire-format.md, for contents that no encoder makes.
@@ -24,6 +24,7 @@ fn payload(version: u8, kind: u8, fields: usize, value: u8) -> Vec<u8> {
 }
 
 const SAMPLE: usize = Sample::LEN - 2;
+const HEALTH: usize = Health::LEN - 2;
 const REQUEST: usize = Request::LEN - 2;
 
 fn wrong() -> Vec<(DecodeError, Vec<u8>)> {
@@ -32,6 +33,11 @@ fn wrong() -> Vec<(DecodeError, Vec<u8>)> {
     let changed = |at: usize, value: u8| {
         let mut line = sample.clone();
         line[at] = value;
+        line
+    };
+    let damaged = |fields| {
+        let mut line = line(1, kind::HEALTH, fields);
+        line[9] ^= 1;
         line
     };
     // A status that nobody has: the fourth byte of the fields.
@@ -47,6 +53,9 @@ fn wrong() -> Vec<(DecodeError, Vec<u8>)> {
         (DecodeError::BadLength, line(1, kind::HEALTH, SAMPLE)),
         (DecodeError::BadLength, line(1, kind::REPLY, SAMPLE)),
         (DecodeError::BadLength, line(1, kind::CORRECTED, SAMPLE)),
+        // Longer than any by a byte, which nobody looks into, and as long as the longest, which has its CRC to fit.
+        (DecodeError::BadLength, damaged(HEALTH + 1)),
+        (DecodeError::BadCrc, damaged(HEALTH)),
         // Longer than any; version and CRC alone; the CRC alone; not even that.
         (DecodeError::BadLength, line(1, kind::SAMPLE, 240)),
         (DecodeError::BadLength, on_the_line(&[1])),

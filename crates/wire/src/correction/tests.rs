@@ -202,3 +202,33 @@ fn the_filter_settles_where_its_equations_say() {
     assert!((0.01 / after / twin.axes[0].known - 1.0).abs() < 0.02);
     assert!((twin.axes[0].bias - 0.5).abs() < 0.01);
 }
+
+/// The twin is at rest by what its rates spread about the mean of each block, however large that is: beyond four times what was
+/// told of a block's mean, for its samples, it moves.
+#[test]
+fn a_twin_is_at_rest_by_the_spread_of_its_rates_and_not_by_their_mean() {
+    let filtered = |mean: f64, spread: f64| {
+        let correction = Correction {
+            block_shift: 4,
+            noise: [1e-3; 3],
+            walk: [1e-6; 3],
+            ..Correction::default()
+        };
+        let mut twin = Twin::new(&correction);
+        for n in 0..16 * 4 {
+            let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+            twin.step(&Inputs {
+                rate: [mean + sign * spread; 3],
+                in_order: true,
+                ..Inputs::default()
+            });
+        }
+        twin.axes[0].known > 0.0
+    };
+    // A block has 16 samples, and both sides have three axes.
+    let edge = (f64::from(1u32 << NOISE_SHIFT) * 16.0 * 1e-3).sqrt();
+    for mean in [0.0, 0.04, -0.06] {
+        assert!(filtered(mean, 0.98 * edge), "at rest: {mean}");
+        assert!(!filtered(mean, 1.02 * edge), "moving: {mean}");
+    }
+}
