@@ -71,7 +71,7 @@ pub(crate) fn extended_model(
             at_rest(channel, &s.target.y, grid.rate_hz);
         }
         let lost = s.target.lost.len() as f64 / grid.n as f64;
-        before_counts(channel, &read, grid.rate_hz, lost);
+        before_counts(channel, &read, &s.target.y, grid.rate_hz, lost);
     }
     extended
 }
@@ -215,7 +215,13 @@ const TIMES: usize = 8;
 /// The channel without what faults of the counts among the `effects` add by themselves: noise and level that readings of the
 /// noise and level `channel` has come of, by simulations with them and without, of the same random numbers. What the audit
 /// took out, a part `lost` of the readings, was not fitted.
-fn before_counts(channel: &mut ChannelModel, effects: &[EffectModel], rate_hz: f64, lost: f64) {
+fn before_counts(
+    channel: &mut ChannelModel,
+    effects: &[EffectModel],
+    values: &[f64],
+    rate_hz: f64,
+    lost: f64,
+) {
     // Bits that are cut off take half of the coarse step, less that of the fine one.
     let own = effects
         .iter()
@@ -243,17 +249,49 @@ fn before_counts(channel: &mut ChannelModel, effects: &[EffectModel], rate_hz: f
     if model.effects.is_empty() {
         return;
     }
+    // More than one noise and level can give the mean and the noise that were read: the one whose readings are spread alike is it.
+    let mut read = values.to_vec();
+    read.sort_by(f64::total_cmp);
+    let starts = LEVELS.iter().flat_map(|l| NOISES.map(|n| (*l, n)));
+    let settled = starts.filter_map(|start| settled(&mut model, channel, &read, start, lost));
+    let Some((start, _)) = settled.min_by(|a, b| a.1.total_cmp(&b.1)) else {
+        return;
+    };
+    let Some(own) = settling(&mut model, channel, start, lost, SAMPLES) else {
+        return;
+    };
+    for name in ["bias", "angle_random_walk"] {
+        if let (Some(to), Some(of)) = (channel.baseline.get_mut(name), own.baseline.get(name)) {
+            to.value = of.value;
+        }
+    }
+}
+
+/// Where the levels and noises before a fault of the counts are sought: in standard deviations of what was read from the mean of
+/// that, and as parts of its noise.
+const LEVELS: [f64; 7] = [-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5];
+const NOISES: [f64; 2] = [1.0, 0.5];
+/// Samples of a simulation that compares them: a twentieth of a standard deviation shows.
+const FEW_SAMPLES: f64 = 4_000.0;
+/// Quantiles by which readings are compared.
+const QUANTILES: usize = 50;
+
+/// The channel before the fault, sought from a place; none where it cannot be told.
+fn settling(
+    model: &mut ModelFile,
+    channel: &ChannelModel,
+    from: (f64, f64),
+    lost: f64,
+    samples: f64,
+) -> Option<ChannelModel> {
     let mut own = channel.clone();
     own.baseline.remove("rate_random_walk");
+    own.baseline.get_mut("bias")?.value += from.0;
+    own.baseline.get_mut("angle_random_walk")?.value *= from.1;
     for _ in 0..TIMES {
-        let Some(added) = added_by_counts(&mut model, &own, lost) else {
-            return;
-        };
-        for (name, by) in [("bias", added.0), ("angle_random_walk", added.1)] {
-            let (Some(own), Some(read)) = (own.baseline.get_mut(name), channel.baseline.get(name))
-            else {
-                return;
-            };
+        let added = added_by_counts(model, &own, lost, samples)?;
+        for (name, by) in [("bias", added.mean), ("angle_random_walk", added.factor)] {
+            let (own, read) = (own.baseline.get_mut(name)?, channel.baseline.get(name)?);
             let wanted = if name == "bias" {
                 read.value - by
             } else {
@@ -262,20 +300,51 @@ fn before_counts(channel: &mut ChannelModel, effects: &[EffectModel], rate_hz: f
             own.value = 0.5 * (own.value + wanted);
         }
     }
-    for name in ["bias", "angle_random_walk"] {
-        if let (Some(to), Some(of)) = (channel.baseline.get_mut(name), own.baseline.get(name)) {
-            to.value = of.value;
-        }
-    }
+    Some(own)
+}
+
+/// A start, in the channel's unit, and how far apart the quantiles of what was read and of a simulation from there are; `start` is in
+/// standard deviations of what was `read`, which is in ascending order.
+fn settled(
+    model: &mut ModelFile,
+    channel: &ChannelModel,
+    read: &[f64],
+    start: (f64, f64),
+    lost: f64,
+) -> Option<((f64, f64), f64)> {
+    let mean = read.iter().sum::<f64>() / read.len() as f64;
+    let square = read.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+    let from = (start.0 * (square / read.len() as f64).sqrt(), start.1);
+    let own = settling(model, channel, from, lost, FEW_SAMPLES)?;
+    let mut made = added_by_counts(model, &own, lost, FEW_SAMPLES)?.with;
+    made.sort_by(f64::total_cmp);
+    let at = |x: &[f64], q: usize| x[(2 * q + 1) * x.len() / (2 * QUANTILES)];
+    let apart = (0..QUANTILES).map(|q| (at(read, q) - at(&made, q)).abs());
+    Some((from, apart.sum()))
+}
+
+/// What a fault of the counts adds.
+struct Added {
+    /// To the mean.
+    mean: f64,
+    /// By which the noise is larger.
+    factor: f64,
+    /// What is read.
+    with: Vec<f64>,
 }
 
 /// What the effects of a model add to the mean of a channel, and the factor by which they make its noise larger; none where
 /// most of the readings that they change are taken out, or nothing can be simulated.
-fn added_by_counts(model: &mut ModelFile, channel: &ChannelModel, lost: f64) -> Option<(f64, f64)> {
+fn added_by_counts(
+    model: &mut ModelFile,
+    channel: &ChannelModel,
+    lost: f64,
+    samples: f64,
+) -> Option<Added> {
     model.channels = vec![channel.clone()];
     let effects = std::mem::take(&mut model.effects);
     let run = |model: &ModelFile| {
-        let record = model::simulate(model, SAMPLES / model.rate_hz, model.rate_hz, 1).ok()?;
+        let record = model::simulate(model, samples / model.rate_hz, model.rate_hz, 1).ok()?;
         let own = record.channels.into_iter().find(|c| c.name == channel.name);
         own.map(|c| c.values)
     };
@@ -288,7 +357,11 @@ fn added_by_counts(model: &mut ModelFile, channel: &ChannelModel, lost: f64) -> 
     let power = |x: &[f64]| x.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>();
     let factor = (power(&with) / power(&without)).sqrt();
     let told = lost < 0.5 * changed && factor.is_finite() && factor > 0.0;
-    told.then(|| (mean(&with) - mean(&without), factor))
+    told.then(|| Added {
+        mean: mean(&with) - mean(&without),
+        factor,
+        with,
+    })
 }
 
 /// Gives far readings their sides, their size (the root of the mean square of how far they lie from what the model expects
