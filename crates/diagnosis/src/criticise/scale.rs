@@ -16,6 +16,11 @@ const LEAST_CORRELATION: f64 = 0.9;
 const STANDARD_GRAVITY: f64 = 9.80665;
 /// The largest zero of an accelerometer that is taken for one, g: what the MMA7260QT's data sheet allows, 0.165 V at 0.8 V/g.
 const LARGEST_ZERO_G: f64 = 0.206;
+/// The largest error of its sensitivity there, 60 mV/g of 800.
+const LARGEST_SENSITIVITY_ERROR: f64 = 0.075;
+/// Part of what the upright one reads beside 1 g that is its zero and not its sensitivity: by the variances of the two.
+const OF_THE_ZERO: f64 = LARGEST_ZERO_G * LARGEST_ZERO_G
+    / (LARGEST_ZERO_G * LARGEST_ZERO_G + LARGEST_SENSITIVITY_ERROR * LARGEST_SENSITIVITY_ERROR);
 
 /// Scale over the stated one, minus 1, with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +39,9 @@ pub struct Scale {
 /// Why the record does not allow it.
 pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
     let n = grid.n;
-    let tilt_rate = Level::of(grid, target)?.tilt_rate(n, grid.rate_hz);
+    let level = Level::of(grid, target)?;
+    let beside = level.beside_gravity();
+    let tilt_rate = level.tilt_rate(n, grid.rate_hz, OF_THE_ZERO * beside);
     // The rate is averaged with the same weights as the central difference of the tilt (trapezoids).
     let y = &target.y;
     let rate: Vec<f64> = (0..n)
@@ -65,7 +72,9 @@ pub fn against_tilt(grid: &Grid, target: &Target) -> Result<Scale, String> {
     let signal = ww - target.white * band.len() as f64;
     let slope = tw / signal;
     let rest = (tt - tw * tw / ww).max(0.0) / band.len().max(2) as f64;
-    let error = (rest / signal).sqrt();
+    // Of the zero or of the sensitivity: which it is tells by how much the tilt is too large.
+    let either = (OF_THE_ZERO * (1.0 - OF_THE_ZERO)).sqrt() * beside / STANDARD_GRAVITY;
+    let error = (rest / signal).sqrt().hypot(slope * either);
     let in_band = |c: &[f64]| {
         let mut kept = vec![0.0; n];
         kept[band.clone()].copy_from_slice(&c[band.clone()]);
@@ -132,9 +141,13 @@ impl<'a> Level<'a> {
         })
     }
 
-    /// How fast the axis tilts, deg/s: the central difference.
-    fn tilt_rate(&self, n: usize, rate_hz: f64) -> Vec<f64> {
-        let zero = upright_zero(self.up, [Some(self.side), self.across]);
+    /// What the upright accelerometer reads beside what the others leave it of 1 g, in its unit.
+    fn beside_gravity(&self) -> f64 {
+        beside_gravity(self.up, [Some(self.side), self.across])
+    }
+
+    /// How fast the axis tilts, deg/s: the central difference. `zero` is that of the upright accelerometer.
+    fn tilt_rate(&self, n: usize, rate_hz: f64, zero: f64) -> Vec<f64> {
         let up: Vec<f64> = self.up.values.iter().map(|a| a - zero).collect();
         let sign = up.iter().sum::<f64>().signum();
         // The roll is atan(y / z). The pitch is that of x against both others, and its rate about the body's y is smaller
@@ -160,8 +173,8 @@ impl<'a> Level<'a> {
 }
 
 /// What the upright accelerometer reads beside the part of 1 g that the other axes leave it, in the mean over the record: its zero,
-/// which would pass for a scale factor of the tilt. None where the unit is not m/s^2, or where more is wrong than a zero.
-fn upright_zero(up: &Signal, level: [Option<&Signal>; 2]) -> f64 {
+/// which would pass for a scale factor of the tilt, or a part of its sensitivity. None where the unit is not m/s^2, or where more is wrong than a zero.
+fn beside_gravity(up: &Signal, level: [Option<&Signal>; 2]) -> f64 {
     if up.unit != "m/s^2" {
         return 0.0;
     }
