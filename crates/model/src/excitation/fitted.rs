@@ -54,10 +54,16 @@ impl ModelFile {
             if by_settings.contains(&channel.name.as_str()) {
                 continue;
             }
-            let (amplitude, period) = fit.swing(&seen.values);
+            let swing = fit.swing(&seen.values);
             let parameters = [
-                ("peak".to_owned(), Parameter::exact(amplitude, "deg/s")),
-                ("frequency".to_owned(), Parameter::exact(1.0 / period, "Hz")),
+                (
+                    "peak".to_owned(),
+                    Parameter::exact(swing.amplitude, "deg/s"),
+                ),
+                (
+                    "frequency".to_owned(),
+                    Parameter::exact(1.0 / swing.period, "Hz"),
+                ),
             ];
             self.effects.push(EffectModel {
                 cause: MOVED.into(),
@@ -121,6 +127,13 @@ fn settings_like(
 }
 
 type Settings = Vec<(&'static str, f64)>;
+
+/// A swing: its amplitude in the unit of the channel, its period and when it begins, s.
+struct Swing {
+    amplitude: f64,
+    period: f64,
+    begins: f64,
+}
 
 struct Fit<'a> {
     record: &'a Record,
@@ -327,17 +340,16 @@ impl Fit<'_> {
         }
     }
 
-    /// Amplitude and period, s, of a swing that is as large and as frequent since it began.
-    fn swing(&self, values: &[f64]) -> (f64, f64) {
+    /// A swing that is as large and as frequent since it began.
+    fn swing(&self, values: &[f64]) -> Swing {
         let rate = centred(&self.blocks(values));
-        let rate = &rate[rest_before(&rate)..];
-        let amplitude = std::f64::consts::SQRT_2 * rms(rate);
-        (amplitude, period(rate, self.block_s()))
-    }
-
-    /// When a swing begins, s.
-    fn begins(&self, values: &[f64]) -> f64 {
-        rest_before(&centred(&self.blocks(values))) as f64 * self.block_s()
+        let rest = rest_before(&rate);
+        let rate = &rate[rest..];
+        Swing {
+            amplitude: std::f64::consts::SQRT_2 * rms(rate),
+            period: period(rate, self.block_s()),
+            begins: rest as f64 * self.block_s(),
+        }
     }
 
     /// The turning of a table or the sway of a base, by the gyro that sees most of it. A sway tilts the accelerometers: what
@@ -346,12 +358,17 @@ impl Fit<'_> {
         let fine = Self::fine(self.record, self.rate_hz);
         let seen = Axis::ALL.into_iter().filter_map(|axis| {
             let channel = self.record.of(Quantity::Gyro, Some(axis))?;
-            let (amplitude, period) = fine.swing(&channel.values);
-            Some((axis, amplitude, period))
+            Some((axis, fine.swing(&channel.values)))
         });
-        let Some((axis, amplitude, period)) = seen.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        let largest = seen.max_by(|a, b| a.1.amplitude.total_cmp(&b.1.amplitude));
+        let Some((axis, swing)) = largest else {
             return;
         };
+        let Swing {
+            amplitude,
+            period,
+            begins,
+        } = swing;
         if axis == Axis::Z {
             settings.push(("turn_dps", amplitude));
             settings.push(("turn_period_s", period));
@@ -361,13 +378,11 @@ impl Fit<'_> {
         let tilts = self
             .record
             .all(Quantity::Acc)
-            .map(|c| fine.swing(&c.values).0);
+            .map(|c| fine.swing(&c.values).amplitude);
         let tilt = tilts.fold(0.0, f64::max) / STANDARD_GRAVITY;
         if tilt > 0.5 * sway.to_radians().sin() {
             settings.push(("sway_deg", sway));
             settings.push(("sway_period_s", period));
-            let begins = self.record.of(Quantity::Gyro, Some(axis));
-            let begins = begins.map_or(0.0, |c| fine.begins(&c.values));
             if begins > 0.0 {
                 settings.push(("sway_from_s", begins));
             }
@@ -379,7 +394,7 @@ impl Fit<'_> {
             for (own, name, key) in about.into_iter().filter(|a| a.0 != axis) {
                 let still = !moved.is_empty() && !moved.iter().any(|m| m == name);
                 let seen = self.record.of(Quantity::Gyro, Some(own)).filter(|_| !still);
-                let part = seen.map_or(0.0, |c| fine.swing(&c.values).0 / amplitude);
+                let part = seen.map_or(0.0, |c| fine.swing(&c.values).amplitude / amplitude);
                 settings.push((key, part));
             }
         }
