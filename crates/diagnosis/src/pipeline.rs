@@ -12,6 +12,7 @@ mod at_rest;
 mod banks;
 mod channel;
 mod concluded;
+mod far_readings;
 mod handed_over;
 mod prepared;
 
@@ -26,9 +27,7 @@ use crate::audit::Audit;
 use crate::criticise::common_noise::{Late, Shared, common};
 use crate::criticise::cross_axis::couplings;
 use crate::fit::channel::VarianceFound;
-use crate::ingest::grid::spike_limit;
 use crate::ingest::types::Grid;
-use crate::ingest::wild;
 use crate::replicates;
 use crate::report::entries::{Ranked, entries, rank};
 use crate::report::findings::{motion_findings, scale_finding, term_findings, variance_finding};
@@ -109,7 +108,7 @@ pub fn diagnose_owned(
 
 fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     let at_rest = at_rest::believed(&mut of.grid);
-    set_aside_wild(&mut of.grid, &of.audited);
+    far_readings::settle(&mut of.grid, &of.audited, &of.singles);
     let search = |t| channel::searched(&of.grid, t);
     let mut searched: Vec<Searched<'_>> = of.grid.targets.iter().map(search).collect();
     of.grid.dct.forget();
@@ -218,38 +217,6 @@ fn ranked_entries(
     let mut unexplained = entries(left, searched, grid, terms, matters);
     ranked(&mut told.findings, &mut unexplained);
     unexplained
-}
-
-/// Sets aside wild readings that are too many rather than too far off, where a first search shows that nothing else makes them.
-fn set_aside_wild(grid: &mut Grid, audited: &Audit) {
-    let single = spike_limit(grid.n);
-    for i in 0..grid.targets.len() {
-        let target = &grid.targets[i];
-        let by_counts = ["outliers", "spikes"];
-        let told = by_counts
-            .iter()
-            .any(|id| audited.is_suppressed(id, &target.name));
-        if target.moving || told || !wild::suspected(grid, i) {
-            continue;
-        }
-        let s = channel::searched(grid, target);
-        let (white, data) = (
-            s.state.solution.white.sqrt(),
-            s.search.panel.dct.inverse(&s.search.panel.column(0)),
-        );
-        let law = |i: usize| s.variance.product().map_or(1.0, |v| v[i].sqrt());
-        let known: Vec<f64> = (target.aside.iter())
-            .map(|(at, given)| s.e[*at] + (given - data[*at]) / (white * law(*at)))
-            .collect();
-        let mut e = s.e.clone();
-        target.lost.iter().for_each(|at| e[*at] = 0.0);
-        let Some(limit) = wild::found(&e, &known, single) else {
-            continue;
-        };
-        let places: Vec<usize> = (0..e.len()).filter(|at| e[*at].abs() >= limit).collect();
-        drop(s);
-        wild::set_aside(grid, i, &places, limit);
-    }
 }
 
 /// The shocks, where the final model bears out each of the blows that were left out of the readings.

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use model::record::Record;
 
 use crate::audit::{Audit, MOST_TIMES};
-use crate::ingest::types::Grid;
+use crate::ingest::types::{Grid, Target};
 use crate::result::{Check, Finding, Parameter};
 use crate::search::searched::Searched;
 
@@ -38,6 +38,9 @@ pub(crate) fn findings(audit: &Audit, searched: &[Searched<'_>], grid: &Grid) ->
             .any(|s| s.target.moving && s.target.name == *name)
     };
     all.retain(|f| f.cause != "outliers" || !f.channels.iter().all(turns));
+    for s in searched {
+        leave_explained(&mut all, s.target, grid.rate_hz);
+    }
     for s in searched {
         let name = &s.target.name;
         let by_counts = ["outliers", "spikes"];
@@ -72,6 +75,35 @@ pub(crate) fn findings(audit: &Audit, searched: &[Searched<'_>], grid: &Grid) ->
         });
     }
     all
+}
+
+/// Takes the readings that what was found explains out of the audit's finding of a channel.
+fn leave_explained(all: &mut Vec<Finding>, target: &Target, rate_hz: f64) {
+    let own = |f: &Finding| f.cause == "outliers" && f.channels == [target.name.as_str()];
+    let Some(i) = all
+        .iter()
+        .position(own)
+        .filter(|_| !target.explained.is_empty())
+    else {
+        return;
+    };
+    let at = |t: f64| {
+        let mut explained = target.explained.iter();
+        explained.any(|i| (*i as f64 / rate_hz - t).abs() < 0.5 / rate_hz)
+    };
+    let mut left = all.remove(i);
+    left.times_s.retain(|t| !at(*t));
+    let Some(count) = left.parameters.get_mut("count") else {
+        return;
+    };
+    count.value -= target.explained.len() as f64;
+    if let (true, Some(first)) = (count.value > 0.0, left.times_s.first()) {
+        let (count, name) = (count.value, &target.name);
+        left.what = format!(
+            "{count} single readings of {name} are none that the noise makes, the first at {first:.2} s"
+        );
+        all.insert(i, left);
+    }
 }
 
 /// Checks of the residual that a fault of the counts explains fail no longer.

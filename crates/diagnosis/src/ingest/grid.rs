@@ -355,6 +355,7 @@ impl<'a> Layout<'a> {
             lost,
             spikes,
             aside,
+            explained: vec![],
             wild_from: None,
             excursions: own.to_vec(),
             motion_rms,

@@ -32,6 +32,8 @@ pub struct Target {
     pub spikes: Vec<usize>,
     /// Places whose reading is not believed, and what was read there.
     pub aside: Vec<(usize, f64)>,
+    /// Places of single far readings that the audit of counts set aside and that what was found explains.
+    pub explained: Vec<usize>,
     /// Standard deviations from which on a reading is wild, where many tell that; else that of a single one.
     pub wild_from: Option<f64>,
     /// Turns of the base that it felt, taken out of `y` as lost readings are.

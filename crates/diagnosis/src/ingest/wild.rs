@@ -175,17 +175,39 @@ pub(crate) fn suspected(grid: &Grid, channel: usize) -> bool {
 
 /// Sets readings of a channel aside as wild, from a distance of `limit` on, and fills their places.
 pub(crate) fn set_aside(grid: &mut Grid, channel: usize, places: &[usize], limit: f64) {
-    let (dct, bins) = (&grid.dct, &grid.bins);
     let target = &mut grid.targets[channel];
-    let mut y = (*target.y).clone();
+    let y = (*target.y).clone();
     target.aside.extend(places.iter().map(|i| (*i, y[*i])));
     target.spikes.extend_from_slice(places);
     target.spikes.sort_unstable();
     target.lost.extend_from_slice(places);
     target.wild_from = Some(limit);
+    filled_again(grid, channel, y);
+}
+
+/// Gives back readings of a channel that were set aside, and are explained by what was found.
+pub(crate) fn give_back(grid: &mut Grid, channel: usize, places: &[usize]) {
+    let target = &mut grid.targets[channel];
+    let mut y = (*target.y).clone();
+    let back = |i: &usize| places.contains(i);
+    for (at, read) in target.aside.extract_if(.., |a| back(&a.0)) {
+        y[at] = read;
+        if !target.spikes.contains(&at) {
+            target.explained.push(at);
+        }
+    }
+    target.spikes.retain(|i| !back(i));
+    target.lost.retain(|i| !back(i));
+    filled_again(grid, channel, y);
+}
+
+/// The readings of a channel, the lost ones among them filled anew, and its noise as it is first fitted.
+fn filled_again(grid: &mut Grid, channel: usize, mut y: Vec<f64>) {
+    let (dct, bins) = (&grid.dct, &grid.bins);
+    let target = &mut grid.targets[channel];
     target.lost.iter().for_each(|i| y[*i] = f64::NAN);
     let step = target.white * target.noise.log_walk.exp();
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(places.len() as u64 ^ 0x7769_6c64);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(target.lost.len() as u64 ^ 0x7769_6c64);
     kalman::fill(&mut y, target.white, step, &mut rng);
     let panel = Panel::new(dct, bins, &y);
     let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);

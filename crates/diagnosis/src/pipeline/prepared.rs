@@ -1,6 +1,7 @@
 //! A record before the search: audited, on its grid, and without the readings in which the base may have been knocked.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use model::record::rows;
@@ -20,6 +21,8 @@ use crate::test_level::{Observation, all_worded};
 pub(super) struct Prepared {
     pub grid: Grid,
     pub audited: Audit,
+    /// Places of single far readings that the audit of counts set aside, by channel.
+    pub singles: BTreeMap<String, Vec<usize>>,
     pub sticking: Vec<Finding>,
     pub dead: Vec<Observation>,
     pub input: Input,
@@ -57,10 +60,14 @@ pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, A
     }
     let record = &*masking::renumbered(record, &audited);
     let mut grid = lay_out(record, &|name| audited.masked(name), seed)?;
+    let places = places_of_rows(record);
+    let of_rows = |rows: &Vec<usize>| rows.iter().map(|r| places[*r]).collect();
+    let singles = (audited.singles.iter()).map(|(name, rows)| (name.clone(), of_rows(rows)));
+    let singles = singles.collect();
     let blows = match bursts {
         // What breaks off and begins anew at each of them is no blow.
         Some(_) => vec![],
-        None => knocked(record, &grid, &audited),
+        None => knocked(&grid, &singles),
     };
     grid.bursts = bursts;
     let input = Input {
@@ -74,6 +81,7 @@ pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, A
     let mut prepared = Prepared {
         grid,
         audited,
+        singles,
         sticking,
         dead,
         input,
@@ -89,18 +97,16 @@ pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, A
 }
 
 /// Where a base at rest may have been knocked.
-fn knocked(record: &Record, grid: &Grid, audited: &Audit) -> Vec<Blow> {
+fn knocked(grid: &Grid, singles: &BTreeMap<String, Vec<usize>>) -> Vec<Blow> {
     if matches!(grid.base, Some(Base::Moving | Base::Turntable)) {
         return vec![];
     }
-    let places = places_of_rows(record);
     // Single far readings may be pieces of a blow; what else is not believed was never measured.
     let read = |target: &Target| {
         let mut y = target.y.to_vec();
-        let rows = audited.singles.get(&target.name);
-        let singles: Vec<usize> = rows.into_iter().flatten().map(|r| places[*r]).collect();
-        let back = (target.aside.iter())
-            .filter(|(at, _)| singles.contains(at) || target.spikes.contains(at));
+        let of_counts = singles.get(&target.name);
+        let single = |at: &usize| of_counts.is_some_and(|s| s.contains(at));
+        let back = (target.aside.iter()).filter(|(at, _)| single(at) || target.spikes.contains(at));
         back.for_each(|(at, v)| y[*at] = *v);
         y
     };
