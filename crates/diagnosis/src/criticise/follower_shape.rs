@@ -39,12 +39,13 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
             .candidates
             .iter()
             .filter(|c| c.effect.id() == effect || c.effect.extends() == Some(effect));
-        let mut own = state.columns();
+        let own = state.columns();
         // What its terms explain together: of several that share it, each alone has little.
         let without = state.terms.iter().filter(|t| t.effect.id() != effect);
         let rest: Vec<usize> = without.flat_map(|t| t.columns.iter().copied()).collect();
         let likelihood = |columns: &[usize]| search.panel.solve(&g, columns).log_likelihood;
         let explained = 2.0 * (likelihood(&own) - likelihood(&rest));
+        let mut own = search.spanning(state);
         own.extend(of_it.flat_map(Candidate::all_columns));
         let beside = Beside::new(&search.panel, &g, &own);
         let (lr, degrees) = beside.gain_of(departures.flat_map(|d| d.columns));

@@ -1,8 +1,11 @@
 //! Estimates with honest errors: coefficients averaged over the random walk, noise parameters from the curvature.
 
-use model::effect::{Found, Peak};
+use std::sync::Arc;
+
+use model::effect::{Found, Peak, Shape};
 
 use crate::fit::channel::{Form, State, Term};
+use crate::fit::delayed::{self, Beside};
 use crate::fit::likelihood::scoring;
 use crate::fit::likelihood::{Noise, Panel, Solution, invert, least_walk};
 
@@ -302,9 +305,10 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
             location: located(panel, state, &t.form, own, rate_hz),
         };
         if let Form::Shaped(shape, at) = &t.form {
-            let (place, coefficients) = shaped(panel, state, t, shape.as_ref(), *at);
-            found.location.push(place);
-            found.coefficients = coefficients;
+            (found.location, found.coefficients) = shaped(panel, state, t, shape, *at);
+            // A delay is told in seconds.
+            let late = found.location.iter_mut().skip(1);
+            late.for_each(|(delay, error)| (*delay, *error) = (*delay / rate_hz, *error / rate_hz));
         }
         if let Form::Covariance(c, theta) = &t.form {
             found.fixed.extend(c.fixed());
@@ -336,90 +340,143 @@ const REACH: [f64; 2] = [0.06, 1.2];
 /// Step over which the curvature of the likelihood is told, in the logarithm.
 const CURVED_OVER: f64 = 0.03;
 
-/// Steps to the best place of a shape between the neighbours of a point: of two a factor of nine apart, to 0.7 %.
-pub(crate) const PLACED: usize = 12;
-
-/// Neighbours in a grid of the point nearest to a value.
-pub(crate) fn neighbours(grid: &[f64], at: f64) -> (f64, f64) {
-    let off = |g: &f64| (g / at).ln().abs();
-    let nearest = (0..grid.len()).min_by(|i, j| off(&grid[*i]).total_cmp(&off(&grid[*j])));
-    let i = nearest.unwrap_or(0);
-    (grid[i.saturating_sub(1)], grid[(i + 1).min(grid.len() - 1)])
+/// Delays to either side that a shape is averaged over, how far they reach in standard errors, and that in samples.
+const DELAYS: i32 = 3;
+const DELAY_ERRORS: f64 = 2.5;
+const DELAY_REACH: [f64; 2] = [1e-4, 1.0];
+/// A fit of a shape: the logarithm of its coordinate, its delay, the logarithm of the weight, and the solution.
+struct Weighed {
+    x: f64,
+    delay: f64,
+    weight: f64,
+    solution: Solution,
 }
 
-/// A shape's coordinate and the coefficients of its columns, averaged over both the coordinate (flat in its logarithm,
-/// within `bounds`) and the random walk: where a slow shape and a slow walk take each other's part, errors at fixed
-/// values of either are too small.
+/// A shape beside the other terms of its model.
+struct Placed<'a> {
+    panel: &'a Panel,
+    noise: &'a Noise,
+    density: Vec<f64>,
+    others: Vec<&'a Term>,
+    effect: &'static str,
+}
+
+impl Placed<'_> {
+    /// Fits over the coordinate, flat in it, and the random walk.
+    fn over_coordinate(&self, shape: Arc<dyn Shape>, at: f64) -> Vec<Weighed> {
+        let grid = shape.grid();
+        let (low, high) = (grid[0].ln(), grid[grid.len() - 1].ln());
+        let width = self.panel.width();
+        let delay = shape.delay();
+        let beside = Beside::new(self.panel, &self.others, self.effect, shape);
+        // Its best place by all that stands beside it now: a grid about another one would end before it.
+        let (best, here) = beside.best(self.panel, &self.density, at);
+        let [below, above] = [-1.0, 1.0].map(|k| {
+            let x = best + k * CURVED_OVER;
+            beside.likelihood(self.panel, &self.density, x)
+        });
+        let information = (2.0 * here - below - above) / CURVED_OVER.powi(2);
+        let reach = if information > 0.0 {
+            (REACH_ERRORS / information.sqrt()).clamp(REACH[0], REACH[1])
+        } else {
+            REACH[1]
+        };
+        let mut all = vec![];
+        for i in -SHAPES..=SHAPES {
+            let x = best + reach * f64::from(i) / f64::from(SHAPES);
+            if x < low - 0.7 || x > high + 0.7 {
+                continue;
+            }
+            let fits = |columns: &[usize]| weighted(self.panel, self.noise, columns);
+            let fits = beside.with(self.panel, x.exp(), fits);
+            // So many of a step in x as the step is wide, and of x as its exponential grows.
+            let prior = reach.ln() + x + delayed::prior(delay);
+            all.extend(fits.into_iter().map(|(weight, solution)| Weighed {
+                x,
+                delay,
+                weight: weight + prior,
+                solution,
+            }));
+        }
+        self.panel.truncate(width);
+        all
+    }
+
+    /// The shape at delays about the most likely one, with a coordinate near its best for each; itself where it is never late.
+    fn delays(&self, shape: &Arc<dyn Shape>, at: f64) -> Vec<(Arc<dyn Shape>, f64)> {
+        let (least, most) = shape.delays();
+        if most <= least {
+            return vec![(Arc::clone(shape), at)];
+        }
+        let of = Arc::clone(shape);
+        let top = delayed::climb(self.panel, &self.density, &self.others, self.effect, of, at);
+        let [[_, both], [_, variance]] = top.covariance;
+        let reach = (DELAY_ERRORS * variance.sqrt()).clamp(DELAY_REACH[0], DELAY_REACH[1]);
+        (-DELAYS..=DELAYS)
+            .map(|i| reach * f64::from(i) / f64::from(DELAYS))
+            .map(|off| (top.shape.delay() + off, top.x + both / variance * off))
+            .filter(|(delay, _)| (least..=most).contains(delay))
+            .filter_map(|(delay, x)| Some((shape.later(delay)?, x.exp())))
+            .collect()
+    }
+}
+
+/// A shape's coordinate, its delay where it may have one, and the coefficients of its columns, averaged over the coordinate, the
+/// delay (by [`delayed::prior`]) and the random walk: where a slow shape and a slow walk take each other's part, or a time and a
+/// delay, errors at fixed values of either are too small. The coordinate is flat in itself: Jeffreys' prior of the size and the
+/// time of an exponential is in proportion to the size alone.
 fn shaped(
     panel: &Panel,
     state: &State,
     term: &Term,
-    shape: &dyn model::effect::Shape,
+    shape: &Arc<dyn Shape>,
     at: f64,
-) -> ((f64, f64), Vec<(f64, f64)>) {
-    let others: Vec<usize> = state
-        .columns()
-        .into_iter()
-        .filter(|c| !term.columns.contains(c))
-        .collect();
-    let width = panel.width();
-    let grid = shape.grid();
-    let (low, high) = (grid[0].ln(), grid[grid.len() - 1].ln());
-    let density = state.noise.over(&panel.bins);
-    let likelihood = |x: f64| {
-        let values = shape.columns(x.exp()).into_iter().map(|c| c.values);
-        let added = panel.add_all(values);
-        let l = panel.solve(&density, &[added, others.clone()].concat());
-        panel.truncate(width);
-        l.log_likelihood
+) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+    let others = state.terms.iter().filter(|t| t.columns != term.columns);
+    let placed = Placed {
+        panel,
+        noise: &state.noise,
+        density: state.noise.over(&panel.bins),
+        others: others.collect(),
+        effect: term.effect.id(),
     };
-    // Its best place by all that stands beside it now: a grid about another one would end before it.
-    let (from, to) = neighbours(&grid, at);
-    let at = numerics::minimise::golden(&|x| -likelihood(x), from.ln(), to.ln(), PLACED).exp();
-    let [below, here, above] = [-1.0, 0.0, 1.0].map(|k| likelihood(at.ln() + k * CURVED_OVER));
-    let information = (2.0 * here - below - above) / CURVED_OVER.powi(2);
-    let reach = if information > 0.0 {
-        (REACH_ERRORS / information.sqrt()).clamp(REACH[0], REACH[1])
-    } else {
-        REACH[1]
-    };
-    let mut all: Vec<(f64, f64, Solution)> = vec![];
-    for i in -SHAPES..=SHAPES {
-        let x = at.ln() + reach * f64::from(i) / f64::from(SHAPES);
-        if x < low - 0.7 || x > high + 0.7 {
-            continue;
-        }
-        let values = shape.columns(x.exp()).into_iter().map(|c| c.values);
-        let added = panel.add_all(values);
-        let columns = [added, others.clone()].concat();
-        for (weight, s) in weighted(panel, &state.noise, &columns) {
-            all.push((x, weight, s));
-        }
-        panel.truncate(width);
-    }
-    over_shapes(&all, term.columns.len())
+    let each = placed.delays(shape, at).into_iter();
+    let each = each.flat_map(|(shape, at)| placed.over_coordinate(shape, at));
+    let all: Vec<_> = each.collect();
+    over_shapes(&all, term.columns.len(), shape.delays())
 }
 
-/// A coordinate and so many coefficients, each with its standard error, averaged over fits: the logarithm of the coordinate, that
-/// of the weight, the solution.
-fn over_shapes(all: &[(f64, f64, Solution)], columns: usize) -> ((f64, f64), Vec<(f64, f64)>) {
-    let top = all.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = all.iter().map(|p| (p.1 - top).exp()).collect();
+/// A coordinate, a delay where it is not always the same, and so many coefficients, each with its standard error, averaged over
+/// fits.
+fn over_shapes(
+    all: &[Weighed],
+    columns: usize,
+    delays: (f64, f64),
+) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+    let top = (all.iter().map(|p| p.weight)).fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = all.iter().map(|p| (p.weight - top).exp()).collect();
     let sum: f64 = weights.iter().sum();
-    let mean_of = |f: &dyn Fn(usize) -> f64| -> f64 {
-        (0..all.len()).map(|i| weights[i] * f(i)).sum::<f64>() / sum
+    let mean_of = |f: &dyn Fn(&Weighed) -> f64| -> f64 {
+        let each = all.iter().zip(&weights);
+        each.map(|(p, w)| w * f(p)).sum::<f64>() / sum
     };
-    let x = mean_of(&|i| all[i].0);
-    let spread = mean_of(&|i| (all[i].0 - x).powi(2)).sqrt();
+    let told = |f: &dyn Fn(&Weighed) -> f64| {
+        let mean = mean_of(f);
+        (mean, mean_of(&|p| (f(p) - mean).powi(2)).sqrt())
+    };
+    let mut location = vec![told(&|p| p.x.exp())];
+    if delays.1 > delays.0 {
+        location.push(told(&|p| p.delay));
+    }
     let coefficients = (0..columns)
         .map(|c| {
-            let mean = mean_of(&|i| all[i].2.beta[c]);
-            let variance = mean_of(&|i| {
-                let s = &all[i].2;
+            let mean = mean_of(&|p| p.solution.beta[c]);
+            let variance = mean_of(&|p| {
+                let s = &p.solution;
                 s.white * s.inverse[c][c] + (s.beta[c] - mean).powi(2)
             });
             (mean, variance.sqrt())
         })
         .collect();
-    ((x.exp(), x.exp() * spread), coefficients)
+    (location, coefficients)
 }

@@ -2,6 +2,7 @@
 
 pub mod bins;
 pub mod channel;
+pub(crate) mod delayed;
 pub mod estimate;
 pub mod likelihood;
 pub mod prequential;

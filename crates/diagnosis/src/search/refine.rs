@@ -2,8 +2,9 @@
 
 use super::Search;
 use crate::fit::channel::{Form, State, Term};
-use crate::fit::estimate::{PLACED, neighbours};
+use crate::fit::delayed::{self, Beside};
 use crate::fit::{scan, threshold};
+use std::sync::Arc;
 
 impl Search<'_> {
     /// Build the columns of a scanned term and refine its location.
@@ -30,17 +31,18 @@ impl Search<'_> {
                     .collect(),
             ],
             Form::Shaped(shape, at) => {
-                let (low, high) = neighbours(&shape.grid(), *at);
-                let make = |x: f64| -> Vec<Vec<f64>> {
-                    shape
-                        .columns(x.exp())
-                        .into_iter()
-                        .map(|c| c.values)
-                        .collect()
-                };
-                *at = numerics::minimise::golden(&|x| with(&make(x)), low.ln(), high.ln(), PLACED)
-                    .exp();
-                make(at.ln())
+                let others: Vec<&Term> = state.terms.iter().collect();
+                let effect = term.effect.id();
+                let beside = Beside::new(&self.panel, &others, effect, Arc::clone(shape));
+                *at = beside.best(&self.panel, &g, *at).0.exp();
+                self.panel.truncate(width);
+                let (least, most) = shape.delays();
+                if most > least {
+                    let of = Arc::clone(shape);
+                    let top = delayed::climb(&self.panel, &g, &others, effect, of, *at);
+                    (*shape, *at) = (top.shape, top.x.exp());
+                }
+                shape.columns(*at).into_iter().map(|c| c.values).collect()
             }
             Form::Line(omega) => {
                 let place = scan::place_of_line(
@@ -110,6 +112,20 @@ impl Search<'_> {
                 beside.terms.insert(i, term);
             }
         }
+        self.delayed(&mut beside.terms);
         beside.terms
+    }
+
+    /// The columns of an effect that has a delayed shape become as late as that.
+    fn delayed(&self, terms: &mut [Term]) {
+        for i in 0..terms.len() {
+            let Form::Shaped(shape, _) = &terms[i].form else {
+                continue;
+            };
+            let (shape, effect) = (Arc::clone(shape), terms[i].effect.id());
+            for t in terms.iter_mut() {
+                t.columns = delayed::columns_beside(&self.panel, t, shape.as_ref(), effect);
+            }
+        }
     }
 }

@@ -260,7 +260,7 @@ impl Search<'_> {
             self.panel.truncate(width);
             -l
         };
-        let (low, high) = crate::fit::estimate::neighbours(&shape.grid(), at);
+        let (low, high) = crate::fit::delayed::neighbours(&shape.grid(), at);
         let best = numerics::minimise::golden(&minus_l, low.ln(), high.ln(), STEPS);
         -minus_l(best)
     }

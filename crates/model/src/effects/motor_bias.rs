@@ -52,6 +52,11 @@ impl Effect for MotorBias {
                 "time in which the surge falls to 1/e: the motor's mechanical time constant",
             ),
             optional(
+                "delay",
+                "s",
+                "how late the sensor shows all of it: its filter, and the instant of its reading",
+            ),
+            optional(
                 "by_magnitude",
                 "1",
                 "1 where the shift follows |duty|, else it follows the sign too",
@@ -63,9 +68,9 @@ impl Effect for MotorBias {
     fn docs(&self) -> Docs {
         Docs {
             title: "Motor shifts the bias",
-            physics: "b(t) = at_full_duty x duty, or x |duty| where both directions are driven and the magnitude fits better: magnetic field or ground shift of the motor current. Current surges until the motor has spun up: with w' = (duty - w) / surge_time, surge_at_full_duty x (duty - w) is added, and surge_at_start x exp(-t / surge_time) where the record begins while it does. Dry friction takes the same current at any speed: while_turning x sign(duty).",
+            physics: "b(t) = at_full_duty x duty, or x |duty| where both directions are driven and the magnitude fits better: magnetic field or ground shift of the motor current. Current surges until the motor has spun up: with w' = (duty - w) / surge_time, surge_at_full_duty x (duty - w) is added, and surge_at_start x exp(-t / surge_time) where the record begins while it does. Dry friction takes the same current at any speed: while_turning x sign(duty). The sensor's filter shows all of it late by delay, to a line between two samples; delay and surge_time stand for each other in part, so each is uncertain by what the other is.",
             excitation: "A motor command that changes, while the axis itself does not turn.",
-            test: "Least squares on the command, and on the surge over a grid of times, refined; random walk refitted.",
+            test: "Least squares on the command, and on the surge over a grid of times and delays, refined and averaged over both; random walk refitted.",
             remedy: "Twist and shield the motor leads, give the motor a ground return of its own, or subtract the bias times the duty.",
             figure: "Rate in time blocks against duty.",
             example: Example::new(Plot::RateAgainst("pwm"), &[("at_full_duty", 0.4)])
@@ -126,6 +131,7 @@ impl Effect for MotorBias {
         let surge = Hypothesis::Shaped(Arc::new(Surge {
             duty: duty.clone(),
             rate_hz: view.rate_hz,
+            delay: 0.0,
         }));
         let mut all = vec![regression(duty.clone(), false)];
         if low < 0.0 && high > 0.0 {
@@ -149,11 +155,8 @@ impl Effect for MotorBias {
 
     fn describe(&self, found: &Found) -> Parameters {
         let mut all = crate::effect::columns_as_parameters(self.parameters(), found);
-        if let Some((time, error)) = found.location.first() {
-            all.insert(
-                "surge_time".into(),
-                Parameter::estimated(*time, *error, "s"),
-            );
+        for (name, (value, error)) in ["surge_time", "delay"].iter().zip(&found.location) {
+            all.insert((*name).into(), Parameter::estimated(*value, *error, "s"));
         }
         all
     }
@@ -167,28 +170,28 @@ impl Effect for MotorBias {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        let full = value(parameters, "at_full_duty");
-        let (surge, time) = (
-            value(parameters, "surge_at_full_duty"),
-            value(parameters, "surge_time"),
-        );
-        let start = value(parameters, "surge_at_start");
-        let by_size = value(parameters, "by_magnitude") != 0.0;
-        let extra = (surge != 0.0 && time > 0.0)
-            .then(|| lagging(&simulation.duty, time * simulation.rate_hz));
-        let first = (start != 0.0 && time > 0.0)
-            .then(|| settling(simulation.duty.len(), time * simulation.rate_hz));
-        for &axis in channels {
-            for (i, (rate, d)) in simulation.rate[axis]
-                .iter_mut()
-                .zip(&simulation.duty)
-                .enumerate()
-            {
-                *rate += full * if by_size { d.abs() } else { *d };
-                *rate += value(parameters, "while_turning") * direction(*d);
-                *rate += surge * extra.as_ref().map_or(0.0, |e| e[i]);
-                *rate += start * first.as_ref().map_or(0.0, |f| f[i]);
+        let of = |name| value(parameters, name);
+        let duty = &simulation.duty;
+        let by_size = of("by_magnitude") != 0.0;
+        let steady = |d: &f64| {
+            let size = if by_size { d.abs() } else { *d };
+            of("at_full_duty") * size + of("while_turning") * direction(*d)
+        };
+        let mut shift: Vec<f64> = duty.iter().map(steady).collect();
+        let tau = of("surge_time") * simulation.rate_hz;
+        if tau > 0.0 {
+            let (surge, start) = (of("surge_at_full_duty"), of("surge_at_start"));
+            let each = lagging(duty, tau)
+                .into_iter()
+                .zip(settling(duty.len(), tau));
+            for (shift, (ahead, left)) in shift.iter_mut().zip(each) {
+                *shift += surge * ahead + start * left;
             }
+        }
+        let shift = late(shift, of("delay") * simulation.rate_hz);
+        for &axis in channels {
+            let rate = simulation.rate[axis].iter_mut();
+            rate.zip(&shift).for_each(|(rate, shift)| *rate += shift);
         }
     }
 }
@@ -242,10 +245,27 @@ fn settling(samples: usize, tau: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The surge, by its time.
+/// Values so many samples late, on a line between two of them; before the first they are as the first.
+fn late(values: Vec<f64>, samples: f64) -> Vec<f64> {
+    if samples <= 0.0 {
+        return values;
+    }
+    let (whole, part) = (samples.floor() as usize, samples.fract());
+    let at = |i: usize, back: usize| values[i.saturating_sub(back)];
+    (0..values.len())
+        .map(|i| (1.0 - part) * at(i, whole) + part * at(i, whole + 1))
+        .collect()
+}
+
+/// Most that a sensor's filter may be late, samples: twice the mean delay of one whose window is two samples long.
+const LATEST: f64 = 2.0;
+
+/// The surge, by its time, so many samples late.
+#[derive(Clone)]
 struct Surge {
     duty: Vec<f64>,
     rate_hz: f64,
+    delay: f64,
 }
 
 impl Shape for Surge {
@@ -267,16 +287,43 @@ impl Shape for Surge {
         let tau = at * self.rate_hz;
         let mut all = vec![Column {
             parameter: "surge_at_full_duty",
-            values: lagging(&self.duty, tau),
+            values: late(lagging(&self.duty, tau), self.delay),
         }];
         // A motor that is driven from the first sample on may have been switched on just before.
         if self.duty.first().is_some_and(|d| *d != 0.0) {
             all.push(Column {
                 parameter: "surge_at_start",
-                values: settling(self.duty.len(), tau),
+                values: late(settling(self.duty.len(), tau), self.delay),
             });
         }
         all
+    }
+
+    fn delays(&self) -> (f64, f64) {
+        (0.0, LATEST)
+    }
+
+    fn delay(&self) -> f64 {
+        self.delay
+    }
+
+    fn later(&self, samples: f64) -> Option<Arc<dyn Shape>> {
+        Some(Arc::new(Self {
+            delay: samples,
+            ..self.clone()
+        }))
+    }
+
+    fn beside(&self, parameter: &str, fixed: &[(&str, f64, &str)]) -> Option<Vec<f64>> {
+        let by_size = fixed.iter().any(|f| f.0 == "by_magnitude" && f.1 != 0.0);
+        let each = self.duty.iter();
+        let values = match parameter {
+            "at_full_duty" if by_size => each.map(|d| d.abs()).collect(),
+            "at_full_duty" => each.copied().collect(),
+            "while_turning" => each.map(|d| direction(*d)).collect(),
+            _ => return None,
+        };
+        Some(late(values, self.delay))
     }
 }
 

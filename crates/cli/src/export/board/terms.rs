@@ -46,7 +46,7 @@ impl Sum {
 
     /// What a motor does until it has spun up, as the model has it: of what the command is ahead of a speed that follows it with
     /// this time constant, the mean over a sample. The motor has one time; that of the largest surge counts.
-    fn surge(&mut self, axis: usize, at_full: f64, time_s: f64) {
+    fn surge(&mut self, axis: usize, Surge { at_full, time_s }: Surge) {
         if at_full == 0.0 || time_s <= 0.0 {
             return;
         }
@@ -82,7 +82,11 @@ impl Sum {
                 };
                 term[axis] -= value("at_full_duty") / FULL_DUTY;
                 self.out.motor_turning[axis] -= value("while_turning");
-                self.surge(axis, value("surge_at_full_duty"), value("surge_time"));
+                let surge = Surge {
+                    at_full: value("surge_at_full_duty"),
+                    time_s: value("surge_time"),
+                };
+                self.surge(axis, surge.at_once(value("at_full_duty"), value("delay")));
             }
             "supply_sensitivity" => {
                 self.out.supply[axis] -= value("slope") * SUPPLY_LSB_V;
@@ -117,5 +121,29 @@ impl Sum {
             _ => return false,
         }
         true
+    }
+}
+
+/// What a motor's current adds right after a step to full duty, deg/s, and the time in which it falls, s.
+#[derive(Clone, Copy)]
+struct Surge {
+    at_full: f64,
+    time_s: f64,
+}
+
+impl Surge {
+    /// The surge that a board without a delay, s, needs beside a steady part, deg/s: that of the same area and the same centre behind
+    /// a step, with what the steady part makes too early. Both are so behind any command.
+    fn at_once(self, steady: f64, delay_s: f64) -> Self {
+        let area = self.at_full * self.time_s - steady * delay_s;
+        let moment =
+            self.at_full * self.time_s * (self.time_s + delay_s) - steady * delay_s.powi(2) / 2.0;
+        let time_s = moment / area;
+        if delay_s > 0.0 && time_s > 0.0 && time_s.is_finite() {
+            let at_full = area / time_s;
+            Self { at_full, time_s }
+        } else {
+            self
+        }
     }
 }

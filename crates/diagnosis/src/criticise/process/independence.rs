@@ -80,7 +80,7 @@ fn of_channel(search: &Search<'_>, state: &State, signal: &Signal) -> Vec<Asked>
     let candidates = || search.candidates.iter();
     let library = || candidates().filter(|c| c.effect.id() != channel::ID);
     let ids: Vec<&str> = library().filter(follows).map(|c| c.effect.id()).collect();
-    let mut own = state.columns();
+    let mut own = search.spanning(state);
     let of_it = library().filter(|c| ids.contains(&c.effect.id()));
     own.extend(of_it.flat_map(Candidate::all_columns));
     own.sort_unstable();
