@@ -279,6 +279,11 @@ impl Built {
         }
         tests.splice(0..0, beside);
         let done = side_by_side(&tests, extent == Extent::AllDraws)?;
+        // Where to look which program is a long one.
+        let seconds: String = (done.iter())
+            .map(|d| format!("{:7.1} s {}\n", d.seconds, d.name))
+            .collect();
+        let _ = std::fs::write(root.join("target/test-seconds.txt"), seconds);
         let failed: Vec<&str> = (done.iter())
             .filter(|d| !d.passed)
             .map(|d| d.name.as_str())
@@ -289,11 +294,6 @@ impl Built {
                 "what they said stands above; `cargo test -p PACKAGE --test NAME` runs one alone",
             ));
         }
-        // Where to look which program is a long one.
-        let seconds: String = (done.iter())
-            .map(|d| format!("{:7.1} s {}\n", d.seconds, d.name))
-            .collect();
-        let _ = std::fs::write(root.join("target/test-seconds.txt"), seconds);
         let passed: usize = done.iter().map(|d| d.tests).sum();
         let mut text = format!("{passed} passed in {} programs", done.len());
         if extent == Extent::Everyday {

@@ -11,6 +11,7 @@ pub const WAIT: &[&str] = &[
     "imu-stand bring_up",
     "imu-stand resume",
     "imu-stand pty",
+    "imu-stand flash",
 ];
 
 /// Test programs of which each takes more than some 15 s of a processor, or waits for longer: they are started first, so that none
@@ -43,6 +44,7 @@ pub const LONG: &[&str] = &[
     "diagnosis pieces",
     "diagnosis levels",
     "diagnosis shocks",
+    "diagnosis unnamed",
     "diagnosis diagnosis",
     "noise noise",
     "imu-stand plan",
@@ -55,8 +57,12 @@ pub const LONG: &[&str] = &[
     "imu-stand model_out",
     "imu-stand browser",
     "imu-stand many",
+    "imu-stand abuse",
     "hil-tests corrected",
     "noise analyze",
+    "diagnosis real_records",
+    "bench correction",
+    "hil-tests c_reference",
 ];
 
 /// Folders of a folder's, or files.
