@@ -14,8 +14,8 @@ pub const WAIT: &[&str] = &[
     "imu-stand flash",
 ];
 
-/// Test programs of which each takes more than some 15 s of a processor, or waits for longer: they are started first, so that none
-/// is left for the end, when one core would wait for it, and the everyday check leaves them out.
+/// Test programs that take long, by target/test-seconds.txt: they are started first, so that none is left for the end, when one core
+/// would wait for it, and the everyday check leaves them out.
 pub const LONG: &[&str] = &[
     "campaign sample",
     "campaign campaign",
