@@ -10,53 +10,14 @@ use crate::wheel::{self, Profile};
 use crate::{cargo, say_sizes, toolchain};
 
 mod programs;
+mod which;
 
 pub use programs::TestProgram;
 use programs::side_by_side;
+use which::{LONG, WAIT, integration_tests, package_name, packages, quick};
 
 /// no_std crates, tested each alone as well: a run of the workspace unites features.
 const ALONE: &[&str] = &["wire", "adis16250", "mma7260qt"];
-
-/// Test programs of a minute or two that the everyday check runs as well. They are started first of all, so that none is left
-/// for the end, when one core would wait for it.
-const FIRST: &[&str] = &[
-    "diagnosis diagnosis",
-    "noise noise",
-    "imu-stand capture",
-    "imu-stand board",
-];
-
-/// Test programs that diagnose records by the hundred, run the image for minutes of its time, or a board in real time: they
-/// are started next, and the everyday check leaves them out.
-const LONG: &[&str] = &[
-    "campaign sample",
-    "campaign campaign",
-    "imu-stand hidden_effect",
-    "hil-tests hidden",
-    "diagnosis closed_loop",
-    "diagnosis limits",
-    "diagnosis claims",
-    "imu-stand soak",
-    "hil-tests soak",
-    "hil-tests rates",
-    "hil-tests timing",
-    "hil-tests same",
-    "hil-tests stack",
-    "hil-tests faults",
-    "diagnosis counts",
-    "diagnosis events",
-    "diagnosis couplings",
-    "diagnosis kin",
-    "diagnosis audit",
-    "imu-stand plan",
-    "imu-stand tutorial",
-    "imu-stand resume",
-    "imu-stand bring_up",
-    "imu-stand live_page",
-    "imu-stand correct",
-    "hil-tests corrected",
-    "noise analyze",
-];
 
 /// How much is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,7 +65,7 @@ pub fn suite(root: &Path, extent: Extent) -> Result<(), Failure> {
     }
     let mut built = Built::default();
     steps.step("build of the tests", |root| {
-        built = Built::of(root)?;
+        built = Built::of(root, extent)?;
         Ok(format!("{} programs", built.tests.len()))
     })?;
     let mut beside = vec![];
@@ -116,7 +77,7 @@ pub fn suite(root: &Path, extent: Extent) -> Result<(), Failure> {
         })?;
         beside.push(short_demo(root, &built)?);
     }
-    steps.step("tests", |_| built.run(extent, &beside))?;
+    steps.step("tests", |root| built.run(root, extent, &beside))?;
     if extent != Extent::Everyday {
         beside_the_tests(&mut steps)?;
     }
@@ -229,16 +190,31 @@ struct Built {
 }
 
 impl Built {
-    fn of(root: &Path) -> Result<Self, Failure> {
-        let mut build = cargo(root, &["test", "--workspace", "--no-run"]);
-        build.arg("--message-format=json-render-diagnostics");
-        let said = watched(
-            "the build of the tests",
-            &mut build,
-            &mut Crates::default(),
-            &mut Pace::Steady,
-        )?;
-        Ok(Self::read(&said.out))
+    fn of(root: &Path, extent: Extent) -> Result<Self, Failure> {
+        // Examples are compiled by the lints, and run by nobody here.
+        let mut builds = vec![cargo(root, &["test", "--workspace", "--no-run", "--tests"])];
+        if extent == Extent::Everyday {
+            // Of the engine, which is compiled as a release is, the tests beside its code take as long to compile as all the rest.
+            let mut units = cargo(root, &["test", "--workspace", "--no-run", "--lib"]);
+            let mut others = cargo(root, &["test", "--workspace", "--no-run", "--bins"]);
+            for package in packages(root).iter().map(|folder| package_name(folder)) {
+                if LONG.contains(&format!("{package} {package}").as_str()) {
+                    units.args(["--exclude", &package]);
+                }
+            }
+            for name in quick(&integration_tests(root)) {
+                others.args(["--test", &name]);
+            }
+            builds = vec![others, units];
+        }
+        let mut messages = vec![];
+        for mut build in builds {
+            build.arg("--message-format=json-render-diagnostics");
+            let what = "the build of the tests";
+            let (mut crates, mut pace) = (Crates::default(), Pace::Steady);
+            messages.extend(watched(what, &mut build, &mut crates, &mut pace)?.out);
+        }
+        Ok(Self::read(&messages))
     }
 
     /// Of the messages of cargo, one a line, whose fields come in an order that does not matter here.
@@ -265,18 +241,15 @@ impl Built {
                 }
                 continue;
             }
-            let package = folder.file_name().unwrap_or_default().to_string_lossy();
-            let package = if package == "cli" {
-                "imu-stand".into()
-            } else {
-                package
-            };
+            let package = package_name(&folder);
+            let name = format!("{package} {name}");
             built.tests.push(TestProgram {
-                name: format!("{package} {name}"),
                 file,
                 arguments: vec![],
                 environment: vec![("CARGO_MANIFEST_DIR", folder.clone().into())],
                 folder,
+                waits: WAIT.contains(&name.as_str()),
+                name,
                 objection: |_| None,
             });
         }
@@ -294,28 +267,23 @@ impl Built {
     }
 
     /// Runs the test programs and others beside them, which are started first; one on each core.
-    fn run(&self, extent: Extent, beside: &[TestProgram]) -> Result<String, Failure> {
-        let started = || FIRST.iter().chain(LONG);
-        let unknown = started().find(|long| self.tests.iter().all(|test| test.name != **long));
-        if let Some(name) = unknown {
-            return Err(Failure::new(
-                &format!("`{name}` is listed as a long test and is none"),
-                "put xtask/src/suite.rs in order",
-            ));
-        }
+    fn run(&self, root: &Path, extent: Extent, beside: &[TestProgram]) -> Result<String, Failure> {
         let order = |test: &TestProgram| {
-            started()
-                .position(|long| *long == test.name)
-                .unwrap_or(usize::MAX)
+            let place = LONG.iter().position(|long| *long == test.name);
+            place.unwrap_or(usize::MAX)
         };
         let mut tests: Vec<&TestProgram> = self.tests.iter().collect();
         tests.sort_by_key(|test| order(test));
         if extent == Extent::Everyday {
             tests.retain(|test| !LONG.contains(&test.name.as_str()));
         }
-        let left_out = self.tests.len() - tests.len();
         tests.splice(0..0, beside);
         let done = side_by_side(&tests, extent == Extent::AllDraws)?;
+        // Where to look which program is a long one.
+        let seconds: String = (done.iter())
+            .map(|d| format!("{:7.1} s {}\n", d.seconds, d.name))
+            .collect();
+        let _ = std::fs::write(root.join("target/test-seconds.txt"), seconds);
         let failed: Vec<&str> = (done.iter())
             .filter(|d| !d.passed)
             .map(|d| d.name.as_str())
@@ -328,8 +296,8 @@ impl Built {
         }
         let passed: usize = done.iter().map(|d| d.tests).sum();
         let mut text = format!("{passed} passed in {} programs", done.len());
-        if left_out > 0 {
-            text += &format!("; {left_out} long ones are left to `cargo xtask test`");
+        if extent == Extent::Everyday {
+            text += &format!("; {} long ones are left to `cargo xtask test`", LONG.len());
         }
         Ok(text)
     }
@@ -356,6 +324,7 @@ fn short_demo(root: &Path, built: &Built) -> Result<TestProgram, Failure> {
         arguments: vec!["demo".into(), "--program".into(), program.into()],
         environment: vec![("CARGO_MANIFEST_DIR", root.join("xtask").into())],
         folder: root.to_owned(),
+        waits: false,
         objection,
     })
 }

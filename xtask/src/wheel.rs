@@ -89,6 +89,7 @@ impl Installed {
                 ("IMU_STAND_PROGRAM", program.into()),
             ],
             folder: root.join("crates/python"),
+            waits: false,
             objection: |_| None,
         }
     }

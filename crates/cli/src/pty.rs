@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use bench::{Run, SerialByte};
 use serialport::{SerialPort, TTYPort};
 
+use crate::link::DEFAULT_BAUD;
 use crate::stand::{Board, Stopped};
 
 /// Why the board cannot be served any longer.
@@ -28,9 +29,61 @@ pub enum PtyError {
     Image(#[from] Stopped),
 }
 
+/// The host's line to the board, which takes its time for each byte. A pseudo-terminal hands over at once whatever has piled up in
+/// it, as keep-alives do while a busy computer holds the board up; answers to all of them at one moment fill the board's queue
+/// and cost a sample, which a board on a cable does not lose.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cable {
+    /// When it was asked last, s.
+    last_s: f64,
+    /// Part of a byte that is under way.
+    part: f64,
+}
+
+/// The most that is read at once.
+const MOST: usize = 4096;
+
+impl Cable {
+    /// How many bytes at most arrive between the last call and `t` s, at a speed of the line.
+    pub fn carries(&mut self, t: f64, baud: u32) -> usize {
+        let bytes = (t - self.last_s).max(0.0) * f64::from(baud) / 10.0 + self.part;
+        let whole = (bytes as usize).min(MOST);
+        (self.last_s, self.part) = (self.last_s.max(t), bytes.fract());
+        whole
+    }
+
+    /// Reads what has arrived at the board by `t` s since power came on.
+    ///
+    /// # Errors
+    /// The pseudo-terminal's, where it is not that nobody is there or nothing has come.
+    pub fn read(&mut self, port: &mut TTYPort, t: f64) -> io::Result<Vec<u8>> {
+        // Both ends have the speed that the host has set.
+        let baud = port.baud_rate().unwrap_or(DEFAULT_BAUD);
+        let mut buffer = vec![0; self.carries(t, baud)];
+        if buffer.is_empty() {
+            return Ok(buffer);
+        }
+        match port.read(&mut buffer) {
+            Ok(count) => {
+                buffer.truncate(count);
+                Ok(buffer)
+            }
+            Err(error)
+                if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock)
+                    || error.raw_os_error() == Some(libc::EIO)
+                    || error.kind() == ErrorKind::BrokenPipe =>
+            {
+                Ok(Vec::new())
+            }
+            Err(error) => Err(error),
+        }
+    }
+}
+
 /// The board's end of a pseudo-terminal.
 pub struct Line {
     port: TTYPort,
+    cable: Cable,
     /// Bytes on their way to whoever has the other end open.
     out: Vec<u8>,
 }
@@ -47,6 +100,7 @@ impl Line {
         Ok((
             Line {
                 port,
+                cable: Cable::default(),
                 out: Vec::new(),
             },
             name,
@@ -74,20 +128,9 @@ impl Line {
         self.out.clear();
     }
 
-    /// What the other end has sent.
-    fn take(&mut self) -> io::Result<Vec<u8>> {
-        let mut buffer = [0; 256];
-        match self.port.read(&mut buffer) {
-            Ok(count) => Ok(buffer[..count].to_vec()),
-            Err(error)
-                if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock)
-                    || error.raw_os_error() == Some(libc::EIO)
-                    || error.kind() == ErrorKind::BrokenPipe =>
-            {
-                Ok(Vec::new())
-            }
-            Err(error) => Err(error),
-        }
+    /// What the other end has sent and has arrived by `t` s.
+    fn take(&mut self, t: f64) -> io::Result<Vec<u8>> {
+        self.cable.read(&mut self.port, t)
     }
 }
 
@@ -151,7 +194,7 @@ pub fn serve(line: Line, board: &Board, run: &Run, stop: &AtomicBool) -> Result<
         pace.wait(t);
         let mut line = line.borrow_mut();
         line.flush();
-        line.take().unwrap_or_else(|error| {
+        line.take(t).unwrap_or_else(|error| {
             failure.get_or_insert(error);
             Vec::new()
         })
@@ -184,6 +227,21 @@ mod tests {
         // And then it is the wall's again.
         pace.wait(0.4);
         assert!(pace.began.elapsed() >= Duration::from_millis(400));
+    }
+
+    #[test]
+    fn a_cable_carries_no_more_than_its_speed_lets_it_and_saves_nothing_up() {
+        let mut cable = Cable::default();
+        let sum = |cable: &mut Cable, from: u32, to: u32| -> usize {
+            let each = (from + 1..=to).map(|ms| cable.carries(f64::from(ms) * 1e-3, 38_400));
+            each.sum()
+        };
+        // 3.84 bytes in a millisecond; while the board starts, all that comes is lost at once.
+        assert_eq!(cable.carries(0.25, 38_400), 960);
+        assert_eq!(sum(&mut cable, 250, 1250), 3840);
+        assert!((3..=4).contains(&sum(&mut cable, 1250, 1251)));
+        assert_eq!(cable.carries(1e5, 38_400), MOST);
+        assert_eq!(cable.carries(1.0, 38_400), 0, "time goes one way");
     }
 
     #[test]

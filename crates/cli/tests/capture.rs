@@ -367,6 +367,42 @@ fn a_monitor_shows_what_the_board_sends_and_writes_its_last_view() {
     assert!((4.5..5.5).contains(&supply), "{supply}");
 }
 
+#[test]
+fn requests_that_have_piled_up_arrive_one_after_the_other_and_cost_no_sample() {
+    let board = Board::start();
+    wait(0.5);
+    let mut port = serialport::new(board.port(), 38_400)
+        .open()
+        .expect("it is there");
+    // What a capture that drives the motor has sent while the board was held up, at all times between two samples.
+    let asked = [
+        wire::Command::MotorDuty { duty: 0 },
+        wire::Command::GetCorrection {
+            other: false,
+            row: 0,
+        },
+        wire::Command::GetHello,
+        wire::Command::KeepAlive,
+    ];
+    let mut piled = vec![];
+    for command in asked {
+        let mut line = [0; wire::Request::FRAME_LEN];
+        let request = wire::Request { number: 7, command };
+        let length = wire::encode_request(&request, &mut line).expect("it fits");
+        piled.extend(&line[..length]);
+    }
+    for _ in 0..40 {
+        std::io::Write::write_all(&mut port, &piled).expect("the line takes it");
+        wait(0.107);
+    }
+    drop(port);
+    let health = folder("capture_piled").join("health.json");
+    assert_success(&board.ask(&["health", "--json", health.to_str().unwrap()]));
+    let counters = &json(&health)["counters"];
+    assert_eq!(counters["frame_dropped"], 0, "{counters}");
+    assert_eq!(counters["rx_overrun"], 0, "{counters}");
+}
+
 /// A capture with the motor driven to and fro. `None`: the computer was too busy to keep the motor alive, and the board
 /// stopped it.
 fn driven(name: &str) -> Option<Record> {

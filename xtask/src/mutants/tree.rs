@@ -51,7 +51,7 @@ fn stages(package: &str) -> &'static [&'static [&'static str]] {
 /// Tests of the image that meet what the host's did not notice: programs of `hil-tests`.
 fn of_the_image(package: &str) -> &'static [&'static str] {
     match package {
-        "firmware" => &["boot", "motor", "faults", "flood"],
+        "firmware" => &["boot", "motor", "stop", "faults", "flood"],
         _ => &[],
     }
 }
@@ -323,7 +323,17 @@ fn end(child: &mut Child) {
 
 #[cfg(test)]
 mod tests {
-    use super::{failed, failed_so_far, forget};
+    use super::{failed, failed_so_far, forget, of_the_image};
+
+    #[test]
+    fn what_meets_the_image_is_there_and_the_motors_stop_is_among_it() {
+        let tests = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../hil-tests/tests");
+        let programs = of_the_image("firmware");
+        assert!(programs.contains(&"stop"));
+        for program in programs {
+            assert!(tests.join(format!("{program}.rs")).exists(), "{program}");
+        }
+    }
 
     #[test]
     fn what_was_renamed_is_gone_from_the_copy_and_what_was_built_stays() {

@@ -19,6 +19,8 @@ pub struct TestProgram {
     pub environment: Vec<(&'static str, OsString)>,
     /// Folder in which it runs: of its package, as cargo would run it.
     pub folder: PathBuf,
+    /// It waits for a clock more than it computes, so that it needs no core of its own.
+    pub waits: bool,
     /// What is wrong with the lines that it printed, where it ended well.
     pub objection: fn(&[String]) -> Option<String>,
 }
@@ -44,22 +46,29 @@ pub struct Done {
     pub said: String,
 }
 
-/// Runs test programs, as many at a time as there are cores, each with one thread; prints what the failed ones said, and
-/// how long the longest took. Tests that grade by rates make all their draws, or a sample.
+/// Runs test programs, as many at a time as there are cores and one more of those that wait; prints what
+/// the failed ones said, and how long the longest took. Tests that grade by rates make all their draws, or a sample.
 pub fn side_by_side(tests: &[&TestProgram], all_draws: bool) -> Result<Vec<Done>, Failure> {
     let mut progress = Progress::new("tests", Pace::Steady);
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    let next = Mutex::new(tests.iter());
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let (waiting, computing): (Vec<_>, Vec<_>) = tests.iter().partition(|test| test.waits);
+    let (waiting, computing) = [waiting, computing]
+        .map(|tests| Mutex::new(tests.into_iter()))
+        .into();
     let (send, results) = channel();
     let mut done: Vec<Done> = Vec::new();
     let mut broken = None;
     std::thread::scope(|scope| {
-        for _ in 0..workers {
-            let (send, next) = (send.clone(), &next);
+        for worker in 0..=cores {
+            let send = send.clone();
+            let (waiting, computing) = (&waiting, &computing);
             scope.spawn(move || {
+                let next = |tests: &Mutex<std::vec::IntoIter<_>>| tests.lock().ok()?.next();
                 loop {
-                    let test = next.lock().ok().and_then(|mut tests| tests.next());
-                    let Some(test) = test else { return };
+                    let computes = (worker < cores).then(|| next(computing)).flatten();
+                    let Some(test) = computes.or_else(|| next(waiting)) else {
+                        return;
+                    };
                     if send.send(run_one(test, all_draws)).is_err() {
                         return;
                     }
@@ -101,7 +110,7 @@ pub fn side_by_side(tests: &[&TestProgram], all_draws: bool) -> Result<Vec<Done>
 fn run_one(test: &TestProgram, all_draws: bool) -> Result<Done, Failure> {
     let from = Instant::now();
     let mut program = test.command();
-    program.env("RUST_TEST_THREADS", "1");
+    program.env("RUST_TEST_THREADS", if test.waits { "4" } else { "1" });
     if all_draws {
         // Read by crates/diagnosis/tests/draws/mod.rs.
         program.env("IMU_STAND_ALL_DRAWS", "1");

@@ -1,7 +1,7 @@
 //! A simulated board behind a real serial device (a pseudo-terminal), and the program run as a user runs it.
 #![allow(dead_code)] // Each test binary uses its own part.
 
-use std::io::{Read as _, Write as _};
+use std::io::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use bench::{Run, Scenario, Timeline};
-use imu_stand::pty::Pace;
+use imu_stand::pty::{Cable, Pace};
 use serialport::{SerialPort as _, TTYPort};
 use wire::{Decoder, Frame, Request, RequestDecoder, encode_request};
 
@@ -284,18 +284,17 @@ fn serve(
         seconds: 1e5,
         requests: vec![],
     };
-    let mut pace = Pace::default();
+    let (mut pace, mut cable) = (Pace::default(), Cable::default());
     let mut requests = RequestDecoder::new();
     let mut request = Vec::new();
     let listen = |t: f64| {
         pace.wait(t);
-        let mut buffer = [0; 256];
-        let count = match &mut *ends.lock().unwrap() {
-            Some((master, _)) => master.read(&mut buffer).unwrap_or(0),
-            None => 0,
+        let arrived = match &mut *ends.lock().unwrap() {
+            Some((master, _)) => cable.read(master, t).unwrap_or_default(),
+            None => Vec::new(),
         };
         let mut through = std::mem::take(&mut *aside.lock().unwrap());
-        for &byte in &buffer[..count] {
+        for byte in arrived {
             request.push(byte);
             let decoded = requests.push(byte);
             if byte == 0 {

@@ -189,6 +189,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 .seconds
                 .is_some_and(|seconds| began.elapsed().as_secs_f64() >= seconds)
     };
+    // A port that fails right here is gone for the loop below, which waits for it.
+    let _ = feed.ask();
     let listened = capture.listen(&mut feed, is_over);
     let listened = listened.and(capture.halt(&mut feed));
     // What has arrived is kept, whatever ended it.
@@ -291,8 +293,6 @@ impl<'a> Capture<'a> {
     }
 
     fn listen(&mut self, feed: &mut Feed, is_over: impl Fn(&Feed) -> bool) -> Result<()> {
-        // A port that fails right here is gone for the loop below, which waits for it.
-        let _ = feed.ask();
         let (mut heard, mut shown, mut asked) = (Instant::now(), Instant::now(), Instant::now());
         while !is_over(feed) {
             let mut written = Ok(());
