@@ -2,6 +2,7 @@
 
 use model::record::{FULL_DUTY, Quantity};
 
+use super::error::brief;
 use super::{CaptureError, STANDARD_GRAVITY};
 
 /// Unit of a gyro channel that holds the angle.
@@ -247,7 +248,7 @@ pub(super) fn convert(what: What, given: Option<&str>) -> Result<Conversion, Cap
     let found = known(given).and_then(|unit| scale(what, unit));
     found.or_else(|| multiple(what, given)).ok_or_else(|| CaptureError::Option {
         option: "--units",
-        why: format!("`{given}` is no unit of {}", what.in_words()),
+        why: format!("`{}` is no unit of {}", brief(given), what.in_words()),
         help: "time: s, ms, us, ns; gyro: deg/s, rad/s, mrad/s, deg/h, mdps, or of an angle deg, rad, arcsec; acc: m/s2, g, \
                mg; temp: degC, K, degF; supply: V, mV; pwm: 1 (-255 to 255), % or fraction (of the full command); a number \
                before it multiplies it, as for counts of 131 a deg/s: gyro=0.00763deg/s"
