@@ -80,6 +80,7 @@ pub enum BrowserError {
 #[derive(Clone, Debug)]
 pub struct Browser {
     path: PathBuf,
+    at_most: Duration,
 }
 
 impl Browser {
@@ -91,14 +92,25 @@ impl Browser {
         let named = std::env::var_os(VARIABLE).map(PathBuf::from);
         if let Some(path) = named {
             let is_there = path.is_file();
-            return is_there.then_some(Self { path }).ok_or(BrowserError::None);
+            return is_there.then(|| Self::at(path)).ok_or(BrowserError::None);
         }
         let folders = std::env::var_os("PATH").unwrap_or_default();
         let by_name =
             std::env::split_paths(&folders).flat_map(|folder| NAMES.map(|name| folder.join(name)));
         let mut all = by_name.chain(PLACES.map(PathBuf::from));
         let path = all.find(|path| path.is_file());
-        path.map(|path| Self { path }).ok_or(BrowserError::None)
+        path.map(Self::at).ok_or(BrowserError::None)
+    }
+
+    fn at(path: PathBuf) -> Self {
+        let at_most = AT_MOST;
+        Self { path, at_most }
+    }
+
+    /// The same for a page that computes longer.
+    #[must_use]
+    pub fn patient(self, at_most: Duration) -> Self {
+        Self { at_most, ..self }
     }
 
     /// Its place.
@@ -249,7 +261,7 @@ impl Browser {
             .stderr(stderr)
             .spawn()
             .map_err(|error| self.failed(&error.to_string()))?;
-        let ended = waited(child);
+        let ended = waited(child, self.at_most);
         let [said, errors] = out.map(|path| {
             let bytes = std::fs::read(path).unwrap_or_default();
             String::from_utf8_lossy(&bytes).into_owned()
@@ -263,9 +275,9 @@ impl Browser {
 }
 
 /// Whether it succeeded; nothing where it took too long, and was ended.
-fn waited(mut child: Child) -> Option<bool> {
+fn waited(mut child: Child, at_most: Duration) -> Option<bool> {
     let begin = Instant::now();
-    while begin.elapsed() < AT_MOST {
+    while begin.elapsed() < at_most {
         match child.try_wait() {
             Ok(Some(status)) => return Some(status.success()),
             Ok(None) => std::thread::sleep(PAUSE),

@@ -117,6 +117,10 @@ fn our_own_names_with_a_unit_from_anywhere_need_no_mapping() {
         ("time,gyro_x,gyro_y\n", 1e3, RAD, "time=ms,gyro=rad/s"),
         ("time (ms),gyro_x (rad/s),gyro_y (rad/s)\n", 1e3, RAD, ""),
         ("time,gyro_x,gyro_y\ns,deg/s,deg/s\n", 1.0, 1.0, ""),
+        // A time of another name that says its unit.
+        ("time_ms,gyro_x,gyro_y\n", 1e3, RAD, "gyro=rad/s"),
+        ("timestamp_ns,gyro_x,gyro_y\n", 1e9, 1.0, "gyro=deg/s"),
+        ("t_us,gyro_x (rad/s),gyro_y (rad/s)\n", 1e6, RAD, ""),
         ("time,gyro_x,gyro_y\n[us],[°/s],[°/s]\n", 1e6, 1.0, ""),
         (
             "# unit of gyro_x: deg/s\n# unit of gyro_y: deg/s\ntime,gyro_x,gyro_y\n",
@@ -211,8 +215,8 @@ fn a_gyros_unit_is_asked_for_what_is_assumed_is_told_and_what_contradicts_itself
         (map, "gyro=deg/s,gyro=rad/s", "`gyro` is given twice"),
         ("gyro_x=gx,gyro_x=gy", "", "`gyro_x` is given twice"),
         (map, "gyros=deg/s", "`gyros` is neither"),
-        (map, "gyro=furlong/s", "no unit of deg/s"),
-        (map, "time=deg/s", "no unit of s"),
+        (map, "gyro=furlong/s", "no unit of an angular rate"),
+        (map, "time=deg/s", "no unit of time"),
         ("time=t,gyro_x=hx", "", "there is no column `hx`"),
     ] {
         let said = error(text.as_bytes(), columns, units);

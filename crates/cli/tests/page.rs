@@ -4,6 +4,7 @@
 mod common;
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use common::{assert_success, folder, program};
 use imu_stand::browser::Browser;
@@ -71,10 +72,17 @@ dispatchEvent(new DragEvent('drop', { dataTransfer: transfer }));
 
 /// What the page makes of a file.
 fn dropped(file: &Path, beside: &Path) -> Option<Value> {
+    dropped_within(file, beside, Duration::from_secs(120))
+}
+
+/// The same of a page that takes so long at the most.
+fn dropped_within(file: &Path, beside: &Path, at_most: Duration) -> Option<Value> {
     let (page, browser) = page()?;
+    let browser = browser.patient(at_most);
     let bytes = std::fs::read(file).expect("a file");
     let name = file.file_name().expect("a name").to_string_lossy();
-    let user = USER.replace("FILE", &base64(&bytes)).replace("NAME", &name);
+    // The name first: 40 million letters have any four of them in a row.
+    let user = USER.replace("NAME", &name).replace("FILE", &base64(&bytes));
     let (start, end) = page.rsplit_once("</body>").expect("a body");
     let shown = [start, &user, end].concat();
     let (dom, console) = browser.dom(&shown, beside).expect("it shows a page");
@@ -237,6 +245,47 @@ fn a_measured_record_dropped_on_the_page_is_diagnosed_as_by_the_program() {
     };
     let file = data.join("mpu6050_static_20hz_600s.csv.gz");
     assert_same(&file, &folder("page_measured").join("look"), &[]);
+}
+
+/// Two busy cores take a part of it.
+const OF_A_DAY: Duration = Duration::from_secs(3600);
+
+/// A day at 20 Hz, in the 4 GB that the engine has there. It takes minutes, so it runs where it is asked for.
+#[test]
+fn a_day_dropped_on_the_page_is_diagnosed_as_by_the_program() {
+    if std::env::var_os("IMU_STAND_DAY").is_none() {
+        eprintln!("NOT TESTED: IMU_STAND_DAY is unset, and a day takes minutes");
+        return;
+    }
+    let folder = folder("page_day");
+    let ran = |words: &str| {
+        let mut command = program(&words.split(' ').collect::<Vec<_>>());
+        assert_success(&command.current_dir(&folder).output().expect("it starts"));
+    };
+    ran("simulate --seconds 86400 --seed 3 --out day.csv.gz");
+    let file = folder.join("day.csv.gz");
+    let Some(said) = dropped_within(&file, &folder.join("look"), OF_A_DAY) else {
+        return;
+    };
+    let done = &said["done"];
+    assert!(done.is_object(), "{:?}", said["failures"]);
+    ran("diagnose day.csv.gz --quiet --json day.json");
+    let parsed = |text: &str| serde_json::from_str::<Value>(text).expect("JSON");
+    let ours = parsed(done["json"].as_str().expect("text"));
+    let theirs = parsed(&std::fs::read_to_string(folder.join("day.json")).expect("JSON"));
+    assert_eq!(ours["input"]["samples"], 1_728_000);
+    for key in ["input", "verdict", "findings", "unexplained"] {
+        let (mut out, mut largest) = (Vec::new(), 0.0);
+        differences(key, &ours[key], &theirs[key], &mut out, &mut largest);
+        assert!(out.is_empty(), "{out:#?}");
+    }
+    let page = done["html"].as_str().expect("a report");
+    assert!(
+        page.matches("<svg").count() >= 9 && page.len() < 4_000_000,
+        "{}",
+        page.len()
+    );
+    eprintln!("{}", said["said"]);
 }
 
 /// White noise by a generator whose period is longer than the record.

@@ -166,3 +166,33 @@ fn the_convicting_figures_can_be_had_as_files() {
     assert_eq!(svg.matches("<svg ").count(), svg.matches("</svg>").count());
     assert!(svg.contains("degC"));
 }
+
+/// The model without the motion is the sensor at rest, no bias that walks away: the scale is that of the sway.
+#[test]
+fn a_base_that_sways_is_shown_beside_the_sensor_at_rest() {
+    let folder = folder("report_sway");
+    let line =
+        "run --native --hide uncalibrated --seed 1795691001 --quiet --no-replicates --out sway.csv";
+    succeed(program().current_dir(&folder).args(line.split(' ')));
+    let line = "report sway.csv --quiet --no-replicates --figures figures --out r.html";
+    succeed(program().current_dir(&folder).args(line.split(' ')));
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("it was written");
+    let texts = |svg: &str| -> Vec<f64> {
+        let parts = svg.split('>').filter_map(|part| part.split('<').next());
+        parts.filter_map(|text| text.trim().parse().ok()).collect()
+    };
+    // Ticks of the rate, beside those of the time, 0 to 600 s.
+    let motion = read("figures/base_motion-gyro_x.svg");
+    let ticks = texts(&motion);
+    assert!(ticks.contains(&4.0) && ticks.contains(&-4.0), "{ticks:?}");
+    assert!(
+        ticks.iter().all(|t| t.abs() < 20.0 || *t >= 100.0),
+        "{ticks:?}"
+    );
+    assert!(motion.contains("simulated without it"));
+    let cross = texts(&read("figures/cross_axis-gyro_y.svg"));
+    assert!(cross.iter().all(|t| t.abs() < 20.0), "{cross:?}");
+    let page = read("r.html");
+    assert!(page.contains("The other causes stay in the simulation."));
+    assert!(page.contains("leaves the figure: its band reaches"));
+}

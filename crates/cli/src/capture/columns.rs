@@ -12,7 +12,7 @@ use super::foreign::meaning;
 use super::header::Lines;
 use super::mapped::{beside_ours, by_known_names, mapped};
 use super::names::{TIMES, left, meant, missing, not_read, respelt};
-use super::propose::unknown;
+use super::propose::{stated_time, unknown};
 use super::units::{COUNTS, What, convert, in_brackets};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
 
@@ -95,7 +95,27 @@ impl Columns {
 
 /// Chooses: the mapping's columns; those of the stand's own format; or those of our names, in the units stated.
 pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
-    let found = if !mapping.columns.is_empty() {
+    let found = chosen(said, mapping);
+    if let Err(CaptureError::MissingKey { .. }) = &found {
+        // A misspelt key of `--units` leaves the cells as counts.
+        let stems = said.names.iter().map(|name| in_brackets(name).0);
+        mapping.check_units(stems)?;
+    }
+    let found = found?;
+    if !mapping.columns.is_empty() && !found.columns.iter().any(is_measured) {
+        return Err(unknown(
+            said.names,
+            "`--columns` names nothing that was measured".to_owned(),
+        ));
+    }
+    let names = found.columns.iter().map(|c| c.name.as_str());
+    mapping.check_units(names)?;
+    not_twice(said, mapping, &found)?;
+    Ok(found)
+}
+
+fn chosen(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
+    Ok(if !mapping.columns.is_empty() {
         match beside_ours(said, mapping) {
             Some((names, units)) => {
                 let said = Said {
@@ -130,17 +150,7 @@ pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Column
             }
             None => by_our_names(said, mapping)?,
         }
-    };
-    if !mapping.columns.is_empty() && !found.columns.iter().any(is_measured) {
-        return Err(unknown(
-            said.names,
-            "`--columns` names nothing that was measured".to_owned(),
-        ));
-    }
-    let names = found.columns.iter().map(|c| c.name.as_str());
-    mapping.check_units(names)?;
-    not_twice(said, mapping, &found)?;
-    Ok(found)
+    })
 }
 
 /// Refuses a name that two columns have, where it was not its number that chose one of them.
@@ -255,13 +265,18 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
         return own(said, said.names, mapping);
     }
     let has = |name: &str| names.iter().any(|n| n == name);
+    let has_time = TIMES.iter().any(|name| has(name)) || has("host_time_s") || has("t_ticks");
+    let other_time = stated_time(said.names).filter(|_| !has_time);
     let mut found = Columns {
         notes,
         ..Columns::default()
     };
     let (mut counted, mut assumed, mut unread) = (Vec::new(), Vec::new(), Vec::new());
     for (at, theirs) in stems.iter().enumerate() {
-        let name = stem(at);
+        let name = match other_time {
+            Some(time) if time == at => TIMES[0],
+            _ => stem(at),
+        };
         let (quantity, _) = meaning(name);
         let unit = unit(at, What::Channel(quantity));
         let role = match name {

@@ -50,8 +50,8 @@ pub enum CaptureError {
     #[diagnostic(
         code(capture::missing_key),
         help(
-            "where the cells are counts, add a line `# {key}: VALUE` before the column names; where they are measured values, \
-             say their unit: `--units gyro=deg/s` or `gyro=rad/s`, `acc=m/s2` or `acc=g`"
+            "where the cells are measured values, say their unit: `--units gyro=deg/s` or `gyro=rad/s`, `acc=m/s2` or `acc=g`; \
+             where they are counts, add a line `# {key}: VALUE` before the column names"
         )
     )]
     MissingKey {

@@ -3,7 +3,7 @@
 use model::record::{Axis, Quantity};
 
 use super::CaptureError;
-use super::units::What;
+use super::units::{COUNTS, What, convert, known};
 
 /// What a unit can be given for.
 const QUANTITIES: [&str; 7] = ["time", "gyro", "acc", "temp", "supply", "pwm", "other"];
@@ -21,7 +21,7 @@ impl ColumnMapping {
     /// From the texts of the options, `time=time_s,gyro_x=gx_dps` and `gyro=deg/s,acc=m/s2`.
     ///
     /// # Errors
-    /// [`CaptureError::Option`] where a text is no list of `a=b`.
+    /// [`CaptureError::Option`] where a text is no list of `a=b`, or a unit is of another quantity.
     pub fn parse(columns: Option<&str>, units: Option<&str>) -> Result<Self, CaptureError> {
         let columns = pairs(
             "--columns",
@@ -33,7 +33,28 @@ impl ColumnMapping {
             units,
             "write `--units time=ms,gyro=deg/s,acc=m/s2,temp=degC,supply=V`",
         )?;
-        Ok(Self { columns, units })
+        let mapping = Self { columns, units };
+        mapping.have_their_units()?;
+        Ok(mapping)
+    }
+
+    /// An error where a quantity was given a unit of another one, whether the file has such a channel or not.
+    fn have_their_units(&self) -> Result<(), CaptureError> {
+        let of = |key: &str| match key {
+            "time" => Some(What::Time),
+            "gyro" => Some(What::Channel(Quantity::Gyro)),
+            "acc" => Some(What::Channel(Quantity::Acc)),
+            "temp" => Some(What::Channel(Quantity::Temp)),
+            "supply" => Some(What::Channel(Quantity::Supply)),
+            "pwm" => Some(What::Channel(Quantity::Pwm)),
+            _ => None,
+        };
+        for (key, unit) in &self.units {
+            if let Some(what) = of(key).filter(|_| known(unit) != Some(COUNTS)) {
+                convert(what, Some(unit))?;
+            }
+        }
+        Ok(())
     }
 
     /// The unit that was given for a channel: by its name, or by its quantity.

@@ -279,6 +279,21 @@ pub(super) fn nearest(name: &str) -> Option<String> {
     }
 }
 
+/// The place of the column whose name calls itself a time and says its unit, where it is the only one: `time_ms`,
+/// `timestamp_ns`.
+pub(super) fn stated_time(names: &[String]) -> Option<usize> {
+    let is_time = |name: &String| {
+        let words = words(in_brackets(name).0);
+        let first = words.first().map_or("", String::as_str);
+        let is_called_so = ["time", "zeit", "stamp"]
+            .iter()
+            .any(|s| first.starts_with(s));
+        (is_called_so || first == "t") && unit_of(name, What::Time, names).is_some()
+    };
+    let mut all = (0..names.len()).filter(|at| is_time(&names[*at]));
+    all.next().filter(|_| all.next().is_none())
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Time,

@@ -2,6 +2,7 @@
 
 use model::record::{FULL_DUTY, Quantity};
 
+use super::error::brief;
 use super::{CaptureError, STANDARD_GRAVITY};
 
 /// Unit of a gyro channel that holds the angle.
@@ -114,6 +115,21 @@ pub(super) enum What {
     Time,
     /// Of a channel.
     Channel(Quantity),
+}
+
+impl What {
+    /// In a sentence.
+    fn in_words(self) -> &'static str {
+        match self {
+            Self::Time => "time",
+            Self::Channel(Quantity::Gyro) => "an angular rate",
+            Self::Channel(Quantity::Acc) => "an acceleration",
+            Self::Channel(Quantity::Temp) => "a temperature",
+            Self::Channel(Quantity::Supply) => "a voltage",
+            Self::Channel(Quantity::Pwm) => "a motor command",
+            Self::Channel(Quantity::Other | Quantity::Derived) => "this channel",
+        }
+    }
 }
 
 /// How cells become values of ours: value = (cell - zero) * scale, in `unit`.
@@ -232,7 +248,7 @@ pub(super) fn convert(what: What, given: Option<&str>) -> Result<Conversion, Cap
     let found = known(given).and_then(|unit| scale(what, unit));
     found.or_else(|| multiple(what, given)).ok_or_else(|| CaptureError::Option {
         option: "--units",
-        why: format!("`{given}` is no unit of {}", usual(what)),
+        why: format!("`{}` is no unit of {}", brief(given), what.in_words()),
         help: "time: s, ms, us, ns; gyro: deg/s, rad/s, mrad/s, deg/h, mdps, or of an angle deg, rad, arcsec; acc: m/s2, g, \
                mg; temp: degC, K, degF; supply: V, mV; pwm: 1 (-255 to 255), % or fraction (of the full command); a number \
                before it multiplies it, as for counts of 131 a deg/s: gyro=0.00763deg/s"

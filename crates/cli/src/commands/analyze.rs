@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Only these channels: gyro_x,acc_z,...
     #[arg(long, value_delimiter = ',')]
     channels: Option<Vec<String>>,
-    /// Print what is to be said against the paper's two figures, too
+    /// Print what is to be said against the paper's two figures, and against those that are read off the same way, too
     #[arg(long)]
     paper: bool,
     /// Seed of the replicates behind intervals
@@ -82,13 +82,17 @@ fn print(analysis: &Analysis, with_paper: bool) {
     }
     point_to_diagnosis(analysis);
     attitude(analysis);
+    let of = match all().any(|(_, channel)| is_rate(channel)) {
+        true => "the paper's procedure",
+        false => READ_OFF,
+    };
     match (notes.len(), with_paper) {
         (0, _) => return,
         (count, false) => {
-            say!("\n--paper: {count} notes on the paper's procedure");
+            say!("\n--paper: {count} notes on {of}");
             return;
         }
-        (_, true) => say!("\non the paper's procedure"),
+        (_, true) => say!("\non {of}"),
     }
     for (note, channels) in notes {
         say!(
@@ -96,6 +100,15 @@ fn print(analysis: &Analysis, with_paper: bool) {
             text::item(&format!("{}: ", channels.join(", ")), note)
         );
     }
+}
+
+/// The two figures of a channel that is no gyro: the line of slope -1/2 at 1 s, and the level of the flat part. The paper's
+/// procedure is for gyros.
+const READ_OFF: &str = "read off the deviations";
+
+/// Whether it is a gyro's rate.
+fn is_rate(channel: &ChannelAnalysis) -> bool {
+    channel.unit == "deg/s"
 }
 
 /// What was analyzed, and how the figures are to be read.
@@ -127,15 +140,24 @@ fn of_channel(name: &str, channel: &ChannelAnalysis, of_record: &[String]) {
     for warning in channel.warnings.iter().filter(is_told) {
         say!("{}", text::item("warning: ", warning));
     }
-    say!("  by the paper's procedure");
+    let rate = is_rate(channel);
+    let of = if rate {
+        "by the paper's procedure"
+    } else {
+        READ_OFF
+    };
+    say!("  {of}");
     interval(
         walk_of_the_integral(&channel.parameters),
         &channel.paper.angle_random_walk,
     );
-    interval(
-        "in-run bias stability",
-        &channel.paper.in_run_bias_stability,
-    );
+    // A bias is an inertial sensor's.
+    let flat = if rate || is_inertial(&channel.parameters) {
+        "in-run bias stability"
+    } else {
+        "level of the flat part"
+    };
+    interval(flat, &channel.paper.in_run_bias_stability);
     if let Some(last) = channel.angle.as_ref().and_then(|a| a.points.last())
         && let Some(angle) = &channel.angle
     {
@@ -250,6 +272,11 @@ fn walk_of_the_integral(p: &NoiseParameters) -> &'static str {
     }
 }
 
+/// Whether it is a gyro or an accelerometer.
+fn is_inertial(p: &NoiseParameters) -> bool {
+    walk_of_the_integral(p) != "white noise"
+}
+
 /// N, B, K, R and Q, a line each, with a mark where the terms do not describe the record.
 pub fn parameters(p: &NoiseParameters, hold: bool) {
     let n = walk_of_the_integral(p);
@@ -261,7 +288,11 @@ pub fn parameters(p: &NoiseParameters, hold: bool) {
     let mark = if hold { "" } else { "  ?" };
     let line = |name: &str, of: &Interval| marked(name, of, mark);
     line(&format!("N {n}"), &p.angle_random_walk);
-    line("B bias instability", &p.bias_instability);
+    let b = match is_inertial(p) {
+        true => "B bias instability",
+        false => "B flicker noise",
+    };
+    line(b, &p.bias_instability);
     line(k, &p.rate_random_walk);
     line(r, &p.rate_ramp);
     line("Q quantization noise", &p.quantization_noise);

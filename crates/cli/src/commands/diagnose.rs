@@ -128,6 +128,7 @@ fn alone(arguments: &Arguments, path: &Path) -> Result<()> {
         let fitted = diagnosed.extended_model.clone().excited_like(&record);
         super::write(path, &fitted.to_toml())?;
     }
+    super::write_json(arguments.json.as_ref(), &diagnosed.diagnosis)?;
     if !arguments.input.quiet {
         say!("{}", text::diagnosis(&diagnosed).trim_end());
         match arguments.details {
@@ -147,7 +148,7 @@ fn alone(arguments: &Arguments, path: &Path) -> Result<()> {
         };
         super::report::write(page, &subject, arguments.input.quiet)?;
     }
-    super::write_json(arguments.json.as_ref(), &diagnosed.diagnosis)
+    Ok(())
 }
 
 /// What is left of one of several: what is said of it, and what is written.

@@ -100,7 +100,8 @@ pub struct Replicates {
     #[arg(long, conflicts_with = "replicates")]
     no_replicates: bool,
     /// Change of an angle error or of a deviation, percent, from which on a cause, or what has no name, is material
-    #[arg(long, value_name = "PERCENT", default_value_t = 100.0 * diagnosis::MATTERS, value_parser = positive)]
+    #[arg(long, value_name = "PERCENT", default_value_t = 100.0 * diagnosis::MATTERS, value_parser = positive,
+        allow_negative_numbers = true)]
     matters: f64,
 }
 

@@ -138,6 +138,13 @@ impl Outputs {
             }
         }
         has_folder(option, path)?;
+        if path.is_dir() {
+            miette::bail!(
+                help = "name a file in it",
+                "{option}: {} is a folder",
+                path.display()
+            );
+        }
         self.taken.push((option, path.clone()));
         // Devices and pipes lose nothing.
         Ok(path.is_file().then_some(path))

@@ -7,7 +7,7 @@ use diagnosis::DiagnoseOptions;
 use imu_stand::browser::Browser;
 use imu_stand::report::{Subject, figure_files, report, standalone};
 use imu_stand::text::shell_word;
-use miette::{IntoDiagnostic, Result, WrapErr};
+use miette::Result;
 
 use super::{Input, Outputs, Replicates};
 
@@ -42,6 +42,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Outputs::beside([&arguments.capture])
         .result("--out", Some(&arguments.out))?
         .result("--pdf", arguments.pdf.as_ref())?;
+    if let Some(folder) = arguments.figures.as_ref().filter(|f| f.exists()) {
+        miette::ensure!(
+            folder.is_dir(),
+            help = "name a folder, which is made where it is not there",
+            "--figures: {} is a file",
+            folder.display()
+        );
+    }
     // Before the work: without a browser there is no PDF.
     let printer = match &arguments.pdf {
         Some(path) if path.as_os_str() == super::outputs::DASH => {
@@ -91,9 +99,7 @@ fn write_figures(
     quiet: bool,
 ) -> Result<()> {
     let figures = figure_files(subject).map_err(|error| miette::miette!("no figures: {error}"))?;
-    std::fs::create_dir_all(folder)
-        .into_diagnostic()
-        .wrap_err_with(|| folder.display().to_string())?;
+    std::fs::create_dir_all(folder).map_err(|error| super::outputs::failed(folder, &error))?;
     if figures.is_empty() && !quiet {
         say!("no figure: no cause was found that one shows");
     }

@@ -5,6 +5,7 @@ use diagnosis::result::{Evidence, Finding};
 use maud::{Markup, html};
 use model::effect::Plot;
 use model::effects::effect;
+use model::file::ModelFile;
 use model::record::Record;
 
 use super::exhibits::views::{self, Pair};
@@ -28,7 +29,6 @@ struct Convicting {
 /// Of all findings.
 fn all(subject: &Subject<'_>) -> Vec<Convicting> {
     let diagnosed = subject.diagnosed;
-    let mut without = None;
     let mut out = vec![];
     let mut drawn: Vec<&Evidence> = vec![];
     for finding in &diagnosed.diagnosis.findings {
@@ -51,8 +51,8 @@ fn all(subject: &Subject<'_>) -> Vec<Convicting> {
             });
         }
         if own.is_empty() {
-            let without = without.get_or_insert_with(|| without_causes(subject));
-            out.extend(without.as_ref().and_then(|r| view(subject, finding, r)));
+            let without = simulated_without(subject, finding);
+            out.extend(without.and_then(|r| view(subject, finding, &r)));
         }
     }
     out
@@ -132,11 +132,13 @@ fn caption(evidence: &Evidence) -> String {
     }
 }
 
-/// A simulation of the baseline in the world of the record; `None` where the model cannot be simulated.
-fn without_causes(subject: &Subject<'_>) -> Option<Record> {
+/// A simulation of the extended model without this one cause, in the world of the record; `None` where it cannot be
+/// simulated. The baseline will not do: it was fitted to the record with all causes in it, and makes of a base that sways a
+/// bias that walks by tens of deg/s.
+fn simulated_without(subject: &Subject<'_>, finding: &Finding) -> Option<Record> {
     /// Half of the counts of the stand's gyro, 14 bits and a sign.
     const COUNTS: f64 = 8192.0;
-    let mut model = subject.diagnosed.baseline_model.clone();
+    let mut model = without(&subject.diagnosed.extended_model, finding);
     // A record that names no step gets one that its largest reading fits into.
     for channel in model.channels.iter_mut().filter(|c| c.lsb.is_none()) {
         let readings = subject.record.channel(&channel.name)?;
@@ -145,6 +147,22 @@ fn without_causes(subject: &Subject<'_>) -> Option<Record> {
         channel.lsb = (largest > 0.0 && largest.is_finite()).then_some(largest / COUNTS);
     }
     model::simulate_in_the_world_of(&model, subject.record, model.rate_hz, subject.seed).ok()
+}
+
+/// The model without the effects of a finding, and without the details of a cause that is gone.
+fn without(extended: &ModelFile, finding: &Finding) -> ModelFile {
+    let mut model = extended.clone();
+    let shares = |channels: &[String]| {
+        channels.is_empty() || channels.iter().any(|c| finding.channels.contains(c))
+    };
+    model
+        .effects
+        .retain(|e| e.cause != finding.cause || !shares(&e.channels));
+    let is_left = |cause: &String| model.effects.iter().any(|e| e.cause == *cause);
+    model
+        .unnamed
+        .retain(|term| term.refines.as_ref().is_none_or(is_left));
+    model
 }
 
 /// The view that the effect names; `None` where the record lacks what it is made of.
@@ -181,8 +199,16 @@ fn view(subject: &Subject<'_>, finding: &Finding, without: &Record) -> Option<Co
         at: (finding.times_s.first()).map(|t| (t * rate_hz).round() as usize),
     };
     let plot = place(docs.example.plot, finding, channel);
-    let figure = views::figure(plot, channel, &pair).ok()?;
-    Some(shown(channel, figure, views::caption(plot, pair.labels)))
+    let mut figure = views::figure(plot, channel, &pair).ok()?;
+    if matches!(plot, Plot::RateInTime { .. }) {
+        // On a narrow page what was measured would hide what is simulated.
+        figure.layers.rotate_left(1);
+    }
+    let mut caption = views::caption(plot, pair.labels);
+    if subject.diagnosed.diagnosis.findings.len() > 1 {
+        caption += " The other causes stay in the simulation.";
+    }
+    Some(shown(channel, figure, caption))
 }
 
 /// The view of this finding: on its own axis, along the channel that it follows most, about its own frequency.
@@ -307,6 +333,44 @@ mod tests {
             ..evidence("telegraph", "time, s", false)
         };
         assert_eq!(caption(&own), "Two levels.");
+    }
+
+    #[test]
+    fn a_simulation_without_a_cause_keeps_all_others() {
+        let mut model = ModelFile::paper();
+        let effect = |cause: &str, channel: &str| model::file::EffectModel {
+            cause: cause.into(),
+            channels: vec![channel.into()],
+            parameters: Default::default(),
+        };
+        model.effects = [
+            ("base_motion", "gyro_x"),
+            ("line", "gyro_x"),
+            ("line", "gyro_y"),
+        ]
+        .map(|(cause, channel)| effect(cause, channel))
+        .to_vec();
+        let finding = |cause: &str, channel: &str| -> Finding {
+            serde_json::from_value(serde_json::json!({
+                "cause": cause, "channels": [channel], "parameters": {}, "alternatives": [],
+                "experiment": null, "gain": null, "material": true
+            }))
+            .expect("a finding")
+        };
+        let left = |cause: &str, channel: &str| -> Vec<String> {
+            let model = without(&model, &finding(cause, channel));
+            let of = |e: &model::file::EffectModel| format!("{} {}", e.cause, e.channels[0]);
+            model.effects.iter().map(of).collect()
+        };
+        assert_eq!(
+            left("base_motion", "gyro_x"),
+            ["line gyro_x", "line gyro_y"]
+        );
+        assert_eq!(
+            left("line", "gyro_x"),
+            ["base_motion gyro_x", "line gyro_y"]
+        );
+        assert_eq!(left("line", "gyro_z").len(), 3);
     }
 
     #[test]

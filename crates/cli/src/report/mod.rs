@@ -1,5 +1,6 @@
 //! The report: one self-contained HTML file, verdict first, then the figures that it rests on.
 
+mod channel;
 mod convict;
 pub mod exhibits;
 pub mod plot;
@@ -15,18 +16,15 @@ use model::record::sampling::Sampling;
 use model::record::{Record, rows};
 
 use crate::text::verdict;
-use plot::{AFTER, BEFORE, Drawn, Figure, Layer, MEASURED, number};
-use replicates::{Against, Places};
+use channel::View;
+use plot::Figure;
+use replicates::Places;
 
 /// Replicates behind the bands, and the fewest of a long record: the outermost of 39 hold 95 % on both sides.
 const REPLICATES: usize = 199;
 const FEWEST: usize = 39;
 /// Rows that are simulated for the bands of one model where that leaves enough replicates: seconds of one core.
 const DRAWN: usize = 35_000_000;
-/// Width of the figure of a signal, units of its view box.
-const SIGNAL: u32 = 880;
-/// Columns of a thinned signal.
-const COLUMNS: usize = 700;
 const STYLE: &str = include_str!("style.css");
 
 /// What a report is made of.
@@ -250,188 +248,6 @@ fn folded(all: Vec<(bool, &str, Markup)>) -> Vec<Markup> {
         .collect()
 }
 
-/// One channel, measured and simulated.
-struct View<'a> {
-    name: &'a str,
-    unit: &'a str,
-    values: &'a [f64],
-    simulated: [&'a [f64]; 2],
-    tau0: f64,
-    extended: bool,
-}
-
-impl View<'_> {
-    fn figures(
-        &self,
-        own: &replicates::Curves,
-        at: &replicates::Abscissae,
-        against: &[Against; 2],
-    ) -> Result<Markup, ReportError> {
-        let [before, after] = against;
-        let name = self.name;
-        let same = !self.extended;
-        Ok(html! {
-            .pair {
-                figure {
-                    (self.allan(own, at, against)?)
-                    figcaption {
-                        b { "Overlapping Allan deviation" } " of " code { (name) } ", up to a tenth of the run. The bands "
-                        "hold whole curves, not points. Chance of a curve as far off: "
-                        (chance(before))
-                        @if !same { " before, " (chance(after)) " after" }
-                        "."
-                    }
-                }
-                figure {
-                    (self.angle(own, at, against)?)
-                    figcaption {
-                        b { (capitalised(model::integral::of(self.unit).0)) " by integration" } ", less the mean of the first " (number(at.calibration_s, 2))
-                        " s. Bands hold 95 % of the replicates at each instant."
-                    }
-                }
-            }
-            figure {
-                (self.signal()?)
-                figcaption {
-                    b { "Signal. " }
-                    "Measured, then simulated by the "
-                    @if same { "model" } @else { "model before and after the extension" }
-                    ", on one scale. Alike to the eye is no test: the figures above are."
-                }
-            }
-        })
-    }
-
-    fn signal(&self) -> Result<Markup, ReportError> {
-        let time: Vec<f64> = (0..self.values.len())
-            .map(|k| k as f64 * self.tau0)
-            .collect();
-        let mut panels = vec![("measured", MEASURED, self.values)];
-        if self.extended {
-            panels.push(("simulated before", BEFORE, self.simulated[0]));
-            panels.push(("simulated after", AFTER, self.simulated[1]));
-        } else {
-            panels.push(("simulated", AFTER, self.simulated[1]));
-        }
-        let finite = || {
-            panels
-                .iter()
-                .flat_map(|(_, _, values)| values.iter())
-                .copied()
-                .filter(|v| v.is_finite())
-        };
-        let (low, high) = (
-            finite().fold(f64::MAX, f64::min),
-            finite().fold(f64::MIN, f64::max),
-        );
-        let margin = ((high - low) * 0.04).max(f64::MIN_POSITIVE);
-        let last = panels.len() - 1;
-        let mut legend = Figure::default();
-        let mut out = Vec::new();
-        for (k, (label, colour, values)) in panels.iter().enumerate() {
-            let curve = Layer::Line(plot::envelope(&time, values, COLUMNS));
-            let figure = Figure {
-                x_label: if k == last {
-                    "time, s".into()
-                } else {
-                    String::new()
-                },
-                y_label: self.unit.to_owned(),
-                // Narrower than the page: its letters can be read in print.
-                width: SIGNAL,
-                height: if k == last { 104 } else { 60 },
-                y_range: (low < high).then_some(low - margin..high + margin),
-                layers: vec![Drawn::new(label, *colour, curve)],
-                ..Figure::default()
-            };
-            out.push(figure.svg()?);
-            legend.layers.extend(figure.layers);
-        }
-        Ok(html! { (legend.legend()) @for panel in out { (PreEscaped(panel)) } })
-    }
-
-    fn bands(&self, x: &[f64], of: impl Fn(usize) -> replicates::Band) -> Vec<Drawn> {
-        let shown: &[(usize, &str, _)] = if self.extended {
-            &[(0, "before", BEFORE), (1, "after", AFTER)]
-        } else {
-            &[(1, "model", AFTER)]
-        };
-        let mut layers = Vec::new();
-        for (k, label, colour) in shown {
-            let band = of(*k);
-            let area = x
-                .iter()
-                .zip(band.low.iter().zip(&band.high))
-                .map(|(x, (low, high))| (*x, *low, *high))
-                .collect();
-            layers.push(Drawn::new(label, *colour, Layer::Band(area)));
-        }
-        layers
-    }
-
-    fn allan(
-        &self,
-        own: &replicates::Curves,
-        at: &replicates::Abscissae,
-        against: &[Against; 2],
-    ) -> Result<Markup, ReportError> {
-        let mut layers = self.bands(&at.tau_s, |k| against[k].adev.clone());
-        let points: Vec<_> = at
-            .tau_s
-            .iter()
-            .zip(&own.ln_adev)
-            .map(|(tau, ln)| (*tau, ln.exp()))
-            .collect();
-        layers.push(Drawn {
-            label: None,
-            colour: MEASURED,
-            layer: Layer::Line(points.clone()),
-        });
-        layers.push(Drawn::new("measured", MEASURED, Layer::Points(points)));
-        let figure = Figure {
-            x_label: "cluster time, s".into(),
-            y_label: format!("deviation, {}", self.unit),
-            log_x: true,
-            log_y: true,
-            width: plot::HALF,
-            height: 380,
-            layers,
-            ..Figure::default()
-        };
-        at_two_widths(&figure)
-    }
-
-    fn angle(
-        &self,
-        own: &replicates::Curves,
-        at: &replicates::Abscissae,
-        against: &[Against; 2],
-    ) -> Result<Markup, ReportError> {
-        let mut layers = self.bands(&at.angle_s, |k| against[k].angle.clone());
-        let points = at.angle_s.iter().copied().zip(own.angle.iter().copied());
-        layers.push(Drawn::new(
-            "measured",
-            MEASURED,
-            Layer::Line(points.collect()),
-        ));
-        let (integral, unit) = model::integral::of(self.unit);
-        let figure = Figure {
-            x_label: "time since the calibration, s".into(),
-            y_label: format!("{integral}, {unit}"),
-            width: plot::HALF,
-            height: 380,
-            layers,
-            ..Figure::default()
-        };
-        at_two_widths(&figure)
-    }
-}
-
-fn capitalised(word: &str) -> String {
-    let first = word.chars().next().into_iter().flat_map(char::to_uppercase);
-    first.chain(word.chars().skip(1)).collect()
-}
-
 /// Width and height of a figure on a telephone and in a column of a printed page, units of its view box: letters keep their
 /// size at 390 px, and have 7 pt in print.
 const NARROW: (u32, u32) = (430, 224);
@@ -448,14 +264,4 @@ fn at_two_widths(wide: &Figure) -> Result<Markup, ReportError> {
         div.wide { (PreEscaped(wide.svg()?)) }
         div.narrow { (PreEscaped(narrow.svg()?)) }
     })
-}
-
-/// A chance as a reader wants it: never 0, because replicates are finite.
-fn chance(of: &Against) -> String {
-    let (p, floor) = (of.adev_p, 1.0 / (of.replicates as f64 + 1.0));
-    if p <= floor * 1.001 {
-        format!("at most {}", number(floor, 1))
-    } else {
-        number(p, 2)
-    }
 }

@@ -69,7 +69,7 @@ pub struct Arguments {
     /// firmware meets the sensors that were fitted
     #[arg(long, value_name = "FILE", conflicts_with = "hide")]
     model: Option<PathBuf>,
-    /// Length, s
+    /// Length, s: 60 to 86400; with --pty any
     #[arg(long, default_value_t = 600.0)]
     seconds: f64,
     /// Seed of all that is random: the same seed gives the same run
@@ -96,11 +96,6 @@ pub struct Arguments {
     /// this length, s; 12 times --seconds if not said
     #[arg(long, value_name = "SECONDS", requires = "correct", value_parser = longest)]
     longest: Option<f64>,
-    #[command(
-        flatten,
-        next_help_heading = "Close the loop on a real board, which stands still, with the belt off"
-    )]
-    line: Line,
     /// The capture to write, .csv or .csv.gz
     #[arg(long, default_value = "capture.csv")]
     out: PathBuf,
@@ -121,19 +116,50 @@ pub struct Arguments {
     /// Print nothing but errors
     #[arg(long, short)]
     quiet: bool,
+    // Last: clap gives the heading to all that follows.
+    #[command(
+        flatten,
+        next_help_heading = "Close the loop on a real board, which stands still, with the belt off"
+    )]
+    line: Line,
 }
 
 /// A part of a run, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span(f64, f64);
 
+/// Shortest run that is analyzed and diagnosed, s: a shorter one leaves most causes untested.
+const SHORTEST_S: f64 = 60.0;
+
+/// Longest run, s: a day.
+const LONGEST_S: f64 = 86_400.0;
+
 /// Longest part that is traced, s: a hundred megabytes.
 const LONGEST_TRACE_S: f64 = 60.0;
 
+/// Whether a run of so many seconds can be answered.
+fn length(seconds: f64) -> Result<()> {
+    let help = if seconds > LONGEST_S {
+        "a run lasts a day at the most: `--seconds 86400`"
+    } else {
+        "a run is analyzed and diagnosed, and a record under a minute is too short for that: `--seconds 60` is the \
+         shortest, 600 the usual length; with --pty any length is served"
+    };
+    miette::ensure!(
+        (SHORTEST_S..=LONGEST_S).contains(&seconds),
+        help = help,
+        "--seconds: {seconds} s is not within {SHORTEST_S} .. {LONGEST_S} s"
+    );
+    Ok(())
+}
+
 /// A length of the first record, s.
 fn longest(text: &str) -> std::result::Result<f64, String> {
-    let seconds = text.parse().ok().filter(|s| (60.0..=86_400.0).contains(s));
-    seconds.ok_or_else(|| "takes a length within 60 .. 86400 s".to_owned())
+    let seconds = text
+        .parse()
+        .ok()
+        .filter(|s| (SHORTEST_S..=LONGEST_S).contains(s));
+    seconds.ok_or_else(|| format!("takes a length within {SHORTEST_S} .. {LONGEST_S} s"))
 }
 
 /// How long the stop is held, from and to, s.
@@ -179,7 +205,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let board = board(arguments)?;
         if arguments.seconds.is_nan() || arguments.seconds <= 0.0 {
             miette::bail!(
-                help = "write `--seconds 600`",
+                help = "say for how many seconds the board is served: `--seconds 600`",
                 "--seconds: {} is no length",
                 arguments.seconds
             );
@@ -189,13 +215,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         #[cfg(not(unix))]
         miette::bail!("this system has no pseudo-terminals: --pty works on Linux and macOS");
     }
-    if !(60.0..=86_400.0).contains(&arguments.seconds) {
-        miette::bail!(
-            help = "write `--seconds 600`",
-            "--seconds: {} is not within 60 .. 86400",
-            arguments.seconds
-        );
-    }
+    length(arguments.seconds)?;
     if arguments.out.as_os_str() == outputs::DASH {
         miette::bail!(
             help = "write `--out run.csv`",
@@ -306,8 +326,14 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
     };
     let found = found.map_err(super::explain)?;
     let comparison = compare(&hidden, &found.diagnosis);
+    let answer = Answer {
+        screen: text::diagnosis(&found),
+        diagnosis: found.diagnosis.clone(),
+        comparison,
+    };
+    super::write_json(arguments.json.as_ref(), &answer)?;
     if let Some(page) = &arguments.report {
-        let hidden = format!("{}\n({RULE}.)", comparison.lines().join("\n"));
+        let hidden = format!("{}\n({RULE}.)", answer.comparison.lines().join("\n"));
         let subject = Subject {
             record: &read.record,
             diagnosed: &found,
@@ -319,12 +345,6 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
         };
         super::report::write(page, &subject, true)?;
     }
-    let answer = Answer {
-        screen: text::diagnosis(&found),
-        diagnosis: found.diagnosis,
-        comparison,
-    };
-    super::write_json(arguments.json.as_ref(), &answer)?;
     Ok(answer)
 }
 
