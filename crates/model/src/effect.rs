@@ -4,6 +4,7 @@
 //! ([`Effect::hypotheses`]) and turns what was estimated into its parameters ([`Effect::describe`]).
 
 mod docs;
+mod shape;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,6 +13,7 @@ use crate::parameter::Parameter;
 use crate::record::{Axis, Base, Quantity};
 use crate::simulate::Simulation;
 pub use docs::{Docs, Example, Plot, Rival};
+pub use shape::Shape;
 
 /// Parameters of one effect by name.
 pub type Parameters = BTreeMap<String, Parameter>;
@@ -211,34 +213,6 @@ pub struct Regression {
     pub fixed: Vec<(&'static str, f64, &'static str)>,
     /// The channel that the columns are made of; `None` for shapes of time.
     pub follows: Option<String>,
-}
-
-/// A family of regressions with one shape coordinate (a time constant), which is sought on a grid and refined.
-pub trait Shape: Send + Sync {
-    /// Name and unit of the coordinate.
-    fn coordinate(&self) -> (&'static str, &'static str);
-    /// Values to try first, ascending; the refinement stays within the outermost.
-    fn grid(&self) -> Vec<f64>;
-    /// The columns at one value.
-    fn columns(&self, at: f64) -> Vec<Column>;
-    /// How many samples the sensor may show it late, least and most: a filter and the instant of its reading delay what it
-    /// feels, and not the source's record. The same for one that is never late.
-    fn delays(&self) -> (f64, f64) {
-        (0.0, 0.0)
-    }
-    /// How many samples late it is.
-    fn delay(&self) -> f64 {
-        0.0
-    }
-    /// The same so many samples late; `None` of one that is never late.
-    fn later(&self, _samples: f64) -> Option<Arc<dyn Shape>> {
-        None
-    }
-    /// The column of another parameter of its effect as late as this is, where `fixed` holds; `None` of one that it shares no
-    /// delay with.
-    fn beside(&self, _parameter: &str, _fixed: &[(&str, f64, &str)]) -> Option<Vec<f64>> {
-        None
-    }
 }
 
 /// Frequencies at which a density is wanted.

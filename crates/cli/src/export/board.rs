@@ -448,29 +448,6 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_is_in_the_surge_by_its_area_and_its_centre_behind_a_step() {
-        let text = "[[effect]]\ncause = \"motor_bias\"\nchannels = [\"gyro_z\"]\nat_full_duty = { value = 0.5, unit = \"deg/s\" }\n\
-                    surge_at_full_duty = { value = 1.5, unit = \"deg/s\" }\nsurge_time = { value = 0.2, unit = \"s\" }\n\
-                    delay = { value = 0.03, unit = \"s\" }\n";
-        let c = BoardCorrection::of(&model(text), SENS_AVG)
-            .unwrap()
-            .correction;
-        // What the board adds to a steady 0.5, deg/s, at 20 Hz behind a step; it is what the sensor shows late.
-        let (mut speed, mut area, mut moment) = (0.0, 0.0, 0.0);
-        for n in 0..200 {
-            let ahead = -c.surge[2] * (255.0 - speed);
-            speed += c.follow * (255.0 - speed);
-            area += 0.05 * ahead;
-            moment += 0.05 * ahead * 0.05 * (f64::from(n) + 0.5);
-        }
-        let (late, surge) = (0.5 * 0.03, 1.5 * 0.2);
-        assert!((area - (surge - late)).abs() < 1e-9, "{area}");
-        // To what lies within a sample.
-        let centre = surge * (0.2 + 0.03) - late * 0.03 / 2.0;
-        assert!((moment - centre).abs() < 0.01 * centre, "{moment} {centre}");
-    }
-
-    #[test]
     fn what_does_not_fit_and_what_has_no_noise_is_refused_by_name() {
         let steep = model(
             "[[effect]]\ncause = \"temperature\"\nchannels = [\"gyro_z\"]\nslope = { value = 3.0, unit = \"deg/s/degC\" }\n",

@@ -421,17 +421,15 @@ impl Placed<'_> {
     }
 }
 
+/// Where a shape lies and what its columns are, each number with its standard error: its coordinate and, where it may have one,
+/// its delay; the coefficients.
+type Told = (Vec<(f64, f64)>, Vec<(f64, f64)>);
+
 /// A shape's coordinate, its delay where it may have one, and the coefficients of its columns, averaged over the coordinate, the
 /// delay (by [`delayed::prior`]) and the random walk: where a slow shape and a slow walk take each other's part, or a time and a
 /// delay, errors at fixed values of either are too small. The coordinate is flat in itself: Jeffreys' prior of the size and the
 /// time of an exponential is in proportion to the size alone.
-fn shaped(
-    panel: &Panel,
-    state: &State,
-    term: &Term,
-    shape: &Arc<dyn Shape>,
-    at: f64,
-) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+fn shaped(panel: &Panel, state: &State, term: &Term, shape: &Arc<dyn Shape>, at: f64) -> Told {
     let others = state.terms.iter().filter(|t| t.columns != term.columns);
     let placed = Placed {
         panel,
@@ -448,11 +446,7 @@ fn shaped(
 
 /// A coordinate, a delay where it is not always the same, and so many coefficients, each with its standard error, averaged over
 /// fits.
-fn over_shapes(
-    all: &[Weighed],
-    columns: usize,
-    delays: (f64, f64),
-) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+fn over_shapes(all: &[Weighed], columns: usize, delays: (f64, f64)) -> Told {
     let top = (all.iter().map(|p| p.weight)).fold(f64::NEG_INFINITY, f64::max);
     let weights: Vec<f64> = all.iter().map(|p| (p.weight - top).exp()).collect();
     let sum: f64 = weights.iter().sum();

@@ -162,14 +162,6 @@ impl Panel {
         self.push(all.map(|c| Column::Whole(Rc::new(c))).collect())
     }
 
-    /// Add what one column is beyond another one; returns its number.
-    pub(crate) fn add_difference(&self, of: usize, to: usize) -> usize {
-        let (of, to) = (self.column(of), self.column(to));
-        let difference = of.iter().zip(to.iter()).map(|(a, b)| a - b).collect();
-        let new = self.push(vec![Column::Whole(Rc::new(difference))]);
-        new[0]
-    }
-
     /// Put other coefficients in the place of the data's.
     pub fn replace_data(&self, coefficients: Vec<f64>) {
         self.revision.set(self.revision.get() + 1);

@@ -292,22 +292,6 @@ impl<'a> Search<'a> {
         self.candidates.iter().find(own).filter(|_| shaped)
     }
 
-    /// The columns of a state; in the place of one that is late, its candidate's and how the late one differs from that. They
-    /// span no less, and what nearly is a multiple of another one takes the digits of all sums.
-    pub(crate) fn spanning(&self, state: &State) -> Vec<usize> {
-        let of = |t: &Term| {
-            let own = &self.candidates[t.candidate].columns;
-            let as_many = matches!(t.form, Form::Columns) && own.len() == t.columns.len();
-            if !as_many || *own == t.columns {
-                return t.columns.clone();
-            }
-            let late = t.columns.iter().zip(own);
-            let changes = late.map(|(late, own)| self.panel.add_difference(*late, *own));
-            own.iter().copied().chain(changes).collect()
-        };
-        state.terms.iter().flat_map(of).collect()
-    }
-
     /// The state with these terms, fitted from a starting noise.
     #[must_use]
     pub fn refit(&self, terms: Vec<Term>, start: f64) -> State {

@@ -128,4 +128,24 @@ impl Search<'_> {
             }
         }
     }
+
+    /// The columns of a state; in the place of one that is late, its candidate's and how the late one differs from that. They
+    /// span no less, and what nearly is a multiple of another one takes the digits of all sums.
+    pub(crate) fn spanning(&self, state: &State) -> Vec<usize> {
+        let of = |t: &Term| {
+            let own = &self.candidates[t.candidate].columns;
+            let as_many = matches!(t.form, Form::Columns) && own.len() == t.columns.len();
+            if !as_many || *own == t.columns {
+                return t.columns.clone();
+            }
+            let changes = t.columns.iter().zip(own).map(|(late, own)| {
+                let (late, own) = (self.panel.column(*late), self.panel.column(*own));
+                let change: Vec<f64> = late.iter().zip(own.iter()).map(|(l, o)| l - o).collect();
+                self.panel.dct.inverse(&change)
+            });
+            let changes: Vec<Vec<f64>> = changes.collect();
+            [own.clone(), self.panel.add_all(changes)].concat()
+        };
+        state.terms.iter().flat_map(of).collect()
+    }
 }

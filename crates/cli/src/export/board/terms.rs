@@ -147,3 +147,32 @@ impl Surge {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_delay_is_in_the_surge_by_its_area_and_its_centre_behind_a_step() {
+        let (steady, delay) = (0.5, 0.03);
+        let sensor = Surge {
+            at_full: 1.5,
+            time_s: 0.2,
+        };
+        let board = sensor.at_once(steady, delay);
+        // In steps of 0.1 ms: what the sensor shows beyond a steady part that is there at once.
+        let (mut area, mut moment) = (0.0, 0.0);
+        for t in (0..40_000).map(|i| (f64::from(i) + 0.5) * 1e-4) {
+            let shown = if t < delay {
+                -steady
+            } else {
+                sensor.at_full * (-(t - delay) / sensor.time_s).exp()
+            };
+            let rest = shown - board.at_full * (-t / board.time_s).exp();
+            area += 1e-4 * rest;
+            moment += 1e-4 * rest * t;
+        }
+        assert!(area.abs() < 1e-6 && moment.abs() < 1e-6, "{area} {moment}");
+        assert_eq!(sensor.at_once(steady, 0.0).time_s, 0.2);
+    }
+}
