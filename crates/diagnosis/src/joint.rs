@@ -15,7 +15,7 @@ use model::record::rows::Bursts;
 
 use crate::fit::channel::{Form, Joint, Levels, State, Term, VarianceFound};
 use crate::fit::estimate;
-use crate::fit::likelihood::{Noise, least_walk};
+use crate::fit::likelihood::least_walk;
 use crate::search::searched::Searched;
 
 use climb::{Peak, climb};
@@ -88,7 +88,7 @@ impl<'a> Model<'a> {
         if state.terms.iter().any(Term::is_band) || !processes.iter().all(known) {
             return None;
         }
-        let density = filter_of(state).map(|only| only.everywhere(&panel.bins));
+        let density = state.filter().map(|only| only.everywhere(&panel.bins));
         let slow = density.as_ref().and_then(|h| h.get(1)).copied();
         let numbers: Vec<usize> = std::iter::once(0).chain(state.columns()).collect();
         let columns = panel.dct.inverse_all(numbers.iter().map(|c| {
@@ -250,16 +250,6 @@ fn coordinates(t: &Term) -> &[f64] {
         Form::Covariance(_, theta) => theta,
         _ => &[],
     }
-}
-
-/// The filter that the white noise goes through, where there is one.
-fn filter_of(state: &State) -> Option<Noise> {
-    let filters = state.noise.terms.iter().filter(|t| t.0.filters_white());
-    let terms: Vec<_> = filters.cloned().collect();
-    (!terms.is_empty()).then_some(Noise {
-        log_walk: f64::NEG_INFINITY,
-        terms,
-    })
 }
 
 /// The noise of a state whose white variance is the same throughout.

@@ -3,7 +3,7 @@
 mod replicated;
 mod unexplained;
 
-use model::effect::Parameters;
+use model::effect::{Effect, Parameters};
 use std::collections::BTreeMap;
 
 use model::file::ModelFile;
@@ -285,9 +285,15 @@ pub(crate) fn decimals(error: f64) -> usize {
     }
 }
 
-pub(crate) fn sentence(title: &str, channel: &str, parameters: &Parameters) -> String {
+/// What an effect is on a channel, by its parameters but those for programs.
+pub(crate) fn sentence(of: &dyn Effect, channel: &str, parameters: &Parameters) -> String {
+    let is_detail = |name: &str| {
+        let mut specs = of.parameters().iter();
+        specs.any(|s| s.name == name && s.detail)
+    };
     let values: Vec<String> = parameters
         .iter()
+        .filter(|(name, _)| !is_detail(name))
         .map(|(name, p)| {
             let unit = if p.unit == "1" { "" } else { &p.unit };
             let text = match p.std_error {
@@ -306,7 +312,7 @@ pub(crate) fn sentence(title: &str, channel: &str, parameters: &Parameters) -> S
             text.trim_end().to_owned()
         })
         .collect();
-    format!("{title} on {channel}: {}", values.join(", "))
+    format!("{} on {channel}: {}", of.docs().title, values.join(", "))
 }
 
 /// The limit of one parameter of an effect that is described, the others named in `at`.

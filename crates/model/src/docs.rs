@@ -83,12 +83,16 @@ fn axes(parameters: &[ParameterSpec]) -> usize {
 /// The parameters as a list.
 fn parameters(out: &mut String, mut left: &[ParameterSpec]) {
     while let Some(p) = left.first() {
-        let count = axes(left);
+        let details = left
+            .iter()
+            .take_while(|other| p.detail && other.detail)
+            .count();
+        let count = axes(left).max(details);
         let optional = if p.required { "" } else { " (optional)" };
-        let of_axes = if count > 1 {
-            "; the same for y and z"
-        } else {
-            ""
+        let of_axes = match left.get(count - 1) {
+            Some(last) if details > 1 => format!("; the same up to `{}`", last.name),
+            Some(_) if count > 1 => "; the same for y and z".to_owned(),
+            _ => String::new(),
         };
         let _ = writeln!(
             out,

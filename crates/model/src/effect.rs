@@ -3,6 +3,7 @@
 //! The search knows hypotheses, never effects by name: an effect lays out its hypotheses for a channel of a record
 //! ([`Effect::hypotheses`]) and turns what was estimated into its parameters ([`Effect::describe`]).
 
+mod covariance;
 mod docs;
 mod shape;
 
@@ -12,6 +13,7 @@ use std::sync::Arc;
 use crate::parameter::Parameter;
 use crate::record::{Axis, Base, Quantity};
 use crate::simulate::Simulation;
+pub use covariance::{Covariance, Frequencies, Peak};
 pub use docs::{Docs, Example, Plot, Rival};
 pub use shape::Shape;
 
@@ -29,6 +31,8 @@ pub struct ParameterSpec {
     pub meaning: &'static str,
     /// Whether a model file has to give it.
     pub required: bool,
+    /// Whether it is for programs alone: one of many numbers that say something together.
+    pub detail: bool,
 }
 
 /// Shorthand for a required parameter.
@@ -43,6 +47,7 @@ pub const fn parameter(
         unit,
         meaning,
         required: true,
+        detail: false,
     }
 }
 
@@ -58,6 +63,20 @@ pub const fn optional(
         unit,
         meaning,
         required: false,
+        detail: false,
+    }
+}
+
+/// Shorthand for a parameter that may be left out, and that nobody reads by itself.
+#[must_use]
+pub const fn detail(
+    name: &'static str,
+    unit: &'static str,
+    meaning: &'static str,
+) -> ParameterSpec {
+    ParameterSpec {
+        detail: true,
+        ..optional(name, unit, meaning)
     }
 }
 
@@ -215,88 +234,6 @@ pub struct Regression {
     pub follows: Option<String>,
 }
 
-/// Frequencies at which a density is wanted.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Frequencies {
-    /// Angular frequency, rad per sample.
-    pub omega: Vec<f64>,
-    /// Its cosine.
-    pub cosine: Vec<f64>,
-}
-
-impl Frequencies {
-    /// Density of an AR(1) process of variance `variance` and pole `p`.
-    #[must_use]
-    pub fn one_pole(&self, variance: f64, p: f64) -> Vec<f64> {
-        let (top, bottom) = (variance * (1.0 - p * p), 1.0 + p * p);
-        self.cosine
-            .iter()
-            .map(|c| top / (bottom - 2.0 * p * c))
-            .collect()
-    }
-}
-
-/// A peak in a spectrum.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Peak {
-    /// Angular frequency of its middle, rad per sample.
-    pub omega: f64,
-    /// Half its width at half its height, rad per sample.
-    pub half_width: f64,
-    /// Its variance over the white one.
-    pub variance: f64,
-}
-
-/// A stationary process added to the noise, or a filter on it.
-pub trait Covariance: Send + Sync {
-    /// Names of the shape's coordinates; they are optimised unconstrained within [`Covariance::bounds`].
-    fn dimensions(&self) -> usize;
-    /// Contribution at each frequency, in units of the white variance.
-    fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64>;
-    /// Whether the density replaces the white noise (a filter) instead of adding to it.
-    fn filters_white(&self) -> bool {
-        false
-    }
-    /// Whether its noise is Gaussian; else its own simulation says what its distribution is.
-    fn is_normal(&self) -> bool {
-        true
-    }
-    /// Parameters that say which of the effect's processes it is.
-    fn fixed(&self) -> Vec<(&'static str, f64, &'static str)> {
-        vec![]
-    }
-    /// The same as first-order processes, each its variance in units of the white variance and its pole, of `samples` samples;
-    /// none where it is no sum of such.
-    fn poles(&self, _theta: &[f64], _samples: usize) -> Option<Vec<(f64, f64)>> {
-        None
-    }
-    /// Lower and upper bound of each coordinate, for `samples` samples.
-    fn bounds(&self, samples: usize) -> Vec<(f64, f64)>;
-    /// Where to start the search from.
-    fn starts(&self, samples: usize) -> Vec<Vec<f64>>;
-    /// The same term with its coordinates measured from a peak of the spectrum, in widths of it, and where it starts from
-    /// there: of a term that stands at one frequency, which has to be sought in the data.
-    fn about(&self, _peak: &Peak) -> Option<(Arc<dyn Covariance>, Vec<f64>)> {
-        None
-    }
-    /// Other shapes of such a term at the same place, with the same coordinates.
-    fn variants(&self) -> Vec<Arc<dyn Covariance>> {
-        vec![]
-    }
-    /// Whether it is such a term.
-    fn is_peak(&self) -> bool {
-        false
-    }
-    /// The peak that such a term is.
-    fn peak(&self, _theta: &[f64]) -> Option<Peak> {
-        None
-    }
-    /// Coordinates with their standard errors as [`Effect::describe`] takes them.
-    fn described(&self, coordinates: &[(f64, f64)]) -> Vec<(f64, f64)> {
-        coordinates.to_vec()
-    }
-}
-
 /// A law by which the white variance changes in time.
 #[derive(Clone, Debug, PartialEq)]
 pub enum VarianceLaw {
@@ -416,10 +353,26 @@ pub trait Effect: Send + Sync {
     fn coarsens(&self, _parameters: &Parameters) -> f64 {
         1.0
     }
+    /// Density, of mean 1, of white noise that went through it; none of what is no filter.
+    fn passes(&self, _parameters: &Parameters, _at: &Frequencies) -> Option<Vec<f64>> {
+        None
+    }
     /// When it acts in a simulation.
     fn stage(&self) -> Stage;
     /// Act on the simulation. `channels` are the gyro axes (0..2) that the model names.
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation);
+}
+
+/// What the slowest of a white noise is, in variance over that of the readings, where it went through an effect; 1 of what is no
+/// filter. A filter passes the slowest as it is, so that this is the noise before it.
+#[must_use]
+pub fn slowest(effect: &dyn Effect, parameters: &Parameters) -> f64 {
+    let at = Frequencies {
+        omega: vec![0.0],
+        cosine: vec![1.0],
+    };
+    let density = effect.passes(parameters, &at);
+    density.map_or(1.0, |d| d[0])
 }
 
 /// The unit of a parameter on a channel of unit `channel_unit`, where the contract states it for deg/s.

@@ -85,6 +85,9 @@ pub fn bounds(name: &str, unit: &str) -> [f64; 2] {
     [least, most]
 }
 
+/// Largest coefficient of the logarithm of a filter's gain: e^40 between what passes and what does not.
+const MOST_CEPSTRUM: f64 = 20.0;
+
 /// Of a parameter of an effect by its name and unit, on a stand of that rate.
 pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
     match (name, unit) {
@@ -98,6 +101,7 @@ pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
         ("dwell_time", _) => range(1.0 / (SWITCHES_A_SAMPLE * rate_hz), LONGEST),
         ("time_constant" | "correlation_time" | "surge_time", _) => POSITIVE,
         ("sigma" | "rms" | "size" | "spread" | "bias_instability", _) => SIZE,
+        (name, _) if name.starts_with("cepstrum_") => range(-MOST_CEPSTRUM, MOST_CEPSTRUM),
         ("delay", _) | (_, "Hz") => range(0.0, LONGEST),
         (_, "s") => range(-LONGEST, LONGEST),
         _ => ANY,

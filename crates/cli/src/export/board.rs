@@ -109,7 +109,6 @@ impl BoardCorrection {
                 ..Correction::default()
             },
             walks: [0.0; 3],
-            alike: [1.0; 3],
             mean_c,
             supply_v,
             rate_hz: model.rate_hz,
@@ -128,13 +127,8 @@ impl BoardCorrection {
             }
             notes.extend(provisos(effect));
         }
-        let Sum {
-            mut out,
-            walks,
-            alike,
-            ..
-        } = sum;
-        notes.extend(filter(&mut out, model.rate_hz, [density, alike, walks]));
+        let Sum { mut out, walks, .. } = sum;
+        notes.extend(filter(&mut out, model.rate_hz, [density, walks]));
         let numbers = rounded(&mut out, supply_v)?;
         let stored = Correction::from_numbers(&numbers).unwrap_or(out);
         judge(&out, &stored, &density, reach_c / TEMP_LSB_C)?;
@@ -216,17 +210,13 @@ fn temp_range(mean_c: f64, reach_c: f64) -> [i8; 2] {
     ]
 }
 
-/// What the filter is told: the shortest block whose memory it can hold, up to a second, and the noise in it. By axis N^2, what neighbours that are
-/// alike multiply it by, and K^2 of all that walks.
-fn filter(
-    out: &mut Correction,
-    rate_hz: f64,
-    [density, alike, walks]: [[f64; 3]; 3],
-) -> Vec<String> {
+/// What the filter is told: the shortest block whose memory it can hold, up to a second, and the noise in it. By axis N^2 and K^2 of all
+/// that walks.
+fn filter(out: &mut Correction, rate_hz: f64, [density, walks]: [[f64; 3]; 2]) -> Vec<String> {
     // Growth of the variance in a block, over that of its mean: a filter at rest remembers the inverse root of it, in blocks.
     let growth = |axis: usize, shift: u8| {
         let block_s = f64::from(1u32 << shift) / rate_hz;
-        walks[axis] * block_s / (density[axis] * alike[axis] / block_s)
+        walks[axis] * block_s / (density[axis] / block_s)
     };
     let all = |shift: u8, is: &dyn Fn(f64) -> bool| (0..3).all(|axis| is(growth(axis, shift)));
     let holds = |shift: &u8| all(*shift, &|g| g == 0.0 || g.sqrt() >= 1.0 / MOST_BLOCKS);
@@ -241,7 +231,7 @@ fn filter(
     let block_s = f64::from(1u32 << out.block_shift) / rate_hz;
     let mut notes = Vec::new();
     for axis in 0..3 {
-        out.noise[axis] = density[axis] * alike[axis] / block_s;
+        out.noise[axis] = density[axis] / block_s;
         let walk = growth(axis, out.block_shift);
         if walk > MOST_WALK {
             notes.push(format!(

@@ -1,6 +1,7 @@
 //! A finding in sentences for a person: what it is and how large, what it costs to leave it out, what is still open.
 
 use diagnosis::result::{Consequence, Finding, Parameter, Unexplained};
+use model::effect::Frequencies;
 use model::effects::effect;
 
 use crate::report::plot::{fixed, number, tidy};
@@ -20,12 +21,13 @@ pub fn title(cause: &str) -> &str {
     effect(cause).map_or(cause, |e| e.docs().title)
 }
 
-/// Whether a parameter only says which law it is (`triangular`, `by_magnitude`), and is no size.
+/// Whether a parameter only says which law it is (`triangular`, `by_magnitude`), and is no size, or is a detail for programs.
 #[must_use]
 pub fn is_switch(cause: &str, name: &str, p: &Parameter) -> bool {
     let specs = effect(cause).map_or(&[][..], |e| e.parameters());
+    let is_detail = specs.iter().any(|s| s.name == name && s.detail);
     let is_optional = specs.iter().any(|s| s.name == name && !s.required);
-    is_optional && p.unit == "1" && p.std_error.is_none()
+    is_detail || is_optional && p.unit == "1" && p.std_error.is_none()
 }
 
 /// What the cause is, where it acts, and its size with 95 % intervals.
@@ -90,7 +92,8 @@ fn named(finding: &Finding) -> Vec<(&String, &Parameter)> {
     let (first, then): (Vec<_>, Vec<_>) = in_order(finding)
         .into_iter()
         .partition(|(name, _)| required(name));
-    let then = then.into_iter().filter(|(_, p)| estimated(p));
+    let then = then.into_iter();
+    let then = then.filter(|(name, p)| estimated(p) && !is_switch(&finding.cause, name, p));
     first.into_iter().chain(then).take(NAMED).collect()
 }
 
@@ -98,9 +101,20 @@ fn named(finding: &Finding) -> Vec<(&String, &Parameter)> {
 #[must_use]
 pub fn cost(finding: &Finding) -> Option<String> {
     match &finding.consequence {
+        Some(consequence) if finding.material && is_filter(finding) => Some(format!(
+            "It takes {} off the variance of the readings, and leaves the angle as it is; without it a deviation is off by up to {}.",
+            percent(consequence.share_of_variance),
+            percent(consequence.largest_change)
+        )),
         Some(consequence) => Some(consequence_of(consequence, finding.material)),
         None => cost_in_angle(finding),
     }
+}
+
+/// Whether it takes something from the noise, and adds nothing.
+fn is_filter(finding: &Finding) -> bool {
+    let at = Frequencies::default();
+    effect(&finding.cause).is_some_and(|e| e.passes(&finding.parameters, &at).is_some())
 }
 
 /// How the model has what has no name.

@@ -270,7 +270,7 @@ fn one(pairs: &[Pair<'_>], of: &dyn Effect, free: f64, read: f64, grid: &Grid) -
     let ratio = pairs.iter().map(log).sum::<f64>();
     let finding = Finding {
         cause: of.id().into(),
-        what: sentence(of.docs().title, &names.join(", "), &parameters),
+        what: sentence(of, &names.join(", "), &parameters),
         channels: names,
         parameters,
         likelihood_ratio: Some(ratio),
@@ -333,7 +333,7 @@ fn correlated(pairs: &[&Pair<'_>], of: &dyn Effect, free: f64) -> Option<Finding
     let channels: BTreeSet<String> = axes.iter().map(|s| s.target.name.clone()).collect();
     let finding = Finding {
         cause: of.id().into(),
-        what: sentence(of.docs().title, first, parameters),
+        what: sentence(of, first, parameters),
         channels: channels.into_iter().collect(),
         parameters: parameters.clone(),
         per_channel: per_channel.clone(),

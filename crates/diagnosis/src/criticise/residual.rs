@@ -24,7 +24,7 @@ pub fn all(u: &[f64], e: &[f64], rate_hz: f64, step: f64) -> Vec<Outcome> {
         ljung_box(e),
         bands(u, rate_hz),
         tiles(e, rate_hz),
-        kurtosis(e, rate_hz),
+        kurtosis(e, rate_hz, step),
         skewness(e),
         dependence::bicovariance(e),
         dependence::three_readings(e),
@@ -313,13 +313,20 @@ pub(crate) fn excess_kurtosis(e: &[f64]) -> f64 {
     sum_of(e, |v| v.powi(4)) / n / (m2 * m2) - 3.0
 }
 
-fn kurtosis(e: &[f64], rate_hz: f64) -> Outcome {
+/// Excess kurtosis of a uniform distribution.
+const UNIFORM: f64 = -1.2;
+
+/// Where rounding to the `step`, in standard deviations of `e`, makes a part of the variance, it makes the tails lighter by the
+/// square of that part.
+fn kurtosis(e: &[f64], rate_hz: f64, step: f64) -> Outcome {
     let n = e.len() as f64;
     let excess = excess_kurtosis(e);
+    let rounding = (step * step / 12.0).min(1.0);
+    let beyond = excess - excess.clamp(UNIFORM * rounding * rounding, 0.0);
     let far = (0..e.len())
         .max_by(|a, b| e[*a].abs().total_cmp(&e[*b].abs()))
         .unwrap_or(0);
-    let z = kurtosis_score(excess + 3.0, n);
+    let z = kurtosis_score(beyond + 3.0, n);
     Outcome {
         id: CheckId::Kurtosis,
         about: vec![],

@@ -90,11 +90,11 @@ pub fn noise_errors(panel: &Panel, state: &State) -> Vec<f64> {
         .collect()
 }
 
-/// Covariance of the coordinates of the noise shape (random walk first): by the information of a noise that has peaks, by
-/// the curvature of the likelihood of any other.
-fn noise_covariance(panel: &Panel, state: &State) -> Vec<Vec<f64>> {
+/// Covariance of the coordinates of the noise shape (random walk first): by the information of a noise that has peaks or
+/// many coordinates, by the curvature of the likelihood of any other.
+pub(super) fn noise_covariance(panel: &Panel, state: &State) -> Vec<Vec<f64>> {
     let columns = state.columns();
-    if !state.noise.peaks().is_empty() {
+    if scoring::serves(&state.noise) {
         return invert(&scoring::information(panel, &state.noise, &columns)).0;
     }
     let mut x = vec![state.noise.log_walk];

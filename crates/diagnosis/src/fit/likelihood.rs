@@ -375,7 +375,7 @@ impl Panel {
             let solution = self.solve(&walk.over(&self.bins), columns);
             return (walk, solution);
         }
-        if !noise.peaks().is_empty() {
+        if scoring::serves(noise) {
             return scoring::fit(self, noise, columns);
         }
         let n = self.bins.n;

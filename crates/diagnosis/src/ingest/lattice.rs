@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use model::record::{Quantity, Record};
+use model::record::{Channel, Quantity, Record};
 use numerics::order_statistics::robust_sigma;
 use numerics::series::smallest_step;
 
@@ -13,6 +13,10 @@ const NEAR: f64 = 0.05;
 /// Steps in the spread of the readings from which on a grid is that of a number's last digit. No audit of counts looks at
 /// more than eight bits within it.
 const FINE: f64 = 256.0;
+/// How far two steps may be apart, in powers of two, to be told as one times a power of two.
+const SAME_STEP: f64 = 0.02;
+/// Most bits that a converter may have lost beside its like.
+const MOST_BITS: f64 = 8.5;
 /// Largest count: converters of 20 bits are the finest of inertial sensors in use.
 const LARGEST: f64 = 524_288.0;
 
@@ -20,17 +24,30 @@ const LARGEST: f64 = 524_288.0;
 #[must_use]
 pub fn counted(record: &Record) -> Cow<'_, Record> {
     let mut whole = Cow::Borrowed(record);
-    for (i, channel) in record.channels.iter().enumerate() {
-        if channel.quantity != Quantity::Gyro || channel.counts.is_some() {
-            continue;
-        }
-        if let Some((step, counts)) = multiples(&channel.values) {
-            let own = &mut whole.to_mut().channels[i];
-            own.lsb = Some(step);
-            own.counts = Some(counts);
-        }
+    let without = |c: &Channel| c.quantity == Quantity::Gyro && c.counts.is_none();
+    let all = record.channels.iter().enumerate();
+    let found: Vec<(usize, f64, Vec<i32>)> = all
+        .filter(|(_, c)| without(c))
+        .filter_map(|(i, c)| multiples(&c.values).map(|(step, counts)| (i, step, counts)))
+        .collect();
+    for (i, step, counts) in &found {
+        let unit = &record.channels[*i].unit;
+        let alike = found.iter().filter(|f| record.channels[f.0].unit == *unit);
+        let finest = alike.map(|f| f.1).fold(*step, f64::min);
+        let bits = bits_between(*step, finest);
+        let own = &mut whole.to_mut().channels[*i];
+        own.lsb = Some(step / f64::from(1 << bits));
+        own.counts = Some(counts.iter().map(|c| c << bits).collect());
     }
     whole
+}
+
+/// Bits by which a step is coarser than that of another gyro of the sensor, whose converters are alike; 0 where it is no such
+/// multiple of it, or one that no counts reach.
+fn bits_between(step: f64, finest: f64) -> u32 {
+    let bits = (step / finest).log2();
+    let is_one = (bits - bits.round()).abs() < SAME_STEP && bits < MOST_BITS;
+    if is_one { bits.round() as u32 } else { 0 }
 }
 
 /// The step of readings, and the multiple that each is, 0 where there is no reading. None where they are no multiples of
@@ -124,6 +141,34 @@ mod tests {
         (values[7], values[9]) = (f64::NAN, 327.65);
         let (_, back) = multiples(&values).expect("a grid");
         assert_eq!((back[7], back[9]), (0, 6553));
+    }
+
+    #[test]
+    fn a_gyro_of_coarser_steps_than_its_like_has_their_counts() {
+        let gyro = |step: f64| {
+            let of = codes(6.0, 0.0);
+            let c = of.iter().map(|c| f64::from(*c) * step);
+            Channel {
+                name: "gyro".into(),
+                quantity: Quantity::Gyro,
+                axis: None,
+                unit: "deg/s".into(),
+                lsb: None,
+                counts: None,
+                values: c.collect(),
+            }
+        };
+        let record = Record {
+            channels: vec![gyro(0.02), gyro(0.08), gyro(0.05)],
+            ..Record::default()
+        };
+        let counted = counted(&record);
+        let lsb = |i: usize| counted.channels[i].lsb.unwrap();
+        for (i, wanted) in [0.02, 0.02, 0.05].into_iter().enumerate() {
+            assert!((lsb(i) / wanted - 1.0).abs() < 1e-6, "{i}: {}", lsb(i));
+        }
+        let counts = counted.channels[1].counts.as_ref().unwrap();
+        assert!(counts.iter().all(|c| c % 4 == 0));
     }
 
     #[test]

@@ -201,7 +201,8 @@ fn compare(
     let angles = horizons(parts.length, rate_hz);
     let angles = angles.into_iter().zip(&more.angle);
     Consequence {
-        share_of_variance: (more.variance / (more.variance + rest.variance)).abs(),
+        // Of what is larger: the readings with it, or those without what takes something from them.
+        share_of_variance: more.variance.abs() / (more.variance.max(0.0) + rest.variance),
         angle_rms_deg: angles
             .map(|((key, _), square)| (key.to_owned(), (square.abs() / draws).sqrt()))
             .collect::<BTreeMap<_, _>>(),

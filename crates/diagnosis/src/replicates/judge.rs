@@ -34,6 +34,7 @@ impl<'a> Judged<'a> {
                 name: t.name.clone(),
                 unit: t.unit.clone(),
                 step: t.step,
+                counted: t.lsb.is_some(),
                 walk: walk_over_white(
                     baseline.channels.iter().find(|c| c.name == t.name),
                     grid.rate_hz,

@@ -119,7 +119,7 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
             let size = (found.coefficients.len() + found.location.len()) as f64;
             let effective = effective(s, term, found);
             let told = if effective { EFFECTIVE } else { "" };
-            let what = sentence(term.effect.docs().title, &s.target.name, &parameters);
+            let what = sentence(term.effect, &s.target.name, &parameters);
             Finding {
                 cause: term.effect.id().into(),
                 channels: vec![s.target.name.clone()],
@@ -207,7 +207,7 @@ pub(crate) fn variance_finding(s: &Searched<'_>, v: &VarianceFound) -> Finding {
             ablation_nats: Some(v.lr / 2.0),
             ..Gain::default()
         }),
-        what: sentence(v.effect.docs().title, &s.target.name, &parameters),
+        what: sentence(v.effect, &s.target.name, &parameters),
         parameters,
         likelihood_ratio: Some(v.lr),
         ..Finding::default()
@@ -368,7 +368,7 @@ pub(crate) fn scale_finding(
         channels: vec![s.target.name.clone()],
         what: format!(
             "{}. The scale of the accelerometers is taken as right",
-            sentence(of.docs().title, &s.target.name, &parameters)
+            sentence(of, &s.target.name, &parameters)
         ),
         parameters,
         likelihood_ratio: Some(lr),

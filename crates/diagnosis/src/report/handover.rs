@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use model::effect::{Effect, Hypothesis, Parameters, Stage};
+use model::effect::{Effect, Frequencies, Hypothesis, Parameters, Stage, slowest};
 use model::effects::effect;
 use model::excitation::at_rest;
 use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
@@ -11,6 +11,7 @@ use model::record::Base;
 use model::unnamed::Unnamed;
 
 use crate::attribute::events;
+use crate::fit::before_filter;
 use crate::fit::channel::{Levels, State, VarianceFound};
 use crate::ingest::types::Grid;
 use crate::joint::{levels_of, levels_under};
@@ -42,6 +43,9 @@ pub(crate) fn extended_model(
 ) -> ModelFile {
     let mut extended = model(searched, grid, &|s| beside(s, named, grid), fitted_on);
     extended.effects = effects_of(named);
+    for (channel, s) in extended.channels.iter_mut().zip(searched) {
+        before_filters(channel, &extended.effects, s);
+    }
     // A tone that is not handed over has no detail.
     let known = |t: &&Unnamed| {
         let of = |cause: &String| extended.effects.iter().any(|e| e.cause == *cause);
@@ -74,6 +78,24 @@ pub(crate) fn extended_model(
         before_counts(channel, &read, &s.target.y, grid.rate_hz, lost);
     }
     extended
+}
+
+/// The noise before the filters among the effects, in the place of that of the readings: what an angle grows by.
+fn before_filters(channel: &mut ChannelModel, effects: &[EffectModel], s: &Searched<'_>) {
+    let own = (effects.iter()).filter(|e| e.channels.contains(&channel.name));
+    let known = own.filter_map(|e| Some((effect(&e.cause)?, &e.parameters)));
+    let filters: Vec<f64> = known
+        .filter(|(e, p)| e.passes(p, &Frequencies::default()).is_some())
+        .map(|(e, p)| slowest(e, p))
+        .collect();
+    let Some(p) = (channel.baseline.get_mut("angle_random_walk")).filter(|_| !filters.is_empty())
+    else {
+        return;
+    };
+    let over = filters.iter().product::<f64>().sqrt();
+    let error = 0.5 * before_filter::error(&s.search.panel, &s.state);
+    p.value *= over;
+    p.std_error = p.std_error.map(|own| (own * over).hypot(error * p.value));
 }
 
 /// The noise and bias of each channel of a model.

@@ -85,7 +85,7 @@ fn finding(of: &dyn Effect, fitted: &Fitted, searched: &[&Searched<'_>], grid: &
         }),
         what: format!(
             "{}. No error of the sensor",
-            sentence(of.docs().title, &channels.join(", "), &parameters)
+            sentence(of, &channels.join(", "), &parameters)
         ),
         times_s: vec![begin],
         likelihood_ratio: Some(fitted.lr),

@@ -8,10 +8,14 @@ use model::effect::{Covariance, Hypothesis};
 
 use super::Search;
 use crate::fit::channel::{Form, State, Term};
+use crate::fit::likelihood::scoring;
 use crate::fit::threshold;
 
 /// Correlation times, samples, at which a second process is sought beside the first: a record's length over these.
 const SPANS: [f64; 3] = [60.0, 600.0, 3000.0];
+
+/// Processes and filters of a state, and their coordinates.
+type Freedom = (usize, usize);
 
 /// A covariance of the library: number of its candidate, and what it is.
 type Process<'a> = (usize, &'a Arc<dyn Covariance>);
@@ -38,7 +42,10 @@ impl Search<'_> {
         if !state.terms.iter().any(paired) {
             return state;
         }
-        let all = self.processes();
+        // A filter of many coordinates is weighed beside others where it was found.
+        let held = |i: usize| state.terms.iter().any(|t| t.candidate == i);
+        let mut all = self.processes();
+        all.retain(|(i, c)| c.dimensions() <= scoring::FEW || held(*i));
         let others: Vec<Term> = state.terms.iter().filter(|t| !paired(t)).cloned().collect();
         let n = self.panel.bins.n;
         let starts = |c: &Arc<dyn Covariance>| -> Vec<Vec<f64>> {
@@ -49,7 +56,7 @@ impl Search<'_> {
                 c.starts(n)
             }
         };
-        let mut pairs: Vec<(usize, State)> = vec![];
+        let mut pairs: Vec<(Freedom, State)> = vec![];
         for (k, a) in all.iter().enumerate() {
             for b in &all[k + 1..] {
                 let one_effect =
@@ -67,10 +74,16 @@ impl Search<'_> {
                 let all = all.flat_map(|of_a| starts(b.1).into_iter().map(move |b| from(&of_a, b)));
                 let best = all.max_by(|a, b| Self::total(a).total_cmp(&Self::total(b)));
                 let freedom = a.1.dimensions() + b.1.dimensions();
-                pairs.extend(best.map(|best| (freedom, best)));
+                pairs.extend(best.map(|best| ((2, freedom), best)));
             }
         }
-        let freedom = |s: &State| -> usize { s.noise.terms.iter().map(|t| t.1.len()).sum() };
+        let freedom = |s: &State| -> Freedom {
+            let coordinates = s.noise.terms.iter().map(|t| t.1.len());
+            (
+                s.terms.iter().filter(|t| paired(t)).count(),
+                coordinates.sum(),
+            )
+        };
         pairs.push((freedom(&state), state));
         // Of those that do about as well, the one with the least freedom: a pole in all of the noise is no process beside it.
         let best = pairs.iter().map(|p| Self::total(&p.1));
@@ -80,7 +93,7 @@ impl Search<'_> {
             a.0.cmp(&b.0).then(ahead)
         });
         let close =
-            |(_, s): &(usize, State)| Self::total(s) > best - crate::fit::channel::RIVAL_SPAN;
+            |(_, s): &(Freedom, State)| Self::total(s) > best - crate::fit::channel::RIVAL_SPAN;
         let mut open: Vec<State> = pairs.into_iter().filter(close).map(|p| p.1).collect();
         let chosen = self.filter_first(open.swap_remove(0));
         self.earned(chosen, open)

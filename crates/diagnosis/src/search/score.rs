@@ -7,7 +7,7 @@ use model::effect::{Covariance, Hypothesis, Regression, Shape};
 
 use super::{Candidate, FASTEST_BEAT, LEAST_BEATS, LEAST_CYCLES, SLOW_BEAT_HZ, Search, bands};
 use crate::fit::channel::{Form, State, Term};
-use crate::fit::likelihood::Noise;
+use crate::fit::likelihood::{Noise, scoring};
 use crate::fit::{scan, threshold};
 
 /// A candidate that is weighed beside a state.
@@ -217,6 +217,10 @@ impl Search<'_> {
     /// What a stationary term offers from the best of its starts.
     fn weigh_covariance(&self, of: &Weighed<'_>, c: &Arc<dyn Covariance>) -> Option<Term> {
         let n = self.panel.bins.n;
+        let limit = threshold::covariance(c.dimensions());
+        if c.dimensions() > scoring::FEW && self.neighbours(of, c.dimensions()) < limit {
+            return None;
+        }
         let best = c
             .starts(n)
             .into_iter()
@@ -227,8 +231,7 @@ impl Search<'_> {
             })
             .max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;
         let lr = self.of_read() * 2.0 * (best.1.log_likelihood - of.null);
-        let theta = best.0.terms.last().map(|t| t.1.clone())?;
-        let limit = threshold::covariance(c.dimensions());
+        let theta = (best.0.terms.last().map(|t| t.1.clone())).filter(|theta| c.claims(theta))?;
         Some(of.term(
             Form::Covariance(Arc::clone(c), theta),
             vec![],
@@ -236,6 +239,23 @@ impl Search<'_> {
             lr,
             limit,
         ))
+    }
+
+    /// What the correlations of a state's residual at the first `lags` lags say against white noise, chi-square of as many degrees.
+    fn neighbours(&self, of: &Weighed<'_>, lags: usize) -> f64 {
+        let (state, bins) = (of.state, &self.panel.bins);
+        let energy = self.panel.energy_left(&of.own, &state.solution.beta);
+        let g = state.noise.over(bins);
+        let off: Vec<f64> = (energy.iter().zip(&g).zip(bins.counts()))
+            .map(|((e, g), m)| e / (g * state.solution.white) - m)
+            .collect();
+        let n = bins.n as f64;
+        let at = |lag: usize| -> f64 {
+            let cosines = bins.at.omega.iter().map(|w| (w * lag as f64).cos());
+            off.iter().zip(cosines).map(|(o, c)| o * c).sum::<f64>() / n
+        };
+        // A coefficient's energy over its variance has the variance 2, and a cosine's square the mean 1/2.
+        (1..=lags).map(|lag| n * at(lag).powi(2)).sum()
     }
 
     /// Fastest slow swing of a line, half cycles in the record.

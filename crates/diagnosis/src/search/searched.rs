@@ -44,6 +44,12 @@ impl Searched<'_> {
 
     /// Step of the readings over the standard deviation of what the model leaves.
     pub(crate) fn step(&self) -> f64 {
-        self.target.step / self.state.solution.white.sqrt()
+        let (bins, state) = (&self.search.panel.bins, &self.state);
+        // Where a filter passes little, what the model leaves is rounding.
+        let part = state.filter().map_or(1.0, |filter| {
+            let over = filter.over(bins).into_iter().zip(bins.counts());
+            over.map(|(g, count)| count / g).sum::<f64>() / (bins.n as f64 - 1.0)
+        });
+        self.target.step * (part / state.solution.white).sqrt()
     }
 }

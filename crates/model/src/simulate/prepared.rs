@@ -10,7 +10,7 @@ use super::unnamed::{Generic, Random, too_correlated};
 use super::{
     BANKS, COUNT_LIMIT, STEPLESS_DPS, SimulateError, Simulation, Stretch, axis_of, white_of,
 };
-use crate::effect::{Effect, Parameters, Stage};
+use crate::effect::{Effect, Parameters, Stage, slowest};
 use crate::effects::effect;
 use crate::excitation::{World, fast};
 use crate::file::ModelFile;
@@ -103,6 +103,9 @@ impl Prepared {
         let acting = acting(model, present)?;
         for (axis, lsb) in lsb.iter().enumerate() {
             let here = acting.iter().filter(|a| a.axes.contains(&axis));
+            // The noise of a model is that before a filter, which makes it smaller.
+            let filters = here.clone().map(|a| slowest(a.effect, &a.parameters));
+            run.white_sigma[axis] /= filters.product::<f64>().sqrt();
             let step = here.fold(lsb.unwrap_or(0.0), |step, a| {
                 step * a.effect.coarsens(&a.parameters)
             });

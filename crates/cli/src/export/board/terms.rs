@@ -15,8 +15,6 @@ pub(super) struct Sum {
     pub(super) out: Correction,
     /// Squares of the random walks.
     pub(super) walks: [f64; 3],
-    /// How much less sure a mean is for neighbours that are alike.
-    pub(super) alike: [f64; 3],
     /// Mean temperature, degC.
     pub(super) mean_c: f64,
     /// Supply, V.
@@ -116,8 +114,8 @@ impl Sum {
                 let level = 0.664 * value("bias_instability") / 3600.0;
                 self.walks[axis] += 3.0 * level.powi(2) / FLICKER_AT_S;
             }
-            // Neighbours that are alike: the mean of a block is less sure.
-            "low_pass" => self.alike[axis] = 1.0 + 2.0 * value("lag1_correlation"),
+            // It passes the mean of a block as it is.
+            "low_pass" => {}
             _ => return false,
         }
         true

@@ -24,6 +24,15 @@ const LONGEST: f64 = 1.5;
 /// Largest ln of the random walk's step variance over the white one.
 const MOST_WALK: f64 = 6.0;
 
+/// Most coordinates of terms that a simplex finds its way in.
+pub(crate) const FEW: usize = 5;
+
+/// Whether it is the better way for a noise: one that has a peak, or many coordinates.
+pub(crate) fn serves(noise: &Noise) -> bool {
+    let coordinates: usize = noise.terms.iter().map(|(_, theta)| theta.len()).sum();
+    coordinates > FEW || !noise.peaks().is_empty()
+}
+
 /// A point: coordinates, g over the bins, the fit there.
 struct Point {
     x: Vec<f64>,
@@ -122,6 +131,11 @@ impl<'a> Scoring<'a> {
         let walk = walk.iter().zip(&at.g).map(|(w, g)| (w - 1.0) / g);
         let mut all = vec![walk.collect::<Vec<f64>>()];
         for (term, theta) in &noise.terms {
+            if let Some(slopes) = term.slopes(theta, &bins.at) {
+                let over = |slope: Vec<f64>| slope.iter().zip(&at.g).map(|(s, g)| s / g).collect();
+                all.extend(slopes.into_iter().map(over));
+                continue;
+            }
             let here = term.density(theta, &bins.at);
             for i in 0..theta.len() {
                 let mut moved = theta.clone();

@@ -8,15 +8,18 @@ const BITS: usize = 8;
 /// Share of readings that are equal to the one before, and of ones in each of the lowest bits.
 pub(super) struct Codes {
     step: f64,
+    /// Whether the count of a reading is known: one of which an offset was taken off has other bits.
+    counted: bool,
     /// Lowest byte of each count.
     codes: Vec<u8>,
 }
 
 impl Codes {
-    /// For readings in steps, 0 where there are none.
-    pub fn new(step: f64) -> Self {
+    /// For readings in steps, 0 where there are none, whose counts are known or not.
+    pub fn new(step: f64, counted: bool) -> Self {
         Self {
             step,
+            counted,
             codes: vec![],
         }
     }
@@ -27,7 +30,7 @@ impl Codes {
                 "share of readings equal to the one before",
                 "1",
             ));
-            for bit in 0..BITS {
+            for bit in 0..if self.counted { BITS } else { 0 } {
                 all.push(Statistic::new(format!("share of ones in bit {bit}"), "1"));
             }
         }
@@ -41,6 +44,9 @@ impl Codes {
         let near = 0.5 * self.step;
         let equal = x.windows(2).map(|w| u32::from((w[1] - w[0]).abs() < near));
         all.push(f64::from(equal.sum::<u32>()) / n);
+        if !self.counted {
+            return;
+        }
         let scale = 1.0 / self.step;
         self.codes.clear();
         let lowest = x.iter().map(|v| (v * scale).round() as i32 as u8);

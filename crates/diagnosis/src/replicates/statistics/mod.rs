@@ -62,6 +62,8 @@ pub(super) struct Subject {
     pub unit: String,
     /// Step of its readings, 0 where there is none.
     pub step: f64,
+    /// Whether each reading is a known count of steps.
+    pub counted: bool,
     /// Variance of a step of the random walk over that of the white noise: what the spectrum is whitened by.
     pub walk: f64,
 }
@@ -96,7 +98,7 @@ impl Battery {
         let of: Vec<OfChannel> = subjects
             .iter()
             .map(|s| OfChannel {
-                codes: Codes::new(s.step),
+                codes: Codes::new(s.step, s.counted),
                 local: Local::new(parts.length, duty.as_deref()),
                 slopes: spectrum.slopes(s, record, parts),
                 white: spectrum.whitener(s.walk),
@@ -167,6 +169,7 @@ mod tests {
             name: name.into(),
             unit: "deg/s".into(),
             step: 0.25,
+            counted: true,
             walk: 0.0,
         };
         let parts = Parts::of(n, 20.0);

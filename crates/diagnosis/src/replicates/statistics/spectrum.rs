@@ -230,7 +230,9 @@ impl Spectrum {
                 aa += dot(&a[..top], &a[..top]);
                 bb += dot(&b[..top], &b[..top]);
             }
-            all.push(ab / (aa * bb).sqrt().max(f64::MIN_POSITIVE));
+            // A channel that says one thing all the time says nothing of another.
+            let both = (aa * bb).sqrt();
+            all.push(if both > 0.0 { ab / both } else { f64::NAN });
         }
     }
 }
