@@ -1,5 +1,7 @@
 //! The readings as counts: equal neighbours, and the bits.
 
+use model::nearest::nearest;
+
 use super::Statistic;
 
 /// Lowest bits whose share of ones is compared.
@@ -8,17 +10,12 @@ const BITS: usize = 8;
 /// Share of readings that are equal to the one before, and of ones in each of the lowest bits.
 pub(super) struct Codes {
     step: f64,
-    /// Lowest byte of each count.
-    codes: Vec<u8>,
 }
 
 impl Codes {
     /// For readings in steps, 0 where there are none.
     pub fn new(step: f64) -> Self {
-        Self {
-            step,
-            codes: vec![],
-        }
+        Self { step }
     }
 
     pub fn name(&self, all: &mut Vec<Statistic>) {
@@ -33,7 +30,8 @@ impl Codes {
         }
     }
 
-    pub fn take(&mut self, x: &[f64], all: &mut Vec<f64>) {
+    /// `codes` is room for the lowest byte of each count.
+    pub fn take(&self, x: &[f64], codes: &mut Vec<u8>, all: &mut Vec<f64>) {
         if self.step <= 0.0 {
             return;
         }
@@ -42,12 +40,12 @@ impl Codes {
         let equal = x.windows(2).map(|w| u32::from((w[1] - w[0]).abs() < near));
         all.push(f64::from(equal.sum::<u32>()) / n);
         let scale = 1.0 / self.step;
-        self.codes.clear();
-        let lowest = x.iter().map(|v| (v * scale).round() as i32 as u8);
-        self.codes.extend(lowest);
+        codes.clear();
+        let lowest = (x.iter()).map(|v| nearest(v * scale, i32::MIN, i32::MAX) as u8);
+        codes.extend(lowest);
         // Counted in bytes, emptied before they overflow.
         let mut ones = [0usize; BITS];
-        for some in self.codes.chunks(usize::from(u8::MAX)) {
+        for some in codes.chunks(usize::from(u8::MAX)) {
             for (bit, ones) in ones.iter_mut().enumerate() {
                 *ones += usize::from(some.iter().map(|c| c >> bit & 1).sum::<u8>());
             }
