@@ -22,7 +22,7 @@ pub struct Arguments {
     #[command(flatten)]
     input: Input,
     /// Seed of whatever is random
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = super::seed, allow_negative_numbers = true)]
     seed: u64,
     /// Write the result as JSON
     #[arg(long, value_name = "FILE")]
