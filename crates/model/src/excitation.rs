@@ -335,7 +335,9 @@ impl Stated<'_> {
             (amplitude * phase.sin(), rate * phase.cos())
         };
         let turned = std::f64::consts::TAU / turn_period;
-        for i in 0..self.samples {
+        let [about_x, about_y, about_z] = &mut motion;
+        let rates = about_x.iter_mut().zip(about_y).zip(about_z);
+        for (i, ((about_x, about_y), about_z)) in rates.enumerate() {
             let t = i as f64 / self.rate_hz;
             let (roll, roll_rate) = sway(t, 0.0, parts[0]);
             let (pitch, pitch_rate) = sway(t, 1.0, parts[1]);
@@ -346,9 +348,9 @@ impl Stated<'_> {
             for (acc, g) in acc.iter_mut().zip(gravity) {
                 acc.get_mut(i).into_iter().for_each(|a| *a += g);
             }
-            motion[0][i] = roll_rate;
-            motion[1][i] = pitch_rate * cos_roll;
-            motion[2][i] = turn * (turned * t).sin() - pitch_rate * sin_roll;
+            *about_x = roll_rate;
+            *about_y = pitch_rate * cos_roll;
+            *about_z = turn * (turned * t).sin() - pitch_rate * sin_roll;
         }
         (acc, motion)
     }

@@ -93,11 +93,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn print(files: &[String], found: &Representative) {
     say!("representative  {}", files[found.run]);
     if found.odd.is_empty() {
-        say!(
-            "no run stands out (limits: {:.1} spreads from the median, {:.1} from the others' mean)",
-            found.limit,
-            found.limit_alone
+        let limits = format!(
+            "(limits: {:.1} spreads from the median, {:.1} from the others' mean)",
+            found.limit, found.limit_alone
         );
+        say!("{}", text::item("no run stands out ", &limits).trim_start());
     }
     for odd in &found.odd {
         let what = format!(
