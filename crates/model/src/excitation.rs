@@ -8,6 +8,7 @@ pub(crate) use moved::{fast, moved_like, slow};
 
 use std::collections::BTreeMap;
 
+use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -180,51 +181,184 @@ impl World {
         rate_hz: f64,
         rng: &mut Xoshiro256PlusPlus,
     ) -> Self {
-        let get = |key| setting_value(given, key);
-        let seconds = samples as f64 / rate_hz;
-        let time = |i: usize| i as f64 / rate_hz;
-        let on = |t: f64, period: f64| (t / period).rem_euclid(1.0) < 0.5;
-        let motor = MotorProfile {
-            on: get("motor_on"),
-            forward: get("motor_forward"),
+        Self::stated_but(given, samples, rate_hz, Some(rng), Recorded::default())
+    }
+
+    /// The same, but for what was recorded of it. Without random numbers a vibration is drawn where it is to be seen alone.
+    pub(crate) fn stated_but(
+        given: &BTreeMap<String, f64>,
+        samples: usize,
+        rate_hz: f64,
+        rng: Option<&mut Xoshiro256PlusPlus>,
+        recorded: Recorded,
+    ) -> Self {
+        let stated = Stated {
+            given,
+            samples,
+            rate_hz,
         };
-        let mut heater = 0.0;
-        let mut temperature = Vec::with_capacity(samples);
-        let mut duty = Vec::with_capacity(samples);
-        let mut supply = Vec::with_capacity(samples);
-        for i in 0..samples {
-            let t = time(i);
-            let target = if on(t, get("heater_period_s")) {
-                get("heater_degc")
-            } else {
-                0.0
-            };
-            heater += (target - heater) / (get("heater_time_constant_s") * rate_hz).max(1.0);
-            temperature.push(
-                get("ambient_degc")
-                    + get("self_heating_degc")
-                        * (1.0 - (-t / get("self_heating_time_constant_s")).exp())
-                    + get("drift_degc") * t / seconds
-                    + heater,
-            );
-            let d = get("motor_duty") * motor.turns(t / get("motor_period_s"));
-            duty.push((d * 255.0).round() / 255.0);
-            let load = if on(t, get("supply_load_period_s")) {
-                0.0
-            } else {
-                get("supply_load_v")
-            };
-            supply.push(get("supply_v") - load - get("supply_motor_v") * d.abs());
+        let mut own = Xoshiro256PlusPlus::seed_from_u64(0);
+        let is_seen = recorded.acc.iter().any(Option::is_none);
+        let rng = rng.or_else(|| is_seen.then_some(&mut own));
+        let (mut acc, motion) = stated.moved(rng);
+        for (acc, recorded) in acc.iter_mut().zip(recorded.acc) {
+            *acc = recorded.unwrap_or_else(|| std::mem::take(acc));
         }
-        let (acc, motion) = moved(given, samples, rate_hz, rng);
+        let temperature = match recorded.temperature {
+            [Some(x), Some(y), Some(z)] => [x, y, z],
+            some => {
+                let all = stated.temperature();
+                some.map(|own| own.unwrap_or_else(|| all.clone()))
+            }
+        };
+        let (supply, duty) = match (recorded.supply, recorded.duty) {
+            (Some(supply), Some(duty)) => (supply, duty),
+            (supply, duty) => {
+                let turning = stated.turning();
+                let rounded = |d: &f64| (d * 255.0).round() / 255.0;
+                let supply = supply.unwrap_or_else(|| stated.supply(&turning));
+                let duty = duty.unwrap_or_else(|| turning.iter().map(rounded).collect());
+                (supply, duty)
+            }
+        };
         Self {
-            temperature: std::array::from_fn(|_| temperature.clone()),
+            temperature,
             supply,
             duty,
             acc,
             motion,
         }
     }
+}
+
+/// What was recorded of a world, as [`World`] has it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Recorded {
+    pub temperature: [Option<Vec<f64>>; 3],
+    pub supply: Option<Vec<f64>>,
+    pub duty: Option<Vec<f64>>,
+    pub acc: [Option<Vec<f64>>; 3],
+}
+
+/// Settings, and the run that they are of.
+struct Stated<'a> {
+    given: &'a BTreeMap<String, f64>,
+    samples: usize,
+    rate_hz: f64,
+}
+
+impl Stated<'_> {
+    fn get(&self, key: &str) -> f64 {
+        setting_value(self.given, key)
+    }
+
+    fn each(&self, of: impl FnMut(f64) -> f64) -> Vec<f64> {
+        let times = (0..self.samples).map(|i| i as f64 / self.rate_hz);
+        times.map(of).collect()
+    }
+
+    /// degC.
+    fn temperature(&self) -> Vec<f64> {
+        let seconds = self.samples as f64 / self.rate_hz;
+        let [swing, period, ambient, own, drift] = [
+            "heater_degc",
+            "heater_period_s",
+            "ambient_degc",
+            "self_heating_degc",
+            "drift_degc",
+        ]
+        .map(|key| self.get(key));
+        let settling = self.get("self_heating_time_constant_s");
+        let slowed = (self.get("heater_time_constant_s") * self.rate_hz).max(1.0);
+        let mut heater = 0.0;
+        self.each(|t| {
+            let target = if is_on(t, period) { swing } else { 0.0 };
+            heater += (target - heater) / slowed;
+            ambient + own * (1.0 - (-t / settling).exp()) + drift * t / seconds + heater
+        })
+    }
+
+    /// Duty of the motor, -1..1.
+    fn turning(&self) -> Vec<f64> {
+        let motor = MotorProfile {
+            on: self.get("motor_on"),
+            forward: self.get("motor_forward"),
+        };
+        let [size, period] = ["motor_duty", "motor_period_s"].map(|key| self.get(key));
+        self.each(|t| size * motor.turns(t / period))
+    }
+
+    /// V, at a duty of the motor.
+    fn supply(&self, turning: &[f64]) -> Vec<f64> {
+        let [level, load, period, motor] = [
+            "supply_v",
+            "supply_load_v",
+            "supply_load_period_s",
+            "supply_motor_v",
+        ]
+        .map(|key| self.get(key));
+        let mut turning = turning.iter();
+        self.each(|t| {
+            let sag = if is_on(t, period) { 0.0 } else { load };
+            level - sag - motor * turning.next().map_or(0.0, |d| d.abs())
+        })
+    }
+
+    /// Specific force, g, and motion, deg/s, of a stand that sways, turns and is shaken; only the motion without random numbers.
+    fn moved(&self, rng: Option<&mut Xoshiro256PlusPlus>) -> ([Vec<f64>; 3], [Vec<f64>; 3]) {
+        let mut acc: [Vec<f64>; 3] = Default::default();
+        if let Some(rng) = rng {
+            let rms = self.get("vibration_g");
+            acc = acc.map(|_| {
+                self.each(|_| {
+                    let e: f64 = StandardNormal.sample(rng);
+                    rms * e
+                })
+            });
+        }
+        let mut motion: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; self.samples]);
+        let [period, size, from] =
+            ["sway_period_s", "sway_deg", "sway_from_s"].map(|key| self.get(key));
+        let [turn, turn_period] = ["turn_dps", "turn_period_s"].map(|key| self.get(key));
+        if size == 0.0 && turn == 0.0 {
+            // Gravity is along z.
+            acc[2].iter_mut().for_each(|z| *z += 1.0);
+            return (acc, motion);
+        }
+        let parts = ["sway_about_x", "sway_about_y"].map(|key| self.get(key));
+        let w = std::f64::consts::TAU / period;
+        let sway = |t: f64, shift: f64, part: f64| {
+            let amplitude = part * size;
+            let since = t - from;
+            let phase = w * since.max(0.0) + shift;
+            let rate = if since < 0.0 { 0.0 } else { amplitude * w };
+            (amplitude * phase.sin(), rate * phase.cos())
+        };
+        let turned = std::f64::consts::TAU / turn_period;
+        let [about_x, about_y, about_z] = &mut motion;
+        let rates = about_x.iter_mut().zip(about_y).zip(about_z);
+        for (i, ((about_x, about_y), about_z)) in rates.enumerate() {
+            let t = i as f64 / self.rate_hz;
+            let (roll, roll_rate) = sway(t, 0.0, parts[0]);
+            let (pitch, pitch_rate) = sway(t, 1.0, parts[1]);
+            // Gravity and rates in the axes of the body, turned by the pitch first and then by the roll.
+            let (sin_pitch, cos_pitch) = pitch.to_radians().sin_cos();
+            let (sin_roll, cos_roll) = roll.to_radians().sin_cos();
+            let gravity = [-sin_pitch, cos_pitch * sin_roll, cos_pitch * cos_roll];
+            for (acc, g) in acc.iter_mut().zip(gravity) {
+                acc.get_mut(i).into_iter().for_each(|a| *a += g);
+            }
+            *about_x = roll_rate;
+            *about_y = pitch_rate * cos_roll;
+            *about_z = turn * (turned * t).sin() - pitch_rate * sin_roll;
+        }
+        (acc, motion)
+    }
+}
+
+/// Whether what is switched is on, in the first half of its period.
+fn is_on(t: f64, period: f64) -> bool {
+    (t / period).rem_euclid(1.0) < 0.5
 }
 
 /// When the motor turns, and which way: a rest, forward, a rest as long, back.
@@ -249,46 +383,4 @@ impl MotorProfile {
             0.0
         }
     }
-}
-
-/// Specific force, g, and motion, deg/s, of a stand that sways, turns and is shaken, by its settings.
-fn moved(
-    given: &BTreeMap<String, f64>,
-    samples: usize,
-    rate_hz: f64,
-    rng: &mut Xoshiro256PlusPlus,
-) -> ([Vec<f64>; 3], [Vec<f64>; 3]) {
-    let get = |key| setting_value(given, key);
-    let time = |i: usize| i as f64 / rate_hz;
-    let sway = |i: usize, shift: f64, part: f64| {
-        let w = std::f64::consts::TAU / get("sway_period_s");
-        let amplitude = part * get("sway_deg");
-        let since = time(i) - get("sway_from_s");
-        let phase = w * since.max(0.0) + shift;
-        let rate = if since < 0.0 { 0.0 } else { amplitude * w };
-        (amplitude * phase.sin(), rate * phase.cos())
-    };
-    let rms = get("vibration_g");
-    let mut shake = |_| {
-        let e: f64 = StandardNormal.sample(rng);
-        rms * e
-    };
-    let mut acc: [Vec<f64>; 3] = std::array::from_fn(|_| (0..samples).map(&mut shake).collect());
-    let mut motion: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; samples]);
-    let parts = [get("sway_about_x"), get("sway_about_y")];
-    for i in 0..samples {
-        let (roll, roll_rate) = sway(i, 0.0, parts[0]);
-        let (pitch, pitch_rate) = sway(i, 1.0, parts[1]);
-        // Gravity and rates in the axes of the body, turned by the pitch first and then by the roll.
-        let (sin_pitch, cos_pitch) = pitch.to_radians().sin_cos();
-        let (sin_roll, cos_roll) = roll.to_radians().sin_cos();
-        acc[0][i] -= sin_pitch;
-        acc[1][i] += cos_pitch * sin_roll;
-        acc[2][i] += cos_pitch * cos_roll;
-        motion[0][i] = roll_rate;
-        motion[1][i] = pitch_rate * cos_roll;
-        let w = std::f64::consts::TAU / get("turn_period_s");
-        motion[2][i] = get("turn_dps") * (w * time(i)).sin() - pitch_rate * sin_roll;
-    }
-    (acc, motion)
 }

@@ -18,6 +18,7 @@ pub mod effects;
 pub mod excitation;
 pub mod file;
 pub mod integral;
+pub mod nearest;
 pub mod parameter;
 mod range;
 pub mod record;

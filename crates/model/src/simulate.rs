@@ -13,7 +13,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::excitation::{World, moved_like};
+use crate::excitation::{Recorded, World, moved_like};
 use crate::file::{ChannelModel, ModelFile};
 use crate::record::{Axis, Quantity, Record};
 use frames::frames;
@@ -96,6 +96,7 @@ pub enum SimulateError {
 const LONGEST: usize = 400_000_000;
 
 /// A run while it is being simulated. Effects act on it, stage by stage.
+#[derive(Clone)]
 pub struct Simulation {
     /// Sample rate, Hz.
     pub rate_hz: f64,
@@ -235,19 +236,20 @@ pub fn simulate_in_the_world_of(
     seed: u64,
 ) -> Result<Record, SimulateError> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let (model, world, read) = world_of(model, record, rate_hz, &mut rng)?;
+    let (model, world, read) = world_of(model, record, rate_hz, Some(&mut rng))?;
     run(&model, world, read, rate_hz, rng)
 }
 
 /// What each gyro read, where the record has it.
 type Read = [Option<Vec<f64>>; 3];
 
-/// The model as it is simulated in the world of a record, that world, and the slow part of each axis that moved, deg/s.
+/// The model as it is simulated in the world of a record, that world, and the slow part of each axis that moved, deg/s. Without
+/// random numbers nothing is drawn of which the record says what it was.
 fn world_of(
     model: &ModelFile,
     record: &Record,
     rate_hz: f64,
-    rng: &mut Xoshiro256PlusPlus,
+    rng: Option<&mut Xoshiro256PlusPlus>,
 ) -> Result<(ModelFile, World, Read), SimulateError> {
     let samples = record.len();
     if samples == 0 {
@@ -257,7 +259,25 @@ fn world_of(
             limit: LONGEST,
         });
     }
-    let mut world = World::stated(&model.excitation, samples, rate_hz, rng);
+    let seen = |quantity, axis: Option<Axis>, scale: f64| {
+        let channel = match axis {
+            Some(axis) => record.of(quantity, Some(axis)),
+            None => record.all(quantity).next(),
+        };
+        channel.and_then(|c| held(&c.values, scale))
+    };
+    let any = record.of(Quantity::Temp, None);
+    let temperature = Axis::ALL.map(|axis| {
+        let own = record.of(Quantity::Temp, Some(axis)).or(any);
+        own.and_then(|c| held(&c.values, 1.0))
+    });
+    let recorded = Recorded {
+        temperature,
+        supply: seen(Quantity::Supply, None, 1.0),
+        duty: seen(Quantity::Pwm, None, 1.0 / 255.0),
+        acc: Axis::ALL.map(|axis| seen(Quantity::Acc, Some(axis), 1.0 / STANDARD_GRAVITY)),
+    };
+    let mut world = World::stated_but(&model.excitation, samples, rate_hz, rng, recorded);
     let (model, read) = moved_like(model, record, rate_hz);
     // What the other axes take of a motion.
     for (motion, read) in world.motion.iter_mut().zip(&read) {
@@ -265,34 +285,6 @@ fn world_of(
             let mean = read.iter().sum::<f64>() / samples as f64;
             *motion = read.iter().map(|v| v - mean).collect();
         }
-    }
-    for axis in Axis::ALL {
-        let own = record
-            .of(Quantity::Temp, Some(axis))
-            .or_else(|| record.of(Quantity::Temp, None));
-        if let Some(t) = own.and_then(|c| held(&c.values, 1.0)) {
-            world.temperature[axis.index()] = t;
-        }
-        if let Some(a) = record
-            .of(Quantity::Acc, Some(axis))
-            .and_then(|c| held(&c.values, 1.0 / STANDARD_GRAVITY))
-        {
-            world.acc[axis.index()] = a;
-        }
-    }
-    if let Some(u) = record
-        .all(Quantity::Supply)
-        .next()
-        .and_then(|c| held(&c.values, 1.0))
-    {
-        world.supply = u;
-    }
-    if let Some(d) = record
-        .all(Quantity::Pwm)
-        .next()
-        .and_then(|c| held(&c.values, 1.0 / 255.0))
-    {
-        world.duty = d;
     }
     Ok((model, world, read))
 }
@@ -369,7 +361,7 @@ fn run(
         .then(|| felt(&accelerometers, world.clone(), rate_hz, rng.clone()));
     let mut prepared = Prepared::new(&gyros, world, read, rate_hz, rng)?;
     prepared.clocks();
-    prepared.draw();
+    prepared.draw(None);
     prepared.frames();
     let mut record = frames(prepared.run, model, prepared.present, prepared.lsb);
     if let Some(felt) = felt {
@@ -392,7 +384,7 @@ fn felt(
     rng.long_jump();
     let mut prepared = Prepared::new(model, world, Default::default(), rate_hz, rng)?;
     prepared.clocks();
-    prepared.draw();
+    prepared.draw(None);
     let each = model.channels.iter().map(|c| {
         let axis = axis_of(c)?;
         let counts = std::mem::take(&mut prepared.run.counts[axis]);

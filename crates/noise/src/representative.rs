@@ -1,5 +1,7 @@
 //! Which of many runs represents them, and which do not: the paper's step before the analysis proper.
 
+mod slow;
+
 use std::borrow::Cow;
 
 use model::record::{Channel, Quantity, Record};
@@ -11,9 +13,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::allan::{Deviation, Phase, deviation};
 use crate::analyze::{NoiseParameters, misfit_warning};
-use crate::edf::{NoiseType, edf};
+use crate::edf::NoiseType;
 use crate::fit::{Spectrum, Term, fit, fit_described};
-use crate::identify::identify;
 use crate::random_effects::{Pooled, pool};
 use crate::units::Units;
 use model::record::AnalysisError;
@@ -317,7 +318,7 @@ const RUN_NEEDS: usize = 64;
 fn row_of(
     name: &str,
     (channel, sampling, phase): (&Channel, &Sampling, &Phase),
-    tau: f64,
+    (tau, noise): (f64, NoiseType),
     units: &Units,
 ) -> Result<([(f64, f64); 3], Spectrum), AnalysisError> {
     let short = || AnalysisError::Inconclusive {
@@ -335,10 +336,8 @@ fn row_of(
     let (Some(value), Some(error)) = (n.value, n.std_error) else {
         return Err(short());
     };
-    let m = (tau / sampling.tau0).round().max(1.0) as usize;
+    let m = slow::cluster(sampling, tau);
     let slow = deviation(phase, Deviation::Oadev, sampling.tau0, m).ok_or_else(short)?;
-    let noise = identify(phase, (m / 4).max(1)).unwrap_or(NoiseType::WhiteRate);
-    let freedom = edf(Deviation::Oadev, noise, m, &phase.run_lengths());
     let readings: Vec<f64> = runs
         .iter()
         .flat_map(|r| channel.values[r.clone()].iter().copied())
@@ -351,7 +350,7 @@ fn row_of(
         ),
         (
             slow.deviation * units.reading.factor,
-            slow.deviation * units.reading.factor / (2.0 * freedom).sqrt(),
+            slow.deviation * units.reading.factor * slow::ln_error(noise, m, phase),
         ),
         (bias * units.reading.factor, 0.0),
     ];
@@ -414,10 +413,11 @@ fn figures_of(
         .map(|(p, s)| p.longest_run() as f64 * s.tau0)
         .fold(f64::INFINITY, f64::min)
         / 10.0;
+    let noise = slow::noise(&phases, samplings, tau);
     let mut spectra = Vec::new();
     let mut rows: Vec<[(f64, f64); 3]> = Vec::new();
     for ((channel, sampling), phase) in channels.iter().zip(samplings).zip(&phases) {
-        let (row, spectrum) = row_of(name, (channel, sampling, phase), tau, &units)?;
+        let (row, spectrum) = row_of(name, (channel, sampling, phase), (tau, noise), &units)?;
         rows.push(row);
         spectra.push(spectrum);
     }

@@ -1,10 +1,11 @@
 //! Reading.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use model::record::{Channel, Header, Quantity, Record};
+use model::record::{Channel, Header, Quantity, Record, fills};
 
 use super::angle::difference_angles;
 use super::columns::{Column, Columns, Role, Said, columns};
@@ -290,6 +291,7 @@ fn finish(
     check_rate(&mut record, options.rate_hz)?;
     difference_angles(&mut record)?;
     share_thermometer(&mut record);
+    let mut record = fills::left_out(Cow::Owned(record)).into_owned();
     let doubts = doubts(&record, !found.assumed_gyros.is_empty());
     record.notes.extend(doubts);
     let unsteady = unsteady(&record);

@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(long)]
     paper: bool,
     /// Seed of the replicates behind intervals
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = super::seed, allow_negative_numbers = true)]
     seed: u64,
     /// Write the result as JSON
     #[arg(long, value_name = "FILE")]

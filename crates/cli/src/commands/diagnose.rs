@@ -24,7 +24,7 @@ pub struct Arguments {
     #[command(flatten)]
     replicates: Replicates,
     /// Seed of whatever is random
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = super::seed, allow_negative_numbers = true)]
     seed: u64,
     /// Only these channels, accelerometers at rest too: gyro_x,acc_z,...
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]

@@ -61,7 +61,7 @@ pub struct Arguments {
     #[arg(long, value_name = "HZ", value_parser = super::positive, allow_negative_numbers = true)]
     at_rate: Option<f64>,
     /// Noise: seed of the replicates behind intervals
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = super::seed, allow_negative_numbers = true)]
     seed: u64,
     #[command(flatten)]
     input: Input,

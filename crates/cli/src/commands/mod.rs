@@ -348,6 +348,11 @@ pub fn positive(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
+/// A seed, from an option's text.
+pub fn seed(text: &str) -> std::result::Result<u64, String> {
+    (text.parse()).map_err(|_| format!("it has to be a whole number from 0 to {}", u64::MAX))
+}
+
 /// Reads a text file.
 pub fn read_text(path: &Path) -> Result<String> {
     std::fs::read_to_string(path).map_err(|error| {

@@ -38,7 +38,7 @@ pub struct Arguments {
     #[arg(long, value_name = "RECORDS")]
     check: Option<usize>,
     /// Seed of the check
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = super::seed, allow_negative_numbers = true)]
     seed: u64,
     /// Write the plan as JSON
     #[arg(long, value_name = "FILE")]

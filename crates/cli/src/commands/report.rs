@@ -21,7 +21,7 @@ pub struct Arguments {
     #[command(flatten)]
     replicates: Replicates,
     /// Seed of whatever is random
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = super::seed, allow_negative_numbers = true)]
     seed: u64,
     /// The report to write
     #[arg(long, default_value = "report.html")]

@@ -22,7 +22,7 @@ pub struct Arguments {
     #[command(flatten)]
     input: Input,
     /// Seed of whatever is random
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = super::seed, allow_negative_numbers = true)]
     seed: u64,
     /// Write the result as JSON
     #[arg(long, value_name = "FILE")]
@@ -93,11 +93,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn print(files: &[String], found: &Representative) {
     say!("representative  {}", files[found.run]);
     if found.odd.is_empty() {
-        say!(
-            "no run stands out (limits: {:.1} spreads from the median, {:.1} from the others' mean)",
-            found.limit,
-            found.limit_alone
+        let limits = format!(
+            "(limits: {:.1} spreads from the median, {:.1} from the others' mean)",
+            found.limit, found.limit_alone
         );
+        say!("{}", text::item("no run stands out ", &limits).trim_start());
     }
     for odd in &found.odd {
         let what = format!(

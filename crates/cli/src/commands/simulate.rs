@@ -23,7 +23,7 @@ pub struct Arguments {
     #[arg(long, value_parser = super::positive, allow_negative_numbers = true)]
     rate: Option<f64>,
     /// Seed: the same seed gives the same capture
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = super::seed, allow_negative_numbers = true)]
     seed: u64,
     /// The capture to write, .csv or .csv.gz
     #[arg(long)]

@@ -206,17 +206,18 @@ pub fn replicate(
     count: usize,
     seed: u64,
 ) -> Result<Drawn, SimulateError> {
-    let draws = |of: Range<u64>| draws(model, record, places, of, seed);
+    let replicas = Replicas::new(model, record, model.rate_hz, &[])?;
+    let draws = |of: Range<u64>| draws(replicas.clone(), places, of, seed);
     let (count, half) = (count as u64, count.div_ceil(2) as u64);
     thread::scope(|threads| {
         let beside = thread::Builder::new().spawn_scoped(threads, || draws(half..count));
-        let (once, mut curves) = draws(0..half)?;
+        let (once, mut curves) = draws(0..half);
         let (_, rest) = match beside {
             Ok(thread) => thread
                 .join()
                 .unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
             Err(_) => draws(half..count),
-        }?;
+        };
         for (curves, rest) in curves.iter_mut().zip(rest) {
             curves.extend(rest);
         }
@@ -226,15 +227,13 @@ pub fn replicate(
 
 /// Some of the draws, by their numbers, and the readings of the first of them.
 fn draws(
-    model: &ModelFile,
-    record: &Record,
+    mut replicas: Replicas,
     places: &[Option<Places>],
     numbers: Range<u64>,
     seed: u64,
-) -> Result<Drawn, SimulateError> {
-    let mut replicas = Replicas::new(model, record, model.rate_hz, &[])?;
+) -> Drawn {
     let mut readings = vec![];
-    let mut curves = vec![Vec::new(); model.channels.len()];
+    let mut curves = vec![Vec::new(); places.len()];
     let mut once = vec![];
     let first = numbers.start;
     for k in numbers {
@@ -251,7 +250,7 @@ fn draws(
             once.clone_from(&readings);
         }
     }
-    Ok((once, curves))
+    (once, curves)
 }
 
 /// Holds the measured curves against replicates.

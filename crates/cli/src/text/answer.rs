@@ -334,6 +334,9 @@ pub fn level(p: &Parameter) -> String {
     }
 }
 
+/// Digits behind the point of a value with an exponent, at most.
+pub const MOST_DIGITS: i32 = 8;
+
 /// A value to the second digit of `half`, the half width of its interval.
 fn to_place_of(value: f64, half: f64) -> String {
     let exponent = |v: f64| format!("{v:.1e}").rsplit_once('e')?.1.parse::<i32>().ok();
@@ -342,7 +345,8 @@ fn to_place_of(value: f64, half: f64) -> String {
     if (-4..9).contains(&size) && place > -10 {
         return fixed(value, (-place).max(0) as usize);
     }
-    format!("{value:.*e}", (size - place).max(1) as usize)
+    // Beside a value that is that much larger than its interval, that has no width.
+    format!("{value:.*e}", (size - place).clamp(1, MOST_DIGITS) as usize)
 }
 
 #[cfg(test)]

@@ -267,7 +267,7 @@ pub fn measured(value: f64, std_error: Option<f64>) -> String {
         let places = (-place).max(0) as usize;
         return format!("{} +- {error:.places$}", fixed(value, places));
     }
-    let digits = (size - place).max(1) as usize;
+    let digits = (size - place).clamp(1, answer::MOST_DIGITS) as usize;
     format!("{value:.digits$e} +- {error:.1e}")
 }
 

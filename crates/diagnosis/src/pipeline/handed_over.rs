@@ -62,14 +62,14 @@ pub(super) fn handed_over(
     let mut fitted = unnamed::fit(searched, grid, &wanted, &causes);
     let mut extended_model = extended(&fitted);
     let adequate = told.findings.is_empty() && told.unexplained.is_empty();
-    let mut judge = match count {
+    let judge = match count {
         0 => None,
         count => Judge::new(grid, &baseline_model, count, options.seed).ok(),
     };
-    let mut among = |model: &ModelFile| {
+    let among = |model: &ModelFile| {
         let mut compared = model.clone();
         compared.effects.retain(|e| !is_mended(e));
-        let all = judge.as_mut().map(|j| j.of(&compared).unwrap_or_default());
+        let all = judge.as_ref().map(|j| j.of(&compared).unwrap_or_default());
         all.unwrap_or_default()
     };
     let mut replicates = among(&extended_model);

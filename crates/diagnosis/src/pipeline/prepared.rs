@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use model::record::fills;
 use model::record::rows;
 use model::record::{AnalysisError, Base, Record};
 
@@ -39,6 +40,7 @@ struct Again {
 }
 
 pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisError> {
+    let record = fills::left_out(record);
     let record = &*rows::in_order(&record);
     let (record, bursts) = match rows::end_to_end(record) {
         Some((joined, bursts)) => (Cow::Owned(joined), Some(bursts)),

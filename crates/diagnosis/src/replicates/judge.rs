@@ -1,6 +1,9 @@
 //! Both models of a diagnosis held against their record.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
+use std::panic::resume_unwind;
+use std::thread;
 
 use model::file::{ChannelModel, ModelFile};
 use model::record::Record;
@@ -19,6 +22,11 @@ use model::record::AnalysisError;
 struct Judged<'a> {
     grid: &'a Grid,
     record: Record,
+    compared: Compared,
+}
+
+/// What of a record is compared with replicates, and how.
+struct Compared {
     parts: Parts,
     measured: Vec<Measured>,
     battery: Battery,
@@ -41,12 +49,15 @@ impl<'a> Judged<'a> {
                 ),
             })
             .collect();
-        Self {
-            grid,
+        let compared = Compared {
             battery: Battery::new(&subjects, &record, grid.rate_hz, &parts),
             measured: grid.targets.iter().map(|t| measured(t, &parts)).collect(),
-            record,
             parts,
+        };
+        Self {
+            grid,
+            record,
+            compared,
         }
     }
 
@@ -55,40 +66,18 @@ impl<'a> Judged<'a> {
     /// # Errors
     /// Those of the simulation.
     pub fn among(
-        &mut self,
+        &self,
         model: &ModelFile,
         count: usize,
         seed: u64,
     ) -> Result<Vec<Among>, SimulateError> {
         let model = in_steps(model, self.grid);
-        let mut replicas = Replicas::new(
-            &model,
-            &self.record,
-            self.grid.rate_hz,
-            &self.parts.stretches,
-        )?;
-        // A motion that is replayed is no property of the model: its channel is compared in what is faster.
-        let compared = |replicas: &Replicas, readings: &mut [Vec<f64>]| {
-            for (k, values) in readings.iter_mut().enumerate() {
-                if replicas.replays(k) {
-                    let parts = values.chunks_mut(self.parts.length);
-                    parts.for_each(|part| replicas.without_replayed(part));
-                }
-            }
-        };
-        let mut readings: Vec<Vec<f64>> = self.measured.iter().map(|m| m.values.clone()).collect();
-        compared(&replicas, &mut readings);
-        let mut rows = vec![self.battery.of(&readings)];
-        for k in 0..count as u64 {
-            replicas.draw(seed.wrapping_add(k), &mut readings);
-            for (values, measured) in readings.iter_mut().zip(&self.measured) {
-                bridge(values, &measured.lost);
-            }
-            compared(&replicas, &mut readings);
-            rows.push(self.battery.of(&readings));
-        }
-        for (k, own) in self.battery.channels.iter().enumerate() {
-            let slow = |i: &usize| self.battery.statistics[*i].slow;
+        let Compared { parts, battery, .. } = &self.compared;
+        let rate_hz = self.grid.rate_hz;
+        let replicas = Replicas::new(&model, &self.record, rate_hz, &parts.stretches)?;
+        let mut rows = self.compared.rows(&replicas, count as u64, seed);
+        for (k, own) in battery.channels.iter().enumerate() {
+            let slow = |i: &usize| battery.statistics[*i].slow;
             for i in own.clone().filter(|_| replicas.replays(k)).filter(slow) {
                 // No number tells nothing.
                 rows.iter_mut().for_each(|row| row[i] = f64::NAN);
@@ -96,9 +85,56 @@ impl<'a> Judged<'a> {
         }
         let table = Table {
             rows,
-            channels: self.battery.channels.clone(),
+            channels: battery.channels.clone(),
         };
-        Ok(table.among(&self.battery.statistics))
+        Ok(table.among(&battery.statistics))
+    }
+}
+
+impl Compared {
+    /// Statistics of the record, and of so many replicates in the order of their numbers, each of which has a seed of its own:
+    /// the second half is drawn beside the first where there is a thread for it.
+    fn rows(&self, replicas: &Replicas, count: u64, seed: u64) -> Vec<Vec<f64>> {
+        let half = count.div_ceil(2);
+        let second = || self.drawn(replicas.clone(), half..count, seed);
+        thread::scope(|threads| {
+            let beside = thread::Builder::new().spawn_scoped(threads, second);
+            let mut readings: Vec<Vec<f64>> =
+                self.measured.iter().map(|m| m.values.clone()).collect();
+            self.without_replayed(replicas, &mut readings);
+            let mut rows = vec![self.battery.of(&readings, &mut self.battery.work())];
+            rows.extend(self.drawn(replicas.clone(), 0..half, seed));
+            rows.extend(match beside {
+                Ok(thread) => (thread.join()).unwrap_or_else(|panic| resume_unwind(panic)),
+                // A browser has none.
+                Err(_) => second(),
+            });
+            rows
+        })
+    }
+
+    /// Statistics of the replicates of these numbers.
+    fn drawn(&self, mut replicas: Replicas, numbers: Range<u64>, seed: u64) -> Vec<Vec<f64>> {
+        let (mut work, mut readings) = (self.battery.work(), vec![]);
+        let row = |k| {
+            replicas.draw(seed.wrapping_add(k), &mut readings);
+            for (values, measured) in readings.iter_mut().zip(&self.measured) {
+                bridge(values, &measured.lost);
+            }
+            self.without_replayed(&replicas, &mut readings);
+            self.battery.of(&readings, &mut work)
+        };
+        numbers.map(row).collect()
+    }
+
+    /// A motion that is replayed is no property of the model: its channel is compared in what is faster.
+    fn without_replayed(&self, replicas: &Replicas, readings: &mut [Vec<f64>]) {
+        for (k, values) in readings.iter_mut().enumerate() {
+            if replicas.replays(k) {
+                let parts = values.chunks_mut(self.parts.length);
+                parts.for_each(|part| replicas.without_replayed(part));
+            }
+        }
     }
 }
 
@@ -139,7 +175,7 @@ impl<'a> Judge<'a> {
         count: usize,
         seed: u64,
     ) -> Result<Self, SimulateError> {
-        let mut judged = Judged::new(grid, baseline);
+        let judged = Judged::new(grid, baseline);
         let before = judged.among(baseline, count, seed)?;
         Ok(Self {
             judged,
@@ -154,10 +190,7 @@ impl<'a> Judge<'a> {
     ///
     /// # Errors
     /// Those of the simulation.
-    pub fn of(
-        &mut self,
-        extended: &ModelFile,
-    ) -> Result<BTreeMap<String, Replicated>, SimulateError> {
+    pub fn of(&self, extended: &ModelFile) -> Result<BTreeMap<String, Replicated>, SimulateError> {
         let same = self.baseline.channels == extended.channels
             && extended.effects.is_empty()
             && extended.unnamed.is_empty();
@@ -188,6 +221,6 @@ pub fn judge_record(
 ) -> Result<BTreeMap<String, Replicated>, AnalysisError> {
     let grid = lay_out(record, &|_| vec![], seed)?;
     let [baseline, extended] = models;
-    let judged = Judge::new(&grid, baseline, count, seed).and_then(|mut j| j.of(extended));
+    let judged = Judge::new(&grid, baseline, count, seed).and_then(|j| j.of(extended));
     Ok(judged.unwrap_or_default())
 }

@@ -3,6 +3,7 @@
 //! Everything that computes takes a [`Record`]: captures of the board, simulations and foreign files all become one.
 
 pub mod error;
+pub mod fills;
 pub mod rows;
 pub mod sampling;
 

@@ -4,6 +4,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
 
 use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::unnamed::{Generic, Random, too_correlated};
@@ -14,9 +15,11 @@ use crate::effect::{Effect, Parameters, Stage, slowest};
 use crate::effects::effect;
 use crate::excitation::{World, fast};
 use crate::file::ModelFile;
+use crate::nearest::nearest;
 use crate::record::flag;
 
 /// An effect of a model, and the axes that it acts on.
+#[derive(Clone)]
 struct Acting {
     effect: &'static dyn Effect,
     parameters: Parameters,
@@ -52,6 +55,7 @@ impl Acting {
 }
 
 /// A run of a model, without what is random.
+#[derive(Clone)]
 pub(super) struct Prepared {
     pub run: Simulation,
     /// Axes that the model has.
@@ -192,6 +196,11 @@ impl Prepared {
         run.flags.truncate(from);
     }
 
+    /// Whether something happens to what the sensor puts out, or later.
+    pub fn is_late(&self) -> bool {
+        !self.late.is_empty()
+    }
+
     /// Clocks and frames, which only a run that is written has.
     pub fn clocks(&mut self) {
         let run = &mut self.run;
@@ -209,14 +218,25 @@ impl Prepared {
         }
     }
 
-    /// Draw what is random, up to the counts.
-    pub fn draw(&mut self) {
+    /// Whether the variances are drawn too.
+    pub fn resized(&self) -> bool {
+        let by_effect = |a: &Acting| a.effect.stage() == Stage::Noise;
+        self.random.iter().any(by_effect) || self.unnamed.random.iter().any(Random::is_noise)
+    }
+
+    /// Draw what is random, up to the counts; on these rates, where the run's are those of a draw before.
+    pub fn draw(&mut self, start: Option<&[Vec<f64>; 3]>) {
         let present = self.present;
         self.run.shared.iter_mut().for_each(Vec::clear);
         self.run.own = [1.0; 3];
-        for axis in (0..3).filter(|a| present[*a]) {
-            self.begin(WALKS + axis as u64);
-            wander(&mut self.run, axis, self.walk[axis]);
+        for axis in 0..3 {
+            let start = start.map(|all| all[axis].as_slice());
+            if present[axis] {
+                self.begin(WALKS + axis as u64);
+                wander(&mut self.run, axis, self.walk[axis], start);
+            } else if let Some(start) = start {
+                self.run.rate[axis].copy_from_slice(start);
+            }
         }
         for k in 0..self.random.len() {
             self.begin(self.random[k].stream());
@@ -226,13 +246,15 @@ impl Prepared {
             self.begin(UNNAMED + k as u64);
             term.on(&mut self.run);
         }
-        let resized = self.random.iter().any(|a| a.effect.stage() == Stage::Noise)
-            || self.unnamed.random.iter().any(Random::is_noise);
-        if resized {
+        if self.resized() {
             self.sized();
         }
         for axis in (0..3).filter(|a| present[*a]) {
             self.begin(WHITES + axis as u64);
+            if self.plain(axis) {
+                self.count_at_once(axis);
+                continue;
+            }
             let mut white = std::mem::take(&mut self.run.white[axis]);
             white.clear();
             let run = &mut self.run;
@@ -250,7 +272,9 @@ impl Prepared {
         }
         self.stage(Stage::Output);
         for axis in (0..3).filter(|a| present[*a]) {
-            self.count(axis);
+            if !self.plain(axis) {
+                self.count(axis);
+            }
         }
         self.stage(Stage::Counts);
     }
@@ -267,6 +291,30 @@ impl Prepared {
                 self.late[k].on(&mut self.run);
             }
         }
+    }
+
+    /// Whether an axis has nothing between its white noise and its counts.
+    fn plain(&self, axis: usize) -> bool {
+        let late = self.late.iter().any(|a| a.axes.contains(&axis));
+        !late && self.read[axis].is_none() && self.run.shared[axis].is_empty()
+    }
+
+    /// The counts of a [plain](Self::plain) axis, the white noise drawn as they are made: its columns are gone through once.
+    fn count_at_once(&mut self, axis: usize) {
+        let run = &mut self.run;
+        let shape = self.unnamed.shapes[axis];
+        let (scale, (unit, limit)) = (run.scale[axis], self.steps[axis]);
+        let mut counts = std::mem::take(&mut run.counts[axis]);
+        let rates = std::mem::take(&mut run.rate[axis]);
+        counts.clear();
+        let each = rates.iter().zip(&run.motion[axis]).zip(&self.white[axis]);
+        let rng = &mut run.rng;
+        counts.extend(each.map(|((rate, moves), sd)| {
+            let z: f64 = StandardNormal.sample(rng);
+            let white = sd * shape.map_or(z, |shape| shape.value(z));
+            nearest((rate + (scale * moves + white)) / unit, -limit - 1, limit)
+        }));
+        (run.counts[axis], run.rate[axis]) = (counts, rates);
     }
 
     fn count(&mut self, axis: usize) {
@@ -295,10 +343,9 @@ impl Prepared {
             }
         }
         let (unit, limit) = self.steps[axis];
-        let (low, high) = (f64::from(-limit - 1), f64::from(limit));
         let counts = run.rate[axis]
             .iter()
-            .map(|w| (w / unit).round().clamp(low, high) as i32);
+            .map(|w| nearest(w / unit, -limit - 1, limit));
         run.counts[axis].clear();
         run.counts[axis].extend(counts);
     }
@@ -373,8 +420,8 @@ fn started(world: World, rate_hz: f64, rng: Xoshiro256PlusPlus) -> Simulation {
     }
 }
 
-/// Adds a random walk that starts at 0 with the run.
-fn wander(run: &mut Simulation, axis: usize, step: f64) {
+/// Adds a random walk that starts at 0 with the run to the rate; or puts the sum of `start` and it there.
+fn wander(run: &mut Simulation, axis: usize, step: f64, start: Option<&[f64]>) {
     let mut level = 0.0;
     for k in 0..run.stretches.len() {
         let Stretch { samples, skipped } = run.stretches[k].clone();
@@ -382,9 +429,15 @@ fn wander(run: &mut Simulation, axis: usize, step: f64) {
             level += step * (skipped as f64).sqrt() * run.normal();
         }
         let mut rates = std::mem::take(&mut run.rate[axis]);
-        for rate in &mut rates[samples] {
-            *rate += level;
+        let mut next = || {
+            let now = level;
             level += step * run.normal();
+            now
+        };
+        match start {
+            Some(start) => (rates[samples.clone()].iter_mut().zip(&start[samples]))
+                .for_each(|(rate, start)| *rate = start + next()),
+            None => rates[samples].iter_mut().for_each(|rate| *rate += next()),
         }
         run.rate[axis] = rates;
     }

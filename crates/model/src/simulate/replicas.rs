@@ -7,18 +7,22 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::prepared::Prepared;
 use super::{SimulateError, world_of};
+use crate::effect::Stage;
+use crate::effects::effect;
 use crate::excitation::slow;
-use crate::file::ModelFile;
+use crate::file::{EffectModel, ModelFile};
 use crate::record::Record;
 
 /// Counts that the largest reading of a record without a step is to take, far below the noise of any gyro.
 const FINE: f64 = 1e9;
 
 /// Replicates of a model in the world that a record saw: what chance has no part in is simulated once.
+#[derive(Clone)]
 pub struct Replicas {
     prepared: Prepared,
     rate: [Vec<f64>; 3],
-    variance: [Vec<f64>; 3],
+    /// Where a draw changes it.
+    variance: Option<[Vec<f64>; 3]>,
     /// Axis of each channel of the model.
     axes: Vec<usize>,
 }
@@ -36,7 +40,10 @@ impl Replicas {
         stretches: &[Range<usize>],
     ) -> Result<Self, SimulateError> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
-        let (model, world, read) = world_of(model, record, rate_hz, &mut rng)?;
+        // A draw has a seed of its own: where these numbers go on to is told by an effect on the world alone.
+        let on_the_world = |e: &EffectModel| effect(&e.cause).map(|e| e.stage());
+        let go_on = (model.effects.iter()).any(|e| on_the_world(e) == Some(Stage::World));
+        let (model, world, read) = world_of(model, record, rate_hz, go_on.then_some(&mut rng))?;
         let mut prepared = Prepared::new(&model, world, read, rate_hz, rng)?;
         let axes = model
             .channels
@@ -59,8 +66,12 @@ impl Replicas {
         if !stretches.is_empty() {
             prepared.only(stretches);
         }
-        prepared.clocks();
-        let (rate, variance) = (prepared.run.rate.clone(), prepared.run.variance.clone());
+        // Which nothing else looks at.
+        if prepared.is_late() {
+            prepared.clocks();
+        }
+        let rate = prepared.run.rate.clone();
+        let variance = (prepared.resized()).then(|| prepared.run.variance.clone());
         Ok(Self {
             prepared,
             rate,
@@ -97,13 +108,10 @@ impl Replicas {
         }
         let run = &mut self.prepared.run;
         run.rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        for (rate, start) in run.rate.iter_mut().zip(&self.rate) {
-            rate.copy_from_slice(start);
-        }
-        for (variance, start) in run.variance.iter_mut().zip(&self.variance) {
+        for (variance, start) in run.variance.iter_mut().zip(self.variance.iter().flatten()) {
             variance.copy_from_slice(start);
         }
-        self.prepared.draw();
+        self.prepared.draw(Some(&self.rate));
         // A frame that repeats the one before does so to its counts; those that are lost are in the record's own places.
         self.prepared.frames();
         readings.resize_with(self.axes.len(), Vec::new);
@@ -122,7 +130,6 @@ impl Replicas {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::EffectModel;
     use crate::parameter::Parameter;
 
     type Tested = Result<(), Box<dyn std::error::Error>>;

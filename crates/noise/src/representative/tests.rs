@@ -50,6 +50,26 @@ fn equal_runs_are_seldom_called_odd() {
 }
 
 #[test]
+fn equal_runs_are_called_different_as_often_as_stated() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(12);
+    let alarms = (0..200)
+        .filter(|_| {
+            let runs: Vec<Record> = (0..5).map(|_| run(0.39, 0.5, &mut rng)).collect();
+            let samplings: Vec<Sampling> = runs
+                .iter()
+                .map(|r| Sampling::of(r, None).unwrap())
+                .collect();
+            let runs: Vec<Cow<'_, Record>> = runs.iter().map(Cow::Borrowed).collect();
+            let (mut figures, _) = figures_of(&runs, &samplings, "gyro_z").unwrap();
+            pool_figures(&mut figures, &|_| false);
+            figures.iter().any(|f| f.differ == Some(true))
+        })
+        .count();
+    // Two figures at 5 % together: Binomial(200, 0.05), of which 21 or more have a chance of 1e-3.
+    assert!(alarms < 21, "{alarms}");
+}
+
+#[test]
 fn a_run_with_twice_the_noise_is_odd_in_that_and_not_chosen() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(12);
     let runs: Vec<Record> = (0..12)

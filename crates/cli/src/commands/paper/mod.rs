@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u32).range(5..))]
     draws: u32,
     /// Seed of whatever is random
-    #[arg(long, default_value_t = 2009)]
+    #[arg(long, default_value_t = 2009, value_parser = super::seed, allow_negative_numbers = true)]
     seed: u64,
     /// Write the result as JSON to another place as well
     #[arg(long, value_name = "FILE")]

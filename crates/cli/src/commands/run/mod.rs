@@ -73,16 +73,16 @@ pub struct Arguments {
     #[arg(long, default_value_t = 600.0)]
     seconds: f64,
     /// Seed of all that is random: the same seed gives the same run
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = super::seed, allow_negative_numbers = true)]
     seed: u64,
     /// Seed of the stand alone, its parts and surroundings: the same one for many runs of one stand
-    #[arg(long, value_name = "SEED")]
+    #[arg(long, value_name = "SEED", value_parser = super::seed, allow_negative_numbers = true)]
     stand_seed: Option<u64>,
     /// Seed of what is hidden, and of the course of the motor
-    #[arg(long, value_name = "SEED")]
+    #[arg(long, value_name = "SEED", value_parser = super::seed, allow_negative_numbers = true)]
     fault_seed: Option<u64>,
     /// Seed of the noise: another one for each run of one stand
-    #[arg(long, value_name = "SEED")]
+    #[arg(long, value_name = "SEED", value_parser = super::seed, allow_negative_numbers = true)]
     noise_seed: Option<u64>,
     /// Close the loop: correct the board by what was found, record the same stand again under another history, and compare.
     /// Beside run.csv it writes run-corrected.csv, the model as run.toml and, of a base that sways, run-sway.csv and

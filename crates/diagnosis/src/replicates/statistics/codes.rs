@@ -1,5 +1,7 @@
 //! The readings as counts: equal neighbours, and the bits.
 
+use model::nearest::nearest;
+
 use super::Statistic;
 
 /// Lowest bits whose share of ones is compared.
@@ -10,18 +12,12 @@ pub(super) struct Codes {
     step: f64,
     /// Whether the count of a reading is known: one of which an offset was taken off has other bits.
     counted: bool,
-    /// Lowest byte of each count.
-    codes: Vec<u8>,
 }
 
 impl Codes {
     /// For readings in steps, 0 where there are none, whose counts are known or not.
     pub fn new(step: f64, counted: bool) -> Self {
-        Self {
-            step,
-            counted,
-            codes: vec![],
-        }
+        Self { step, counted }
     }
 
     pub fn name(&self, all: &mut Vec<Statistic>) {
@@ -36,7 +32,8 @@ impl Codes {
         }
     }
 
-    pub fn take(&mut self, x: &[f64], all: &mut Vec<f64>) {
+    /// `codes` is room for the lowest byte of each count.
+    pub fn take(&self, x: &[f64], codes: &mut Vec<u8>, all: &mut Vec<f64>) {
         if self.step <= 0.0 {
             return;
         }
@@ -48,12 +45,12 @@ impl Codes {
             return;
         }
         let scale = 1.0 / self.step;
-        self.codes.clear();
-        let lowest = x.iter().map(|v| (v * scale).round() as i32 as u8);
-        self.codes.extend(lowest);
+        codes.clear();
+        let lowest = (x.iter()).map(|v| nearest(v * scale, i32::MIN, i32::MAX) as u8);
+        codes.extend(lowest);
         // Counted in bytes, emptied before they overflow.
         let mut ones = [0usize; BITS];
-        for some in self.codes.chunks(usize::from(u8::MAX)) {
+        for some in codes.chunks(usize::from(u8::MAX)) {
             for (bit, ones) in ones.iter_mut().enumerate() {
                 *ones += usize::from(some.iter().map(|c| c >> bit & 1).sum::<u8>());
             }

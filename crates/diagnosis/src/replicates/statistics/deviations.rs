@@ -9,6 +9,10 @@ const CLUSTERS: usize = 8;
 const TIMES: usize = 4;
 /// Places in a cluster, or in the time of an angle, at which one begins: more add nothing.
 const PLACES: usize = 8;
+/// Clusters of which one begins at every sample.
+const EVERY: [usize; 4] = [1, 2, 4, 8];
+/// Prefix sums that two of the longest of them have.
+const SPAN: usize = 2 * EVERY[EVERY.len() - 1] + 1;
 /// Fewest stretches whose means have a deviation.
 const LEAST_STRETCHES: usize = 4;
 
@@ -19,8 +23,6 @@ pub(super) struct Deviations {
     tau0: f64,
     clusters: Vec<usize>,
     angles: Vec<(f64, usize)>,
-    /// Prefix sums of what was taken last.
-    sums: Vec<f64>,
 }
 
 impl Deviations {
@@ -36,7 +38,6 @@ impl Deviations {
                 .into_iter()
                 .filter(|(_, m)| *m > 0 && TIMES * m <= length)
                 .collect(),
-            sums: vec![],
         }
     }
 
@@ -58,26 +59,25 @@ impl Deviations {
         }
     }
 
-    /// Of readings about their mean.
-    pub fn take(&mut self, x: &[f64], all: &mut Vec<f64>) {
-        let mut sum = 0.0;
-        self.sums.clear();
-        self.sums.push(0.0);
-        self.sums.extend(x.iter().map(|v| {
-            sum += v;
-            sum
-        }));
-        for m in &self.clusters {
+    /// Of the prefix sums of readings about their mean, one more than readings.
+    pub fn take(&self, sums: &[f64], all: &mut Vec<f64>) {
+        let (every, some) = self.clusters.split_at(EVERY.len().min(self.clusters.len()));
+        let squares = self.at_every_place(sums);
+        for (m, square) in every.iter().zip(squares) {
+            let count = self.stretches * (self.length - 2 * m + 1);
+            all.push((0.5 * (square / count as f64)).sqrt() / *m as f64);
+        }
+        for m in some {
             let bend = |s: &[f64], k: usize| s[k + 2 * m] - 2.0 * s[k + m] + s[k];
-            let mean = self.mean_square(2 * m, *m, bend);
+            let mean = self.mean_square(sums, 2 * m, *m, bend);
             all.push((0.5 * mean).sqrt() / *m as f64);
         }
         for (_, m) in &self.angles {
-            let mean = self.mean_square(*m, *m, |s, k| s[k + m] - s[k]);
+            let mean = self.mean_square(sums, *m, *m, |s, k| s[k + m] - s[k]);
             all.push(mean.sqrt() * self.tau0);
         }
         if self.stretches >= LEAST_STRETCHES {
-            let ends = (0..=self.stretches).map(|j| self.sums[j * self.length]);
+            let ends = (0..=self.stretches).map(|j| sums[j * self.length]);
             let ends: Vec<f64> = ends.collect();
             let bends = ends.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]).powi(2));
             let mean = bends.sum::<f64>() / (self.stretches - 1) as f64;
@@ -85,17 +85,44 @@ impl Deviations {
         }
     }
 
-    /// Prefix sums of what was taken last, one more than samples.
-    pub fn sums(&self) -> &[f64] {
-        &self.sums
+    /// Sums of the squares of what bends over the shortest clusters, [`EVERY`] of them: side by side, for one waits for the
+    /// product before it.
+    fn at_every_place(&self, sums: &[f64]) -> [f64; EVERY.len()] {
+        let bend = |s: &[f64], m: usize| s[2 * m] - 2.0 * s[m] + s[0];
+        let mut all = [0.0; EVERY.len()];
+        for j in 0..self.stretches {
+            let sums = &sums[j * self.length..=(j + 1) * self.length];
+            let together = (sums.len() + 1).saturating_sub(SPAN);
+            let mut squares = [0.0; EVERY.len()];
+            for s in sums.windows(SPAN).filter_map(<[f64]>::first_chunk::<SPAN>) {
+                for (square, m) in squares.iter_mut().zip(EVERY) {
+                    let bend = bend(s, m);
+                    *square += bend * bend;
+                }
+            }
+            for (square, m) in squares.iter_mut().zip(EVERY) {
+                for s in sums[together..].windows(2 * m + 1) {
+                    let bend = bend(s, m);
+                    *square += bend * bend;
+                }
+            }
+            all.iter_mut().zip(squares).for_each(|(all, s)| *all += s);
+        }
+        all
     }
 
     /// Mean square over all stretches of what spans `span` samples, at every place of which a time of `m` has [`PLACES`].
-    fn mean_square(&self, span: usize, m: usize, of: impl Fn(&[f64], usize) -> f64) -> f64 {
+    fn mean_square(
+        &self,
+        sums: &[f64],
+        span: usize,
+        m: usize,
+        of: impl Fn(&[f64], usize) -> f64,
+    ) -> f64 {
         let stride = (m / PLACES).max(1);
         let (mut sum, mut count) = (0.0, 0usize);
         for j in 0..self.stretches {
-            let sums = &self.sums[j * self.length..=(j + 1) * self.length];
+            let sums = &sums[j * self.length..=(j + 1) * self.length];
             let last = self.length - span;
             if stride == 1 {
                 sum += (0..=last).map(|k| of(sums, k).powi(2)).sum::<f64>();

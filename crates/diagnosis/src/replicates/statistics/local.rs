@@ -13,7 +13,6 @@ pub(super) struct Local {
     length: usize,
     /// Square of the duty about its mean over its own sum of squares, where it changes.
     duty: Option<Vec<f64>>,
-    residual: Vec<f64>,
 }
 
 impl Local {
@@ -30,7 +29,6 @@ impl Local {
         Self {
             length,
             duty: shape,
-            residual: vec![],
         }
     }
 
@@ -61,9 +59,9 @@ impl Local {
         }
     }
 
-    /// Of readings about their mean, and their prefix sums.
-    pub fn take(&mut self, x: &[f64], sums: &[f64], all: &mut Vec<f64>) {
-        self.residual.clear();
+    /// Of readings about their mean, and their prefix sums; `r` is room for what is left of them.
+    pub fn take(&self, x: &[f64], sums: &[f64], r: &mut Vec<f64>, all: &mut Vec<f64>) {
+        r.clear();
         let width = (2 * HALF + 1) as f64;
         for (values, sums) in x
             .chunks_exact(self.length)
@@ -74,31 +72,44 @@ impl Local {
                 .iter()
                 .zip(sums)
                 .map(|(b, a)| (b - a) / width);
-            self.residual
-                .extend(middle.iter().zip(means).map(|(v, mean)| v - mean));
+            r.extend(middle.iter().zip(means).map(|(v, mean)| v - mean));
         }
-        let r = &self.residual;
         let n = r.len() as f64;
-        let (mut two, mut three, mut four) = (0.0, 0.0, 0.0);
-        for v in r {
-            let square = v * v;
-            two += square;
-            three += square * v;
-            four += square * square;
+        // All sums side by side, for each waits for the one before it.
+        let (mut two, mut three, mut four, mut with_duty) = (0.0, 0.0, 0.0, 0.0);
+        let mut blocks = [0.0; BLOCKS];
+        for (b, rms) in blocks.iter_mut().enumerate() {
+            let places = b * r.len() / BLOCKS..(b + 1) * r.len() / BLOCKS;
+            let block = &r[places.clone()];
+            let mut own = 0.0;
+            let mut add = |v: f64| {
+                let square = v * v;
+                own += square;
+                two += square;
+                three += square * v;
+                four += square * square;
+                square
+            };
+            match &self.duty {
+                Some(duty) => {
+                    for (v, duty) in block.iter().zip(&duty[places]) {
+                        with_duty += add(*v) * duty;
+                    }
+                }
+                None => block.iter().for_each(|v| {
+                    add(*v);
+                }),
+            }
+            *rms = (own / block.len().max(1) as f64).sqrt();
         }
         let variance = (two / n).max(f64::MIN_POSITIVE);
         all.push(three / n / variance.powf(1.5));
         all.push(four / n / variance.powi(2));
         let [low, high] = model::effect::extremes(r);
         all.extend([high, low]);
-        for b in 0..BLOCKS {
-            let block = &r[b * r.len() / BLOCKS..(b + 1) * r.len() / BLOCKS];
-            let square: f64 = block.iter().map(|v| v * v).sum();
-            all.push((square / block.len().max(1) as f64).sqrt());
-        }
-        if let Some(duty) = &self.duty {
-            let sum: f64 = r.iter().zip(duty).map(|(v, d)| v * v * d).sum();
-            all.push(sum / variance);
+        all.extend(blocks);
+        if self.duty.is_some() {
+            all.push(with_duty / variance);
         }
     }
 }

@@ -22,10 +22,14 @@ const SLOW: usize = 16;
 pub(super) struct Spectrum {
     length: usize,
     rate_hz: f64,
-    dct: Dct,
-    fft: RealFft,
     /// First coefficients of the bands, and the end of the last.
     edges: Vec<usize>,
+}
+
+/// The transforms, each with room of its own.
+pub(super) struct Transforms {
+    dct: Dct,
+    fft: RealFft,
 }
 
 /// What the transform gave of one channel.
@@ -52,9 +56,14 @@ impl Spectrum {
         Self {
             length,
             rate_hz,
-            dct: Dct::new(length),
-            fft: RealFft::new(length),
             edges,
+        }
+    }
+
+    pub fn transforms(&self) -> Transforms {
+        Transforms {
+            dct: Dct::new(self.length),
+            fft: RealFft::new(self.length),
         }
     }
 
@@ -72,10 +81,10 @@ impl Spectrum {
         each.collect()
     }
 
-    pub fn of(&self, x: &[f64], white: &[f64]) -> Whitened {
+    pub fn of(&self, x: &[f64], white: &[f64], by: &Transforms) -> Whitened {
         let mut coefficients = Vec::with_capacity(x.len());
         let mut bands = vec![0.0; self.edges.len() - 1];
-        for c in self.dct.forward_all(x.chunks_exact(self.length)) {
+        for c in by.dct.forward_all(x.chunks_exact(self.length)) {
             for (band, edge) in bands.iter_mut().zip(self.edges.windows(2)) {
                 let some = &c[edge[0]..edge[1]];
                 *band += dot(some, some);
@@ -111,10 +120,10 @@ impl Spectrum {
         ));
     }
 
-    pub fn take(&self, of: &Whitened, all: &mut Vec<f64>) {
+    pub fn take(&self, of: &Whitened, by: &Transforms, all: &mut Vec<f64>) {
         all.extend(of.bands.iter().map(|b| b.sqrt()));
         all.push(self.strongest_line(of));
-        let (single, largest) = self.correlations(of);
+        let (single, largest) = self.correlations(of, &by.fft);
         all.extend(single);
         all.push(largest);
     }
@@ -135,7 +144,7 @@ impl Spectrum {
     ///
     /// The energies u[k]^2 at even k, smoothed over their neighbours, are those of a circular record of the same length:
     /// their transform is the correlation at each lag l, tapered by (1 + cos(pi l / n)) / 2, up to half the length.
-    fn correlations(&self, of: &Whitened) -> ([f64; LAGS], f64) {
+    fn correlations(&self, of: &Whitened, fft: &RealFft) -> ([f64; LAGS], f64) {
         let (n, half) = (self.length, self.length / 2);
         let mut energies = vec![0.0; half + 1];
         for u in of.coefficients.chunks_exact(n) {
@@ -149,7 +158,7 @@ impl Spectrum {
         let at = |j: usize| energies[j.min(n - j)];
         let (mut power, mut single, mut largest) = (1.0, [0.0; LAGS], 0.0f64);
         let mut rest = Vec::with_capacity(half);
-        self.fft.run(
+        fft.run(
             |j| Complex::new(at(2 * j), at(2 * j + 1)),
             |lag, f| match lag {
                 0 => power = f.re,
@@ -165,6 +174,7 @@ impl Spectrum {
 
     /// Weighted slopes on what was recorded beside the gyros.
     pub fn slopes(&self, subject: &Subject, record: &Record, parts: &Parts) -> Slopes {
+        let dct = Dct::new(self.length);
         let white = self.whitener(subject.walk);
         let axis = record.channel(&subject.name).and_then(|c| c.axis);
         let mut slopes = Slopes {
@@ -179,29 +189,31 @@ impl Spectrum {
             let values = parts.pick(&channel.values);
             let mean = values.iter().sum::<f64>() / values.len() as f64;
             let linear: Vec<f64> = values.iter().map(|v| v - mean).collect();
-            self.add(
-                &mut slopes,
-                format!("slope over {}", channel.name),
-                &channel.unit,
-                &linear,
-                &white,
-            );
+            let what = format!("slope over {}", channel.name);
+            self.add(&mut slopes, (what, &channel.unit), &linear, &white, &dct);
             if channel.quantity != Quantity::Acc {
                 let square: Vec<f64> = linear.iter().map(|v| v * v).collect();
                 let (what, unit) = (
                     format!("curvature over {}", channel.name),
                     format!("{}^2", channel.unit),
                 );
-                self.add(&mut slopes, what, &unit, &square, &white);
+                self.add(&mut slopes, (what, &unit), &square, &white, &dct);
             }
         }
         slopes
     }
 
     /// Adds a column, where it changes.
-    fn add(&self, slopes: &mut Slopes, what: String, unit: &str, values: &[f64], white: &[f64]) {
+    fn add(
+        &self,
+        slopes: &mut Slopes,
+        (what, unit): (String, &str),
+        values: &[f64],
+        white: &[f64],
+        dct: &Dct,
+    ) {
         let mut column = vec![];
-        for c in self.dct.forward_all(values.chunks_exact(self.length)) {
+        for c in dct.forward_all(values.chunks_exact(self.length)) {
             column.extend(c.iter().zip(white).map(|(c, w)| c * w));
         }
         let square = dot(&column, &column);
@@ -221,19 +233,35 @@ impl Spectrum {
         all.push(Statistic::new(format!("{both} below {top} Hz"), "1").with(other));
     }
 
-    pub fn take_with(&self, one: &Whitened, other: &Whitened, all: &mut Vec<f64>) {
-        for top in [self.length, self.length / SLOW] {
-            let pairs = one.coefficients.chunks_exact(self.length);
-            let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
-            for (a, b) in pairs.zip(other.coefficients.chunks_exact(self.length)) {
-                ab += dot(&a[..top], &b[..top]);
-                aa += dot(&a[..top], &a[..top]);
-                bb += dot(&b[..top], &b[..top]);
+    /// Correlations of each pair, by the place of the one and then of the other: of the whole band, and of its slow part.
+    pub fn correlated(&self, all: &[Whitened]) -> Vec<Vec<[f64; 2]>> {
+        let tops = [self.length, self.length / SLOW];
+        let product = |one: &Whitened, other: &Whitened| {
+            tops.map(|top| {
+                let pairs = one.coefficients.chunks_exact(self.length);
+                let pairs = pairs.zip(other.coefficients.chunks_exact(self.length));
+                pairs.fold(0.0, |sum, (a, b)| sum + dot(&a[..top], &b[..top]))
+            })
+        };
+        let own: Vec<[f64; 2]> = match all {
+            // Nothing to correlate with.
+            [_] => vec![[0.0; 2]],
+            _ => all.iter().map(|one| product(one, one)).collect(),
+        };
+        let mut table = vec![vec![[0.0; 2]; all.len()]; all.len()];
+        for (j, other) in all.iter().enumerate() {
+            for (i, one) in all[..j].iter().enumerate() {
+                let both = product(one, other);
+                // A channel that says one thing all the time says nothing of another.
+                let of = |k: usize| match (own[i][k] * own[j][k]).sqrt() {
+                    size if size > 0.0 => both[k] / size,
+                    _ => f64::NAN,
+                };
+                table[i][j] = [of(0), of(1)];
+                table[j][i] = table[i][j];
             }
-            // A channel that says one thing all the time says nothing of another.
-            let both = (aa * bb).sqrt();
-            all.push(if both > 0.0 { ab / both } else { f64::NAN });
         }
+        table
     }
 }
 

@@ -4,6 +4,7 @@ use diagnosis::MATTERS;
 use diagnosis::result::{Diagnosis, Finding};
 use imu_stand::correct::{Change, Judged, NEAR, Needed, Proposed, Row, SPANS_S, short};
 use imu_stand::stand::planted::Comparison;
+use imu_stand::text;
 use model::ModelFile;
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -68,7 +69,7 @@ impl Recorded {
         if self.seconds <= self.asked_s {
             return None;
         }
-        let mut line = format!("first record: {:.0} s", self.seconds);
+        let mut line = format!("{:.0} s", self.seconds);
         if let Some(half_s) = self.heater_s {
             let _ = write!(line, ", the heater on and off for {half_s:.0} s each");
         }
@@ -87,7 +88,7 @@ impl Recorded {
                 self.seconds, left.seconds, left.seconds
             );
         }
-        Some(line)
+        Some(text::item("first record: ", &line).trim_start().to_owned())
     }
 }
 
