@@ -1,6 +1,7 @@
 //! What people read in a terminal.
 
 pub mod answer;
+mod cost;
 mod details;
 pub mod noise;
 mod screen;
