@@ -1,6 +1,6 @@
 //! The models that are handed over: the baseline, and the extended one with what has no name, held against the record.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use model::file::{EffectModel, FittedOn, ModelFile};
 
@@ -61,7 +61,11 @@ pub(super) fn handed_over(
     let mut wanted = Wanted::of(&told.unexplained);
     let mut fitted = unnamed::fit(searched, grid, &wanted, &causes);
     let mut extended_model = extended(&fitted);
-    let adequate = told.findings.is_empty() && told.unexplained.is_empty();
+    let found = told.findings.iter().flat_map(|f| &f.channels);
+    let found: BTreeSet<&String> = found
+        .chain(told.unexplained.iter().map(|o| &o.channel))
+        .collect();
+    let is_plain = |name: &str| !found.iter().any(|f| *f == name);
     let judge = match count {
         0 => None,
         count => Judge::new(grid, &baseline_model, count, options.seed).ok(),
@@ -69,11 +73,13 @@ pub(super) fn handed_over(
     let among = |model: &ModelFile| {
         let mut compared = model.clone();
         compared.effects.retain(|e| !is_mended(e));
-        let all = judge.as_ref().map(|j| j.of(&compared).unwrap_or_default());
+        let all = judge
+            .as_ref()
+            .map(|j| j.of(&compared, &is_plain).unwrap_or_default());
         all.unwrap_or_default()
     };
     let mut replicates = among(&extended_model);
-    let mut said = held(&replicates, adequate, count);
+    let mut said = held(&replicates, &is_plain, count);
     let (first, strayed) = (replicates.clone(), said.unexplained.clone());
     // What strays the more for a round may be what it had hidden, which the next takes up: the best of them is handed over.
     let mut strays = said.unexplained.clone();
@@ -85,7 +91,7 @@ pub(super) fn handed_over(
         }
         let model = extended(&again);
         let all = among(&model);
-        let now = held(&all, false, count);
+        let now = held(&all, &is_plain, count);
         strays.clone_from(&now.unexplained);
         if now.unexplained.len() <= said.unexplained.len() {
             (extended_model, replicates, said) = (model, all, now);

@@ -11,6 +11,7 @@ use model::simulate::{Replicas, SimulateError};
 
 use super::envelope::Table;
 use super::statistics::{Battery, Subject};
+use super::verdict::{MORE, limit};
 use super::world::{Measured, Parts, bridge, in_steps, measured, record_of};
 
 use crate::ingest::grid::lay_out;
@@ -186,11 +187,16 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// The record among replicates of the baseline and of the extended model, by channel.
+    /// The record among replicates of the baseline and of the extended model, by channel. A channel that `is_plain`, on which
+    /// nothing was found, and that strays from all of them, is told by [`MORE`] times as many.
     ///
     /// # Errors
     /// Those of the simulation.
-    pub fn of(&self, extended: &ModelFile) -> Result<BTreeMap<String, Replicated>, SimulateError> {
+    pub fn of(
+        &self,
+        extended: &ModelFile,
+        is_plain: &dyn Fn(&str) -> bool,
+    ) -> Result<BTreeMap<String, Replicated>, SimulateError> {
         let same = self.baseline.channels == extended.channels
             && extended.effects.is_empty()
             && extended.unnamed.is_empty();
@@ -199,9 +205,19 @@ impl<'a> Judge<'a> {
         } else {
             self.judged.among(extended, self.count, self.seed)?
         };
-        let names = self.judged.grid.targets.iter().map(|t| t.name.clone());
+        let names = || self.judged.grid.targets.iter().map(|t| t.name.clone());
+        let strays = |name: &str, r: &Among| is_plain(name) && r.p_value <= limit(true, self.count);
+        let after = if names().zip(&after).any(|(name, r)| strays(&name, r)) {
+            let others = self.seed.wrapping_add(self.count as u64);
+            let more = self.judged.among(extended, MORE * self.count, others)?;
+            let all = names().zip(after).zip(more);
+            all.map(|((name, few), more)| if strays(&name, &few) { more } else { few })
+                .collect()
+        } else {
+            after
+        };
         let both = self.before.iter().cloned().zip(after);
-        Ok(names
+        Ok(names()
             .zip(both)
             .map(|(name, (before, after))| (name, Replicated { before, after }))
             .collect())
@@ -221,6 +237,6 @@ pub fn judge_record(
 ) -> Result<BTreeMap<String, Replicated>, AnalysisError> {
     let grid = lay_out(record, &|_| vec![], seed)?;
     let [baseline, extended] = models;
-    let judged = Judge::new(&grid, baseline, count, seed).and_then(|j| j.of(extended));
+    let judged = Judge::new(&grid, baseline, count, seed).and_then(|j| j.of(extended, &|_| false));
     Ok(judged.unwrap_or_default())
 }

@@ -5,6 +5,10 @@ use std::collections::BTreeMap;
 use crate::result::{Check, LEVEL, Replicated};
 use crate::test_level::Observation;
 
+/// By how many times as many replicates a channel on which nothing was found has to stray from all: with as many as the others, one
+/// record of a true model in so many would, on each channel.
+pub(crate) const MORE: usize = 4;
+
 /// Id of the check, and of the entry where the replicates do not hold the record.
 const ID: &str = "replicates";
 
@@ -14,14 +18,20 @@ pub(crate) struct Held {
     pub unexplained: Vec<Observation>,
 }
 
-/// The checks, and what is unexplained by a model of that verdict.
-///
-/// `adequate` says that nothing was found and nothing is left. An extended model has to hold the record in every channel. Of a baseline to which nothing was found the
-/// whole search has said that it describes the record, at a level of alarms far below that of the replicates: it falls
-/// only where none of `count` replicates strays as far as the record.
-pub(crate) fn held(all: &BTreeMap<String, Replicated>, adequate: bool, count: usize) -> Held {
+/// Largest chance at which a channel is out of its replicates, of which there are `count`. Where something was found on it, or is
+/// left, the model has to hold the record. Of a baseline to which nothing was found the whole search has said that it describes
+/// the channel, at a level of alarms far below that of the replicates: it falls only where none of them strays as far.
+pub(crate) fn limit(is_plain: bool, count: usize) -> f64 {
     let least = 1.0 / (count + 1) as f64;
-    let limit = if adequate { least.min(LEVEL) } else { LEVEL };
+    (if is_plain { least.min(LEVEL) } else { LEVEL }) + 1e-9
+}
+
+/// The checks, and what is unexplained by a model; `is_plain` says of which channels nothing was found and nothing is left.
+pub(crate) fn held(
+    all: &BTreeMap<String, Replicated>,
+    is_plain: &dyn Fn(&str) -> bool,
+    count: usize,
+) -> Held {
     let check = |(name, r): (&String, &Replicated)| Check {
         id: ID.into(),
         about: vec![],
@@ -39,7 +49,7 @@ pub(crate) fn held(all: &BTreeMap<String, Replicated>, adequate: bool, count: us
         ),
     };
     let entry = |(name, r): (&String, &Replicated)| {
-        let worse = if r.before.holds() && !adequate {
+        let worse = if r.before.holds() && !is_plain(name) {
             "; the baseline model alone holds it: the extended one is worse here"
         } else {
             ""
@@ -58,7 +68,11 @@ pub(crate) fn held(all: &BTreeMap<String, Replicated>, adequate: bool, count: us
     };
     Held {
         checks: all.iter().map(check).collect(),
-        unexplained: (all.iter().filter(|(_, r)| r.after.p_value <= limit + 1e-9))
+        unexplained: (all.iter())
+            .filter(|(name, r)| {
+                let plain = is_plain(name);
+                r.after.p_value <= limit(plain, if plain { MORE * count } else { count })
+            })
             .map(entry)
             .collect(),
     }
