@@ -161,6 +161,9 @@ pub(super) enum Kind {
     Signal,
 }
 
+/// Most coordinates that a simplex finds its way in: filters of more are the sharper ones of a family.
+const MOST_COORDINATES: usize = 6;
+
 /// Share of the gain of an expected spectrum that the best process of an effect describes, random walk and white noise
 /// refitted.
 pub(super) fn of_process(
@@ -191,6 +194,9 @@ pub(super) fn of_process(
         let Hypothesis::Covariance(process) = h else {
             continue;
         };
+        if process.dimensions() > MOST_COORDINATES {
+            continue;
+        }
         let starts = if process.is_peak() && kind == Kind::Noise {
             placed(&process, expected, count, bins)
         } else {
@@ -210,7 +216,11 @@ pub(super) fn of_process(
                 let from = [vec![log_walk], start.clone()].concat();
                 let steps = vec![1.0; from.len()];
                 let once = nelder_mead(&value, &from, &steps, 300);
-                best = best.min(value(&nelder_mead(&value, &once, &steps, 300)));
+                let found = nelder_mead(&value, &once, &steps, 300);
+                // A shape that its name does not mean is not told by it.
+                if process.claims(&found[1..]) {
+                    best = best.min(value(&found));
+                }
             }
         }
     }
