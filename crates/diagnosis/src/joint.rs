@@ -88,7 +88,10 @@ impl<'a> Model<'a> {
         if state.terms.iter().any(Term::is_band) || !processes.iter().all(known) {
             return None;
         }
-        let density = state.filter().map(|only| only.everywhere(&panel.bins));
+        let density = state
+            .noise
+            .filter()
+            .map(|only| only.everywhere(&panel.bins));
         let slow = density.as_ref().and_then(|h| h.get(1)).copied();
         let numbers: Vec<usize> = std::iter::once(0).chain(state.columns()).collect();
         let columns = panel.dct.inverse_all(numbers.iter().map(|c| {

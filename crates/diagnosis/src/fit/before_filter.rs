@@ -7,20 +7,16 @@ use crate::fit::likelihood::{Noise, Panel};
 /// Standard error of ln of the white variance before the filter of a state, which passes the slowest as it is; beside that of the
 /// white variance itself, with which it has nothing in common.
 pub(crate) fn error(panel: &Panel, state: &State) -> f64 {
-    /// Step of a numerical derivative, and a frequency without one of the walk, rad per sample.
+    // Step of a numerical derivative, and a frequency at which the shape of the walk is a number, rad per sample.
     const STEP: f64 = 1e-3;
     const SLOWEST: f64 = 1e-6;
-    if state.filter().is_none() {
+    if state.noise.filter().is_none() {
         return 0.0;
     }
     let (bins, counts) = (&panel.bins, panel.bins.counts());
     // At the best white variance its logarithm goes down by the mean of what ln g goes up.
     let of = |noise: &Noise| -> f64 {
-        let own = State {
-            noise: noise.clone(),
-            ..state.clone()
-        };
-        let slowest = own.filter().map_or(1.0, |filter| filter.at(SLOWEST));
+        let slowest = noise.filter().map_or(1.0, |filter| filter.at(SLOWEST));
         let logs = noise
             .over(bins)
             .iter()

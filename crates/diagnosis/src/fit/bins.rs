@@ -184,6 +184,16 @@ impl Noise {
         }
     }
 
+    /// The filter that the white noise goes through, where there is one.
+    pub(crate) fn filter(&self) -> Option<Self> {
+        let filters = self.terms.iter().filter(|t| t.0.filters_white());
+        let terms: Vec<_> = filters.cloned().collect();
+        (!terms.is_empty()).then_some(Self {
+            log_walk: f64::NEG_INFINITY,
+            terms,
+        })
+    }
+
     /// The peaks that its terms are.
     #[must_use]
     pub fn peaks(&self) -> Vec<Peak> {

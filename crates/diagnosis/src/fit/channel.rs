@@ -214,16 +214,6 @@ impl State {
         self.terms.iter().all(Term::is_normal)
     }
 
-    /// The filter that the white noise goes through, where there is one.
-    pub(crate) fn filter(&self) -> Option<Noise> {
-        let filters = self.noise.terms.iter().filter(|t| t.0.filters_white());
-        let terms: Vec<_> = filters.cloned().collect();
-        (!terms.is_empty()).then_some(Noise {
-            log_walk: f64::NEG_INFINITY,
-            terms,
-        })
-    }
-
     /// The noise without all processes and bands.
     pub(crate) fn noise_beside_processes(&self) -> Noise {
         let mut noise = self.noise.clone();

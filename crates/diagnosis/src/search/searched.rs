@@ -46,7 +46,7 @@ impl Searched<'_> {
     pub(crate) fn step(&self) -> f64 {
         let (bins, state) = (&self.search.panel.bins, &self.state);
         // Where a filter passes little, what the model leaves is rounding.
-        let part = state.filter().map_or(1.0, |filter| {
+        let part = state.noise.filter().map_or(1.0, |filter| {
             let over = filter.over(bins).into_iter().zip(bins.counts());
             over.map(|(g, count)| count / g).sum::<f64>() / (bins.n as f64 - 1.0)
         });

@@ -1,5 +1,6 @@
 //! Filters of one and two coordinates: a pole, a pole behind a short window, a triangular window.
 
+use super::smooth::cosine_sum;
 use crate::effect::{Covariance, Frequencies};
 
 /// Smallest pole that noise of the lag-1 correlation `rho` can have: below it some density would be negative.
@@ -149,15 +150,7 @@ impl Covariance for Triangle {
             .collect();
         at.cosine
             .iter()
-            .map(|c| {
-                // Sum of taps times cosines of multiples of the frequency, by Clenshaw's recurrence.
-                let (first, second) = taps
-                    .iter()
-                    .rev()
-                    .fold((0.0, 0.0), |(b, next), r| (r + 2.0 * c * b - next, b));
-                let tail = 2.0 * (c * first - second);
-                (1.0 + tail).max(0.0) + FLOOR
-            })
+            .map(|c| (1.0 + 2.0 * cosine_sum(&taps, *c)).max(0.0) + FLOOR)
             .collect()
     }
 

@@ -68,7 +68,7 @@ pub(super) struct Smooth {
 }
 
 /// Sum of coefficients times cosines of multiples of the angle of that cosine (Clenshaw's recurrence).
-fn sum(coefficients: &[f64], cosine: f64) -> f64 {
+pub(super) fn cosine_sum(coefficients: &[f64], cosine: f64) -> f64 {
     let (first, second) = (coefficients.iter().rev())
         .fold((0.0, 0.0), |(b, next), r| (r + 2.0 * cosine * b - next, b));
     cosine * first - second
@@ -81,13 +81,16 @@ pub(super) fn places() -> impl Iterator<Item = f64> {
 
 /// Mean over all frequencies of the exponential.
 fn mean(coefficients: &[f64]) -> f64 {
-    places().map(|c| sum(coefficients, c).exp()).sum::<f64>() / PLACES as f64
+    places()
+        .map(|c| cosine_sum(coefficients, c).exp())
+        .sum::<f64>()
+        / PLACES as f64
 }
 
 /// The spectrum, of mean 1, at some frequencies.
 pub(super) fn density(coefficients: &[f64], at: &Frequencies) -> Vec<f64> {
     let mean = mean(coefficients);
-    let of = |c: &f64| sum(coefficients, *c).exp() / mean;
+    let of = |c: &f64| cosine_sum(coefficients, *c).exp() / mean;
     at.cosine.iter().map(of).collect()
 }
 
@@ -98,7 +101,7 @@ pub(super) fn lag1(coefficients: &[(f64, f64)]) -> (f64, f64) {
     let (mut lag1, mut alone) = (0.0, vec![0.0; values.len()]);
     let mut both = alone.clone();
     for c in places() {
-        let d = sum(&values, c).exp() / mean / PLACES as f64;
+        let d = cosine_sum(&values, c).exp() / mean / PLACES as f64;
         lag1 += d * c;
         let angle = c.acos();
         for (k, (alone, both)) in alone.iter_mut().zip(&mut both).enumerate() {
@@ -118,8 +121,8 @@ pub(super) fn lag1(coefficients: &[(f64, f64)]) -> (f64, f64) {
 /// everywhere.
 pub(super) fn half_power(coefficients: &[(f64, f64)]) -> Option<(f64, f64)> {
     let values: Vec<f64> = coefficients.iter().map(|c| c.0).collect();
-    let half = sum(&values, 1.0) - std::f64::consts::LN_2;
-    let omega = places().find(|c| sum(&values, *c) < half)?.acos();
+    let half = cosine_sum(&values, 1.0) - std::f64::consts::LN_2;
+    let omega = places().find(|c| cosine_sum(&values, *c) < half)?.acos();
     let lags = || {
         coefficients
             .iter()
@@ -147,14 +150,8 @@ pub(super) fn stated(parameters: &Parameters) -> Option<Vec<f64>> {
 /// `rounding` of the variance by itself.
 pub(super) fn taps(coefficients: &[f64], rounding: f64) -> Vec<f64> {
     let mean = mean(coefficients);
-    let all: Vec<f64> = places().collect();
-    let logs: Vec<f64> = (all.iter())
-        .map(|c| {
-            (sum(coefficients, *c).exp() / mean - rounding)
-                .max(LEAST_DRAWN)
-                .ln()
-        })
-        .collect();
+    let drawn = places().map(|c| cosine_sum(coefficients, c).exp() / mean - rounding);
+    let logs: Vec<f64> = drawn.map(|d| d.max(LEAST_DRAWN).ln()).collect();
     // ln of the factor without zeros outside the unit circle has half of each cosine's coefficient; its exponential is by
     // recurrence (Oppenheim and Schafer, "Discrete-Time Signal Processing", 13.6).
     let of = |k: usize| {
@@ -206,7 +203,7 @@ impl Covariance for Smooth {
         let own = density(theta, at);
         let mean = mean(theta);
         let weights: Vec<(f64, f64)> = places()
-            .map(|c| (c.acos(), sum(theta, c).exp() / mean / PLACES as f64))
+            .map(|c| (c.acos(), cosine_sum(theta, c).exp() / mean / PLACES as f64))
             .collect();
         let of = |k: usize| {
             let lag = (k + 1) as f64;
@@ -232,8 +229,8 @@ impl Covariance for Smooth {
         };
         // What goes on rising to the lowest frequencies that so many cosines tell apart is a process that wanders.
         let is_flat = half > FLAT * std::f64::consts::PI / theta.len() as f64;
-        let slowest = sum(theta, 1.0);
-        let passed = || places().map(|c| (c, (sum(theta, c) - slowest).exp()));
+        let slowest = cosine_sum(theta, 1.0);
+        let passed = || places().map(|c| (c, (cosine_sum(theta, c) - slowest).exp()));
         let most = passed().map(|p| p.1).fold(0.0, f64::max);
         let least = passed().map(|p| p.1).fold(f64::INFINITY, f64::min);
         // What passes again beyond is a notch.
