@@ -119,6 +119,10 @@ pub struct Finding {
     /// Lorentzian.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub components: Vec<BTreeMap<String, Parameter>>,
+    /// Parameters of each time that it happened, by channel, where it did several times: turns of the base. The parameters of
+    /// the finding are those of the largest, and their `count`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub occurrences: Vec<BTreeMap<String, BTreeMap<String, Parameter>>>,
     /// Times of the events, s from the start, for causes that happen at instants.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub times_s: Vec<f64>,

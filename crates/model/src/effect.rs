@@ -340,6 +340,10 @@ pub trait Effect: Send + Sync {
     fn same_event(&self, _a: &Parameters, _b: &Parameters) -> bool {
         false
     }
+    /// Whether this is one of several times that a cause acts, all of which are told as one.
+    fn recurs(&self, _parameters: &Parameters) -> bool {
+        false
+    }
     /// Settings of the excitation ([`crate::excitation::SETTINGS`]) without all of which it does not show in a
     /// simulation; empty where it needs none.
     fn excited_by(&self) -> &'static [&'static str] {

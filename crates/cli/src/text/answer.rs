@@ -45,10 +45,14 @@ pub fn headline(finding: &Finding) -> String {
         true => "; effective for this excitation, a static test gives more",
         false => "",
     };
+    let times = match finding.occurrences.len() {
+        0 => String::new(),
+        count => format!("{count} times, "),
+    };
     match sizes.is_empty() {
         true => format!("{place}: {title} ({})", finding.cause),
         false => format!(
-            "{place}: {title} ({}), {}{effective}",
+            "{place}: {title} ({}), {times}{}{effective}",
             finding.cause,
             sizes.join("; ")
         ),

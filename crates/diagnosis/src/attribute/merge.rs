@@ -1,8 +1,10 @@
 //! What belongs together is one finding: far readings within a turn, at a step, in a louder stretch; one event on several
 //! channels; several terms of one cause.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
+use model::effect::Parameters;
 use model::effects::effect;
 
 use crate::attribute::events::{BLOW_S, blow_of, step_at};
@@ -145,6 +147,79 @@ pub(crate) fn joined(findings: Vec<Finding>) -> Vec<Finding> {
     all
 }
 
+/// One finding for what happened several times, each of which would say the same.
+pub(crate) fn repeated(findings: Vec<Finding>) -> Vec<Finding> {
+    let recurs = |f: &Finding| effect(&f.cause).is_some_and(|e| e.recurs(&f.parameters));
+    let mut all: Vec<Finding> = vec![];
+    for f in findings {
+        let mut same = all.iter_mut().filter(|o| o.cause == f.cause && recurs(o));
+        match same.next().filter(|_| recurs(&f)) {
+            Some(other) => other.occurrences.extend(once(f)),
+            None => all.push(f),
+        }
+    }
+    all.into_iter().map(of_occurrences).collect()
+}
+
+/// Parameters of one finding by channel.
+fn once(f: Finding) -> Option<BTreeMap<String, Parameters>> {
+    if f.per_channel.is_empty() {
+        let channel = f.channels.into_iter().next()?;
+        return Some(BTreeMap::from([(channel, f.parameters)]));
+    }
+    Some(f.per_channel)
+}
+
+/// A finding to which later ones of its kind were added, told as one.
+fn of_occurrences(f: Finding) -> Finding {
+    if f.occurrences.is_empty() {
+        return f;
+    }
+    let mut told = Finding {
+        cause: f.cause.clone(),
+        ..Finding::default()
+    };
+    let later = f.occurrences.clone();
+    told.occurrences = once(f).into_iter().chain(later).collect();
+    let value = |p: &Parameters, name: &str| p.get(name).map_or(0.0, |p| p.value);
+    let start = |by: &BTreeMap<String, Parameters>| {
+        let starts = by.values().map(|p| value(p, "start"));
+        starts.fold(f64::INFINITY, f64::min)
+    };
+    (told.occurrences).sort_by(|a, b| start(a).total_cmp(&start(b)));
+    told.times_s = told.occurrences.iter().map(start).collect();
+    let size = |p: &Parameters| value(p, "peak");
+    let mut largest: BTreeMap<String, Parameters> = BTreeMap::new();
+    for (channel, p) in told.occurrences.iter().flatten() {
+        let known = largest.get(channel).map_or(0.0, size);
+        if size(p) > known {
+            largest.insert(channel.clone(), p.clone());
+        }
+    }
+    let count = told.occurrences.len();
+    for p in largest.values_mut() {
+        p.retain(|name, _| name != "start" && name != "end");
+        let of = Parameter::exact(count as f64, "1");
+        p.insert("count".into(), of);
+    }
+    told.channels = largest.keys().cloned().collect();
+    told.parameters = (largest.values())
+        .max_by(|a, b| size(a).total_cmp(&size(b)))
+        .cloned()
+        .unwrap_or_default();
+    let last = told.times_s.last().copied().unwrap_or_default();
+    told.what = format!(
+        "The base turns {count} times about {}, first at {:.1} s and last at {last:.1} s, by up to {:.2} deg/s, and is back at rest each time. No error of the sensor",
+        told.channels.join(", "),
+        told.times_s.first().copied().unwrap_or_default(),
+        size(&told.parameters),
+    );
+    if largest.len() > 1 {
+        told.per_channel = largest;
+    }
+    told
+}
+
 /// Parameters that every finding of a cause has and that the fit left out are 0.
 pub(crate) fn complete(mut findings: Vec<Finding>) -> Vec<Finding> {
     for f in &mut findings {
@@ -157,4 +232,73 @@ pub(crate) fn complete(mut findings: Vec<Finding>) -> Vec<Finding> {
         }
     }
     findings
+}
+
+#[cfg(test)]
+mod tests {
+    use model::effects::base_motion;
+
+    use super::*;
+
+    fn turn(channels: &[(&str, f64)], from: f64) -> Finding {
+        let by = |peak: f64| {
+            let exact = |value: f64, unit: &str| Parameter::exact(value, unit);
+            Parameters::from([
+                ("peak".into(), exact(peak, "deg/s")),
+                ("start".into(), exact(from, "s")),
+                ("end".into(), exact(from + 5.0, "s")),
+            ])
+        };
+        let each = channels
+            .iter()
+            .map(|(name, peak)| ((*name).into(), by(*peak)));
+        let per_channel: BTreeMap<String, Parameters> = each.collect();
+        Finding {
+            cause: base_motion::ID.into(),
+            channels: per_channel.keys().cloned().collect(),
+            parameters: per_channel.values().next().unwrap().clone(),
+            per_channel: if channels.len() > 1 {
+                per_channel
+            } else {
+                BTreeMap::new()
+            },
+            ..Finding::default()
+        }
+    }
+
+    #[test]
+    fn turns_at_several_times_are_one_entry_and_stay_several_in_the_model() {
+        let sway = Finding {
+            cause: base_motion::ID.into(),
+            channels: vec!["gyro_z".into()],
+            parameters: Parameters::from([("peak".into(), Parameter::exact(1.0, "deg/s"))]),
+            ..Finding::default()
+        };
+        let both = [("gyro_x", 2.0), ("gyro_y", 4.0)];
+        let turns = vec![
+            turn(&[("gyro_x", 3.0)], 200.0),
+            sway.clone(),
+            turn(&both, 50.0),
+            turn(&[("gyro_x", 1.5)], 400.0),
+        ];
+        let told = repeated(turns.clone());
+        assert_eq!(told.len(), 2, "{told:#?}");
+        assert_eq!(told[1], sway);
+        let one = &told[0];
+        assert_eq!(one.channels, ["gyro_x", "gyro_y"]);
+        assert_eq!(one.times_s, [50.0, 200.0, 400.0]);
+        assert_eq!(one.parameters["peak"].value, 4.0);
+        assert_eq!(one.per_channel["gyro_x"]["peak"].value, 3.0);
+        assert_eq!(one.parameters["count"].value, 3.0);
+        // Each turn acts on each axis that felt it, as it does where each is told apart.
+        let of = |all: &[Finding]| {
+            let all: Vec<&Finding> = all.iter().collect();
+            let mut effects = crate::report::handover::effects_of(&all);
+            effects.sort_by_key(|e| format!("{e:?}"));
+            effects
+        };
+        assert_eq!(of(&told), of(&turns));
+        let single = vec![turn(&both, 50.0)];
+        assert_eq!(repeated(single.clone()), single);
+    }
 }

@@ -114,14 +114,22 @@ pub fn lay_out(
     seed: u64,
 ) -> Result<Grid, AnalysisError> {
     let layout = Layout::new(record, masked)?;
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
     let gyros = || record.all(Quantity::Gyro);
+    let targets = |felt: &[Vec<Excursion>]| -> Result<Vec<Target>, _> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
+        gyros()
+            .zip(felt)
+            .map(|(channel, own)| layout.target(channel, own, felt, &mut rng))
+            .collect()
+    };
     let felt: Vec<Vec<Excursion>> = gyros().map(|g| layout.felt(g)).collect();
-    let targets: Result<Vec<Target>, _> = gyros()
-        .zip(&felt)
-        .map(|(channel, own)| layout.target(channel, own, &felt, &mut rng))
-        .collect();
-    let mut targets = targets?;
+    let seldom = targets(&felt)?;
+    // What still moves without them moves all the time, and they are part of that.
+    let goes_on = seldom.iter().any(|t| t.moving && !t.excursions.is_empty());
+    let mut targets = match goes_on {
+        true => targets(&vec![vec![]; felt.len()])?,
+        false => seldom,
+    };
     followers(&mut targets, &|t, strongest| layout.rest(t, strongest));
     let (mut others, mut of_gyros) = (layout.others.into_iter(), targets.iter());
     let signals = (record.channels.iter())

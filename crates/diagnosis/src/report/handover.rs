@@ -444,7 +444,7 @@ pub(crate) fn effects_of(findings: &[&Finding]) -> Vec<EffectModel> {
                 .map(|(k, v)| (k.clone(), v.clone()))
                 .collect()
         };
-        if f.per_channel.is_empty() {
+        if f.per_channel.is_empty() && f.occurrences.is_empty() {
             let whole = f.components.is_empty().then_some(&f.parameters);
             all.extend(whole.into_iter().chain(&f.components).map(|p| EffectModel {
                 cause: f.cause.clone(),
@@ -452,17 +452,20 @@ pub(crate) fn effects_of(findings: &[&Finding]) -> Vec<EffectModel> {
                 parameters: known(p),
             }));
         }
-        // What is the same to the last digit on several channels is one event on all of them.
-        let first = all.len();
-        for (channel, p) in &f.per_channel {
-            let parameters = known(p);
-            match all[first..].iter_mut().find(|e| e.parameters == parameters) {
-                Some(same) => same.channels.push(channel.clone()),
-                None => all.push(EffectModel {
-                    cause: f.cause.clone(),
-                    channels: vec![channel.clone()],
-                    parameters,
-                }),
+        let whole = f.occurrences.is_empty().then_some(&f.per_channel);
+        for once in whole.into_iter().chain(&f.occurrences) {
+            // What is the same to the last digit on several channels is one event on all of them.
+            let first = all.len();
+            for (channel, p) in once {
+                let parameters = known(p);
+                match all[first..].iter_mut().find(|e| e.parameters == parameters) {
+                    Some(same) => same.channels.push(channel.clone()),
+                    None => all.push(EffectModel {
+                        cause: f.cause.clone(),
+                        channels: vec![channel.clone()],
+                        parameters,
+                    }),
+                }
             }
         }
     }

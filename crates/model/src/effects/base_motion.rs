@@ -97,6 +97,10 @@ impl Effect for BaseMotion {
         }
     }
 
+    fn recurs(&self, parameters: &Parameters) -> bool {
+        stretch(parameters).is_some()
+    }
+
     fn stage(&self) -> Stage {
         Stage::World
     }
