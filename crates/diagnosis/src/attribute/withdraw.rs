@@ -32,6 +32,8 @@ enum Doubt {
     No,
     /// A check fails where the term acts.
     Checks,
+    /// It follows any smooth spectrum, and this one is no filter's.
+    Spectrum,
     /// It swings at the frequency of the channel of this name, or is a shape of time beside what does: that follows late.
     Beside(String),
     /// It holds this share of what the effect explains that follows a channel beside it.
@@ -114,6 +116,12 @@ pub(crate) fn withdraw(
             match doubt {
                 Doubt::No => kept.push(finding),
                 Doubt::Checks => nearest.push(finding),
+                Doubt::Spectrum => {
+                    let what =
+                        "the noise has a smooth spectrum that no effect of the library makes";
+                    unexplained.push(Observation::of_noise(name, what.to_owned()));
+                    beside.push(finding);
+                }
                 Doubt::Beside(of) => {
                     let what = format!(
                         "follows {of}, at whose frequency it swings, late or bent as no effect of the library does: {}",

@@ -15,6 +15,16 @@ pub const ID: &str = "beyond";
 /// Scores closer than this (twice 3 nats) leave the answer open.
 pub const RIVAL_SPAN: f64 = 6.0;
 
+/// Largest width at half power over the centre: a mode of a lower quality factor than 3 is hardly one, and what wanders, bent
+/// by what a random walk takes up, has such a peak.
+const NARROW: f64 = 1.0 / 3.0;
+/// Whether a peak is no narrow one, or is not seen to have two sides: a fifth of its height, two half widths from its middle, lies
+/// beyond half the sample rate.
+pub(crate) fn is_wide(peak: &Peak) -> bool {
+    let width = 2.0 * peak.half_width;
+    width > NARROW * peak.omega || peak.omega + width > std::f64::consts::PI
+}
+
 /// What an accepted or weighed term is made of.
 #[derive(Clone)]
 pub enum Form {
@@ -152,6 +162,11 @@ impl Term {
     /// Whether it is a filter that the white noise goes through.
     pub(crate) fn is_filter(&self) -> bool {
         matches!(&self.form, Form::Covariance(c, _) if c.filters_white())
+    }
+
+    /// Whether it stands for a spectrum of no kind: what follows any smooth one, and is not what its name claims.
+    pub(crate) fn is_any_spectrum(&self) -> bool {
+        matches!(&self.form, Form::Covariance(c, theta) if c.filters_white() && !c.claims(theta))
     }
 
     pub(crate) fn is_covariance(&self) -> bool {

@@ -57,6 +57,7 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     let mut plain = whitened(&search.panel, &baseline);
     let mut before = plain_checks(&plain, &baseline, grid, target);
     let ascended = search.ascend(baseline.clone());
+    let ascended = search.beside_any_spectrum(ascended);
     let mut state = search.conclude(compare::hold(&search, ascended));
     let refilled = impute::again(&search, &state, target);
     if let Some(refilled) = refilled.clone() {

@@ -99,9 +99,12 @@ impl Power {
                 continue;
             }
             if let Form::Covariance(process, theta) = &term.form {
-                // A filter has the white noise in the place of which it stands.
-                let instead = f64::from(u8::from(process.filters_white()));
                 let density = process.density(theta, &bins.at);
+                // A filter has the white noise in the place of which it stands; a spectrum of no kind stands out of its floor.
+                let instead = match process.filters_white() {
+                    true if term.is_any_spectrum() => median(&density, &counts),
+                    filters => f64::from(u8::from(filters)),
+                };
                 for (((m, x), d), count) in
                     model.iter_mut().zip(&mut excess).zip(density).zip(&counts)
                 {
@@ -156,19 +159,23 @@ impl Power {
 /// Power above the median density: the nearest cause has tails over all frequencies, which are no place.
 fn above_floor(power: &[f64], counts: &[f64]) -> Vec<f64> {
     let density = |(p, m): (&f64, &f64)| if *m > 0.0 { p.abs() / m } else { 0.0 };
-    let mut all: Vec<(f64, f64)> = (power.iter().zip(counts))
-        .map(|pair| (density(pair), *pair.1))
-        .collect();
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let densities: Vec<f64> = power.iter().zip(counts).map(density).collect();
+    let floor = median(&densities, counts);
+    let above = power.iter().zip(counts);
+    above.map(|(p, m)| (p.abs() - floor * m).max(0.0)).collect()
+}
+
+/// Median of a density over coefficients.
+fn median(density: &[f64], counts: &[f64]) -> f64 {
+    let mut all: Vec<(&f64, &f64)> = density.iter().zip(counts).collect();
+    all.sort_by(|a, b| a.0.total_cmp(b.0));
     let half = 0.5 * counts.iter().sum::<f64>();
     let mut sum = 0.0;
     let median = all.iter().find(|(_, m)| {
-        sum += m;
+        sum += *m;
         sum >= half
     });
-    let floor = median.map_or(0.0, |m| m.0);
-    let above = power.iter().zip(counts);
-    above.map(|(p, m)| (p.abs() - floor * m).max(0.0)).collect()
+    median.map_or(0.0, |m| *m.0)
 }
 
 /// Lowest and highest share of half the sample rate between which nine tenths of a power lie, none where there is none.

@@ -2,6 +2,7 @@
 //! walk refitted, the best one joins, covariance terms are challenged by what they may have swallowed, and what the
 //! others make superfluous is dropped. The search knows hypotheses, not effects.
 
+mod any_spectrum;
 mod band_alone;
 pub(crate) mod band_source;
 pub(crate) mod bands;

@@ -218,7 +218,7 @@ impl Search<'_> {
     fn weigh_covariance(&self, of: &Weighed<'_>, c: &Arc<dyn Covariance>) -> Option<Term> {
         let n = self.panel.bins.n;
         let limit = threshold::covariance(c.dimensions());
-        if c.dimensions() > scoring::FEW && self.neighbours(of, c.dimensions()) < limit {
+        if c.dimensions() > scoring::FEW && self.neighbours(of.state, c.dimensions()) < limit {
             return None;
         }
         let best = c
@@ -242,9 +242,11 @@ impl Search<'_> {
     }
 
     /// What the correlations of a state's residual at the first `lags` lags say against white noise, chi-square of as many degrees.
-    fn neighbours(&self, of: &Weighed<'_>, lags: usize) -> f64 {
-        let (state, bins) = (of.state, &self.panel.bins);
-        let energy = self.panel.energy_left(&of.own, &state.solution.beta);
+    pub(super) fn neighbours(&self, state: &State, lags: usize) -> f64 {
+        let bins = &self.panel.bins;
+        let energy = self
+            .panel
+            .energy_left(&state.columns(), &state.solution.beta);
         let g = state.noise.over(bins);
         let off: Vec<f64> = (energy.iter().zip(&g).zip(bins.counts()))
             .map(|((e, g), m)| e / (g * state.solution.white) - m)

@@ -8,10 +8,10 @@
 use std::collections::BTreeSet;
 
 use super::facts::{Facts, LEFT, REMAINDER, REMAINDER_PROCESS, TOUCHED, generic};
-use super::{Doubt, nearest_of, rules};
+use super::{Doubt, nearest_of};
 use crate::criticise::residual;
 use crate::fit::channel;
-use crate::fit::channel::{Form, Term, VarianceFound};
+use crate::fit::channel::{Form, Term, VarianceFound, is_wide};
 use crate::result::{Check, Finding};
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, DEPARTURE, Observation};
@@ -70,7 +70,7 @@ impl Kin<'_> {
             return false;
         }
         let at = &self.facts.s.search.panel.bins.at;
-        let wide = |o: &&Term| o.peak().is_some_and(|p| rules::wide(&p));
+        let wide = |o: &&Term| o.peak().is_some_and(|p| is_wide(&p));
         let mut humps = self.facts.s.state.terms.iter().filter(wide);
         humps.any(|o| {
             let Form::Covariance(process, theta) = &o.form else {

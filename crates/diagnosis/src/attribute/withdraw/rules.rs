@@ -2,16 +2,13 @@
 //!
 //! A row says what it is asked of and what it looks for. Any row that holds withdraws the name; the rows do not know each other.
 
-use std::f64::consts::PI;
-
 use super::Doubt;
 use super::facts::{Facts, LEFT, generic};
 use super::of_band::explains;
 use crate::features;
-use crate::fit::channel::{Form, ID, Term};
+use crate::fit::channel::{Form, ID, Term, is_wide};
 use crate::search::MOST_ALIKE;
 use crate::test_level::{CheckId, DEPARTURE};
-use model::effect::Peak;
 
 /// Likelihood ratio beyond its threshold from which on a term is no makeshift for what is left elsewhere.
 const WIDE: f64 = 25.0;
@@ -209,17 +206,6 @@ fn unlike(f: &Facts<'_>) -> bool {
     CheckId::OF_PROCESS.into_iter().any(|id| f.fails(id))
 }
 
-/// Largest width at half power over the centre: a mode of a lower quality factor than 3 is hardly one, and what wanders, bent
-/// by what a random walk takes up, has such a peak.
-const NARROW: f64 = 1.0 / 3.0;
-
-/// Whether a peak is no narrow one, or is not seen to have two sides: a fifth of its height, two half widths from its middle, lies
-/// beyond half the sample rate.
-pub(super) fn wide(peak: &Peak) -> bool {
-    let width = 2.0 * peak.half_width;
-    width > NARROW * peak.omega || peak.omega + width > PI
-}
-
 /// Whether a channel has more bands than separate causes make: they are one structure.
 fn crowded(f: &Facts<'_>) -> bool {
     let bands =
@@ -237,7 +223,7 @@ pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
         let lr = explains(t.term);
         let falls = CheckId::OF_BAND.into_iter().any(|id| f.fails(id))
             || f.left_where_it_acts(t.term, t.own, lr)
-            || t.term.peak().is_some_and(|p| wide(&p))
+            || t.term.peak().is_some_and(|p| is_wide(&p))
             || crowded(f)
             || f.is_of_another_axis(t.term);
         return match f.beside_follower(t.term) {
@@ -245,6 +231,9 @@ pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
             Some((id, share)) => Doubt::Remainder(id, share),
             None => Doubt::No,
         };
+    }
+    if t.term.is_any_spectrum() {
+        return Doubt::Spectrum;
     }
     if let Some(name) = f.swings_beside(t.term) {
         return Doubt::Beside(name);
