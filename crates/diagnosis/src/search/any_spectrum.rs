@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use model::effect::Hypothesis;
+use model::effect::{Hypothesis, Peak};
 
 use super::Search;
 use crate::fit::channel::{Form, State, Term, is_wide};
@@ -15,8 +15,8 @@ use crate::fit::likelihood::scoring;
 use crate::fit::threshold;
 use crate::test_level::omnibus_level;
 
-/// How much broader than a band is what the cosines beside it tell apart: the half period of the fastest over the band's width.
-const BROADER: f64 = 2.0;
+/// Half widths between the two places at which a twentieth of a resonance's height is left: 2 * 19^1/2.
+const SKIRTS: f64 = 8.7;
 
 impl Search<'_> {
     /// What was `found`, or what is found beside a spectrum of no kind where that explains more.
@@ -24,12 +24,8 @@ impl Search<'_> {
         if self.view.moving || self.view.sways() {
             return found;
         }
-        // Cosines that tell apart what is narrower than a band would take its place.
-        let peaks = found.terms.iter().filter_map(Term::peak);
-        let widths = peaks.filter(|p| !is_wide(p)).map(|p| 2.0 * p.half_width);
-        let most = std::f64::consts::PI / (BROADER * widths.fold(0.0, f64::max));
         let candidates = self.candidates.iter().enumerate();
-        let beside = |(i, c)| self.with_spectrum(&found, (i, c), most);
+        let beside = |(i, c)| self.with_spectrum(&found, (i, c));
         let all = candidates.filter_map(beside);
         let best = all.max_by(|a, b| Self::total(a).total_cmp(&Self::total(b)));
         best.unwrap_or(found)
@@ -40,17 +36,13 @@ impl Search<'_> {
         &self,
         found: &State,
         (i, candidate): (usize, &super::Candidate),
-        most: f64,
     ) -> Option<State> {
         let Hypothesis::Covariance(of) = &candidate.hypothesis else {
             return None;
         };
         let limit = threshold::covariance(of.dimensions());
         let follows_any = of.filters_white() && of.dimensions() > scoring::FEW;
-        if !follows_any
-            || of.dimensions() as f64 > most
-            || self.neighbours(found, of.dimensions()) < limit
-        {
+        if !follows_any || self.neighbours(found, of.dimensions()) < limit {
             return None;
         }
         let start = of.starts(self.panel.bins.n).into_iter().next()?;
@@ -61,8 +53,21 @@ impl Search<'_> {
         let state = self.climb(self.refit(all, found.noise.log_walk));
         let more = freedom(&state).saturating_sub(freedom(found)).max(1);
         let by_chance = threshold::tail(more, omnibus_level());
-        (explains(&state) - explains(found) > by_chance).then_some(state)
+        let more = explains(&state) - explains(found) > by_chance;
+        (more && !share_a_place(found, &state, of.dimensions())).then_some(state)
     }
+}
+
+/// Whether so many cosines tell apart what is narrower than a band of a state with its skirts, which stays beside them: they have
+/// taken a part of it.
+fn share_a_place(found: &State, state: &State, cosines: usize) -> bool {
+    let stays = |p: &Peak| {
+        let mut peaks = state.terms.iter().filter_map(Term::peak);
+        peaks.any(|o| (o.omega - p.omega).abs() < 0.5 * SKIRTS * p.half_width)
+    };
+    let mut bands = (found.terms.iter().filter_map(Term::peak)).filter(|p| !is_wide(p));
+    let finest = std::f64::consts::PI / cosines as f64;
+    bands.any(|p| finest < SKIRTS * p.half_width && stays(&p))
 }
 
 /// Coordinates of the noise of a state.

@@ -294,6 +294,12 @@ impl<'a> Facts<'a> {
             })
     }
 
+    /// Whether a band that explains so much may be what a spectrum of no kind beside it is off by.
+    pub(super) fn is_of_a_spectrum(&self, lr: f64) -> bool {
+        let mut terms = self.s.state.terms.iter();
+        terms.any(|o| o.is_any_spectrum() && REMAINDER_PROCESS * o.lr > lr)
+    }
+
     /// Whether correlation is left that is no echo.
     pub(super) fn correlated_otherwise(&self) -> bool {
         self.fails(CheckId::LjungBox) && self.echo.is_none()

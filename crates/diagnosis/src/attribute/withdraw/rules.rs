@@ -225,7 +225,8 @@ pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
             || f.left_where_it_acts(t.term, t.own, lr)
             || t.term.peak().is_some_and(|p| is_wide(&p))
             || crowded(f)
-            || f.is_of_another_axis(t.term);
+            || f.is_of_another_axis(t.term)
+            || f.is_of_a_spectrum(lr);
         return match f.beside_follower(t.term) {
             _ if falls => Doubt::Checks,
             Some((id, share)) => Doubt::Remainder(id, share),
