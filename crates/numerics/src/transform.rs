@@ -8,8 +8,8 @@
 //! assert!((c[0] - 6.0).abs() < 1e-12 && (dct.inverse(&c)[4] - 2.0).abs() < 1e-12);
 //! ```
 
-use std::cell::{Cell, OnceCell, RefCell};
-use std::collections::{HashMap, HashSet};
+use std::cell::{OnceCell, RefCell};
+use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -22,8 +22,13 @@ use abreast::{Number, Plane};
 use even::{forward_of_one, inverse_of_one};
 use odd::{forward_of_two, inverse_of_two};
 
+pub use known::Known;
+pub use length::quick_length;
+
 mod abreast;
 mod even;
+mod known;
+mod length;
 mod odd;
 
 /// Longest transform whose plan is kept for the next one who asks on the same thread, and most of them.
@@ -205,55 +210,6 @@ fn both<Z: Plane>(a: Z, b: Z, turn: Z) -> (Z, Z) {
     let square = turn * turn;
     let turned = square * square * odd.quarter_back();
     (even + turned, even - turned)
-}
-
-/// Coefficients of columns that the channels of a record have in common, by a digest of their samples.
-#[derive(Default)]
-pub struct Known {
-    /// Those that go by what they hold.
-    pub columns: RefCell<HashMap<[u64; 2], Column>>,
-    /// Those that go by a name.
-    pub named: RefCell<HashMap<String, Vec<Column>>>,
-    /// Whether what the channels have in common is known: those of the first are, and no later one's own are kept.
-    pub complete: Cell<bool>,
-    /// Sums of products of the columns, by their places in memory, where they stay while they are kept.
-    products: RefCell<HashMap<[usize; 2], Rc<Vec<f64>>>>,
-    kept: RefCell<HashSet<usize>>,
-}
-
-impl Known {
-    /// Keeps a column for the channels to come.
-    pub fn keep(&self, key: [u64; 2], column: &Column) {
-        self.kept.borrow_mut().insert(column.place());
-        self.columns.borrow_mut().insert(key, column.clone());
-    }
-
-    /// Sums of products of two columns, where they are known.
-    pub fn products(&self, two: [&Column; 2]) -> Option<Rc<Vec<f64>>> {
-        self.products.borrow().get(&Self::places(two)).cloned()
-    }
-
-    /// Keeps them for the next who asks, where both columns are kept.
-    pub fn keep_products(&self, two: [&Column; 2], products: &Rc<Vec<f64>>) {
-        let (places, kept) = (Self::places(two), self.kept.borrow());
-        if places.iter().all(|p| kept.contains(p)) {
-            let mut all = self.products.borrow_mut();
-            all.insert(places, Rc::clone(products));
-        }
-    }
-
-    fn places(two: [&Column; 2]) -> [usize; 2] {
-        let mut places = two.map(Column::place);
-        places.sort_unstable();
-        places
-    }
-
-    fn forget(&self) {
-        self.products.borrow_mut().clear();
-        self.kept.borrow_mut().clear();
-        self.columns.borrow_mut().clear();
-        self.named.borrow_mut().clear();
-    }
 }
 
 /// Samples about their level, as numbers of a transform.

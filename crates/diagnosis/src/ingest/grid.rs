@@ -2,6 +2,8 @@
 //! tell, slow channels smoothed, motion of the base noticed.
 
 mod signals;
+#[cfg(test)]
+mod tests;
 
 use std::rc::Rc;
 use std::sync::Arc;
@@ -17,7 +19,9 @@ use crate::ingest::motion::{MOTION_BAND_HZ, Rest, drives, felt, followers, motio
 use crate::ingest::types::{Grid, Target};
 use crate::ingest::{dequantise, fill, kalman};
 use model::record::AnalysisError;
+use numerics::column::LONG;
 use numerics::series::{smallest_step, white_by_differences};
+use numerics::transform::quick_length;
 use signals::{of_gyro, other};
 
 /// Least number of samples of a gyro.
@@ -133,6 +137,7 @@ pub fn lay_out(
     Ok(Grid {
         rate_hz: layout.rate_hz,
         n: layout.n,
+        end: layout.end,
         dct: layout.dct,
         bins: layout.bins,
         bursts: None,
@@ -147,8 +152,9 @@ struct Layout<'a> {
     masked: &'a dyn Fn(&str) -> Vec<usize>,
     base: Option<Base>,
     rate_hz: f64,
-    /// Places, and that of every row.
+    /// Places, those up to the last reading, and that of every row.
     n: usize,
+    end: usize,
     places: Vec<usize>,
     dct: Dct,
     bins: Rc<Bins>,
@@ -168,14 +174,15 @@ impl<'a> Layout<'a> {
                 present,
             });
         }
-        let (places, n) = places(record);
-        let seconds = n as f64 / rate_hz;
-        if n < LEAST_SAMPLES {
-            return Err(short(n as f64, LEAST_SAMPLES as f64, "samples"));
+        let (places, end) = places(record);
+        let seconds = end as f64 / rate_hz;
+        if end < LEAST_SAMPLES {
+            return Err(short(end as f64, LEAST_SAMPLES as f64, "samples"));
         }
         if seconds < LEAST_SECONDS {
             return Err(short(seconds, LEAST_SECONDS, "s"));
         }
+        let n = if end > LONG { quick_length(end) } else { end };
         let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
         // Of the coefficients of what may drive a bias only the band of motion is asked for.
         let top = places_of(MOTION_BAND_HZ.1, n, rate_hz);
@@ -191,6 +198,7 @@ impl<'a> Layout<'a> {
             base: record.header.base,
             rate_hz,
             n,
+            end,
             places,
             dct,
             bins,
@@ -223,7 +231,11 @@ impl<'a> Layout<'a> {
         if unit_of(channel).1 != "deg/s" || self.turns() {
             return vec![];
         }
-        let y = interpolated(&self.read(channel));
+        let mut y = interpolated(&self.read(channel));
+        // After the last reading noise goes on, and no level.
+        let (read, after) = y.split_at_mut(self.end);
+        let mirrored = after.iter_mut().zip(read.iter().rev());
+        mirrored.for_each(|(y, read)| *y = *read);
         felt(&y, &self.others, self.rate_hz, &self.dct)
     }
 
@@ -253,7 +265,7 @@ impl<'a> Layout<'a> {
         let lost = given.iter().any(|v| !v.is_finite());
         let mut fit = (Noise::new(0.0), guess.max(1e-300));
         let mut y = given.to_vec();
-        kalman::fill(&mut y, fit.1, fit.1 * 1e-4, rng);
+        kalman::fill_to(self.end, &mut y, fit.1, fit.1 * 1e-4, rng);
         let mut pass = 0;
         loop {
             let panel = Panel::new(&self.dct, &self.bins, &y);
@@ -263,7 +275,7 @@ impl<'a> Layout<'a> {
                 return (y, panel.column(0), fit);
             }
             y = given.to_vec();
-            kalman::fill(&mut y, fit.1, fit.1 * fit.0.log_walk.exp(), rng);
+            kalman::fill_to(self.end, &mut y, fit.1, fit.1 * fit.0.log_walk.exp(), rng);
             pass += 1;
         }
     }
@@ -338,7 +350,8 @@ impl<'a> Layout<'a> {
         let aside = self.aside(channel, &given, &spikes);
         let lost = [lost, spikes.clone()].concat();
         if still {
-            c = fill::first(&channel.name, dct, bins, &mut y, &lost, &mut fit);
+            let panel = Panel::of(dct, bins, c);
+            c = fill::first(&channel.name, panel, &mut y, &lost, &mut fit);
         }
         if is_rate && !spikes.is_empty() {
             motion_rms = self.motion(&y, &c, &lost, &fit);

@@ -56,6 +56,9 @@ pub struct Grid {
     pub rate_hz: f64,
     /// Places.
     pub n: usize,
+    /// Places up to the last reading. In a long record some lost ones follow, with which its length transforms fast: nothing
+    /// that is told of the record counts them.
+    pub end: usize,
     /// Transform of that length.
     pub dct: Dct,
     /// Its bins.
@@ -68,4 +71,11 @@ pub struct Grid {
     pub targets: Vec<Target>,
     /// All channels, gyros included.
     pub signals: Vec<Signal>,
+}
+
+impl Grid {
+    /// Length of the record.
+    pub(crate) fn seconds(&self) -> f64 {
+        self.end as f64 / self.rate_hz
+    }
 }
