@@ -8,11 +8,9 @@
 //! assert!((c[0] - 6.0).abs() < 1e-12 && (dct.inverse(&c)[4] - 2.0).abs() < 1e-12);
 //! ```
 
-use std::cell::{OnceCell, RefCell};
 use std::collections::HashMap;
 use std::f64::consts::PI;
-use std::rc::Rc;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
 
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
@@ -31,20 +29,18 @@ mod known;
 mod length;
 mod odd;
 
-/// Longest transform whose plan is kept for the next one who asks on the same thread, and most of them.
+/// Longest transform whose plan is kept for the next one who asks, and most of them.
 const KEPT: usize = 1 << 17;
 const MOST_KEPT: usize = 64;
 
-thread_local! {
-    static PLANS: RefCell<HashMap<usize, Plan<f64>>> = RefCell::default();
-}
+static PLANS: LazyLock<Mutex<HashMap<usize, Plan<f64>>>> = LazyLock::new(Mutex::default);
 
 /// What real transforms of one length need.
 #[derive(Clone)]
 struct Plan<T> {
     /// Of half an even length, of the whole of an odd one.
     complex: Arc<dyn Fft<T>>,
-    turn: Rc<Turns<T>>,
+    turn: Arc<Turns<T>>,
 }
 
 /// exp(-i pi k / (2 n)) of the first k, each the product of one of few coarse and one of few fine turns: what would be a
@@ -91,7 +87,7 @@ impl<T: Number> Plan<T> {
         };
         Self {
             complex: FftPlanner::new().plan_fft_forward(length),
-            turn: Rc::new(Turns::new(n, last)),
+            turn: Arc::new(Turns::new(n, last)),
         }
     }
 }
@@ -102,16 +98,15 @@ impl Plan<f64> {
         if n > KEPT {
             return Self::new(n);
         }
-        PLANS.with_borrow_mut(|known| {
-            if known.len() >= MOST_KEPT && !known.contains_key(&n) {
-                known.clear();
-            }
-            known.entry(n).or_insert_with(|| Self::new(n)).clone()
-        })
+        let mut known = PLANS.lock().unwrap_or_else(PoisonError::into_inner);
+        if known.len() >= MOST_KEPT && !known.contains_key(&n) {
+            known.clear();
+        }
+        known.entry(n).or_insert_with(|| Self::new(n)).clone()
     }
 }
 
-/// Work space that transforms have in common.
+/// Work space of a transform.
 struct Space<T> {
     packed: Vec<Complex<T>>,
     scratch: Vec<Complex<T>>,
@@ -121,18 +116,15 @@ struct Space<T> {
 #[derive(Clone)]
 struct Packed<T> {
     plan: Plan<T>,
-    space: Rc<RefCell<Space<T>>>,
+    /// One for each that is made at the same time.
+    spaces: Arc<Mutex<Vec<Space<T>>>>,
 }
 
 impl<T: Number> Packed<T> {
     fn new(plan: Plan<T>) -> Self {
-        let space = Space {
-            packed: vec![],
-            scratch: vec![],
-        };
         Self {
             plan,
-            space: Rc::new(RefCell::new(space)),
+            spaces: Arc::default(),
         }
     }
 
@@ -143,7 +135,13 @@ impl<T: Number> Packed<T> {
         take: impl FnOnce(&[Complex<T>], &Turns<T>),
     ) {
         let Plan { complex, turn } = &self.plan;
-        let Space { packed, scratch } = &mut *self.space.borrow_mut();
+        let spaces = || self.spaces.lock().unwrap_or_else(PoisonError::into_inner);
+        let idle = spaces().pop();
+        let mut space = idle.unwrap_or_else(|| Space {
+            packed: vec![],
+            scratch: vec![],
+        });
+        let Space { packed, scratch } = &mut space;
         let zero = Complex::new(T::zero(), T::zero());
         packed.resize(complex.len(), zero);
         fill(packed);
@@ -153,6 +151,7 @@ impl<T: Number> Packed<T> {
         }
         complex.process_with_scratch(packed, &mut scratch[..need]);
         take(packed, turn);
+        spaces().push(space);
     }
 }
 
@@ -323,11 +322,11 @@ impl<T: Number> Kind<T> {
 pub struct Dct {
     n: usize,
     /// Each made for the first who asks.
-    whole: Rc<OnceCell<Kind<f64>>>,
+    whole: Arc<OnceLock<Kind<f64>>>,
     /// In short numbers, for the columns of long records.
-    short: Rc<OnceCell<Kind<f32>>>,
+    short: Arc<OnceLock<Kind<f32>>>,
     /// Columns that channels have in common.
-    pub known: Rc<Known>,
+    pub known: Arc<Known>,
 }
 
 impl Dct {
@@ -336,15 +335,15 @@ impl Dct {
     pub fn new(n: usize) -> Self {
         Self {
             n,
-            whole: Rc::default(),
-            short: Rc::default(),
-            known: Rc::default(),
+            whole: Arc::default(),
+            short: Arc::default(),
+            known: Arc::default(),
         }
     }
 
     /// Keep no further columns for other channels.
     pub fn keep_no_more(&self) {
-        self.known.complete.set(true);
+        self.known.complete();
     }
 
     /// Let go of the columns that channels have in common.
@@ -369,10 +368,12 @@ impl Dct {
     /// Columns of several that may explain the data, those of a long record in short numbers.
     pub fn columns<X: AsRef<[f64]>>(&self, all: impl IntoIterator<Item = X>) -> Vec<Column> {
         if self.n > LONG {
-            self.short(all).map(|c| Column::Short(Rc::new(c))).collect()
+            self.short(all)
+                .map(|c| Column::Short(Arc::new(c)))
+                .collect()
         } else {
             let whole = self.forward_all(all);
-            whole.map(|c| Column::Whole(Rc::new(c))).collect()
+            whole.map(|c| Column::Whole(Arc::new(c))).collect()
         }
     }
 

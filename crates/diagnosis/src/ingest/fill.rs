@@ -1,6 +1,6 @@
 //! Lost readings, filled before the search by the spectrum that the others have.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -71,7 +71,7 @@ pub(crate) fn first(
     y: &mut [f64],
     lost: &[usize],
     fit: &mut (Noise, f64),
-) -> Rc<Vec<f64>> {
+) -> Arc<Vec<f64>> {
     if many(lost, y.len()) {
         for _ in 0..SPECTRUM_PASSES {
             let precision = by_spectrum(&panel, &fit.0, fit.1);

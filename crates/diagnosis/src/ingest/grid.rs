@@ -5,7 +5,6 @@ mod signals;
 #[cfg(test)]
 mod tests;
 
-use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::Signal;
@@ -18,6 +17,7 @@ use crate::ingest::base_turns::{Excursion, MOTION_RMS};
 use crate::ingest::motion::{MOTION_BAND_HZ, Rest, drives, felt, followers, motion, places_of};
 use crate::ingest::types::{Grid, Target};
 use crate::ingest::{dequantise, fill, kalman};
+use crate::test_level::on_two_threads;
 use model::record::AnalysisError;
 use numerics::column::LONG;
 use numerics::series::{smallest_step, white_by_differences};
@@ -157,7 +157,7 @@ struct Layout<'a> {
     end: usize,
     places: Vec<usize>,
     dct: Dct,
-    bins: Rc<Bins>,
+    bins: Arc<Bins>,
     /// All channels but the gyros.
     others: Vec<Signal>,
     /// Coefficients, in the band of motion, of what may drive a bias.
@@ -183,16 +183,16 @@ impl<'a> Layout<'a> {
             return Err(short(seconds, LEAST_SECONDS, "s"));
         }
         let n = if end > LONG { quick_length(end) } else { end };
-        let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
+        let (dct, bins) = (Dct::new(n), Arc::new(Bins::new(n)));
         // Of the coefficients of what may drive a bias only the band of motion is asked for.
         let top = places_of(MOTION_BAND_HZ.1, n, rate_hz);
-        let (mut others, mut known) = (vec![], vec![]);
-        let channels = record.channels.iter();
-        for channel in channels.filter(|c| c.quantity != Quantity::Gyro) {
+        let channels = (record.channels.iter()).filter(|c| c.quantity != Quantity::Gyro);
+        let laid = on_two_threads(channels, |channel| {
             let (signal, driver) = other(channel, &places, n, &dct, &bins);
-            known.extend(driver.map(|c| c[..top].to_vec()));
-            others.push(signal);
-        }
+            (signal, driver.map(|c| c[..top].to_vec()))
+        });
+        let (others, known): (Vec<_>, Vec<_>) = laid.into_iter().unzip();
+        let known = known.into_iter().flatten().collect();
         Ok(Self {
             masked,
             base: record.header.base,
@@ -261,7 +261,7 @@ impl<'a> Layout<'a> {
         given: &[f64],
         guess: f64,
         rng: &mut Xoshiro256PlusPlus,
-    ) -> (Vec<f64>, Rc<Vec<f64>>, (Noise, f64)) {
+    ) -> (Vec<f64>, Arc<Vec<f64>>, (Noise, f64)) {
         let lost = given.iter().any(|v| !v.is_finite());
         let mut fit = (Noise::new(0.0), guess.max(1e-300));
         let mut y = given.to_vec();
@@ -426,10 +426,10 @@ fn unit_of(channel: &Channel) -> (f64, String) {
 fn spikes(
     given: &[f64],
     y: &mut Vec<f64>,
-    coefficients: &mut Rc<Vec<f64>>,
+    coefficients: &mut Arc<Vec<f64>>,
     fit: &mut (Noise, f64),
     dct: &Dct,
-    bins: &Rc<Bins>,
+    bins: &Arc<Bins>,
     rng: &mut Xoshiro256PlusPlus,
 ) -> Vec<usize> {
     const PASSES: usize = 8;

@@ -1,6 +1,5 @@
 //! A record on an even grid, and a gyro of it.
 
-use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::Signal;
@@ -25,7 +24,7 @@ pub struct Target {
     /// Readings, lost ones filled.
     pub y: Arc<Vec<f64>>,
     /// Their coefficients.
-    pub coefficients: Rc<Vec<f64>>,
+    pub coefficients: Arc<Vec<f64>>,
     /// Grid places without a reading, spikes included.
     pub lost: Vec<usize>,
     /// Places whose reading the noise cannot have made.
@@ -62,7 +61,7 @@ pub struct Grid {
     /// Transform of that length.
     pub dct: Dct,
     /// Its bins.
-    pub bins: Rc<Bins>,
+    pub bins: Arc<Bins>,
     /// Where the bursts lie that were laid end to end; none of a record of one piece.
     pub bursts: Option<Bursts>,
     /// What the base did.

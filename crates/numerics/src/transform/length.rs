@@ -42,7 +42,7 @@ mod tests {
         let mut from = 1 << 18;
         while from < 1 << 23 {
             let next = quick_length(from + 1);
-            assert!(next % 2 == 0 && next > from);
+            assert!(next.is_multiple_of(2) && next > from);
             assert!(
                 (next - from) as f64 <= 1.1e-3 * from as f64,
                 "{from} {next}"
