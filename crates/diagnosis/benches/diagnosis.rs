@@ -1,7 +1,7 @@
 //! The three demands on the diagnosis: 600 s and 24 h of three axes at 20 Hz, and a baseline fit of 1e6 samples.
 
 use std::hint::black_box;
-use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -35,7 +35,7 @@ fn bench(c: &mut Criterion) {
     group.finish();
     let y: Vec<f64> = record(50_000.0).channels.swap_remove(0).values;
     c.bench_function("baseline fit of 1e6 samples", |b| {
-        let (dct, bins) = (Dct::new(y.len()), Rc::new(Bins::new(y.len())));
+        let (dct, bins) = (Dct::new(y.len()), Arc::new(Bins::new(y.len())));
         b.iter(|| Panel::new(&dct, &bins, black_box(&y)).fit(&Noise::new(-12.0), &[]));
     });
 }

@@ -2,7 +2,7 @@
 //! the effects planted on gyro_x, of "temperature", "bias_step", "line", "lines" (eight harmonics), "gauss_markov",
 //! "telegraph"; none for a sound stand. Processor time counts on a machine that does other things.
 
-use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Instant;
 
 use diagnosis::likelihood::{Bins, Dct, Noise, Panel};
@@ -107,7 +107,7 @@ fn main() {
         .cycle()
         .take(1_000_000)
         .collect();
-    let (dct, bins) = (Dct::new(y.len()), Rc::new(Bins::new(y.len())));
+    let (dct, bins) = (Dct::new(y.len()), Arc::new(Bins::new(y.len())));
     let mut fastest = f64::INFINITY;
     for _ in 0..5 {
         let begun = Instant::now();

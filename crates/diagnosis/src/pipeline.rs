@@ -37,7 +37,7 @@ use crate::result::{
     Verdict,
 };
 use crate::search::searched::Searched;
-use crate::test_level::{CheckId, Observation, all_worded, worded};
+use crate::test_level::{CheckId, Observation, all_worded, on_two_threads, worded};
 pub use banks::diagnose_channels;
 use concluded::{Told, concluded};
 use handed_over::HandedOver;
@@ -109,8 +109,7 @@ pub fn diagnose_owned(
 fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     let at_rest = at_rest::believed(&mut of.grid);
     far_readings::settle(&mut of.grid, &of.audited, &of.singles);
-    let search = |t| channel::searched(&of.grid, t);
-    let mut searched: Vec<Searched<'_>> = of.grid.targets.iter().map(search).collect();
+    let mut searched = channel::all_searched(&of.grid);
     of.grid.dct.forget();
     let tested = tested(&mut searched, &of.audited, &of.grid);
     let shocks = match held(&searched, &tested, &of) {
@@ -120,7 +119,7 @@ fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
             return diagnosed(of.with_those(&borne_out), options);
         }
     };
-    let named = name_all(&searched, &tested, &of, shocks, options.seed);
+    let named = name_all(&mut searched, &tested, &of, shocks, options.seed);
     let Prepared {
         ref grid,
         mut audited,
@@ -164,15 +163,16 @@ fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         },
         baseline_model: models.baseline_model,
         extended_model: models.extended_model,
-        evidence: (searched.iter().filter(|_| !options.no_evidence))
-            .flat_map(|s| figures::of_channel(s, grid))
-            .collect(),
+        evidence: match options.no_evidence {
+            true => vec![],
+            false => on_two_threads(&mut searched, |s| figures::of_channel(s, grid)).concat(),
+        },
     }
 }
 
 /// What is named: of the counts, the far readings, the shocks, and then channel by channel.
 fn name_all(
-    searched: &[Searched<'_>],
+    searched: &mut [Searched<'_>],
     tested: &Tested,
     of: &Prepared,
     shocks: Vec<Finding>,
@@ -189,8 +189,20 @@ fn name_all(
         limits: audited.limits.clone(),
         ..Named::default()
     };
-    let name = |named, s| name_channel(named, s, searched, tested, audited, grid, seed);
-    searched.iter().fold(first, name)
+    let of_terms = on_two_threads(&mut *searched, |s| term_findings(s, grid, seed));
+    let searched = &*searched;
+    let name = |named, (s, of_terms)| {
+        name_channel(
+            named,
+            s,
+            all_worded(of_terms),
+            searched,
+            tested,
+            audited,
+            grid,
+        )
+    };
+    searched.iter().zip(of_terms).fold(first, name)
 }
 
 /// What has no name, by place; causes and entries get their ranks. What the replicates say of the models is told with the rest.
@@ -295,16 +307,16 @@ struct Named {
     not_tested: Vec<NotTested>,
 }
 
-/// Adds what is named on a channel: motion, then the terms and the law of the variance that the checks bear out. Names that
+/// Adds what is named on a channel: motion, then its terms, `of_terms`, and the law of the variance that the checks bear out. Names that
 /// stand already may fall by what is found here.
 fn name_channel(
     mut named: Named,
     s: &Searched<'_>,
+    of_terms: Vec<Finding>,
     searched: &[Searched<'_>],
     tested: &Tested,
     audited: &Audit,
     grid: &Grid,
-    seed: u64,
 ) -> Named {
     let all = tested.checks.iter().chain(&audited.checks);
     let fails: Vec<&Check> = all
@@ -314,7 +326,6 @@ fn name_channel(
     let (moved, unmoved) = motion_findings(s, grid, &failing);
     named.findings.extend(all_worded(moved));
     named.withdrawn.extend(all_worded(unmoved));
-    let of_terms = all_worded(term_findings(s, grid, seed));
     let of_law = |v: &VarianceFound| {
         let told = !by_counts(s, v, audited);
         told.then(|| worded(variance_finding(s, v)))

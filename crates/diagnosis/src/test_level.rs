@@ -33,7 +33,7 @@ pub(crate) const ENVELOPE_LEVEL: f64 = 1e-2;
 /// Chance of a false alarm of one audit on one channel.
 pub const AUDIT_LEVEL: f64 = 2e-5;
 thread_local! {
-    /// Part of the error budget that the channels under test have; the engine uses one thread for a record.
+    /// Part of the error budget that the channels under test have; the second thread of a record has it from the first.
     static PART: Cell<f64> = const { Cell::new(1.0) };
 }
 
@@ -48,6 +48,23 @@ pub(crate) fn with_part<T>(part: f64, f: impl FnOnce() -> T) -> T {
 /// The part of the error budget that the channels under test have of a chance.
 pub(crate) fn part_of(chance: f64) -> f64 {
     chance * PART.get()
+}
+
+/// What `work` makes of each item, in their order, on two threads that have the same part of the error budget.
+pub(crate) fn on_two_threads<T: Send, R: Send>(
+    items: impl IntoIterator<Item = T, IntoIter: Send>,
+    work: impl Fn(T) -> R + Sync,
+) -> Vec<R> {
+    let part = PART.get();
+    #[cfg(test)]
+    let reworded = rewording::is_on();
+    let about = move |share: &mut dyn FnMut()| {
+        PART.set(part);
+        #[cfg(test)]
+        rewording::set(reworded);
+        share();
+    };
+    numerics::threads::in_order(items, about, work)
 }
 
 /// [`OMNIBUS_LEVEL`], shared.
@@ -333,6 +350,14 @@ pub(crate) mod rewording {
         let given = f();
         ON.set(false);
         given
+    }
+
+    pub(super) fn is_on() -> bool {
+        ON.get()
+    }
+
+    pub(super) fn set(on: bool) {
+        ON.set(on);
     }
 
     pub(super) fn reworded<T: Worded>(mut told: T) -> T {

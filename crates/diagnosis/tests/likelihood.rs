@@ -1,6 +1,6 @@
 //! The DCT likelihood against the Kalman filter, an independent witness.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use diagnosis::kalman;
 use diagnosis::likelihood::{Bins, Dct, Noise, Panel};
@@ -25,7 +25,7 @@ fn ref_dct_and_kalman_agree_within_a_hundredth_of_a_nat() {
     let n = 12_000;
     for (seed, ratio) in [(1, 1e-6), (2, 1e-5), (3, 1e-4)] {
         let y = walk(n, 28.7, 28.7 * ratio, seed);
-        let panel = Panel::new(&Dct::new(n), &Rc::new(Bins::new(n)), &y);
+        let panel = Panel::new(&Dct::new(n), &Arc::new(Bins::new(n)), &y);
         // The constant between the two does not depend on the random walk: differences are compared.
         let dct = |lambda: f64| {
             let s = panel.solve(&Noise::new(lambda.ln()).over(&panel.bins), &[]);
@@ -56,7 +56,7 @@ fn a_quarter_of_the_samples_lost_costs_no_bias_of_the_noise() {
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         kalman::fill(&mut y, 1.0, 2e-5, &mut rng);
-        let panel = Panel::new(&Dct::new(n), &Rc::new(Bins::new(n)), &y);
+        let panel = Panel::new(&Dct::new(n), &Arc::new(Bins::new(n)), &y);
         let (noise, s) = panel.fit(&Noise::new(-12.0), &[]);
         ratios.push((noise.log_walk.exp() / 2e-5, s.white));
     }
@@ -74,7 +74,7 @@ fn a_quarter_of_the_samples_lost_costs_no_bias_of_the_noise() {
 fn two_levels_without_height_are_the_gaussian_model() {
     let n = 3000;
     let y = walk(n, 1.0, 1e-4, 5);
-    let panel = Panel::new(&Dct::new(n), &Rc::new(Bins::new(n)), &y);
+    let panel = Panel::new(&Dct::new(n), &Arc::new(Bins::new(n)), &y);
     let s = panel.solve(&Noise::new(1e-4f64.ln()).over(&panel.bins), &[]);
     let count = (n - 1) as f64;
     let gaussian = s.log_likelihood - 0.5 * count * (1.0 + std::f64::consts::TAU.ln());

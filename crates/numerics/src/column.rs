@@ -1,7 +1,7 @@
 //! Coefficients of the columns that may explain the data.
 
 use std::ops::Range;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use crate::wide;
 
@@ -154,9 +154,9 @@ where
 #[derive(Clone)]
 pub enum Column {
     /// As computed.
-    Whole(Rc<Vec<f64>>),
+    Whole(Arc<Vec<f64>>),
     /// Of a long record, where what may explain the data fills memory.
-    Short(Rc<Vec<f32>>),
+    Short(Arc<Vec<f32>>),
 }
 
 /// Samples beyond which columns that may explain the data are kept short.
@@ -166,8 +166,8 @@ impl Column {
     /// Where its coefficients are in memory: columns that share them are one.
     pub fn place(&self) -> usize {
         match self {
-            Self::Whole(c) => Rc::as_ptr(c).addr(),
-            Self::Short(c) => Rc::as_ptr(c).addr(),
+            Self::Whole(c) => Arc::as_ptr(c).addr(),
+            Self::Short(c) => Arc::as_ptr(c).addr(),
         }
     }
 
@@ -181,10 +181,10 @@ impl Column {
 
     /// All its samples, in full numbers.
     #[must_use]
-    pub fn whole(&self) -> Rc<Vec<f64>> {
+    pub fn whole(&self) -> Arc<Vec<f64>> {
         match self {
-            Self::Whole(c) => Rc::clone(c),
-            Self::Short(c) => Rc::new(c.iter().map(|v| f64::from(*v)).collect()),
+            Self::Whole(c) => Arc::clone(c),
+            Self::Short(c) => Arc::new(c.iter().map(|v| f64::from(*v)).collect()),
         }
     }
 

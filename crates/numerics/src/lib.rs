@@ -10,4 +10,5 @@ pub mod order_statistics;
 pub mod series;
 pub mod simd;
 pub mod tails;
+pub mod threads;
 pub mod transform;

@@ -8,11 +8,9 @@
 //! assert!((c[0] - 6.0).abs() < 1e-12 && (dct.inverse(&c)[4] - 2.0).abs() < 1e-12);
 //! ```
 
-use std::cell::{Cell, OnceCell, RefCell};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::f64::consts::PI;
-use std::rc::Rc;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
 
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
@@ -22,24 +20,27 @@ use abreast::{Number, Plane};
 use even::{forward_of_one, inverse_of_one};
 use odd::{forward_of_two, inverse_of_two};
 
+pub use known::Known;
+pub use length::quick_length;
+
 mod abreast;
 mod even;
+mod known;
+mod length;
 mod odd;
 
-/// Longest transform whose plan is kept for the next one who asks on the same thread, and most of them.
+/// Longest transform whose plan is kept for the next one who asks, and most of them.
 const KEPT: usize = 1 << 17;
 const MOST_KEPT: usize = 64;
 
-thread_local! {
-    static PLANS: RefCell<HashMap<usize, Plan<f64>>> = RefCell::default();
-}
+static PLANS: LazyLock<Mutex<HashMap<usize, Plan<f64>>>> = LazyLock::new(Mutex::default);
 
 /// What real transforms of one length need.
 #[derive(Clone)]
 struct Plan<T> {
     /// Of half an even length, of the whole of an odd one.
     complex: Arc<dyn Fft<T>>,
-    turn: Rc<Turns<T>>,
+    turn: Arc<Turns<T>>,
 }
 
 /// exp(-i pi k / (2 n)) of the first k, each the product of one of few coarse and one of few fine turns: what would be a
@@ -86,7 +87,7 @@ impl<T: Number> Plan<T> {
         };
         Self {
             complex: FftPlanner::new().plan_fft_forward(length),
-            turn: Rc::new(Turns::new(n, last)),
+            turn: Arc::new(Turns::new(n, last)),
         }
     }
 }
@@ -97,16 +98,15 @@ impl Plan<f64> {
         if n > KEPT {
             return Self::new(n);
         }
-        PLANS.with_borrow_mut(|known| {
-            if known.len() >= MOST_KEPT && !known.contains_key(&n) {
-                known.clear();
-            }
-            known.entry(n).or_insert_with(|| Self::new(n)).clone()
-        })
+        let mut known = PLANS.lock().unwrap_or_else(PoisonError::into_inner);
+        if known.len() >= MOST_KEPT && !known.contains_key(&n) {
+            known.clear();
+        }
+        known.entry(n).or_insert_with(|| Self::new(n)).clone()
     }
 }
 
-/// Work space that transforms have in common.
+/// Work space of a transform.
 struct Space<T> {
     packed: Vec<Complex<T>>,
     scratch: Vec<Complex<T>>,
@@ -116,18 +116,15 @@ struct Space<T> {
 #[derive(Clone)]
 struct Packed<T> {
     plan: Plan<T>,
-    space: Rc<RefCell<Space<T>>>,
+    /// One for each that is made at the same time.
+    spaces: Arc<Mutex<Vec<Space<T>>>>,
 }
 
 impl<T: Number> Packed<T> {
     fn new(plan: Plan<T>) -> Self {
-        let space = Space {
-            packed: vec![],
-            scratch: vec![],
-        };
         Self {
             plan,
-            space: Rc::new(RefCell::new(space)),
+            spaces: Arc::default(),
         }
     }
 
@@ -138,7 +135,13 @@ impl<T: Number> Packed<T> {
         take: impl FnOnce(&[Complex<T>], &Turns<T>),
     ) {
         let Plan { complex, turn } = &self.plan;
-        let Space { packed, scratch } = &mut *self.space.borrow_mut();
+        let spaces = || self.spaces.lock().unwrap_or_else(PoisonError::into_inner);
+        let idle = spaces().pop();
+        let mut space = idle.unwrap_or_else(|| Space {
+            packed: vec![],
+            scratch: vec![],
+        });
+        let Space { packed, scratch } = &mut space;
         let zero = Complex::new(T::zero(), T::zero());
         packed.resize(complex.len(), zero);
         fill(packed);
@@ -148,6 +151,7 @@ impl<T: Number> Packed<T> {
         }
         complex.process_with_scratch(packed, &mut scratch[..need]);
         take(packed, turn);
+        spaces().push(space);
     }
 }
 
@@ -205,55 +209,6 @@ fn both<Z: Plane>(a: Z, b: Z, turn: Z) -> (Z, Z) {
     let square = turn * turn;
     let turned = square * square * odd.quarter_back();
     (even + turned, even - turned)
-}
-
-/// Coefficients of columns that the channels of a record have in common, by a digest of their samples.
-#[derive(Default)]
-pub struct Known {
-    /// Those that go by what they hold.
-    pub columns: RefCell<HashMap<[u64; 2], Column>>,
-    /// Those that go by a name.
-    pub named: RefCell<HashMap<String, Vec<Column>>>,
-    /// Whether what the channels have in common is known: those of the first are, and no later one's own are kept.
-    pub complete: Cell<bool>,
-    /// Sums of products of the columns, by their places in memory, where they stay while they are kept.
-    products: RefCell<HashMap<[usize; 2], Rc<Vec<f64>>>>,
-    kept: RefCell<HashSet<usize>>,
-}
-
-impl Known {
-    /// Keeps a column for the channels to come.
-    pub fn keep(&self, key: [u64; 2], column: &Column) {
-        self.kept.borrow_mut().insert(column.place());
-        self.columns.borrow_mut().insert(key, column.clone());
-    }
-
-    /// Sums of products of two columns, where they are known.
-    pub fn products(&self, two: [&Column; 2]) -> Option<Rc<Vec<f64>>> {
-        self.products.borrow().get(&Self::places(two)).cloned()
-    }
-
-    /// Keeps them for the next who asks, where both columns are kept.
-    pub fn keep_products(&self, two: [&Column; 2], products: &Rc<Vec<f64>>) {
-        let (places, kept) = (Self::places(two), self.kept.borrow());
-        if places.iter().all(|p| kept.contains(p)) {
-            let mut all = self.products.borrow_mut();
-            all.insert(places, Rc::clone(products));
-        }
-    }
-
-    fn places(two: [&Column; 2]) -> [usize; 2] {
-        let mut places = two.map(Column::place);
-        places.sort_unstable();
-        places
-    }
-
-    fn forget(&self) {
-        self.products.borrow_mut().clear();
-        self.kept.borrow_mut().clear();
-        self.columns.borrow_mut().clear();
-        self.named.borrow_mut().clear();
-    }
 }
 
 /// Samples about their level, as numbers of a transform.
@@ -367,11 +322,11 @@ impl<T: Number> Kind<T> {
 pub struct Dct {
     n: usize,
     /// Each made for the first who asks.
-    whole: Rc<OnceCell<Kind<f64>>>,
+    whole: Arc<OnceLock<Kind<f64>>>,
     /// In short numbers, for the columns of long records.
-    short: Rc<OnceCell<Kind<f32>>>,
+    short: Arc<OnceLock<Kind<f32>>>,
     /// Columns that channels have in common.
-    pub known: Rc<Known>,
+    pub known: Arc<Known>,
 }
 
 impl Dct {
@@ -380,15 +335,15 @@ impl Dct {
     pub fn new(n: usize) -> Self {
         Self {
             n,
-            whole: Rc::default(),
-            short: Rc::default(),
-            known: Rc::default(),
+            whole: Arc::default(),
+            short: Arc::default(),
+            known: Arc::default(),
         }
     }
 
     /// Keep no further columns for other channels.
     pub fn keep_no_more(&self) {
-        self.known.complete.set(true);
+        self.known.complete();
     }
 
     /// Let go of the columns that channels have in common.
@@ -413,10 +368,12 @@ impl Dct {
     /// Columns of several that may explain the data, those of a long record in short numbers.
     pub fn columns<X: AsRef<[f64]>>(&self, all: impl IntoIterator<Item = X>) -> Vec<Column> {
         if self.n > LONG {
-            self.short(all).map(|c| Column::Short(Rc::new(c))).collect()
+            self.short(all)
+                .map(|c| Column::Short(Arc::new(c)))
+                .collect()
         } else {
             let whole = self.forward_all(all);
-            whole.map(|c| Column::Whole(Rc::new(c))).collect()
+            whole.map(|c| Column::Whole(Arc::new(c))).collect()
         }
     }
 

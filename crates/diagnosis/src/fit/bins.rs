@@ -1,8 +1,7 @@
 //! The shape of the noise over bins of coefficients in which it hardly changes: finer than elsewhere about a peak.
 
-use std::cell::OnceCell;
 use std::f64::consts::PI;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use model::effect::{Covariance, Frequencies, Peak};
 
@@ -37,8 +36,8 @@ pub struct Bins {
     walk: Vec<f64>,
     /// Frequencies and random-walk shape at every coefficient, that of k = 0 in the place of which k = 1 stands, each once
     /// it is asked for.
-    fine: OnceCell<Frequencies>,
-    walks: OnceCell<Vec<f64>>,
+    fine: OnceLock<Frequencies>,
+    walks: OnceLock<Vec<f64>>,
 }
 
 fn walk_shape(omega: f64) -> f64 {
@@ -90,8 +89,8 @@ impl Bins {
             counts,
             at: Frequencies { omega, cosine },
             walk,
-            fine: OnceCell::new(),
-            walks: OnceCell::new(),
+            fine: OnceLock::new(),
+            walks: OnceLock::new(),
         }
     }
 

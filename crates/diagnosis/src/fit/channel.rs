@@ -1,6 +1,5 @@
 //! The model of a channel: its terms, their form, the noise and the fit.
 
-use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::{Effect, Found, Frequencies, Parameters, Peak, Shape};
@@ -215,7 +214,7 @@ pub struct State {
     /// Structure that was seen and that no single effect explains.
     pub notes: Vec<Note>,
     /// The level of a process that is not Gaussian, where one was named: sample by sample.
-    pub level: Option<Rc<Vec<f64>>>,
+    pub level: Option<Arc<Vec<f64>>>,
     /// The one power law that explains as much as the processes.
     pub power_law: Option<PowerLawFound>,
     /// How much wider lost readings make the errors of the noise: of the white variance, the random walk, the coordinates of

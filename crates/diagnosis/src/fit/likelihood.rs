@@ -7,7 +7,6 @@
 
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
-use std::rc::Rc;
 use std::sync::Arc;
 
 mod normal;
@@ -50,14 +49,14 @@ fn digest(x: &[f64]) -> [u64; 2] {
 }
 
 /// Sums over bins by pair of columns.
-type Pairs = HashMap<(usize, usize), Rc<Vec<f64>>>;
+type Pairs = HashMap<(usize, usize), Arc<Vec<f64>>>;
 
 /// The data of one channel and all columns that may explain it, as coefficients.
 pub struct Panel {
     /// Transform.
     pub dct: Dct,
     /// Bins.
-    pub bins: Rc<Bins>,
+    pub bins: Arc<Bins>,
     columns: RefCell<Vec<Column>>,
     pairs: RefCell<Pairs>,
     revision: Cell<usize>,
@@ -66,24 +65,24 @@ pub struct Panel {
 impl Panel {
     /// A panel on the data `y`, which becomes column 0.
     #[must_use]
-    pub fn new(dct: &Dct, bins: &Rc<Bins>, y: &[f64]) -> Self {
-        Self::of(dct, bins, Rc::new(dct.forward(y)))
+    pub fn new(dct: &Dct, bins: &Arc<Bins>, y: &[f64]) -> Self {
+        Self::of(dct, bins, Arc::new(dct.forward(y)))
     }
 
     /// A panel on the first of these sequences, which the others may explain; they are columns 0, 1 and so on, those of a long
     /// record in short numbers.
-    pub(crate) fn of_all(dct: &Dct, bins: &Rc<Bins>, all: &[&[f64]]) -> Self {
-        let panel = Self::of(dct, bins, Rc::default());
+    pub(crate) fn of_all(dct: &Dct, bins: &Arc<Bins>, all: &[&[f64]]) -> Self {
+        let panel = Self::of(dct, bins, Arc::default());
         *panel.columns.borrow_mut() = dct.columns(all);
         panel
     }
 
     /// A panel on data whose coefficients are known.
     #[must_use]
-    pub fn of(dct: &Dct, bins: &Rc<Bins>, coefficients: Rc<Vec<f64>>) -> Self {
+    pub fn of(dct: &Dct, bins: &Arc<Bins>, coefficients: Arc<Vec<f64>>) -> Self {
         Self {
             dct: dct.clone(),
-            bins: Rc::clone(bins),
+            bins: Arc::clone(bins),
             columns: RefCell::new(vec![Column::Whole(coefficients)]),
             pairs: RefCell::default(),
             revision: Cell::default(),
@@ -101,14 +100,12 @@ impl Panel {
             return self.dct.columns(values);
         }
         let keys: Vec<[u64; 2]> = values.iter().map(|v| digest(v)).collect();
-        let known = |key: &[u64; 2]| self.dct.known.columns.borrow().get(key).cloned();
-        let mut all: Vec<Option<Column>> = keys.iter().map(known).collect();
+        let known = &self.dct.known;
+        let mut all: Vec<Option<Column>> = keys.iter().map(|k| known.column(k)).collect();
         let missing: Vec<usize> = (0..all.len()).filter(|i| all[*i].is_none()).collect();
         let new: Vec<&Vec<f64>> = missing.iter().map(|i| &values[*i]).collect();
         for (i, c) in missing.into_iter().zip(self.dct.columns(new)) {
-            if !self.dct.known.complete.get() {
-                self.dct.known.keep(keys[i], &c);
-            }
+            known.keep(keys[i], &c);
             all[i] = Some(c);
         }
         all.into_iter().flatten().collect()
@@ -131,13 +128,9 @@ impl Panel {
     ) -> Vec<usize> {
         let made = || self.candidate(&make(), common);
         let all = if common {
-            let known = self.dct.known.named.borrow().get(name).cloned();
-            known.unwrap_or_else(|| {
+            self.dct.known.named(name).unwrap_or_else(|| {
                 let all = made();
-                if !self.dct.known.complete.get() {
-                    let mut named = self.dct.known.named.borrow_mut();
-                    named.insert(name.to_owned(), all.clone());
-                }
+                self.dct.known.keep_named(name, &all);
                 all
             })
         } else {
@@ -149,7 +142,7 @@ impl Panel {
     /// Add a column of samples; returns its number.
     pub fn add(&self, values: &[f64]) -> usize {
         let c = self.dct.forward(values);
-        self.columns.borrow_mut().push(Column::Whole(Rc::new(c)));
+        self.columns.borrow_mut().push(Column::Whole(Arc::new(c)));
         self.columns.borrow().len() - 1
     }
 
@@ -159,13 +152,13 @@ impl Panel {
         values: impl IntoIterator<Item = X>,
     ) -> Vec<usize> {
         let all = self.dct.forward_all(values);
-        self.push(all.map(|c| Column::Whole(Rc::new(c))).collect())
+        self.push(all.map(|c| Column::Whole(Arc::new(c))).collect())
     }
 
     /// Put other coefficients in the place of the data's.
     pub fn replace_data(&self, coefficients: Vec<f64>) {
         self.revision.set(self.revision.get() + 1);
-        self.columns.borrow_mut()[0] = Column::Whole(Rc::new(coefficients));
+        self.columns.borrow_mut()[0] = Column::Whole(Arc::new(coefficients));
         self.pairs.borrow_mut().retain(|k, _| k.0 > 0);
     }
 
@@ -186,7 +179,7 @@ impl Panel {
 
     /// Coefficients of a column.
     #[must_use]
-    pub fn column(&self, i: usize) -> Rc<Vec<f64>> {
+    pub fn column(&self, i: usize) -> Arc<Vec<f64>> {
         self.columns.borrow()[i].whole()
     }
 
@@ -220,7 +213,7 @@ impl Panel {
     pub fn release(&self, kept: &[usize]) {
         for (i, c) in self.columns.borrow_mut().iter_mut().enumerate() {
             if i > 0 && !kept.contains(&i) {
-                *c = Column::Whole(Rc::default());
+                *c = Column::Whole(Arc::default());
             }
         }
     }
@@ -231,12 +224,12 @@ impl Panel {
         self.columns.borrow().len()
     }
 
-    fn pair(&self, i: usize, j: usize) -> Rc<Vec<f64>> {
+    fn pair(&self, i: usize, j: usize) -> Arc<Vec<f64>> {
         self.pairs([(i, j)]).swap_remove(0)
     }
 
     /// Sums of products of pairs of columns over the bins: those that are not known yet are made together.
-    fn pairs(&self, all: impl IntoIterator<Item = (usize, usize)>) -> Vec<Rc<Vec<f64>>> {
+    fn pairs(&self, all: impl IntoIterator<Item = (usize, usize)>) -> Vec<Arc<Vec<f64>>> {
         let in_order = |(i, j): (usize, usize)| (i.min(j), i.max(j));
         let keys: Vec<_> = all.into_iter().map(in_order).collect();
         let mut pairs = self.pairs.borrow_mut();
@@ -262,7 +255,7 @@ impl Panel {
         }
         let of: Vec<_> = missing.iter().map(two).collect();
         for ((key, two), made) in missing.iter().zip(&of).zip(self.bins.products_of(&of)) {
-            let made = Rc::new(made);
+            let made = Arc::new(made);
             if self.bins.plain {
                 known.keep_products(*two, &made);
             }

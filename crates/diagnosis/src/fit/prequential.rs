@@ -11,7 +11,7 @@
 mod events;
 mod laws;
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use model::effect::Peak;
 use statrs::function::gamma::ln_gamma;
@@ -183,7 +183,7 @@ impl<'a> Blocks<'a> {
     /// The panel of what lies before the end of a block, with the numbers of the columns of each term.
     fn panel(&self, peaks: &[Peak], block: usize) -> (Panel, Vec<Vec<usize>>) {
         let end = self.ends[block];
-        let (dct, bins) = (Dct::new(end), Rc::new(Bins::about(end, peaks)));
+        let (dct, bins) = (Dct::new(end), Arc::new(Bins::about(end, peaks)));
         let shapes = self.values.iter().flatten().map(Vec::as_slice);
         let beginnings: Vec<&[f64]> = std::iter::once(self.y)
             .chain(shapes)

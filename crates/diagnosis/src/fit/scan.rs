@@ -2,7 +2,7 @@
 
 mod variance;
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use rustfft::num_complex::Complex;
 
@@ -130,9 +130,9 @@ pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Ve
     let n = panel.bins.n;
     let m = n.min(LONGEST_STEP_GRID);
     let (dct, coarse) = if m < n {
-        (Dct::new(m), Rc::new(Bins::new(m)))
+        (Dct::new(m), Arc::new(Bins::new(m)))
     } else {
-        (panel.dct.clone(), Rc::clone(&panel.bins))
+        (panel.dct.clone(), Arc::clone(&panel.bins))
     };
     let walk_shapes = &panel.bins.walks()[..m];
     // A step on the grid has these parts of the coefficients of one in the record: 1 where the grid is the record.

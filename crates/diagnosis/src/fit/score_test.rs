@@ -104,7 +104,7 @@ fn likelihood(panel: &Panel, normal: &Normal) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use std::rc::Rc;
+    use std::sync::Arc;
 
     use super::*;
     use crate::fit::likelihood::{Bins, Dct};
@@ -120,7 +120,7 @@ mod tests {
             };
             (0..n).map(next).collect()
         };
-        let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
+        let (dct, bins) = (Dct::new(n), Arc::new(Bins::new(n)));
         let panel = Panel::new(&dct, &bins, &column());
         let own: Vec<usize> = (0..4).map(|_| panel.add(&column())).collect();
         let mut further: Vec<Vec<f64>> = (0..3).map(|_| column()).collect();

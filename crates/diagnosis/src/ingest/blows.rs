@@ -14,6 +14,7 @@ use model::effects::shock::LONGEST_S;
 use crate::fit::likelihood::{Bins, Dct};
 use crate::fit::threshold;
 use crate::ingest::types::Target;
+use crate::test_level::on_two_threads;
 use numerics::order_statistics::{median, robust_sigma};
 
 /// Half sines have lengths this far apart; their ends are sought in steps of this part of them.
@@ -341,12 +342,37 @@ fn whitened(y: &[f64], target: &Target, dct: &Dct, bins: &Bins) -> Vec<f64> {
     e
 }
 
+/// By how much the shape that stands out most at a reading does, and its number.
+type Best = (f32, u32);
+
 /// At every reading the shape that stands out most, where one does nearly.
 fn standing_out(whitened: &[Vec<f64>], shapes: &[Shape], chance: f64) -> Vec<Place> {
+    let numbered: Vec<(u32, Shape)> = (0..).zip(shapes.iter().copied()).collect();
+    let halves = numbered.chunks(numbered.len().div_ceil(2).max(1));
+    let mut halves = on_two_threads(halves, |half| best_of(whitened, half, chance)).into_iter();
+    let mut best = halves.next().unwrap_or_default();
+    for (best, other) in best.iter_mut().zip(halves.flatten()) {
+        // Of two alike the first counts.
+        if other.0 > best.0 {
+            *best = other;
+        }
+    }
+    let all = best.into_iter().enumerate();
+    let all = all.filter(|(_, (excess, _))| f64::from(*excess) > -NEARLY);
+    all.map(|(at, (excess, shape))| Place {
+        at,
+        shape: shape as usize,
+        excess: f64::from(excess),
+    })
+    .collect()
+}
+
+/// The best of some shapes at every reading.
+fn best_of(whitened: &[Vec<f64>], shapes: &[(u32, Shape)], chance: f64) -> Vec<Best> {
     let (n, channels) = (whitened[0].len(), whitened.len());
-    let mut best: Vec<(f32, u32)> = vec![(f32::NEG_INFINITY, 0); n];
+    let mut best = vec![(f32::NEG_INFINITY, 0); n];
     let mut energies = vec![];
-    for (k, shape) in shapes.iter().enumerate() {
+    for (k, shape) in shapes {
         let sizes = shape.sizes();
         let limits = least(chance, n, sizes, channels);
         let of_channels: Vec<Vec<f64>> = (whitened.iter())
@@ -373,18 +399,11 @@ fn standing_out(whitened: &[Vec<f64>], shapes: &[Shape], chance: f64) -> Vec<Pla
             energies.extend(of_channels.iter().map(|all| all[i]).zip(0..));
             let excess = sum.of(*shape == Shape::HalfSine(1.0), &mut energies) as f32;
             if excess > best[i].0 {
-                best[i] = (excess, k as u32);
+                best[i] = (excess, *k);
             }
         }
     }
-    let all = best.into_iter().enumerate();
-    let all = all.filter(|(_, (excess, _))| f64::from(*excess) > -NEARLY);
-    all.map(|(at, (excess, shape))| Place {
-        at,
-        shape: shape as usize,
-        excess: f64::from(excess),
-    })
-    .collect()
+    best
 }
 
 /// How large an energy usually is, over that of white noise: by its median where it is asked.

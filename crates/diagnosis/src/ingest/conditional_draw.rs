@@ -73,7 +73,7 @@ pub(crate) fn fill(
 
 #[cfg(test)]
 mod tests {
-    use std::rc::Rc;
+    use std::sync::Arc;
 
     use rand_core::SeedableRng;
 
@@ -100,7 +100,7 @@ mod tests {
         lost.iter().for_each(|i| smoothed[*i] = f64::NAN);
         crate::ingest::kalman::bridge(&mut smoothed, white, white * log_walk.exp());
         lost.iter().for_each(|i| y[*i] = 0.0);
-        let bins = Rc::new(Bins::new(n));
+        let bins = Arc::new(Bins::new(n));
         let g = Noise::new(log_walk).everywhere(&bins);
         let precision: Vec<f64> = g.iter().map(|g| 1.0 / (white * g)).collect();
         fill_mean(&Dct::new(n), &precision, &mut y, &lost);

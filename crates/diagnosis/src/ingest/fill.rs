@@ -1,11 +1,11 @@
 //! Lost readings, filled before the search by the spectrum that the others have.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
+use crate::fit::likelihood::{Noise, Panel};
 use crate::ingest::conditional_draw;
 use numerics::tails;
 
@@ -63,22 +63,20 @@ pub(crate) fn by_spectrum(panel: &Panel, noise: &Noise, white: f64) -> Vec<f64> 
     (0..n).map(|k| (white * g[k] * ratio(k)).recip()).collect()
 }
 
-/// Fills the lost readings of `y` by the spectrum of all, and fits white noise and a random walk again. Returns the
-/// coefficients.
+/// Fills the lost readings of `y`, the data of a panel, by the spectrum of all, and fits white noise and a random walk again.
+/// Returns the coefficients.
 pub(crate) fn first(
     channel: &str,
-    dct: &Dct,
-    bins: &Rc<Bins>,
+    mut panel: Panel,
     y: &mut [f64],
     lost: &[usize],
     fit: &mut (Noise, f64),
-) -> Rc<Vec<f64>> {
-    let mut panel = Panel::new(dct, bins, y);
+) -> Arc<Vec<f64>> {
     if many(lost, y.len()) {
         for _ in 0..SPECTRUM_PASSES {
             let precision = by_spectrum(&panel, &fit.0, fit.1);
-            conditional_draw::fill(dct, &precision, y, lost, &mut draws(channel));
-            panel = Panel::new(dct, bins, y);
+            conditional_draw::fill(&panel.dct, &precision, y, lost, &mut draws(channel));
+            panel = Panel::new(&panel.dct, &panel.bins, y);
         }
         let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
         *fit = (noise, solution.white);

@@ -2,8 +2,9 @@
 //! tell, slow channels smoothed, motion of the base noticed.
 
 mod signals;
+#[cfg(test)]
+mod tests;
 
-use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::Signal;
@@ -16,8 +17,11 @@ use crate::ingest::base_turns::{Excursion, MOTION_RMS};
 use crate::ingest::motion::{MOTION_BAND_HZ, Rest, drives, felt, followers, motion, places_of};
 use crate::ingest::types::{Grid, Target};
 use crate::ingest::{dequantise, fill, kalman};
+use crate::test_level::on_two_threads;
 use model::record::AnalysisError;
+use numerics::column::LONG;
 use numerics::series::{smallest_step, white_by_differences};
+use numerics::transform::quick_length;
 use signals::{of_gyro, other};
 
 /// Least number of samples of a gyro.
@@ -141,6 +145,7 @@ pub fn lay_out(
     Ok(Grid {
         rate_hz: layout.rate_hz,
         n: layout.n,
+        end: layout.end,
         dct: layout.dct,
         bins: layout.bins,
         bursts: None,
@@ -155,11 +160,12 @@ struct Layout<'a> {
     masked: &'a dyn Fn(&str) -> Vec<usize>,
     base: Option<Base>,
     rate_hz: f64,
-    /// Places, and that of every row.
+    /// Places, those up to the last reading, and that of every row.
     n: usize,
+    end: usize,
     places: Vec<usize>,
     dct: Dct,
-    bins: Rc<Bins>,
+    bins: Arc<Bins>,
     /// All channels but the gyros.
     others: Vec<Signal>,
     /// Coefficients, in the band of motion, of what may drive a bias.
@@ -176,29 +182,31 @@ impl<'a> Layout<'a> {
                 present,
             });
         }
-        let (places, n) = places(record);
-        let seconds = n as f64 / rate_hz;
-        if n < LEAST_SAMPLES {
-            return Err(short(n as f64, LEAST_SAMPLES as f64, "samples"));
+        let (places, end) = places(record);
+        let seconds = end as f64 / rate_hz;
+        if end < LEAST_SAMPLES {
+            return Err(short(end as f64, LEAST_SAMPLES as f64, "samples"));
         }
         if seconds < LEAST_SECONDS {
             return Err(short(seconds, LEAST_SECONDS, "s"));
         }
-        let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
+        let n = if end > LONG { quick_length(end) } else { end };
+        let (dct, bins) = (Dct::new(n), Arc::new(Bins::new(n)));
         // Of the coefficients of what may drive a bias only the band of motion is asked for.
         let top = places_of(MOTION_BAND_HZ.1, n, rate_hz);
-        let (mut others, mut known) = (vec![], vec![]);
-        let channels = record.channels.iter();
-        for channel in channels.filter(|c| c.quantity != Quantity::Gyro) {
+        let channels = (record.channels.iter()).filter(|c| c.quantity != Quantity::Gyro);
+        let laid = on_two_threads(channels, |channel| {
             let (signal, driver) = other(channel, &places, n, &dct, &bins);
-            known.extend(driver.map(|c| c[..top].to_vec()));
-            others.push(signal);
-        }
+            (signal, driver.map(|c| c[..top].to_vec()))
+        });
+        let (others, known): (Vec<_>, Vec<_>) = laid.into_iter().unzip();
+        let known = known.into_iter().flatten().collect();
         Ok(Self {
             masked,
             base: record.header.base,
             rate_hz,
             n,
+            end,
             places,
             dct,
             bins,
@@ -231,7 +239,11 @@ impl<'a> Layout<'a> {
         if unit_of(channel).1 != "deg/s" || self.turns() {
             return vec![];
         }
-        let y = interpolated(&self.read(channel));
+        let mut y = interpolated(&self.read(channel));
+        // After the last reading noise goes on, and no level.
+        let (read, after) = y.split_at_mut(self.end);
+        let mirrored = after.iter_mut().zip(read.iter().rev());
+        mirrored.for_each(|(y, read)| *y = *read);
         felt(&y, &self.others, self.rate_hz, &self.dct)
     }
 
@@ -257,11 +269,11 @@ impl<'a> Layout<'a> {
         given: &[f64],
         guess: f64,
         rng: &mut Xoshiro256PlusPlus,
-    ) -> (Vec<f64>, Rc<Vec<f64>>, (Noise, f64)) {
+    ) -> (Vec<f64>, Arc<Vec<f64>>, (Noise, f64)) {
         let lost = given.iter().any(|v| !v.is_finite());
         let mut fit = (Noise::new(0.0), guess.max(1e-300));
         let mut y = given.to_vec();
-        kalman::fill(&mut y, fit.1, fit.1 * 1e-4, rng);
+        kalman::fill_to(self.end, &mut y, fit.1, fit.1 * 1e-4, rng);
         let mut pass = 0;
         loop {
             let panel = Panel::new(&self.dct, &self.bins, &y);
@@ -271,7 +283,7 @@ impl<'a> Layout<'a> {
                 return (y, panel.column(0), fit);
             }
             y = given.to_vec();
-            kalman::fill(&mut y, fit.1, fit.1 * fit.0.log_walk.exp(), rng);
+            kalman::fill_to(self.end, &mut y, fit.1, fit.1 * fit.0.log_walk.exp(), rng);
             pass += 1;
         }
     }
@@ -346,7 +358,8 @@ impl<'a> Layout<'a> {
         let aside = self.aside(channel, &given, &spikes);
         let lost = [lost, spikes.clone()].concat();
         if still {
-            c = fill::first(&channel.name, dct, bins, &mut y, &lost, &mut fit);
+            let panel = Panel::of(dct, bins, c);
+            c = fill::first(&channel.name, panel, &mut y, &lost, &mut fit);
         }
         if is_rate && !spikes.is_empty() {
             motion_rms = self.motion(&y, &c, &lost, &fit);
@@ -421,10 +434,10 @@ fn unit_of(channel: &Channel) -> (f64, String) {
 fn spikes(
     given: &[f64],
     y: &mut Vec<f64>,
-    coefficients: &mut Rc<Vec<f64>>,
+    coefficients: &mut Arc<Vec<f64>>,
     fit: &mut (Noise, f64),
     dct: &Dct,
-    bins: &Rc<Bins>,
+    bins: &Arc<Bins>,
     rng: &mut Xoshiro256PlusPlus,
 ) -> Vec<usize> {
     const PASSES: usize = 8;

@@ -89,3 +89,15 @@ pub fn fill(y: &mut [f64], white: f64, step: f64, rng: &mut Xoshiro256PlusPlus) 
         }
     }
 }
+
+/// Readings before a lost one that tell all of its level that noise does not hide.
+const MEMORY: usize = 1 << 14;
+
+/// As [`fill`], where all from `end` on are missing: if they are the only ones, by the last readings alone.
+pub fn fill_to(end: usize, y: &mut [f64], white: f64, step: f64, rng: &mut Xoshiro256PlusPlus) {
+    let from = match y[..end].iter().all(|v| v.is_finite()) {
+        true => end.saturating_sub(MEMORY),
+        false => 0,
+    };
+    fill(&mut y[from..], white, step, rng);
+}

@@ -1,6 +1,5 @@
 //! A record on an even grid, and a gyro of it.
 
-use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::Signal;
@@ -25,7 +24,7 @@ pub struct Target {
     /// Readings, lost ones filled.
     pub y: Arc<Vec<f64>>,
     /// Their coefficients.
-    pub coefficients: Rc<Vec<f64>>,
+    pub coefficients: Arc<Vec<f64>>,
     /// Grid places without a reading, spikes included.
     pub lost: Vec<usize>,
     /// Places whose reading the noise cannot have made.
@@ -56,10 +55,13 @@ pub struct Grid {
     pub rate_hz: f64,
     /// Places.
     pub n: usize,
+    /// Places up to the last reading. In a long record some lost ones follow, with which its length transforms fast: nothing
+    /// that is told of the record counts them.
+    pub end: usize,
     /// Transform of that length.
     pub dct: Dct,
     /// Its bins.
-    pub bins: Rc<Bins>,
+    pub bins: Arc<Bins>,
     /// Where the bursts lie that were laid end to end; none of a record of one piece.
     pub bursts: Option<Bursts>,
     /// What the base did.
@@ -68,4 +70,11 @@ pub struct Grid {
     pub targets: Vec<Target>,
     /// All channels, gyros included.
     pub signals: Vec<Signal>,
+}
+
+impl Grid {
+    /// Length of the record.
+    pub(crate) fn seconds(&self) -> f64 {
+        self.end as f64 / self.rate_hz
+    }
 }

@@ -212,7 +212,7 @@ fn filled_again(grid: &mut Grid, channel: usize, mut y: Vec<f64>) {
     let panel = Panel::new(dct, bins, &y);
     let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
     let mut fit = (noise, solution.white);
-    target.coefficients = fill::first(&target.name, dct, bins, &mut y, &target.lost, &mut fit);
+    target.coefficients = fill::first(&target.name, panel, &mut y, &target.lost, &mut fit);
     (target.noise, target.white) = fit;
     target.y = Arc::new(y);
 }

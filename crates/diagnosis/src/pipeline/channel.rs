@@ -1,6 +1,6 @@
 //! One channel from its readings to a searched one: baseline, search, checks.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use model::effect::View;
 
@@ -14,17 +14,17 @@ use crate::report::detection_limits;
 use crate::result::Check;
 use crate::search::searched::Searched;
 use crate::search::{Search, bands, impute};
-use crate::test_level::{CheckId, Outcome, all_worded, omnibus_level, worded};
+use crate::test_level::{self, CheckId, Outcome, all_worded, omnibus_level, worded};
 use crate::two_level::compare;
 
 /// The search of a channel, its hypotheses laid out.
 fn laid_out<'a>(grid: &'a Grid, target: &'a Target) -> Search<'a> {
     let coefficients = &target.coefficients;
     let bins = match bands::peaks(coefficients, &target.noise, target.white, &grid.bins) {
-        none if none.is_empty() => Rc::clone(&grid.bins),
-        peaks => Rc::new(Bins::about(grid.n, &peaks)),
+        none if none.is_empty() => Arc::clone(&grid.bins),
+        peaks => Arc::new(Bins::about(grid.n, &peaks)),
     };
-    let panel = Panel::of(&grid.dct, &bins, Rc::clone(coefficients));
+    let panel = Panel::of(&grid.dct, &bins, Arc::clone(coefficients));
     let view = View {
         channel: &target.name,
         axis: target.axis,
@@ -37,6 +37,8 @@ fn laid_out<'a>(grid: &'a Grid, target: &'a Target) -> Search<'a> {
         signals: &grid.signals,
     };
     let mut search = Search::new(panel, view, grid.bursts.is_some());
+    // No later channel has more in common with others.
+    grid.dct.keep_no_more();
     search.read = 1.0 - target.lost.len() as f64 / grid.n as f64;
     search
 }
@@ -50,9 +52,24 @@ fn plain_checks((u, e): &Whitened, baseline: &State, grid: &Grid, target: &Targe
     residual::all(u, e, grid.rate_hz, step)
 }
 
-/// Search a channel, and ask its model and what that leaves.
+/// Searches all channels, two at a time: their columns in common are those of the first.
+pub(super) fn all_searched(grid: &Grid) -> Vec<Searched<'_>> {
+    let Some(target) = grid.targets.first() else {
+        return vec![];
+    };
+    let first = std::iter::once(Some(laid_out(grid, target)));
+    let laid = first.chain(std::iter::repeat_with(|| None));
+    test_level::on_two_threads(grid.targets.iter().zip(laid), |(target, laid)| {
+        searched_from(grid, target, laid.unwrap_or_else(|| laid_out(grid, target)))
+    })
+}
+
+/// Searches a channel, and asks its model and what that leaves.
 pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
-    let search = laid_out(grid, target);
+    searched_from(grid, target, laid_out(grid, target))
+}
+
+fn searched_from<'a>(grid: &'a Grid, target: &'a Target, search: Search<'a>) -> Searched<'a> {
     let baseline = search.baseline(&target.noise);
     let mut plain = whitened(&search.panel, &baseline);
     let mut before = plain_checks(&plain, &baseline, grid, target);
@@ -97,7 +114,6 @@ pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
         *outcome = worded(outcome.clone());
     }
     s.search.panel.release(&s.state.columns());
-    grid.dct.keep_no_more();
     if !target.moving {
         s.variance = variance_law::found(&s);
     }

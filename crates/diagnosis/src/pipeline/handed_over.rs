@@ -32,7 +32,7 @@ fn fitted_on(grid: &Grid, options: &DiagnoseOptions) -> FittedOn {
     FittedOn {
         file: options.file.clone(),
         hash: options.hash.clone(),
-        seconds: grid.n as f64 / grid.rate_hz,
+        seconds: grid.seconds(),
     }
 }
 

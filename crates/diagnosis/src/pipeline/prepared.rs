@@ -74,7 +74,7 @@ pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, A
     grid.bursts = bursts;
     let input = Input {
         file: String::new(),
-        seconds: grid.n as f64 / grid.rate_hz,
+        seconds: grid.seconds(),
         rate_hz: grid.rate_hz,
         samples: record.len(),
         channels: record.channels.iter().map(|c| c.name.clone()).collect(),

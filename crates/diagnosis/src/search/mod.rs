@@ -19,7 +19,6 @@ pub(crate) mod searched;
 
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::{Effect, Hypothesis, VarianceLaw, View};
@@ -87,12 +86,12 @@ impl Candidate {
 #[must_use]
 pub fn peak_of_white(y: &[f64]) -> f64 {
     let n = y.len();
-    let (dct, plain) = (Dct::new(n), Rc::new(Bins::new(n)));
-    let coefficients = Rc::new(dct.forward(y));
+    let (dct, plain) = (Dct::new(n), Arc::new(Bins::new(n)));
+    let coefficients = Arc::new(dct.forward(y));
     let mean_square = y.iter().map(|v| v * v).sum::<f64>() / n as f64;
     let start = Noise::new(f64::NEG_INFINITY);
     let peaks = bands::peaks(&coefficients, &start, mean_square, &plain);
-    let bins = Rc::new(Bins::about(n, &peaks));
+    let bins = Arc::new(Bins::about(n, &peaks));
     let view = View {
         channel: "gyro_x",
         axis: None,

@@ -8,7 +8,6 @@ mod level;
 mod steps;
 
 use std::f64::consts::TAU;
-use std::rc::Rc;
 use std::sync::Arc;
 
 use model::effect::{Covariance, Effect, Hypothesis};
@@ -89,7 +88,7 @@ fn looks_two_level(search: &Search<'_>, state: &State) -> bool {
     if m < COARSE_BLOCKS / 2 {
         return false;
     }
-    let panel = Panel::new(&Dct::new(m), &Rc::new(Bins::new(m)), &blocks);
+    let panel = Panel::new(&Dct::new(m), &Arc::new(Bins::new(m)), &blocks);
     let (noise, walk) = panel.fit(&Noise::new(-9.0), &[]);
     // A level that never moves does not switch.
     if noise.log_walk <= least_walk(m) {
@@ -269,7 +268,7 @@ struct Field<'a> {
     rest: Vec<f64>,
     blocks: Vec<f64>,
     dct: Dct,
-    bins: Rc<Bins>,
+    bins: Arc<Bins>,
 }
 
 /// Two levels fitted, with what they are held against.
@@ -311,7 +310,7 @@ impl<'a> Field<'a> {
             rest,
             blocks,
             dct: Dct::new(m),
-            bins: Rc::new(Bins::new(m)),
+            bins: Arc::new(Bins::new(m)),
         })
     }
 
@@ -400,12 +399,12 @@ impl<'a> Field<'a> {
                 fit = self.again(&settled, &fit.x);
             }
         }
-        settled.level = self.level(&settled, &fit.x).map(Rc::new);
+        settled.level = self.level(&settled, &fit.x).map(Arc::new);
         let level = settled.level.clone().filter(|_| fit.at_random());
         if let Some(more) = level.and_then(|l| level::beside(self.search, &settled, term, &l)) {
             (settled, term, self.rest) = (more.state, more.term, more.rest);
             fit = self.again(&settled, &fit.x);
-            settled.level = self.level(&settled, &fit.x).map(Rc::new);
+            settled.level = self.level(&settled, &fit.x).map(Arc::new);
         }
         self.give_spectrum(&mut settled, term, &fit.x);
         if many_ahead(&self.blocks, &fit.x) > MARGIN {

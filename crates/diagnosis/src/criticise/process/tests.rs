@@ -1,6 +1,6 @@
 //! Tests of [`super`].
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -12,7 +12,7 @@ use crate::fit::likelihood::Dct;
 /// White coefficients behind the filter of a process with a correlation of some 3 of 6000 samples.
 fn filtered(seed: u64) -> Filtered {
     let n = 6000;
-    let panel = Panel::new(&Dct::new(n), &Rc::new(Bins::new(n)), &vec![0.0; n]);
+    let panel = Panel::new(&Dct::new(n), &Arc::new(Bins::new(n)), &vec![0.0; n]);
     let u = crate::fit::white(n, seed);
     let filter: Vec<f64> = (0..n)
         .map(|k| 1.0 / (1.0 + (PI * k as f64 / n as f64 * 3.0).powi(2)))

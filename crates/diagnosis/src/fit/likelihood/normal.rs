@@ -1,6 +1,6 @@
 //! Normal equations of weighted least squares, and their solution.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use numerics::column::dot;
 use numerics::wide;
@@ -27,7 +27,7 @@ pub struct Solution {
 /// Sums of products over the bins: of the data and the columns, each with itself and those behind it.
 pub(super) struct Sums {
     pub(super) columns: usize,
-    pub(super) pairs: Vec<Rc<Vec<f64>>>,
+    pub(super) pairs: Vec<Arc<Vec<f64>>>,
 }
 
 impl Sums {
@@ -54,11 +54,11 @@ impl Sums {
 
 wide! {
     /// Sums of products with weights.
-    fn dots[](all: &[Rc<Vec<f64>>], weight: &[f64]) -> Vec<f64> = dots_of
+    fn dots[](all: &[Arc<Vec<f64>>], weight: &[f64]) -> Vec<f64> = dots_of
 }
 
 #[inline(always)]
-fn dots_of(all: &[Rc<Vec<f64>>], weight: &[f64]) -> Vec<f64> {
+fn dots_of(all: &[Arc<Vec<f64>>], weight: &[f64]) -> Vec<f64> {
     let mut sums = Vec::with_capacity(all.len());
     for of in all {
         sums.push(dot(of, weight));

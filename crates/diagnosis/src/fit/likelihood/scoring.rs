@@ -208,7 +208,7 @@ impl<'a> Scoring<'a> {
 
 #[cfg(test)]
 mod tests {
-    use std::rc::Rc;
+    use std::sync::Arc;
 
     use model::effect::Hypothesis;
     use model::effects::effect;
@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn it_climbs_as_high_as_a_simplex() {
         let n = 6000;
-        let (dct, bins) = (Dct::new(n), Rc::new(Bins::new(n)));
+        let (dct, bins) = (Dct::new(n), Arc::new(Bins::new(n)));
         let view = model::effect::View {
             channel: "gyro_x",
             axis: None,

@@ -23,15 +23,15 @@ pub(super) fn other(
     places: &[usize],
     n: usize,
     dct: &Dct,
-    bins: &Rc<Bins>,
-) -> (Signal, Option<Rc<Vec<f64>>>) {
+    bins: &Arc<Bins>,
+) -> (Signal, Option<Arc<Vec<f64>>>) {
     let read = spread(&c.values, places, n, &[]);
     let values = Arc::new(interpolated(&read));
     let is_noisy = matches!(
         c.quantity,
         Quantity::Temp | Quantity::Supply | Quantity::Other
     );
-    let coefficients = drives(c.quantity).then(|| Rc::new(dct.forward(&values)));
+    let coefficients = drives(c.quantity).then(|| Arc::new(dct.forward(&values)));
     let step = || c.lsb.unwrap_or_else(|| smallest_step(few(&c.values)));
     let smooth = coefficients.as_ref().filter(|_| is_noisy);
     let smooth = smooth
@@ -52,11 +52,11 @@ pub(super) fn other(
 
 /// The level of a local-level model fitted to readings of these coefficients, every one shrunk by the random walk's share;
 /// none where the readings never change.
-fn smoothed(coefficients: &Rc<Vec<f64>>, dct: &Dct, bins: &Rc<Bins>) -> Option<Vec<f64>> {
+fn smoothed(coefficients: &Arc<Vec<f64>>, dct: &Dct, bins: &Arc<Bins>) -> Option<Vec<f64>> {
     if coefficients[1..].iter().all(|v| v.abs() < 1e-9) {
         return None;
     }
-    let panel = Panel::of(dct, bins, Rc::clone(coefficients));
+    let panel = Panel::of(dct, bins, Arc::clone(coefficients));
     let (noise, _) = panel.fit(&Noise::new(-12.0), &[]);
     let mut c = coefficients.to_vec();
     let g = noise.everywhere(bins);

@@ -1,6 +1,6 @@
 //! The level of two levels, sample by sample, and what is found beside it once it is known.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use super::{Field, MOST_BLOCKS, contested, means};
 use crate::fit::channel::{Form, State, Term};
@@ -29,7 +29,7 @@ impl Field<'_> {
         self.length = shorter;
         self.blocks = means(&self.rest, shorter, MOST_BLOCKS);
         self.dct = Dct::new(self.blocks.len());
-        self.bins = Rc::new(Bins::new(self.blocks.len()));
+        self.bins = Arc::new(Bins::new(self.blocks.len()));
         true
     }
 
