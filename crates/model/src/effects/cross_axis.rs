@@ -63,7 +63,7 @@ impl Effect for CrossAxis {
             .filter(|s| s.moving && s.axis != view.axis && s.axis.is_some())
             .collect();
         if sources.is_empty() {
-            return Err("no other axis turns: do a rate-table run".into());
+            return Err("no other axis turns for more than seconds: do a rate-table run, or say `--base moving` where it was turned to see that".into());
         }
         Ok(sources
             .iter()
