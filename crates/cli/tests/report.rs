@@ -1,8 +1,13 @@
 //! The report as a reader gets it: a file that needs nothing beside it.
 
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
+
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 fn program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_imu-stand"))
@@ -195,4 +200,34 @@ fn a_base_that_sways_is_shown_beside_the_sensor_at_rest() {
     let page = read("r.html");
     assert!(page.contains("The other causes stay in the simulation."));
     assert!(page.contains("leaves the figure: its band reaches"));
+}
+
+/// An echo of half of each reading seven readings later is in no library: the page shows its spectrum, under no name.
+#[test]
+fn what_has_no_name_has_a_figure() {
+    let folder = folder("report_unnamed");
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
+    let mut csv = String::from("time_s,gx_dps,gy_dps,gz_dps\n");
+    let mut before = std::collections::VecDeque::from([0.0; 7]);
+    for i in 0..12_000 {
+        let [x, y, z]: [f64; 3] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
+        before.push_back(x);
+        let echo = 0.5 * before.pop_front().unwrap();
+        let time = f64::from(i) / 20.0;
+        writeln!(csv, "{time:.2},{:.2},{y:.2},{z:.2}", x + echo).unwrap();
+    }
+    std::fs::write(folder.join("echo.csv"), csv).expect("it is written");
+    let line = "report echo.csv --quiet --no-replicates --figures figures --out r.html";
+    succeed(program().current_dir(&folder).args(line.split(' ')));
+    let names = std::fs::read_dir(folder.join("figures")).expect("figures");
+    let names: Vec<String> = names
+        .map(|f| f.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.ends_with(".svg"))
+        .collect();
+    assert!(
+        names.contains(&"unexplained-gyro_x.svg".to_owned()),
+        "{names:?}"
+    );
+    let page = std::fs::read_to_string(folder.join("r.html")).expect("it was written");
+    assert!(page.contains("gyro_x: what has no name. </b>"));
 }

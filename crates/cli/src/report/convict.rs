@@ -55,6 +55,30 @@ fn all(subject: &Subject<'_>) -> Vec<Convicting> {
             out.extend(without.and_then(|r| view(subject, finding, &r)));
         }
     }
+    out.extend(without_a_name(subject));
+    out
+}
+
+/// The figure of each channel on which something that matters has no name: what the model has in its place shows where it lies.
+fn without_a_name(subject: &Subject<'_>) -> Vec<Convicting> {
+    let d = &subject.diagnosed.diagnosis;
+    let mut out: Vec<Convicting> = vec![];
+    for left in d.unexplained.iter().filter(|u| u.material) {
+        let is_named = |cause: &String| {
+            let mut findings = d.findings.iter();
+            findings.any(|f| f.cause == *cause && f.channels.contains(&left.channel))
+        };
+        let mut own = subject.diagnosed.evidence.iter();
+        let own = own.find(|e| e.channel == left.channel && !is_named(&e.cause));
+        let shown = out.iter().any(|o| o.channel == left.channel);
+        out.extend(own.filter(|_| !shown).map(|evidence| Convicting {
+            cause: "unexplained".into(),
+            channel: left.channel.clone(),
+            title: format!("{}: what has no name", left.channel),
+            caption: plain_caption(evidence),
+            figure: standalone::figure(evidence),
+        }));
+    }
     out
 }
 
@@ -108,28 +132,31 @@ fn caption(evidence: &Evidence) -> String {
         return evidence.caption.clone();
     };
     let plot = docs.example.plot;
-    let (is_said, own) = match evidence.x_label.as_str() {
-        _ if evidence.log_x => (
-            matches!(plot, Plot::Spectrum),
-            "Spectrum of the rate with the model before and after.".to_owned(),
-        ),
-        "frequency, Hz" => (
-            matches!(plot, Plot::Lines { .. }),
-            "Amplitude spectrum of the rate around it, other terms taken out.".to_owned(),
-        ),
-        "time, s" => (
-            matches!(plot, Plot::RateInTime { .. }),
-            "Rate in time blocks, the other terms taken out, with the course that the model gives it.".to_owned(),
-        ),
-        other => (
-            matches!(plot, Plot::RateAgainst(_)),
-            format!("Rate in time blocks, the other terms taken out, against {other}."),
-        ),
+    let is_said = match evidence.x_label.as_str() {
+        _ if evidence.log_x => matches!(plot, Plot::Spectrum),
+        "frequency, Hz" => matches!(plot, Plot::Lines { .. }),
+        "time, s" => matches!(plot, Plot::RateInTime { .. }),
+        _ => matches!(plot, Plot::RateAgainst(_)),
     };
     match is_said {
         true => docs.figure.to_owned(),
-        false => own,
+        false => plain_caption(evidence),
     }
+}
+
+/// The same without what an effect says of it.
+fn plain_caption(evidence: &Evidence) -> String {
+    let own = match evidence.x_label.as_str() {
+        _ if evidence.log_x => "Spectrum of the rate with the model before and after.",
+        "frequency, Hz" => "Amplitude spectrum of the rate around it, other terms taken out.",
+        "time, s" => {
+            "Rate in time blocks, the other terms taken out, with the course that the model gives it."
+        }
+        other => {
+            return format!("Rate in time blocks, the other terms taken out, against {other}.");
+        }
+    };
+    own.to_owned()
 }
 
 /// A simulation of the extended model without this one cause, in the world of the record; `None` where it cannot be
