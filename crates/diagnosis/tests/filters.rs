@@ -1,11 +1,11 @@
 //! Digital filters of other sensors and loggers, hidden at random in white noise: named, and the noise before them told.
 
 mod draws;
+mod white;
 
 use std::f64::consts::PI;
 
 use diagnosis::{DiagnoseOptions, diagnose};
-use model::record::{Axis, Channel, Header, Quantity, Record};
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -96,8 +96,7 @@ fn statistical_filters_of_any_kind_are_named_and_the_noise_before_them_is_told()
         let step = sigma * between(&mut rng, 0.05, 0.3);
         let rate_hz = [20.0, 50.0, 100.0][between(&mut rng, 0.0, 3.0) as usize];
         let filter = Filter::drawn(&mut rng);
-        let channels = [Axis::X, Axis::Y, Axis::Z].into_iter().enumerate();
-        let channels = channels.map(|(i, axis)| {
+        let record = white::gyros(rate_hz, |i| {
             let white: Vec<f64> = (0..BEFORE + SAMPLES)
                 .map(|_| sigma * Distribution::<f64>::sample(&StandardNormal, &mut rng))
                 .collect();
@@ -106,24 +105,8 @@ fn statistical_filters_of_any_kind_are_named_and_the_noise_before_them_is_told()
                 false => white,
             };
             let values = all[BEFORE..].iter().map(|v| (v / step).round() * step);
-            Channel {
-                name: format!("gyro_{}", ["x", "y", "z"][axis.index()]),
-                quantity: Quantity::Gyro,
-                axis: Some(axis),
-                unit: "deg/s".into(),
-                lsb: None,
-                counts: None,
-                values: values.collect(),
-            }
+            values.collect()
         });
-        let record = Record {
-            header: Header {
-                rate_hz: Some(rate_hz),
-                ..Header::default()
-            },
-            channels: channels.collect(),
-            ..Record::default()
-        };
         let made = diagnose(&record, &options).expect("a diagnosis");
         let (d, name) = (&made.diagnosis, record.channels[filtered].name.clone());
         let n = made.extended_model.channels.iter().find(|c| c.name == name);

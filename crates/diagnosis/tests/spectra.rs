@@ -2,11 +2,11 @@
 //! else gets one, and the model that is handed over holds the record.
 
 mod draws;
+mod white;
 
 use std::f64::consts::TAU;
 
 use diagnosis::{DiagnoseOptions, diagnose};
-use model::record::{Axis, Channel, Header, Quantity, Record};
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -96,8 +96,7 @@ fn statistical_a_cause_beside_a_spectrum_of_no_kind_keeps_its_name() {
         let rate_hz = [20.0, 50.0, 100.0][between(&mut rng, 0.0, 3.0) as usize];
         let taps = taps(&mut rng);
         let (wanted, added) = cause(&mut rng, &taps);
-        let channels = [Axis::X, Axis::Y, Axis::Z].into_iter().enumerate();
-        let channels = channels.map(|(i, axis)| {
+        let record = white::gyros(rate_hz, |i| {
             let white: Vec<f64> = (0..MEMORY + SAMPLES).map(|_| normal(&mut rng)).collect();
             let value = |k: usize| match i == coloured {
                 true => {
@@ -107,24 +106,8 @@ fn statistical_a_cause_beside_a_spectrum_of_no_kind_keeps_its_name() {
                 false => white[MEMORY + k],
             };
             let values = (0..SAMPLES).map(|k| (sigma * value(k) / step).round() * step);
-            Channel {
-                name: format!("gyro_{}", ["x", "y", "z"][axis.index()]),
-                quantity: Quantity::Gyro,
-                axis: Some(axis),
-                unit: "deg/s".into(),
-                lsb: None,
-                counts: None,
-                values: values.collect(),
-            }
+            values.collect()
         });
-        let record = Record {
-            header: Header {
-                rate_hz: Some(rate_hz),
-                ..Header::default()
-            },
-            channels: channels.collect(),
-            ..Record::default()
-        };
         let name = record.channels[coloured].name.clone();
         let d = diagnose(&record, &options).expect("a diagnosis").diagnosis;
         let named: Vec<&str> = d.findings.iter().map(|f| f.cause.as_str()).collect();

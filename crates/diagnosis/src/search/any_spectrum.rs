@@ -51,10 +51,10 @@ impl Search<'_> {
         let beside = found.terms.iter().filter(|t| !t.is_filter());
         let all: Vec<Term> = beside.cloned().chain([term]).collect();
         let state = self.climb(self.refit(all, found.noise.log_walk));
-        let more = freedom(&state).saturating_sub(freedom(found)).max(1);
-        let by_chance = threshold::tail(more, omnibus_level());
-        let more = explains(&state) - explains(found) > by_chance;
-        (more && !share_a_place(found, &state, of.dimensions())).then_some(state)
+        let freer = freedom(&state).saturating_sub(freedom(found)).max(1);
+        let by_chance = threshold::tail(freer, omnibus_level());
+        let explains_more = explains(&state) - explains(found) > by_chance;
+        (explains_more && !share_a_place(found, &state, of.dimensions())).then_some(state)
     }
 }
 
