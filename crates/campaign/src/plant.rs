@@ -201,6 +201,7 @@ fn blank(stand: &Stand) -> Simulation {
         own: [1.0; 3],
         variance: std::array::from_fn(|_| vec![1.0; n]),
         white: Default::default(),
+        sensor_step: [None; 3],
         counts: Default::default(),
         flags: vec![flag::IN_ORDER; n],
         keep: vec![true; n],

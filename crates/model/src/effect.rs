@@ -91,6 +91,8 @@ pub enum Stage {
     Noise,
     /// On all that the sensor put out before quantisation, noise included (filters).
     Output,
+    /// On what the filters let through, before it is counted.
+    Reading,
     /// On counts.
     Counts,
     /// On frames and clocks.

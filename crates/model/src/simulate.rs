@@ -13,6 +13,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::effects::double_rounding::Halves;
 use crate::excitation::{Recorded, World, moved_like};
 use crate::file::{ChannelModel, ModelFile};
 use crate::record::{Axis, Quantity, Record};
@@ -134,6 +135,8 @@ pub struct Simulation {
     pub variance: [Vec<f64>; 3],
     /// White noise, deg/s; empty before the stage [`Stage::Output`].
     pub white: [Vec<f64>; 3],
+    /// A rounding by the sensor before the readings are rounded to their step.
+    pub sensor_step: [Option<SensorStep>; 3],
     /// Readings, counts; empty before the stage [`Stage::Counts`].
     pub counts: [Vec<i32>; 3],
     /// Flags.
@@ -144,6 +147,34 @@ pub struct Simulation {
     pub device_time: Vec<f64>,
     /// Host time, s.
     pub host_time: Vec<f64>,
+}
+
+/// Codes of a sensor that are rounded once more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorStep {
+    /// Their step, deg/s.
+    pub step: f64,
+    /// Their zero, deg/s.
+    pub zero: f64,
+    /// What becomes of one half-way between two readings.
+    pub halves: Halves,
+}
+
+impl SensorStep {
+    /// Nearer to the middle of two readings than this part of a step, a code is half-way.
+    const HALF_WAY: f64 = 1e-6;
+
+    /// The code nearest to a rate, in the unit of the readings, deg/s, and off the middle of two of them.
+    fn read(self, rate: f64, unit: f64) -> f64 {
+        let own = ((rate - self.zero) / self.step).round();
+        let code = (self.step * own + self.zero) / unit;
+        let below = code.floor();
+        if (code - below - 0.5).abs() > Self::HALF_WAY {
+            return code;
+        }
+        let up = self.halves.up(own, self.step, below, (1.0 / unit).round());
+        below + f64::from(u8::from(up))
+    }
 }
 
 /// Samples of a simulation without a gap between them.

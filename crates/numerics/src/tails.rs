@@ -98,6 +98,9 @@ pub fn kurtosis_score(b2: f64, n: f64) -> f64 {
 /// The 95 % quantile of the standard normal.
 pub const ONE_SIDED: f64 = 1.644_854;
 
+/// The 97.5 % quantile of the standard normal: 95 % lie within it.
+pub const TWO_SIDED: f64 = 1.959_964;
+
 /// Median of chi-square of one degree: of the square of a normal variable.
 pub const MEDIAN: f64 = 0.4549;
 

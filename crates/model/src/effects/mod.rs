@@ -10,6 +10,7 @@ pub mod coarse_lsb;
 pub mod common_noise;
 pub mod correlated_noise;
 pub mod cross_axis;
+pub mod double_rounding;
 pub mod dropped_samples;
 pub mod flicker;
 pub mod g_sensitivity;
@@ -67,6 +68,7 @@ pub static EFFECTS: &[&dyn Effect] = &[
     &saturation::EFFECT,
     &coarse_lsb::EFFECT,
     &stuck_bit::EFFECT,
+    &double_rounding::EFFECT,
     &stale_samples::EFFECT,
     &dropped_samples::EFFECT,
     &timestamp_jitter::EFFECT,

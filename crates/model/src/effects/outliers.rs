@@ -75,7 +75,7 @@ impl Effect for Outliers {
     }
 
     fn stage(&self) -> Stage {
-        Stage::Output
+        Stage::Reading
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {

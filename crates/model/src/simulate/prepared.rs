@@ -271,6 +271,7 @@ impl Prepared {
             self.run.white[axis] = white;
         }
         self.stage(Stage::Output);
+        self.stage(Stage::Reading);
         for axis in (0..3).filter(|a| present[*a]) {
             if !self.plain(axis) {
                 self.count(axis);
@@ -343,6 +344,10 @@ impl Prepared {
             }
         }
         let (unit, limit) = self.steps[axis];
+        if let Some(sensor) = run.sensor_step[axis] {
+            let rates = run.rate[axis].iter_mut();
+            rates.for_each(|w| *w = unit * sensor.read(*w, unit));
+        }
         let counts = run.rate[axis]
             .iter()
             .map(|w| nearest(w / unit, -limit - 1, limit));
@@ -412,6 +417,7 @@ fn started(world: World, rate_hz: f64, rng: Xoshiro256PlusPlus) -> Simulation {
         own: [1.0; 3],
         variance: std::array::from_fn(|_| vec![1.0; samples]),
         white: Default::default(),
+        sensor_step: [None; 3],
         counts: Default::default(),
         flags: vec![flag::IN_ORDER; samples],
         keep: vec![],

@@ -244,6 +244,26 @@ mod tests {
     }
 
     #[test]
+    fn far_readings_come_behind_a_filter_wherever_a_model_lists_it() -> Tested {
+        let far: &[_] = &[("count", 20.0, "1"), ("size", 500.0, "deg/s")];
+        let filter: &[_] = &[("lag1_correlation", 0.5, "1")];
+        let model = stand(
+            &[("angle_random_walk", 5.0)],
+            &[("outliers", far), ("low_pass", filter)],
+        );
+        let record = crate::simulate(&model, 100.0, 20.0, 1)?;
+        let read = &record.channels[0].values;
+        let far: Vec<usize> = (1..read.len() - 1)
+            .filter(|i| read[*i].abs() > 100.0)
+            .collect();
+        // Of 20 readings two may fall on one of 2000.
+        assert!(far.len() > 15, "{far:?}");
+        let apart = far.windows(2).filter(|w| w[1] > w[0] + 1).count();
+        assert!(apart + 3 > far.len(), "{far:?}");
+        Ok(())
+    }
+
+    #[test]
     fn a_random_walk_wanders_on_between_stretches() -> Tested {
         let k = 0.02;
         let model = stand(&[("rate_random_walk", k)], &[]);
