@@ -407,6 +407,7 @@ mod tests {
             "outliers",
             "saturation",
             "coarse_lsb",
+            "double_rounding",
             "stuck_bit",
             "stale_samples",
             "dropped_samples",

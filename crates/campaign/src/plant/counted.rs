@@ -21,7 +21,7 @@ const fn row(id: u16, cause: &'static str, how: How) -> Row {
 }
 
 /// The rows, by number.
-pub const COUNTED: [Row; 10] = [
+pub const COUNTED: [Row; 11] = [
     row(200, "base_motion", |d, _, _| {
         let peak = d.by_ratio(1.5, 20.0);
         one(vec![("peak", peak), ("frequency", d.between(0.05, 0.5))])
@@ -57,6 +57,16 @@ pub const COUNTED: [Row; 10] = [
         one(vec![("ppm", d.sign() * d.by_ratio(300.0, 3000.0))])
     })
     .on_all_channels(),
+    row(209, "double_rounding", |d, _, _| {
+        // Near a half, one or two steps of the file, cells of two widths lie farther apart than the noise reaches: near two it is a
+        // bit that is missing.
+        let ratio = match d.of_many(3) {
+            0 => d.between(0.55, 0.9),
+            1 => d.between(1.15, 1.9),
+            _ => d.between(2.1, 2.6),
+        };
+        one(vec![("sensor_step", ratio * LSB), ("file_step", LSB)])
+    }),
     Row {
         label: "outliers, small",
         ..row(230, "outliers", |d, s, a| {

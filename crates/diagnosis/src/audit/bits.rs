@@ -11,8 +11,10 @@
 
 use std::f64::consts::PI;
 
+use model::record::Channel;
 use model::{Parameter, effects};
 
+use super::rounded_twice::Cells;
 use super::stuck::{self, Stuck, Verdict};
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};
@@ -34,10 +36,20 @@ struct Coarse {
     bits: u32,
     residue: i32,
     changes: u64,
+    /// Whether all readings between the ends lie on it.
+    whole: bool,
 }
 
 fn coarse(counts: &[i32], known: &[bool]) -> Option<Coarse> {
     let mut found = None;
+    let known_codes = || {
+        counts
+            .iter()
+            .zip(known)
+            .filter(|(_, k)| **k)
+            .map(|(c, _)| c)
+    };
+    let (low, high) = (*known_codes().min()?, *known_codes().max()?);
     for bits in 1..=BITS {
         let step = 1 << bits;
         let mut tally = vec![0u64; step as usize];
@@ -72,6 +84,7 @@ fn coarse(counts: &[i32], known: &[bool]) -> Option<Coarse> {
             bits,
             residue,
             changes: trials,
+            whole: known_codes().all(|c| [low, high].contains(c) || c.rem_euclid(step) == residue),
         });
     }
     found
@@ -176,8 +189,9 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     let name = g.channel.name.as_str();
     audit.smallest(effects::coarse_lsb::ID, name, "missing_bits", 1.0, "1");
     let known: Vec<bool> = (0..counts.len()).map(|i| g.known(i)).collect();
-    if let Some(c) = coarse(counts, &known) {
-        tell_coarse(&c, name, unrounded(&g.local), audit);
+    let coarse = coarse(counts, &known);
+    if let Some(c) = coarse.as_ref().filter(|c| c.whole) {
+        tell_coarse(c, name, unrounded(&g.local), audit);
         return Shape::Other;
     }
     if known.iter().filter(|k| **k).count() < LEAST_READINGS {
@@ -194,7 +208,14 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     let Some(worst) = worst_share(&codes, &levels, sigma, name, audit) else {
         return Shape::Unknown;
     };
-    match stuck::judge(&codes, sigma, BITS, worst.alarmed) {
+    let lsb = g.channel.lsb.unwrap_or(1.0);
+    let verdict = stuck::judge(&codes, sigma, lsb, BITS, worst.alarmed);
+    // Single readings off a coarse grid are another fault's, unless two roundings make them.
+    if let Some(c) = coarse.filter(|_| !matches!(verdict, Verdict::Twice { .. })) {
+        tell_coarse(&c, name, unrounded(&g.local), audit);
+        return Shape::Other;
+    }
+    match verdict {
         Verdict::Smooth => Shape::Sound,
         Verdict::Rails => Shape::Rails,
         Verdict::Bit(s) => {
@@ -203,8 +224,32 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
             audit.lacks_a_bit(name, effects::stuck_bit::ID, step, sigma);
             Shape::Other
         }
-        Verdict::Unlike { nats, nearest } => {
-            let what = unlike(name, &worst, nats, nearest.as_ref());
+        Verdict::Twice { cells, error } => {
+            let found = rounded_twice(cells, error, lsb, g.channel);
+            audit.findings.push(found);
+            let wide = cells.step.max(1.0);
+            audit.lacks_a_bit(name, effects::double_rounding::ID, wide, sigma);
+            audit.untested_on(
+                name,
+                effects::stuck_bit::ID,
+                "its readings were rounded twice: record the sensor's own counts",
+            );
+            Shape::Other
+        }
+        Verdict::Unlike {
+            nats,
+            nearest,
+            twice,
+        } => {
+            let nearest = match twice {
+                Some(cells) => format!(
+                    "a step of {:.4} {} that was rounded to {lsb:.4} comes nearest: write the sensor's counts, or more digits",
+                    cells.step * lsb,
+                    g.channel.unit
+                ),
+                None => nearest_bit(nearest.as_ref()),
+            };
+            let what = unlike(name, &worst, nats, &nearest);
             audit.not_normal.push(Observation::of_readings(name, what));
             Shape::Other
         }
@@ -228,18 +273,53 @@ fn sticks(s: &Stuck, name: &str) -> Finding {
     }
 }
 
-/// What is said of codes that no smooth law explains, nor a bit.
-fn unlike(name: &str, worst: &Worst, nats: f64, nearest: Option<&Stuck>) -> String {
-    let bit = nearest.map_or("no bit that sticks makes them so".to_owned(), |s| {
+/// The finding of readings that were rounded before, of codes that are `lsb` each.
+fn rounded_twice(cells: Cells, error: f64, lsb: f64, of: &Channel) -> Finding {
+    let unit = &of.unit;
+    let sensor = Parameter {
+        std_error: Some(error * lsb),
+        ..Parameter::exact(cells.decimal.map_or(cells.step * lsb, |d| d.step), unit)
+    };
+    Finding {
+        cause: effects::double_rounding::ID.into(),
+        channels: vec![of.name.clone()],
+        what: format!(
+            "{} holds a sensor's steps of {:.4} {unit} rounded to {lsb:.4} {unit}",
+            of.name, sensor.value
+        ),
+        parameters: [
+            ("sensor_step".to_owned(), sensor),
+            ("file_step".to_owned(), Parameter::exact(lsb, unit)),
+            (
+                "offset".to_owned(),
+                Parameter::exact(cells.offset * lsb, unit),
+            ),
+            (
+                "halves".to_owned(),
+                Parameter::exact(cells.decimal.map_or(0.0, |d| d.halves.number()), "1"),
+            ),
+        ]
+        .into(),
+        ..Finding::default()
+    }
+}
+
+/// The bit that comes nearest to making codes as they are.
+fn nearest_bit(nearest: Option<&Stuck>) -> String {
+    nearest.map_or("no bit that sticks makes them so".to_owned(), |s| {
         format!(
             "bit {} at {} in {:.0} % of the samples comes nearest and leaves much of it",
             s.bit,
             s.value,
             100.0 * s.fraction
         )
-    });
+    })
+}
+
+/// What is said of codes that no smooth law explains, and of what comes nearest.
+fn unlike(name: &str, worst: &Worst, nats: f64, nearest: &str) -> String {
     format!(
-        "the codes of {name} have shares that no smooth distribution has ({nats:.0} nats; {:.1} sigma at bit {}), and {bit}",
+        "the codes of {name} have shares that no smooth distribution has ({nats:.0} nats; {:.1} sigma at bit {}), and {nearest}",
         worst.share.z.abs(),
         worst.share.bit
     )

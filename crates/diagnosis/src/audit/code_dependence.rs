@@ -45,6 +45,7 @@ impl<'a> Codes<'a> {
         if audit.found(
             &[
                 effects::coarse_lsb::ID,
+                effects::double_rounding::ID,
                 effects::stuck_bit::ID,
                 effects::saturation::ID,
             ],

@@ -16,6 +16,7 @@ use std::rc::Rc;
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use super::rounded_twice::Cells;
 use numerics::column::dot;
 use numerics::exp_ln::{logarithms, powers};
 use numerics::wide;
@@ -43,7 +44,7 @@ const MET: f64 = 1e-9;
 const COST: f64 = 50.0;
 
 /// What a converter does to a code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Fault {
     /// Nothing.
     None,
@@ -51,12 +52,14 @@ pub(super) enum Fault {
     Bit { bit: u32, value: i32 },
     /// Codes end at rails.
     Rails { low: i32, high: i32 },
+    /// Readings were rounded before, to other steps: no code moves, and the law is that of other cells.
+    Twice(Cells),
 }
 
 impl Fault {
     fn of(self, x: i32) -> i32 {
         match self {
-            Self::None => x,
+            Self::None | Self::Twice(_) => x,
             Self::Bit { bit, value } => (x & !(1 << bit)) | (value << bit),
             Self::Rails { low, high } => x.clamp(low, high),
         }
@@ -66,7 +69,7 @@ impl Fault {
     fn moves(self) -> i32 {
         match self {
             Self::Bit { bit, .. } => 1 << bit,
-            Self::None | Self::Rails { .. } => 0,
+            Self::None | Self::Rails { .. } | Self::Twice(_) => 0,
         }
     }
 }
@@ -82,9 +85,12 @@ pub(super) struct Histogram {
     pub mean: f64,
     /// Standard deviation.
     pub spread: f64,
-    /// Levels that were made, by first code, codes and spread: faults that move codes as far have the same.
-    known: RefCell<HashMap<(i32, usize, u64), Rc<Levels>>>,
+    /// Levels that were made: faults that move codes as far have the same.
+    known: RefCell<HashMap<OfLevels, Rc<Levels>>>,
 }
+
+/// What levels are made of: first code, codes, and the bits of spread and cells.
+type OfLevels = (i32, usize, [u64; 3]);
 
 /// Levels of one spread.
 #[derive(Debug)]
@@ -95,7 +101,7 @@ struct Levels {
 }
 
 impl Levels {
-    fn new(first: i32, codes: usize, spread: f64) -> Self {
+    fn new(first: i32, codes: usize, spread: f64, cells: Cells) -> Self {
         let normal = Normal::standard();
         let step = spread / BY_SPREAD;
         let levels: Vec<f64> = (0..=((codes - 1) as f64 / step) as usize)
@@ -106,7 +112,8 @@ impl Levels {
             .map(|m| {
                 let at = |x: f64| (x - f64::from(first)).clamp(0.0, (codes - 1) as f64) as usize;
                 let (a, b) = (at(m - REACH * spread), at(m + REACH * spread));
-                let edge = |i: usize| normal.cdf((f64::from(first) + i as f64 - 0.5 - m) / spread);
+                let begin = |i: usize| cells.begin(f64::from(first) + i as f64);
+                let edge = |i: usize| normal.cdf((begin(i) - m) / spread);
                 let edges: Vec<f64> = (a..=b + 1).map(edge).collect();
                 (a, edges.windows(2).map(|w| w[1] - w[0]).collect())
             })
@@ -249,10 +256,18 @@ impl<'a> Laws<'a> {
         let to = (first..=last)
             .map(|x| (fault.of(x).clamp(first, last) - first) as usize)
             .collect();
-        let key = (first, codes, spread.to_bits());
+        let cells = match fault {
+            Fault::Twice(cells) => cells,
+            _ => Cells::ONE_ROUNDING,
+        };
+        let key = (
+            first,
+            codes,
+            [spread, cells.step, cells.offset].map(f64::to_bits),
+        );
         let mut known = of.known.borrow_mut();
         let levels = known.entry(key);
-        let levels = levels.or_insert_with(|| Rc::new(Levels::new(first, codes, spread)));
+        let levels = levels.or_insert_with(|| Rc::new(Levels::new(first, codes, spread, cells)));
         Self {
             of,
             fault,
@@ -352,10 +367,9 @@ impl<'a> Laws<'a> {
         let known = from.filter(|f| f.weights.len() == self.levels.at.len());
         Course {
             weights: known.map_or_else(|| self.start(), |f| f.weights.clone()),
-            share: if self.fault == Fault::None {
-                0.0
-            } else {
-                share
+            share: match self.fault {
+                Fault::None | Fault::Twice(_) => 0.0,
+                Fault::Bit { .. } | Fault::Rails { .. } => share,
             },
             held: held || !matches!(self.fault, Fault::Bit { .. }),
             step: STEP,

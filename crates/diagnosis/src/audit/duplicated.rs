@@ -272,7 +272,9 @@ fn pair(a: &Gyro<'_>, b: &Gyro<'_>, audit: &mut Audit) {
         return;
     }
     let (one, two) = (times(1) + times(-1), times(2) + times(-2));
-    let expected = ((4.0 * one - two) / 6.0).max(0.0);
+    // Codes that both leave out, and codes that are wider on both, make more agree.
+    let alone = by_chance(x, y, &rows) * d.len() as f64;
+    let expected = ((4.0 * one - two) / 6.0).max(alone);
     // Errors of the four neighbours.
     let error = (16.0 * one + two).sqrt() / 6.0;
     let chance = tails::at_least(same as u64, expected * (1.0 + ROOM) + 3.0 * error + 1.0);

@@ -280,7 +280,12 @@ fn foretold(y: &[f64]) -> Option<Foretold> {
 pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     let name = g.channel.name.as_str();
     // These make the step wider than it is said to be.
-    if audit.found(&[effects::coarse_lsb::ID, effects::stuck_bit::ID], name) {
+    let wider = [
+        effects::coarse_lsb::ID,
+        effects::double_rounding::ID,
+        effects::stuck_bit::ID,
+    ];
+    if audit.found(&wider, name) {
         return;
     }
     let Some(usable) = audit.usable.get(name) else {

@@ -17,6 +17,7 @@ pub mod local;
 mod outliers;
 mod rate_limit;
 pub(crate) mod repeats;
+mod rounded_twice;
 mod rounding;
 mod runs;
 mod saturation;

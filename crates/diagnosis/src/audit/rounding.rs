@@ -217,8 +217,12 @@ fn explained(rounded: &Rounded, name: &str, audit: &mut Audit) {
 pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
     let name = g.channel.name.as_str();
     let coarse = |f: &crate::result::Finding| {
-        [effects::coarse_lsb::ID, effects::stuck_bit::ID].contains(&f.cause.as_str())
-            && f.channels == [name]
+        let of_codes = [
+            effects::coarse_lsb::ID,
+            effects::double_rounding::ID,
+            effects::stuck_bit::ID,
+        ];
+        of_codes.contains(&f.cause.as_str()) && f.channels == [name]
     };
     if audit.findings.iter().any(coarse) {
         return;

@@ -6,6 +6,7 @@
 //! nothing here explains is not passed over ([`Verdict::Unlike`]).
 
 use super::codes::{Course, Fault, Fit, Histogram, Laws};
+use super::rounded_twice::{self, Cells};
 use crate::test_level::audit_level;
 use numerics::tails;
 
@@ -66,8 +67,14 @@ pub(super) enum Verdict {
     Rails,
     /// A bit that sticks does.
     Bit(Stuck),
-    /// Nothing here does; `nats` are left over. With the bit that comes nearest.
-    Unlike { nats: f64, nearest: Option<Stuck> },
+    /// Two roundings do, in cells whose step, in steps of the codes, has this standard error.
+    Twice { cells: Cells, error: f64 },
+    /// Nothing here does; `nats` are left over. With the bit that comes nearest, and the cells of two roundings that do.
+    Unlike {
+        nats: f64,
+        nearest: Option<Stuck>,
+        twice: Option<Cells>,
+    },
 }
 
 /// Fits of one fault on their way, at several spreads and from several starts.
@@ -113,7 +120,9 @@ impl<'a> Tries<'a> {
                 [0.0, away].map(from).into()
             }
             Fault::Bit { .. } => SHARES.map(|share| laws.begin(None, share, false)).into(),
-            Fault::None | Fault::Rails { .. } => vec![laws.begin(None, 1.0, false)],
+            Fault::None | Fault::Rails { .. } | Fault::Twice(_) => {
+                vec![laws.begin(None, 1.0, false)]
+            }
         };
         self.by_spread.push((laws, courses));
     }
@@ -165,17 +174,24 @@ struct Judged {
     sigma: f64,
     /// Bits below this one are looked at.
     bits: u32,
+    /// Units a code.
+    lsb: f64,
 }
 
 impl Judged {
     /// None where the codes tell of nothing.
-    fn of(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Option<Self> {
+    fn of(codes: &[i32], sigma: f64, lsb: f64, bits: u32, alarmed: bool) -> Option<Self> {
         const FAR: f64 = 8.0;
         let h = Histogram::new(codes, FAR * sigma)?;
         // Where codes are fewer than once each, no share of any is known. Where the level moves far it is the share of ones
         // about each level that tells.
         let told = h.times.len() as f64 <= h.n && (alarmed || h.spread <= MOVES * sigma);
-        told.then_some(Self { h, sigma, bits })
+        told.then_some(Self {
+            h,
+            sigma,
+            bits,
+            lsb,
+        })
     }
 
     /// The bits that a spread of readings can show, at both values.
@@ -264,17 +280,40 @@ impl Judged {
         let without_bit =
             (self.sigma * self.sigma - 0.25 * f64::from(1u32 << bit).powi(2)).max(0.0);
         let natural = fit.spread >= NATURAL * without_bit.sqrt();
-        let ahead = fit.score() - smooth;
-        let whole = chance > LEAST_CHANCE || rest < LITTLE * ahead;
-        let holds = natural && whole && ahead >= NEARLY_ALL * (self.h.of_its_own() - smooth);
+        let holds = natural && self.is_whole(rest, chance, fit.score(), smooth);
         (stuck, holds)
+    }
+
+    /// Whether a law leaves next to nothing: the excess of its chi-square in nats and the chance of that, by its score, that of the
+    /// smooth law and that of shares of the codes of their own.
+    fn is_whole(&self, rest: f64, chance: f64, score: f64, smooth: f64) -> bool {
+        let ahead = score - smooth;
+        (chance > LEAST_CHANCE || rest < LITTLE * ahead)
+            && ahead >= NEARLY_ALL * (self.h.of_its_own() - smooth)
+    }
+
+    /// Cells of two roundings, where a law in them is ahead of the smooth score and of others that have no edges of their own, the
+    /// standard error of their step, and whether the law holds.
+    fn twice(&self, smooth: f64, others: &[Option<&Fit>]) -> Option<(Cells, f64, bool)> {
+        let (cells, error) = rounded_twice::cells(&self.h, self.sigma, self.lsb)?;
+        let fault = Fault::Twice(cells);
+        let mut tries = Tries::none(&self.h, fault);
+        let natural = SPREADS.iter().filter(|s| **s >= NATURAL);
+        natural.for_each(|s| tries.also(s * self.sigma));
+        let fit = tries.best(LAST)?;
+        let (rest, chance) = left_by(&self.h, &Laws::new(&self.h, fault, fit.spread), &fit);
+        let holds = self.is_whole(rest, chance, fit.score(), smooth);
+        let is_natural = |f: &&Fit| f.spread >= NATURAL * self.sigma;
+        let others = others.iter().copied().flatten().filter(is_natural);
+        let most = others.map(Fit::score).fold(f64::NEG_INFINITY, f64::max);
+        (fit.score() > most + CLEARLY).then_some((cells, error, holds))
     }
 }
 
-/// Judge codes with the spread `sigma` about their level, bits below `bits`; `alarmed` where something else has shown
-/// already that they are no law.
-pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verdict {
-    let Some(of) = Judged::of(codes, sigma, bits, alarmed) else {
+/// Judge codes of `lsb` units with the spread `sigma` about their level, bits below `bits`; `alarmed` where something else has
+/// shown already that they are no law.
+pub(super) fn judge(codes: &[i32], sigma: f64, lsb: f64, bits: u32, alarmed: bool) -> Verdict {
+    let Some(of) = Judged::of(codes, sigma, lsb, bits, alarmed) else {
         return Verdict::Smooth;
     };
     let Some(first) = Tries::new(&of.h, Fault::None, sigma).best(FIRST) else {
@@ -292,6 +331,16 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
         .as_ref()
         .map_or(f64::NEG_INFINITY, |(_, fit)| fit.score());
     let nearest = of.nearest();
+    let others = [
+        Some(&plain),
+        railed.as_ref().map(|(_, fit)| fit),
+        nearest.as_ref().map(|(_, _, fit)| fit),
+    ];
+    let twice = of.twice(smooth, &others);
+    if let Some((cells, error, true)) = twice {
+        return Verdict::Twice { cells, error };
+    }
+    let twice = twice.map(|(cells, ..)| cells);
     let (fault, sound) = railed
         .filter(|(_, fit)| fit.score() > smooth)
         .unwrap_or((Fault::None, plain));
@@ -304,6 +353,7 @@ pub(super) fn judge(codes: &[i32], sigma: f64, bits: u32, alarmed: bool) -> Verd
             Verdict::Unlike {
                 nats: over,
                 nearest,
+                twice,
             }
         } else if rails > smooth + CLEARLY {
             Verdict::Rails

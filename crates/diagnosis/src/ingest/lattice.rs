@@ -10,6 +10,13 @@ use numerics::series::smallest_step;
 /// Distance of a reading from its multiple, steps, up to which it is that multiple printed with few digits: a step of
 /// 0.07 deg/s printed to 0.001 leaves 0.007.
 const NEAR: f64 = 0.05;
+/// Digits behind the point that a file may have, and how near to a multiple of the last one a number is one.
+const DIGITS: i32 = 9;
+const LAST_DIGIT: f64 = 1e-3;
+/// Steps to either side that are tried, within what the last digits at both ends leave open.
+const PLACES: i32 = 100;
+/// Distance of a reading from its multiple, steps, from which on it may be another one's.
+const FAR: f64 = 0.22;
 /// Steps in the spread of the readings from which on a grid is that of a number's last digit. No audit of counts looks at
 /// more than eight bits within it.
 const FINE: f64 = 256.0;
@@ -38,6 +45,15 @@ pub fn counted(record: &Record) -> Cow<'_, Record> {
         let own = &mut whole.to_mut().channels[*i];
         own.lsb = Some(step / f64::from(1 << bits));
         own.counts = Some(counts.iter().map(|c| c << bits).collect());
+        // What few digits took off the multiples is no noise of the sensor, and hangs on the code.
+        let multiples: Vec<f64> = counts.iter().map(|c| f64::from(*c) * step).collect();
+        let off = |(v, m): (&f64, &f64)| (v - m).abs() > NEAR * step;
+        if own.values.iter().zip(&multiples).any(off) {
+            let known = own.values.iter_mut().zip(multiples);
+            known
+                .filter(|(v, _)| v.is_finite())
+                .for_each(|(v, m)| *v = m);
+        }
     }
     whole
 }
@@ -52,48 +68,101 @@ fn bits_between(step: f64, finest: f64) -> u32 {
 
 /// The step of readings, and the multiple that each is, 0 where there is no reading. None where they are no multiples of
 /// one, or of one that is too fine to tell. Those of a grid whose zero is no reading had an offset taken off, and their bits
-/// are not known.
+/// are not known. Of a few digits, a reading is near its multiple; where the step is not much more than the last digit, that is the
+/// step, and the audits tell what the sensor's was.
 fn multiples(values: &[f64]) -> Option<(f64, Vec<i32>)> {
-    let guess = smallest_step(values);
     let mut levels: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     levels.sort_unstable_by(f64::total_cmp);
     let sigma = robust_sigma(&levels);
-    if guess <= 0.0 || guess * FINE < sigma {
-        return None;
-    }
+    let even = smallest_step(values);
+    let digit = last_digit(&levels);
+    let gaps = levels.windows(2).map(|w| w[1] - w[0]);
+    let least = gaps
+        .filter(|g| *g > 0.5 * digit)
+        .fold(f64::INFINITY, f64::min);
+    let uneven = (even <= 0.0 && digit > 0.0 && least.is_finite()).then_some([least, digit]);
+    let guesses = std::iter::once(even).chain(uneven.into_iter().flatten());
+    let enough = guesses.filter(|guess| *guess > 0.0 && guess * FINE >= sigma);
+    let step = enough
+        .filter_map(|guess| step_near(&levels, guess, digit))
+        .next()?;
+    let of = |v: &f64| {
+        if v.is_finite() {
+            (v / step).round() as i32
+        } else {
+            0
+        }
+    };
+    Some((step, values.iter().map(of).collect()))
+}
+
+/// The step near a guess that sorted levels, printed to a last digit, are multiples of.
+fn step_near(levels: &[f64], guess: f64, digit: f64) -> Option<f64> {
+    let mut levels = levels.to_vec();
     levels.dedup_by(|a, b| (*a - *b).abs() < 0.5 * guess);
     // The smallest distance of two printed readings is a step and twice their last digit: distances of a few steps tell it
     // better, and all of them best.
     let mut step = guess;
-    for reach in [8.0, 64.0, f64::INFINITY] {
-        step = refined(&levels, step, reach)?;
+    for reach in [2.0, 8.0, 64.0] {
+        step = between(&levels, step, reach)?;
     }
+    step = of_multiples(&levels, through_zero(&levels, step, digit))?;
+    // Half of the last digit, and a little as the step is not known to all of its own.
+    let off = 0.55 * digit / step;
+    let near = if off < FAR { off.max(NEAR) } else { NEAR };
     let code = |v: f64| (v / step).round();
-    let holds = |v: &f64| code(*v).abs() < LARGEST && (v / step - code(*v)).abs() < NEAR;
-    levels.iter().all(holds).then(|| {
-        let of = |v: &f64| if v.is_finite() { code(*v) as i32 } else { 0 };
-        (step, values.iter().map(of).collect())
-    })
+    let holds = |v: &f64| code(*v).abs() < LARGEST && (v / step - code(*v)).abs() < near;
+    if !levels.iter().all(holds) {
+        return None;
+    }
+    // A step that is the last digit is it exactly: what is half-way between two readings hangs on that.
+    let whole = (step / digit - 1.0).abs() < 1e-9;
+    Some(if whole { digit } else { step })
 }
 
-/// Least squares of the distances between neighbours of up to `reach` steps, by how many steps they are; all of them in one
-/// line where the reach is infinite. None where there are none.
-fn refined(levels: &[f64], step: f64, reach: f64) -> Option<f64> {
-    let steps = |w: &[f64]| ((w[1] - w[0]) / step).round();
-    let near = levels.windows(2).filter(|w| steps(w) <= reach);
+/// The step about one of which levels are multiples best: those between them alone leave open how many lie below the least.
+fn through_zero(levels: &[f64], step: f64, digit: f64) -> f64 {
+    let span = levels
+        .last()
+        .zip(levels.first())
+        .map_or(0.0, |(b, a)| b - a);
+    let apart = digit * step / span.max(step) / f64::from(PLACES);
+    let off = |step: f64| -> f64 {
+        let of = |v: &f64| (v / step - (v / step).round()).powi(2);
+        levels.iter().map(of).sum()
+    };
+    let all = (-PLACES..=PLACES).map(|k| step + apart * f64::from(k));
+    all.min_by(|a, b| off(*a).total_cmp(&off(*b)))
+        .unwrap_or(step)
+}
+
+/// The last digit of decimal numbers; 0 where they have more of them than a file of few.
+fn last_digit(levels: &[f64]) -> f64 {
+    let is_of = |place: &f64| {
+        let whole = |v: &f64| (v / place - (v / place).round()).abs() < LAST_DIGIT;
+        levels.iter().all(whole)
+    };
+    let mut places = (0..DIGITS).map(|d| 10f64.powi(d).recip());
+    places.find(is_of).unwrap_or(0.0)
+}
+
+/// The distances between neighbours of up to `reach` steps, over how many steps they are. What a last digit takes off one it adds to
+/// the next. None where there are none.
+fn between(levels: &[f64], step: f64, reach: f64) -> Option<f64> {
+    let distances = levels.windows(2).map(|w| w[1] - w[0]);
+    let counted = distances.map(|d| (d, (d / step).round()));
+    let near = counted.filter(|(_, steps)| *steps <= reach);
+    let (all, steps) = near.fold((0.0, 0.0), |sum, d| (sum.0 + d.0, sum.1 + d.1));
+    (steps > 0.0).then(|| all / steps)
+}
+
+/// Least squares of the levels, through zero: a multiple of the step is what a reading is. None where all are zero.
+fn of_multiples(levels: &[f64], step: f64) -> Option<f64> {
     let [mut products, mut squares] = [0.0; 2];
-    if reach.is_finite() {
-        for w in near {
-            products += steps(w) * (w[1] - w[0]);
-            squares += steps(w).powi(2);
-        }
-    } else {
-        // Through zero: a multiple of the step is what a reading is.
-        for v in levels {
-            let code = (v / step).round();
-            products += code * v;
-            squares += code * code;
-        }
+    for v in levels {
+        let code = (v / step).round();
+        products += code * v;
+        squares += code * code;
     }
     (squares > 0.0).then(|| products / squares)
 }
@@ -126,10 +195,23 @@ mod tests {
     fn codes_come_back_from_what_was_printed() {
         for (sigma, level) in [(0.6, 3.2), (5.0, -41.0), (40.0, 812.0)] {
             let codes = codes(sigma, level);
-            for (step, digits) in [(0.07326, 4), (0.05, 2), (1.0 / 131.0, 6), (0.0175, 9)] {
+            for (step, digits) in [
+                (0.07326, 4),
+                (0.07326, 2),
+                (0.0305, 2),
+                (0.05, 2),
+                (1.0 / 131.0, 6),
+                (1.0 / 131.0, 3),
+                (0.0175, 9),
+            ] {
                 let values = printed(&codes, step, digits);
-                let (found, back) = multiples(&values).expect("a grid");
-                assert!((found / step - 1.0).abs() < 1e-3, "{found} for {step}");
+                let (found, back) = multiples(&values)
+                    .unwrap_or_else(|| panic!("a grid of {step} to {digits} at {level}"));
+                let off = 10f64.powi(-digits) / (level.abs() + 3.0 * sigma);
+                assert!(
+                    (found - step).abs() < off.max(1e-3 * step),
+                    "{found} for {step}"
+                );
                 assert_eq!(back, codes, "step {step} to {digits} digits at {level}");
             }
         }

@@ -230,6 +230,8 @@ fn bias(s: &Searched<'_>, state: &State, grid: &Grid) -> f64 {
     mean - added.sum::<f64>() - level.sum::<f64>() / n
 }
 
+/// Spread of the readings over that of their noise up to which their level stands still.
+const STANDS: f64 = 1.2;
 /// Samples of a simulation that tells what a fault of the counts adds, and how often it is made.
 const SAMPLES: f64 = 20_000.0;
 const TIMES: usize = 8;
@@ -248,14 +250,24 @@ fn before_counts(
     let own = effects
         .iter()
         .filter(|e| e.channels.contains(&channel.name));
-    let coarser = own.filter_map(|e| Some(effect(&e.cause)?.coarsens(&e.parameters)));
+    let coarser = own
+        .filter_map(|e| Some((effect(&e.cause)?, e)))
+        .filter(|(known, _)| known.stage() == Stage::Counts)
+        .map(|(known, e)| known.coarsens(&e.parameters));
     let cut = 0.5 * (coarser.product::<f64>() - 1.0) * channel.lsb.unwrap_or(0.0);
     if let Some(bias) = channel.baseline.get_mut("bias") {
         bias.value += cut;
     }
+    // Where the level moves over many steps, a rounding adds nothing to mean and noise.
+    let sigma = numerics::order_statistics::robust_sigma(values);
+    let white = channel.baseline.get("angle_random_walk");
+    let white = white.map_or(0.0, |p| p.value / 60.0 * rate_hz.sqrt());
+    let stands = sigma < STANDS * white;
     let faults = effects.iter().filter(|e| {
-        let on_counts = |known: &&dyn Effect| {
-            known.stage() == Stage::Counts && known.coarsens(&e.parameters) == 1.0
+        let on_counts = |known: &&dyn Effect| match known.stage() {
+            Stage::Counts => known.coarsens(&e.parameters) == 1.0,
+            Stage::Reading => known.coarsens(&e.parameters) != 1.0 && stands,
+            _ => false,
         };
         e.channels.contains(&channel.name) && effect(&e.cause).is_some_and(|k| on_counts(&k))
     });
