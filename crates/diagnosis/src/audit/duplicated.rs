@@ -4,8 +4,6 @@
 //! the difference 0 alone. What is expected there is the parabola through the differences beside it. A stretch of copies is too
 //! few of them to show so, but is a run of equal readings that is longer than chance makes any.
 
-use std::collections::BTreeMap;
-
 use model::record::Record;
 
 use super::{Audit, Gyro, LEAST_READINGS};
@@ -48,17 +46,19 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
 
 /// Share of the frames in which two gyros that know nothing of each other read the same.
 fn by_chance(x: &[i32], y: &[i32], rows: &[usize]) -> f64 {
-    let shares = |of: &[i32]| {
-        let mut all: BTreeMap<i32, f64> = BTreeMap::new();
-        for i in rows {
-            *all.entry(of[*i]).or_default() += 1.0 / rows.len() as f64;
-        }
+    let sorted = |of: &[i32]| {
+        let mut all: Vec<i32> = rows.iter().map(|i| of[*i]).collect();
+        all.sort_unstable();
         all
     };
-    let of_y = shares(y);
-    let both = shares(x).into_iter();
-    both.map(|(code, share)| share * of_y.get(&code).copied().unwrap_or(0.0))
-        .sum()
+    let (x, y) = (sorted(x), sorted(y));
+    let mut of_y = y.chunk_by(|a, b| a == b).peekable();
+    let pairs = x.chunk_by(|a, b| a == b).map(|of_x| {
+        while of_y.next_if(|own| own[0] < of_x[0]).is_some() {}
+        let own = of_y.next_if(|own| own[0] == of_x[0]);
+        own.map_or(0.0, |own| of_x.len() as f64 * own.len() as f64)
+    });
+    pairs.sum::<f64>() / (rows.len() as f64).powi(2)
 }
 
 /// Counts of two gyros of one step, and the rows in which both are known.

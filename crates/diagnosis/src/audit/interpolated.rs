@@ -245,7 +245,7 @@ fn taken(y: &[f64], apart: usize) -> Vec<f64> {
 }
 
 /// Windows that are too small together, expected and counted.
-struct Foretold {
+pub(super) struct Foretold {
     chance: f64,
     expected: f64,
     counted: u64,
@@ -277,7 +277,8 @@ fn foretold(y: &[f64]) -> Option<Foretold> {
     all.into_iter().min_by(|a, b| a.chance.total_cmp(&b.chance))
 }
 
-pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
+/// What is foretold of a gyro; none where it cannot be said.
+pub(super) fn found(g: &Gyro<'_>, audit: &Audit) -> Option<Foretold> {
     let name = g.channel.name.as_str();
     // These make the step wider than it is said to be.
     let wider = [
@@ -286,11 +287,9 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         effects::stuck_bit::ID,
     ];
     if audit.found(&wider, name) {
-        return;
+        return None;
     }
-    let Some(usable) = audit.usable.get(name) else {
-        return;
-    };
+    let usable = audit.usable.get(name)?;
     let unit = if g.counts.is_some() {
         g.channel.lsb.unwrap_or(1.0)
     } else {
@@ -301,7 +300,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
         None => (g.channel.values.clone(), f64::INFINITY),
     };
     if y.len() < LEAST_READINGS || sigma < LEAST_SIGMA {
-        return;
+        return None;
     }
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x666f_7265);
     let width = if sigma.is_finite() { 0.5 } else { 0.0 };
@@ -312,7 +311,13 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) {
             if *usable { v + dither } else { f64::NAN }
         })
         .collect();
-    let Some(found) = foretold(&y) else {
+    foretold(&y)
+}
+
+/// Tells of what is foretold of a gyro.
+pub(super) fn audit(g: &Gyro<'_>, found: Option<Foretold>, audit: &mut Audit) {
+    let name = g.channel.name.as_str();
+    let Some(found) = found else {
         return;
     };
     let what = format!(

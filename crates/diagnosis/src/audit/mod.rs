@@ -31,7 +31,7 @@ use model::effects;
 use model::record::{Channel, Quantity, Record};
 
 use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter};
-use crate::test_level::{CheckId, Observation, audit_level};
+use crate::test_level::{CheckId, Observation, audit_level, on_two_threads};
 use local::Local;
 
 /// Steps of a converter that lacks a bit, over the noise, up to which the variance of readings is the same at any level: to
@@ -410,11 +410,10 @@ pub fn audit(record: &Record) -> Audit {
     let (record, still) = constant_run::set_aside(record);
     let (record, wild) = gross_outliers::set_aside(record);
     let record = record.as_ref();
-    let gyros: Vec<Gyro<'_>> = record
+    let known = record
         .all(Quantity::Gyro)
-        .filter(|c| c.values.len() == rows)
-        .map(Gyro::of)
-        .collect();
+        .filter(|c| c.values.len() == rows);
+    let gyros: Vec<Gyro<'_>> = on_two_threads(known.collect::<Vec<_>>(), Gyro::of);
     for g in &gyros {
         audit.usable.insert(
             g.channel.name.clone(),
@@ -447,8 +446,9 @@ pub fn audit(record: &Record) -> Audit {
     repeats::audit(record, &gyros, &at, &mut audit);
     duplicated::audit(record, &gyros, &at, &mut audit);
     code_dependence::audit(&gyros, &mut audit);
-    for g in &gyros {
-        interpolated::audit(g, &mut audit);
+    let foretold = on_two_threads(&gyros, |g| interpolated::found(g, &audit));
+    for (g, foretold) in gyros.iter().zip(foretold) {
+        interpolated::audit(g, foretold, &mut audit);
         outliers::audit(g, &at, &mut audit);
     }
     audit
