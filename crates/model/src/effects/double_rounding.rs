@@ -2,7 +2,7 @@
 
 use crate::effect::{
     Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, detail,
-    parameter, value,
+    optional, parameter, value,
 };
 use crate::simulate::{SensorStep, Simulation};
 
@@ -77,7 +77,7 @@ impl Effect for DoubleRounding {
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
             parameter("sensor_step", "deg/s", "step of the first rounding"),
-            parameter("file_step", "deg/s", "step of the readings"),
+            optional("file_step", "deg/s", "step of the readings"),
             detail(
                 "offset",
                 "deg/s",
