@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 use model::record::Channel;
 use model::{Parameter, effects};
 
-use super::rounded_twice::Cells;
+use super::cells::Cells;
 use super::stuck::{self, Stuck, Verdict};
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};

@@ -16,7 +16,7 @@ use std::rc::Rc;
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::rounded_twice::Cells;
+use super::cells::Cells;
 use numerics::column::dot;
 use numerics::exp_ln::{logarithms, powers};
 use numerics::wide;

@@ -5,6 +5,7 @@
 //! and one audit; [`AUDIT_LEVEL`] is what each may spend.
 
 mod bits;
+mod cells;
 mod code_dependence;
 mod codes;
 mod constant_run;

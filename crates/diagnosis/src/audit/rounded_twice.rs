@@ -7,13 +7,14 @@
 //! a grid over the codes that are read most, and followed as more of them are added: over many codes a step has to be right to a
 //! part in as many.
 
+use super::cells::{Cells, Decimal};
 use super::codes::Histogram;
 use model::effects::double_rounding::Halves;
 use numerics::tails::TWO_SIDED;
 
-/// Sensor steps in those of the file that are sought. Below, all cells are nearly as wide; beyond, the codes that are read lie
-/// apart, on a grid of their own.
-const STEPS: [f64; 2] = [0.22, 3.2];
+/// Sensor steps in those of the file that are sought. Below, cells of three steps and more are nearly as wide, and other faults do
+/// as much; beyond, the codes that are read lie apart, on a grid of their own.
+const STEPS: [f64; 2] = [0.4, 3.2];
 /// Most codes of the first search.
 const FIRST: usize = 256;
 /// Points of its grid: in the resolution of a pitch over so many codes, and in a sensor step.
@@ -31,8 +32,6 @@ const NO_WIDTH: [f64; 2] = [0.1, 1e-3];
 const ROUNDS: usize = 4;
 const SIDE: i32 = 16;
 const FINER: f64 = 0.4;
-/// Sensor codes nearer to the middle of two codes, in sensor steps, are half-way.
-const HALF_WAY: f64 = 1e-6;
 /// Largest denominator of steps that have codes half-way throughout: 7 / 8 of a data sheet's 8.75 mdeg/s in hundredths is one.
 const DENOMINATOR: u32 = 40;
 /// Nats that such a step has to be ahead: the logarithm of their number, 700, and of the ways to round halves.
@@ -40,63 +39,15 @@ const AHEAD: f64 = 8.2;
 /// Nats that two roundings have to gain at least. Of 200 histograms of one rounding none gains half of it, and two roundings that
 /// gain it come back with their step (tests below).
 const LEAST: f64 = 45.0;
+/// Nats that cells tell so many codes apart from the one that tells most: a third of what two roundings have to.
+const ELSEWHERE: f64 = 15.0;
+const APART: f64 = 4.0;
 /// Nats below the best at which a step is at the end of its 95 % interval: half the quantile of chi-square, one degree.
 const INTERVAL: f64 = 1.92;
 /// Parts of the way to such cells.
 const PARTS: u32 = 20;
 /// Offsets to either side that a step is tried with.
 const PLACES: i32 = 100;
-
-/// A sensor's step in a file of decimals.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Decimal {
-    /// The step, units: the double nearest to the fraction.
-    pub step: f64,
-    /// Codes of the file in a unit.
-    pub in_unit: f64,
-    pub halves: Halves,
-}
-
-/// Cells of the file's codes: step and offset of the first rounding, in steps of the file.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Cells {
-    pub step: f64,
-    pub offset: f64,
-    /// Where a sensor code half-way between two codes goes; none where it comes to the upper one.
-    pub decimal: Option<Decimal>,
-}
-
-impl Cells {
-    /// Those of one rounding.
-    pub(super) const ONE_ROUNDING: Self = Self {
-        step: 1.0,
-        offset: 0.0,
-        decimal: None,
-    };
-
-    /// Where the cell of code c begins, its end being the beginning of the next, in steps of the file.
-    pub(super) fn begin(self, c: f64) -> f64 {
-        // The first sensor code that comes to c or beyond.
-        let edge = (c - 0.5 - self.offset) / self.step;
-        let first = match self.decimal {
-            Some(of) if (edge - edge.round()).abs() < HALF_WAY => {
-                let own = edge.round();
-                own + f64::from(u8::from(!of.halves.up(own, of.step, c - 1.0, of.in_unit)))
-            }
-            _ => edge.ceil(),
-        };
-        (first - 0.5) * self.step + self.offset
-    }
-
-    /// The same cells, codes counted from another one.
-    fn from(self, code: f64) -> Self {
-        let offset = self.offset - code;
-        Self {
-            offset: offset - self.step * (offset / self.step).round(),
-            ..self
-        }
-    }
-}
 
 /// Codes in a row, from `first` on: how often each occurs, and how often where all cells are alike.
 struct Codes<'a> {
@@ -128,6 +79,36 @@ impl Codes<'_> {
             begin = end;
         }
         sum - self.n * (expected / all).ln()
+    }
+}
+
+impl Codes<'_> {
+    /// Whether cells of another width than most readings have tell of themselves in more than one place: a dead zone, or one code
+    /// that is never sent, is in one.
+    fn tells_in_places(&self, cells: Cells) -> bool {
+        let all: f64 = self.even.iter().sum();
+        let width = |code: f64| cells.begin(code + 1.0) - cells.begin(code);
+        let codes = || (0..self.times.len()).map(|i| self.first + i as f64);
+        // Of the two widths that there are, by half a sensor step.
+        let narrow = cells.step * ((1.0 / cells.step).floor() + 0.5);
+        let wide = codes()
+            .zip(self.times)
+            .filter(|(code, _)| width(*code) > narrow);
+        let is_wide = 2.0 * wide.map(|(_, times)| times).sum::<f64>() > self.n;
+        let gain = |times: f64, even: f64, width: f64| {
+            times * width.max(self.no_width).ln() - even * self.n / all * (width - 1.0)
+        };
+        let each = codes().zip(self.times.iter().zip(self.even));
+        let told: Vec<(f64, f64)> = each
+            .map(|(code, (times, even))| (code, width(code), times, even))
+            .filter(|(_, width, ..)| (*width > narrow) != is_wide)
+            .map(|(code, width, times, even)| (code, gain(*times, *even, width)))
+            .collect();
+        let most = told.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        most.is_some_and(|(at, _)| {
+            let apart = told.iter().filter(|(code, _)| (code - at).abs() >= APART);
+            apart.map(|(_, gain)| gain).sum::<f64>() > ELSEWHERE
+        })
     }
 }
 
@@ -206,8 +187,8 @@ pub(super) fn cells(h: &Histogram, sigma: f64, lsb: f64) -> Option<(Cells, f64)>
     let halves = halves(&absolute, (1.0 / lsb).round());
     let ahead = |cells: &Cells| absolute.gain(*cells) > best.0 + AHEAD;
     let cells = halves.filter(ahead).unwrap_or(found);
-    let gain = absolute.gain(cells);
-    (gain > LEAST).then(|| (cells, error(&codes, cells.from(middle))))
+    let holds = absolute.gain(cells) > LEAST && absolute.tells_in_places(cells);
+    holds.then(|| (cells, error(&codes, cells.from(middle))))
 }
 
 /// Of the cells that describe the codes as well, those in whose middle the codes are read: the second rounding moves neither mean nor
@@ -392,20 +373,6 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_holds_the_sensor_codes_that_come_to_its_code() {
-        let cells = Cells {
-            step: 1.5,
-            offset: 0.2,
-            decimal: None,
-        };
-        for m in -20..20 {
-            let x = f64::from(m) * 1.5 + 0.2;
-            let c = x.round();
-            assert!(cells.begin(c) <= x && x < cells.begin(c + 1.0), "{m}");
-        }
-    }
-
-    #[test]
     fn step_and_offset_of_the_first_rounding_come_back() {
         let mut seed = 0;
         for step in [
@@ -438,6 +405,20 @@ mod tests {
                     "{cells:?}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn a_code_that_takes_two_and_one_that_is_never_sent_are_no_second_rounding() {
+        for seed in 0..20 {
+            let mut h = histogram(1.0, 0.0, 7.3, 5.0, seed);
+            let at = (9 - h.first) as usize;
+            if seed % 2 == 0 {
+                h.times[at] += h.times[at - 1];
+            }
+            h.times[at - 1] = 0.0;
+            let found = cells(&h, 5.0, 0.01);
+            assert!(found.is_none(), "{seed}: {found:?}");
         }
     }
 

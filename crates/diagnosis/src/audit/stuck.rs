@@ -5,8 +5,9 @@
 //! of the codes could explain: a hole inside the range has no place in rails, a pile on one code none in a bit. What
 //! nothing here explains is not passed over ([`Verdict::Unlike`]).
 
+use super::cells::Cells;
 use super::codes::{Course, Fault, Fit, Histogram, Laws};
-use super::rounded_twice::{self, Cells};
+use super::rounded_twice;
 use crate::test_level::audit_level;
 use numerics::tails;
 

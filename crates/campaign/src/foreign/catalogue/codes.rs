@@ -17,7 +17,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(313, 1, "dead band", Shaped(|d, s, a, _| edges::still_band(d, s, a))).needs(TM).strength(Strength::None),
     row(319, 1, "codes that are missing", Shaped(|d, _, a, _| edges::missing(d, a))).needs(TM).strength(Strength::None),
     row(335, 2, "uneven steps of the converter", Shaped(|d, s, a, _| edges::uneven_steps(d, s, a))).needs(TM),
-    row(349, 3, "two codes of the part in one", Shaped(|d, s, a, _| edges::two_in_one(d, s, a))).needs(TM).strength(Strength::Own),
+    row(349, 3, "two codes of the part in one", Shaped(|d, s, a, _| edges::two_in_one(d, s, a))).needs(TM).strength(Strength::Own).later("double_rounding"),
     row(365, 4, "reading that is renewed beyond a threshold", Shaped(|_, _, a, _| steps::threshold(a))).needs(TM),
     row(377, 5, "dead zone of a push-pull stage", Shaped(|d, s, a, _| edges::push_pull(d, s, a))).needs(TM),
     row(399, 6, "gain that differs with the sense", Shaped(|d, s, a, _| edges::two_gains(d, s, a))).needs(TM),
