@@ -355,7 +355,8 @@ fn axis_of(channel: &ChannelModel) -> Result<usize, SimulateError> {
 }
 
 /// White standard deviation of a reading for a random walk of the angle, or of the velocity, of the unit that the channel's has.
-fn white_of(unit: &str, walk: f64, rate_hz: f64) -> f64 {
+#[must_use]
+pub fn white_of(unit: &str, walk: f64, rate_hz: f64) -> f64 {
     // deg/sqrt(h) -> deg/s at one sample: N sqrt(rate), N in deg/s/sqrt(Hz); any other unit U in U/sqrt(Hz).
     let per_root_hertz = if unit == "deg/s" { walk / 60.0 } else { walk };
     per_root_hertz * rate_hz.sqrt()

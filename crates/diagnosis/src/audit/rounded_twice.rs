@@ -36,18 +36,20 @@ const FINER: f64 = 0.4;
 const DENOMINATOR: u32 = 40;
 /// Nats that such a step has to be ahead: the logarithm of their number, 700, and of the ways to round halves.
 const AHEAD: f64 = 8.2;
-/// Nats that two roundings have to gain at least. Of 200 histograms of one rounding none gains half of it, and two roundings that
-/// gain it come back with their step (tests below).
+/// Nats that two roundings have to gain at least. Of 200 histograms of one rounding none gains it, and two roundings
+/// that do come back with their step (tests below).
 const LEAST: f64 = 45.0;
 /// Nats that cells tell so many codes apart from the one that tells most: a third of what two roundings have to.
 const ELSEWHERE: f64 = 15.0;
 const APART: f64 = 4.0;
 /// Nats below the best at which a step is at the end of its 95 % interval: half the quantile of chi-square, one degree.
 const INTERVAL: f64 = 1.92;
-/// Parts of the way to such cells.
+/// Steps to either side that are tried for its ends, out to so many resolutions of a pitch over the codes, and offsets of each.
+const PLACES: i32 = 50;
+const PITCHES: f64 = 1.0;
+/// Parts of the way to cells in whose middle the codes are read, and nats below the best that describe them as well.
 const PARTS: u32 = 20;
-/// Offsets to either side that a step is tried with.
-const PLACES: i32 = 100;
+const AS_WELL: f64 = 0.5;
 
 /// Codes in a row, from `first` on: how often each occurs, and how often where all cells are alike.
 struct Codes<'a> {
@@ -80,9 +82,7 @@ impl Codes<'_> {
         }
         sum - self.n * (expected / all).ln()
     }
-}
 
-impl Codes<'_> {
     /// Whether cells of another width than most readings have tell of themselves in more than one place: a dead zone, or one code
     /// that is never sent, is in one.
     fn tells_in_places(&self, cells: Cells) -> bool {
@@ -179,7 +179,8 @@ pub(super) fn cells(h: &Histogram, sigma: f64, lsb: f64) -> Option<(Cells, f64)>
     }
     let codes = window(0, h.times.len(), NO_WIDTH[1]);
     let best = places.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let found = centered(&codes, of(best)).from(-middle);
+    let near = centered(&codes, of(best));
+    let found = near.from(-middle);
     let absolute = Codes {
         first: f64::from(h.first),
         ..codes
@@ -188,7 +189,8 @@ pub(super) fn cells(h: &Histogram, sigma: f64, lsb: f64) -> Option<(Cells, f64)>
     let ahead = |cells: &Cells| absolute.gain(*cells) > best.0 + AHEAD;
     let cells = halves.filter(ahead).unwrap_or(found);
     let holds = absolute.gain(cells) > LEAST && absolute.tells_in_places(cells);
-    holds.then(|| (cells, error(&codes, cells.from(middle))))
+    // What the arithmetic of the file would add to that is known for a few steps alone.
+    holds.then(|| (cells, error(&codes, near)))
 }
 
 /// Of the cells that describe the codes as well, those in whose middle the codes are read: the second rounding moves neither mean nor
@@ -217,7 +219,7 @@ fn centered(codes: &Codes<'_>, cells: Cells) -> Cells {
     let all = (0..=PARTS)
         .rev()
         .map(|k| moved(f64::from(k) / f64::from(PARTS)));
-    let mut well = all.filter(|c| codes.gain(*c) > gain - 0.5);
+    let mut well = all.filter(|c| codes.gain(*c) > gain - AS_WELL);
     well.next().unwrap_or(cells)
 }
 
@@ -315,24 +317,23 @@ fn refined(codes: &Codes<'_>, from: Place, mut apart: f64, mut aside: f64) -> Pl
     best
 }
 
-/// Standard error of the step, by the width of the steps that describe the codes nearly as well, with offsets of their own.
+/// Standard error of the step, by the farthest step that describes the codes nearly as well with an offset of its own: between those
+/// that do may lie some that do not.
 fn error(codes: &Codes<'_>, cells: Cells) -> f64 {
     let best = codes.gain(cells);
     let turns = 1.0 / cells.step;
     let place = cells.offset * turns;
+    let offset = |j: i32| 0.5 * f64::from(j) / f64::from(PLACES);
     let nearly = |turns: f64| {
-        let places = (-PLACES..=PLACES).map(|j| place + 0.5 * f64::from(j) / f64::from(PLACES));
-        let mut gains = places.map(|p| at(codes, turns, p).0);
-        gains.any(|gain| gain > best - INTERVAL)
+        let mut places = (-PLACES..=PLACES).map(|j| place + offset(j));
+        places.any(|p| at(codes, turns, p).0 > best - INTERVAL)
     };
-    let away = |sign: f64| {
-        let mut by = 1e-3 * turns / codes.times.len() as f64;
-        while by < 0.5 * turns && nearly(turns + sign * by) {
-            by *= 1.3;
-        }
-        by
-    };
-    0.5 * (away(1.0) + away(-1.0)) / TWO_SIDED * cells.step.powi(2)
+    let apart = PITCHES / codes.times.len() as f64 / f64::from(PLACES);
+    let farthest = (1..=PLACES).rev().find(|k| {
+        let by = apart * f64::from(*k);
+        nearly(turns - by) || nearly(turns + by)
+    });
+    apart * f64::from(farthest.unwrap_or(1)) / TWO_SIDED * cells.step.powi(2)
 }
 
 #[cfg(test)]
@@ -343,13 +344,7 @@ mod tests {
 
     use super::*;
 
-    pub(super) fn histogram(
-        step: f64,
-        offset: f64,
-        level: f64,
-        sigma: f64,
-        seed: u64,
-    ) -> Histogram {
+    fn histogram(step: f64, offset: f64, level: f64, sigma: f64, seed: u64) -> Histogram {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let codes: Vec<i32> = (0..6000)
             .map(|_| {
@@ -361,7 +356,7 @@ mod tests {
         Histogram::new(&codes, 8.0 * sigma).expect("codes")
     }
 
-    pub(super) fn gain(h: &Histogram, cells: Cells, sigma: f64) -> f64 {
+    fn gain(h: &Histogram, cells: Cells, sigma: f64) -> f64 {
         let codes = Codes {
             first: f64::from(h.first),
             times: &h.times,
@@ -391,7 +386,7 @@ mod tests {
                 let (cells, error) = cells(&h, 6.0, 0.01).expect("two roundings");
                 let off = (cells.step - step).abs();
                 assert!(
-                    off < 4.0 * error && off < 0.02 * step,
+                    off < 4.0 * error && off < 0.02 * step && error < 0.02 * step,
                     "{step}: {cells:?} +- {error}"
                 );
                 let truth = Cells {

@@ -8,6 +8,7 @@ use model::effects::effect;
 use model::excitation::at_rest;
 use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
 use model::record::Base;
+use model::simulate::white_of;
 use model::unnamed::Unnamed;
 
 use crate::attribute::events;
@@ -261,7 +262,7 @@ fn before_counts(
     // Where the level moves over many steps, a rounding adds nothing to mean and noise.
     let sigma = numerics::order_statistics::robust_sigma(values);
     let white = channel.baseline.get("angle_random_walk");
-    let white = white.map_or(0.0, |p| p.value / 60.0 * rate_hz.sqrt());
+    let white = white.map_or(0.0, |p| white_of(&channel.unit, p.value, rate_hz));
     let stands = sigma < STANDS * white;
     let faults = effects.iter().filter(|e| {
         let on_counts = |known: &&dyn Effect| match known.stage() {
