@@ -197,6 +197,7 @@ fn blank(stand: &Stand) -> Simulation {
         rate: zeros(),
         white_sigma: [0.0; 3],
         rounding: [0.0; 3],
+        felt: vec![],
         shared: Default::default(),
         own: [1.0; 3],
         variance: std::array::from_fn(|_| vec![1.0; n]),

@@ -26,6 +26,7 @@ use crate::attribute::{events, masking, merge, withdraw};
 use crate::audit::Audit;
 use crate::criticise::common_noise::{Late, Shared, common};
 use crate::criticise::cross_axis::couplings;
+use crate::criticise::one_source::{self, OneSource};
 use crate::fit::channel::VarianceFound;
 use crate::ingest::types::Grid;
 use crate::replicates;
@@ -189,8 +190,11 @@ fn name_all(
         limits: audited.limits.clone(),
         ..Named::default()
     };
-    let of_terms = on_two_threads(&mut *searched, |s| term_findings(s, grid, seed));
+    let mut of_terms = on_two_threads(&mut *searched, |s| term_findings(s, grid, seed));
     let searched = &*searched;
+    for (axis, of_axis) in of_terms.iter_mut().enumerate() {
+        one_source::state(of_axis, axis, searched, &tested.sources);
+    }
     let name = |named, (s, of_terms)| {
         name_channel(
             named,
@@ -280,16 +284,26 @@ struct Tested {
     checks: Vec<Check>,
     /// What the axes share.
     shared: Shared,
+    /// Bands that several of them feel.
+    sources: Vec<OneSource>,
 }
 
 fn tested(searched: &mut [Searched<'_>], audited: &Audit, grid: &Grid) -> Tested {
     let own = searched.iter_mut();
     let mut checks: Vec<Check> = own.flat_map(|s| std::mem::take(&mut s.checks)).collect();
     masking::suppress(&mut checks, audited);
+    let sources = one_source::found(searched);
+    let whole = one_source::taken_apart(searched, &sources);
     let mut shared = common(searched, grid);
     shared.checks = all_worded(shared.checks);
-    checks.extend(all_worded(couplings(searched, grid)));
-    Tested { checks, shared }
+    one_source::put_back(searched, whole);
+    let alone = one_source::alone(searched, &sources);
+    checks.extend(all_worded(couplings(searched, &alone, grid)));
+    Tested {
+        checks,
+        shared,
+        sources,
+    }
 }
 
 /// What is named so far.

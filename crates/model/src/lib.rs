@@ -19,6 +19,7 @@ pub mod excitation;
 pub mod file;
 pub mod integral;
 pub mod nearest;
+pub mod one_source;
 pub mod parameter;
 mod range;
 pub mod record;

@@ -16,6 +16,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::effects::double_rounding::Halves;
 use crate::excitation::{Recorded, World, moved_like};
 use crate::file::{ChannelModel, ModelFile};
+use crate::one_source::Felt;
 use crate::record::{Axis, Quantity, Record};
 use frames::frames;
 use prepared::Prepared;
@@ -123,6 +124,8 @@ pub struct Simulation {
     pub scale: [f64; 3],
     /// Errors of the rate but for the white noise, deg/s.
     pub rate: [Vec<f64>; 3],
+    /// Oscillations of axes that others may feel too.
+    pub felt: Vec<Felt>,
     /// White standard deviation of the baseline, rounding included, deg/s.
     pub white_sigma: [f64; 3],
     /// Variance that rounding to the step of the readings adds, (deg/s)^2.

@@ -158,12 +158,14 @@ fn told(
     }
 }
 
-/// Each axis at rest against what the others are made of, and its variance against what the accelerometers felt.
-pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
-    let still: Vec<&Searched<'_>> = searched
-        .iter()
-        .filter(|s| !s.target.moving && !s.search.view.sways())
-        .collect();
+/// Each axis at rest against what the others are made of, and its variance against what the accelerometers felt; `alone` are the
+/// residuals without what a source makes of several axes, where there is one.
+pub(crate) fn couplings(searched: &[Searched<'_>], alone: &[Vec<f64>], grid: &Grid) -> Vec<Check> {
+    let at_rest = searched.iter().enumerate();
+    let at_rest = at_rest.filter(|(_, s)| !s.target.moving && !s.search.view.sways());
+    let (own, still): (Vec<&Vec<f64>>, Vec<&Searched<'_>>) = at_rest
+        .map(|(k, s)| (alone.get(k).unwrap_or(&s.e), s))
+        .unzip();
     let mut found = vec![];
     let Some(samples) = still.iter().map(|s| s.e.len().min(MOST)).min() else {
         return found;
@@ -171,7 +173,7 @@ pub(crate) fn couplings(searched: &[Searched<'_>], grid: &Grid) -> Vec<Check> {
     let sources: Vec<Vec<Source>> = still.iter().map(|s| of_one(s, samples)).collect();
     let felt = felt(grid, samples);
     for (i, a) in still.iter().enumerate() {
-        let e = &a.e[..samples];
+        let e = &own[i][..samples];
         let others = || (0..still.len()).filter(|j| *j != i);
         let pairs = others().flat_map(|j| others().filter(move |k| *k > j).map(move |k| (j, k)));
         let products: Vec<Source> = pairs

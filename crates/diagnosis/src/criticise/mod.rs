@@ -4,6 +4,7 @@ pub mod common_noise;
 pub mod cross_axis;
 pub mod follower_shape;
 pub(crate) mod mixing;
+pub(crate) mod one_source;
 pub mod process;
 pub mod random_walk;
 pub mod residual;

@@ -30,7 +30,9 @@ pub(super) fn concluded(
     dead: Vec<Observation>,
     named: Named,
 ) -> Told {
-    let Tested { mut checks, shared } = tested;
+    let Tested {
+        mut checks, shared, ..
+    } = tested;
     let Named {
         mut findings,
         mut nearest,

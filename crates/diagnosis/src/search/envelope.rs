@@ -114,8 +114,9 @@ struct Simulations {
 impl Simulations {
     /// Of a band of this height and half width over the noise.
     fn new(band: &Band, (top, half): (f64, f64), seed: u64) -> Self {
-        // A shorter record has fewer values of the same kind.
-        let stride = band.density.len().div_ceil(MOST);
+        // A shorter record has fewer values of the same kind: an envelope is as many values as a power of two, which have to lie
+        // as close there.
+        let stride = band.density.len().div_ceil(MOST).next_power_of_two();
         let half = half / stride as f64;
         let reach = ((2.0 * REACH * half) as usize).clamp(8, 2 * MOST);
         let length = (2 * reach).next_power_of_two();

@@ -96,7 +96,15 @@ pub(crate) fn fit(
         let alone = wanted.channels.contains(name);
         let paired = wanted.pairs.iter().any(|p| p.contains(name));
         // Of one band only where something is left.
-        let merged = as_one(s, if alone { 1 } else { 2 });
+        let mut merged = as_one(s, if alone { 1 } else { 2 });
+        // A tone that other axes feel too has no detail of its own.
+        let felt = |id: &str| {
+            let mut all = causes
+                .iter()
+                .filter(|f| f.cause == id && f.channels.contains(name));
+            all.any(|f| f.channels.len() > 1)
+        };
+        merged.retain(|tone| !felt(tone.id));
         if !alone && !paired && merged.is_empty() {
             continue;
         }

@@ -7,6 +7,7 @@ use crate::effect::{
     Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
     Peak, Plot, Rival, Stage, View, optional, parameter, value,
 };
+use crate::one_source::{self, PARAMETERS as SHARED};
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
 
@@ -45,6 +46,18 @@ impl Effect for NarrowBand {
                 "1",
                 "1 where the rate is what a driven mode is displaced by, -1 where it is its velocity; 0, left out, is a Lorentzian peak, as high on either side",
             ),
+            SHARED[0],
+            SHARED[1],
+            SHARED[2],
+            SHARED[3],
+            SHARED[4],
+            SHARED[5],
+            SHARED[6],
+            SHARED[7],
+            SHARED[8],
+            SHARED[9],
+            SHARED[10],
+            SHARED[11],
         ];
         PARAMETERS
     }
@@ -131,17 +144,32 @@ impl Effect for NarrowBand {
             value(parameters, "center_frequency"),
         );
         let (width, skew) = (value(parameters, "bandwidth"), value(parameters, "skew"));
+        let is_shared = one_source::is_of_another(parameters);
         for &axis in channels {
+            let split = simulation.split(axis, centre, parameters);
+            let own = rms * split.own;
+            let mut turning = Vec::new();
+            let unit = own.max(f64::MIN_POSITIVE);
+            let seen = |z: [f64; 2]| {
+                if !is_shared {
+                    turning.push(z.map(|v| v / unit));
+                }
+            };
             if skew == 0.0 {
-                simulation.add_mode(axis, rms, centre, width);
+                simulation.add_mode(axis, own, centre, width, seen);
             } else {
-                simulation.add_resonator(
-                    axis,
-                    rms,
-                    &Resonator::new(centre, width, skew, simulation.rate_hz),
-                );
+                let of = Resonator::new(centre, width, skew, simulation.rate_hz);
+                simulation.add_resonator(axis, own, &of, seen);
+            }
+            split.add(rms, &mut simulation.rate[axis]);
+            if !is_shared {
+                simulation.keep_felt(axis, centre, turning);
             }
         }
+    }
+
+    fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
+        one_source::is_one(a, b, "bandwidth")
     }
 }
 
@@ -285,6 +313,8 @@ pub(crate) struct Resonator {
     driven: f64,
     /// Correlation of neighbours.
     neighbours: f64,
+    /// Angle by which it turns in a sample, rad.
+    turn: f64,
 }
 
 impl Resonator {
@@ -303,6 +333,7 @@ impl Resonator {
             zero,
             driven: (a / (1.0 + zero * zero)).max(0.0).sqrt(),
             neighbours: p * (cos + s * sin),
+            turn,
         }
     }
 }
@@ -310,7 +341,15 @@ impl Resonator {
 impl Simulation {
     /// Adds to the rate of an axis a mode of that standard deviation, deg/s, in its stationary state. Where a stretch is left
     /// out it begins anew.
-    fn add_resonator(&mut self, axis: usize, size: f64, of: &Resonator) {
+    /// As of [`Simulation::add_mode`], both quadratures are told to `seen`.
+    fn add_resonator(
+        &mut self,
+        axis: usize,
+        size: f64,
+        of: &Resonator,
+        mut seen: impl FnMut([f64; 2]),
+    ) {
+        let (sin, cos) = of.turn.sin_cos();
         let mut rates = std::mem::take(&mut self.rate[axis]);
         for k in 0..self.stretches.len() {
             // The two readings before and what drove the last one, which is all of it that the one before does not hold.
@@ -320,6 +359,7 @@ impl Simulation {
             let (mut y, mut e) = ([last, older], driven);
             for rate in &mut rates[self.stretches[k].samples.clone()] {
                 *rate += size * y[0];
+                seen([y[0], (y[1] - cos * y[0]) / sin].map(|v| size * v));
                 let next = of.driven * self.normal();
                 y = [
                     of.before[0] * y[0] + of.before[1] * y[1] + next + of.zero * e,

@@ -9,6 +9,7 @@ use crate::effect::{
     Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
     parameter, value,
 };
+use crate::one_source::{self, PARAMETERS as SHARED};
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
 
@@ -39,6 +40,18 @@ impl Effect for WanderingLine {
                 "Hz",
                 "full width of its spectrum at half power",
             ),
+            SHARED[0],
+            SHARED[1],
+            SHARED[2],
+            SHARED[3],
+            SHARED[4],
+            SHARED[5],
+            SHARED[6],
+            SHARED[7],
+            SHARED[8],
+            SHARED[9],
+            SHARED[10],
+            SHARED[11],
         ];
         PARAMETERS
     }
@@ -121,13 +134,29 @@ impl Effect for WanderingLine {
             .max(0.0)
             .sqrt();
         let turn = TAU * centre / simulation.rate_hz;
+        let is_shared = one_source::is_of_another(parameters);
         for &axis in channels {
+            let split = simulation.split(axis, centre, parameters);
+            let own = amplitude * split.own;
+            let mut turning = Vec::new();
             let mut phase = Uniform::new(-PI, PI).map_or(0.0, |u| u.sample(&mut simulation.rng));
             for i in 0..simulation.samples {
-                simulation.rate[axis][i] += amplitude * phase.cos();
+                let (sin, cos) = phase.sin_cos();
+                simulation.rate[axis][i] += own * cos;
+                if !is_shared {
+                    turning.push([cos, sin]);
+                }
                 let by: f64 = StandardNormal.sample(&mut simulation.rng);
                 phase += turn + step * by;
             }
+            split.add(amplitude, &mut simulation.rate[axis]);
+            if !is_shared {
+                simulation.keep_felt(axis, centre, turning);
+            }
         }
+    }
+
+    fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
+        one_source::is_one(a, b, "linewidth")
     }
 }

@@ -16,6 +16,7 @@ use crate::effects::effect;
 use crate::excitation::{World, fast};
 use crate::file::ModelFile;
 use crate::nearest::nearest;
+use crate::one_source::is_of_another;
 use crate::record::flag;
 
 /// An effect of a model, and the axes that it acts on.
@@ -118,7 +119,8 @@ impl Prepared {
         let (mut early, late): (Vec<_>, Vec<_>) = acting
             .into_iter()
             .partition(|a| a.effect.stage() < Stage::Output);
-        early.sort_by_key(|a| a.effect.stage());
+        // What an axis feels of another's oscillation comes after that.
+        early.sort_by_key(|a| (a.effect.stage(), is_of_another(&a.parameters)));
         // What the base does is an input of the run: the same each time, even where it is random.
         let again = |a: &Acting| a.effect.stage() != Stage::World && a.draws(rate_hz);
         let (random, once): (Vec<_>, Vec<_>) = early.into_iter().partition(again);
@@ -228,6 +230,7 @@ impl Prepared {
     pub fn draw(&mut self, start: Option<&[Vec<f64>; 3]>) {
         let present = self.present;
         self.run.shared.iter_mut().for_each(Vec::clear);
+        self.run.felt.clear();
         self.run.own = [1.0; 3];
         for axis in 0..3 {
             let start = start.map(|all| all[axis].as_slice());
@@ -411,6 +414,7 @@ fn started(world: World, rate_hz: f64, rng: Xoshiro256PlusPlus) -> Simulation {
         motion: world.motion,
         scale: [1.0; 3],
         rate: std::array::from_fn(|_| vec![0.0; samples]),
+        felt: vec![],
         white_sigma: [0.0; 3],
         rounding: [0.0; 3],
         shared: Default::default(),

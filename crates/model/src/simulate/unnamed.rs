@@ -49,7 +49,7 @@ impl Random {
                 size,
                 center,
                 width,
-            } => run.add_mode(*axis, *size, *center, *width),
+            } => run.add_mode(*axis, *size, *center, *width, |_| {}),
             Self::Tone { axis, size, places } => run.add_tone(*axis, *size, places),
             Self::Shared { axes, correlation } => {
                 correlated_noise::share(run, *axes, *correlation);
@@ -221,8 +221,16 @@ fn followed(name: &str, run: &Simulation) -> Result<Vec<f64>, SimulateError> {
 
 impl Simulation {
     /// Adds to the rate of an axis a noise of a Lorentzian spectrum: standard deviation deg/s, centre and full width at half
-    /// power, Hz. At the centre 0 it is a Gauss-Markov process.
-    pub fn add_mode(&mut self, axis: usize, size: f64, center: f64, width: f64) {
+    /// power, Hz. At the centre 0 it is a Gauss-Markov process. Both quadratures of each sample, the first of which is what is added,
+    /// are told to `seen`.
+    pub fn add_mode(
+        &mut self,
+        axis: usize,
+        size: f64,
+        center: f64,
+        width: f64,
+        mut seen: impl FnMut([f64; 2]),
+    ) {
         let decay = PI * width / self.rate_hz;
         let turn = TAU * center / self.rate_hz;
         let kept = (-decay).exp();
@@ -242,6 +250,7 @@ impl Simulation {
             }
             for rate in &mut rates[samples] {
                 *rate += x[0];
+                seen(x);
                 let turned = [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1]];
                 x = turned.map(|v| kept * v + driven * self.normal());
             }
