@@ -42,6 +42,8 @@ const HALF_WIDTHS: f64 = 1.39;
 pub(super) const AHEAD: f64 = 2.0;
 /// How much wider a window is that may show a broader peak than the best one.
 const BROADER: f64 = 4.0;
+/// Part of the width at which a peak was seen, below which it is sought anew about where it was found.
+const NARROWER: f64 = 0.5;
 /// Bands that lie within so many of their half widths are one: a twentieth of the height of each is left there.
 const NEAR: f64 = 4.0;
 /// Peaks about which the bins are made finer, at most.
@@ -192,18 +194,33 @@ impl Search<'_> {
             let theta = noise.terms.last().map(|t| t.1.clone())?;
             Some((of, theta, solution.log_likelihood))
         };
+        // The likelihood does not see what is narrower than its bins.
+        let resolved = |omega: f64| RESOLVED * self.panel.bins.width_at(omega) * spacing;
         let fits = [Some(best), broader].into_iter().flatten().filter_map(|w| {
             let (middle, half) = w.peak();
-            // The likelihood does not see what is narrower than its bins.
-            let half = half.max(RESOLVED * self.panel.bins.width_at(middle * spacing));
+            let omega = middle * spacing;
             let level = g[w.from..w.to].iter().sum::<f64>() / w.width();
             let held = FRAC_2_PI * HALF_WIDTHS.atan();
-            let (located, theta) = c.about(&Peak {
-                omega: middle * spacing,
-                half_width: half * spacing,
+            let mut seen = Peak {
+                omega,
+                half_width: (half * spacing).max(resolved(omega)),
                 variance: (w.energy - 1.0) * level * w.width() / n as f64 / held,
-            })?;
-            fitted(located, theta)
+            };
+            let (located, theta) = c.about(&seen)?;
+            let mut fit = fitted(located, theta)?;
+            // The skirts of a strong peak fill a window that is many times as wide, and about which it may be this much narrower.
+            while let Some(peak) = fit.0.peak(&fit.1)
+                && peak.half_width < NARROWER * seen.half_width
+                && NARROWER * seen.half_width > resolved(peak.omega)
+            {
+                seen = Peak {
+                    half_width: peak.half_width.max(resolved(peak.omega)),
+                    ..peak
+                };
+                let (located, theta) = c.about(&seen)?;
+                fit = fitted(located, theta)?;
+            }
+            Some(fit)
         });
         let plain = fits.max_by(|a, b| a.2.total_cmp(&b.2))?;
         let variants = plain.0.variants().into_iter();
