@@ -126,6 +126,8 @@ pub struct Simulation {
     pub rate: [Vec<f64>; 3],
     /// Oscillations of axes that others may feel too.
     pub felt: Vec<Felt>,
+    /// Whether the axes are those of accelerometers.
+    pub of_accelerometers: bool,
     /// White standard deviation of the baseline, rounding included, deg/s.
     pub white_sigma: [f64; 3],
     /// Variance that rounding to the step of the readings adds, (deg/s)^2.

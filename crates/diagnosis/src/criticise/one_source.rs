@@ -4,9 +4,13 @@
 //! variances has the correlation E[Y X*] = r b d e^(ip). Coherence r and phase p are estimated by the likelihood of jointly normal
 //! values over all frequencies (Whittle). What axes share beside that is asked of what a common source leaves of each ([`Way`]).
 
-use model::effect::Parameters;
+use std::collections::BTreeMap;
+use std::f64::consts::SQRT_2;
+
+use model::effect::{Parameters, Signal};
 use model::effects::effect;
 use model::one_source;
+use model::record::Quantity;
 use numerics::minimise::golden;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
@@ -14,7 +18,8 @@ use rustfft::num_complex::Complex;
 use crate::fit::channel::{Form, Term};
 use crate::fit::threshold;
 use crate::result::{Finding, sentence};
-use crate::search::band_source::FOLLOWED;
+use crate::search::band_source::{FOLLOWED, Standing};
+use crate::search::envelope::REACH;
 use crate::search::searched::Searched;
 
 /// Largest coherence: of more, what noise there is tells nothing.
@@ -43,11 +48,121 @@ struct Member {
     lr: f64,
     /// Its part of the standard deviation at each frequency.
     weights: Vec<f64>,
+    /// Its standard deviation by what accelerometers read of the source, where they do.
+    size: Option<f64>,
 }
 
-/// A source that several axes feel. The first stands for it.
+/// An accelerometer that feels a source.
+struct Acceleration {
+    name: String,
+    /// Of the first band with what the accelerometer reads.
+    coherence: (f64, f64),
+    phase: (f64, f64),
+    lr: f64,
+    read: Shaken,
+}
+
+/// A source that several axes feel, or one and an accelerometer. The first stands for it.
 pub(crate) struct OneSource {
     members: Vec<Member>,
+    accelerations: Vec<Acceleration>,
+}
+
+impl OneSource {
+    /// How large the band of each axis is by what accelerometers read: they know how large the source was in this record, and a band by
+    /// itself only what it may have been. Generalised least squares of the residual on that, as a simulation makes it.
+    fn size(&mut self, searched: &[Searched<'_>], planner: &mut FftPlanner<f64>) {
+        let Some(first) = self.members.first() else {
+            return;
+        };
+        let signals = searched[first.band.axis].search.view.signals.iter();
+        let read = self.accelerations.iter().filter_map(|a| {
+            let own = signals.clone().find(|s| s.name == a.name)?;
+            Some((own.values.as_slice(), a.phase.0))
+        });
+        let read: Vec<(&[f64], f64)> = read.collect();
+        let Some(z) = one_source::read(&read, first.band.omega, first.band.half_width) else {
+            return;
+        };
+        let z = transformed(&z, planner);
+        let coherences = self.accelerations.iter().map(|a| a.coherence.0);
+        let of_first = coherences.sum::<f64>() / self.accelerations.len() as f64;
+        for m in &mut self.members {
+            let s = &searched[m.band.axis];
+            let white = s.state.solution.white;
+            let g = s.state.noise.through(frequencies(s.e.len()));
+            let own = transformed(&s.e, planner);
+            let each = z[1..].iter().zip(&own[1..]).zip(g);
+            let (product, square) = each.fold(
+                (Complex::<f64>::default(), 0.0),
+                |(product, square), ((z, e), g)| {
+                    let x = z / (white * g).sqrt();
+                    (product + x.conj() * e, square + x.norm_sqr())
+                },
+            );
+            m.size = Some(product.norm() / square / (of_first * m.coherence.0));
+        }
+    }
+}
+
+/// What an accelerometer reads about a band.
+struct Shaken {
+    /// Transform of its readings over the square root of their density; 0 elsewhere.
+    values: Vec<Complex<f64>>,
+    /// The part of its standard deviation that the oscillation makes; 0 elsewhere.
+    weights: Vec<f64>,
+}
+
+/// The peak that an accelerometer reads where a band is; none where it shows none.
+fn shaken(values: &[Complex<f64>], band: &Band) -> Option<Shaken> {
+    let step = std::f64::consts::TAU / values.len() as f64;
+    let off = |k: usize| (k as f64 * step - band.omega) / band.half_width;
+    let places = 1..values.len().div_ceil(2);
+    let energies = places.clone().map(|k| (off(k), values[k].norm_sqr()));
+    let Standing { height, level } = Standing::of(energies, 1.0)?;
+    let mut found = Shaken {
+        values: vec![Complex::default(); values.len()],
+        weights: vec![0.0; places.len()],
+    };
+    for k in places.filter(|k| off(*k).abs() <= REACH) {
+        let above = height * Standing::shape(off(k));
+        let density = above + level;
+        found.values[k] = values[k] / density.sqrt();
+        found.weights[k - 1] = (above / density).sqrt();
+    }
+    Some(found)
+}
+
+/// The accelerometers that read a peak where a band is, and feel the same.
+fn accelerations(
+    s: &Searched<'_>,
+    band: &Band,
+    own: &[Complex<f64>],
+    weights: &[f64],
+    planner: &mut FftPlanner<f64>,
+) -> Vec<Acceleration> {
+    let signals = s.search.view.signals.iter();
+    let accelerometers = signals.filter(|c| c.quantity == Quantity::Acc);
+    let all = accelerometers.filter_map(|c| {
+        let mean = c.values.iter().sum::<f64>() / c.values.len() as f64;
+        let centred: Vec<f64> = c.values.iter().map(|v| v - mean).collect();
+        let read = shaken(&transformed(&centred, planner), band)?;
+        let pair = Pair::new(&read.values, own, &read.weights, weights);
+        let (coherence, phase, lr) = pair.estimate();
+        is_one(coherence.0, lr).then(|| Acceleration {
+            name: c.name.clone(),
+            coherence,
+            phase,
+            lr,
+            read,
+        })
+    });
+    all.collect()
+}
+
+/// Whether a coherence of that likelihood ratio is none of chance: it has two degrees of freedom.
+fn is_one(coherence: f64, lr: f64) -> bool {
+    (-lr / 2.0).exp() < threshold::false_alarm() && coherence.powi(2) > FOLLOWED
 }
 
 /// The bands of an axis at rest.
@@ -179,7 +294,9 @@ pub(crate) fn found(searched: &[Searched<'_>]) -> Vec<OneSource> {
         let near = |b: &Band| {
             b.axis != first.axis && (b.omega - first.omega).abs() < b.half_width + first.half_width
         };
-        if !left.iter().any(near) {
+        let felt = |c: &Signal| c.quantity == Quantity::Acc;
+        let shakes = searched[first.axis].search.view.signals.iter().any(felt);
+        if !shakes && !left.iter().any(near) {
             continue;
         }
         let own = transformed(&searched[first.axis].e, &mut planner);
@@ -193,27 +310,36 @@ pub(crate) fn found(searched: &[Searched<'_>]) -> Vec<OneSource> {
             let weights = weights(s, &band);
             let there = transformed(&s.e, &mut planner);
             let (coherence, phase, lr) = Pair::new(&own, &there, &of_first, &weights).estimate();
-            // Two degrees of freedom.
-            if (-lr / 2.0).exp() < threshold::false_alarm() && coherence.0.powi(2) > FOLLOWED {
+            if is_one(coherence.0, lr) {
                 others.push(Member {
                     band,
                     coherence,
                     phase,
                     lr,
                     weights,
+                    size: None,
                 });
             }
         }
-        if !others.is_empty() {
+        let s = &searched[first.axis];
+        let accelerations = accelerations(s, &first, &own, &of_first, &mut planner);
+        if !others.is_empty() || !accelerations.is_empty() {
             let first = Member {
                 band: first,
                 coherence: (1.0, 0.0),
                 phase: (0.0, 0.0),
                 lr: 0.0,
                 weights: of_first,
+                size: None,
             };
             let members = std::iter::once(first).chain(others).collect();
-            all.push(OneSource { members });
+            all.push(OneSource {
+                members,
+                accelerations,
+            });
+            if let Some(source) = all.last_mut() {
+                source.size(searched, &mut planner);
+            }
         }
     }
     all
@@ -286,13 +412,21 @@ fn apart(all: Vec<Vec<f64>>, sources: &[OneSource], way: Way) -> Vec<Vec<f64>> {
     let planner = &mut FftPlanner::new();
     let length = all.first().map_or(0, Vec::len);
     let mut spectra: Vec<Vec<Complex<f64>>> = all.iter().map(|e| transformed(e, planner)).collect();
-    let axes = all.len();
+    // The accelerometers come first: what they tell is known before any axis.
+    let read: Vec<&Acceleration> = sources.iter().flat_map(|s| &s.accelerations).collect();
+    let known = read.len();
+    let axes = known + all.len();
     let mut shares = vec![vec![Complex::default(); axes]; sources.len()];
     for k in 1..length.div_ceil(2) {
+        let mut places = 0..known;
         for (source, shares) in sources.iter().zip(&mut shares) {
             for m in &source.members {
                 let size = m.coherence.0.min(MOST) * m.weights[k - 1];
-                shares[m.band.axis] = Complex::from_polar(size, m.phase.0);
+                shares[known + m.band.axis] = Complex::from_polar(size, m.phase.0);
+            }
+            for (a, place) in source.accelerations.iter().zip(&mut places) {
+                let size = a.coherence.0.min(MOST) * a.read.weights[k - 1];
+                shares[place] = Complex::from_polar(size, -a.phase.0);
             }
         }
         let correlation = |i: usize, j: usize| -> Complex<f64> {
@@ -301,8 +435,11 @@ fn apart(all: Vec<Vec<f64>>, sources: &[OneSource], way: Way) -> Vec<Vec<f64>> {
             }
             shares.iter().map(|a| a[i] * a[j].conj()).sum()
         };
-        let values: Vec<Complex<f64>> = spectra.iter().map(|z| z[k]).collect();
-        for (z, value) in spectra.iter_mut().zip(solved(&correlation, &values, way)) {
+        let of_known = read.iter().map(|a| a.read.values[k]);
+        let values = of_known.chain(spectra.iter().map(|z| z[k]));
+        let values: Vec<Complex<f64>> = values.collect();
+        let left = solved(&correlation, &values, way).into_iter().skip(known);
+        for (z, value) in spectra.iter_mut().zip(left) {
             z[k] = value;
             z[length - k] = value.conj();
         }
@@ -358,6 +495,13 @@ fn solved(
     (0..count).map(of_unit).collect()
 }
 
+/// Whether what is told by channel is one source that these feel.
+pub(crate) fn is_shared(per_channel: &BTreeMap<String, Parameters>) -> bool {
+    let names = || per_channel.keys();
+    let mut all = per_channel.values();
+    all.any(|p| names().any(|of| p.contains_key(&format!("with_{of}"))))
+}
+
 /// States in the findings of the terms of an axis what of them is another axis' too.
 pub(crate) fn state(
     findings: &mut [Finding],
@@ -370,14 +514,25 @@ pub(crate) fn state(
             continue;
         };
         let name = &searched[first.band.axis].target.name;
-        for m in others.iter().filter(|m| m.band.axis == axis) {
-            let of: Option<Parameters> = one_source::of_axis(name, m.coherence, m.phase);
+        let of_first = source.accelerations.iter();
+        let of_first = of_first.map(|a| (first, &a.name, a.coherence, a.phase, a.lr));
+        let of_others = others.iter().map(|m| (m, name, m.coherence, m.phase, m.lr));
+        let own = of_first
+            .chain(of_others)
+            .filter(|(m, ..)| m.band.axis == axis);
+        for (m, name, coherence, phase, lr) in own {
+            let of: Option<Parameters> = one_source::of_axis(name, coherence, phase);
             let finding = m.band.terms.first().and_then(|i| findings.get_mut(*i));
             let (Some(of), Some(f)) = (of, finding) else {
                 continue;
             };
             f.parameters.extend(of);
-            f.likelihood_ratio = f.likelihood_ratio.map(|lr| lr + m.lr);
+            for (name, by) in [("rms", 1.0), ("amplitude", SQRT_2)] {
+                if let (Some(p), Some(size)) = (f.parameters.get_mut(name), m.size) {
+                    p.value = by * size;
+                }
+            }
+            f.likelihood_ratio = f.likelihood_ratio.map(|own| own + lr);
             if let Some(e) = effect(&f.cause) {
                 f.what = sentence(e, &searched[axis].target.name, &f.parameters);
             }

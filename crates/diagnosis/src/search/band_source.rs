@@ -20,9 +20,11 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::envelope::law::{changes, pitch};
 use super::envelope::{Band, REACH, envelope_of, kept};
+use crate::fit::threshold;
 use crate::ingest::motion::drives;
 use crate::test_level::{CheckId, Outcome};
 use numerics::column::dot;
+use numerics::tails;
 
 /// Frequencies either side over which the energy of a residual is averaged.
 const SMOOTHED: usize = 6;
@@ -30,6 +32,8 @@ const SMOOTHED: usize = 6;
 const DEGREES: f64 = 2.0 * (2.0 * SMOOTHED as f64 + 1.0);
 /// Least part of the energy of pitch or size that has to follow: it is otherwise off by a seventh at most.
 pub(crate) const FOLLOWED: f64 = 0.02;
+/// Half widths off a band up to which what lies beside it is looked at.
+const BESIDE: f64 = 3.0 * REACH;
 /// Fewest values of the envelope.
 const LEAST: usize = 64;
 
@@ -110,6 +114,44 @@ pub(super) fn chance(
     let t = slope * own / variance.sqrt();
     let law = StudentsT::new(0.0, 1.0, DEGREES).ok()?;
     Some((2.0 * law.sf(t.abs()), slope * slope * own / all))
+}
+
+/// A peak of a channel where a band is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Standing {
+    /// Density at its top over what is beside it, and that.
+    pub height: f64,
+    pub level: f64,
+}
+
+impl Standing {
+    /// Height over the top, some half widths off it.
+    pub(crate) fn shape(off: f64) -> f64 {
+        (1.0 + off * off).recip()
+    }
+
+    /// Of energies and how many half widths they lie off the middle, each of which scatters by `spread` times its mean; none where
+    /// no peak stands out.
+    pub(crate) fn of(energies: impl Iterator<Item = (f64, f64)>, spread: f64) -> Option<Self> {
+        // Energies are a height times the shape and a level: by their sums about the middle and beside it.
+        let (mut near, mut beside) = ([0.0; 4], [0.0; 4]);
+        for (off, energy) in energies.filter(|(off, _)| off.abs() <= BESIDE) {
+            let l = Self::shape(off);
+            let sums = if off.abs() <= REACH {
+                &mut near
+            } else {
+                &mut beside
+            };
+            let each = sums.iter_mut().zip([energy, l, l * l, 1.0]);
+            each.for_each(|(sum, v)| *sum += v);
+        }
+        let determinant = near[1] * beside[3] - beside[1] * near[3];
+        let height = (near[0] * beside[3] - beside[0] * near[3]) / determinant;
+        let level = (near[1] * beside[0] - beside[1] * near[0]) / determinant;
+        let z = height / level * near[2].sqrt() / spread;
+        let stands = level > 0.0 && z > 0.0 && tails::normal_tail(z) < threshold::false_alarm();
+        stands.then_some(Self { height, level })
+    }
 }
 
 /// How a band moves.
@@ -226,7 +268,18 @@ pub(super) fn claim(
             }
         }
     }
+    let shakes = |name: &str, coefficients: &[f64]| {
+        let mut named = signals.iter().filter(|s| s.name == name);
+        // What an accelerometer reads as a peak of its own shakes both: it is no channel that the band follows.
+        let energies = coefficients.iter().enumerate().skip(1);
+        let energies = energies.map(|(k, c)| ((k as f64 - own.middle()) / own.half, c * c));
+        named.any(|s| s.quantity == Quantity::Acc)
+            && Standing::of(energies, std::f64::consts::SQRT_2).is_some()
+    };
     for (name, coefficients) in felt {
+        if shakes(name, coefficients) {
+            continue;
+        }
         let there = envelope_of(&coefficients[own.places.clone()], planner);
         let (p, part) = coherent(&own.envelope, &there, planner);
         asked += 1;

@@ -25,7 +25,7 @@ use law::{Law, Portrait};
 /// Nats within which the name stays open.
 pub(super) const OPEN: f64 = 3.0;
 /// Half widths either side of a band that belong to it: 0.9 of its energy.
-pub(super) const REACH: f64 = 6.0;
+pub(crate) const REACH: f64 = 6.0;
 /// Simulations of either kind, and the most coefficients of one.
 const RUNS: usize = 96;
 const MOST: usize = 2048;

@@ -14,6 +14,7 @@ use model::effect::{Signal, extremes};
 use model::record::Quantity;
 use model::unnamed::{Column, Domain, Unnamed};
 
+use crate::criticise::one_source;
 use crate::ingest::types::Grid;
 use crate::result::Finding;
 use crate::search::searched::Searched;
@@ -127,7 +128,7 @@ pub(crate) fn fit(
         if alone {
             all.terms.extend(of_white(s, &white, grid.rate_hz));
             all.terms.extend(of_combinations(s, grid));
-            all.terms.extend(of_signals(s, &white, grid));
+            all.terms.extend(of_signals(s, &white, grid, causes));
         }
         whites.push((s, white));
     }
@@ -145,7 +146,7 @@ fn of_pair(
     let of = |name: &String| whites.iter().find(|w| w.0.target.name == *name);
     let shares = |f: &&Finding| {
         let both = pair.iter().all(|c| f.channels.contains(c));
-        both && SHARING.contains(&f.cause.as_str())
+        both && (SHARING.contains(&f.cause.as_str()) || one_source::is_shared(&f.per_channel))
     };
     let ((a, white), (b, other)) = (of(&pair[0])?, of(&pair[1])?);
     if causes.iter().any(shares) {
@@ -197,15 +198,30 @@ fn of_spectrum(s: &Searched<'_>, found: &Spectrum, rate_hz: f64) -> Vec<Unnamed>
     tones.chain(noise).collect()
 }
 
-/// What follows the channels that were recorded beside the gyros, straight.
-fn of_signals(s: &Searched<'_>, white: &White<'_>, grid: &Grid) -> Vec<Unnamed> {
+/// What follows the channels that were recorded beside the gyros, straight, but for those that a source shakes together with the axis.
+fn of_signals(
+    s: &Searched<'_>,
+    white: &White<'_>,
+    grid: &Grid,
+    causes: &[&Finding],
+) -> Vec<Unnamed> {
     let axis = |signal: &Signal| signal.axis.is_none() || signal.axis == s.target.axis;
     let own = grid.signals.iter().filter(|signal| match signal.quantity {
         Quantity::Temp => axis(signal),
         Quantity::Supply | Quantity::Acc | Quantity::Pwm => true,
         _ => false,
     });
-    let terms = own.filter_map(|signal| {
+    let shaken = |signal: &&Signal| {
+        let of = format!("with_{}", signal.name);
+        let mut causes = causes
+            .iter()
+            .filter(|f| f.channels.contains(&s.target.name));
+        causes.any(|f| {
+            let mut each = f.per_channel.values().chain([&f.parameters]);
+            each.any(|p| p.contains_key(&of))
+        })
+    };
+    let terms = own.filter(|signal| !shaken(signal)).filter_map(|signal| {
         let values: &[f64] = &signal.smooth;
         let slope = white.slope_over(values)?;
         let n = values.len() as f64;

@@ -144,12 +144,13 @@ impl Effect for NarrowBand {
             value(parameters, "center_frequency"),
         );
         let (width, skew) = (value(parameters, "bandwidth"), value(parameters, "skew"));
-        let is_shared = one_source::is_of_another(parameters);
+        let of_accelerometers = simulation.of_accelerometers;
+        let is_shared = one_source::is_of_another(parameters, of_accelerometers);
         for &axis in channels {
-            let split = simulation.split(axis, centre, parameters);
+            let split = simulation.split(axis, [centre, width], parameters);
             let own = rms * split.own;
+            let unit = rms.max(f64::MIN_POSITIVE);
             let mut turning = Vec::new();
-            let unit = own.max(f64::MIN_POSITIVE);
             let seen = |z: [f64; 2]| {
                 if !is_shared {
                     turning.push(z.map(|v| v / unit));
@@ -161,10 +162,7 @@ impl Effect for NarrowBand {
                 let of = Resonator::new(centre, width, skew, simulation.rate_hz);
                 simulation.add_resonator(axis, own, &of, seen);
             }
-            split.add(rms, &mut simulation.rate[axis]);
-            if !is_shared {
-                simulation.keep_felt(axis, centre, turning);
-            }
+            simulation.add_shared(axis, [rms, centre, width], &split, turning);
         }
     }
 

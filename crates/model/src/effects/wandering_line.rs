@@ -130,13 +130,13 @@ impl Effect for WanderingLine {
             value(parameters, "amplitude"),
             value(parameters, "center_frequency"),
         );
-        let step = (TAU * value(parameters, "linewidth") / simulation.rate_hz)
-            .max(0.0)
-            .sqrt();
+        let width = value(parameters, "linewidth");
+        let step = (TAU * width / simulation.rate_hz).max(0.0).sqrt();
         let turn = TAU * centre / simulation.rate_hz;
-        let is_shared = one_source::is_of_another(parameters);
+        let of_accelerometers = simulation.of_accelerometers;
+        let is_shared = one_source::is_of_another(parameters, of_accelerometers);
         for &axis in channels {
-            let split = simulation.split(axis, centre, parameters);
+            let split = simulation.split(axis, [centre, width], parameters);
             let own = amplitude * split.own;
             let mut turning = Vec::new();
             let mut phase = Uniform::new(-PI, PI).map_or(0.0, |u| u.sample(&mut simulation.rng));
@@ -144,15 +144,15 @@ impl Effect for WanderingLine {
                 let (sin, cos) = phase.sin_cos();
                 simulation.rate[axis][i] += own * cos;
                 if !is_shared {
-                    turning.push([cos, sin]);
+                    turning.push([cos, sin].map(|v| split.own * v));
                 }
                 let by: f64 = StandardNormal.sample(&mut simulation.rng);
                 phase += turn + step * by;
             }
-            split.add(amplitude, &mut simulation.rate[axis]);
-            if !is_shared {
-                simulation.keep_felt(axis, centre, turning);
-            }
+            // Its standard deviation, and quadratures over that.
+            let rms = amplitude / SQRT_2;
+            turning.iter_mut().for_each(|z| *z = z.map(|v| SQRT_2 * v));
+            simulation.add_shared(axis, [rms, centre, width], &split, turning);
         }
     }
 

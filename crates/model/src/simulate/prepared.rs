@@ -95,6 +95,8 @@ impl Prepared {
         rng: Xoshiro256PlusPlus,
     ) -> Result<Self, SimulateError> {
         let mut run = started(world, rate_hz, rng);
+        let names = model.channels.iter().map(|c| c.name.as_str());
+        run.of_accelerometers = names.clone().any(|n| BANKS[1].contains(&n));
         let (mut present, mut lsb, mut walk) = ([false; 3], [None; 3], [0.0; 3]);
         for channel in &model.channels {
             let axis = axis_of(channel)?;
@@ -120,7 +122,8 @@ impl Prepared {
             .into_iter()
             .partition(|a| a.effect.stage() < Stage::Output);
         // What an axis feels of another's oscillation comes after that.
-        early.sort_by_key(|a| (a.effect.stage(), is_of_another(&a.parameters)));
+        let behind = |a: &Acting| is_of_another(&a.parameters, run.of_accelerometers);
+        early.sort_by_key(|a| (a.effect.stage(), behind(a)));
         // What the base does is an input of the run: the same each time, even where it is random.
         let again = |a: &Acting| a.effect.stage() != Stage::World && a.draws(rate_hz);
         let (random, once): (Vec<_>, Vec<_>) = early.into_iter().partition(again);
@@ -415,6 +418,7 @@ fn started(world: World, rate_hz: f64, rng: Xoshiro256PlusPlus) -> Simulation {
         scale: [1.0; 3],
         rate: std::array::from_fn(|_| vec![0.0; samples]),
         felt: vec![],
+        of_accelerometers: false,
         white_sigma: [0.0; 3],
         rounding: [0.0; 3],
         shared: Default::default(),
