@@ -192,9 +192,7 @@ fn name_all(
     };
     let mut of_terms = on_two_threads(&mut *searched, |s| term_findings(s, grid, seed));
     let searched = &*searched;
-    for (axis, of_axis) in of_terms.iter_mut().enumerate() {
-        one_source::state(of_axis, axis, searched, &tested.sources);
-    }
+    one_source::state(&mut of_terms, searched, &tested.sources, grid.rate_hz);
     let name = |named, (s, of_terms)| {
         name_channel(
             named,

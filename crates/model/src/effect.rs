@@ -35,6 +35,18 @@ pub struct ParameterSpec {
     pub detail: bool,
 }
 
+/// Standard errors within which values on two channels are one: by chance 1 in 16 000 of such pairs lie farther apart.
+const ONE: f64 = 4.0;
+
+/// Whether a value is the same on two channels, which both state it, within their errors.
+pub(crate) fn agree(a: &Parameters, b: &Parameters, name: &str) -> bool {
+    let (Some(a), Some(b)) = (a.get(name), b.get(name)) else {
+        return false;
+    };
+    let error = a.std_error.unwrap_or(0.0).hypot(b.std_error.unwrap_or(0.0));
+    (a.value - b.value).abs() <= ONE * error
+}
+
 /// Shorthand for a required parameter.
 #[must_use]
 pub const fn parameter(

@@ -102,7 +102,7 @@ pub struct Felt {
 }
 
 /// Half widths to either side of an oscillation at which the noise beside it is read.
-const BESIDE: f64 = 12.0;
+const BESIDE: f64 = 30.0;
 /// Least white noise beside an oscillation, over its variance: its skirts hide less.
 const LEAST_NOISE: f64 = 1e-3;
 

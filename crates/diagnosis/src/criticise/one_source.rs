@@ -5,7 +5,7 @@
 //! values over all frequencies (Whittle). What axes share beside that is asked of what a common source leaves of each ([`Way`]).
 
 use std::collections::BTreeMap;
-use std::f64::consts::SQRT_2;
+use std::f64::consts::{SQRT_2, TAU};
 
 use model::effect::{Parameters, Signal};
 use model::effects::effect;
@@ -48,8 +48,6 @@ struct Member {
     lr: f64,
     /// Its part of the standard deviation at each frequency.
     weights: Vec<f64>,
-    /// Its standard deviation by what accelerometers read of the source, where they do.
-    size: Option<f64>,
 }
 
 /// An accelerometer that feels a source.
@@ -69,39 +67,26 @@ pub(crate) struct OneSource {
 }
 
 impl OneSource {
-    /// How large the band of each axis is by what accelerometers read: they know how large the source was in this record, and a band by
-    /// itself only what it may have been. Generalised least squares of the residual on that, as a simulation makes it.
-    fn size(&mut self, searched: &[Searched<'_>], planner: &mut FftPlanner<f64>) {
-        let Some(first) = self.members.first() else {
-            return;
-        };
-        let signals = searched[first.band.axis].search.view.signals.iter();
+    /// The coherence at which the first band of a standard deviation, centre and half width in rad per sample, is what a simulation makes
+    /// of the accelerometers' readings: those know how large the source was in this record. Generalised least squares of the residual.
+    fn as_simulated(&self, s: &Searched<'_>, [rms, omega, half_width]: [f64; 3]) -> Option<f64> {
+        let signals = s.search.view.signals.iter();
         let read = self.accelerations.iter().filter_map(|a| {
             let own = signals.clone().find(|s| s.name == a.name)?;
             Some((own.values.as_slice(), a.phase.0))
         });
-        let read: Vec<(&[f64], f64)> = read.collect();
-        let Some(z) = one_source::read(&read, first.band.omega, first.band.half_width) else {
-            return;
-        };
-        let z = transformed(&z, planner);
-        let coherences = self.accelerations.iter().map(|a| a.coherence.0);
-        let of_first = coherences.sum::<f64>() / self.accelerations.len() as f64;
-        for m in &mut self.members {
-            let s = &searched[m.band.axis];
-            let white = s.state.solution.white;
-            let g = s.state.noise.through(frequencies(s.e.len()));
-            let own = transformed(&s.e, planner);
-            let each = z[1..].iter().zip(&own[1..]).zip(g);
-            let (product, square) = each.fold(
-                (Complex::<f64>::default(), 0.0),
-                |(product, square), ((z, e), g)| {
-                    let x = z / (white * g).sqrt();
-                    (product + x.conj() * e, square + x.norm_sqr())
-                },
-            );
-            m.size = Some(product.norm() / square / (of_first * m.coherence.0));
+        let z = one_source::read(&read.collect::<Vec<_>>(), omega, half_width)?;
+        let planner = &mut FftPlanner::new();
+        let (z, own) = (transformed(&z, planner), transformed(&s.e, planner));
+        let g = s.state.noise.through(frequencies(s.e.len()));
+        let each = z[1..].iter().zip(&own[1..]).zip(g);
+        let (mut product, mut square) = (Complex::<f64>::default(), 0.0);
+        for ((z, e), g) in each {
+            let x = z / (s.state.solution.white * g).sqrt();
+            product += x.conj() * e;
+            square += x.norm_sqr();
         }
+        Some((product.norm() / square / rms).min(1.0))
     }
 }
 
@@ -317,7 +302,6 @@ pub(crate) fn found(searched: &[Searched<'_>]) -> Vec<OneSource> {
                     phase,
                     lr,
                     weights,
-                    size: None,
                 });
             }
         }
@@ -330,16 +314,12 @@ pub(crate) fn found(searched: &[Searched<'_>]) -> Vec<OneSource> {
                 phase: (0.0, 0.0),
                 lr: 0.0,
                 weights: of_first,
-                size: None,
             };
             let members = std::iter::once(first).chain(others).collect();
             all.push(OneSource {
                 members,
                 accelerations,
             });
-            if let Some(source) = all.last_mut() {
-                source.size(searched, &mut planner);
-            }
         }
     }
     all
@@ -502,36 +482,45 @@ pub(crate) fn is_shared(per_channel: &BTreeMap<String, Parameters>) -> bool {
     all.any(|p| names().any(|of| p.contains_key(&format!("with_{of}"))))
 }
 
-/// States in the findings of the terms of an axis what of them is another axis' too.
+/// States in the findings of the terms of each axis what of them is another axis' too.
 pub(crate) fn state(
-    findings: &mut [Finding],
-    axis: usize,
+    of_terms: &mut [Vec<Finding>],
     searched: &[Searched<'_>],
     sources: &[OneSource],
+    rate_hz: f64,
 ) {
     for source in sources {
         let Some((first, others)) = source.members.split_first() else {
             continue;
         };
-        let name = &searched[first.band.axis].target.name;
-        let of_first = source.accelerations.iter();
-        let of_first = of_first.map(|a| (first, &a.name, a.coherence, a.phase, a.lr));
-        let of_others = others.iter().map(|m| (m, name, m.coherence, m.phase, m.lr));
-        let own = of_first
-            .chain(of_others)
-            .filter(|(m, ..)| m.band.axis == axis);
-        for (m, name, coherence, phase, lr) in own {
+        let of_first = &searched[first.band.axis];
+        let found = (first.band.terms.first()).and_then(|i| of_terms[first.band.axis].get(*i));
+        let value = |name: &str| found?.parameters.get(name).map(|p| p.value);
+        let to_omega = TAU / rate_hz;
+        let described = value("rms")
+            .or(value("amplitude").map(|a| a / SQRT_2))
+            .zip(value("center_frequency").zip(value("bandwidth").or(value("linewidth"))));
+        let simulated = described.and_then(|(rms, (center, width))| {
+            source.as_simulated(of_first, [rms, to_omega * center, 0.5 * to_omega * width])
+        });
+        let read = source.accelerations.iter().map(|a| {
+            let coherence = (simulated.unwrap_or(a.coherence.0), a.coherence.1);
+            (first, &a.name, coherence, a.phase, a.lr)
+        });
+        let name = &of_first.target.name;
+        let felt = others.iter().map(|m| (m, name, m.coherence, m.phase, m.lr));
+        for (m, name, coherence, phase, lr) in read.chain(felt) {
             let of: Option<Parameters> = one_source::of_axis(name, coherence, phase);
-            let finding = m.band.terms.first().and_then(|i| findings.get_mut(*i));
+            let axis = m.band.axis;
+            let finding = m
+                .band
+                .terms
+                .first()
+                .and_then(|i| of_terms[axis].get_mut(*i));
             let (Some(of), Some(f)) = (of, finding) else {
                 continue;
             };
             f.parameters.extend(of);
-            for (name, by) in [("rms", 1.0), ("amplitude", SQRT_2)] {
-                if let (Some(p), Some(size)) = (f.parameters.get_mut(name), m.size) {
-                    p.value = by * size;
-                }
-            }
             f.likelihood_ratio = f.likelihood_ratio.map(|own| own + lr);
             if let Some(e) = effect(&f.cause) {
                 f.what = sentence(e, &searched[axis].target.name, &f.parameters);

@@ -134,21 +134,23 @@ impl Standing {
     /// no peak stands out.
     pub(crate) fn of(energies: impl Iterator<Item = (f64, f64)>, spread: f64) -> Option<Self> {
         // Energies are a height times the shape and a level: by their sums about the middle and beside it.
-        let (mut near, mut beside) = ([0.0; 4], [0.0; 4]);
+        let (mut near, mut beside) = ([0.0; 3], [0.0; 3]);
         for (off, energy) in energies.filter(|(off, _)| off.abs() <= BESIDE) {
-            let l = Self::shape(off);
             let sums = if off.abs() <= REACH {
                 &mut near
             } else {
                 &mut beside
             };
-            let each = sums.iter_mut().zip([energy, l, l * l, 1.0]);
+            let each = sums.iter_mut().zip([energy, Self::shape(off), 1.0]);
             each.for_each(|(sum, v)| *sum += v);
         }
-        let determinant = near[1] * beside[3] - beside[1] * near[3];
-        let height = (near[0] * beside[3] - beside[0] * near[3]) / determinant;
-        let level = (near[1] * beside[0] - beside[1] * near[0]) / determinant;
-        let z = height / level * near[2].sqrt() / spread;
+        // What of each sum about the middle is more than that beside it.
+        let share = near[2] / beside[2];
+        let more = |k: usize| near[k] - share * beside[k];
+        let height = more(0) / more(1);
+        let level = (beside[0] - height * beside[1]) / beside[2];
+        let error = spread * level * (near[2] * (1.0 + share)).sqrt() / more(1);
+        let z = height / error;
         let stands = level > 0.0 && z > 0.0 && tails::normal_tail(z) < threshold::false_alarm();
         stands.then_some(Self { height, level })
     }

@@ -1,8 +1,8 @@
 //! Readings that were rounded twice, to different steps.
 
 use crate::effect::{
-    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, detail,
-    optional, parameter, value,
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, agree,
+    detail, optional, parameter, value,
 };
 use crate::simulate::{SensorStep, Simulation};
 
@@ -127,6 +127,10 @@ impl Effect for DoubleRounding {
         } else {
             1.0
         }
+    }
+
+    fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
+        agree(a, b, "sensor_step")
     }
 
     fn stage(&self) -> Stage {

@@ -2,7 +2,7 @@
 
 use crate::effect::{
     Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
-    optional, parameter, value,
+    agree, optional, parameter, value,
 };
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
@@ -101,11 +101,7 @@ impl Effect for Line {
     }
 
     fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
-        let (Some(a), Some(b)) = (a.get("frequency"), b.get("frequency")) else {
-            return false;
-        };
-        let error = a.std_error.unwrap_or(0.0).hypot(b.std_error.unwrap_or(0.0));
-        (a.value - b.value).abs() <= 4.0 * error
+        agree(a, b, "frequency")
     }
 
     fn stage(&self) -> Stage {

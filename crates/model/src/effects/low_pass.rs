@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::effect::{
     Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters, Plot, Rival,
-    Stage, View, detail, optional, parameter, value,
+    Stage, View, agree, detail, optional, parameter, value,
 };
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
@@ -151,6 +151,10 @@ impl Effect for LowPass {
             ("pole".to_owned(), pole)
         });
         fixed.chain([size]).chain(pole).collect()
+    }
+
+    fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
+        agree(a, b, "lag1_correlation")
     }
 
     fn stage(&self) -> Stage {

@@ -2,7 +2,7 @@
 
 use crate::effect::{
     Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage,
-    VarianceLaw, View, parameter, value,
+    VarianceLaw, View, agree, parameter, value,
 };
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
@@ -76,6 +76,10 @@ impl Effect for NoiseChange {
             all.insert((*name).into(), Parameter::estimated(at.0, at.1, "s"));
         }
         all
+    }
+
+    fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
+        agree(a, b, "start") && agree(a, b, "end")
     }
 
     fn stage(&self) -> Stage {

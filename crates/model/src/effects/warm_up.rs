@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::effect::{
     Column, Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival,
-    Shape, Stage, View, parameter, value,
+    Shape, Stage, View, agree, parameter, value,
 };
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
@@ -88,6 +88,10 @@ impl Effect for WarmUp {
             );
         }
         all
+    }
+
+    fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
+        agree(a, b, "time_constant")
     }
 
     fn stage(&self) -> Stage {
