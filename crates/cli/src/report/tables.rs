@@ -151,6 +151,7 @@ fn finding(found: &Finding) -> Markup {
                     }
                 }
             }
+            @if let Some(elsewhere) = answer::elsewhere(found) { p { (elsewhere) } }
             @if !found.alternatives.is_empty() {
                 p.warning {
                     "This run cannot tell it from: "

@@ -1,7 +1,10 @@
 //! A finding in sentences for a person: what it is and how large, what it costs to leave it out, what is still open.
 
+use std::collections::BTreeSet;
+
 use diagnosis::result::{Finding, Parameter, Unexplained};
-use model::effects::effect;
+use model::effect::Parameters;
+use model::effects::{correlated_noise, effect};
 
 use crate::report::plot::{fixed, number, tidy};
 pub use crate::text::cost::{consequence_of, cost};
@@ -57,6 +60,69 @@ pub fn headline(finding: &Finding) -> String {
             sizes.join("; ")
         ),
     }
+}
+
+/// What a cause of several channels is on the others, where that is not what it is on the first; and what feels the same.
+#[must_use]
+pub fn elsewhere(finding: &Finding) -> Option<String> {
+    let said: Vec<String> = [on_others(finding), felt(finding)]
+        .into_iter()
+        .flatten()
+        .collect();
+    (!said.is_empty()).then(|| said.join(" "))
+}
+
+/// Sizes on the channels after the first that are not those on it.
+fn on_others(finding: &Finding) -> Option<String> {
+    let (first, others) = finding.channels.split_first()?;
+    let own = finding.per_channel.get(first)?;
+    let names: Vec<&String> = named(finding).into_iter().map(|(name, _)| name).collect();
+    let apart = |name: &str, p: &Parameters| match (own.get(name), p.get(name)) {
+        (Some(a), Some(b)) => {
+            let error = a.std_error.unwrap_or(0.0).hypot(b.std_error.unwrap_or(0.0));
+            (a.value - b.value).abs() > HALF_WIDTH_95 * error
+        }
+        _ => false,
+    };
+    let of = |channel: &String| {
+        let p = finding.per_channel.get(channel)?;
+        let sizes = names.iter().filter(|name| apart(name, p));
+        let sizes = sizes.map(|name| {
+            let size = found_size(&finding.cause, name, &p[*name]);
+            format!("{} {size}", name.replace('_', " "))
+        });
+        let sizes: Vec<String> = sizes.collect();
+        (!sizes.is_empty()).then(|| format!("on {channel} {}", sizes.join(", ")))
+    };
+    let sizes: Vec<String> = others.iter().filter_map(of).collect();
+    (!sizes.is_empty()).then(|| format!("That is on {first}; {}.", sizes.join("; ")))
+}
+
+/// Of an oscillation: that one source makes it, and what reads that too.
+fn felt(finding: &Finding) -> Option<String> {
+    if finding.cause == correlated_noise::ID {
+        return None;
+    }
+    let all = finding.per_channel.values().chain([&finding.parameters]);
+    let all = all.flatten();
+    let all = all.filter_map(|(name, p)| Some((name.strip_prefix("with_")?, p.value)));
+    let all: Vec<(&str, f64)> = all.collect();
+    let least = all.iter().map(|(_, v)| *v).reduce(f64::min)?;
+    let is_other = |name: &&str| !finding.channels.iter().any(|c| c == name);
+    let others: BTreeSet<&str> = all.iter().map(|(name, _)| *name).filter(is_other).collect();
+    let others: Vec<&str> = others.into_iter().collect();
+    let shaken = match finding.channels.len() {
+        1 => "it",
+        _ => "them",
+    };
+    let read = match others.is_empty() {
+        true => String::new(),
+        false => format!(", which {} read too", others.join(", ")),
+    };
+    let least = without_error(least);
+    Some(format!(
+        "One source shakes {shaken}{read}: coherence {least} and more."
+    ))
 }
 
 /// The cause, where it acts and how large it is, in a few words.
@@ -333,6 +399,29 @@ mod tests {
             "{}",
             headline(&f)
         );
+    }
+
+    #[test]
+    fn what_is_otherwise_on_other_channels_is_said_and_what_feels_the_same() {
+        let sizes = |rms: f64, with: &str| {
+            let error = Some(0.001);
+            let all = [("rms", rms, error, "deg/s"), (with, 0.97, error, "1")];
+            finding("narrow_band", &all).parameters
+        };
+        let mut f = Finding {
+            parameters: sizes(0.03, "with_acc_y"),
+            ..finding("narrow_band", &[])
+        };
+        let alone = "One source shakes it, which acc_y read too: coherence 0.97 and more.";
+        assert_eq!(elsewhere(&f).as_deref(), Some(alone));
+        f.channels.push("gyro_z".into());
+        f.per_channel = BTreeMap::from([
+            ("gyro_x".to_owned(), f.parameters.clone()),
+            ("gyro_z".to_owned(), sizes(0.05, "with_gyro_x")),
+        ]);
+        let both = "That is on gyro_x; on gyro_z rms 0.0500 deg/s (95\u{a0}%: 0.0480 to 0.0520). One source shakes them, which acc_y read too: coherence 0.97 and more.";
+        assert_eq!(elsewhere(&f).as_deref(), Some(both));
+        assert_eq!(elsewhere(&finding("temperature", &[])), None);
     }
 
     #[test]

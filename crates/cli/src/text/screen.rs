@@ -35,6 +35,7 @@ pub fn diagnosis(diagnosed: &Diagnosed) -> String {
     for (k, finding) in material.iter().enumerate() {
         let _ = writeln!(out, "\n{:>2}. {}", k + 1, lead(&answer::headline(finding)));
         let lines = [
+            answer::elsewhere(finding),
             answer::cost(finding),
             remedy(&material, k),
             answer::open_question(finding),
