@@ -3,6 +3,7 @@
 use model::effects;
 use model::record::{Axis, Record, flag};
 
+use super::repeats::beat;
 use super::runs::Runs;
 use super::{Audit, Gyro, counted};
 use crate::test_level::{CheckId, Observation};
@@ -184,6 +185,8 @@ fn flags(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut Audit) {
         let mut finding = counted(effects::stale_samples::ID, names, count, None, &times, what);
         let runs = Runs::new(&rows, 0.0, flags.len()).running();
         finding.parameters.insert("running".into(), runs);
+        let rate = beat::sensor_rate(&rows, 0.0, at);
+        (finding.parameters).extend(rate.map(|rate| ("sensor_rate".into(), rate)));
         audit.findings.push(finding);
     }
 }

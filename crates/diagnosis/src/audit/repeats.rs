@@ -5,6 +5,7 @@
 //! and however alike neighbours are. Where the noise is below a count, pairs farther apart tell the share instead. Three
 //! gyros agree with the product of theirs: (1 / (2 sqrt(pi) sigma))^3 for white noise of sigma counts.
 
+pub(super) mod beat;
 mod near;
 
 use std::f64::consts::SQRT_2;
@@ -323,6 +324,8 @@ impl<'a> Readings<'a> {
         let runs = Runs::new(&repeated, expected, self.rows);
         let mut finding = counted(cause, names, runs.stalled().round(), error, &times, what);
         finding.parameters.insert("running".into(), runs.running());
+        let rate = beat::sensor_rate(&repeated, expected, at);
+        (finding.parameters).extend(rate.map(|rate| ("sensor_rate".into(), rate)));
         if record.flags.is_some() {
             finding.what.push_str("; the new-data flags do not tell");
         }

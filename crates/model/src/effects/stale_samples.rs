@@ -17,6 +17,9 @@ pub const ID: &str = "stale_samples";
 /// The one instance that the library lists.
 pub static EFFECT: StaleSamples = StaleSamples;
 
+/// Draws of a place for a run of stale frames, for each frame of a record.
+const DRAWN: usize = 8;
+
 impl Effect for StaleSamples {
     fn id(&self) -> &'static str {
         ID
@@ -31,6 +34,11 @@ impl Effect for StaleSamples {
                 "such frames in a row, on the average; 1 where it is left out",
             ),
             optional("silent", "1", "1 where the new-data flags do not tell"),
+            optional(
+                "sensor_rate",
+                "Hz",
+                "rate at which the sensor renews its readings, below that of the frames; frames then repeat as evenly as the beat of both lays them. Left out, they do at random",
+            ),
         ];
         PARAMETERS
     }
@@ -38,7 +46,7 @@ impl Effect for StaleSamples {
     fn docs(&self) -> Docs {
         Docs {
             title: "Stale samples",
-            physics: "A frame repeats the readings of the frame before: the sensor was read before it had a new sample, or a buffer was sent twice.",
+            physics: "A frame repeats the readings of the frame before: the sensor was read before it had a new sample, as one is all the time that renews its readings more slowly than frames come; or a buffer was sent twice.",
             excitation: "Nothing.",
             test: "Audit: new-data flags, and frames with all gyros equal to the frame before against their chance.",
             remedy: "Read on the sensor's data-ready signal, or read more slowly, and skip frames whose new-data flag is not set.",
@@ -64,25 +72,45 @@ impl Effect for StaleSamples {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        let count = simulation.events(value(parameters, "count").round().max(0.0) as usize);
         let silent = value(parameters, "silent") != 0.0;
+        let repeat = |simulation: &mut Simulation, i: usize| {
+            for &axis in channels {
+                simulation.counts[axis][i] = simulation.counts[axis][i - 1];
+                if !silent {
+                    simulation.flags[i] &= !(1 << axis);
+                }
+            }
+        };
+        let renewed = value(parameters, "sensor_rate") / simulation.rate_hz;
+        if renewed > 0.0 && renewed < 1.0 {
+            let phase = Uniform::new(0.0, 1.0).map_or(0.0, |u| u.sample(&mut simulation.rng));
+            let reading = |i: usize| (i as f64 * renewed + phase).floor();
+            for i in (1..simulation.samples).filter(|i| reading(*i) == reading(*i - 1)) {
+                repeat(simulation, i);
+            }
+            return;
+        }
+        let count = simulation.events(value(parameters, "count").round().max(0.0) as usize);
         let Ok(at) = Uniform::new(1, simulation.samples.max(2)) else {
             return;
         };
         let running = parameters.get("running").map_or(1.0, |p| p.value).max(1.0);
-        let mut done = 0.0;
-        while done < count as f64 {
+        let mut stale = vec![false; simulation.samples];
+        // Of many some fall on others: drawn anew, so often that all find a place.
+        let (mut done, mut drawn) = (0.0, 0);
+        while done < count as f64 && drawn < DRAWN * simulation.samples {
+            drawn += 1;
             let first = at.sample(&mut simulation.rng).min(simulation.samples - 1);
             // As many as make the average right by then.
             let frames = ((done / running).floor() + 1.0) * running - done;
             let frames = (frames.round() as usize).clamp(1, count - done as usize);
-            for i in first..(first + frames).min(simulation.samples) {
-                for &axis in channels {
-                    simulation.counts[axis][i] = simulation.counts[axis][i - 1];
-                    if !silent {
-                        simulation.flags[i] &= !(1 << axis);
-                    }
-                }
+            let run = first..(first + frames).min(simulation.samples);
+            if stale[run.clone()].iter().any(|s| *s) {
+                continue;
+            }
+            for i in run {
+                stale[i] = true;
+                repeat(simulation, i);
             }
             done += frames as f64;
         }
