@@ -355,11 +355,11 @@ mod tests {
 
     #[test]
     fn an_oscillation_is_read_from_noise_as_well_as_its_height_lets_it() {
-        let (omega, half, n) = (1.1, 0.005, 200_000);
+        let (omega, half, n) = (1.1f64, 0.005f64, 200_000);
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let kept = (-half as f64).exp();
-        let (sin, cos) = (omega as f64).sin_cos();
+        let kept = (-half).exp();
+        let (sin, cos) = omega.sin_cos();
         let driven = (1.0 - kept * kept).sqrt();
         let mut z = [normal(), normal()];
         let true_z: Vec<[f64; 2]> = (0..n)

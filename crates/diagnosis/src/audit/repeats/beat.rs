@@ -30,7 +30,7 @@ pub(in crate::audit) fn sensor_rate(
     } else {
         (repeated, count / all)
     };
-    if few.len() < FEWEST || !(share > 0.0) || !rate_hz.is_finite() {
+    if few.len() < FEWEST || share <= 0.0 || !rate_hz.is_finite() {
         return None;
     }
     let mean = share.recip();
