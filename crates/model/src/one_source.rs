@@ -42,16 +42,16 @@ const fn phase(axis: usize) -> ParameterSpec {
 /// The parameters that say what an oscillation has in common with that of another axis.
 pub(crate) const PARAMETERS: [ParameterSpec; 12] = [
     coherence(0),
-    phase(0),
     coherence(1),
-    phase(1),
     coherence(2),
-    phase(2),
     coherence(3),
-    phase(3),
     coherence(4),
-    phase(4),
     coherence(5),
+    phase(0),
+    phase(1),
+    phase(2),
+    phase(3),
+    phase(4),
     phase(5),
 ];
 

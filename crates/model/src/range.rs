@@ -101,6 +101,7 @@ pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
         ("dwell_time", _) => range(1.0 / (SWITCHES_A_SAMPLE * rate_hz), LONGEST),
         ("time_constant" | "correlation_time" | "surge_time", _) => POSITIVE,
         ("sigma" | "rms" | "size" | "spread" | "bias_instability", _) => SIZE,
+        (name, _) if name.starts_with("with_") => range(-1.0, 1.0),
         (name, _) if name.starts_with("cepstrum_") => range(-MOST_CEPSTRUM, MOST_CEPSTRUM),
         ("delay", _) | (_, "Hz") => range(0.0, LONGEST),
         (_, "s") => range(-LONGEST, LONGEST),

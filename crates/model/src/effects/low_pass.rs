@@ -90,7 +90,7 @@ impl Effect for LowPass {
             excitation: "Nothing.",
             test: "White noise shaped by one pole, by one pole behind a window that is shorter than a sample, by a triangular window, or by a filter of any smooth shape that passes the slow best and stops some frequency; refitted by maximum likelihood.",
             remedy: "Simulate white noise through this filter, and take fewer taps, or a lower sample rate, if the filter has to see white noise.",
-            figure: "Spectrum of the rate with the model before and after: it falls towards half the sample rate.",
+            figure: "Spectrum of the rate with the model before and after: what the filter takes away.",
             example: Example::new(Plot::Spectrum, &[("lag1_correlation", 0.5)]),
         }
     }
