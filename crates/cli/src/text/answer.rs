@@ -80,7 +80,7 @@ fn on_others(finding: &Finding) -> Option<String> {
     let apart = |name: &str, p: &Parameters| match (own.get(name), p.get(name)) {
         (Some(a), Some(b)) => {
             let error = a.std_error.unwrap_or(0.0).hypot(b.std_error.unwrap_or(0.0));
-            (a.value - b.value).abs() > HALF_WIDTH_95 * error
+            a.unit != b.unit || (a.value - b.value).abs() > HALF_WIDTH_95 * error
         }
         _ => false,
     };

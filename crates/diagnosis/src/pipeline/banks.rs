@@ -6,6 +6,7 @@
 //! moves the base moves them, and is no error of theirs: a line, a band or a step of an accelerometer has a motion of the base
 //! for its rival, and they are diagnosed at rest only.
 
+use model::effects::effect;
 use model::effects::{
     am_line, base_motion, bias_step, common_noise, correlated_noise, gauss_markov, line, low_pass,
     narrow_band, noise_change, rate_ramp, shock, wandering_line,
@@ -190,7 +191,11 @@ fn joined(mut first: Diagnosed, second: Diagnosed) -> Diagnosed {
     let new = other.not_tested.into_iter().filter(|n| !known.contains(n));
     d.not_tested.extend(new);
     for f in other.findings {
-        match d.findings.iter_mut().find(|own| is_one_shock(own, &f)) {
+        match d
+            .findings
+            .iter_mut()
+            .find(|own| is_one_shock(own, &f) || shakes_both(own, &f))
+        {
             Some(own) => felt_too(own, f),
             None => d.findings.push(f),
         }
@@ -226,6 +231,16 @@ fn is_one_shock(a: &Finding, b: &Finding) -> bool {
         }
         _ => false,
     }
+}
+
+/// Whether what an oscillation of the gyros is read by, as it says, is that of accelerometers.
+fn shakes_both(gyros: &Finding, accelerometers: &Finding) -> bool {
+    let of = |channel: &String| format!("with_{channel}");
+    let mut read = accelerometers.channels.iter().map(of);
+    gyros.cause == accelerometers.cause
+        && read.any(|of| gyros.parameters.contains_key(&of))
+        && effect(&gyros.cause)
+            .is_some_and(|e| e.same_event(&gyros.parameters, &accelerometers.parameters))
 }
 
 /// Adds the channels of one finding to another of the same event.
