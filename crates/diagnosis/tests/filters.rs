@@ -130,3 +130,49 @@ fn statistical_filters_of_any_kind_are_named_and_the_noise_before_them_is_told()
     // Of 24 intervals of 95 %, fewer than 18 hold the truth less than once in a thousand; of 8 fewer than 4.
     assert!(held + 3 + asked / 8 >= asked, "{held} of {asked}");
 }
+
+/// Readings of 20 Hz: white noise, and an angle's error of standard deviation q differenced, normal or that of a rounding.
+fn differenced(normal: bool, sigma: f64, q: f64, rng: &mut Rng) -> Vec<f64> {
+    let half_step = 3f64.sqrt() * q;
+    let rounding = Uniform::new_inclusive(-half_step, half_step).expect("a range");
+    let error = |rng: &mut Rng| -> f64 {
+        let z: f64 = StandardNormal.sample(rng);
+        if normal { q * z } else { rounding.sample(rng) }
+    };
+    let mut before = error(rng);
+    let mut read = || {
+        let z: f64 = StandardNormal.sample(rng);
+        let now = error(rng);
+        let rate = sigma * z + (now - before) * 20.0;
+        before = now;
+        (rate / 0.005).round() * 0.005
+    };
+    (0..12_000).map(|_| read()).collect()
+}
+
+#[test]
+fn statistical_the_law_of_an_angles_error_is_in_the_model() {
+    let mut rng = Rng::seed_from_u64(0x616e_676c_65);
+    let options = DiagnoseOptions {
+        replicates: 99,
+        ..DiagnoseOptions::default()
+    };
+    let graded = draws::graded(12, 10, |draw| {
+        let normal = draw % 2 == 0;
+        let sigma = between(&mut rng, 0.1, 0.3);
+        // The larger part of the variance of the readings.
+        let q = sigma / 20.0 * between(&mut rng, 1.0, 3.0);
+        let record = white::gyros(20.0, |axis| match axis {
+            0 => differenced(normal, sigma, q, &mut rng),
+            _ => differenced(true, sigma, 0.0, &mut rng),
+        });
+        let d = diagnose(&record, &options).expect("a diagnosis").diagnosis;
+        let found = d.findings.iter().find(|f| f.cause == "quantization_noise");
+        let told = found.is_some_and(|f| f.parameters.contains_key("normal") == normal);
+        let after = &d.replicates["gyro_x"].after;
+        (told && after.p_value > 0.01)
+            .then_some(())
+            .ok_or_else(|| format!("normal {normal}, {sigma:.3}, {q:.5}: {found:?} {after:?}"))
+    });
+    assert!(graded.is_ok(), "{}", graded.unwrap_err());
+}

@@ -94,7 +94,7 @@ pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
         ("count" | "clipped", _) => range(0.0, MOST_SAMPLES),
         ("running", _) => range(1.0, MOST_SAMPLES),
         ("bit" | "missing_bits", _) => whole(0.0, HIGHEST_BIT),
-        ("value" | "by_magnitude" | "triangular" | "silent", _) => whole(0.0, 1.0),
+        ("value" | "by_magnitude" | "triangular" | "silent" | "normal", _) => whole(0.0, 1.0),
         ("fraction" | "upward", _) => range(0.0, 1.0),
         ("lag1_correlation" | "skew", _) => range(-1.0, 1.0),
         ("variance_increase" | "variance_increase_at_full_duty", _) => range(-1.0, LARGEST),

@@ -16,7 +16,7 @@ use crate::fit::{estimate, prequential, threshold};
 use crate::ingest::types::Grid;
 use crate::report::{detection_limits, figures};
 use crate::result;
-use crate::result::{Alternative, DetectionLimit, Finding, Gain, sentence};
+use crate::result::{Alternative, DetectionLimit, Finding, Gain, Parameter, sentence};
 use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Observation};
 use numerics::transform::Dct;
@@ -101,6 +101,12 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
             } else {
                 term.effect.describe(found)
             };
+            let mut parameters = parameters;
+            if is_normal_after_all(s, term) {
+                let specs = term.effect.parameters().iter();
+                let own = specs.filter(|p| p.name == NORMAL);
+                parameters.extend(own.map(|p| (p.name.into(), Parameter::exact(1.0, p.unit))));
+            }
             let gaussian = &s.search.candidates[term.candidate].hypothesis;
             // One tone is no sum of several.
             let parted = parts.len() > 1 && matches!(gaussian, Hypothesis::Covariance(_));
@@ -154,6 +160,43 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
             }
         })
         .collect()
+}
+
+/// The parameter of an effect by which its values are normal where its name says another law.
+const NORMAL: &str = "normal";
+/// Readings about whose mean the law of a process is looked at.
+const ABOUT: usize = 8;
+
+/// Whether a process that its name gives a law of lighter or heavier tails is nearer to a normal one by the kurtosis of the readings.
+fn is_normal_after_all(s: &Searched<'_>, term: &Term) -> bool {
+    let Form::Covariance(process, theta) = &term.form else {
+        return false;
+    };
+    let of_law = process.excess_kurtosis();
+    if of_law == 0.0 {
+        return false;
+    }
+    let bins = &s.search.panel.bins;
+    let counts = bins.counts();
+    let mean = |density: &[f64]| {
+        let each = density.iter().zip(counts).map(|(d, m)| d * m);
+        each.sum::<f64>() / counts.iter().sum::<f64>()
+    };
+    let own = mean(&process.density(theta, &bins.at));
+    // The slowest is no part of what scatters about a local mean.
+    let others = s.state.noise_beside_processes();
+    let white = others.at(std::f64::consts::FRAC_PI_2);
+    let share = own / (own + white);
+    let (mut square, mut fourth, mut count) = (0.0, 0.0, 0.0);
+    for near in s.target.y.chunks_exact(ABOUT) {
+        let level = near.iter().sum::<f64>() / ABOUT as f64;
+        for v in near {
+            let off = (v - level).powi(2);
+            (square, fourth, count) = (square + off, fourth + off * off, count + 1.0);
+        }
+    }
+    let excess = count * fourth / (square * square) - 3.0;
+    (excess / (share * share) / of_law) < 0.5
 }
 
 /// What is said of a value that holds for one excitation alone.

@@ -56,6 +56,10 @@ pub trait Covariance: Send + Sync {
     fn is_normal(&self) -> bool {
         true
     }
+    /// Excess kurtosis of its values at the law that its name says.
+    fn excess_kurtosis(&self) -> f64 {
+        0.0
+    }
     /// Parameters that say which of the effect's processes it is.
     fn fixed(&self) -> Vec<(&'static str, f64, &'static str)> {
         vec![]

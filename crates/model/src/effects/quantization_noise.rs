@@ -7,7 +7,7 @@ use rand_distr::{Distribution, Uniform};
 
 use crate::effect::{
     Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
-    Plot, Rival, Stage, View, parameter, value,
+    Plot, Rival, Stage, View, optional, parameter, value,
 };
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
@@ -30,11 +30,18 @@ impl Effect for QuantizationNoise {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[parameter(
-            "q",
-            "deg",
-            "Q of IEEE Std 952, standard deviation of the angle's rounding: its step over sqrt(12)",
-        )];
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter(
+                "q",
+                "deg",
+                "Q of IEEE Std 952, standard deviation of the angle's rounding: its step over sqrt(12)",
+            ),
+            optional(
+                "normal",
+                "1",
+                "1 where the angle's error is normal, as that of an angle that is read with noise; left out, it is that of a rounding, uniform",
+            ),
+        ];
         PARAMETERS
     }
 
@@ -93,14 +100,22 @@ impl Effect for QuantizationNoise {
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         // A rounding error is uniform within half a step, which is sqrt(3) of its standard deviation.
-        let half_step = 3f64.sqrt() * value(parameters, "q");
+        let q = value(parameters, "q");
+        let half_step = 3f64.sqrt() * q;
         let Ok(rounding) = Uniform::new_inclusive(-half_step, half_step) else {
             return;
         };
+        let normal = value(parameters, "normal") != 0.0;
+        let error = |simulation: &mut Simulation| -> f64 {
+            match normal {
+                true => q * simulation.normal(),
+                false => rounding.sample(&mut simulation.rng),
+            }
+        };
         for &axis in channels {
-            let mut before = rounding.sample(&mut simulation.rng);
+            let mut before = error(simulation);
             for i in 0..simulation.samples {
-                let now = rounding.sample(&mut simulation.rng);
+                let now = error(simulation);
                 simulation.rate[axis][i] += (now - before) * simulation.rate_hz;
                 before = now;
             }
@@ -119,6 +134,11 @@ impl Covariance for Difference {
     /// Errors of rounding are uniform.
     fn is_normal(&self) -> bool {
         false
+    }
+
+    /// Of the difference of two values of a uniform law: half of its -6/5.
+    fn excess_kurtosis(&self) -> f64 {
+        -0.6
     }
 
     fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
