@@ -152,7 +152,7 @@ fn differenced(normal: bool, sigma: f64, q: f64, rng: &mut Rng) -> Vec<f64> {
 
 #[test]
 fn statistical_the_law_of_an_angles_error_is_in_the_model() {
-    let mut rng = Rng::seed_from_u64(0x616e_676c_65);
+    let mut rng = Rng::seed_from_u64(0x61_6e67_6c65);
     let options = DiagnoseOptions {
         replicates: 99,
         ..DiagnoseOptions::default()

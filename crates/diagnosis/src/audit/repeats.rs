@@ -282,6 +282,21 @@ impl<'a> Readings<'a> {
         }
     }
 
+    /// Whether gyros repeat as often beyond chance in frames that do not repeat as a whole: each by itself, then, and no frame.
+    fn each_by_itself(&self) -> bool {
+        let whole: Vec<bool> = (1..self.rows).map(|i| self.same(1, i)).collect();
+        let others = whole.iter().filter(|w| !**w).count() as f64;
+        let all = self.columns.iter().zip(&self.steps).zip(&self.chances);
+        let beyond = all.filter(|((column, step), (p, known))| {
+            let own = (1..self.rows)
+                .filter(|i| !whole[i - 1] && equal(column[*i], column[*i - 1], **step));
+            let expected = p * others;
+            let error = (expected + (known * expected).powi(2)).sqrt();
+            own.count() as f64 > (1.0 + EXCESS) * expected + CERTAIN * error
+        });
+        beyond.count() > 1
+    }
+
     /// Whether whole frames repeat.
     fn frames(&self, record: &Record, at: &[f64], audit: &mut Audit) -> bool {
         let repeated = self.repeated(audit);
@@ -312,6 +327,11 @@ impl<'a> Readings<'a> {
             names.join(", ")
         );
         let (id, seen) = (CheckId::RepeatedFrames, observed as f64);
+        let chance = if chance < audit_level() && self.each_by_itself() {
+            1.0
+        } else {
+            chance
+        };
         if !audit.check(id, "record", seen, chance, what.clone()) {
             return false;
         }
@@ -333,8 +353,8 @@ impl<'a> Readings<'a> {
         true
     }
 
-    /// Repeats of one gyro.
-    fn one(&self, g: usize, at: &[f64], audit: &mut Audit) {
+    /// Repeats of one gyro; whether there are some that are none of a frame.
+    fn one(&self, g: usize, at: &[f64], audit: &mut Audit) -> bool {
         let (values, step, (p, known)) = (self.columns[g], self.steps[g], self.chances[g]);
         let name = self.gyros[g].channel.name.as_str();
         let rest = audit.usable.get(name).cloned().unwrap_or_default();
@@ -367,11 +387,11 @@ impl<'a> Readings<'a> {
         let weighed = if relative && !suppressed { chance } else { 1.0 };
         let fails = audit.check(CheckId::RepeatedReadings, name, z, weighed, what.clone());
         if !fails || chance >= audit_level() {
-            return;
+            return false;
         }
         if let Some(why) = self.no_repeats(values, step, &own, expected) {
             audit.unexplain(name, format!("{what}; {why}"));
-            return;
+            return true;
         }
         // Which of them is a repeat by chance cannot be told, but of a run that is longer than chance makes it.
         let times = own.iter().filter(|_| excess > expected).map(|i| at[*i]);
@@ -383,6 +403,7 @@ impl<'a> Readings<'a> {
         let mut finding = counted(cause, names, runs.stalled().round(), error, &times, what);
         finding.parameters.insert("running".into(), runs.running());
         audit.findings.push(finding);
+        false
     }
 
     /// Why equal readings are no repeats of a frame.
@@ -425,5 +446,16 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
     if readings.columns.is_empty() || readings.frames(record, at, audit) {
         return;
     }
-    (0..readings.gyros.len()).for_each(|g| readings.one(g, at, audit));
+    let known = audit.findings.len();
+    let none_of_frames = (0..readings.gyros.len()).filter(|g| readings.one(*g, at, audit));
+    // What makes readings of one axis come again without a frame that repeats does so on the others.
+    if none_of_frames.count() > 0 {
+        for finding in audit.findings.split_off(known) {
+            let what = format!(
+                "{}; other axes repeat what is none of a frame",
+                finding.what
+            );
+            audit.unexplain(&finding.channels[0], what);
+        }
+    }
 }
