@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use model::effect::{Effect, Found, Hypothesis};
+use model::effect::{Effect, Found, Hypothesis, Parameters};
 use model::effects::effect;
 use model::record::Base;
 use rand_core::SeedableRng;
@@ -58,6 +58,29 @@ fn overlapping(s: &Searched<'_>, term: &Term) -> Vec<usize> {
     of_it.map(|(i, _)| i).collect()
 }
 
+/// The parameters of a term, and of the bands that it is one with.
+fn parameters_of(
+    s: &Searched<'_>,
+    term: &Term,
+    found: &Found,
+    parts: &[usize],
+    rate_hz: f64,
+) -> Parameters {
+    let mut parameters = if parts.len() > 1 {
+        let (panel, unit) = (&s.search.panel, &s.target.unit);
+        let all = estimate::of_bands(panel, &s.state, parts, unit, rate_hz);
+        term.effect.describe(&all)
+    } else {
+        term.effect.describe(found)
+    };
+    if is_normal_after_all(s, term) {
+        let specs = term.effect.parameters().iter();
+        let own = specs.filter(|p| p.name == NORMAL);
+        parameters.extend(own.map(|p| (p.name.into(), Parameter::exact(1.0, p.unit))));
+    }
+    parameters
+}
+
 pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Finding> {
     if s.state.terms.is_empty() {
         return vec![];
@@ -89,24 +112,7 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
         .zip(scores)
         .map(|((term, found), score)| {
             let parts = overlapping(s, term);
-            let parameters = if parts.len() > 1 {
-                let (panel, unit) = (&s.search.panel, &s.target.unit);
-                term.effect.describe(&estimate::of_bands(
-                    panel,
-                    &s.state,
-                    &parts,
-                    unit,
-                    grid.rate_hz,
-                ))
-            } else {
-                term.effect.describe(found)
-            };
-            let mut parameters = parameters;
-            if is_normal_after_all(s, term) {
-                let specs = term.effect.parameters().iter();
-                let own = specs.filter(|p| p.name == NORMAL);
-                parameters.extend(own.map(|p| (p.name.into(), Parameter::exact(1.0, p.unit))));
-            }
+            let parameters = parameters_of(s, term, found, &parts, grid.rate_hz);
             let gaussian = &s.search.candidates[term.candidate].hypothesis;
             // One tone is no sum of several.
             let parted = parts.len() > 1 && matches!(gaussian, Hypothesis::Covariance(_));
