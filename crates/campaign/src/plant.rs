@@ -197,7 +197,7 @@ fn blank(stand: &Stand) -> Simulation {
         rate: zeros(),
         white_sigma: [0.0; 3],
         rounding: [0.0; 3],
-        felt: vec![],
+        felt: None,
         of_accelerometers: false,
         shared: Default::default(),
         own: [1.0; 3],

@@ -40,7 +40,7 @@ const fn phase(axis: usize) -> ParameterSpec {
 }
 
 /// The parameters that say what an oscillation has in common with that of another axis.
-pub(crate) const PARAMETERS: [ParameterSpec; 12] = [
+const PARAMETERS: [ParameterSpec; 12] = [
     coherence(0),
     coherence(1),
     coherence(2),
@@ -54,6 +54,34 @@ pub(crate) const PARAMETERS: [ParameterSpec; 12] = [
     phase(4),
     phase(5),
 ];
+
+/// The `N` parameters of an oscillation, and those: `M` in all.
+pub(crate) const fn with_shared<const N: usize, const M: usize>(
+    own: [ParameterSpec; N],
+) -> [ParameterSpec; M] {
+    let mut all = [PARAMETERS[0]; M];
+    let mut i = 0;
+    while i < M {
+        all[i] = if i < N { own[i] } else { PARAMETERS[i - N] };
+        i += 1;
+    }
+    all
+}
+
+/// The axes whose oscillation this one says it is in part, and the coherence.
+pub fn others(parameters: &Parameters) -> impl Iterator<Item = (&'static str, f64)> {
+    stated(parameters)
+        .map(|(k, coherence, _)| (PHASE[k].trim_start_matches("phase_to_"), coherence))
+}
+
+/// The same by the places of their names, and the phases.
+fn stated(parameters: &Parameters) -> impl Iterator<Item = (usize, f64, f64)> {
+    let value = |name: &str| parameters.get(name).map(|p| p.value);
+    let names = WITH.iter().zip(PHASE).enumerate();
+    names.filter_map(move |(k, (with, phase))| {
+        Some((k, value(with)?.clamp(0.0, 1.0), value(phase)?))
+    })
+}
 
 /// What says that an oscillation is, to a coherence and ahead by a phase, that of the axis of this name; none where no parameter
 /// is called after that.
@@ -75,12 +103,7 @@ pub fn of_axis(name: &str, coherence: (f64, f64), phase: (f64, f64)) -> Option<P
 
 /// Whether an oscillation is in part that of another axis of its kind; of gyros the accelerometers are none.
 pub(crate) fn is_of_another(parameters: &Parameters, of_accelerometers: bool) -> bool {
-    let names = if of_accelerometers {
-        &PHASE[..]
-    } else {
-        &PHASE[..3]
-    };
-    names.iter().any(|name| parameters.contains_key(*name))
+    stated(parameters).any(|(k, ..)| of_accelerometers || k < 3)
 }
 
 /// Whether oscillations of two axes, of which one says that it is the other's, have one place: their centres lie within the wider of
@@ -101,7 +124,8 @@ pub struct Felt {
     turning: Vec<[f64; 2]>,
 }
 
-/// Half widths to either side of an oscillation at which the noise beside it is read.
+/// Half widths to either side of an oscillation at which the noise beside it is read: what a filter of its width has of it there is a
+/// 226th of that at the centre, less than noise that a hundredth of an oscillation stands in.
 const BESIDE: f64 = 30.0;
 /// Least white noise beside an oscillation, over its variance: its skirts hide less.
 const LEAST_NOISE: f64 = 1e-3;
@@ -266,8 +290,13 @@ impl Split {
 }
 
 impl Simulation {
+    /// Whether an oscillation of these parameters is kept for others that feel it: some do, and it is not another's itself.
+    pub(crate) fn keeps(&self, parameters: &Parameters) -> bool {
+        self.felt.is_some() && !is_of_another(parameters, self.of_accelerometers)
+    }
+
     /// Adds to the rate of an axis what an oscillation of a size, centre and full width in Hz, has of another. Its own quadratures over
-    /// its size, in `turning`, become those of the whole and are kept for others that feel it; none are where it is another's.
+    /// its size, in `turning`, become those of the whole and are kept for others that feel it where it [`Simulation::keeps`] any.
     pub(crate) fn add_shared(
         &mut self,
         axis: usize,
@@ -290,8 +319,8 @@ impl Simulation {
         for (z, shared) in turning.iter_mut().zip(&split.shared) {
             *z = [z[0] + shared[0], z[1] + shared[1]];
         }
-        if !turning.is_empty() {
-            self.felt.push(Felt {
+        if let Some(felt) = self.felt.as_mut().filter(|_| !turning.is_empty()) {
+            felt.push(Felt {
                 axis,
                 center_hz: center,
                 turning,
@@ -307,16 +336,12 @@ impl Simulation {
         [center_hz, width_hz]: [f64; 2],
         parameters: &Parameters,
     ) -> Split {
-        let value = |name: &str| parameters.get(name).map(|p| p.value);
-        let own = WITH.iter().zip(PHASE).enumerate();
-        let stated = own.filter_map(|(k, (with, phase))| {
-            Some((k, value(with)?.clamp(0.0, 1.0), value(phase)?))
-        });
         let (axes, read): (Vec<_>, Vec<_>) =
-            stated.partition(|(k, ..)| *k < 3 || self.of_accelerometers);
+            stated(parameters).partition(|(k, ..)| *k < 3 || self.of_accelerometers);
         for (k, r, phase) in axes {
             let away = |f: &&Felt| (f.center_hz - center_hz).abs();
-            let own = (self.felt.iter()).filter(|f| f.axis == k % 3 && f.axis != axis);
+            let kept = self.felt.iter().flatten();
+            let own = kept.filter(|f| f.axis == k % 3 && f.axis != axis);
             if let Some(felt) = own.min_by(|a, b| away(a).total_cmp(&away(b))) {
                 return Split::new(r, phase, &felt.turning);
             }

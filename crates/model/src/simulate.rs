@@ -124,8 +124,8 @@ pub struct Simulation {
     pub scale: [f64; 3],
     /// Errors of the rate but for the white noise, deg/s.
     pub rate: [Vec<f64>; 3],
-    /// Oscillations of axes that others may feel too.
-    pub felt: Vec<Felt>,
+    /// Oscillations of axes, where others feel them too.
+    pub felt: Option<Vec<Felt>>,
     /// Whether the axes are those of accelerometers.
     pub of_accelerometers: bool,
     /// White standard deviation of the baseline, rounding included, deg/s.

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use diagnosis::result::{Finding, Parameter, Unexplained};
 use model::effect::Parameters;
-use model::effects::{correlated_noise, effect};
+use model::effects::effect;
+use model::one_source;
 
 use crate::report::plot::{fixed, number, tidy};
 pub use crate::text::cost::{consequence_of, cost};
@@ -100,13 +101,8 @@ fn on_others(finding: &Finding) -> Option<String> {
 
 /// Of an oscillation: that one source makes it, and what reads that too.
 fn felt(finding: &Finding) -> Option<String> {
-    if finding.cause == correlated_noise::ID {
-        return None;
-    }
     let all = finding.per_channel.values().chain([&finding.parameters]);
-    let all = all.flatten();
-    let all = all.filter_map(|(name, p)| Some((name.strip_prefix("with_")?, p.value)));
-    let all: Vec<(&str, f64)> = all.collect();
+    let all: Vec<(&str, f64)> = all.flat_map(one_source::others).collect();
     let least = all.iter().map(|(_, v)| *v).reduce(f64::min)?;
     let is_other = |name: &&str| !finding.channels.iter().any(|c| c == name);
     let others: BTreeSet<&str> = all.iter().map(|(name, _)| *name).filter(is_other).collect();
@@ -405,7 +401,12 @@ mod tests {
     fn what_is_otherwise_on_other_channels_is_said_and_what_feels_the_same() {
         let sizes = |rms: f64, with: &str| {
             let error = Some(0.001);
-            let all = [("rms", rms, error, "deg/s"), (with, 0.97, error, "1")];
+            let phase = format!("phase_to_{}", &with["with_".len()..]);
+            let all = [
+                ("rms", rms, error, "deg/s"),
+                (with, 0.97, error, "1"),
+                (&phase, 0.3, error, "rad"),
+            ];
             finding("narrow_band", &all).parameters
         };
         let mut f = Finding {

@@ -7,7 +7,6 @@
 mod apart;
 mod pair;
 
-use std::collections::BTreeMap;
 use std::f64::consts::{SQRT_2, TAU};
 
 use model::effect::{Parameters, Signal};
@@ -160,10 +159,8 @@ fn bands(axis: usize, s: &Searched<'_>) -> Vec<Band> {
     let first = terms.filter(|(_, t)| t.is_band() && !t.is_part());
     let all = first.filter_map(|(i, t)| {
         let peak = t.peak()?;
-        let of_it = |o: &Term| {
-            o.cluster
-                .is_some_and(|c| Some(c.number) == t.cluster.map(|c| c.number))
-        };
+        let number = t.cluster.map(|c| c.number);
+        let of_it = |o: &Term| number.is_some() && o.cluster.map(|c| c.number) == number;
         let others = s.state.terms.iter().enumerate();
         let others = others.filter(|(k, o)| *k != i && of_it(o)).map(|(k, _)| k);
         Some(Band {
@@ -264,11 +261,16 @@ pub(crate) fn found(searched: &[Searched<'_>]) -> Vec<OneSource> {
     all
 }
 
-/// Whether what is told by channel is one source that these feel.
-pub(crate) fn is_shared(per_channel: &BTreeMap<String, Parameters>) -> bool {
-    let names = || per_channel.keys();
-    let mut all = per_channel.values();
-    all.any(|p| names().any(|of| p.contains_key(&format!("with_{of}"))))
+/// Whether a finding of several channels is one source that these feel.
+pub(crate) fn is_shared(f: &Finding) -> bool {
+    let mut all = f.per_channel.values().flat_map(one_source::others);
+    all.any(|(of, _)| f.channels.iter().any(|c| c == of))
+}
+
+/// Whether a finding is an oscillation that this channel reads too.
+pub(crate) fn is_read_by(f: &Finding, channel: &str) -> bool {
+    let mut each = f.per_channel.values().chain([&f.parameters]);
+    each.any(|p| one_source::others(p).any(|(of, _)| of == channel))
 }
 
 /// States in the findings of the terms of each axis what of them is another axis' too.

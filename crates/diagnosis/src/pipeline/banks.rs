@@ -16,6 +16,7 @@ use model::integral;
 use model::record::{AnalysisError, Base, Channel, Quantity, Record};
 
 use super::{DiagnoseOptions, diagnose, ranked};
+use crate::criticise::one_source;
 use crate::result::{Alternative, Consequence, Diagnosed, Diagnosis, Finding, Verdict};
 use crate::test_level::with_part;
 
@@ -235,10 +236,9 @@ fn is_one_shock(a: &Finding, b: &Finding) -> bool {
 
 /// Whether what an oscillation of the gyros is read by, as it says, is that of accelerometers.
 fn shakes_both(gyros: &Finding, accelerometers: &Finding) -> bool {
-    let of = |channel: &String| format!("with_{channel}");
-    let mut read = accelerometers.channels.iter().map(of);
+    let mut channels = accelerometers.channels.iter();
     gyros.cause == accelerometers.cause
-        && read.any(|of| gyros.parameters.contains_key(&of))
+        && channels.any(|c| one_source::is_read_by(gyros, c))
         && effect(&gyros.cause)
             .is_some_and(|e| e.same_event(&gyros.parameters, &accelerometers.parameters))
 }

@@ -10,7 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::attribute::events;
-use crate::criticise::scale;
+use crate::criticise::{residual, scale};
 use crate::fit::channel::{Form, Term, VarianceFound, undo};
 use crate::fit::{estimate, prequential, threshold};
 use crate::ingest::types::Grid;
@@ -170,7 +170,7 @@ pub(crate) fn term_findings(s: &Searched<'_>, grid: &Grid, seed: u64) -> Vec<Fin
 
 /// The parameter of an effect by which its values are normal where its name says another law.
 const NORMAL: &str = "normal";
-/// Readings about whose mean the law of a process is looked at.
+/// Readings about whose mean the law of a process is looked at: few enough for what is slow to have no part.
 const ABOUT: usize = 8;
 
 /// Whether a process that its name gives a law of lighter or heavier tails is nearer to a normal one by the kurtosis of the readings.
@@ -193,15 +193,12 @@ fn is_normal_after_all(s: &Searched<'_>, term: &Term) -> bool {
     let others = s.state.noise_beside_processes();
     let white = others.at(std::f64::consts::FRAC_PI_2);
     let share = own / (own + white);
-    let (mut square, mut fourth, mut count) = (0.0, 0.0, 0.0);
-    for near in s.target.y.chunks_exact(ABOUT) {
-        let level = near.iter().sum::<f64>() / ABOUT as f64;
-        for v in near {
-            let off = (v - level).powi(2);
-            (square, fourth, count) = (square + off, fourth + off * off, count + 1.0);
-        }
-    }
-    let excess = count * fourth / (square * square) - 3.0;
+    let about = |near: &[f64]| {
+        let level = near.iter().sum::<f64>() / near.len() as f64;
+        near.iter().map(|v| v - level).collect::<Vec<f64>>()
+    };
+    let off: Vec<f64> = s.target.y.chunks_exact(ABOUT).flat_map(about).collect();
+    let excess = residual::excess_kurtosis(&off);
     (excess / (share * share) / of_law) < 0.5
 }
 

@@ -146,7 +146,7 @@ fn of_pair(
     let of = |name: &String| whites.iter().find(|w| w.0.target.name == *name);
     let shares = |f: &&Finding| {
         let both = pair.iter().all(|c| f.channels.contains(c));
-        both && (SHARING.contains(&f.cause.as_str()) || one_source::is_shared(&f.per_channel))
+        both && (SHARING.contains(&f.cause.as_str()) || one_source::is_shared(f))
     };
     let ((a, white), (b, other)) = (of(&pair[0])?, of(&pair[1])?);
     if causes.iter().any(shares) {
@@ -212,14 +212,9 @@ fn of_signals(
         _ => false,
     });
     let shaken = |signal: &&Signal| {
-        let of = format!("with_{}", signal.name);
-        let mut causes = causes
-            .iter()
-            .filter(|f| f.channels.contains(&s.target.name));
-        causes.any(|f| {
-            let mut each = f.per_channel.values().chain([&f.parameters]);
-            each.any(|p| p.contains_key(&of))
-        })
+        let mut causes = causes.iter();
+        causes
+            .any(|f| f.channels.contains(&s.target.name) && one_source::is_read_by(f, &signal.name))
     };
     let terms = own.filter(|signal| !shaken(signal)).filter_map(|signal| {
         let values: &[f64] = &signal.smooth;

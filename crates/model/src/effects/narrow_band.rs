@@ -7,7 +7,7 @@ use crate::effect::{
     Covariance, Docs, Effect, Example, Found, Frequencies, Hypothesis, ParameterSpec, Parameters,
     Peak, Plot, Rival, Stage, View, optional, parameter, value,
 };
-use crate::one_source::{self, PARAMETERS as SHARED};
+use crate::one_source::{self, with_shared};
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
 
@@ -29,7 +29,7 @@ impl Effect for NarrowBand {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
+        const PARAMETERS: &[ParameterSpec] = &with_shared::<4, 16>([
             parameter("rms", "deg/s", "standard deviation"),
             parameter(
                 "center_frequency",
@@ -46,19 +46,7 @@ impl Effect for NarrowBand {
                 "1",
                 "1 where the rate is what a driven mode is displaced by, -1 where it is its velocity; 0, left out, is a Lorentzian peak, as high on either side",
             ),
-            SHARED[0],
-            SHARED[1],
-            SHARED[2],
-            SHARED[3],
-            SHARED[4],
-            SHARED[5],
-            SHARED[6],
-            SHARED[7],
-            SHARED[8],
-            SHARED[9],
-            SHARED[10],
-            SHARED[11],
-        ];
+        ]);
         PARAMETERS
     }
 
@@ -144,15 +132,14 @@ impl Effect for NarrowBand {
             value(parameters, "center_frequency"),
         );
         let (width, skew) = (value(parameters, "bandwidth"), value(parameters, "skew"));
-        let of_accelerometers = simulation.of_accelerometers;
-        let is_shared = one_source::is_of_another(parameters, of_accelerometers);
+        let keeps = simulation.keeps(parameters);
         for &axis in channels {
             let split = simulation.split(axis, [centre, width], parameters);
             let own = rms * split.own;
             let unit = rms.max(f64::MIN_POSITIVE);
             let mut turning = Vec::new();
             let seen = |z: [f64; 2]| {
-                if !is_shared {
+                if keeps {
                     turning.push(z.map(|v| v / unit));
                 }
             };
@@ -338,8 +325,7 @@ impl Resonator {
 
 impl Simulation {
     /// Adds to the rate of an axis a mode of that standard deviation, deg/s, in its stationary state. Where a stretch is left
-    /// out it begins anew.
-    /// As of [`Simulation::add_mode`], both quadratures are told to `seen`.
+    /// out it begins anew. As of [`Simulation::add_mode`], both quadratures are told to `seen`.
     fn add_resonator(
         &mut self,
         axis: usize,
@@ -348,6 +334,12 @@ impl Simulation {
         mut seen: impl FnMut([f64; 2]),
     ) {
         let (sin, cos) = of.turn.sin_cos();
+        // By half a turn a sample it has one quadrature.
+        let over = if sin.abs() > f64::EPSILON.sqrt() {
+            sin.recip()
+        } else {
+            0.0
+        };
         let mut rates = std::mem::take(&mut self.rate[axis]);
         for k in 0..self.stretches.len() {
             // The two readings before and what drove the last one, which is all of it that the one before does not hold.
@@ -357,7 +349,7 @@ impl Simulation {
             let (mut y, mut e) = ([last, older], driven);
             for rate in &mut rates[self.stretches[k].samples.clone()] {
                 *rate += size * y[0];
-                seen([y[0], (y[1] - cos * y[0]) / sin].map(|v| size * v));
+                seen([y[0], (y[1] - cos * y[0]) * over].map(|v| size * v));
                 let next = of.driven * self.normal();
                 y = [
                     of.before[0] * y[0] + of.before[1] * y[1] + next + of.zero * e,

@@ -9,7 +9,7 @@ use crate::effect::{
     Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
     parameter, value,
 };
-use crate::one_source::{self, PARAMETERS as SHARED};
+use crate::one_source::{self, with_shared};
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
 
@@ -28,7 +28,7 @@ impl Effect for WanderingLine {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[
+        const PARAMETERS: &[ParameterSpec] = &with_shared::<3, 15>([
             parameter("amplitude", "deg/s", "amplitude"),
             parameter(
                 "center_frequency",
@@ -40,19 +40,7 @@ impl Effect for WanderingLine {
                 "Hz",
                 "full width of its spectrum at half power",
             ),
-            SHARED[0],
-            SHARED[1],
-            SHARED[2],
-            SHARED[3],
-            SHARED[4],
-            SHARED[5],
-            SHARED[6],
-            SHARED[7],
-            SHARED[8],
-            SHARED[9],
-            SHARED[10],
-            SHARED[11],
-        ];
+        ]);
         PARAMETERS
     }
 
@@ -133,8 +121,7 @@ impl Effect for WanderingLine {
         let width = value(parameters, "linewidth");
         let step = (TAU * width / simulation.rate_hz).max(0.0).sqrt();
         let turn = TAU * centre / simulation.rate_hz;
-        let of_accelerometers = simulation.of_accelerometers;
-        let is_shared = one_source::is_of_another(parameters, of_accelerometers);
+        let keeps = simulation.keeps(parameters);
         for &axis in channels {
             let split = simulation.split(axis, [centre, width], parameters);
             let own = amplitude * split.own;
@@ -143,7 +130,7 @@ impl Effect for WanderingLine {
             for i in 0..simulation.samples {
                 let (sin, cos) = phase.sin_cos();
                 simulation.rate[axis][i] += own * cos;
-                if !is_shared {
+                if keeps {
                     turning.push([cos, sin].map(|v| split.own * v));
                 }
                 let by: f64 = StandardNormal.sample(&mut simulation.rng);

@@ -122,8 +122,10 @@ impl Prepared {
             .into_iter()
             .partition(|a| a.effect.stage() < Stage::Output);
         // What an axis feels of another's oscillation comes after that.
-        let behind = |a: &Acting| is_of_another(&a.parameters, run.of_accelerometers);
+        let of_accelerometers = run.of_accelerometers;
+        let behind = |a: &Acting| is_of_another(&a.parameters, of_accelerometers);
         early.sort_by_key(|a| (a.effect.stage(), behind(a)));
+        run.felt = early.iter().any(behind).then(Vec::new);
         // What the base does is an input of the run: the same each time, even where it is random.
         let again = |a: &Acting| a.effect.stage() != Stage::World && a.draws(rate_hz);
         let (random, once): (Vec<_>, Vec<_>) = early.into_iter().partition(again);
@@ -233,7 +235,7 @@ impl Prepared {
     pub fn draw(&mut self, start: Option<&[Vec<f64>; 3]>) {
         let present = self.present;
         self.run.shared.iter_mut().for_each(Vec::clear);
-        self.run.felt.clear();
+        self.run.felt.iter_mut().for_each(Vec::clear);
         self.run.own = [1.0; 3];
         for axis in 0..3 {
             let start = start.map(|all| all[axis].as_slice());
@@ -417,7 +419,7 @@ fn started(world: World, rate_hz: f64, rng: Xoshiro256PlusPlus) -> Simulation {
         motion: world.motion,
         scale: [1.0; 3],
         rate: std::array::from_fn(|_| vec![0.0; samples]),
-        felt: vec![],
+        felt: None,
         of_accelerometers: false,
         white_sigma: [0.0; 3],
         rounding: [0.0; 3],
