@@ -12,6 +12,10 @@ pub const WIDE: u32 = 1100;
 /// Width of one of two figures beside each other: the same size of letters at half the width.
 pub const HALF: u32 = 540;
 
+/// Size of letters, units of the view box; a letter of a label that stands upright takes this part of it, so that a long one is as
+/// large as its figure is high.
+const LETTERS: f64 = 15.0;
+const LETTER: f64 = 0.45;
 /// Radius of a dot, units of the view box.
 pub const DOT: u32 = 3;
 
@@ -209,11 +213,15 @@ impl Figure {
     ) -> Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>> {
         let (x_is_log, y_is_log) = (x.log, y.log);
         let place = |(a, b): (f64, f64)| (scaled(a, x_is_log), scaled(b, y_is_log));
+        // Without a label it stands on another figure, which has the numbers.
+        let below = if self.x_label.is_empty() { 0 } else { 44 };
+        let along = self.height.saturating_sub(below);
+        let letters = self.y_label.chars().count().max(1) as f64;
+        let described = (f64::from(along) / (LETTER * letters)).min(LETTERS);
         let mut chart = ChartBuilder::on(area)
             .margin(8)
             .margin_right(18)
-            // Without a label it stands on another figure, which has the numbers.
-            .x_label_area_size(if self.x_label.is_empty() { 0 } else { 44 })
+            .x_label_area_size(below)
             .y_label_area_size(78)
             .build_cartesian_2d(x, y)?;
         chart
@@ -230,8 +238,8 @@ impl Figure {
             .light_line_style(TRANSPARENT)
             .bold_line_style(GRID)
             .axis_style(INK)
-            .label_style(("sans-serif", 15).into_font().color(&INK))
-            .axis_desc_style(("sans-serif", 15).into_font().color(&INK))
+            .label_style(("sans-serif", LETTERS).into_font().color(&INK))
+            .axis_desc_style(("sans-serif", described).into_font().color(&INK))
             .draw()?;
         for drawn in &self.layers {
             let colour = drawn.colour;
