@@ -176,6 +176,9 @@ pub struct View<'a> {
     pub lsb: Option<f64>,
     /// Standard deviation of its white noise, in its unit.
     pub white_sigma: f64,
+    /// Standard deviation of the change from one sample to the next over the root of 2: that of the noise which neighbours do not
+    /// share, in its unit.
+    pub neighbours_sigma: f64,
     /// Sample rate, Hz.
     pub rate_hz: f64,
     /// Length of the grid.
@@ -350,6 +353,10 @@ pub trait Effect: Send + Sync {
     fn at_most(&self, _parameter: &str) -> Option<(&'static str, f64)> {
         None
     }
+    /// Parameters that a sentence names first, where they are others than those that the effect requires.
+    fn named_first(&self, _parameters: &Parameters) -> &'static [&'static str] {
+        &[]
+    }
     /// Whether the same cause on two channels is one event.
     fn same_event(&self, _a: &Parameters, _b: &Parameters) -> bool {
         false
@@ -385,10 +392,7 @@ pub trait Effect: Send + Sync {
 /// filter. A filter passes the slowest as it is, so that this is the noise before it.
 #[must_use]
 pub fn slowest(effect: &dyn Effect, parameters: &Parameters) -> f64 {
-    let at = Frequencies {
-        omega: vec![0.0],
-        cosine: vec![1.0],
-    };
+    let at = Frequencies::at(vec![0.0]);
     let density = effect.passes(parameters, &at);
     density.map_or(1.0, |d| d[0])
 }

@@ -108,6 +108,7 @@ pub fn separation(
         axis: Some(Axis::Z),
         lsb: None,
         white_sigma: noise.angle_random_walk_n * rate_hz.sqrt(),
+        neighbours_sigma: noise.angle_random_walk_n * rate_hz.sqrt(),
         rate_hz,
         samples,
         base: Some(Base::Static),

@@ -150,6 +150,13 @@ fn named(finding: &Finding) -> Vec<(&String, &Parameter)> {
     let specs = effect(&finding.cause).map_or(&[][..], |e| e.parameters());
     let required = |name: &str| specs.iter().any(|s| s.name == name && s.required);
     let estimated = |p: &Parameter| p.std_error.is_some_and(|e| e.is_finite() && e > 0.0);
+    let first = effect(&finding.cause).map_or(&[][..], |e| e.named_first(&finding.parameters));
+    if !first.is_empty() {
+        let each = first.iter();
+        return each
+            .filter_map(|name| finding.parameters.get_key_value(*name))
+            .collect();
+    }
     let (first, then): (Vec<_>, Vec<_>) = in_order(finding)
         .into_iter()
         .partition(|(name, _)| required(name));

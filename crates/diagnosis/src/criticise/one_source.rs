@@ -183,8 +183,7 @@ fn frequencies(samples: usize) -> impl Iterator<Item = f64> {
 fn weights(s: &Searched<'_>, band: &Band) -> Vec<f64> {
     let omega: Vec<f64> = frequencies(s.e.len()).collect();
     let all = s.state.noise.through(omega.iter().copied());
-    let cosine = omega.iter().map(|w| w.cos()).collect();
-    let at = model::effect::Frequencies { omega, cosine };
+    let at = model::effect::Frequencies::at(omega);
     let mut own = vec![0.0; all.len()];
     for i in &band.terms {
         if let Form::Covariance(process, theta) = &s.state.terms[*i].form {

@@ -314,6 +314,7 @@ mod tests {
             axis: None,
             lsb: None,
             white_sigma: 0.3,
+            neighbours_sigma: 0.3,
             rate_hz: 20.0,
             samples: 2000,
             base: None,

@@ -132,10 +132,7 @@ impl Term {
         let Form::Covariance(c, theta) = &self.form else {
             return false;
         };
-        let at = Frequencies {
-            omega: ENDS.to_vec(),
-            cosine: ENDS.map(f64::cos).to_vec(),
-        };
+        let at = Frequencies::at(ENDS.to_vec());
         let density = c.density(theta, &at);
         self.is_process() && density.first() > density.last()
     }
@@ -445,6 +442,32 @@ pub(crate) fn by_model(
         .zip(&g)
         .map(|(r, g)| r / (white * g).sqrt())
         .collect();
-    let e = panel.dct.inverse(&u);
-    (u, e)
+    let mut e = panel.dct.inverse(&u);
+    let settled = (DIED_AWAY * noise.settles(&panel.bins)) as usize;
+    if settled == 0 {
+        return (u, e);
+    }
+    let middle = e.len() / 2;
+    let (head, tail) = e.split_at_mut(middle);
+    calm(&mut head[..settled.min(middle)]);
+    let late = tail.len().saturating_sub(settled);
+    calm(&mut tail[late..]);
+    (panel.dct.forward(&e), e)
+}
+
+/// Times within which what rings has died away: a part of e^-3 is left.
+const DIED_AWAY: f64 = 3.0;
+/// Readings of which the size is told at once, and the rms from which on they ring: four standard errors beyond that of noise.
+const TOLD_AT_ONCE: usize = 64;
+const RINGS: f64 = 1.35;
+
+/// What rings at an end of the record for what is not known beyond it, no larger than the noise.
+fn calm(end: &mut [f64]) {
+    for some in end.chunks_mut(TOLD_AT_ONCE) {
+        let square = some.iter().map(|e| e * e).sum::<f64>() / some.len() as f64;
+        let rms = square.sqrt();
+        if rms > RINGS {
+            some.iter_mut().for_each(|e| *e /= rms);
+        }
+    }
 }

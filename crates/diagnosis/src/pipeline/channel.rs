@@ -17,6 +17,12 @@ use crate::search::{Search, bands, impute};
 use crate::test_level::{self, CheckId, Outcome, all_worded, omnibus_level, worded};
 use crate::two_level::compare;
 
+/// Half the mean square of the change from one sample to the next.
+fn mean_square_step(y: &[f64]) -> f64 {
+    let steps = y.windows(2).map(|w| (w[1] - w[0]).powi(2));
+    steps.sum::<f64>() / (2 * y.len()) as f64
+}
+
 /// The search of a channel, its hypotheses laid out.
 fn laid_out<'a>(grid: &'a Grid, target: &'a Target) -> Search<'a> {
     let coefficients = &target.coefficients;
@@ -30,6 +36,7 @@ fn laid_out<'a>(grid: &'a Grid, target: &'a Target) -> Search<'a> {
         axis: target.axis,
         lsb: target.lsb,
         white_sigma: target.white.sqrt(),
+        neighbours_sigma: mean_square_step(&target.y).sqrt(),
         rate_hz: grid.rate_hz,
         samples: grid.n,
         base: grid.base,

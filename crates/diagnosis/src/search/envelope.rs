@@ -258,8 +258,7 @@ pub(super) fn wider(mode: &Arc<dyn Covariance>, peak: &Peak, level: f64) -> Vec<
         return vec![];
     };
     let omega: Vec<f64> = (0..LENGTH).map(|k| PI * k as f64 / LENGTH as f64).collect();
-    let cosine = omega.iter().map(|w| w.cos()).collect();
-    let at = Frequencies { omega, cosine };
+    let at = Frequencies::at(omega);
     let density: Vec<f64> = mode.density(&theta, &at).iter().map(|d| 1.0 + d).collect();
     let deviation = |i: usize| -> Vec<f64> {
         let mut moved = theta.clone();

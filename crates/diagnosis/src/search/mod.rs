@@ -97,6 +97,7 @@ pub fn peak_of_white(y: &[f64]) -> f64 {
         axis: None,
         lsb: None,
         white_sigma: mean_square.sqrt(),
+        neighbours_sigma: mean_square.sqrt(),
         rate_hz: 1.0,
         samples: n,
         base: None,

@@ -42,14 +42,15 @@ impl Search<'_> {
         if !state.terms.iter().any(paired) {
             return state;
         }
-        // A filter of many coordinates is weighed beside others where it was found.
+        // A filter of many coordinates, or of many tops, is weighed beside others where it was found.
         let held = |i: usize| state.terms.iter().any(|t| t.candidate == i);
         let mut all = self.processes();
-        all.retain(|(i, c)| c.dimensions() <= scoring::FEW || held(*i));
+        let is_plain = |c: &dyn Covariance| c.dimensions() <= scoring::FEW && c.grid().is_empty();
+        all.retain(|(i, c)| is_plain(c.as_ref()) || held(*i));
         let others: Vec<Term> = state.terms.iter().filter(|t| !paired(t)).cloned().collect();
         let n = self.panel.bins.n;
         let starts = |c: &Arc<dyn Covariance>| -> Vec<Vec<f64>> {
-            if c.dimensions() == 2 {
+            if c.dimensions() == 2 && c.grid().is_empty() {
                 let times = SPANS.map(|s| (n as f64 / s).max(2.0).ln());
                 times.map(|t| vec![-3.0 - 0.5 * t, t]).to_vec()
             } else {

@@ -10,6 +10,10 @@ use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::{Noise, scoring};
 use crate::fit::{scan, threshold};
 
+/// Lags at which one is asked for that tells of a mean: beside a random walk that has taken it for slow noise, one of n readings
+/// shows at lag n.
+const FAR: usize = 64;
+
 /// A candidate that is weighed beside a state.
 struct Weighed<'a> {
     candidate: &'a Candidate,
@@ -138,7 +142,8 @@ impl Search<'_> {
     /// What a step offers at its best time.
     fn weigh_step(&self, of: &Weighed<'_>) -> Option<Term> {
         let n = self.panel.bins.n;
-        let margin = (0.5 * self.view.rate_hz).max(4.0);
+        let settled = of.state.noise.settles(&self.panel.bins);
+        let margin = (0.5 * self.view.rate_hz).max(4.0).max(settled);
         let noises: Vec<Noise> = of.walks.iter().step_by(2).map(|w| w.0.clone()).collect();
         let curve = scan::steps(&self.panel, &noises, &of.own, of.null);
         let inside: Vec<_> = curve
@@ -218,17 +223,35 @@ impl Search<'_> {
     fn weigh_covariance(&self, of: &Weighed<'_>, c: &Arc<dyn Covariance>) -> Option<Term> {
         let n = self.panel.bins.n;
         let limit = threshold::covariance(c.dimensions());
-        if c.dimensions() > scoring::FEW && self.neighbours(of.state, c.dimensions()) < limit {
+        let grid = c.grid();
+        let reason = match grid.is_empty() {
+            false => self.correlations(of.state, FAR).fold(0.0, f64::max),
+            true if c.dimensions() > scoring::FEW => self.neighbours(of.state, c.dimensions()),
+            true => limit,
+        };
+        if reason < limit {
             return None;
         }
-        let best = c
-            .starts(n)
+        let beside = |theta: Vec<f64>| {
+            let mut noise = of.state.noise.clone();
+            noise.terms.push((Arc::clone(c), theta));
+            noise
+        };
+        let starts = if grid.is_empty() {
+            c.starts(n).into_iter().map(beside).collect()
+        } else {
+            let tops = grid.into_iter().map(|theta| {
+                let walks = self.panel.walks(&beside(theta));
+                (self.panel.profile(&walks, &of.own), walks)
+            });
+            let best = tops.max_by(|a, b| a.0.total_cmp(&b.0));
+            best.map(|(_, walks)| self.panel.likeliest(walks, &of.own))
+                .into_iter()
+                .collect::<Vec<_>>()
+        };
+        let best = starts
             .into_iter()
-            .map(|theta| {
-                let mut noise = of.state.noise.clone();
-                noise.terms.push((Arc::clone(c), theta));
-                self.panel.fit(&noise, &of.own)
-            })
+            .map(|noise| self.panel.fit(&noise, &of.own))
             .max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;
         let lr = self.of_read() * 2.0 * (best.1.log_likelihood - of.null);
         let theta = (best.0.terms.last().map(|t| t.1.clone())).filter(|theta| c.claims(theta))?;
@@ -243,6 +266,11 @@ impl Search<'_> {
 
     /// What the correlations of a state's residual at the first `lags` lags say against white noise, chi-square of as many degrees.
     pub(super) fn neighbours(&self, state: &State, lags: usize) -> f64 {
+        self.correlations(state, lags).sum()
+    }
+
+    /// The same at each lag.
+    fn correlations(&self, state: &State, lags: usize) -> impl Iterator<Item = f64> {
         let bins = &self.panel.bins;
         let energy = self
             .panel
@@ -252,12 +280,18 @@ impl Search<'_> {
             .map(|((e, g), m)| e / (g * state.solution.white) - m)
             .collect();
         let n = bins.n as f64;
-        let at = |lag: usize| -> f64 {
-            let cosines = bins.at.omega.iter().map(|w| (w * lag as f64).cos());
-            off.iter().zip(cosines).map(|(o, c)| o * c).sum::<f64>() / n
+        let cosines = bins.at.cosine.clone();
+        // Cosines of multiples of an angle, by recurrence.
+        let mut now = cosines.clone();
+        let mut before = vec![1.0; now.len()];
+        let mut next = move || {
+            let at = off.iter().zip(&now).map(|(o, c)| o * c).sum::<f64>() / n;
+            for ((now, before), c) in now.iter_mut().zip(&mut before).zip(&cosines) {
+                (*now, *before) = (2.0 * c * *now - *before, *now);
+            }
+            at
         };
-        // A coefficient's energy over its variance has the variance 2, and a cosine's square the mean 1/2.
-        (1..=lags).map(|lag| n * at(lag).powi(2)).sum()
+        (0..lags).map(move |_| n * next().powi(2))
     }
 
     /// Fastest slow swing of a line, half cycles in the record.

@@ -9,9 +9,23 @@ pub struct Frequencies {
     pub omega: Vec<f64>,
     /// Its cosine.
     pub cosine: Vec<f64>,
+    /// How wide the place is that each stands for, rad per sample: empty where it is itself.
+    pub width: Vec<f64>,
 }
 
 impl Frequencies {
+    /// Angular frequencies, each itself.
+    #[must_use]
+    pub fn at(omega: Vec<f64>) -> Self {
+        let cosine = omega.iter().map(|w| w.cos()).collect();
+        let width = vec![];
+        Self {
+            omega,
+            cosine,
+            width,
+        }
+    }
+
     /// Density of an AR(1) process of variance `variance` and pole `p`.
     #[must_use]
     pub fn one_pole(&self, variance: f64, p: f64) -> Vec<f64> {
@@ -73,6 +87,10 @@ pub trait Covariance: Send + Sync {
     fn bounds(&self, samples: usize) -> Vec<(f64, f64)>;
     /// Where to start the search from.
     fn starts(&self, samples: usize) -> Vec<Vec<f64>>;
+    /// Points of which the best is where the search starts, in the place of the starts: of a term whose likelihood has many tops.
+    fn grid(&self) -> Vec<Vec<f64>> {
+        vec![]
+    }
     /// The same term with its coordinates measured from a peak of the spectrum, in widths of it, and where it starts from
     /// there: of a term that stands at one frequency, which has to be sought in the data.
     fn about(&self, _peak: &Peak) -> Option<(Arc<dyn Covariance>, Vec<f64>)> {

@@ -149,10 +149,7 @@ mod tests {
     #[test]
     fn the_ladder_has_the_density_of_flicker() {
         let omega = [1e-3, 1e-2, 0.1, 0.5, std::f64::consts::PI];
-        let at = Frequencies {
-            omega: omega.to_vec(),
-            cosine: omega.map(f64::cos).to_vec(),
-        };
+        let at = Frequencies::at(omega.to_vec());
         let wanted = Pink.density(&[0.0], &at);
         for apart in [1.0, 2.0] {
             let all = ladder(12_000, apart)

@@ -376,10 +376,7 @@ mod tests {
         let theta = [0.7, 0.3, -0.2];
         let (omega, half) = mode.place(&theta);
         let frequencies: Vec<f64> = (1..40).map(|i| 0.078 * f64::from(i)).collect();
-        let at = Frequencies {
-            cosine: frequencies.iter().map(|w| w.cos()).collect(),
-            omega: frequencies.clone(),
-        };
+        let at = Frequencies::at(frequencies.clone());
         for skew in [-1.0, 0.0, 1.0] {
             let mode = Mode { skew, ..mode };
             for (w, d) in frequencies.iter().zip(mode.density(&theta, &at)) {

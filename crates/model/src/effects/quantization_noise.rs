@@ -163,10 +163,7 @@ mod tests {
     #[test]
     fn its_density_is_that_of_white_noise_differenced() {
         let omega: Vec<f64> = (1..30).map(|i| 0.1 * f64::from(i)).collect();
-        let at = Frequencies {
-            cosine: omega.iter().map(|w| w.cos()).collect(),
-            omega: omega.clone(),
-        };
+        let at = Frequencies::at(omega.clone());
         let variance = 0.6f64;
         for (w, d) in omega.iter().zip(Difference.density(&[variance.ln()], &at)) {
             // |1 - exp(-i w)|^2 of an error of half the variance.

@@ -40,6 +40,7 @@ pub(super) fn hypotheses(effect: &dyn Effect, stand: &Stand, axis: usize) -> Vec
         axis: Some(Axis::ALL[axis]),
         lsb: Some(LSB),
         white_sigma: stand.white(axis).sqrt(),
+        neighbours_sigma: stand.white(axis).sqrt(),
         rate_hz: stand.rate_hz,
         samples: stand.samples(),
         base: Some(Base::Static),

@@ -42,6 +42,7 @@ fn chances(e: &[f64], command: &[f64]) -> [f64; 3] {
         axis: None,
         lsb: None,
         white_sigma: 1.0,
+        neighbours_sigma: 1.0,
         rate_hz: RATE_HZ,
         samples: N,
         base: None,

@@ -228,6 +228,7 @@ mod tests {
             axis: None,
             lsb: None,
             white_sigma: 1.0,
+            neighbours_sigma: 1.0,
             rate_hz: 20.0,
             samples: n,
             base: None,

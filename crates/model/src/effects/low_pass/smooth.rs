@@ -250,8 +250,7 @@ mod tests {
 
     fn frequencies() -> Frequencies {
         let omega: Vec<f64> = (1..40).map(|i| f64::from(i) * 0.08).collect();
-        let cosine = omega.iter().map(|w| w.cos()).collect();
-        Frequencies { omega, cosine }
+        Frequencies::at(omega)
     }
 
     /// Coefficients of a mean of so many readings, on which rounding adds a part.
