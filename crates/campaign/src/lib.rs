@@ -13,6 +13,7 @@ pub mod motor;
 pub mod plant;
 pub mod random;
 pub mod report;
+mod series;
 pub mod stand;
 pub mod strength;
 pub mod tally;

@@ -1,5 +1,7 @@
 //! Draws by range, from a generator whose stream belongs to one case.
 
+use std::f64::consts::TAU;
+
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -25,9 +27,19 @@ impl Draw {
         Uniform::new(low, high).map_or(low, |u| u.sample(&mut self.0))
     }
 
+    /// The same, of either sign.
+    pub fn signed(&mut self, low: f64, high: f64) -> f64 {
+        self.sign() * self.between(low, high)
+    }
+
     /// Even in the logarithm.
     pub fn by_ratio(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
+    }
+
+    /// Even over a turn, rad.
+    pub fn phase(&mut self) -> f64 {
+        self.between(0.0, TAU)
     }
 
     /// True with that chance.
@@ -35,14 +47,29 @@ impl Draw {
         self.between(0.0, 1.0) < p
     }
 
+    /// The one with that chance, else the other.
+    pub fn choose<A>(&mut self, p: f64, one: A, other: A) -> A {
+        if self.chance(p) { one } else { other }
+    }
+
+    /// The one or the other, as often.
+    pub fn either<A>(&mut self, one: A, other: A) -> A {
+        self.choose(0.5, one, other)
+    }
+
     /// 1 or -1.
     pub fn sign(&mut self) -> f64 {
-        if self.chance(0.5) { 1.0 } else { -1.0 }
+        self.either(1.0, -1.0)
     }
 
     /// One of 0..count.
     pub fn of_many(&mut self, count: usize) -> usize {
         ((self.between(0.0, count as f64)) as usize).min(count.saturating_sub(1))
+    }
+
+    /// One of several.
+    pub fn one_of<A: Copy>(&mut self, all: &[A]) -> A {
+        all[self.of_many(all.len())]
     }
 
     /// Standard normal.

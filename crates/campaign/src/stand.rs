@@ -1,5 +1,7 @@
 //! A stand as it may be: random noise, and random histories of temperature, supply, motor command and vibration.
 
+use std::f64::consts::TAU;
+
 use model::ModelFile;
 use model::excitation::World;
 use model::file::EffectModel;
@@ -7,6 +9,7 @@ use model::record::{Axis, Base, Channel, Header, Quantity, Record};
 use model::simulate::SimulateError;
 
 use crate::random::Draw;
+use crate::series::{add_at, each, lagged, one_if};
 
 /// Names of the gyro channels.
 pub const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
@@ -77,16 +80,21 @@ impl Stand {
                 draw.by_ratio(3e-4, 7e-3)
             }
         };
-        Self {
+        let mut stand = Self {
             seconds,
             rate_hz,
             walk_of_angle: std::array::from_fn(|_| draw.between(3.6, 7.0)),
             walk_of_rate: std::array::from_fn(|_| walk(draw)),
             bias: std::array::from_fn(|_| draw.between(-1.0, 1.0)),
             lsb: [LSB; 3],
-            world: world(draw, samples, rate_hz, needs),
+            world: World {
+                duty: vec![0.0; samples],
+                ..World::default()
+            },
             excitation: vec![],
-        }
+        };
+        stand.world = stand.drawn_world(draw, needs);
+        stand
     }
 
     /// Samples.
@@ -123,14 +131,42 @@ impl Stand {
         &self,
         draw: &mut Draw,
         dwell_s: (f64, f64),
-        level: impl FnMut(&mut Draw) -> f64,
+        mut level: impl FnMut(&mut Draw) -> f64,
     ) -> Vec<f64> {
-        held(draw, self.samples(), self.rate_hz, dwell_s, level)
+        let mut all = Vec::with_capacity(self.samples());
+        while all.len() < self.samples() {
+            let length = (draw.between(dwell_s.0, dwell_s.1) * self.rate_hz).ceil() as usize;
+            let value = level(draw);
+            all.extend(std::iter::repeat_n(value, length.max(1)));
+        }
+        all.truncate(self.samples());
+        all
+    }
+
+    /// What is on and off by turns, each for a random time, s: of a size each time, and 0 while it is off. It begins other than
+    /// `on`.
+    pub(crate) fn by_turns(
+        &self,
+        draw: &mut Draw,
+        mut on: bool,
+        dwell_s: (f64, f64),
+        mut size: impl FnMut(&mut Draw) -> f64,
+    ) -> Vec<f64> {
+        self.held(draw, dwell_s, |d| {
+            on = !on;
+            one_if(on) * size(d)
+        })
     }
 
     /// An Ornstein-Uhlenbeck process of this standard deviation and time constant, s.
     pub(crate) fn wander(&self, draw: &mut Draw, sigma: f64, tau: f64) -> Vec<f64> {
-        wander(draw, self.samples(), self.rate_hz, sigma, tau)
+        let keep = (-1.0 / (tau * self.rate_hz)).exp();
+        let step = sigma * (1.0 - keep * keep).sqrt();
+        let mut x = sigma * draw.normal();
+        self.series(|_| {
+            x = keep * x + step * draw.normal();
+            x
+        })
     }
 
     /// Values behind a lag of `tau` s.
@@ -178,229 +214,133 @@ impl Stand {
 
     /// The world as a record, exact.
     pub(crate) fn witness(&self) -> Record {
-        let axis = |i: usize| Some(Axis::ALL[i]);
-        let channel = |name: &str, quantity, axis, values: Vec<f64>| Channel {
-            name: name.to_owned(),
+        let channel = |name: String, quantity, axis, values: &[f64], by: f64| Channel {
+            name,
             quantity,
             axis,
             unit: String::new(),
-            values,
+            values: each(values, |v| v * by),
             counts: None,
             lsb: None,
         };
-        let scaled = |values: &[f64], by: f64| values.iter().map(|v| v * by).collect::<Vec<_>>();
+        let (world, none) = (&self.world, None);
         let mut channels = vec![
-            channel("supply", Quantity::Supply, None, self.world.supply.clone()),
-            channel("pwm", Quantity::Pwm, None, scaled(&self.world.duty, 255.0)),
+            channel("supply".into(), Quantity::Supply, none, &world.supply, 1.0),
+            channel("pwm".into(), Quantity::Pwm, none, &world.duty, 255.0),
         ];
-        for i in 0..3 {
-            let letter = ["x", "y", "z"][i];
-            channels.push(channel(
-                &format!("temp_{letter}"),
-                Quantity::Temp,
-                axis(i),
-                self.world.temperature[i].clone(),
-            ));
-            channels.push(channel(
-                &format!("acc_{letter}"),
-                Quantity::Acc,
-                axis(i),
-                scaled(&self.world.acc[i], GRAVITY),
-            ));
+        for (i, letter) in ["x", "y", "z"].into_iter().enumerate() {
+            let axis = Some(Axis::ALL[i]);
+            let (temp, acc) = (format!("temp_{letter}"), format!("acc_{letter}"));
+            channels.extend([
+                channel(temp, Quantity::Temp, axis, &world.temperature[i], 1.0),
+                channel(acc, Quantity::Acc, axis, &world.acc[i], GRAVITY),
+            ]);
         }
+        let header = Header {
+            rate_hz: Some(self.rate_hz),
+            base: Some(Base::Static),
+            ..Header::default()
+        };
         Record {
-            header: Header {
-                rate_hz: Some(self.rate_hz),
-                base: Some(Base::Static),
-                ..Header::default()
-            },
+            header,
             channels,
             ..Record::default()
         }
     }
-}
 
-/// A signal that holds each of its levels for a random time.
-pub(crate) fn held(
-    draw: &mut Draw,
-    samples: usize,
-    rate_hz: f64,
-    dwell_s: (f64, f64),
-    mut level: impl FnMut(&mut Draw) -> f64,
-) -> Vec<f64> {
-    let mut all = Vec::with_capacity(samples);
-    while all.len() < samples {
-        let length = (draw.between(dwell_s.0, dwell_s.1) * rate_hz).ceil() as usize;
-        let value = level(draw);
-        all.extend(std::iter::repeat_n(value, length.max(1)));
-    }
-    all.truncate(samples);
-    all
-}
-
-fn duty(draw: &mut Draw, samples: usize, rate_hz: f64) -> Vec<f64> {
-    let top = draw.between(0.4, 1.0);
-    let one_way = draw.chance(0.3);
-    let mut d = match draw.of_many(4) {
-        0 => held(draw, samples, rate_hz, (8.0, 40.0), |d| {
-            top * d.between(-1.0, 1.0)
-        }),
-        1 => {
-            let mut on = false;
-            held(draw, samples, rate_hz, (15.0, 50.0), |d| {
-                on = !on;
-                if on { top * d.sign() } else { 0.0 }
-            })
-        }
-        2 => {
-            let period = draw.between(30.0, 120.0) * rate_hz;
-            (0..samples)
-                .map(|i| {
-                    let x = (i as f64 / period).fract();
-                    top * (4.0 * (x - 0.5).abs() - 1.0)
+    /// A motor's command: random levels, on and off, a triangle or a sine.
+    fn drawn_duty(&self, draw: &mut Draw) -> Vec<f64> {
+        let top = draw.between(0.4, 1.0);
+        let one_way = draw.chance(0.3);
+        let which = draw.of_many(4);
+        let duty = match which {
+            0 => self.held(draw, (8.0, 40.0), |d| top * d.between(-1.0, 1.0)),
+            1 => {
+                let mut on = false;
+                self.held(draw, (15.0, 50.0), |d| {
+                    on = !on;
+                    if on { top * d.sign() } else { 0.0 }
                 })
-                .collect()
-        }
-        _ => {
-            let period = draw.between(30.0, 120.0) * rate_hz;
-            (0..samples)
-                .map(|i| top * (std::f64::consts::TAU * i as f64 / period).sin())
-                .collect()
-        }
-    };
-    for v in &mut d {
-        if one_way {
-            *v = v.abs();
-        }
-        *v = (*v * 255.0).round() / 255.0;
-    }
-    d
-}
-
-/// Behind a lag of `tau` s.
-pub(crate) fn lagged(values: &[f64], tau: f64, rate_hz: f64) -> Vec<f64> {
-    let gain = 1.0 - (-1.0 / (tau * rate_hz)).exp();
-    let mut y = values.first().copied().unwrap_or(0.0);
-    values
-        .iter()
-        .map(|v| {
-            y += gain * (v - y);
-            y
+            }
+            _ => {
+                let period = draw.between(30.0, 120.0) * self.rate_hz;
+                let triangle = |turns: f64| 4.0 * (turns.fract() - 0.5).abs() - 1.0;
+                self.series(|i| match which {
+                    2 => top * triangle(i as f64 / period),
+                    _ => top * (TAU * i as f64 / period).sin(),
+                })
+            }
+        };
+        each(&duty, |d| {
+            let d = if one_way { d.abs() } else { d };
+            (d * 255.0).round() / 255.0
         })
-        .collect()
-}
+    }
 
-/// An Ornstein-Uhlenbeck process.
-pub(crate) fn wander(
-    draw: &mut Draw,
-    samples: usize,
-    rate_hz: f64,
-    sigma: f64,
-    tau: f64,
-) -> Vec<f64> {
-    let keep = (-1.0 / (tau * rate_hz)).exp();
-    let step = sigma * (1.0 - keep * keep).sqrt();
-    let mut x = sigma * draw.normal();
-    (0..samples)
-        .map(|_| {
-            x = keep * x + step * draw.normal();
-            x
-        })
-        .collect()
-}
-
-/// What the room and a heater make of the temperature, deg C.
-fn temperature(draw: &mut Draw, samples: usize, rate_hz: f64, needs: Needs) -> Vec<f64> {
-    let seconds = samples as f64 / rate_hz;
-    let heater = needs.has(Needs::TEMPERATURE) || draw.chance(0.5);
-    let mut temperature = vec![draw.between(18.0, 32.0); samples];
-    let mut add = |values: Vec<f64>| {
+    /// What the room and a heater make of the temperature, deg C.
+    fn drawn_temperature(&self, draw: &mut Draw, needs: Needs) -> Vec<f64> {
+        let heater = needs.has(Needs::TEMPERATURE) || draw.chance(0.5);
+        let mut temperature = vec![draw.between(18.0, 32.0); self.samples()];
+        let mut add = |values: Vec<f64>| add_at(&mut temperature, 0, values);
+        if heater {
+            let (swing, on) = (draw.between(3.0, 10.0), draw.chance(0.5));
+            let target = self.by_turns(draw, on, (40.0, 150.0), |_| swing);
+            add(self.lagged(&target, draw.between(15.0, 60.0)));
+        }
+        if draw.chance(0.5) {
+            let (rise, tau) = (draw.between(1.0, 8.0), draw.between(60.0, 240.0));
+            add(self.series(|i| rise * (1.0 - (-(i as f64) / self.rate_hz / tau).exp())));
+        }
+        if draw.chance(0.3) {
+            let seconds = self.samples() as f64 / self.rate_hz;
+            let rise = draw.between(-3.0, 3.0);
+            add(self.series(|i| rise * i as f64 / self.rate_hz / seconds));
+        }
+        let room = draw.by_ratio(0.02, 0.3);
+        add(self.wander(draw, room, 200.0));
         temperature
-            .iter_mut()
-            .zip(values)
-            .for_each(|(t, v)| *t += v);
-    };
-    if heater {
-        let swing = draw.between(3.0, 10.0);
-        let mut on = draw.chance(0.5);
-        let target = held(draw, samples, rate_hz, (40.0, 150.0), |_| {
-            on = !on;
-            if on { swing } else { 0.0 }
-        });
-        let lag = draw.between(15.0, 60.0);
-        add(lagged(&target, lag, rate_hz));
     }
-    if draw.chance(0.5) {
-        let (rise, tau) = (draw.between(1.0, 8.0), draw.between(60.0, 240.0));
-        let heat = |i: usize| rise * (1.0 - (-(i as f64) / rate_hz / tau).exp());
-        add((0..samples).map(heat).collect());
-    }
-    if draw.chance(0.3) {
-        let rise = draw.between(-3.0, 3.0);
-        add((0..samples)
-            .map(|i| rise * i as f64 / rate_hz / seconds)
-            .collect());
-    }
-    let room = draw.by_ratio(0.02, 0.3);
-    add(wander(draw, samples, rate_hz, room, 200.0));
-    temperature
-}
 
-/// A supply of 5 V that a load and the motor pull down, V.
-fn supply(draw: &mut Draw, duty: &[f64], rate_hz: f64, needs: Needs) -> Vec<f64> {
-    let samples = duty.len();
-    let mut supply = vec![5.0; samples];
-    let mut sag = |values: Vec<f64>| supply.iter_mut().zip(values).for_each(|(u, v)| *u -= v);
-    sag(wander(draw, samples, rate_hz, 0.001, 60.0));
-    if needs.has(Needs::SUPPLY) || draw.chance(0.5) {
-        let drop = draw.between(0.03, 0.06);
-        let mut on = false;
-        sag(held(draw, samples, rate_hz, (10.0, 50.0), |_| {
-            on = !on;
-            if on { drop } else { 0.0 }
-        }));
+    /// A supply of 5 V that a load and the motor pull down, V.
+    fn drawn_supply(&self, draw: &mut Draw, duty: &[f64], needs: Needs) -> Vec<f64> {
+        let mut supply = vec![5.0; duty.len()];
+        let mut sag = |values: Vec<f64>| add_at(&mut supply, 0, each(&values, |v| -v));
+        sag(self.wander(draw, 0.001, 60.0));
+        if needs.has(Needs::SUPPLY) || draw.chance(0.5) {
+            let drop = draw.between(0.03, 0.06);
+            sag(self.by_turns(draw, false, (10.0, 50.0), |_| drop));
+        }
+        if draw.chance(0.3) {
+            let drop = draw.between(0.01, 0.04);
+            sag(each(&self.lagged(duty, 0.3), |d| drop * d.abs()));
+        }
+        supply
     }
-    if draw.chance(0.3) {
-        let drop = draw.between(0.01, 0.04);
-        sag(lagged(duty, 0.3, rate_hz)
-            .iter()
-            .map(|d| drop * d.abs())
-            .collect());
-    }
-    supply
-}
 
-fn world(draw: &mut Draw, samples: usize, rate_hz: f64, needs: Needs) -> World {
-    let duty = if needs.has(Needs::MOTOR) || draw.chance(0.6) {
-        duty(draw, samples, rate_hz)
-    } else {
-        vec![0.0; samples]
-    };
-    let temperature = temperature(draw, samples, rate_hz, needs);
-    let supply = supply(draw, &duty, rate_hz, needs);
-    let rms = if needs.has(Needs::VIBRATION) || draw.chance(0.5) {
-        draw.between(0.05, 0.2)
-    } else {
-        0.0
-    };
-    let acc = std::array::from_fn(|axis| {
-        let still = if axis == 2 { 1.0 } else { 0.0 };
-        (0..samples).map(|_| still + rms * draw.normal()).collect()
-    });
-    // Three parts on one board: nearly the same temperature.
-    let temperature = std::array::from_fn(|_| {
-        let (gain, offset) = (draw.between(0.95, 1.05), draw.between(-0.5, 0.5));
-        let first = temperature[0];
-        temperature
-            .iter()
-            .map(|t| first + offset + gain * (t - first))
-            .collect()
-    });
-    World {
-        temperature,
-        supply,
-        duty,
-        acc,
-        motion: std::array::from_fn(|_| vec![0.0; samples]),
+    fn drawn_world(&self, draw: &mut Draw, needs: Needs) -> World {
+        let still = &self.world.duty;
+        let duty = if needs.has(Needs::MOTOR) || draw.chance(0.6) {
+            self.drawn_duty(draw)
+        } else {
+            still.clone()
+        };
+        let room = self.drawn_temperature(draw, needs);
+        let supply = self.drawn_supply(draw, &duty, needs);
+        let shakes = needs.has(Needs::VIBRATION) || draw.chance(0.5);
+        let rms = if shakes { draw.between(0.05, 0.2) } else { 0.0 };
+        World {
+            duty,
+            supply,
+            acc: std::array::from_fn(|axis| {
+                let still = if axis == 2 { 1.0 } else { 0.0 };
+                self.series(|_| still + rms * draw.normal())
+            }),
+            // Three parts on one board: nearly the same temperature.
+            temperature: std::array::from_fn(|_| {
+                let (gain, offset) = (draw.between(0.95, 1.05), draw.between(-0.5, 0.5));
+                each(&room, |t| room[0] + offset + gain * (t - room[0]))
+            }),
+            motion: std::array::from_fn(|_| still.clone()),
+        }
     }
 }

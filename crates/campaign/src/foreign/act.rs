@@ -2,8 +2,9 @@
 
 use model::record::Record;
 
-use super::words::{each, within_step};
+use super::words::within_step;
 use crate::random::Draw;
+use crate::series::{each, spread};
 use crate::stand::{GYROS, LSB, Stand};
 
 /// What the three axes read, counts.
@@ -60,12 +61,13 @@ fn code(at: f64, first: i32, edges: &[f64]) -> i32 {
 
 impl Change {
     /// What a converter of these lower edges of its codes from the first on, counts, reads of an axis.
-    pub(super) fn edges(axis: usize, first: i32, edges: Vec<f64>) -> Self {
-        Self::made(move |counts, draw| {
-            each(&counts[axis], |own| {
-                code(within_step(own, draw), first, &edges)
-            })
-        })
+    pub(super) fn edges(axis: usize, (first, edges): (i32, Vec<f64>)) -> Self {
+        Self::reread(axis, move |rate| code(rate, first, &edges))
+    }
+
+    /// What is read of an axis by the rate that it has read, counts.
+    pub(super) fn reread(axis: usize, read: impl Fn(f64) -> i32 + 'static) -> Self {
+        Self::made(move |counts, draw| each(&counts[axis], |own| read(within_step(own, draw))))
     }
 
     /// Counts of an axis that are made of those of all three.
@@ -81,11 +83,7 @@ impl Change {
     /// Rms of what is added, deg/s.
     pub(super) fn rms(&self) -> f64 {
         match self {
-            Self::Add(signal) => {
-                let n = signal.len() as f64;
-                let mean = signal.iter().sum::<f64>() / n;
-                (signal.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
-            }
+            Self::Add(signal) => spread(signal).sqrt(),
             _ => 0.0,
         }
     }
@@ -96,21 +94,18 @@ impl Change {
         match self {
             Self::Add(signal) => add(record, channel, signal, draw),
             Self::Scale(factor) => {
-                let noise: Vec<f64> = factor.iter().map(|f| f * sigma * draw.normal()).collect();
+                let noise = each(factor, |f| f * sigma * draw.normal());
                 add(record, channel, &noise, draw);
             }
             Self::Noise(noise, share) => {
                 let (own, normal) = (share.sqrt() * sigma, (1.0 - share).sqrt() * sigma);
-                let mixed: Vec<f64> = noise
-                    .iter()
-                    .map(|e| own * e + normal * draw.normal())
-                    .collect();
+                let mixed = each(noise, |e| own * e + normal * draw.normal());
                 add(record, channel, &mixed, draw);
             }
             Self::Made(new) => {
                 let new = new(&counts(record), draw);
                 if let Some(c) = record.channels.iter_mut().find(|c| c.name == channel) {
-                    c.values = new.iter().map(|c| LSB * f64::from(*c)).collect();
+                    c.values = each(&new, |c| LSB * f64::from(c));
                     c.counts = Some(new);
                 }
             }

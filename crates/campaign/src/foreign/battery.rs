@@ -4,13 +4,17 @@
 //! What is held of a row has no chance in it: its draws have fixed seeds. So the rows of the newest set are held and of the others
 //! one in eight; all of them where all draws are asked for. tests/draws.rs says of each row whether it is drawn as before.
 
+use std::f64::consts::TAU;
+
 use model::effects::EFFECTS as LIBRARY;
 
 use super::act::{Change, counts};
 use super::catalogue::{EFFECTS, ForeignEffect, KINDS, Strength};
 use super::known::Known;
+use super::words::in_time;
 use super::{Foreign, LARGEST_RMS, foreign, sets};
 use crate::random::Draw;
+use crate::series::{each, each_pair, extremes, mean, mean_square, one_if};
 use crate::stand::{GYROS, LSB, Stand};
 use crate::strength::Meter;
 
@@ -69,22 +73,18 @@ impl Drawn {
         let mut after = before.clone();
         self.effect
             .act(&mut after, &self.stand, self.axis, &mut self.draw);
-        let of = |c: &Vec<i32>| c.iter().map(|c| LSB * f64::from(*c)).collect();
-        [before, after].map(|record| counts(&record).each_ref().map(of))
+        let rates = |c: Vec<i32>| each(&c, |c| LSB * f64::from(c));
+        [before, after].map(|record| counts(&record).map(rates))
     }
 
     /// Share of what is added to the readings that a straight line in the other two axes describes.
     fn of_other_axes(&mut self) -> f64 {
         let [before, after] = self.readings();
         let own = self.axis;
-        let moved = before[own].iter().zip(&after[own]);
-        let added: Vec<f64> = moved.map(|(a, b)| b - a).collect();
+        let added = each_pair(&before[own], &after[own], |a, b| b - a);
         let meter = Meter::new(&self.stand, own);
         let gain = |s: &[f64]| meter.of_signal(&meter.energy(s)).powi(2);
-        let others: Vec<Vec<f64>> = (0..3)
-            .filter(|k| *k != own)
-            .map(|k| before[k].clone())
-            .collect();
+        let others = [1, 2].map(|k| before[(own + k) % 3].clone());
         1.0 - gain(&meter.beyond(&added, &others)) / gain(&added)
     }
 
@@ -93,17 +93,16 @@ impl Drawn {
         let (stand, axis) = (&self.stand, self.axis);
         let gain = self.effect.strength.powi(2);
         let n = stand.samples();
-        let mut all: Vec<(&str, f64)> = match (&self.effect.known, &self.effect.change) {
-            (_, Change::Add(signal)) if matches!(self.effect.known, Known::Energy(_)) => {
+        let filtered = |r: f64| vec![("low_pass", by_neighbours(r, n, gain))];
+        let mut all = match (&self.effect.known, &self.effect.change) {
+            (Known::Energy(_), Change::Add(signal)) => {
                 let two = of_two(stand, axis, signal);
-                let mut all: Vec<(String, f64)> = of_all(stand, axis, signal)
-                    .into_iter()
-                    .map(|(id, share)| (id.to_owned(), share))
-                    .collect();
-                all.push((two.names.join(" and "), two.share));
                 let (process, share) = two.with_process;
-                all.push((format!("{} and {process}", two.names[0]), share));
-                return all;
+                let pairs = [
+                    (two.names.join(" and "), two.share),
+                    (format!("{} and {process}", two.names[0]), share),
+                ];
+                return [named(of_all(stand, axis, signal)), pairs.into()].concat();
             }
             (Known::Variance(law), _) => of_variance_laws(stand, axis, law),
             (Known::Shaped(by), _) => vec![of_processes(stand, axis, by, &[], gain)],
@@ -112,33 +111,28 @@ impl Drawn {
                 let density: Vec<f64> = (0..places[0].len()).map(mean).collect();
                 vec![of_processes(stand, axis, &[], &density, gain)]
             }
-            (Known::Codes { first, read, .. }, _) => of_code_laws(stand, *first, read).into(),
-            (
-                Known::Steps {
-                    first,
-                    steps,
-                    shares,
-                    ..
-                },
-                _,
-            ) => of_step_laws(stand, *first, steps, shares, self.effect.strength).into(),
+            (Known::Codes(law, _), _) => of_code_laws(stand, law).into(),
+            (Known::Steps(law, steps, _), _) => of_step_laws(stand, law, steps, gain).into(),
             (Known::Strength(_), Change::Noise(series, share)) => {
-                let r = share * of_series(series);
-                vec![("low_pass", by_neighbours(r, n, self.effect.strength))]
+                filtered(share * of_series(series))
+            }
+            (Known::Strength(_), Change::Made(_)) if !couples => {
+                let [_, after] = self.readings();
+                filtered(of_series(&after[axis]))
             }
             _ => vec![],
         };
         if couples {
             all.push(("cross_axis", self.of_other_axes()));
-        } else if let (Known::Strength(_), Change::Made(_)) =
-            (&self.effect.known, &self.effect.change)
-        {
-            let [_, after] = self.readings();
-            let r = of_series(&after[self.axis]);
-            all.push(("low_pass", by_neighbours(r, n, self.effect.strength)));
         }
-        all.into_iter().map(|(id, s)| (id.to_owned(), s)).collect()
+        named(all)
     }
+}
+
+/// Shares with the names that they are told by.
+fn named(shares: Vec<(&str, f64)>) -> Vec<(String, f64)> {
+    let shares = shares.into_iter();
+    shares.map(|(id, share)| (id.to_owned(), share)).collect()
 }
 
 /// Every effect of some kinds that is held, on all threads; what a row fails by is told of all of them.
@@ -260,15 +254,11 @@ fn each_acts_on_its_channel_and_leaves_the_others() {
         let (mut drawn, _) = drawn(place, 600.0, 0, Some(30.0));
         let own = drawn.axis;
         let [before, after] = drawn.readings();
-        let moved = |axis: usize| -> Vec<f64> {
-            let pairs = before[axis].iter().zip(&after[axis]);
-            pairs.map(|(a, b)| (a - b).abs()).collect()
-        };
         let mut wrong = vec![];
         for (axis, name) in GYROS.iter().enumerate() {
-            let moved = moved(axis);
-            let share = moved.iter().filter(|d| **d > 0.0).count() as f64 / moved.len() as f64;
-            let most = moved.iter().copied().fold(0.0, f64::max);
+            let moved = each_pair(&before[axis], &after[axis], |a, b| (a - b).abs());
+            let share = mean(&each(&moved, |d| one_if(d > 0.0)));
+            let most = extremes(&moved).1;
             // At least 60 of 12 000 readings, and none so far that it would be an outlier.
             if axis == own && !(share > 0.005 && most < 5.0) {
                 wrong.push(format!("{share} of the readings, by up to {most} deg/s"));
@@ -289,7 +279,7 @@ fn noise_has_the_variance_and_the_density_that_its_strength_reckons_with() {
             return vec![];
         };
         let mut wrong = vec![];
-        let square = series.iter().map(|v| v * v).sum::<f64>() / series.len() as f64;
+        let square = mean_square(series);
         // A filter that acts in spells takes up to a sixth off.
         if (square - 1.0).abs() > 0.2 {
             wrong.push(format!("variance {square}"));
@@ -314,19 +304,13 @@ fn codes_come_and_repeat_as_often_as_their_strength_reckons_with() {
         // What wanders has other codes by and by, which no law of codes holds.
         drawn.stand.walk_of_rate = [0.0; 3];
         let [_, after] = drawn.readings();
-        let own = after[drawn.axis].iter();
-        let codes: Vec<i32> = own.map(|v| (v / LSB).round() as i32).collect();
-        let (first, shares, repeats) = match &drawn.effect.known {
-            Known::Codes { first, read, .. } => (first, read, None),
-            Known::Steps {
-                first,
-                shares,
-                steps,
-                ..
-            } => {
-                let own = shares.iter().zip(steps).enumerate();
+        let codes = each(&after[drawn.axis], |v| (v / LSB).round() as i32);
+        let (law, repeats) = match &drawn.effect.known {
+            Known::Codes(law, _) => (law, None),
+            Known::Steps(law, steps, _) => {
+                let own = law.shares.iter().zip(steps).enumerate();
                 let repeats: f64 = own.map(|(i, (share, row))| share * row[i]).sum();
-                (first, shares, Some(repeats))
+                (law, Some(repeats))
             }
             _ => return vec![],
         };
@@ -336,9 +320,9 @@ fn codes_come_and_repeat_as_often_as_their_strength_reckons_with() {
             (seen - told).abs() > 5.0 * (told.max(1e-4) * (1.0 - told) / n).sqrt() + 0.01
         };
         let mut wrong = vec![];
-        for (code, told) in (*first..).zip(shares) {
+        for (code, told) in law.codes() {
             let seen = codes.iter().filter(|c| **c == code).count() as f64 / n;
-            if off(*told, seen) {
+            if off(told, seen) {
                 wrong.push(format!("code {code}: {seen}, reckoned {told}"));
             }
         }
@@ -386,16 +370,13 @@ fn rows_have_names_sets_twins_and_parts_that_there_are() {
 fn an_effect_of_the_library_describes_itself() {
     let draw = &mut Draw::of(SEED, 11, 0);
     let stand = Stand::draw(draw, 600.0, 20.0, EFFECTS[0].needs);
-    let of = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
-        let at = |i: usize| 0.1 * f(i as f64 / stand.rate_hz);
-        (0..stand.samples()).map(at).collect()
-    };
-    let tau = std::f64::consts::TAU;
-    let swing = |t: f64| 1.0 + 0.7 * (tau * 0.11 * t).cos();
+    let of = |f: &dyn Fn(f64) -> f64| in_time(&stand, |t| 0.1 * f(t));
+    let line = |t: f64| (TAU * 2.371 * t + 0.4).cos();
+    let swing = |t: f64| 1.0 + 0.7 * (TAU * 0.11 * t).cos();
     for (cause, signal) in [
-        ("line", of(&|t| (tau * 2.371 * t + 0.4).cos())),
-        ("am_line", of(&|t| swing(t) * (tau * 2.371 * t + 0.4).cos())),
-        ("bias_step", of(&|t| f64::from(u8::from(t >= 301.7)))),
+        ("line", of(&line)),
+        ("am_line", of(&|t| swing(t) * line(t))),
+        ("bias_step", of(&|t| one_if(t >= 301.7))),
         ("temperature", stand.world.temperature[1].clone()),
     ] {
         let share = of_all(&stand, 1, &signal)
@@ -406,11 +387,11 @@ fn an_effect_of_the_library_describes_itself() {
     }
     // A process of the library, in its own spectrum.
     let pole = (-1.0 / (2.0 * stand.rate_hz)).exp();
-    let density = |w: &f64| {
+    let density = |w: f64| {
         0.1 * stand.white(1) * (1.0 - pole * pole) / (1.0 + pole * pole - 2.0 * pole * w.cos())
     };
     let meter = Meter::new(&stand, 1);
-    let beside: Vec<f64> = meter.omega().iter().map(density).collect();
+    let beside = each(meter.omega(), density);
     let gain = meter.of_density(&beside).powi(2);
     let (_, share) = of_processes(&stand, 1, &[], &beside, gain);
     assert!(

@@ -7,5 +7,6 @@ pub(super) use super::known::*;
 pub(super) use super::shape::*;
 pub(super) use super::words::*;
 pub(super) use crate::random::Draw;
-pub(super) use crate::stand::{LSB, Stand, lagged};
+pub(super) use crate::series::*;
+pub(super) use crate::stand::{LSB, Stand};
 pub(super) use crate::strength::Meter;

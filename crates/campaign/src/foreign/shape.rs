@@ -3,9 +3,10 @@
 use std::rc::Rc;
 
 use super::act::{Change, Counts};
-use super::known::{Known, Next};
+use super::known::Known;
 use super::words::within_step;
 use crate::random::Draw;
+use crate::series::{carry, each, each_pair};
 use crate::stand::{LSB, Stand};
 use crate::strength::{Meter, size_for};
 
@@ -17,11 +18,7 @@ type Does = dyn FnOnce(&Stand, &mut Draw, f64) -> Change;
 /// A foreign effect as drawn, its size still open.
 pub(super) enum Shape {
     /// What has a size, up to a largest one, by which its strength is known.
-    Sized {
-        most: f64,
-        knows: Box<Knows>,
-        does: Box<Does>,
-    },
+    Sized(f64, Box<Knows>, Box<Does>),
     /// What comes in whole steps, or as it is: of the strength that it has.
     Fixed(Known, Change),
 }
@@ -36,27 +33,23 @@ impl Shape {
         wanted: f64,
     ) -> (Known, Change) {
         match self {
-            Self::Sized { most, knows, does } => {
-                let strength = |size: f64| knows(stand, size).strength(stand, axis);
-                let size = size_for(wanted, &strength).min(most);
-                (knows(stand, size), does(stand, draw, size))
+            Self::Sized(most, knows, does) => {
+                let known = |size: f64| knows(stand, size.min(most));
+                let size = size_for(wanted, &|size| known(size).strength(stand, axis)).min(most);
+                (known(size), does(stand, draw, size))
             }
             Self::Fixed(known, change) => (known, change),
         }
     }
 }
 
-/// What has a size of at most `most`.
+/// What has a size of at most `most`. Larger ones are not asked for.
 pub(super) fn sized(
     most: f64,
     knows: impl Fn(&Stand, f64) -> Known + 'static,
     does: impl FnOnce(&Stand, &mut Draw, f64) -> Change + 'static,
 ) -> Shape {
-    Shape::Sized {
-        most,
-        knows: Box::new(knows),
-        does: Box::new(does),
-    }
+    Shape::Sized(most, Box::new(knows), Box::new(does))
 }
 
 /// What has a size of at most `most`, by which it makes new counts of an axis of those of all three.
@@ -72,17 +65,14 @@ pub(super) fn remade(
 
 /// What adds a series of these energies by bin, at size 1, to an axis.
 pub(super) fn by_energy(energy: Vec<f64>, does: impl FnOnce(f64) -> Change + 'static) -> Shape {
-    sized(
-        f64::INFINITY,
-        move |_, size| Known::Energy(energy.iter().map(|e| e * size * size).collect()),
-        move |_, _, size| does(size),
-    )
+    let knows = move |_: &Stand, size: f64| Known::Energy(each(&energy, |e| e * size * size));
+    sized(f64::INFINITY, knows, move |_, _, size| does(size))
 }
 
 /// A signal that may have any size.
 pub(super) fn signal(stand: &Stand, axis: usize, unit: Vec<f64>) -> Shape {
     by_energy(Meter::new(stand, axis).energy(&unit), move |size| {
-        Change::Add(unit.iter().map(|v| size * v).collect())
+        Change::Add(each(&unit, |v| size * v))
     })
 }
 
@@ -106,109 +96,88 @@ pub(super) fn share(
     sized(most, knows, |_, _, share| Change::Noise(series, share))
 }
 
-/// White noise whose variance follows a law, by size.
-pub(super) fn variance(law: impl Fn(f64) -> Vec<f64> + 'static) -> Shape {
+/// White noise whose variance follows a law, by size, up to `most`.
+pub(super) fn variance(most: f64, law: impl Fn(f64) -> Vec<f64> + 'static) -> Shape {
     let law = Rc::new(law);
     let known = Rc::clone(&law);
     sized(
-        f64::INFINITY,
+        most,
         move |_, size| Known::Variance(known(size)),
-        move |_, _, size| Change::Scale(law(size).iter().map(|v| v.sqrt()).collect()),
+        move |_, _, size| Change::Scale(each(&law(size), f64::sqrt)),
     )
 }
 
 /// White noise whose variance is 1, and more by a shape.
 pub(super) fn more(shape: Vec<f64>) -> Shape {
-    variance(move |size| shape.iter().map(|s| 1.0 + size * s).collect())
+    variance(f64::INFINITY, move |size| each(&shape, |s| 1.0 + size * s))
 }
 
 /// White noise whose variance is the exponential of so much of a shape.
 pub(super) fn exponential(shape: Vec<f64>) -> Shape {
-    variance(move |size| shape.iter().map(|s| (size * s).exp()).collect())
+    variance(f64::INFINITY, move |size| {
+        each(&shape, |s| (size * s).exp())
+    })
 }
 
-/// A converter with these lower edges of its codes from the first on, counts, by size.
-pub(super) fn edges(axis: usize, at: impl Fn(&Stand, f64) -> (i32, Vec<f64>) + 'static) -> Shape {
-    let at = Rc::new(at);
-    let known = Rc::clone(&at);
+/// A converter with these lower edges of its codes from the first on, counts, by size, up to `most`.
+pub(super) fn edges(
+    axis: usize,
+    most: f64,
+    at: impl Fn(&Stand, f64) -> (i32, Vec<f64>) + Copy + 'static,
+) -> Shape {
     sized(
-        f64::INFINITY,
-        move |stand, size| Known::edges(stand, axis, &known(stand, size)),
-        move |stand, _, size| {
-            let (first, edges) = at(stand, size);
-            Change::edges(axis, first, edges)
-        },
+        most,
+        move |stand, size| Known::edges(stand, axis, &at(stand, size)),
+        move |stand, _, size| Change::edges(axis, at(stand, size)),
     )
 }
 
 /// Readings that go through a map of the codes, with the chance that is their size.
-pub(super) fn map(axis: usize, map: impl Fn(i32) -> i32 + 'static) -> Shape {
-    let map = Rc::new(map);
-    let known = Rc::clone(&map);
+pub(super) fn map(axis: usize, map: impl Fn(i32) -> i32 + Copy + 'static) -> Shape {
     remade(
         1.0,
-        move |stand, chance| Known::map(stand, axis, chance.min(1.0), &*known),
+        move |stand, chance| Known::map(stand, axis, chance, map),
         move |counts, draw, chance| {
-            let read = |c: &i32| if draw.chance(chance) { map(*c) } else { *c };
-            counts[axis].iter().map(read).collect()
+            each(&counts[axis], |code| draw.choose(chance, map(code), code))
         },
     )
 }
 
 /// Readings that are what `next` makes of the reading before and the code, with the chance that is their size.
-pub(super) fn by_chance(axis: usize, next: impl Fn(i32, i32) -> i32 + 'static) -> Shape {
-    let next: Rc<Next> = Rc::new(next);
-    let known = Rc::clone(&next);
+pub(super) fn by_chance(axis: usize, next: impl Fn(i32, i32) -> i32 + Copy + 'static) -> Shape {
     remade(
         1.0,
-        move |stand, chance| Known::next(stand, axis, chance.min(1.0), &*known),
+        move |stand, chance| Known::next(stand, axis, chance, &next),
         move |counts, draw, chance| {
             let own = &counts[axis];
-            let mut reading = own[0];
-            own.iter()
-                .map(|code| {
-                    reading = if draw.chance(chance) {
-                        next(reading, *code)
-                    } else {
-                        *code
-                    };
-                    reading
-                })
-                .collect()
+            carry(own[0], own, |before, code| {
+                draw.choose(chance, next(before, code), code)
+            })
         },
     )
 }
 
-/// What the frames of other axes add to this one, deg/s, a signal of this kind giving the strength; the converter rounds
-/// again.
+/// What the run of other axes adds to this one, deg/s, a signal of this kind giving the strength; the converter rounds again.
 pub(super) fn coupled(
-    stand: &Stand,
-    axis: usize,
-    like: &[f64],
-    of: impl Fn(&Counts, usize) -> f64 + 'static,
-) -> Shape {
-    coupled_series(stand, axis, like, move |counts| {
-        (0..counts[axis].len()).map(|i| of(counts, i)).collect()
-    })
-}
-
-/// The same of what the whole run of the other axes adds, deg/s.
-pub(super) fn coupled_series(
     stand: &Stand,
     axis: usize,
     like: &[f64],
     of: impl Fn(&Counts) -> Vec<f64> + 'static,
 ) -> Shape {
-    by_energy(Meter::new(stand, axis).energy(like), move |size| {
+    coupled_by(Meter::new(stand, axis).energy(like), axis, of)
+}
+
+/// The same, these energies by bin giving the strength.
+pub(super) fn coupled_by(
+    energy: Vec<f64>,
+    axis: usize,
+    of: impl Fn(&Counts) -> Vec<f64> + 'static,
+) -> Shape {
+    by_energy(energy, move |size| {
         Change::made(move |counts, draw| {
-            counts[axis]
-                .iter()
-                .zip(of(counts))
-                .map(|(own, added)| {
-                    let rate = within_step(*own, draw);
-                    (rate + size * added / LSB).round() as i32
-                })
-                .collect()
+            each_pair(&counts[axis], &of(counts), |own, added| {
+                (within_step(own, draw) + size * added / LSB).round() as i32
+            })
         })
     })
 }

@@ -3,9 +3,9 @@
 use model::effect::{Hypothesis, VarianceLaw};
 use model::effects::EFFECTS;
 
-use super::super::known::{of_law, of_steps, refitted};
-use super::super::words::each_pair;
+use super::super::known::{Law, of_law, of_steps};
 use super::library::{Kind, best_process, hypotheses};
+use crate::series::{about_mean, each_pair, mean, one_if};
 use crate::stand::Stand;
 use crate::strength::{Meter, of_variance};
 
@@ -16,8 +16,7 @@ pub(super) fn of_variance_laws(
     law: &[f64],
 ) -> Vec<(&'static str, f64)> {
     let whole = of_variance(law).powi(2);
-    let n = law.len() as f64;
-    let mean = law.iter().sum::<f64>() / n;
+    let (n, mean) = (law.len() as f64, mean(law));
     // The level is refitted beside the shape.
     let gain = |shape: &dyn Fn(usize) -> f64| {
         let (mut sum, mut logs) = (0.0, 0.0);
@@ -28,16 +27,12 @@ pub(super) fn of_variance_laws(
         n * mean.ln() - n * (sum / n).ln() - logs
     };
     let best = |how: &VarianceLaw| match how {
-        VarianceLaw::Shape { shape, .. } => (-9..20)
-            .map(|k| {
-                if k < 0 {
-                    0.1 * f64::from(k)
-                } else {
-                    0.1 * 1.3f64.powi(k)
-                }
-            })
-            .map(|a| gain(&|i| 1.0 + a * shape[i]))
-            .fold(0.0, f64::max),
+        VarianceLaw::Shape { shape, .. } => {
+            let fewer = (1..10).map(|k| -0.1 * f64::from(k));
+            let more = (0..20).map(|k| 0.1 * 1.3f64.powi(k));
+            let gains = fewer.chain(more).map(|a| gain(&|i| 1.0 + a * shape[i]));
+            gains.fold(0.0, f64::max)
+        }
         VarianceLaw::Segment => of_segments(law, mean),
     };
     let mut all = vec![];
@@ -89,29 +84,28 @@ pub(super) fn of_processes(
     (id, share * meter.of_density(&density).powi(2) / gain)
 }
 
-/// Correlation of neighbours is all that white noise and one pole, or any filter of the library, have of them; the longer
-/// lags of a pole follow from it.
-pub(super) fn by_neighbours(r: f64, n: usize, strength: f64) -> f64 {
-    -(n as f64) * (-r * r).ln_1p() / strength.powi(2)
+/// Share of `gain` that a pole has: correlation of neighbours is all that white noise and one pole, or any filter of the
+/// library, have of them; the longer lags of a pole follow from it.
+pub(super) fn by_neighbours(r: f64, n: usize, gain: f64) -> f64 {
+    -(n as f64) * (-r * r).ln_1p() / gain
 }
 
 /// Correlation of neighbours in a series.
 pub(super) fn of_series(x: &[f64]) -> f64 {
-    let mean = x.iter().sum::<f64>() / x.len() as f64;
-    let square: f64 = x.iter().map(|v| (v - mean).powi(2)).sum();
-    let products = x.windows(2).map(|w| (w[0] - mean) * (w[1] - mean));
-    products.sum::<f64>() / square
+    let x = about_mean(x);
+    let square: f64 = x.iter().map(|v| v * v).sum();
+    x.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / square
 }
 
 /// Correlation of neighbours among readings that step by these chances.
-fn of_neighbours(steps: &[Vec<f64>], shares: &[f64]) -> f64 {
-    let mean: f64 = shares.iter().enumerate().map(|(i, p)| i as f64 * p).sum();
+fn of_neighbours(law: &Law, steps: &[Vec<f64>]) -> f64 {
+    let mean: f64 = law.codes().map(|(code, p)| f64::from(code) * p).sum();
+    let off = |code: i32| f64::from(code) - mean;
     let (mut own, mut next) = (0.0, 0.0);
-    for (i, (p, row)) in shares.iter().zip(steps).enumerate() {
-        let off = i as f64 - mean;
-        let then = |(k, q): (usize, &f64)| q * (k as f64 - mean);
-        own += p * off * off;
-        next += p * off * row.iter().enumerate().map(then).sum::<f64>();
+    for ((code, p), row) in law.codes().zip(steps) {
+        let then = (law.first..).zip(row).map(|(code, q)| q * off(code));
+        own += p * off(code).powi(2);
+        next += p * off(code) * then.sum::<f64>();
     }
     next / own
 }
@@ -120,60 +114,43 @@ fn of_neighbours(steps: &[Vec<f64>], shares: &[f64]) -> f64 {
 /// that come again at random.
 pub(super) fn of_step_laws(
     stand: &Stand,
-    first: i32,
+    law: &Law,
     steps: &[Vec<f64>],
-    shares: &[f64],
-    strength: f64,
+    gain: f64,
 ) -> [(&'static str, f64); 2] {
-    let (normal, n) = (refitted(first, shares), stand.samples());
-    let filtered = by_neighbours(of_neighbours(steps, shares), n, strength);
+    let (normal, n) = (law.refitted(), stand.samples());
+    let filtered = by_neighbours(of_neighbours(law, steps), n, gain);
     let against = |stale: f64| {
-        let law = |from: usize, to: usize| {
-            stale * f64::from(u8::from(from == to)) + (1.0 - stale) * normal[to]
-        };
-        of_steps(steps, shares, &law, n).powi(2)
+        let other = |from, to| stale * one_if(from == to) + (1.0 - stale) * normal[to];
+        of_steps(steps, &law.shares, &other, n).powi(2)
     };
-    let least = (1..400)
-        .map(|k| against(f64::from(k) / 1000.0))
-        .fold(f64::INFINITY, f64::min);
+    let tried = (1..400).map(|k| against(f64::from(k) / 1000.0));
+    let least = tried.fold(f64::INFINITY, f64::min);
     [
         ("low_pass", filtered),
         ("stale_samples", 1.0 - least / against(0.0)),
     ]
 }
 
-/// Codes of which this bit is `one`, or not, with a chance.
-fn with_stuck_bit(even: &[f64], first: i32, bit: u32, one: bool, chance: f64) -> Vec<f64> {
-    let mut law: Vec<f64> = even.iter().map(|p| (1.0 - chance) * p).collect();
-    for (i, p) in even.iter().enumerate() {
-        let code = first + i as i32;
-        let set = if one {
-            code | 1 << bit
-        } else {
-            code & !(1 << bit)
-        };
-        if let Some(q) = law.get_mut((set - first) as usize) {
-            *q += chance * p;
-        }
-    }
-    law
-}
-
 /// Share of what a law of codes gains that a bit that sticks has, and a rail at either end, of noise with its mean and
 /// variance.
-pub(super) fn of_code_laws(stand: &Stand, first: i32, read: &[f64]) -> [(&'static str, f64); 2] {
-    let even = refitted(first, read);
-    let whole = of_law(read, &even, stand.samples()).powi(2);
-    let share = |law: &[f64]| 1.0 - of_law(read, law, stand.samples()).powi(2) / whole;
+pub(super) fn of_code_laws(stand: &Stand, read: &Law) -> [(&'static str, f64); 2] {
+    let even = read.with(read.refitted());
+    let against = |law: &[f64]| of_law(&read.shares, law, stand.samples()).powi(2);
+    let whole = against(&even.shares);
+    let share = |law: &[f64]| 1.0 - against(law) / whole;
     let (mut stuck, mut rail) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-    for bit in 0..6 {
-        for percent in 1..=100 {
-            for one in [false, true] {
-                let law = with_stuck_bit(&even, first, bit, one, f64::from(percent) / 100.0);
-                stuck = stuck.max(share(&law));
+    for bit in (0..6).map(|bit| 1 << bit) {
+        for chance in (1..=100).map(|percent| f64::from(percent) / 100.0) {
+            for law in [
+                even.mapped(chance, |code| code | bit),
+                even.mapped(chance, |code| code & !bit),
+            ] {
+                stuck = stuck.max(share(&law.shares));
             }
         }
     }
+    let even = even.shares;
     for low in 0..even.len() / 2 {
         for high in even.len() / 2..even.len() {
             let mut law = vec![0.0; even.len()];

@@ -1,7 +1,7 @@
 //! How much of what a signal or a spectrum adds to the likelihood the closest effect of the library describes. From 95 % on
 //! it would not be foreign.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use diagnosis::likelihood::{Bins, Dct};
@@ -10,7 +10,7 @@ use model::effects::EFFECTS;
 use model::record::{Axis, Base};
 use numerics::minimise::nelder_mead;
 
-use super::super::words::{each, each_pair};
+use crate::series::{add_at, each, each_pair, one_if};
 use crate::stand::{GYROS, LSB, Stand};
 use crate::strength::Meter;
 
@@ -56,19 +56,15 @@ fn within_bounds(effect: &dyn Effect, all: &[Column]) -> Vec<Vec<Vec<f64>>> {
     let (parts, whole): (Vec<&Column>, Vec<&Column>) = all
         .iter()
         .partition(|c| effect.at_most(c.parameter).is_some());
-    let signs: &[f64] = if parts.is_empty() {
-        &[0.0]
-    } else {
-        &[-1.0, 0.0, 1.0]
+    let signs: &[f64] = match parts.is_empty() {
+        true => &[0.0],
+        false => &[-1.0, 0.0, 1.0],
     };
     let with = |c: &Column, sign: f64| {
         let mut values = c.values.clone();
         for p in &parts {
             if let Some((_, most)) = effect.at_most(p.parameter).filter(|a| a.0 == c.parameter) {
-                values
-                    .iter_mut()
-                    .zip(&p.values)
-                    .for_each(|(v, p)| *v += sign * most * p);
+                add_at(&mut values, 0, each(&p.values, |p| sign * most * p));
             }
         }
         values
@@ -85,29 +81,20 @@ fn columns(effect: &dyn Effect, stand: &Stand, axis: usize) -> Vec<Vec<Vec<f64>>
         match h {
             Hypothesis::Regression(r) => regressions.extend(r.columns),
             Hypothesis::Shaped(s) => {
-                let at = |x: f64| {
-                    s.columns(x)
-                        .into_iter()
-                        .map(|c| c.values)
-                        .collect::<Vec<_>>()
-                };
+                let values = |columns: Vec<Column>| columns.into_iter().map(|c| c.values);
+                let at = |x: f64| values(s.columns(x)).collect::<Vec<_>>();
                 shaped.extend(s.grid().into_iter().map(at));
             }
             Hypothesis::Step => {
-                for at in (40..stand.samples()).step_by(40) {
-                    let step = |i| f64::from(u8::from(i >= at));
-                    sets.push(vec![(0..stand.samples()).map(step).collect()]);
-                }
+                let step = |at: usize| vec![stand.series(|i| one_if(i >= at))];
+                sets.extend((40..stand.samples()).step_by(40).map(step));
             }
             _ => {}
         }
     }
     for fixed in within_bounds(effect, &regressions) {
-        sets.extend(
-            shaped
-                .iter()
-                .map(|s: &Vec<_>| [fixed.clone(), s.clone()].concat()),
-        );
+        let with = |s: &Vec<_>| [fixed.clone(), s.clone()].concat();
+        sets.extend(shaped.iter().map(with));
         if !fixed.is_empty() {
             sets.push(fixed);
         }
@@ -134,23 +121,20 @@ fn strongest_line(stand: &Stand, axis: usize, signal: &[f64]) -> [Vec<f64>; 2] {
     let (n, meter) = (stand.samples(), Meter::new(stand, axis));
     let c = Dct::new(n).forward(signal);
     let weight = |k: usize| {
-        let w = std::f64::consts::PI * k as f64 / n as f64;
+        let w = PI * k as f64 / n as f64;
         c[k] * c[k] / (stand.white(axis) + stand.step(axis) / (2.0 - 2.0 * w.cos()))
     };
     let mut order: Vec<usize> = (2..n).collect();
     order.sort_by(|a, b| weight(*b).total_cmp(&weight(*a)));
-    let tries = order
-        .iter()
-        .take(6)
-        .flat_map(|k| [-0.5, 0.0, 0.5].map(|d| *k as f64 + d));
+    let near = |k: &usize| [-0.5, 0.0, 0.5].map(|d| PI * (*k as f64 + d) / n as f64);
+    let line = |w: f64| {
+        let at = |phase: f64| stand.series(|i| (w * i as f64 + phase).cos());
+        [0.0, TAU / 4.0].map(at)
+    };
     let left = |line: &[Vec<f64>; 2]| meter.of_signal(&meter.energy(&meter.beyond(signal, line)));
-    tries
-        .map(|k| {
-            let w = std::f64::consts::PI * k / n as f64;
-            [0.0, TAU / 4.0].map(|phase| (0..n).map(|i| (w * i as f64 + phase).cos()).collect())
-        })
-        .min_by(|a, b| left(a).total_cmp(&left(b)))
-        .expect("there are tries")
+    let lines = order.iter().take(6).flat_map(near).map(line);
+    let best = lines.min_by(|a, b| left(a).total_cmp(&left(b)));
+    best.expect("there are tries")
 }
 
 /// What an expected spectrum is of.
@@ -206,7 +190,7 @@ pub(super) fn of_process(
         };
         for (process, start) in starts {
             let bounds = process.bounds(stand.samples());
-            let white = f64::from(u8::from(!process.filters_white()));
+            let white = one_if(!process.filters_white());
             let value = |x: &[f64]| {
                 let inside = |(v, (low, high)): (&f64, &(f64, f64))| v.clamp(*low, *high);
                 let theta: Vec<f64> = x[1..].iter().zip(&bounds).map(inside).collect();
@@ -267,20 +251,17 @@ pub(super) fn of_all(stand: &Stand, axis: usize, signal: &[f64]) -> Vec<(&'stati
     let meter = Meter::new(stand, axis);
     let whole = meter.of_signal(&meter.energy(signal)).powi(2);
     let expected = with_noise(&meter, &meter.energy(signal));
-    let mut all: Vec<_> = EFFECTS
-        .iter()
-        .map(|effect| {
-            let left = |set: &Vec<Vec<f64>>| meter.energy(&meter.beyond(signal, set));
-            let described = columns(*effect, stand, axis)
-                .iter()
-                .map(|set| 1.0 - meter.of_signal(&left(set)).powi(2) / whole)
-                .fold(
-                    of_process(stand, axis, &expected, *effect, Kind::Signal),
-                    f64::max,
-                );
-            (effect.id(), described)
-        })
-        .collect();
+    let described = |set: &Vec<Vec<f64>>| {
+        let left = meter.energy(&meter.beyond(signal, set));
+        1.0 - meter.of_signal(&left).powi(2) / whole
+    };
+    let most = |effect: &&dyn Effect| {
+        let process = of_process(stand, axis, &expected, *effect, Kind::Signal);
+        let sets = columns(*effect, stand, axis);
+        let most = sets.iter().map(described).fold(process, f64::max);
+        (effect.id(), most)
+    };
+    let mut all: Vec<_> = EFFECTS.iter().map(most).collect();
     let (line, swinging) = of_lines(stand, axis, signal);
     all.extend([("line", line), ("am_line", swinging)]);
     all
@@ -298,11 +279,9 @@ pub(super) struct OfTwo {
 
 /// Each effect of the library with each set of columns that it can be.
 fn all_columns(stand: &Stand, axis: usize) -> Vec<(&'static str, Vec<Vec<f64>>)> {
-    let of = |e: &&'static dyn Effect| {
-        let (id, effect) = (e.id(), *e);
-        columns(effect, stand, axis)
-            .into_iter()
-            .map(move |set| (id, set))
+    let of = |effect: &&'static dyn Effect| {
+        let (id, sets) = (effect.id(), columns(*effect, stand, axis));
+        sets.into_iter().map(move |set| (id, set))
     };
     EFFECTS.iter().flat_map(of).collect()
 }

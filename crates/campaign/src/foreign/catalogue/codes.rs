@@ -31,7 +31,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(447, 8, "play in the reading", Shaped(|_, _, a, _| steps::play(a))).needs(TM),
     row(464, 9, "low bits that a latch keeps", Shaped(|d, _, a, _| by_chance(a, steps::latched(1 + d.of_many(2))))).needs(TM),
     row(465, 9, "differences sent in few levels", Shaped(|_, _, a, _| by_chance(a, steps::in_levels))).needs(TM),
-    row(466, 9, "code taken for a fault", Shaped(|d, s, a, _| by_chance(a, steps::repeated(steps::fault_of(d, s, a))))).needs(TM).parts(&["stale_samples"]),
+    row(466, 9, "code taken for a fault", Shaped(|d, s, a, _| by_chance(a, steps::repeated(edges::zero_code(d, s, a))))).needs(TM).parts(&["stale_samples"]),
     row(467, 9, "gaps bridged by straight lines", Shaped(|d, s, a, w| gaps::bridged(d, s, a, w))).needs(TM),
     row(471, 10, "dead zone about zero rate", Shaped(|d, s, a, _| edges::dead_zone(d, s, a))).twin(377),
     row(483, 10, "slew limit of the output stage", Shaped(|_, _, a, _| steps::slew(a))).twin(404),

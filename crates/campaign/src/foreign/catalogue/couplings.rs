@@ -36,20 +36,52 @@ fn other_than(draw: &mut Draw, axis: usize) -> usize {
     (axis + 1 + draw.of_many(2)) % 3
 }
 
+/// What an axis has read, deg/s.
+fn rates(counts: &[i32]) -> Vec<f64> {
+    each(counts, |c| LSB * f64::from(c))
+}
+
+/// What an axis has read about its bias, deg/s.
+fn about_bias(counts: &[i32], bias: f64) -> Vec<f64> {
+    each(counts, |c| LSB * f64::from(c) - bias)
+}
+
+/// White readings of an axis about its bias, deg/s.
+fn white_of(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
+    let sigma = stand.white(axis).sqrt();
+    stand.series(|_| sigma * draw.normal())
+}
+
+/// Firmware has taken the biases off: another axis is about as far from zero as this one, to within a share of its noise.
+fn without_bias(draw: &mut Draw, stand: &mut Stand, (axis, other): (usize, usize), within: f64) {
+    let sigma = stand.white(axis).sqrt();
+    stand.bias[other] = stand.bias[axis] + within * sigma * draw.between(-1.0, 1.0);
+}
+
+/// A capacitor that samples the axes in turn, or a buffer that is not cleared, keeps a share of another axis's reading for
+/// one to four frames: what two axes have in common is in no frame, only in frames that far apart.
+fn late(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    let (other, frames) = (other_than(draw, axis), 1 + draw.of_many(4));
+    let sign = draw.sign();
+    coupled_by(Meter::new(stand, other).noise(), axis, move |counts| {
+        let from = about_mean(&rates(&counts[other]));
+        let kept = |i: usize| sign * from[i.saturating_sub(frames)];
+        (0..from.len()).map(kept).collect()
+    })
+}
+
 /// d' of frames of which a share hold another axis's reading, who looks at one against mean and variance refitted, who
 /// knows at both.
-fn of_exchanged(stand: &Stand, axis: usize, other: usize, chance: f64) -> f64 {
-    let chance = chance.min(0.9);
-    let at = |axis: usize| (stand.bias[axis] / LSB, stand.white(axis).sqrt() / LSB);
-    let ((mean, sigma), (its_mean, its_sigma)) = (at(axis), at(other));
+fn of_exchanged(stand: &Stand, axis: usize, other: usize, chance: f64) -> Known {
+    let [(mean, sigma), (its_mean, its_sigma)] =
+        [axis, other].map(|axis| mean_and_sigma_read(stand, axis));
     let reach = sigma.max(its_sigma) + (mean - its_mean).abs() / REACH;
-    let law = |m: f64, s: f64| law_of(m, s, mean, reach).1;
-    let own = law(mean, sigma);
-    let its = law(its_mean, its_sigma);
+    let law = |m: f64, s: f64| law_of(m, s, mean, reach).shares;
     let both = mean + chance * (its_mean - mean);
     let spread = (1.0 - chance) * sigma.powi(2)
         + chance * its_sigma.powi(2)
         + chance * (1.0 - chance) * (its_mean - mean).powi(2);
+    let (own, its) = (law(mean, sigma), law(its_mean, its_sigma));
     let refitted = law(both, spread.sqrt());
     let mut nats = 0.0;
     for ((p, q), r) in own.iter().zip(&its).zip(&refitted) {
@@ -60,103 +92,17 @@ fn of_exchanged(stand: &Stand, axis: usize, other: usize, chance: f64) -> f64 {
         nats += q * same * (same / r).ln();
         nats += unlike * (1.0 - q) * (unlike.max(1e-300) / r).ln();
     }
-    (2.0 * stand.samples() as f64 * nats).max(0.0).sqrt()
-}
-
-/// What an axis has read about its bias, deg/s.
-fn about_bias(counts: &[i32], bias: f64) -> Vec<f64> {
-    each(counts, |c| LSB * f64::from(c) - bias)
-}
-
-/// d' of `n` readings whose gain is exp(turn z) for a z of the normal law: what is left of the logarithms of the variance.
-fn of_gain(turn: f64, n: usize) -> f64 {
-    turn * (2.0 * n as f64).sqrt()
-}
-
-/// A diode from another axis's line to this one's.
-#[derive(Clone, Copy)]
-struct Diode {
-    /// How far the other has to be beyond this one, deg/s.
-    threshold: f64,
-    /// Share of what it is beyond that comes over.
-    share: f64,
-}
-
-impl Diode {
-    /// Largest share: at 1 the two lines are one.
-    const MOST: f64 = 0.9;
-
-    fn of(self, own: f64, other: f64) -> f64 {
-        own + self.share * (other - own - self.threshold).max(0.0)
-    }
-
-    /// d' of readings of an axis that these of the other do so to, the variance refitted: what the law narrows by, where
-    /// it conducts, over what the readings as a whole still spread.
-    fn strength(self, own: &[f64], other: &[f64], white: f64) -> f64 {
-        let n = own.len() as f64;
-        let with: Vec<f64> = each_pair(own, other, |w, o| self.of(w, o));
-        let variance = |of: &[f64]| {
-            let mean = of.iter().sum::<f64>() / n;
-            of.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n
-        };
-        let open = |(w, o): &(&f64, &f64)| *o - *w > self.threshold;
-        let conducts = own.iter().zip(other).filter(open).count() as f64;
-        // The draws themselves are not exactly of their variance.
-        let spread = variance(&with) / variance(own) * white;
-        (n * (spread / white).ln() - 2.0 * conducts * (-self.share).ln_1p())
-            .max(0.0)
-            .sqrt()
-    }
-}
-
-/// What a tail does to a spectrum.
-fn of_tail(keep: f64, w: f64) -> f64 {
-    1.0 / (1.0 + keep * keep - 2.0 * keep * w.cos())
-}
-
-/// White readings of an axis about its bias, deg/s.
-fn white_of(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
-    let sigma = stand.white(axis).sqrt();
-    stand.series(|_| sigma * draw.normal())
-}
-
-/// Nats of a reading that is another axis's, for who holds it for one of its own and, knowing, has it to the count.
-fn nats_of_copy(stand: &Stand, axis: usize, other: usize) -> f64 {
-    let (first, own) = law(stand, axis);
-    let (its_first, its) = law(stand, other);
-    let of = |(i, q): (usize, &f64)| {
-        let code = usize::try_from(its_first + i as i32 - first).ok();
-        let p = code.and_then(|c| own.get(c)).copied().unwrap_or(0.0);
-        -q * p.max(1e-12).ln()
-    };
-    its.iter().enumerate().map(of).sum()
-}
-
-/// A capacitor that samples the axes in turn, or a buffer that is not cleared, keeps a share of another axis's reading for
-/// one to four frames: what two axes have in common is in no frame, only in frames that far apart.
-fn late(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    let (other, frames) = (other_than(draw, axis), 1 + draw.of_many(4));
-    let sign = draw.sign();
-    by_energy(Meter::new(stand, other).noise(), move |share| {
-        Change::made(move |counts, draw| {
-            let from = about_mean(&each(&counts[other], |c| LSB * f64::from(c)));
-            let added = (0..from.len()).map(|i| sign * share * from[i.saturating_sub(frames)]);
-            let own = counts[axis].iter().zip(added);
-            own.map(|(own, a)| ((LSB * within_step(*own, draw) + a) / LSB).round() as i32)
-                .collect()
-        })
-    })
+    Known::nats(stand.samples() as f64 * nats)
 }
 
 /// The part answers on its bus what was asked a word before: when an interrupt comes in between, a frame holds the reading
 /// of another axis, code for code. The firmware has taken the biases off, so that it does not stand out.
 fn other_frames(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Shape {
     let other = other_than(draw, axis);
-    let off = draw.between(-1.0, 1.0) * stand.white(axis).sqrt();
-    stand.bias[other] = stand.bias[axis] + off;
+    without_bias(draw, stand, (axis, other), 1.0);
     remade(
         0.9,
-        move |stand, chance| Known::Strength(of_exchanged(stand, axis, other, chance)),
+        move |stand, chance| of_exchanged(stand, axis, other, chance),
         move |counts, draw, chance| {
             let taken = each(&counts[other], |its| draw.chance(chance).then_some(its));
             each_pair(&counts[axis], &taken, |own, its| {
@@ -172,9 +118,9 @@ fn other_frames(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Shape {
 fn toggling(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (other, bit) = (other_than(draw, axis), draw.of_many(2));
     let sign = draw.sign();
-    let like: Vec<f64> = stand.series(|_| 0.5 * draw.sign());
-    coupled(stand, axis, &like, move |counts, i| {
-        sign * (f64::from(counts[other][i] >> bit & 1) - 0.5)
+    let like = stand.series(|_| 0.5 * draw.sign());
+    coupled(stand, axis, &like, move |counts| {
+        each(&counts[other], |c| sign * (f64::from(c >> bit & 1) - 0.5))
     })
 }
 
@@ -183,22 +129,24 @@ fn toggling(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 fn alternating(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (other, first) = (other_than(draw, axis), draw.of_many(2));
     let like = white_of(draw, stand, other);
-    let middle = stand.bias[other];
-    coupled(stand, axis, &like, move |counts, i| {
-        let sign = if (i + first) % 2 == 0 { 1.0 } else { -1.0 };
-        sign * (LSB * f64::from(counts[other][i]) - middle)
+    let bias = stand.bias[other];
+    coupled(stand, axis, &like, move |counts| {
+        let mut its = about_bias(&counts[other], bias);
+        let turned = its.iter_mut().skip(1 - first).step_by(2);
+        turned.for_each(|v| *v = -*v);
+        its
     })
 }
 
 /// Anisoinertia (IEEE Std 528), or an amplifier that is bent and shared: the product of what the two other axes read.
 fn product(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    let (one, other, sign) = ((axis + 1) % 3, (axis + 2) % 3, draw.sign());
-    let (a, b) = (white_of(draw, stand, one), white_of(draw, stand, other));
-    let like: Vec<f64> = each_pair(&a, &b, |a, b| a * b);
-    let (first, second) = (stand.bias[one], stand.bias[other]);
-    coupled(stand, axis, &like, move |counts, i| {
-        let about = |k: usize, middle: f64| LSB * f64::from(counts[k][i]) - middle;
-        sign * about(one, first) * about(other, second)
+    let (one, two, sign) = ((axis + 1) % 3, (axis + 2) % 3, draw.sign());
+    let (a, b) = (white_of(draw, stand, one), white_of(draw, stand, two));
+    let like = each_pair(&a, &b, |a, b| a * b);
+    let biases = stand.bias;
+    coupled(stand, axis, &like, move |counts| {
+        let [a, b] = [one, two].map(|k| about_bias(&counts[k], biases[k]));
+        each_pair(&a, &b, |a, b| sign * a * b)
     })
 }
 
@@ -206,26 +154,26 @@ fn product(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 /// reading has changed by, up to the frame before.
 fn differences(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (other, sign) = (other_than(draw, axis), draw.sign());
-    let white = white_of(draw, stand, other);
-    let like: Vec<f64> = (0..white.len())
-        .map(|i| white[i] - white[i.saturating_sub(1)])
-        .collect();
-    coupled(stand, axis, &like, move |counts, i| {
-        let at = |before: usize| LSB * f64::from(counts[other][i.saturating_sub(before)]);
-        sign * (at(1) - at(2))
+    let like = changes(&white_of(draw, stand, other));
+    coupled(stand, axis, &like, move |counts| {
+        let mut changes = changes(&rates(&counts[other]));
+        changes.rotate_right(1);
+        changes[0] = 0.0;
+        each(&changes, |c| sign * c)
     })
 }
 
 /// A rectifier on the board: how far another axis is off its middle, either way.
 fn magnitude(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let (other, sign) = (other_than(draw, axis), draw.sign());
-    let white = white_of(draw, stand, other);
-    let like = about_mean(&each(&white, |v| v.abs()));
+    let like = about_mean(&each(&white_of(draw, stand, other), f64::abs));
     // Of half a normal law, so that the bias of this axis stays.
-    let mean = (2.0 / std::f64::consts::PI * stand.white(other)).sqrt();
-    let middle = stand.bias[other];
-    coupled(stand, axis, &like, move |counts, i| {
-        sign * ((LSB * f64::from(counts[other][i]) - middle).abs() - mean)
+    let mean = (2.0 / PI * stand.white(other)).sqrt();
+    let bias = stand.bias[other];
+    coupled(stand, axis, &like, move |counts| {
+        each(&about_bias(&counts[other], bias), |v| {
+            sign * (v.abs() - mean)
+        })
     })
 }
 
@@ -234,22 +182,16 @@ fn tail(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let other = other_than(draw, axis);
     let (keep, sign) = (draw.between(0.2, 0.85), draw.sign());
     // Of its own noise, not of what the other axis's bias does.
-    let energy: Vec<f64> = each_pair(
-        Meter::new(stand, axis).omega(),
-        &Meter::new(stand, other).noise(),
-        |w, e| e * of_tail(keep, w),
-    );
-    by_energy(energy, move |share| {
-        Change::made(move |counts, draw| {
-            let from = &counts[other];
-            let mean = from.iter().map(|c| f64::from(*c)).sum::<f64>() / from.len() as f64;
-            let mut held = 0.0;
-            each_pair(&counts[axis], from, |own, from| {
-                let new = within_step(own, draw) + sign * share * held;
-                held = keep * held + f64::from(from) - mean;
-                new.round() as i32
-            })
-        })
+    let noise = Meter::new(stand, other).noise();
+    let energy = each_pair(Meter::new(stand, axis).omega(), &noise, |w, e| {
+        e / (1.0 + keep * keep - 2.0 * keep * w.cos())
+    });
+    coupled_by(energy, axis, move |counts| {
+        let from = about_mean(&rates(&counts[other]));
+        let mut held = carry(0.0, &from, |held, v| keep * held + sign * v);
+        held.rotate_right(1);
+        held[0] = 0.0;
+        held
     })
 }
 
@@ -260,7 +202,7 @@ fn resonance(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let mode = (draw.by_ratio(0.8, 8.5), draw.by_ratio(0.1, 0.6));
     let like = resonating(&white_of(draw, stand, other), mode, rate_hz);
     let bias = stand.bias[other];
-    coupled_series(stand, axis, &like, move |counts| {
+    coupled(stand, axis, &like, move |counts| {
         resonating(&about_bias(&counts[other], bias), mode, rate_hz)
     })
 }
@@ -271,52 +213,59 @@ fn of_both(
     (axis, other): (usize, usize),
     of: impl Fn(f64, f64) -> f64 + 'static,
 ) -> Change {
-    let (own_bias, bias) = (stand.bias[axis], stand.bias[other]);
+    let (bias, its_bias) = (stand.bias[axis], stand.bias[other]);
     Change::made(move |counts, draw| {
-        each_pair(
-            &about_bias(&counts[other], bias),
-            &counts[axis],
-            |z, own| {
-                let rate = LSB * within_step(own, draw) - own_bias;
-                ((own_bias + of(rate, z)) / LSB).round() as i32
-            },
-        )
+        let its = about_bias(&counts[other], its_bias);
+        each_pair(&counts[axis], &its, |own, its| {
+            let rate = LSB * within_step(own, draw) - bias;
+            ((bias + of(rate, its)) / LSB).round() as i32
+        })
     })
 }
 
 /// An amplifier whose gain is set by a current that another axis carries along: this one is louder while that is on one
-/// side, and quieter on the other, by decibels.
+/// side, and quieter on the other, by decibels. What is left of the logarithms of the variance tells.
 fn gain(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> Shape {
     let (other, sign) = (other_than(draw, axis), draw.sign());
-    let turn = wanted / of_gain(1.0, stand.samples());
+    let turn = wanted / (2.0 * stand.samples() as f64).sqrt();
     let sigma = stand.white(other).sqrt();
-    Shape::Fixed(
-        Known::Strength(of_gain(turn, stand.samples())),
-        of_both(stand, (axis, other), move |own, z| {
-            own * (sign * turn * z / sigma).exp()
-        }),
-    )
+    let change = of_both(stand, (axis, other), move |own, its| {
+        own * (sign * turn * its / sigma).exp()
+    });
+    Shape::Fixed(Known::Strength(wanted), change)
 }
 
 /// A protection diode between two lines: where another axis is far enough above this one it draws it along. The line that
 /// a part of it is counts as true.
 fn diode(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
+    // At 1 the two lines are one.
+    const MOST: f64 = 0.9;
     let other = other_than(draw, axis);
     let threshold = stand.white(axis).sqrt() * draw.between(0.0, 1.0);
     let own = white_of(draw, stand, axis);
     let its = white_of(draw, stand, other);
-    let at = move |share: f64| Diode {
-        threshold,
-        share: share.min(Diode::MOST),
-    };
+    let drawn =
+        move |share: f64| move |own: f64, its: f64| own + share * (its - own - threshold).max(0.0);
     sized(
-        f64::INFINITY,
-        move |stand, share| Known::Strength(at(share).strength(&own, &its, stand.white(axis))),
-        move |stand, _, share| {
-            let diode = at(share);
-            of_both(stand, (axis, other), move |own, z| diode.of(own, z))
+        MOST,
+        move |_, share| {
+            let n = own.len() as f64;
+            let open = each_pair(&own, &its, |own, its| one_if(its - own > threshold));
+            // What the law narrows by, where it conducts, over what the readings as a whole still spread. The draws themselves
+            // are not exactly of their variance.
+            let spreads = spread(&each_pair(&own, &its, drawn(share))) / spread(&own);
+            let narrows = open.iter().sum::<f64>() * (-share).ln_1p();
+            Known::nats(0.5 * n * spreads.ln() - narrows)
         },
+        move |stand, _, share| of_both(stand, (axis, other), drawn(share)),
     )
+}
+
+/// Nats of a reading that is another axis's, for who holds it for one of its own and, knowing, has it to the count.
+fn nats_of_copy(stand: &Stand, axis: usize, other: usize) -> f64 {
+    let own = law(stand, axis);
+    let of = |(code, q): (i32, f64)| -q * own.of(code).max(1e-12).ln();
+    law(stand, other).codes().map(of).sum()
 }
 
 /// The address of the register that is read for this axis flips to another axis's, until it is written anew: meanwhile both
@@ -324,7 +273,7 @@ fn diode(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 /// rest would show two steps and a change of the noise, which the library has.
 fn neighbour(draw: &mut Draw, stand: &mut Stand, axis: usize, wanted: f64) -> Shape {
     let other = other_than(draw, axis);
-    stand.bias[other] = stand.bias[axis] + 0.2 * stand.white(axis).sqrt() * draw.between(-1.0, 1.0);
+    without_bias(draw, stand, (axis, other), 0.2);
     let nats = nats_of_copy(stand, axis, other);
     let long = (wanted * wanted / (2.0 * nats)).round() as usize;
     let from = draw.of_many(stand.samples().saturating_sub(long));
@@ -341,25 +290,23 @@ fn neighbour(draw: &mut Draw, stand: &mut Stand, axis: usize, wanted: f64) -> Sh
 /// same, the last reading is sent again. It has taken the biases off. No correlation tells, only codes that never coincide.
 fn duplicates(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Shape {
     let other = other_than(draw, axis);
-    stand.bias[other] = stand.bias[axis] + 0.3 * stand.white(axis).sqrt() * draw.between(-1.0, 1.0);
-    let strength = move |stand: &Stand, chance: f64| {
-        let (first, own) = law(stand, axis);
-        let (its_first, its) = law(stand, other);
-        let mut nats = 0.0;
-        for (p, code) in own.iter().zip(first..) {
-            let at = usize::try_from(code - its_first).ok();
-            let same = p * at.and_then(|at| its.get(at)).copied().unwrap_or(0.0);
-            // What is dropped is missing here, and comes where the reading before was.
-            nats += same * (1.0 - chance) * (1.0 - chance).max(1e-12).ln();
-            let gains =
-                |r: &f64| same / p.max(1e-300) * r * (r + chance * p) * (chance * p / r).ln_1p();
-            nats += own.iter().filter(|r| **r > 1e-300).map(gains).sum::<f64>();
-        }
-        Known::nats(stand.samples() as f64 * nats)
-    };
+    without_bias(draw, stand, (axis, other), 0.3);
     remade(
         1.0,
-        move |stand, chance| strength(stand, chance.min(1.0)),
+        move |stand, chance| {
+            let (own, its) = (law(stand, axis), law(stand, other));
+            let mut nats = 0.0;
+            for (code, p) in own.codes() {
+                let same = p * its.of(code);
+                // What is dropped is missing here, and comes where the reading before was.
+                nats += same * (1.0 - chance) * (1.0 - chance).max(1e-12).ln();
+                for (_, r) in own.codes().filter(|(_, r)| *r > 1e-300) {
+                    let comes = r * (r + chance * p) * (chance * p / r).ln_1p();
+                    nats += same / p.max(1e-300) * comes;
+                }
+            }
+            Known::nats(stand.samples() as f64 * nats)
+        },
         move |counts, draw, chance| {
             let mut last = counts[axis][0];
             each_pair(&counts[axis], &counts[other], |own, its| {
@@ -376,21 +323,20 @@ fn duplicates(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Shape {
 /// twice, and this axis is not read then. Where something else wakes it, it reads.
 fn by_neighbour(draw: &mut Draw, axis: usize) -> Shape {
     let other = other_than(draw, axis);
-    let strength = move |stand: &Stand, chance: f64| {
-        let square = |law: &[f64]| law.iter().map(|p| p * p).sum::<f64>();
-        let own = law(stand, axis).1;
-        let stands = |p: &f64| {
-            let again = chance + (1.0 - chance) * p;
-            p * again * (again / p).ln()
-        };
-        let again: f64 = own.iter().filter(|p| **p > 1e-300).map(stands).sum();
-        let moves = (1.0 - chance) * (1.0 - square(&own)) * (1.0 - chance).max(1e-12).ln();
-        let frames = stand.samples() as f64 * square(&law(stand, other).1);
-        Known::nats(frames * (again + moves))
-    };
     remade(
         1.0,
-        move |stand, chance| strength(stand, chance.min(1.0)),
+        move |stand, chance| {
+            let square = |law: &Law| law.shares.iter().map(|p| p * p).sum::<f64>();
+            let (own, its) = (law(stand, axis), law(stand, other));
+            let stands = |p: &f64| {
+                let again = chance + (1.0 - chance) * p;
+                p * again * (again / p).ln()
+            };
+            let some = own.shares.iter().filter(|p| **p > 1e-300);
+            let again: f64 = some.map(stands).sum();
+            let moves = (1.0 - chance) * (1.0 - square(&own)) * (1.0 - chance).max(1e-12).ln();
+            Known::nats(stand.samples() as f64 * square(&its) * (again + moves))
+        },
         move |counts, draw, chance| {
             let (mut last, mut its_last) = (counts[axis][0], counts[other][0].wrapping_add(1));
             each_pair(&counts[axis], &counts[other], |own, its| {
@@ -417,37 +363,28 @@ fn within(own: f64, others: f64, limit: f64) -> (f64, f64) {
 /// Firmware that limits the length of the rate's vector, about the biases: a reading is drawn in where the other axes are
 /// large. The size is 1 over the limit, in sigma of this axis.
 fn limited(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    let (one, two) = ((axis + 1) % 3, (axis + 2) % 3);
+    let others = [(axis + 1) % 3, (axis + 2) % 3];
     let own = white_of(draw, stand, axis);
-    let others = each_pair(
-        &white_of(draw, stand, one),
-        &white_of(draw, stand, two),
-        f64::hypot,
-    );
-    let biases = stand.bias;
-    let limit_of = move |stand: &Stand, size: f64| stand.white(axis).sqrt() / size.max(1e-9);
+    let [a, b] = others.map(|k| white_of(draw, stand, k));
+    let lengths = each_pair(&a, &b, f64::hypot);
+    let (sigma, biases) = (stand.white(axis).sqrt(), stand.bias);
     sized(
         f64::INFINITY,
-        move |stand, size| {
-            let limit = limit_of(stand, size);
+        move |_, size| {
+            let limit = sigma / size.max(1e-9);
             // No slope tells more than the code that is read.
-            let least = LSB / stand.white(axis).sqrt() / std::f64::consts::TAU;
-            let (mut square, mut logs) = (0.0, 0.0);
-            for (w, r) in own.iter().zip(&others) {
-                let (read, slope) = within(*w, *r, limit);
-                square += read * read;
-                logs += slope.max(least).ln();
-            }
+            let least = LSB / sigma / TAU;
+            let read = each_pair(&own, &lengths, |own, r| within(own, r, limit));
+            let logs: f64 = read.iter().map(|(_, slope)| slope.max(least).ln()).sum();
+            let square = mean_square(&each(&read, |(read, _)| read));
             let n = own.len() as f64;
-            let input: f64 = own.iter().map(|w| w * w).sum();
-            Known::Strength((n * (square / input).ln() - 2.0 * logs).max(0.0).sqrt())
+            Known::nats(0.5 * n * (square / mean_square(&own)).ln() - logs)
         },
-        move |stand, _, size| {
-            let limit = limit_of(stand, size);
+        move |_, _, size| {
+            let limit = sigma / size.max(1e-9);
             Change::made(move |counts, draw| {
-                let [a, b] = [one, two].map(|k| about_bias(&counts[k], biases[k]));
-                let others = each_pair(&a, &b, f64::hypot);
-                each_pair(&counts[axis], &others, |own, r| {
+                let [a, b] = others.map(|k| about_bias(&counts[k], biases[k]));
+                each_pair(&counts[axis], &each_pair(&a, &b, f64::hypot), |own, r| {
                     let rate = LSB * within_step(own, draw) - biases[axis];
                     ((biases[axis] + within(rate, r, limit).0) / LSB).round() as i32
                 })

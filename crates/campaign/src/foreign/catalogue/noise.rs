@@ -15,7 +15,7 @@ mod variance;
 #[rustfmt::skip]
 pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(309, 1, "swinging variance", Shaped(|d, s, _, _| variance::swinging(d, s))).needs(TM),
-    row(310, 1, "growing variance", Shaped(|d, s, _, _| variance::growing(d, s))).needs(TM),
+    row(310, 1, "growing variance", More(|d, s, _| variance::growing(d, s))).needs(TM),
     row(311, 1, "heavy tails", Shaped(|d, s, _, _| laws::laplace(d, s))).needs(TM).strength(Strength::None),
     row(312, 1, "skewed noise", Shaped(|d, s, _, _| laws::skewed(d, s))).needs(TM).strength(Strength::None),
     row(317, 1, "bursts of noise", More(|d, s, _| variance::spells(d, s))).needs(TM),
@@ -32,7 +32,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(347, 3, "noise while the temperature moves", More(|d, s, a| variance::slow_pace(d, s, a))).needs(TM),
     row(348, 3, "hump of noise that moves with temperature", Shaped(|d, s, a, _| processes::hump(d, s, a))).needs(TM),
     row(360, 4, "noise that ends at an edge", Shaped(|d, s, a, _| spectrum::edge(d, s, a))).needs(TM),
-    row(361, 4, "noise as large as the acceleration", Shaped(|d, s, _, _| variance::by_acceleration(d, s))).needs(TMV),
+    row(361, 4, "noise as large as the acceleration", More(|d, s, _| variance::by_acceleration(d, s))).needs(TMV),
     row(362, 4, "noise after each change of the command", More(|d, s, _| variance::after_changes(d, s))).needs(TM),
     row(363, 4, "tone caught at any phase", Shaped(|d, s, _, _| laws::any_phase(d, s))).needs(TM),
     row(375, 5, "noise of a supply near its end", More(|d, s, _| variance::near_end(d, s))).needs(TM),

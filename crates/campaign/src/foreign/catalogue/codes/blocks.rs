@@ -1,19 +1,39 @@
 //! Readings that are handled by blocks, and words that disturb the next.
 
 use super::super::super::prelude::*;
-use super::edges::zero_of;
+use super::edges::zero_code;
 use super::gaps::hidden;
 
 /// Nats by which a reading tells that it is a copy of another one: the entropy of its law.
 fn nats_of_copy(stand: &Stand, axis: usize) -> f64 {
-    let (_, law) = law(stand, axis);
-    law.iter().filter(|p| **p > 0.0).map(|p| -p * p.ln()).sum()
+    let law = law(stand, axis);
+    let some = law.shares.iter().filter(|p| **p > 0.0);
+    some.map(|p| -p * p.ln()).sum()
 }
 
 /// Nats of a block that a fault, of this chance, makes so many times likelier.
 pub(super) fn nats_of_block(chance: f64, times: f64) -> f64 {
     let quiet = (1.0 - chance).max(1e-12);
     chance * (quiet + chance * times).ln() + (1.0 - chance) * quiet.ln()
+}
+
+/// The code that is nearest in steps of so many counts from a zero.
+pub(super) fn in_coarse_steps(code: i32, zero: i32, step: i32) -> i32 {
+    let steps = f64::from(code - zero) / f64::from(step);
+    zero + step * steps.round() as i32
+}
+
+/// Readings of which each whole block from the first on is made anew.
+fn in_blocks(own: &[i32], first: usize, length: usize, of: impl FnMut(&mut [i32])) -> Vec<i32> {
+    let mut own = own.to_vec();
+    own[first..].chunks_exact_mut(length).for_each(of);
+    own
+}
+
+/// Readings as an axis would have them.
+fn like(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<i32> {
+    let (mean, sigma) = mean_and_sigma(stand, axis);
+    stand.series(|_| (mean + sigma * draw.normal()).round() as i32)
 }
 
 /// Bits of a word of the part that differ from another one.
@@ -25,11 +45,9 @@ fn toggled(one: i32, other: i32) -> f64 {
 /// While a reading is converted, the word before is shifted out, and each of its bits that toggles against the word before that
 /// pulls at the ground. About zero all bits of a negative number toggle.
 pub(super) fn pulling(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    let (mean, sigma) = mean_and_sigma(stand, axis);
-    let words: Vec<i32> = stand.series(|_| (mean + sigma * draw.normal()).round() as i32);
-    let bits: Vec<f64> = words.windows(2).map(|w| toggled(w[0], w[1])).collect();
-    let usual = bits.iter().sum::<f64>() / bits.len() as f64;
-    let rms = mean_square(&each(&bits, |b| b - usual)).sqrt();
+    let words = like(draw, stand, axis);
+    let bits = each_pair(&words, &words[1..], toggled);
+    let (usual, rms) = (mean(&bits), spread(&bits).sqrt());
     let sign = draw.sign();
     // The size is what a bit pulls, counts.
     remade(
@@ -39,13 +57,12 @@ pub(super) fn pulling(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
             Known::Strength(size * rms / sigma * (stand.samples() as f64).sqrt())
         },
         move |counts, draw, size| {
-            let (mut last, mut before) = (counts[axis][0], counts[axis][0]);
-            each(&counts[axis], |own| {
+            let own = &counts[axis];
+            let words = carry((own[0], own[0]), own, |(before, last), own| {
                 let pulled = sign * size * (toggled(last, before) - usual);
-                before = last;
-                last = (within_step(own, draw) + pulled).round() as i32;
-                last
-            })
+                (last, (within_step(own, draw) + pulled).round() as i32)
+            });
+            each(&words, |(_, word)| word)
         },
     )
 }
@@ -55,9 +72,8 @@ pub(super) fn pulling(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 pub(super) fn sorted(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let length = 4 + draw.of_many(4);
     let first = draw.of_many(length);
-    let (_, law) = law(stand, axis);
     // Of two readings that are equal, either order is sorted.
-    let equal: f64 = law.iter().map(|p| p * p).sum();
+    let equal: f64 = law(stand, axis).shares.iter().map(|p| p * p).sum();
     let pairs = (length * (length - 1) / 2) as f64;
     let orders: f64 = (2..=length).map(|k| k as f64).product();
     let times = orders * (-equal * pairs * 2f64.ln()).exp();
@@ -65,16 +81,14 @@ pub(super) fn sorted(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
         1.0,
         move |stand, chance| {
             let blocks = (stand.samples() / length) as f64;
-            Known::nats(blocks * nats_of_block(chance.min(1.0), times))
+            Known::nats(blocks * nats_of_block(chance, times))
         },
         move |counts, draw, chance| {
-            let mut own = counts[axis].clone();
-            for block in own[first..].chunks_exact_mut(length) {
+            in_blocks(&counts[axis], first, length, |block| {
                 if draw.chance(chance) {
                     block.sort_unstable();
                 }
-            }
-            own
+            })
         },
     )
 }
@@ -114,43 +128,29 @@ pub(super) fn held(draw: &mut Draw, stand: &Stand, axis: usize, wanted: f64) -> 
 pub(super) fn exponents(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     const BLOCK: usize = 8;
     const LARGEST: i32 = 7;
-    let zero = zero_of(draw, stand, axis).round() as i32;
+    let zero = zero_code(draw, stand, axis);
     let step_of = move |block: &[i32]| {
         let most = block.iter().map(|c| (c - zero).abs()).max().unwrap_or(0);
-        (0..14)
-            .map(|k| 1 << k)
-            .find(|step| most <= LARGEST * step)
-            .unwrap_or(1)
+        let mut steps = (0..14).map(|k| 1 << k);
+        steps.find(|step| most <= LARGEST * step).unwrap_or(1)
     };
-    let (mean, sigma) = mean_and_sigma(stand, axis);
-    let like: Vec<i32> = stand.series(|_| (mean + sigma * draw.normal()).round() as i32);
     // How much likelier a block is by its step; one of single counts tells nothing.
-    let times: Vec<f64> = like
+    let times: Vec<f64> = like(draw, stand, axis)
         .chunks_exact(BLOCK)
         .map(|block| f64::from(step_of(block)).powi(BLOCK as i32))
         .filter(|times| *times > 1.0)
         .collect();
     remade(
         1.0,
-        move |_, chance| {
-            let nats: f64 = times
-                .iter()
-                .map(|t| nats_of_block(chance.min(1.0), *t))
-                .sum();
-            Known::nats(nats)
-        },
+        move |_, chance| Known::nats(times.iter().map(|t| nats_of_block(chance, *t)).sum()),
         move |counts, draw, chance| {
-            let mut own = counts[axis].clone();
-            for block in own.chunks_exact_mut(BLOCK) {
+            in_blocks(&counts[axis], 0, BLOCK, |block| {
                 let step = step_of(block);
                 if draw.chance(chance) {
-                    for code in block {
-                        let mantissa = f64::from(*code - zero) / f64::from(step);
-                        *code = zero + step * mantissa.round() as i32;
-                    }
+                    let coarse = |code: &mut i32| *code = in_coarse_steps(*code, zero, step);
+                    block.iter_mut().for_each(coarse);
                 }
-            }
-            own
+            })
         },
     )
 }
@@ -162,12 +162,11 @@ pub(super) fn packed(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     const FINE: usize = 4;
     let (_, sigma) = mean_and_sigma(stand, axis);
     let step = sigma * draw.between(1.2, 2.2);
-    let waves: Vec<[f64; BLOCK]> = (FINE..BLOCK)
-        .map(|k| {
-            let at = |i: usize| PI * k as f64 * (i as f64 + 0.5) / BLOCK as f64;
-            std::array::from_fn(|i| (2.0 / BLOCK as f64).sqrt() * at(i).cos())
-        })
-        .collect();
+    let wave = |k: usize| -> [f64; BLOCK] {
+        let at = |i: usize| PI * k as f64 * (i as f64 + 0.5) / BLOCK as f64;
+        std::array::from_fn(|i| (2.0 / BLOCK as f64).sqrt() * at(i).cos())
+    };
+    let waves: Vec<[f64; BLOCK]> = (FINE..BLOCK).map(wave).collect();
     // A coefficient is known to the rounding of the codes, and would be anywhere.
     let rounding = 1.0 / 12.0 * TAU * 1f64.exp();
     let nats = (step / rounding.sqrt()).ln() + 0.5 * (step * step / (12.0 * sigma * sigma)).ln_1p();
@@ -175,27 +174,16 @@ pub(super) fn packed(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let known = Known::nats(blocks * (BLOCK - FINE) as f64 * nats);
     let first = draw.of_many(BLOCK);
     let change = Change::made(move |counts, _| {
-        let mut own = counts[axis].clone();
-        for block in own[first..].chunks_exact_mut(BLOCK) {
-            let mut unpacked = each(block, f64::from);
+        in_blocks(&counts[axis], first, BLOCK, |block| {
+            let codes = each(block, f64::from);
+            let mut unpacked = codes.clone();
             for wave in &waves {
-                let held: f64 = wave
-                    .iter()
-                    .zip(&*block)
-                    .map(|(w, c)| w * f64::from(*c))
-                    .sum();
+                let held: f64 = each_pair(wave, &codes, |w, c| w * c).iter().sum();
                 let moved = step * (held / step).round() - held;
-                unpacked
-                    .iter_mut()
-                    .zip(wave)
-                    .for_each(|(v, w)| *v += moved * w);
+                add_at(&mut unpacked, 0, each(wave, |w| moved * w));
             }
-            block
-                .iter_mut()
-                .zip(unpacked)
-                .for_each(|(code, v)| *code = v.round() as i32);
-        }
-        own
+            block.copy_from_slice(&each(&unpacked, |v| v.round() as i32));
+        })
     });
     Shape::Fixed(known, change)
 }

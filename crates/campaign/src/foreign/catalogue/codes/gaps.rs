@@ -3,18 +3,7 @@
 use super::super::super::prelude::*;
 
 /// Readings of a gap, least and most.
-pub(super) const GAP: (usize, usize) = (4, 10);
-
-/// Nats by which a straight line tells a reading that lies on it from one of the noise: that of the density at the line,
-/// for the converter's step, averaged over a gap of this many readings.
-pub(super) fn nats_of_gap(length: usize, sigma_counts: f64) -> f64 {
-    let square = |k: usize| {
-        let part = k as f64 / (length + 1) as f64;
-        part.powi(2) + (1.0 - part).powi(2)
-    };
-    let mean = (1..=length).map(square).sum::<f64>() / length as f64;
-    (sigma_counts * TAU.sqrt()).ln() + 0.5 * mean
-}
+const GAP: (usize, usize) = (4, 10);
 
 /// A driver that hides the gaps that a link has lost, none touching another and together as strong as wanted: `nats` tells what
 /// a gap of a length adds to half the d'^2, and `fill` fills one from a reading on.
@@ -29,10 +18,8 @@ pub(super) fn hidden(
     let mut gaps: Vec<(usize, usize)> = vec![];
     let mut left = 0.5 * wanted * wanted;
     while left > 0.0 {
-        let (from, length) = (
-            1 + draw.of_many(n - GAP.1 - 2),
-            GAP.0 + draw.of_many(GAP.1 + 1 - GAP.0),
-        );
+        let from = 1 + draw.of_many(n - GAP.1 - 2);
+        let length = GAP.0 + draw.of_many(GAP.1 + 1 - GAP.0);
         let free = |(f, l): &(usize, usize)| from > f + l || *f > from + length;
         if !gaps.iter().all(free) {
             continue;
@@ -50,14 +37,23 @@ pub(super) fn hidden(
     }
     let change = Change::made(move |counts, _| {
         let mut own = counts[axis].clone();
-        gaps.iter()
-            .for_each(|(from, length)| fill(&mut own, *from, *length));
+        for (from, length) in &gaps {
+            fill(&mut own, *from, *length);
+        }
         own
     });
-    Shape::Fixed(
-        Known::Strength((wanted * wanted - 2.0 * left).sqrt()),
-        change,
-    )
+    Shape::Fixed(Known::nats(0.5 * wanted * wanted - left), change)
+}
+
+/// Nats by which a straight line tells a reading that lies on it from one of the noise: that of the density at the line,
+/// for the converter's step, averaged over a gap of this many readings.
+fn nats_of_gap(length: usize, sigma_counts: f64) -> f64 {
+    let square = |k: usize| {
+        let part = k as f64 / (length + 1) as f64;
+        part.powi(2) + (1.0 - part).powi(2)
+    };
+    let mean = (1..=length).map(square).sum::<f64>() / length as f64;
+    (sigma_counts * TAU.sqrt()).ln() + 0.5 * mean
 }
 
 /// A driver that hides what the link has lost: between the last reading before a gap and the first one after it there is a

@@ -1,7 +1,7 @@
 //! Couplings between two axes that remember.
 
 use super::super::super::prelude::*;
-use super::{other_than, white_of};
+use super::{other_than, rates, white_of};
 
 /// What lets changes through: a series less what it has been within some seconds.
 fn without_mean(series: &[f64], rate_hz: f64) -> Vec<f64> {
@@ -17,17 +17,14 @@ pub(super) fn latch(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let threshold = stand.white(other).sqrt() * draw.between(1.7, 2.3);
     let (first, sign) = (draw.sign(), draw.sign());
     let latched = move |its: &[f64]| {
-        let mut state = first;
-        each(&without_mean(its, rate_hz), |v| {
-            if v.abs() > threshold {
-                state = sign * v.signum();
-            }
-            state
+        carry(first, &without_mean(its, rate_hz), |state, v| {
+            let trips = v.abs() > threshold;
+            if trips { sign * v.signum() } else { state }
         })
     };
     let like = latched(&white_of(draw, stand, other));
-    coupled_series(stand, axis, &like, move |counts| {
-        latched(&each(&counts[other], |c| LSB * f64::from(c)))
+    coupled(stand, axis, &like, move |counts| {
+        latched(&rates(&counts[other]))
     })
 }
 
@@ -35,15 +32,11 @@ pub(super) fn latch(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 /// a share of this axis's last reading comes back, upright or reversed. No two readings correlate, of one axis or of both; of
 /// three, the last reading, this one and the other axis's, the product does not vanish.
 pub(super) fn turned_round(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    const MOST: f64 = 0.95;
     let (other, sign, rate_hz) = (other_than(draw, axis), draw.sign(), stand.rate_hz);
     remade(
-        MOST,
-        |stand, kept| {
-            // Of white noise the variance grows by 1 / (1 - kept^2), and what is new stays.
-            let nats = -(-kept.min(MOST).powi(2)).ln_1p();
-            Known::Strength((stand.samples() as f64 * nats).sqrt())
-        },
+        0.95,
+        // Of white noise the variance grows by 1 / (1 - kept^2), and what is new stays.
+        |stand, kept| Known::by_reading(stand, -(-kept.powi(2)).ln_1p()),
         move |counts, draw, kept| {
             let its = without_mean(&each(&counts[other], f64::from), rate_hz);
             let own = each(&counts[axis], |c| within_step(c, draw));

@@ -8,12 +8,12 @@ pub(super) fn lorries(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let ground = draw.by_ratio(0.3, 2.0);
     arriving(stand, draw.between(2.0, 25.0), |y, at| {
         let (takes, size) = (draw.by_ratio(1.5, 4.0), draw.between(0.5, 1.5));
-        let (pitch, first) = (ground * draw.between(0.85, 1.15), draw.between(0.0, TAU));
+        let (pitch, first) = (ground * draw.between(0.85, 1.15), draw.phase());
         let packet = in_time(stand, |t| {
             let since = t - at;
             size * (-0.5 * (since / takes).powi(2)).exp() * (first + TAU * pitch * since).sin()
         });
-        y.iter_mut().zip(packet).for_each(|(y, p)| *y += p);
+        add_at(y, 0, packet);
         at + (4.0 * takes + 25.0 * draw.exponential())
     })
 }
@@ -34,9 +34,7 @@ pub(super) fn ball(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
             // A blow within a sample is shared with the next one.
             let late = place.fract();
             let shares = [1.0 - late, late - back * (1.0 - late), -back * late];
-            for (v, share) in y.iter_mut().skip(place as usize).zip(shares) {
-                *v += blow * share;
-            }
+            add_at(y, place as usize, shares.map(|share| blow * share));
             flight *= restitution;
             hit += flight;
             blow *= restitution;
@@ -46,30 +44,27 @@ pub(super) fn ball(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 }
 
 /// What passes a chain of all-pass filters of this pole: every pitch as loud as before, each with a delay of its own.
-pub(super) fn dispersed(series: &[f64], stages: usize, pole: f64) -> Vec<f64> {
-    let mut all = series.to_vec();
-    for _ in 0..stages {
-        let (mut last, mut out) = (0.0, 0.0);
-        for v in &mut all {
-            out = last - pole * *v + pole * out;
-            last = *v;
-            *v = out;
-        }
-    }
-    all
+fn dispersed(series: Vec<f64>, stages: usize, pole: f64) -> Vec<f64> {
+    let passed = |(last, out): (f64, f64), v: f64| (v, last - pole * v + pole * out);
+    (0..stages).fold(series, |series, _| {
+        each(&carry((0.0, 0.0), &series, passed), |(_, out)| out)
+    })
 }
 
 /// Knocks on a long pipe, in which bending waves of high pitch run ahead of low ones, or the other way round: each arrives
 /// as a whistle whose pitch slides, and all of them together are as white as a knock.
 pub(super) fn pipe(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let apart = draw.by_ratio(6.0, 25.0);
-    let (stages, pole) = (8 + draw.of_many(13), draw.sign() * draw.between(0.4, 0.7));
+    let (stages, pole) = (8 + draw.of_many(13), draw.signed(0.4, 0.7));
     let knocks = arriving(stand, apart * draw.exponential(), |knocks, at| {
-        let size = draw.sign() * draw.between(0.5, 1.5);
-        knocks[(at * stand.rate_hz) as usize] += size;
+        add_at(
+            knocks,
+            (at * stand.rate_hz) as usize,
+            [draw.signed(0.5, 1.5)],
+        );
         at + apart * (0.1 + draw.exponential())
     });
-    dispersed(&knocks, stages, pole)
+    dispersed(knocks, stages, pole)
 }
 
 /// Knocks at random on a bench that rings: any sense, many small ones and few large ones.
@@ -115,15 +110,10 @@ pub(super) fn heart(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         let size = 1.0 + 0.2 * breathes;
         for (after, share) in [(0.10, -0.6), (0.20, 1.0), (0.31, -0.5)] {
             let middle = (at + after) * rate_hz;
-            let reach = 4.0 * width * rate_hz;
-            let first = (middle - reach).max(0.0) as usize;
-            for (k, v) in y.iter_mut().enumerate().skip(first) {
-                let x = (k as f64 - middle) / width / rate_hz;
-                if x > 4.0 {
-                    break;
-                }
-                *v += size * share * (-0.5 * x * x).exp();
-            }
+            let first = (middle - 4.0 * width * rate_hz).max(0.0) as usize;
+            let off = (first..).map(|k| (k as f64 - middle) / width / rate_hz);
+            let beat = off.take_while(|x| *x <= 4.0);
+            add_at(y, first, beat.map(|x| size * share * (-0.5 * x * x).exp()));
         }
         off = 0.9 * off + 0.02 * draw.normal();
         at + beat * (1.0 + depth * breathes + off)
@@ -138,10 +128,7 @@ pub(super) fn lasting_shocks(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     for knock in &at {
         let i = (knock * stand.rate_hz).ceil() as usize;
         for acc in &mut stand.world.acc {
-            let g = draw.sign() * draw.between(0.3, 0.9);
-            if let Some(a) = acc.get_mut(i) {
-                *a += g;
-            }
+            add_at(acc, i, [draw.signed(0.3, 0.9)]);
         }
     }
     let (pitch, rings) = (draw.by_ratio(1.0, 8.5), draw.by_ratio(0.5, 2.5));
@@ -168,7 +155,7 @@ pub(super) fn ring_down(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     stand.series(|_| {
         left -= 1.0 / stand.rate_hz;
         if left <= 0.0 {
-            speed += w * draw.sign() * draw.between(1.0, 2.5);
+            speed += w * draw.signed(1.0, 2.5);
             left = apart * draw.between(0.5, 1.5);
         }
         // Half a step of speed, a step of place, half a step of speed.
@@ -184,7 +171,7 @@ pub(super) fn ring_down(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 
 /// Where the axles of a carriage are, of its length: two pairs, of which each is near an end. Those of a pair are 1.8 to 2.6 m
 /// apart, and a carriage is some 15 to 26 m long.
-pub(super) fn axles(draw: &mut Draw) -> [f64; 4] {
+fn axles(draw: &mut Draw) -> [f64; 4] {
     let (from_end, wheelbase) = (draw.between(0.08, 0.15), draw.between(0.08, 0.15));
     let last = 1.0 - from_end;
     [from_end, from_end + wheelbase, last - wheelbase, last]
@@ -203,12 +190,7 @@ pub(super) fn trains(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
             for axle in axles {
                 let since = carriage_s * (carriage as f64 + axle);
                 let near = 1.0 / (1.0 + (4.0 * (since / lasts - 0.5)).powi(2));
-                let place = (at + since) * stand.rate_hz;
-                // Between two readings, a part of it in either.
-                let parts = [1.0 - place.fract(), place.fract()];
-                for (stroke, part) in strokes.iter_mut().skip(place as usize).zip(parts) {
-                    *stroke += part * load * near;
-                }
+                strike(strokes, (at + since) * stand.rate_hz, load * near);
             }
         }
         at + (lasts + 5.0 + 30.0 * draw.exponential())
@@ -221,10 +203,12 @@ pub(super) fn bursts_of_ringing(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (f, decay) = (draw.between(0.8, 6.0), draw.between(0.5, 3.0));
     arriving(stand, 5.0, |y, at| {
         let first = (at * stand.rate_hz) as usize;
-        for (i, v) in y.iter_mut().enumerate().skip(first) {
-            let s = i as f64 / stand.rate_hz - at;
-            *v += (-s / decay).exp() * (TAU * f * s).sin();
-        }
+        let since = (first..).map(|i| i as f64 / stand.rate_hz - at);
+        add_at(
+            y,
+            first,
+            since.map(|s| (-s / decay).exp() * (TAU * f * s).sin()),
+        );
         at + (15.0 * draw.exponential() + 3.0)
     })
 }

@@ -2,18 +2,14 @@
 
 use super::super::super::prelude::*;
 
-/// Shortest and longest avalanche, s.
-pub(super) const AVALANCHES: (f64, f64) = (0.1, 4.0);
-
 /// Something sweeps past a resonance now and then, and what is absorbed follows the law of Lorentz: 1 / (1 + (t / w)^2),
 /// of either sign, whose skirts never quite end.
 pub(super) fn peaks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (width, apart) = (draw.by_ratio(0.15, 0.9), draw.by_ratio(8.0, 40.0));
     arriving(stand, apart * draw.exponential(), |y, at| {
-        let size = draw.sign() * draw.between(0.5, 1.5);
-        for (i, v) in y.iter_mut().enumerate() {
-            *v += size / (1.0 + ((i as f64 / stand.rate_hz - at) / width).powi(2));
-        }
+        let size = draw.signed(0.5, 1.5);
+        let peak = |t: f64| size / (1.0 + ((t - at) / width).powi(2));
+        add_at(y, 0, in_time(stand, peak));
         at + apart * (0.2 + draw.exponential())
     })
 }
@@ -25,13 +21,14 @@ pub(super) fn passing(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     arriving(stand, draw.between(0.0, 20.0), |y, at| {
         // Distance over speed, s.
         let takes = draw.by_ratio(0.5, 4.0);
-        let (size, (across, along)) = (draw.between(0.5, 1.5), draw.between(0.0, TAU).sin_cos());
-        for (i, v) in y.iter_mut().enumerate() {
-            let x = (i as f64 / stand.rate_hz - at) / takes;
+        let (size, (across, along)) = (draw.between(0.5, 1.5), draw.phase().sin_cos());
+        // The component across the way: 3 (m.r) r / r^5 - m / r^3.
+        let field = |t: f64| {
+            let x = (t - at) / takes;
             let square = 1.0 + x * x;
-            // The component across the way: 3 (m.r) r / r^5 - m / r^3.
-            *v += size * (3.0 * (across + along * x) / square - across) / square.powf(1.5);
-        }
+            size * (3.0 * (across + along * x) / square - across) / square.powf(1.5)
+        };
+        add_at(y, 0, in_time(stand, field));
         at + (4.0 * takes + 25.0 * draw.exponential())
     })
 }
@@ -48,15 +45,9 @@ pub(super) fn door(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         } else {
             draw.between(1.5, 6.0)
         };
-        let strokes = [
-            (at, -draw.between(0.4, 1.0)),
-            (at + open, draw.between(0.7, 1.5)),
-        ];
-        for (when, kick) in strokes {
-            if let Some(k) = kicks.get_mut((when * stand.rate_hz) as usize) {
-                *k += sign * kick;
-            }
-        }
+        let [opened, shut] = [at, at + open].map(|t| (t * stand.rate_hz) as usize);
+        add_at(kicks, opened, [-sign * draw.between(0.4, 1.0)]);
+        add_at(kicks, shut, [sign * draw.between(0.7, 1.5)]);
         at + (open + 2.0 + 12.0 * draw.exponential())
     });
     let pressure = leaking(&kicks, leaks, stand.rate_hz);
@@ -69,14 +60,13 @@ pub(super) fn touches(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let decay = draw.by_ratio(1.0, 6.0);
     let mut y = vec![0.0; stand.samples()];
     for _ in 0..12 + draw.of_many(24) {
-        let (at, size) = (
-            draw.between(0.0, 0.97 * stand.seconds),
-            draw.between(0.4, 1.5),
-        );
-        for (i, v) in y.iter_mut().enumerate() {
-            let since = (i as f64 / stand.rate_hz - at).max(0.0) / decay;
-            *v += size * since * (1.0 - since).exp();
-        }
+        let at = draw.between(0.0, 0.97 * stand.seconds);
+        let size = draw.between(0.4, 1.5);
+        let heat = |t: f64| {
+            let since = (t - at).max(0.0) / decay;
+            size * since * (1.0 - since).exp()
+        };
+        add_at(&mut y, 0, in_time(stand, heat));
     }
     y
 }
@@ -89,9 +79,8 @@ pub(super) fn pairs(draw: &mut Draw, stand: &Stand, wanted: f64) -> Vec<f64> {
     let count = (wanted * wanted / (2.0 * sigma_high * sigma_high)).ceil() as usize;
     let mut y = vec![0.0; n];
     for _ in 0..count {
-        let (at, size) = (draw.of_many(n - 1), draw.sign() * draw.between(0.8, 1.2));
-        y[at] += size;
-        y[at + 1] -= size;
+        let (at, size) = (draw.of_many(n - 1), draw.signed(0.8, 1.2));
+        add_at(&mut y, at, [size, -size]);
     }
     y
 }
@@ -99,17 +88,19 @@ pub(super) fn pairs(draw: &mut Draw, stand: &Stand, wanted: f64) -> Vec<f64> {
 /// Iron that is slowly magnetised gives way in avalanches (Barkhausen 1919): of the mean field, durations by the power -2,
 /// each a parabola as high as it is long (Sethna, Dahmen and Myers 2001), in either sense.
 pub(super) fn crackle(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let (least, most) = AVALANCHES;
+    // Shortest and longest avalanche, s.
+    let (least, most) = (0.1, 4.0);
     let apart = draw.by_ratio(0.5, 3.0);
     arriving(stand, apart * draw.exponential(), |y, at| {
         let long = 1.0 / draw.between(1.0 / most, 1.0 / least);
         let sign = draw.sign();
-        let from = (at * stand.rate_hz).ceil() as usize;
-        let to = ((at + long) * stand.rate_hz).ceil() as usize;
-        for (i, v) in y.iter_mut().enumerate().take(to).skip(from) {
-            let part = (i as f64 / stand.rate_hz - at) / long;
-            *v += sign * long * 4.0 * part * (1.0 - part);
-        }
+        let [from, to] = [at, at + long].map(|t| (t * stand.rate_hz).ceil() as usize);
+        let parts = (from..to).map(|i| (i as f64 / stand.rate_hz - at) / long);
+        add_at(
+            y,
+            from,
+            parts.map(|part| sign * long * 4.0 * part * (1.0 - part)),
+        );
         at + (long + apart * draw.exponential())
     })
 }
@@ -180,7 +171,7 @@ pub(super) fn jumps_that_relax(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         left -= 1.0 / stand.rate_hz;
         y *= (-1.0 / (decay * stand.rate_hz)).exp();
         if left <= 0.0 {
-            y += draw.sign() * draw.between(0.5, 1.5);
+            y += draw.signed(0.5, 1.5);
             left = 10.0 + 30.0 * draw.exponential();
         }
         y

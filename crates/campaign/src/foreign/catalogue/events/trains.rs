@@ -6,8 +6,6 @@ use super::super::super::prelude::*;
 /// and these again others (Hawkes 1971): minutes of quiet, and swarms. Sizes by a power law, as those of earthquakes; the part
 /// turns by each slip, and back.
 pub(super) fn aftershocks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    /// Shortest and longest time after which a slip sets off another one, s.
-    const AFTER: (f64, f64) = (0.1, 30.0);
     const MOST: usize = 2000;
     let brings = draw.between(0.75, 0.92);
     let quiet = draw.by_ratio(8.0, 25.0);
@@ -22,8 +20,8 @@ pub(super) fn aftershocks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         // As many as a process of Poisson has.
         let mut left = brings - draw.exponential();
         while left > 0.0 {
-            // By one over the time.
-            let then = slips[next] + draw.by_ratio(AFTER.0, AFTER.1);
+            // By one over the time, s.
+            let then = slips[next] + draw.by_ratio(0.1, 30.0);
             if then < stand.seconds {
                 slips.push(then);
             }
@@ -31,19 +29,13 @@ pub(super) fn aftershocks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         }
         next += 1;
     }
-    let keep = (-1.0 / (draw.by_ratio(0.05, 0.25) * stand.rate_hz)).exp();
+    let back = draw.by_ratio(0.05, 0.25);
     let mut kicks = vec![0.0; stand.samples()];
     for at in slips {
         let size = draw.sign() * draw.between(0.05, 1.0).powf(-0.6);
-        if let Some(kick) = kicks.get_mut((at * stand.rate_hz) as usize) {
-            *kick += size;
-        }
+        add_at(&mut kicks, (at * stand.rate_hz) as usize, [size]);
     }
-    let mut left = 0.0;
-    each(&kicks, |kick| {
-        left = keep * left + kick;
-        left
-    })
+    leaking(&kicks, back, stand.rate_hz)
 }
 
 /// A tap that drips: how long a drop takes to fall hangs on how far the one before has sprung back, by a law that has no period
@@ -51,27 +43,18 @@ pub(super) fn aftershocks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn dripping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let mean = draw.by_ratio(0.8, 2.5);
     let (bend, wide) = (draw.between(1.75, 1.95), draw.between(0.35, 0.6));
-    let keep = (-1.0 / (draw.by_ratio(0.06, 0.2) * stand.rate_hz)).exp();
+    let fades = draw.by_ratio(0.06, 0.2);
     let mut place = draw.between(-0.5, 0.5);
     let mut blows = vec![0.0; stand.samples()];
     let mut at = draw.between(0.0, 2.0);
     while at < stand.seconds {
-        let reading = at * stand.rate_hz;
-        let late = reading.fract();
-        for (k, share) in [(0, 1.0 - late), (1, late)] {
-            if let Some(blow) = blows.get_mut(reading as usize + k) {
-                *blow += share;
-            }
-        }
+        strike(&mut blows, at * stand.rate_hz, 1.0);
         // The air moves the drops a little.
         place = (1.0 - bend * place * place + 0.003 * draw.normal()).clamp(-1.0, 1.0);
         at += mean * (1.0 + wide * place);
     }
-    let (sign, mut left) = (draw.sign(), 0.0);
-    about_mean(&each(&blows, |blow| {
-        left = keep * left + sign * blow;
-        left
-    }))
+    let blows = either_way(draw, &blows);
+    about_mean(&leaking(&blows, fades, stand.rate_hz))
 }
 
 /// A register of the zero whose bits particles flip at random, and a scrubber that comes by at a fixed period and puts right what

@@ -7,20 +7,16 @@ use super::super::super::prelude::*;
 pub(super) fn rectified(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (rms, slant) = (draw.between(0.05, 0.25), draw.between(0.3, 1.2));
     let gain = 1.0 - (-1.0 / (draw.between(0.2, 1.0) * stand.rate_hz)).exp();
-    let (mut now, mut goal, mut left) = (0.0, 0.0, draw.between(0.0, 12.0));
-    let size: Vec<f64> = stand.series(|_| {
-        left -= 1.0 / stand.rate_hz;
-        if left <= 0.0 {
-            goal = if goal == 0.0 {
-                draw.between(0.4, 1.0)
-            } else {
-                0.0
-            };
-            left = draw.between(2.0, 12.0);
-        }
-        now += gain * (goal - now);
-        now
+    let rests = (0.0, draw.between(0.0, 12.0));
+    let spells = in_spells(stand, rests, |was| {
+        let is = if was == 0.0 {
+            draw.between(0.4, 1.0)
+        } else {
+            0.0
+        };
+        (is, draw.between(2.0, 12.0))
     });
+    let size = carry(0.0, &spells, |now, goal| now + gain * (goal - now));
     for (i, s) in size.iter().enumerate() {
         let shake = rms * s * draw.normal();
         stand.world.acc[0][i] = shake * slant.cos();
@@ -32,10 +28,7 @@ pub(super) fn rectified(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// A capacitor lets through how fast the acceleration changes, and nothing of what it is.
 pub(super) fn change(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let shake = shaken(draw, stand, (0.3, 3.0));
-    let last = shake.len() - 1;
-    (0..shake.len())
-        .map(|i| shake[(i + 1).min(last)] - shake[i.saturating_sub(1)])
-        .collect()
+    pace(&shake, 1)
 }
 
 /// A mass between stops that are close: what it does follows the acceleration for a little and is then the same however
@@ -59,15 +52,12 @@ pub(super) fn vibration_level(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// z, which the gyro of that axis reads, times what the temperature is off that one.
 pub(super) fn misaligned(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     cycles(draw, stand);
-    let period = draw.by_ratio(5.0, 15.0);
-    stand.excitation = vec![
-        ("turn_dps", draw.between(7.0, 28.0)),
-        ("turn_period_s", period),
-    ];
-    let temperature = from_trim(draw, stand, axis);
+    let (period, turn) = (draw.by_ratio(5.0, 15.0), draw.between(7.0, 28.0));
+    stand.excitation = vec![("turn_dps", turn), ("turn_period_s", period)];
+    let leans = from_trim(draw, stand, axis);
     let sign = draw.sign();
-    let lean = |(i, t): (usize, &f64)| sign * t * (TAU * i as f64 / stand.rate_hz / period).sin();
-    temperature.iter().enumerate().map(lean).collect()
+    let turns = stand.series(|i| (TAU * i as f64 / stand.rate_hz / period).sin());
+    each_pair(&leans, &turns, |lean, turn| sign * lean * turn)
 }
 
 /// A multiplexer that comes to this gyro first in each frame, from the accelerometer that was last in the frame before: a
@@ -98,12 +88,8 @@ pub(super) fn stuck(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         let free = sticks * draw.between(0.3, 1.7);
         for (k, v) in y.iter_mut().skip(at + 1).enumerate() {
             let since = k as f64 / stand.rate_hz - free;
-            let off = if since < 0.0 {
-                1.0
-            } else {
-                left * (-since / leaks).exp()
-            };
-            *v = force.signum() * off;
+            let freed = left * (-since / leaks).exp();
+            *v = force.signum() * if since < 0.0 { 1.0 } else { freed };
         }
     }
     y
@@ -112,7 +98,7 @@ pub(super) fn stuck(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// Anisoelasticity (IEEE Std 528): along its two principal axes a suspension yields unequally, and the mass that has moved
 /// along one is turned by the acceleration along the other. Its axes lie at a slant to the board's.
 pub(super) fn anisoelastic(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let (sin, cos) = draw.between(0.0, TAU).sin_cos();
+    let (sin, cos) = draw.phase().sin_cos();
     let [x, y, _] = &stand.world.acc;
     each_pair(x, y, |x, y| sin * x * y + 0.5 * cos * (x * x - y * y))
 }
@@ -143,14 +129,9 @@ pub(super) fn opens(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// there is another than the way back. The straight line through the loop is taken off, for the part is calibrated.
 pub(super) fn slips(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     const CONTACTS: usize = 5;
-    let (n, along) = (stand.samples(), draw.of_many(3));
-    let rms = draw.between(0.08, 0.3);
-    let sway = Turning::new(
-        draw.by_ratio(0.15, 1.5),
-        draw.by_ratio(0.02, 0.2),
-        stand.rate_hz,
-    );
-    let force: Vec<f64> = each(&sway.of(draw, n), |s| rms * s);
+    let (along, rms) = (draw.of_many(3), draw.between(0.08, 0.3));
+    let sway = Turning::any(draw, stand, (0.15, 1.5), (0.02, 0.2));
+    let force = each(&sway.of(draw, stand.samples()), |s| rms * s);
     let contacts: [(f64, f64); CONTACTS] =
         std::array::from_fn(|_| (rms * draw.between(0.3, 1.5), draw.between(0.5, 1.5)));
     let y = behind_plays(&force, &contacts);
@@ -161,19 +142,13 @@ pub(super) fn slips(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// A shaking that the accelerometers follow from sample to sample, strong and weak by turns, and a rate that answers to
 /// its square alone.
 pub(super) fn squared(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    let (rate_hz, n) = (stand.rate_hz, stand.samples());
     let (along, rms) = (draw.of_many(3), draw.between(0.08, 0.3));
-    let shake = Turning::new(
-        draw.by_ratio(0.4, 6.0),
-        draw.by_ratio(0.02, 0.3),
-        stand.rate_hz,
-    );
-    let shake = shake.of(draw, n);
+    let shake = Turning::any(draw, stand, (0.4, 6.0), (0.02, 0.3)).of(draw, stand.samples());
     let depth = draw.between(0.3, 0.9);
-    let swell = TAU / (draw.by_ratio(10.0, 80.0) * rate_hz);
-    let first = draw.between(0.0, TAU);
+    let swell = TAU / (draw.by_ratio(10.0, 80.0) * stand.rate_hz);
+    let first = draw.phase();
     let swell = |i: usize| 1.0 + depth * (first + swell * i as f64).sin();
-    let force: Vec<f64> = (0..n).map(|i| rms * shake[i] * swell(i)).collect();
+    let force = stand.series(|i| rms * shake[i] * swell(i));
     felt(draw, stand, along, &force);
     each(&force, |a| a * a)
 }
@@ -185,10 +160,9 @@ pub(super) fn recovery(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (rises, falls) = (draw.by_ratio(0.2, 0.6), draw.by_ratio(0.8, 3.0));
     let mut y = vec![0.0; stand.samples()];
     for (at, hard) in shocks {
-        for (k, v) in y.iter_mut().skip(at + 1).enumerate() {
-            let since = k as f64 / stand.rate_hz;
-            *v += hard * ((-since / falls).exp() - (-since / rises).exp());
-        }
+        let since = (0..).map(|k| f64::from(k) / stand.rate_hz);
+        let off = since.map(|t| hard * ((-t / falls).exp() - (-t / rises).exp()));
+        add_at(&mut y, at + 1, off);
     }
     y
 }

@@ -2,9 +2,6 @@
 
 use super::super::super::prelude::*;
 
-/// Steps of the reckoning for each reading: many for a belt that swings a few times a second.
-pub(super) const FINE: usize = 20;
-
 /// The cable to the table drags over an edge and jumps off it at a few angles: a kick, and the table rings. Turned back it
 /// slides over without one.
 pub(super) fn edge(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
@@ -13,11 +10,12 @@ pub(super) fn edge(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let mut kicks = vec![0.0; rate.len()];
     for _ in 0..1 + draw.of_many(3) {
         let (place, hard) = (draw.between(0.0, 1.0), draw.between(0.4, 1.6));
-        for ((kick, jumps), r) in kicks.iter_mut().zip(passes(&angle, 1.0, place)).zip(&rate) {
-            if *r > 0.0 {
-                *kick += hard * jumps * draw.between(0.7, 1.3);
-            }
-        }
+        let jumps = passes(&angle, 1.0, place);
+        let jumped = each_pair(&jumps, &rate, |jumps, r| match r > 0.0 {
+            true => hard * jumps * draw.between(0.7, 1.3),
+            false => 0.0,
+        });
+        add_at(&mut kicks, 0, jumped);
     }
     let mode = (draw.between(1.5, 8.0), draw.by_ratio(0.3, 1.5));
     resonating(&kicks, mode, stand.rate_hz)
@@ -28,10 +26,10 @@ pub(super) fn edge(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn rubber(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let hardens = 1.0 / (draw.by_ratio(5.0, 40.0) * stand.rate_hz);
-    let (softens, sign, mut soft) = (draw.between(1.0, 4.0), draw.sign(), 0.0f64);
-    let leans: Vec<f64> = each(&rate, |r| {
-        let load = r * r;
-        soft = load.max(soft - hardens * soft);
+    let (softens, sign) = (draw.between(1.0, 4.0), draw.sign());
+    let loads = each(&rate, |r| r * r);
+    let soft = carry(0.0f64, &loads, |soft, load| load.max(soft - hardens * soft));
+    let leans = each_pair(&loads, &soft, |load, soft| {
         sign * load * (1.0 + softens * soft)
     });
     changes(&stand.lagged(&leans, draw.by_ratio(0.3, 2.0)))
@@ -45,7 +43,7 @@ pub(super) fn cages(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (balls, apart) = (draw.between(3.0, 5.0), draw.between(0.02, 0.08));
     let angle = angle_of_table(&rate, balls * draw.by_ratio(0.3, 1.2), stand.rate_hz);
     let second = draw.between(0.5, 1.0);
-    let [one, other] = [0, 1].map(|_| draw.between(0.0, TAU));
+    let [one, other] = [0, 1].map(|_| draw.phase());
     let ripple = |a: f64| (a + one).cos() + second * ((1.0 + apart) * a + other).cos();
     each_pair(&angle, &rate, |a, r| r * ripple(a))
 }
@@ -58,16 +56,12 @@ pub(super) fn tooth(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let holds = draw.between(0.4, 0.8);
     let apart = (draw.between(0.1, 0.4) * stand.rate_hz).ceil() as usize;
     let mut jumps = vec![0.0; stand.samples()];
-    for (i, change) in changes(&stand.world.duty).iter().enumerate() {
-        if *change == 0.0 {
-            continue;
-        }
+    let changes = changes(&stand.world.duty).into_iter().enumerate();
+    for (i, change) in changes.filter(|(_, change)| *change != 0.0) {
         let here = holds * draw.between(0.4, 1.6);
         let teeth = (change.abs() / here).floor().min(MOST) as usize;
         for k in 0..teeth {
-            if let Some(jump) = jumps.get_mut(i + k * apart) {
-                *jump -= change.signum();
-            }
+            add_at(&mut jumps, i + k * apart, [-change.signum()]);
         }
     }
     stand.lagged(&jumps, draw.by_ratio(0.08, 0.3))
@@ -129,12 +123,11 @@ pub(super) fn cogging(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     // Ripples per second at full duty; inertia is what counts beyond a corner.
     let (pitch, corner) = (draw.by_ratio(3.0, 9.5), draw.between(0.1, 0.3));
-    let first = draw.between(0.0, TAU);
-    each_pair(
-        &angle_of_table(&rate, pitch, stand.rate_hz),
-        &rate,
-        |angle, r| 2.0 * r * corner / (r * r + corner * corner) * (first + angle).cos(),
-    )
+    let first = draw.phase();
+    let angle = angle_of_table(&rate, pitch, stand.rate_hz);
+    each_pair(&angle, &rate, |angle, r| {
+        2.0 * r * corner / (r * r + corner * corner) * (first + angle).cos()
+    })
 }
 
 /// A cable to the table that has some slack: wound up further, either way, it pulls the part askew, the more the further.
@@ -167,6 +160,8 @@ pub(super) fn cable(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// turns (Stribeck), so that it jerks where it is to turn slowly. What the rate is off the one commanded.
 pub(super) fn friction(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     const CREEP: (f64, f64) = (0.03, 0.15);
+    // Steps of the reckoning for each reading: many for a belt that swings a few times a second.
+    const FINE: usize = 20;
     creeping(draw, stand, CREEP, (8.0, 40.0));
     let stiff = (TAU * draw.by_ratio(0.8, 2.5)).powi(2);
     // What is left of the friction at speed, and how far the belt gives before the table does, in seconds of the least creep.
@@ -207,8 +202,8 @@ pub(super) fn belt(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let teeth = angle_of_table(&rate, draw.by_ratio(2.0, 9.0), stand.rate_hz);
     let height = draw.by_ratio(0.005, 0.03);
-    let bumps: Vec<f64> = each(&teeth, |a| height * a.cos());
-    let pushed: Vec<f64> = each_pair(&changes(&rate), &changes(&bumps), |r, b| r + b);
+    let bumps = each(&teeth, |a| height * a.cos());
+    let pushed = each_pair(&changes(&rate), &changes(&bumps), |r, b| r + b);
     let mode = (draw.by_ratio(0.6, 3.0), draw.by_ratio(0.04, 0.2));
     resonating(&pushed, mode, stand.rate_hz)
 }
@@ -220,7 +215,7 @@ pub(super) fn chain(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     // Links a second at full duty.
     let angle = angle_of_table(&rate, draw.by_ratio(0.8, 4.0), stand.rate_hz);
     let links = passes(&angle, 1.0, draw.between(0.0, 1.0));
-    let kicks: Vec<f64> = each_pair(&links, &rate, |link, r| {
+    let kicks = each_pair(&links, &rate, |link, r| {
         link * r.signum() * draw.between(0.6, 1.4)
     });
     let mode = (draw.between(1.5, 8.0), draw.by_ratio(0.4, 2.0));
@@ -232,7 +227,7 @@ pub(super) fn chain(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn unbalanced(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     programme(draw, stand, DWELL);
     let (takes, full) = (draw.by_ratio(0.3, 1.5), draw.by_ratio(0.15, 0.8));
-    let (weight, first) = (draw.by_ratio(0.02, 0.08), draw.between(0.0, TAU));
+    let (weight, first) = (draw.by_ratio(0.02, 0.08), draw.phase());
     let even = stand.lagged(&stand.world.duty, takes);
     let gain = 1.0 - (-1.0 / (takes * stand.rate_hz)).exp();
     let (mut rate, mut angle) = (stand.world.duty[0], first);
@@ -259,7 +254,7 @@ pub(super) fn chipped(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (full, per_turn) = (draw.by_ratio(0.4, 1.2), draw.between(2.2, 5.8));
     let angle = angle_of_table(&rate, full, stand.rate_hz);
     let strokes = passes(&angle, per_turn, draw.between(0.0, 1.0));
-    let hard: Vec<f64> = each_pair(&strokes, &rate, |s, r| s * r);
+    let hard = each_pair(&strokes, &rate, |s, r| s * r);
     let mode = (draw.between(2.0, 8.0), draw.by_ratio(0.8, 2.5));
     resonating(&hard, mode, stand.rate_hz)
 }
@@ -271,7 +266,7 @@ pub(super) fn gear(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let full = draw.by_ratio(0.1, 0.6);
     let waves: [(f64, f64); 3] = std::array::from_fn(|k| {
         let most = if k == 0 { 1.0 } else { draw.between(0.1, 0.5) };
-        (most, draw.between(0.0, TAU))
+        (most, draw.phase())
     });
     let angle = angle_of_table(&rate, full, stand.rate_hz);
     let ahead = |angle: f64| -> f64 {
@@ -291,11 +286,8 @@ pub(super) fn acceleration(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 
 /// Commands of a table that creeps, which the stand gets, each for a random time, s; it rests now and then.
 fn creeping(draw: &mut Draw, stand: &mut Stand, creep: (f64, f64), dwell_s: (f64, f64)) {
-    stand.world.duty = stand.held(draw, dwell_s, |d| {
-        if d.chance(0.2) {
-            0.0
-        } else {
-            in_steps(d.sign() * d.by_ratio(creep.0, creep.1))
-        }
+    stand.world.duty = stand.held(draw, dwell_s, |d| match d.chance(0.2) {
+        true => 0.0,
+        false => in_steps(d.sign() * d.by_ratio(creep.0, creep.1)),
     });
 }

@@ -31,14 +31,11 @@ pub(super) fn oven(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> 
 /// one is written, however long that takes. What it takes off belongs to the command before; the present one does nothing.
 pub(super) fn command_before(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     programme(draw, stand, DWELL);
-    let (mut now, mut before) = (stand.world.duty[0], 0.0);
-    let written = each(&stand.world.duty, |d| {
-        if d != now {
-            before = std::mem::replace(&mut now, d);
-        }
-        before
+    let duty = &stand.world.duty;
+    let written = carry((duty[0], 0.0), duty, |(now, before), d| {
+        (d, if d == now { before } else { now })
     });
-    either_way(draw, &written)
+    either_way(draw, &each(&written, |(_, before)| before))
 }
 
 /// Grease that sets while the motor rests, by the logarithm of the time: to break it loose takes a surge that hangs on how long
@@ -46,7 +43,7 @@ pub(super) fn command_before(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn grease(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let setting = draw.by_ratio(0.5, 2.0);
     let keep = (-1.0 / (draw.by_ratio(0.25, 1.0) * stand.rate_hz)).exp();
-    let level = |d: &mut Draw| in_steps(d.sign() * d.between(0.3, 1.0));
+    let level = |d: &mut Draw| in_steps(d.signed(0.3, 1.0));
     stand.world.duty = in_spells(stand, (0.0, draw.between(1.0, 5.0)), |was: f64| {
         if was == 0.0 {
             (level(draw), draw.between(1.0, 4.0))
@@ -74,9 +71,7 @@ pub(super) fn grease(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn served(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     programme(draw, stand, DWELL);
     let turn = TAU * draw.by_ratio(0.5, 8.0) / stand.rate_hz;
-    let (first, late) = (draw.between(0.0, TAU), draw.between(4.0, 10.0));
-    let sampled = stand.world.duty.iter().enumerate();
-    sampled
-        .map(|(i, d)| (first + turn * i as f64 + late * d.abs()).cos())
-        .collect()
+    let (first, late) = (draw.phase(), draw.between(4.0, 10.0));
+    let duty = &stand.world.duty;
+    stand.series(|i| (first + turn * i as f64 + late * duty[i].abs()).cos())
 }

@@ -13,11 +13,8 @@ pub(super) fn edge(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let sign = draw.sign();
     each(&stand.world.duty, |d| {
         let since = sampled - d.abs();
-        if since < 0.0 {
-            0.0
-        } else {
-            sign * (-since / decay).exp() * (TAU * turns * since).cos()
-        }
+        let rings = sign * (-since / decay).exp() * (TAU * turns * since).cos();
+        if since < 0.0 { 0.0 } else { rings }
     })
 }
 
@@ -40,14 +37,15 @@ pub(super) fn brake(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn peak(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     programme(draw, stand, DWELL);
     let (force, duty) = (shaking(draw, stand), &stand.world.duty);
-    let (mut most, mut command) = (0.0f64, duty[0]);
-    let kept = each_pair(&force, duty, |a, d| {
-        if d != command {
-            (most, command) = (0.0, d);
-        }
-        most = most.max(a.abs());
-        most
-    });
+    let cleared = each(&changes(duty), |change| change != 0.0);
+    let felt = each_pair(&force, &cleared, |a, cleared| (a.abs(), cleared));
+    let kept = carry(
+        0.0f64,
+        &felt,
+        |most, (a, cleared)| {
+            if cleared { a } else { most.max(a) }
+        },
+    );
     about_mean(&either_way(draw, &kept))
 }
 
@@ -57,8 +55,6 @@ pub(super) fn path(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let force = shaking(draw, stand);
     let bends = draw.between(1.5, 3.0) / mean_square(&force).sqrt();
     let turn = TAU * draw.by_ratio(0.5, 9.0) / stand.rate_hz;
-    let first = draw.between(0.0, TAU);
-    let bent = force.iter().enumerate();
-    bent.map(|(i, a)| (first + turn * i as f64 + bends * a).cos())
-        .collect()
+    let first = draw.phase();
+    stand.series(|i| (first + turn * i as f64 + bends * force[i]).cos())
 }

@@ -9,7 +9,7 @@ pub(super) fn ripple(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let top_hz = draw.by_ratio(1.5, 9.0);
     let gain = 1.0 - (-1.0 / (draw.between(0.3, 2.0) * stand.rate_hz)).exp();
     let keep = (-1.0 / (5.0 * stand.rate_hz)).exp();
-    let (mut speed, mut load, mut phase) = (0.0, draw.normal(), draw.between(0.0, TAU));
+    let (mut speed, mut load, mut phase) = (0.0, draw.normal(), draw.phase());
     each(&stand.world.duty, |duty| {
         load = keep * load + (1.0 - keep * keep).sqrt() * draw.normal();
         speed += gain * (duty - speed);
@@ -55,15 +55,13 @@ pub(super) fn iron(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         if stroke {
             ((false, 0.0), draw.between(5.0, 25.0))
         } else {
-            let command = in_steps(draw.sign() * draw.between(0.3, 1.0));
+            let command = in_steps(draw.signed(0.3, 1.0));
             ((true, command), draw.between(0.5, 3.0))
         }
     });
     stand.world.duty = each(&strokes, |(_, command)| command);
-    let mut kept = 0.0f64;
-    each(&stand.world.duty, |d| {
-        kept = kept.clamp(d - coercive, d + coercive);
-        kept
+    carry(0.0f64, &stand.world.duty, |kept, d| {
+        kept.clamp(d - coercive, d + coercive)
     })
 }
 
@@ -87,15 +85,12 @@ pub(super) fn sticking(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     stand.world.duty = each(&command, |d| in_steps(d.clamp(-1.0, 1.0)));
     let starts = draw.between(0.45, 0.7);
     let stops = starts * draw.between(0.2, 0.5);
-    let (sign, mut runs) = (draw.sign(), 0.0);
-    each(&stand.world.duty, |d| {
-        if d.abs() > starts {
-            runs = d.signum();
-        } else if d * runs < stops {
-            runs = 0.0;
-        }
-        sign * runs
-    })
+    let runs = carry(0.0, &stand.world.duty, |runs, d| match d.abs() {
+        pushed if pushed > starts => d.signum(),
+        _ if d * runs < stops => 0.0,
+        _ => runs,
+    });
+    either_way(draw, &runs)
 }
 
 /// Whenever the motor is turned about, the gear runs through its play and strikes on the other flank, and the arm that
@@ -126,32 +121,26 @@ pub(super) fn reversals(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// askew. It knows the angle that the motor has turned, the sum of its speed, not its command.
 pub(super) fn winding(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     const SLACK: f64 = 0.35;
-    let (n, rate_hz) = (stand.samples(), stand.rate_hz);
+    let rate_hz = stand.rate_hz;
     // Turned about before the cable breaks, or of the operator's will.
     let end = draw.between(4.0, 9.0);
     let (mut angle, mut command, mut left) = (0.0f64, 0.0, 0.0);
-    stand.world.duty = (0..n)
-        .map(|_| {
-            left -= 1.0 / rate_hz;
-            if left <= 0.0 || angle * command > 0.0 && angle.abs() > end {
-                let sense = if angle.abs() > 0.3 * end {
-                    -angle.signum()
-                } else {
-                    draw.sign()
-                };
-                command = in_steps(sense * draw.between(0.5, 1.0));
-                left = draw.between(3.0, 14.0);
-            }
-            angle += command / rate_hz;
-            command
-        })
-        .collect();
+    stand.world.duty = stand.series(|_| {
+        left -= 1.0 / rate_hz;
+        if left <= 0.0 || angle * command > 0.0 && angle.abs() > end {
+            let sense = match angle.abs() > 0.3 * end {
+                true => -angle.signum(),
+                false => draw.sign(),
+            };
+            command = in_steps(sense * draw.between(0.5, 1.0));
+            left = draw.between(3.0, 14.0);
+        }
+        angle += command / rate_hz;
+        command
+    });
     let speed = stand.lagged(&stand.world.duty, draw.between(0.1, 0.5));
-    let mut angle = 0.0f64;
-    each(&speed, |s| {
-        angle += s / rate_hz;
-        angle.signum() * (angle.abs() - SLACK * end).max(0.0)
-    })
+    let angles = carry(0.0f64, &speed, |angle, s| angle + s / rate_hz);
+    each(&angles, |a| a.signum() * (a.abs() - SLACK * end).max(0.0))
 }
 
 /// One pit in the bearing of the table: at one angle of each turn it dips in and out again, the harder the faster it turns,
@@ -199,10 +188,10 @@ pub(super) fn rotor(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rests = ((false, 0.0, 0.0), draw.between(1.0, 8.0));
     let spells = in_spells(stand, rests, |(runs, ..)| {
         if runs {
-            let field = draw.between(0.0, TAU).cos();
+            let field = draw.phase().cos();
             ((false, 0.0, field), draw.between(4.0, 15.0))
         } else {
-            let command = in_steps(draw.sign() * draw.between(0.3, 1.0));
+            let command = in_steps(draw.signed(0.3, 1.0));
             ((true, command, 0.0), draw.between(1.5, 6.0))
         }
     });
@@ -232,7 +221,7 @@ pub(super) fn beat(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (swing, memory) = (draw.by_ratio(0.05, 0.4), draw.by_ratio(3.0, 20.0));
     let off = stand.wander(draw, swing, memory);
     let pitches = each(&off, |off| middle + off);
-    let tone = tone(draw.between(0.0, TAU), &pitches, stand.rate_hz);
+    let tone = tone(draw.phase(), &pitches, stand.rate_hz);
     each_pair(&stand.world.duty, &tone, |duty, t| {
         (PI * harmonic * FULL * duty).sin() * t
     })

@@ -6,21 +6,13 @@ use super::super::super::prelude::*;
 /// friction holds, and each shock lets all of it go. The bias is what the temperature has moved by since the last shock.
 pub(super) fn released(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     cycles(draw, stand);
-    let mut shocked = vec![false; stand.samples()];
-    for (at, _) in shocks(draw, stand) {
-        shocked[at] = true;
-    }
+    let shocks = shocks(draw, stand);
     let own = &stand.world.temperature[axis];
-    let mut free = own[0];
-    let stress: Vec<f64> = (0..own.len())
-        .map(|i| {
-            if shocked[i] {
-                free = own[i];
-            }
-            own[i] - free
-        })
-        .collect();
-    either_way(draw, &stress)
+    let mut free = vec![own[0]; own.len()];
+    for (at, _) in shocks {
+        free[at..].fill(own[at]);
+    }
+    either_way(draw, &each_pair(own, &free, |t, free| t - free))
 }
 
 /// A supervisor resets the part when the supply dips below its threshold, and lets go some millivolts above it: after each
@@ -53,15 +45,11 @@ pub(super) fn asleep(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     // Of the normal law, once in 4 to 13 s at 20 Hz.
     let threshold = rms * draw.between(2.5, 2.9);
     let awake = (draw.by_ratio(1.0, 5.0) * stand.rate_hz) as usize;
-    let mut left = 0;
-    let sleeps = each(&force, |a| {
-        left = if a.abs() > threshold {
-            awake
-        } else {
-            left.saturating_sub(1)
-        };
-        one_if(left == 0)
+    let left = carry(0usize, &force, |left, a| {
+        let wakes = a.abs() > threshold;
+        if wakes { awake } else { left.saturating_sub(1) }
     });
+    let sleeps = each(&left, |left| one_if(left == 0));
     let settled = stand.lagged(&sleeps, draw.by_ratio(0.1, 0.8));
     about_mean(&either_way(draw, &settled))
 }
@@ -73,9 +61,7 @@ pub(super) fn of_thermometer(draw: &mut Draw, stand: &mut Stand, axis: usize) ->
     let off = from_trim(draw, stand, axis);
     let every = 3 + draw.of_many(8);
     let (first, sign) = (draw.of_many(every), draw.sign());
-    (0..off.len())
-        .map(|i| sign * off[i] * one_if(i % every == first))
-        .collect()
+    stand.series(|i| sign * off[i] * one_if(i % every == first))
 }
 
 /// Popcorn noise of one trap: it takes a charge by a rate that grows tenfold for each third of the temperature's range
@@ -84,15 +70,9 @@ pub(super) fn popcorn(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
     const DECADES: f64 = 3.0;
     let warm = within_range(&stand.world.temperature[axis]);
     let loses = 1.0 / (draw.by_ratio(0.4, 3.0) * stand.rate_hz);
-    let mut full = false;
-    let levels = each(&warm, |w| {
-        let chance = if full {
-            loses
-        } else {
-            loses * 10f64.powf(DECADES * (w - 1.0))
-        };
-        full ^= draw.chance(chance);
-        one_if(full)
+    let full = carry(false, &warm, |full, w| {
+        let takes = loses * 10f64.powf(DECADES * (w - 1.0));
+        full ^ draw.chance(if full { loses } else { takes })
     });
-    about_mean(&either_way(draw, &levels))
+    about_mean(&either_way(draw, &each(&full, one_if)))
 }

@@ -33,10 +33,8 @@ pub(super) fn drop_out(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn behind_diode(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (_, tau, load) = wandering(draw, stand, (0.4, 2.0));
     let sinks = 1.0 - (-1.0 / (tau * draw.between(3.0, 8.0) * stand.rate_hz)).exp();
-    let mut kept = load[0];
-    about_mean(&each(&load, |u| {
-        kept = u.max(kept + sinks * (u - kept));
-        kept
+    about_mean(&carry(load[0], &load, |kept, u| {
+        u.max(kept + sinks * (u - kept))
     }))
 }
 
@@ -46,7 +44,7 @@ pub(super) fn pump(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let most = draw.between(0.05, 0.15);
     loaded(draw, stand, most, (3.0, 15.0));
     let (idle, span) = (draw.between(1.0, 9.0), draw.between(10.0, 40.0));
-    let first = draw.between(0.0, TAU);
+    let first = draw.phase();
     let pitches = each(&stand.world.supply, |u| idle + span * (5.0 - u) / most);
     tone(first, &pitches, stand.rate_hz)
 }

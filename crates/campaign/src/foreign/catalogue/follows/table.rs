@@ -2,9 +2,6 @@
 
 use super::super::super::prelude::*;
 
-/// How long an indexed table rests at a heading, s.
-pub(super) const RESTS: (f64, f64) = (1.5, 7.0);
-
 /// A multiplexed converter that comes to this axis a part of a frame after the encoder was read, or before: off by that
 /// time's change of the rate. The table's drive ramps from rate to rate with one acceleration.
 pub(super) fn converted_late(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
@@ -56,11 +53,9 @@ pub(super) fn modes(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64>
     let rate = turned(draw, stand, DWELL);
     let own = &stand.world.temperature[axis];
     let (low, span) = (extremes(own).0, swing(own));
-    let (middle, half_width) = (
-        low + span * draw.between(0.3, 0.7),
-        span * draw.by_ratio(0.04, 0.2),
-    );
-    let (sin, cos) = draw.between(0.0, TAU).sin_cos();
+    let middle = low + span * draw.between(0.3, 0.7);
+    let half_width = span * draw.by_ratio(0.04, 0.2);
+    let (sin, cos) = draw.phase().sin_cos();
     each_pair(own, &rate, |t, r| {
         let off = (t - middle) / half_width;
         r * (sin + cos * off) / (1.0 + off * off)
@@ -76,17 +71,15 @@ pub(super) fn differences(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let most = low.abs().max(high) * draw.between(0.1, 0.5);
     let whole = (draw.by_ratio(1.0, 8.0) * stand.rate_hz).round() as usize;
     let mut off = 0.0;
-    changes
-        .iter()
-        .enumerate()
-        .map(|(i, change)| {
-            off += change.clamp(-most, most) - change;
-            if i % whole == 0 {
-                off = 0.0;
-            }
-            off
-        })
-        .collect()
+    stand.series(|i| {
+        let told = changes[i].clamp(-most, most);
+        off = if i % whole == 0 {
+            0.0
+        } else {
+            off + (told - changes[i])
+        };
+        off
+    })
 }
 
 /// Lamps about the stand shine on a die without a lid: photo current while the part is turned to one of them, and the
@@ -97,10 +90,9 @@ pub(super) fn lamps(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (shade, sign) = (draw.between(-0.2, 0.6), draw.sign());
     let mut light = vec![0.0; angle.len()];
     for _ in 0..1 + draw.of_many(3) {
-        let (place, bright) = (draw.between(0.0, TAU), draw.between(0.3, 1.0));
-        for (l, a) in light.iter_mut().zip(&angle) {
-            *l += sign * bright * ((a + place).cos() - shade).max(0.0);
-        }
+        let (place, bright) = (draw.phase(), draw.between(0.3, 1.0));
+        let shines = |a: f64| sign * bright * ((a + place).cos() - shade).max(0.0);
+        add_at(&mut light, 0, each(&angle, shines));
     }
     about_mean(&light)
 }
@@ -126,14 +118,12 @@ pub(super) fn steady(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let window = draw.by_ratio(0.02, 0.1);
     let follows = 1.0 / (draw.by_ratio(0.5, 3.0) * stand.rate_hz);
     let mut zero = 0.0;
-    (0..rate.len())
-        .map(|i| {
-            if i >= waits && swing(&rate[i - waits..=i]) < window {
-                zero += follows * (rate[i] - zero);
-            }
-            -zero
-        })
-        .collect()
+    stand.series(|i| {
+        if i >= waits && swing(&rate[i - waits..=i]) < window {
+            zero += follows * (rate[i] - zero);
+        }
+        -zero
+    })
 }
 
 /// Deflection, whichever way, charges the surfaces that the electrodes come near to; they are traps of several depths, so
@@ -145,7 +135,7 @@ pub(super) fn charged(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     traps(rate.len(), sign, |k| {
         let empties = 1.0 / (fastest * apart.powi(k));
         let grows = |r: f64, full: f64| fills * r * r * (1.0 - full) - empties * full;
-        filled(&rate, |r, full| full + grows(r, full) / stand.rate_hz)
+        carry(0.0, &rate, |full, r| full + grows(r, full) / stand.rate_hz)
     })
 }
 
@@ -173,7 +163,7 @@ pub(super) fn squared_rate(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 pub(super) fn heading(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let (full, soft) = (draw.by_ratio(0.1, 0.4), draw.between(0.0, 0.4));
-    let (first, second) = (draw.between(0.0, TAU), draw.between(0.0, TAU));
+    let (first, second) = (draw.phase(), draw.phase());
     let angle = angle_of_table(&rate, full, stand.rate_hz);
     about_mean(&each(&angle, |a| {
         (a + first).cos() + soft * (2.0 * a + second).cos()
@@ -213,7 +203,7 @@ pub(super) fn zeroed(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// A table whose axis is not square to its face: a level axis sees the sine of the angle times the rate.
 pub(super) fn wobble(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
-    let (full, first) = (draw.by_ratio(0.1, 0.5), draw.between(0.0, TAU));
+    let (full, first) = (draw.by_ratio(0.1, 0.5), draw.phase());
     let angle = angle_of_table(&rate, full, stand.rate_hz);
     about_mean(&each_pair(&angle, &rate, |a, r| r * (a + first).sin()))
 }
@@ -252,13 +242,11 @@ pub(super) fn slow_turns(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     });
     let rate = rate_of_table(draw, stand);
     let follows = 1.0 / (draw.by_ratio(0.4, 2.0) * stand.rate_hz);
-    let mut zero = 0.0;
-    each(&rate, |r| {
-        if r.abs() < slow {
-            zero += follows * (r - zero);
-        }
-        -zero
-    })
+    let zero = carry(0.0, &rate, |zero, r| {
+        let taken = if r.abs() < slow { follows } else { 0.0 };
+        zero + taken * (r - zero)
+    });
+    each(&zero, |zero| -zero)
 }
 
 /// Traps in a dielectric that the electrode's side of the rate fills and the other empties, each in its own time, some
@@ -270,7 +258,7 @@ pub(super) fn sense(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (apart, sign) = (draw.between(1.6, 2.5), draw.sign());
     traps(rate.len(), sign, |k| {
         let takes = 1.0 / (fastest * apart.powi(k) * stand.rate_hz);
-        filled(&rate, |r, full| {
+        carry(0.0, &rate, |full, r| {
             let goes = if r.abs() > least { takes.min(1.0) } else { 0.0 };
             full + goes * (r.signum() - full)
         })
@@ -283,7 +271,7 @@ pub(super) fn folded_cogging(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let rate = turned(draw, stand, DWELL);
     let poles = angle_of_table(&rate, draw.by_ratio(20.0, 90.0), stand.rate_hz);
     let (corner, overtone) = (draw.between(0.1, 0.3), draw.between(0.2, 0.7));
-    let [first, second] = [0, 1].map(|_| draw.between(0.0, TAU));
+    let [first, second] = [0, 1].map(|_| draw.phase());
     each_pair(&poles, &rate, |a, r| {
         let torque = (a + first).cos() + overtone * (2.0 * a + second).cos();
         r / (r * r + corner * corner) * torque
@@ -291,11 +279,11 @@ pub(super) fn folded_cogging(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 }
 
 /// Commands of a table that is indexed: it rests at a heading, and goes on by a few parts of a turn, either way.
-pub(super) fn indexed(draw: &mut Draw, stand: &mut Stand, full: f64) {
-    let part = 1.0 / [4.0, 6.0, 8.0, 12.0][draw.of_many(4)];
+fn indexed(draw: &mut Draw, stand: &mut Stand, full: f64) {
+    let part = 1.0 / draw.one_of(&[4.0, 6.0, 8.0, 12.0]);
     let mut duty = Vec::with_capacity(stand.samples());
     while duty.len() < stand.samples() {
-        let rests = (draw.between(RESTS.0, RESTS.1) * stand.rate_hz) as usize;
+        let rests = (draw.between(1.5, 7.0) * stand.rate_hz) as usize;
         duty.extend(std::iter::repeat_n(0.0, rests));
         let (turn, level) = (part * (1 + draw.of_many(3)) as f64, draw.between(0.3, 1.0));
         let takes = (turn / full / level * stand.rate_hz).ceil();
@@ -312,19 +300,9 @@ pub(super) fn ground(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let full = draw.by_ratio(0.2, 0.5);
     indexed(draw, stand, full);
     let rate = rate_of_table(draw, stand);
-    let north = draw.between(0.0, TAU);
-    each(&angle_of_table(&rate, full, stand.rate_hz), |angle| {
-        (angle - north).sin()
-    })
-}
-
-/// The share, by sample, of a trap that fills and empties by the rate: 0 at first, and `next` of the rate and of what it was.
-fn filled(rate: &[f64], mut next: impl FnMut(f64, f64) -> f64) -> Vec<f64> {
-    let mut filled = 0.0;
-    each(rate, |r| {
-        filled = next(r, filled);
-        filled
-    })
+    let north = draw.phase();
+    let angle = angle_of_table(&rate, full, stand.rate_hz);
+    each(&angle, |angle| (angle - north).sin())
 }
 
 /// Sum of what traps of several depths hold, each a series by its number.
@@ -332,7 +310,7 @@ fn traps(samples: usize, sign: f64, of: impl Fn(i32) -> Vec<f64>) -> Vec<f64> {
     const TRAPS: i32 = 4;
     let mut all = vec![0.0; samples];
     for k in 0..TRAPS {
-        all.iter_mut().zip(of(k)).for_each(|(v, t)| *v += sign * t);
+        add_at(&mut all, 0, each(&of(k), |t| sign * t));
     }
     about_mean(&all)
 }

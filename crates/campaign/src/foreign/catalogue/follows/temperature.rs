@@ -2,9 +2,6 @@
 
 use super::super::super::prelude::*;
 
-/// Degrees in which a leak grows twofold.
-pub(super) const TWOFOLD_K: f64 = 10.0;
-
 /// A reference whose drift with temperature is a share of the supply: the product of both about their means. A term in
 /// one of them alone is not in it.
 pub(super) fn by_supply(stand: &Stand, axis: usize) -> Vec<f64> {
@@ -24,10 +21,9 @@ pub(super) fn creaks(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
     let mut signal = vec![0.0; pace.len()];
     for (i, p) in pace.iter().enumerate() {
         if draw.chance(jerks * p / total) {
-            let size = draw.sign() * draw.between(0.6, 1.4);
-            for (k, v) in signal.iter_mut().skip(i).take(length).enumerate() {
-                *v += size * (TAU * (k as f64 + 0.5) / length as f64).sin();
-            }
+            let size = draw.signed(0.6, 1.4);
+            let jerk = |k| size * (TAU * (k as f64 + 0.5) / length as f64).sin();
+            add_at(&mut signal, i, (0..length).map(jerk));
         }
     }
     signal
@@ -65,20 +61,15 @@ pub(super) fn dips(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> 
     let span = high - low;
     let count = 2 + draw.of_many(4);
     // One in each of as many equal ranges: dips do not lie on each other.
-    let modes: Vec<[f64; 3]> = (0..count)
-        .map(|i| {
-            let place = (i as f64 + draw.between(0.2, 0.8)) / count as f64;
-            [
-                low + span * place,
-                span * draw.by_ratio(0.01, 0.05),
-                draw.sign() * draw.between(0.5, 1.5),
-            ]
-        })
-        .collect();
-    each(temperature, |t| {
-        let dip = |[at, width, depth]: &[f64; 3]| depth / (1.0 + ((t - at) / width).powi(2));
-        modes.iter().map(dip).sum()
-    })
+    let mut dips = vec![0.0; temperature.len()];
+    for i in 0..count {
+        let place = (i as f64 + draw.between(0.2, 0.8)) / count as f64;
+        let (at, width) = (low + span * place, span * draw.by_ratio(0.01, 0.05));
+        let depth = draw.signed(0.5, 1.5);
+        let dip = |t: f64| depth / (1.0 + ((t - at) / width).powi(2));
+        add_at(&mut dips, 0, each(temperature, dip));
+    }
+    dips
 }
 
 /// Firmware that corrects by a thermometer of few bits: what of the slope is left within its steps.
@@ -100,15 +91,13 @@ pub(super) fn heater(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let (asked, play) = (draw.between(0.35, 0.65), draw.by_ratio(0.05, 0.3));
     let takes = draw.by_ratio(4.0, 20.0);
     let (mut on, mut warm) = (draw.chance(0.5), asked);
-    let (current, warmth): (Vec<f64>, Vec<f64>) = air
-        .iter()
-        .map(|air| {
-            let heats = one_if(on);
-            warm += (heats + air - warm) / (takes * stand.rate_hz);
-            on = warm < asked + if on { 0.5 } else { -0.5 } * play;
-            (heats, warm - asked)
-        })
-        .unzip();
+    let heats = each(&air, |air| {
+        let heats = one_if(on);
+        warm += (heats + air - warm) / (takes * stand.rate_hz);
+        on = warm < asked + if on { 0.5 } else { -0.5 } * play;
+        (heats, warm - asked)
+    });
+    let (current, warmth): (Vec<f64>, Vec<f64>) = heats.into_iter().unzip();
     let full = draw.between(5.0, 15.0);
     for own in &mut stand.world.temperature {
         *own = each_pair(own, &warmth, |t, w| t + full * w);
@@ -137,11 +126,8 @@ pub(super) fn disc(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> 
     let (low, high) = extremes(&sheet);
     let at = |share: f64| low + share * (high - low);
     let (over, back) = (at(draw.between(0.5, 0.7)), at(draw.between(0.25, 0.45)));
-    let mut snapped = false;
-    each(&sheet, |t| {
-        snapped = t > if snapped { back } else { over };
-        one_if(snapped)
-    })
+    let snapped = carry(false, &sheet, |was, t| t > if was { back } else { over });
+    each(&snapped, one_if)
 }
 
 /// A bridge that is fed with alternating current and balanced at one temperature: what comes out is a tone as large as the
@@ -149,9 +135,8 @@ pub(super) fn disc(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> 
 pub(super) fn bridge(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     cycles(draw, stand);
     let temperature = &stand.world.temperature[axis];
-    let mean = temperature.iter().sum::<f64>() / temperature.len() as f64;
-    let balanced = mean + 0.1 * swing(temperature) * draw.between(-1.0, 1.0);
-    let (pitch, first) = (draw.by_ratio(0.8, 9.5), draw.between(0.0, TAU));
+    let balanced = mean(temperature) + 0.1 * swing(temperature) * draw.between(-1.0, 1.0);
+    let (pitch, first) = (draw.by_ratio(0.8, 9.5), draw.phase());
     let tone = in_time(stand, |t| (first + TAU * pitch * t).sin());
     each_pair(temperature, &tone, |t, s| (t - balanced) * s)
 }
@@ -181,18 +166,17 @@ pub(super) fn teeth(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
 pub(super) fn droop(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
     cycles(draw, stand);
     let slips = draw.sign() * draw.by_ratio(0.15, 3.0);
-    let (size, tau) = (
-        slips.abs() * draw.by_ratio(0.01, 0.05),
-        draw.by_ratio(5.0, 60.0),
-    );
+    let size = slips.abs() * draw.by_ratio(0.01, 0.05);
+    let tau = draw.by_ratio(5.0, 60.0);
     let off = stand.wander(draw, size, tau);
-    let (mut wait, sign) = (draw.between(0.0, 1.0), draw.sign());
-    let own = &stand.world.temperature[axis];
-    let held: Vec<f64> = each_pair(own, &off, |t, off| {
-        wait = (wait + (slips + off) / stand.rate_hz).rem_euclid(1.0);
-        sign * wait * ((t - own[0]) / TWOFOLD_K).exp2()
+    let waits = carry(draw.between(0.0, 1.0), &off, |wait, off| {
+        (wait + (slips + off) / stand.rate_hz).rem_euclid(1.0)
     });
-    about_mean(&held)
+    let sign = draw.sign();
+    let own = &stand.world.temperature[axis];
+    about_mean(&each_pair(own, &waits, |t, wait| {
+        sign * wait * ((t - own[0]) / 10.0).exp2()
+    }))
 }
 
 /// Quadrature, which wanders, leaks into the rate by the sine of the demodulator's phase error. That was trimmed at one
@@ -213,13 +197,11 @@ pub(super) fn entries(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f6
     let wide = (high - low).max(1e-9) / draw.between(4.0, 10.0);
     let (first, slope) = (draw.between(0.0, 1.0), draw.between(-1.0, 1.0));
     let errors: [f64; 12] = std::array::from_fn(|_| draw.normal());
-    without_line(
-        &each(own, |t| {
-            let place = (t - low) / wide + first;
-            errors[(place as usize).min(errors.len() - 1)] + slope * (place.fract() - 0.5)
-        }),
-        own,
-    )
+    let off = each(own, |t| {
+        let place = (t - low) / wide + first;
+        errors[(place as usize).min(errors.len() - 1)] + slope * (place.fract() - 0.5)
+    });
+    without_line(&off, own)
 }
 
 /// Heat that flows through the package bends it: by the pace at which the temperature rises, behind two of its layers.
@@ -239,14 +221,9 @@ pub(super) fn softens(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f6
     let (low, high) = extremes(own);
     // Not in the middle, where a parabola comes near it.
     let from_end = draw.between(0.15, 0.35);
-    let share = if draw.chance(0.5) {
-        from_end
-    } else {
-        1.0 - from_end
-    };
-    let at = low + (high - low) * share;
+    let at = low + (high - low) * draw.either(from_end, 1.0 - from_end);
     let sign = draw.sign();
-    let beyond: Vec<f64> = each(own, |t| sign * (t - at).max(0.0));
+    let beyond = each(own, |t| sign * (t - at).max(0.0));
     without_line(&beyond, own)
 }
 
@@ -262,20 +239,17 @@ pub(super) fn die(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Vec<f64> {
 pub(super) fn backlash(stand: &Stand, axis: usize) -> Vec<f64> {
     let temperature = &stand.world.temperature[axis];
     let play = 0.4 * swing(temperature);
-    let mut held = temperature[0];
-    each(temperature, |v| {
-        held = held.clamp(v - play, v + play);
-        // Minus what a linear term takes.
-        held - 0.6 * v
-    })
+    let held = carry(temperature[0], temperature, |held, t| {
+        held.clamp(t - play, t + play)
+    });
+    // Minus what a linear term takes.
+    each_pair(&held, temperature, |held, t| held - 0.6 * t)
 }
 
 /// How fast the temperature rises.
 pub(super) fn rate_of_temperature(stand: &Stand, axis: usize) -> Vec<f64> {
-    pace(
-        &stand.world.temperature[axis],
-        (2.0 * stand.rate_hz) as usize,
-    )
+    let half = (2.0 * stand.rate_hz) as usize;
+    pace(&stand.world.temperature[axis], half)
 }
 
 /// The motor's command times what the temperature is off its mean.
@@ -286,8 +260,8 @@ pub(super) fn by_duty(stand: &Stand, axis: usize) -> Vec<f64> {
 
 /// An oscillator in the read-out that drifts with temperature and beats with the sampling.
 pub(super) fn drifting_tone(draw: &mut Draw, stand: &Stand, axis: usize) -> Vec<f64> {
-    let (from, span) = (draw.between(0.5, 6.0), draw.sign() * draw.between(0.4, 3.0));
+    let (from, span) = (draw.between(0.5, 6.0), draw.signed(0.4, 3.0));
     let places = within_range(&stand.world.temperature[axis]);
     let pitches = each(&places, |place| from + span * place);
-    tone(draw.between(0.0, TAU), &pitches, stand.rate_hz)
+    tone(draw.phase(), &pitches, stand.rate_hz)
 }

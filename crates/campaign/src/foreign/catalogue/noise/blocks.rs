@@ -12,9 +12,7 @@ fn square_of_largest(looks: i32) -> f64 {
     let wide = 2.0 * REACH / f64::from(CELLS);
     let square = |k: i32| {
         let x = wide * (f64::from(k) + 0.5) - REACH;
-        let below = 0.5 * statrs::function::erf::erfc(-x / 2f64.sqrt());
-        let density = (-0.5 * x * x).exp() / TAU.sqrt();
-        wide * x * x * f64::from(looks) * below.powi(looks - 1) * density
+        wide * x * x * f64::from(looks) * below(x).powi(looks - 1) * normal(x)
     };
     (0..CELLS).map(square).sum()
 }
@@ -43,10 +41,7 @@ pub(super) fn extremes_of_stretch(draw: &mut Draw) -> Shape {
     let largest = square_of_largest(number);
     noise(
         1.0,
-        move |stand, chance| {
-            let nats = nats_of_pair(number, chance.min(1.0));
-            Known::nats(0.5 * stand.samples() as f64 * nats)
-        },
+        move |stand, chance| Known::by_reading(stand, nats_of_pair(number, chance)),
         move |stand, draw, chance| {
             let scale = (1.0 + chance * (largest - 1.0)).sqrt();
             let mut second = None;
@@ -57,11 +52,7 @@ pub(super) fn extremes_of_stretch(draw: &mut Draw) -> Shape {
                 let several = draw.chance(chance);
                 let all = white(draw, if several { looks } else { 2 });
                 let (low, high) = extremes(&all);
-                let (one, other) = if draw.chance(0.5) {
-                    (low, high)
-                } else {
-                    (high, low)
-                };
+                let (one, other) = draw.either((low, high), (high, low));
                 second = Some(other / scale);
                 one / scale
             })
@@ -85,7 +76,6 @@ pub(super) fn levelled(draw: &mut Draw) -> Shape {
     noise(
         MOST,
         move |stand, size| {
-            let size = size.min(MOST);
             let logarithm = 0.5 * (digamma(0.5 * n) + 2f64.ln());
             let nats = n * (size * logarithm - gain(size)) - (-size).ln_1p();
             Known::nats(stand.samples() as f64 / n * nats)

@@ -3,56 +3,48 @@
 use super::super::super::prelude::*;
 
 /// Least and largest share of the variance that leans; below the least the law is normal, as far as can be seen.
-pub(super) const SHARES: (f64, f64) = (0.05, 0.95);
+const SHARES: (f64, f64) = (0.05, 0.95);
 
-/// Density of the sum of a uniform part, `share` of a variance of 1, and a normal rest, against the normal law.
-pub(super) fn of_uniform(share: f64, n: usize) -> f64 {
+/// d' of `n` readings of a law, by its density, against the normal one.
+fn against_normal((count, reach): (i32, f64), law: &dyn Fn(f64) -> f64, n: usize) -> Known {
+    let cells = |of: &dyn Fn(f64) -> f64| cells(count, reach, of);
+    Known::Strength(of_law(&cells(law), &cells(&normal), n))
+}
+
+/// Density, at x, of the sum of a uniform part, `share` of a variance of 1, and a normal rest.
+fn with_uniform(share: f64, x: f64) -> f64 {
     let (half, rest) = ((3.0 * share).sqrt(), (1.0 - share).max(1e-6).sqrt());
-    let below = |z: f64| 0.5 * statrs::function::erf::erfc(-z / 2f64.sqrt());
-    let mixed = |x: f64| (below((x + half) / rest) - below((x - half) / rest)) / (2.0 * half);
-    let normal = |x: f64| (-0.5 * x * x).exp() / TAU.sqrt();
-    let law = |of: &dyn Fn(f64) -> f64| cells(1200, 6.0, of);
-    of_law(&law(&mixed), &law(&normal), n)
+    (below((x + half) / rest) - below((x - half) / rest)) / (2.0 * half)
 }
 
 /// Density, at x, of what has variance 1: a sine of any phase, `share` of the variance, and a normal rest.
-pub(super) fn with_sine(share: f64, x: f64) -> f64 {
+fn with_sine(share: f64, x: f64) -> f64 {
     const PHASES: i32 = 96;
     let (size, rest) = ((2.0 * share).sqrt(), (1.0 - share).max(1e-4).sqrt());
     let at = |i: i32| {
         let phase = PI * (f64::from(i) + 0.5) / f64::from(PHASES);
-        let z = (x - size * phase.cos()) / rest;
-        (-0.5 * z * z).exp()
+        normal((x - size * phase.cos()) / rest)
     };
-    (0..PHASES).map(at).sum::<f64>() / f64::from(PHASES) / rest / TAU.sqrt()
+    (0..PHASES).map(at).sum::<f64>() / f64::from(PHASES) / rest
 }
 
 /// Density, at x, of what has mean 0 and variance 1: an exponential law about its mean, `share` of the variance, and a
 /// normal rest (Grushka 1972).
-pub(super) fn leans(share: f64, x: f64) -> f64 {
+fn leans(share: f64, x: f64) -> f64 {
     let (rate, rest) = (1.0 / share.sqrt(), 1.0 - share);
     let off = rate * rest - 1.0 / rate - x;
     let tail = statrs::function::erf::erfc(off / (2.0 * rest).sqrt());
     0.5 * rate * (rate * (off - 0.5 * rate * rest)).exp() * tail
 }
 
-/// d' of `n` readings of that law against the normal one.
-pub(super) fn of_leaning(share: f64, n: f64) -> f64 {
-    let share = share.clamp(SHARES.0, SHARES.1);
-    let law = |of: &dyn Fn(f64) -> f64| cells(1200, 8.0, of);
-    let normal = law(&|x| (-0.5 * x * x).exp());
-    of_law(&law(&|x| leans(share, x)), &normal, 1) * n.sqrt()
-}
-
 /// d' of noise whose variance is drawn anew for each sample, a share of it exponential, against the normal law of the same
 /// variance. At share 1 it is the law of Laplace.
-pub(super) fn of_exponential_variance(share: f64, n: usize) -> f64 {
+fn of_exponential_variance(share: f64, n: usize) -> f64 {
     const CELLS: i32 = 800;
     const SIZES: usize = 100;
     // Each of equal chance.
-    let sizes: Vec<f64> = (0..SIZES)
-        .map(|k| 1.0 - share - share * (1.0 - (k as f64 + 0.5) / SIZES as f64).ln())
-        .collect();
+    let size = |k| 1.0 - share - share * (1.0 - (k as f64 + 0.5) / SIZES as f64).ln();
+    let sizes: Vec<f64> = (0..SIZES).map(size).collect();
     let normal = |x: f64, v: f64| (-0.5 * x * x / v).exp() / (TAU * v).sqrt();
     let cells = |of: &dyn Fn(f64) -> f64| -> Vec<f64> {
         let at = |i: i32| 12.0 * (f64::from(i) + 0.5) / f64::from(CELLS);
@@ -60,7 +52,7 @@ pub(super) fn of_exponential_variance(share: f64, n: usize) -> f64 {
         let sum: f64 = all.iter().sum();
         each(&all, |p| p / sum)
     };
-    let mean = sizes.iter().sum::<f64>() / SIZES as f64;
+    let mean = mean(&sizes);
     let mixed = cells(&|x| sizes.iter().map(|v| normal(x, v / mean)).sum::<f64>());
     of_law(&mixed, &cells(&|x| normal(x, 1.0)), n)
 }
@@ -81,20 +73,18 @@ pub(super) fn skewed(draw: &mut Draw, stand: &Stand) -> Shape {
 pub(super) fn uniform_part(draw: &mut Draw, stand: &Stand) -> Shape {
     let half = 3f64.sqrt();
     let dither = stand.series(|_| draw.between(-half, half));
-    let known =
-        |stand: &Stand, share: f64| Known::Strength(of_uniform(share.min(0.999), stand.samples()));
+    let known = |stand: &Stand, share| {
+        against_normal((1200, 6.0), &|x| with_uniform(share, x), stand.samples())
+    };
     share(0.999, known, dither)
 }
 
 /// A tone far above the samples' rate, from a switched supply or the part's own drive, whose clock is so unsteady that
 /// each sample catches it at another phase: no line is left, but values that crowd at its two crests.
 pub(super) fn any_phase(draw: &mut Draw, stand: &Stand) -> Shape {
-    let at = |of: &dyn Fn(f64) -> f64| cells(400, 6.0, of);
-    let normal = at(&|x| (-0.5 * x * x).exp());
-    let tone = stand.series(|_| 2f64.sqrt() * draw.between(0.0, TAU).sin());
-    let known = move |stand: &Stand, share: f64| {
-        let law = at(&|x| with_sine(share.min(0.98), x));
-        Known::Strength(of_law(&law, &normal, stand.samples()))
+    let tone = stand.series(|_| 2f64.sqrt() * draw.phase().sin());
+    let known = |stand: &Stand, share| {
+        against_normal((400, 6.0), &|x| with_sine(share, x), stand.samples())
     };
     share(0.98, known, tone)
 }
@@ -103,7 +93,7 @@ pub(super) fn any_phase(draw: &mut Draw, stand: &Stand) -> Shape {
 pub(super) fn double_exponential() -> Shape {
     noise(
         0.999,
-        |stand, share| Known::Strength(of_exponential_variance(share.min(0.999), stand.samples())),
+        |stand, share| Known::Strength(of_exponential_variance(share, stand.samples())),
         |stand, draw, share| {
             stand.series(|_| (1.0 - share + share * draw.exponential()).sqrt() * draw.normal())
         },
@@ -114,7 +104,7 @@ pub(super) fn double_exponential() -> Shape {
 /// other way backward, and not at rest. Its size stays.
 pub(super) fn leaning(draw: &mut Draw, stand: &mut Stand) -> Shape {
     with_rests(draw, stand, DWELL, 0.3);
-    let turning = stand.world.duty.iter().filter(|d| **d != 0.0).count() as f64;
+    let turning = stand.world.duty.iter().filter(|d| **d != 0.0).count();
     let sense = draw.sign();
     let series = each(&stand.world.duty, |d| {
         if d == 0.0 {
@@ -125,7 +115,10 @@ pub(super) fn leaning(draw: &mut Draw, stand: &mut Stand) -> Shape {
     });
     sized(
         SHARES.1,
-        move |_, share| Known::Strength(of_leaning(share, turning)),
+        move |_, share| {
+            let share = share.max(SHARES.0);
+            against_normal((1200, 8.0), &|x| leans(share, x), turning)
+        },
         |_, _, share| Change::Noise(series, share.max(SHARES.0)),
     )
 }

@@ -12,10 +12,7 @@ fn of_cubic(share: f64) -> f64 {
     let sigma = (1.0 - share).sqrt();
     let wide = 2.0 * REACH / CELLS as f64;
     let at = |k: usize| wide * (k as f64 + 0.5) - REACH;
-    let cell = |middle: f64, k: usize| {
-        let z = (at(k) - middle) / sigma;
-        wide / (sigma * TAU.sqrt()) * (-0.5 * z * z).exp()
-    };
+    let cell = |middle: f64, k: usize| wide / sigma * normal((at(k) - middle) / sigma);
     let laws = |times: f64| -> Vec<Vec<f64>> {
         let law = |a: usize| {
             let angle = PI * (a as f64 + 0.5) / ANGLES as f64;
@@ -25,15 +22,10 @@ fn of_cubic(share: f64) -> f64 {
         (0..ANGLES).map(law).collect()
     };
     let (own, next) = (laws(1.0), laws(3.0));
-    let one: Vec<f64> = (0..CELLS)
-        .map(|k| own.iter().map(|law| law[k]).sum::<f64>() / ANGLES as f64)
-        .collect();
-    let normal: Vec<f64> = (0..CELLS)
-        .map(|k| wide / TAU.sqrt() * (-0.5 * at(k) * at(k)).exp())
-        .collect();
+    let one = |x: usize| own.iter().map(|law| law[x]).sum::<f64>() / ANGLES as f64;
     let mut nats = 0.0;
-    for (x, p) in one.iter().enumerate() {
-        for (y, q) in normal.iter().enumerate() {
+    for (x, p) in (0..CELLS).map(one).enumerate() {
+        for (y, q) in (0..CELLS).map(|y| wide * normal(at(y))).enumerate() {
             let both = own.iter().zip(&next).map(|(o, n)| o[x] * n[y]);
             let both = both.sum::<f64>() / ANGLES as f64;
             if both > 1e-14 {
@@ -54,9 +46,7 @@ pub(super) fn cubic(draw: &mut Draw, stand: &Stand) -> Shape {
         ripple = (ripple * (4.0 * ripple * ripple - 3.0) + 1e-9 * draw.normal()).clamp(-1.0, 1.0);
         2f64.sqrt() * ripple
     });
-    let known = |stand: &Stand, part: f64| {
-        Known::Strength((stand.samples() as f64 * of_cubic(part.min(MOST))).sqrt())
-    };
+    let known = |stand: &Stand, part| Known::by_reading(stand, of_cubic(part));
     share(MOST, known, series)
 }
 
@@ -70,21 +60,16 @@ pub(super) fn turning_back() -> Shape {
     noise(
         MOST,
         |stand, often| {
-            let often = often.min(MOST);
-            let nats = 0.5 * ((1.0 + often) * often.ln_1p() + (1.0 - often) * (-often).ln_1p());
-            Known::Strength((2.0 * stand.samples() as f64 * nats).max(0.0).sqrt())
+            let nats = (1.0 + often) * often.ln_1p() + (1.0 - often) * (-often).ln_1p();
+            Known::by_reading(stand, nats)
         },
         move |stand, draw, often| {
             let opens = draw.sign();
             let mut last = draw.normal();
             stand.series(|_| {
                 let goes_on = opens * if last.abs() < large { 1.0 } else { -1.0 };
-                let sense = if draw.chance(0.5 * (1.0 + often)) {
-                    goes_on * last.signum()
-                } else {
-                    -goes_on * last.signum()
-                };
-                last = sense * draw.normal().abs();
+                let as_told = draw.choose(0.5 * (1.0 + often), 1.0, -1.0);
+                last = as_told * goes_on * last.signum() * draw.normal().abs();
                 last
             })
         },
@@ -111,12 +96,8 @@ pub(super) fn anew(draw: &mut Draw) -> Shape {
     noise(
         1.0,
         move |stand, size| {
-            let (variance, logs) = of_block(size.min(1.0));
-            Known::Strength(
-                (stand.samples() as f64 * (variance.ln() - logs))
-                    .max(0.0)
-                    .sqrt(),
-            )
+            let (variance, logs) = of_block(size);
+            Known::by_reading(stand, variance.ln() - logs)
         },
         move |stand, draw, size| {
             let scale = of_block(size).0.sqrt();

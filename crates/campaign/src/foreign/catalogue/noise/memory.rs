@@ -6,27 +6,27 @@ use super::super::super::prelude::*;
 pub(super) const MOST: f64 = 0.95;
 
 /// Readings beyond which two have no sample in common, for ratios from [`RATIO`].0 on.
-pub(super) const FAR: usize = 4;
+const FAR: usize = 4;
 
 /// Samples of the part for each reading.
-pub(super) const RATIO: (f64, f64) = (0.5, 0.95);
+const RATIO: (f64, f64) = (0.5, 0.95);
 
 /// Mean and variance of that autoregression.
-pub(super) fn moments(push: f64) -> (f64, f64) {
+fn moments(push: f64) -> (f64, f64) {
     let square = 1.0 / (1.0 - push * push);
     let mean = push * (2.0 / PI * square).sqrt();
     (mean, square - mean * mean)
 }
 
 /// d'^2 over the samples of a reference that stands for `length` readings and has `part` times the variance of the rest.
-pub(super) fn of_reference(length: usize, part: f64) -> f64 {
+fn of_reference(length: usize, part: f64) -> f64 {
     let m = length as f64;
     part.ln_1p() - (m * part).ln_1p() / m
 }
 
 /// Mean over the places of a reading between two samples, and over frequency, of the logarithm of what interpolation
 /// leaves of white noise, when it has variance 1 in the mean and `share` of the noise.
-pub(super) fn mean_log(share: f64) -> f64 {
+fn mean_log(share: f64) -> f64 {
     const PLACES: usize = 60;
     const TONES: usize = 120;
     let at = |i: usize, of: usize| (i as f64 + 0.5) / of as f64;
@@ -42,13 +42,13 @@ pub(super) fn mean_log(share: f64) -> f64 {
 
 /// Where a reading lies among the samples of a part that gives `ratio` of them for each reading: the one before it, and
 /// how far it is on the way to the next.
-pub(super) fn between(ratio: f64, reading: usize) -> (usize, f64) {
+fn between(ratio: f64, reading: usize) -> (usize, f64) {
     let at = ratio * reading as f64;
     (at as usize, at.fract())
 }
 
 /// Covariance of readings `apart` from each other, that of the samples being 1.
-pub(super) fn covariance(ratio: f64, reading: usize, apart: usize) -> f64 {
+fn covariance(ratio: f64, reading: usize, apart: usize) -> f64 {
     let ((from, u), (to, v)) = (between(ratio, reading), between(ratio, reading + apart));
     match to - from {
         0 => (1.0 - u) * (1.0 - v) + u * v,
@@ -58,14 +58,13 @@ pub(super) fn covariance(ratio: f64, reading: usize, apart: usize) -> f64 {
 }
 
 /// Mean covariance of `n` readings with those `apart` from them.
-pub(super) fn mean_covariance(ratio: f64, n: usize, apart: usize) -> f64 {
+fn mean_covariance(ratio: f64, n: usize, apart: usize) -> f64 {
     (0..n).map(|i| covariance(ratio, i, apart)).sum::<f64>() / n as f64
 }
 
 /// d' of `n` readings of which `share` of the variance is filled up so, the variance refitted: the determinant of their
 /// covariance, by Cholesky's factors of a band.
-pub(super) fn of_filled(ratio: f64, share: f64, n: usize) -> f64 {
-    let share = share.min(MOST);
+fn of_filled(ratio: f64, share: f64, n: usize) -> f64 {
     let mean = mean_covariance(ratio, n, 0);
     let mut logs = 0.0;
     // Rows of the factor, the last ones: [k] is the element k before the diagonal.
@@ -75,17 +74,12 @@ pub(super) fn of_filled(ratio: f64, share: f64, n: usize) -> f64 {
         for apart in (0..FAR.min(i + 1)).rev() {
             let own = share / mean * covariance(ratio, i - apart, apart);
             let white = if apart == 0 { 1.0 - share } else { 0.0 };
-            let known: f64 = (apart + 1..FAR.min(i + 1))
-                .map(|k| {
-                    let other = if apart == 0 { &row } else { &rows[i - apart] };
-                    row[k] * other[k - apart]
-                })
-                .sum();
-            let left = own + white - known;
-            row[apart] = if apart == 0 {
-                left.max(1e-12).sqrt()
-            } else {
-                left / rows[i - apart][0]
+            let other = if apart == 0 { &row } else { &rows[i - apart] };
+            let known = (apart + 1..FAR.min(i + 1)).map(|k| row[k] * other[k - apart]);
+            let left = own + white - known.sum::<f64>();
+            row[apart] = match apart {
+                0 => left.max(1e-12).sqrt(),
+                _ => left / other[0],
             };
         }
         logs += 2.0 * row[0].ln();
@@ -95,18 +89,12 @@ pub(super) fn of_filled(ratio: f64, share: f64, n: usize) -> f64 {
 }
 
 /// Straight lines between samples, at `n` readings.
-pub(super) fn filled_up(ratio: f64, samples: &[f64], n: usize) -> Vec<f64> {
-    (0..n)
-        .map(|i| {
-            let (before, part) = between(ratio, i);
-            (1.0 - part) * samples[before] + part * samples[before + 1]
-        })
-        .collect()
-}
-
-/// A d' by the nats that each of the samples tells, twice over: d'^2 = samples x nats.
-fn by_nats(stand: &Stand, nats: f64) -> Known {
-    Known::nats(0.5 * stand.samples() as f64 * nats)
+fn filled_up(ratio: f64, samples: &[f64], n: usize) -> Vec<f64> {
+    let at = |i: usize| {
+        let (before, part) = between(ratio, i);
+        (1.0 - part) * samples[before] + part * samples[before + 1]
+    };
+    (0..n).map(at).collect()
 }
 
 /// Thermal tail of an amplifier: the heat of a swing, its square, unbalances the input when the next reading is taken.
@@ -115,15 +103,12 @@ fn by_nats(stand: &Stand, nats: f64) -> Known {
 pub(super) fn square_behind() -> Shape {
     noise(
         f64::INFINITY,
-        |stand, tail| by_nats(stand, (2.0 * tail * tail).ln_1p()),
+        |stand, tail| Known::by_reading(stand, (2.0 * tail * tail).ln_1p()),
         |stand, draw, tail| {
             let (size, tail) = ((1.0 + 2.0 * tail * tail).sqrt(), tail * draw.sign());
-            let mut before = draw.normal();
-            stand.series(|_| {
-                let e = draw.normal();
-                let x = e + tail * (before * before - 1.0);
-                before = e;
-                x / size
+            let white = white(draw, stand.samples() + 1);
+            each_pair(&white, &white[1..], |before, e| {
+                (e + tail * (before * before - 1.0)) / size
             })
         },
     )
@@ -133,18 +118,17 @@ pub(super) fn square_behind() -> Shape {
 /// clocks move past each other, a reading is now one sample and now the mean of two: white of variance 1 here, smoothed and
 /// of half the variance there, and back within seconds.
 pub(super) fn interpolated(draw: &mut Draw, stand: &Stand) -> Shape {
-    let n = stand.samples();
     // The part's samples are a little further apart: none is left out.
     let pace = 1.0 - draw.by_ratio(0.003, 0.03);
     let first = draw.between(0.0, 1.0);
-    let white: Vec<f64> = (0..n + 2).map(|_| draw.normal()).collect();
-    let at = |i| {
+    let white = white(draw, stand.samples() + 2);
+    let series = stand.series(|i| {
         let place = first + pace * i as f64;
         let (k, f) = (place as usize, place.fract());
         1.5f64.sqrt() * ((1.0 - f) * white[k] + f * white[k + 1])
-    };
-    let nats = |stand: &Stand, share: f64| by_nats(stand, -mean_log(share.min(0.999)));
-    share(0.999, nats, (0..n).map(at).collect())
+    });
+    let known = |stand: &Stand, share| Known::by_reading(stand, -mean_log(share));
+    share(0.999, known, series)
 }
 
 /// A capacitor that holds a sample keeps some of the one before, and a second one is switched against it; what they differ
@@ -155,20 +139,15 @@ pub(super) fn trimmed(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let off = about_mean(&stand.world.temperature[axis]);
     let (low, high) = extremes(&off);
     let most = high.max(-low).max(1e-9);
-    let (kept, sign): (Vec<f64>, f64) = (each(&off, |t| t / most), draw.sign());
-    let square = kept.iter().map(|c| c * c).sum::<f64>() / stand.samples() as f64;
+    let (kept, sign) = (each(&off, |t| t / most), draw.sign());
+    let square = mean_square(&kept);
     noise(
         0.98,
-        move |stand, size| by_nats(stand, (size * size * square).ln_1p()),
-        move |_, draw, size| {
+        move |stand, size| Known::by_reading(stand, (size * size * square).ln_1p()),
+        move |stand, draw, size| {
             let scale = (1.0 + size * size * square).sqrt();
-            let mut before = draw.normal();
-            each(&kept, |c| {
-                let e = draw.normal();
-                let x = e + sign * size * c * before;
-                before = e;
-                x / scale
-            })
+            let white = white(draw, stand.samples() + 1);
+            stand.series(|i| (white[i + 1] + sign * size * kept[i] * white[i]) / scale)
         },
     )
 }
@@ -178,7 +157,7 @@ pub(super) fn trimmed(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 pub(super) fn product() -> Shape {
     noise(
         f64::INFINITY,
-        |stand, share| by_nats(stand, (share * share).ln_1p()),
+        |stand, share| Known::by_reading(stand, (share * share).ln_1p()),
         |stand, draw, share| {
             let (scale, sign) = ((1.0 + share * share).sqrt(), draw.sign());
             let (mut one, mut two) = (draw.normal(), draw.normal());
@@ -228,15 +207,13 @@ fn bent(
     noise(
         most,
         move |stand, share| {
-            let (y, logs) = of(share.min(most), &known);
+            let (y, logs) = of(share, &known);
             let logs = logs / known.len() as f64;
-            by_nats(
-                stand,
-                (mean_square(&y) / mean_square(&known)).ln() - 2.0 * logs,
-            )
+            let widens = mean_square(&y) / mean_square(&known);
+            Known::by_reading(stand, widens.ln() - 2.0 * logs)
         },
         move |_, _, share| {
-            let (y, _) = of(share.min(most), &white);
+            let (y, _) = of(share, &white);
             let scale = mean_square(&y).sqrt();
             each(&y, |v| v / scale)
         },
@@ -248,22 +225,23 @@ fn bent(
 pub(super) fn switched(draw: &mut Draw, stand: &mut Stand) -> Shape {
     with_rests(draw, stand, (4.0, 20.0), 0.2);
     let runs = each(&stand.world.duty, |d| d != 0.0);
-    let share = runs.iter().filter(|r| **r).count() as f64 / runs.len() as f64;
+    let share = mean(&each(&runs, one_if));
     noise(
         0.5,
         move |stand, f| {
-            let f = f.min(0.5);
             let left = (1.0 - f).powi(2) + f * f;
             let nats = (1.0 - share + share * left).ln() - 2.0 * share * (1.0 - f).ln();
-            by_nats(stand, nats)
+            Known::by_reading(stand, nats)
         },
-        move |_, draw, f| {
-            let mut before = draw.normal();
-            each(&runs, |runs| {
-                let e = draw.normal();
-                let x = if runs { (1.0 - f) * e + f * before } else { e };
-                before = e;
-                x
+        move |stand, draw, f| {
+            let white = white(draw, stand.samples() + 1);
+            stand.series(|i| {
+                let (before, e) = (white[i], white[i + 1]);
+                if runs[i] {
+                    (1.0 - f) * e + f * before
+                } else {
+                    e
+                }
             })
         },
     )
@@ -276,15 +254,15 @@ pub(super) fn blocks(draw: &mut Draw) -> Shape {
     let length = 4 + draw.of_many(4);
     noise(
         f64::INFINITY,
-        move |stand, share| by_nats(stand, (share * share / length as f64).ln_1p()),
+        move |stand, share| Known::by_reading(stand, (share * share / length as f64).ln_1p()),
         move |stand, draw, share| {
             let n = stand.samples();
             let scale = (1.0 + share * share / length as f64).sqrt();
             let first = draw.of_many(length);
-            let white: Vec<f64> = (0..n + 2 * length).map(|_| draw.normal()).collect();
+            let white = white(draw, n + 2 * length);
             let off = |i: usize| {
                 let (here, block) = (i + first + length, (i + first) / length * length);
-                let zero = white[block..block + length].iter().sum::<f64>() / length as f64;
+                let zero = mean(&white[block..block + length]);
                 (white[here] - share * zero) / scale
             };
             (0..n).map(off).collect()
@@ -295,26 +273,21 @@ pub(super) fn blocks(draw: &mut Draw) -> Shape {
 /// Neighbours that correlate now and anticorrelate then, turn by turn, while the variance stays: over the whole periods of
 /// the record the noise is white. d'^2 = - samples x mean ln(1 - c^2).
 pub(super) fn turning_colour(draw: &mut Draw, stand: &Stand) -> Shape {
-    let n = stand.samples();
+    let n = stand.samples() as f64;
     let periods = draw.by_ratio(2.0, 40.0).round();
-    let first = draw.between(0.0, TAU);
-    let shape: Vec<f64> = (0..n)
-        .map(|i| (first + TAU * periods * i as f64 / n as f64).sin())
-        .collect();
+    let first = draw.phase();
+    let shape = stand.series(|i| (first + TAU * periods * i as f64 / n).sin());
     let known = shape.clone();
     noise(
         0.98,
         move |_, size| {
-            let size = size.min(0.98);
             let nats = |s: &f64| -(-(size * s).powi(2)).ln_1p();
             Known::Strength(known.iter().map(nats).sum::<f64>().sqrt())
         },
         move |_, draw, size| {
-            let mut x = draw.normal();
-            each(&shape, |s| {
+            carry(draw.normal(), &shape, |x, s| {
                 let c = size * s;
-                x = c * x + (1.0 - c * c).sqrt() * draw.normal();
-                x
+                c * x + (1.0 - c * c).sqrt() * draw.normal()
             })
         },
     )
@@ -326,7 +299,7 @@ pub(super) fn turning_colour(draw: &mut Draw, stand: &Stand) -> Shape {
 pub(super) fn pushing() -> Shape {
     noise(
         0.95,
-        |stand, push| by_nats(stand, moments(push.min(0.95)).1.ln()),
+        |stand, push| Known::by_reading(stand, moments(push).1.ln()),
         |stand, draw, push| {
             let ((mean, variance), sign) = (moments(push), draw.sign());
             let mut x = draw.normal();
@@ -346,7 +319,7 @@ pub(super) fn renewed(draw: &mut Draw) -> Shape {
     let length = 2 + draw.of_many(5);
     noise(
         f64::INFINITY,
-        move |stand, part| by_nats(stand, of_reference(length, part)),
+        move |stand, part| Known::by_reading(stand, of_reference(length, part)),
         move |stand, draw, part| {
             let first = draw.of_many(length);
             let mut reference = part.sqrt() * draw.normal();
@@ -366,7 +339,7 @@ pub(super) fn filled(draw: &mut Draw, stand: &Stand) -> Shape {
     let n = stand.samples();
     let ratio = draw.between(RATIO.0, RATIO.1);
     let size = 1.0 / mean_covariance(ratio, n, 0).sqrt();
-    let samples: Vec<f64> = (0..n + 2).map(|_| size * draw.normal()).collect();
+    let samples = each(&white(draw, n + 2), |v| size * v);
     let known = move |_: &Stand, share: f64| Known::Strength(of_filled(ratio, share, n));
     share(MOST, known, filled_up(ratio, &samples, n))
 }
@@ -393,14 +366,12 @@ pub(super) fn shrunk(draw: &mut Draw, stand: &Stand) -> Shape {
 /// side in turn and less each time. Predicted from the past the noise has variance 1.
 pub(super) fn overloaded(draw: &mut Draw) -> Shape {
     let (beyond, keep) = (draw.between(1.3, 1.9), draw.between(0.3, 0.75));
-    let tail = 0.5 * statrs::function::erf::erfc(beyond / 2f64.sqrt());
-    let density = (-0.5 * beyond * beyond).exp() / TAU.sqrt();
     // Mean square of what a normal law has beyond, and of its sum over the readings after.
-    let square = 2.0 * ((1.0 + beyond * beyond) * tail - beyond * density);
+    let square = 2.0 * ((1.0 + beyond * beyond) * below(-beyond) - beyond * normal(beyond));
     let rings = square / (1.0 - keep * keep);
     noise(
         f64::INFINITY,
-        move |stand, size| by_nats(stand, (size * size * rings).ln_1p()),
+        move |stand, size| Known::by_reading(stand, (size * size * rings).ln_1p()),
         move |stand, draw, size| {
             let scale = (1.0 + size * size * rings).sqrt();
             let mut left = 0.0;

@@ -3,7 +3,7 @@
 use super::super::super::prelude::*;
 
 /// Density of a mode of this pitch and half width, Hz, driven by white noise of variance 1.
-pub(super) fn of_mode((pitch, half_width): (f64, f64), rate_hz: f64, w: f64) -> f64 {
+fn of_mode((pitch, half_width): (f64, f64), rate_hz: f64, w: f64) -> f64 {
     let (keep, own) = ((-TAU * half_width / rate_hz).exp(), TAU * pitch / rate_hz);
     let pole = |off: f64| 1.0 - 2.0 * keep * off.cos() + keep * keep;
     (keep * own.sin()).powi(2) / (pole(w - own) * pole(w + own))
@@ -53,19 +53,21 @@ pub(super) fn resonance(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 /// Places of the run at which a hump that moves is looked at for its strength.
 const PLACES: usize = 12;
 
-/// A hump of noise that moves through the band, of the width that `keep` gives it and at `at_hz` by sample. Its d' is that of
-/// humps that stay at each of `places`, Hz, averaged over the run.
+/// A hump of noise that moves through the band, of a half width, Hz, and at `at_hz` by sample. Its d' is that of humps that stay
+/// at each of `places`, Hz, averaged over the run.
 fn moving_hump(
     stand: &Stand,
     axis: usize,
-    keep: f64,
+    half_width: f64,
     at_hz: Vec<f64>,
-    places: impl Iterator<Item = f64>,
+    places: &[f64],
 ) -> Shape {
     let meter = Meter::new(stand, axis);
-    let places: Vec<Vec<f64>> = places
-        .map(|f| of_humps(&meter, f, keep, stand.rate_hz))
-        .collect();
+    let keep = (-TAU * half_width / stand.rate_hz).exp();
+    let places = each(places, |f| {
+        let hump = Turning::new(f, half_width, stand.rate_hz);
+        each(meter.omega(), |w| hump.density(w))
+    });
     let knows = move |_: &Stand, sigma: f64| {
         let of = |place: &Vec<f64>| each(place, |d| sigma * sigma * d);
         Known::Beside(places.iter().map(of).collect())
@@ -80,7 +82,6 @@ fn moving_hump(
 /// what it makes of the molecules' blows wanders through the band with the temperature.
 pub(super) fn hump(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let temperature = &stand.world.temperature[axis];
-    let (low, high) = extremes(temperature);
     let from = draw.between(1.5, 8.5);
     let to = loop {
         let to = draw.between(1.0, 9.0);
@@ -88,30 +89,24 @@ pub(super) fn hump(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
             break to;
         }
     };
-    let keep = (-TAU * draw.by_ratio(0.08, 0.4) / stand.rate_hz).exp();
-    let at_hz: Vec<f64> = each(temperature, |t| {
-        from + (to - from) * (t - low) / (high - low).max(1e-9)
-    });
-    let places: Vec<f64> = (0..PLACES)
-        .map(|i| at_hz[(2 * i + 1) * at_hz.len() / (2 * PLACES)])
-        .collect();
-    moving_hump(stand, axis, keep, at_hz, places.into_iter())
+    let half_width = draw.by_ratio(0.08, 0.4);
+    let at_hz = each(&within_range(temperature), |t| from + (to - from) * t);
+    let place = |i: usize| at_hz[(2 * i + 1) * at_hz.len() / (2 * PLACES)];
+    let places: Vec<f64> = (0..PLACES).map(place).collect();
+    moving_hump(stand, axis, half_width, at_hz, &places)
 }
 
 /// What flows past a body rubs and whistles at a pitch that rises with its speed, never quite the same: a hump of noise that
 /// takes the whole run to go through the band.
 pub(super) fn running(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    let (mut from, mut to) = (draw.between(1.0, 4.0), draw.between(6.0, 9.3));
-    if draw.chance(0.5) {
-        std::mem::swap(&mut from, &mut to);
-    }
-    let keep = (-TAU * draw.by_ratio(0.08, 0.5) / stand.rate_hz).exp();
-    let n = stand.samples();
-    let at_hz = (0..n)
-        .map(|i| from + (to - from) * i as f64 / n as f64)
-        .collect();
+    let (low, high) = (draw.between(1.0, 4.0), draw.between(6.0, 9.3));
+    let (from, to) = draw.either((high, low), (low, high));
+    let half_width = draw.by_ratio(0.08, 0.5);
+    let n = stand.samples() as f64;
+    let at_hz = stand.series(|i| from + (to - from) * i as f64 / n);
     let place = |i| from + (to - from) * (i as f64 + 0.5) / PLACES as f64;
-    moving_hump(stand, axis, keep, at_hz, (0..PLACES).map(place))
+    let places: Vec<f64> = (0..PLACES).map(place).collect();
+    moving_hump(stand, axis, half_width, at_hz, &places)
 }
 
 /// A lightly damped mode of the mount that whatever is random drives.
@@ -137,9 +132,8 @@ pub(super) fn narrow_band(draw: &mut Draw, axis: usize) -> Shape {
         move |stand, draw, variance| {
             // It rang before.
             let before = (5.0 / mode.1 * stand.rate_hz) as usize;
-            let drive: Vec<f64> = (0..before + stand.samples())
-                .map(|_| variance.sqrt() * draw.normal())
-                .collect();
+            let white = white(draw, before + stand.samples());
+            let drive = each(&white, |v| variance.sqrt() * v);
             Change::Add(resonating(&drive, mode, stand.rate_hz).split_off(before))
         },
     )
@@ -164,21 +158,9 @@ pub(super) fn wandering_ramp(draw: &mut Draw, stand: &Stand, axis: usize) -> Sha
     beside(axis, density, move |stand, draw| {
         // It wandered before.
         let before = (10.0 * ramp.max(rate)) as usize;
-        let size = drive.sqrt();
-        let drive: Vec<f64> = (0..before + stand.samples())
-            .map(|_| size * draw.normal())
-            .collect();
+        let white = white(draw, before + stand.samples());
+        let drive = each(&white, |v| drive.sqrt() * v);
         lagged(&lagged(&drive, ramp, 1.0), rate, 1.0).split_off(before)
-    })
-}
-
-/// Density of a hump about a frequency, Hz, of variance 1: of a circle that turns, fades and is driven at random, the real
-/// part.
-fn of_humps(meter: &Meter, f: f64, keep: f64, rate_hz: f64) -> Vec<f64> {
-    let turn = TAU * f / rate_hz;
-    each(meter.omega(), |w| {
-        let side = |from: f64| 1.0 / (1.0 - 2.0 * keep * (w - from).cos() + keep * keep);
-        0.5 * (1.0 - keep * keep) * (side(turn) + side(-turn))
     })
 }
 

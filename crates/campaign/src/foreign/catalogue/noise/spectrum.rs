@@ -4,11 +4,8 @@ use diagnosis::likelihood::Dct;
 
 use super::super::super::prelude::*;
 
-/// Orders of the memory: with less a random walk hides all but little of it, with more it is flicker noise.
-pub(super) const ORDERS: (f64, f64) = (0.28, 0.32);
-
 /// Density of fractionally integrated noise of that order, 1 in the mean (Granger and Joyeux 1980).
-pub(super) fn of_memory(order: f64, w: f64) -> f64 {
+fn of_memory(order: f64, w: f64) -> f64 {
     // Mean of |2 sin(w/2)|^(-2 order).
     let gamma = statrs::function::gamma::gamma;
     let mean = gamma(1.0 - 2.0 * order) / gamma(1.0 - order).powi(2);
@@ -16,7 +13,7 @@ pub(super) fn of_memory(order: f64, w: f64) -> f64 {
 }
 
 /// A filter that takes one band out of white noise and leaves the rest.
-pub(super) struct Notch {
+struct Notch {
     turn: f64,
     zeros: f64,
     poles: f64,
@@ -27,7 +24,7 @@ impl Notch {
     const LEFT: f64 = 0.12;
 
     /// By frequency and half width, Hz.
-    pub(super) fn new(f: f64, half_width: f64, rate_hz: f64) -> Self {
+    fn new(f: f64, half_width: f64, rate_hz: f64) -> Self {
         let radius = |half_width: f64| (-TAU * half_width / rate_hz).exp();
         Self {
             turn: TAU * f / rate_hz,
@@ -37,7 +34,7 @@ impl Notch {
     }
 
     /// What it makes of a series.
-    pub(super) fn of(&self, series: impl Iterator<Item = f64>) -> Vec<f64> {
+    fn of(&self, series: impl Iterator<Item = f64>) -> Vec<f64> {
         let (cos, z, p) = (self.turn.cos(), self.zeros, self.poles);
         let (mut x1, mut x2, mut y1, mut y2) = (0.0, 0.0, 0.0, 0.0);
         series
@@ -50,7 +47,7 @@ impl Notch {
     }
 
     /// Variance that it gives to white noise of variance 1: the sum of its squared response to a pulse.
-    pub(super) fn variance(&self) -> f64 {
+    fn variance(&self) -> f64 {
         let length = (40.0 / (1.0 - self.poles)).ceil().clamp(100.0, 200_000.0) as usize;
         let pulse = (0..length).map(|i| one_if(i == 0));
         self.of(pulse).iter().map(|y| y * y).sum()
@@ -58,29 +55,23 @@ impl Notch {
 }
 
 /// What a capacitor of this corner, Hz, leaves of the power at an angular frequency, rad per sample.
-pub(super) fn passed(corner_hz: f64, rate_hz: f64, w: f64) -> f64 {
+fn passed(corner_hz: f64, rate_hz: f64, w: f64) -> f64 {
     let keep = (-TAU * corner_hz / rate_hz).exp();
     keep * keep * (2.0 - 2.0 * w.cos()) / (1.0 + keep * keep - 2.0 * keep * w.cos())
 }
 
 /// What is left of a series about a level behind a capacitor that had settled at it.
-pub(super) fn behind_capacitor(
-    series: &[f64],
-    level: f64,
-    corner_hz: f64,
-    rate_hz: f64,
-) -> Vec<f64> {
-    let from_level: Vec<f64> = [level].iter().chain(series).copied().collect();
+fn behind_capacitor(series: &[f64], level: f64, corner_hz: f64, rate_hz: f64) -> Vec<f64> {
+    let from_level = [&[level], series].concat();
     let slow = lagged(&from_level, 1.0 / (TAU * corner_hz), rate_hz);
     each_pair(series, &slow[1..], |v, s| v - s)
 }
 
 /// Noise of a density, of mean 1, at an angular frequency, rad per sample: so many samples.
 fn coloured(draw: &mut Draw, n: usize, density: &dyn Fn(f64) -> f64) -> Vec<f64> {
-    let c: Vec<f64> = (0..n)
-        .map(|k| density(PI * k as f64 / n as f64).sqrt() * draw.normal())
-        .collect();
-    Dct::new(n).inverse(&c)
+    let coefficient = |k| density(PI * k as f64 / n as f64).sqrt() * draw.normal();
+    let coefficients: Vec<f64> = (0..n).map(coefficient).collect();
+    Dct::new(n).inverse(&coefficients)
 }
 
 /// Noise of which a share has another density, of variance 1, at an angular frequency.
@@ -91,9 +82,8 @@ fn of_density(
     density: impl Fn(f64) -> f64 + 'static,
 ) -> Shape {
     let series = coloured(draw, stand.samples(), &density);
-    let known = move |stand: &Stand, share: f64| {
-        Known::shaped(stand, axis, |w| share.min(1.0) * (density(w) - 1.0))
-    };
+    let known =
+        move |stand: &Stand, share| Known::shaped(stand, axis, |w| share * (density(w) - 1.0));
     share(1.0, known, series)
 }
 
@@ -102,7 +92,7 @@ fn of_density(
 pub(super) fn differenced(axis: usize) -> Shape {
     noise(
         1.0,
-        move |stand, share| Known::shaped(stand, axis, |w| -share.min(1.0) * w.cos()),
+        move |stand, share| Known::shaped(stand, axis, |w| -share * w.cos()),
         |stand, draw, share| {
             let mut before = draw.normal();
             stand.series(|_| {
@@ -125,8 +115,7 @@ pub(super) fn rounded(draw: &mut Draw, stand: &Stand, axis: usize, most: f64) ->
         let now = draw.between(-half, half);
         now - std::mem::replace(&mut before, now)
     });
-    let known =
-        move |stand: &Stand, share: f64| Known::shaped(stand, axis, |w| -share.min(most) * w.cos());
+    let known = move |stand: &Stand, share: f64| Known::shaped(stand, axis, |w| -share * w.cos());
     share(most, known, series)
 }
 
@@ -136,15 +125,15 @@ pub(super) fn echo(draw: &mut Draw, axis: usize) -> Shape {
     noise(
         1.0,
         move |stand, share| {
-            let (g, after) = (sign * share.min(1.0), after as f64);
+            let (g, after) = (sign * share, after as f64);
             Known::shaped(stand, axis, |w| 2.0 * g / (1.0 + g * g) * (after * w).cos())
         },
         move |stand, draw, share| {
             let all = stand.samples() + after;
-            let white: Vec<f64> = (0..all).map(|_| draw.normal()).collect();
-            let with =
-                |i| (white[i] + sign * share * white[i - after]) / (1.0 + share * share).sqrt();
-            (after..all).map(with).collect()
+            let white = white(draw, all);
+            each_pair(&white[after..], &white, |own, echo| {
+                (own + sign * share * echo) / (1.0 + share * share).sqrt()
+            })
         },
     )
 }
@@ -155,16 +144,15 @@ pub(super) fn reverberation(draw: &mut Draw, axis: usize) -> Shape {
     noise(
         0.95,
         move |stand, share| {
-            let share = sign * share.min(0.95);
-            let (square, after) = (share * share, after as f64);
+            let (share, after) = (sign * share, after as f64);
+            let square = share * share;
             let of = |w: f64| (1.0 - square) / (1.0 + square - 2.0 * share * (after * w).cos());
-            let by = |w: f64| of(w) - 1.0;
-            Known::shaped(stand, axis, by)
+            Known::shaped(stand, axis, |w| of(w) - 1.0)
         },
         move |stand, draw, share| {
             let share = sign * share;
             let drive = (1.0 - share * share).sqrt();
-            let mut noise: Vec<f64> = (0..after).map(|_| draw.normal()).collect();
+            let mut noise = white(draw, after);
             for i in after..after + stand.samples() {
                 noise.push(share * noise[i - after] + drive * draw.normal());
             }
@@ -183,17 +171,13 @@ pub(super) fn hole(draw: &mut Draw) -> Shape {
     };
     noise(
         f64::INFINITY,
-        move |stand, half_width| {
-            let passes = of(stand, half_width).variance();
-            Known::Strength((stand.samples() as f64 * passes.ln()).sqrt())
-        },
+        move |stand, half_width| Known::by_reading(stand, of(stand, half_width).variance().ln()),
         move |stand, draw, half_width| {
             let (notch, n) = (of(stand, half_width), stand.samples());
             // As long again until it has settled.
-            let white: Vec<f64> = (0..2 * n).map(|_| draw.normal()).collect();
+            let passed = notch.of(white(draw, 2 * n).into_iter());
             let size = notch.variance().sqrt();
-            let passed = notch.of(white.into_iter());
-            passed.iter().skip(n).map(|y| y / size).collect()
+            each(&passed[n..], |y| y / size)
         },
     )
 }
@@ -234,7 +218,8 @@ pub(super) fn band(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
 /// Noise that forgets by a power of time, between white and flicker. Its strength is that of its order, a little above 25
 /// in 600 s.
 pub(super) fn long_memory(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
-    let order = draw.between(ORDERS.0, ORDERS.1);
+    // With less a random walk hides all but little of it, with more it is flicker noise.
+    let order = draw.between(0.28, 0.32);
     // What is lowest in the record is half a cycle long.
     let least = PI / stand.samples() as f64;
     let series = coloured(draw, stand.samples(), &|w| of_memory(order, w.max(least)));
@@ -249,7 +234,7 @@ pub(super) fn long_memory(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape 
 pub(super) fn undoing(axis: usize) -> Shape {
     noise(
         0.9,
-        move |stand, order| Known::shaped(stand, axis, |w| of_memory(-order.min(0.9), w) - 1.0),
+        move |stand, order| Known::shaped(stand, axis, |w| of_memory(-order, w) - 1.0),
         |stand, draw, order| coloured(draw, stand.samples(), &|w| of_memory(-order, w)),
     )
 }
@@ -267,7 +252,7 @@ pub(super) fn behind_corner(stand: &Stand, axis: usize) -> Shape {
     };
     sized(f64::INFINITY, knows, move |_, _, corner| {
         Change::made(move |counts, draw| {
-            let rate: Vec<f64> = each(&counts[axis], |c| within_step(c, draw));
+            let rate = each(&counts[axis], |c| within_step(c, draw));
             each(&behind_capacitor(&rate, level, corner, rate_hz), |v| {
                 (level + v).round() as i32
             })

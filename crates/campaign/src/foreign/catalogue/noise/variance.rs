@@ -4,17 +4,13 @@ use super::super::super::prelude::*;
 
 /// What noise that feeds its own size makes of independent draws: variance[i] = 1 - stays + gain last^2 + (stays - gain)
 /// variance[i-1], with the series itself.
-pub(super) fn fed(gain: f64, stays: f64, independent: &[f64]) -> (Vec<f64>, Vec<f64>) {
+fn fed(gain: f64, stays: f64, independent: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let gain = gain.min(stays);
-    let (mut variance, mut last) = (1.0f64, 1.0f64);
-    independent
-        .iter()
-        .map(|z| {
-            variance = 1.0 - stays + gain * last * last + (stays - gain) * variance;
-            last = variance.sqrt() * z;
-            (variance, last)
-        })
-        .unzip()
+    let fed = carry((1.0f64, 1.0f64), independent, |(variance, last), z| {
+        let next = 1.0 - stays + gain * last * last + (stays - gain) * variance;
+        (next, next.sqrt() * z)
+    });
+    fed.into_iter().unzip()
 }
 
 /// A part that ages in the course of the record, or settles: by so many decibels an hour its noise goes up or down.
@@ -39,7 +35,7 @@ pub(super) fn worn(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
         .map(|_| (draw.between(0.0, 1.0), draw.between(0.05, 0.15)))
         .collect();
     each(&angle_of_table(&rate, full, stand.rate_hz), |angle| {
-        let turns = angle / std::f64::consts::TAU;
+        let turns = angle / TAU;
         let on = |(at, wide): &(f64, f64)| (turns - at).rem_euclid(1.0) < *wide;
         one_if(places.iter().any(on))
     })
@@ -63,13 +59,11 @@ pub(super) fn whistle(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let speed = stand.lagged(&stand.world.duty, draw.by_ratio(0.5, 3.0));
     let (low, wide) = (draw.between(0.1, 0.4), draw.between(0.1, 0.25));
     let (high, holds) = (low + wide, wide * draw.between(0.2, 0.5));
-    let mut on = false;
-    let sounds: Vec<f64> = each(&speed, |s| {
+    let sounds = carry(false, &speed, |on, s| {
         let beyond = if on { holds } else { 0.0 };
-        on = (low - beyond..high + beyond).contains(&s.abs());
-        one_if(on)
+        (low - beyond..high + beyond).contains(&s.abs())
     });
-    stand.lagged(&sounds, draw.by_ratio(0.1, 0.6))
+    stand.lagged(&each(&sounds, one_if), draw.by_ratio(0.1, 0.6))
 }
 
 /// How much is left, by sample, of what the last changes of the motor's command have stirred up: brushes that leave their
@@ -82,43 +76,36 @@ pub(super) fn after_changes(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 
 /// Noise whose size is exp(size z / 2) for the swing z before it, itself of variance 1: the law of its variance, with the
 /// series.
-pub(super) fn louder(size: f64, independent: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let mut last = 0.0f64;
-    independent
-        .iter()
-        .map(|z| {
-            let variance = (size * last).exp();
-            last = *z;
-            (variance, variance.sqrt() * z)
-        })
-        .unzip()
+fn louder(size: f64, independent: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut last = 0.0;
+    let louder = each(independent, |z: f64| {
+        let variance: f64 = (size * std::mem::replace(&mut last, z)).exp();
+        (variance, variance.sqrt() * z)
+    });
+    louder.into_iter().unzip()
 }
 
 /// Where an amplifier that a shock has driven to its stop does not answer: 1 for a while after each shock, by sample.
-pub(super) fn blocked(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
+fn blocked(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let lasts = draw.by_ratio(0.4, 1.5) * stand.rate_hz;
     let mut all = vec![0.0; stand.samples()];
     for (at, hard) in shocks(draw, stand) {
         // The harder the shock, the longer.
         let length = (lasts * hard.abs()).ceil() as usize;
-        all.iter_mut()
-            .skip(at + 1)
-            .take(length)
-            .for_each(|b| *b = 1.0);
+        let after = all.iter_mut().skip(at + 1);
+        after.take(length).for_each(|b| *b = 1.0);
     }
     all
 }
 
 /// A reading is the mean of as many looks at the part as fit before it has to go out: one to four, by where the clock of
 /// the looks stands, which is no multiple of the readings'.
-pub(super) fn looks(draw: &mut Draw, n: usize) -> Vec<f64> {
+fn looks(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (mut place, pace) = (draw.between(0.0, 1.0), draw.between(0.1, 0.9));
-    (0..n)
-        .map(|_| {
-            place = (place + pace).fract();
-            1.0 + (4.0 * place).floor()
-        })
-        .collect()
+    stand.series(|_| {
+        place = (place + pace).fract();
+        1.0 + (4.0 * place).floor()
+    })
 }
 
 /// Brushes that spark while the current changes: each change of the command by its size, then dying away.
@@ -137,12 +124,11 @@ pub(super) fn rate_squared(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 /// A fan coil that blows until its thermostat is content, on one of three steps, and runs up and down within seconds. The
 /// pressure of turbulence goes with the square of the speed, and its variance with the fourth power.
 pub(super) fn fan(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    const STEPS: [f64; 3] = [0.6, 0.8, 1.0];
     let (period, blows) = (draw.by_ratio(12.0, 80.0), draw.between(0.2, 0.6));
     let runs_up = draw.by_ratio(0.5, 3.0);
     let first = (draw.chance(0.5), 1.0);
     let asked = in_spells(stand, (first, 0.0), |(on, _)| {
-        let step = STEPS[draw.of_many(STEPS.len())];
+        let step = draw.one_of(&[0.6, 0.8, 1.0]);
         let share = if on { 1.0 - blows } else { blows };
         ((!on, step), period * share * draw.between(0.75, 1.25))
     });
@@ -155,7 +141,7 @@ pub(super) fn fan(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn gas(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (lid, cavity) = (draw.by_ratio(8.0, 30.0), draw.by_ratio(20.0, 90.0));
     // Once a record would be a stretch of more noise.
-    let outside = by_turns(draw, stand, true, (15.0, 120.0), |d| d.between(0.5, 1.0));
+    let outside = stand.by_turns(draw, true, (15.0, 120.0), |d| d.between(0.5, 1.0));
     stand.lagged(&stand.lagged(&outside, lid), cavity)
 }
 
@@ -172,25 +158,23 @@ pub(super) fn bursts(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn swinging(draw: &mut Draw, stand: &Stand) -> Shape {
     let period = draw.between(30.0, 150.0);
     let swing = in_time(stand, |t| (TAU * t / period).sin());
-    variance(move |depth| each(&swing, |s| (1.0 + depth.min(0.999) * s).max(1e-3)))
+    variance(0.999, move |depth| {
+        each(&swing, |s| (1.0 + depth * s).max(1e-3))
+    })
 }
 
 /// A variance that grows through the run. The period that is drawn is that of the one that swings.
-pub(super) fn growing(draw: &mut Draw, stand: &Stand) -> Shape {
+pub(super) fn growing(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     draw.between(30.0, 150.0);
-    let (seconds, times) = (stand.seconds, in_time(stand, |t| t));
-    variance(move |depth| each(&times, |t| 1.0 + depth * t / seconds))
+    in_time(stand, |t| t / stand.seconds)
 }
 
 /// Noise that comes for seconds and rests for longer.
 pub(super) fn spells(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let rests = (false, draw.between(5.0, 40.0));
     let on = in_spells(stand, rests, |on| {
-        if on {
-            (false, draw.between(20.0, 60.0))
-        } else {
-            (true, draw.between(2.0, 10.0))
-        }
+        let (least, most) = if on { (20.0, 60.0) } else { (2.0, 10.0) };
+        (!on, draw.between(least, most))
     });
     each(&on, one_if)
 }
@@ -218,29 +202,33 @@ pub(super) fn every_few(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// Noise that swells and ebbs with a period.
 pub(super) fn swell(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let swell = TAU / (draw.by_ratio(5.0, 150.0) * stand.rate_hz);
-    let first = draw.between(0.0, TAU);
+    let first = draw.phase();
     stand.series(|i| (first + swell * i as f64).sin())
 }
 
 /// A gyro reads its rate as a carrier's size; what the carrier leaks into the read-out, its quadrature, is as large as the
 /// acceleration that pushes the two plates apart, and the phase of the demodulator is never quiet: noise whose size is
 /// the acceleration of the same instant.
-pub(super) fn by_acceleration(draw: &mut Draw, stand: &Stand) -> Shape {
+pub(super) fn by_acceleration(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let force = shaking(draw, stand);
     let square = mean_square(&force);
-    variance(move |size| each(&force, |a| 1.0 + size * a * a / square))
+    each(&force, |a| a * a / square)
 }
 
 /// An amplifier that a shock has driven to its stop gives out nothing.
 pub(super) fn silenced(draw: &mut Draw, stand: &mut Stand) -> Shape {
     let blocked = blocked(draw, stand);
-    variance(move |size| each(&blocked, |b| 1.0 / (1.0 + size * b)))
+    variance(f64::INFINITY, move |size| {
+        each(&blocked, |b| 1.0 / (1.0 + size * b))
+    })
 }
 
 /// A mean of a share of the noise over as many looks as fit.
 pub(super) fn averaged(draw: &mut Draw, stand: &Stand) -> Shape {
-    let looks = looks(draw, stand.samples());
-    variance(move |share| each(&looks, |l| 1.0 - share.min(1.0) * (1.0 - 1.0 / l)))
+    let looks = looks(draw, stand);
+    variance(1.0, move |share| {
+        each(&looks, |l| 1.0 - share * (1.0 - 1.0 / l))
+    })
 }
 
 /// A gain control that is pumped by what it has just passed: the variance of a reading goes with the square of the one
@@ -260,7 +248,7 @@ pub(super) fn remembering(draw: &mut Draw, stand: &Stand) -> Shape {
 /// A series over the root of the mean of its law of variance: the variance of a run is seldom 1, and what it adds to it
 /// would be told before its shape.
 fn evened((law, series): (Vec<f64>, Vec<f64>), sign: f64) -> Vec<f64> {
-    let mean = law.iter().sum::<f64>() / law.len() as f64;
+    let mean = mean(&law);
     each(&series, |x| sign * x / mean.sqrt())
 }
 

@@ -10,7 +10,7 @@ pub(super) fn snapping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let swing = draw.between(2.0, 3.0);
     // Snaps a second where the sway helps most: of each half period most have theirs.
     let most = draw.between(4.0, 9.0) / period;
-    let first = draw.between(0.0, TAU);
+    let first = draw.phase();
     let mut state = draw.sign();
     let shape = in_time(stand, |t| {
         let helps = -state * (first + TAU * t / period).cos();
@@ -42,11 +42,7 @@ pub(super) fn moves(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let mut y = vec![0.0; stand.samples()];
     let mut at = draw.exponential() * waits;
     while at < stand.seconds {
-        let from = (at * stand.rate_hz) as usize;
-        y.iter_mut()
-            .skip(from)
-            .zip(&motif)
-            .for_each(|(y, m)| *y += m);
+        add_at(&mut y, (at * stand.rate_hz) as usize, motif.iter().copied());
         at += motif.len() as f64 / stand.rate_hz + 0.5 + waits * draw.exponential();
     }
     y
@@ -58,7 +54,7 @@ pub(super) fn moves(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn trolley(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let joints: Vec<(f64, f64, f64)> = (0..8 + draw.of_many(7))
         .map(|_| {
-            let high = draw.sign() * draw.between(0.3, 1.0);
+            let high = draw.signed(0.3, 1.0);
             (draw.between(0.0, 1.0), high, draw.by_ratio(0.008, 0.02))
         })
         .collect();
@@ -91,11 +87,9 @@ pub(super) fn by_halves(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
         let (zero, mut trim) = (draw.between(-1.0, 1.0), 0.0);
         for bit in 1..=BITS {
             trim += 0.5f64.powi(bit) * if zero > trim { 1.0 } else { -1.0 };
-            let begins = ((at + step_s * f64::from(bit - 1)) * stand.rate_hz) as usize;
-            let ends = ((at + step_s * f64::from(bit)) * stand.rate_hz) as usize;
-            let long = ends - begins;
-            let own = y.iter_mut().skip(begins).take(long);
-            own.for_each(|v| *v += trim - zero);
+            let [begins, ends] = [bit - 1, bit]
+                .map(|bits| ((at + step_s * f64::from(bits)) * stand.rate_hz) as usize);
+            add_at(y, begins, std::iter::repeat_n(trim - zero, ends - begins));
         }
         at + step_s * f64::from(BITS) + 1.0 + waits * draw.exponential()
     })

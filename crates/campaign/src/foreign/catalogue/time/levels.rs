@@ -2,12 +2,6 @@
 
 use super::super::super::prelude::*;
 
-/// Primitive polynomials.
-pub(super) const PRIMITIVE: [(u32, u32); 3] = [(5, 2), (6, 1), (7, 1)];
-
-/// Terms of the series for a film that are followed.
-pub(super) const TERMS: i32 = 40;
-
 /// A part that is dragged by friction, holds until a stress that differs a little each time, and lets go.
 pub(super) fn stick_and_slip(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let rise = 1.0 / (draw.by_ratio(6.0, 30.0) * stand.rate_hz);
@@ -29,13 +23,12 @@ pub(super) fn pressure(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let sign = draw.sign();
     let (fills, empties) = (draw.by_ratio(0.15, 0.8), draw.by_ratio(1.0, 4.0));
     let open = draw.chance(0.5);
-    let valve = by_turns(draw, stand, open, (1.5, 8.0), |_| 1.0);
-    let mut level = 0.0;
-    each(&valve, |end| {
+    let valve = stand.by_turns(draw, open, (1.5, 8.0), |_| 1.0);
+    let level = carry(0.0, &valve, |level, end| {
         let tau = if end > 0.5 { fills } else { empties };
-        level = end + (level - end) * (-1.0 / (tau * stand.rate_hz)).exp();
-        sign * level
-    })
+        end + (level - end) * (-1.0 / (tau * stand.rate_hz)).exp()
+    });
+    each(&level, |level| sign * level)
 }
 
 /// Two switches on one lamp, each turned over by a clock of its own: it is lit where they differ. The periods have no
@@ -70,7 +63,7 @@ pub(super) fn hunting(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let per_sample = 1.0 / (period * stand.rate_hz);
     let (mut level, mut rises, mut until) = (draw.between(0.0, 1.0), true, 1.0);
     let sign = draw.sign();
-    let y: Vec<f64> = stand.series(|_| {
+    let y = stand.series(|_| {
         level += per_sample * if rises { up } else { down };
         if rises == (level > until) {
             rises = !rises;
@@ -114,8 +107,7 @@ pub(super) fn self_test(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// others.
 pub(super) fn in_turn(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let count = 32 + draw.of_many(33);
-    let off: Vec<f64> = (0..count).map(|_| draw.normal()).collect();
-    let off = about_mean(&off);
+    let off = about_mean(&white(draw, count));
     let first = draw.of_many(count);
     stand.series(|i| off[(first + i) % count])
 }
@@ -160,11 +152,8 @@ pub(super) fn train(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let first = draw.between(0.0, period);
     in_time(stand, |t| {
         let since = (first + t) % period;
-        if since < width {
-            sign * (0.5 * TAU * since / width).sin().powi(2)
-        } else {
-            0.0
-        }
+        let pulse = sign * (0.5 * TAU * since / width).sin().powi(2);
+        if since < width { pulse } else { 0.0 }
     })
 }
 
@@ -195,7 +184,7 @@ pub(super) fn slipping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// of it off again: as the polynomial is primitive the same 31, 63 or 127 levels over and over, spread over as many weak lines as
 /// the sequence is long.
 pub(super) fn dither(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let (order, tap) = PRIMITIVE[draw.of_many(PRIMITIVE.len())];
+    let (order, tap): (u32, u32) = draw.one_of(&[(5, 2), (6, 1), (7, 1)]);
     // Any state other than zero.
     let mut state = 1 + draw.of_many((1 << order) - 1) as u32;
     let hold = 1 + draw.of_many(2);
@@ -215,7 +204,7 @@ pub(super) fn dither(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn sun(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let shines = draw.chance(0.5);
     let dwell = draw.by_ratio(4.0, 15.0);
-    let sky = by_turns(draw, stand, shines, (0.3 * dwell, 1.7 * dwell), |d| {
+    let sky = stand.by_turns(draw, shines, (0.3 * dwell, 1.7 * dwell), |d| {
         d.between(0.4, 1.0)
     });
     // The edge of a cloud is not sharp.
@@ -227,13 +216,14 @@ pub(super) fn sun(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 
 /// What a film has taken up whose face has this humidity: Fick's law, each odd term of the series a lag of its own. At first
 /// it goes as the square root of time, and after the longest lag it is full.
-pub(super) fn taken_up(face: &[f64], longest_s: f64, stand: &Stand) -> Vec<f64> {
+fn taken_up(face: &[f64], longest_s: f64, stand: &Stand) -> Vec<f64> {
+    const TERMS: i32 = 40;
     let mut all = vec![0.0; face.len()];
     for k in 0..TERMS {
         let odd = f64::from(2 * k + 1).powi(2);
         let term = stand.lagged(face, longest_s / odd);
         let share = 8.0 / (PI * PI * odd);
-        all.iter_mut().zip(term).for_each(|(a, t)| *a += share * t);
+        add_at(&mut all, 0, each(&term, |t| share * t));
     }
     all
 }
@@ -244,7 +234,7 @@ pub(super) fn taken_up(face: &[f64], longest_s: f64, stand: &Stand) -> Vec<f64> 
 pub(super) fn moisture(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let damp = draw.chance(0.5);
     let dwell = draw.by_ratio(4.0, 12.0);
-    let face = by_turns(draw, stand, damp, (0.6 * dwell, 1.4 * dwell), |d| {
+    let face = stand.by_turns(draw, damp, (0.6 * dwell, 1.4 * dwell), |d| {
         d.between(0.6, 1.0)
     });
     let longest = dwell * draw.by_ratio(0.7, 3.0);
@@ -258,7 +248,7 @@ pub(super) fn draught(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (period, blows) = (draw.by_ratio(20.0, 45.0), draw.between(0.02, 0.08));
     let (mut level, mut cools, sign) = (draw.between(0.0, 1.0), draw.chance(0.5), draw.sign());
     let mut pace = 1.0;
-    let room: Vec<f64> = stand.series(|_| {
+    let room = stand.series(|_| {
         let takes = period * if cools { -blows } else { 1.0 - blows };
         level += pace / (takes * stand.rate_hz);
         if !(0.0..=1.0).contains(&level) {

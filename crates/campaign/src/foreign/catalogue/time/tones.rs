@@ -31,12 +31,9 @@ pub(super) fn swing_without_period(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// A carrier that turns over by the bits of a message: its phase is one of two, its size is always the same.
 pub(super) fn keyed(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (f, bit) = (draw.by_ratio(0.8, 9.5), draw.by_ratio(0.4, 3.0));
-    let first = draw.between(0.0, TAU);
+    let first = draw.phase();
     let bits = stand.held(draw, (bit, bit), Draw::sign);
-    bits.iter()
-        .enumerate()
-        .map(|(i, b)| b * (first + TAU * f * i as f64 / stand.rate_hz).sin())
-        .collect()
+    stand.series(|i| bits[i] * (first + TAU * f * i as f64 / stand.rate_hz).sin())
 }
 
 /// A tone that the sampling folds into the band: as the oscillator of one of the two warms up it glides to where it stays,
@@ -45,7 +42,7 @@ pub(super) fn gliding(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (stays, warms) = (draw.between(0.8, 9.2), draw.by_ratio(120.0, 400.0));
     // From the side on which there is room.
     let from = draw.between(0.5, 3.0) * if stays < 5.0 { 1.0 } else { -1.0 };
-    let first = draw.between(0.0, TAU);
+    let first = draw.phase();
     in_time(stand, |t| {
         let turns = stays * t + from * warms * (1.0 - (-t / warms).exp());
         (first + TAU * turns).sin()
@@ -58,13 +55,13 @@ pub(super) fn quenched(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (f, growth) = (draw.by_ratio(0.4, 8.0), draw.by_ratio(1.5, 8.0));
     let grows = (1.0 / (growth * stand.rate_hz)).exp();
     let mut size = draw.by_ratio(0.02, 1.0);
-    let mut phase = draw.between(0.0, TAU);
+    let mut phase = draw.phase();
     stand.series(|_| {
         size *= grows;
         phase += TAU * f / stand.rate_hz;
         if size > 1.0 {
             size = draw.by_ratio(0.01, 0.1);
-            phase = draw.between(0.0, TAU);
+            phase = draw.phase();
         }
         size * phase.sin()
     })
@@ -82,7 +79,7 @@ pub(super) fn hopping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     };
     // Each with the time for which it stays there, s.
     let places = [first, second].map(|pitch| (pitch, draw.by_ratio(4.0, 20.0)));
-    let (at, phase) = (draw.of_many(2), draw.between(0.0, TAU));
+    let (at, phase) = (draw.of_many(2), draw.phase());
     let at = in_spells(stand, (at, 0.0), |at| {
         (1 - at, places[1 - at].1 * draw.exponential())
     });
@@ -95,7 +92,7 @@ pub(super) fn swaying(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (sway, index) = (draw.by_ratio(0.02, 0.15), draw.between(4.0, 12.0));
     let reach = sway * index;
     let pitch = draw.between(reach + 0.5, 9.5 - reach);
-    let (first, start) = (draw.between(0.0, TAU), draw.between(0.0, TAU));
+    let (first, start) = (draw.phase(), draw.phase());
     in_time(stand, |t| {
         (first + TAU * pitch * t + index * (start + TAU * sway * t).sin()).sin()
     })
@@ -108,13 +105,13 @@ pub(super) fn siren(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let apart = draw.by_ratio(15.0, 50.0);
     arriving(stand, apart * draw.exponential(), |y, at| {
         let pitch = draw.between(fall + 0.5, 9.5 - fall);
-        let (pace, first) = (draw.by_ratio(0.6, 3.0), draw.between(0.0, TAU));
-        for (i, v) in y.iter_mut().enumerate() {
-            let t = i as f64 / stand.rate_hz;
+        let (pace, first) = (draw.by_ratio(0.6, 3.0), draw.phase());
+        let heard = |t: f64| {
             let distance = 1.0f64.hypot((t - at) / pace);
             let turns = pitch * (t - at) - fall * pace * distance;
-            *v += (first + TAU * turns).sin() / distance;
-        }
+            (first + TAU * turns).sin() / distance
+        };
+        add_at(y, 0, in_time(stand, heard));
         at + apart * (0.3 + draw.exponential())
     })
 }
@@ -122,27 +119,21 @@ pub(super) fn siren(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// A rotor that takes the whole record to run up or to run down, evenly in pitch or in its logarithm.
 pub(super) fn sweep(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let n = stand.samples() as f64;
-    let (mut from, mut to) = (draw.between(0.3, 3.0), draw.between(4.0, 9.7));
-    if draw.chance(0.5) {
-        std::mem::swap(&mut from, &mut to);
-    }
+    let (low, high) = (draw.between(0.3, 3.0), draw.between(4.0, 9.7));
+    let (from, to) = draw.either((high, low), (low, high));
     let even = draw.chance(0.5);
-    let pitches = stand.series(|i| {
-        let at = i as f64 / n;
-        if even {
-            from + (to - from) * at
-        } else {
-            from * (to / from).powf(at)
-        }
+    let pitches = stand.series(|i| match i as f64 / n {
+        at if even => from + (to - from) * at,
+        at => from * (to / from).powf(at),
     });
-    tone(draw.between(0.0, TAU), &pitches, stand.rate_hz)
+    tone(draw.phase(), &pitches, stand.rate_hz)
 }
 
 /// An oscillator without a crystal: its pitch wanders about its mean.
 pub(super) fn wandering(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let pitch = draw.between(1.0, 9.0);
     let (sigma, tau) = (draw.by_ratio(0.05, 0.4), draw.by_ratio(5.0, 60.0));
-    let first = draw.between(0.0, TAU);
+    let first = draw.phase();
     let pitches = each(&stand.wander(draw, sigma, tau), |off| pitch + off);
     tone(first, &pitches, stand.rate_hz)
 }
@@ -155,15 +146,13 @@ pub(super) fn starts_and_stops(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let rise = draw.by_ratio(0.3, 2.0);
     arriving(stand, rests * draw.exponential(), |y, from| {
         let to = from + runs * draw.between(0.5, 1.5);
-        let (f, phase) = (pitch * (1.0 + slip * draw.normal()), draw.between(0.0, TAU));
+        let (f, phase) = (pitch * (1.0 + slip * draw.normal()), draw.phase());
         let size = draw.between(0.6, 1.4);
-        for (i, v) in y.iter_mut().enumerate() {
-            let t = i as f64 / stand.rate_hz;
-            if (from..to).contains(&t) {
-                let swelling = ((t - from) / rise).min((to - t) / rise).min(1.0);
-                *v += size * swelling * (TAU * f * (t - from) + phase).sin();
-            }
-        }
+        let runs = |t: f64| {
+            let swelling = ((t - from) / rise).min((to - t) / rise).clamp(0.0, 1.0);
+            size * swelling * (TAU * f * (t - from) + phase).sin()
+        };
+        add_at(y, 0, in_time(stand, runs));
         to + rests * draw.exponential() + 0.5
     })
 }
@@ -177,7 +166,7 @@ pub(super) fn runs_up(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let runs = resonance * draw.between(6.0, 9.0);
     let (up, down) = (draw.between(8.0, 20.0), draw.between(4.0, 10.0));
     let (mut on, mut left, mut speed) = (true, draw.between(15.0, 40.0), 0.0);
-    let mut phase = draw.between(0.0, TAU);
+    let mut phase = draw.phase();
     stand.series(|_| {
         left -= 1.0 / rate_hz;
         if left <= 0.0 {
@@ -203,11 +192,9 @@ pub(super) fn runs_up(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn idle_tones(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (size, memory) = (draw.by_ratio(0.003, 0.03), draw.by_ratio(10.0, 60.0));
     let off = stand.wander(draw, size, memory);
-    let (middle, mut sum) = (draw.between(0.05, 0.45), draw.between(0.0, 1.0));
-    each(&off, |o| {
-        sum = (sum + middle + o).rem_euclid(1.0);
-        sum - 0.5
-    })
+    let (middle, first) = (draw.between(0.05, 0.45), draw.between(0.0, 1.0));
+    let sums = carry(first, &off, |sum, o| (sum + middle + o).rem_euclid(1.0));
+    each(&sums, |sum| sum - 0.5)
 }
 
 /// Drives of two gyros on one board pull each other (Adler 1946): phase' = detuning - pull sin(phase). Nearly in step, the
@@ -220,13 +207,11 @@ pub(super) fn pulled(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (middle, swing) = (draw.between(1.0, 1.3), draw.between(0.1, 0.3));
     let memory = draw.by_ratio(8.0, 40.0);
     let detuning = stand.wander(draw, swing, memory);
-    let mut phase = draw.between(0.0, TAU);
-    each(&detuning, |d| {
-        for _ in 0..PARTS {
-            phase += h * pull * (middle + d - phase.sin());
-        }
-        phase.sin()
-    })
+    let phases = carry(draw.phase(), &detuning, |phase, d| {
+        let next = |phase: f64, _| phase + h * pull * (middle + d - phase.sin());
+        (0..PARTS).fold(phase, next)
+    });
+    each(&phases, f64::sin)
 }
 
 /// A harmonic of the mains, folded to anywhere in the band: the grid's frequency wanders by some 20 mHz, and the harmonic by
@@ -237,7 +222,7 @@ pub(super) fn hum(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (sigma, tau) = (draw.by_ratio(0.012, 0.03), draw.by_ratio(20.0, 120.0));
     let grid = stand.wander(draw, sigma, tau);
     let pitches = each(&grid, |off| folded + turns_over * harmonic * off);
-    tone(draw.between(0.0, TAU), &pitches, stand.rate_hz)
+    tone(draw.phase(), &pitches, stand.rate_hz)
 }
 
 /// A tone that glides from pitch to pitch.
@@ -252,7 +237,7 @@ pub(super) fn chirp(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// A tone with its harmonics.
 pub(super) fn comb(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let f = draw.between(0.4, 1.5);
-    let phases: Vec<f64> = (0..6).map(|_| draw.between(0.0, TAU)).collect();
+    let phases: [f64; 6] = std::array::from_fn(|_| draw.phase());
     in_time(stand, |t| {
         let term = |(k, p): (usize, &f64)| (TAU * f * (k + 1) as f64 * t + p).sin();
         phases.iter().enumerate().map(term).sum()
@@ -300,21 +285,15 @@ pub(super) fn spring_pendulum(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let (mut swing, mut bounce) = ((0.2 + 0.3 * draw.normal(), 0.2), (1.0, draw.normal()));
     stand.series(|i| {
         let middle = slope(swing, bounce);
-        let half = (
-            along(swing, 0.5 * step, middle.0),
-            along(bounce, 0.5 * step, middle.1),
-        );
-        let then = slope(half.0, half.1);
+        let half_swing = along(swing, 0.5 * step, middle.0);
+        let then = slope(half_swing, along(bounce, 0.5 * step, middle.1));
         let pushed = (DRAUGHT * draw.normal(), DRAUGHT * draw.normal());
         swing = along(along(swing, step, then.0), 1.0, pushed);
         bounce = along(bounce, step, then.1);
         // What the draughts bring the losses take.
         let energy = swing.0.powi(2) + swing.1.powi(2) + bounce.0.powi(2) + bounce.1.powi(2);
         let whole = 1.0 / energy.sqrt();
-        (swing, bounce) = (
-            (whole * swing.0, whole * swing.1),
-            (whole * bounce.0, whole * bounce.1),
-        );
+        [swing, bounce] = [swing, bounce].map(|(re, im)| (whole * re, whole * im));
         let (sin, cos) = (turn * i as f64).sin_cos();
         let real = |(re, im): Complex, sin: f64, cos: f64| re * cos - im * sin;
         real(swing, sin, cos) + seen * real(bounce, 2.0 * sin * cos, cos * cos - sin * sin)
@@ -326,16 +305,11 @@ pub(super) fn spring_pendulum(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn fading(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     const WAYS: usize = 8;
     let fastest = TAU * draw.by_ratio(0.2, 2.0) / stand.rate_hz;
-    let speed = stand.held(draw, (2.0, 10.0), |d| {
-        if d.chance(0.3) {
-            0.0
-        } else {
-            d.between(0.3, 1.0)
-        }
+    let speed = stand.held(draw, (2.0, 10.0), |d| match d.chance(0.3) {
+        true => 0.0,
+        false => d.between(0.3, 1.0),
     });
-    let mut ways: Vec<(f64, f64)> = (0..WAYS)
-        .map(|_| (draw.between(0.0, TAU).cos(), draw.between(0.0, TAU)))
-        .collect();
+    let mut ways: [(f64, f64); WAYS] = std::array::from_fn(|_| (draw.phase().cos(), draw.phase()));
     let sign = draw.sign();
     let power = each(&speed, |s| {
         let (mut re, mut im) = (0.0, 0.0);
