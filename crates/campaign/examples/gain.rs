@@ -59,10 +59,8 @@ impl Claims {
         for own in self.of.iter().filter(|own| own.len() > 1) {
             let n = own.len() as f64;
             let mean = own.iter().map(|c| c.0).sum::<f64>() / n;
-            square += own
-                .iter()
-                .map(|c| ((c.0 - mean) / c.1).powi(2))
-                .sum::<f64>();
+            let squares = own.iter().map(|c| ((c.0 - mean) / c.1).powi(2));
+            square += squares.sum::<f64>();
             free += n - 1.0;
             sum += mean * n;
             error += own.iter().map(|c| c.1).sum::<f64>();

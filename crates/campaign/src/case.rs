@@ -11,9 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::clean::KINDS;
 use crate::company::{self, STRUCTURES};
 use crate::foreign::{EFFECTS, Foreign, add, foreign};
-use crate::plant::{
-    BY_COUNT, BY_STRENGTH, COUNTED, STRONG, Truth, as_effect, plant, plant_counted,
-};
+use crate::plant::{COUNTED, STRONG, Truth, as_effect, plant, plant_counted};
 use crate::random::Draw;
 use crate::stand::{GYROS, Needs, Stand};
 
@@ -26,9 +24,9 @@ pub enum Family {
     Elsewhere,
     /// Nothing is wrong; another kind of record, by its place in [`KINDS`].
     CleanOf(usize),
-    /// One effect, by its place in [`BY_STRENGTH`].
+    /// One effect, by its place in [`STRONG`].
     One(usize),
-    /// One effect that is counted, by its place in [`BY_COUNT`].
+    /// One effect that is counted, by its place in [`COUNTED`].
     Counted(usize),
     /// Two effects.
     Pair,
@@ -41,46 +39,38 @@ pub enum Family {
 }
 
 impl Family {
+    /// Its number and its row of the tables.
+    fn row(self) -> (u16, &'static str) {
+        match self {
+            Self::Clean => (1, "nothing"),
+            Self::Elsewhere => (2, "nothing, other rates"),
+            Self::Pair => (3, "two"),
+            Self::OneAxis => (4, "two or three on one axis"),
+            Self::CleanOf(i) => (KINDS[i].id, KINDS[i].label),
+            Self::Beside(i) => (STRUCTURES[i].id, STRUCTURES[i].label),
+            Self::One(i) => (STRONG[i].id, STRONG[i].label),
+            Self::Counted(i) => (COUNTED[i].id, COUNTED[i].label),
+            Self::Foreign(i) => (EFFECTS[i].id, EFFECTS[i].name),
+        }
+    }
+
     /// A number that no other family has.
     #[must_use]
     pub fn number(self) -> u64 {
-        match self {
-            Self::Clean => 1,
-            Self::Elsewhere => 2,
-            Self::Pair => 3,
-            Self::OneAxis => 4,
-            Self::CleanOf(i) => u64::from(KINDS[i].id),
-            Self::Beside(i) => u64::from(STRUCTURES[i].id),
-            Self::One(i) => u64::from(STRONG[i].id),
-            Self::Counted(i) => u64::from(COUNTED[i].id),
-            Self::Foreign(i) => u64::from(EFFECTS[i].id),
-        }
+        self.row().0.into()
     }
 
     /// The row of the tables.
     #[must_use]
     pub fn label(self) -> &'static str {
-        match self {
-            Self::Clean => "nothing",
-            Self::Elsewhere => "nothing, other rates",
-            Self::Pair => "two",
-            Self::OneAxis => "two or three on one axis",
-            Self::CleanOf(i) => KINDS[i].label,
-            Self::Beside(i) => STRUCTURES[i].label,
-            Self::One(i) => BY_STRENGTH[i],
-            Self::Counted(i) => BY_COUNT[i],
-            Self::Foreign(i) => EFFECTS[i].name,
-        }
+        self.row().1
     }
 
     /// Whether `only` leaves it: its row of the tables, or for a foreign effect its set.
     #[must_use]
     pub fn is_of(self, only: &str) -> bool {
-        let set = match self {
-            Self::Foreign(i) => only == format!("set {}", EFFECTS[i].set),
-            _ => false,
-        };
-        set || self.label() == only
+        let in_set = |i: usize| only == format!("set {}", EFFECTS[i].set);
+        self.label() == only || matches!(self, Self::Foreign(i) if in_set(i))
     }
 }
 
@@ -173,43 +163,34 @@ fn grade(
     allowed: &[&str],
 ) -> (Vec<Hit>, Vec<String>, Vec<Estimate>) {
     let mut estimates = vec![];
-    let hits = truths
-        .iter()
-        .map(|t| {
-            let own = d.findings.iter().filter(|f| about(f, t));
-            if let Some(f) = own.clone().find(|f| f.cause == t.cause) {
-                let of_channel = f.per_channel.get(&t.channel).unwrap_or(&f.parameters);
-                for (name, p) in of_channel {
-                    if let (Some(e), Some(truth)) = (p.std_error, t.parameters.get(name)) {
-                        estimates.push(Estimate {
-                            label: t.label,
-                            parameter: name.clone(),
-                            value: p.value,
-                            std_error: e,
-                            truth: truth.value,
-                        });
-                    }
-                }
-                Hit::Named
-            } else if own.clone().any(|f| holds(f, t.cause)) {
-                Hit::InSet
-            } else {
-                Hit::Missed
+    let hit = |t: &Truth| {
+        let mut own = d.findings.iter().filter(|f| about(f, t));
+        let Some(f) = own.clone().find(|f| f.cause == t.cause) else {
+            let in_set = own.any(|f| holds(f, t.cause));
+            return if in_set { Hit::InSet } else { Hit::Missed };
+        };
+        let of_channel = f.per_channel.get(&t.channel).unwrap_or(&f.parameters);
+        for (name, p) in of_channel {
+            if let (Some(std_error), Some(truth)) = (p.std_error, t.parameters.get(name)) {
+                estimates.push(Estimate {
+                    label: t.label,
+                    parameter: name.clone(),
+                    value: p.value,
+                    std_error,
+                    truth: truth.value,
+                });
             }
-        })
-        .collect();
-    let wrong = d
-        .findings
-        .iter()
-        .filter(|f| {
-            !allowed.contains(&f.cause.as_str())
-                && !truths
-                    .iter()
-                    .any(|t| about(f, t) && (holds(f, t.cause) || part_of(&f.cause, t.cause)))
-        })
-        .map(|f| format!("{} on {}", f.cause, f.channels.join("+")))
-        .collect();
-    (hits, wrong, estimates)
+        }
+        Hit::Named
+    };
+    let hits = truths.iter().map(hit).collect();
+    let is_true = |f: &Finding| {
+        let is_it = |t: &Truth| holds(f, t.cause) || part_of(&f.cause, t.cause);
+        allowed.contains(&f.cause.as_str()) || truths.iter().any(|t| about(f, t) && is_it(t))
+    };
+    let wrong = d.findings.iter().filter(|f| !is_true(f));
+    let told = wrong.map(|f| format!("{} on {}", f.cause, f.channels.join("+")));
+    (hits, told.collect(), estimates)
 }
 
 /// Rates and lengths of [`Family::Elsewhere`].
@@ -274,8 +255,8 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
             allowed.extend(row.true_parts);
         }
         Family::Counted(i) => truths.push(plant_counted(draw, &stand, i, axis)),
-        Family::Pair => company::two(draw, &mut stand, &mut truths),
-        Family::OneAxis => company::on_one_axis(draw, &mut stand, &mut truths),
+        Family::Pair => truths = company::two(draw, &mut stand),
+        Family::OneAxis => truths = company::on_one_axis(draw, &mut stand),
         Family::Beside(i) => {
             let kind = &STRUCTURES[i];
             allowed.extend(kind.allowed);
@@ -385,11 +366,8 @@ fn answer(p: &Planted, index: u64) -> Diagnosis {
 pub fn describe(seed: u64, family: Family, index: u64) -> (String, Diagnosis) {
     let p = planted(seed, family, index);
     let told = |t: &Truth| {
-        let values = t
-            .parameters
-            .iter()
-            .map(|(k, p)| format!("{k} {:.4}", p.value));
-        let values: Vec<String> = values.collect();
+        let values = t.parameters.iter();
+        let values: Vec<String> = values.map(|(k, p)| format!("{k} {:.4}", p.value)).collect();
         let (label, channel, values) = (t.label, &t.channel, values.join(", "));
         format!("{label} on {channel} (d' {:.1}): {values}", t.strength)
     };
@@ -410,15 +388,13 @@ pub fn run(seed: u64, family: Family, index: u64) -> Outcome {
     let (hits, wrong, estimates) = grade(&d, &p.truths, &p.allowed);
     let truths = p.truths.iter().zip(hits);
     let left = d.unexplained.iter();
+    let told = left.clone().map(|u| format!("{}: {}", u.channel, u.what));
     Outcome {
         family,
         index,
         truths: truths.map(|(t, h)| (t.label, t.strength, h)).collect(),
         wrong,
-        unexplained: left
-            .clone()
-            .map(|u| format!("{}: {}", u.channel, u.what))
-            .collect(),
+        unexplained: told.collect(),
         checks: left.map(|u| u.checks.clone()).collect(),
         estimates,
         walks: p.walks,

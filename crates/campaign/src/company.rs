@@ -3,9 +3,10 @@
 
 use std::f64::consts::TAU;
 
-use crate::foreign::words::phasor;
+use crate::foreign::words::{phasor, white};
 use crate::plant::{STRONG, StrongRow as Row, Truth, plant, plant_outliers, strong};
 use crate::random::Draw;
+use crate::series::{each, each_pair};
 use crate::stand::{GYROS, Stand};
 use crate::strength::Meter;
 
@@ -30,10 +31,9 @@ fn beside(meter: &Meter, one: &Truth, others: &[&Truth]) -> f64 {
     let among = densities.fold(meter.clone(), |m, d| m.over(d));
     match (&one.signal, &one.density) {
         (Some(signal), _) => {
-            let energy = if signals.is_empty() {
-                meter.energy(signal)
-            } else {
-                meter.energy(&among.beyond(signal, &signals))
+            let energy = match signals.as_slice() {
+                [] => meter.energy(signal),
+                others => meter.energy(&among.beyond(signal, others)),
             };
             among.beside_fitted(&|m| m.of_signal(&energy))
         }
@@ -46,19 +46,17 @@ fn beside(meter: &Meter, one: &Truth, others: &[&Truth]) -> f64 {
 
 /// Gives each effect its strength beside those on the same channel.
 fn among_each_other(stand: &Stand, truths: &mut [Truth]) {
-    let strengths: Vec<f64> = (0..truths.len())
-        .map(|i| {
-            let one = &truths[i];
-            let others = truths.iter().enumerate();
-            let same = others.filter(|(j, t)| *j != i && t.channel == one.channel);
-            let others: Vec<&Truth> = same.map(|(_, t)| t).collect();
-            let axis = GYROS.iter().position(|g| *g == one.channel);
-            match axis {
-                Some(axis) if !others.is_empty() => beside(&Meter::new(stand, axis), one, &others),
-                _ => one.strength,
-            }
-        })
-        .collect();
+    let strength = |i: usize| {
+        let one = &truths[i];
+        let others = truths.iter().enumerate();
+        let same = others.filter(|(j, t)| *j != i && t.channel == one.channel);
+        let others: Vec<&Truth> = same.map(|(_, t)| t).collect();
+        match GYROS.iter().position(|g| *g == one.channel) {
+            Some(axis) if !others.is_empty() => beside(&Meter::new(stand, axis), one, &others),
+            _ => one.strength,
+        }
+    };
+    let strengths: Vec<f64> = (0..truths.len()).map(strength).collect();
     for (truth, strength) in truths.iter_mut().zip(strengths) {
         truth.strength = strength;
     }
@@ -74,52 +72,55 @@ fn wanted(draw: &mut Draw, row: &Row) -> f64 {
     draw.by_ratio(1.1 * row.asked_from, 2.2 * row.asked_from)
 }
 
-/// Two effects, each as strong as asked beside the other.
-pub(crate) fn two(draw: &mut Draw, stand: &mut Stand, truths: &mut Vec<Truth>) {
-    let fit = rows(|_| true);
+/// Effects that are planted together until each is as strong as asked beside the others; none where some do not go together.
+fn together(
+    stand: &mut Stand,
+    mut some: impl FnMut(&mut Stand) -> Option<Vec<Truth>>,
+) -> Vec<Truth> {
     loop {
-        truths.clear();
-        let rows = [0, 1].map(|_| fit[draw.of_many(fit.len())]);
-        if rows[0].cause == rows[1].cause {
+        let Some(mut truths) = some(stand) else {
             continue;
-        }
-        for row in rows {
-            let axis = draw.of_many(3);
-            let wanted = wanted(draw, row);
-            truths.push(plant(draw, stand, row.label, axis, wanted));
-        }
-        let same = truths[0].channel == truths[1].channel;
-        if same && holds_the_other(truths) {
-            continue;
-        }
-        among_each_other(stand, truths);
-        if as_asked(truths) {
-            return;
+        };
+        among_each_other(stand, &mut truths);
+        if as_asked(&truths) {
+            return truths;
         }
     }
 }
 
+/// Two effects, each as strong as asked beside the other.
+pub(crate) fn two(draw: &mut Draw, stand: &mut Stand) -> Vec<Truth> {
+    let fit = rows(|_| true);
+    together(stand, |stand| {
+        let rows = [0, 1].map(|_| draw.one_of(&fit));
+        if rows[0].cause == rows[1].cause {
+            return None;
+        }
+        let truths = rows.map(|row| {
+            let axis = draw.of_many(3);
+            let wanted = wanted(draw, row);
+            plant(draw, stand, row.label, axis, wanted)
+        });
+        let same = truths[0].channel == truths[1].channel;
+        (!(same && holds_the_other(&truths))).then_some(truths.into())
+    })
+}
+
 /// Two or three effects on one axis, each as strong as asked beside the others.
-pub(crate) fn on_one_axis(draw: &mut Draw, stand: &mut Stand, truths: &mut Vec<Truth>) {
+pub(crate) fn on_one_axis(draw: &mut Draw, stand: &mut Stand) -> Vec<Truth> {
     let fit = rows(|r| !r.everywhere);
     let count = 2 + draw.of_many(2);
-    loop {
-        truths.clear();
+    together(stand, |stand| {
         let axis = draw.of_many(3);
-        for _ in 0..count {
-            let row = fit[draw.of_many(fit.len())];
+        let mut one = |_| {
+            let row = draw.one_of(&fit);
             let wanted = wanted(draw, row);
-            truths.push(plant(draw, stand, row.label, axis, wanted));
-        }
+            plant(draw, stand, row.label, axis, wanted)
+        };
+        let truths: Vec<Truth> = (0..count).map(&mut one).collect();
         let twice = (1..count).any(|i| truths[..i].iter().any(|t| t.cause == truths[i].cause));
-        if twice || holds_the_other(truths) {
-            continue;
-        }
-        among_each_other(stand, truths);
-        if as_asked(truths) {
-            return;
-        }
-    }
+        (!twice && !holds_the_other(&truths)).then_some(truths)
+    })
 }
 
 /// What an axis has beside an effect.
@@ -214,7 +215,7 @@ fn line(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
 
 fn band(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
     let wanted = draw.by_ratio(LOUD.0, LOUD.1);
-    let label = ["narrow_band", "wandering_line"][draw.of_many(2)];
+    let label = draw.one_of(&["narrow_band", "wandering_line"]);
     Structure::of(plant(draw, stand, label, axis, wanted))
 }
 
@@ -229,14 +230,16 @@ fn echo(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
     let rho = draw.by_ratio(10.0, 20.0) / (n as f64).sqrt();
     // Of white noise of variance s^2 and c times a noise and itself a lag before: rho = c^2 / (s^2 + 2 c^2).
     let square = rho * stand.white(axis) / (1.0 - 2.0 * rho);
-    let own: Vec<f64> = (0..n + lag).map(|_| draw.normal()).collect();
-    let signal = (0..n).map(|i| square.sqrt() * (own[i] + own[i + lag]));
+    let own = white(draw, n + lag);
+    let signal = each_pair(&own, &own[lag..], |a, b| square.sqrt() * (a + b));
     let meter = Meter::new(stand, axis);
-    let density = (meter.omega().iter()).map(|w| 2.0 * square * (1.0 + (w * lag as f64).cos()));
+    let density = each(meter.omega(), |w| {
+        2.0 * square * (1.0 + (w * lag as f64).cos())
+    });
     Structure {
         truth: None,
-        added: Some(signal.collect()),
-        density: Some(density.collect()),
+        added: Some(signal),
+        density: Some(density),
     }
 }
 
@@ -251,7 +254,7 @@ fn vibration(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
     let turns = pitch.iter().map(|p| TAU * (centre + p) / rate_hz);
     let rms = (0.35 / 0.65 * stand.white(axis)).sqrt();
     let swings = phasor(draw, keep, turns);
-    let signal: Vec<f64> = swings.iter().map(|x| rms * x).collect();
+    let signal = each(&swings, |x| rms * x);
     let meter = Meter::new(stand, axis);
     // What it has by bin is its periodogram, smoothed over so many bins that its scatter does not count.
     let density = smoothed(&meter.energy(&signal), meter.counts());
@@ -302,7 +305,7 @@ pub(crate) fn beside_a_structure(
         asked && !is_it && !r.everywhere && !swings
     });
     loop {
-        let row = fit[draw.of_many(fit.len())];
+        let row = draw.one_of(&fit);
         let wanted = row.asked_from * draw.by_ratio(kind.wanted.0, kind.wanted.1);
         let mut truth = plant(draw, stand, row.label, axis, wanted);
         truth.strength = beside_structure(&Meter::new(stand, axis), &truth, &found);
@@ -323,12 +326,9 @@ fn beside_structure(meter: &Meter, one: &Truth, structure: &Structure) -> f64 {
             let signal = one.signal.as_deref().unwrap_or(&[]);
             meter.of_signal(&meter.energy(signal))
         }
-        _ => structure.truth.as_ref().map_or(one.strength, |t| {
-            if t.signal.is_some() {
-                beside(meter, one, &[t])
-            } else {
-                one.strength
-            }
-        }),
+        _ => match &structure.truth {
+            Some(truth) if truth.signal.is_some() => beside(meter, one, &[truth]),
+            _ => one.strength,
+        },
     }
 }

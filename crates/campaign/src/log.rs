@@ -10,7 +10,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Estimate, Hit, Outcome};
-use crate::plant::{BY_COUNT, BY_STRENGTH};
+use crate::plant::labels;
 
 /// First line: what made the rest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -58,36 +58,27 @@ fn number(v: f64) -> Option<f64> {
 
 /// The label of the tables that reads so.
 fn label(text: &str) -> Option<&'static str> {
-    BY_STRENGTH.into_iter().chain(BY_COUNT).find(|l| *l == text)
+    labels().find(|l| *l == text)
 }
 
 impl Line {
     fn of(o: &Outcome, since: f64) -> Self {
+        let truths = o.truths.iter().map(|t| (t.0.into(), number(t.1), t.2));
+        let estimate = |e: &Estimate| {
+            let numbers = [e.value, e.std_error, e.truth].map(number);
+            let [Some(value), Some(std_error), Some(truth)] = numbers else {
+                return None;
+            };
+            Some((e.label.into(), e.parameter.clone(), value, std_error, truth))
+        };
         Self {
             row: o.family.label().into(),
             index: o.index,
-            truths: o
-                .truths
-                .iter()
-                .map(|t| (t.0.into(), number(t.1), t.2))
-                .collect(),
+            truths: truths.collect(),
             wrong: o.wrong.clone(),
             unexplained: o.unexplained.clone(),
             checks: o.checks.clone(),
-            estimates: o
-                .estimates
-                .iter()
-                .filter(|e| e.value.is_finite() && e.std_error.is_finite() && e.truth.is_finite())
-                .map(|e| {
-                    (
-                        e.label.into(),
-                        e.parameter.clone(),
-                        e.value,
-                        e.std_error,
-                        e.truth,
-                    )
-                })
-                .collect(),
+            estimates: o.estimates.iter().filter_map(estimate).collect(),
             walks: o.walks,
             strength: number(o.strength),
             seconds: o.seconds,
@@ -109,22 +100,16 @@ impl Line {
                 truth,
             })
         };
+        let truths: Option<Vec<_>> = self.truths.into_iter().map(truth).collect();
+        let estimates: Option<Vec<_>> = self.estimates.into_iter().map(estimate).collect();
         Some(Outcome {
             family: crate::family_of(&self.row)?,
             index: self.index,
-            truths: self
-                .truths
-                .into_iter()
-                .map(truth)
-                .collect::<Option<Vec<_>>>()?,
+            truths: truths?,
             wrong: self.wrong,
             unexplained: self.unexplained,
             checks: self.checks,
-            estimates: self
-                .estimates
-                .into_iter()
-                .map(estimate)
-                .collect::<Option<Vec<_>>>()?,
+            estimates: estimates?,
             walks: self.walks,
             strength: self.strength.unwrap_or(f64::NAN),
             seconds: self.seconds,
@@ -209,12 +194,12 @@ mod tests {
         Outcome {
             family: Family::One(2),
             index,
-            truths: vec![(BY_STRENGTH[2], 8.5, Hit::InSet)],
+            truths: vec![("warm_up", 8.5, Hit::InSet)],
             wrong: vec!["line on gyro_x".into()],
             unexplained: vec![],
             checks: vec![],
             estimates: vec![Estimate {
-                label: BY_STRENGTH[2],
+                label: "warm_up",
                 parameter: "amplitude".into(),
                 value: 1.0,
                 std_error: 0.1,

@@ -78,6 +78,7 @@ fn with(path: &Path, help: &'static str) -> impl Fn(std::io::Error) -> Failure {
 }
 
 const WRITABLE: &str = "name a place that exists and can be written";
+const ROWS: &str = "rows are the causes of docs/effects.md, \"nothing\", \"two\", and the foreign effects of docs/power.md";
 
 fn campaign_of(a: Arguments) -> Result<(), Failure> {
     let (mut size, name) = match (a.quick, a.full) {
@@ -90,23 +91,16 @@ fn campaign_of(a: Arguments) -> Result<(), Failure> {
     }
     let all = cases(size, a.only.as_deref());
     if all.is_empty() {
-        return Err((
-            format!(
-                "no row of the tables is called {:?}",
-                a.only.unwrap_or_default()
-            ),
-            "rows are the causes of docs/effects.md, \"nothing\", \"two\", and the foreign effects of docs/power.md",
-        ));
+        let what = format!(
+            "no row of the tables is called {:?}",
+            a.only.unwrap_or_default()
+        );
+        return Err((what, ROWS));
     }
     let told = |log: &Log| {
         let command = format!("cargo xtask campaign {name}--seed {}", log.head.seed);
-        report::page(
-            &log.outcomes,
-            &command,
-            &log.head.date,
-            log.seconds,
-            all.len(),
-        )
+        let (runs, date) = (&log.outcomes, &log.head.date);
+        report::page(runs, &command, date, log.seconds, all.len())
     };
     if let Some(path) = &a.from {
         let log = log::read(path).map_err(with(path, "name a file that --log made"))?;
@@ -147,16 +141,10 @@ fn describe(seed: u64, family: campaign::Family, index: u64) {
     for f in &d.findings {
         println!("named {} on {}: {}", f.cause, f.channels.join("+"), f.what);
     }
-    for c in d
-        .checks
-        .iter()
-        .filter(|c| c.fails_after || c.threshold > 1e-4)
-    {
-        let p = c.p_value.unwrap_or(f64::NAN);
-        println!(
-            "{} on {}: {:.3}, chance {p:.1e}",
-            c.id, c.channel, c.statistic
-        );
+    let checks = d.checks.iter();
+    for c in checks.filter(|c| c.fails_after || c.threshold > 1e-4) {
+        let (id, channel, p) = (&c.id, &c.channel, c.p_value.unwrap_or(f64::NAN));
+        println!("{id} on {channel}: {:.3}, chance {p:.1e}", c.statistic);
     }
     for u in &d.unexplained {
         println!("unexplained on {}: {}", u.channel, u.what);
@@ -175,11 +163,8 @@ fn earlier(path: &Path, head: &Head) -> Result<Option<Log>, Failure> {
         return Ok(Some(log));
     }
     let aside = path.with_extension("jsonl.old");
-    println!(
-        "{} is of another build: kept as {}, all runs anew",
-        path.display(),
-        aside.display()
-    );
+    let (name, kept) = (path.display(), aside.display());
+    println!("{name} is of another build: kept as {kept}, all runs anew");
     std::fs::rename(path, &aside).map_err(with(&aside, WRITABLE))?;
     Ok(None)
 }
@@ -225,12 +210,9 @@ fn go_on(
             let _ = std::io::stdout().flush();
         }
     };
-    println!(
-        "seed {}, {} runs on {threads} threads",
-        log.head.seed,
-        left.len()
-    );
-    let new = run_all(log.head.seed, &left, threads, &stop, &seen);
+    let (seed, runs) = (log.head.seed, left.len());
+    println!("seed {seed}, {runs} runs on {threads} threads");
+    let new = run_all(seed, &left, threads, &stop, &seen);
     if let Ok((_, Some(error))) = written.into_inner() {
         eprintln!(
             "\nwarning: the log ended early, {error}: what came after cannot be taken up again"

@@ -10,6 +10,7 @@ use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::random::Draw;
+use crate::series::each;
 use crate::stand::{GYROS, Needs, Stand};
 use crate::strength::Meter;
 
@@ -61,56 +62,46 @@ impl<How: Copy> LibraryEffect<How> {
         }
     }
 
-    const fn needs(self, needs: Needs) -> Self {
-        Self { needs, ..self }
+    const fn needs(mut self, needs: Needs) -> Self {
+        self.needs = needs;
+        self
     }
 
     /// Asked for from this strength on, and up to so far above the oracle's limit.
-    const fn asked(self, asked_from: f64, asked_ratio: f64) -> Self {
-        Self {
-            asked_from,
-            asked_ratio,
-            ..self
-        }
+    const fn asked(mut self, asked_from: f64, asked_ratio: f64) -> Self {
+        (self.asked_from, self.asked_ratio) = (asked_from, asked_ratio);
+        self
     }
 
-    const fn on_a_moving_base(self) -> Self {
-        Self {
-            moves: true,
-            ..self
-        }
+    const fn on_a_moving_base(mut self) -> Self {
+        self.moves = true;
+        self
     }
 
-    const fn on_all_channels(self) -> Self {
-        Self {
-            everywhere: true,
-            ..self
-        }
+    const fn on_all_channels(mut self) -> Self {
+        self.everywhere = true;
+        self
+    }
+
+    const fn called(mut self, label: &'static str) -> Self {
+        self.label = label;
+        self
     }
 }
 
 /// A row whose strength is a d'.
 pub type StrongRow = LibraryEffect<strong::How>;
 
-/// Rows of the tables whose strength is a d'.
-pub const BY_STRENGTH: [&str; STRONG.len()] = labels(&STRONG);
-/// Rows of what is counted, at sizes that are certain to show.
-pub const BY_COUNT: [&str; COUNTED.len()] = labels(&COUNTED);
-
-const fn labels<How, const N: usize>(rows: &[LibraryEffect<How>; N]) -> [&'static str; N] {
-    let mut all = [""; N];
-    let mut i = 0;
-    while i < N {
-        all[i] = rows[i].label;
-        i += 1;
-    }
-    all
+/// The rows of the tables: what has a strength, then what is counted.
+pub fn labels() -> impl Iterator<Item = &'static str> {
+    let counted = COUNTED.iter().map(|row| row.label);
+    STRONG.iter().map(|row| row.label).chain(counted)
 }
 
 /// The row of this label, of those whose strength is a d'.
 ///
 /// # Panics
-/// For a label that none of [`BY_STRENGTH`] is.
+/// For a label that no row of [`STRONG`] has.
 #[must_use]
 pub fn strong(label: &str) -> &'static StrongRow {
     let own = STRONG.iter().find(|row| row.label == label);
@@ -142,39 +133,48 @@ pub struct Truth {
     pub density: Option<Vec<f64>>,
 }
 
-/// Parameters of a cause, in their units.
-type Values = Vec<(&'static str, f64)>;
+impl Truth {
+    /// A cause on an axis or on all, with these parameters and without a strength.
+    fn of(label: &'static str, cause: &'static str, axis: Option<usize>, values: &[Value]) -> Self {
+        Self {
+            label,
+            cause,
+            channel: axis.map_or("", |axis| GYROS[axis]).to_owned(),
+            strength: f64::NAN,
+            parameters: parameters_of(cause, values),
+            signal: None,
+            density: None,
+        }
+    }
+}
 
-fn parameters_of(cause: &str, values: &[(&str, f64)]) -> Parameters {
+/// A parameter of a cause, in its unit.
+type Value = (&'static str, f64);
+type Values = Vec<Value>;
+
+fn parameters_of(cause: &str, values: &[Value]) -> Parameters {
     let specs = effect(cause).map_or(&[][..], |e| e.parameters());
-    values
-        .iter()
-        .map(|(name, value)| {
-            let unit = specs
-                .iter()
-                .find(|s| s.name == *name)
-                .map_or("1", |s| s.unit);
-            ((*name).to_owned(), Parameter::exact(*value, unit))
-        })
-        .collect()
+    let with_unit = |(name, value): &Value| {
+        let spec = specs.iter().find(|s| s.name == *name);
+        let unit = spec.map_or("1", |s| s.unit);
+        ((*name).to_owned(), Parameter::exact(*value, unit))
+    };
+    values.iter().map(with_unit).collect()
 }
 
 /// The history of the table's turning about z, deg/s, that a stand's excitation asks for.
 fn turning(stand: &Stand, times: &[f64]) -> Option<Vec<f64>> {
-    let setting = |key: &str| {
-        let own = stand.excitation.iter().find(|(k, _)| *k == key);
-        own.map(|s| s.1)
-    };
+    let setting = |key: &str| Some(stand.excitation.iter().find(|(k, _)| *k == key)?.1);
     let (turn, period) = (setting("turn_dps")?, setting("turn_period_s")?);
     let w = std::f64::consts::TAU / period;
-    Some(times.iter().map(|t| turn * (w * t).sin()).collect())
+    Some(each(times, |t| turn * (w * t).sin()))
 }
 
 /// An empty run in the world of a stand, for an effect to act on.
 fn blank(stand: &Stand) -> Simulation {
     let n = stand.samples();
     let zeros = || std::array::from_fn(|_| vec![0.0; n]);
-    let times: Vec<f64> = (0..n).map(|i| i as f64 / stand.rate_hz).collect();
+    let times = stand.series(|i| i as f64 / stand.rate_hz);
     let mut motion: [Vec<f64>; 3] = zeros();
     if let Some(turned) = turning(stand, &times) {
         motion[2] = turned;
@@ -213,17 +213,19 @@ fn blank(stand: &Stand) -> Simulation {
 }
 
 /// What an effect without chance adds to the rate of an axis.
-fn signal_of(stand: &Stand, cause: &str, parameters: &Parameters, axis: usize) -> Vec<f64> {
+fn signal_of(stand: &Stand, cause: &str, values: &[Value], axis: usize) -> Vec<f64> {
     let mut run = blank(stand);
     if let Some(e) = effect(cause).filter(|e| e.stage() == Stage::Rate) {
-        e.simulate(parameters, &[axis], &mut run);
+        e.simulate(&parameters_of(cause, values), &[axis], &mut run);
     }
     std::mem::take(&mut run.rate[axis])
 }
 
-/// Where and how strong an effect is to be.
+/// What is to be planted, where and how strong.
 #[derive(Clone, Copy, Debug)]
 pub struct Asked {
+    /// Cause.
+    pub cause: &'static str,
     /// Axis.
     pub axis: usize,
     /// d'.
@@ -233,92 +235,78 @@ pub struct Asked {
 }
 
 /// An effect with a strength, as drawn.
-pub enum Drawn {
-    /// Parameters that give its shape, those that its size multiplies, and signals beyond which it is measured.
-    Shape {
-        /// Shape.
-        shape: Values,
-        /// Size 1.
-        sized: Values,
-        /// What a simpler cause describes of it.
-        less: Vec<Vec<f64>>,
-    },
-    /// A process: parameters, strength, density by bin.
-    Process(Values, f64, Vec<f64>),
-    /// Anything else: parameters, strength, and the signal where it is added afterwards.
-    Known(Values, f64, Option<Vec<f64>>),
+pub struct Drawn {
+    values: Values,
+    strength: f64,
+    /// Signal that it adds to its channel, where it is one.
+    signal: Option<Vec<f64>>,
+    /// Variance that it adds to the coefficients of its channel, by bin, where it is a process.
+    density: Option<Vec<f64>>,
 }
 
-/// The size of a shape that is as strong as asked: parameters, strength, signal.
-fn sized(
-    stand: &Stand,
-    cause: &str,
-    asked: Asked,
-    (shape, sized, less): (&Values, &Values, &[Vec<f64>]),
-) -> (Parameters, f64, Vec<f64>) {
-    let all = |size: f64| {
-        let scaled: Values = sized.iter().map(|(k, v)| (*k, v * size)).collect();
-        parameters_of(cause, &[shape.as_slice(), &scaled].concat())
-    };
-    let meter = Meter::new(stand, asked.axis);
-    let unit = signal_of(stand, cause, &all(1.0), asked.axis);
-    let energy = if less.is_empty() {
-        meter.energy(&unit)
-    } else {
-        meter.energy(&meter.beyond(&unit, less))
-    };
-    let (size, strength) = meter.sized(&energy, asked.wanted);
-    let signal = unit.iter().map(|v| v * size).collect();
-    (all(size), strength, signal)
+impl Drawn {
+    /// Neither a signal nor a process.
+    fn of(values: Values, strength: f64) -> Self {
+        Self {
+            values,
+            strength,
+            signal: None,
+            density: None,
+        }
+    }
+
+    /// A process.
+    fn process(values: Values, strength: f64, density: Vec<f64>) -> Self {
+        Self {
+            density: Some(density),
+            ..Self::of(values, strength)
+        }
+    }
+
+    /// A shape of the size that is as strong as asked: its parameters, those that its size multiplies, and signals beyond which it
+    /// is measured, for a simpler cause describes them.
+    fn shape(
+        stand: &Stand,
+        asked: Asked,
+        (shape, sized): (&[Value], &[Value]),
+        less: &[Vec<f64>],
+    ) -> Self {
+        let all = |size: f64| [shape, &each(sized, |(name, v)| (name, v * size))].concat();
+        let meter = Meter::new(stand, asked.axis);
+        let unit = signal_of(stand, asked.cause, &all(1.0), asked.axis);
+        let energy = match less {
+            [] => meter.energy(&unit),
+            _ => meter.energy(&meter.beyond(&unit, less)),
+        };
+        let (size, strength) = meter.sized(&energy, asked.wanted);
+        Self {
+            signal: Some(each(&unit, |v| v * size)),
+            ..Self::of(all(size), strength)
+        }
+    }
 }
 
 /// Plant the row `label` on `axis` of a stand at a strength of `wanted`. The stand's excitation may gain a turn or a sway.
 ///
 /// # Panics
-/// Never for the labels of [`BY_STRENGTH`].
+/// Never for the labels of [`STRONG`].
 #[must_use]
 pub fn plant(draw: &mut Draw, stand: &mut Stand, label: &str, axis: usize, wanted: f64) -> Truth {
     let row = strong(label);
+    let (cause, sign) = (row.cause, draw.sign());
     let asked = Asked {
+        cause,
         axis,
         wanted,
-        sign: draw.sign(),
+        sign,
     };
-    let (parameters, strength, signal, density) = match (row.how)(draw, stand, asked) {
-        Drawn::Shape {
-            shape,
-            sized: size,
-            less,
-        } => {
-            let (parameters, strength, signal) =
-                sized(stand, row.cause, asked, (&shape, &size, &less));
-            (parameters, strength, Some(signal), None)
-        }
-        Drawn::Process(values, strength, density) => {
-            let parameters = parameters_of(row.cause, &values);
-            (parameters, strength, None, Some(density))
-        }
-        Drawn::Known(values, strength, signal) => {
-            (parameters_of(row.cause, &values), strength, signal, None)
-        }
-    };
+    let drawn = (row.how)(draw, stand, asked);
+    let axis = Some(axis).filter(|_| !row.everywhere);
     Truth {
-        label: row.label,
-        cause: row.cause,
-        channel: channel(axis, row.everywhere),
-        strength,
-        parameters,
-        signal,
-        density,
-    }
-}
-
-/// The channel that an effect is told of; empty for all.
-fn channel(axis: usize, everywhere: bool) -> String {
-    if everywhere {
-        String::new()
-    } else {
-        GYROS[axis].to_owned()
+        strength: drawn.strength,
+        signal: drawn.signal,
+        density: drawn.density,
+        ..Truth::of(row.label, cause, axis, &drawn.values)
     }
 }
 
@@ -327,15 +315,8 @@ fn channel(axis: usize, everywhere: bool) -> String {
 pub fn plant_counted(draw: &mut Draw, stand: &Stand, place: usize, axis: usize) -> Truth {
     let row = &COUNTED[place];
     let counted::Fault { values, everywhere } = (row.how)(draw, stand, axis);
-    Truth {
-        label: row.label,
-        cause: row.cause,
-        channel: channel(axis, everywhere || row.everywhere),
-        strength: f64::NAN,
-        parameters: parameters_of(row.cause, &values),
-        signal: None,
-        density: None,
-    }
+    let axis = Some(axis).filter(|_| !(everywhere || row.everywhere));
+    Truth::of(row.label, row.cause, axis, &values)
 }
 
 /// Wild readings on an axis: how many, and how far off in standard deviations of the white noise, even in the logarithm.
@@ -349,46 +330,34 @@ pub fn plant_outliers(
 ) -> Truth {
     let count = draw.by_ratio(many.0, many.1 + 1.0).floor();
     let size = stand.white(axis).sqrt() * draw.by_ratio(far.0, far.1);
-    Truth {
-        label: "outliers",
-        cause: "outliers",
-        channel: channel(axis, false),
-        strength: f64::NAN,
-        parameters: parameters_of("outliers", &[("count", count), ("size", size)]),
-        signal: None,
-        density: None,
-    }
+    let values = [("count", count), ("size", size)];
+    Truth::of("outliers", "outliers", Some(axis), &values)
 }
 
 /// The effect of a truth, as the simulation takes it; `None` where its signal is added afterwards.
 #[must_use]
 pub fn as_effect(truth: &Truth) -> Option<EffectModel> {
+    let channel = Some(truth.channel.clone()).filter(|c| !c.is_empty());
     (truth.label != strong::CURRENT).then(|| EffectModel {
         cause: truth.cause.to_owned(),
-        channels: if truth.channel.is_empty() {
-            vec![]
-        } else {
-            vec![truth.channel.clone()]
-        },
+        channels: channel.into_iter().collect(),
         parameters: truth.parameters.clone(),
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use model::effects::EFFECTS;
 
     use super::*;
 
     #[test]
     fn every_effect_of_the_library_has_a_row() {
-        let causes: Vec<&str> = STRONG
-            .iter()
-            .map(|r| r.cause)
-            .chain(COUNTED.iter().map(|r| r.cause))
-            .collect();
-        for effect in EFFECTS {
-            let id = effect.id();
+        let counted = COUNTED.iter().map(|r| r.cause);
+        let causes: Vec<&str> = STRONG.iter().map(|r| r.cause).chain(counted).collect();
+        for id in EFFECTS.iter().map(|e| e.id()) {
             assert!(
                 causes.contains(&id),
                 "{id} has no row in plant/strong.rs or plant/counted.rs: the campaign would never plant it"
@@ -401,17 +370,10 @@ mod tests {
 
     #[test]
     fn no_two_rows_have_a_number_or_a_label_in_common() {
-        let mut numbers: Vec<u16> = STRONG
-            .iter()
-            .map(|r| r.id)
-            .chain(COUNTED.iter().map(|r| r.id))
-            .collect();
-        let mut labels: Vec<&str> = BY_STRENGTH.into_iter().chain(BY_COUNT).collect();
-        let all = labels.len();
-        numbers.sort_unstable();
-        numbers.dedup();
-        labels.sort_unstable();
-        labels.dedup();
+        let counted = COUNTED.iter().map(|r| r.id);
+        let numbers: BTreeSet<u16> = STRONG.iter().map(|r| r.id).chain(counted).collect();
+        let all = STRONG.len() + COUNTED.len();
+        let labels: BTreeSet<&str> = labels().collect();
         assert_eq!((numbers.len(), labels.len()), (all, all));
     }
 
@@ -422,13 +384,8 @@ mod tests {
             let mut stand = Stand::draw(draw, 600.0, 20.0, row.needs);
             let truth = plant(draw, &mut stand, row.label, 1, 12.0);
             let off = truth.strength / 12.0 - 1.0;
-            assert!(off < 0.01, "{}: {}", row.label, truth.strength);
-            assert!(
-                off > -0.02 || truth.density.is_some(),
-                "{}: {}",
-                row.label,
-                truth.strength
-            );
+            let kept = off < 0.01 && (off > -0.02 || truth.density.is_some());
+            assert!(kept, "{}: {}", row.label, truth.strength);
         }
     }
 }

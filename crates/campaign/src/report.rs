@@ -25,24 +25,15 @@ pub fn worth_a_line(o: &Outcome) -> bool {
 /// A run in a line.
 #[must_use]
 pub fn line(o: &Outcome) -> String {
-    let planted: Vec<String> = o
-        .truths
-        .iter()
-        .map(|(label, d, hit)| format!("{label} (d' {d:.1}) {hit:?}"))
-        .collect();
-    let strange = if o.strength.is_nan() {
-        String::new()
-    } else {
-        format!(" d' {:.0}", o.strength)
+    let effect = |(label, d, hit): &(_, f64, Hit)| format!("{label} (d' {d:.1}) {hit:?}");
+    let planted: Vec<String> = o.truths.iter().map(effect).collect();
+    let strange = match o.strength.is_nan() {
+        true => String::new(),
+        false => format!(" d' {:.0}", o.strength),
     };
-    format!(
-        "{}{strange} #{}: {} | wrong: {} | unexplained: {}",
-        o.family.label(),
-        o.index,
-        planted.join(", "),
-        o.wrong.join(", "),
-        o.unexplained.join("; ")
-    )
+    let (label, index, planted) = (o.family.label(), o.index, planted.join(", "));
+    let (wrong, unexplained) = (o.wrong.join(", "), o.unexplained.join("; "));
+    format!("{label}{strange} #{index}: {planted} | wrong: {wrong} | unexplained: {unexplained}")
 }
 
 fn percent(r: Rate) -> String {
@@ -50,22 +41,27 @@ fn percent(r: Rate) -> String {
         return "-".into();
     }
     let (low, high) = r.interval();
-    format!(
-        "{:.1} % ({}/{}, {:.1}..{:.1})",
-        100.0 * r.share(),
-        r.hits,
-        r.trials,
-        100.0 * low,
-        100.0 * high
-    )
+    let [share, low, high] = [r.share(), low, high].map(|share| 100.0 * share);
+    format!("{share:.1} % ({r}, {low:.1}..{high:.1})")
 }
 
-/// Hits of runs, for a table whose rows a reader compares with each other.
-fn count(r: Rate) -> String {
-    match r.trials {
-        0 => "-".into(),
-        n => format!("{}/{n}", r.hits),
-    }
+/// The runs of a family.
+fn of(all: &[Outcome], family: Family) -> impl Iterator<Item = &Outcome> + Clone {
+    all.iter().filter(move |o| o.family == family)
+}
+
+/// Runs in which something is told that has no cause or a wrong one.
+fn alarms<'a>(runs: impl IntoIterator<Item = &'a Outcome>) -> Rate {
+    Rate::of(runs.into_iter().map(|o| !o.quiet()))
+}
+
+/// Runs in which something is unexplained, and those in which a cause is named that is not there.
+fn unexplained_and_wrong<'a>(runs: impl Iterator<Item = &'a Outcome> + Clone) -> [Rate; 2] {
+    let unexplained = runs.clone().map(|o| !o.unexplained.is_empty());
+    [
+        Rate::of(unexplained),
+        Rate::of(runs.map(|o| !o.wrong.is_empty())),
+    ]
 }
 
 /// How often each was said, in words. What was said of a channel is counted without it.
@@ -97,15 +93,10 @@ fn covers(e: &Estimate) -> bool {
 /// Estimates of runs strong enough that being named does not select them.
 fn estimates(all: &[Outcome]) -> BTreeMap<(&'static str, String), Vec<&Estimate>> {
     let mut by: BTreeMap<_, Vec<&Estimate>> = BTreeMap::new();
-    for o in all
-        .iter()
-        .filter(|o| matches!(o.family, Family::One(_)) && strong(o))
-    {
-        for e in &o.estimates {
-            by.entry((e.label, e.parameter.clone()))
-                .or_default()
-                .push(e);
-        }
+    let one = |o: &&Outcome| matches!(o.family, Family::One(_)) && strong(o);
+    for e in all.iter().filter(one).flat_map(|o| &o.estimates) {
+        let own = by.entry((e.label, e.parameter.clone())).or_default();
+        own.push(e);
     }
     // Locations and shapes cover as sizes do; counts and phases are not graded.
     by.retain(|k, _| !k.1.ends_with("phase"));
@@ -115,22 +106,20 @@ fn estimates(all: &[Outcome]) -> BTreeMap<(&'static str, String), Vec<&Estimate>
 /// The page, of runs of which `planned` were to be.
 #[must_use]
 pub fn page(all: &[Outcome], command: &str, date: &str, seconds: f64, planned: usize) -> String {
-    let mut out = String::new();
-    let _ = writeln!(out, "# What the diagnosis can find: detection rates\n");
+    let mut out = String::from("# What the diagnosis can find: detection rates\n\n");
+    let (runs, minutes) = (all.len(), seconds / 60.0);
+    let comma = if date.is_empty() { "" } else { ", " };
     let _ = writeln!(
         out,
-        "{} runs{}{date}, {:.0} min: `{command}`\n",
-        all.len(),
-        if date.is_empty() { "" } else { ", " },
-        seconds / 60.0
+        "{runs} runs{comma}{date}, {minutes:.0} min: `{command}`\n"
     );
     let proper = crate::cases(crate::DEFAULT, None).len();
-    if all.len() < planned {
+    if runs < planned {
         let _ = writeln!(
             out,
             "Ended early: {planned} runs were planned; each row has its share of those made.\n"
         );
-    } else if all.len() < proper {
+    } else if runs < proper {
         let _ = writeln!(
             out,
             "A sample of the {proper} runs of the campaign proper: read the intervals, not the shares.\n"
@@ -174,36 +163,22 @@ const NAMES: &str = include_str!("report/names.md");
 const WALKS: [f64; 5] = [0.0, 1.5e-3, 3e-3, 5e-3, 1.0];
 
 fn clean(out: &mut String, all: &[Outcome]) {
-    let _ = writeln!(
-        out,
-        "## False alarms by noise\n\n| clean runs | with an alarm |\n|---|---|"
-    );
-    let alarms = |of: &mut dyn Iterator<Item = &Outcome>| percent(Rate::of(of.map(|o| !o.quiet())));
+    out.push_str("## False alarms by noise\n\n| clean runs | with an alarm |\n|---|---|\n");
     for edges in WALKS.windows(2) {
-        let mut of = all.iter().filter(|o| {
-            let top = o.walks.iter().copied().fold(0.0, f64::max);
-            o.family == Family::Clean && (edges[0]..edges[1]).contains(&top)
-        });
+        let (from, to) = (edges[0], edges[1]);
+        let top = |o: &Outcome| o.walks.iter().copied().fold(0.0, f64::max);
+        let own = of(all, Family::Clean).filter(|o| (from..to).contains(&top(o)));
+        let rate = percent(alarms(own));
         let _ = writeln!(
             out,
-            "| largest random walk {}..{} deg/s/sqrt(s) | {} |",
-            edges[0],
-            edges[1],
-            alarms(&mut of)
+            "| largest random walk {from}..{to} deg/s/sqrt(s) | {rate} |"
         );
     }
-    let mut elsewhere = all.iter().filter(|o| o.family == Family::Elsewhere);
-    let _ = writeln!(
-        out,
-        "| 60 to 7200 s, 1 to 1000 Hz | {} |",
-        alarms(&mut elsewhere)
-    );
-    let clean = all.iter().filter(|o| {
-        matches!(
-            o.family,
-            Family::Clean | Family::Elsewhere | Family::CleanOf(_)
-        )
-    });
+    let elsewhere = percent(alarms(of(all, Family::Elsewhere)));
+    let _ = writeln!(out, "| 60 to 7200 s, 1 to 1000 Hz | {elsewhere} |");
+    use Family::{Clean, CleanOf, Elsewhere};
+    let clean = all.iter();
+    let clean = clean.filter(|o| matches!(o.family, Clean | Elsewhere | CleanOf(_)));
     let said = counts(clean.flat_map(|o| o.wrong.iter().chain(&o.unexplained)));
     let said = if said.is_empty() { "none" } else { &said };
     let _ = writeln!(out, "\nAlarms: {said}.\n");
@@ -218,26 +193,17 @@ fn foreign(out: &mut String, all: &[Outcome]) {
     let mut rows = String::new();
     let mut others = 0;
     for (i, effect) in EFFECTS.iter().enumerate() {
-        let own: Vec<&Outcome> = all
-            .iter()
-            .filter(|o| o.family == Family::Foreign(i))
-            .collect();
-        if own.is_empty() || effect.later.is_some() {
+        let own = of(all, Family::Foreign(i));
+        if own.clone().next().is_none() || effect.later.is_some() {
             continue;
         }
-        let unexplained = Rate::of(own.iter().map(|o| !o.unexplained.is_empty()));
-        let named = Rate::of(own.iter().map(|o| !o.wrong.is_empty()));
+        let [unexplained, named] = unexplained_and_wrong(own.clone());
         if !is_short(unexplained, named) {
             others += 1;
             continue;
         }
-        let _ = writeln!(
-            rows,
-            "| {} | {} | {} |",
-            effect.name,
-            count(unexplained),
-            counts(own.iter().flat_map(|o| &o.wrong))
-        );
+        let (name, wrong) = (effect.name, counts(own.flat_map(|o| &o.wrong)));
+        let _ = writeln!(rows, "| {name} | {unexplained} | {wrong} |");
     }
     let _ = writeln!(
         out,
@@ -256,20 +222,18 @@ fn times(out: &mut String, all: &[Outcome]) {
         *row = (row.0 + o.seconds, row.1 + 1);
     }
     let total: f64 = rows.values().map(|r| r.0).sum();
-    let mut means: Vec<(&str, f64)> = rows
+    let means = rows
         .iter()
-        .map(|(f, (sum, n))| (f.label(), sum / *n as f64))
-        .collect();
+        .map(|(f, (sum, n))| (f.label(), sum / *n as f64));
+    let mut means: Vec<(&str, f64)> = means.collect();
     means.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let slowest: Vec<String> = means
-        .iter()
-        .take(2)
+    let slowest = means.iter().take(2);
+    let slowest: Vec<String> = slowest
         .map(|(label, s)| format!("{label} {s:.1} s"))
         .collect();
+    let (ms, slowest) = (1e3 * total / all.len().max(1) as f64, slowest.join(", "));
     let _ = writeln!(
         out,
-        "\nA diagnosis took {:.0} ms on average; slowest rows: {}.",
-        1e3 * total / all.len().max(1) as f64,
-        slowest.join(", ")
+        "\nA diagnosis took {ms:.0} ms on average; slowest rows: {slowest}."
     );
 }

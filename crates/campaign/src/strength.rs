@@ -9,6 +9,7 @@ use diagnosis::likelihood::{Bins, Dct, least_walk};
 use numerics::minimise::golden;
 pub use numerics::minimise::size_for;
 
+use crate::series::{add_at, each, each_pair, mean};
 use crate::stand::Stand;
 
 /// Random walks that are tried first, and the largest of them.
@@ -32,27 +33,20 @@ impl Length {
         let bins = Bins::new(n);
         let ones = vec![1.0; n];
         let count = bins.products(&ones, &ones);
-        let walk: Vec<f64> = bins
-            .at
-            .omega
-            .iter()
-            .map(|w| 1.0 / (4.0 * (w / 2.0).sin().powi(2)))
-            .collect();
+        let walk = each(&bins.at.omega, |w| 1.0 / (4.0 * (w / 2.0).sin().powi(2)));
         let low = least_walk(n);
-        let tried = (0..WALKS)
-            .map(|i| {
-                let x = low + (MOST_WALK - low) * i as f64 / (WALKS - 1) as f64;
-                let g: Vec<f64> = walk.iter().map(|w| 1.0 + x.exp() * w).collect();
-                let logs = g.iter().zip(&count).map(|(g, m)| m * g.ln()).sum();
-                (x, g.iter().map(|g| 1.0 / g).collect(), logs)
-            })
-            .collect();
+        let tried = |i| {
+            let x = low + (MOST_WALK - low) * i as f64 / (WALKS - 1) as f64;
+            let g = each(&walk, |w| 1.0 + x.exp() * w);
+            let logs = g.iter().zip(&count).map(|(g, m)| m * g.ln()).sum();
+            (x, each(&g, |g| 1.0 / g), logs)
+        };
         Self {
             dct: Dct::new(n),
+            tried: (0..WALKS).map(tried).collect(),
             bins,
             count,
             walk,
-            tried,
         }
     }
 
@@ -61,13 +55,8 @@ impl Length {
         thread_local! {
             static KNOWN: RefCell<HashMap<usize, Rc<Length>>> = RefCell::default();
         }
-        KNOWN.with(|k| {
-            Rc::clone(
-                k.borrow_mut()
-                    .entry(n)
-                    .or_insert_with(|| Rc::new(Self::new(n))),
-            )
-        })
+        let made = || Rc::new(Self::new(n));
+        KNOWN.with(|k| Rc::clone(k.borrow_mut().entry(n).or_insert_with(made)))
     }
 }
 
@@ -87,15 +76,11 @@ impl Meter {
     #[must_use]
     pub fn new(stand: &Stand, axis: usize) -> Self {
         let length = Length::of(stand.samples());
-        let clean = length
-            .walk
-            .iter()
-            .map(|w| stand.white(axis) + stand.step(axis) * w)
-            .collect();
+        let (white, step) = (stand.white(axis), stand.step(axis));
         Self {
+            clean: each(&length.walk, |w| white + step * w),
             length,
-            clean,
-            white: stand.white(axis),
+            white,
             beside: None,
         }
     }
@@ -116,15 +101,14 @@ impl Meter {
     /// known: what it makes likelier is no strength of an effect beside it.
     #[must_use]
     pub fn over(&self, density: &[f64]) -> Self {
-        let mut other = self.clone();
-        let mut beside = other.beside.take();
-        let all = beside.get_or_insert_with(|| vec![0.0; density.len()]);
-        for ((clean, all), d) in other.clean.iter_mut().zip(all).zip(density) {
-            *clean += d;
-            *all += d / self.white;
+        let none = vec![0.0; density.len()];
+        let before = self.beside.as_ref().unwrap_or(&none);
+        let beside = each_pair(before, density, |b, d| b + d / self.white);
+        Self {
+            clean: each_pair(&self.clean, density, |c, d| c + d),
+            beside: Some(beside),
+            ..self.clone()
         }
-        other.beside = beside;
-        other
     }
 
     /// Coefficients of each bin.
@@ -135,8 +119,7 @@ impl Meter {
 
     /// Expected energy in each bin where its coefficients have these variances.
     fn energies(&self, variances: &[f64]) -> Vec<f64> {
-        let bins = variances.iter().zip(&self.length.count);
-        bins.map(|(v, m)| m * v).collect()
+        each_pair(variances, &self.length.count, |v, m| m * v)
     }
 
     /// Expected energy of the noise in each bin.
@@ -171,7 +154,7 @@ impl Meter {
             let mut x = self.length.dct.forward(other);
             for b in &basis {
                 let share = weighted(&x, b);
-                x.iter_mut().zip(b).for_each(|(x, b)| *x -= share * b);
+                add_at(&mut x, 0, each(b, |b| -share * b));
             }
             let length = weighted(&x, &x).sqrt();
             if length > 1e-9 {
@@ -181,7 +164,7 @@ impl Meter {
         }
         for b in &basis {
             let share = weighted(&c, b);
-            c.iter_mut().zip(b).for_each(|(c, b)| *c -= share * b);
+            add_at(&mut c, 0, each(b, |b| -share * b));
         }
         c[0] = 0.0;
         self.length.dct.inverse(&c)
@@ -190,18 +173,14 @@ impl Meter {
     /// d' of a signal of known shape, by its energies.
     #[must_use]
     pub fn of_signal(&self, energy: &[f64]) -> f64 {
-        let noise = self.noise();
-        let expected: Vec<f64> = noise.iter().zip(energy).map(|(n, e)| n + e).collect();
+        let expected = each_pair(&self.noise(), energy, |n, e| n + e);
         self.against_baseline(&expected, self.under_itself(&self.clean))
     }
 
     /// The multiple of a signal of these energies that is `wanted` strong, and how strong it is.
     #[must_use]
     pub fn sized(&self, energy: &[f64], wanted: f64) -> (f64, f64) {
-        let strength = |size: f64| {
-            let scaled: Vec<f64> = energy.iter().map(|e| e * size * size).collect();
-            self.of_signal(&scaled)
-        };
+        let strength = |size: f64| self.of_signal(&each(energy, |e| e * size * size));
         let size = size_for(wanted, &strength);
         (size, strength(size))
     }
@@ -210,12 +189,7 @@ impl Meter {
     /// noise (then `density` is what the filter changes, negative where it takes off).
     #[must_use]
     pub fn of_density(&self, density: &[f64]) -> f64 {
-        let with: Vec<f64> = self
-            .clean
-            .iter()
-            .zip(density)
-            .map(|(v, d)| (v + d).max(1e-9 * v))
-            .collect();
+        let with = each_pair(&self.clean, density, |v, d| (v + d).max(1e-9 * v));
         self.against_baseline(&self.energies(&with), self.under_itself(&with))
     }
 
@@ -271,11 +245,9 @@ impl Meter {
 /// d' of a variance that changes in time, `law` its ratio to that at rest.
 #[must_use]
 pub fn of_variance(law: &[f64]) -> f64 {
-    let n = law.len() as f64;
-    let mean = law.iter().sum::<f64>() / n;
-    (n * mean.ln() - law.iter().map(|v| v.ln()).sum::<f64>())
-        .max(0.0)
-        .sqrt()
+    let logs: f64 = law.iter().map(|v| v.ln()).sum();
+    let square = law.len() as f64 * mean(law).ln() - logs;
+    square.max(0.0).sqrt()
 }
 
 /// d' of noise of variance `shared` common to channels of these white variances.
@@ -299,11 +271,9 @@ mod tests {
         let mut draw = Draw::of(5, 0, 0);
         let stand = Stand::draw(&mut draw, 600.0, 20.0, Needs::NONE);
         let meter = Meter::new(&stand, 0);
-        let tone = |i: usize| (1.3 * i as f64).sin();
-        let unit: Vec<f64> = (0..stand.samples()).map(tone).collect();
-        let energy = meter.energy(&unit);
+        let energy = meter.energy(&stand.series(|i| (1.3 * i as f64).sin()));
         let (size, alone) = meter.sized(&energy, 6.0);
-        let energy: Vec<f64> = energy.iter().map(|e| size * size * e).collect();
+        let energy = each(&energy, |e| size * size * e);
         let flat = vec![3.0 * stand.white(0); energy.len()];
         let loud = meter.over(&flat);
         // The random walk is lost in such noise, so that a little more than half is left of what it hid.

@@ -2,6 +2,8 @@
 
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF, Normal};
 
+use crate::series::{each, one_if};
+
 /// The oracle's limit: d' that one test at 1 % finds 95 times in 100.
 pub const ORACLE: f64 = 4.22;
 
@@ -13,13 +15,22 @@ pub fn oracle(d: f64) -> f64 {
     normal.sf(limit - d) + normal.cdf(-limit - d)
 }
 
-/// So many of so many.
+/// So many of so many. It is told by hits and trials, for a table whose rows a reader compares with each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rate {
     /// Hits.
     pub hits: u64,
     /// Trials.
     pub trials: u64,
+}
+
+impl std::fmt::Display for Rate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.trials {
+            0 => f.write_str("-"),
+            n => write!(f, "{}/{n}", self.hits),
+        }
+    }
 }
 
 impl Rate {
@@ -48,15 +59,13 @@ impl Rate {
         let (k, n) = (self.hits as f64, self.trials as f64);
         let quantile =
             |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |d| d.inverse_cdf(p));
-        let low = if self.hits == 0 {
-            0.0
-        } else {
-            quantile(k, n - k + 1.0, 0.025)
+        let low = match self.hits {
+            0 => 0.0,
+            _ => quantile(k, n - k + 1.0, 0.025),
         };
-        let high = if self.hits == self.trials {
-            1.0
-        } else {
-            quantile(k + 1.0, n - k, 0.975)
+        let high = match self.trials - self.hits {
+            0 => 1.0,
+            _ => quantile(k + 1.0, n - k, 0.975),
         };
         (low, high)
     }
@@ -86,12 +95,8 @@ pub fn d95(runs: &[(f64, bool)]) -> Option<(f64, f64)> {
         return None;
     }
     // Newton's method, with half a hit and half a miss far off as a prior, so that separable data converge.
-    let mut data: Vec<(f64, f64, f64)> = runs
-        .iter()
-        .map(|r| (r.0.ln(), f64::from(u8::from(r.1)), 1.0))
-        .collect();
-    data.push((1.5f64.ln(), 0.0, 0.5));
-    data.push((40f64.ln(), 1.0, 0.5));
+    let mut data = each(runs, |(d, hit)| (d.ln(), one_if(hit), 1.0));
+    data.extend([(1.5f64.ln(), 0.0, 0.5), (40f64.ln(), 1.0, 0.5)]);
     let (mut a, mut b) = (-8.0f64, 5.0f64);
     let mut inverse = [0.0; 3];
     for _ in 0..60 {
@@ -107,13 +112,10 @@ pub fn d95(runs: &[(f64, bool)]) -> Option<(f64, f64)> {
         }
         let det = aa * bb - ab * ab;
         inverse = [bb / det, -ab / det, aa / det];
-        let step = (
-            inverse[0] * ga + inverse[1] * gb,
-            inverse[1] * ga + inverse[2] * gb,
-        );
-        let damp = (2.0 / step.0.abs().max(step.1.abs()).max(2.0)).min(1.0);
-        a += damp * step.0;
-        b += damp * step.1;
+        let by_a = inverse[0] * ga + inverse[1] * gb;
+        let by_b = inverse[1] * ga + inverse[2] * gb;
+        let damp = (2.0 / by_a.abs().max(by_b.abs()).max(2.0)).min(1.0);
+        (a, b) = (a + damp * by_a, b + damp * by_b);
     }
     if b < 0.5 {
         return None;
@@ -130,15 +132,9 @@ mod tests {
 
     #[test]
     fn the_bound_of_no_hit_in_n_is_one_minus_the_root_of_a_fortieth() {
-        let (low, high) = Rate {
-            hits: 0,
-            trials: 100,
-        }
-        .interval();
-        assert!(
-            low == 0.0 && (high - (1.0 - 0.025f64.powf(0.01))).abs() < 1e-6,
-            "{high}"
-        );
+        let (low, high) = Rate::of([false; 100]).interval();
+        let bound = 1.0 - 0.025f64.powf(0.01);
+        assert!(low == 0.0 && (high - bound).abs() < 1e-6, "{high}");
     }
 
     #[test]
@@ -160,9 +156,7 @@ mod tests {
             runs.push((d, ((state >> 11) as f64 / (1u64 << 53) as f64) < p));
         }
         let (x, error) = d95(&runs).expect("both outcomes");
-        assert!(
-            (x - 6.0).abs() < 4.0 * error && error < 0.2,
-            "{x} +- {error}"
-        );
+        let is_near = (x - 6.0).abs() < 4.0 * error && error < 0.2;
+        assert!(is_near, "{x} +- {error}");
     }
 }

@@ -21,7 +21,7 @@ pub(super) fn either_way(draw: &mut Draw, series: &[f64]) -> Vec<f64> {
 }
 
 /// Independent draws of the normal law.
-pub(super) fn white(draw: &mut Draw, n: usize) -> Vec<f64> {
+pub(crate) fn white(draw: &mut Draw, n: usize) -> Vec<f64> {
     (0..n).map(|_| draw.normal()).collect()
 }
 

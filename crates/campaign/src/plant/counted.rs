@@ -2,6 +2,7 @@
 
 use super::{LibraryEffect, Values};
 use crate::random::Draw;
+use crate::series::one_if;
 use crate::stand::{LSB, Stand};
 
 /// A fault as drawn.
@@ -67,14 +68,12 @@ pub const COUNTED: [Row; 11] = [
         };
         one(vec![("sensor_step", ratio * LSB), ("file_step", LSB)])
     }),
-    Row {
-        label: "outliers, small",
-        ..row(230, "outliers", |d, s, a| {
-            let count = d.by_ratio(3.0, 41.0).floor();
-            let size = s.white(a).sqrt() * d.by_ratio(6.0, 8.5);
-            one(vec![("count", count), ("size", size)])
-        })
-    },
+    row(230, "outliers", |d, s, a| {
+        let count = d.by_ratio(3.0, 41.0).floor();
+        let size = s.white(a).sqrt() * d.by_ratio(6.0, 8.5);
+        one(vec![("count", count), ("size", size)])
+    })
+    .called("outliers, small"),
 ];
 
 /// A fault of the row's own channels.
@@ -90,7 +89,7 @@ fn stale(draw: &mut Draw, _: &Stand, _: usize) -> Fault {
     let silent = draw.chance(0.5);
     let count = 15.0 + draw.of_many(60) as f64;
     Fault {
-        values: vec![("count", count), ("silent", f64::from(u8::from(silent)))],
+        values: vec![("count", count), ("silent", one_if(silent))],
         everywhere: silent,
     }
 }

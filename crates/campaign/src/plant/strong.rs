@@ -3,6 +3,7 @@
 use super::{Asked, Drawn, LibraryEffect, Values};
 use crate::motor;
 use crate::random::Draw;
+use crate::series::{each, one_if};
 use crate::stand::{Needs, Stand};
 use crate::strength::{Meter, of_common, of_variance, size_for};
 
@@ -20,17 +21,17 @@ const fn row(id: u16, cause: &'static str, how: How) -> Row {
 /// The rows, by number. What is asked beyond the usual has its reason in docs/power.md, "Bars".
 #[rustfmt::skip]
 pub const STRONG: [Row; 25] = [
-    row(100, "temperature", |_, _, a| size("slope", a.sign)).needs(Needs::TEMPERATURE),
+    row(100, "temperature", |_, s, a| size(s, a, "slope")).needs(Needs::TEMPERATURE),
     row(101, "temperature_quadratic", parabola).needs(Needs::TEMPERATURE),
     row(102, "warm_up", warm_up),
-    row(103, "rate_ramp", |_, _, a| size("slope", a.sign)),
+    row(103, "rate_ramp", |_, s, a| size(s, a, "slope")),
     row(104, "line", line).asked(8.0, 1.7),
     row(105, "am_line", am_line).asked(13.0, 2.5),
     row(106, "motor_bias", motor_bias).needs(Needs::MOTOR),
-    Row { label: CURRENT, ..row(107, "motor_bias", by_current).needs(Needs::MOTOR) },
+    row(107, "motor_bias", by_current).needs(Needs::MOTOR).called(CURRENT),
     row(108, "motor_noise", motor_noise).needs(Needs::MOTOR),
     row(109, "g_sensitivity", g_sensitivity).needs(Needs::VIBRATION),
-    row(110, "supply_sensitivity", |_, _, a| size("slope", a.sign)).needs(Needs::SUPPLY),
+    row(110, "supply_sensitivity", |_, s, a| size(s, a, "slope")).needs(Needs::SUPPLY),
     row(111, "bias_step", bias_step).asked(8.0, 1.5),
     row(112, "cross_axis", cross_axis).on_a_moving_base(),
     Row { true_parts: &["base_motion"], ..row(113, "scale_error", scale_error).asked(10.0, 2.0).on_a_moving_base() },
@@ -52,41 +53,45 @@ pub const STRONG: [Row; 25] = [
 const LARGEST_RMS: f64 = 0.25;
 
 /// A shape whose size is one parameter.
-fn size(name: &'static str, sign: f64) -> Drawn {
-    shape(vec![], (name, sign))
+fn size(stand: &Stand, asked: Asked, name: &'static str) -> Drawn {
+    shape(stand, asked, vec![], (name, asked.sign))
 }
 
 /// A shape of these parameters, whose size is another.
-fn shape(shape: Values, size: (&'static str, f64)) -> Drawn {
-    Drawn::Shape {
-        shape,
-        sized: vec![size],
-        less: vec![],
-    }
+fn shape(stand: &Stand, asked: Asked, shape: Values, size: (&'static str, f64)) -> Drawn {
+    Drawn::shape(stand, asked, (&shape, &[size]), &[])
 }
 
 /// Measured beyond a straight line, for a parabola that a line fits is none.
 fn parabola(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let lean = draw.between(-5.0, 5.0);
-    Drawn::Shape {
-        shape: vec![],
-        sized: vec![("slope", asked.sign * lean), ("curvature", asked.sign)],
-        less: vec![stand.world.temperature[asked.axis].clone()],
-    }
+    let sized = [("slope", asked.sign * lean), ("curvature", asked.sign)];
+    let line = stand.world.temperature[asked.axis].clone();
+    Drawn::shape(stand, asked, (&[], &sized), &[line])
 }
 
 fn warm_up(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let tau = draw.by_ratio(stand.seconds / 60.0, stand.seconds / 4.0);
-    shape(vec![("time_constant", tau)], ("amplitude", asked.sign))
+    shape(
+        stand,
+        asked,
+        vec![("time_constant", tau)],
+        ("amplitude", asked.sign),
+    )
 }
 
-fn line(draw: &mut Draw, stand: &mut Stand, _: Asked) -> Drawn {
+fn line(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let f = draw.by_ratio(0.05, 0.49 * stand.rate_hz);
     let phase = draw.between(-3.1, 3.1);
-    shape(vec![("frequency", f), ("phase", phase)], ("amplitude", 1.0))
+    shape(
+        stand,
+        asked,
+        vec![("frequency", f), ("phase", phase)],
+        ("amplitude", 1.0),
+    )
 }
 
-fn am_line(draw: &mut Draw, stand: &mut Stand, _: Asked) -> Drawn {
+fn am_line(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let frequency = draw.between(0.05, 0.45) * stand.rate_hz;
     let values = vec![
         ("frequency", frequency),
@@ -95,29 +100,35 @@ fn am_line(draw: &mut Draw, stand: &mut Stand, _: Asked) -> Drawn {
         ("phase", draw.between(-3.1, 3.1)),
         ("modulation_phase", draw.between(-3.1, 3.1)),
     ];
-    shape(values, ("amplitude", 1.0))
+    shape(stand, asked, values, ("amplitude", 1.0))
 }
 
 fn motor_bias(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let both = stand.world.duty.iter().any(|d| *d < 0.0);
-    let size = f64::from(u8::from(both && draw.chance(0.4)));
-    shape(vec![("by_magnitude", size)], ("at_full_duty", asked.sign))
+    let size = one_if(both && draw.chance(0.4));
+    shape(
+        stand,
+        asked,
+        vec![("by_magnitude", size)],
+        ("at_full_duty", asked.sign),
+    )
 }
 
 fn by_current(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let unit = motor::current(draw, &stand.world.duty, stand.rate_hz);
     let meter = Meter::new(stand, asked.axis);
     let (size, strength) = meter.sized(&meter.energy(&unit), asked.wanted);
-    let signal = unit.iter().map(|v| asked.sign * size * v).collect();
-    Drawn::Known(vec![], strength, Some(signal))
+    Drawn {
+        signal: Some(each(&unit, |v| asked.sign * size * v)),
+        ..Drawn::of(vec![], strength)
+    }
 }
 
 fn motor_noise(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
-    let square: Vec<f64> = stand.world.duty.iter().map(|d| d * d).collect();
-    let law = |size: f64| square.iter().map(|d| 1.0 + size * d).collect::<Vec<f64>>();
+    let law = |size: f64| each(&stand.world.duty, |d| 1.0 + size * (d * d));
     let size = size_for(asked.wanted, &|x| of_variance(&law(x)));
     let values = vec![("variance_increase_at_full_duty", size)];
-    Drawn::Known(values, of_variance(&law(size)), None)
+    Drawn::of(values, of_variance(&law(size)))
 }
 
 fn noise_change(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
@@ -126,27 +137,23 @@ fn noise_change(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let start = draw.between(0.02 * seconds, 0.98 * seconds - length);
     let inside = length / seconds;
     let strength = |x: f64| {
-        let n = stand.samples() as f64;
-        (n * ((1.0 + inside * x).ln() - inside * (1.0 + x).ln()))
-            .max(0.0)
-            .sqrt()
+        let square = (1.0 + inside * x).ln() - inside * (1.0 + x).ln();
+        (stand.samples() as f64 * square).max(0.0).sqrt()
     };
     let size = size_for(asked.wanted, &strength);
-    let values = vec![
-        ("start", start),
-        ("end", start + length),
-        ("variance_increase", size),
-    ];
-    Drawn::Known(values, strength(size), None)
+    let (end, louder) = (start + length, ("variance_increase", size));
+    let values = vec![("start", start), ("end", end), louder];
+    Drawn::of(values, strength(size))
 }
 
-fn g_sensitivity(draw: &mut Draw, _: &mut Stand, asked: Asked) -> Drawn {
-    size(["acc_x", "acc_y", "acc_z"][draw.of_many(3)], asked.sign)
+fn g_sensitivity(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
+    let axis = draw.one_of(&["acc_x", "acc_y", "acc_z"]);
+    size(stand, asked, axis)
 }
 
 fn bias_step(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let at = stand.seconds * draw.between(0.1, 0.9);
-    shape(vec![("time", at)], ("height", asked.sign))
+    shape(stand, asked, vec![("time", at)], ("height", asked.sign))
 }
 
 /// A half sine or a ring that several readings see: one alone is as well a disturbed word.
@@ -161,16 +168,13 @@ fn shock(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
         values.push(("phase", draw.between(-3.1, 3.1)));
         sign = 1.0;
     }
-    shape(values, ("peak", sign))
+    shape(stand, asked, values, ("peak", sign))
 }
 
 fn cross_axis(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
-    let turn = draw.between(7.0, 28.0);
-    stand.excitation = vec![
-        ("turn_dps", turn),
-        ("turn_period_s", draw.between(15.0, 60.0)),
-    ];
-    size("from_gyro_z", asked.sign)
+    let (turn, period) = (draw.between(7.0, 28.0), draw.between(15.0, 60.0));
+    stand.excitation = vec![("turn_dps", turn), ("turn_period_s", period)];
+    size(stand, asked, "from_gyro_z")
 }
 
 fn scale_error(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
@@ -182,7 +186,7 @@ fn scale_error(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let tilt = (4.7f64 / 800.0).to_degrees() * w;
     let error = ((2.0 / n) * (stand.white(asked.axis) + tilt * tilt)).sqrt() / (sway * w);
     let relative = asked.sign * (asked.wanted * error).min(0.5);
-    Drawn::Known(vec![("relative", relative)], relative.abs() / error, None)
+    Drawn::of(vec![("relative", relative)], relative.abs() / error)
 }
 
 /// A process of the size that is as strong as asked, or of the largest: size, strength, density by bin.
@@ -193,7 +197,7 @@ fn of_density(
     density: &dyn Fn(f64, f64) -> f64,
 ) -> (f64, f64, Vec<f64>) {
     let meter = Meter::new(stand, asked.axis);
-    let all = |size: f64| -> Vec<f64> { meter.omega().iter().map(|w| density(size, *w)).collect() };
+    let all = |size: f64| each(meter.omega(), |w| density(size, w));
     let strength = |size: f64| meter.of_density(&all(size));
     let size = size_for(asked.wanted, &strength).min(largest);
     (size, strength(size), all(size))
@@ -236,13 +240,13 @@ fn strongest(
 fn gauss_markov(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let (tau, sigma, strength, density) = strongest(draw, stand, asked, ((0.2, 10.0), 1.0));
     let values = vec![("sigma", sigma), ("correlation_time", tau)];
-    Drawn::Process(values, strength, density)
+    Drawn::process(values, strength, density)
 }
 
 fn telegraph(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let (dwell, half, strength, density) = strongest(draw, stand, asked, ((3.0, 40.0), 2.0));
     let values = vec![("half_height", half), ("dwell_time", dwell)];
-    Drawn::Process(values, strength, density)
+    Drawn::process(values, strength, density)
 }
 
 /// A band about a centre, of the width that is called so: rms, strength, centre and width, density. Some hundred independent
@@ -267,19 +271,19 @@ fn band(
 
 fn narrow_band(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let (rms, strength, values, density) = band(draw, stand, asked, "bandwidth");
-    Drawn::Process([vec![("rms", rms)], values].concat(), strength, density)
+    Drawn::process([vec![("rms", rms)], values].concat(), strength, density)
 }
 
 fn wandering_line(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let (rms, strength, values, density) = band(draw, stand, asked, "linewidth");
     let values = [vec![("amplitude", rms * 2f64.sqrt())], values].concat();
-    Drawn::Process(values, strength, density)
+    Drawn::process(values, strength, density)
 }
 
 /// Two-sided density B^2 / (2 pi f): B^2 / w per sample.
 fn flicker(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let (b, strength, density) = of_density(stand, asked, LARGEST_RMS, &|b, w| b * b / w);
-    Drawn::Process(vec![("bias_instability", b * 3600.0)], strength, density)
+    Drawn::process(vec![("bias_instability", b * 3600.0)], strength, density)
 }
 
 /// With another axis the other way about: what goes the same way is common noise.
@@ -289,7 +293,7 @@ fn correlated_noise(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let n = stand.samples() as f64;
     let strength = |r: f64| (-n * (1.0 - r * r).ln()).sqrt();
     let r = (1.0 - (-asked.wanted.powi(2) / n).exp()).sqrt();
-    Drawn::Known(vec![(with, -r)], strength(r), None)
+    Drawn::of(vec![(with, -r)], strength(r))
 }
 
 /// The angle's rounding of standard deviation q, differenced: 2 (q f_s)^2 (1 - cos w) per sample.
@@ -297,28 +301,23 @@ fn quantization_noise(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let rate = stand.rate_hz;
     let density = |q: f64, w: f64| 2.0 * (q * rate).powi(2) * (1.0 - w.cos());
     let (q, strength, density) = of_density(stand, asked, f64::INFINITY, &density);
-    Drawn::Process(vec![("q", q)], strength, density)
+    Drawn::process(vec![("q", q)], strength, density)
 }
 
 fn low_pass(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let white = stand.white(asked.axis);
     let of = |rho: f64| rho.min(0.7);
-    let density = |rho: f64, w: f64| {
-        let rho = of(rho);
-        white
-            * if rho <= 0.3 {
-                2.0 * rho * w.cos()
-            } else {
-                one_pole(rho, w) - 1.0
-            }
+    let density = |rho: f64, w: f64| match of(rho) {
+        rho if rho <= 0.3 => white * (2.0 * rho * w.cos()),
+        rho => white * (one_pole(rho, w) - 1.0),
     };
     let (rho, strength, density) = of_density(stand, asked, f64::INFINITY, &density);
-    Drawn::Process(vec![("lag1_correlation", of(rho))], strength, density)
+    Drawn::process(vec![("lag1_correlation", of(rho))], strength, density)
 }
 
 fn common_noise(_: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let whites: Vec<f64> = (0..3).map(|i| stand.white(i)).collect();
     let strength = |s: f64| of_common(&whites, s * s, stand.samples());
     let sigma = size_for(asked.wanted, &strength);
-    Drawn::Known(vec![("sigma", sigma)], strength(sigma), None)
+    Drawn::of(vec![("sigma", sigma)], strength(sigma))
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::structures::{kept, named};
-use super::{covers, estimates, percent, strong};
+use super::{alarms, covers, estimates, of, percent, strong, unexplained_and_wrong};
 use crate::case::{Family, Outcome};
 use crate::clean::KINDS;
 use crate::foreign::{EFFECTS, sets};
@@ -79,13 +79,11 @@ not 7.2. The modulation of an AM line holds depth^2 / (2 + depth^2) of its energ
 ";
 
 /// Foreign effects that are strong enough to be reported.
-fn strange(all: &[Outcome]) -> Vec<&Outcome> {
-    all.iter()
-        .filter(|o| {
-            matches!(o.family, Family::Foreign(i) if EFFECTS[i].later.is_none())
-                && (o.strength.is_nan() || o.strength >= 0.99 * 25.0)
-        })
-        .collect()
+fn strange(all: &[Outcome]) -> impl Iterator<Item = &Outcome> + Clone {
+    let foreign =
+        |o: &&Outcome| matches!(o.family, Family::Foreign(i) if EFFECTS[i].later.is_none());
+    let strong = |o: &&Outcome| o.strength.is_nan() || o.strength >= 0.99 * 25.0;
+    all.iter().filter(foreign).filter(strong)
 }
 
 /// Both bars of foreign effects: told, and given a name.
@@ -102,22 +100,13 @@ const ALARMS: f64 = 0.005;
 
 /// The bars of runs without an effect.
 fn of_clean(all: &[Outcome]) -> Vec<Bar> {
-    let alarms = |family| {
-        let own = all.iter().filter(|o| o.family == family);
-        Rate::of(own.map(|o| !o.quiet()))
-    };
-    let mut bars = vec![bar(
-        "clean runs with an alarm",
-        AtMost,
-        ALARMS,
-        alarms(Family::Clean),
-    )];
-    bars.extend(KINDS.iter().enumerate().map(|(i, kind)| {
+    let of_family = |what: String, family| bar(what, AtMost, ALARMS, alarms(of(all, family)));
+    let first = of_family("clean runs with an alarm".into(), Family::Clean);
+    let others = KINDS.iter().enumerate().map(|(i, kind)| {
         let what = kind.label.trim_start_matches("nothing, ");
-        let rate = alarms(Family::CleanOf(i));
-        bar(format!("the same, {what}"), AtMost, ALARMS, rate)
-    }));
-    bars
+        of_family(format!("the same, {what}"), Family::CleanOf(i))
+    });
+    std::iter::once(first).chain(others).collect()
 }
 
 /// The bars of effects of the library.
@@ -154,32 +143,15 @@ pub(super) fn bars(out: &mut String, all: &[Outcome]) {
         let what = format!("foreign effects of d' >= 25, set {latest} before any change by it");
         bars.extend(of_strange(&what, [first.unexplained, first.named].map(of)));
     }
-    let strange = strange(all);
-    let of = |hit: fn(&Outcome) -> bool| Rate::of(strange.iter().map(|o| hit(o)));
-    let rates = [
-        of(|o| !o.unexplained.is_empty()),
-        of(|o| !o.wrong.is_empty()),
-    ];
+    let rates = unexplained_and_wrong(strange(all));
     bars.extend(of_strange("foreign effects of d' >= 25, all sets", rates));
-    bars.push(bar(
-        "95 % intervals that hold the truth",
-        AtLeast,
-        0.93,
-        covered,
-    ));
-    let _ = writeln!(
-        out,
-        "## Bars\n\n| bar | asked | measured | |\n|---|---|---|---|"
-    );
+    let what = "95 % intervals that hold the truth";
+    bars.push(bar(what, AtLeast, 0.93, covered));
+    out.push_str("## Bars\n\n| bar | asked | measured | |\n|---|---|---|---|\n");
     for b in &bars {
-        let _ = writeln!(
-            out,
-            "| {} | {} | {} | {} |",
-            b.what,
-            b.asked(),
-            percent(b.measured),
-            b.verdict()
-        );
+        let (what, asked, measured, verdict) =
+            (&b.what, b.asked(), percent(b.measured), b.verdict());
+        let _ = writeln!(out, "| {what} | {asked} | {measured} | {verdict} |");
     }
     let _ = writeln!(out, "{BEYOND_REACH}");
 }

@@ -3,31 +3,25 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::{count, counts, covers, estimates, found, strong};
+use super::{counts, covers, estimates, found, of, strong};
 use crate::case::{Estimate, Family, Outcome};
-use crate::plant::{BY_COUNT, BY_STRENGTH, strong as row_of};
+use crate::plant::{COUNTED, STRONG};
 use crate::tally::{ORACLE, Rate, d95, oracle};
 
 /// Edges of the power curves, d'.
 const STRENGTHS: [f64; 5] = [3.0, 5.0, 8.0, 13.0, 26.0];
 
-/// The runs of a family.
-fn of(all: &[Outcome], family: Family) -> impl Iterator<Item = &Outcome> {
-    all.iter().filter(move |o| o.family == family)
-}
-
 /// Runs of a family in which an effect was named beside others.
-fn beside(all: &[Outcome], family: Family, label: &str) -> String {
+fn beside(all: &[Outcome], family: Family, label: &str) -> Rate {
     let effects = of(all, family).flat_map(|o| &o.truths);
-    count(Rate::of(effects.filter(|t| t.0 == label).map(found)))
+    Rate::of(effects.filter(|t| t.0 == label).map(found))
 }
 
 fn by_strength(out: &mut String, all: &[Outcome]) {
     let bands = || STRENGTHS.windows(2).map(|w| (w[0], w[1]));
     let heads: Vec<String> = bands().map(|(a, b)| format!("{a:.0}..{b:.0}")).collect();
-    let chances: Vec<String> = bands()
-        .map(|(a, b)| format!("{:.2}", oracle((a * b).sqrt())))
-        .collect();
+    let chance = |(a, b): (f64, f64)| format!("{:.2}", oracle((a * b).sqrt()));
+    let chances: Vec<String> = bands().map(chance).collect();
     let _ = writeln!(
         out,
         "## Effects of the library\n\n\
@@ -40,28 +34,23 @@ fn by_strength(out: &mut String, all: &[Outcome]) {
         "---|".repeat(heads.len()),
         chances.join(" | ")
     );
-    for (i, label) in BY_STRENGTH.iter().enumerate() {
-        let own: Vec<&Outcome> = of(all, Family::One(i)).collect();
-        let curve: Vec<(f64, bool)> = own
-            .iter()
-            .map(|o| (o.truths[0].1, found(&o.truths[0])))
-            .collect();
-        let named: Vec<String> = bands()
-            .map(|(low, high)| {
-                let within = curve.iter().filter(|c| (low..high).contains(&c.0));
-                count(Rate::of(within.map(|c| c.1)))
-            })
-            .collect();
-        let alone = Rate::of(own.iter().filter(|o| strong(o)).map(|o| o.right()));
+    for (i, row) in STRONG.iter().enumerate() {
+        let own = of(all, Family::One(i));
+        let seen = own.clone().map(|o| (o.truths[0].1, found(&o.truths[0])));
+        let curve: Vec<(f64, bool)> = seen.collect();
+        let within = |(low, high): (f64, f64)| {
+            let own = curve.iter().filter(|c| (low..high).contains(&c.0));
+            Rate::of(own.map(|c| c.1)).to_string()
+        };
+        let named: Vec<String> = bands().map(within).collect();
+        let alone = Rate::of(own.filter(|o| strong(o)).map(Outcome::right));
         let at = d95(&curve).map_or("-".into(), |(x, e)| format!("{x:.1}±{e:.1}"));
+        let (label, named, asked) = (row.label, named.join(" | "), ORACLE * row.asked_ratio);
+        let [pair, one_axis] =
+            [Family::Pair, Family::OneAxis].map(|family| beside(all, family, label));
         let _ = writeln!(
             out,
-            "| {label} | {} | {} | {at} ({:.1}) | {} | {} |",
-            named.join(" | "),
-            count(alone),
-            ORACLE * row_of(label).asked_ratio,
-            beside(all, Family::Pair, label),
-            beside(all, Family::OneAxis, label)
+            "| {label} | {named} | {alone} | {at} ({asked:.1}) | {pair} | {one_axis} |"
         );
     }
 }
@@ -75,14 +64,11 @@ bits stuck in 15..100 % of the samples, 15..75 repeats, 5..65 lost frames, jitte
 
 fn by_count(out: &mut String, all: &[Outcome]) {
     let _ = writeln!(out, "{FAULTS}\n| fault | named | alone |\n|---|---|---|");
-    for (i, label) in BY_COUNT.iter().enumerate() {
-        let own: Vec<&Outcome> = of(all, Family::Counted(i)).collect();
-        let _ = writeln!(
-            out,
-            "| {label} | {} | {} |",
-            count(Rate::of(own.iter().map(|o| found(&o.truths[0])))),
-            count(Rate::of(own.iter().map(|o| o.right()))),
-        );
+    for (i, row) in COUNTED.iter().enumerate() {
+        let (label, own) = (row.label, of(all, Family::Counted(i)));
+        let named = Rate::of(own.clone().map(|o| found(&o.truths[0])));
+        let alone = Rate::of(own.map(Outcome::right));
+        let _ = writeln!(out, "| {label} | {named} | {alone} |");
     }
 }
 
@@ -106,10 +92,9 @@ fn confusion(out: &mut String, all: &[Outcome]) {
             rows.push(format!("{label} ({} runs): {said}", own.len()));
         }
     }
-    let rows = if rows.is_empty() {
-        "nothing".into()
-    } else {
-        rows.join("; ")
+    let rows = match rows.as_slice() {
+        [] => "nothing".into(),
+        some => some.join("; "),
     };
     let _ = writeln!(
         out,
@@ -120,16 +105,13 @@ fn confusion(out: &mut String, all: &[Outcome]) {
 /// Intervals that hold the truth, and the mean of estimate over truth with its standard error.
 fn told(parameter: &str, of: &[&Estimate]) -> String {
     let covered = Rate::of(of.iter().map(|e| covers(e)));
-    let ratios: Vec<f64> = of
-        .iter()
-        .filter(|e| e.truth != 0.0)
-        .map(|e| e.value / e.truth)
-        .collect();
+    let told = of.iter().filter(|e| e.truth != 0.0);
+    let ratios: Vec<f64> = told.map(|e| e.value / e.truth).collect();
     let n = ratios.len().max(1) as f64;
     let mean = ratios.iter().sum::<f64>() / n;
     let variance = ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
     let error = (variance / n).sqrt();
-    format!("`{parameter}` {} {mean:.3}±{error:.3}", count(covered))
+    format!("`{parameter}` {covered} {mean:.3}±{error:.3}")
 }
 
 fn intervals(out: &mut String, all: &[Outcome]) {
