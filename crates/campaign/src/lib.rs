@@ -18,6 +18,7 @@ pub mod stand;
 pub mod strength;
 pub mod tally;
 
+use std::hash::{BuildHasher, Hasher};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 pub use case::{Family, Hit, Outcome};
@@ -124,6 +125,12 @@ pub fn cases(size: Size, only: Option<&str>) -> Vec<(Family, u64)> {
     let mut all: Vec<(f64, Family, u64)> = asked.flat_map(runs).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     all.into_iter().map(|(_, f, i)| (f, i)).collect()
+}
+
+/// A seed that no campaign has had.
+#[must_use]
+pub fn fresh_seed() -> u64 {
+    std::hash::RandomState::new().build_hasher().finish() >> 16
 }
 
 /// How many threads this computer has.

@@ -1,6 +1,5 @@
 //! `cargo xtask campaign`: see docs/power.md.
 
-use std::hash::{BuildHasher, Hasher};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -106,9 +105,7 @@ fn campaign_of(a: Arguments) -> Result<(), Failure> {
         let log = log::read(path).map_err(with(path, "name a file that --log made"))?;
         return put(&told(&log), a.out.as_deref());
     }
-    let seed = a
-        .seed
-        .unwrap_or_else(|| std::hash::RandomState::new().build_hasher().finish() >> 16);
+    let seed = a.seed.unwrap_or_else(campaign::fresh_seed);
     if let (Some(index), Some((family, _))) = (a.run, all.first()) {
         describe(seed, *family, index);
         return Ok(());

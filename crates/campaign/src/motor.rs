@@ -1,6 +1,7 @@
 //! The current of a motor that has to spin up: what couples by physics is not proportional to the command.
 
 use crate::random::Draw;
+use crate::series::each;
 
 /// Current over that of a blocked motor at full duty, by sample. After a step of the command it surges, then falls with
 /// the mechanical time constant to what friction takes; a reversal surges up to twice as high.
@@ -13,30 +14,21 @@ pub fn current(draw: &mut Draw, duty: &[f64], rate_hz: f64) -> Vec<f64> {
     const STEPS: usize = 8;
     let dt = 1.0 / rate_hz / STEPS as f64;
     let mut speed = 0.0f64;
-    duty.iter()
-        .map(|u| {
-            let mut sum = 0.0;
-            for _ in 0..STEPS {
-                let i = u - speed;
-                sum += i;
-                let drive = i - viscous * speed;
-                if speed == 0.0 && drive.abs() <= coulomb {
-                    continue;
-                }
-                let against = if speed == 0.0 {
-                    drive.signum()
-                } else {
-                    speed.signum()
-                };
-                let next = speed + dt / tau * (drive - coulomb * against);
-                // Friction stops a rotor, it does not turn it back.
-                speed = if speed != 0.0 && next.signum() != speed.signum() {
-                    0.0
-                } else {
-                    next
-                };
+    each(duty, |u| {
+        let mut sum = 0.0;
+        for _ in 0..STEPS {
+            let i = u - speed;
+            sum += i;
+            let drive = i - viscous * speed;
+            if speed == 0.0 && drive.abs() <= coulomb {
+                continue;
             }
-            sum / STEPS as f64
-        })
-        .collect()
+            let against = if speed == 0.0 { drive } else { speed }.signum();
+            let next = speed + dt / tau * (drive - coulomb * against);
+            // Friction stops a rotor, it does not turn it back.
+            let stops = speed != 0.0 && next.signum() != against;
+            speed = if stops { 0.0 } else { next };
+        }
+        sum / STEPS as f64
+    })
 }

@@ -57,6 +57,11 @@ impl Draw {
         self.choose(0.5, one, other)
     }
 
+    /// 0 with that chance, else what is drawn.
+    pub fn zero_or(&mut self, p: f64, of: impl FnOnce(&mut Self) -> f64) -> f64 {
+        if self.chance(p) { 0.0 } else { of(self) }
+    }
+
     /// 1 or -1.
     pub fn sign(&mut self) -> f64 {
         self.either(1.0, -1.0)

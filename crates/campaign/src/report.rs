@@ -222,15 +222,11 @@ fn times(out: &mut String, all: &[Outcome]) {
         *row = (row.0 + o.seconds, row.1 + 1);
     }
     let total: f64 = rows.values().map(|r| r.0).sum();
-    let means = rows
-        .iter()
-        .map(|(f, (sum, n))| (f.label(), sum / *n as f64));
-    let mut means: Vec<(&str, f64)> = means.collect();
+    let mean = |(f, (sum, n)): (&Family, &(f64, usize))| (f.label(), sum / *n as f64);
+    let mut means: Vec<(&str, f64)> = rows.iter().map(mean).collect();
     means.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let slowest = means.iter().take(2);
-    let slowest: Vec<String> = slowest
-        .map(|(label, s)| format!("{label} {s:.1} s"))
-        .collect();
+    let row = |(label, s): &(&str, f64)| format!("{label} {s:.1} s");
+    let slowest: Vec<String> = means.iter().take(2).map(row).collect();
     let (ms, slowest) = (1e3 * total / all.len().max(1) as f64, slowest.join(", "));
     let _ = writeln!(
         out,

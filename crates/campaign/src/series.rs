@@ -108,11 +108,6 @@ pub(crate) fn ramped(series: &[f64], most_per_s: f64, rate_hz: f64) -> Vec<f64> 
 pub(crate) fn without_line(y: &[f64], x: &[f64]) -> Vec<f64> {
     let (y, x) = (about_mean(y), about_mean(x));
     let sum = |a: &[f64], b: &[f64]| each_pair(a, b, |a, b| a * b).iter().sum::<f64>();
-    let square = sum(&x, &x);
-    let slope = if square > 0.0 {
-        sum(&y, &x) / square
-    } else {
-        0.0
-    };
+    let slope = sum(&y, &x) / sum(&x, &x).max(f64::MIN_POSITIVE);
     each_pair(&y, &x, |y, x| y - slope * x)
 }

@@ -73,18 +73,11 @@ impl Stand {
     #[must_use]
     pub fn draw(draw: &mut Draw, seconds: f64, rate_hz: f64, needs: Needs) -> Self {
         let samples = (seconds * rate_hz).round() as usize;
-        let walk = |draw: &mut Draw| {
-            if draw.chance(0.15) {
-                0.0
-            } else {
-                draw.by_ratio(3e-4, 7e-3)
-            }
-        };
         let mut stand = Self {
             seconds,
             rate_hz,
             walk_of_angle: std::array::from_fn(|_| draw.between(3.6, 7.0)),
-            walk_of_rate: std::array::from_fn(|_| walk(draw)),
+            walk_of_rate: std::array::from_fn(|_| draw.zero_or(0.15, |d| d.by_ratio(3e-4, 7e-3))),
             bias: std::array::from_fn(|_| draw.between(-1.0, 1.0)),
             lsb: [LSB; 3],
             world: World {

@@ -137,12 +137,9 @@ fn named(shares: Vec<(&str, f64)>) -> Vec<(String, f64)> {
 
 /// Every effect of some kinds that is held, on all threads; what a row fails by is told of all of them.
 fn hold_each(kinds: &[&str], of: &(dyn Fn(usize, &ForeignEffect) -> Vec<String> + Sync)) {
-    let all: Vec<&ForeignEffect> = KINDS
-        .iter()
-        .filter(|(kind, _)| kinds.contains(kind))
-        .flat_map(|(_, effects)| *effects)
-        .filter(|effect| is_held(effect))
-        .collect();
+    let kinds = KINDS.iter().filter(|(kind, _)| kinds.contains(kind));
+    let effects = kinds.flat_map(|(_, effects)| *effects);
+    let all: Vec<&ForeignEffect> = effects.filter(|effect| is_held(effect)).collect();
     let wrong = crate::in_parallel(&all, crate::threads(), |effect| {
         let wrong = of(usize::from(effect.id - EFFECTS[0].id), effect);
         let named = |w| format!("{}: {w}", effect.name);

@@ -87,6 +87,23 @@ pub(super) fn noise(
     })
 }
 
+/// Noise in which each reading brings something new of variance 1, the whole having this variance, by size: who knows the law
+/// predicts the rest, d'^2 = samples x ln(variance). It is made to have variance 1.
+pub(super) fn predicted(
+    most: f64,
+    variance: impl Fn(&Stand, f64) -> f64 + Copy + 'static,
+    series: impl FnOnce(&Stand, &mut Draw, f64) -> Vec<f64> + 'static,
+) -> Shape {
+    noise(
+        most,
+        move |stand, size| Known::by_reading(stand, variance(stand, size).ln()),
+        move |stand, draw, size| {
+            let scale = variance(stand, size).sqrt();
+            each(&series(stand, draw, size), |x| x / scale)
+        },
+    )
+}
+
 /// White noise of which the share that is the size gets this series in its place, of variance 1.
 pub(super) fn share(
     most: f64,

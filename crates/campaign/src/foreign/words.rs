@@ -258,9 +258,8 @@ pub(super) fn with_rests(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64)
 /// ones, in either sense, and a rest now and then.
 pub(super) fn programme(draw: &mut Draw, stand: &mut Stand, dwell_s: (f64, f64)) {
     const RESTS: f64 = 0.25;
-    stand.world.duty = stand.held(draw, dwell_s, |d| match d.chance(RESTS) {
-        true => 0.0,
-        false => in_steps((0.45 * d.normal()).clamp(-1.0, 1.0)),
+    stand.world.duty = stand.held(draw, dwell_s, |d| {
+        d.zero_or(RESTS, |d| in_steps((0.45 * d.normal()).clamp(-1.0, 1.0)))
     });
 }
 
@@ -292,8 +291,9 @@ pub(super) fn passes(angle: &[f64], per_turn: f64, first: f64) -> Vec<f64> {
     each(&changes(&places), f64::abs)
 }
 
-/// Events of a record, s: `count` of them, the first after a tenth of it, and no two within a twentieth.
-pub(super) fn events(draw: &mut Draw, stand: &Stand, count: usize) -> Vec<f64> {
+/// Events of a record, s: at least so many, of so many numbers, the first after a tenth of it, and no two within a twentieth.
+pub(super) fn events(draw: &mut Draw, stand: &Stand, least: usize, numbers: usize) -> Vec<f64> {
+    let count = least + draw.of_many(numbers);
     let mut all: Vec<f64> = vec![];
     while all.len() < count {
         let at = stand.seconds * draw.between(0.1, 0.9);

@@ -340,9 +340,7 @@ pub(super) fn best_process(
     expected: &[f64],
     kind: Kind,
 ) -> (&'static str, f64) {
-    EFFECTS
-        .iter()
-        .map(|e| (e.id(), of_process(stand, axis, expected, *e, kind)))
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .expect("the library has processes")
+    let of = |e: &&'static dyn Effect| (e.id(), of_process(stand, axis, expected, *e, kind));
+    let best = EFFECTS.iter().map(of).max_by(|a, b| a.1.total_cmp(&b.1));
+    best.expect("the library has processes")
 }

@@ -123,8 +123,7 @@ pub(super) fn heart(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// Knocks at the stand: the part rings, has another bias after each, and recovers a part of that. The accelerometers feel
 /// the knock itself.
 pub(super) fn lasting_shocks(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
-    let count = 2 + draw.of_many(4);
-    let at = events(draw, stand, count);
+    let at = events(draw, stand, 2, 4);
     for knock in &at {
         let i = (knock * stand.rate_hz).ceil() as usize;
         for acc in &mut stand.world.acc {

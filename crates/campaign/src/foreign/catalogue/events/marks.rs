@@ -126,8 +126,7 @@ pub(super) fn pulses(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 
 /// Discharges that leave charge at the proof mass: each a jump of the bias that leaks away through the oxide.
 pub(super) fn charge(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let count = 3 + draw.of_many(5);
-    let at = events(draw, stand, count);
+    let at = events(draw, stand, 3, 5);
     let leaks = draw.by_ratio(3.0, 25.0);
     let size = sizes(draw, &at);
     about_mean(&since(stand, &at, |k, t| size[k] * (-t / leaks).exp()))
@@ -135,8 +134,7 @@ pub(super) fn charge(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 
 /// Jolts that leave stress in the package, which relaxes as the logarithm of the time since.
 pub(super) fn jolts(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let count = 3 + draw.of_many(5);
-    let at = events(draw, stand, count);
+    let at = events(draw, stand, 3, 5);
     let (begins, ends) = (draw.by_ratio(0.1, 1.0), draw.by_ratio(20.0, 120.0));
     let size = sizes(draw, &at);
     let whole = (ends / begins).ln_1p();
@@ -147,19 +145,15 @@ pub(super) fn jolts(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// The loop that holds the drive at its resonance loses it now and then: for a moment its phase slips through whole turns,
 /// slower and slower, then it is caught and what is left of the error dies away.
 pub(super) fn lock(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let count = 3 + draw.of_many(6);
-    let at = events(draw, stand, count);
+    let at = events(draw, stand, 3, 6);
     let (slips, beat) = (draw.between(0.4, 1.5), draw.between(2.0, 6.0));
     let dies = draw.by_ratio(1.5, 8.0);
     let size = sizes(draw, &at);
+    // Its pitch goes down to 0 evenly, and ends at a crest.
+    let slipping = |t: f64| (PI * beat * slips * (1.0 - t / slips).powi(2)).cos();
+    let caught = |t: f64| (-(t - slips) / dies).exp();
     since(stand, &at, |k, t| {
-        size[k]
-            * if t < slips {
-                // Its pitch goes down to 0 evenly, and ends at a crest.
-                (PI * beat * slips * (1.0 - t / slips).powi(2)).cos()
-            } else {
-                (-(t - slips) / dies).exp()
-            }
+        size[k] * if t < slips { slipping(t) } else { caught(t) }
     })
 }
 

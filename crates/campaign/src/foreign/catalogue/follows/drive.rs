@@ -286,8 +286,7 @@ pub(super) fn acceleration(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
 
 /// Commands of a table that creeps, which the stand gets, each for a random time, s; it rests now and then.
 fn creeping(draw: &mut Draw, stand: &mut Stand, creep: (f64, f64), dwell_s: (f64, f64)) {
-    stand.world.duty = stand.held(draw, dwell_s, |d| match d.chance(0.2) {
-        true => 0.0,
-        false => in_steps(d.sign() * d.by_ratio(creep.0, creep.1)),
+    stand.world.duty = stand.held(draw, dwell_s, |d| {
+        d.zero_or(0.2, |d| in_steps(d.sign() * d.by_ratio(creep.0, creep.1)))
     });
 }

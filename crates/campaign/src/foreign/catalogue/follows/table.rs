@@ -73,11 +73,8 @@ pub(super) fn differences(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     let mut off = 0.0;
     stand.series(|i| {
         let told = changes[i].clamp(-most, most);
-        off = if i % whole == 0 {
-            0.0
-        } else {
-            off + (told - changes[i])
-        };
+        let keeps = one_if(i % whole != 0);
+        off = keeps * (off + (told - changes[i]));
         off
     })
 }

@@ -98,20 +98,16 @@ fn filled_up(ratio: f64, samples: &[f64], n: usize) -> Vec<f64> {
 }
 
 /// Thermal tail of an amplifier: the heat of a swing, its square, unbalances the input when the next reading is taken.
-/// x[i] = e[i] + tail (e[i-1]^2 - 1), of variance 1 + 2 tail^2, is white: e and its square do not correlate. Who knows the
-/// law predicts it down to variance 1, d'^2 = samples x ln(1 + 2 tail^2).
+/// x[i] = e[i] + tail (e[i-1]^2 - 1), of variance 1 + 2 tail^2, is white: e and its square do not correlate.
 pub(super) fn square_behind() -> Shape {
-    noise(
-        f64::INFINITY,
-        |stand, tail| Known::by_reading(stand, (2.0 * tail * tail).ln_1p()),
-        |stand, draw, tail| {
-            let (size, tail) = ((1.0 + 2.0 * tail * tail).sqrt(), tail * draw.sign());
-            let white = white(draw, stand.samples() + 1);
-            each_pair(&white, &white[1..], |before, e| {
-                (e + tail * (before * before - 1.0)) / size
-            })
-        },
-    )
+    let variance = |_: &Stand, tail: f64| 1.0 + 2.0 * tail * tail;
+    predicted(f64::INFINITY, variance, |stand, draw, tail| {
+        let tail = tail * draw.sign();
+        let white = white(draw, stand.samples() + 1);
+        each_pair(&white, &white[1..], |before, e| {
+            e + tail * (before * before - 1.0)
+        })
+    })
 }
 
 /// A part with a clock of its own, brought to the board's by drawing a straight line between its two last samples. As the
@@ -133,42 +129,34 @@ pub(super) fn interpolated(draw: &mut Draw, stand: &Stand) -> Shape {
 
 /// A capacitor that holds a sample keeps some of the one before, and a second one is switched against it; what they differ
 /// by moves with the temperature, and was trimmed away in the middle of its range: neighbours correlate in the cold and
-/// anticorrelate in the heat, or the other way. Predicted, the noise has variance 1; as a whole 1 + the mean of what is
-/// kept squared.
+/// anticorrelate in the heat, or the other way. The whole has variance 1 + the mean of what is kept squared.
 pub(super) fn trimmed(draw: &mut Draw, stand: &Stand, axis: usize) -> Shape {
     let off = about_mean(&stand.world.temperature[axis]);
     let (low, high) = extremes(&off);
     let most = high.max(-low).max(1e-9);
     let (kept, sign) = (each(&off, |t| t / most), draw.sign());
     let square = mean_square(&kept);
-    noise(
-        0.98,
-        move |stand, size| Known::by_reading(stand, (size * size * square).ln_1p()),
-        move |stand, draw, size| {
-            let scale = (1.0 + size * size * square).sqrt();
-            let white = white(draw, stand.samples() + 1);
-            stand.series(|i| (white[i + 1] + sign * size * kept[i] * white[i]) / scale)
-        },
-    )
+    let variance = move |_: &Stand, size: f64| 1.0 + size * size * square;
+    predicted(0.98, variance, move |stand, draw, size| {
+        let white = white(draw, stand.samples() + 1);
+        stand.series(|i| white[i + 1] + sign * size * kept[i] * white[i])
+    })
 }
 
 /// A mixer whose two inputs still hold the last two swings gives out their product: white, without skew, and only three
-/// readings together tell. Who knows the law predicts it down to variance 1, d'^2 = samples x ln(1 + share^2).
+/// readings together tell.
 pub(super) fn product() -> Shape {
-    noise(
-        f64::INFINITY,
-        |stand, share| Known::by_reading(stand, (share * share).ln_1p()),
-        |stand, draw, share| {
-            let (scale, sign) = ((1.0 + share * share).sqrt(), draw.sign());
-            let (mut one, mut two) = (draw.normal(), draw.normal());
-            stand.series(|_| {
-                let e = draw.normal();
-                let x = e + sign * share * one * two;
-                (two, one) = (one, e);
-                x / scale
-            })
-        },
-    )
+    let variance = |_: &Stand, share: f64| 1.0 + share * share;
+    predicted(f64::INFINITY, variance, |stand, draw, share| {
+        let sign = draw.sign();
+        let (mut one, mut two) = (draw.normal(), draw.normal());
+        stand.series(|_| {
+            let e = draw.normal();
+            let x = e + sign * share * one * two;
+            (two, one) = (one, e);
+            x
+        })
+    })
 }
 
 /// Firmware with a filter that is slow for small changes and fast for large ones, which it takes for motion: of a change d it
@@ -236,38 +224,26 @@ pub(super) fn switched(draw: &mut Draw, stand: &mut Stand) -> Shape {
         move |stand, draw, f| {
             let white = white(draw, stand.samples() + 1);
             stand.series(|i| {
-                let (before, e) = (white[i], white[i + 1]);
-                if runs[i] {
-                    (1.0 - f) * e + f * before
-                } else {
-                    e
-                }
+                let f = if runs[i] { f } else { 0.0 };
+                (1.0 - f) * white[i + 1] + f * white[i]
             })
         },
     )
 }
 
 /// Firmware that takes its zero anew from each block of a few readings, and most of it off the readings of the next: the
-/// steps of this zero come back as noise, and who knows the blocks knows the zero. d'^2 = samples x ln(1 + share^2 /
-/// length).
+/// steps of this zero come back as noise, and who knows the blocks knows the zero.
 pub(super) fn blocks(draw: &mut Draw) -> Shape {
     let length = 4 + draw.of_many(4);
-    noise(
-        f64::INFINITY,
-        move |stand, share| Known::by_reading(stand, (share * share / length as f64).ln_1p()),
-        move |stand, draw, share| {
-            let n = stand.samples();
-            let scale = (1.0 + share * share / length as f64).sqrt();
-            let first = draw.of_many(length);
-            let white = white(draw, n + 2 * length);
-            let off = |i: usize| {
-                let (here, block) = (i + first + length, (i + first) / length * length);
-                let zero = mean(&white[block..block + length]);
-                (white[here] - share * zero) / scale
-            };
-            (0..n).map(off).collect()
-        },
-    )
+    let variance = move |_: &Stand, share: f64| 1.0 + share * share / length as f64;
+    predicted(f64::INFINITY, variance, move |stand, draw, share| {
+        let first = draw.of_many(length);
+        let white = white(draw, stand.samples() + 2 * length);
+        stand.series(|i| {
+            let (here, block) = (i + first + length, (i + first) / length * length);
+            white[here] - share * mean(&white[block..block + length])
+        })
+    })
 }
 
 /// Neighbours that correlate now and anticorrelate then, turn by turn, while the variance stays: over the whole periods of
@@ -295,23 +271,20 @@ pub(super) fn turning_colour(draw: &mut Draw, stand: &Stand) -> Shape {
 
 /// A valve, or a diode, that turns either swing into a push of one sense for the next: x[i] = e[i] + push |x[i-1]|, the
 /// threshold autoregression whose law is known, skew-normal with |x| that of half a normal law (Andel, Netuka and Svara
-/// 1984). d'^2 = samples x ln(variance).
+/// 1984).
 pub(super) fn pushing() -> Shape {
-    noise(
-        0.95,
-        |stand, push| Known::by_reading(stand, moments(push).1.ln()),
-        |stand, draw, push| {
-            let ((mean, variance), sign) = (moments(push), draw.sign());
-            let mut x = draw.normal();
-            for _ in 0..200 {
-                x = draw.normal() + push * x.abs();
-            }
-            stand.series(|_| {
-                x = draw.normal() + push * x.abs();
-                sign * (x - mean) / variance.sqrt()
-            })
-        },
-    )
+    let variance = |_: &Stand, push: f64| moments(push).1;
+    predicted(0.95, variance, |stand, draw, push| {
+        let (mean, sign) = (moments(push).0, draw.sign());
+        let mut x = draw.normal();
+        for _ in 0..200 {
+            x = draw.normal() + push * x.abs();
+        }
+        stand.series(|_| {
+            x = draw.normal() + push * x.abs();
+            sign * (x - mean)
+        })
+    })
 }
 
 /// A reference is sampled anew, noise and all, every few readings only, and stands for those between.
@@ -363,24 +336,20 @@ pub(super) fn shrunk(draw: &mut Draw, stand: &Stand) -> Shape {
 }
 
 /// A modulator whose integrators a large swing overloads: what was beyond comes out over the readings that follow, to either
-/// side in turn and less each time. Predicted from the past the noise has variance 1.
+/// side in turn and less each time.
 pub(super) fn overloaded(draw: &mut Draw) -> Shape {
     let (beyond, keep) = (draw.between(1.3, 1.9), draw.between(0.3, 0.75));
     // Mean square of what a normal law has beyond, and of its sum over the readings after.
     let square = 2.0 * ((1.0 + beyond * beyond) * below(-beyond) - beyond * normal(beyond));
     let rings = square / (1.0 - keep * keep);
-    noise(
-        f64::INFINITY,
-        move |stand, size| Known::by_reading(stand, (size * size * rings).ln_1p()),
-        move |stand, draw, size| {
-            let scale = (1.0 + size * size * rings).sqrt();
-            let mut left = 0.0;
-            stand.series(|_| {
-                let e = draw.normal();
-                let x = e + size * left;
-                left = e - e.clamp(-beyond, beyond) - keep * left;
-                x / scale
-            })
-        },
-    )
+    let variance = move |_: &Stand, size: f64| 1.0 + size * size * rings;
+    predicted(f64::INFINITY, variance, move |stand, draw, size| {
+        let mut left = 0.0;
+        stand.series(|_| {
+            let e = draw.normal();
+            let x = e + size * left;
+            left = e - e.clamp(-beyond, beyond) - keep * left;
+            x
+        })
+    })
 }

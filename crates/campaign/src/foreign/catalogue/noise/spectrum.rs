@@ -162,24 +162,18 @@ pub(super) fn reverberation(draw: &mut Draw, axis: usize) -> Shape {
 }
 
 /// A part that suppresses the fold of its own drive, or of the mains, by a narrow filter takes its noise out with it. The
-/// filter's first response is 1 and its zeros lie inside the circle, so that the mean logarithm of its gain is 0 (Szegoe)
-/// and d'^2 = samples x ln(variance of what it passes).
+/// filter's first response is 1 and its zeros lie inside the circle, so that the mean logarithm of its gain is 0 (Szegoe).
 pub(super) fn hole(draw: &mut Draw) -> Shape {
     let f = draw.between(1.5, 8.5);
     let of = move |stand: &Stand, half_width: f64| {
         Notch::new(f, half_width.clamp(1e-3, 1.2), stand.rate_hz)
     };
-    noise(
-        f64::INFINITY,
-        move |stand, half_width| Known::by_reading(stand, of(stand, half_width).variance().ln()),
-        move |stand, draw, half_width| {
-            let (notch, n) = (of(stand, half_width), stand.samples());
-            // As long again until it has settled.
-            let passed = notch.of(white(draw, 2 * n).into_iter());
-            let size = notch.variance().sqrt();
-            each(&passed[n..], |y| y / size)
-        },
-    )
+    let variance = move |stand: &Stand, half_width| of(stand, half_width).variance();
+    predicted(f64::INFINITY, variance, move |stand, draw, half_width| {
+        // As long again until it has settled.
+        let white = white(draw, 2 * stand.samples()).into_iter();
+        of(stand, half_width).of(white).split_off(stand.samples())
+    })
 }
 
 /// A part whose own noise is cut by a filter of high order (Butterworth 1930), as sigma-delta converters have it, and a stage

@@ -231,51 +231,49 @@ pub(super) fn averaged(draw: &mut Draw, stand: &Stand) -> Shape {
     })
 }
 
-/// A gain control that is pumped by what it has just passed: the variance of a reading goes with the square of the one
-/// before (Engle 1982). The spectrum stays white.
-pub(super) fn remembering(draw: &mut Draw, stand: &Stand) -> Shape {
-    let independent = white(draw, stand.samples());
-    let known = independent.clone();
-    // All that stays of a size is what the last reading gave.
-    let of = |share: f64, independent: &[f64]| fed(share, share.min(0.95), independent);
+/// White noise that goes through a law of its own variance, by size: `of` gives the law with the series.
+fn through(
+    white: Vec<f64>,
+    of: impl Fn(f64, &[f64]) -> (Vec<f64>, Vec<f64>) + Copy + 'static,
+) -> Shape {
+    let known = white.clone();
     noise(
         f64::INFINITY,
-        move |_, share| Known::Variance(of(share, &known).0),
-        move |_, _, share| of(share, &independent).1,
+        move |_, size| Known::Variance(of(size, &known).0),
+        move |_, _, size| of(size, &white).1,
     )
+}
+
+/// A gain control that is pumped by what it has just passed: the variance of a reading goes with the square of the one
+/// before (Engle 1982), and all that stays of a size is what the last reading gave. The spectrum stays white.
+pub(super) fn remembering(draw: &mut Draw, stand: &Stand) -> Shape {
+    through(white(draw, stand.samples()), |share, white| {
+        fed(share, share.min(0.95), white)
+    })
 }
 
 /// A series over the root of the mean of its law of variance: the variance of a run is seldom 1, and what it adds to it
 /// would be told before its shape.
-fn evened((law, series): (Vec<f64>, Vec<f64>), sign: f64) -> Vec<f64> {
-    let mean = mean(&law);
-    each(&series, |x| sign * x / mean.sqrt())
+fn evened((law, series): (Vec<f64>, Vec<f64>), sign: f64) -> (Vec<f64>, Vec<f64>) {
+    let size = mean(&law).sqrt();
+    (law, each(&series, |x| sign * x / size))
 }
 
 /// A large swing makes the next ones larger, and the unrest dies down over some tens of readings (GARCH, Bollerslev 1986).
 /// The spectrum stays white.
 pub(super) fn feeding(draw: &mut Draw, stand: &Stand) -> Shape {
     let stays = 1.0 - draw.by_ratio(0.02, 0.1);
-    let independent = white(draw, stand.samples());
-    let known = independent.clone();
-    noise(
-        f64::INFINITY,
-        move |_, gain| Known::Variance(fed(gain, stays, &known).0),
-        move |_, _, gain| evened(fed(gain, stays, &independent), 1.0),
-    )
+    through(white(draw, stand.samples()), move |gain, white| {
+        evened(fed(gain, stays, white), 1.0)
+    })
 }
 
 /// An amplifier whose working point is carried along by what it last gave out: after a swing to one side the next reading
 /// is noisier, after one to the other quieter (the asymmetry of Nelson 1991). Neither readings nor their squares correlate
 /// by much; a reading does with the square after it.
 pub(super) fn one_sided(draw: &mut Draw, stand: &Stand) -> Shape {
-    let independent = white(draw, stand.samples());
-    let (known, sign) = (independent.clone(), draw.sign());
-    noise(
-        f64::INFINITY,
-        move |_, size| Known::Variance(louder(size, &known).0),
-        move |_, _, size| evened(louder(size, &independent), sign),
-    )
+    let (white, sign) = (white(draw, stand.samples()), draw.sign());
+    through(white, move |size, white| evened(louder(size, white), sign))
 }
 
 /// What a jump of the motor's command stirs up, by its size, and what dies away with a time constant, s.

@@ -15,9 +15,7 @@ pub(super) fn snapping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let shape = in_time(stand, |t| {
         let helps = -state * (first + TAU * t / period).cos();
         let rate = most * (swing * (helps - 1.0)).exp();
-        if draw.chance(-(-rate / stand.rate_hz).exp_m1()) {
-            state = -state;
-        }
+        state *= draw.choose(-(-rate / stand.rate_hz).exp_m1(), -1.0, 1.0);
         state
     });
     stand.lagged(&shape, draw.by_ratio(0.05, 0.2))

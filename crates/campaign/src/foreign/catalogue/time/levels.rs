@@ -173,9 +173,7 @@ pub(super) fn slipping(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let stays = draw.by_ratio(1.0, 8.0) * stand.rate_hz;
     let mut which = 1.0;
     stand.series(|_| {
-        if !draw.chance(1.0 / stays) {
-            which = -which;
-        }
+        which *= draw.choose(1.0 / stays, 1.0, -1.0);
         which
     })
 }
@@ -276,14 +274,8 @@ pub(super) fn sawtooth(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 
 /// A level that is another at random times.
 pub(super) fn jumps(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
-    let (mut level, mut left) = (0.0, 0.0);
-    stand.series(|_| {
-        if left <= 0.0 {
-            level = draw.normal();
-            left = 25.0 * draw.exponential();
-        }
-        left -= 1.0 / stand.rate_hz;
-        level
+    in_spells(stand, (0.0, 0.0), |_| {
+        (draw.normal(), 25.0 * draw.exponential())
     })
 }
 

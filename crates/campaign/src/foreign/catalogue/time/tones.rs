@@ -165,14 +165,10 @@ pub(super) fn runs_up(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     // Speed at which it runs: far above, where the bench no longer follows.
     let runs = resonance * draw.between(6.0, 9.0);
     let (up, down) = (draw.between(8.0, 20.0), draw.between(4.0, 10.0));
-    let (mut on, mut left, mut speed) = (true, draw.between(15.0, 40.0), 0.0);
-    let mut phase = draw.phase();
-    stand.series(|_| {
-        left -= 1.0 / rate_hz;
-        if left <= 0.0 {
-            on = !on;
-            left = draw.between(15.0, 40.0);
-        }
+    let first = (true, draw.between(15.0, 40.0));
+    let (mut phase, mut speed) = (draw.phase(), 0.0);
+    let on = in_spells(stand, first, |on| (!on, draw.between(15.0, 40.0)));
+    each(&on, |on| {
         let (goal, takes) = if on { (runs, up) } else { (0.0, down) };
         speed += (goal - speed) / takes / rate_hz;
         phase += TAU * speed / rate_hz;
@@ -256,15 +252,10 @@ pub(super) fn changing_pitch(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 /// A tone that is there for a while, and not for another.
 pub(super) fn comes_and_goes(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let f = draw.between(0.5, 8.0);
-    let (mut on, mut left) = (draw.chance(0.5), 0.0);
-    in_time(stand, |t| {
-        if left <= 0.0 {
-            on = !on;
-            left = draw.between(10.0, 60.0);
-        }
-        left -= 1.0 / stand.rate_hz;
-        one_if(on) * (TAU * f * t).sin()
-    })
+    let first = (draw.chance(0.5), 0.0);
+    let on = in_spells(stand, first, |on| (!on, draw.between(10.0, 60.0)));
+    let tone = in_time(stand, |t| (TAU * f * t).sin());
+    each_pair(&on, &tone, |on, tone| one_if(on) * tone)
 }
 
 /// A mass that hangs on a spring twice as fast as it swings: the bounce drives the swing, and the swing the bounce, so that
@@ -305,9 +296,8 @@ pub(super) fn spring_pendulum(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
 pub(super) fn fading(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     const WAYS: usize = 8;
     let fastest = TAU * draw.by_ratio(0.2, 2.0) / stand.rate_hz;
-    let speed = stand.held(draw, (2.0, 10.0), |d| match d.chance(0.3) {
-        true => 0.0,
-        false => d.between(0.3, 1.0),
+    let speed = stand.held(draw, (2.0, 10.0), |d| {
+        d.zero_or(0.3, |d| d.between(0.3, 1.0))
     });
     let mut ways: [(f64, f64); WAYS] = std::array::from_fn(|_| (draw.phase().cos(), draw.phase()));
     let sign = draw.sign();
