@@ -34,11 +34,11 @@ impl Claims {
         let gain = f.gain.as_ref();
         let score = gain.and_then(|g| g.held_out_log_score_nats.zip(g.std_error));
         match score.filter(|s| s.0.is_finite() && s.1.is_finite()) {
-            Some(score) => {
-                if let Some(own) = self.of.last_mut() {
-                    own.push(score);
-                }
-            }
+            Some(score) => self
+                .of
+                .last_mut()
+                .into_iter()
+                .for_each(|own| own.push(score)),
             None => {
                 self.without[0] += 1;
                 self.without[1] += usize::from(f.no_gain.is_none());
@@ -121,28 +121,33 @@ fn main() {
     };
     let (stands, records, seed) = (argument(1, 4), argument(2, 10), argument(3, 1));
     let only = std::env::args().nth(4);
-    let asked = |label: &str| only.as_deref().is_none_or(|o| o == label);
-    for (i, row) in STRONG.iter().enumerate().filter(|(_, r)| asked(r.label)) {
+    let measure = |label: &str, family: u64, planted: &dyn Fn(&mut Draw) -> (Stand, Truth)| {
+        if only.as_deref().is_some_and(|only| only != label) {
+            return;
+        }
         let mut claims = Claims::default();
         for k in 0..stands {
-            let draw = &mut Draw::of(seed, 5000 + i as u64, k);
+            let draw = &mut Draw::of(seed, family, k);
+            let (stand, truth) = planted(draw);
+            claimed(&mut claims, draw, &stand, &truth, records as usize);
+        }
+        claims.line(label);
+    };
+    for (family, row) in (5000..).zip(&STRONG) {
+        measure(row.label, family, &|draw| {
             let mut stand = stand_of(draw, row.needs);
             let axis = draw.of_many(if row.moves { 2 } else { 3 });
             let wanted = draw.by_ratio(STRENGTHS.0, STRENGTHS.1);
             let truth = plant(draw, &mut stand, row.label, axis, wanted);
-            claimed(&mut claims, draw, &stand, &truth, records as usize);
-        }
-        claims.line(row.label);
+            (stand, truth)
+        });
     }
-    for (i, row) in COUNTED.iter().enumerate().filter(|(_, r)| asked(r.label)) {
-        let mut claims = Claims::default();
-        for k in 0..stands {
-            let draw = &mut Draw::of(seed, 6000 + i as u64, k);
+    for (i, row) in COUNTED.iter().enumerate() {
+        measure(row.label, 6000 + i as u64, &|draw| {
             let stand = stand_of(draw, row.needs);
             let axis = draw.of_many(GYROS.len());
             let truth = plant_counted(draw, &stand, i, axis);
-            claimed(&mut claims, draw, &stand, &truth, records as usize);
-        }
-        claims.line(row.label);
+            (stand, truth)
+        });
     }
 }

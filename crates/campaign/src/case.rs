@@ -260,7 +260,7 @@ fn planted(seed: u64, family: Family, index: u64) -> Planted {
         Family::Beside(i) => {
             let kind = &STRUCTURES[i];
             allowed.extend(kind.allowed);
-            added = company::beside_a_structure(draw, &mut stand, kind, axis, &mut truths).added;
+            (truths, added) = company::beside_a_structure(draw, &mut stand, kind, axis);
         }
         Family::Foreign(i) => {
             let wanted = draw.by_ratio(25.0, 40.0);

@@ -124,13 +124,13 @@ pub(crate) fn on_one_axis(draw: &mut Draw, stand: &mut Stand) -> Vec<Truth> {
 }
 
 /// What an axis has beside an effect.
-pub(crate) struct Structure {
+struct Structure {
     /// Where the library has it.
     truth: Option<Truth>,
     /// Variance that it adds to the coefficients, by bin.
     density: Option<Vec<f64>>,
     /// Signal that is added to the readings.
-    pub added: Option<Vec<f64>>,
+    added: Option<Vec<f64>>,
 }
 
 impl Structure {
@@ -268,34 +268,33 @@ fn vibration(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
 /// Energy for each coefficient over bins of some hundred coefficients.
 fn smoothed(energy: &[f64], count: &[f64]) -> Vec<f64> {
     const OVER: f64 = 100.0;
-    (0..energy.len())
-        .map(|b| {
-            let (mut from, mut to, mut sum, mut number) = (b, b + 1, energy[b], count[b]);
-            while number < OVER && (from > 0 || to < energy.len()) {
-                if from > 0 {
-                    from -= 1;
-                    sum += energy[from];
-                    number += count[from];
-                }
-                if to < energy.len() {
-                    sum += energy[to];
-                    number += count[to];
-                    to += 1;
-                }
+    let about = |b: usize| {
+        let (mut from, mut to, mut sum, mut number) = (b, b + 1, energy[b], count[b]);
+        while number < OVER && (from > 0 || to < energy.len()) {
+            if from > 0 {
+                from -= 1;
+                sum += energy[from];
+                number += count[from];
             }
-            sum / number
-        })
-        .collect()
+            if to < energy.len() {
+                sum += energy[to];
+                number += count[to];
+                to += 1;
+            }
+        }
+        sum / number
+    };
+    (0..energy.len()).map(about).collect()
 }
 
-/// One effect on an axis that has a structure of this kind, as strong as asked beside it. What is planted stands first.
+/// One effect on an axis that has a structure of this kind, as strong as asked beside it: what is true, what is planted first, and
+/// the signal that the structure adds.
 pub(crate) fn beside_a_structure(
     draw: &mut Draw,
     stand: &mut Stand,
     kind: &StructureKind,
     axis: usize,
-    truths: &mut Vec<Truth>,
-) -> Structure {
+) -> (Vec<Truth>, Option<Vec<f64>>) {
     let found = (kind.how)(draw, stand, axis);
     let taken = found.truth.as_ref().map(|t| t.cause);
     let fit = rows(|r| {
@@ -310,9 +309,8 @@ pub(crate) fn beside_a_structure(
         let mut truth = plant(draw, stand, row.label, axis, wanted);
         truth.strength = beside_structure(&Meter::new(stand, axis), &truth, &found);
         if truth.strength >= row.asked_from {
-            truths.push(truth);
-            truths.extend(found.truth.clone());
-            return found;
+            let truths = std::iter::once(truth).chain(found.truth);
+            return (truths.collect(), found.added);
         }
     }
 }

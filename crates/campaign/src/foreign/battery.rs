@@ -43,23 +43,24 @@ fn is_held(effect: &ForeignEffect) -> bool {
 struct Drawn {
     stand: Stand,
     axis: usize,
+    wanted: f64,
     effect: Foreign,
     draw: Draw,
 }
 
-fn drawn(place: usize, seconds: f64, index: u64, wanted: Option<f64>) -> (Drawn, f64) {
+fn drawn(place: usize, seconds: f64, index: u64, wanted: Option<f64>) -> Drawn {
     let mut draw = Draw::of(SEED, u64::from(EFFECTS[place].id), index);
     let mut stand = Stand::draw(&mut draw, seconds, 20.0, EFFECTS[place].needs);
     let axis = EFFECTS[place].axis(draw.of_many(3));
     let wanted = wanted.unwrap_or_else(|| draw.by_ratio(25.0, 40.0));
     let effect = foreign(&mut draw, &mut stand, place, axis, wanted);
-    let drawn = Drawn {
+    Drawn {
         stand,
         axis,
+        wanted,
         effect,
         draw,
-    };
-    (drawn, wanted)
+    }
 }
 
 impl Drawn {
@@ -156,7 +157,7 @@ fn hold_foreign(kind: &str) {
         if effect.set == 1 {
             return vec![];
         }
-        let (mut drawn, _) = drawn(place, 600.0, 0, Some(25.0));
+        let mut drawn = drawn(place, 600.0, 0, Some(25.0));
         let described = drawn.described(kind == "couplings");
         assert!(!described.is_empty(), "nothing to hold {}", effect.name);
         let by_later = |id: &str| effect.later.is_some_and(|later| id.contains(later));
@@ -213,8 +214,10 @@ fn each_is_as_strong_as_its_row_says_or_as_large_as_may_be() {
     hold_each(&KINDS.map(|k| k.0), &|place, effect| {
         let (mut wrong, mut weak) = (vec![], 0);
         for index in 0..STRENGTHS {
-            let (drawn, wanted) = drawn(place, 600.0, index, None);
-            let (d, large) = (drawn.effect.strength, drawn.effect.change.rms());
+            let Drawn {
+                effect: f, wanted, ..
+            } = drawn(place, 600.0, index, None);
+            let (d, large) = (f.strength, f.change.rms());
             if large > 1.001 * LARGEST_RMS {
                 wrong.push(format!("{large} deg/s"));
             }
@@ -248,7 +251,7 @@ fn each_is_as_strong_as_its_row_says_or_as_large_as_may_be() {
 #[test]
 fn each_acts_on_its_channel_and_leaves_the_others() {
     hold_each(&KINDS.map(|k| k.0), &|place, _| {
-        let (mut drawn, _) = drawn(place, 600.0, 0, Some(30.0));
+        let mut drawn = drawn(place, 600.0, 0, Some(30.0));
         let own = drawn.axis;
         let [before, after] = drawn.readings();
         let mut wrong = vec![];
@@ -271,7 +274,7 @@ fn each_acts_on_its_channel_and_leaves_the_others() {
 #[test]
 fn noise_has_the_variance_and_the_density_that_its_strength_reckons_with() {
     hold_each(&["noise"], &|place, _| {
-        let (drawn, _) = drawn(place, 3000.0, 0, Some(40.0));
+        let drawn = drawn(place, 3000.0, 0, Some(40.0));
         let Change::Noise(series, share) = &drawn.effect.change else {
             return vec![];
         };
@@ -297,7 +300,7 @@ fn noise_has_the_variance_and_the_density_that_its_strength_reckons_with() {
 #[test]
 fn codes_come_and_repeat_as_often_as_their_strength_reckons_with() {
     hold_each(&["codes"], &|place, _| {
-        let (mut drawn, _) = drawn(place, 3000.0, 0, Some(40.0));
+        let mut drawn = drawn(place, 3000.0, 0, Some(40.0));
         // What wanders has other codes by and by, which no law of codes holds.
         drawn.stand.walk_of_rate = [0.0; 3];
         let [_, after] = drawn.readings();

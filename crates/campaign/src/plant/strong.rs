@@ -1,6 +1,6 @@
 //! Effects of the library whose strength is a d', one row each: what their parameters are drawn from.
 
-use super::{Asked, Drawn, LibraryEffect, Values};
+use super::{Asked, Drawn, LibraryEffect, Value, Values};
 use crate::motor;
 use crate::random::Draw;
 use crate::series::{each, one_if};
@@ -54,12 +54,12 @@ const LARGEST_RMS: f64 = 0.25;
 
 /// A shape whose size is one parameter.
 fn size(stand: &Stand, asked: Asked, name: &'static str) -> Drawn {
-    shape(stand, asked, vec![], (name, asked.sign))
+    shape(stand, asked, &[], (name, asked.sign))
 }
 
 /// A shape of these parameters, whose size is another.
-fn shape(stand: &Stand, asked: Asked, shape: Values, size: (&'static str, f64)) -> Drawn {
-    Drawn::shape(stand, asked, (&shape, &[size]), &[])
+fn shape(stand: &Stand, asked: Asked, shape: &[Value], size: Value) -> Drawn {
+    Drawn::shape(stand, asked, (shape, &[size]), &[])
 }
 
 /// Measured beyond a straight line, for a parabola that a line fits is none.
@@ -72,46 +72,32 @@ fn parabola(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
 
 fn warm_up(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let tau = draw.by_ratio(stand.seconds / 60.0, stand.seconds / 4.0);
-    shape(
-        stand,
-        asked,
-        vec![("time_constant", tau)],
-        ("amplitude", asked.sign),
-    )
+    let values = [("time_constant", tau)];
+    shape(stand, asked, &values, ("amplitude", asked.sign))
 }
 
 fn line(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let f = draw.by_ratio(0.05, 0.49 * stand.rate_hz);
-    let phase = draw.between(-3.1, 3.1);
-    shape(
-        stand,
-        asked,
-        vec![("frequency", f), ("phase", phase)],
-        ("amplitude", 1.0),
-    )
+    let values = [("frequency", f), ("phase", draw.between(-3.1, 3.1))];
+    shape(stand, asked, &values, ("amplitude", 1.0))
 }
 
 fn am_line(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let frequency = draw.between(0.05, 0.45) * stand.rate_hz;
-    let values = vec![
+    let values = [
         ("frequency", frequency),
         ("modulation_frequency", draw.by_ratio(0.02, 0.2 * frequency)),
         ("depth", draw.between(0.5, 1.0)),
         ("phase", draw.between(-3.1, 3.1)),
         ("modulation_phase", draw.between(-3.1, 3.1)),
     ];
-    shape(stand, asked, values, ("amplitude", 1.0))
+    shape(stand, asked, &values, ("amplitude", 1.0))
 }
 
 fn motor_bias(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let both = stand.world.duty.iter().any(|d| *d < 0.0);
-    let size = one_if(both && draw.chance(0.4));
-    shape(
-        stand,
-        asked,
-        vec![("by_magnitude", size)],
-        ("at_full_duty", asked.sign),
-    )
+    let values = [("by_magnitude", one_if(both && draw.chance(0.4)))];
+    shape(stand, asked, &values, ("at_full_duty", asked.sign))
 }
 
 fn by_current(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
@@ -153,7 +139,7 @@ fn g_sensitivity(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
 
 fn bias_step(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
     let at = stand.seconds * draw.between(0.1, 0.9);
-    shape(stand, asked, vec![("time", at)], ("height", asked.sign))
+    shape(stand, asked, &[("time", at)], ("height", asked.sign))
 }
 
 /// A half sine or a ring that several readings see: one alone is as well a disturbed word.
@@ -168,7 +154,7 @@ fn shock(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {
         values.push(("phase", draw.between(-3.1, 3.1)));
         sign = 1.0;
     }
-    shape(stand, asked, values, ("peak", sign))
+    shape(stand, asked, &values, ("peak", sign))
 }
 
 fn cross_axis(draw: &mut Draw, stand: &mut Stand, asked: Asked) -> Drawn {

@@ -57,11 +57,8 @@ pub(super) fn pipe(draw: &mut Draw, stand: &Stand) -> Vec<f64> {
     let apart = draw.by_ratio(6.0, 25.0);
     let (stages, pole) = (8 + draw.of_many(13), draw.signed(0.4, 0.7));
     let knocks = arriving(stand, apart * draw.exponential(), |knocks, at| {
-        add_at(
-            knocks,
-            (at * stand.rate_hz) as usize,
-            [draw.signed(0.5, 1.5)],
-        );
+        let size = draw.signed(0.5, 1.5);
+        add_at(knocks, (at * stand.rate_hz) as usize, [size]);
         at + apart * (0.1 + draw.exponential())
     });
     dispersed(knocks, stages, pole)
