@@ -174,35 +174,23 @@ const fn structure(
     }
 }
 
+impl StructureKind {
+    const fn beside(mut self, rows: &'static [&'static str], wanted: (f64, f64)) -> Self {
+        (self.beside, self.wanted) = (rows, wanted);
+        self
+    }
+}
+
 /// The kinds. The last one is what was measured on gyro z of an ADIS16405: a vibration of a third of the variance whose pitch
 /// wanders over a fifth of its centre, and beside it what was planted there.
+#[rustfmt::skip]
 pub const STRUCTURES: [StructureKind; 5] = [
     structure(20, "beside a line", &[], line),
-    structure(
-        21,
-        "beside a band",
-        &["narrow_band", "wandering_line"],
-        band,
-    ),
+    structure(21, "beside a band", &["narrow_band", "wandering_line"], band),
     structure(22, "beside outliers", &[], outliers),
     structure(23, "beside an echo", &[], echo),
-    StructureKind {
-        beside: &[
-            "line",
-            "rate_ramp",
-            "bias_step",
-            "noise_change",
-            "telegraph",
-            "temperature",
-        ],
-        wanted: (1.3, 1.5),
-        ..structure(
-            24,
-            "beside a vibration that wanders",
-            &["narrow_band", "wandering_line"],
-            vibration,
-        )
-    },
+    structure(24, "beside a vibration that wanders", &["narrow_band", "wandering_line"], vibration)
+        .beside(&["line", "rate_ramp", "bias_step", "noise_change", "telegraph", "temperature"], (1.3, 1.5)),
 ];
 
 /// Strengths of a line or a band that an effect is planted beside.

@@ -21,7 +21,7 @@ pub(crate) mod words;
 use act::Change;
 pub use act::add;
 pub(crate) use catalogue::EFFECTS;
-use catalogue::{ForeignEffect, Make};
+use catalogue::Make;
 use known::Known;
 use shape::{exponential, more, signal};
 
@@ -47,14 +47,29 @@ pub fn foreign(
     wanted: f64,
 ) -> Foreign {
     const TRIES: usize = 12;
-    let effect = EFFECTS[place];
-    for _ in 0..TRIES {
-        let f = drawn(draw, stand, effect, axis, wanted);
-        if f.change.rms() <= LARGEST_RMS {
-            return f;
+    let mut one = || {
+        let shape = match EFFECTS[place].make {
+            Make::Signal(of) => {
+                let unit = of(draw, stand, axis);
+                signal(stand, axis, unit)
+            }
+            Make::More(of) => more(of(draw, stand, axis)),
+            Make::Exponential(of) => exponential(of(draw, stand, axis)),
+            Make::Shaped(of) => of(draw, stand, axis, wanted),
+        };
+        // At the size that gives the strength.
+        let (known, change) = shape.sized(draw, stand, axis, wanted);
+        Foreign {
+            strength: known.strength(stand, axis),
+            known,
+            change,
         }
+    };
+    let mut tried = (0..TRIES).map(|_| one());
+    if let Some(f) = tried.find(|f| f.change.rms() <= LARGEST_RMS) {
+        return f;
     }
-    let mut f = drawn(draw, stand, effect, axis, wanted);
+    let mut f = one();
     let down = (LARGEST_RMS / f.change.rms()).min(1.0);
     if let Change::Add(signal) = &mut f.change {
         signal.iter_mut().for_each(|v| *v *= down);
@@ -62,31 +77,6 @@ pub fn foreign(
         f.strength = f.known.strength(stand, axis);
     }
     f
-}
-
-/// One draw, at the size that gives the strength.
-fn drawn(
-    draw: &mut Draw,
-    stand: &mut Stand,
-    effect: &ForeignEffect,
-    axis: usize,
-    wanted: f64,
-) -> Foreign {
-    let shape = match effect.make {
-        Make::Signal(of) => {
-            let unit = of(draw, stand, axis);
-            signal(stand, axis, unit)
-        }
-        Make::More(of) => more(of(draw, stand, axis)),
-        Make::Exponential(of) => exponential(of(draw, stand, axis)),
-        Make::Shaped(of) => of(draw, stand, axis, wanted),
-    };
-    let (known, change) = shape.sized(draw, stand, axis, wanted);
-    Foreign {
-        strength: known.strength(stand, axis),
-        known,
-        change,
-    }
 }
 
 impl Foreign {

@@ -90,11 +90,8 @@ fn campaign_of(a: Arguments) -> Result<(), Failure> {
     }
     let all = cases(size, a.only.as_deref());
     if all.is_empty() {
-        let what = format!(
-            "no row of the tables is called {:?}",
-            a.only.unwrap_or_default()
-        );
-        return Err((what, ROWS));
+        let only = a.only.unwrap_or_default();
+        return Err((format!("no row of the tables is called {only:?}"), ROWS));
     }
     let told = |log: &Log| {
         let command = format!("cargo xtask campaign {name}--seed {}", log.head.seed);

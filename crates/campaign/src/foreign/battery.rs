@@ -97,13 +97,8 @@ impl Drawn {
         let filtered = |r: f64| vec![("low_pass", by_neighbours(r, n, gain))];
         let mut all = match (&self.effect.known, &self.effect.change) {
             (Known::Energy(_), Change::Add(signal)) => {
-                let two = of_two(stand, axis, signal);
-                let (process, share) = two.with_process;
-                let pairs = [
-                    (two.names.join(" and "), two.share),
-                    (format!("{} and {process}", two.names[0]), share),
-                ];
-                return [named(of_all(stand, axis, signal)), pairs.into()].concat();
+                let one = named(of_all(stand, axis, signal));
+                return [one, of_two(stand, axis, signal)].concat();
             }
             (Known::Variance(law), _) => of_variance_laws(stand, axis, law),
             (Known::Shaped(by), _) => vec![of_processes(stand, axis, by, &[], gain)],

@@ -50,11 +50,9 @@ const fn set(date: &'static str, author_knew: &'static str, grades: &'static [Gr
 }
 
 impl Set {
-    const fn wrong(self, wrong_names: &'static str) -> Self {
-        Self {
-            wrong_names,
-            ..self
-        }
+    const fn wrong(mut self, wrong_names: &'static str) -> Self {
+        self.wrong_names = wrong_names;
+        self
     }
 }
 
@@ -106,10 +104,8 @@ of unknown effects: that is the first grade of the latest one.
 /// The latest set, counted from 1, and its first grade.
 #[must_use]
 pub fn latest() -> Option<(usize, Grade)> {
-    let graded = SETS.iter().enumerate().rev();
-    graded
-        .filter_map(|(i, s)| Some((i + 1, *s.grades.first()?)))
-        .next()
+    let mut graded = SETS.iter().enumerate().rev();
+    graded.find_map(|(i, s)| Some((i + 1, *s.grades.first()?)))
 }
 
 /// First grades: of the latest set, and of the others together.
@@ -119,29 +115,22 @@ pub fn page() -> String {
         "{RULES}\n| first grade, d' 25 and more | effects | runs | unexplained | wrong name |\n|---|---|---|---|---|\n"
     );
     let effects = |set: usize| EFFECTS.iter().filter(|e| e.set == set).count();
-    let mut row = |label: &str, effects: usize, g: Grade| {
-        let share = |hits: u32| 100.0 * f64::from(hits) / f64::from(g.runs.max(1));
+    let mut row = |label: String, effects: usize, of: &[Grade]| {
+        let sum = |number: fn(&Grade) -> u32| of.iter().map(number).sum::<u32>();
+        let runs = sum(|g| g.runs);
+        let share = |hits: u32| 100.0 * f64::from(hits) / f64::from(runs.max(1));
+        let (told, named) = (share(sum(|g| g.unexplained)), share(sum(|g| g.named)));
         let _ = writeln!(
             out,
-            "| {label} | {effects} | {} | {:.1} % | {:.1} % |",
-            g.runs,
-            share(g.unexplained),
-            share(g.named)
+            "| {label} | {effects} | {runs} | {told:.1} % | {named:.1} % |"
         );
     };
-    let Some((latest, own)) = latest() else {
-        return out;
-    };
-    let others = || (1..latest).zip(&SETS);
-    let together =
-        (others().filter_map(|(_, s)| s.grades.first())).fold(grade(0, 0, 0, 0), |sum, g| Grade {
-            seed: 0,
-            unexplained: sum.unexplained + g.unexplained,
-            named: sum.named + g.named,
-            runs: sum.runs + g.runs,
-        });
-    let all = others().map(|(i, _)| effects(i)).sum();
-    row(&format!("sets 1 to {}", latest - 1), all, together);
-    row(&format!("set {latest}"), effects(latest), own);
+    if let Some((latest, own)) = latest() {
+        let earlier = SETS.iter().take(latest - 1);
+        let first: Vec<Grade> = earlier.filter_map(|s| s.grades.first().copied()).collect();
+        let all = (1..latest).map(effects).sum();
+        row(format!("sets 1 to {}", latest - 1), all, &first);
+        row(format!("set {latest}"), effects(latest), &[own]);
+    }
     out
 }

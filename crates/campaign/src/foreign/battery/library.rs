@@ -267,16 +267,6 @@ pub(super) fn of_all(stand: &Stand, axis: usize, signal: &[f64]) -> Vec<(&'stati
     all
 }
 
-/// What the best two effects of the library describe together.
-pub(super) struct OfTwo {
-    /// The best, then the best beside it.
-    pub names: Vec<&'static str>,
-    /// Share of a signal's gain that both describe.
-    pub share: f64,
-    /// The best process for what is left beside the best, and the share that both describe.
-    pub with_process: (&'static str, f64),
-}
-
 /// Each effect of the library with each set of columns that it can be.
 fn all_columns(stand: &Stand, axis: usize) -> Vec<(&'static str, Vec<Vec<f64>>)> {
     let of = |effect: &&'static dyn Effect| {
@@ -292,13 +282,14 @@ fn is_bounded(id: &str) -> bool {
     of.is_some_and(|e| e.parameters().iter().any(|p| e.at_most(p.name).is_some()))
 }
 
-/// Two effects of the library against a signal: the best, then the best beside it.
-pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> OfTwo {
+/// Two effects of the library against a signal, with the share of its gain that both describe: the best and the best process for
+/// what is left beside it, then the best and the best beside it.
+pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> Vec<(String, f64)> {
     let meter = Meter::new(stand, axis);
     let gain = |s: &[f64]| meter.of_signal(&meter.energy(s)).powi(2);
     let whole = gain(signal);
     let sets = all_columns(stand, axis);
-    let (mut taken, mut names, mut with_process) = (vec![], vec![], ("", 0.0));
+    let (mut taken, mut names, mut pairs) = (vec![], vec![], vec![]);
     let mut rest = signal.to_vec();
     for turn in 0..2 {
         // A line, and one that swings: a line with two beside it.
@@ -323,14 +314,12 @@ pub(super) fn of_two(stand: &Stand, axis: usize, signal: &[f64]) -> OfTwo {
             // Beside the first a process may take more than a second regression.
             let expected = with_noise(&meter, &meter.energy(&rest));
             let (id, process) = best_process(stand, axis, &expected, Kind::Signal);
-            with_process = (id, 1.0 - gain(&rest) / whole * (1.0 - process));
+            let share = 1.0 - gain(&rest) / whole * (1.0 - process);
+            pairs.push((format!("{} and {id}", names[0]), share));
         }
     }
-    OfTwo {
-        names,
-        share: 1.0 - gain(&rest) / whole,
-        with_process,
-    }
+    pairs.push((names.join(" and "), 1.0 - gain(&rest) / whole));
+    pairs
 }
 
 /// The process of the library that describes most of an expected spectrum, with the share of its gain.
