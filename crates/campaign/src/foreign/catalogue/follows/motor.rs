@@ -85,10 +85,9 @@ pub(super) fn sticking(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     stand.world.duty = each(&command, |d| in_steps(d.clamp(-1.0, 1.0)));
     let starts = draw.between(0.45, 0.7);
     let stops = starts * draw.between(0.2, 0.5);
-    let runs = carry(0.0, &stand.world.duty, |runs, d| match d.abs() {
-        pushed if pushed > starts => d.signum(),
-        _ if d * runs < stops => 0.0,
-        _ => runs,
+    let runs = carry(0.0, &stand.world.duty, |runs, d| {
+        let kept = if d * runs < stops { 0.0 } else { runs };
+        if d.abs() > starts { d.signum() } else { kept }
     });
     either_way(draw, &runs)
 }
@@ -128,10 +127,8 @@ pub(super) fn winding(draw: &mut Draw, stand: &mut Stand) -> Vec<f64> {
     stand.world.duty = stand.series(|_| {
         left -= 1.0 / rate_hz;
         if left <= 0.0 || angle * command > 0.0 && angle.abs() > end {
-            let sense = match angle.abs() > 0.3 * end {
-                true => -angle.signum(),
-                false => draw.sign(),
-            };
+            let far = angle.abs() > 0.3 * end;
+            let sense = if far { -angle.signum() } else { draw.sign() };
             command = in_steps(sense * draw.between(0.5, 1.0));
             left = draw.between(3.0, 14.0);
         }
