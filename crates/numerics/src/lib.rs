@@ -4,6 +4,7 @@
 
 pub mod column;
 pub mod exp_ln;
+pub mod least_squares;
 pub mod log_product;
 pub mod minimise;
 pub mod order_statistics;

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use model::Parameter;
 use model::file::EffectModel;
+use numerics::least_squares::fit;
 use wire::Frame;
 
 use super::blocks::{Block, Blocks, moved, white};
-use super::{Identified, Outcome, SequenceError, Told, fit};
+use super::{Identified, Outcome, SequenceError, Told};
 use crate::RecordBuilder;
 use crate::capture::Calibration;
 use crate::link::Link;

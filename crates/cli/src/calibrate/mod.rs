@@ -6,13 +6,11 @@
 
 mod blocks;
 mod heater;
-mod least_squares;
 mod outcome;
 mod six_position;
 mod turns;
 
 pub use heater::{Heater, heater};
-pub use least_squares::{Fit, fit};
 pub use outcome::{Identified, Outcome, merged};
 pub use six_position::{Side, SixPosition, six_position};
 pub use turns::{Turns, turns};

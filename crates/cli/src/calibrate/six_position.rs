@@ -3,9 +3,10 @@
 
 use model::Parameter;
 use model::file::EffectModel;
+use numerics::least_squares::{Fit, fit};
 
 use super::blocks::{Block, Blocks, moved, white};
-use super::{Fit, Identified, Outcome, SequenceError, Told, fit};
+use super::{Identified, Outcome, SequenceError, Told};
 use crate::RecordBuilder;
 use crate::capture::Calibration;
 use crate::link::Link;

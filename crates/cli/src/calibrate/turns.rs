@@ -7,9 +7,9 @@ use std::f64::consts::TAU;
 use model::Parameter;
 use model::file::EffectModel;
 use model::record::{Base, Record};
+use numerics::least_squares::{fit, student};
 
-use super::least_squares::student;
-use super::{Identified, Outcome, SequenceError, Told, fit};
+use super::{Identified, Outcome, SequenceError, Told};
 use crate::capture::STANDARD_GRAVITY;
 use crate::correct::{Course, record};
 use crate::link::Link;

@@ -1,7 +1,7 @@
-//! Straight lines through what a gyro reads while its bias walks: generalized least squares.
+//! Straight lines through readings whose zero walks: generalized least squares.
 //!
 //! y = X b + e, cov(e)_ij = v_i [i = j] + K^2 min(t_i, t_j). The white part v is measured; the walk K comes from the same
-//! readings, by restricted maximum likelihood (Patterson and Thompson 1971), so a bias that drifts widens the intervals and is
+//! readings, by restricted maximum likelihood (Patterson and Thompson 1971), so a zero that drifts widens the intervals and is
 //! not taken for what was varied.
 
 /// Values of the walk that are tried, from none on, over the white noise of a reading and the root of its spacing.
