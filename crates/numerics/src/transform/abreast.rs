@@ -2,11 +2,11 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use rustfft::FftNum;
+use rustfft::Real;
 use rustfft::num_complex::Complex;
 
 /// Numbers that a transform is made in.
-pub(super) trait Number: FftNum + Into<f64> {
+pub(super) trait Number: Real + Into<f64> {
     fn of(v: f64) -> Self;
 }
 
