@@ -3,9 +3,11 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Test programs that wait for a board's clock more than they compute: a worker of their own runs them, each with four tests at a
-/// time.
+/// Test programs that wait for a board's clock or a browser more than they compute, the long ones first: a worker of their own runs
+/// them, each with four tests at a time.
 pub const WAIT: &[&str] = &[
+    "imu-stand live_page",
+    "imu-stand soak",
     "imu-stand board",
     "imu-stand capture",
     "imu-stand bring_up",
