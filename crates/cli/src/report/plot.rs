@@ -12,8 +12,7 @@ pub const WIDE: u32 = 1100;
 /// Width of one of two figures beside each other: the same size of letters at half the width.
 pub const HALF: u32 = 540;
 
-/// Size of letters, units of the view box; a letter of a label that stands upright takes this part of it, so that a long one is as
-/// large as its figure is high.
+/// Size of letters, units of the view box, and the part of it by which a letter of a label advances.
 const LETTERS: f64 = 15.0;
 const LETTER: f64 = 0.45;
 /// Radius of a dot, units of the view box.
@@ -215,9 +214,9 @@ impl Figure {
         let place = |(a, b): (f64, f64)| (scaled(a, x_is_log), scaled(b, y_is_log));
         // Without a label it stands on another figure, which has the numbers.
         let below = if self.x_label.is_empty() { 0 } else { 44 };
-        let along = self.height.saturating_sub(below);
         let letters = self.y_label.chars().count().max(1) as f64;
-        let described = (f64::from(along) / (LETTER * letters)).min(LETTERS);
+        let described =
+            (f64::from(self.height.saturating_sub(below)) / (LETTER * letters)).min(LETTERS);
         let mut chart = ChartBuilder::on(area)
             .margin(8)
             .margin_right(18)
