@@ -27,6 +27,8 @@ fn between(rng: &mut Rng, low: f64, high: f64) -> f64 {
 struct Filter {
     forward: Vec<f64>,
     back: Vec<f64>,
+    /// Readings of a mean, and how often it is taken.
+    averages: Option<(usize, usize)>,
 }
 
 impl Filter {
@@ -34,6 +36,7 @@ impl Filter {
         Self {
             forward: vec![1.0 / of as f64; of],
             back: vec![],
+            averages: Some((of, 1)),
         }
     }
 
@@ -44,6 +47,7 @@ impl Filter {
         Self {
             forward: (0..2 * of - 1).map(tap).collect(),
             back: vec![],
+            averages: Some((of, 2)),
         }
     }
 
@@ -58,6 +62,7 @@ impl Filter {
                 2.0 * (w * w - 1.0) / norm,
                 (1.0 - 2f64.sqrt() * w + w * w) / norm,
             ],
+            averages: None,
         }
     }
 
@@ -117,10 +122,18 @@ fn statistical_filters_of_any_kind_are_named_and_the_noise_before_them_is_told()
         held += u64::from(off.abs() < 1.96);
         let named: Vec<&str> = d.findings.iter().map(|f| f.cause.as_str()).collect();
         let looks_alike = d.replicates[&name].after.p_value > 0.01;
-        match named == ["low_pass"] && d.findings[0].channels == [name.clone()] && looks_alike {
+        let counted = filter.averages.is_none_or(|(readings, times)| {
+            let told = |p: &str| d.findings.first()?.parameters.get(p).map(|p| p.value);
+            let off = |p: &str, wanted: usize| told(p).map_or(f64::INFINITY, |v| v - wanted as f64);
+            off("averaged", readings).abs() < 0.02 * readings as f64 && off("times", times) == 0.0
+        });
+        let alone = named == ["low_pass"] && d.findings[0].channels == [name.clone()];
+        match alone && looks_alike && counted {
             true => Ok(()),
             false => Err(format!(
-                "{named:?} | {:?} | N off by {off:.1}",
+                "{named:?} | {:?} of {:?} | {:?} | N off by {off:.1}",
+                filter.averages,
+                d.findings.first().map(|f| &f.parameters),
                 d.unexplained
             )),
         }

@@ -472,14 +472,18 @@ impl Panel {
             .collect()
     }
 
-    /// The likeliest of noises that differ in their random walk.
-    pub(crate) fn likeliest(&self, walks: Vec<(Noise, Vec<f64>, f64)>, columns: &[usize]) -> Noise {
-        let at = |(_, weight, log_det): &(Noise, Vec<f64>, f64)| {
-            self.solve_weighted(weight, *log_det, columns)
-                .log_likelihood
+    /// The likeliest of noises as [`Panel::walks`] gives them.
+    pub(crate) fn likeliest(
+        &self,
+        all: impl Iterator<Item = (Noise, Vec<f64>, f64)>,
+        columns: &[usize],
+    ) -> Option<Noise> {
+        let at = |(noise, weight, log_det): (Noise, Vec<f64>, f64)| {
+            let solution = self.solve_weighted(&weight, log_det, columns);
+            (noise, solution.log_likelihood)
         };
-        let best = walks.into_iter().max_by(|a, b| at(a).total_cmp(&at(b)));
-        best.map(|walk| walk.0).unwrap_or_else(|| Noise::new(0.0))
+        let best = all.map(at).max_by(|a, b| a.1.total_cmp(&b.1));
+        best.map(|b| b.0)
     }
 
     /// Highest log likelihood over the given random walks, with a parabola through the best three.

@@ -237,17 +237,13 @@ impl Search<'_> {
             noise.terms.push((Arc::clone(c), theta));
             noise
         };
-        let starts = if grid.is_empty() {
+        let starts: Vec<Noise> = if grid.is_empty() {
             c.starts(n).into_iter().map(beside).collect()
         } else {
-            let tops = grid.into_iter().map(|theta| {
-                let walks = self.panel.walks(&beside(theta));
-                (self.panel.profile(&walks, &of.own), walks)
-            });
-            let best = tops.max_by(|a, b| a.0.total_cmp(&b.0));
-            best.map(|(_, walks)| self.panel.likeliest(walks, &of.own))
+            let all = grid
                 .into_iter()
-                .collect::<Vec<_>>()
+                .flat_map(|theta| self.panel.walks(&beside(theta)));
+            self.panel.likeliest(all, &of.own).into_iter().collect()
         };
         let best = starts
             .into_iter()

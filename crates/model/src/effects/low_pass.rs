@@ -14,7 +14,7 @@ use crate::effect::{
 };
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
-use drawn::{averaged, behind_a_window, factor, two_samples};
+use drawn::{averaged, behind_a_window, two_samples};
 use shapes::{BehindWindow, Pole, least_pole, logistic, pole};
 use smooth::{MOST, NAMES, Smooth};
 use window::{Of, Window};
@@ -222,7 +222,7 @@ impl Effect for LowPass {
             let drawn = if rounding < 1.0 { 1.0 - rounding } else { 1.0 };
             let rho = (stated / drawn).clamp(0.0, MOST_ALIKE);
             match kind {
-                Kind::Mean(window, length) => averaged(noise, &taps(window, length)),
+                Kind::Mean(window, length) => averaged(noise, &window.taps(length)),
                 Kind::TwoSamples => averaged(noise, &two_samples(rho)),
                 // From one lag to the next rounding changes nothing.
                 Kind::Pole(pole) => behind_a_window(noise, rho, pole.clamp(least_pole(rho), rho)),
@@ -258,34 +258,18 @@ fn stated(parameters: &Parameters) -> (f64, Kind) {
     (rho, kind)
 }
 
-/// Taps that draw the noise of a mean over so many samples out of white noise.
-fn taps(window: Window, length: f64) -> Vec<f64> {
-    match window.of {
-        Of::Readings => window.taps(length),
-        Of::Course => factor(&window.correlations(length)),
-    }
-}
-
 /// The mean that a model states.
 fn of_model(parameters: &Parameters) -> Kind {
     let stated = |name: &str| parameters.get(name).map(|p| p.value);
     let times = stated("times").map_or(1, |t| (t as usize).clamp(1, MOST_TIMES));
-    let of = if stated("of_readings") == Some(1.0) {
-        Of::Readings
-    } else {
-        Of::Course
-    };
+    let of = Of::stated(stated("of_readings").unwrap_or(0.0));
     Kind::Mean(Window::exact(times, of), value(parameters, "averaged"))
 }
 
 /// The mean that was found, if it is one.
 fn of_found(found: &Found) -> Option<Window> {
     let fixed = |name: &str| found.fixed.iter().find(|f| f.0 == name).map(|f| f.1);
-    let of = if fixed("of_readings")? == 1.0 {
-        Of::Readings
-    } else {
-        Of::Course
-    };
+    let of = Of::stated(fixed("of_readings")?);
     Some(Window::exact(fixed("times")? as usize, of))
 }
 

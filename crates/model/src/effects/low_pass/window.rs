@@ -2,6 +2,7 @@
 //! window of the ADIS16250, the decimator of third order of many sensors (E. B. Hogenauer, "An economical class of digital
 //! filters for decimation and interpolation", IEEE Trans. ASSP 29, 1981).
 
+use super::drawn::factor;
 use super::shapes::logistic;
 use super::smooth::{cosine_sum, places};
 use crate::effect::{Covariance, Frequencies};
@@ -13,6 +14,17 @@ pub(super) enum Of {
     Course,
     /// Of whole readings.
     Readings,
+}
+
+impl Of {
+    /// What the switch `of_readings` says.
+    pub(super) fn stated(of_readings: f64) -> Self {
+        if of_readings == 1.0 {
+            Self::Readings
+        } else {
+            Self::Course
+        }
+    }
 }
 
 /// Means of one kind. Coordinate: logit of the lag-1 correlation; of readings ln of their number beyond the first, and ln of the
@@ -60,27 +72,25 @@ impl Window {
         }
     }
 
-    /// Autocorrelations from lag 1 on of a window of so many samples.
-    pub(super) fn correlations(self, length: f64) -> Vec<f64> {
+    /// Taps that draw the noise of a window of so many samples out of white noise, sum of squares 1.
+    pub(super) fn taps(self, length: f64) -> Vec<f64> {
         match self.of {
-            Of::Course => (1..)
-                .map(|lag| f64::from(lag) / length)
-                .take_while(|u| *u < self.times as f64)
-                .map(|u| self.spline(u))
-                .collect(),
-            Of::Readings => {
-                let taps = self.taps(length);
-                let at = |lag: usize| -> f64 {
-                    let pairs = taps.iter().zip(&taps[lag..]);
-                    pairs.map(|(a, b)| a * b).sum()
-                };
-                (1..taps.len()).map(at).collect()
-            }
+            Of::Course => factor(&self.correlations(length)),
+            Of::Readings => self.of_whole(length),
         }
     }
 
-    /// Taps of a mean of whole readings, sum of squares 1.
-    pub(super) fn taps(self, length: f64) -> Vec<f64> {
+    /// Autocorrelations from lag 1 on of a window over what lies between the readings, too.
+    pub(super) fn correlations(self, length: f64) -> Vec<f64> {
+        (1..)
+            .map(|lag| f64::from(lag) / length)
+            .take_while(|u| *u < self.times as f64)
+            .map(|u| self.spline(u))
+            .collect()
+    }
+
+    /// Taps of a mean of whole readings.
+    fn of_whole(self, length: f64) -> Vec<f64> {
         let width = length.round().max(1.0) as usize;
         let mut taps = vec![1.0];
         for _ in 0..self.times {
