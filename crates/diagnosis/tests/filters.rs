@@ -124,8 +124,7 @@ fn statistical_filters_of_any_kind_are_named_and_the_noise_before_them_is_told()
         let looks_alike = d.replicates[&name].after.p_value > 0.01;
         let counted = filter.averages.is_none_or(|(readings, times)| {
             let told = |p: &str| d.findings.first()?.parameters.get(p).map(|p| p.value);
-            let off = |p: &str, wanted: usize| told(p).map_or(f64::INFINITY, |v| v - wanted as f64);
-            off("averaged", readings).abs() < 0.02 * readings as f64 && off("times", times) == 0.0
+            told("averaged") == Some(readings as f64) && told("times") == Some(times as f64)
         });
         let alone = named == ["low_pass"] && d.findings[0].channels == [name.clone()];
         match alone && looks_alike && counted {

@@ -85,7 +85,7 @@ pub fn bounds(name: &str, unit: &str) -> [f64; 2] {
     [least, most]
 }
 
-/// Most means one after the other, and most samples of each.
+/// Most means one after the other, and most readings of each.
 const MOST_TIMES: f64 = 3.0;
 const MOST_AVERAGED: f64 = 64.0;
 
@@ -98,11 +98,9 @@ pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
         ("count" | "clipped", _) => range(0.0, MOST_SAMPLES),
         ("running", _) => range(1.0, MOST_SAMPLES),
         ("bit" | "missing_bits", _) => whole(0.0, HIGHEST_BIT),
-        ("value" | "by_magnitude" | "triangular" | "of_readings" | "silent" | "normal", _) => {
-            whole(0.0, 1.0)
-        }
+        ("value" | "by_magnitude" | "triangular" | "silent" | "normal", _) => whole(0.0, 1.0),
         ("times", _) => whole(1.0, MOST_TIMES),
-        ("averaged", _) => range(0.0, MOST_AVERAGED),
+        ("averaged", _) => whole(1.0, MOST_AVERAGED),
         ("fraction" | "upward", _) => range(0.0, 1.0),
         ("lag1_correlation" | "skew", _) => range(-1.0, 1.0),
         ("variance_increase" | "variance_increase_at_full_duty", _) => range(-1.0, LARGEST),

@@ -1,9 +1,9 @@
 //! A filter makes neighbouring samples alike.
 
 mod drawn;
+mod mean;
 mod shapes;
 mod smooth;
-mod window;
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -14,10 +14,10 @@ use crate::effect::{
 };
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
-use drawn::{averaged, behind_a_window, two_samples};
-use shapes::{BehindWindow, Pole, least_pole, logistic, pole};
+use drawn::{averaged, behind_a_window, two_samples, window};
+use mean::Mean;
+use shapes::{BehindWindow, Pole, Triangle, least_pole, logistic, pole};
 use smooth::{MOST, NAMES, Smooth};
-use window::{Of, Window};
 
 /// The effect.
 pub struct LowPass;
@@ -37,7 +37,7 @@ const TWO_SAMPLES: f64 = 0.3;
 /// Largest correlation that is simulated.
 const MOST_ALIKE: f64 = 0.999;
 
-const PLAIN: [ParameterSpec; 7] = [
+const PLAIN: [ParameterSpec; 6] = [
     parameter(
         "lag1_correlation",
         "1",
@@ -46,17 +46,12 @@ const PLAIN: [ParameterSpec; 7] = [
     optional(
         "averaged",
         "samples",
-        "samples over which the mean is that each reading is",
+        "how many readings each is the mean of",
     ),
     optional(
         "times",
         "1",
-        "how often such a mean is taken, each of what the one before gives: twice is a triangular window",
-    ),
-    optional(
-        "of_readings",
-        "1",
-        "1 where whole readings are averaged, 0 where what lies between them is, too",
+        "how often such a mean is taken, each of what the one before gives",
     ),
     optional(
         "triangular",
@@ -107,7 +102,7 @@ impl Effect for LowPass {
             title: "Low-pass filter",
             physics: "The white noise has passed a filter whose memory reaches over a sample: the Bartlett filter of the ADIS16250 with many taps, the digital filter of another sensor, a moving average of the logger, or a pole of the read-out. The filter passes the slowest as it is: angle_random_walk is the density of the noise before it, by which an angle grows.",
             excitation: "Nothing.",
-            test: "White noise shaped by one pole, by one pole behind a window that is shorter than a sample, by a mean over some samples that is taken once to three times, or by a filter of any smooth shape that passes the slow best and stops some frequency; refitted by maximum likelihood.",
+            test: "White noise shaped by one pole, by one pole behind a window that is shorter than a sample, by a triangular window, by a mean of some readings that is taken once to three times, or by a filter of any smooth shape that passes the slow best and stops some frequency; refitted by maximum likelihood.",
             remedy: "Simulate white noise through this filter, and take fewer taps, or a lower sample rate, if the filter has to see white noise.",
             figure: "Spectrum of the rate with the model before and after: what the filter takes away.",
             example: Example::new(Plot::Spectrum, &[("lag1_correlation", 0.5)]),
@@ -136,17 +131,11 @@ impl Effect for LowPass {
         let rounding = step * step / 12.0;
         let smooth =
             COSINES.map(|cosines| Hypothesis::Covariance(Arc::new(Smooth { cosines, rounding })));
-        let means = [Of::Course, Of::Readings].into_iter().flat_map(|of| {
-            (1..=MOST_TIMES).map(move |times| {
-                Hypothesis::Covariance(Arc::new(Window {
-                    times,
-                    of,
-                    rounding,
-                }))
-            })
-        });
+        let means = (1..=MOST_TIMES)
+            .map(|times| Hypothesis::Covariance(Arc::new(Mean { times, rounding })));
         let plain = [
             Hypothesis::Covariance(Arc::new(Pole)),
+            Hypothesis::Covariance(Arc::new(Triangle)),
             Hypothesis::Covariance(Arc::new(BehindWindow)),
         ];
         Ok(plain.into_iter().chain(means).chain(smooth).collect())
@@ -159,8 +148,8 @@ impl Effect for LowPass {
         if COSINES.contains(&found.coefficients.len()) {
             return described(found);
         }
-        if let Some(window) = of_found(found) {
-            return described_mean(found, window);
+        if let Some((_, times, _)) = found.fixed.iter().find(|f| f.0 == "times") {
+            return described_mean(found, Mean::taken(*times as usize));
         }
         let rho = logistic(theta);
         let fixed = found
@@ -202,7 +191,8 @@ impl Effect for LowPass {
         }
         let (rho, kind) = stated(parameters);
         Some(match kind {
-            Kind::Mean(window, length) => window.passes(length, at),
+            Kind::Mean(mean, readings) => mean.passes(readings as f64, at),
+            Kind::Triangular => Triangle::of(rho, at),
             Kind::TwoSamples => at.cosine.iter().map(|c| 1.0 + 2.0 * rho * c).collect(),
             Kind::Pole(pole) => BehindWindow::of(rho, pole.clamp(least_pole(rho), rho), at),
         })
@@ -222,7 +212,8 @@ impl Effect for LowPass {
             let drawn = if rounding < 1.0 { 1.0 - rounding } else { 1.0 };
             let rho = (stated / drawn).clamp(0.0, MOST_ALIKE);
             match kind {
-                Kind::Mean(window, length) => averaged(noise, &window.taps(length)),
+                Kind::Mean(mean, readings) => averaged(noise, &mean.taps(readings)),
+                Kind::Triangular => averaged(noise, &window(rho)),
                 Kind::TwoSamples => averaged(noise, &two_samples(rho)),
                 // From one lag to the next rounding changes nothing.
                 Kind::Pole(pole) => behind_a_window(noise, rho, pole.clamp(least_pole(rho), rho)),
@@ -234,8 +225,9 @@ impl Effect for LowPass {
 /// A filter that two numbers tell.
 #[derive(Clone, Copy)]
 enum Kind {
-    /// A mean over so many samples.
-    Mean(Window, f64),
+    /// A mean of so many readings.
+    Mean(Mean, usize),
+    Triangular,
     TwoSamples,
     /// One pole, behind a window where it is smaller than the correlation of neighbours.
     Pole(f64),
@@ -246,73 +238,35 @@ fn stated(parameters: &Parameters) -> (f64, Kind) {
     let rho = value(parameters, "lag1_correlation").clamp(0.0, MOST_ALIKE);
     let triangular = parameters.get("triangular").map(|p| p.value != 0.0);
     let pole = parameters.get("pole").map(|p| p.value);
+    let readings = parameters.get("averaged").map(|p| p.value as usize);
     let kind = match (triangular, pole) {
-        _ if parameters.contains_key("averaged") => of_model(parameters),
-        (Some(true), _) => {
-            let window = Window::exact(2, Of::Course);
-            Kind::Mean(window, window.of_lag1(rho))
+        _ if readings.is_some_and(|n| n > 0) => {
+            let times = parameters.get("times").map_or(1, |p| p.value as usize);
+            Kind::Mean(Mean::taken(times.max(1)), readings.unwrap_or(1))
         }
+        (Some(true), _) => Kind::Triangular,
         (None, None) if rho <= TWO_SAMPLES => Kind::TwoSamples,
         (_, pole) => Kind::Pole(pole.unwrap_or(rho)),
     };
     (rho, kind)
 }
 
-/// The mean that a model states.
-fn of_model(parameters: &Parameters) -> Kind {
-    let stated = |name: &str| parameters.get(name).map(|p| p.value);
-    let times = stated("times").map_or(1, |t| (t as usize).clamp(1, MOST_TIMES));
-    let of = Of::stated(stated("of_readings").unwrap_or(0.0));
-    Kind::Mean(Window::exact(times, of), value(parameters, "averaged"))
-}
-
-/// The mean that was found, if it is one.
-fn of_found(found: &Found) -> Option<Window> {
-    let fixed = |name: &str| found.fixed.iter().find(|f| f.0 == name).map(|f| f.1);
-    let of = Of::stated(fixed("of_readings")?);
-    Some(Window::exact(fixed("times")? as usize, of))
-}
-
 /// Parameters of a mean. Whole readings have no error.
-fn described_mean(found: &Found, window: Window) -> Parameters {
-    let (theta, error) = found.coefficients[0];
-    let length = match window.of {
-        Of::Readings => window.length(theta).round(),
-        Of::Course => window.length(theta),
-    };
-    let off = |x: f64| (window.length(x) - length).abs();
-    let error = match window.of {
-        Of::Readings => 0.0,
-        Of::Course => 0.5 * (off(theta + error) + off(theta - error)),
-    };
-    let sized = |value: f64, error: f64, unit: &str| match window.of {
-        Of::Readings => Parameter::exact(value, unit),
-        Of::Course => Parameter::estimated(value, error, unit),
-    };
-    let lag1 = |length: f64| window.lag1(length);
-    let slope = (lag1(length * (1.0 + STEP)) - lag1(length)) / (STEP * length);
-    let half = window.half_power(length).map(|omega| {
+fn described_mean(found: &Found, mean: Mean) -> Parameters {
+    let readings = Mean::readings(found.coefficients[0].0).round();
+    let half = mean.half_power(readings).map(|omega| {
         let hz = omega * found.rate_hz / TAU;
-        ("half_power", sized(hz, hz * error / length, "Hz"))
+        ("half_power", hz, "Hz")
     });
     let all = [
-        ("averaged", sized(length, error, "samples")),
-        ("times", Parameter::exact(window.times as f64, "1")),
-        (
-            "of_readings",
-            Parameter::exact(f64::from(window.of == Of::Readings), "1"),
-        ),
-        (
-            "lag1_correlation",
-            sized(lag1(length), (slope * error).abs(), "1"),
-        ),
+        ("averaged", readings, "samples"),
+        ("times", mean.times as f64, "1"),
+        ("lag1_correlation", mean.lag1(readings), "1"),
     ];
-    let named = all.into_iter().chain(half);
-    named.map(|(name, p)| (name.to_owned(), p)).collect()
+    let all = all.into_iter().chain(half);
+    all.map(|(name, value, unit)| (name.to_owned(), Parameter::exact(value, unit)))
+        .collect()
 }
-
-/// Part of a length over which a slope is taken.
-const STEP: f64 = 1e-4;
 
 /// Parameters of a filter of a smooth shape.
 fn described(found: &Found) -> Parameters {

@@ -1,6 +1,6 @@
 //! Noise of a filter's correlations, drawn out of white noise.
 
-use super::window::FLOOR;
+use super::shapes::{FLOOR, inverse_spline, spline};
 
 /// A mean of a sample and the one before, weights 1 : w, of the lag-1 correlation w / (1 + w^2) <= 1/2; sum of squares 1.
 pub(super) fn two_samples(rho: f64) -> Vec<f64> {
@@ -13,10 +13,15 @@ pub(super) fn two_samples(rho: f64) -> Vec<f64> {
     vec![1.0 / norm, w / norm]
 }
 
-/// Taps of a noise that has these correlations from lag 1 on, sum of squares 1: the factor of its density without zeros outside
-/// the unit circle (Wilson's iteration, SIAM J. Numer. Anal. 6, 1969).
-pub(super) fn factor(correlations: &[f64]) -> Vec<f64> {
-    let r = [&[1.0 + FLOOR], correlations].concat();
+/// Taps of a noise that has the correlations of a triangular window of that lag-1 correlation, sum of squares 1: the factor
+/// of its density without zeros outside the unit circle (Wilson's iteration, SIAM J. Numer. Anal. 6, 1969).
+pub(super) fn window(rho: f64) -> Vec<f64> {
+    let unit = inverse_spline(rho);
+    let all = (0..)
+        .map(|l| spline(f64::from(l) * unit))
+        .take_while(|r| *r > 0.0);
+    let mut r: Vec<f64> = all.collect();
+    r[0] += FLOOR;
     let lags = r.len();
     let mut b = vec![0.0; lags];
     b[0] = r.iter().map(|v| v.abs()).sum::<f64>().sqrt();
@@ -38,7 +43,7 @@ pub(super) fn factor(correlations: &[f64]) -> Vec<f64> {
     b
 }
 
-/// Iterations of [`factor`]: they converge quadratically but near a zero of the density, where each halves what is off.
+/// Iterations of [`window`]: they converge quadratically but near a zero of the density, where each halves what is off.
 const FACTORING: usize = 40;
 
 /// The solution of a x = right, by elimination with pivots.
@@ -98,7 +103,6 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    use super::super::window::{Of, Window};
     use super::*;
 
     #[test]
@@ -120,15 +124,16 @@ mod tests {
 
     #[test]
     fn what_is_simulated_has_the_correlations_that_are_fitted() {
-        for (times, length) in [(1, 2.0), (1, 4.3), (1, 25.0), (2, 0.8), (2, 3.0), (3, 2.5)] {
-            let wanted = Window::exact(times, Of::Course).correlations(length);
-            let taps = factor(&wanted);
+        for rho in [0.1, 0.25, 0.5, 0.8] {
+            let unit = inverse_spline(rho);
+            let taps = window(rho);
             for lag in 0..taps.len() {
                 let found: f64 = taps.iter().zip(&taps[lag..]).map(|(a, b)| a * b).sum();
-                let wanted = if lag == 0 { 1.0 } else { wanted[lag - 1] };
+                let floor = if lag == 0 { FLOOR } else { 0.0 };
+                let wanted = (spline(lag as f64 * unit) + floor) / (1.0 + FLOOR);
                 assert!(
                     (found - wanted).abs() < 1e-3,
-                    "{times} times {length}, lag {lag}: {found} {wanted}"
+                    "{rho}, lag {lag}: {found} {wanted}"
                 );
             }
         }
