@@ -122,9 +122,9 @@ fn statistical_filters_of_any_kind_are_named_and_the_noise_before_them_is_told()
         held += u64::from(off.abs() < 1.96);
         let named: Vec<&str> = d.findings.iter().map(|f| f.cause.as_str()).collect();
         let looks_alike = d.replicates[&name].after.p_value > 0.01;
-        let counted = filter.averages.is_none_or(|(readings, times)| {
+        let counted = filter.averages.is_none_or(|(readings, stages)| {
             let told = |p: &str| d.findings.first()?.parameters.get(p).map(|p| p.value);
-            told("averaged") == Some(readings as f64) && told("times") == Some(times as f64)
+            told("averaged") == Some(readings as f64) && told("stages") == Some(stages as f64)
         });
         let alone = named == ["low_pass"] && d.findings[0].channels == [name.clone()];
         match alone && looks_alike && counted {

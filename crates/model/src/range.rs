@@ -86,7 +86,7 @@ pub fn bounds(name: &str, unit: &str) -> [f64; 2] {
 }
 
 /// Most means one after the other, and most readings of each.
-const MOST_TIMES: f64 = 3.0;
+const MOST_STAGES: f64 = 3.0;
 const MOST_AVERAGED: f64 = 64.0;
 
 /// Largest coefficient of the logarithm of a filter's gain: e^40 between what passes and what does not.
@@ -99,7 +99,7 @@ pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
         ("running", _) => range(1.0, MOST_SAMPLES),
         ("bit" | "missing_bits", _) => whole(0.0, HIGHEST_BIT),
         ("value" | "by_magnitude" | "triangular" | "silent" | "normal", _) => whole(0.0, 1.0),
-        ("times", _) => whole(1.0, MOST_TIMES),
+        ("stages", _) => whole(1.0, MOST_STAGES),
         ("averaged", _) => whole(1.0, MOST_AVERAGED),
         ("fraction" | "upward", _) => range(0.0, 1.0),
         ("lag1_correlation" | "skew", _) => range(-1.0, 1.0),

@@ -31,7 +31,7 @@ pub static EFFECT: LowPass = LowPass;
 /// Cosines of the filters of any smooth shape that are tried: each about twice as sharp as the one before.
 const COSINES: [usize; 3] = [6, 14, MOST];
 /// Most means one after the other.
-const MOST_TIMES: usize = 3;
+const MOST_STAGES: usize = 3;
 /// Largest correlation of neighbours that is taken for a mean of two samples where a model does not say the filter's kind.
 const TWO_SAMPLES: f64 = 0.3;
 /// Largest correlation that is simulated.
@@ -49,9 +49,9 @@ const PLAIN: [ParameterSpec; 6] = [
         "how many readings each is the mean of",
     ),
     optional(
-        "times",
+        "stages",
         "1",
-        "how often such a mean is taken, each of what the one before gives",
+        "means one after the other, each of what the one before gives",
     ),
     optional(
         "triangular",
@@ -131,8 +131,8 @@ impl Effect for LowPass {
         let rounding = step * step / 12.0;
         let smooth =
             COSINES.map(|cosines| Hypothesis::Covariance(Arc::new(Smooth { cosines, rounding })));
-        let means = (1..=MOST_TIMES)
-            .map(|times| Hypothesis::Covariance(Arc::new(Mean { times, rounding })));
+        let means = (1..=MOST_STAGES)
+            .map(|stages| Hypothesis::Covariance(Arc::new(Mean { stages, rounding })));
         let plain = [
             Hypothesis::Covariance(Arc::new(Pole)),
             Hypothesis::Covariance(Arc::new(Triangle)),
@@ -148,8 +148,8 @@ impl Effect for LowPass {
         if COSINES.contains(&found.coefficients.len()) {
             return described(found);
         }
-        if let Some((_, times, _)) = found.fixed.iter().find(|f| f.0 == "times") {
-            return described_mean(found, Mean::taken(*times as usize));
+        if let Some((_, stages, _)) = found.fixed.iter().find(|f| f.0 == "stages") {
+            return described_mean(found, Mean::taken(*stages as usize));
         }
         let rho = logistic(theta);
         let fixed = found
@@ -170,10 +170,10 @@ impl Effect for LowPass {
     }
 
     fn named_first(&self, parameters: &Parameters) -> &'static [&'static str] {
-        match parameters.get("times").map(|p| p.value) {
+        match parameters.get("stages").map(|p| p.value) {
             None => &[],
             Some(1.0) => &["averaged", "half_power"],
-            Some(_) => &["averaged", "times", "half_power"],
+            Some(_) => &["averaged", "stages", "half_power"],
         }
     }
 
@@ -241,8 +241,8 @@ fn stated(parameters: &Parameters) -> (f64, Kind) {
     let readings = parameters.get("averaged").map(|p| p.value as usize);
     let kind = match (triangular, pole) {
         _ if readings.is_some_and(|n| n > 0) => {
-            let times = parameters.get("times").map_or(1, |p| p.value as usize);
-            Kind::Mean(Mean::taken(times.max(1)), readings.unwrap_or(1))
+            let stages = parameters.get("stages").map_or(1, |p| p.value as usize);
+            Kind::Mean(Mean::taken(stages.max(1)), readings.unwrap_or(1))
         }
         (Some(true), _) => Kind::Triangular,
         (None, None) if rho <= TWO_SAMPLES => Kind::TwoSamples,
@@ -260,7 +260,7 @@ fn described_mean(found: &Found, mean: Mean) -> Parameters {
     });
     let all = [
         ("averaged", readings, "samples"),
-        ("times", mean.times as f64, "1"),
+        ("stages", mean.stages as f64, "1"),
         ("lag1_correlation", mean.lag1(readings), "1"),
     ];
     let all = all.into_iter().chain(half);

@@ -9,8 +9,8 @@ use crate::effect::{Covariance, Frequencies};
 /// mean has none, over the white one: a long mean tells little but for what is behind it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mean {
-    /// How often it is taken.
-    pub times: usize,
+    /// Means one after the other.
+    pub stages: usize,
     /// Variance of the rounding of the readings, over that of the noise between neighbours.
     pub rounding: f64,
 }
@@ -34,15 +34,15 @@ const GAUSS: [(f64, f64); 3] = [
 
 impl Mean {
     /// One that is taken so often of readings that are not rounded.
-    pub(super) fn taken(times: usize) -> Self {
+    pub(super) fn taken(stages: usize) -> Self {
         let rounding = 0.0;
-        Self { times, rounding }
+        Self { stages, rounding }
     }
 
     /// Taps of a mean of so many readings, sum of squares 1.
     pub(super) fn taps(self, readings: usize) -> Vec<f64> {
         let mut taps = vec![1.0];
-        for _ in 0..self.times {
+        for _ in 0..self.stages {
             let mut wider = vec![0.0; taps.len() + readings - 1];
             for (i, tap) in taps.iter().enumerate() {
                 wider[i..i + readings].iter_mut().for_each(|w| *w += tap);
@@ -61,7 +61,7 @@ impl Mean {
         } else {
             readings
         };
-        one.powi(2 * self.times as i32)
+        one.powi(2 * self.stages as i32)
     }
 
     /// Mean of the density over all frequencies.
@@ -132,7 +132,7 @@ impl Covariance for Mean {
     }
 
     fn fixed(&self) -> Vec<(&'static str, f64, &'static str)> {
-        vec![("times", self.times as f64, "1")]
+        vec![("stages", self.stages as f64, "1")]
     }
 
     fn claims(&self, theta: &[f64]) -> bool {
@@ -161,8 +161,8 @@ mod tests {
     #[test]
     fn its_density_is_that_of_its_taps() {
         let at = Frequencies::at((0..40).map(|i| f64::from(i) * 0.08).collect());
-        for (times, readings) in [(1, 2), (1, 7), (2, 3), (3, 4)] {
-            let (mean, taps) = (Mean::taken(times), Mean::taken(times).taps(readings));
+        for (stages, readings) in [(1, 2), (1, 7), (2, 3), (3, 4)] {
+            let (mean, taps) = (Mean::taken(stages), Mean::taken(stages).taps(readings));
             let density = mean.passes(readings as f64, &at);
             for (w, d) in at.omega.iter().zip(density) {
                 let part = |f: fn(f64) -> f64| -> f64 {
@@ -172,7 +172,7 @@ mod tests {
                 let wanted = part(f64::cos).powi(2) + part(f64::sin).powi(2);
                 assert!(
                     (d - wanted).abs() < 1e-9,
-                    "{times} {readings} {w}: {d} {wanted}"
+                    "{stages} {readings} {w}: {d} {wanted}"
                 );
             }
             let neighbours: f64 = taps.windows(2).map(|t| t[0] * t[1]).sum();
