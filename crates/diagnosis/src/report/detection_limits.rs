@@ -244,6 +244,8 @@ fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smalle
         Hypothesis::Step => of_step(s, meter),
         Hypothesis::Line => Some(of_line(s, meter)),
         Hypothesis::SideBands => Some(of_side_bands(s, meter)),
+        // The smallest filter is told by those whose size is free: a mean of two readings is large.
+        Hypothesis::Covariance(process) if !process.grid().is_empty() => None,
         Hypothesis::Covariance(process) => of_process(s, meter, c, process),
         Hypothesis::TwoLevel => of_two_levels(s, meter),
         Hypothesis::Variance(law) => Some(of_variance_law(s, first, law)),

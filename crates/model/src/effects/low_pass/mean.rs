@@ -109,9 +109,10 @@ impl Mean {
         (readings - 1.0).ln()
     }
 
-    /// Where a mean of so many readings starts: rounding is larger over the noise between neighbours than over all.
+    /// Where a mean of so many readings starts: over all of the noise rounding is smaller than over that between neighbours, by as
+    /// many readings where the mean is taken once.
     fn start(self, readings: f64) -> Vec<f64> {
-        let floor = self.rounding * (1.0 - self.lag1(readings)) + FLOOR;
+        let floor = self.rounding / readings + FLOOR;
         vec![Self::coordinate(readings), floor.ln()]
     }
 }
