@@ -353,7 +353,7 @@ pub trait Effect: Send + Sync {
     fn at_most(&self, _parameter: &str) -> Option<(&'static str, f64)> {
         None
     }
-    /// Parameters that a sentence names first, where they are others than those that the effect requires.
+    /// Parameters that say it all to a reader, where they are others than those that the effect requires.
     fn named_first(&self, _parameters: &Parameters) -> &'static [&'static str] {
         &[]
     }

@@ -146,7 +146,7 @@ fn finding(found: &Finding) -> Markup {
             @if let Some(remedy) = answer::remedy(found).filter(|_| found.material) { p { (remedy) } }
             table.plain {
                 tbody {
-                    @for (name, parameter) in answer::in_order(found).into_iter().filter(|(n, p)| !answer::is_switch(&found.cause, n, p)) {
+                    @for (name, parameter) in answer::listed(found) {
                         tr { th { (name.replace('_', " ")) } td.number { (answer::found_size(&found.cause, name, parameter)) } }
                     }
                 }
