@@ -14,6 +14,7 @@ mod channel;
 mod concluded;
 mod far_readings;
 mod handed_over;
+mod high_passed;
 mod prepared;
 
 use std::borrow::Cow;

@@ -382,6 +382,10 @@ pub trait Effect: Send + Sync {
     fn passes(&self, _parameters: &Parameters, _at: &Frequencies) -> Option<Vec<f64>> {
         None
     }
+    /// What it takes from the readings, of an effect that adds nothing to them but what is missing.
+    fn takes(&self) -> Option<&'static str> {
+        None
+    }
     /// When it acts in a simulation.
     fn stage(&self) -> Stage;
     /// Act on the simulation. `channels` are the gyro axes (0..2) that the model names.

@@ -22,7 +22,7 @@ const fn row(id: u16, cause: &'static str, how: How) -> Row {
 }
 
 /// The rows, by number.
-pub const COUNTED: [Row; 11] = [
+pub const COUNTED: [Row; 12] = [
     row(200, "base_motion", |d, _, _| {
         let peak = d.by_ratio(1.5, 20.0);
         one(vec![("peak", peak), ("frequency", d.between(0.05, 0.5))])
@@ -67,6 +67,9 @@ pub const COUNTED: [Row; 11] = [
             _ => d.between(2.1, 2.6),
         };
         one(vec![("sensor_step", ratio * LSB), ("file_step", LSB)])
+    }),
+    row(210, "high_pass", |d, _, _| {
+        one(vec![("corner_frequency", d.by_ratio(0.05, 0.8))])
     }),
     row(230, "outliers", |d, s, a| {
         let count = d.by_ratio(3.0, 41.0).floor();

@@ -59,7 +59,7 @@ fn by_strength(out: &mut String, all: &[Outcome]) {
 const FAULTS: &str = "
 Faults of frames, counts and base: 1..8 outliers of 8.5..30 sigma (small: 3..40 of 6..8.5), rails at 2..2.6 sigma, 1..3 missing bits,
 bits stuck in 15..100 % of the samples, 15..75 repeats, 5..65 lost frames, jitter 0.4..5 ms, clocks 300..3000 ppm off, motion of
-1.5..20 deg/s.
+1.5..20 deg/s, high-pass filters of 0.05..0.8 Hz.
 ";
 
 fn by_count(out: &mut String, all: &[Outcome]) {

@@ -20,7 +20,13 @@ pub fn cost(finding: &Finding) -> Option<String> {
             percent(consequence.share_of_variance),
             percent(consequence.largest_change)
         )),
-        Some(consequence) => Some(consequence_of(consequence, finding.material)),
+        Some(consequence) => Some(match taken(finding).filter(|_| finding.material) {
+            Some(what) => format!(
+                "It takes {what} from the readings; without it a deviation is off by up to {}.",
+                percent(consequence.largest_change)
+            ),
+            None => consequence_of(consequence, finding.material),
+        }),
         None => cost_in_angle(finding),
     }
 }
@@ -29,6 +35,11 @@ pub fn cost(finding: &Finding) -> Option<String> {
 fn is_filter(finding: &Finding) -> bool {
     let at = Frequencies::default();
     effect(&finding.cause).is_some_and(|e| e.passes(&finding.parameters, &at).is_some())
+}
+
+/// What it takes from the readings, where that is more than noise.
+fn taken(finding: &Finding) -> Option<&'static str> {
+    effect(&finding.cause)?.takes()
 }
 
 /// What something does to the integrated angle and to the readings.

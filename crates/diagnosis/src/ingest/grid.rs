@@ -79,7 +79,8 @@ fn spread(values: &[f64], places: &[usize], n: usize, masked: &[usize]) -> Vec<f
     grid
 }
 
-fn interpolated(values: &[f64]) -> Vec<f64> {
+/// Values with straight lines over what is missing, the first and the last held.
+pub(crate) fn interpolated(values: &[f64]) -> Vec<f64> {
     let known: Vec<usize> = (0..values.len())
         .filter(|i| values[*i].is_finite())
         .collect();

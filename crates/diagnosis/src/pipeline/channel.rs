@@ -71,6 +71,13 @@ pub(super) fn all_searched(grid: &Grid) -> Vec<Searched<'_>> {
     })
 }
 
+/// How well the best model of a channel explains it: twice its log likelihood beyond what its terms have to.
+pub(super) fn score(grid: &Grid, target: &Target) -> f64 {
+    let search = laid_out(grid, target);
+    let found = search.ascend(search.baseline(&target.noise));
+    Search::total(&search.beside_any_spectrum(found))
+}
+
 /// Searches a channel, and asks its model and what that leaves.
 pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
     searched_from(grid, target, laid_out(grid, target))

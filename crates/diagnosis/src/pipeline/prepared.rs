@@ -8,6 +8,7 @@ use model::record::fills;
 use model::record::rows;
 use model::record::{AnalysisError, Base, Record};
 
+use super::high_passed;
 use crate::attribute::masking;
 use crate::audit::{Audit, audit, sign_bit};
 use crate::ingest::blows::{Blow, blows};
@@ -49,18 +50,22 @@ pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, A
     let record = &*record;
     let (alive, dead) = dead::left_out(record)?;
     let counted = lattice::counted(&alive);
-    let (mended, sticking) = sign_bit::mend(&counted);
+    let (mended, mut sticking) = sign_bit::mend(&counted);
     let record = &*mended;
-    let mut audited = audit(record);
-    audited.findings = all_worded(audited.findings);
-    audited.checks = all_worded(audited.checks);
-    audited.unexplained = all_worded(audited.unexplained);
-    audited.not_tested = all_worded(audited.not_tested);
-    // Put right by the sign, but for the readings that lay beyond the bit.
-    for f in &sticking {
-        audited.put_right(f);
+    let mut audited = audited_of(record, &sticking);
+    let filters = match bursts {
+        Some(_) => vec![],
+        None => {
+            let record = masking::renumbered(record, &audited);
+            high_passed::found(&record, &|name| audited.masked(name), seed)
+        }
+    };
+    if !filters.is_empty() {
+        audited = audited_of(&high_passed::settled(record, &filters), &sticking);
     }
     let record = &*masking::renumbered(record, &audited);
+    let record = &*high_passed::undone(record, &filters, &|name| audited.masked(name));
+    sticking.extend(high_passed::findings(record, &filters));
     let mut grid = lay_out(record, &|name| audited.masked(name), seed)?;
     let places = places_of_rows(record);
     let of_rows = |rows: &Vec<usize>| rows.iter().map(|r| places[*r]).collect();
@@ -96,6 +101,20 @@ pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, A
         prepared.leave_out(blows);
     }
     Ok(prepared)
+}
+
+/// What the audits say of a record of which `mended` was put right.
+fn audited_of(record: &Record, mended: &[Finding]) -> Audit {
+    let mut audited = audit(record);
+    audited.findings = all_worded(audited.findings);
+    audited.checks = all_worded(audited.checks);
+    audited.unexplained = all_worded(audited.unexplained);
+    audited.not_tested = all_worded(audited.not_tested);
+    // Put right by the sign, but for the readings that lay beyond the bit.
+    for f in mended {
+        audited.put_right(f);
+    }
+    audited
 }
 
 /// Where a base at rest may have been knocked.

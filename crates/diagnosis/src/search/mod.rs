@@ -354,7 +354,7 @@ impl<'a> Search<'a> {
     }
 
     /// Total score: likelihood beyond what all thresholds ask.
-    fn total(state: &State) -> f64 {
+    pub(crate) fn total(state: &State) -> f64 {
         2.0 * state.solution.log_likelihood - state.terms.iter().map(|t| t.threshold).sum::<f64>()
     }
 

@@ -15,6 +15,7 @@ pub mod dropped_samples;
 pub mod flicker;
 pub mod g_sensitivity;
 pub mod gauss_markov;
+pub mod high_pass;
 pub mod line;
 pub mod low_pass;
 pub mod motor_bias;
@@ -56,6 +57,7 @@ pub static EFFECTS: &[&dyn Effect] = &[
     &gauss_markov::EFFECT,
     &flicker::EFFECT,
     &low_pass::EFFECT,
+    &high_pass::EFFECT,
     &narrow_band::EFFECT,
     &wandering_line::EFFECT,
     &quantization_noise::EFFECT,

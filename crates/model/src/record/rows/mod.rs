@@ -19,7 +19,7 @@ use crate::record::Record;
 
 pub use bursts::{Bursts, end_to_end};
 use keys::Keys;
-pub use parts::longest_part;
+pub use parts::{longest_part, part_of};
 pub use rate::by_times;
 
 /// Largest counter that is one.

@@ -13,6 +13,21 @@ use super::{Place, rate, taken};
 /// Rows of which an interruption may be as long as one, in a part that is taken as one record.
 const ROWS_TO_A_HOLE: f64 = 4.0;
 
+/// Some rows of a record, one after the other.
+#[must_use]
+pub fn part_of(record: &Record, rows: Range<usize>) -> Record {
+    let seq = record.seq.as_ref();
+    let places: Vec<Place> = rows
+        .map(|row| Place {
+            row,
+            seq: seq.map(|s| s[row] as i64),
+            ticks: record.t_ticks.as_ref().map(|t| t[row] as i64),
+            shift_s: 0.0,
+        })
+        .collect();
+    taken(record, &places)
+}
+
 /// The longest part of a record without an interruption that is long against it. A record without any is borrowed.
 #[must_use]
 pub fn longest_part(record: &Record) -> Cow<'_, Record> {
@@ -44,17 +59,7 @@ pub fn longest_part(record: &Record) -> Cow<'_, Record> {
     if part == (0..rows) {
         return Cow::Borrowed(record);
     }
-    let seq = record.seq.as_ref();
-    let places: Vec<Place> = part
-        .clone()
-        .map(|row| Place {
-            row,
-            seq: seq.map(|s| s[row] as i64),
-            ticks: record.t_ticks.as_ref().map(|t| t[row] as i64),
-            shift_s: 0.0,
-        })
-        .collect();
-    let mut out = taken(record, &places);
+    let mut out = part_of(record, part.clone());
     out.notes.push(format!(
         "the record is interrupted for longer than can be bridged: rows {} to {} of {rows}, its longest part, are diagnosed. \
          Split the file to have the others, too",
