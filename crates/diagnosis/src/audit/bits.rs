@@ -250,7 +250,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
                 None => nearest_bit(nearest.as_ref()),
             };
             let what = unlike(name, &worst, nats, &nearest);
-            audit.not_normal.push(Observation::of_readings(name, what));
+            audit.not_normal.push(Observation::of_codes(name, what));
             Shape::Other
         }
     }

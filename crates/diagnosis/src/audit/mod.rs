@@ -242,7 +242,7 @@ impl Audit {
 
     /// What the last check has found has no name in the library.
     fn unexplain(&mut self, channel: &str, what: String) {
-        let mut seen = Observation::of_readings(channel, what);
+        let mut seen = Observation::of_codes(channel, what);
         if let Some(check) = self.checks.last_mut() {
             check.fails_after = true;
             seen.check = CheckId::of(&check.id).zip(check.p_value.or(Some(0.0)));

@@ -71,6 +71,16 @@ pub fn covariance(dimensions: usize) -> f64 {
     quantile(dimensions, 1.0)
 }
 
+/// Part of the false alarms of a hypothesis that one has which is asked once in a thousand channels.
+pub(crate) const SELDOM: f64 = 0.1;
+
+/// A filter with one coordinate that is undone, and the random walk of what was before it: asked where the slowest frequencies
+/// hold too little.
+#[must_use]
+pub fn undone_filter() -> f64 {
+    quantile(2, 1.0 / SELDOM)
+}
+
 /// A peak of any width at any place of the spectrum of `n` samples. Its size is the root Z of the likelihood ratio, a field
 /// over centre and width whose maxima above z number A z exp(-z^2 / 2) / (2 pi)^(3/2) (Adler, 1981): a Lorentzian of half
 /// width h has the metric 1 / (8 h^2) there, and h from 1.5 coefficients on A = n / (8^(1/2) 1.5). For z about 6 that is

@@ -226,7 +226,7 @@ impl Seeker<'_> {
         let first = (START * y.len() as f64) as usize;
         let seen = Spectrum::of(&y[first..]).lacks()?;
         let late = estimate(&y[first..], seen.ln());
-        if self.gain(channel, late, first)? < threshold::covariance(2) {
+        if self.gain(channel, late, first)? < threshold::undone_filter() {
             return None;
         }
         // The whole tells more, where the filter was at rest when the record began.

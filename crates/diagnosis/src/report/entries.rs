@@ -12,7 +12,8 @@ use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Domain, Observation};
 
 /// The entries of a record. Observations of the noise of one channel are views of one residual, and one entry; so are those
-/// of what an axis has in common with others. A fault of the readings stands for itself.
+/// of what an axis has in common with others, and what audits see in how the readings of one channel are made. What else befalls
+/// readings stands for itself.
 pub(crate) fn entries(
     all: Vec<Observation>,
     searched: &[Searched<'_>],
@@ -50,9 +51,10 @@ pub(crate) fn entries(
 /// Domains of the terms of a model that an entry has there.
 fn modelled(group: &[Observation], terms: &[Unnamed]) -> Vec<String> {
     let shared = group[0].domain == Domain::Coupling;
+    let in_residual = matches!(group[0].domain, Domain::Noise | Domain::Coupling);
     let own = terms.iter().filter(|t| {
         let of_domain = shared == (t.domain == unnamed::Domain::Cross);
-        of_domain && group[0].domain != Domain::Readings && t.channels.contains(&group[0].channel)
+        of_domain && in_residual && t.channels.contains(&group[0].channel)
     });
     let ids: BTreeSet<&str> = own.map(|t| t.domain.id()).collect();
     ids.into_iter().map(String::from).collect()
@@ -61,9 +63,11 @@ fn modelled(group: &[Observation], terms: &[Unnamed]) -> Vec<String> {
 /// An entry whose consequence nobody knows.
 fn plain(group: &[Observation]) -> Unexplained {
     let checks: BTreeSet<CheckId> = group.iter().filter_map(|o| o.check).map(|c| c.0).collect();
+    let chance = |o: &Observation| o.check.map_or(1.0, |(_, chance)| chance);
+    let surest = group.iter().min_by(|a, b| chance(a).total_cmp(&chance(b)));
     Unexplained {
         channel: group[0].channel.clone(),
-        what: group[0].what.clone(),
+        what: surest.map_or_else(String::new, |o| o.what.clone()),
         details: match group {
             [_] => vec![],
             _ => group.iter().map(|o| o.what.clone()).collect(),

@@ -10,7 +10,9 @@ pub enum Domain {
     Noise,
     /// What axes have in common.
     Coupling,
-    /// Counts, frames and clocks, or a channel that is not searched at all: each is a thing of its own.
+    /// How the readings of one channel are made: which codes there are, and how each depends on others.
+    Codes,
+    /// Frames and clocks, or a channel that is not searched at all: each is a thing of its own.
     Readings,
 }
 
@@ -60,6 +62,14 @@ impl Observation {
     pub(crate) fn of_readings(channel: &str, what: String) -> Self {
         Self {
             domain: Domain::Readings,
+            ..Self::of_noise(channel, what)
+        }
+    }
+
+    /// Of how the readings of a channel are made.
+    pub(crate) fn of_codes(channel: &str, what: String) -> Self {
+        Self {
+            domain: Domain::Codes,
             ..Self::of_noise(channel, what)
         }
     }

@@ -53,7 +53,7 @@ impl Wanted {
                     self.pairs.insert(pair);
                 }
             }
-            test_level::Domain::Readings => {}
+            test_level::Domain::Codes | test_level::Domain::Readings => {}
         }
     }
 }
