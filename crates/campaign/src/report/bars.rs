@@ -70,7 +70,7 @@ pub(super) const NAMED: f64 = 0.03;
 const BEYOND_REACH: &str = "
 An effect is *strong* from d' 8 on; an AM line from 13; telegraph, noise change and scale from 10. Foreign effects without a d'
 (another law of the noise, codes) count as strong. Not counted are those that 0.28 deg/s rms keep below d' 25, and those whose cause
-the library has got since (modes, wandering tones, rounded angles, two roundings).
+the library has got since (modes, wandering tones, rounded angles, two roundings, a capacitor).
 
 Some d' asked of the smallest sizes cannot be reached. False alarms of 0.5 % leave about 7e-5 to each of some twenty hypotheses on
 three axes; one test at that level finds 95 of 100 from d' 5.6 to 5.8 on, not 5.5. A line may have any of 12 000 frequencies: d' 7.8,

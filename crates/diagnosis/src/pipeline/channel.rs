@@ -7,7 +7,7 @@ use model::effect::View;
 use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
 use crate::fit::channel::{State, VarianceLaws, whitened};
 use crate::fit::estimate;
-use crate::fit::likelihood::{Bins, Panel};
+use crate::fit::likelihood::{Bins, Noise, Panel};
 use crate::ingest::types::{Grid, Target};
 use crate::joint;
 use crate::report::detection_limits;
@@ -71,11 +71,20 @@ pub(super) fn all_searched(grid: &Grid) -> Vec<Searched<'_>> {
     })
 }
 
-/// How well the best model of a channel explains it: twice its log likelihood beyond what its terms have to.
-pub(super) fn score(grid: &Grid, target: &Target) -> f64 {
+/// How well the best model of a channel explains it: twice its log likelihood beyond what its terms have to; and how much better than
+/// with a random walk of `log_walk`, the logarithm of its step variance over the white one, where it has a smaller one.
+pub(super) fn best(grid: &Grid, target: &Target, log_walk: f64) -> (f64, f64) {
     let search = laid_out(grid, target);
     let found = search.ascend(search.baseline(&target.noise));
-    Search::total(&search.beside_any_spectrum(found))
+    let best = search.beside_any_spectrum(found);
+    let walking = Noise {
+        log_walk: best.noise.log_walk.max(log_walk),
+        terms: best.noise.terms.clone(),
+    };
+    let panel = &search.panel;
+    let other = panel.solve(&walking.over(&panel.bins), &best.columns());
+    let lost = best.solution.log_likelihood - other.log_likelihood;
+    (Search::total(&best), 2.0 * lost)
 }
 
 /// Searches a channel, and asks its model and what that leaves.

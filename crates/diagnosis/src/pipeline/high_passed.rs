@@ -226,7 +226,8 @@ impl Seeker<'_> {
         let first = (START * y.len() as f64) as usize;
         let seen = Spectrum::of(&y[first..]).lacks()?;
         let late = estimate(&y[first..], seen.ln());
-        if self.gain(channel, late, first)? < threshold::undone_filter() {
+        let least = threshold::undone_filter();
+        if !self.is_before(channel, late, first, [least; 2]) {
             return None;
         }
         // The whole tells more, where the filter was at rest when the record began.
@@ -241,7 +242,8 @@ impl Seeker<'_> {
         let y = whole(own, &(self.masked)(&own.name))?;
         let all = estimate(&y, other.log);
         let told = if all.agrees(other) { all } else { other };
-        (self.gain(channel, told, 0)? >= threshold::covariance(1)).then_some(told)
+        self.is_before(channel, told, 0, [threshold::covariance(1), 0.0])
+            .then_some(told)
     }
 
     /// One filter of all channels that do about as well with it as with their own, and those of the others.
@@ -281,8 +283,10 @@ impl Seeker<'_> {
         all.filter(|f| !f.channels.is_empty()).collect()
     }
 
-    /// How much better the readings before a filter are explained than those behind it, from row `first` on.
-    fn gain(&self, channel: usize, told: Told, first: usize) -> Option<f64> {
+    /// Whether the readings from row `first` on are explained better before a filter than behind it, by `least[0]`, and the filter
+    /// took something: put back before it, white noise that never went through has a random walk of its own, and one of less has
+    /// to be likelier than that, by `least[1]`. Signals alone do not tell: of what the bias follows a filter makes its pace.
+    fn is_before(&self, channel: usize, told: Told, first: usize, least: [f64; 2]) -> bool {
         let behind = rows::part_of(self.record, first..self.record.len());
         let masked = |name: &str| -> Vec<usize> {
             let all = (self.masked)(name).into_iter();
@@ -291,12 +295,17 @@ impl Seeker<'_> {
         let own = &self.record.channels[channel].name;
         let mut undone = behind.clone();
         before(&mut undone.channels[channel], told.filter(), &masked(own));
-        let score = |record: &Record| -> Option<f64> {
+        let best = |record: &Record| {
             let grid = lay_out(record, &masked, self.seed).ok()?;
-            let target = grid.targets.iter().find(|t| t.name == *own)?;
-            Some(channel::score(&grid, target))
+            let target = grid.targets.iter().find(|t| t.name == *own);
+            let still = target.filter(|t| !t.moving)?;
+            Some(channel::best(&grid, still, -2.0 * told.log))
         };
-        Some(score(&undone)? - score(&behind)? + 2.0 * shrunk(told.log, behind.len()))
+        let Some((score, lacks)) = best(&undone) else {
+            return false;
+        };
+        let gained = |(as_read, _)| score - as_read + 2.0 * shrunk(told.log, behind.len());
+        lacks >= least[1] && best(&behind).map(gained).is_some_and(|g| g >= least[0])
     }
 }
 

@@ -70,7 +70,7 @@ pub(super) const EFFECTS: &[ForeignEffect] = &[
     row(495, 11, "slip ring that is worn at some angles", More(|d, s, _| variance::worn(d, s))).twin(317),
     row(505, 11, "noise that grows with the warmth", Exponential(|_, s, a| variance::warmth(s, a))).needs(T).twin(318),
     row(506, 11, "ramp of the rate that wanders", Shaped(|d, s, a, _| processes::wandering_ramp(d, s, a))),
-    row(519, 12, "coupling capacitor in the signal's way", Shaped(|_, s, a, _| spectrum::behind_corner(s, a))).twin(376),
+    row(519, 12, "coupling capacitor in the signal's way", Shaped(|_, s, a, _| spectrum::behind_corner(s, a))).twin(376).later("high_pass"),
     row(521, 12, "bursts of a bus every few seconds", More(|d, s, _| variance::bursts(d, s))).twin(317),
     row(543, 13, "fan coil that a thermostat switches", More(|d, s, _| variance::fan(d, s))).twin(521),
     row(544, 13, "gas that leaks into the cavity", More(|d, s, _| variance::gas(d, s))).twin(421),
