@@ -42,7 +42,7 @@ use crate::search::searched::Searched;
 use crate::test_level::{CheckId, Observation, all_worded, on_two_threads, worded};
 pub use banks::diagnose_channels;
 use concluded::{Told, concluded};
-use handed_over::HandedOver;
+use handed_over::{AsRead, HandedOver};
 use model::record::AnalysisError;
 use model::record::rows::Bursts;
 use prepared::{Prepared, prepared};
@@ -127,6 +127,7 @@ fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         mut audited,
         sticking: mended,
         dead,
+        ref as_read,
         mut input,
         ..
     } = of;
@@ -135,7 +136,12 @@ fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     let mut told = concluded(&searched, tested, audited, dead, named);
     at_rest::with_motion(&mut told.findings, &at_rest);
     gain::complete(&mut told.findings, &searched, grid, &mended);
-    let mut models = handed_over::handed_over(&searched, grid, &told, &mended, options);
+    let as_read = as_read.as_ref().map(|grid| AsRead {
+        grid,
+        searched: channel::all_searched(grid),
+    });
+    let mut models =
+        handed_over::handed_over(&searched, grid, &told, &mended, as_read.as_ref(), options);
     let strays = !models.held.unexplained.is_empty();
     let mut unexplained = ranked_entries(&mut told, &mut models, &searched, grid, options);
     if let Some(bursts) = &grid.bursts {

@@ -141,10 +141,11 @@ fn statistical_a_high_pass_filter_is_named_with_its_corner_and_what_is_before_it
         let off = told.map(|p| (p.value - corner) / p.std_error.expect("an error"));
         covered += u64::from(off.is_some_and(|o| o.abs() < 1.96));
         let alike = d.replicates.values().all(|r| r.after.p_value > 0.003);
-        match sorted == wanted && alike {
+        let missed = d.replicates.values().any(|r| r.before.p_value <= 0.05);
+        match sorted == wanted && alike && missed {
             true => Ok(()),
             false => Err(format!(
-                "{named:?} | {corner:.4} Hz of {rate_hz}, off by {off:.1?} | {logger:?} {beside:?} {axis} | {:?}",
+                "{named:?} | {alike} {missed} | {corner:.4} Hz of {rate_hz}, off by {off:.1?} | {logger:?} {beside:?} {axis} | {:?}",
                 said()
             )),
         }

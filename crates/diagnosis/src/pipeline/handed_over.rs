@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use model::effects::high_pass;
 use model::file::{EffectModel, FittedOn, ModelFile};
 
 use super::{DiagnoseOptions, Told};
@@ -41,22 +42,36 @@ fn is_of(f: &Finding, e: &EffectModel) -> bool {
     f.cause == e.cause && f.channels == e.channels
 }
 
+/// Channels as they were read, where a filter was undone before the search.
+pub(super) struct AsRead<'a> {
+    pub grid: &'a Grid,
+    pub searched: Vec<Searched<'a>>,
+}
+
 /// Terms without a name are sought where the search left something; and again, where the replicates of that model do not hold
-/// the record. Faults that were `mended` before the search are in the model, and not in what was fitted and is compared.
+/// the record. Faults that were `mended` before the search are in the model, and not in what was fitted and is compared; a filter
+/// that was undone is in the model that is compared with the record `as_read`.
 pub(super) fn handed_over(
     searched: &[Searched<'_>],
     grid: &Grid,
     told: &Told,
     mended: &[Finding],
+    as_read: Option<&AsRead<'_>>,
     options: &DiagnoseOptions,
 ) -> HandedOver {
     let count = options.replicates;
     let causes: Vec<&Finding> = told.findings.iter().chain(&told.nearest).collect();
-    let baseline_model = handover::baseline_model(searched, grid, fitted_on(grid, options));
+    let (read, its) = as_read.map_or((grid, searched), |r| (r.grid, r.searched.as_slice()));
+    let baseline_model = handover::baseline_model(its, read, fitted_on(grid, options));
     let is_mended = |e: &EffectModel| mended.iter().any(|f| is_of(f, e));
     let extended = |by: &Fitted| {
         let on = fitted_on(grid, options);
-        handover::extended_model(searched, grid, &causes, by, &is_mended, on)
+        let mut model = handover::extended_model(searched, grid, &causes, by, &is_mended, on);
+        // Readings are counted behind a filter.
+        for (channel, s) in model.channels.iter_mut().zip(its) {
+            channel.lsb = s.target.lsb;
+        }
+        model
     };
     let mut wanted = Wanted::of(&told.unexplained);
     let mut fitted = unnamed::fit(searched, grid, &wanted, &causes);
@@ -68,11 +83,12 @@ pub(super) fn handed_over(
     let is_plain = |name: &str| !found.iter().any(|f| *f == name);
     let judge = match count {
         0 => None,
-        count => Judge::new(grid, &baseline_model, count, options.seed).ok(),
+        count => Judge::new(read, &baseline_model, count, options.seed).ok(),
     };
     let among = |model: &ModelFile| {
         let mut compared = model.clone();
-        compared.effects.retain(|e| !is_mended(e));
+        let undone = |e: &EffectModel| as_read.is_some() && e.cause == high_pass::ID;
+        compared.effects.retain(|e| undone(e) || !is_mended(e));
         let all = judge
             .as_ref()
             .map(|j| j.of(&compared, &is_plain).unwrap_or_default());

@@ -135,7 +135,7 @@ fn settle(channel: &mut Channel, told: Told) {
     let first = &x[..x.len().min(told.log.exp().ceil() as usize)];
     let level = first.iter().sum::<f64>() / first.len() as f64;
     let mut start = vec![level; x.len()];
-    told.filter().pass(&mut start);
+    told.filter().pass(&mut start, 0.0);
     let step = channel.lsb.unwrap_or(0.0);
     for (i, start) in start.into_iter().enumerate() {
         if step <= 0.0 {
@@ -427,7 +427,7 @@ mod tests {
             assert_eq!(Spectrum::of(&y).lacks(), None, "{seed}");
             let tau = 4.0 * 1.06f64.powi(seed as i32);
             let mut through = y;
-            Filter::of(tau).pass(&mut through);
+            Filter::of(tau).pass(&mut through, 0.0);
             let seen = Spectrum::of(&through[3000..]).lacks().unwrap();
             assert!((seen / tau).ln().abs() < 1.2, "{seed}: {seen} for {tau}");
         }
@@ -439,7 +439,7 @@ mod tests {
             .map(|seed| {
                 let tau = 5.0 * 1.05f64.powi(seed);
                 let mut y = noise(12_000, 100 + u64::from(seed.unsigned_abs()));
-                Filter::of(tau).pass(&mut y);
+                Filter::of(tau).pass(&mut y, 0.0);
                 let told = estimate(&y[3000..], tau.ln() + 0.3);
                 (told.log - tau.ln()) / told.error
             })

@@ -28,6 +28,8 @@ pub(super) struct Prepared {
     pub sticking: Vec<Finding>,
     pub dead: Vec<Observation>,
     pub input: Input,
+    /// The record as it was read, where a filter was undone.
+    pub as_read: Option<Grid>,
     /// Where the base may have been knocked: those readings are lost on the grid.
     pub blows: Vec<Blow>,
     /// What the grid was laid out of, where there are blows.
@@ -64,6 +66,10 @@ pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, A
         audited = audited_of(&high_passed::settled(record, &filters), &sticking);
     }
     let record = &*masking::renumbered(record, &audited);
+    let as_read = match filters.as_slice() {
+        [] => None,
+        _ => Some(lay_out(record, &|name| audited.masked(name), seed)?),
+    };
     let record = &*high_passed::undone(record, &filters, &|name| audited.masked(name));
     sticking.extend(high_passed::findings(record, &filters));
     let mut grid = lay_out(record, &|name| audited.masked(name), seed)?;
@@ -92,6 +98,7 @@ pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, A
         sticking,
         dead,
         input,
+        as_read,
         blows: vec![],
         again: None,
     };

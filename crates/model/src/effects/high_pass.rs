@@ -32,10 +32,10 @@ impl Filter {
         Self { pole }
     }
 
-    /// What it makes of values.
-    pub fn pass(self, values: &mut [f64]) {
+    /// What it makes of values, at rest at `level` before them.
+    pub fn pass(self, values: &mut [f64], level: f64) {
         let gain = 0.5 * (1.0 + self.pole);
-        let (mut before, mut out) = (0.0, 0.0);
+        let (mut before, mut out) = (level, 0.0);
         for v in values {
             out = self.pole * out + gain * (*v - before);
             before = std::mem::replace(v, out);
@@ -115,7 +115,7 @@ impl Effect for HighPass {
         for &axis in channels {
             for stretch in simulation.stretches.clone() {
                 let at = stretch.samples;
-                filter.pass(&mut simulation.white[axis][at.clone()]);
+                filter.pass(&mut simulation.white[axis][at.clone()], 0.0);
                 // The motion is added later: here comes what the filter makes of it, less what is added.
                 let scale = simulation.scale[axis];
                 let moves: Vec<f64> = (simulation.motion[axis][at.clone()].iter())
@@ -123,7 +123,9 @@ impl Effect for HighPass {
                     .collect();
                 let rates = &mut simulation.rate[axis][at];
                 rates.iter_mut().zip(&moves).for_each(|(r, m)| *r += m);
-                filter.pass(rates);
+                // A stretch that begins later finds it at rest.
+                let level = if stretch.skipped > 0 { rates[0] } else { 0.0 };
+                filter.pass(rates, level);
                 rates.iter_mut().zip(&moves).for_each(|(r, m)| *r -= m);
             }
         }
@@ -139,7 +141,7 @@ mod tests {
         let filter = Filter::of(20.0);
         let step = vec![2.0; 100];
         let mut through = step.clone();
-        filter.pass(&mut through);
+        filter.pass(&mut through, 0.0);
         let gain = 0.5 * (1.0 + (-0.05f64).exp());
         assert!((through[0] - 2.0 * gain).abs() < 1e-12);
         assert!((through[20] / through[0] - (-1f64).exp()).abs() < 1e-12);
@@ -156,7 +158,7 @@ mod tests {
             let mut tone: Vec<f64> = (0..20_000)
                 .map(|i| (TAU * hz * f64::from(i) / rate).sin())
                 .collect();
-            filter.pass(&mut tone);
+            filter.pass(&mut tone, 0.0);
             let late = &tone[10_000..];
             2.0 * late.iter().map(|v| v * v).sum::<f64>() / late.len() as f64
         };
