@@ -259,10 +259,10 @@ fn a_clean_record_has_none() {
 /// A record in which something is that is no shock.
 fn without_a_shock(
     what: &str,
-    of: u64,
+    (of, runs): (u64, u64),
     mut change: impl FnMut(&mut Record, &mut Xoshiro256PlusPlus),
 ) {
-    let runs = draws::of(6, 16);
+    let runs = runs * draws::of(1, 3);
     let rng = &mut draws(of);
     let none = (0..runs).filter(|_| {
         let mut record = stand(rng);
@@ -277,26 +277,36 @@ fn without_a_shock(
     asked(what, none.count() as u64, runs, 0.99);
 }
 
+/// Adds single far readings to an axis, anywhere and to either side, up to so many standard deviations off.
+fn far(record: &mut Record, rng: &mut Xoshiro256PlusPlus, count: usize, largest: f64) {
+    for _ in 0..count {
+        let at = between(rng, 0.0, SECONDS);
+        let size = by_ratio(rng, 6.0, largest) * between(rng, -1.0, 1.0).signum() * SIGMA;
+        add(record, "gyro_y", |t| {
+            if (0.0..1.0 / RATE_HZ).contains(&(t - at)) {
+                size
+            } else {
+                0.0
+            }
+        });
+    }
+}
+
 #[test]
 fn a_step_a_far_reading_and_a_turn_are_no_shocks() {
-    without_a_shock("a step", 3, |record, rng| {
+    without_a_shock("a step", (3, 6), |record, rng| {
         let (at, height) = (between(rng, 60.0, 540.0), by_ratio(rng, 0.5, 3.0));
         add(record, "gyro_x", |t| if t >= at { height } else { 0.0 });
     });
-    without_a_shock("single far readings", 4, |record, rng| {
-        for _ in 0..5 {
-            let at = between(rng, 0.0, SECONDS);
-            let size = by_ratio(rng, 7.0, 40.0) * SIGMA;
-            add(record, "gyro_y", |t| {
-                if (0.0..1.0 / RATE_HZ).contains(&(t - at)) {
-                    size
-                } else {
-                    0.0
-                }
-            });
-        }
+    without_a_shock("single far readings", (4, 6), |record, rng| {
+        far(record, rng, 5, 40.0)
     });
-    without_a_shock("a turn", 5, |record, rng| {
+    // Of so many two lie within a second of each other.
+    without_a_shock("many far readings", (9, 20), |record, rng| {
+        let count = between(rng, 15.0, 40.0) as usize;
+        far(record, rng, count, 8.5);
+    });
+    without_a_shock("a turn", (5, 6), |record, rng| {
         let (at, lasts, peak) = (
             between(rng, 60.0, 500.0),
             between(rng, 2.0, 15.0),
@@ -315,7 +325,7 @@ fn a_step_a_far_reading_and_a_turn_are_no_shocks() {
 
 #[test]
 fn noise_with_tails_a_loud_stretch_and_levels_are_no_shocks() {
-    without_a_shock("noise with tails", 6, |record, rng| {
+    without_a_shock("noise with tails", (6, 6), |record, rng| {
         let tails: Vec<f64> = (0..12_000)
             .map(|_| {
                 let (e, z): (f64, f64) = (Exp1.sample(rng), StandardNormal.sample(rng));
@@ -324,7 +334,7 @@ fn noise_with_tails_a_loud_stretch_and_levels_are_no_shocks() {
             .collect();
         add(record, "gyro_x", |t| tails[(t * RATE_HZ).round() as usize]);
     });
-    without_a_shock("a loud stretch", 7, |record, rng| {
+    without_a_shock("a loud stretch", (7, 6), |record, rng| {
         let (at, lasts) = (between(rng, 60.0, 400.0), between(rng, 3.0, 60.0));
         let more: Vec<f64> = (0..12_000).map(|_| StandardNormal.sample(rng)).collect();
         add(record, "gyro_x", |t| {
@@ -336,7 +346,7 @@ fn noise_with_tails_a_loud_stretch_and_levels_are_no_shocks() {
             }
         });
     });
-    without_a_shock("two levels", 8, |record, rng| {
+    without_a_shock("two levels", (8, 6), |record, rng| {
         let (mut level, mut left, dwell) = (0.3, 0.0, by_ratio(rng, 2.0, 20.0));
         let levels: Vec<f64> = (0..12_000)
             .map(|_| {

@@ -17,8 +17,10 @@ use crate::ingest::blows::{Blow, Shape, least};
 use crate::search::searched::Searched;
 use crate::test_level::CLAIM_LEVEL;
 use grids::{Known, coordinates, half_sines, rings};
+use meetings::meet;
 
 mod grids;
+mod meetings;
 
 /// Readings of the piece over those of the blow, and the fewest.
 const PIECE: usize = 8;
@@ -69,6 +71,14 @@ struct Channel {
     weight: Vec<f64>,
     /// Share of it that processes make.
     by_processes: Vec<f64>,
+}
+
+impl Channel {
+    /// Product of two shapes by the noise.
+    fn over(&self, a: &[f64], b: &[f64]) -> f64 {
+        let pairs = a.iter().zip(b).zip(&self.weight);
+        pairs.map(|((a, b), w)| a * b * w).sum()
+    }
 }
 
 /// A piece of the record about a blow.
@@ -155,12 +165,9 @@ impl Piece {
         let shapes: Vec<Vec<f64>> = columns.iter().map(|c| self.dct.forward(c)).collect();
         of.iter()
             .map(|k| {
-                let Channel { left, weight, .. } = &self.channels[*k];
-                let over = |a: &[f64], b: &[f64]| -> f64 {
-                    let pairs = a.iter().zip(b).zip(weight);
-                    pairs.map(|((a, b), w)| a * b * w).sum()
-                };
-                let right: Vec<f64> = shapes.iter().map(|s| over(s, left)).collect();
+                let channel = &self.channels[*k];
+                let over = |a: &[f64], b: &[f64]| channel.over(a, b);
+                let right: Vec<f64> = shapes.iter().map(|s| over(s, &channel.left)).collect();
                 let covariance = inverse(&shapes, &over);
                 let beta: Vec<f64> = (0..shapes.len())
                     .map(|i| right.iter().zip(covariance[i]).map(|(r, v)| r * v).sum())
@@ -269,6 +276,10 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
         return None;
     }
     let location = location(&known, &piece, best, rate_hz);
+    let freedom = location.len() + felt.len() * sizes;
+    if meet(&piece, blow, &felt, searched, (lr, freedom)) {
+        return None;
+    }
     if location
         .get(1)
         .is_none_or(|(length, error)| length - 2.0 * error > LONGEST_S)
@@ -280,7 +291,7 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
     Some(Fitted {
         lr,
         least: wanted,
-        freedom: location.len() + felt.len() * sizes,
+        freedom,
         location,
         felt: felt.iter().map(of).collect(),
         single,
