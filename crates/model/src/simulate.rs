@@ -33,8 +33,8 @@ pub(crate) const ACC_NOISE_G: f64 = 4.7 / 800.0;
 pub(crate) const STANDARD_GRAVITY: f64 = 9.80665;
 /// Step of a channel whose model states none, deg/s: a file holds counts, and these are far below the noise of any gyro.
 const STEPLESS_DPS: f64 = 1e-6;
-/// Limits of the 14-bit word.
-const COUNT_LIMIT: i32 = 8191;
+/// Limit of a count in a file. The word of a part may be shorter: what clips is said by `saturation`.
+const COUNT_LIMIT: i32 = i32::MAX - 1;
 /// Why a model cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -425,12 +425,7 @@ fn felt(
     let each = model.channels.iter().map(|c| {
         let axis = axis_of(c)?;
         let counts = std::mem::take(&mut prepared.run.counts[axis]);
-        Ok((
-            c.name.clone(),
-            counts,
-            prepared.steps[axis].0,
-            c.unit.clone(),
-        ))
+        Ok((c.name.clone(), counts, prepared.steps[axis], c.unit.clone()))
     });
     each.collect()
 }

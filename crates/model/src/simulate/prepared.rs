@@ -63,8 +63,8 @@ pub(super) struct Prepared {
     pub present: [bool; 3],
     /// Unit per count, where the model states one.
     pub lsb: [Option<f64>; 3],
-    /// Unit in which readings come, and the largest count.
-    pub steps: [(f64, i32); 3],
+    /// Unit in which readings come.
+    pub steps: [f64; 3],
     /// Random walk from sample to sample, deg/s.
     walk: [f64; 3],
     /// White standard deviation at each sample, deg/s.
@@ -134,10 +134,7 @@ impl Prepared {
         }
         too_correlated(model)?;
         let unnamed = Generic::of(model, &mut run)?;
-        let steps = lsb.map(|lsb| match lsb {
-            Some(lsb) => (lsb, COUNT_LIMIT),
-            None => (STEPLESS_DPS, i32::MAX - 1),
-        });
+        let steps = lsb.map(|lsb| lsb.unwrap_or(STEPLESS_DPS));
         let mut prepared = Self {
             run,
             present,
@@ -312,7 +309,7 @@ impl Prepared {
     fn count_at_once(&mut self, axis: usize) {
         let run = &mut self.run;
         let shape = self.unnamed.shapes[axis];
-        let (scale, (unit, limit)) = (run.scale[axis], self.steps[axis]);
+        let (scale, unit) = (run.scale[axis], self.steps[axis]);
         let mut counts = std::mem::take(&mut run.counts[axis]);
         let rates = std::mem::take(&mut run.rate[axis]);
         counts.clear();
@@ -321,7 +318,11 @@ impl Prepared {
         counts.extend(each.map(|((rate, moves), sd)| {
             let z: f64 = StandardNormal.sample(rng);
             let white = sd * shape.map_or(z, |shape| shape.value(z));
-            nearest((rate + (scale * moves + white)) / unit, -limit - 1, limit)
+            nearest(
+                (rate + (scale * moves + white)) / unit,
+                -COUNT_LIMIT - 1,
+                COUNT_LIMIT,
+            )
         }));
         (run.counts[axis], run.rate[axis]) = (counts, rates);
     }
@@ -351,14 +352,14 @@ impl Prepared {
                     .for_each(|(w, (own, read))| *w = read + own);
             }
         }
-        let (unit, limit) = self.steps[axis];
+        let unit = self.steps[axis];
         if let Some(sensor) = run.sensor_step[axis] {
             let rates = run.rate[axis].iter_mut();
             rates.for_each(|w| *w = unit * sensor.read(*w, unit));
         }
         let counts = run.rate[axis]
             .iter()
-            .map(|w| nearest(w / unit, -limit - 1, limit));
+            .map(|w| nearest(w / unit, -COUNT_LIMIT - 1, COUNT_LIMIT));
         run.counts[axis].clear();
         run.counts[axis].extend(counts);
     }

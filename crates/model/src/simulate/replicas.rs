@@ -53,14 +53,10 @@ impl Replicas {
         for (channel, axis) in model.channels.iter().zip(&axes) {
             let readings = record.channel(&channel.name).map(|c| c.values.as_slice());
             let [low, high] = crate::effect::extremes(readings.unwrap_or_default());
-            let (step, limit) = &mut prepared.steps[*axis];
+            let step = &mut prepared.steps[*axis];
             let largest = low.abs().max(high.abs());
             if channel.lsb.is_none() && largest.is_finite() {
                 *step = step.max(largest / FINE);
-            }
-            // A part with a longer word than the stand's.
-            if largest.is_finite() && largest / *step > f64::from(*limit) + 1.0 {
-                *limit = i32::MAX - 1;
             }
         }
         if !stretches.is_empty() {
@@ -116,7 +112,7 @@ impl Replicas {
         self.prepared.frames();
         readings.resize_with(self.axes.len(), Vec::new);
         for (out, axis) in readings.iter_mut().zip(&self.axes) {
-            let (step, _) = self.prepared.steps[*axis];
+            let step = self.prepared.steps[*axis];
             out.clear();
             out.extend(
                 self.prepared.run.counts[*axis]
