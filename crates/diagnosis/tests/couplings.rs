@@ -3,10 +3,12 @@
 
 mod draws;
 
-use diagnosis::result::Diagnosis;
+use std::f64::consts::TAU;
+
+use diagnosis::result::{Diagnosis, Finding};
 use diagnosis::{DiagnoseOptions, diagnose};
 use model::file::EffectModel;
-use model::record::Record;
+use model::record::{Quantity, Record};
 use model::{ModelFile, Parameter};
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
@@ -41,6 +43,13 @@ fn add(record: &mut Record, of: impl Fn(usize) -> f64) {
         *count += more as i32;
         *v += more * LSB;
     }
+}
+
+/// The same of what is less than a count: up as often as its part of a count says.
+fn add_dithered(record: &mut Record, rng: &mut Rng, of: impl Fn(usize) -> f64) {
+    let n = record.channels.first().map_or(0, |c| c.values.len());
+    let within: Vec<f64> = (0..n).map(|_| between(rng, -0.5, 0.5)).collect();
+    add(record, |i| of(i) + LSB * within[i]);
 }
 
 fn told(record: &Record) -> Diagnosis {
@@ -278,6 +287,45 @@ fn a_noise_that_beats_is_told_with_its_rhythm() {
         });
     };
     graded(600.0, 6400, plant, |d| tells(d, "variance_rhythm"));
+}
+
+/// Sets what the thermometer reads, in its counts, and returns it from -1 to 1 over its swing.
+fn warmed(record: &mut Record, rng: &mut Rng) -> Vec<f64> {
+    let (cycles, swing) = (between(rng, 2.5, 6.0), between(rng, 3.0, 8.0));
+    let phase = between(rng, 0.0, TAU);
+    let temp = record
+        .channels
+        .iter_mut()
+        .find(|c| c.quantity == Quantity::Temp);
+    let temp = temp.expect("a thermometer");
+    let (lsb, n) = (temp.lsb.expect("counts"), temp.values.len() as f64);
+    let level: Vec<f64> = (0..temp.values.len())
+        .map(|i| (TAU * cycles * i as f64 / n + phase).sin())
+        .collect();
+    temp.counts = None;
+    temp.values = (level.iter())
+        .map(|u| ((30.0 + swing * u) / lsb).round() * lsb)
+        .collect();
+    level
+}
+
+#[test]
+fn a_cubic_law_of_the_temperature_is_told_and_is_no_line() {
+    let plant = |record: &mut Record, rng: &mut Rng| {
+        let u = warmed(record, rng);
+        let size = between(rng, 0.15, 0.4);
+        let [straight, bent] = [between(rng, -0.3, 0.3), between(rng, -0.3, 0.3)];
+        add_dithered(record, rng, |i| {
+            let u = u[i];
+            size * (straight * u + bent * u * u + (4.0 * u * u - 3.0) * u)
+        });
+    };
+    // The straight or the bent part of it is true.
+    graded(1200.0, 90, plant, |d| {
+        let part = |f: &Finding| f.cause.starts_with("temperature");
+        let mut told = d.unexplained.iter();
+        d.findings.iter().all(part) && told.any(|u| u.says("follows temp"))
+    });
 }
 
 #[test]

@@ -143,14 +143,10 @@ mod tests {
                     })
                     .collect();
                 let local = Local::new(&codes);
-                let (told, all) = (
-                    sigma(&local, step),
-                    f64::hypot(wide, (1.0f64 / 12.0).sqrt()),
-                );
-                assert!(
-                    told > 0.97 * wide && told < 1.2 * all,
-                    "{wide} {level}: {told}"
-                );
+                let told = sigma(&local, step);
+                // Noise is no longer even within a step of twice its width.
+                let all = 1.25 * f64::hypot(wide, (1.0f64 / 12.0).sqrt());
+                assert!(told > 0.97 * wide && told < all, "{wide} {level}: {told}");
                 narrow += usize::from(local.sigma < 0.8 * wide);
             }
         }

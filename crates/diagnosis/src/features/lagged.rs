@@ -197,9 +197,6 @@ impl<'a> Followed<'a> {
 
 fn bent<'a>(f: Rc<Followed<'a>>) -> Columns<'a> {
     let n = f.scaled.len() as f64;
-    let all = || f.scaled.iter();
-    let low = all().fold(f64::INFINITY, |m, v| m.min(*v));
-    let high = all().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
     let powers = [|v: f64| v * v, |v: f64| v * v * v].into_iter();
     let of = Rc::clone(&f);
     let powers = powers.map(move |power| of.scaled.iter().map(|v| power(*v)).collect());
@@ -208,12 +205,17 @@ fn bent<'a>(f: Rc<Followed<'a>>) -> Columns<'a> {
         let all = of.scaled.iter().enumerate();
         all.map(|(i, v)| v * (2.0 * i as f64 / n - 1.0)).collect()
     });
-    // A bend anywhere: what dips, saturates or has a dead zone is no parabola.
-    let bends = BENDS.iter().map(move |share| {
-        let at = low + share * (high - low);
-        f.scaled.iter().map(|v| (v - at).max(0.0)).collect()
-    });
+    let bends = bends(&f.scaled).collect::<Vec<_>>();
     Box::new(powers.chain(drift).chain(bends))
+}
+
+/// A bend anywhere: what dips, saturates or has a dead zone is no parabola.
+pub(super) fn bends(values: &[f64]) -> impl Iterator<Item = Vec<f64>> {
+    let [low, high] = extremes(values);
+    BENDS.iter().map(move |share| {
+        let at = low + share * (high - low);
+        values.iter().map(|v| (v - at).max(0.0)).collect()
+    })
 }
 
 /// What goes up and down over what a level spans, of no use to a response that is nearly straight: a table of steps makes a

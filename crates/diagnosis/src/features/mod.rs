@@ -1,6 +1,7 @@
 //! Combinations of the recorded channels that no effect of the library is made of. A channel that follows one of them
 //! has a cause without a name: the search weighs them beside the effects, and the answer is "unexplained, but follows".
 
+use std::iter;
 use std::sync::Arc;
 
 use model::effect::{
@@ -162,11 +163,7 @@ fn of_temperature<'a>(
             played(&t.smooth, 0.5 * play)
         }));
     }
-    all.push(Combination::of(
-        format!("cube of {name}"),
-        &[t],
-        move || c().iter().map(|v| v.powi(3)).collect(),
-    ));
+    all.extend(laws(t));
     // The command has a zero of its own; the supply has none that means anything.
     if let Some(m) = motor {
         let what = format!("{} times {name}", m.name);
@@ -188,6 +185,29 @@ fn of_temperature<'a>(
         }));
     }
     all
+}
+
+/// Laws that a bias may have of a temperature beyond a parabola, each as a whole: where it swings there and back by a cubic,
+/// neither the temperature nor its cube alone explains anything, and a line at three times the frequency does.
+fn laws(t: &Signal) -> [Combination<'_>; 2] {
+    let cubic = || {
+        let c = centred(&t.smooth);
+        let power = |k: i32| c.iter().map(|v| v.powi(k)).collect();
+        (1..=3).map(power).collect()
+    };
+    let bent = || {
+        let bends = lagged::bends(&t.smooth);
+        iter::once(centred(&t.smooth)).chain(bends).collect()
+    };
+    let all: [(&str, Maker<'_>); 2] = [
+        ("by a cubic law", Box::new(cubic)),
+        ("by a law with bends", Box::new(bent)),
+    ];
+    all.map(|(how, columns)| Combination {
+        what: format!("{} {how}", t.name),
+        channels: vec![t.name.clone()],
+        columns,
+    })
 }
 
 /// Accelerometers that feel vibration.

@@ -94,6 +94,8 @@ impl Power {
         let off: Vec<f64> = sums.iter().map(off).collect();
         let each = model.iter().zip(&bins.at.omega);
         let mut excess: Vec<f64> = each.map(|(p, w)| p * off[band(*w)]).collect();
+        // What follows one channel in two ways may nearly cancel: together they are as large as they are.
+        let mut together = vec![0.0; bins.n];
         for (place, (term, own)) in s.state.parts().enumerate() {
             if !terms.contains(&place) {
                 continue;
@@ -112,13 +114,12 @@ impl Power {
                     (*m, *x) = (*m - power, *x + power);
                 }
             } else {
-                let mut sum = vec![0.0; bins.n];
-                s.search.panel.add_columns(&mut sum, 0, &term.columns, own);
-                sum[0] = 0.0;
-                let energy = bins.products(&sum, &sum);
-                excess.iter_mut().zip(energy).for_each(|(x, e)| *x += e / n);
+                (s.search.panel).add_columns(&mut together, 0, &term.columns, own);
             }
         }
+        together[0] = 0.0;
+        let energy = bins.products(&together, &together);
+        excess.iter_mut().zip(energy).for_each(|(x, e)| *x += e / n);
         let above = above_floor(&excess, &counts);
         let at = place(&above, &bins.at.omega);
         let mut power = Self {

@@ -1,11 +1,9 @@
 //! What a combination without a name has beyond the names beside it.
 
+use model::record::Quantity;
+
 use super::{Search, State, Term};
 use crate::fit::likelihood;
-
-/// Columns of a response with a memory: a signal, which may have a name, and the same behind a lag. A response to vibration over
-/// some samples is one law, which the library has with the gyro's filter, and is not divided.
-const PAIR: usize = 2;
 
 impl<'a> Search<'a> {
     /// Which columns of a term lie beyond those of a state.
@@ -23,9 +21,19 @@ impl<'a> Search<'a> {
         })
     }
 
+    /// Whether a term without a name has columns that may have one: a signal beside the same behind a lag, or in other laws. A
+    /// response to vibration over some samples is one law, which the library has with the gyro's filter, and is not divided.
+    fn is_divided(&self, term: &Term) -> bool {
+        let of_vibration = |name: &String| {
+            let mut signals = self.view.all(Quantity::Acc);
+            signals.any(|s| s.name == *name)
+        };
+        term.has_no_name() && term.columns.len() > 1 && !term.of.iter().any(of_vibration)
+    }
+
     /// Whether a state has some of the columns of a term without a name, and not all.
     pub(super) fn spans_part(&self, state: &State, term: &Term) -> bool {
-        term.has_no_name() && term.columns.len() == PAIR && {
+        self.is_divided(term) && {
             let beyond = self.beyond(state, term).count();
             beyond > 0 && beyond < term.columns.len()
         }

@@ -12,7 +12,8 @@ use crate::search::searched::Searched;
 
 /// Fewest and most knots of a course over time; their number doubles until the course is told.
 const KNOTS: (usize, usize) = (64, 2048);
-/// Share of the energy of a course that is no term of its own.
+/// Share of the energy of a course, or of the white noise where that has less, that need not be told: a course may nearly cancel
+/// what stands beside it.
 const LEFT_OUT: f64 = 0.01;
 /// Least correlation of neighbours of what is noise: less is white.
 const WHITE: f64 = 0.02;
@@ -39,7 +40,7 @@ fn of_course(s: &Searched<'_>, course: &[f64], rate_hz: f64) -> Vec<Unnamed> {
         length,
         means,
         rest,
-    } = Told::of(course);
+    } = Told::of(course, s.state.solution.white);
     let energy = |of: &[f64]| of.iter().map(|v| v * v).sum::<f64>();
     let rms = |energy: f64| (energy / course.len().max(1) as f64).sqrt();
     let (all, left) = (energy(course), energy(&rest));
@@ -78,15 +79,20 @@ struct Told {
 }
 
 impl Told {
-    /// By as few knots as tell it; by the fewest where all of them would not.
-    fn of(course: &[f64]) -> Self {
+    /// By as few knots as tell it beside white noise of that variance; by the fewest where all of them would not.
+    fn of(course: &[f64], white: f64) -> Self {
         let energy = |of: &[f64]| of.iter().map(|v| v * v).sum::<f64>();
         let counts = std::iter::successors(Some(KNOTS.0), |k| Some(2 * k));
-        let mut all = counts
+        let told: Vec<Self> = counts
             .take_while(|k| *k <= KNOTS.1 && *k <= course.len())
-            .map(|k| Self::by(course, k));
-        let enough = |t: &Self| energy(&t.rest) <= LEFT_OUT * energy(course);
-        all.find(enough)
+            .map(|k| Self::by(course, k))
+            .collect();
+        let all = energy(course);
+        let noise = white * course.len() as f64;
+        let enough = |most: f64| told.iter().position(|t| energy(&t.rest) <= LEFT_OUT * most);
+        let best = enough(all.min(noise)).or_else(|| enough(all));
+        told.into_iter()
+            .nth(best.unwrap_or(0))
             .unwrap_or_else(|| Self::by(course, KNOTS.0))
     }
 
@@ -123,7 +129,7 @@ mod tests {
     fn a_slow_course_has_few_knots_a_fast_one_more_and_a_wild_one_few() {
         let knots = |period: f64| {
             let course: Vec<f64> = (0..12_000).map(|i| (f64::from(i) / period).sin()).collect();
-            Told::of(&course).means.len()
+            Told::of(&course, 1.0).means.len()
         };
         assert_eq!(knots(2000.0), KNOTS.0);
         assert!(knots(40.0) > 4 * KNOTS.0, "{}", knots(40.0));

@@ -32,6 +32,9 @@ const REMAINDER_UNLAWFUL: f64 = 1.0;
 /// Share of the energy of a slow channel from which on a line at its place swings as the channel does: a line elsewhere
 /// meets so much of it at a handful of thousands of frequencies.
 const SWINGS: f64 = 0.02;
+/// The same of a channel that swings at a half or a third of a line's place, and at little else.
+const SWINGS_MOSTLY: f64 = 0.5;
+const POWERS: [f64; 2] = [2.0, 3.0];
 /// Half cycles in the record by which they may lie apart.
 const SAME_SWING: f64 = 1.5;
 /// Standard errors beyond which readings come again more often than by chance, and within which a correlation is none.
@@ -408,22 +411,28 @@ fn bent(s: &Searched<'_>, failing: &dyn Fn(CheckId) -> bool) -> f64 {
     failed.map(|(_, chi_square)| chi_square()).sum()
 }
 
-/// The recorded temperature, supply or motor command that swings at the frequency of a line.
+/// The recorded temperature, supply or motor command that swings at the frequency of a line, or at a half or a third of it: by a
+/// law with a bend or an S it swings as fast as the line.
 fn swings_as(s: &Searched<'_>, t: &Term) -> Option<String> {
     let (Form::Line(omega) | Form::SideBands(omega, _)) = t.form else {
         return None;
     };
     let panel = &s.search.panel;
     let at = omega * panel.bins.n as f64 / PI;
-    let (from, to) = (
-        (at - SAME_SWING).ceil() as usize,
-        (at + SAME_SWING) as usize,
-    );
     let mut signals = s.search.view.signals.iter().filter(|o| drives(o.quantity));
     let swings = |o: &&Signal| {
         let c = panel.dct.forward(&o.smooth);
         let energy = |c: &[f64]| c.iter().map(|c| c * c).sum::<f64>();
-        energy(&c[from.max(1)..(to + 1).min(c.len())]) > SWINGS * energy(&c[1..])
+        let all = energy(&c[1..]);
+        let about = |at: f64| {
+            let (from, to) = (
+                (at - SAME_SWING).ceil() as usize,
+                (at + SAME_SWING) as usize,
+            );
+            energy(&c[from.max(1)..(to + 1).min(c.len())])
+        };
+        let bent = |power: f64| about(at / power) > SWINGS_MOSTLY * all;
+        about(at) > SWINGS * all || POWERS.into_iter().any(bent)
     };
     signals.find(swings).map(|o| o.name.clone())
 }
