@@ -161,7 +161,7 @@ fn times_that_tell_arrival_are_told_by_all() {
     let time = |k: usize| 0.1 * (k / 2) as f64 + 0.02 * (k % 2) as f64;
     told_by_all(
         &table(&folder, "bursts.csv", time, FLAT),
-        "the times come in bursts",
+        "the times are uneven",
     );
 }
 

@@ -257,6 +257,35 @@ impl CheckId {
         Some(words)
     }
 
+    /// What kind of thing it sees.
+    #[must_use]
+    pub fn of_what(self) -> Domain {
+        match self {
+            Self::MissingTail
+            | Self::LowBits
+            | Self::BitShare
+            | Self::FineCodes
+            | Self::Foretold
+            | Self::Slew
+            | Self::RepeatedReadings => Domain::Codes,
+            Self::FrozenReadings
+            | Self::EqualReadings
+            | Self::CopiedStretch
+            | Self::RepeatedFrames
+            | Self::ClockRate
+            | Self::WildReadings
+            | Self::DroppedSamples
+            | Self::NewDataFlag
+            | Self::ErrorAlarm
+            | Self::TimestampJitter
+            | Self::ClockCourse => Domain::Readings,
+            Self::Couplings | Self::CrossCorrelation | Self::CrossCorrelationLate => {
+                Domain::Coupling
+            }
+            _ => Domain::Noise,
+        }
+    }
+
     /// What the name of a process claims.
     pub const OF_PROCESS: [Self; 7] = [
         Self::ProcessSpectrum,

@@ -96,7 +96,7 @@ const MOST_CEPSTRUM: f64 = 20.0;
 pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
     match (name, unit) {
         ("count" | "clipped", _) => range(0.0, MOST_SAMPLES),
-        ("running", _) => range(1.0, MOST_SAMPLES),
+        ("running" | "behind", _) => range(1.0, MOST_SAMPLES),
         ("bit" | "missing_bits", _) => whole(0.0, HIGHEST_BIT),
         ("value" | "by_magnitude" | "triangular" | "silent" | "normal", _) => whole(0.0, 1.0),
         ("stages", _) => whole(1.0, MOST_STAGES),

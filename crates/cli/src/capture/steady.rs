@@ -21,7 +21,7 @@ pub(super) fn unsteady(record: &Record) -> Vec<String> {
     let times = times(record);
     let rates = times.as_deref().and_then(changing_rate);
     let own = match (&rates, Sampling::of(record, None)) {
-        // It says of such times that they come in bursts.
+        // It says of such times that they are of arrival.
         (None, Ok(sampling)) => sampling.warnings,
         _ => Vec::new(),
     };

@@ -6,7 +6,7 @@ use model::file::ModelFile;
 
 use super::Subject;
 use super::plot::number;
-use crate::text::answer;
+use crate::text::{advice, answer};
 
 /// Verdict, input and findings: what a reader in a hurry reads.
 pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
@@ -81,7 +81,7 @@ fn left_over(all: &[Unexplained]) -> Markup {
                     }
                 }
                 p.note {
-                    "What to do: record again, twice as long. What comes again belongs to the sensor or the stand."
+                    "What to do: " (advice::of(all.iter()).join(" "))
                 }
             }
         }

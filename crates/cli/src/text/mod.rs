@@ -1,5 +1,6 @@
 //! What people read in a terminal.
 
+pub mod advice;
 pub mod answer;
 mod cost;
 mod details;

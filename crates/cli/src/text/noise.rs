@@ -9,6 +9,9 @@ use super::answer;
 /// at all, its curvature there says nothing.
 const NOTHING: f64 = 0.01;
 
+/// What is said of a random walk that the record does not show.
+pub const NO_WALK: &str = "too small to be told from 0";
+
 /// A term of the noise of a channel.
 pub struct Term {
     /// The value.
@@ -23,12 +26,15 @@ pub fn term(model: &ModelFile, channel: &str, key: &str, seconds: f64) -> Option
     let own = model.channels.iter().find(|c| c.name == channel)?;
     let value = usual(own.baseline.get(key)?);
     let limit = value.value + answer::HALF_WIDTH_95 * value.std_error.unwrap_or(0.0);
+    let smallest = || smallest_walk(own.baseline.get("angle_random_walk"), seconds);
+    let has_interval = value.std_error.is_some_and(|e| e > 0.0 && e.is_finite());
     let said = match key {
         "bias" => answer::with_interval(&value),
+        // Without an interval what is smaller than can be seen is no estimate.
         "rate_random_walk"
-            if limit < NOTHING * smallest_walk(own.baseline.get("angle_random_walk"), seconds) =>
+            if limit < NOTHING * smallest() || !has_interval && limit < smallest() =>
         {
-            "none to be seen".to_owned()
+            NO_WALK.to_owned()
         }
         _ => answer::level(&value),
     };
@@ -93,7 +99,9 @@ mod tests {
         assert_eq!(n, "0.1800 m/s/sqrt(h) (95 %: 0.1765 to 0.1835)");
         // 0.003 sqrt(3) / 600 is 8.7e-6.
         let walk = |k, error| said(k, error, "rate_random_walk");
-        assert_eq!(walk(3e-33, 3e-31), "none to be seen");
+        assert_eq!(walk(3e-33, 3e-31), NO_WALK);
+        // Nor is it one of which nothing tells the error.
+        assert_eq!(walk(1e-6, f64::NAN), NO_WALK);
         assert_eq!(walk(1e-6, 1e-5), "< 2.1e-5 m/s^2/sqrt(s)");
     }
 }

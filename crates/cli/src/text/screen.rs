@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use diagnosis::result::{Diagnosed, Diagnosis, Finding, Unexplained};
 
-use super::{answer, item, noise, verdict};
+use super::{advice, answer, item, noise, verdict};
 
 /// Entries of what is left over that the first screen shows; the rest is counted.
 const SHOWN: usize = 4;
@@ -147,22 +147,26 @@ fn write_unexplained(out: &mut String, all: &[Unexplained]) {
             "    and {more} more (all of them: --json, or the report)"
         );
     }
-    let next = match large.iter().filter(|u| verdict::was_read(u)).count() {
-        0 => {
-            "Look to the sensor, its supply and the column: nothing can be said of what was not measured."
-        }
-        _ => {
-            "Record again, twice as long: what comes again belongs to the sensor or the stand. The report shows where it lies."
-        }
-    };
-    let _ = writeln!(out, "{}", item("", next));
+    for next in advice::of(large.iter().copied()) {
+        let _ = writeln!(out, "{}", item("", next));
+    }
 }
 
+/// The first parts of an entry, which semicolons divide, so many that there are few words; the first one whole.
 fn shortened(what: &str) -> String {
-    let words: Vec<&str> = what.split_whitespace().collect();
-    match words.len() > WORDS {
-        true => format!("{} ...", words[..WORDS].join(" ")),
-        false => what.to_owned(),
+    let words = |text: &str| text.split_whitespace().count();
+    let (mut open, mut end) = (0, None);
+    for (i, c) in what.char_indices() {
+        match c {
+            '(' => open += 1,
+            ')' => open -= 1,
+            ';' if open == 0 && (end.is_none() || words(&what[..i]) <= WORDS) => end = Some(i),
+            _ => {}
+        }
+    }
+    match end {
+        Some(end) if words(what) > WORDS => format!("{}; ...", &what[..end]),
+        _ => what.to_owned(),
     }
 }
 
@@ -199,7 +203,11 @@ fn write_noise(out: &mut String, of: &Diagnosed) {
 fn change(before: Option<noise::Term>, after: &noise::Term, without: &str) -> String {
     let now = &after.said;
     let error = after.value.std_error.unwrap_or(0.0).max(f64::MIN_POSITIVE);
-    match before.map(|b| b.value.value) {
+    // Of two that cannot be seen the difference says nothing.
+    let seen = before.filter(|b| {
+        b.said != noise::NO_WALK && !(b.said.starts_with('<') && now == noise::NO_WALK)
+    });
+    match seen.map(|b| b.value.value) {
         Some(b) if (b - after.value.value).abs() > answer::HALF_WIDTH_95 * error => {
             let before = crate::report::plot::number(b, 3);
             format!("{now}; {without} {before}")
@@ -217,5 +225,24 @@ fn write_rest(out: &mut String, d: &Diagnosis) {
             "\n{}",
             item("not tested: ", &causes.join(", ")).trim_start()
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shortened;
+
+    #[test]
+    fn an_entry_is_cut_between_its_parts_and_never_in_its_first() {
+        let number = "codes that no distribution has (4 nats; 5 sigma), and a step of 0.0009 deg/s that was rounded to 0.0001 \
+                      comes nearest: write the counts of the sensor, or more digits than its step has, and record again";
+        assert_eq!(shortened(number), number);
+        let parts = format!("a band; 1.0 to 2.0 Hz; {number}; more");
+        assert_eq!(shortened(&parts), "a band; 1.0 to 2.0 Hz; ...");
+        assert_eq!(
+            shortened(&format!("{number}; more")),
+            format!("{number}; ...")
+        );
+        assert_eq!(shortened("a band; 1.0 to 2.0 Hz"), "a band; 1.0 to 2.0 Hz");
     }
 }

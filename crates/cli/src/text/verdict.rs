@@ -11,7 +11,7 @@ const NAMED: usize = 3;
 const REPLICATES: &str = "replicates";
 
 /// How an entry ends of a channel that gave too few readings.
-const LEFT_OUT: &str = "it is left out";
+pub(super) const LEFT_OUT: &str = "it is left out";
 
 /// The verdict as a terminal shows it: the word of the JSON, and what it means.
 #[must_use]

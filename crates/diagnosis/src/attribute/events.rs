@@ -309,7 +309,10 @@ fn outliers(
     }
     let said = why.map(|why| {
         let first = apart.iter().map(|w| w.time_s).fold(f64::INFINITY, f64::min);
-        let what = format!("{} far readings, the first at {first:.2} s", apart.len());
+        let what = match apart.len() {
+            1 => format!("1 far reading, at {first:.2} s"),
+            n => format!("{n} far readings, the first at {first:.2} s"),
+        };
         told(&why, &what)
     });
     wild.retain(|w| apart.iter().all(|a| a.at != w.at));

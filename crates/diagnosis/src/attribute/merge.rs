@@ -56,10 +56,11 @@ pub(crate) fn blows(mut findings: Vec<Finding>) -> Vec<Finding> {
             .find(|f| f.channels[0] == channel && step_at(f) == Some(at));
         if let Some(f) = own.filter(|_| !blow.is_empty()) {
             let count: usize = blow.iter().map(|b| b.times_s.len()).sum();
-            f.what = format!(
-                "{}; {count} far readings within {BLOW_S} s of it are the blow",
-                f.what
-            );
+            let those = match count {
+                1 => format!("1 far reading within {BLOW_S} s of it is the blow"),
+                n => format!("{n} far readings within {BLOW_S} s of it are the blow"),
+            };
+            f.what = format!("{}; {those}", f.what);
         }
     }
     findings

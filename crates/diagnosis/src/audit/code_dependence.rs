@@ -239,8 +239,14 @@ pub(super) fn audit<'a>(gyros: &'a [Gyro<'a>], audit: &mut Audit) {
             continue;
         };
         let [first, second] = common.periods;
+        let [shorter, longer] = [second, first].map(|p| format!("{p:.1}"));
+        let periods = if shorter == longer {
+            format!("a period of {shorter}")
+        } else {
+            format!("periods of {shorter} and {longer}")
+        };
         let what = format!(
-            "codes of {} follow {of} in what is finer than their noise, most at periods of {second:.1} and {first:.1} counts",
+            "codes of {} follow {of} in what is finer than their noise, most at {periods} counts",
             own.name
         );
         let chance = (looks * common.chance).min(1.0);

@@ -1,4 +1,4 @@
-//! Repeats that no flag tells: frames with every gyro reading as in the frame before.
+//! Repeats that no flag tells: frames with every gyro reading as in the frame before, and blocks of them ([`blocks`]).
 //!
 //! Differences of neighbours d have a smooth distribution; repeats add to d = 0 alone. The expected share at 0 is that of
 //! the curve ln p(d) = a - c d^2 through its neighbours d = +-1 .. +-K, K below the spread of d, whatever the base does
@@ -6,6 +6,7 @@
 //! gyros agree with the product of theirs: (1 / (2 sqrt(pi) sigma))^3 for white noise of sigma counts.
 
 pub(super) mod beat;
+mod blocks;
 mod near;
 
 use std::f64::consts::SQRT_2;
@@ -443,7 +444,11 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
         return;
     }
     let readings = Readings::new(gyros, rows, audit);
-    if readings.columns.is_empty() || readings.frames(record, at, audit) {
+    if readings.columns.is_empty() {
+        return;
+    }
+    blocks::audit(record, &readings.gyros, at, audit);
+    if readings.frames(record, at, audit) {
         return;
     }
     let known = audit.findings.len();

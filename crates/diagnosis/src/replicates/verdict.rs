@@ -90,9 +90,9 @@ pub(crate) fn taken_up(
         let among = without.get(&o.channel).map(|r| &r.after);
         let what = among.map(|r| {
             format!(
-                "simulations of the model without the unnamed term differ (chance {}): {}",
-                chance(r.p_value, count),
-                r.strays()
+                "{} without the unnamed term (chance {})",
+                r.strays(),
+                chance(r.p_value, count)
             )
         });
         Observation {

@@ -168,7 +168,12 @@ fn sentence(group: &[Observation], entry: &Unexplained, follows: &[&String], uni
         (None, some) => format!("follows {} as no cause does", joined(some)),
     }];
     if let Some([low, high]) = entry.band_hz {
-        parts.push(format!("{} to {} Hz", digits(low), digits(high)));
+        let [low, high] = [digits(low), digits(high)];
+        parts.push(if low == high {
+            format!("at {low} Hz")
+        } else {
+            format!("{low} to {high} Hz")
+        });
     }
     if let Some([from, to]) = entry.span_s {
         parts.push(format!("from {from:.0} to {to:.0} s"));

@@ -167,11 +167,12 @@ fn coded(f: &Finding, of: &[&Searched<'_>]) -> Option<(Vec<Option<bool>>, f64)> 
     match f.cause.as_str() {
         effects::stale_samples::ID => {
             let (mut chance, mut events): (f64, Vec<Option<bool>>) = (1.0, vec![]);
+            let behind = value("behind").map_or(1, |b| (b as usize).max(1));
             for s in of {
                 let (read, step) = (read(s), s.target.step);
                 chance *= repeats::agreement(&s.target.y, step).0;
-                let same = read.windows(2).map(|w| {
-                    let both = w[0].zip(w[1]);
+                let same = read.windows(behind + 1).map(|w| {
+                    let both = w[0].zip(w[behind]);
                     both.map(|(a, b)| repeats::equal(a, b, step))
                 });
                 if events.is_empty() {

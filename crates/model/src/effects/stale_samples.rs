@@ -33,6 +33,11 @@ impl Effect for StaleSamples {
                 "1",
                 "such frames in a row, on the average; 1 where it is left out",
             ),
+            optional(
+                "behind",
+                "1",
+                "how many frames the one that is repeated lies before, where a buffer was sent twice; 1 where it is left out",
+            ),
             optional("silent", "1", "1 where the new-data flags do not tell"),
             optional(
                 "sensor_rate",
@@ -48,7 +53,7 @@ impl Effect for StaleSamples {
             title: "Stale samples",
             physics: "A frame repeats the readings of the frame before: the sensor was read before it had a new sample, as one is all the time that renews its readings more slowly than frames come; or a buffer was sent twice.",
             excitation: "Nothing.",
-            test: "Audit: new-data flags, and frames with all gyros equal to the frame before against their chance.",
+            test: "Audit: new-data flags, and frames with all gyros equal to the frame before, or runs of them to those some frames before, against their chance.",
             remedy: "Read on the sensor's data-ready signal, or read more slowly, and skip frames whose new-data flag is not set.",
             figure: "The rate around each of them.",
             example: Example::new(Plot::Around, &[("count", 40.0)]).on_all(),
@@ -73,9 +78,12 @@ impl Effect for StaleSamples {
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let silent = value(parameters, "silent") != 0.0;
+        let behind = parameters.get("behind").map_or(1.0, |p| p.value);
+        let behind =
+            (behind.round() as usize).clamp(1, simulation.samples.saturating_sub(1).max(1));
         let repeat = |simulation: &mut Simulation, i: usize| {
             for &axis in channels {
-                simulation.counts[axis][i] = simulation.counts[axis][i - 1];
+                simulation.counts[axis][i] = simulation.counts[axis][i - behind];
                 if !silent {
                     simulation.flags[i] &= !(1 << axis);
                 }
@@ -85,13 +93,13 @@ impl Effect for StaleSamples {
         if renewed > 0.0 && renewed < 1.0 {
             let phase = Uniform::new(0.0, 1.0).map_or(0.0, |u| u.sample(&mut simulation.rng));
             let reading = |i: usize| (i as f64 * renewed + phase).floor();
-            for i in (1..simulation.samples).filter(|i| reading(*i) == reading(*i - 1)) {
+            for i in (behind..simulation.samples).filter(|i| reading(*i) == reading(*i - 1)) {
                 repeat(simulation, i);
             }
             return;
         }
         let count = simulation.events(value(parameters, "count").round().max(0.0) as usize);
-        let Ok(at) = Uniform::new(1, simulation.samples.max(2)) else {
+        let Ok(at) = Uniform::new(behind, simulation.samples.max(behind + 1)) else {
             return;
         };
         let running = parameters.get("running").map_or(1.0, |p| p.value).max(1.0);

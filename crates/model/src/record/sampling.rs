@@ -166,7 +166,7 @@ impl<'a> Clocks<'a> {
         {
             if interval.bursty() {
                 warnings.push(format!(
-                    "the times come in bursts ({:.0} % of the steps are off the median by more than half of it), so they \
+                    "the times are uneven ({:.0} % of the steps are off the median by more than half of it), so they \
                      tell arrival, not sampling: rows are taken as evenly spaced at {:.6} s, and gaps cannot be seen",
                     100.0 * interval.irregular_share,
                     tau0
