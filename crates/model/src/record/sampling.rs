@@ -424,7 +424,7 @@ mod tests {
         let s = Sampling::of(&r, None).unwrap();
         assert!((s.tau0 / 0.01 - 1.0).abs() < 0.02, "{}", s.tau0);
         assert_eq!(s.runs, vec![0..1000]);
-        assert!(s.warnings[0].contains("bursts"), "{:?}", s.warnings);
+        assert!(s.warnings[0].contains("arrival"), "{:?}", s.warnings);
     }
 
     #[test]
