@@ -236,14 +236,7 @@ fn a_bit_that_folds_the_range_is_no_rail() {
     let mut wrong = vec![];
     for _ in 0..30 {
         let sigma = 4.0 + f64::from(rng.next_u32() % 400) / 100.0;
-        let mut r = record(
-            World {
-                sigma,
-                walk: 0.0,
-                ..PLAIN
-            },
-            &mut rng,
-        );
+        let mut r = record(World::white(sigma), &mut rng);
         let (bit, value) = (5, (rng.next_u32() % 2) as i32);
         // The level to within two spreads of an edge of the bit.
         let from = f64::from(rng.next_u32() % 400) / 100.0 - 2.0;

@@ -198,14 +198,7 @@ fn a_gyro_that_holds_another_s_readings_for_a_while_is_told_from_when_to_when() 
 fn gyros_that_share_a_motion_hang_at_a_value_or_have_few_codes_hold_none_of_each_other() {
     let mut rng = rng(67);
     for sigma in [0.2, 0.6, 3.0] {
-        let mut r = record(
-            World {
-                sigma,
-                walk: 0.0,
-                ..PLAIN
-            },
-            &mut rng,
-        );
+        let mut r = record(World::white(sigma), &mut rng);
         let shared: Vec<i32> = (0..12_000)
             .map(|i| (300.0 * (f64::from(i) / 40.0).sin()).round() as i32)
             .collect();
@@ -281,14 +274,7 @@ fn few_codes_motions_that_come_again_and_quiet_stretches_are_no_buffers() {
     for round in 0..80 {
         let sigma = [0.05, 0.2, 0.35, 0.6, 1.0, 3.0][drawn(0, 6, &mut rng)];
         let axes = drawn(1, 4, &mut rng);
-        let mut r = record(
-            World {
-                sigma,
-                walk: 0.0,
-                ..PLAIN
-            },
-            &mut rng,
-        );
+        let mut r = record(World::white(sigma), &mut rng);
         r.channels.truncate(axes);
         let period = drawn(5, 3000, &mut rng) as f64;
         let quiet = drawn(0, 11_000, &mut rng);

@@ -3,7 +3,7 @@
 use diagnosis::result::Unexplained;
 use diagnosis::test_level::{CheckId, Domain};
 
-use super::verdict::{self, LEFT_OUT};
+use super::verdict;
 
 const NOT_READ: &str =
     "Look to the sensor, its supply and the column: nothing can be said of what was not measured.";
@@ -28,10 +28,9 @@ fn of_one(left: &Unexplained) -> &'static str {
         ids.any(|id| id.of_what() == domain)
     };
     // What audits see in codes may have no check of its own, and no size.
-    let read = verdict::was_read(left);
-    if !read && left.what.ends_with(LEFT_OUT) {
+    if verdict::is_dead(left) {
         NOT_READ
-    } else if !read || of(Domain::Codes) || of(Domain::Readings) {
+    } else if !verdict::was_read(left) || of(Domain::Codes) || of(Domain::Readings) {
         MADE
     } else {
         NOISE
@@ -51,7 +50,7 @@ mod tests {
 
     fn dead() -> Unexplained {
         Unexplained {
-            what: format!("few readings {LEFT_OUT}"),
+            what: "too few readings: it is left out".to_owned(),
             ..Unexplained::default()
         }
     }

@@ -295,13 +295,17 @@ fn between(p: &Parameter, [least, most]: [f64; 2]) -> String {
 /// A size that cannot be negative: with its interval, or the upper limit where the interval reaches 0.
 #[must_use]
 pub fn level(p: &Parameter) -> String {
-    match p.std_error {
-        Some(error) if error.is_finite() && p.value < HALF_WIDTH_95 * error => {
-            let limit = p.value + HALF_WIDTH_95 * error;
-            format!("< {} {}", number(limit, 2), p.unit)
-        }
-        _ => with_interval(p),
+    match upper_limit(p) {
+        Some(limit) => format!("< {} {}", number(limit, 2), p.unit),
+        None => with_interval(p),
     }
+}
+
+/// The upper limit of a size that cannot be negative, where its interval reaches 0.
+#[must_use]
+pub fn upper_limit(p: &Parameter) -> Option<f64> {
+    let half = HALF_WIDTH_95 * p.std_error.filter(|e| e.is_finite())?;
+    (p.value < half).then_some(p.value + half)
 }
 
 /// Digits behind the point of a value with an exponent, at most.

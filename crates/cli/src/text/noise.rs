@@ -9,13 +9,23 @@ use super::answer;
 /// at all, its curvature there says nothing.
 const NOTHING: f64 = 0.01;
 
-/// What is said of a random walk that the record does not show.
-pub const NO_WALK: &str = "too small to be told from 0";
+/// How much of a term the record shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shown {
+    /// Nothing, not even how large it is at most.
+    Nothing,
+    /// An upper limit.
+    Limit,
+    /// A size.
+    Size,
+}
 
 /// A term of the noise of a channel.
 pub struct Term {
     /// The value.
     pub value: Parameter,
+    /// What of it the record shows.
+    pub shown: Shown,
     /// Value and 95 % interval, or an upper limit, for people.
     pub said: String,
 }
@@ -28,17 +38,20 @@ pub fn term(model: &ModelFile, channel: &str, key: &str, seconds: f64) -> Option
     let limit = value.value + answer::HALF_WIDTH_95 * value.std_error.unwrap_or(0.0);
     let smallest = || smallest_walk(own.baseline.get("angle_random_walk"), seconds);
     let has_interval = value.std_error.is_some_and(|e| e > 0.0 && e.is_finite());
-    let said = match key {
-        "bias" => answer::with_interval(&value),
-        // Without an interval what is smaller than can be seen is no estimate.
-        "rate_random_walk"
-            if limit < NOTHING * smallest() || !has_interval && limit < smallest() =>
-        {
-            NO_WALK.to_owned()
-        }
+    // Without an interval what is smaller than can be seen is no estimate.
+    let unseen = || limit < NOTHING * smallest() || !has_interval && limit < smallest();
+    let shown = match key {
+        "bias" => Shown::Size,
+        "rate_random_walk" if unseen() => Shown::Nothing,
+        _ if answer::upper_limit(&value).is_some() => Shown::Limit,
+        _ => Shown::Size,
+    };
+    let said = match (key, shown) {
+        ("bias", _) => answer::with_interval(&value),
+        (_, Shown::Nothing) => "too small to be told from 0".to_owned(),
         _ => answer::level(&value),
     };
-    Some(Term { value, said })
+    Some(Term { value, shown, said })
 }
 
 /// The random walk that after `seconds` has gone as far as white noise moves a mean over them: K sqrt(T / 3) = N / sqrt(T).
@@ -91,17 +104,21 @@ mod tests {
 
     #[test]
     fn a_velocity_walks_by_the_root_of_an_hour_and_a_limit_of_nothing_is_none() {
-        let said = |k, error, key: &str| {
-            let term = term(&model(k, error), "acc_x", key, 600.0).expect("a term");
-            term.said.replace('\u{a0}', " ")
-        };
+        let told =
+            |k, error, key: &str| term(&model(k, error), "acc_x", key, 600.0).expect("a term");
+        let said = |k, error, key: &str| told(k, error, key).said.replace('\u{a0}', " ");
         let n = said(1e-4, 1e-5, "angle_random_walk");
         assert_eq!(n, "0.1800 m/s/sqrt(h) (95 %: 0.1765 to 0.1835)");
         // 0.003 sqrt(3) / 600 is 8.7e-6.
         let walk = |k, error| said(k, error, "rate_random_walk");
-        assert_eq!(walk(3e-33, 3e-31), NO_WALK);
+        let none = "too small to be told from 0";
+        assert_eq!(walk(3e-33, 3e-31), none);
         // Nor is it one of which nothing tells the error.
-        assert_eq!(walk(1e-6, f64::NAN), NO_WALK);
+        assert_eq!(walk(1e-6, f64::NAN), none);
         assert_eq!(walk(1e-6, 1e-5), "< 2.1e-5 m/s^2/sqrt(s)");
+        let shown = |k, error| told(k, error, "rate_random_walk").shown;
+        assert_eq!(shown(3e-33, 3e-31), Shown::Nothing);
+        assert_eq!(shown(1e-6, 1e-5), Shown::Limit);
+        assert_eq!(shown(1e-4, 1e-5), Shown::Size);
     }
 }

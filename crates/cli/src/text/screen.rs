@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use diagnosis::result::{Diagnosed, Diagnosis, Finding, Unexplained};
 
-use super::{advice, answer, item, noise, verdict};
+use super::noise::{self, Shown};
+use super::{advice, answer, item, verdict};
 
 /// Entries of what is left over that the first screen shows; the rest is counted.
 const SHOWN: usize = 4;
@@ -204,8 +205,10 @@ fn change(before: Option<noise::Term>, after: &noise::Term, without: &str) -> St
     let now = &after.said;
     let error = after.value.std_error.unwrap_or(0.0).max(f64::MIN_POSITIVE);
     // Of two that cannot be seen the difference says nothing.
-    let seen = before.filter(|b| {
-        b.said != noise::NO_WALK && !(b.said.starts_with('<') && now == noise::NO_WALK)
+    let seen = before.filter(|b| match b.shown {
+        Shown::Nothing => false,
+        Shown::Limit => after.shown != Shown::Nothing,
+        Shown::Size => true,
     });
     match seen.map(|b| b.value.value) {
         Some(b) if (b - after.value.value).abs() > answer::HALF_WIDTH_95 * error => {

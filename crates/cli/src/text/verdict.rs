@@ -11,7 +11,7 @@ const NAMED: usize = 3;
 const REPLICATES: &str = "replicates";
 
 /// How an entry ends of a channel that gave too few readings.
-pub(super) const LEFT_OUT: &str = "it is left out";
+const LEFT_OUT: &str = "it is left out";
 
 /// The verdict as a terminal shows it: the word of the JSON, and what it means.
 #[must_use]
@@ -136,10 +136,14 @@ pub fn was_read(left: &Unexplained) -> bool {
     !left.checks.is_empty() || left.rms.is_some()
 }
 
+/// Whether an entry is of a channel that gave too few readings.
+pub(super) fn is_dead(left: &Unexplained) -> bool {
+    !was_read(left) && left.what.ends_with(LEFT_OUT)
+}
+
 /// The channels that gave too few readings, where nothing else is left that matters.
 fn not_measured(all: &[Unexplained]) -> Option<Vec<&str>> {
     let material = all.iter().filter(|u| u.material);
-    let is_dead = |u: &Unexplained| !was_read(u) && u.what.ends_with(LEFT_OUT);
     let channels: Option<Vec<&str>> = material
         .map(|u| is_dead(u).then_some(u.channel.as_str()))
         .collect();

@@ -47,6 +47,17 @@ pub const PLAIN: World = World {
     samples: 12_000,
 };
 
+impl World {
+    /// White noise of so many counts, and nothing else.
+    pub fn white(sigma: f64) -> Self {
+        Self {
+            sigma,
+            walk: 0.0,
+            ..PLAIN
+        }
+    }
+}
+
 /// A record of three gyros at 20 Hz.
 pub fn record(world: World, rng: &mut Xoshiro256PlusPlus) -> Record {
     let n = world.samples;

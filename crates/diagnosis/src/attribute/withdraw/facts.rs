@@ -32,8 +32,10 @@ const REMAINDER_UNLAWFUL: f64 = 1.0;
 /// Share of the energy of a slow channel from which on a line at its place swings as the channel does: a line elsewhere
 /// meets so much of it at a handful of thousands of frequencies.
 const SWINGS: f64 = 0.02;
-/// The same of a channel that swings at a half or a third of a line's place, and at little else.
+/// The same of a channel that swings at a half or a third of a line's place: most of what it does, since the square and the cube of
+/// a sum of swings hold those of each at small part.
 const SWINGS_MOSTLY: f64 = 0.5;
+/// Multiples of its frequency that a law of the second and the third degree makes.
 const POWERS: [f64; 2] = [2.0, 3.0];
 /// Half cycles in the record by which they may lie apart.
 const SAME_SWING: f64 = 1.5;
