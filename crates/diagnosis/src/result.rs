@@ -244,7 +244,7 @@ pub struct Series {
 /// The figure that convicts a cause.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
-    /// Cause id it belongs to.
+    /// Cause id it belongs to, or [`Self::WITHOUT_A_NAME`].
     pub cause: String,
     /// Title.
     pub title: String,
@@ -262,6 +262,11 @@ pub struct Evidence {
     pub series: Vec<Series>,
     /// What to see in it.
     pub caption: String,
+}
+
+impl Evidence {
+    /// In the place of a cause, of what follows recorded channels as no effect of the library does.
+    pub const WITHOUT_A_NAME: &str = "unexplained";
 }
 
 /// All that a diagnosis yields.

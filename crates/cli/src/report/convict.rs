@@ -68,11 +68,19 @@ fn without_a_name(subject: &Subject<'_>) -> Vec<Convicting> {
             let mut findings = d.findings.iter();
             findings.any(|f| f.cause == *cause && f.channels.contains(&left.channel))
         };
-        let mut own = subject.diagnosed.evidence.iter();
-        let own = own.find(|e| e.channel == left.channel && !is_named(&e.cause));
+        let own = |follows: bool| {
+            let mut own = subject.diagnosed.evidence.iter();
+            own.find(|e| {
+                let same = e.channel == left.channel && !is_named(&e.cause);
+                same && follows == (e.cause == Evidence::WITHOUT_A_NAME)
+            })
+        };
+        // What follows a recorded channel has a figure of its own.
+        let follows = left.follows.is_some();
+        let own = own(follows).or_else(|| own(!follows));
         let shown = out.iter().any(|o| o.channel == left.channel);
         out.extend(own.filter(|_| !shown).map(|evidence| Convicting {
-            cause: "unexplained".into(),
+            cause: Evidence::WITHOUT_A_NAME.into(),
             channel: left.channel.clone(),
             title: format!("{}: what has no name", left.channel),
             caption: plain_caption(evidence),

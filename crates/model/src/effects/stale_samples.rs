@@ -54,9 +54,16 @@ impl Effect for StaleSamples {
             physics: "A frame repeats the readings of the frame before: the sensor was read before it had a new sample, as one is all the time that renews its readings more slowly than frames come; or a buffer was sent twice.",
             excitation: "Nothing.",
             test: "Audit: new-data flags, and frames with all gyros equal to the frame before, or runs of them to those some frames before, against their chance.",
-            remedy: "Read on the sensor's data-ready signal, or read more slowly, and skip frames whose new-data flag is not set.",
+            remedy: "Read on the sensor's data-ready signal, or read more slowly, and skip frames whose new-data flag is not set. Where blocks come twice, hand each buffer over once.",
             figure: "The rate around each of them.",
             example: Example::new(Plot::Around, &[("count", 40.0)]).on_all(),
+        }
+    }
+
+    fn named_first(&self, parameters: &Parameters) -> &'static [&'static str] {
+        match parameters.contains_key("behind") {
+            true => &["count", "behind"],
+            false => &[],
         }
     }
 
