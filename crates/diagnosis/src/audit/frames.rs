@@ -1,6 +1,7 @@
 //! Frames: gaps of the sequence numbers, time that passes without a number, readings flagged as not new, alarms.
 
 use model::effects;
+use model::record::batches;
 use model::record::{Axis, Record, flag};
 
 use super::repeats::beat;
@@ -106,7 +107,12 @@ pub(super) fn audit(record: &Record, gyros: &[Gyro<'_>], at: &[f64], audit: &mut
     let clock: Option<Vec<f64>> = ticks
         .map(|t| t.iter().map(|v| v.saturating_sub(t[0]) as f64).collect())
         .or_else(|| host.filter(|_| seq.is_none()).cloned());
+    let is_host = ticks.is_none() && seq.is_none();
     match clock.as_ref().and_then(|t| in_intervals(t, &number)) {
+        Some(_) if is_host && host.is_some_and(|t| batches::arrive(t)) => audit.untested(
+            effects::dropped_samples::ID,
+            "rows arrive many at once, so a missing one does not show in their times: record a sequence number or a device time",
+        ),
         Some(time) => lost_in_time(&time, &number, audit),
         None if seq.is_none() => audit.untested(
             effects::dropped_samples::ID,

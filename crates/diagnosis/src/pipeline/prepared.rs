@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use model::record::fills;
 use model::record::rows;
 use model::record::{AnalysisError, Base, Record};
+use model::record::{fills, sentinels};
 
 use super::high_passed;
 use crate::attribute::masking;
@@ -43,7 +43,7 @@ struct Again {
 }
 
 pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, AnalysisError> {
-    let record = fills::left_out(record);
+    let record = sentinels::left_out(fills::left_out(record));
     let record = &*rows::in_order(&record);
     let (record, bursts) = match rows::end_to_end(record) {
         Some((joined, bursts)) => (Cow::Owned(joined), Some(bursts)),

@@ -2,10 +2,12 @@
 //!
 //! Everything that computes takes a [`Record`]: captures of the board, simulations and foreign files all become one.
 
+pub mod batches;
 pub mod error;
 pub mod fills;
 pub mod rows;
 pub mod sampling;
+pub mod sentinels;
 
 pub use error::AnalysisError;
 

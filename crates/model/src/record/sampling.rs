@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::record::Record;
+use crate::record::{Record, batches};
 
 use crate::record::error::AnalysisError;
 
@@ -286,6 +286,8 @@ struct Interval {
     /// Length over number of steps, s.
     mean_s: f64,
     irregular_share: f64,
+    /// Whether rows come in batches.
+    in_batches: bool,
 }
 
 impl Interval {
@@ -313,11 +315,12 @@ impl Interval {
             regular_s,
             mean_s,
             irregular_share,
+            in_batches: irregular_share <= BURSTY_SHARE && batches::arrive(times),
         })
     }
 
     fn bursty(&self) -> bool {
-        self.irregular_share > BURSTY_SHARE
+        self.irregular_share > BURSTY_SHARE || self.in_batches
     }
 
     fn best_s(&self) -> f64 {

@@ -15,7 +15,7 @@ use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use crate::record::Record;
+use crate::record::{Record, sentinels};
 
 pub use bursts::{Bursts, end_to_end};
 use keys::Keys;
@@ -186,14 +186,16 @@ fn set_back(
     let t: Option<Vec<f64>> = left.iter().map(|row| keys.host(*row)).collect();
     let t = t?;
     let shifts = set_back::shifts(&t, back)?;
-    for k in back {
-        notes.push(format!(
-            "the clock of the times was set back by {:.3} s before row {} of the file: the rows stay in the order of the file, \
-             and its times go on from there. Two recordings in one file look the same: if it is that, split it there",
-            t[k - 1] - t[*k],
-            left[*k] + 1
-        ));
-    }
+    let first = *back.first()?;
+    let (size, row) = (t[first - 1] - t[first], left[first] + 1);
+    let places = match back.len() {
+        1 => format!("by {size:.3} s before row {row} of the file"),
+        n => format!("at {n} places, first by {size:.3} s before row {row} of the file"),
+    };
+    notes.push(format!(
+        "the clock of the times was set back {places}: the rows stay in the order of the file, and its times go on from there. Two \
+         recordings in one file look the same: if it is that, split it there"
+    ));
     let mut places = keys.places(left);
     for (k, place) in places.iter_mut().enumerate() {
         let settings = back.partition_point(|at| *at <= k);
@@ -369,7 +371,8 @@ fn without_readings(record: &Record) -> Vec<String> {
     let mut by_count: Vec<(usize, Vec<&str>)> = vec![];
     for c in &record.channels {
         let none = c.values.iter().filter(|v| !v.is_finite()).count();
-        if none == 0 {
+        // What was left out of it is told already.
+        if none == 0 || sentinels::are_told(record, &c.name, none) {
             continue;
         }
         match by_count.iter_mut().find(|(n, _)| *n == none) {

@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use crate::record::Record;
+use crate::record::{Record, batches};
 
 use super::LARGEST;
 use super::keys::Keys;
@@ -116,7 +116,7 @@ pub(super) fn steps(record: &Record) -> Option<Vec<f64>> {
     let usual = rate::median(&steps);
     let alike = steps.iter().filter(|d| (**d - usual).abs() < 0.5 * usual);
     // Times of arrival that come in batches tell nothing of interruptions.
-    let regular = alike.count() as f64 > 0.9 * steps.len() as f64;
+    let regular = alike.count() as f64 > 0.9 * steps.len() as f64 && !batches::arrive(t);
     regular.then(|| {
         [1.0]
             .into_iter()

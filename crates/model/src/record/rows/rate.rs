@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::record::Record;
+use crate::record::{Record, batches};
 
 use super::LARGEST;
 
@@ -70,7 +70,7 @@ pub fn by_times(record: &Record) -> Option<f64> {
             let usual = median(&steps);
             let alike = || steps.iter().filter(|d| (**d - usual).abs() < 0.5 * usual);
             let (count, sum) = (alike().count() as f64, alike().sum::<f64>());
-            if count > REGULAR * steps.len() as f64 {
+            if count > REGULAR * steps.len() as f64 && !batches::arrive(t) {
                 // A first line by what is certain, a second one over short holes.
                 let first = slope(&parts(t, sum / count, 1.5)).unwrap_or(sum / count);
                 slope(&parts(t, first, COUNTABLE)).or(Some(first))
