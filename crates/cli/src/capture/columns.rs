@@ -10,7 +10,7 @@ use super::conventions::unit_of;
 use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
-use super::mapped::{beside_ours, by_known_names, mapped};
+use super::mapped::{beside_known, beside_ours, by_known_names, mapped};
 use super::names::{TIMES, left, meant, missing, not_read, respelt};
 use super::propose::{stated_time, unknown};
 use super::units::{COUNTS, What, convert, in_brackets};
@@ -125,7 +125,14 @@ fn chosen(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureEr
                 };
                 by_our_names(&said, mapping)?
             }
-            None => mapped(said, mapping)?,
+            None => match beside_known(said, mapping) {
+                Some(all) => {
+                    let mut found = mapped(said, &all)?;
+                    found.notes.push(taken(said, &all, &found));
+                    found
+                }
+                None => mapped(said, mapping)?,
+            },
         }
     } else if said.lines.get("format").is_some() {
         refuse_units(said, mapping)?;

@@ -20,13 +20,6 @@ pub(super) fn beside_ours(
     said: &Said<'_>,
     mapping: &ColumnMapping,
 ) -> Option<(Vec<String>, Vec<Option<String>>)> {
-    let is_beside = |name: &str| {
-        matches!(name, "time" | "host_time_s" | "seq" | "flags")
-            || matches!(
-                meaning(name).0,
-                Quantity::Temp | Quantity::Supply | Quantity::Pwm
-            )
-    };
     let ours = |given: &str| alias(given).unwrap_or_else(|| given.to_owned());
     let is_inertial = |name: &String| {
         matches!(
@@ -34,11 +27,10 @@ pub(super) fn beside_ours(
             Quantity::Gyro | Quantity::Acc
         )
     };
-    let all_beside = mapping
-        .columns
-        .iter()
-        .all(|(given, _)| is_beside(&ours(given)));
-    if !all_beside || said.lines.get("format").is_some() || !said.names.iter().any(is_inertial) {
+    if !all_beside(mapping)
+        || said.lines.get("format").is_some()
+        || !said.names.iter().any(is_inertial)
+    {
         return None;
     }
     let (mut names, mut units) = (said.names.to_vec(), said.units.to_vec());
@@ -71,6 +63,67 @@ pub(super) fn beside_ours(
         }
     }
     Some((names, units))
+}
+
+/// Whether a mapping names nothing that is analyzed.
+fn all_beside(mapping: &ColumnMapping) -> bool {
+    let is_beside = |name: &str| {
+        matches!(name, "time" | "host_time_s" | "seq" | "flags")
+            || matches!(
+                meaning(name).0,
+                Quantity::Temp | Quantity::Supply | Quantity::Pwm
+            )
+    };
+    let given = mapping.columns.iter();
+    let mut given = given.map(|(given, _)| alias(given).unwrap_or_else(|| given.clone()));
+    given.all(|name| is_beside(&name))
+}
+
+/// Where a mapping names nothing that is analyzed, and the file's names say what their columns are, those that it does not name
+/// are read, too.
+pub(super) fn beside_known(said: &Said<'_>, mapping: &ColumnMapping) -> Option<ColumnMapping> {
+    if !all_beside(mapping) || said.lines.get("format").is_some() {
+        return None;
+    }
+    let places: Option<Vec<usize>> = (mapping.columns.iter())
+        .map(|(_, theirs)| place(said, theirs))
+        .collect();
+    let places = places?;
+    // One of two times, say, may be what was given.
+    let others = said.names.iter().enumerate();
+    let others = others.map(|(at, name)| {
+        if places.contains(&at) {
+            "-"
+        } else {
+            name.as_str()
+        }
+    });
+    let others: Vec<String> = others.map(str::to_owned).collect();
+    let said_of_others = Said {
+        names: &others,
+        ..*said
+    };
+    let known = by_known_names(&said_of_others, mapping)?;
+    let kind = |name: &str| match alias(name).unwrap_or_else(|| name.to_owned()).as_str() {
+        "host_time_s" | "time" => "time".to_owned(),
+        name => name.to_owned(),
+    };
+    let given: Vec<String> = mapping.columns.iter().map(|(ours, _)| kind(ours)).collect();
+    let is_free = |(ours, theirs): &(String, String)| {
+        let at = place(said, theirs);
+        !given.contains(&kind(ours)) && at.is_some_and(|at| !places.contains(&at))
+    };
+    let mut columns: Vec<(String, String)> = known.columns.into_iter().filter(is_free).collect();
+    // What a name says of a column holds for no other one.
+    let of_known = |key: &str| columns.iter().any(|(ours, _)| ours.starts_with(key));
+    let is_given = |key: &str| mapping.units.iter().any(|(known, _)| known == key);
+    let units = known.units.into_iter();
+    let units = units
+        .filter(|(key, _)| is_given(key) || of_known(key))
+        .collect();
+    columns.extend(mapping.columns.iter().cloned());
+    columns.sort_by_key(|(_, theirs)| place(said, theirs));
+    Some(ColumnMapping { columns, units })
 }
 
 /// The mapping of a file whose names say of each column what it is and in which unit, and leave no choice; nothing where
