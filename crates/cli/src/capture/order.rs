@@ -74,10 +74,28 @@ pub(super) fn unwrap(values: &[u64], modulus: u64) -> Vec<u64> {
         .collect()
 }
 
-/// Undoes the wrapping of a time that a counter of 32 bits holds, as boards' microseconds do every 71 minutes: it goes back
-/// by more than half of what such a counter can hold. How often.
-pub(super) fn unwrap_times(times: &mut [f64], scale: f64) -> usize {
-    let turn = scale * 4_294_967_296.0;
+/// Undoes the wrapping of a time that a counter of 32 or 16 bits holds, as boards' microseconds do every 71 minutes and their
+/// milliseconds in a `uint16_t` every 66 s. How often, and how many bits it has; `None` where it goes on.
+pub(super) fn unwrap_times(times: &mut [f64], scale: f64) -> Option<(usize, u32)> {
+    let turns = unwrap_far(times, scale * 4_294_967_296.0);
+    if turns > 0 {
+        return Some((turns, 32));
+    }
+    // Ticks of the unit of the column, or of what boards count in: thousandths and millionths of it.
+    for (bits, tick) in [16, 32].iter().flat_map(|b| TICKS.map(|t| (*b, t))) {
+        let turns = unwrap_even(times, scale * tick * 2f64.powi(bits));
+        if turns > 0 {
+            return Some((turns, bits as u32));
+        }
+    }
+    None
+}
+
+/// Ticks of a counter, in the unit of the column.
+const TICKS: [f64; 3] = [1.0, 1e-3, 1e-6];
+
+/// As a time that goes back by more than half a turn says.
+fn unwrap_far(times: &mut [f64], turn: f64) -> usize {
     if !times.iter().all(|t| (0.0..turn).contains(t)) {
         return 0;
     }
@@ -85,6 +103,39 @@ pub(super) fn unwrap_times(times: &mut [f64], scale: f64) -> usize {
         (times.iter_mut().filter(|t| **t < next)).for_each(|t| *t += turn);
         return usize::from(next > 0.0);
     }
+    go_on(times, turn)
+}
+
+/// As times say that go back, and by a turn later would have made a step like all others: a short counter, whose turn is no
+/// longer than a pause or a clock that was set.
+fn unwrap_even(times: &mut [f64], turn: f64) -> usize {
+    if times.len() < 3 || !times.iter().all(|t| (0.0..turn).contains(t)) {
+        return 0;
+    }
+    let over: Vec<f64> = (steps(times).filter(|step| *step < -turn / 2.0))
+        .map(|step| step + turn)
+        .collect();
+    let mut forward: Vec<f64> = steps(times).filter(|step| *step > 0.0).collect();
+    if over.is_empty() || forward.is_empty() {
+        return 0;
+    }
+    let usual = middle(&mut forward);
+    let is_even = (0.5..1.5).contains(&(middle(&mut over.clone()) / usual));
+    // Rows may be lost there.
+    if !is_even || over.iter().any(|step| *step > NEAR * usual) {
+        return 0;
+    }
+    go_on(times, turn)
+}
+
+/// The value in the middle.
+fn middle(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Adds the turns where the time goes back by more than half of one; how many.
+fn go_on(times: &mut [f64], turn: f64) -> usize {
     let (mut turns, mut last) = (0, 0.0);
     for t in times {
         turns += usize::from(last - *t > turn / 2.0);
@@ -221,9 +272,26 @@ mod tests {
             .collect();
         let turn = 4_294_967_296.0;
         let mut seen: Vec<f64> = micros.iter().map(|t| t % turn * 1e-6).collect();
-        assert_eq!(unwrap_times(&mut seen, 1e-6), 1);
+        assert_eq!(unwrap_times(&mut seen, 1e-6), Some((1, 32)));
         for (seen, t) in seen.iter().zip(&micros) {
             assert!((seen - t * 1e-6).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_short_counter_goes_on_where_a_turn_makes_its_step_even() {
+        // 25 000 rows of 20 ms from 41.256 s on: eight turns of 65.536 s; and in seconds of such milliseconds.
+        let truth: Vec<f64> = (0..25_000).map(|k| 41.256 + 0.02 * f64::from(k)).collect();
+        for scale in [1e-3, 1.0] {
+            let mut seen: Vec<f64> = truth.iter().map(|t| t % 65.536).collect();
+            assert_eq!(unwrap_times(&mut seen, scale), Some((8, 16)));
+            let far = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-6;
+            assert!(!seen.iter().zip(&truth).any(far));
+        }
+        // A clock that was set back, by another span; a recording of one minute before another.
+        for turn in [40.0, 60.0] {
+            let mut seen: Vec<f64> = truth.iter().map(|t| t % turn).collect();
+            assert_eq!(unwrap_times(&mut seen, 1e-3), None, "{turn}");
         }
     }
 }

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use model::record::{Channel, Header, Quantity, Record, fills};
+use model::record::{Channel, Header, Quantity, Record, fills, sentinels};
 
 use super::angle::difference_angles;
 use super::columns::{Column, Columns, Role, Said, columns};
@@ -291,7 +291,7 @@ fn finish(
     check_rate(&mut record, options.rate_hz)?;
     difference_angles(&mut record)?;
     share_thermometer(&mut record);
-    let mut record = fills::left_out(Cow::Owned(record)).into_owned();
+    let mut record = sentinels::left_out(fills::left_out(Cow::Owned(record))).into_owned();
     let doubts = doubts(&record, !found.assumed_gyros.is_empty());
     record.notes.extend(doubts);
     let unsteady = unsteady(&record);
@@ -308,10 +308,9 @@ fn times_that_go_on(found: &mut Columns, cells: &mut [Vec<f64>]) -> Result<(), C
         let Role::Time { scale } = column.role else {
             continue;
         };
-        let turns = unwrap_times(times, scale);
-        if turns > 0 {
+        if let Some((turns, bits)) = unwrap_times(times, scale) {
             found.notes.push(format!(
-                "the time begins again ({turns} x), as a counter of 32 bits does: taken to go on"
+                "the time begins again ({turns} x), as a counter of {bits} bits does: taken to go on"
             ));
         }
         check_varies(times)?;
