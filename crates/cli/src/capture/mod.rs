@@ -34,6 +34,7 @@ mod several;
 mod skipped;
 mod span;
 mod steady;
+pub(crate) mod steps;
 mod stream;
 mod table;
 #[cfg(feature = "native")]

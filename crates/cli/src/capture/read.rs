@@ -23,6 +23,7 @@ use super::several::Sensors;
 use super::skipped::keep_places;
 use super::span::Span;
 use super::steady::{by_rounded_times, one_rate, unsteady};
+use super::steps::own_steps;
 use super::stream::{TextLines, io, named, unpacked};
 use super::table::Table;
 #[cfg(feature = "native")]
@@ -264,6 +265,7 @@ fn finish(
             None => place(&mut record, column, values),
         }
     }
+    own_steps(&mut record);
     if !skipped.is_empty() {
         let kept = keep_places(&mut record, skipped);
         let note = format!(

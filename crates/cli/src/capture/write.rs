@@ -7,6 +7,7 @@ use std::path::Path;
 use model::record::{Base, Record};
 
 use super::CaptureError;
+use super::steps::in_one_step;
 
 /// Key of the header that says which command simulated a capture.
 pub const SIMULATED: &str = "simulated";
@@ -45,8 +46,9 @@ pub fn write_capture(path: &Path, record: &Record) -> Result<(), CaptureError> {
 /// # Errors
 /// The stream's.
 pub fn write_to(out: &mut impl Write, record: &Record) -> std::io::Result<()> {
-    write_head(out, record)?;
-    write_rows(out, record)
+    let record = in_one_step(record);
+    write_head(out, &record)?;
+    write_rows(out, &record)
 }
 
 /// The header and the names of the columns.

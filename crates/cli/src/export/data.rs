@@ -14,6 +14,8 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
+use crate::capture::steps::in_one_step;
+
 /// Why data cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -63,6 +65,7 @@ impl Table {
     /// counts where they have them, and keep the capture's header, else they are scaled.
     #[must_use]
     pub fn of(record: &Record, raw: bool) -> Self {
+        let record = &*in_one_step(record);
         let mut columns = vec![Column {
             name: "time_s".to_owned(),
             unit: "s".to_owned(),
