@@ -233,3 +233,17 @@ fn simulated_channels_that_step_differently_are_read_as_they_were_simulated() {
         }
     }
 }
+
+#[test]
+fn estimates_of_one_step_are_one() {
+    let small = 1.0 / 131.0;
+    let steps = [Some(small), Some(small * (1.0 + 3e-7)), Some(small)];
+    let mut model = stepping(steps);
+    model.channels.truncate(3);
+    let simulated = model::simulate(&model, 60.0, 20.0, 3).expect("a run");
+    let mut text = Vec::new();
+    write_to(&mut text, &simulated).expect("memory");
+    let text = String::from_utf8(text).expect("text");
+    let scale = format!("# gyro_lsb_dps: {small}\n");
+    assert!(text.contains(&scale) && !text.contains("_step_"));
+}

@@ -18,7 +18,9 @@ const MOST_PARTS: u32 = 64;
 /// part is too little to be taken for another code.
 const FINE: f64 = 1e-6;
 const PARTS: f64 = 4.0;
-/// Steps are equal that differ by less of themselves.
+/// Part of a step by which the largest value may be off where steps are estimates of one, which differ in their last digits.
+const OFF: f64 = 1e-3;
+/// Parts are whole that are off by less of themselves.
 const EQUAL: f64 = 1e-9;
 
 /// What columns of a kind have in common: their scale's key, their own step's ending and its unit here.
@@ -91,7 +93,9 @@ pub(crate) fn in_one_step(record: &Record) -> Cow<'_, Record> {
             continue;
         };
         let largest = largest(&own);
-        let fits = (steps.iter()).all(|s| (s / stated - 1.0).abs() < EQUAL)
+        let off = |s: &f64| (s / stated - 1.0).abs() * (largest / stated).max(1.0);
+        let fits = steps.iter().all(|s| off(s) < OFF)
+            && own.iter().all(|c| c.counts.is_some())
             && largest / stated < LARGEST_COUNT;
         if fits {
             continue;

@@ -49,7 +49,7 @@ fn note(channel: &Channel, cells: &[usize]) -> String {
         *often.entry(value.to_string()).or_default() += 1;
     }
     let mut often: Vec<(String, usize)> = often.into_iter().collect();
-    often.sort_by(|a, b| b.1.cmp(&a.1));
+    often.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
     let more = match often.len().saturating_sub(NAMED) {
         0 => String::new(),
         more => format!(" and {more} other values"),
