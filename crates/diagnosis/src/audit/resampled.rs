@@ -35,8 +35,10 @@ const KNOWN: f64 = 0.25;
 /// Error of a correlation by which a rate is told, and how much nearer one rate has to be than another.
 const NEAR: f64 = 0.15;
 const APART: f64 = 0.05;
+/// Most rates that are told.
+const MOST_TOLD: usize = 2;
 /// Highest multiple of the rate of the frames that the readings may have come at.
-const MOST_RATES: usize = 3;
+const MOST_RATES: usize = 2;
 
 /// What is taken of a gyro.
 struct Taken {
@@ -169,7 +171,7 @@ fn rates(turns: f64, alike: f64) -> Vec<f64> {
     let near = all
         .into_iter()
         .filter(|(_, off)| *off < least + APART && *off < NEAR);
-    near.map(|(r, _)| r).collect()
+    near.map(|(r, _)| r).take(MOST_TOLD).collect()
 }
 
 /// Whether curves between readings make a swing of the variance that all of some gyros have.
