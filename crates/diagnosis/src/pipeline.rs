@@ -144,8 +144,15 @@ fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
         grid,
         searched: channel::all_searched(grid, !between.is_empty()),
     });
-    let mut models =
-        handed_over::handed_over(&searched, grid, &told, &mended, as_read.as_ref(), options);
+    let mut models = handed_over::handed_over(
+        &searched,
+        grid,
+        &told,
+        &mended,
+        as_read.as_ref(),
+        options,
+        !between.is_empty(),
+    );
     let is_told = |o: &Observation| between::tells(o, &between);
     told.unexplained.retain(|o| !is_told(o));
     models.held.unexplained.retain(|o| !is_told(o));
