@@ -10,6 +10,7 @@
 
 mod at_rest;
 mod banks;
+mod between;
 mod channel;
 mod concluded;
 mod far_readings;
@@ -111,13 +112,15 @@ pub fn diagnose_owned(
 fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     let at_rest = at_rest::believed(&mut of.grid);
     far_readings::settle(&mut of.grid, &of.audited, &of.singles);
-    let mut searched = channel::all_searched(&of.grid);
+    let between = std::mem::take(&mut of.audited.between);
+    let mut searched = channel::all_searched(&of.grid, !between.is_empty());
     of.grid.dct.forget();
     let tested = tested(&mut searched, &of.audited, &of.grid);
     let shocks = match held(&searched, &tested, &of) {
         Ok(shocks) => shocks,
         Err(borne_out) => {
             drop(searched);
+            of.audited.between = between;
             return diagnosed(of.with_those(&borne_out), options);
         }
     };
@@ -134,14 +137,26 @@ fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     input.notes.append(&mut audited.notes);
     input.file.clone_from(&options.file);
     let mut told = concluded(&searched, tested, audited, dead, named);
+    between::without_names(&mut told, &between);
     at_rest::with_motion(&mut told.findings, &at_rest);
     gain::complete(&mut told.findings, &searched, grid, &mended);
     let as_read = as_read.as_ref().map(|grid| AsRead {
         grid,
-        searched: channel::all_searched(grid),
+        searched: channel::all_searched(grid, !between.is_empty()),
     });
-    let mut models =
-        handed_over::handed_over(&searched, grid, &told, &mended, as_read.as_ref(), options);
+    let mut models = handed_over::handed_over(
+        &searched,
+        grid,
+        &told,
+        &mended,
+        as_read.as_ref(),
+        options,
+        !between.is_empty(),
+    );
+    let is_told = |o: &Observation| between::tells(o, &between);
+    told.unexplained.retain(|o| !is_told(o));
+    models.held.unexplained.retain(|o| !is_told(o));
+    models.taken_up.retain(|o| !is_told(o));
     let strays = !models.held.unexplained.is_empty();
     let mut unexplained = ranked_entries(&mut told, &mut models, &searched, grid, options);
     if let Some(bursts) = &grid.bursts {

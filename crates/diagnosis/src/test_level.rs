@@ -189,6 +189,7 @@ checks! {
     ErrorAlarm "error_alarm" 0.0, Limit;
     TimestampJitter "timestamp_jitter" 0.0, Limit;
     ClockCourse "clock_course" 0.0, Limit;
+    Resampled "resampled" 0.0, Limit;
 }
 
 impl std::fmt::Display for CheckId {
@@ -278,7 +279,8 @@ impl CheckId {
             | Self::NewDataFlag
             | Self::ErrorAlarm
             | Self::TimestampJitter
-            | Self::ClockCourse => Domain::Readings,
+            | Self::ClockCourse
+            | Self::Resampled => Domain::Readings,
             Self::Couplings | Self::CrossCorrelation | Self::CrossCorrelationLate => {
                 Domain::Coupling
             }

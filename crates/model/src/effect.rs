@@ -6,6 +6,7 @@
 mod covariance;
 mod docs;
 mod shape;
+mod slowest;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,6 +17,7 @@ use crate::simulate::Simulation;
 pub use covariance::{Covariance, Frequencies, Peak};
 pub use docs::{Docs, Example, Plot, Rival};
 pub use shape::Shape;
+pub use slowest::{Frames, Held, slowest};
 
 /// Parameters of one effect by name.
 pub type Parameters = BTreeMap<String, Parameter>;
@@ -382,6 +384,10 @@ pub trait Effect: Send + Sync {
     fn passes(&self, _parameters: &Parameters, _at: &Frequencies) -> Option<Vec<f64>> {
         None
     }
+    /// How it holds readings in a run of so many frames at this rate; none of what holds none.
+    fn holds(&self, _parameters: &Parameters, _frames: Frames) -> Option<Held> {
+        None
+    }
     /// What it takes from the readings, of an effect that adds nothing to them but what is missing.
     fn takes(&self) -> Option<&'static str> {
         None
@@ -390,15 +396,6 @@ pub trait Effect: Send + Sync {
     fn stage(&self) -> Stage;
     /// Act on the simulation. `channels` are the gyro axes (0..2) that the model names.
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation);
-}
-
-/// What the slowest of a white noise is, in variance over that of the readings, where it went through an effect; 1 of what is no
-/// filter. A filter passes the slowest as it is, so that this is the noise before it.
-#[must_use]
-pub fn slowest(effect: &dyn Effect, parameters: &Parameters) -> f64 {
-    let at = Frequencies::at(vec![0.0]);
-    let density = effect.passes(parameters, &at);
-    density.map_or(1.0, |d| d[0])
 }
 
 /// The unit of a parameter on a channel of unit `channel_unit`, where the contract states it for deg/s.

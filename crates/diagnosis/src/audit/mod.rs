@@ -18,6 +18,7 @@ pub mod local;
 mod outliers;
 mod rate_limit;
 pub(crate) mod repeats;
+mod resampled;
 mod rounded_twice;
 mod rounding;
 mod runs;
@@ -81,6 +82,8 @@ pub struct Audit {
     pub notes: Vec<String>,
     /// Rows of single readings that the noise cannot have made, by channel.
     pub singles: BTreeMap<String, Vec<usize>>,
+    /// Channels whose readings lie between others of another rate.
+    pub between: Vec<String>,
     /// Steps, counts, of channels whose converter lacks a bit.
     steps: BTreeMap<String, f64>,
     /// Channels whose noise is hardly larger than their step.
@@ -443,6 +446,14 @@ pub fn audit(record: &Record) -> Audit {
         ] {
             audit.untested(cause, "the record holds no counts, and its readings are no multiples of one step: record what the converter delivers, before any scaling, offset or averaging");
         }
+    }
+    // A curve between readings makes some that repeat, that their neighbours foretell, and that share their last digits.
+    let rate_hz = crate::ingest::grid::rate_of(record).unwrap_or(1.0);
+    if resampled::audit(&gyros, rate_hz, &mut audit) {
+        for g in &gyros {
+            outliers::audit(g, &at, &mut audit);
+        }
+        return audit;
     }
     repeats::audit(record, &gyros, &at, &mut audit);
     duplicated::audit(record, &gyros, &at, &mut audit);

@@ -283,6 +283,21 @@ impl<'a> Readings<'a> {
         }
     }
 
+    /// The same; where the repeats keep a beat, as readings have it that are not held: those that are make neighbours as alike as a
+    /// filter would.
+    fn expected_beside(&self, repeated: &[usize]) -> f64 {
+        if !beat::lie_evenly(repeated, self.rows) {
+            return self.expected();
+        }
+        let new = |i: &usize| repeated.binary_search(i).is_err();
+        let new = |column: &&[f64]| (0..self.rows).filter(new).map(|i| column[i]).collect();
+        let columns: Vec<Vec<f64>> = self.columns.iter().map(new).collect();
+        let own = columns.iter().zip(&self.steps);
+        let chances = own.map(|(c, s)| agreement(c, *s).0);
+        self.expected()
+            .min(chances.product::<f64>() * self.rows as f64)
+    }
+
     /// Whether gyros repeat as often beyond chance in frames that do not repeat as a whole: each by itself, then, and no frame.
     fn each_by_itself(&self) -> bool {
         let whole: Vec<bool> = (1..self.rows).map(|i| self.same(1, i)).collect();
@@ -301,7 +316,7 @@ impl<'a> Readings<'a> {
     /// Whether whole frames repeat.
     fn frames(&self, record: &Record, at: &[f64], audit: &mut Audit) -> bool {
         let repeated = self.repeated(audit);
-        let expected = self.expected();
+        let expected = self.expected_beside(&repeated);
         let observed = repeated.len() as u64;
         let doubt = self.chances.iter().map(|p| p.1 * p.1).sum::<f64>().sqrt();
         let mean = expected * (1.0 + 3.0 * doubt);
@@ -344,8 +359,8 @@ impl<'a> Readings<'a> {
         let cause = effects::stale_samples::ID;
         let runs = Runs::new(&repeated, expected, self.rows);
         let mut finding = counted(cause, names, runs.stalled().round(), error, &times, what);
-        finding.parameters.insert("running".into(), runs.running());
-        let rate = beat::sensor_rate(&repeated, expected, at);
+        finding.parameters.extend(runs.how_long());
+        let rate = beat::sensor_rate(&repeated, runs.stalled(), at);
         (finding.parameters).extend(rate.map(|rate| ("sensor_rate".into(), rate)));
         if record.flags.is_some() {
             finding.what.push_str("; the new-data flags do not tell");
@@ -402,7 +417,7 @@ impl<'a> Readings<'a> {
         runs.beyond_chance().for_each(|i| audit.mask(name, i));
         let error = Some(error / (1.0 - p).max(0.1));
         let mut finding = counted(cause, names, runs.stalled().round(), error, &times, what);
-        finding.parameters.insert("running".into(), runs.running());
+        finding.parameters.extend(runs.how_long());
         audit.findings.push(finding);
         false
     }

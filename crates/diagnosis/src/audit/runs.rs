@@ -53,6 +53,28 @@ impl<'a> Runs<'a> {
         Parameter::exact((stalled / stalls.max(1.0)).max(1.0), "1")
     }
 
+    /// The same on the average over the frames, each of which is in a longer run the longer it is.
+    pub fn running_by_frames(&self) -> Parameter {
+        let (stalled, p, running) = (self.stalled(), self.chance, self.running().value);
+        let seen: f64 = self.runs.iter().map(|r| (r.len() as f64).powi(2)).sum();
+        let by_chance = p * (1.0 + p) / (1.0 - p) * (self.all - stalled);
+        // Chance goes on by a geometric number on either side.
+        let beyond = 2.0 * p / (1.0 - p);
+        let its_square = (2.0 * p + 4.0 * p * p) / (1.0 - p).powi(2);
+        let longer = (2.0 * running * beyond + its_square) * stalled / running;
+        let own = (seen - by_chance - longer) / stalled;
+        Parameter::exact(own.clamp(running, self.all), "1")
+    }
+
+    /// Both, by their names.
+    pub fn how_long(&self) -> [(String, Parameter); 2] {
+        let both = [
+            ("running", self.running()),
+            ("running_by_frames", self.running_by_frames()),
+        ];
+        both.map(|(name, value)| (name.to_owned(), value))
+    }
+
     /// Rows of the runs that are longer than chance makes them.
     pub fn beyond_chance(&self) -> impl Iterator<Item = usize> {
         let longest = self.runs.iter().map(Range::len).max().unwrap_or(0);
@@ -90,6 +112,8 @@ mod tests {
         assert!((all.stalled() - 2000.0).abs() < 150.0, "{}", all.stalled());
         let running = all.running().value;
         assert!((running - 4.0).abs() < 0.6, "{running}");
+        let by_frames = all.running_by_frames().value;
+        assert!((by_frames - 4.0).abs() < 0.6, "{by_frames}");
     }
 
     #[test]
@@ -107,6 +131,8 @@ mod tests {
     fn without_chance_all_are_stalls() {
         let all = Runs::new(&[3, 7, 8, 9], 0.0, 100);
         assert_eq!((all.stalled(), all.running().value), (4.0, 2.0));
+        // One is alone, and three are three.
+        assert_eq!(all.running_by_frames().value, 2.5);
         assert_eq!(all.beyond_chance().count(), 4);
     }
 }

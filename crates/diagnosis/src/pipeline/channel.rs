@@ -59,15 +59,17 @@ fn plain_checks((u, e): &Whitened, baseline: &State, grid: &Grid, target: &Targe
     residual::all(u, e, grid.rate_hz, step)
 }
 
-/// Searches all channels, two at a time: their columns in common are those of the first.
-pub(super) fn all_searched(grid: &Grid) -> Vec<Searched<'_>> {
+/// Searches all channels, two at a time: their columns in common are those of the first. Of readings that lie `between` others
+/// the spectrum has no kind, and is there before anything is sought beside it.
+pub(super) fn all_searched(grid: &Grid, between: bool) -> Vec<Searched<'_>> {
     let Some(target) = grid.targets.first() else {
         return vec![];
     };
     let first = std::iter::once(Some(laid_out(grid, target)));
     let laid = first.chain(std::iter::repeat_with(|| None));
     test_level::on_two_threads(grid.targets.iter().zip(laid), |(target, laid)| {
-        searched_from(grid, target, laid.unwrap_or_else(|| laid_out(grid, target)))
+        let laid = laid.unwrap_or_else(|| laid_out(grid, target));
+        searched_from(grid, target, laid, between)
     })
 }
 
@@ -89,15 +91,23 @@ pub(super) fn best(grid: &Grid, target: &Target, log_walk: f64) -> (f64, f64) {
 
 /// Searches a channel, and asks its model and what that leaves.
 pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
-    searched_from(grid, target, laid_out(grid, target))
+    searched_from(grid, target, laid_out(grid, target), false)
 }
 
-fn searched_from<'a>(grid: &'a Grid, target: &'a Target, search: Search<'a>) -> Searched<'a> {
+fn searched_from<'a>(
+    grid: &'a Grid,
+    target: &'a Target,
+    search: Search<'a>,
+    between: bool,
+) -> Searched<'a> {
     let baseline = search.baseline(&target.noise);
     let mut plain = whitened(&search.panel, &baseline);
     let mut before = plain_checks(&plain, &baseline, grid, target);
-    let ascended = search.ascend(baseline.clone());
-    let ascended = search.beside_any_spectrum(ascended);
+    let ascended = if between {
+        search.ascend(search.beside_any_spectrum(baseline.clone()))
+    } else {
+        search.beside_any_spectrum(search.ascend(baseline.clone()))
+    };
     let mut state = search.conclude(compare::hold(&search, ascended));
     let refilled = impute::again(&search, &state, target);
     if let Some(refilled) = refilled.clone() {

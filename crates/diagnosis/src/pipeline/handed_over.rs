@@ -58,6 +58,7 @@ pub(super) fn handed_over(
     mended: &[Finding],
     as_read: Option<&AsRead<'_>>,
     options: &DiagnoseOptions,
+    between: bool,
 ) -> HandedOver {
     let count = options.replicates;
     let causes: Vec<&Finding> = told.findings.iter().chain(&told.nearest).collect();
@@ -99,7 +100,8 @@ pub(super) fn handed_over(
     let (first, strayed) = (replicates.clone(), said.unexplained.clone());
     // What strays the more for a round may be what it had hidden, which the next takes up: the best of them is handed over.
     let mut strays = said.unexplained.clone();
-    for _ in 0..ROUNDS {
+    // What strays of readings that lie between others is that they do, and no term takes it up.
+    for _ in 0..if between { 0 } else { ROUNDS } {
         strays.iter().for_each(|o| wanted.add(o));
         let again = unnamed::fit(searched, grid, &wanted, &causes);
         if again == fitted {

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use model::effect::{Effect, Frequencies, Hypothesis, Parameters, Stage, slowest};
+use model::effect::{Effect, Frames, Frequencies, Hypothesis, Parameters, Stage, slowest};
 use model::effects::effect;
 use model::excitation::at_rest;
 use model::file::{ChannelModel, EffectModel, FittedOn, ModelFile};
@@ -45,7 +45,11 @@ pub(crate) fn extended_model(
     let mut extended = model(searched, grid, &|s| beside(s, named, grid), fitted_on);
     extended.effects = effects_of(named);
     for (channel, s) in extended.channels.iter_mut().zip(searched) {
-        before_filters(channel, &extended.effects, s);
+        let frames = Frames {
+            samples: grid.n,
+            rate_hz: grid.rate_hz,
+        };
+        before_filters(channel, &extended.effects, s, frames);
     }
     // A tone that is not handed over has no detail.
     let known = |t: &&Unnamed| {
@@ -81,20 +85,31 @@ pub(crate) fn extended_model(
     extended
 }
 
-/// The noise before the filters among the effects, in the place of that of the readings: what an angle grows by.
-fn before_filters(channel: &mut ChannelModel, effects: &[EffectModel], s: &Searched<'_>) {
+/// The noise before the filters among the effects, and as what holds readings makes it, in the place of that of the readings: what an
+/// angle grows by.
+fn before_filters(
+    channel: &mut ChannelModel,
+    effects: &[EffectModel],
+    s: &Searched<'_>,
+    frames: Frames,
+) {
     let own = (effects.iter()).filter(|e| e.channels.contains(&channel.name));
     let known = own.filter_map(|e| Some((effect(&e.cause)?, &e.parameters)));
-    let filters: Vec<f64> = known
-        .filter(|(e, p)| e.passes(p, &Frequencies::default()).is_some())
-        .map(|(e, p)| slowest(e, p))
-        .collect();
-    let Some(p) = (channel.baseline.get_mut("angle_random_walk")).filter(|_| !filters.is_empty())
+    let filters = |(e, p): &(&dyn Effect, &Parameters)| {
+        let at = Frequencies::default();
+        e.passes(p, &at).is_some()
+    };
+    let filtered = known.clone().any(|of| filters(&of));
+    let holds = known.clone().any(|(e, p)| e.holds(p, frames).is_some());
+    let Some(p) = (channel.baseline.get_mut("angle_random_walk")).filter(|_| filtered || holds)
     else {
         return;
     };
-    let over = filters.iter().product::<f64>().sqrt();
-    let error = 0.5 * before_filter::error(&s.search.panel, &s.state);
+    let over = slowest(known, frames).sqrt();
+    let error = match filtered {
+        true => 0.5 * before_filter::error(&s.search.panel, &s.state),
+        false => 0.0,
+    };
     p.value *= over;
     p.std_error = p.std_error.map(|own| (own * over).hypot(error * p.value));
 }

@@ -11,7 +11,7 @@ use super::unnamed::{Generic, Random, too_correlated};
 use super::{
     BANKS, COUNT_LIMIT, STEPLESS_DPS, SimulateError, Simulation, Stretch, axis_of, white_of,
 };
-use crate::effect::{Effect, Parameters, Stage, slowest};
+use crate::effect::{Effect, Frames, Parameters, Stage, slowest};
 use crate::effects::effect;
 use crate::excitation::{World, fast};
 use crate::file::ModelFile;
@@ -110,9 +110,14 @@ impl Prepared {
         let acting = acting(model, present)?;
         for (axis, lsb) in lsb.iter().enumerate() {
             let here = acting.iter().filter(|a| a.axes.contains(&axis));
-            // The noise of a model is that before a filter, which makes it smaller.
-            let filters = here.clone().map(|a| slowest(a.effect, &a.parameters));
-            run.white_sigma[axis] /= filters.product::<f64>().sqrt();
+            // The noise of a model is that by which an angle grows: before a filter, which makes it smaller,
+            // and before what holds readings, which makes it larger.
+            let frames = Frames {
+                samples: run.span,
+                rate_hz,
+            };
+            let slow = slowest(here.clone().map(|a| (a.effect, &a.parameters)), frames);
+            run.white_sigma[axis] /= slow.sqrt();
             let step = here.fold(lsb.unwrap_or(0.0), |step, a| {
                 step * a.effect.coarsens(&a.parameters)
             });
