@@ -298,7 +298,7 @@ fn outliers(
     let before = wild.len();
     // What was found explains them: they are its largest.
     if !s.state.terms.is_empty() {
-        let single = || crate::ingest::grid::spike_limit(e.len());
+        let single = || crate::ingest::spikes::spike_limit(e.len());
         let limit = s.target.wild_from.unwrap_or_else(single);
         wild.retain(|w| w.size.abs() > limit);
     }

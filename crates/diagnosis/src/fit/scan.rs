@@ -124,6 +124,12 @@ fn from_each_time(
     sums
 }
 
+/// Readings between two places of the scan for steps in a record of `n`.
+#[must_use]
+pub fn apart(n: usize) -> f64 {
+    n as f64 / n.min(LONGEST_STEP_GRID) as f64
+}
+
 /// Likelihood ratio of a step at each of the grid's times, the random walk profiled; times in samples.
 #[must_use]
 pub fn steps(panel: &Panel, walks: &[Noise], columns: &[usize], null: f64) -> Vec<(f64, f64)> {

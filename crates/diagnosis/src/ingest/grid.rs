@@ -14,7 +14,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
 use crate::ingest::base_turns::{Excursion, MOTION_RMS};
+use crate::ingest::jumps::Jumps;
 use crate::ingest::motion::{MOTION_BAND_HZ, Rest, drives, felt, followers, motion, places_of};
+use crate::ingest::spikes::spikes;
 use crate::ingest::types::{Grid, Target};
 use crate::ingest::{dequantise, fill, kalman};
 use crate::test_level::on_two_threads;
@@ -154,6 +156,17 @@ pub fn lay_out(
         targets,
         signals,
     })
+}
+
+/// The readings of a gyro whose levels are made one.
+struct Still {
+    given: Vec<f64>,
+    lost: Vec<usize>,
+    /// The lost ones filled, their coefficients, and white noise and a random walk fitted to them.
+    y: Vec<f64>,
+    c: Arc<Vec<f64>>,
+    fit: (Noise, f64),
+    motion_rms: f64,
 }
 
 /// The grid while channels are put on it.
@@ -331,6 +344,32 @@ impl<'a> Layout<'a> {
             .collect()
     }
 
+    /// White noise, a random walk and the motion in the readings `given` of a gyro, once their levels are made one.
+    fn still(
+        &self,
+        (given, lost): (&[f64], &[usize]),
+        jumps: &Jumps,
+        is_rate: bool,
+        (guess, rng): (f64, &mut Xoshiro256PlusPlus),
+    ) -> Still {
+        let lost = [lost, &jumps.on_the_way].concat();
+        let given = jumps.levelled(given);
+        let (y, c, fit) = self.filled(&given, guess, rng);
+        let motion_rms = if is_rate {
+            self.motion(&y, &c, &lost, &fit)
+        } else {
+            0.0
+        };
+        Still {
+            given,
+            lost,
+            y,
+            c,
+            fit,
+            motion_rms,
+        }
+    }
+
     /// A gyro on the grid; `own` are the turns that it felt, `felt` those of all gyros: while the base turns, no axis of it is
     /// at rest.
     fn target(
@@ -341,14 +380,27 @@ impl<'a> Layout<'a> {
         rng: &mut Xoshiro256PlusPlus,
     ) -> Result<Target, AnalysisError> {
         let (scale, unit) = unit_of(channel);
-        let (given, lost, guess) = self.given(channel, felt)?;
-        let (mut y, mut c, mut fit) = self.filled(&given, guess, rng);
+        let (read, lost, guess) = self.given(channel, felt)?;
+        let step = scale * (channel.lsb).unwrap_or_else(|| smallest_step(few(&channel.values)));
         let is_rate = unit == "deg/s";
-        let mut motion_rms = if is_rate {
-            self.motion(&y, &c, &lost, &fit)
-        } else {
-            0.0
+        let mut jumps = match self.turns() {
+            true => Jumps::default(),
+            false => Jumps::of(&read, step),
         };
+        let mut still = self.still((&read, &lost), &jumps, is_rate, (guess, rng));
+        if still.motion_rms > MOTION_RMS && !jumps.is_empty() {
+            // What moves without them moves, and they are part of that.
+            jumps = Jumps::default();
+            still = self.still((&read, &lost), &jumps, is_rate, (guess, rng));
+        }
+        let Still {
+            given,
+            lost,
+            mut y,
+            mut c,
+            mut fit,
+            mut motion_rms,
+        } = still;
         let still = motion_rms <= MOTION_RMS;
         let (dct, bins) = (&self.dct, &self.bins);
         let spikes = if still {
@@ -356,7 +408,7 @@ impl<'a> Layout<'a> {
         } else {
             vec![]
         };
-        let aside = self.aside(channel, &given, &spikes);
+        let aside = self.aside(channel, &read, &spikes);
         let lost = [lost, spikes.clone()].concat();
         if still {
             let panel = Panel::of(dct, bins, c);
@@ -365,18 +417,21 @@ impl<'a> Layout<'a> {
         if is_rate && !spikes.is_empty() {
             motion_rms = self.motion(&y, &c, &lost, &fit);
         }
-        let shown = || smallest_step(few(&channel.values));
+        if !jumps.is_empty() {
+            c = jumps.put_back(&mut y, &mut fit, (dct, bins));
+        }
         Ok(Target {
             name: channel.name.clone(),
             axis: channel.axis,
             unit,
             lsb: channel.lsb.map(|l| l * scale),
-            step: scale * channel.lsb.unwrap_or_else(shown),
+            step,
             y: Arc::new(y),
             coefficients: c,
             lost,
             spikes,
             aside,
+            jumps,
             explained: vec![],
             wild_from: None,
             excursions: own.to_vec(),
@@ -428,63 +483,6 @@ fn unit_of(channel: &Channel) -> (f64, String) {
         "rad/s" => (180.0 / std::f64::consts::PI, "deg/s".to_owned()),
         other => (1.0, other.to_owned()),
     }
-}
-
-/// Take out single samples that the noise cannot have made, and fill their places; largest first, since each one
-/// widens the noise that the others are held against.
-fn spikes(
-    given: &[f64],
-    y: &mut Vec<f64>,
-    coefficients: &mut Arc<Vec<f64>>,
-    fit: &mut (Noise, f64),
-    dct: &Dct,
-    bins: &Arc<Bins>,
-    rng: &mut Xoshiro256PlusPlus,
-) -> Vec<usize> {
-    const PASSES: usize = 8;
-    let n = y.len();
-    let mut found: Vec<usize> = vec![];
-    for _ in 0..PASSES {
-        let g = fit.0.everywhere(bins);
-        let c: Vec<f64> = coefficients
-            .iter()
-            .zip(&g)
-            .map(|(c, g)| c / (fit.1 * g).sqrt())
-            .collect();
-        let e = dct.inverse(&c);
-        let beyond = |limit: f64| {
-            (0..n)
-                .filter(|i| e[*i].abs() > limit && given[*i].is_finite())
-                .collect::<Vec<_>>()
-        };
-        let fresh: Vec<usize> = beyond(spike_limit(n))
-            .into_iter()
-            .filter(|i| !found.contains(i))
-            .collect();
-        if fresh.is_empty() {
-            break;
-        }
-        found.extend(fresh);
-        let mut rest = given.to_vec();
-        for i in &found {
-            rest[*i] = f64::NAN;
-        }
-        kalman::fill(&mut rest, fit.1, fit.1 * fit.0.log_walk.exp(), rng);
-        let panel = Panel::new(dct, bins, &rest);
-        let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
-        *fit = (noise, solution.white);
-        (*y, *coefficients) = (rest, panel.column(0));
-    }
-    found.sort_unstable();
-    found
-}
-
-/// Distance in sigma that one of `n` samples reaches once in 10^5 records.
-pub(crate) fn spike_limit(n: usize) -> f64 {
-    let tail = |z: f64| {
-        (n as f64 * numerics::tails::normal_tail(z)).ln() - crate::test_level::omnibus_level().ln()
-    };
-    numerics::minimise::golden(&|z| tail(z).abs(), 4.0, 12.0, 40)
 }
 
 fn white_of(y: &[f64]) -> f64 {

@@ -8,6 +8,7 @@ use model::record::{Axis, Base};
 
 use crate::fit::likelihood::{Bins, Dct, Noise};
 use crate::ingest::base_turns::Excursion;
+use crate::ingest::jumps::Jumps;
 
 /// A gyro on the grid.
 pub struct Target {
@@ -31,6 +32,8 @@ pub struct Target {
     pub spikes: Vec<usize>,
     /// Places whose reading is not believed, and what was read there.
     pub aside: Vec<(usize, f64)>,
+    /// Where its level jumps and stays.
+    pub jumps: Jumps,
     /// Places of single far readings that the audit of counts set aside and that what was found explains.
     pub explained: Vec<usize>,
     /// Standard deviations from which on a reading is wild, where many tell that; else that of a single one.

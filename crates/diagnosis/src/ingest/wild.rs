@@ -206,13 +206,19 @@ fn filled_again(grid: &mut Grid, channel: usize, mut y: Vec<f64>) {
     let (dct, bins) = (&grid.dct, &grid.bins);
     let target = &mut grid.targets[channel];
     target.lost.iter().for_each(|i| y[*i] = f64::NAN);
-    let step = target.white * target.noise.log_walk.exp();
+    let mut y = target.jumps.levelled(&y);
+    let (noise, white) =
+        (target.jumps.fit.as_ref()).map_or((&target.noise, target.white), |f| (&f.0, f.1));
+    let step = white * noise.log_walk.exp();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(target.lost.len() as u64 ^ 0x7769_6c64);
-    kalman::fill(&mut y, target.white, step, &mut rng);
+    kalman::fill(&mut y, white, step, &mut rng);
     let panel = Panel::new(dct, bins, &y);
     let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
     let mut fit = (noise, solution.white);
     target.coefficients = fill::first(&target.name, panel, &mut y, &target.lost, &mut fit);
+    if !target.jumps.is_empty() {
+        target.coefficients = target.jumps.put_back(&mut y, &mut fit, (dct, bins));
+    }
     (target.noise, target.white) = fit;
     target.y = Arc::new(y);
 }

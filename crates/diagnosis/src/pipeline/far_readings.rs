@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use super::channel;
 use crate::audit::Audit;
-use crate::ingest::grid::spike_limit;
+use crate::ingest::spikes::spike_limit;
 use crate::ingest::types::{Grid, Target};
 use crate::ingest::wild;
 use crate::search::searched::Searched;

@@ -25,11 +25,17 @@ impl Search<'_> {
         let bin = std::f64::consts::PI / n as f64;
         let values: Vec<Vec<f64>> = match &mut term.form {
             Form::Columns | Form::Covariance(..) => return term,
-            Form::Step(at, _) => vec![
-                (0..n)
-                    .map(|i| f64::from(u8::from(i as f64 >= *at)))
-                    .collect(),
-            ],
+            Form::Step(at, error) => {
+                let from = |at: f64| {
+                    vec![
+                        (0..n)
+                            .map(|i| f64::from(u8::from(i as f64 >= at)))
+                            .collect(),
+                    ]
+                };
+                *at = place_of_step(n, *at, *error, &|at| with(&from(at)));
+                from(*at)
+            }
             Form::Shaped(shape, at) => {
                 let others: Vec<&Term> = state.terms.iter().collect();
                 let effect = term.effect.id();
@@ -148,4 +154,17 @@ impl Search<'_> {
         };
         state.terms.iter().flat_map(of).collect()
     }
+}
+
+/// The reading between two places of the scan at which a step begins, where its time is known better than these are apart: of
+/// a large one each reading that is on the wrong side is far off.
+fn place_of_step(n: usize, at: f64, error: f64, minus_l: &dyn Fn(f64) -> f64) -> f64 {
+    let apart = scan::apart(n);
+    if apart <= 1.0 || error >= apart {
+        return at;
+    }
+    let (first, last) = ((at - apart).ceil() as usize, (at + apart) as usize);
+    let all = (first..=last).map(|i| (i as f64, minus_l(i as f64)));
+    let best = all.min_by(|a, b| a.1.total_cmp(&b.1));
+    best.map_or(at, |b| b.0)
 }

@@ -168,8 +168,8 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     let theirs = like_one.0.max(found.0 - contest.steps as f64 * m.ln());
     let (two, x) = field.two_levels(&state);
     let ahead = two - theirs;
-    // A step or two are no noise that switches.
-    if contest.steps > 0 && !contest.wandering && m < 1.001 * LEAST_SWITCHES * x[3].exp() {
+    // A step or two are no noise that switches, whatever wanders beside them.
+    if contest.steps > 0 && m < 1.001 * LEAST_SWITCHES * x[3].exp() {
         return state;
     }
     if !contest.is_on() && 2.0 * ahead < threshold::two_level() {

@@ -1,0 +1,139 @@
+//! Levels that jump from one reading to the next and stay: a bias that steps, a range that switches, a sign that flips.
+//!
+//! White noise and a random walk, which tell what readings are too far off to be believed, know no jump. Beside one of a dozen
+//! standard deviations the readings on either side are farther off than noise is; set aside and filled by the walk, they make a
+//! ramp of it, and the larger the jump the longer. So before that is asked the levels are made one. What is taken off comes
+//! back: whether it is a step, the search tells.
+
+use std::sync::Arc;
+
+use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
+use numerics::order_statistics::median;
+use numerics::series::white_by_differences;
+use numerics::tails;
+
+/// Readings on either side that tell of a level, and the fewest.
+const LEVEL: usize = 16;
+const FEWEST: usize = 6;
+/// Readings that may lie on the way from one level to the other: a filter has so many.
+const ON_THE_WAY: usize = 3;
+/// Least jump: standard deviations of the readings about their levels, and of the change of two of them. Half of it is less than
+/// single readings need to be too far off.
+const APART: f64 = 6.0;
+/// Standard deviations within which a reading lies at its level.
+const AT_LEVEL: f64 = 5.0;
+/// Readings in a record for each jump, at least: what jumps more often is a process, which a random walk stands for.
+const SELDOM: usize = 100;
+
+/// One of them: the first reading at the new level, and how far it is from the old one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Jump {
+    at: usize,
+    height: f64,
+}
+
+/// The jumps of a channel.
+#[derive(Clone, Default)]
+pub struct Jumps {
+    all: Vec<Jump>,
+    /// Places of the readings that lie on the way.
+    pub(super) on_the_way: Vec<usize>,
+    /// White noise and a random walk of the readings without their jumps.
+    pub(super) fit: Option<(Noise, f64)>,
+}
+
+impl Jumps {
+    /// Those of readings in steps of `step`, NaN where there is none.
+    pub(super) fn of(y: &[f64], step: f64) -> Self {
+        let (places, known): (Vec<usize>, Vec<f64>) = (y.iter().copied().enumerate())
+            .filter(|(_, v)| v.is_finite())
+            .unzip();
+        let sigma = white_by_differences(&known).sqrt().max(0.5 * step);
+        let mut found = Self::default();
+        let mut from = 0;
+        for k in FEWEST..known.len().saturating_sub(FEWEST) {
+            let Some((gap, height)) = between(&known, from, k, sigma) else {
+                continue;
+            };
+            let at = places[k];
+            // Over a longer hole nobody knows that it jumps.
+            if at - places[k - gap] > 2 * ON_THE_WAY {
+                continue;
+            }
+            from = k;
+            found.all.push(Jump { at, height });
+            let way = k + 1 - gap..k;
+            found.on_the_way.extend(way.map(|i| places[i]));
+        }
+        if found.all.len() * SELDOM > known.len() {
+            return Self::default();
+        }
+        found
+    }
+
+    /// Whether there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// Readings at one level, those on the way left out.
+    pub(super) fn levelled(&self, y: &[f64]) -> Vec<f64> {
+        let mut y = y.to_vec();
+        self.add(&mut y, -1.0);
+        self.on_the_way.iter().for_each(|i| y[*i] = f64::NAN);
+        y
+    }
+
+    fn add(&self, y: &mut [f64], sign: f64) {
+        let mut next = self.all.iter().peekable();
+        let mut level = 0.0;
+        for (i, v) in y.iter_mut().enumerate() {
+            while let Some(jump) = next.next_if(|j| j.at <= i) {
+                level += sign * jump.height;
+            }
+            *v += level;
+        }
+    }
+
+    /// Puts them back into levelled readings: what white noise and a random walk make of these is kept, and they are fitted anew.
+    /// Returns the coefficients.
+    pub(super) fn put_back(
+        &mut self,
+        y: &mut [f64],
+        fit: &mut (Noise, f64),
+        (dct, bins): (&Dct, &Arc<Bins>),
+    ) -> Arc<Vec<f64>> {
+        self.add(y, 1.0);
+        let panel = Panel::new(dct, bins, y);
+        let (noise, solution) = panel.fit(&Noise::new(-12.0), &[]);
+        self.fit = Some(std::mem::replace(fit, (noise, solution.white)));
+        panel.column(0)
+    }
+}
+
+/// How many readings before the one at `k` of all that are `known` the level was another, and how far off it was; `from` is where that
+/// level begins.
+fn between(known: &[f64], from: usize, k: usize, sigma: f64) -> Option<(usize, f64)> {
+    let change = |gap: usize| (known[k] - known[k - gap]).abs();
+    (1..=ON_THE_WAY + 1).find_map(|gap| {
+        if k < from + gap + FEWEST - 1 || change(gap) < APART * 2f64.sqrt() * sigma {
+            return None;
+        }
+        let last = k - gap;
+        let before = &known[from.max((last + 1).saturating_sub(LEVEL))..=last];
+        let after = &known[k..(k + LEVEL).min(known.len())];
+        let (a, b) = (median(before), median(after));
+        let off = |part: &[f64], level: f64| {
+            let sizes: Vec<f64> = part.iter().map(|v| (v - level).abs()).collect();
+            median(&sizes) / tails::MEDIAN.sqrt()
+        };
+        let wide = off(before, a).max(off(after, b)).max(sigma);
+        let (low, high) = (a.min(b) - AT_LEVEL * wide, a.max(b) + AT_LEVEL * wide);
+        let at_level = |v: f64, level: f64| (v - level).abs() < AT_LEVEL * wide;
+        let jumps = (b - a).abs() > APART * wide
+            && at_level(known[last], a)
+            && at_level(known[k], b)
+            && known[last..=k].iter().all(|v| (low..=high).contains(v));
+        jumps.then_some((gap, b - a))
+    })
+}
