@@ -76,7 +76,7 @@ fn taken(y: &[f64]) -> Option<Taken> {
     let level = all.iter().zip(&count).map(|(s, n)| s / n);
     let mut own: Vec<f64> = filled.iter().zip(level).map(|(v, l)| v - l).collect();
     let sigma = robust_sigma(&own);
-    if !(sigma > 0.0) {
+    if sigma.is_nan() || sigma <= 0.0 {
         return None;
     }
     for v in &mut own {
@@ -270,7 +270,7 @@ fn on_steps(g: &Gyro<'_>) -> Option<OnSteps> {
     let even = often.iter().filter(|(v, _)| near(*v)).count() as f64;
     let part = all.iter().filter(|v| near(**v as f64)).count() as f64 / n - 3.0 / step;
     let holds = even >= EVEN * often.len() as f64 && ON_STEPS.contains(&part);
-    holds.then(|| OnSteps {
+    holds.then_some(OnSteps {
         part,
         step: step * fine,
     })

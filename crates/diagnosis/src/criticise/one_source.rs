@@ -8,6 +8,7 @@ mod apart;
 mod pair;
 
 use std::f64::consts::{SQRT_2, TAU};
+use std::sync::Arc;
 
 use model::effect::{Parameters, Signal};
 use model::effects::effect;
@@ -16,7 +17,7 @@ use model::record::Quantity;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use crate::fit::channel::{Form, Term};
+use crate::fit::channel::{Form, Path, Term, whitened_by_spectrum};
 use crate::fit::threshold;
 use crate::result::{Finding, sentence};
 use crate::search::band_source::{FOLLOWED, Standing};
@@ -28,6 +29,9 @@ use pair::Pair;
 /// Largest coherence: of more, what noise there is tells nothing.
 const MOST: f64 = 0.9999;
 
+/// Coherence of two tones that were tracked, from which on they are one.
+const TOGETHER: f64 = 0.5;
+
 /// A band of an axis.
 struct Band {
     /// The axis, by its place among those searched.
@@ -36,6 +40,43 @@ struct Band {
     terms: Vec<usize>,
     omega: f64,
     half_width: f64,
+    /// Of a tone that was tracked: its phase.
+    path: Option<Arc<Path>>,
+}
+
+impl Band {
+    /// The residual that has the band in it: that of an axis is without a tone that was tracked.
+    fn seen(&self, s: &Searched<'_>) -> Vec<f64> {
+        match self.path {
+            Some(_) => whitened_by_spectrum(&s.search.panel, &s.state).1,
+            None => s.e.clone(),
+        }
+    }
+
+    /// What it has of a residual that its source is taken out of: of a tone that was tracked nothing is left there.
+    fn left(&self, weights: Vec<f64>) -> Vec<f64> {
+        match self.path {
+            Some(_) => vec![0.0; weights.len()],
+            None => weights,
+        }
+    }
+}
+
+/// Coherence and phase of two tones that were tracked with their standard errors, and the likelihood ratio against tones that have
+/// nothing in common.
+fn of_paths(one: &Path, other: &Path, samples: usize) -> ((f64, f64), (f64, f64), f64) {
+    let common = one.goes_with(other, samples);
+    let coherence = common.norm().min(MOST);
+    let blocks = one.phase.len().min(other.phase.len()) as f64;
+    let off = 1.0 - coherence * coherence;
+    let error = (off / blocks).sqrt();
+    // Two pitches that wander by themselves stay together for a while by chance.
+    let lr = if coherence > TOGETHER {
+        -blocks * off.ln()
+    } else {
+        0.0
+    };
+    ((coherence, error), (common.arg(), error), lr)
 }
 
 /// What a band has of the source.
@@ -77,7 +118,11 @@ impl OneSource {
         });
         let z = one_source::read(&read.collect::<Vec<_>>(), omega, half_width)?;
         let planner = &mut FftPlanner::new();
-        let (z, own) = (transformed(&z, planner), transformed(&s.e, planner));
+        let first = self.members.first()?;
+        let (z, own) = (
+            transformed(&z, planner),
+            transformed(&first.band.seen(s), planner),
+        );
         let g = s.state.noise.through(frequencies(s.e.len()));
         let each = z[1..].iter().zip(&own[1..]).zip(g);
         let (mut product, mut square) = (Complex::<f64>::default(), 0.0);
@@ -168,6 +213,7 @@ fn bands(axis: usize, s: &Searched<'_>) -> Vec<Band> {
             terms: std::iter::once(i).chain(others).collect(),
             omega: peak.omega,
             half_width: peak.half_width,
+            path: t.path.clone(),
         })
     });
     all.collect()
@@ -219,7 +265,7 @@ pub(crate) fn found(searched: &[Searched<'_>]) -> Vec<OneSource> {
         if !shakes && !left.iter().any(near) {
             continue;
         }
-        let own = transformed(&searched[first.axis].e, &mut planner);
+        let own = transformed(&first.seen(&searched[first.axis]), &mut planner);
         let of_first = weights(&searched[first.axis], &first);
         let mut others: Vec<Member> = vec![];
         while let Some(k) = (0..left.len())
@@ -228,15 +274,20 @@ pub(crate) fn found(searched: &[Searched<'_>]) -> Vec<OneSource> {
             let band = left.remove(k);
             let s = &searched[band.axis];
             let weights = weights(s, &band);
-            let there = transformed(&s.e, &mut planner);
-            let (coherence, phase, lr) = Pair::new(&own, &there, &of_first, &weights).estimate();
+            let (coherence, phase, lr) = match (&first.path, &band.path) {
+                (Some(one), Some(other)) => of_paths(one, other, s.e.len()),
+                _ => {
+                    let there = transformed(&band.seen(s), &mut planner);
+                    Pair::new(&own, &there, &of_first, &weights).estimate()
+                }
+            };
             if is_one(coherence.0, lr) {
                 others.push(Member {
+                    weights: band.left(weights),
                     band,
                     coherence,
                     phase,
                     lr,
-                    weights,
                 });
             }
         }
@@ -244,11 +295,11 @@ pub(crate) fn found(searched: &[Searched<'_>]) -> Vec<OneSource> {
         let accelerations = accelerations(s, &first, &own, &of_first, &mut planner);
         if !others.is_empty() || !accelerations.is_empty() {
             let first = Member {
+                weights: first.left(of_first),
                 band: first,
                 coherence: (1.0, 0.0),
                 phase: (0.0, 0.0),
                 lr: 0.0,
-                weights: of_first,
             };
             let members = std::iter::once(first).chain(others).collect();
             all.push(OneSource {

@@ -68,6 +68,20 @@ pub(crate) fn of_processes(
     if state.noise.terms.is_empty() {
         return all;
     }
+    let tracked = |t: &Term| t.is_band() && t.stated.is_some();
+    if let Some(level) = state
+        .level
+        .as_ref()
+        .filter(|_| state.terms.iter().any(tracked))
+    {
+        // Of tones that were tracked their course has told; the other processes are those of the record without them.
+        let others = state.terms.iter().filter(|t| t.stated.is_none());
+        let others: Vec<Term> = others.cloned().collect();
+        let of_stated = state.terms.iter().filter(|t| t.stated.is_some());
+        let of_stated: Vec<Outcome> = of_stated.flat_map(|t| t.claims.clone()).collect();
+        let rest = || of_processes(search, &search.refit(others, state.noise.log_walk), law);
+        return [of_stated, search.panel.without(level, rest)].concat();
+    }
     let (u, _) = whitened_by_spectrum(&search.panel, state);
     let covariances: Vec<&Term> = state.terms.iter().filter(|t| t.is_covariance()).collect();
     let beside_white = |of: &dyn Fn(&Term) -> bool| {

@@ -1,5 +1,7 @@
 //! The model of a channel: its terms, their form, the noise and the fit.
 
+mod path;
+
 use std::sync::Arc;
 
 use model::effect::{Effect, Found, Frequencies, Parameters, Peak, Shape};
@@ -7,6 +9,7 @@ use model::effect::{Effect, Found, Frequencies, Parameters, Peak, Shape};
 use crate::fit::likelihood::{Noise, Panel, Solution};
 use crate::fit::scan::residual;
 use crate::test_level::{Outcome, Worded};
+pub use path::Path;
 
 /// Id of the stand-in that the search knows them by; no cause of the library.
 pub const ID: &str = "beyond";
@@ -68,6 +71,8 @@ pub struct Term {
     pub alternatives: Vec<(&'static dyn Effect, f64)>,
     /// Coefficients found by other means than the fit.
     pub stated: Option<Vec<(f64, f64)>>,
+    /// Of a tone that was tracked: its phase.
+    pub path: Option<Arc<Path>>,
     /// What its name claims, where a contest has weighed that.
     pub claims: Vec<Outcome>,
     /// Of a band: the bands that it is one with.
@@ -108,6 +113,7 @@ impl Term {
             threshold,
             alternatives: vec![],
             stated: None,
+            path: None,
             claims: vec![],
             cluster: None,
             wider: vec![],

@@ -71,6 +71,15 @@ impl Jumps {
         found
     }
 
+    /// Standard deviation of the level that they make over so many readings.
+    pub(crate) fn spread(&self, readings: usize) -> f64 {
+        let mut level = vec![0.0; readings];
+        self.add(&mut level, 1.0);
+        let n = readings as f64;
+        let mean = level.iter().sum::<f64>() / n;
+        (level.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+    }
+
     /// Whether there are none.
     pub(super) fn is_empty(&self) -> bool {
         self.all.is_empty()

@@ -12,7 +12,8 @@ use model::effects::{
 use model::record::Base;
 
 use super::channel;
-use crate::ingest::types::Grid;
+use crate::ingest::base_turns::MOTION_RMS;
+use crate::ingest::types::{Grid, Target};
 use crate::result::{Alternative, Finding};
 
 /// What a bias may do and a base does not.
@@ -22,12 +23,15 @@ const TONES: [&str; 4] = [line::ID, am_line::ID, narrow_band::ID, wandering_line
 /// What tells.
 const EXPERIMENT: &str = "clamp the stand to a wall or a floor of stone and record again: what comes again is the sensor's";
 
-/// Takes axes for being at rest that are described by that, and gives their names.
+/// Takes axes for being at rest that are described by that, and gives their names with those that read as much by their jumps
+/// alone.
 pub(super) fn believed(grid: &mut Grid) -> Vec<String> {
+    let by_jumps = |t: &&Target| !t.moving && t.jumps.spread(t.y.len()) > MOTION_RMS;
+    let jumping = grid.targets.iter().filter(by_jumps);
+    let mut names: Vec<String> = jumping.map(|t| t.name.clone()).collect();
     if grid.base != Some(Base::Static) {
-        return vec![];
+        return names;
     }
-    let mut names = vec![];
     for i in 0..grid.targets.len() {
         if !grid.targets[i].moving {
             continue;

@@ -103,12 +103,17 @@ fn searched_from<'a>(
     let baseline = search.baseline(&target.noise);
     let mut plain = whitened(&search.panel, &baseline);
     let mut before = plain_checks(&plain, &baseline, grid, target);
-    let ascended = if between {
-        search.ascend(search.beside_any_spectrum(baseline.clone()))
-    } else {
-        search.beside_any_spectrum(search.ascend(baseline.clone()))
+    let explained = || {
+        let baseline = search.baseline(&target.noise);
+        let ascended = if between {
+            search.ascend(search.beside_any_spectrum(baseline))
+        } else {
+            search.beside_any_spectrum(search.ascend(baseline))
+        };
+        compare::hold(&search, ascended)
     };
-    let mut state = search.conclude(compare::hold(&search, ascended));
+    let explained = search.beside_tracked_tones(explained(), &explained);
+    let mut state = search.conclude(explained);
     let refilled = impute::again(&search, &state, target);
     if let Some(refilled) = refilled.clone() {
         state = refilled;

@@ -258,7 +258,7 @@ fn of_terms(s: &Searched<'_>, grid: &Grid, terms: &[&Term]) -> Evidence {
     };
     match &term.form {
         Form::Covariance(..) => match levels::of(s, term, &beside(s, &others), grid.rate_hz) {
-            Some(drawn) => (evidence.series, evidence.caption) = (drawn.series, drawn.caption),
+            Some(drawn) => drawn.onto(&mut evidence),
             None => spectrum(s, grid, term.peak(), &mut evidence),
         },
         Form::Line(omega) => {

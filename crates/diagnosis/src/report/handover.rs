@@ -95,11 +95,8 @@ fn before_filters(
 ) {
     let own = (effects.iter()).filter(|e| e.channels.contains(&channel.name));
     let known = own.filter_map(|e| Some((effect(&e.cause)?, &e.parameters)));
-    let filters = |(e, p): &(&dyn Effect, &Parameters)| {
-        let at = Frequencies::default();
-        e.passes(p, &at).is_some()
-    };
-    let filtered = known.clone().any(|of| filters(&of));
+    let at = Frequencies::default();
+    let filtered = known.clone().any(|(e, p)| e.passes(p, &at).is_some());
     let holds = known.clone().any(|(e, p)| e.holds(p, frames).is_some());
     let Some(p) = (channel.baseline.get_mut("angle_random_walk")).filter(|_| filtered || holds)
     else {

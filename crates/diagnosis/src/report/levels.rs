@@ -1,7 +1,10 @@
-//! The figure of two levels: the record in means, and the level on which each most probably lies.
+//! The figure of what is known sample by sample: of two levels the record in means, and the level on which each most probably lies;
+//! of a tone that was tracked its frequency.
 
-use crate::fit::channel::Term;
-use crate::result::{Series, SeriesStyle};
+use std::f64::consts::TAU;
+
+use crate::fit::channel::{Path, Term};
+use crate::result::{Evidence, Series, SeriesStyle};
 use crate::search::searched::Searched;
 use crate::two_level::fit::{of_blocks, path};
 
@@ -16,13 +19,55 @@ const SLOW: f64 = 10.0;
 
 /// What is drawn.
 pub(super) struct Drawn {
-    pub series: Vec<Series>,
-    pub caption: String,
+    series: Vec<Series>,
+    caption: String,
+    /// Of another quantity than the rate.
+    y_label: Option<&'static str>,
+}
+
+impl Drawn {
+    /// Puts it into a figure.
+    pub(super) fn onto(self, figure: &mut Evidence) {
+        (figure.series, figure.caption) = (self.series, self.caption);
+        if let Some(label) = self.y_label {
+            figure.y_label = label.into();
+        }
+    }
+}
+
+/// Frequencies of a tone that its figure shows, about.
+const PITCHES: usize = 400;
+
+/// The frequency of a tone over time.
+fn pitch(path: &Path, rate_hz: f64) -> Drawn {
+    let step = path.phase.len().div_ceil(PITCHES).max(2);
+    let block_s = path.length / rate_hz;
+    let steps = path.phase.windows(step + 1).step_by(step);
+    let turned = steps.map(|w| (w[step].0 - w[0].0) / (step as f64 * path.length));
+    let y: Vec<f64> = turned.map(|t| (path.omega + t) * rate_hz / TAU).collect();
+    let middle = |i: usize| (((i as f64 + 0.5) * step as f64) + 1.0) * block_s;
+    let series = Series {
+        label: "frequency".into(),
+        style: SeriesStyle::Line,
+        x: (0..y.len()).map(middle).collect(),
+        y,
+    };
+    Drawn {
+        series: vec![series],
+        caption: format!(
+            "Frequency of the tone over time, from its phase over {} s each: it wanders, and comes back.",
+            (step as f64 * block_s * 100.0).round() / 100.0
+        ),
+        y_label: Some("frequency, Hz"),
+    }
 }
 
 /// The figure of a term that two levels stand for; `seen` are the readings without the other terms. None of another term, and of a
 /// record too short for it.
 pub(super) fn of(s: &Searched<'_>, term: &Term, seen: &[f64], rate_hz: f64) -> Option<Drawn> {
+    if let Some(path) = &term.path {
+        return Some(pitch(path, rate_hz));
+    }
     let [(half, _), (dwell_s, _)] = term.stated.as_deref()? else {
         return None;
     };
@@ -60,6 +105,7 @@ pub(super) fn of(s: &Searched<'_>, term: &Term, seen: &[f64], rate_hz: f64) -> O
         y,
     };
     Some(Drawn {
+        y_label: None,
         series: vec![
             line(
                 "measured, other terms taken out",

@@ -274,7 +274,10 @@ impl Search<'_> {
             .map(|b| b.as_ref().and_then(|(band, from)| Moves::of(band, *from)))
             .collect();
         for (number, (cluster, band)) in clusters.into_iter().zip(&bands).enumerate() {
-            let seen = (band.as_ref()).and_then(|(band, from)| Seen::new(band, *from as u64));
+            // Of a tone that was tracked its course has told.
+            let tracked = cluster.iter().any(|i| state.terms[*i].stated.is_some());
+            let seen = band.as_ref().filter(|_| !tracked);
+            let seen = seen.and_then(|(band, from)| Seen::new(band, *from as u64));
             let others = state.terms.iter().enumerate();
             let others = others.filter(|(i, _)| !cluster.contains(i));
             let rest = self.refit(
@@ -288,27 +291,29 @@ impl Search<'_> {
             for (place, i) in cluster.iter().enumerate() {
                 let t = &mut state.terms[*i];
                 t.cluster = Some(Cluster { number, place, lr });
-                let Some(seen) = &seen else { continue };
-                let [noise, steady] = [t.candidate, tone].map(|c| self.candidates[c].effect);
-                let is_tone = seen.odds > 0.0;
-                if is_tone {
-                    t.effect = steady;
-                    t.candidate = tone;
+                if let Some(seen) = &seen {
+                    let [noise, steady] = [t.candidate, tone].map(|c| self.candidates[c].effect);
+                    let is_tone = seen.odds > 0.0;
+                    if is_tone {
+                        t.effect = steady;
+                        t.candidate = tone;
+                    }
+                    if seen.odds.abs() < envelope::OPEN {
+                        let other = if is_tone { noise } else { steady };
+                        t.alternatives.push((other, -seen.odds.abs()));
+                    }
                 }
-                if seen.odds.abs() < envelope::OPEN {
-                    let other = if is_tone { noise } else { steady };
-                    t.alternatives.push((other, -seen.odds.abs()));
-                }
-                if place == 0 {
-                    t.claims.push(seen.claim(t.effect.id()));
+                if place == 0 && (seen.is_some() || tracked) {
+                    let named = t.effect.id();
+                    t.claims.extend(seen.as_ref().map(|s| s.claim(named)));
                     let others = moves.iter().enumerate().filter(|(k, _)| *k != number);
                     let others: Vec<&Moves> = others.filter_map(|(_, m)| m.as_ref()).collect();
-                    let source = moves[number].as_ref().and_then(|own| {
-                        band_source::claim(own, self.view.signals, &felt, t.effect.id())
-                    });
+                    let source = moves[number]
+                        .as_ref()
+                        .and_then(|own| band_source::claim(own, self.view.signals, &felt, named));
                     let alone = moves[number]
                         .as_ref()
-                        .and_then(|own| band_alone::claim(own, &others, &harmonics, t.effect.id()));
+                        .and_then(|own| band_alone::claim(own, &others, &harmonics, named));
                     t.claims.extend(source.into_iter().chain(alone));
                 }
             }
@@ -325,7 +330,7 @@ impl Search<'_> {
     }
 
     /// All noise but some bands.
-    fn beside(state: &State, without: &[usize]) -> Noise {
+    pub(super) fn beside(state: &State, without: &[usize]) -> Noise {
         let mut places = (0..state.terms.len()).filter(|i| state.terms[*i].is_covariance());
         let mut noise = state.noise.clone();
         noise

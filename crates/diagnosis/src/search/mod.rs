@@ -16,6 +16,7 @@ mod refine;
 mod rivals;
 mod score;
 pub(crate) mod searched;
+mod tracked;
 
 use std::cell::RefCell;
 use std::collections::HashMap;

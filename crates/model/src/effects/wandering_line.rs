@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal, Uniform};
 use super::narrow_band::LEAST_SAMPLES;
 use crate::effect::{
     Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
-    parameter, value,
+    optional, parameter, value,
 };
 use crate::one_source::{self, with_shared};
 use crate::parameter::Parameter;
@@ -28,7 +28,7 @@ impl Effect for WanderingLine {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &with_shared::<3, 15>([
+        const PARAMETERS: &[ParameterSpec] = &with_shared::<5, 17>([
             parameter("amplitude", "deg/s", "amplitude"),
             parameter(
                 "center_frequency",
@@ -40,6 +40,16 @@ impl Effect for WanderingLine {
                 "Hz",
                 "full width of its spectrum at half power",
             ),
+            optional(
+                "pitch_rms",
+                "Hz",
+                "standard deviation of its frequency; left out, the phase is a random walk",
+            ),
+            optional(
+                "pitch_time",
+                "s",
+                "correlation time of its frequency; left out, the phase is a random walk",
+            ),
         ]);
         PARAMETERS
     }
@@ -47,9 +57,9 @@ impl Effect for WanderingLine {
     fn docs(&self) -> Docs {
         Docs {
             title: "Wandering line",
-            physics: "b(t) = amplitude cos(2 pi center_frequency t + phase), the phase a random walk: its variance grows by 2 pi linewidth in a second, and the spectrum is a Lorentzian peak of that full width at half power (the line of a free-running oscillator). A motor or a fan whose speed drifts, a clock that is not locked.",
+            physics: "b(t) = amplitude cos(2 pi center_frequency t + phase), the phase a random walk: its variance grows by 2 pi linewidth in a second, and the spectrum is a Lorentzian peak of that full width at half power (the line of a free-running oscillator). A pitch that stays for some time is an Ornstein-Uhlenbeck process of standard deviation pitch_rms and correlation time pitch_time, and the line that of R. Kubo (1954): nearly normal where it turns the phase by more than 1 rad in that time. A motor or a fan whose speed drifts, the hum of the mains, a clock that is not locked.",
             excitation: "Nothing; some ten times 1 / linewidth.",
-            test: "As for the narrow band; the mean square of the squared envelope over its squared mean is 1 of a steady tone and 2 of noise; simulations of the tone then have its sizes, and no line in the spectrum of size, pitch or square.",
+            test: "A pitch so slow that its phase can be tracked: an extended Kalman filter, which has to be ahead of all lines and bands laid there; then its surprises have no rhythm, memory or jumps, and the size is steady. Else as for the narrow band; the mean square of the squared envelope over its squared mean is 1 of a steady tone and 2 of noise; simulations of the tone then have its sizes, and no line in the spectrum of size, pitch or square.",
             remedy: "Find the rotor or oscillator that runs free at this frequency and lock, isolate or filter it with the whole band in which it wanders.",
             figure: "Spectrum of the rate with the model before and after: a peak that is wider than a line.",
             example: Example::new(
@@ -85,6 +95,9 @@ impl Effect for WanderingLine {
     }
 
     fn describe(&self, found: &Found) -> Parameters {
+        if let [size, omega, half, rms, time, ..] = found.coefficients[..] {
+            return tracked(found, [size, omega, half, rms, time]);
+        }
         let [(a, a_error), (omega, omega_error), (half, half_error), ..] = found.coefficients[..]
         else {
             return Parameters::new();
@@ -121,12 +134,16 @@ impl Effect for WanderingLine {
         let width = value(parameters, "linewidth");
         let step = (TAU * width / simulation.rate_hz).max(0.0).sqrt();
         let turn = TAU * centre / simulation.rate_hz;
+        let time = value(parameters, "pitch_time") * simulation.rate_hz;
+        let rms = TAU * value(parameters, "pitch_rms") / simulation.rate_hz;
+        let stays = (rms > 0.0 && time > 0.0).then(|| (rms, (-1.0 / time).exp()));
         let keeps = simulation.keeps(parameters);
         for &axis in channels {
             let split = simulation.split(axis, [centre, width], parameters);
             let own = amplitude * split.own;
             let mut turning = Vec::new();
             let mut phase = Uniform::new(-PI, PI).map_or(0.0, |u| u.sample(&mut simulation.rng));
+            let mut off = stays.map_or(0.0, |(rms, _)| rms * simulation.normal());
             for i in 0..simulation.samples {
                 let (sin, cos) = phase.sin_cos();
                 simulation.rate[axis][i] += own * cos;
@@ -134,7 +151,14 @@ impl Effect for WanderingLine {
                     turning.push([cos, sin].map(|v| split.own * v));
                 }
                 let by: f64 = StandardNormal.sample(&mut simulation.rng);
-                phase += turn + step * by;
+                phase += match stays {
+                    Some((rms, keep)) => {
+                        let before = off;
+                        off = keep * off + rms * (1.0 - keep * keep).sqrt() * by;
+                        turn + 0.5 * (before + off)
+                    }
+                    None => turn + step * by,
+                };
             }
             // Its standard deviation, and quadratures over that.
             let rms = amplitude / SQRT_2;
@@ -145,5 +169,78 @@ impl Effect for WanderingLine {
 
     fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
         one_source::is_one(a, b, "linewidth")
+    }
+}
+
+/// The parameters of a tone whose phase was tracked: amplitude in the unit of the channel; mean, half width at half power and
+/// standard deviation of its frequency, rad per sample; the correlation time of that, samples; each with its standard error.
+fn tracked(found: &Found, all: [(f64, f64); 5]) -> Parameters {
+    let hz = found.rate_hz / TAU;
+    let [size, mean, half, rms, time] = all;
+    let told = |(v, e): (f64, f64), by: f64, unit| Parameter::estimated(v * by, e * by, unit);
+    [
+        ("amplitude", told(size, 1.0, &found.unit)),
+        ("center_frequency", told(mean, hz, "Hz")),
+        ("linewidth", told(half, 2.0 * hz, "Hz")),
+        ("pitch_rms", told(rms, hz, "Hz")),
+        ("pitch_time", told(time, found.rate_hz.recip(), "s")),
+    ]
+    .map(|(name, p)| (name.to_owned(), p))
+    .into()
+}
+
+/// Phase, rad, that a departure of the pitch turns by in its correlation time, from which on the line is normal to a hundredth.
+const NORMAL: f64 = 6.0;
+/// Levels of the continued fraction, halvings of the way to the half power.
+const LEVELS: usize = 400;
+const HALVINGS: usize = 40;
+
+/// Full width at half power of the line of a tone whose pitch is an Ornstein-Uhlenbeck process of standard deviation `rms`, rad per
+/// unit of time, and correlation time `time`: in rad per unit of time. Kubo's continued fraction; of a slow pitch its normal limit.
+#[must_use]
+pub fn width_at_half_power(rms: f64, time: f64) -> f64 {
+    if rms * time > NORMAL {
+        return 2.0 * rms * (2.0 * std::f64::consts::LN_2).sqrt();
+    }
+    let rate = time.recip();
+    let density = |omega: f64| {
+        // Of s^2 / (i w + g + 2 s^2 / (i w + 2 g + ...)) from the innermost level outwards: real and imaginary part.
+        let inner = (0..LEVELS).rev().fold((0.0, 0.0), |(a, b), k| {
+            let (re, im) = (a + (k + 1) as f64 * rate, b + omega);
+            let over = (k + 1) as f64 * rms * rms / (re * re + im * im);
+            (re * over, -im * over)
+        });
+        let (re, im) = (inner.0, inner.1 + omega);
+        re / (re * re + im * im)
+    };
+    let top = density(0.0);
+    let (mut low, mut high) = (0.0, 4.0 * rms);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        match density(middle) > 0.5 * top {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    2.0 * low
+}
+
+#[cfg(test)]
+mod tests {
+    use super::width_at_half_power;
+
+    #[test]
+    fn a_line_narrows_with_the_speed_of_its_pitch() {
+        // Fast: a Lorentzian of half width s^2 T. Slow: normal.
+        let fast = width_at_half_power(0.02, 1.0);
+        assert!(
+            (fast / (2.0 * 0.02f64.powi(2)) - 1.0).abs() < 0.01,
+            "{fast}"
+        );
+        let slow = width_at_half_power(0.02, 299.0);
+        assert!(
+            (slow / (2.0 * 0.02 * (2.0 * 2f64.ln()).sqrt()) - 1.0).abs() < 0.02,
+            "{slow}"
+        );
     }
 }

@@ -152,7 +152,7 @@ mod tests {
                 .filter(|i| beats.binary_search(i).is_ok() || uniform.sample(&mut rng) < chance)
                 .collect();
             assert!(
-                lie_evenly(&seen, 20_000) || chance > 0.1 * (1.0 - renewed),
+                lie_evenly(&seen, 20_000) || chance > 0.05 * (1.0 - renewed),
                 "{renewed}, {chance}"
             );
             let Some(told) = sensor_rate(&seen, late, &at) else {
