@@ -60,7 +60,7 @@ impl Effect for WanderingLine {
             physics: "b(t) = amplitude cos(2 pi center_frequency t + phase), the phase a random walk: its variance grows by 2 pi linewidth in a second, and the spectrum is a Lorentzian peak of that full width at half power (the line of a free-running oscillator). A pitch that stays for some time is an Ornstein-Uhlenbeck process of standard deviation pitch_rms and correlation time pitch_time, and the line that of R. Kubo (1954): nearly normal where it turns the phase by more than 1 rad in that time. A motor or a fan whose speed drifts, the hum of the mains, a clock that is not locked.",
             excitation: "Nothing; some ten times 1 / linewidth.",
             test: "A pitch so slow that its phase can be tracked: an extended Kalman filter, which has to be ahead of all lines and bands laid there; then its surprises have no rhythm, memory or jumps, and the size is steady. Else as for the narrow band; the mean square of the squared envelope over its squared mean is 1 of a steady tone and 2 of noise; simulations of the tone then have its sizes, and no line in the spectrum of size, pitch or square.",
-            remedy: "Find the rotor or oscillator that runs free at this frequency and lock, isolate or filter it with the whole band in which it wanders.",
+            remedy: "Find the rotor or oscillator that runs free at this frequency and lock, isolate or filter it with the whole band in which it wanders. At 50 or 60 Hz, a multiple of it, or where that folds to, it is the mains: shield and ground in one place, and keep cables apart.",
             figure: "Spectrum of the rate with the model before and after: a peak that is wider than a line.",
             example: Example::new(
                 Plot::Spectrum,
@@ -70,6 +70,13 @@ impl Effect for WanderingLine {
                     ("amplitude", 0.3),
                 ],
             ),
+        }
+    }
+
+    fn named_first(&self, parameters: &Parameters) -> &'static [&'static str] {
+        match parameters.contains_key("pitch_rms") {
+            true => &["amplitude", "center_frequency", "pitch_rms", "pitch_time"],
+            false => &[],
         }
     }
 
@@ -190,9 +197,9 @@ fn tracked(found: &Found, all: [(f64, f64); 5]) -> Parameters {
 }
 
 /// Phase, rad, that a departure of the pitch turns by in its correlation time, from which on the line is normal to a hundredth.
-const NORMAL: f64 = 6.0;
+const NORMAL: f64 = 36.0;
 /// Levels of the continued fraction, halvings of the way to the half power.
-const LEVELS: usize = 400;
+const LEVELS: usize = 6000;
 const HALVINGS: usize = 40;
 
 /// Full width at half power of the line of a tone whose pitch is an Ornstein-Uhlenbeck process of standard deviation `rms`, rad per
@@ -237,7 +244,7 @@ mod tests {
             (fast / (2.0 * 0.02f64.powi(2)) - 1.0).abs() < 0.01,
             "{fast}"
         );
-        let slow = width_at_half_power(0.02, 299.0);
+        let slow = width_at_half_power(0.02, 1750.0);
         assert!(
             (slow / (2.0 * 0.02 * (2.0 * 2f64.ln()).sqrt()) - 1.0).abs() < 0.02,
             "{slow}"

@@ -32,9 +32,9 @@ const STEPS: Coordinates = [0.1, 0.4, 0.7, 0.02];
 const CURVED_OVER: Coordinates = [0.01, 0.1, 0.1, 0.003];
 /// Ends of the pitch's standard deviation over a block, rad: beyond the upper one it leaves the blocks' band.
 const PITCH: [f64; 2] = [1e-6, 0.7];
-/// Shortest correlation time, blocks, and that below which a pitch forgets itself within a block: no record tells such times apart.
+/// Shortest correlation time, blocks, and that below which a pitch is hardly told from one that forgets itself at once.
 const SHORTEST: f64 = 0.02;
-pub(super) const FORGOTTEN: f64 = 0.25;
+pub(super) const FORGOTTEN: f64 = 2.0;
 /// Blocks to a correlation time below which the variances are those of a series: the exact ones cancel.
 const SERIES: f64 = 0.02;
 
