@@ -202,7 +202,8 @@ impl Search<'_> {
             }
             tries.push(attempt);
         }
-        let best = tries.last()?;
+        // A phase that is a random walk has the Lorentzian of a band, by which it is told as well as by its course.
+        let best = tries.last().filter(|t| t.seen.at[2] > FORGOTTEN.ln())?;
         // Long blocks show a departure of the pitch best.
         let first = tries
             .iter()
@@ -242,8 +243,7 @@ impl Search<'_> {
         let seen = tracked(&blocks, 2.0 * density / length);
         let doubt = seen.phase.iter().map(|p| p.1).sum::<f64>() / seen.phase.len() as f64;
         let times = blocks.len() as f64 * (-seen.at[2]).exp();
-        // A phase that is a random walk has the Lorentzian of a band, by which it is told as well as by its course.
-        if doubt > LARGEST_DOUBT || times < LEAST_TIMES || seen.at[2] < FORGOTTEN.ln() {
+        if doubt > LARGEST_DOUBT || times < LEAST_TIMES {
             return None;
         }
         Some(Attempt {
