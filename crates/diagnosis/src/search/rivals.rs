@@ -75,23 +75,6 @@ fn comb(lines: &[(f64, f64)], per_record: f64) -> Option<(f64, Vec<u32>)> {
     })
 }
 
-/// Part of the likelihood ratio of a large step below which another one is a stray.
-const STRAY: f64 = 0.05;
-
-/// Leaves out the steps that are next to nothing beside as many as are told as single events: of a walk beside large ones the search
-/// takes a bend for another now and then, and a crowd is as many alike. Whether there were any.
-fn strays_go(terms: &mut Vec<Term>) -> bool {
-    let step = |t: &Term| matches!(t.form, Form::Step(..));
-    let mut all: Vec<f64> = terms.iter().filter(|t| step(t)).map(|t| t.lr).collect();
-    all.sort_by(|a, b| b.total_cmp(a));
-    let Some(least) = all.get(MOST_ALIKE - 1).map(|lr| STRAY * lr) else {
-        return false;
-    };
-    let before = terms.len();
-    terms.retain(|t| !step(t) || t.lr >= least);
-    terms.len() < before
-}
-
 impl Search<'_> {
     /// More lines or more steps than separate causes make are one structure that the library does not have: the
     /// strongest line stays, the steps go, and a note says what is seen.
@@ -150,9 +133,6 @@ impl Search<'_> {
                 _ => true,
             });
             self.as_line(&mut state.terms);
-        }
-        if strays_go(&mut state.terms) {
-            self.settle(state);
         }
         let times: Vec<f64> = state
             .terms
