@@ -1,10 +1,12 @@
 //! A tone whose pitch wanders so slowly that its phase can be tracked, as the hum of the mains does, is named with its size; what
-//! turns its phase by another law is not.
+//! turns its phase by another law is not. A motion that repeats and is no sine, as of a fan or an engine, has no name: it is told
+//! with its frequency, its harmonics stand in the model, and the noise and the causes beside it are as they are without it.
 
 mod graded;
 
 use std::f64::consts::TAU;
 
+use diagnosis::result::Diagnosis;
 use diagnosis::{DiagnoseOptions, diagnose};
 use graded::{add, graded, graded_over, named, record, said, told};
 use model::record::Quantity;
@@ -116,5 +118,78 @@ fn a_pitch_that_jumps_or_sways_is_none() {
         (!wrong && !d.unexplained.is_empty())
             .then_some(())
             .ok_or_else(|| format!("{centre} Hz, {off}, {stays}, {period}: {}", said(&d)))
+    });
+}
+
+/// What repeats: frequency in Hz, amplitude and phase of each harmonic.
+struct Motion {
+    hz: f64,
+    harmonics: Vec<(f64, f64)>,
+}
+
+impl Motion {
+    /// With 3 to 6 harmonics below half the rate of 20 Hz, the largest of 0.1 to 5 deg/s.
+    fn draw(rng: &mut impl Rng) -> Self {
+        let most = between(3.0, 7.0, rng).floor();
+        let hz = between(1.2, 9.5 / most, rng);
+        let size = between(0.1f64.ln(), 5f64.ln(), rng).exp();
+        let falls = between(0.0, 1.2, rng);
+        let of = |k: f64, rng: &mut _| {
+            let part = k.powf(-falls) * between(0.5, 1.0, rng);
+            (size * part, between(0.0, TAU, rng))
+        };
+        let harmonics = (1..=most as u32).map(|k| of(f64::from(k), rng)).collect();
+        Self { hz, harmonics }
+    }
+
+    fn at(&self, i: usize) -> f64 {
+        let turned = |k: usize| TAU * self.hz * (k + 1) as f64 * i as f64 / 20.0;
+        let each = self.harmonics.iter().enumerate();
+        each.map(|(k, (size, phase))| size * (turned(k) + phase).cos())
+            .sum()
+    }
+}
+
+#[test]
+fn a_motion_that_repeats_leaves_the_noise_and_the_names_beside_it() {
+    graded_over((24, 21), "a motion with harmonics", |run, rng| {
+        let mut r = record(&[], 8500 + run);
+        let steps = run % 2 == 1;
+        let step = between(3000.0, 9000.0, rng) as usize;
+        let height = between(0.1, 0.4, rng);
+        if steps {
+            add(&mut r, "gyro_y", |i| if i < step { 0.0 } else { height });
+        }
+        let options = DiagnoseOptions {
+            replicates: 99,
+            ..DiagnoseOptions::default()
+        };
+        let noise = |d: &Diagnosis| d.extended["gyro_y"]["angle_random_walk"].value;
+        let quiet = noise(&diagnose(&r, &options).expect("a diagnosis").diagnosis);
+        let motion = Motion::draw(rng);
+        add(&mut r, "gyro_y", |i| motion.at(i));
+        let d = diagnose(&r, &options).expect("a diagnosis").diagnosis;
+        let names: &[_] = if steps {
+            &[("bias_step", "gyro_y")]
+        } else {
+            &[]
+        };
+        let told = d
+            .unexplained
+            .iter()
+            .any(|u| u.what.contains("a motion that repeats"));
+        // One standard error of it is 0.7 %; both are of the same readings.
+        let same_noise = (noise(&d) / quiet - 1.0).abs() < 0.02;
+        let holds = d.replicates["gyro_y"].after.p_value > 0.01;
+        (named(&d) == names && told && same_noise && holds)
+            .then_some(())
+            .ok_or_else(|| {
+                let Motion { hz, harmonics } = &motion;
+                let ratio = noise(&d) / quiet;
+                format!(
+                    "{hz} Hz {harmonics:?}, N {ratio} of {quiet}, {holds}: {}",
+                    said(&d)
+                )
+            })
     });
 }

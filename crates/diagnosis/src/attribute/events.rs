@@ -429,10 +429,8 @@ pub(crate) fn no_turn(
         CheckId::ProcessLevels,
         CheckId::ProcessSteadiness,
     ];
-    let notes = s.state.notes.iter().any(|note| match note.at {
-        None => true,
-        Some((from, _)) => from / PI < fastest,
-    });
+    let notes = (s.state.notes.iter())
+        .any(|note| note.at.is_empty() || note.at.iter().any(|(from, _)| from / PI < fastest));
     let mut left = residual::failing_bands(&s.u).chain(residual::unsteady(&s.e));
     let has_its_like =
         notes || wandering.into_iter().any(failing) || left.any(|p| p.from < fastest);

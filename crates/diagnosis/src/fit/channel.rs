@@ -195,8 +195,10 @@ impl Term {
 pub struct Note {
     /// What is seen.
     pub what: String,
-    /// Lowest and highest angular frequency, rad per sample, where it has such a place.
-    pub at: Option<(f64, f64)>,
+    /// Lowest and highest angular frequency, rad per sample, of each place that it has; none where it has no such place.
+    pub at: Vec<(f64, f64)>,
+    /// Whether the terms of the model hold it, and nothing is left.
+    pub held: bool,
 }
 
 impl Worded for Note {

@@ -265,7 +265,11 @@ fn located(
     rate_hz: f64,
 ) -> Vec<(f64, f64)> {
     let n = panel.bins.n as f64;
-    let amplitude = |first: usize| own[first].0.hypot(own[first + 1].0);
+    let amplitude = |first: usize| {
+        own[first]
+            .0
+            .hypot(own.get(first + 1).map_or(0.0, |sine| sine.0))
+    };
     // Cramer-Rao bound of a frequency, rad per sample: 24 s^2 / (A^2 n^3).
     let frequency = |omega: f64, amplitude: f64| {
         let variance = 24.0 * state.solution.white * state.noise.at(omega) / n.powi(3);

@@ -1,5 +1,6 @@
 //! The likelihood of a channel, its terms, and what a term has to reach.
 
+pub(crate) mod about_line;
 pub(crate) mod before_filter;
 pub mod bins;
 pub mod channel;

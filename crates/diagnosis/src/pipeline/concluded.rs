@@ -99,8 +99,12 @@ fn bent(name: &str, searched: &[Searched<'_>], checks: &[Check]) -> bool {
 
 /// What the search noted of a channel.
 fn noted(s: &Searched<'_>, note: &Note) -> Observation {
+    let ends = (note.at.iter()).fold((PI, 0.0f64), |(low, high), (from, to)| {
+        (low.min(*from), high.max(*to))
+    });
     Observation {
-        place: note.at.map(|(from, to)| [from / PI, to / PI]),
+        place: (!note.at.is_empty()).then_some([ends.0 / PI, ends.1 / PI]),
+        structure: true,
         ..Observation::of_noise(&s.target.name, note.what.clone())
     }
 }

@@ -158,7 +158,9 @@ fn stated(group: &[Observation], rate_hz: f64) -> Option<[f64; 2]> {
 fn sentence(group: &[Observation], entry: &Unexplained, follows: &[&String], unit: &str) -> String {
     let checks = group.iter().filter_map(|o| o.check);
     let lead = checks.min_by(|a, b| a.1.total_cmp(&b.1)).map(|c| c.0);
-    let mut parts = vec![match (lead.and_then(CheckId::seen_as), follows) {
+    // What says of itself what it is goes before the checks that see parts of it.
+    let structure = group.iter().find(|o| o.structure);
+    let seen = || match (lead.and_then(CheckId::seen_as), follows) {
         (Some(seen), []) => seen.to_owned(),
         (Some(seen), some) => format!("{seen}, with {}", joined(some)),
         (None, []) if group.iter().any(|o| !o.nearest.is_empty()) => {
@@ -166,8 +168,10 @@ fn sentence(group: &[Observation], entry: &Unexplained, follows: &[&String], uni
         }
         (None, []) => group[0].what.clone(),
         (None, some) => format!("follows {} as no cause does", joined(some)),
-    }];
-    if let Some([low, high]) = entry.band_hz {
+    };
+    let mut parts = vec![structure.map_or_else(seen, |o| o.what.clone())];
+    let stated = structure.is_some_and(|o| o.place.is_some());
+    if let Some([low, high]) = entry.band_hz.filter(|_| !stated) {
         let [low, high] = [digits(low), digits(high)];
         parts.push(if low == high {
             format!("at {low} Hz")

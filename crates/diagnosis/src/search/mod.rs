@@ -7,6 +7,7 @@ mod band_alone;
 pub(crate) mod band_source;
 pub(crate) mod bands;
 mod beyond;
+mod combs;
 pub(crate) mod envelope;
 mod harmonic;
 pub(crate) mod impute;
@@ -36,14 +37,6 @@ use crate::test_level::{CLAIM_LEVEL, worded};
 const MOST_TERMS: usize = 8;
 /// Most lines, and most steps, that are told as separate causes.
 pub const MOST_ALIKE: usize = 2;
-/// Fewest cycles of a line in the record.
-const LEAST_CYCLES: f64 = 3.0;
-/// A swing of a line is slow up to here, Hz; faster ones are sought up to this share of the line's own frequency, beyond
-/// which side bands are lines like others; and fewest swings in the record.
-const SLOW_BEAT_HZ: f64 = 0.6;
-const FASTEST_BEAT: f64 = 0.25;
-const LEAST_BEATS: f64 = 3.0;
-
 /// A hypothesis under test.
 pub struct Candidate {
     /// Its effect.
@@ -377,7 +370,8 @@ impl<'a> Search<'a> {
         let mut notes = std::mem::take(&mut state.notes);
         notes.extend(self.crowds(&mut state));
         self.name_bands(&mut state);
-        self.find_rivals(&mut state);
+        let crowd = notes.iter().any(|note| note.held);
+        self.find_rivals(&mut state, crowd);
         state.power_law = power_law::instead(self, &state);
         state.notes = notes;
         state
@@ -385,7 +379,22 @@ impl<'a> Search<'a> {
 
     /// Add terms while they pass, then drop what the others made superfluous.
     fn climb(&self, mut state: State) -> State {
-        while state.terms.len() < MOST_TERMS {
+        state = self.grown_with_teeth(state);
+        loop {
+            self.reweigh(&mut state);
+            let Some(i) = (0..state.terms.len())
+                .filter(|i| state.terms[*i].score() < 0.0)
+                .min_by(|a, b| state.terms[*a].score().total_cmp(&state.terms[*b].score()))
+            else {
+                return state;
+            };
+            state = self.without(&state, i);
+        }
+    }
+
+    /// The state with terms that pass, up to so many in all.
+    fn grown(&self, mut state: State, most: usize) -> State {
+        while state.terms.len() < most {
             let offers = self.offers(&state, &|_| true);
             let Some(best) = Self::simplest_best(offers) else {
                 break;
@@ -399,16 +408,7 @@ impl<'a> Search<'a> {
             }
             state = self.swap(next);
         }
-        loop {
-            self.reweigh(&mut state);
-            let Some(i) = (0..state.terms.len())
-                .filter(|i| state.terms[*i].score() < 0.0)
-                .min_by(|a, b| state.terms[*a].score().total_cmp(&state.terms[*b].score()))
-            else {
-                return state;
-            };
-            state = self.without(&state, i);
-        }
+        state
     }
 
     /// The best offer; where it extends another that would pass too, that one: the extension has to earn its place.

@@ -6,6 +6,11 @@ use crate::fit::delayed::{self, Beside};
 use crate::fit::{scan, threshold};
 use std::sync::Arc;
 
+/// Coefficients below half the sample rate within which a line may stand at it, and what the frequency and the phase that it needs
+/// less there gain by chance, as a likelihood ratio: chi-square of two degrees of freedom, at 1 %.
+const OF_HALF_THE_RATE: f64 = 3.0;
+const ONE_MORE: f64 = 9.21;
+
 impl Search<'_> {
     /// Build the columns of a scanned term and refine its location.
     pub(super) fn refine(&self, state: &State, mut term: Term) -> Term {
@@ -67,7 +72,16 @@ impl Search<'_> {
                         12,
                     )
                 });
-                scan::sinusoid(n, *omega).into()
+                let at_half = scan::sinusoid(n, std::f64::consts::PI)[..1].to_vec();
+                // At half the sample rate a line is a sign that changes with every reading: there is no sine beside it.
+                let near = std::f64::consts::PI - *omega < OF_HALF_THE_RATE * bin;
+                if near && 2.0 * (with(&at_half) - with(&scan::sinusoid(n, *omega))) < ONE_MORE {
+                    *omega = std::f64::consts::PI;
+                    term.names.truncate(1);
+                    at_half
+                } else {
+                    scan::sinusoid(n, *omega).into()
+                }
             }
             Form::SideBands(carrier, distance) => {
                 let phase = state.carrier().map_or(0.0, |c| c.1);

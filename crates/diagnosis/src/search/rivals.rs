@@ -1,7 +1,5 @@
 //! What the search says of its own answer: effects that would do as well, and crowds of terms that no one cause makes.
 
-use std::f64::consts::PI;
-
 use model::effect::Hypothesis;
 use model::record::Quantity;
 
@@ -10,129 +8,22 @@ use crate::fit::channel::{self, Form, Note, RIVAL_SPAN, State, Term};
 use crate::fit::threshold;
 use numerics::series::white_by_differences;
 
-/// Part of its frequency by which a crowd of lines reaches beyond the outermost ones.
-const AROUND: f64 = 0.02;
-
-/// Largest harmonic that is sought; a higher one would fit too many frequencies.
-const HIGHEST_HARMONIC: u32 = 7;
-
-/// Of two lines of (frequency in Hz, likelihood ratio), the lower one and the multiple of it at which the other lies
-/// within three standard errors of a frequency, sqrt(3 / LR) / (pi T) each; `per_record` is 1 / T. Two lines with
-/// nothing to do with each other meet that by chance only.
-fn harmonics(lines: &[(f64, f64)], per_record: f64) -> Option<(f64, u32)> {
-    let [a, b] = lines else {
-        return None;
-    };
-    let (low, high) = if a.0 < b.0 { (a, b) } else { (b, a) };
-    let error = |l: &(f64, f64)| per_record / PI * (3.0 / l.1.max(3.0)).sqrt();
-    (2..=HIGHEST_HARMONIC).find_map(|k| {
-        let off = (high.0 - f64::from(k) * low.0).abs();
-        let limit = 3.0 * (f64::from(k) * error(low)).hypot(error(high));
-        (off < limit).then_some((low.0, k))
-    })
-}
-
-/// Highest multiple in a comb of lines, and the largest part of a fundamental that a line may lie beside its multiple:
-/// any lines fit a comb that is fine enough.
-const HIGHEST_TOOTH: f64 = 24.0;
-const LARGEST_MISS: f64 = 0.1;
-
-/// The fundamental of which three or more lines of (frequency in Hz, likelihood ratio) are multiples, within three
-/// standard errors, and which ones; the highest that fits.
-fn comb(lines: &[(f64, f64)], per_record: f64) -> Option<(f64, Vec<u32>)> {
-    let error = |l: &(f64, f64)| per_record / PI * (3.0 / l.1.max(3.0)).sqrt();
-    let mut sorted = lines.to_vec();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let lowest = sorted.first()?;
-    let apart = sorted.windows(2).map(|w| w[1].0 - w[0].0);
-    let mut starts: Vec<f64> = (1..=4)
-        .map(|k| lowest.0 / f64::from(k))
-        .chain(apart)
-        .collect();
-    starts.sort_by(|a, b| b.total_cmp(a));
-    starts.into_iter().find_map(|start| {
-        let mut f = start;
-        // From the lowest tooth up, each line narrows the fundamental.
-        for _ in 0..2 {
-            let (mut top, mut bottom) = (0.0, 0.0);
-            for l in &sorted {
-                let k = (l.0 / f).round().max(1.0);
-                let weight = (k / error(l)).powi(2);
-                top += weight * l.0 / k;
-                bottom += weight;
-                f = top / bottom;
-            }
-        }
-        let teeth: Vec<u32> = sorted.iter().map(|l| (l.0 / f).round() as u32).collect();
-        let fits = |(l, k): (&(f64, f64), &u32)| {
-            let miss = (l.0 - f64::from(*k) * f).abs();
-            *k > 0
-                && f64::from(*k) <= HIGHEST_TOOTH
-                && miss < (3.0 * error(l)).min(LARGEST_MISS * f)
-        };
-        let apart = teeth.windows(2).all(|w| w[1] > w[0]);
-        (apart && sorted.iter().zip(&teeth).all(fits)).then_some((f, teeth))
-    })
-}
-
 impl Search<'_> {
-    /// More lines or more steps than separate causes make are one structure that the library does not have: the
-    /// strongest line stays, the steps go, and a note says what is seen.
+    /// More lines or more steps than separate causes make are one structure that the library does not have, and a note says what
+    /// is seen. Lines that are steady stay in the model; of others the strongest one does, and no step.
     pub(super) fn crowds(&self, state: &mut State) -> Vec<Note> {
-        let mut notes = vec![];
-        let hz = |w: f64| w * self.view.rate_hz / std::f64::consts::TAU;
-        let lines: Vec<(f64, f64)> = state
-            .terms
-            .iter()
-            .filter_map(|t| match t.form {
-                Form::Line(w) | Form::SideBands(w, _) => Some((w, t.lr)),
-                _ => None,
-            })
-            .map(|(w, lr)| (hz(w), lr))
-            .collect();
-        let span = |low: f64, high: f64| {
-            let to_omega = std::f64::consts::TAU / self.view.rate_hz;
-            Some((
-                low * (1.0 - AROUND) * to_omega,
-                high * (1.0 + AROUND) * to_omega,
-            ))
-        };
-        if let Some((low, times)) = harmonics(&lines, self.view.rate_hz / self.panel.bins.n as f64)
-        {
-            let what = format!(
-                "lines at {low:.4} Hz and {times} times that: one motion that repeats, and is no sine"
-            );
-            let at = span(low, low * f64::from(times));
-            notes.push(Note { what, at });
-        }
-        if lines.len() > MOST_ALIKE {
-            let (low, high) = lines
-                .iter()
-                .fold((f64::INFINITY, 0.0f64), |(l, h), (f, _)| {
-                    (l.min(*f), h.max(*f))
-                });
-            let per_record = self.view.rate_hz / self.panel.bins.n as f64;
-            let repeats = comb(&lines, per_record);
-            let what = if let Some((fundamental, teeth)) = repeats {
-                let teeth: Vec<String> = teeth.iter().map(u32::to_string).collect();
-                format!(
-                    "lines at {} times {fundamental:.4} Hz: a comb of harmonics, one motion that repeats and is no sine",
-                    teeth.join(", ")
-                )
-            } else {
-                format!(
-                    "{} lines from {low:.3} to {high:.3} Hz: no steady line but a band or a chirp",
-                    lines.len()
-                )
-            };
-            let at = span(low, high);
-            notes.push(Note { what, at });
-            let strongest = lines.iter().map(|l| l.1).fold(0.0, f64::max);
-            state.terms.retain(|t| match t.form {
-                Form::Line(_) | Form::SideBands(..) => t.lr == strongest,
-                _ => true,
-            });
-            self.as_line(&mut state.terms);
+        let crowd = self.crowd_of_lines(state);
+        let mut changed = crowd.is_some();
+        let mut notes: Vec<Note> = vec![];
+        if let Some(crowd) = crowd {
+            if !crowd.held {
+                let of_lines = |t: &Term| matches!(t.form, Form::Line(_) | Form::SideBands(..));
+                let lines = state.terms.iter().filter(|t| of_lines(t));
+                let strongest = lines.map(|t| t.lr).fold(0.0, f64::max);
+                state.terms.retain(|t| !of_lines(t) || t.lr == strongest);
+                self.as_line(&mut state.terms);
+            }
+            notes.push(crowd);
         }
         let times: Vec<f64> = state
             .terms
@@ -148,10 +39,15 @@ impl Search<'_> {
                 "jumps at {} s: more than single events make",
                 told.join(", ")
             );
-            notes.push(Note { what, at: None });
+            notes.push(Note {
+                what,
+                at: vec![],
+                held: false,
+            });
             state.terms.retain(|t| !matches!(t.form, Form::Step(..)));
+            changed = true;
         }
-        if !notes.is_empty() {
+        if changed {
             self.settle(state);
         }
         notes
@@ -201,10 +97,12 @@ impl Search<'_> {
     }
 
     /// Put every other effect that would do as well in the place of a term beside it. One that does better, for the noise
-    /// of the gyro that it follows or for the parameter that it needs less, takes the place.
-    pub(super) fn find_rivals(&self, state: &mut State) {
+    /// of the gyro that it follows or for the parameter that it needs less, takes the place. A line of a `crowd` has no name that
+    /// another could take.
+    pub(super) fn find_rivals(&self, state: &mut State, crowd: bool) {
         for i in 0..state.terms.len() {
-            if state.terms[i].stated.is_some() {
+            let line = matches!(state.terms[i].form, Form::Line(_));
+            if state.terms[i].stated.is_some() || (crowd && line) {
                 continue;
             }
             let rest = self.without(state, i);
@@ -259,31 +157,5 @@ impl Search<'_> {
             alternatives.sort_by(|a, b| b.1.total_cmp(&a.1));
             state.terms[i].alternatives = alternatives;
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_comb_is_known_by_its_fundamental_though_teeth_are_missing() {
-        let per_record = 1.0 / 600.0;
-        let lines: Vec<(f64, f64)> = [3.0, 1.0, 2.0, 5.0]
-            .iter()
-            .map(|k| (k * 0.7312 + 2e-5 * (k - 2.0), 60.0))
-            .collect();
-        let (fundamental, teeth) = comb(&lines, per_record).unwrap();
-        assert!((fundamental - 0.7312).abs() < 1e-4, "{fundamental}");
-        assert_eq!(teeth, vec![1, 2, 3, 5]);
-        // Without the fundamental: their distance tells it.
-        let odd = [(1.4624, 60.0), (2.1936, 60.0), (5.1184, 60.0)];
-        assert_eq!(comb(&odd, per_record).unwrap().1, vec![2, 3, 7]);
-    }
-
-    #[test]
-    fn lines_of_a_chirp_are_no_comb() {
-        let lines = [(1.013, 40.0), (1.371, 50.0), (1.9107, 45.0), (2.833, 60.0)];
-        assert_eq!(comb(&lines, 1.0 / 600.0), None);
     }
 }

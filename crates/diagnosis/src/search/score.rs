@@ -5,11 +5,18 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Hypothesis, Regression, Shape};
 
-use super::{Candidate, FASTEST_BEAT, LEAST_BEATS, LEAST_CYCLES, SLOW_BEAT_HZ, Search, bands};
+use super::{Candidate, Search, bands};
 use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::{Noise, scoring};
 use crate::fit::{scan, threshold};
 
+/// Fewest cycles of a line in the record.
+const LEAST_CYCLES: f64 = 3.0;
+/// A swing of a line is slow up to here, Hz; faster ones are sought up to this share of the line's own frequency, beyond
+/// which side bands are lines like others; and fewest swings in the record.
+const SLOW_BEAT_HZ: f64 = 0.6;
+const FASTEST_BEAT: f64 = 0.25;
+const LEAST_BEATS: f64 = 3.0;
 /// Lags at which one is asked for that tells of a mean: beside a random walk that has taken it for slow noise, one of n readings
 /// shows at lag n.
 const FAR: usize = 64;

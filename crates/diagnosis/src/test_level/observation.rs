@@ -37,6 +37,8 @@ pub struct Observation {
     pub terms: Vec<usize>,
     /// Lowest and highest frequency, as shares of half the sample rate, where it has such a place.
     pub place: Option<[f64; 2]>,
+    /// Whether it says what the structure is that checks see parts of.
+    pub structure: bool,
 }
 
 impl Observation {

@@ -410,7 +410,8 @@ impl<'a> Field<'a> {
         if many_ahead(&self.blocks, &fit.x) > MARGIN {
             settled.notes.push(Note {
                 what: "jumps between more than two levels".into(),
-                at: None,
+                at: vec![],
+                held: false,
             });
         }
         let stated = self.stated(&fit.x, self.block_s());

@@ -79,8 +79,11 @@ impl Effect for Line {
 
     fn describe(&self, found: &Found) -> Parameters {
         let mut all = Parameters::new();
-        let [(c, c_error), (s, s_error), ..] = found.coefficients[..] else {
-            return all;
+        let (c, c_error, s, s_error) = match found.coefficients[..] {
+            [(c, c_error), (s, s_error), ..] => (c, c_error, s, s_error),
+            // At half the sample rate there is no sine.
+            [(c, c_error)] => (c, c_error, 0.0, c_error),
+            [] => return all,
         };
         let amplitude = c.hypot(s);
         all.insert(

@@ -8,6 +8,7 @@ use model::effect::Signal;
 use crate::audit::repeats;
 use crate::criticise::follower_shape;
 use crate::criticise::residual::{self, Place, Repeats};
+use crate::fit::about_line;
 use crate::fit::channel::{Form, ID, Term};
 use crate::ingest::motion::drives;
 use crate::search::searched::Searched;
@@ -107,27 +108,28 @@ impl<'a> Facts<'a> {
         let g = s.state.noise.over(&panel.bins);
         let ones = vec![1.0; panel.bins.n];
         let unsteady = residual::unsteady(&s.e);
-        let notes = s.state.notes.iter().filter_map(|note| note.at);
-        let crowds: Vec<Place> = notes
-            .map(|(from, to)| Place {
-                from: from / PI,
-                to: to / PI,
-                nats: f64::INFINITY,
-                lacks: false,
-            })
-            .collect();
+        let crowd = |(from, to): &(f64, f64)| Place {
+            from: from / PI,
+            to: to / PI,
+            nats: f64::INFINITY,
+            lacks: false,
+        };
+        let of = |held: bool| {
+            let notes = s.state.notes.iter().filter(move |note| note.held == held);
+            notes.flat_map(|note| &note.at).map(crowd)
+        };
         let mut places: Vec<Place> = residual::failing_bands(&s.u).collect();
         places.extend(&unsteady);
         // A level that was taken off takes some of the noise with it.
         places.retain(|p| !(p.lacks && s.state.level.is_some()));
-        places.extend(&crowds);
+        places.extend(of(false));
         let mut facts = Self {
             s,
             failing,
             left,
             counts: panel.bins.products(&ones, &ones),
             places,
-            crowds,
+            crowds: of(true).chain(of(false)).collect(),
             unsteady,
             repeats: residual::repeats(&s.e).filter(|r| r.chance < omnibus_level()),
             bent: 0.0,
@@ -152,7 +154,7 @@ impl<'a> Facts<'a> {
 
     /// Whether something is left that has no place in frequency.
     pub(super) fn without_place(&self) -> bool {
-        self.s.state.notes.iter().any(|note| note.at.is_none())
+        self.s.state.notes.iter().any(|note| note.at.is_empty())
     }
 
     /// Whether something is left at an angular frequency.
@@ -187,7 +189,7 @@ impl<'a> Facts<'a> {
         let about = about.map(|p| p.nats).fold(0.0, f64::max);
         let asked = self.fails(CheckId::LjungBox) || !self.places.is_empty();
         if asked {
-            about.max(residual::stands_out(&self.s.u, at))
+            about.max(about_line::stands_out(&self.s.u, at))
         } else {
             about
         }
