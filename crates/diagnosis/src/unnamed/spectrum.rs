@@ -22,6 +22,9 @@ const LEAST_SCORE: f64 = 9.0;
 /// Bumps in an octave, and their full widths over their centres.
 const AN_OCTAVE: i32 = 6;
 const WIDTHS: [f64; 3] = [0.08, 0.25, 0.7];
+/// Widths of a bump about the bin that stands out most, over that of the bin, and points over which its mean in a bin is taken.
+const WIDTHS_OF_A_BIN: [f64; 3] = [1.0, 3.0, 9.0];
+const POINTS: i32 = 5;
 /// Fewest coefficients below the centre of a bump, and in the width of a process at frequency zero.
 const LEAST_COEFFICIENTS: f64 = 12.0;
 /// Widths of its bands to either side in which a tone is sought, most places there, and least share of its time in one.
@@ -102,6 +105,17 @@ impl Bump {
     fn over(&self, omega: &[f64]) -> Vec<f64> {
         let at = |w: &f64| self.variance * lorentzian(self.center, self.width, *w);
         omega.iter().map(at).collect()
+    }
+
+    /// The means in bins of a length, of a bump no wider than some of them.
+    fn in_bins(&self, bins: &Bins) -> Vec<f64> {
+        let coefficient = PI / bins.n as f64;
+        let mean = |(w, count): (&f64, &f64)| {
+            let point = |k: i32| (f64::from(2 * k + 1) / f64::from(POINTS) - 1.0) * 0.5 * count;
+            let at = |k: i32| lorentzian(self.center, self.width, w + coefficient * point(k));
+            self.variance * (0..POINTS).map(at).sum::<f64>() / f64::from(POINTS)
+        };
+        bins.at.omega.iter().zip(bins.counts()).map(mean).collect()
     }
 }
 
@@ -202,6 +216,23 @@ impl Fit<'_> {
         let information = dot(&own, &own);
         let left = (information - taken).max(LEAST_LEFT * information);
         up / left.sqrt().max(f64::MIN_POSITIVE)
+    }
+
+    /// Bumps about the bin that stands out most of the density: what is narrow stands between the places of any list.
+    fn about_the_highest(&self, density: &[f64], bins: &Bins) -> Vec<Bump> {
+        let off = self.counts.iter().zip(&self.power).zip(density);
+        let scores = off.map(|((m, p), s)| (0.5 * m).sqrt() * (p / s - 1.0));
+        let highest = scores.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+        let found = highest.filter(|(_, z)| *z > 0.0 && z * z > LEAST_SCORE);
+        let of_bin = |k: usize| {
+            let width = self.counts[k] * PI / bins.n as f64;
+            WIDTHS_OF_A_BIN.map(|by| Bump {
+                center: bins.at.omega[k],
+                width: by * width,
+                variance: 1.0,
+            })
+        };
+        found.map_or(vec![], |(k, _)| of_bin(k).into())
     }
 
     /// A shape over the density, by the root of the information of each bin.
@@ -341,8 +372,8 @@ fn begun<'a>(s: &'a Searched<'_>, merged: &[AsOne]) -> Fit<'a> {
 /// noise, then those of the bumps that there are, which no score is held against.
 fn add_bumps(fit: &mut Fit<'_>, bumps: &mut Vec<Bump>, bins: &Bins, fixed: usize) {
     let of_tones = bumps.len();
-    let places = places(bins.n);
-    let shapes: Vec<Vec<f64>> = (places.iter())
+    let mut places = places(bins.n);
+    let mut shapes: Vec<Vec<f64>> = (places.iter())
         .map(|(center, width)| {
             let at = |w: &f64| lorentzian(*center, *width, *w);
             bins.at.omega.iter().map(at).collect()
@@ -352,6 +383,10 @@ fn add_bumps(fit: &mut Fit<'_>, bumps: &mut Vec<Bump>, bins: &Bins, fixed: usize
     fit.climb(ROUNDS);
     while chosen.len() < MOST {
         let density = fit.density();
+        for bump in fit.about_the_highest(&density, bins) {
+            places.push((bump.center, bump.width));
+            shapes.push(bump.in_bins(bins));
+        }
         let free = (0..places.len()).filter(|k| !chosen.contains(k));
         let others = (0..fixed).chain(fixed + of_tones..fit.shapes.len());
         let beside = fit.directions(&density, others);
