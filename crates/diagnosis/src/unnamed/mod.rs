@@ -3,6 +3,7 @@
 //! Under them a simulation is the record's where nothing can be named. Each is sought only on channels where the search, or the
 //! replicates of the model, left something.
 
+mod bump;
 mod followed;
 mod spectrum;
 mod white;
@@ -19,8 +20,9 @@ use crate::ingest::types::Grid;
 use crate::result::Finding;
 use crate::search::searched::Searched;
 use crate::test_level::{self, Observation};
+use bump::Bump;
 use followed::of_combinations;
-use spectrum::{Bump, Spectrum, as_one, spectrum};
+use spectrum::{Spectrum, as_one, spectrum};
 use white::{White, hz};
 
 /// Channels that terms are sought for.

@@ -7,8 +7,9 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use model::effect::{Covariance, Hypothesis, Peak};
+use model::effect::{Covariance, Hypothesis};
 
+use super::bump::{Bump, lorentzian, places};
 use crate::fit::channel::{Form, Term};
 use crate::fit::likelihood::{Bins, Noise};
 use crate::search::searched::Searched;
@@ -19,14 +20,8 @@ const MOST: usize = 16;
 /// Score, the square of a standard normal value of one sign, that a further bump has to reach: bumps are sought where something is
 /// left, and what three standard errors make is in the simulations too.
 const LEAST_SCORE: f64 = 9.0;
-/// Bumps in an octave, and their full widths over their centres.
-const AN_OCTAVE: i32 = 6;
-const WIDTHS: [f64; 3] = [0.08, 0.25, 0.7];
-/// Widths of a bump about the bin that stands out most, over that of the bin, and points over which its mean in a bin is taken.
+/// Widths of a bump about the bin that stands out most, over that of the bin.
 const WIDTHS_OF_A_BIN: [f64; 3] = [1.0, 3.0, 9.0];
-const POINTS: i32 = 5;
-/// Fewest coefficients below the centre of a bump, and in the width of a process at frequency zero.
-const LEAST_COEFFICIENTS: f64 = 12.0;
 /// Widths of its bands to either side in which a tone is sought, most places there, and least share of its time in one.
 const REACH: f64 = 3.0;
 const MOST_PITCHES: f64 = 64.0;
@@ -41,14 +36,6 @@ const LEAST_LEFT: f64 = 0.02;
 /// Rounds of the fit while bumps are added, and of the last one.
 const ROUNDS: usize = 60;
 const LAST_ROUNDS: usize = 600;
-
-/// One bump: centre and full width at half power, rad per sample, and its variance over the white one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bump {
-    pub center: f64,
-    pub width: f64,
-    pub variance: f64,
-}
 
 /// What describes the noise of a channel better than its causes do.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,33 +52,6 @@ pub(super) struct Spectrum {
     pub density: Vec<f64>,
 }
 
-/// Density of a bump of variance 1 as it is sampled.
-fn lorentzian(center: f64, width: f64, omega: f64) -> f64 {
-    let kept = (-0.5 * width).exp();
-    let about = |w: f64| (1.0 - kept * kept) / (1.0 - 2.0 * kept * w.cos() + kept * kept);
-    0.5 * (about(omega - center) + about(omega + center))
-}
-
-/// Centres and widths that are tried in a record of `n` samples.
-fn places(n: usize) -> Vec<(f64, f64)> {
-    let spacing = PI / n as f64;
-    let mut all = vec![];
-    let mut width = LEAST_COEFFICIENTS * spacing;
-    while width < PI {
-        all.push((0.0, width));
-        width *= 2.0;
-    }
-    let ratio = 2f64.powf(f64::from(AN_OCTAVE).recip());
-    let mut center = LEAST_COEFFICIENTS * spacing;
-    while center < PI {
-        let wide = |by: &f64| (center, center * by);
-        let widths = WIDTHS.iter().map(wide);
-        all.extend(widths.filter(|(_, w)| *w >= 0.25 * LEAST_COEFFICIENTS * spacing));
-        center *= ratio;
-    }
-    all
-}
-
 /// Bands of a channel that overlap and that a model has as one.
 pub(super) struct AsOne {
     /// The effect.
@@ -99,34 +59,6 @@ pub(super) struct AsOne {
     parts: Vec<Bump>,
     /// Density of them in the model over the bins, over the white variance.
     density: Vec<f64>,
-}
-
-impl Bump {
-    fn over(&self, omega: &[f64]) -> Vec<f64> {
-        let at = |w: &f64| self.variance * lorentzian(self.center, self.width, *w);
-        omega.iter().map(at).collect()
-    }
-
-    /// The means in bins of a length, of a bump no wider than some of them.
-    fn in_bins(&self, bins: &Bins) -> Vec<f64> {
-        let coefficient = PI / bins.n as f64;
-        let mean = |(w, count): (&f64, &f64)| {
-            let point = |k: i32| (f64::from(2 * k + 1) / f64::from(POINTS) - 1.0) * 0.5 * count;
-            let at = |k: i32| lorentzian(self.center, self.width, w + coefficient * point(k));
-            self.variance * (0..POINTS).map(at).sum::<f64>() / f64::from(POINTS)
-        };
-        bins.at.omega.iter().zip(bins.counts()).map(mean).collect()
-    }
-}
-
-impl From<Peak> for Bump {
-    fn from(p: Peak) -> Self {
-        Self {
-            center: p.omega,
-            width: 2.0 * p.half_width,
-            variance: p.variance,
-        }
-    }
 }
 
 /// Tones of a channel that a model has as one Lorentzian, and of which at least so many bands were found. A tone that wanders
@@ -452,19 +384,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bump_has_the_variance_that_it_states() {
-        let steps = 100_000;
-        for (center, width) in [(0.0, 0.01), (0.3, 0.02), (2.0, 1.4)] {
-            let all = (0..steps).map(|k| {
-                let omega = PI * (f64::from(k) + 0.5) / f64::from(steps);
-                lorentzian(center, width, omega)
-            });
-            let mean = all.sum::<f64>() / f64::from(steps);
-            assert!((mean - 1.0).abs() < 1e-6, "{center} {width}: {mean}");
-        }
-    }
-
-    #[test]
     fn sizes_climb_to_those_of_the_power() {
         let shape = |center: f64| -> Vec<f64> {
             (1..400)
@@ -486,6 +405,28 @@ mod tests {
             assert!((size / truth - 1.0).abs() < 0.01, "{size} {truth}");
         }
         assert!(fit.score(&fit.density(), &shape(1.2), &[]).abs() < 0.1);
+    }
+
+    #[test]
+    fn what_is_narrow_leaves_the_white_noise_as_it_is() {
+        let bins = Bins::new(20_000);
+        let count = bins.at.omega.len();
+        let mut power = vec![1.0; count];
+        // Between two places of the list, as strong as a line of 0.4 of the white deviation and more.
+        for (place, energy) in [(2, 40.0), (3, 3e4)] {
+            power[place * count / 5] = energy;
+        }
+        let mut fit = Fit {
+            counts: bins.counts(),
+            power,
+            named: vec![0.0; count],
+            shapes: vec![vec![1.0; count]],
+            sizes: vec![1.0],
+        };
+        let mut bumps = vec![];
+        add_bumps(&mut fit, &mut bumps, &bins, 1);
+        fit.climb(LAST_ROUNDS);
+        assert!((fit.sizes[0] - 1.0).abs() < 0.02, "{}", fit.sizes[0]);
     }
 
     #[test]
