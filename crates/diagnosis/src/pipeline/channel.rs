@@ -106,11 +106,11 @@ fn searched_from<'a>(
     let explained = || {
         let baseline = search.baseline(&target.noise);
         let ascended = if between {
-            search.ascend(search.beside_any_spectrum(baseline))
+            search.ascend(search.beside_any_spectrum(baseline.clone()))
         } else {
-            search.beside_any_spectrum(search.ascend(baseline))
+            search.beside_any_spectrum(search.ascend(baseline.clone()))
         };
-        compare::hold(&search, ascended)
+        compare::hold(&search, search.beside_a_stretch(ascended, &baseline))
     };
     let explained = search.beside_tracked_tones(explained(), &explained);
     let mut state = search.conclude(explained);
@@ -177,6 +177,14 @@ fn estimate_under_law(s: &mut Searched<'_>, grid: &Grid) {
         }
     }
     laws.divide(&mut s.e);
+    if let Some(joint) = s.joint.as_ref().filter(|_| laws.are_loud()) {
+        // What is whitened by a spectrum is not white where the noise is another one; by the filter it is.
+        let own = s.e.iter_mut().zip(&joint.innovations);
+        own.filter(|(_, own)| own.is_finite())
+            .for_each(|(e, own)| *e = *own);
+        s.u = s.search.panel.dct.forward(&s.e);
+        s.u[0] = 0.0;
+    }
     s.variance = laws;
 }
 
