@@ -74,6 +74,11 @@ impl Sensor {
         each.collect()
     }
 
+    /// Part by which a noise may be off that was read for so long: a fiftieth, and three and a half standard errors.
+    fn doubt(&self, seconds: f64) -> f64 {
+        0.02 + 3.5 / (2.0 * seconds * self.rate_hz).sqrt()
+    }
+
     /// Density of noise some times as large as its own, with its rounding.
     fn density(&self, times: f64) -> f64 {
         let variance = (self.sigma * times).powi(2) + self.lsb * self.lsb / 12.0;
@@ -105,11 +110,11 @@ impl Sensor {
         }
     }
 
-    /// Whether the white noise told is `times` its own, and the walk no larger than it is.
-    fn noise(&self, d: &Diagnosis, times: f64) -> Result<(), String> {
+    /// Whether the white noise told is `times` its own, by so many seconds of it.
+    fn noise(&self, d: &Diagnosis, times: f64, seconds: f64) -> Result<(), String> {
         let density = &d.extended["gyro_x"]["angle_random_walk"];
         let ratio = density.value / self.density(times);
-        if (ratio - 1.0).abs() > 0.04 {
+        if (ratio - 1.0).abs() > self.doubt(seconds) {
             return Err(format!("the noise is {ratio:.3} times what it is"));
         }
         Ok(())
@@ -154,7 +159,7 @@ fn level_draw(rng: &mut Xoshiro256PlusPlus) -> Result<(), String> {
         if (h.value / half - 1.0).abs() > 0.02 || off.abs() > 2.0 {
             return Err(told);
         }
-        sensor.noise(&d, 1.0)
+        sensor.noise(&d, 1.0, SECONDS)
     };
     let judged = judged().map_err(|e| format!("{e}; {about}"));
     eprintln!("{judged:?} {about}");
@@ -190,17 +195,19 @@ fn noise_draw(rng: &mut Xoshiro256PlusPlus) -> Result<(), String> {
             near(of("start"), start) && near(of("end"), end),
             near(of("start"), 0.0) && near(of("end"), start) && end == SECONDS,
         );
+        let (long, rest) = (end - start, SECONDS - (end - start));
+        let doubt = sensor.doubt(long.min(rest));
         let truth = sensor.density(factor) / sensor.density(1.0);
         let (truth, outside) = if as_quiet {
-            (truth.recip(), factor)
+            (truth.recip(), (factor, long))
         } else {
-            (truth, 1.0)
+            (truth, (1.0, rest))
         };
-        if !(as_loud || as_quiet) || (ratio / truth - 1.0).abs() > 0.05 {
+        if !(as_loud || as_quiet) || (ratio / truth - 1.0).abs() > doubt {
             let told = format!("{ratio} times from {} to {}", of("start"), of("end"));
             return Err(told);
         }
-        sensor.noise(&d, outside)
+        sensor.noise(&d, outside.0, outside.1)
     };
     let judged = judged().map_err(|e| format!("{e}; {about}"));
     eprintln!("{judged:?} {about}");

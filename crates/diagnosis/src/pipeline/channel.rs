@@ -77,8 +77,9 @@ pub(super) fn all_searched(grid: &Grid, between: bool) -> Vec<Searched<'_>> {
 /// with a random walk of `log_walk`, the logarithm of its step variance over the white one, where it has a smaller one.
 pub(super) fn best(grid: &Grid, target: &Target, log_walk: f64) -> (f64, f64) {
     let search = laid_out(grid, target);
-    let found = search.ascend(search.baseline(&target.noise));
-    let best = search.beside_any_spectrum(found);
+    let baseline = search.baseline(&target.noise);
+    let found = search.beside_any_spectrum(search.ascend(baseline.clone()));
+    let best = search.beside_a_stretch(found, &baseline);
     let walking = Noise {
         log_walk: best.noise.log_walk.max(log_walk),
         terms: best.noise.terms.clone(),
@@ -86,7 +87,7 @@ pub(super) fn best(grid: &Grid, target: &Target, log_walk: f64) -> (f64, f64) {
     let panel = &search.panel;
     let other = panel.solve(&walking.over(&panel.bins), &best.columns());
     let lost = best.solution.log_likelihood - other.log_likelihood;
-    (Search::total(&best), 2.0 * lost)
+    (search.total_beside_a_stretch(&best), 2.0 * lost)
 }
 
 /// Searches a channel, and asks its model and what that leaves.

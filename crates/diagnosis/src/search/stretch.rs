@@ -11,7 +11,7 @@ use crate::fit::scan;
 
 impl Search<'_> {
     /// Twice the log likelihood beyond what terms have to reach, noise that is loud for a while with it.
-    fn total_beside_a_stretch(&self, state: &State) -> f64 {
+    pub(crate) fn total_beside_a_stretch(&self, state: &State) -> f64 {
         let (_, e) = whitened(&self.panel, state);
         Self::total(state) + 2.0 * scan::of_a_stretch(&e)
     }

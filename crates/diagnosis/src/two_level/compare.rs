@@ -3,8 +3,9 @@
 //! Both sides are weighed on the same block means: the Gaussian model by its exact likelihood, the two-level one (with
 //! white noise and a random walk of the level) by a bank of Kalman filters, one for each level, merged by moments.
 
-pub(super) mod dwell_times;
-pub(super) mod level;
+mod dwell_times;
+mod level;
+mod plain;
 mod steps;
 
 use std::f64::consts::TAU;
@@ -20,11 +21,10 @@ use crate::search::Search;
 use crate::test_level::{CLAIM_LEVEL, CheckId, Outcome};
 pub use crate::two_level::fit::two_level;
 use crate::two_level::fit::{Coordinates, Side, Sides, again, covariance_of, fitted, many_ahead};
-use crate::two_level::plain;
 use numerics::tails::normal_tail;
 
 /// Nats by which two levels have to be better.
-pub(super) const MARGIN: f64 = 4.0;
+const MARGIN: f64 = 4.0;
 /// Switches that two levels make at least, where steps explain them too.
 const LEAST_SWITCHES: f64 = 3.0;
 /// Nats within which the answer stays open.

@@ -3,4 +3,3 @@
 pub mod compare;
 pub mod filter_bank;
 pub mod fit;
-mod plain;

@@ -65,7 +65,7 @@ pub(super) fn at_random(y: &[f64], x: &Coordinates, block_s: f64) -> Option<Outc
 }
 
 /// The same of levels that every place tells, whether it lies on the `upper` one, each of `place_s` seconds: no stay is too short.
-pub(in crate::two_level) fn of_stays(upper: &[bool], place_s: f64) -> Option<Outcome> {
+pub(super) fn of_stays(upper: &[bool], place_s: f64) -> Option<Outcome> {
     let found = dwells(upper);
     score(&found).map(|z| claim(z, &found, place_s))
 }

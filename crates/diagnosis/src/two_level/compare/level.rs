@@ -141,7 +141,7 @@ pub(super) fn beside(
 
 /// The coordinates of a process of one pole with the spectrum of two levels: of their variance, over `white` (both as ln), and
 /// half their dwell time long.
-pub(in crate::two_level) fn spectrum(x: &Coordinates, blocks: f64, white: f64) -> Vec<f64> {
+pub(super) fn spectrum(x: &Coordinates, blocks: f64, white: f64) -> Vec<f64> {
     let variance = 2.0 * x[2] + x[0];
     vec![variance - white, x[3] + blocks - std::f64::consts::LN_2]
 }

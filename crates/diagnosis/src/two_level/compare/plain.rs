@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Effect};
 
-use super::compare::level::spectrum;
-use super::compare::{MARGIN, dwell_times};
+use super::level::spectrum;
+use super::{MARGIN, dwell_times};
 use crate::fit::channel::{Form, State, Term};
 use crate::fit::likelihood::Noise;
 use crate::fit::scan::residual;
