@@ -188,9 +188,15 @@ fn floor(s: &Searched<'_>, bumps: &[Bump], nearest: &[&Finding]) -> f64 {
             _ => {}
         }
     }
-    let white = s.state.noise.filter().map(|only| only.over(bins));
-    let each = (0..sum.len()).map(|k| sum[k] / white.as_ref().map_or(1.0, |w| w[k]));
-    each.fold(f64::INFINITY, f64::min)
+    let least = |each: &mut dyn Iterator<Item = f64>| each.fold(f64::INFINITY, f64::min);
+    match s.state.noise.filter().map(|only| only.over(bins)) {
+        None => least(&mut sum.iter().copied()),
+        // Through the filter, or as what comes behind it: of either the slowest make an angle.
+        Some(white) => {
+            let through = least(&mut sum.iter().zip(&white).map(|(s, w)| s / w));
+            through.max(least(&mut sum.iter().copied()) / white[0])
+        }
+    }
 }
 
 /// What the white noise of two channels shares, where none of these causes has it.

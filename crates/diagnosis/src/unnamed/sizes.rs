@@ -366,6 +366,9 @@ mod tests {
                 fit.shapes.push(bump.over(&bins.at.omega));
                 fit.sizes.push(1.0);
             }
+            // A climb by factors leaves them what they have.
+            fit.climb(600);
+            assert!(fit.sizes[0] < 0.9, "seed {seed}: {}", fit.sizes[0]);
             fit.prune(1, LEAST_SCORE);
             // What is left of them by chance costs three standard errors of a bump, of which a part is white.
             let error = fit.error(0);
