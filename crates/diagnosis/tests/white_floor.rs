@@ -1,14 +1,13 @@
 //! White noise is what a spectrum has at every frequency: what has no name stands above it, and where what has no name covers it,
 //! its interval says so.
 
-mod graded;
+mod draws;
 mod white;
 
 use std::f64::consts::TAU;
 
 use diagnosis::result::Diagnosis;
 use diagnosis::{DiagnoseOptions, diagnose};
-use graded::graded_over;
 use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -19,6 +18,19 @@ const SAMPLES: usize = 60_000;
 
 fn between(low: f64, high: f64, rng: &mut impl Rng) -> f64 {
     Uniform::new(low, high).expect("a range").sample(rng)
+}
+
+/// Draws and grades so many runs, of which at least so many have to be right.
+fn graded_over(
+    (runs, least): (u64, u64),
+    what: &str,
+    mut right: impl FnMut(u64, &mut Xoshiro256PlusPlus) -> Result<(), String>,
+) {
+    let seed = std::env::var("IMU_STAND_SEED").ok();
+    let seed = seed.and_then(|s| s.parse().ok()).unwrap_or(0xf100);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let told = draws::graded(runs, least, |run| right(run, &mut rng));
+    assert!(told.is_ok(), "{what}: {}", told.unwrap_err());
 }
 
 /// White noise of this deviation by the sample.
