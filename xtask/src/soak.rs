@@ -62,12 +62,13 @@ pub fn soak(root: &Path, arguments: &[String]) -> Result<(), Failure> {
         ("image", "the_image_for_hours", plan.hours / 30.0),
         ("line", "a_live_capture", plan.minutes),
     ];
+    // Every part is compiled beside the simulator, which is of the workspace.
+    crate::toolchain::simulator()?;
     for (name, test, amount) in parts {
         if plan.only.as_deref().is_some_and(|only| only != name) {
             continue;
         }
         if name == "image" {
-            crate::toolchain::simulator()?;
             crate::build_image(root, &mut crate::step::Pace::Steady)?;
         }
         println!("== {name}");

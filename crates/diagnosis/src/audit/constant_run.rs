@@ -17,8 +17,8 @@ use numerics::series::smallest_step;
 
 /// Largest share of agreeing neighbours with which a reading that stands still says anything.
 const MOST_AGREEING: f64 = 0.5;
-/// Shortest stretch that is called frozen, and its chance at the largest.
-const LEAST: usize = 20;
+/// Fewest readings of a stretch that is called frozen, and its chance at the largest.
+const LEAST: f64 = 20.0;
 const CHANCE: f64 = 1e-9;
 /// Share of their repeats that gyros have in common when they stopped together.
 const TOGETHER: f64 = 0.9;
@@ -32,7 +32,7 @@ pub(super) struct Still {
     rows: Vec<usize>,
 }
 
-fn of(record: &Record, channel: &Channel) -> Still {
+fn of(record: &Record, channel: &Channel, came: f64) -> Still {
     let values = &channel.values;
     let rows = values.len();
     let flags = record.flags.as_ref().filter(|f| f.len() == rows);
@@ -42,7 +42,7 @@ fn of(record: &Record, channel: &Channel) -> Still {
     let step = lsb.unwrap_or_else(|| smallest_step(values));
     // Asked for where something stands still at all.
     let agreeing = LazyCell::new(|| agreement(values, step).0);
-    let chance = |run: usize| run as f64 * agreeing.ln() + (rows as f64).ln();
+    let chance = |readings: f64| readings * agreeing.ln() + (rows as f64).ln();
     let (low, high) = values
         .iter()
         .filter(|v| v.is_finite())
@@ -64,7 +64,8 @@ fn of(record: &Record, channel: &Channel) -> Still {
         let inside = ![low, high].iter().any(|v| equal(values[start], *v, step));
         if inside {
             still.longest = still.longest.max(run);
-            if run >= LEAST && *agreeing < MOST_AGREEING && chance(run) < CHANCE.ln() {
+            let readings = run as f64 * came;
+            if readings >= LEAST && *agreeing < MOST_AGREEING && chance(readings) < CHANCE.ln() {
                 still.rows.extend(start + 1..i);
             }
         }
@@ -73,14 +74,15 @@ fn of(record: &Record, channel: &Channel) -> Still {
     still
 }
 
-/// The record without readings that stand still, and what stood still of each gyro.
-pub(super) fn set_aside(record: &Record) -> (Cow<'_, Record>, Vec<Still>) {
+/// The record without readings that stand still, and what stood still of each gyro; `came` readings of the sensor, at most 1, are one
+/// that is written.
+pub(super) fn set_aside(record: &Record, came: f64) -> (Cow<'_, Record>, Vec<Still>) {
     let asked = |c: &&Channel| {
         c.values.len() == record.len()
             && c.values.iter().filter(|v| v.is_finite()).count() >= LEAST_READINGS
     };
     let gyros = record.all(Quantity::Gyro).filter(asked);
-    let all: Vec<Still> = gyros.map(|c| of(record, c)).collect();
+    let all: Vec<Still> = gyros.map(|c| of(record, c, came)).collect();
     let mut rest = Cow::Borrowed(record);
     for still in all.iter().filter(|s| !s.rows.is_empty()) {
         let channels = &mut rest.to_mut().channels;

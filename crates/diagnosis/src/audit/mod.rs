@@ -427,7 +427,9 @@ pub fn audit(record: &Record) -> Audit {
     let rows = record.len();
     let mut audit = Audit::default();
     let whole = record;
-    let (record, still) = constant_run::set_aside(record);
+    let beats = resampled::beats(record);
+    let came = beats.as_ref().map_or(1.0, resampled::Beats::least);
+    let (record, still) = constant_run::set_aside(record, came);
     let (record, wild) = gross_outliers::set_aside(record);
     let record = record.as_ref();
     let known = record
@@ -465,7 +467,7 @@ pub fn audit(record: &Record) -> Audit {
     }
     // A curve between readings makes some that repeat, that their neighbours foretell, and that share their last digits.
     let rate_hz = crate::ingest::grid::rate_of(record).unwrap_or(1.0);
-    if resampled::audit(&gyros, rate_hz, &mut audit) {
+    if resampled::audit(&gyros, rate_hz, beats.as_ref(), &mut audit) {
         for g in &gyros {
             outliers::audit(g, &at, &mut audit);
         }

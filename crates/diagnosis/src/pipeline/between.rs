@@ -1,14 +1,17 @@
 //! A record whose readings lie between others of another rate: that is told once, and what follows of it is no thing of its own.
 
 use model::effects::{
-    correlated_noise, low_pass, narrow_band, noise_change, quantization_noise, wandering_line,
+    am_line, common_noise, correlated_noise, low_pass, narrow_band, noise_change,
+    quantization_noise, wandering_line,
 };
 
 use super::concluded::Told;
 use crate::test_level::{Domain, Observation};
 
 /// Causes of fast noise that a curve between readings looks like.
-const LOOKS_LIKE: [&str; 6] = [
+const LOOKS_LIKE: [&str; 8] = [
+    am_line::ID,
+    common_noise::ID,
     low_pass::ID,
     narrow_band::ID,
     wandering_line::ID,
