@@ -64,9 +64,11 @@ fn gyros(rng: &mut Rng, sigma: f64, base: Base, add: [&[f64]; 3]) -> Record {
 }
 
 fn told(record: &Record) -> Diagnosis {
-    diagnose(record, &DiagnoseOptions::default())
-        .expect("a diagnosis")
-        .diagnosis
+    let options = DiagnoseOptions {
+        replicates: 199,
+        ..DiagnoseOptions::default()
+    };
+    diagnose(record, &options).expect("a diagnosis").diagnosis
 }
 
 /// What a finding of a cause on gyro_x says of the angle over both horizons, against what was planted there; it has to matter.
