@@ -245,6 +245,10 @@ pub(crate) fn blows(
             continue;
         }
         seen.push(own.clone());
+        // What the record begins with may be the end of what began before it: a bias that settles.
+        if own.start == 0 {
+            continue;
+        }
         if is_single(&whitened, place, shape) || changes(place, shape) {
             continue;
         }

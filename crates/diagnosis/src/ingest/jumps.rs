@@ -5,7 +5,11 @@
 //! ramp of it, and the larger the jump the longer. So before that is asked the levels are made one. What is taken off comes
 //! back: whether it is a step, the search tells.
 
+mod settling;
+
 use std::sync::Arc;
+
+use settling::Settling;
 
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
 use numerics::order_statistics::median;
@@ -36,6 +40,8 @@ struct Jump {
 #[derive(Clone, Default)]
 pub struct Jumps {
     all: Vec<Jump>,
+    /// How the level settles from the first reading on.
+    settling: Option<Settling>,
     /// Places of the readings that lie on the way.
     pub(super) on_the_way: Vec<usize>,
     /// White noise and a random walk of the readings without their jumps.
@@ -45,10 +51,30 @@ pub struct Jumps {
 impl Jumps {
     /// Those of readings in steps of `step`, NaN where there is none.
     pub(super) fn of(y: &[f64], step: f64) -> Self {
+        let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
+        let sigma = white_by_differences(&known).sqrt().max(0.5 * step);
+        // What settles fast jumps as well, until it is taken off.
+        if let Some(settling) = Settling::of(y, sigma, y.len()) {
+            let mut rest = y.to_vec();
+            settling.add(&mut rest, -1.0);
+            return Self {
+                settling: Some(settling),
+                ..Self::steps(&rest, sigma)
+            };
+        }
+        let steps = Self::steps(y, sigma);
+        let end = steps.all.first().map_or(0, |jump| jump.at);
+        Self {
+            settling: Settling::of(y, sigma, end),
+            ..steps
+        }
+    }
+
+    /// Those that stay.
+    fn steps(y: &[f64], sigma: f64) -> Self {
         let (places, known): (Vec<usize>, Vec<f64>) = (y.iter().copied().enumerate())
             .filter(|(_, v)| v.is_finite())
             .unzip();
-        let sigma = white_by_differences(&known).sqrt().max(0.5 * step);
         let mut found = Self::default();
         let mut from = 0;
         for k in FEWEST..known.len().saturating_sub(FEWEST) {
@@ -82,7 +108,7 @@ impl Jumps {
 
     /// Whether there are none.
     pub(super) fn is_empty(&self) -> bool {
-        self.all.is_empty()
+        self.all.is_empty() && self.settling.is_none()
     }
 
     /// Readings at one level, those on the way left out.
@@ -94,6 +120,9 @@ impl Jumps {
     }
 
     fn add(&self, y: &mut [f64], sign: f64) {
+        if let Some(settling) = self.settling {
+            settling.add(y, sign);
+        }
         let mut next = self.all.iter().peekable();
         let mut level = 0.0;
         for (i, v) in y.iter_mut().enumerate() {

@@ -114,8 +114,10 @@ impl Effect for WarmUp {
     }
 }
 
-/// Shortest time constant that is sought in a long record, s: a die on its leads settles in tens of seconds.
-const SHORTEST_S: f64 = 10.0;
+/// Shortest time constant that is sought in a long record, s, and in readings: a die on its leads settles in tens of seconds, a supply
+/// and a reference behind their capacitors in less than one; fewer readings are no course.
+const SHORTEST_S: f64 = 0.5;
+const SHORTEST_READINGS: f64 = 8.0;
 
 /// exp(-t / tau), tau to a third of the record from a fiftieth of it, or from [`SHORTEST_S`] where that is less.
 struct Exponentials {
@@ -132,7 +134,8 @@ impl Shape for Exponentials {
         let seconds = self.samples as f64 / self.rate_hz;
         let of_record = [50.0, 24.0, 12.0, 6.0, 3.0].map(|part| seconds / part);
         let shorter = std::iter::successors(Some(0.5 * of_record[0]), |tau| Some(0.5 * tau));
-        let mut all: Vec<f64> = shorter.take_while(|tau| *tau >= SHORTEST_S).collect();
+        let shortest = SHORTEST_S.max(SHORTEST_READINGS / self.rate_hz);
+        let mut all: Vec<f64> = shorter.take_while(|tau| *tau >= shortest).collect();
         all.reverse();
         all.extend(of_record);
         all
